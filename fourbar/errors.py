@@ -95,7 +95,10 @@ class InputError(FourBarError):
             value = value.item()
         shown = " ".join(repr(value).split())  # arrays take several lines
         if unit is not None:
-            numbers = value if isinstance(value, tuple) else (value,)
+            if isinstance(value, tuple):
+                numbers = value
+            else:
+                numbers = (value,)
             shown = write_in_units(unit, *map(float, numbers))
         if len(shown) > LONGEST_SHOWN:  # of a long path the end says which
             shown = (
@@ -243,11 +246,9 @@ def _read_exit(raised: SystemExit, streams: tuple[TextIO, ...]) -> int:
     breaks, that of a worker too.
     """
     if sys.stdout is not streams[0]:
-        return (
-            HOLDS
-            if any(map(_is_unread, streams))
-            else _say("a pipe inside the program broke", BROKEN)
-        )
+        if any(map(_is_unread, streams)):
+            return HOLDS
+        return _say("a pipe inside the program broke", BROKEN)
     if isinstance(raised.__context__, BrokenPipeError):
         return HOLDS
     if raised.code is None or isinstance(raised.code, int):

@@ -43,13 +43,11 @@ ANY, AT_LEAST_ZERO, POSITIVE = (
 
 def is_within(number: float, bound: str) -> bool:
     """Return True if a finite number satisfies a bound."""
-    return (
-        number > 0.0
-        if bound == POSITIVE
-        else number >= 0.0
-        if bound == AT_LEAST_ZERO
-        else True
-    )
+    if bound == POSITIVE:
+        return number > 0.0
+    if bound == AT_LEAST_ZERO:
+        return number >= 0.0
+    return True
 
 
 def require(key: str, value: object, unit: str = "1", bound: str = ANY) -> float:
@@ -111,9 +109,9 @@ def convert_to_unit(key: str, value: object, unit: str) -> object:
         value = _read_quantity(value)
     if isinstance(value, (list, tuple)):
         return [convert_to_unit(key, entry, unit) for entry in value]
-    return (
-        require(key, value, unit) if unit != "1" and isinstance(value, str) else value
-    )
+    if unit != "1" and isinstance(value, str):
+        return require(key, value, unit)
+    return value
 
 
 def require_numbers(
@@ -174,9 +172,13 @@ def require_pair(key: str, value: Any, by: Declared) -> tuple[float, float]:
     try:
         size, other = value
     except (TypeError, ValueError):
-        names = "size, angle" if by.pair == "rad" else ", ".join(by.units)
+        if by.pair == "rad":
+            names = "size, angle"
+        else:
+            names = ", ".join(by.units)
         raise InputError(key, value, f"must be a pair ({names})") from None
-    (unit, second), (bound, of_second) = by.units, by.bounds
+    unit, second = by.units
+    bound, of_second = by.bounds
     return require(key, size, unit, bound), require(key, other, second, of_second)
 
 
@@ -212,7 +214,10 @@ def copy_with(description: Description, /, **changed: Any) -> Description:
     kind: Any = description.__class__
     copied: Description = object.__new__(kind)
     for name in list_fields(kind):
-        value = changed[name] if name in changed else getattr(description, name)
+        if name in changed:
+            value = changed[name]
+        else:
+            value = getattr(description, name)
         object.__setattr__(copied, name, value)
     return copied
 
@@ -326,11 +331,9 @@ class Bar:
 
         If left out, it is that of a uniform slender bar, m L^2/12.
         """
-        return (
-            self.mass * self.length * self.length / 12.0
-            if self.inertia is None
-            else self.inertia
-        )
+        if self.inertia is None:
+            return self.mass * self.length * self.length / 12.0
+        return self.inertia
 
     @property
     def mass_centre(self) -> tuple[float, float]:

@@ -160,7 +160,10 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
         )
         on = f"on bar {self.drive_bar}"
         if self.drive is not None:
-            on = "along a line" if self.drive.has_stroke else "at a point"
+            if self.drive.has_stroke:
+                on = "along a line"
+            else:
+                on = "at a point"
         lines = [
             f"Solution {self.title!r}: {describe_extent(self.theta_2)}, drive {on}",
             "status: "
@@ -270,11 +273,9 @@ def split_parts(name: str, values: Array) -> dict[str, Array]:
     if name in SCALARS:
         return {name: values}
     parts = {f"{name}_x": values[..., 0], f"{name}_y": values[..., 1]}
-    return (
-        {f"|{name}|": np.hypot(values[..., 0], values[..., 1]), **parts}
-        if name in PIN_FORCES
-        else parts
-    )
+    if name in PIN_FORCES:
+        return {f"|{name}|": np.hypot(values[..., 0], values[..., 1]), **parts}
+    return parts
 
 
 def list_parts(
@@ -331,12 +332,16 @@ def write_csv(
     `chosen`: the columns by heading, in these units; left out: all quantities.
     """
     size = solution.theta_2.size
-    first = _list_leading(solution) if chosen is None else {}
-    scalars: Mapping[str, Array | None] = (
-        {column.heading: column.values for column in _list_scalars(solution, units)}
-        if chosen is None
-        else chosen
-    )
+    if chosen is None:
+        first = _list_leading(solution)
+    else:
+        first = {}
+    if chosen is None:
+        scalars: Mapping[str, Array | None] = {
+            column.heading: column.values for column in _list_scalars(solution, units)
+        }
+    else:
+        scalars = chosen
     columns = {
         heading: [math.nan] * size if values is None else values.tolist()
         for heading, values in scalars.items()
@@ -403,7 +408,10 @@ def _list_scalars(solution: Solution, units: Conversion = SI) -> list[_ScalarCol
     columns = []
     for name, values in quantities.items():
         unit, _ = find_unit_in(find_unit(name), units)
-        named = f" [{unit}]" if units and unit != "1" else ""
+        if units and unit != "1":
+            named = f" [{unit}]"
+        else:
+            named = ""
         for part, column in _split_columns(name, values).items():
             columns.append(_ScalarColumn(f"{part}{named}", unit, column))
     if solution.time is None and (time := compute_times(solution)) is not None:
@@ -417,7 +425,8 @@ def _split_columns(name: str, values: Array | None) -> dict[str, Array | None]:
         return {name: None if values is None else values.ravel()}
     x = y = size = None
     if values is not None:
-        x, y = values[..., 0].ravel(), values[..., 1].ravel()
+        x = values[..., 0].ravel()
+        y = values[..., 1].ravel()
     parts = {f"{name}_x": x, f"{name}_y": y}
     if has_size(name):
         if x is not None and y is not None:
@@ -447,9 +456,11 @@ def compute_times(solution: Solution) -> Array | None:
     A sweep is steady if what it commands moves at one speed.
     """
     at, places = solution.at, solution.at.places
-    speed, acceleration = at.speed, at.acceleration
+    speed = at.speed
+    acceleration = at.acceleration
     if at.stroke is not None and solution.scene is not None:
-        speed, acceleration = at.stroke_speed, solution.scene.motion.acceleration
+        speed = at.stroke_speed
+        acceleration = solution.scene.motion.acceleration
     if speed is None or solution.theta_2.ndim > 1 or len(places) < 2:
         return None
     if np.ptp(speed) != 0.0 or np.any(acceleration) or not np.all(speed):
@@ -491,7 +502,10 @@ def _list_quantities(solution: "Solution") -> list[str]:
     """
     left_out: tuple[str, ...] = LINE_QUANTITIES
     if solution.drive is not None:
-        left_out = () if solution.drive.has_stroke else (STROKE,)
+        if solution.drive.has_stroke:
+            left_out = ()
+        else:
+            left_out = (STROKE,)
     names = [
         name
         for name in UNITS
@@ -523,7 +537,9 @@ def find_values(solution: Solution, name: str, units: Conversion = SI) -> Any:
     unit = find_unit(name)
     if values is not None and unit == "m" and not is_scalar(name):
         values = shift_to_drawing(solution, values)
-    return values if values is None or unit not in units else values * units[unit][1]
+    if values is None or unit not in units:
+        return values
+    return values * units[unit][1]
 
 
 def _find_si(solution: Solution, name: str) -> Array | None:
@@ -536,12 +552,17 @@ def _find_si(solution: Solution, name: str) -> Array | None:
         values = getattr(solution, name)
         return values
     table = {"v_": solution.velocity, "a_": solution.acceleration}.get(name[:2])
-    return solution.points.get(name) if table is None else table.get(name[2:])
+    if table is None:
+        return solution.points.get(name)
+    return table.get(name[2:])
 
 
 def shift_to_drawing(solution: Solution, places: Array) -> Array:
     """Shift places, (n, 2), from O2 to the origin of the scene's drawing."""
-    origin = (0.0, 0.0) if solution.scene is None else solution.scene.origin
+    if solution.scene is None:
+        origin = (0.0, 0.0)
+    else:
+        origin = solution.scene.origin
     return places + origin if any(origin) else places
 
 

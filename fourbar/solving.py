@@ -102,7 +102,8 @@ def solve(
         from fourbar.evaluation.free_motion import release
 
         released = release(scene)
-        commanded, change_points = released.command, released.change_points
+        commanded = released.command
+        change_points = released.change_points
     else:
         commanded = command(scene)
     request = find_requested(scene, commanded, stage, out)
@@ -133,7 +134,9 @@ class _Requested(NamedTuple):
     @property
     def block(self) -> int:
         """Number of positions evaluated at a time."""
-        return BLOCK if self.last_stage < ERROR else _LONG_BLOCK
+        if self.last_stage < ERROR:
+            return BLOCK
+        return _LONG_BLOCK
 
     @property
     def asks_forces(self) -> bool:
@@ -145,11 +148,15 @@ class Results:
     """Status codes and arrays of all positions, which are filled block by block."""
 
     def __init__(self, request: _Requested) -> None:
-        shape, given = request.shape, request.out or {}
+        shape = request.shape
+        given = request.out or {}
         self.codes: NDArray[np.uint8] = np.zeros(shape, dtype=np.uint8)
         self.arrays: dict[str, Array] = {}
         for name in request.wanted:
-            shape_of_one = shape if name in SCALARS else (*shape, 2)
+            if name in SCALARS:
+                shape_of_one = shape
+            else:
+                shape_of_one = (*shape, 2)
             self.arrays[name] = given[name] if name in given else np.empty(shape_of_one)
         self.reverses = False
         """True if sin(theta_4 - theta_3) may have another sign than the branch."""
@@ -228,7 +235,8 @@ def _solve_alone(case: Case, commanded: Command, request: _Requested) -> Results
 
 def _solve_blocks(case: Case, commanded: Command, request: _Requested) -> Results:
     """Solve the positions of one linkage block by block."""
-    results, evaluated = Results(request), None
+    results = Results(request)
+    evaluated = None
     for part in split(len(commanded.angle), request.block):
         block = commanded.part(part)
         # kept until the next block is evaluated, so that its memory is used again
@@ -321,11 +329,9 @@ def find_last_stage(scene: Scene) -> str:
     It is that of the error bars, or the positions alone.
     """
     motion = scene.motion
-    return (
-        "position"
-        if motion.speed is None and motion.law is None and motion.free is None
-        else STAGES[-1]
-    )
+    if motion.speed is None and motion.law is None and motion.free is None:
+        return "position"
+    return STAGES[-1]
 
 
 def find_requested(
@@ -342,7 +348,10 @@ def find_requested(
     shape = commanded.angle.shape
     if out is None:
         if stage is None:
-            stage = "position" if commanded.speed is None else "force"
+            if commanded.speed is None:
+                stage = "position"
+            else:
+                stage = "force"
         if not isinstance(stage, str) or stage not in STAGES:
             raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
         last_stage = STAGES.index(stage)
@@ -352,17 +361,18 @@ def find_requested(
     else:
         expect("out", out, Mapping)
         wanted = out.keys()
-        foreign, stages = (
-            _list_foreign(scene),
-            _list_stages(tuple(point.name for point in scene.points)),
-        )
+        foreign = _list_foreign(scene)
+        stages = _list_stages(tuple(point.name for point in scene.points))
         stages = {
             name: stage_of for name, stage_of in stages.items() if name not in foreign
         }
         for name, array in out.items():
             if name not in stages:
                 raise InputError("out", name, "must be among " + ", ".join(stages))
-            wanted_shape = shape if name in SCALARS else (*shape, 2)
+            if name in SCALARS:
+                wanted_shape = shape
+            else:
+                wanted_shape = (*shape, 2)
             expect(f"out.{name}", array, np.ndarray)
             if (
                 array.shape != wanted_shape
@@ -420,7 +430,8 @@ def make_solution(
     solved : the scene, or None for a study, whose numbers are arrays.
     change_points : times at which a free motion passed a change point, s.
     """
-    codes, quantities_by_name = results.codes, results.arrays
+    codes = results.codes
+    quantities_by_name = results.arrays
     _unwrap_angles(quantities_by_name, commanded.bar)
     if commanded.stroke is not None:
         # as commanded, wherever it has a value
@@ -492,7 +503,9 @@ def _list_foreign(scene: Scene) -> tuple[str, ...]:
     """List quantities of the kind of drive that the scene lacks."""
     if scene.drive is None:
         return LINE_QUANTITIES
-    return COUPLE if scene.drive.has_stroke else (*COUPLE, STROKE)
+    if scene.drive.has_stroke:
+        return COUPLE
+    return (*COUPLE, STROKE)
 
 
 def _list_absent(scene: Scene) -> tuple[str, ...]:
@@ -504,8 +517,6 @@ def _list_absent(scene: Scene) -> tuple[str, ...]:
     absent = _list_foreign(scene)
     if not any(effect.dry for effect in scene.effects):
         absent = (*absent, *DRY_FRICTION_QUANTITIES)
-    return (
-        absent
-        if any(effect.loaded_pins for effect in scene.effects)
-        else (*absent, *PIN_LOAD_QUANTITIES)
-    )
+    if any(effect.loaded_pins for effect in scene.effects):
+        return absent
+    return (*absent, *PIN_LOAD_QUANTITIES)

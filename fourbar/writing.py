@@ -54,7 +54,10 @@ def read_bytes(
     def refuse(allowed: str) -> InputError:
         return InputError(key, str(path) if shown is None else shown, allowed)
 
-    source = sys.stdin.fileno() if pipes and Path(path) == STANDARD_STREAM else path
+    if pipes and Path(path) == STANDARD_STREAM:
+        source = sys.stdin.fileno()
+    else:
+        source = path
     try:
         about = os.stat(source)
         is_pipe = stat.S_ISFIFO(about.st_mode) or stat.S_ISSOCK(about.st_mode)
@@ -109,7 +112,8 @@ def name_file(path: Path) -> Iterator[None]:
         if error.filename is None or any(
             str(name).endswith(_TEMPORARY) for name in both
         ):
-            error.filename, error.filename2 = str(path), None
+            error.filename = str(path)
+            error.filename2 = None
         raise
 
 
@@ -202,11 +206,9 @@ def make_data_frame(columns: Mapping[str, Any]) -> "DataFrame":
 def describe_extent(theta_2: Any) -> str:
     """Say how many positions there are, of how many linkages."""
     count = f"{theta_2.shape[-1]} position{'s' if theta_2.shape[-1] != 1 else ''}"
-    return (
-        count
-        if theta_2.ndim == 1
-        else f"{len(theta_2)} linkage{'s' if len(theta_2) != 1 else ''}, {count} each"
-    )
+    if theta_2.ndim == 1:
+        return count
+    return f"{len(theta_2)} linkage{'s' if len(theta_2) != 1 else ''}, {count} each"
 
 
 def write_between(values: Any) -> str:
@@ -214,11 +216,9 @@ def write_between(values: Any) -> str:
     finite = values[np.isfinite(values)]
     if not finite.size:
         return "no value"
-    return (
-        f"{finite.min():.6g}"
-        if finite.min() == finite.max()
-        else f"{finite.min():.6g} to {finite.max():.6g}"
-    )
+    if finite.min() == finite.max():
+        return f"{finite.min():.6g}"
+    return f"{finite.min():.6g} to {finite.max():.6g}"
 
 
 def list_names(what: str, names: Iterable[str]) -> str:
@@ -253,15 +253,15 @@ def null_nan(value: Any) -> Any:
     """
     if isinstance(value, np.ndarray):
         plain = value.tolist()
-        return (
-            null_nan(plain)
-            if value.dtype.kind == "f" and not np.isfinite(value).all()
-            else plain
-        )
+        if value.dtype.kind == "f" and not np.isfinite(value).all():
+            return null_nan(plain)
+        return plain
     if hasattr(value, "_asdict"):
         value = value._asdict()
     if isinstance(value, dict):
         return {name: null_nan(entry) for name, entry in value.items()}
     if isinstance(value, (list, tuple)):
         return [null_nan(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

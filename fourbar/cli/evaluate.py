@@ -47,7 +47,10 @@ def classify(
             "must be four ratios, or four lengths each with its unit",
         )
     d, a, b, c = given.read_lengths(lengths)
-    units = None if all(ratios) else suit_units(lengths[0])
+    if all(ratios):
+        units = None
+    else:
+        units = suit_units(lengths[0])
     ratios_only = {"m": ("", 1.0)}
     with state_messages_in(ratios_only if all(ratios) else units_of_length(lengths[0])):
         linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
@@ -117,7 +120,10 @@ def new(
     if file == STANDARD_STREAM:
         return
     # to be copied into any shell
-    shown = str(file) if " " not in str(file) else f'"{file}"'
+    if " " not in str(file):
+        shown = str(file)
+    else:
+        shown = f'"{file}"'
     click.echo(f"wrote {file}; edit it, then: fourbar analyze {shown}")
 
 
@@ -173,7 +179,9 @@ def _choose_form(table: bool, as_json: bool, as_csv: bool, out: Path | None) -> 
         return "table"
     if as_json or (given.ends_in(out, ".json") and not as_csv):
         return "json"
-    return "csv" if as_csv or given.ends_in(out, ".csv") else "summary"
+    if as_csv or given.ends_in(out, ".csv"):
+        return "csv"
+    return "summary"
 
 
 @click.command()
@@ -267,7 +275,10 @@ def analyze(  # noqa: PLR0913 - one for each option
         bore = _read_pressure(described, pressure)
         shown = _choose_units(form, units, degrees)
         wanted = [given.read_position(described, text) for text in at]
-        positions = find_positions(described, wanted) if wanted else None
+        if wanted:
+            positions = find_positions(described, wanted)
+        else:
+            positions = None
         solution = solve(described, find_last_stage(described), at=positions)
     if not solution.assembled.any():
         raise _assembles_nowhere(scene, described)
@@ -338,16 +349,25 @@ def _write_positions(
 
     scene = solution.scene
     assert scene is not None
-    columns = [] if names is None else read_columns(scene, solution, names)
+    if names is None:
+        columns = []
+    else:
+        columns = read_columns(scene, solution, names)
     if form == "json":
         motor = write_motor(scene, solution, units)
         notes = list_gas_notes(scene, solution, units)
         return write_json(solution, units, motor=motor, notes=notes)
     if form == "csv":
-        chosen = _list_chosen(columns, units) if columns else None
+        if columns:
+            chosen = _list_chosen(columns, units)
+        else:
+            chosen = None
         return write_csv(solution, units, decimal or ".", chosen)
     on_terminal = out is None and sys.stdout.isatty()
-    width = shutil.get_terminal_size().columns if on_terminal else None
+    if on_terminal:
+        width = shutil.get_terminal_size().columns
+    else:
+        width = None
     return print_positions(solution, width, units, every=every, columns=columns)
 
 
@@ -359,7 +379,10 @@ def _list_chosen(columns: "list[Column]", units: Conversion) -> dict[str, Array]
     chosen = dict[str, Array]()
     for column in columns:
         label = column.label(units)
-        heading = f"{column.name} [{label}]" if units and label else column.name
+        if units and label:
+            heading = f"{column.name} [{label}]"
+        else:
+            heading = column.name
         chosen[heading] = column.shown(units)
     return chosen
 

@@ -143,7 +143,10 @@ def plot(
     from fourbar.show.plot import draw
 
     with given.open_scene(scene) as described, given.show_waiting(described):
-        place = None if at is None else _find_place(described, at)
+        if at is None:
+            place = None
+        else:
+            place = _find_place(described, at)
         draw(
             described,
             out,
@@ -163,7 +166,10 @@ def _find_place(scene: Scene, text: str) -> float:
     from fourbar.studies.passing import find_positions
 
     positions = find_positions(scene, [given.read_position(scene, text)])
-    places = positions.angle if positions.stroke is None else positions.stroke
+    if positions.stroke is None:
+        places = positions.angle
+    else:
+        places = positions.stroke
     return float(places[0])
 
 

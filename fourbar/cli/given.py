@@ -81,7 +81,10 @@ def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:
             )
         return out
 
-    told = "Write to FILE." if required else "Write to FILE instead of printing."
+    if required:
+        told = "Write to FILE."
+    else:
+        told = "Write to FILE instead of printing."
     return click.option(
         "-o",
         "--out",
@@ -126,10 +129,12 @@ def open_scene(path: Path) -> Iterator[Scene]:
     from fourbar.show.units import units_of_text
     from fourbar.writing import require_file
 
-    context, text = click.get_current_context(), read_text(path)
+    context = click.get_current_context()
+    text = read_text(path)
     context.meta[_SCENE_TEXT] = text
     with state_messages_in(units_of_text(text)):
-        scene, out = loads(text, str(path)), context.params.get("out")
+        scene = loads(text, str(path))
+        out = context.params.get("out")
         if out is not None:
             require_file(out, path)
         require_steps(scene.motion, MOST_POSITIONS, "here", str(path))
@@ -192,7 +197,10 @@ def read_position(scene: Scene, text: str) -> tuple[str, float]:
     from fourbar.studies.passing import PLACES
 
     name, equals, value = text.rpartition("=")
-    name = name.strip() if equals else scene.motion.commanded
+    if equals:
+        name = name.strip()
+    else:
+        name = scene.motion.commanded
     if name not in PLACES:
         allowed = f"must be one of {', '.join(PLACES)}"
         raise InputError("--at", name, f'{allowed}, like "theta_4=30 deg"')
@@ -224,9 +232,10 @@ def _read_drawn(scene: Scene, name: str, text: str) -> float:
     from fourbar.files.drawing import find_drawn
 
     drawing = scene.drawing
-    drawn = (
-        None if drawing is None else find_drawn(drawing, scene.settled_drive(), name)
-    )
+    if drawing is None:
+        drawn = None
+    else:
+        drawn = find_drawn(drawing, scene.settled_drive(), name)
     if drawn is None:
         raise InputError("--at", text, "needs a scene that states [pins]")
     return drawn

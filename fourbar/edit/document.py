@@ -60,7 +60,8 @@ def list_offers() -> dict[str, Any]:
     offers = tomllib.loads(
         files("fourbar.edit").joinpath("offers.toml").read_text(encoding="utf-8")
     )
-    parts, pairs = offers["parts"], dict[str, list[str]]()
+    parts = offers["parts"]
+    pairs = dict[str, list[str]]()
     for kind in (Bar, Point, Load):
         for name, number in kind.numbers.items():
             if number.pair == "rad":
@@ -98,7 +99,10 @@ def _offer_bars(offers: dict[str, Any]) -> None:
         for name, number in Bar.numbers.items():
             if number.pair:
                 polar = [EXAMPLES[number.unit], "0 deg"]
-                value = polar if number.pair == "rad" else [*_SECTION]
+                if number.pair == "rad":
+                    value = polar
+                else:
+                    value = [*_SECTION]
                 offers["parts"].append({"at": ["bars", bar, name], "value": value})
             elif number.left_out is not REQUIRED:
                 fields.setdefault(bar, {})[name] = EXAMPLES[number.unit]
@@ -169,9 +173,10 @@ class SceneDocument:
         if not text.strip() and old is not None and not isinstance(path[-1], int):
             self.remove(path)
         elif text.strip() or old is not None:
-            example = (
-                old if old is not None else _find_table(list_offers()["fields"], path)
-            )
+            if old is not None:
+                example = old
+            else:
+                example = _find_table(list_offers()["fields"], path)
             self.put(
                 path,
                 (
@@ -205,7 +210,10 @@ class SceneDocument:
             own_table = len(path) == 1 and isinstance(
                 value, dict
             )  # at the top of the file; anywhere else in one line
-            new = _make_table(value) if own_table else _write_inline(value)
+            if own_table:
+                new = _make_table(value)
+            else:
+                new = _write_inline(value)
             holder[last] = new if old is None else _make_like(old, value)
         else:
             raise InputError(
@@ -228,12 +236,10 @@ class SceneDocument:
             return holder
         if path == ["loads"]:
             made: Item = tomlkit.aot()
+        elif len(path) == 1 or path[0] == "bars":
+            made = tomlkit.table()
         else:
-            made = (
-                tomlkit.table()
-                if len(path) == 1 or path[0] == "bars"
-                else tomlkit.inline_table()
-            )
+            made = tomlkit.inline_table()
         if len(path) > 1:
             self._find_holder(path[:-1])
         parent = self.at(path[:-1])
@@ -248,7 +254,10 @@ def name_entry(path: Iterable[str | int]) -> str:
 
 def _find_table(table: Any, path: Path) -> Any:
     for step in path:
-        table = table.get(step) if isinstance(table, dict) else None
+        if isinstance(table, dict):
+            table = table.get(step)
+        else:
+            table = None
     return table
 
 

@@ -189,7 +189,10 @@ def drag(
         frame = cmath.rect(1.0, turned[handle.bar])
         foot = pins[FIRST_PIN[handle.bar]] + frame * handle.at
         own_frame = frame if handle.turns else 1.0 + 0.0j
-        force_frame = frame if handle.force_turns else 1.0 + 0.0j
+        if handle.force_turns:
+            force_frame = frame
+        else:
+            force_frame = 1.0 + 0.0j
         if list(handle.path) == dragged.what:
             pair = (dragged.to - foot) / own_frame
             put_place(document, handle.path, pair, dragged.grain)
@@ -234,7 +237,8 @@ def _drag_pin(
             ),
         )
     if dragged.what == "O4":
-        angle, key = cmath.phase(dragged.to), ("lengths", "ground_angle")
+        angle = cmath.phase(dragged.to)
+        key = ("lengths", "ground_angle")
         document.put(
             key,
             _write_angle(
@@ -291,7 +295,10 @@ def put_place(
     file has no place yet, its unit is that of the ground's length.
     """
     old = document.at(path)
-    before = "xy" if isinstance(old, dict) else "polar"
+    if isinstance(old, dict):
+        before = "xy"
+    else:
+        before = "polar"
     if isinstance(old, dict) and DRAWN in old:  # a place of its bar from now on
         by = by or "xy"
         before = DRAWN
@@ -300,7 +307,8 @@ def put_place(
     if isinstance(length, list):
         length = length[0]
     if length is None:
-        ground, drawn = (("lengths", "ground"), ("pins", "A", 0))
+        ground = ("lengths", "ground")
+        drawn = ("pins", "A", 0)
         length = document.at(ground) or document.at(drawn)
     if (by or before) == "xy":
         parts: dict[str | int, str] = {
@@ -309,10 +317,8 @@ def put_place(
         }
         stated: Any = parts
     else:
-        size, old_angle = (
-            abs(place),
-            document.at((*path, 1)) if before == "polar" else None,
-        )
+        size = abs(place)
+        old_angle = document.at((*path, 1)) if before == "polar" else None
         angle = _write_angle(old_angle, cmath.phase(place), grain / max(size, grain))
         parts = {0: _write_like(length, size, grain, "m", "m"), 1: angle}
         stated = list(parts.values())

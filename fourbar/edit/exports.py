@@ -61,7 +61,10 @@ def evaluate_scene(
 
     Raises NotAssembledError where no position assembles, InputError as `solve` does.
     """
-    stage = find_last_stage(scene) if settled else None
+    if settled:
+        stage = find_last_stage(scene)
+    else:
+        stage = None
     solution = solve(scene, stage)
     if not solution.assembled.any():
         raise NotAssembledError(
@@ -109,7 +112,8 @@ class Exports:
     """The folder that exports go to; made when there is something for it."""
 
     def __init__(self, folder: Path, stem: str) -> None:
-        self.folder, self.stem = folder, stem
+        self.folder = folder
+        self.stem = stem
 
     def write(self, scene: Scene, name: str, units: Conversion) -> Path:
         """Write one export and return its path; InputError for an unknown format."""
@@ -162,7 +166,8 @@ class HarnessRun:
     """One run of the harness at a time, with its progress."""
 
     def __init__(self, folder: Path, tell: Callable[[dict[str, Any]], None]) -> None:
-        self.folder, self.tell = folder, tell
+        self.folder = folder
+        self.tell = tell
         self.process: asyncio.subprocess.Process | None = None
         self.task: asyncio.Task[None] | None = None
 
@@ -185,7 +190,8 @@ class HarnessRun:
                 self.process.terminate()
 
     async def _run(self, text: str) -> None:
-        began, lines = time.monotonic(), list[str]()
+        began = time.monotonic()
+        lines = list[str]()
 
         def report(**more: Any) -> None:
             self.tell(

@@ -174,7 +174,9 @@ class Workbench:
         Changes are answered meanwhile.
         """
         session = self.session
-        state, units, pressure = session.now, session.units, session.pressure
+        state = session.now
+        units = session.units
+        pressure = session.pressure
         chosen = (session.unit_names, session.pressure_text)
 
         def is_present() -> bool:
@@ -189,7 +191,9 @@ class Workbench:
             return evaluate_scene(state.scene, units, settled=True, pressure=pressure)
 
         def describe(data: dict[str, Any]) -> dict[str, Any] | None:
-            return session.describe(data, settled=True) if is_present() else None
+            if is_present():
+                return session.describe(data, settled=True)
+            return None
 
         try:
             data = await self.loop.run_in_executor(self.aside, evaluate)
@@ -327,7 +331,8 @@ class _Guarded(RequestHandler):
 
     def initialize(self, bench: Workbench, hosts: frozenset[str]) -> None:
         """Know the workbench and the names of this address."""
-        self.bench, self.hosts = bench, hosts
+        self.bench = bench
+        self.hosts = hosts
 
     def prepare(self) -> None:
         """Refuse another Host or Origin (403), and a wrong token (404)."""

@@ -86,11 +86,18 @@ class Session:
         )
         self.state_file = self.path.with_name(self.path.name + ENDING)
         self.token = secrets.token_urlsafe(32)  # of this process alone
-        self.unit_names, self.pressure_text = _AS_THE_FILE, ""
-        text = read_text(self.path) if self.path.exists() else write_new_scene(NEW)
+        self.unit_names = _AS_THE_FILE
+        self.pressure_text = ""
+        if self.path.exists():
+            text = read_text(self.path)
+        else:
+            text = write_new_scene(NEW)
         self.disk = self._read_disk()
-        self.texts, self.place, self.kept = [text], 0, {"start": text}
-        self.reference, self.gesture = "start", ""
+        self.texts = [text]
+        self.place = 0
+        self.kept = {"start": text}
+        self.reference = "start"
+        self.gesture = ""
         if self.state_file.exists():
             self._resume()
         else:
@@ -177,7 +184,9 @@ class Session:
     @property
     def pressure(self) -> float | None:
         """Pressure of the cylinder, Pa; None where none is stated."""
-        return to_si(self.pressure_text, "Pa") if self.pressure_text else None
+        if self.pressure_text:
+            return to_si(self.pressure_text, "Pa")
+        return None
 
     @property
     def fresh(self) -> bool:
@@ -193,11 +202,9 @@ class Session:
         return self._read_disk() == _hash_text(self.now.text.encode())
 
     def _read_disk(self) -> str | None:
-        return (
-            _hash_text(read_bytes(self.path, "scene file", LARGEST_FILE))
-            if self.path.exists()
-            else None
-        )
+        if self.path.exists():
+            return _hash_text(read_bytes(self.path, "scene file", LARGEST_FILE))
+        return None
 
     def read(self, text: str) -> SceneState:
         """Read the text of a scene; InputError where the workbench takes none such."""
@@ -268,11 +275,10 @@ class Session:
         ) as error:  # of a page whose request makes no sense too: the server goes on
             self.texts, self.place, self.now = before
             self.document = SceneDocument(self.now.text)
-            words = (
-                str(error)
-                if isinstance(error, FourBarError | OSError)
-                else f"this cannot be done: {error}"
-            )
+            if isinstance(error, FourBarError | OSError):
+                words = str(error)
+            else:
+                words = f"this cannot be done: {error}"
             if isinstance(error, InputError):
                 words = f"{error.key}: {error.allowed}"
             return {"refused": words, "text": self.now.text, "plain": self.now.plain}
@@ -296,8 +302,10 @@ class Session:
             len(self.texts) > _MOST_STATES
             or sum(map(len, self.texts)) > MOST_CHARACTERS
         ):
-            self.texts, self.place = self.texts[1:], self.place - 1
-        self.now, self.gesture = now, gesture
+            self.texts = self.texts[1:]
+            self.place = self.place - 1
+        self.now = now
+        self.gesture = gesture
         if not gesture:
             # entries that were put in then stand as in a file; too slow for each step
             self.document = SceneDocument(now.text)
@@ -351,7 +359,8 @@ def _suit_entry(value: Any, plain: dict[str, Any]) -> Any:
 
 
 def _add(session: Session, asked: dict[str, Any]) -> None:
-    part, name = list_offers()["parts"][int(asked["part"])], str(asked.get("name", ""))
+    part = list_offers()["parts"][int(asked["part"])]
+    name = str(asked.get("name", ""))
     path = [name if step == "" else step for step in part["at"]]
     value = _suit_entry(part["value"], session.now.plain)
     if path[0] == "tolerances":
@@ -396,11 +405,9 @@ def _move(session: Session, by: int) -> None:
     place = session.place + by
     if not 0 <= place < len(session.texts):
         raise InputError("history", place, "no further state to undo or redo")
-    session.now, session.place, session.gesture = (
-        session.read(session.texts[place]),
-        place,
-        "",
-    )
+    session.now = session.read(session.texts[place])
+    session.place = place
+    session.gesture = ""
     session.document = SceneDocument(session.now.text)
 
 
@@ -552,7 +559,8 @@ def _find_monotone(values: Any, shown: int | None) -> tuple[int, int]:
 
 def _restate(session: Session, asked: dict[str, Any]) -> None:
     """State a place by x and y, or by distance and angle."""
-    path, by = asked["path"], str(asked["by"])
+    path = asked["path"]
+    by = str(asked["by"])
     stated = session.document.at(path)
     if by not in ("xy", "polar") or stated is None:
         raise InputError(name_entry(path), by, 'must be stated by "xy" or "polar"')
@@ -566,19 +574,26 @@ def _restate(session: Session, asked: dict[str, Any]) -> None:
 
 def _draw(session: Session, asked: dict[str, Any]) -> None:
     """State four pins in the plane, given in a unit, in place of those of the file."""
-    unit, grain = str(asked["unit"]), float(asked["grain"])
+    unit = str(asked["unit"])
+    grain = float(asked["grain"])
     pins = {
         pin: tuple(write_rounded(float(x), grain, unit) for x in place)
         for pin, place in zip(PINS, asked["pins"], strict=True)
     }
     drawn = write_drawn_scene({pin: (x, y) for pin, (x, y) in pins.items()})
-    text = drawn if session.fresh else session.now.text
+    if session.fresh:
+        text = drawn
+    else:
+        text = session.now.text
 
     def alter(document: SceneDocument) -> None:
         document.become(text)
         plain = tomllib.loads(text)
         for path in (["lengths"], ["motion", "branch"]):
-            holder = plain if len(path) == 1 else plain.get(path[0], {})
+            if len(path) == 1:
+                holder = plain
+            else:
+                holder = plain.get(path[0], {})
             if path[-1] in holder:
                 document.remove(path)
         for pin, place in pins.items():

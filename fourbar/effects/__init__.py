@@ -56,8 +56,10 @@ def __getattr__(name: str) -> Any:
     file = FILE_OF.get(name) or OTHER_FILES.get(name)
     if file is not None:
         value = getattr(import_module(f"fourbar.effects.{file}"), name)
+    elif name.startswith("_"):
+        value = None
     else:
-        value = None if name.startswith("_") else list_further().get(name)
+        value = list_further().get(name)
     if value is None:
         raise AttributeError(f"module 'fourbar.effects' has no attribute {name!r}")
     globals()[name] = value

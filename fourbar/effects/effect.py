@@ -134,14 +134,15 @@ class Actions:
             self.pull_ends(start, end, force)
             return
         first, second = PINS[pin]
-        on_second = force if start.bar == second else -force
+        if start.bar == second:
+            on_second = force
+        else:
+            on_second = -force
         (from_start, square), (from_end, other_square) = (
             point.arm_from(pin, self.state) for point in (start, end)
         )
-        by_one, by_other = (
-            from_start * self.state.direction(start.bar),
-            from_end * self.state.direction(end.bar),
-        )
+        by_one = from_start * self.state.direction(start.bar)
+        by_other = from_end * self.state.direction(end.bar)
         self.pin_couple(
             pin,
             select(
@@ -229,7 +230,8 @@ class Actions:
         at rest begins to move as theta_2 grows or falls; a pin that is at rest in a
         linkage that moves turns in either sense.
         """
-        slip, turning = self.state.slip(pin), self.turning(pin)
+        slip = self.state.slip(pin)
+        turning = self.turning(pin)
         if not is_any(self.side != 0):
             return turning * np.sign(slip * self.state.speed)
         moving = np.where(turning, np.sign(slip * self.state.speed), self.side)
@@ -251,7 +253,8 @@ class Actions:
 
         D'Alembert's forces and moments are included.
         """
-        R, M = [*inertia[:3]], [*inertia[3:6]]
+        R = [*inertia[:3]]
+        M = [*inertia[3:6]]
         for bar, force in self.forces.items():
             R[bar - 2] = R[bar - 2] + force
         for bar, moment in self.moments.items():
@@ -452,7 +455,9 @@ class PinRows(Effect):
         return getattr(self, self.field)  # type: ignore[no-any-return]
 
     def __post_init__(self) -> None:
-        key, numbers, rows = f"effects.{self.key}", self.numbers, self.rows
+        key = f"effects.{self.key}"
+        numbers = self.numbers
+        rows = self.rows
         expect(key, rows, tuple, list)
         by_pin: dict[str, tuple[Any, ...]] = {}
         for row in rows:

@@ -92,7 +92,9 @@ class ForceDrive(ABC):
         drive on bar 2, 3, 4.
         """
         _, a, b, c, _, _ = state.lengths
-        h2, h3, h4 = sines[2], (-a / b) * sines[3], (-a / c) * sines[4]
+        h2 = sines[2]
+        h3 = (-a / b) * sines[3]
+        h4 = (-a / c) * sines[4]
         turned = state._replace(
             k=state.k._replace(h2=h2, h3=h3, h4=h4, h23=h2 - h3, h43=h4 - h3)
         )

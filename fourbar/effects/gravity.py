@@ -56,7 +56,8 @@ class Gravity(Effect):
 
     def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
         """Sum m g L, with L the longest arm at which a weight acts."""
-        longest, total = max(linkage.lengths), 0.0
+        longest = max(linkage.lengths)
+        total = 0.0
         for number in MOVING_BARS:
             bar = linkage.bar(number)
             total += bar.mass * max(longest, abs(bar.mass_centre[0]))

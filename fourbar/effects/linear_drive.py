@@ -60,7 +60,9 @@ class LinearDrive(ForceDrive):
         in any pair's.
         """
         bars = {self.start.bar, self.end.bar}
-        return (*bars - {1},) if bars in ({1, 2}, {1, 4}) else MOVING_BARS
+        if bars in ({1, 2}, {1, 4}):
+            return (*bars - {1},)
+        return MOVING_BARS
 
     def require_motion(self, linkage: FourBar) -> None:
         """Raise InputError if no motion changes the distance of the ends.
@@ -98,14 +100,13 @@ class LinearDrive(ForceDrive):
         rounded by the lengths over which they are reached, the line's direction by that
         over the stroke.
         """
-        stroke, (lever, most) = self.line(state)[0], self.leverage(state, sines)
+        stroke = self.line(state)[0]
+        lever, most = self.leverage(state, sines)
         away = (
             sum(state.lengths[:4]) + abs(self.start.distance) + abs(self.end.distance)
         )
-        none, meet = (
-            abs(lever) * stroke <= NO_DIGIT_LEFT * most * away,
-            stroke <= COINCIDE * away,
-        )
+        none = abs(lever) * stroke <= NO_DIGIT_LEFT * most * away
+        meet = stroke <= COINCIDE * away
         if not is_any(none | meet):
             return None
         return np.where(meet, NO_DIRECTION, np.where(none, NO_LEVER, OK))

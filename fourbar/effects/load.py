@@ -101,8 +101,10 @@ class Table:
         piece = np.clip(piece, 0, len(self.theta_2) - 2)
         points = make_like(self.theta_2, theta_2)
         factors = make_like(self.factor, theta_2)
-        start, width = points[piece], points[piece + 1] - points[piece]
-        before, rise = factors[piece], factors[piece + 1] - factors[piece]
+        start = points[piece]
+        width = points[piece + 1] - points[piece]
+        before = factors[piece]
+        rise = factors[piece + 1] - factors[piece]
         away, lost = split_sum(theta_2, -start)
         rest = np.fmod(away, TURN)
         turns = np.rint((theta_2 - place) / TURN)
@@ -118,14 +120,16 @@ class Table:
 
         Raises InputError for one that the table does not cover.
         """
-        first, last = self.theta_2[0], self.theta_2[-1]
+        first = self.theta_2[0]
+        last = self.theta_2[-1]
         beyond = place > last + 1e-12 * TURN
         if not beyond.any():
             return place
         # a position just below the first angle has come round to a whole turn above it
         round_ = beyond & (first + TURN - place < 1e-12 * TURN)
         if not (round_ == beyond).all():
-            ends, bad = np.degrees((first, last)), math.degrees(float(np.max(place)))
+            ends = np.degrees((first, last))
+            bad = math.degrees(float(np.max(place)))
             allowed = (
                 f"covers {ends[0]:.6g} to {ends[1]:.6g} deg; the position at {bad:.6g}"
                 " deg lies outside"
@@ -238,7 +242,10 @@ class Load(Effect):
             if self.frame == "bar":
                 force = force * state.direction(self.bar)
             foot = self.foot(actions.bodies[self.bar - 2].z)
-            beyond = None if self.arm is None else polar(*self.arm)
+            if self.arm is None:
+                beyond = None
+            else:
+                beyond = polar(*self.arm)
             actions.force(self.bar, factor * force, foot, beyond)
         if is_any(self.moment != 0.0):
             actions.couple(self.bar, factor * self.moment)
@@ -257,11 +264,9 @@ class Load(Effect):
             elif self.place is not None:
                 reach = abs(self.place.distance)
             total += abs(self.force[0]) * (1.0 + reach / bar.length)
-        return (
-            total
-            if self.table is None
-            else total * max(abs(factor) for factor in self.table.factor)
-        )
+        if self.table is None:
+            return total
+        return total * max(abs(factor) for factor in self.table.factor)
 
     def add_to_mjcf(self, model: Any) -> None:
         """Add a constant actuator on a site (force) or on the bar (couple)."""

@@ -172,14 +172,14 @@ class PinFriction(PinRows):
         numbers that carry their derivatives the same steps are the theorem of the
         implicit function.
         """
-        names, arms = list(couples), {pin: mu * r for pin, mu, r in self.pins}
+        names = list(couples)
+        arms = {pin: mu * r for pin, mu, r in self.pins}
         for _ in range(2):
-            gaps, slopes = [], []
+            gaps = []
+            slopes = []
             for pin in names:
-                by, force = (
-                    [getattr(per_unit[q], PIN_FORCE[pin]) for q in names],
-                    getattr(pins, PIN_FORCE[pin]),
-                )
+                by = [getattr(per_unit[q], PIN_FORCE[pin]) for q in names]
+                force = getattr(pins, PIN_FORCE[pin])
                 for c, couple in zip(by, couples.values(), strict=True):
                     force = force + c * couple
                 gaps.append(arms[pin] * np.abs(force) - couples[pin])
@@ -279,8 +279,10 @@ def _solve_quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.ui
     under = c - turned * turned
     root = np.sqrt(under)
     q = -(b + np.where(b < 0.0, -root, root))
-    first, second = np.where(a == 0.0, np.inf, q / a), np.where(q == 0.0, 0.0, c / q)
-    low, high = np.fmin(first, second), np.fmax(first, second)
+    first = np.where(a == 0.0, np.inf, q / a)
+    second = np.where(q == 0.0, 0.0, c / q)
+    low = np.fmin(first, second)
+    high = np.fmax(first, second)
     x = np.where(a < 0.0, high, low)
     count = np.full(len(x), ONE, dtype=np.uint8)
     count[~(a < 0.0) & ((under < 0.0) | (b >= 0.0)) & (c > 0.0)] = NONE
@@ -354,13 +356,12 @@ def _search(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.int_]]:
         ]
     )
     x = (size[:, None, None] * starts).reshape(-1, p)
-    problem, moving, before = (
-        np.repeat(np.arange(n), len(starts)),
-        np.arange(len(x)),
-        np.full_like(x, np.inf),
-    )
+    problem = np.repeat(np.arange(n), len(starts))
+    moving = np.arange(len(x))
+    before = np.full_like(x, np.inf)
     for _ in range(60):
-        members, last = problem[moving], x[moving]
+        members = problem[moving]
+        last = x[moving]
         right, slope = _compute_right_side(F[members], C[members], k[members], last)
         new = np.clip(
             last + _compute_step(right - last, slope), 0.0, 1e12 * size[members, None]
@@ -376,7 +377,8 @@ def _search(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.int_]]:
     solves = np.abs(right - x).max(axis=1) <= 1e-9 * np.maximum(
         x.max(axis=1), size[problem]
     )
-    x, solves = x.reshape(n, -1, p), solves.reshape(n, -1)
+    x = x.reshape(n, -1, p)
+    solves = solves.reshape(n, -1)
     least = x[np.arange(n), np.argmin(np.where(solves, x.sum(axis=2), np.inf), axis=1)]
     apart = np.abs(x - least[:, None]).max(axis=2) > SAME * np.maximum(
         x.max(axis=2), least.max(axis=1)[:, None]

@@ -77,7 +77,9 @@ class Place(NamedTuple):
         """
         assert self.from_pin is not None
         z = polar(*self.from_pin)
-        return z if self.from_centre is None else z + polar(*self.from_centre)
+        if self.from_centre is None:
+            return z
+        return z + polar(*self.from_centre)
 
     def polar_from_pin(self) -> tuple[Any, Any]:
         """Return distance (m) and angle (rad) of a settled place.
@@ -109,7 +111,9 @@ class Place(NamedTuple):
         It is an array, so that products round alike.
         """
         z = self.vector()
-        return np.asarray(z) if isinstance(z, complex) else z
+        if isinstance(z, complex):
+            return np.asarray(z)
+        return z
 
     def arm_from(self, pin: str, state: State) -> tuple[Any, Any]:
         """Return the vector from a pin of the bar, and the square of its length.

@@ -63,11 +63,14 @@ class PointDrive(ForceDrive):
         2 or 4 is in the moment of that bar alone, as a couple is; on bar 3 it is in any
         pair's.
         """
-        return MOVING_BARS if self.place.bar == 3 else (self.place.bar,)
+        if self.place.bar == 3:
+            return MOVING_BARS
+        return (self.place.bar,)
 
     def require_motion(self, linkage: FourBar) -> None:
         """Raise InputError where the point is a fixed pin."""
-        bar, distance = self.place.bar, abs(self.place.distance)
+        bar = self.place.bar
+        distance = abs(self.place.distance)
         if bar != 3 and distance <= COINCIDE * linkage.bar(bar).length:
             allowed = "is a fixed pin, at which a force does no work: state another"
             raise InputError("drive", f"the first pin of bar {bar}", allowed)
@@ -88,4 +91,6 @@ class PointDrive(ForceDrive):
         """Return NO_LEVER where P lies within its rounding; None: nowhere."""
         lever, most = self.leverage(state, sines)
         none = abs(lever) <= NO_DIGIT_LEFT * most
-        return np.where(none, NO_LEVER, OK) if is_any(none) else None
+        if is_any(none):
+            return np.where(none, NO_LEVER, OK)
+        return None

@@ -108,10 +108,8 @@ class Spring:
         extended_force : at no stroke, N, >= 0.
         compressed_force : at full stroke, N, no less; left out: the same.
         """
-        key, last = (
-            "effects.springs.gas",
-            extended_force if compressed_force is None else compressed_force,
-        )
+        key = "effects.springs.gas"
+        last = extended_force if compressed_force is None else compressed_force
         pairs = zip(GAS.items(), (extended, stroke, extended_force, last), strict=True)
         extended, stroke, first, last = (
             require(f"{key}.{name}", value, *declared[:2])

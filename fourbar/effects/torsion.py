@@ -156,17 +156,16 @@ def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
     quarter turn. Where it vanishes at a change point (a = d, b = c) it has the
     direction of (theta_1 + theta_2)/2 less a quarter turn, and a signed length.
     """
-    bar, theta_1, theta_2 = (
-        state.bar,
-        state.theta_1,
-        state.theta_2 if state.q is None else state.q,
-    )
+    bar = state.bar
+    theta_1 = state.theta_1
+    theta_2 = state.theta_2 if state.q is None else state.q
     d, a, b, c = reorder_lengths(bar, state.lengths[:4])
     turned = (
         math.pi if bar == 4 else 0.0
     )  # turn of the ground, and of the coupler with it
     u2, u3, u4 = (state.direction(role) for role in ROLES[bar])
-    theta_3, theta_4 = np.angle(u3) + turned, np.angle(u4)
+    theta_3 = np.angle(u3) + turned
+    theta_4 = np.angle(u4)
     theta_1 = theta_1 + turned
     phi = np.angle(
         state.position.diagonal if bar == 2 else d * np.exp(1j * theta_1) - a * u2
@@ -179,7 +178,8 @@ def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
     half = 0.5 * (theta_2 - theta_1)
     of_3 = _find_middle(b, c, half, outer, inner)
     of_4 = _find_middle(c, b, half, outer, inner)
-    at_3, at_4 = branch * (theta_3 - phi), branch * (phi + math.pi - theta_4)
+    at_3 = branch * (theta_3 - phi)
+    at_4 = branch * (phi + math.pi - theta_4)
     angles = (
         theta_2,
         phi + branch * (of_3 + wrap_angle(at_3 - of_3)) - turned,

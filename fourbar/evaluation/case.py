@@ -61,7 +61,9 @@ def _find_undecided(
 def find_sign(branch: NDArray[np.int8]) -> Any:
     """Return the branch of each position, or one number where all have the same."""
     if branch.ndim == 0 or (branch.size and branch.min() == branch.max()):
-        return float(branch.flat[0]) if branch.ndim else float(branch)
+        if branch.ndim:
+            return float(branch.flat[0])
+        return float(branch)
     return branch
 
 
@@ -70,7 +72,9 @@ def find_margin(commanded: Command) -> float:
 
     It is 0 where the angle is known in many digits.
     """
-    return NO_DIGIT_LEFT if commanded.remainder is None else 0.0
+    if commanded.remainder is None:
+        return NO_DIGIT_LEFT
+    return 0.0
 
 
 class Dynamics(NamedTuple):
@@ -118,12 +122,14 @@ class Case(NamedTuple):
         The command is that of bar 2, 3 or 4.
         """
         scene = scene.settled()
-        terms, linkage = (*scene.loads, *scene.effects), scene.linkage
+        terms = (*scene.loads, *scene.effects)
+        linkage = scene.linkage
         path = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle, bar)
         points = tuple(
             (point.name, point.bar, point.place.vector()) for point in scene.points
         )
-        lengths, bodies = _restore_unit(linkage, path), list_bodies(linkage, terms)
+        lengths = _restore_unit(linkage, path)
+        bodies = list_bodies(linkage, terms)
         return cls(
             linkage,
             lengths,
@@ -166,7 +172,8 @@ class Case(NamedTuple):
             Loop(d, a, b, c, 0.0, 0.0), linkage.ground_angle, self.path.bar
         )
         path = path._replace(passing=self.path.passing)
-        bodies, lengths = list_bodies(linkage, terms), _restore_unit(linkage, path)
+        bodies = list_bodies(linkage, terms)
+        lengths = _restore_unit(linkage, path)
         return self._replace(
             linkage=linkage,
             lengths=lengths,
@@ -190,11 +197,9 @@ class Case(NamedTuple):
 
         It is that of the driven bar, rad/s, or that of the stroke, m/s.
         """
-        return (
-            state.omega(self.drive_bar)
-            if self.drive is None
-            else self.drive.gain(state) * state.speed
-        )
+        if self.drive is None:
+            return state.omega(self.drive_bar)
+        return self.drive.gain(state) * state.speed
 
     def drive_condition(self, state: State) -> Any:
         """Compute the drive's leverage over the largest possible one, in [0, 1]."""
@@ -230,7 +235,8 @@ class Case(NamedTuple):
                 q, half, branch, condition=condition, margin=margin
             )
         else:
-            position, k = path.position(q, half, branch), _NO_MOTION
+            position = path.position(q, half, branch)
+            k = _NO_MOTION
             position, sine = path.in_order(position), position.sin_mu
             speed = acceleration = 0.0
         return State(
@@ -306,7 +312,8 @@ class Case(NamedTuple):
         self, q: Array, remainder: Any
     ) -> tuple[HalfAngle, NDArray[np.intp]]:
         """Compute the half angles, and the indices of those in many digits."""
-        lengths, half = self.path.lengths, self.path.half_angle(q)
+        lengths = self.path.lengths
+        half = self.path.half_angle(q)
         close: Any = remainder is not None
         if remainder is None:
             for factor, constant in (
@@ -337,12 +344,10 @@ class Case(NamedTuple):
         `sine`: of theta_3 - theta_2 if the moment about pin B is wanted, otherwise
         None.
         """
-        a, position, k, square = (
-            self.lengths.a,
-            state.position,
-            state.k,
-            state.speed * state.speed,
-        )
+        a = self.lengths.a
+        position = state.position
+        k = state.k
+        square = state.speed * state.speed
         wrenches, mass_at_A = inertia_wrenches(a, self.bodies, position, state.moving)
         inertial = others = half_slope(a, self.bodies, position, k) * square
         if is_any(acceleration != 0.0):
@@ -353,13 +358,12 @@ class Case(NamedTuple):
             others = (
                 others - (about_first_pin(self.bodies[0]) * (k.h2 * k.dh2)) * square
             )
-        about_B = (
-            0.0
-            if sine is None
-            else coupler_about_B(
+        if sine is None:
+            about_B = 0.0
+        else:
+            about_B = coupler_about_B(
                 self.lengths, self.bodies[1], position, state.moving, sine
             )
-        )
         return _Inertia(inertial, others, wrenches, mass_at_A, about_B)
 
     def dynamics(self, state: State, acceleration: Any, side: Any = 0) -> Dynamics:
@@ -459,7 +463,10 @@ class _FreeBodies(NamedTuple):
         virtual work, and then is one more load; where it acts on two moving bars or on
         bar 3, the pair of bars whose directions differ most keeps the digits.
         """
-        inertia = self.inertia if with_inertia else _Inertia()
+        if with_inertia:
+            inertia = self.inertia
+        else:
+            inertia = _Inertia()
         if self.drive is not None:
             actions = actions.plus(
                 self.drive, driving_torque(self.gain, inertia.total, actions.work()[0])
@@ -472,7 +479,8 @@ class _FreeBodies(NamedTuple):
             for bar in self.sines
         }
         s2, s3, s4 = (abs(self.sines[bar]) for bar in MOVING_BARS)
-        first, second = (s2 >= s3) & (s2 >= s4), s3 >= s4
+        first = (s2 >= s3) & (s2 >= s4)
+        second = s3 >= s4
         forces = zip(*(pins[bar] for bar in MOVING_BARS), strict=True)
         return PinForces(
             *(select(first, x, select(second, y, z)) for x, y, z in forces)
@@ -482,7 +490,9 @@ class _FreeBodies(NamedTuple):
         self, left_out: int, actions: Actions, inertia: _Inertia
     ) -> PinForces:
         """Solve from the moments of the two bars other than the one left out."""
-        lengths, position, moment = self.state.lengths, self.state.position, 0.0
+        lengths = self.state.lengths
+        position = self.state.position
+        moment = 0.0
         if left_out == 4:
             moment = -(actions.about_B() + inertia.about_B)
         elif left_out == 2 and is_any(lengths.d < lengths.a):

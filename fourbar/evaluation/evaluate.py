@@ -49,7 +49,8 @@ from fourbar.scene.numbers import POINT_STAGES
 if TYPE_CHECKING:
     from fourbar.effects import ForceDrive
 
-FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
+FORCE = STAGES.index("force")
+ERROR = STAGES.index("error")
 _LONG_EPS = float(np.finfo(np.longdouble).eps)
 """Distance of long doubles beside 1."""
 ROUNDINGS = 16.0
@@ -139,7 +140,8 @@ def _compute_codes(
 
     `sine`: times `unit`.
     """
-    size, margin = abs(sine), find_margin(command) * unit
+    size = abs(sine)
+    margin = find_margin(command) * unit
     if command.condition is not None:
         size = np.where(np.isnan(size), size, np.minimum(size, command.condition))
     if type(size) is float and size > margin:
@@ -244,7 +246,10 @@ def _withhold_forces(case: Case, codes: Any, values: dict[str, Any]) -> None:
     for name, value in values.items():
         if name == "drive_condition":
             continue
-        missing = gone | (codes == CHANGE_POINT) if name in of_pins else gone
+        if name in of_pins:
+            missing = gone | (codes == CHANGE_POINT)
+        else:
+            missing = gone
         values[name] = np.where(missing, _make_no_value(value), value)
 
 
@@ -411,11 +416,10 @@ def _withhold(
             if STAGE_OF.get(name, POINT_STAGES.get(name[:2], "position")) == stage
         ]
         of_forces = stage in STAGES[3:]
-        promised = (
-            np.isin(code, (OK, SEVERAL))
-            if of_forces
-            else ~np.isin(code, (NOT_ASSEMBLED, SINGULAR))
-        )
+        if of_forces:
+            promised = np.isin(code, (OK, SEVERAL))
+        else:
+            promised = ~np.isin(code, (NOT_ASSEMBLED, SINGULAR))
         infinite = np.zeros_like(gone)
         for name in names:
             infinite |= ~np.isfinite(values[name])
@@ -436,7 +440,9 @@ def _withhold(
 
 def _make_no_value(quantity: Any) -> complex:
     """Return NaN; of a vector in both components."""
-    return complex(np.nan, np.nan) if np.iscomplexobj(quantity) else np.nan
+    if np.iscomplexobj(quantity):
+        return complex(np.nan, np.nan)
+    return np.nan
 
 
 SCALAR_FORMULAS: dict[str, Callable[[State], Any]] = {
@@ -474,7 +480,8 @@ def list_kinematics(case: Case, state: State, wanted: Set[str]) -> dict[str, Any
         values |= {name: value for name, value in of_line.items() if name in wanted}
     if not case.points and wanted.isdisjoint(PLACES):
         return values
-    lengths, (two, three, four) = case.lengths, case.bodies
+    lengths = case.lengths
+    two, three, four = case.bodies
     places: dict[int, list[tuple[str, Any]]] = {
         2: [("A", lengths.a), ("G2", two.z)],
         3: [("G3", three.z)],

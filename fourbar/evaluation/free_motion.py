@@ -120,7 +120,8 @@ def release(scene: Scene) -> Released:
     array([0., 0., 0.])
     """
     expect("scene", scene, Scene)
-    free, start = scene.motion.free, command(scene)
+    free = scene.motion.free
+    start = command(scene)
     if free is None:
         raise InputError(
             "motion.free", None, "is needed for a release: its duration and steps"
@@ -147,7 +148,10 @@ def release(scene: Scene) -> Released:
             begun = Case.of(scene).begin_with(motion.part(slice(0, 1)))
             state, _ = begun.at(motion)
             for term in begun.terms:
-                codes = term.status(state, motion.branch) if term.counts_turns else None
+                if term.counts_turns:
+                    codes = term.status(state, motion.branch)
+                else:
+                    codes = None
                 if codes is not None and codes.any():
                     raise LimitError(
                         f"effects.{term.key}: at {released.time[np.argmax(codes)]:.6g}"
@@ -177,7 +181,8 @@ class _Reading:
             u1=complex(path.u1),
             unit=float(path.unit),
         )
-        self.bar, self.branch = bar, 1.0
+        self.bar = bar
+        self.branch = 1.0
         self.last: tuple[tuple[float, float], tuple[Position, Coefficients]] | None = (
             None
         )
@@ -199,11 +204,9 @@ class _Reading:
         # a motion may start at a limit of the bar that it is read from: coefficients
         # are then infinite, and another bar is taken
         position, k, _ = self.path.close(q, half, self.branch, margin=-1.0)
-        return (
-            (_make_plain(position), _make_plain(k))
-            if self.path.may_stay_parallel
-            else (position, k)
-        )
+        if self.path.may_stay_parallel:
+            return (_make_plain(position), _make_plain(k))
+        return (position, k)
 
 
 def _compute_sines(position: Position) -> dict[int, float]:
@@ -266,12 +269,17 @@ class _Run:
         branch: int,
         bar: int,
     ) -> None:
-        self.linkage, self.terms, self.bar = linkage, terms, bar
+        self.linkage = linkage
+        self.terms = terms
+        self.bar = bar
         self.lengths = _make_plain(loop(*linkage.lengths))
         two, three, four = (_make_plain(body) for body in list_bodies(linkage, terms))
         self.bodies: tuple[Body, Body, Body] = two, three, four
         self.readings = {each: _Reading(linkage, each) for each in (2, 4)}
-        self.reading = self.readings[bar] if bar != 3 else _Reading(linkage, 3)
+        if bar != 3:
+            self.reading = self.readings[bar]
+        else:
+            self.reading = _Reading(linkage, 3)
         self.reading.branch = self.branch = float(branch)
         position, k = self.reading.evaluate(theta)
         if not np.isfinite(position.u3):
@@ -298,7 +306,8 @@ class _Run:
         self.dry = ahead != back
         self.start_energy = self._compute_kinetic_energy()
         self.times = np.empty(0)
-        self.t, self.steps = 0.0, 0
+        self.t = 0.0
+        self.steps = 0
         self.change_points: list[float] = []
         self.drift = self.largest = 0.0
         self.rows: list[tuple[float, ...]] = []
@@ -360,10 +369,14 @@ class _Run:
         ]
 
     def _compute_rates(self, _: float, y: Array) -> list[float]:
-        q, rate = float(y[0]), float(y[1])
+        q = float(y[0])
+        rate = float(y[1])
         position, k = self.reading.evaluate(q)
         # friction keeps its sense beyond a standstill, at which the step is then cut
-        moving = self.side * max(self.side * rate, VANISHING) if self.side else rate
+        if self.side:
+            moving = self.side * max(self.side * rate, VANISHING)
+        else:
+            moving = rate
         Q = self._compute_generalised_force(q, position, k, moving)
         slope = half_slope(self.lengths.a, self.bodies, position, k)
         # NumPy's division raises no error where the inertia vanishes
@@ -381,14 +394,19 @@ class _Run:
         Position, velocity and work are kept.
         """
         position, k = self._at()
-        sines, bar = _compute_sines(position), 6 - self.reading.bar
+        sines = _compute_sines(position)
+        bar = 6 - self.reading.bar
         if self.reading.bar == 3:  # only at the start
             bar = max((2, 4), key=lambda number: abs(sines[number]))
         elif abs(sines[self.reading.bar]) >= _CHANGE_OVER * abs(sines[bar]):
             return False
-        q, reading = self.theta[bar], self.readings[bar]
+        q = self.theta[bar]
+        reading = self.readings[bar]
         reading.branch = float(reading.path.sign(q, math.copysign(1.0, sines[bar])))
-        rate = float(self.y[1] * (k.h2 if bar == 2 else k.h4)) if self.y[1] else 0.0
+        if self.y[1]:
+            rate = float(self.y[1] * (k.h2 if bar == 2 else k.h4))
+        else:
+            rate = 0.0
         self.reading, self.y = reading, np.array([q, rate, self.y[2]])
         return True
 
@@ -412,7 +430,10 @@ class _Run:
         if rate == 0.0:
             ahead, back = self._try_both_senses()
             if ahead <= 0.0 <= back:
-                self.holding = (ahead + back) / (back - ahead) if ahead < back else 0.0
+                if ahead < back:
+                    self.holding = (ahead + back) / (back - ahead)
+                else:
+                    self.holding = 0.0
                 return False
             rate = 1.0 if ahead > 0.0 else -1.0
         self.side = math.copysign(1.0, rate)
@@ -427,7 +448,8 @@ class _Run:
                 f"SciPy is needed for free motion: {say_install('studies')}"
             ) from None
         end = float(times[-1])
-        self.times, self.largest = times, self.start_energy
+        self.times = times
+        self.largest = self.start_energy
         moves = self._starts()
         self._report(0.0, lambda _: self.y)
         while self.t < end:
@@ -477,7 +499,9 @@ class _Run:
                     " s; make it shorter"
                 )
                 raise InputError("motion.free.duration", float(self.times[-1]), allowed)
-            dense, t, new = _interpolate(solver), solver.t, solver.y
+            dense = _interpolate(solver)
+            t = solver.t
+            new = solver.y
             rested = bool(self.side and self.side * new[1] < 0.0)
             if rested:
                 t = _find_root(dense, lambda y: float(y[1]), solver.t_old, t)
@@ -531,21 +555,28 @@ class _Run:
 
         They belong to one instant.
         """
-        q, rate = float(y[0]), float(y[1])
+        q = float(y[0])
+        rate = float(y[1])
         position, k = self.reading.evaluate(q)
         now = cmath.phase(position.u2)
         theta_2 = now + 2.0 * math.pi * round((self.theta[2] - now) / (2.0 * math.pi))
         if self.reading.bar == 2:
             theta_2 = q
         still = self.dry and rate == 0.0 and not self.side
-        growth = 0.0 if still else self._compute_rates(0.0, y)[1]
+        if still:
+            growth = 0.0
+        else:
+            growth = self._compute_rates(0.0, y)[1]
         moving = rates(k, rate, growth)
         sine = _compute_sines(position)[2]
         if abs(sine) > NO_DIGIT_LEFT:  # at a limit of theta_2 both branches meet
             self.branch = float(
                 self.readings[2].path.sign(theta_2, math.copysign(1.0, sine))
             )
-        side = (self.side or self.holding) if self.dry and rate == 0.0 else 0.0
+        if self.dry and rate == 0.0:
+            side = self.side or self.holding
+        else:
+            side = 0.0
         independent = (
             float(self.reading.bar),
             q,

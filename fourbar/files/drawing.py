@@ -113,7 +113,9 @@ def meet_lengths(drawing: DrawnPins, pins: dict[str, Any]) -> tuple[float, ...]:
     )
     met = meet_change_points(lengths, roundings, decimals)  # type: ignore[arg-type]
     # one equality alone is met by chance: nobody draws it
-    return met if count_equalities(met) > 1 else lengths
+    if count_equalities(met) > 1:
+        return met
+    return lengths
 
 
 def _state_places(
@@ -199,7 +201,8 @@ def find_drawn(drawing: DrawnPins, line: ForceDrive | None, name: str) -> float 
 
 def _draw_ends(drawing: DrawnPins, line: LinearDrive) -> tuple[complex, complex]:
     """Return the drawn places of the ends of a cylinder, m."""
-    start, end = line.start, line.end
+    start = line.start
+    end = line.end
     return (
         drawing.from_bar(start.bar, start.vector()),
         drawing.from_bar(end.bar, end.vector()),

@@ -77,7 +77,10 @@ class Reader:
             )
         for name, entry in value.items():
             if name not in names:
-                hint = ELSEWHERE if name in _FOREIGN else _suggest(name, names)
+                if name in _FOREIGN:
+                    hint = ELSEWHERE
+                else:
+                    hint = _suggest(name, names)
                 allowed = f"unknown key; {hint}allowed: {', '.join(names)}"
                 raise self.refuse(_join_key(key, name), entry, allowed)
         return value
@@ -172,9 +175,9 @@ class Reader:
         """Read a number, or a magnitude with its angle, as it is declared."""
         if value is None and by.left_out is not REQUIRED:
             return by.left_out
-        return (
-            self.pair(key, value, by) if by.pair else self.quantity(key, value, *by[:2])
-        )
+        if by.pair:
+            return self.pair(key, value, by)
+        return self.quantity(key, value, *by[:2])
 
     def numbers(
         self, key: str, given: Mapping[str, object], numbers: Mapping[str, Declared]
@@ -221,7 +224,8 @@ class Reader:
             return convert_to_polar(x, y)
         if not isinstance(value, list) or len(value) != 2:
             named = name_unit(unit)
-            polar, form = self.POLAR.format(named), self.COORDINATES.format(named)
+            polar = self.POLAR.format(named)
+            form = self.COORDINATES.format(named)
             raise self.refuse(key, value, f"must be a pair like {polar} {form}".strip())
         return (
             self.quantity(f"{key}[0]", value[0], unit),
@@ -277,12 +281,13 @@ def _suggest(word: object, names: list[str]) -> str:
     """Suggest the valid word that is nearest to one that is not, or means the same."""
     if isinstance(word, str) and _MEANT.get(word) in names:
         return f'did you mean "{_MEANT[word]}"? '
-    close = (
-        difflib.get_close_matches(word[:LONGEST_SHOWN], names, 1)
-        if isinstance(word, str)
-        else []
-    )
-    return f'did you mean "{close[0]}"? ' if close else ""
+    if isinstance(word, str):
+        close = difflib.get_close_matches(word[:LONGEST_SHOWN], names, 1)
+    else:
+        close = []
+    if close:
+        return f'did you mean "{close[0]}"? '
+    return ""
 
 
 def _join_key(key: str, name: str) -> str:

@@ -120,7 +120,10 @@ def load(path: str | Path | IO[str] | IO[bytes]) -> Scene:
 def _read_stream(stream: IO[str] | IO[bytes]) -> Scene:
     """Read the scene of an open file, text or bytes."""
     name = getattr(stream, "name", None)
-    shown = name if isinstance(name, str) else "stream"
+    if isinstance(name, str):
+        shown = name
+    else:
+        shown = "stream"
     content = stream.read(LARGEST_FILE + 1)
     if len(content) > LARGEST_FILE:
         raise InputError("scene file", shown, f"must not exceed {LARGEST_FILE} bytes")
@@ -180,7 +183,8 @@ def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
             f"cannot be read: {' '.join(reason.split())[:120]}",
             shown,
         )
-    line, column = int(place[1] or len(lines)), int(place[2] or len(lines[-1]) + 1)
+    line = int(place[1] or len(lines))
+    column = int(place[2] or len(lines[-1]) + 1)
     start = max(0, column - 1 - LONGEST_LINE // 2)
     value = lines[line - 1][start : start + LONGEST_LINE].strip()
     why = " ".join(reason[: place.start()].split())[:120]
@@ -210,7 +214,8 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
             "loads", entries, f"must be written as [[loads]], at most {_MOST_LOADS}"
         )
     effects = read.table("effects", top.get("effects", {}), list_kinds())
-    motion, linkage = top.get("motion", {}), _read_linkage(read, top)
+    motion = top.get("motion", {})
+    linkage = _read_linkage(read, top)
     if drawing is not None:
         line = None
         if isinstance(drive, LinearDrive):
@@ -267,7 +272,10 @@ def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
         )
     points = []
     for name, point in value.items():
-        key = f"points.{name}" if BARE_KEY.fullmatch(name) else "points"
+        if BARE_KEY.fullmatch(name):
+            key = f"points.{name}"
+        else:
+            key = "points"
         entry = read_table_with_place(read, key, point, ("bar", *STATED_PLACES))
         place = read_stated_place(read, key, entry, {})
         points.append(Point(name, place.bar, place.from_pin, place.from_centre))
@@ -368,7 +376,8 @@ def _read_motion(read: Reader, value: object) -> Motion:
                 entry[name],
                 f"{of_stroke[0]} commands a cylinder, and nothing else is",
             )
-        (place, speed, acceleration), unit = STROKE_COMMAND, "m"
+        place, speed, acceleration = STROKE_COMMAND
+        unit = "m"
         arguments["side"] = read.choice(
             "motion.side", entry.get("side"), ("left", "right")
         )
@@ -378,7 +387,8 @@ def _read_motion(read: Reader, value: object) -> Motion:
             if int(name[-1]) != bar:
                 allowed = f"{stated[0]} commands bar {bar}; one bar is commanded"
                 raise read.refuse(f"motion.{name}", entry[name], allowed)
-        (place, speed, acceleration), unit = COMMANDS[bar], "rad"
+        place, speed, acceleration = COMMANDS[bar]
+        unit = "rad"
     if place in entry or of_stroke:
         arguments[place] = _read_places(read, f"motion.{place}", entry.get(place), unit)
     if speed in entry:
@@ -442,7 +452,10 @@ def _read_places(
         return read.quantity(key, value, unit)
     if isinstance(value, list) and value:
         return np.array(read.quantities(key, value, unit))
-    from_limit = " or { limit, offset }" if unit == "rad" else ""
+    if unit == "rad":
+        from_limit = " or { limit, offset }"
+    else:
+        from_limit = ""
     if not isinstance(value, dict):
         like = "135 deg" if unit == "rad" else "1.5 m"
         raise read.refuse(
@@ -511,11 +524,10 @@ def _read_effect(
     if issubclass(kind, PinRows):
         rows = []
         for pin, entry in read.table(path, value, PINS).items():
-            stated = (
-                {"": entry}
-                if "" in kind.numbers
-                else read.table(f"{path}.{pin}", entry, kind.numbers)
-            )
+            if "" in kind.numbers:
+                stated = {"": entry}
+            else:
+                stated = read.table(f"{path}.{pin}", entry, kind.numbers)
             rows.append(
                 (pin, *read.numbers(f"{path}.{pin}", stated, kind.numbers).values())
             )
@@ -593,7 +605,8 @@ def _read_tolerances(
 
     The first is plus or minus, the second a standard deviation.
     """
-    entries, tolerances = list_entries(scene), []
+    entries = list_entries(scene)
+    tolerances = []
     for key, stated in _flatten(read, value).items():
         name = f'tolerances."{key}"'
         if key in COMMAND_KEYS:
@@ -607,7 +620,8 @@ def _read_tolerances(
             raise read.refuse(
                 name, stated, refuse_key(key, stated, list(entries)).allowed
             )
-        entry, sigma = entries[key], isinstance(stated, list)
+        entry = entries[key]
+        sigma = isinstance(stated, list)
         if sigma and (len(stated) != 2 or stated[1] != SIGMA):
             raise read.refuse(
                 name,

@@ -76,7 +76,8 @@ def dump(scene: Scene) -> str:
         for key, value in {"title": scene.title, "source": scene.source}.items()
         if value
     }
-    described, motion = describe(scene), _write_motion(scene.motion)
+    described = describe(scene)
+    motion = _write_motion(scene.motion)
     points = {
         point.name: {"bar": point.bar, **write_numbers(point)} for point in scene.points
     }
@@ -188,13 +189,18 @@ def describe(scene: Scene) -> dict[str, Any]:
 def _write_bar(bar: Bar) -> dict[str, Any]:
     if bar == Bar(bar.length):
         return {}
-    left_out = {"length"} if bar.density is None else {"length", "mass"}
+    if bar.density is None:
+        left_out = {"length"}
+    else:
+        left_out = {"length", "mass"}
     numbers = write_numbers(bar).items()
     return {name: text for name, text in numbers if name not in left_out}
 
 
 def _write_motion(motion: Motion) -> dict[str, Any]:
-    law, free, stated = motion.law, motion.free, motion.angle
+    law = motion.law
+    free = motion.free
+    stated = motion.angle
     theta, omega, alpha = motion.names
     unit = "rad" if motion.stroke is None else "m"
     angles: Any = None
@@ -290,7 +296,10 @@ def _write_effect(effect: Effect) -> Any:
             }
             rows[pin] = texts.get("", texts)
         return rows
-    bar = {"bar": effect.bar} if hasattr(effect, "bar") else {}
+    if hasattr(effect, "bar"):
+        bar = {"bar": effect.bar}
+    else:
+        bar = {}
     return {**bar, **write_numbers(effect)}
 
 
@@ -361,7 +370,8 @@ def _write_tolerances(scene: Scene) -> dict[str, Any]:
 
     Raises InputError for a tolerance that reading the file would refuse.
     """
-    entries, rows = list_entries(scene), dict[str, Any]()
+    entries = list_entries(scene)
+    rows = dict[str, Any]()
     for tolerance in scene.tolerances:
         if tolerance.key not in entries:
             raise InputError(

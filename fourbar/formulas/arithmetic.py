@@ -35,7 +35,9 @@ def is_any(mask: Number) -> bool:
     """
     if type(mask) is bool:
         return mask
-    return bool(mask) if isinstance(mask, PLAIN) else bool(mask.any())
+    if isinstance(mask, PLAIN):
+        return bool(mask)
+    return bool(mask.any())
 
 
 def is_zero(x: Number) -> Number:
@@ -102,7 +104,8 @@ def vector(x: Number, y: Number) -> Number:
         np.broadcast(x, y).shape,
         dtype=complex if kinds <= _DOUBLES else np.result_type(x, y, np.complex64),
     )
-    z.real, z.imag = x, y
+    z.real = x
+    z.imag = y
     return z[()]
 
 
@@ -115,12 +118,16 @@ def polar(r: Number, phi: Number) -> Number:
 
 def sine_of(x: Number) -> Number:
     """Compute sin x; a Python float gives a Python float."""
-    return math.sin(x) if type(x) is float else np.sin(x)
+    if type(x) is float:
+        return math.sin(x)
+    return np.sin(x)
 
 
 def angle(u: Number) -> Number:
     """Return the angle of a complex number, rad, in [-pi, pi]."""
-    return cmath.phase(u) if type(u) is complex else np.arctan2(u.imag, u.real)
+    if type(u) is complex:
+        return cmath.phase(u)
+    return np.arctan2(u.imag, u.real)
 
 
 def wrap_angle(x: Number) -> Number:
@@ -131,7 +138,9 @@ def wrap_angle(x: Number) -> Number:
 
 def tangent(x: Number) -> Number:
     """Compute tan x; a Python float gives a Python float."""
-    return np.tan(x).item() if type(x) is float else np.tan(x)
+    if type(x) is float:
+        return np.tan(x).item()
+    return np.tan(x)
 
 
 def square_root(x: Number) -> Number:
@@ -139,7 +148,9 @@ def square_root(x: Number) -> Number:
 
     A Python float gives a Python float where x >= 0.
     """
-    return math.sqrt(x) if type(x) is float and x >= 0.0 else np.sqrt(x)
+    if type(x) is float and x >= 0.0:
+        return math.sqrt(x)
+    return np.sqrt(x)
 
 
 def power_of_two(x: Number) -> Number:

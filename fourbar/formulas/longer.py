@@ -34,11 +34,9 @@ def lengthen(number: Number) -> Number:
     """Return a double, or an array of them, as a longer number."""
     if not HAS_LONG_DOUBLES:
         return Pair(np.asarray(number, dtype=float), 0.0)
-    return (
-        number.astype(np.longdouble)
-        if isinstance(number, np.ndarray)
-        else np.longdouble(number)
-    )
+    if isinstance(number, np.ndarray):
+        return number.astype(np.longdouble)
+    return np.longdouble(number)
 
 
 def shorten(number: Number) -> Number:
@@ -67,7 +65,9 @@ def change_numbers(value: Any, change: Callable[[Any], Any]) -> Any:
         return change(value)
     if isinstance(value, tuple):
         parts = [change_numbers(part, change) for part in value]
-        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+        if hasattr(value, "_fields"):
+            return type(value)(*parts)
+        return tuple(parts)
     if not _has_numbers(value.__class__):
         return value
     names = list_fields(value.__class__)
@@ -129,11 +129,9 @@ class Pair(NDArrayOperatorsMixin):
     ) -> Any:
         if function is np.where:
             return _choose(*args)
-        return (
-            function(args[0].high)
-            if function in (np.shape, np.ndim, np.iscomplexobj)
-            else NotImplemented
-        )
+        if function in (np.shape, np.ndim, np.iscomplexobj):
+            return function(args[0].high)
+        return NotImplemented
 
 
 def _choose(mask: Any, x: Any, y: Any) -> Any:
@@ -167,7 +165,8 @@ def _halve(x: Any) -> tuple[Any, Any]:
 
 def _multiply_real(x: Any, y: Any) -> Any:
     product = x.high * y.high
-    (a, b), (c, d) = _halve(x.high), _halve(y.high)
+    a, b = _halve(x.high)
+    c, d = _halve(y.high)
     lost = ((a * c - product) + a * d + b * c) + b * d
     return _renew(product, lost + (x.high * y.low + x.low * y.high))
 
@@ -220,11 +219,10 @@ def _turn(x: Any) -> tuple[Any, Any]:
         for k in range(last, 1, -2):
             total = 1.0 - square * total / float(k * (k - 1))
         sums.append(total)
-    sine, cosine = rest * sums[0], sums[1]
-    odd, turned = (
-        quarters % 2.0 == 1.0,
-        (quarters % 4.0 >= 2.0, (quarters + 1.0) % 4.0 >= 2.0),
-    )
+    sine = rest * sums[0]
+    cosine = sums[1]
+    odd = quarters % 2.0 == 1.0
+    turned = (quarters % 4.0 >= 2.0, (quarters + 1.0) % 4.0 >= 2.0)
     sine, cosine = _choose(odd, cosine, sine), _choose(odd, sine, cosine)
     return _choose(turned[0], -sine, sine), _choose(turned[1], -cosine, cosine)
 
@@ -242,7 +240,8 @@ def _find_size(x: Any) -> Any:
     unit = np.ldexp(
         1.0, np.frexp(np.abs(x.high))[1]
     )  # whose square stays in the range of doubles
-    along, across = x.real / unit, x.imag / unit
+    along = x.real / unit
+    across = x.imag / unit
     return _root(along * along + across * across) * unit
 
 

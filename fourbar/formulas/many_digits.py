@@ -64,7 +64,8 @@ def half_angle(
         ) / 2
         if bar == 4:
             h -= mp.pi / 2
-        s, k = mp.sin(h), mp.cos(h)
+        s = mp.sin(h)
+        k = mp.cos(h)
         lengths = loop(d, a, b, c)
         half = compute_factors(lengths, s * s, k * k, s * k)
         size = 2 * (a + b + c + d) * mp.sqrt(half.inner + (b - c) ** 2)
@@ -97,7 +98,8 @@ def decide_half_angles(
     `lost`: what a theta_2 that was computed leaves out as a double, rad; for the others
     see `half_angle`.
     """
-    flat, shape = np.ravel(theta_2), np.shape(theta_2)
+    flat = np.ravel(theta_2)
+    shape = np.shape(theta_2)
     left_out = np.broadcast_to(lost, shape).ravel().tolist()
     mask = np.zeros(flat.shape, dtype=bool)
     mask[index] = True
@@ -110,10 +112,8 @@ def decide_half_angles(
             high[row, i] = float(value)
             low[row, i] = float(value - high[row, i])
     *numbers, side = half
-    mask, rows = (
-        mask.reshape(shape),
-        zip(numbers, high.reshape(5, *shape), low.reshape(5, *shape), strict=True),
-    )
+    mask = mask.reshape(shape)
+    rows = zip(numbers, high.reshape(5, *shape), low.reshape(5, *shape), strict=True)
     decided = (
         np.where(mask, make_like(rounded, number) + rest, number)[()]
         for number, rounded, rest in rows

@@ -67,11 +67,9 @@ class Reach(NamedTuple):
     def sum(self, d: int, own: int, x: int, y: int) -> float:
         """Sum the lengths with these signs exactly, rounded once."""
         total = math.fsum((d * self.d, own * self.own, x * self.x, y * self.y))
-        return (
-            0.0
-            if abs(total) <= TOUCHING * (self.d + self.own + self.x + self.y)
-            else total
-        )
+        if abs(total) <= TOUCHING * (self.d + self.own + self.x + self.y):
+            return 0.0
+        return total
 
     @property
     def beyond_stretched(self) -> float:
@@ -81,7 +79,8 @@ class Reach(NamedTuple):
     @property
     def beyond_folded(self) -> float:
         """|x - y| - |d - l|: > 0 where folded bars stop bar k, 0 at a change point."""
-        p, q = (1 if self.x >= self.y else -1), (1 if self.d >= self.own else -1)
+        p = 1 if self.x >= self.y else -1
+        q = 1 if self.d >= self.own else -1
         return self.sum(-q, q, p, -p)
 
     def triangle(self, stretched: bool) -> tuple[float, float]:
@@ -94,8 +93,10 @@ class Reach(NamedTuple):
         and the same with d, e for d, l.
         """
         x, y = (1, 1) if stretched else (1, -1) if self.x >= self.y else (-1, 1)
-        short_d, short_l = self.sum(-1, 1, x, y), self.sum(1, -1, x, y)
-        short_e, perimeter = self.sum(1, 1, -x, -y), self.sum(1, 1, x, y)
+        short_d = self.sum(-1, 1, x, y)
+        short_l = self.sum(1, -1, x, y)
+        short_e = self.sum(1, 1, -x, -y)
+        perimeter = self.sum(1, 1, x, y)
         at_near = math.atan2(
             math.sqrt(short_d) * math.sqrt(short_l),
             math.sqrt(short_e) * math.sqrt(perimeter),
@@ -167,13 +168,13 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
             vectors = {bar: side * psi, others[0]: -side * eta, others[1]: -side * eta}
             if not stretched:
                 vectors[others[1] if reach.x >= reach.y else others[0]] += math.pi
-            psi_2, theta_3 = vectors[2] % TURN, theta_1 + vectors[3]
+            psi_2 = vectors[2] % TURN
+            theta_3 = theta_1 + vectors[3]
             theta_4 = theta_1 + vectors[4] + math.pi
-            branch = (
-                0
-                if bar == 2 or straight
-                else int(math.copysign(1.0, math.sin(theta_4 - theta_3)))
-            )
+            if bar == 2 or straight:
+                branch = 0
+            else:
+                branch = int(math.copysign(1.0, math.sin(theta_4 - theta_3)))
             limits.append(
                 LimitPosition(
                     theta_1 + psi_2, _wrap(theta_3), _wrap(theta_4), branch, stretched
@@ -192,14 +193,18 @@ def find_intervals(linkage: FourBar, bar: int = 2) -> tuple[tuple[float, float],
     """
     reach = reach_of(linkage, bar)
     start = linkage.ground_angle + (math.pi if bar == 4 else 0.0)
-    inner = reach.triangle(False)[0] if reach.beyond_folded > 0.0 else None
-    outer = reach.triangle(True)[0] if reach.beyond_stretched > 0.0 else None
+    if reach.beyond_folded > 0.0:
+        inner = reach.triangle(False)[0]
+    else:
+        inner = None
+    if reach.beyond_stretched > 0.0:
+        outer = reach.triangle(True)[0]
+    else:
+        outer = None
     if inner is None:
-        return (
-            ((start, start + TURN),)
-            if outer is None
-            else ((start - outer, start + outer),)
-        )
+        if outer is None:
+            return ((start, start + TURN),)
+        return ((start - outer, start + outer),)
     if outer is None:
         return ((start + inner, start + (TURN - inner)),)
     return (start + inner, start + outer), (
@@ -262,8 +267,10 @@ def change_points(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
     within the rounding of the lengths; likewise of the lengths as they are read from
     another bar, from bar 4 with the ground reversed.
     """
-    reach, theta_1 = reach_of(linkage, bar), linkage.ground_angle
-    folded, stretched = reach.beyond_folded == 0.0, reach.beyond_stretched == 0.0
+    reach = reach_of(linkage, bar)
+    theta_1 = linkage.ground_angle
+    folded = reach.beyond_folded == 0.0
+    stretched = reach.beyond_stretched == 0.0
     if bar == 4:
         folded, stretched = stretched, folded
     return (theta_1,) * folded + (theta_1 + math.pi,) * stretched
@@ -423,10 +430,8 @@ def classify(linkage: FourBar, within: float = TOUCHING) -> LinkageType:
     lengths = dict(
         zip(BAR_NAMES, (length / unit for length in linkage.lengths), strict=True)
     )
-    shortest, longest = (
-        min(lengths, key=lengths.__getitem__),
-        max(lengths, key=lengths.__getitem__),
-    )
+    shortest = min(lengths, key=lengths.__getitem__)
+    longest = max(lengths, key=lengths.__getitem__)
     perimeter = math.fsum(lengths.values())
 
     def balance(bar: int, partner: int) -> float:
@@ -434,7 +439,9 @@ def classify(linkage: FourBar, within: float = TOUCHING) -> LinkageType:
         total = math.fsum(
             length if k in (bar, partner) else -length for k, length in lengths.items()
         )
-        return 0.0 if abs(total) <= within * perimeter else total
+        if abs(total) <= within * perimeter:
+            return 0.0
+        return total
 
     # all bars equal: every bar is both, and any other one is its partner
     surplus = -balance(shortest, longest if longest != shortest else 4) * unit
@@ -465,11 +472,10 @@ def classify(linkage: FourBar, within: float = TOUCHING) -> LinkageType:
             return found(13, "S2X", PARALLELOGRAM)
         # d + b = a + c and d + c = a + b give d = a;
         # d + b = a + c and d + a = b + c give d = c
-        pairs = (
-            ("ground and input", "coupler and output")
-            if with_output
-            else ("ground and output", "input and coupler")
-        )
+        if with_output:
+            pairs = ("ground and input", "coupler and output")
+        else:
+            pairs = ("ground and output", "input and coupler")
         return found(13, "S2X", f"kite (equal: {pairs[0]}; {pairs[1]})")
     return found(
         8 + shortest, CHANGE_POINT[shortest], f"change-point {_GRASHOF[shortest][1]}"
@@ -503,7 +509,8 @@ def find_miss(linkage: FourBar) -> tuple[float, str] | None:
 
     None: by too much.
     """
-    meant, own = classify(linkage, _NEARLY), classify(linkage)
+    meant = classify(linkage, _NEARLY)
+    own = classify(linkage)
     if meant.name == own.name or meant.barker is None or meant.barker < 9:
         return None
     sums = [abs(math.fsum(map(mul, signs, linkage.lengths))) for signs in _EQUALITIES]

@@ -66,22 +66,25 @@ def coefficients(lengths: Loop, position: Position) -> Coefficients:
     """
     d, a, b, c, E1, E2 = lengths
     ss, kk, sk, outer, inner, _ = position.half
-    ad, per_e2, per_root = a * d, 1.0 / position.e2, 0.5 / position.root
-    x, y = (b - c) * (b + c), (d - a) * (d + a)
-    S, grown = (4.0 * ad) * sk, (2.0 * ad) * ss
+    ad = a * d
+    per_e2 = 1.0 / position.e2
+    per_root = 0.5 / position.root
+    x = (b - c) * (b + c)
+    y = (d - a) * (d + a)
+    S = (4.0 * ad) * sk
+    grown = (2.0 * ad) * ss
     g = S * per_root
     xg = x * g
     leaning = xg * per_e2
-    n, rest = (
-        (grown + a * (a - d)) * per_e2 + leaning,
-        (grown + d * (d - a)) * per_e2 - leaning,
-    )
+    n = (grown + a * (a - d)) * per_e2 + leaning
+    rest = (grown + d * (d - a)) * per_e2 - leaning
     w = (xg - 0.5 * y) * per_e2
     if is_any(_may_turn_fast(lengths)):
         fast = _find_fast_turns(lengths, position)
         heron = E2 * (d + a) * (d + a) * outer + E1 * (b - c) * (b - c) * (2.0 * grown)
         w = select(fast, -heron * per_root / (x * S + y * position.root), w)
-        n, rest = select(fast, 0.5 + w, n), select(fast, 0.5 - w, rest)
+        n = select(fast, 0.5 + w, n)
+        rest = select(fast, 0.5 - w, rest)
     dg = ((2.0 * ad * E2) * kk / inner - (2.0 * ad * E1) * ss / outer) * per_root
     dn = (x * dg - S * w) * per_e2
     return Coefficients(1.0, n - g, n + g, rest + g, 2.0 * g, 0.0, dn - dg, dn + dg)
@@ -115,11 +118,10 @@ def take_sines_of_rates(lengths: Loop, position: Position, k: Coefficients) -> P
     d, _, b, c, _, _ = lengths
     if not is_any(_may_turn_fast(lengths)):
         return position
-    fast, scale = _find_fast_turns(lengths, position), position.sin_mu / d
-    u3, u4 = (
-        position.u3 * position.u1.conjugate(),
-        position.u4 * position.u1.conjugate(),
-    )
+    fast = _find_fast_turns(lengths, position)
+    scale = position.sin_mu / d
+    u3 = position.u3 * position.u1.conjugate()
+    u4 = position.u4 * position.u1.conjugate()
     u3 = select(
         fast, vector(u3.real, c * scale * (k.h23 - k.h43)) * position.u1, position.u3
     )
@@ -143,11 +145,10 @@ def put_parallel_pairs(k: Coefficients, first: Number, second: Number) -> Coeffi
     h3, h4 = 0, 1 where `first`; 1, 0 where `second`.
     """
     either = first | second
-    h3, h4 = np.where(either, 1.0 * second, k.h3), np.where(either, 1.0 * first, k.h4)
-    h23, h43 = (
-        np.where(either, 1.0 * first, k.h23),
-        np.where(either, 1.0 * first - 1.0 * second, k.h43),
-    )
+    h3 = np.where(either, 1.0 * second, k.h3)
+    h4 = np.where(either, 1.0 * first, k.h4)
+    h23 = np.where(either, 1.0 * first, k.h23)
+    h43 = np.where(either, 1.0 * first - 1.0 * second, k.h43)
     return Coefficients(
         k.h2,
         h3,
@@ -177,7 +178,9 @@ def rates(k: Coefficients, speed: Number, acceleration: Number) -> Rates:
     The speed q' is in rad/s, the acceleration q'' in rad/s^2.
     """
     square = speed * speed
-    alpha_2, alpha_3, alpha_4 = k.dh2 * square, k.dh3 * square, k.dh4 * square
+    alpha_2 = k.dh2 * square
+    alpha_3 = k.dh3 * square
+    alpha_4 = k.dh4 * square
     if is_any(acceleration != 0.0):
         alpha_2 = alpha_2 + k.h2 * acceleration
         alpha_3 = alpha_3 + k.h3 * acceleration
@@ -292,7 +295,9 @@ class State(NamedTuple):
     def point_coefficient(self, bar: int, z: Number) -> Number:
         """Compute the derivative of a bar's point z by the independent angle, m/rad."""
         turned = (1j * self.coefficient(bar)) * (z * self.direction(bar))
-        return turned + (1j * self.k.h2) * self.foot(3) if bar == 3 else turned
+        if bar == 3:
+            return turned + (1j * self.k.h2) * self.foot(3)
+        return turned
 
     def velocity(self, bar: int, z: Number) -> Number:
         """Compute the velocity of a bar's point z, m/s."""

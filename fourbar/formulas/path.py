@@ -150,9 +150,12 @@ class Path(NamedTuple):
         d, a, b, c, _, _ = self.lengths
         ss, kk, sk, _, inner, _ = half
         root = signed_root(half, branch)
-        at_A, at_O4 = inner + 2.0 * b * (b - c), 2.0 * c * (b - c) - inner
-        x, y = (d - a) * kk + (d + a) * ss, (-2.0 * a) * sk
-        along, across = x * root, y * root
+        at_A = inner + 2.0 * b * (b - c)
+        at_O4 = 2.0 * c * (b - c) - inner
+        x = (d - a) * kk + (d + a) * ss
+        y = (-2.0 * a) * sk
+        along = x * root
+        across = y * root
         theta_3 = np.arctan2(along + y * at_A, x * at_A - across)
         theta_4 = np.arctan2(along + y * at_O4, x * at_O4 - across)
         if np.any(self.theta_1):
@@ -160,7 +163,8 @@ class Path(NamedTuple):
                 np.remainder(np.pi - theta - self.theta_1, 2.0 * np.pi)
                 for theta in (theta_3, theta_4)
             )
-            theta_3, theta_4 = np.pi - theta_3, np.pi - theta_4
+            theta_3 = np.pi - theta_3
+            theta_4 = np.pi - theta_4
         return theta_3, theta_4, root
 
     def close(
@@ -203,11 +207,9 @@ class Path(NamedTuple):
             first, second = find_parallel_pairs(self.lengths, branch)
             regular = ~np.isnan(position.root)
             k = parallel_motion(k, first & regular, second & regular)
-        return (
-            (position, k)
-            if self.bar == 2
-            else (self.in_order(position), _read_from(self.bar, k))
-        )
+        if self.bar == 2:
+            return (position, k)
+        return (self.in_order(position), _read_from(self.bar, k))
 
     def in_order(self, position: Position) -> Position:
         """Put the bars in their usual order; the triangle stays that of the reading."""
@@ -244,11 +246,9 @@ class Path(NamedTuple):
             return drive_sine(position, drive_bar)
         role = ROLES[self.bar][drive_bar - 2]
         if role == 2:
-            return (
-                position.sin_mu
-                if self.bar == 2
-                else position.root * (0.5 / (self.lengths.b * self.lengths.c))
-            )
+            if self.bar == 2:
+                return position.sin_mu
+            return position.root * (0.5 / (self.lengths.b * self.lengths.c))
         sine = drive_sine_of_triangle(self.lengths, position, role)
         if self.may_stay_parallel:  # all bars make one angle, whose sine is exact
             assembly = np.sign(position.root) * np.sign(position.half.sk)
@@ -268,10 +268,8 @@ def prepare_path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
     """Prepare the path in the angle of bar 2, 3 or 4."""
     d, a, b, c, _, _ = lengths
     unit = power_of_two(0.25 * (d + a + b + c))
-    reordered, u1 = (
-        loop(*reorder_lengths(bar, (d / unit, a / unit, b / unit, c / unit))),
-        polar(1.0, theta_1),
-    )
+    reordered = loop(*reorder_lengths(bar, (d / unit, a / unit, b / unit, c / unit)))
+    u1 = polar(1.0, theta_1)
     passing = find_passing(reordered)
     meets = is_any(passing.outer & passing.inner)
     if bar == 4:
@@ -368,8 +366,6 @@ def _read_from(bar: int, k: Coefficients) -> Coefficients:
         return Coefficients(
             k.h3, k.h2, k.h4, -k.h23, k.h43 - k.h23, k.dh3, k.dh2, k.dh4
         )
-    return (
-        Coefficients(k.h4, k.h3, k.h2, k.h43, k.h23, k.dh4, k.dh3, k.dh2)
-        if bar == 4
-        else k
-    )
+    if bar == 4:
+        return Coefficients(k.h4, k.h3, k.h2, k.h43, k.h23, k.dh4, k.dh3, k.dh2)
+    return k

@@ -53,9 +53,12 @@ class Wrenches(NamedTuple):
 
     def on(self, bar: int) -> tuple[Number, Number]:
         """Return the force and the moment on bar 2, 3 or 4."""
-        moment = (
-            self.M2 if bar == 2 else self.M3 - self.C if bar == 3 else self.M4 + self.C
-        )
+        if bar == 2:
+            moment = self.M2
+        elif bar == 3:
+            moment = self.M3 - self.C
+        else:
+            moment = self.M4 + self.C
         return self[bar - 2], moment
 
 
@@ -114,7 +117,9 @@ def coupler_about_B(
     `sine`: of theta_3 - theta_2.
     """
     w2, w3, _, alpha_2, alpha_3, _ = moving
-    x, y, cosine = three.z.real - lengths.b, three.z.imag, dot(position.u2, position.u3)
+    x = three.z.real - lengths.b
+    y = three.z.imag
+    cosine = dot(position.u2, position.u3)
     of_A = lengths.a * (
         w2 * w2 * (x * sine + y * cosine) + alpha_2 * (x * cosine - y * sine)
     )
@@ -179,10 +184,8 @@ def pin_forces(
     d, a, b, c, _, _ = lengths
     R2, R3, R4, M2, M3, M4, C = w
     of_3 = M3 - C
-    along, across = (
-        mass_at_A.real,
-        mass_at_A.imag,
-    )  # bar 2; separate, because a sum of both loses digits
+    along = mass_at_A.real
+    across = mass_at_A.imag  # bar 2; separate, because a sum of both loses digits
     if drive_bar == 4:
         F32 = solve_between(-M2 / a, moment_of_F32 / b, position.u2, position.u3, sine)
         F43 = solve_between(

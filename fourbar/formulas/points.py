@@ -99,7 +99,8 @@ def instant_centres(
     here = _compute_state(linkage, theta_2, branch)
     position = here.position
     O4 = linkage.ground * position.u1 + 0.0 * position.u2
-    A, B = here.foot(3), here.point(4, linkage.output.length)
+    A = here.foot(3)
+    B = here.point(4, linkage.output.length)
     return locate_centres(O4, A, B, position.u1, position.u2, position.u3, position.u4)
 
 
@@ -113,7 +114,8 @@ def locate_centres(
     one = np.ones(np.shape(A))
     pins = {(1, 2): 0.0 * A, (2, 3): A, (3, 4): B, (1, 4): O4}
     centres = {bars: Centre(pin.real, pin.imag, one) for bars, pin in pins.items()}
-    I13, I24 = cross(O4, u4) * u2, cross(A, u3) * u1
+    I13 = cross(O4, u4) * u2
+    I24 = cross(A, u3) * u1
     centres[1, 3] = Centre(I13.real, I13.imag, sine(u2, u4))
     centres[2, 4] = Centre(I24.real, I24.imag, sine(u1, u3))
     return centres
@@ -173,7 +175,8 @@ def coupler_curve(
     )
     theta_2, assembly, turns = list_circuit(linkage, circuit, branch, steps)
     curve = compute_state(linkage, theta_2, assembly).point(3, point)
-    x, y = curve.real, curve.imag
+    x = curve.real
+    y = curve.imag
     path = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle)
     signs = path.sign(theta_2, assembly).astype(np.int8)
     theta_2 = np.append(theta_2, theta_2[0] + turns * TURN)
@@ -194,7 +197,10 @@ def list_circuit(
     branch = branch if branch in branches else branches[0]
     half = np.arange(0.5, steps, dtype=np.float64)
     if turns_fully(linkage):
-        turns = 2 if len(change_points(linkage)) == 1 else 1
+        if len(change_points(linkage)) == 1:
+            turns = 2
+        else:
+            turns = 1
         # odd halves of a multiple of 4 never meet theta_1 or theta_1 + pi
         theta_2: Array = start + half * (turns * TURN / steps)
         return theta_2, np.full(theta_2.shape, branch), turns
@@ -208,10 +214,8 @@ def list_circuit(
 def _compute_state(linkage: FourBar, theta_2: object, branch: object) -> State:
     """Compute the state at positions given by a user, after checking them."""
     expect("linkage", linkage, FourBar)
-    angles, signs = (
-        require_numbers("theta_2", theta_2),
-        require_numbers("branch", branch, A_BRANCH),
-    )
+    angles = require_numbers("theta_2", theta_2)
+    signs = require_numbers("branch", branch, A_BRANCH)
     if not (np.abs(signs) == 1.0).all() or signs.shape not in ((), angles.shape):
         raise InputError("branch", branch, f"{A_BRANCH}, or one of them for each angle")
     return compute_state(linkage, angles, signs)

@@ -120,7 +120,11 @@ def reorder_lengths(
     The order is ground, the bar itself, coupler and output.
     """
     d, a, b, c = lengths
-    return (d, b, a, c) if bar == 3 else (d, c, b, a) if bar == 4 else (d, a, b, c)
+    if bar == 3:
+        return (d, b, a, c)
+    if bar == 4:
+        return (d, c, b, a)
+    return (d, a, b, c)
 
 
 def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
@@ -133,14 +137,19 @@ def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
     >>> loop(0.3, 0.1, 0.3, 0.1).E1  # a parallelogram, which has change points
     0.0
     """
-    as_c, as_b, as_d = _are_equal(c, a), _are_equal(b, a), _are_equal(a, d)
+    as_c = _are_equal(c, a)
+    as_b = _are_equal(b, a)
+    as_d = _are_equal(a, d)
     if is_any(as_c | as_b | as_d):  # the input is as long as another bar
         parallelogram = as_c & _are_equal(b, d)
         kite_at_B = as_b & _are_equal(c, d)
         kite_at_A = as_d & _are_equal(c, b)
-        b, c = _replace(b, d, parallelogram), _replace(c, a, parallelogram)
-        b, c = _replace(b, a, kite_at_B), _replace(c, d, kite_at_B)
-        a, c = _replace(a, d, kite_at_A), _replace(c, b, kite_at_A)
+        b = _replace(b, d, parallelogram)
+        c = _replace(c, a, parallelogram)
+        b = _replace(b, a, kite_at_B)
+        c = _replace(c, d, kite_at_B)
+        a = _replace(a, d, kite_at_A)
+        c = _replace(c, b, kite_at_A)
     lengths = d, a, b, c
     E1 = _vanish(exact_difference(b, c, a, d), lengths) * (a + b + c + d)
     E2 = _vanish(exact_difference(d, c, a, b), lengths, d - a)
@@ -150,7 +159,8 @@ def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
 
 def _are_equal(length: Number, other: Number) -> Number:
     """Mark lengths that are equal within their rounding."""
-    difference, rounding = length - other, 2.0 * TOUCHING * other
+    difference = length - other
+    rounding = 2.0 * TOUCHING * other
     return difference * difference <= rounding * rounding
 
 
@@ -171,7 +181,8 @@ def _vanish(
     part of a bar, or of the least length of the diagonal, d - a.
     """
     d, a, b, c = lengths
-    square, rounding = difference * difference, TOUCHING * (d + a + b + c)
+    square = difference * difference
+    rounding = TOUCHING * (d + a + b + c)
     touching = square <= rounding * rounding
     if not is_any(touching):
         return difference
@@ -210,15 +221,22 @@ def half_angle(
     to O2. `passing`: roots that pass through zero with their sign; left out: those of
     the lengths.
     """
-    passing = find_passing(lengths) if passing is None else passing
+    if passing is None:
+        passing = find_passing(lengths)
     t = tangent(0.5 * psi)
-    collinear = passing.outer if opposite else passing.inner
+    if opposite:
+        collinear = passing.outer
+    else:
+        collinear = passing.inner
     if is_any(collinear):
         t = select(collinear, t + np.copysign(_TINY_TANGENT, t), t)
     kk = 1.0 / (1.0 + t * t)
     sk = t * kk
     ss = t * sk
-    squares = (kk, ss, -sk) if opposite else (ss, kk, sk)
+    if opposite:
+        squares = (kk, ss, -sk)
+    else:
+        squares = (ss, kk, sk)
     side = find_side(psi, passing, opposite=opposite)
     return compute_factors(lengths, *squares, side)
 
@@ -251,8 +269,10 @@ def compute_factors(
     lengths: Loop, ss: Number, kk: Number, sk: Number, side: Number = 1.0
 ) -> HalfAngle:
     """Compute the factors of Heron's formula from sin^2 h, cos^2 h and sin h cos h."""
-    four_ad, four_bc = 4.0 * lengths.a * lengths.d, 4.0 * lengths.b * lengths.c
-    outer, inner = lengths.E1 + four_ad * kk, lengths.E2 + four_ad * ss
+    four_ad = 4.0 * lengths.a * lengths.d
+    four_bc = 4.0 * lengths.b * lengths.c
+    outer = lengths.E1 + four_ad * kk
+    inner = lengths.E2 + four_ad * ss
     short = four_ad > four_bc
     if is_any(
         short
@@ -301,9 +321,11 @@ def close_loop(
     diagonal = vector((d - a) * unit + twice_a * half.ss, -twice_a * half.sk) * u1
     # e^2 + b^2 - c^2 and b^2 - e^2 - c^2 use the factor in the root, so that u3 and u4
     # keep their length
-    at_A, at_O4 = half.inner + 2.0 * b * (b - c), 2.0 * c * (b - c) - half.inner
+    at_A = half.inner + 2.0 * b * (b - c)
+    at_O4 = 2.0 * c * (b - c) - half.inner
     part = (0.5 / unit) / e2
-    to_3, to_4 = (1.0 / b) * part, (1.0 / c) * part
+    to_3 = (1.0 / b) * part
+    to_4 = (1.0 / c) * part
     u3 = diagonal * vector(at_A * to_3, root * to_3)
     u4 = diagonal * vector(at_O4 * to_4, root * to_4)
     return Position(u1, u2, u3, u4, root * (0.5 / (b * c)), diagonal, e2, root, half)

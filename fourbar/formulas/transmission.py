@@ -76,14 +76,19 @@ def transmission_extremes(linkage: FourBar) -> TransmissionExtremes:
 
     at e = |d - a| and e = d + a.
     """
-    reach, theta_1 = reach_of(linkage), linkage.ground_angle
+    reach = reach_of(linkage)
+    theta_1 = linkage.ground_angle
     sign = 1 if reach.d >= reach.own else -1
-    least, at_least = _angle_at_B(reach, sign, -sign), theta_1
-    greatest, at_greatest = _angle_at_B(reach, 1, 1), theta_1 + math.pi
+    least = _angle_at_B(reach, sign, -sign)
+    at_least = theta_1
+    greatest = _angle_at_B(reach, 1, 1)
+    at_greatest = theta_1 + math.pi
     if reach.beyond_folded > 0.0:
-        least, at_least = 0.0, theta_1 + reach.triangle(False)[0]
+        least = 0.0
+        at_least = theta_1 + reach.triangle(False)[0]
     if reach.beyond_stretched > 0.0:
-        greatest, at_greatest = math.pi, theta_1 + reach.triangle(True)[0]
+        greatest = math.pi
+        at_greatest = theta_1 + reach.triangle(True)[0]
     return TransmissionExtremes(least, greatest, at_least, at_greatest)
 
 

@@ -75,7 +75,8 @@ def assemble(
     linkage = scene.linkage
     require_carriable(linkage)
     inertia = {number: linkage.bar(number).moment_of_inertia for number in MOVING_BARS}
-    gravity, dynamics = (0.0, 0.0), dict[str, dict[str, float]]()
+    gravity = (0.0, 0.0)
+    dynamics = dict[str, dict[str, float]]()
     effect: Any
     for effect in scene.effects:
         if effect.key == "gravity":
@@ -92,10 +93,8 @@ def assemble(
     theta_3 = theta_2 + of_3_to_2
     foot = {1: 0j, 2: 0j, 3: cmath.rect(linkage.input.length, theta_2)}
     foot[4] = cmath.rect(linkage.ground, linkage.ground_angle)
-    turn, numbers = (
-        {1: 0.0, 2: theta_2, 3: theta_3, 4: theta_4},
-        (theta_2, theta_3, theta_4, *speeds),
-    )
+    turn = {1: 0.0, 2: theta_2, 3: theta_3, 4: theta_4}
+    numbers = (theta_2, theta_3, theta_4, *speeds)
     return Assembly(turn, foot, numbers, inertia, gravity, dynamics)
 
 
@@ -108,8 +107,12 @@ def _write_comment(
     plane: Plane = LEVEL,
 ) -> str:
     """Say in what state the file stands, and where its reader's numbers are."""
-    notes, bar = NOTES["assembled"], scene.drive_bar
-    joint = f", joint {FIRST_PIN[bar]}" if bar != 3 else ""
+    notes = NOTES["assembled"]
+    bar = scene.drive_bar
+    if bar != 3:
+        joint = f", joint {FIRST_PIN[bar]}"
+    else:
+        joint = ""
     lines = [
         notes["opens"]
         .strip()
@@ -121,7 +124,8 @@ def _write_comment(
     ]
     if plane.is_moved:
         axes = ", ".join(f"({write_rounded(*axis)})" for axis in plane.rotation.T)
-        origin, gravity = plane.origin, plane.turn(*assembly.gravity)
+        origin = plane.origin
+        gravity = plane.turn(*assembly.gravity)
         tilted = notes["tilted"].strip()
         lines.append(
             tilted.format(axes=axes, origin=join(*origin), gravity=join(*gravity))
@@ -174,7 +178,10 @@ def write_sdf(
         "sdf",
         {"version": "1.9", **({"xmlns:drake": DRAKE} if reader == "drake" else {})},
     )
-    at_B = f", joint B {omega_2 + at_A - omega_4!r} rad/s" if reader == "gazebo" else ""
+    if reader == "gazebo":
+        at_B = f", joint B {omega_2 + at_A - omega_4!r} rad/s"
+    else:
+        at_B = ""
     for line in _write_comment(
         scene, "SDF", reader, assembled, at_B, plane
     ).splitlines():
@@ -207,7 +214,8 @@ def write_sdf(
             BAR_NAMES[number],
             dynamics.get(pin, {}),
         )
-    length_3, length_4 = linkage.coupler.length, linkage.output.length
+    length_3 = linkage.coupler.length
+    length_4 = linkage.output.length
     if reader == "gazebo":
         joint = _add_joint(
             model, "B", "revolute", BAR_NAMES[4], BAR_NAMES[3], dynamics.get("B", {})
@@ -323,7 +331,8 @@ def write_usd(
             "O4": foot[4],
         }[pin]
         relative = turn[follower] - turn[one]
-        on_first, turn_on_first = (*_split(on_one), 0.0), LEVEL.turn_on(relative)
+        on_first = (*_split(on_one), 0.0)
+        turn_on_first = LEVEL.turn_on(relative)
         if one == 1:  # the world, whose axes are not the plane's
             on_first = plane.place(*_split(on_one))
             turn_on_first = plane.turn_on(relative)
@@ -341,7 +350,10 @@ def write_usd(
 """)
     comment = _write_comment(scene, "USD", "newton", assembled, plane=plane)
     notes = json.dumps(comment)
-    down = plane.turn(x / pull, y / pull) if pull else (0.0, -1.0, 0.0)
+    if pull:
+        down = plane.turn(x / pull, y / pull)
+    else:
+        down = (0.0, -1.0, 0.0)
     return f"""#usda 1.0
 (
     doc = {notes}

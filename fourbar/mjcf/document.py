@@ -222,7 +222,10 @@ def _size_control(scene: Scene) -> float:
     """
     motion = scene.motion.replace(speed=scene.motion.speed or 0.0)
     solution = solve(replace(scene, motion=motion), "force")
-    driving = solution.torque if scene.drive is None else solution.drive_force
+    if scene.drive is None:
+        driving = solution.torque
+    else:
+        driving = solution.drive_force
     sizes = np.abs(np.asarray(driving))
     largest = float(sizes[np.isfinite(sizes)].max(initial=0.0))
     if not largest:
@@ -235,7 +238,9 @@ def _write_comments(
     scene: Scene, drive: Drive, reader: str, *, exerts: bool
 ) -> list[str]:
     """Say how the file starts and where its numbers stand, a line each."""
-    notes, numbers, bar = NOTES["mjcf"], NOTES["numbers"][reader], scene.drive_bar
+    notes = NOTES["mjcf"]
+    numbers = NOTES["numbers"][reader]
+    bar = scene.drive_bar
     lines: list[str] = [
         notes.get(f"{reader}_{kind}", notes[kind]).format(bar=bar)
         for kind in ("opens", *_list_kinds(scene, drive))
@@ -313,7 +318,9 @@ def compute_load_ratio(scene: Scene) -> float:
     It relates loads and weights to the inertia of the bars.
     """
     inertia = _sum_inertia(scene.linkage)
-    return _sum_load_inertia(scene) / inertia if inertia else math.inf
+    if inertia:
+        return _sum_load_inertia(scene) / inertia
+    return math.inf
 
 
 def _leave_out_flywheel(scene: Scene, settings: Settings) -> Settings:
@@ -349,7 +356,9 @@ def fit_pad(scene: Scene) -> float:
     acceleration = (
         _compute_acceleration_scale(scene) * a / max(b, c)
     )  # of bars 3 and 4, by its size
-    return least_sag if acceleration < QUICK else min(_STIFF_PAD, least_sag)
+    if acceleration < QUICK:
+        return least_sag
+    return min(_STIFF_PAD, least_sag)
 
 
 def compute_mass_ratio(linkage: FourBar) -> float:
@@ -361,7 +370,9 @@ def compute_mass_ratio(linkage: FourBar) -> float:
         (bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) / bar.length**2
         for bar in (linkage.coupler, linkage.output)
     ]
-    return max(masses) / min(masses) if min(masses) > 0.0 else 1.0
+    if min(masses) > 0.0:
+        return max(masses) / min(masses)
+    return 1.0
 
 
 def _compute_acceleration_scale(scene: Scene) -> float:
@@ -413,7 +424,10 @@ class WindowMotion:
     def __init__(self, start: float, stop: float, omega: float, alpha: float) -> None:
         if (stop - start) * omega < 0.0:
             raise ValueError("the input turns away from the end of its window")
-        self.start, self.stop, self.omega, self.alpha = start, stop, omega, alpha
+        self.start = start
+        self.stop = stop
+        self.omega = omega
+        self.alpha = alpha
 
     @property
     def fastest(self) -> float:
@@ -455,11 +469,10 @@ class WindowMotion:
         # at the greatest speed throughout: an input that speeds up covers the end of
         # its window in few steps
         width = abs(self.stop - self.start)
-        window = (
-            settings.steps_per_window * duration * self.fastest / width
-            if 0.0 < width < FULL_TURN
-            else 1.0
-        )
+        if 0.0 < width < FULL_TURN:
+            window = settings.steps_per_window * duration * self.fastest / width
+        else:
+            window = 1.0
         # a window of 628 steps per revolution must not become one more by a rounding
         steps = max(math.ceil(max(per_revolution, window) * (1.0 - 1e-9)), at_least)
         return duration / steps * settings.timestep_scale
@@ -478,12 +491,11 @@ def choose_run(theta_2: Array, omega: float, alpha: float) -> WindowMotion:
 
     It is counter-clockwise from the least, or clockwise from the greatest.
     """
-    least, most = float(np.min(theta_2)), float(np.max(theta_2))
-    return (
-        WindowMotion(least, most, omega, alpha)
-        if omega > 0.0
-        else WindowMotion(most, least, omega, alpha)
-    )
+    least = float(np.min(theta_2))
+    most = float(np.max(theta_2))
+    if omega > 0.0:
+        return WindowMotion(least, most, omega, alpha)
+    return WindowMotion(most, least, omega, alpha)
 
 
 def find_start(scene: Scene) -> Start:
@@ -595,7 +607,10 @@ def make_scene(
     title = f"four-bar {ground!r} {input!r} {coupler!r} {output!r}"
     # half a turn from the ground's line would start a parallelogram in its change point
     quarter = linkage.ground_angle + math.pi / 2.0
-    start = quarter if turns_fully(linkage) else 0.5 * sum(choose_range(linkage))
+    if turns_fully(linkage):
+        start = quarter
+    else:
+        start = 0.5 * sum(choose_range(linkage))
     return Scene(linkage, Motion(start, omega), title=title)
 
 

@@ -94,9 +94,12 @@ def compute_frame(linkage: FourBar) -> _CameraView:
     No position leaves it.
     """
     d, a, _, c = linkage.lengths
-    x, y = d * math.cos(linkage.ground_angle), d * math.sin(linkage.ground_angle)
-    left, right = min(-a, x - c), max(a, x + c)
-    low, high = min(-a, y - c), max(a, y + c)
+    x = d * math.cos(linkage.ground_angle)
+    y = d * math.sin(linkage.ground_angle)
+    left = min(-a, x - c)
+    right = max(a, x + c)
+    low = min(-a, y - c)
+    high = max(a, y + c)
     half = MARGIN * max(0.5 * (high - low), 0.5 * (right - left) / _ASPECT)
     return _CameraView(0.5 * (left + right), 0.5 * (low + high), half)
 
@@ -208,11 +211,9 @@ def make_constant_motor(force: float) -> dict[str, str]:
 
     There is none if the force is 0.
     """
-    return (
-        {**_UNCONTROLLED, "joint": "O2", "biasprm": join(force, 0.0, 0.0)}
-        if force
-        else {}
-    )
+    if force:
+        return {**_UNCONTROLLED, "joint": "O2", "biasprm": join(force, 0.0, 0.0)}
+    return {}
 
 
 def make_servo(gain: float, omega: float) -> dict[str, str]:
@@ -253,12 +254,14 @@ def require_carriable(linkage: FourBar) -> None:
     The error says which mass it carries.
     """
     heaviest = max(linkage.bar(number).mass for number in MOVING_BARS)
-    enough = max(_A_MILLIONTH * heaviest, 2.0 * FLOOR) if heaviest else ALONE
-    part = (
-        "a millionth of the heaviest bar's"
-        if heaviest
-        else "which all bars can have where loads alone act"
-    )
+    if heaviest:
+        enough = max(_A_MILLIONTH * heaviest, 2.0 * FLOOR)
+    else:
+        enough = ALONE
+    if heaviest:
+        part = "a millionth of the heaviest bar's"
+    else:
+        part = "which all bars can have where loads alone act"
     for number in MOVING_BARS:
         bar = linkage.bar(number)
         for key, value, unit in (
@@ -283,7 +286,8 @@ class Model:
     """
 
     def __init__(self, linkage: FourBar, settings: Settings, timestep: float) -> None:
-        self.linkage, self.settings = linkage, settings
+        self.linkage = linkage
+        self.settings = settings
         self.option: dict[str, Iterable[float]] = {"gravity": (0.0, 0.0, 0.0)}
         self.timestep = timestep
         self.pin: dict[str, dict[str, float | tuple[float, ...]]] = {
@@ -317,7 +321,8 @@ class Model:
     @property
     def O4(self) -> tuple[float, float]:
         """The fixed pin O4, m."""
-        d, theta_1 = self.linkage.ground, self.linkage.ground_angle
+        d = self.linkage.ground
+        theta_1 = self.linkage.ground_angle
         return (d * math.cos(theta_1), d * math.sin(theta_1))
 
     @property
@@ -377,7 +382,8 @@ class Model:
 
         Bars 3 and 4 end in the sites that the loop's closure joins.
         """
-        bar, pin = self.linkage.bar(number), FIRST_PIN[number]
+        bar = self.linkage.bar(number)
+        pin = FIRST_PIN[number]
         body = ET.SubElement(parent, "body", name=BAR_NAMES[number], pos=join(*at, 0.0))
         if self.rest is not None:
             angle = self.rest[number - 2]
@@ -427,8 +433,12 @@ class Model:
         self, body: ET.Element, number: int, length: float, z: float
     ) -> None:
         """Add a bar's shape: for the eye only, without mass and without contact."""
-        theta = self.linkage.ground_angle if number == 1 else 0.0
-        cos, sin = math.cos(theta), math.sin(theta)
+        if number == 1:
+            theta = self.linkage.ground_angle
+        else:
+            theta = 0.0
+        cos = math.cos(theta)
+        sin = math.sin(theta)
         shape = {
             "name": BAR_NAMES[number],
             "type": "capsule",
@@ -441,7 +451,8 @@ class Model:
 
     def add_closure(self, root: ET.Element) -> None:
         """Close the loop at B."""
-        s, pair = self.settings, {"name": "B", "site1": "B3", "site2": "B4"}
+        s = self.settings
+        pair = {"name": "B", "site1": "B3", "site2": "B4"}
         solref = join(s.time_constant_steps * self.timestep, 1.0)
         solimp = join(s.impedance, s.impedance, 0.001, 0.5, 2.0)
         ET.SubElement(
@@ -529,7 +540,10 @@ class Model:
             return
         actuators = ET.SubElement(root, "actuator")
         if drive:
-            name = CYLINDER if drive.get("tendon") == CYLINDER else "drive"
+            if drive.get("tendon") == CYLINDER:
+                name = CYLINDER
+            else:
+                name = "drive"
             ET.SubElement(actuators, "general", drive, name=name)
         if cylinder:
             ET.SubElement(actuators, "general", name=CYLINDER, tendon=CYLINDER)
@@ -551,10 +565,8 @@ class Model:
             fx = fy = 0.0
             couple = load.moment
             if load.force is not None:
-                fx, fy = (
-                    load.force[0] * math.cos(load.force[1]),
-                    load.force[0] * math.sin(load.force[1]),
-                )
+                fx = load.force[0] * math.cos(load.force[1])
+                fy = load.force[0] * math.sin(load.force[1])
                 if load.arm is not None:
                     # force and arm both keep their direction, and so their moment
                     arm, angle = load.arm

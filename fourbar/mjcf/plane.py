@@ -110,12 +110,15 @@ class Plane:
 
         A drawing has O2 there.
         """
-        return Plane(self.axis, self.place(x, y)) if x or y else self
+        if x or y:
+            return Plane(self.axis, self.place(x, y))
+        return self
 
     def turn_on(self, angle: float) -> tuple[float, float, float, float]:
         """Return the quaternion of a body that is turned in the plane (rad)."""
         w, x, y, z = self.quaternion
-        cos, sin = math.cos(0.5 * angle), math.sin(0.5 * angle)
+        cos = math.cos(0.5 * angle)
+        sin = math.sin(0.5 * angle)
         return (
             w * cos - z * sin,
             x * cos + y * sin,
@@ -128,7 +131,8 @@ class Plane:
 
         Ground, gravity, light and camera move.
         """
-        option, statistic = root.find("option"), root.find("statistic")
+        option = root.find("option")
+        statistic = root.find("statistic")
         assert option is not None
         assert statistic is not None
         gravity = _read_numbers(option.get("gravity", "0 0 0"))

@@ -172,7 +172,10 @@ def find_unit(text: object, otherwise: str) -> str:
     """Return the unit that a text has; another one where it has none."""
     last = _FEET.sub("", str(text).strip())  # the inches of 1'6"
     number_text = _FRACTION.match(last) or NUMBER.match(last)
-    unit = last[number_text.end() :].strip() if number_text else ""
+    if number_text:
+        unit = last[number_text.end() :].strip()
+    else:
+        unit = ""
     unit = re.sub('[″”"]', "in", re.sub("[′’']", "ft", unit))
     return unit or otherwise
 
@@ -183,7 +186,10 @@ def find_rounding(text: object, unit: str) -> float:
     It is 0 for a number without decimals.
     """
     last = _FEET.sub("", str(text).strip())
-    number_text = None if _FRACTION.match(last) else NUMBER.match(last)
+    if _FRACTION.match(last):
+        number_text = None
+    else:
+        number_text = NUMBER.match(last)
     if number_text is None:
         return 0.0
     digits, _, power = number_text[0].lower().partition("e")

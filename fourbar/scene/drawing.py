@@ -63,7 +63,8 @@ class DrawnPins:
     def vector(self, bar: int) -> complex:
         """Return the vector of a bar, from its first pin to its second, m."""
         first, second = ENDS[bar]
-        (x, y), (to_x, to_y) = self.place(first), self.place(second)
+        x, y = self.place(first)
+        to_x, to_y = self.place(second)
         return complex(to_x - x, to_y - y)
 
     def length(self, bar: int) -> float:

@@ -34,7 +34,8 @@ from fourbar.linkage import (
 )
 from fourbar.quantities import Array
 
-OPEN, CROSSED = 1, -1
+OPEN = 1
+CROSSED = -1
 BRANCH_NAMES = {OPEN: "open", CROSSED: "crossed"}
 FASTEST = math.sqrt(sys.float_info.max)
 """Largest speed, rad/s. The square of a greater one is beyond the range of a double,
@@ -255,7 +256,8 @@ class Law(_OverTime):
                 f"SciPy is needed for a motion law: {say_install('studies')}"
             ) from None
         time = require_numbers("time", time)
-        t, angle = np.array(self.time), np.array(self.angle)
+        t = np.array(self.time)
+        angle = np.array(self.angle)
         mean = 0.0
         if self.ends == "periodic":
             # what is periodic is the departure from the mean speed
@@ -275,8 +277,10 @@ def _compute_law(kind: str, u: Array) -> tuple[Array, Array, Array]:
     """
     v = 1.0 - u
     if kind == "cycloidal":
-        near, rises = np.minimum(u, v), u <= v
-        sine, cosine = np.sin(TURN * near), np.cos(TURN * near)
+        near = np.minimum(u, v)
+        rises = u <= v
+        sine = np.sin(TURN * near)
+        cosine = np.cos(TURN * near)
         place = near - sine / TURN
         return (
             np.where(rises, place, 1.0 - place),
@@ -350,7 +354,8 @@ class Rise(_OverTime):
     def at(self, time: Array) -> tuple[Array, Array, Array]:
         """Compute angle, speed and acceleration of the law's bar, each (n,)."""
         time = require_numbers("time", time)
-        (angle, duration), first = self.rise, getattr(self, f"theta_{self.bar}")
+        angle, duration = self.rise
+        first = getattr(self, f"theta_{self.bar}")
         place, speed, acceleration = _part(self.kind, time, duration)
         if self.fall is not None:
             late = time - (duration + self.dwell)
@@ -377,13 +382,13 @@ def _read_number(name: str, place: int) -> Any:
 
     It is None (an acceleration: 0) if the command has another name.
     """
-    field, otherwise = (
-        ("angle", "speed", "acceleration")[place],
-        0.0 if place == 2 else None,
-    )
+    field = ("angle", "speed", "acceleration")[place]
+    otherwise = 0.0 if place == 2 else None
 
     def read(motion: "Motion") -> Any:
-        return getattr(motion, field) if name == motion.names[place] else otherwise
+        if name == motion.names[place]:
+            return getattr(motion, field)
+        return otherwise
 
     return property(
         read, doc=f"The {field} if {name} is commanded, otherwise {otherwise}."
@@ -483,7 +488,8 @@ class Motion:
         }
         stated = _find_bar("motion", angles)
         bar = (stated or 2) if law is None else law.bar
-        names, numbers = COMMANDS[bar], angles[bar]
+        names = COMMANDS[bar]
+        numbers = angles[bar]
         if stroke is not None or side is not None or stroke_speed is not None:
             if (
                 stroke is None
@@ -496,10 +502,8 @@ class Motion:
                     stroke,
                     "is commanded alone: no angle, law or release besides",
                 )
-            names, numbers = (
-                STROKE_COMMAND,
-                (_require_strokes(stroke), stroke_speed, stroke_acceleration),
-            )
+            names = STROKE_COMMAND
+            numbers = (_require_strokes(stroke), stroke_speed, stroke_acceleration)
             if side not in SIDES:
                 raise InputError(
                     "motion.side",
@@ -588,14 +592,19 @@ class Motion:
 
         They are those of bar 2, 3 or 4, or of the stroke.
         """
-        return STROKE_COMMAND if self.commanded == "stroke" else COMMANDS[self.bar]
+        if self.commanded == "stroke":
+            return STROKE_COMMAND
+        return COMMANDS[self.bar]
 
 
 def _require_strokes(stroke: Any) -> Any:
     """Return the strokes, checked; InputError for what is no length above zero."""
     if not isinstance(stroke, Sweep):
         stroke = require_numbers("motion.stroke", stroke, "must be finite lengths", "m")
-    ends = (stroke.start, stroke.stop) if isinstance(stroke, Sweep) else stroke
+    if isinstance(stroke, Sweep):
+        ends = (stroke.start, stroke.stop)
+    else:
+        ends = stroke
     if not np.all(np.asarray(ends) > 0.0):
         raise InputError("motion.stroke", stroke, "must be above 0 m")
     return stroke
@@ -615,7 +624,10 @@ def _require_command(
         if angles.size == 0:
             raise InputError(f"motion.{theta}", angle, "must be one angle or more")
         angles.flags.writeable = False
-        angle = float(angles) if angles.ndim == 0 else angles
+        if angles.ndim == 0:
+            angle = float(angles)
+        else:
+            angle = angles
     if speed is not None:
         speed = require(f"motion.{omega}", speed, per_second)
         if not math.isfinite(speed * speed):

@@ -141,9 +141,16 @@ def find_unit(key: str) -> str | None:
         numbers = {**STATED_PLACES, "direction": Declared("rad")}
     elif table == "effects" and names and (kind := effects.list_kinds().get(names[0])):
         numbers = {**kind.numbers, "gravity": effects.Gravity.numbers["magnitude"]}
-    part = names.pop() if names and names[-1] in ("0", "1") else ""
+    if names and names[-1] in ("0", "1"):
+        part = names.pop()
+    else:
+        part = ""
     stated = numbers.get(names[-1] if names else "", numbers.get(""))
-    return None if stated is None else "rad" if part == "1" else stated.unit
+    if stated is None:
+        return None
+    if part == "1":
+        return "rad"
+    return stated.unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,9 +184,13 @@ class Tolerance:
     @property
     def deviation(self) -> float:
         """Standard deviation."""
-        return self.width if self.sigma else self.width / math.sqrt(3.0)
+        if self.sigma:
+            return self.width
+        return self.width / math.sqrt(3.0)
 
     @property
     def reach(self) -> float:
         """The largest change that a worst case counts with."""
-        return _THREE_SIGMA * self.width if self.sigma else self.width
+        if self.sigma:
+            return _THREE_SIGMA * self.width
+        return self.width

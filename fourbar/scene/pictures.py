@@ -47,7 +47,10 @@ class Picture:
     def __post_init__(self) -> None:
         object.__setattr__(self, "bar", require_bar("picture.bar", self.bar))
         expect("picture.folder", self.folder, str, Path)
-        parts = self.name.split("/") if isinstance(self.name, str) else []
+        if isinstance(self.name, str):
+            parts = self.name.split("/")
+        else:
+            parts = []
         plain = all(
             part not in ("", ".", "..") and not set(part) & set('\\:*?"<>|')
             for part in parts
@@ -84,7 +87,8 @@ class Picture:
 
         Raises InputError where it does not lie in that folder.
         """
-        file, target = Path(self.folder).resolve() / self.name, folder.resolve()
+        file = Path(self.folder).resolve() / self.name
+        target = folder.resolve()
         if not file.is_relative_to(target):
             raise InputError(
                 self.key,

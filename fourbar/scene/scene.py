@@ -124,11 +124,10 @@ class Scene:
         if len(set(names)) < len(names):
             raise InputError("points", names, "each point has a name of its own")
         if self.drive is None:
-            bar = (
-                2
-                if self.drive_bar is None
-                else require_bar("drive.bar", self.drive_bar)
-            )
+            if self.drive_bar is None:
+                bar = 2
+            else:
+                bar = require_bar("drive.bar", self.drive_bar)
             object.__setattr__(self, "drive_bar", bar)
         else:
             self._require_force_drive(self.drive)
@@ -177,7 +176,10 @@ class Scene:
         NotAssembledError : there is no position to draw.
         DependencyError : matplotlib is missing.
         """
-        options = {} if units is None else {"units": units}
+        if units is None:
+            options = {}
+        else:
+            options = {"units": units}
         return load_show("plot").draw_figure(
             self,
             figure,
@@ -253,7 +255,9 @@ class Scene:
     @property
     def origin(self) -> tuple[float, float]:
         """Return the place of O2 in the coordinates that places are shown in, m."""
-        return (0.0, 0.0) if self.drawing is None else self.drawing.O2
+        if self.drawing is None:
+            return (0.0, 0.0)
+        return self.drawing.O2
 
     @property
     def counts_turns(self) -> bool:
@@ -344,7 +348,9 @@ class Command(NamedTuple):
     @property
     def commanded(self) -> str:
         """Name of what is commanded: the angle, or the stroke."""
-        return COMMANDS[self.bar][0] if self.stroke is None else STROKE_COMMAND[0]
+        if self.stroke is None:
+            return COMMANDS[self.bar][0]
+        return STROKE_COMMAND[0]
 
     @property
     def places(self) -> Array:
@@ -352,7 +358,10 @@ class Command(NamedTuple):
 
         They are times if a law commands them.
         """
-        places = self.angle if self.stroke is None else self.stroke
+        if self.stroke is None:
+            places = self.angle
+        else:
+            places = self.stroke
         return places if self.time is None else self.time
 
     def part(self, index: Any) -> "Command":
@@ -446,11 +455,13 @@ class _Triangle(NamedTuple):
         )
         far = exact_difference(length, reach, stroke, zero) * (length + reach + stroke)
         with np.errstate(all="ignore"):
-            near, far = np.sqrt(near), np.sqrt(far)
+            near = np.sqrt(near)
+            far = np.sqrt(far)
             beta = 2.0 * np.arctan2(near, far)
             lever = near * far / (2.0 * stroke)
             longer = 0.5 * (length + reach + abs(length - reach))
-            theta, condition = self.angle + sign * beta, lever / longer
+            theta = self.angle + sign * beta
+            condition = lever / longer
             if speed is None:
                 return theta, None, np.zeros(np.shape(theta)), condition
             rate = speed / lever
@@ -470,7 +481,8 @@ def _find_triangle(linkage: FourBar, drive: "ForceDrive | None") -> _Triangle:
     """
     from fourbar.effects.linear_drive import LinearDrive
 
-    bars, drives = set[int](), "no cylinder"
+    bars = set[int]()
+    drives = "no cylinder"
     if isinstance(drive, LinearDrive):
         bars = {drive.start.bar, drive.end.bar}
         drives = f"one from bar {drive.start.bar} to bar {drive.end.bar}"
@@ -484,14 +496,13 @@ def _find_triangle(linkage: FourBar, drive: "ForceDrive | None") -> _Triangle:
         (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
     )
     if moving.bar == 2:  # points of the ground are polar about O2
-        reach, towards = (
-            abs(fixed.distance),
-            fixed.angle + linkage.ground_angle + _reverse(fixed),
-        )
+        reach = abs(fixed.distance)
+        towards = fixed.angle + linkage.ground_angle + _reverse(fixed)
     else:
         end = polar(fixed.distance, fixed.angle + linkage.ground_angle)
         across = end - polar(linkage.ground, linkage.ground_angle)
-        reach, towards = abs(across), angle(across)
+        reach = abs(across)
+        towards = angle(across)
     return _Triangle(
         moving.bar,
         abs(moving.distance),
@@ -514,20 +525,20 @@ def default_places(scene: Scene, holding: float | None = None) -> Array:
     """
     steps = DEFAULT_STEPS
     if scene.motion.stroke is not None:
-        triangle, half = (
-            _find_triangle(scene.linkage, scene.settled_drive()),
-            0.5 * np.array([MARGIN, np.pi - MARGIN]),
-        )
+        triangle = _find_triangle(scene.linkage, scene.settled_drive())
+        half = 0.5 * np.array([MARGIN, np.pi - MARGIN])
         twice_mean = 2.0 * np.sqrt(triangle.length * triangle.reach)
         first, last = np.hypot(
             triangle.length - triangle.reach, twice_mean * np.sin(half)
         ).tolist()
     else:
-        linkage, bar = scene.linkage, scene.motion.bar
+        linkage = scene.linkage
+        bar = scene.motion.bar
         first, last = choose_range(linkage, bar, holding)
         if turns_fully(linkage, bar):
             turns = int(count_turns(linkage.lengths, bar))
-            last, steps = first + turns * (last - first), turns * DEFAULT_STEPS
+            last = first + turns * (last - first)
+            steps = turns * DEFAULT_STEPS
     return np.linspace(first, last, steps + 1)
 
 
@@ -598,10 +609,8 @@ def command_at(scene: Scene, places: Array) -> Command:
     motion, bar = scene.motion, scene.motion.bar
     if motion.stroke is not None:
         triangle = _find_triangle(scene.linkage, scene.settled_drive())
-        least, most = (
-            abs(triangle.length - triangle.reach),
-            triangle.length + triangle.reach,
-        )
+        least = abs(triangle.length - triangle.reach)
+        most = triangle.length + triangle.reach
         inside = (places >= least) & (places <= most)
         if not inside.all():
             stroke = float(places[np.argmin(inside)])
@@ -637,16 +646,21 @@ def command(scene: Scene) -> Command:
     """List the positions that the scene's motion names, each with its branch."""
     expect("scene", scene, Scene)
     motion, linkage, bar = scene.motion, scene.linkage, scene.motion.bar
-    stated, remainder = motion.angle, None
+    stated = motion.angle
+    remainder = None
     if motion.law is not None:
         places = motion.law.times()
     elif stated is None:
-        drawn = None if scene.drawing is None else scene.drawing.angle(bar)
+        if scene.drawing is None:
+            drawn = None
+        else:
+            drawn = scene.drawing.angle(bar)
         places = default_places(scene, drawn)
     elif isinstance(stated, Sweep):
         places = np.linspace(stated.start, stated.stop, stated.steps + 1)
     elif isinstance(stated, FromLimit):
-        key, limits = f"motion.theta_{bar}.limit", find_limit_angles(linkage, bar)
+        key = f"motion.theta_{bar}.limit"
+        limits = find_limit_angles(linkage, bar)
         if not limits:
             raise InputError(
                 key,
@@ -665,4 +679,6 @@ def command(scene: Scene) -> Command:
     else:
         places = np.array(stated, dtype=float, ndmin=1)
     commanded = command_at(scene, places)
-    return commanded if remainder is None else commanded._replace(remainder=remainder)
+    if remainder is None:
+        return commanded
+    return commanded._replace(remainder=remainder)

@@ -97,11 +97,10 @@ def collect_page_data(
         str(number): picture
         for number, picture in _encode_pictures(scene, pictures).items()
     }
-    spreads = (
-        collect_tolerances(scene, data["over"]["values"] or data["theta_2"])
-        if scene.tolerances
-        else None
-    )
+    if scene.tolerances:
+        spreads = collect_tolerances(scene, data["over"]["values"] or data["theta_2"])
+    else:
+        spreads = None
     try:
         text = dump(scene)
     except InputError:  # a file has no form of what acts
@@ -124,12 +123,12 @@ def collect_live_data(
     `signs`: the branches of a sweep; left out: the scene's. `stage`: the last one
     evaluated; left out: as of `solve`.
     """
-    linkage, motion = scene.linkage, scene.motion
-    shown = (
-        _collect_motion(scene, stage)
-        if is_over_time(scene)
-        else _collect_sweep(scene, signs or (motion.branch,), stage)
-    )
+    linkage = scene.linkage
+    motion = scene.motion
+    if is_over_time(scene):
+        shown = _collect_motion(scene, stage)
+    else:
+        shown = _collect_sweep(scene, signs or (motion.branch,), stage)
     closes = np.isfinite(shown["branches"][str(motion.branch)]["theta_3"])
     if not closes.any():
         raise NotAssembledError(
@@ -194,18 +193,21 @@ def _collect_sweep(
 ) -> dict[str, Any]:
     """Collect both branches over theta_2, or over another commanded quantity."""
     motion = scene.motion
-    swept, commanded = list_sweep(scene), command(scene)
-    thinned, start, name = thin_out(swept), None, swept.commanded
+    swept = list_sweep(scene)
+    commanded = command(scene)
+    thinned = thin_out(swept)
+    start = None
+    name = swept.commanded
     if len(commanded.angle) == 1:
-        away = (
-            np.angle(np.exp(1j * (thinned.angle - commanded.angle[0])))
-            if commanded.stroke is None
-            else thinned.places - commanded.places
-        )
+        if commanded.stroke is None:
+            away = np.angle(np.exp(1j * (thinned.angle - commanded.angle[0])))
+        else:
+            away = thinned.places - commanded.places
         start = int(np.argmin(np.abs(away)))
     elif (drawn := find_drawn_place(scene)) is not None:
         start = int(np.argmin(np.abs(thinned.places - drawn)))
-    theta_2, branches = thinned.angle, {}
+    theta_2 = thinned.angle
+    branches = {}
     for sign in signs if name == "theta_2" else (motion.branch,):
         one = set_branch(scene, sign)
         solution = solve(one, stage, at=command_at(one, thinned.places))
@@ -231,7 +233,10 @@ def _over(
 
     Its numbers are given where it is not theta_2.
     """
-    shown = None if name == "theta_2" else values.tolist()
+    if name == "theta_2":
+        shown = None
+    else:
+        shown = values.tolist()
     return {"name": name, "commanded": commanded, "values": shown, "speed": speed}
 
 
@@ -275,11 +280,9 @@ def _collect_motion(scene: Scene, stage: str | None) -> dict[str, Any]:
 def thin_out(positions: Command) -> Command:
     """Take at most `MAX_ROWS` of the positions, evenly, both ends included."""
     n = len(positions.angle)
-    return (
-        positions
-        if n <= MAX_ROWS
-        else positions.part(np.round(np.linspace(0, n - 1, MAX_ROWS)).astype(int))
-    )
+    if n <= MAX_ROWS:
+        return positions
+    return positions.part(np.round(np.linspace(0, n - 1, MAX_ROWS)).astype(int))
 
 
 def _choose_rate(duration: float) -> float:
@@ -292,11 +295,9 @@ def _choose_rate(duration: float) -> float:
     shortest, longest = _WATCHED
     if duration < shortest:
         return float(10.0 ** math.floor(math.log10(duration / shortest)))
-    return (
-        float(10.0 ** math.ceil(math.log10(duration / longest)))
-        if duration > longest
-        else 1.0
-    )
+    if duration > longest:
+        return float(10.0 ** math.ceil(math.log10(duration / longest)))
+    return 1.0
 
 
 def _describe_pace(motion: Solution, rate: float, shown: int) -> str:
@@ -394,7 +395,8 @@ def write(
     NotAssembledError : the linkage assembles at none of the scene's positions.
     DependencyError : a film without matplotlib, or MP4 without ffmpeg.
     """
-    target, kind = Path(path), format_of(path, FORMATS)
+    target = Path(path)
+    kind = format_of(path, FORMATS)
     if kind == "html":
         write_text(target, write_page(scene, pictures or {}, units, vectors))
         return
@@ -424,9 +426,11 @@ def write_page(
             folder.joinpath(name).read_text(encoding="utf-8") for name in names
         )
 
-    style, script = asset("page.css"), asset(*_SCRIPTS)
+    style = asset("page.css")
+    script = asset(*_SCRIPTS)
     if live:
-        style, script = style + asset("edit.css"), script + asset(*_LIVE_SCRIPTS)
+        style = style + asset("edit.css")
+        script = script + asset(*_LIVE_SCRIPTS)
     return Template(asset("page.html")).substitute(
         title=html.escape(shorten_text(scene.title, 200) or "Four-bar linkage"),
         source=html.escape(shorten_text(scene.source, 400)),

@@ -89,14 +89,22 @@ class _Block:
     """The facts of a scene and the units that they are written in."""
 
     def __init__(self, facts: Facts, units: Conversion) -> None:
-        self.facts, self.units = facts, units
-        self.digits = POSITION_DIGITS if facts.kind == "position" else DIGITS
+        self.facts = facts
+        self.units = units
+        if facts.kind == "position":
+            self.digits = POSITION_DIGITS
+        else:
+            self.digits = DIGITS
         self.longest = max(facts.scene.linkage.lengths)
         if facts.kind in ("law", "released"):
-            self.symbol, self.unit = "t", "s"
+            self.symbol = "t"
+            self.unit = "s"
         else:
             self.symbol = facts.solution.commanded
-            self.unit = "rad" if facts.solution.at.stroke is None else "m"
+            if facts.solution.at.stroke is None:
+                self.unit = "rad"
+            else:
+                self.unit = "m"
 
     def write(self, pressure: float | None, *, headed: bool = True) -> list[str]:
         """Write all paragraphs; a blank line parts them. `headed`: with the linkage."""
@@ -164,8 +172,12 @@ class _Block:
         Of a motion over time it writes the time too.
         """
         one = self.facts.solution
-        name, unit = one.commanded, "rad" if one.at.stroke is None else "m"
-        place = one.at.angle if one.at.stroke is None else one.at.stroke
+        name = one.commanded
+        unit = "rad" if one.at.stroke is None else "m"
+        if one.at.stroke is None:
+            place = one.at.angle
+        else:
+            place = one.at.stroke
         text = f"at {name} = {self._value(float(place[0]), unit)}"
         if one.time is None:
             return text
@@ -187,24 +199,36 @@ class _Block:
         text = self._value(
             place, self.unit, {"m": self.longest, "s": 1.0}.get(self.unit)
         )
-        return f"{self.symbol}{_TIED}={_TIED}{text}" if named else text
+        if named:
+            return f"{self.symbol}{_TIED}={_TIED}{text}"
+        return text
 
     def _angle(self, angle: float) -> str:
         return self._value(0.0 if abs(angle) < _NO_ANGLE else angle, "rad")
 
     def _write_head(self) -> list[str]:
         """Write what the linkage is."""
-        name, lengths = f"{self._name_linkage()}:", self._write_lengths()
+        name = f"{self._name_linkage()}:"
+        lengths = self._write_lengths()
         line = f"{name} {lengths}"
-        lines = [line] if len(line) <= WIDTH else [name, f"    {lengths}"]
+        if len(line) <= WIDTH:
+            lines = [line]
+        else:
+            lines = [name, f"    {lengths}"]
         return [*lines, *self._write_change_points()]
 
     def _name_linkage(self) -> str:
         """Name the linkage by its type, its title and its branch."""
         scene, motion = self.facts.scene, self.facts.scene.motion
         name = name_assembly(scene.linkage, motion.bar, motion.branch)
-        title = f' "{clean_line(scene.title)}"' if scene.title else ""
-        of_bar = "" if motion.bar == 2 else f" of the command {motion.commanded}"
+        if scene.title:
+            title = f' "{clean_line(scene.title)}"'
+        else:
+            title = ""
+        if motion.bar == 2:
+            of_bar = ""
+        else:
+            of_bar = f" of the command {motion.commanded}"
         branch = f"{BRANCH_NAMES[motion.branch]} branch{of_bar}"
         return f"{name[0].upper()}{name[1:]}{title}, {branch}"
 
@@ -271,7 +295,8 @@ class _Block:
 
         If there is none, write how nearly there would be one.
         """
-        linkage, motion = self.facts.scene.linkage, self.facts.scene.motion
+        linkage = self.facts.scene.linkage
+        motion = self.facts.scene.motion
         if (miss := find_miss(linkage)) is not None:
             gap = self._value(miss[0], "m")
             return [f"misses a {miss[1]} by {gap}: it has no change point"]
@@ -301,7 +326,8 @@ class _Block:
         If the output is commanded, it is the input.
         """
         facts = self.facts
-        bar, (first, last) = facts.solution.at.bar, facts.commanded
+        bar = facts.solution.at.bar
+        first, last = facts.commanded
         if facts.kind == "turn":
             begin = f"{BAR_NAMES[bar]} turns fully"
         elif facts.kind == "list":
@@ -317,12 +343,18 @@ class _Block:
                 f" {write_digits(last - first)} s"
             )
         else:
-            name = "stroke" if self.unit == "m" else BAR_NAMES[bar]
+            if self.unit == "m":
+                name = "stroke"
+            else:
+                name = BAR_NAMES[bar]
             begin = (
                 f"{name} from {self._place(first, named=False)} to"
                 f" {self._place(last, named=False)}"
             )
-        following = [2, 4] if facts.kind == "released" else [4 if bar != 4 else 2]
+        if facts.kind == "released":
+            following = [2, 4]
+        else:
+            following = [4 if bar != 4 else 2]
         return "; ".join(
             [
                 begin,
@@ -352,7 +384,8 @@ class _Block:
         )
 
     def _write_release(self) -> str:
-        free, solution = self.facts.scene.motion.free, self.facts.solution
+        free = self.facts.scene.motion.free
+        solution = self.facts.solution
         assert free is not None
         begin = f"released for {write_digits(free.duration)} s, without a drive"
         if not solution.change_points:
@@ -370,16 +403,14 @@ class _Block:
             return []
         parts = []
         for low, high in facts.stretches:
-            start = (
-                ""
-                if low is None
-                else f"from {self._place(low, named=self.unit != 'm')}"
-            )
-            stop = (
-                ""
-                if high is None
-                else f"up to {self._place(high, named=self.unit != 'm')}"
-            )
+            if low is None:
+                start = ""
+            else:
+                start = f"from {self._place(low, named=self.unit != 'm')}"
+            if high is None:
+                stop = ""
+            else:
+                stop = f"up to {self._place(high, named=self.unit != 'm')}"
             parts.append(f"{start} {stop}".strip())
         grows = ""
         if facts.drive is not None and facts.drive.keys.value in facts.between.growing:
@@ -399,12 +430,16 @@ class _Block:
         facts = self.facts
         if facts.drive is None or facts.peak is None:
             return []
-        drive, duty = facts.drive, facts.duty
+        drive = facts.drive
+        duty = facts.duty
         lines = [self._write_drive_head()]
         word = "force" if facts.linear else "torque"
         row = self._value(self._without_rounding(facts.peak.value), drive.unit)
         if duty is not None:
-            rms = duty.rms_force if facts.linear else duty.rms_torque
+            if facts.linear:
+                rms = duty.rms_force
+            else:
+                rms = duty.rms_torque
             beyond = self._beyond(drive.keys.value)
             row = (
                 f"peak {row} at {self._place(facts.peak.place)}{beyond}, RMS"
@@ -416,11 +451,10 @@ class _Block:
                 self._value(value, drive.unit, max(map(abs, facts.held)))
                 for value in facts.held
             )
-            holds = (
-                "dry friction holds it between them"
-                if facts.duty is None
-                else "the range where dry friction holds"
-            )
+            if facts.duty is None:
+                holds = "dry friction holds it between them"
+            else:
+                holds = "the range where dry friction holds"
             lines.append(self._row("at rest", f"{low} to {high}: {holds}"))
         if facts.stroke_range is not None:
             lines += self._write_stroke()
@@ -444,7 +478,8 @@ class _Block:
 
         At a change point an error bar is less.
         """
-        solution, bars = self.facts.solution, self.facts.scene.linkage.moving
+        solution = self.facts.solution
+        bars = self.facts.scene.linkage.moving
         inertial = 0.0
         for number, bar in zip(MOVING_BARS, bars, strict=True):
             a_G = getattr(solution, f"a_G{number}")
@@ -456,10 +491,15 @@ class _Block:
         """Write power and energy of the drive, and what a motor must have."""
         facts, duty, power = self.facts, self.facts.duty, self.facts.solution.power
         if duty is None:
-            one = float(power[0]) if power is not None else 0.0
+            if power is not None:
+                one = float(power[0])
+            else:
+                one = 0.0
             if facts.peak is not None and not self._without_rounding(facts.peak.value):
                 one = 0.0
-            return [self._row("power", self._value(one, "W"))] if one else []
+            if one:
+                return [self._row("power", self._value(one, "W"))]
+            return []
         if not duty.peak_power > 0.0:
             return []
         peak = self._value(duty.peak_power, "W")
@@ -469,12 +509,18 @@ class _Block:
             and duty.energy_in is not None
             and duty.energy_out is not None
         ):
-            over = "over the motion" if facts.kind == "law" else "over the sweep"
+            if facts.kind == "law":
+                over = "over the motion"
+            else:
+                over = "over the sweep"
             if facts.kind == "turn":
                 turns = round(
                     abs(facts.commanded[1] - facts.commanded[0]) / (2.0 * math.pi)
                 )
-                over = "per turn" if turns == 1 else f"in {turns} turns"
+                if turns == 1:
+                    over = "per turn"
+                else:
+                    over = f"in {turns} turns"
             most = max(duty.energy_in, duty.energy_out)
             forward, back = (
                 self._value(energy, "J", most)
@@ -503,12 +549,17 @@ class _Block:
         if scene.drive is None:
             head = f"drive on the {BAR_NAMES[scene.drive_bar]}"
         if motion.speed is None:
-            return head if motion.law is None else f"{head}, by a law over time"
+            if motion.law is None:
+                return head
+            return f"{head}, by a law over time"
         si = "rad/s" if motion.stroke is None else "m/s"
         drives = motion.stroke is not None or (
             scene.drive is None and scene.drive_bar == motion.bar
         )
-        speed = "at rest" if motion.speed == 0.0 else self._value(motion.speed, si)
+        if motion.speed == 0.0:
+            speed = "at rest"
+        else:
+            speed = self._value(motion.speed, si)
         if not drives:
             speed = (
                 f"the {BAR_NAMES[motion.bar]}"
@@ -522,12 +573,16 @@ class _Block:
 
     def _write_stroke(self) -> list[str]:
         """Write the stroke, over what it assembles, and its speed."""
-        facts, lines = self.facts, list[str]()
+        facts = self.facts
+        lines = list[str]()
         assert facts.stroke_range is not None
         low, high = (
             self._value(x.value, "m", self.longest) for x in facts.stroke_range
         )
-        row = low if facts.kind == "position" else f"{low} to {high}"
+        if facts.kind == "position":
+            row = low
+        else:
+            row = f"{low} to {high}"
         if facts.stroke_limits is not None:
             ends = (self._value(x, "m", self.longest) for x in facts.stroke_limits)
             row += "; assembles from {} to {}".format(*ends)
@@ -551,10 +606,8 @@ class _Block:
         """Write the bore that pushes, and the area that pulls, at a pressure."""
         values = self.facts.between.bounded(LINE.value).drive_force
         assert values is not None
-        push, pull = (
-            max(0.0, float(np.nanmax(values))),
-            max(0.0, -float(np.nanmin(values))),
-        )
+        push = max(0.0, float(np.nanmax(values)))
+        pull = max(0.0, -float(np.nanmin(values)))
         parts = []
         if push:
             bore = math.sqrt(4.0 * push / (math.pi * pressure))
@@ -565,7 +618,9 @@ class _Block:
                 f"{self._value(bore, 'm')}, and the rod's area besides, to pull"
                 f" {self._value(pull, 'N')}"
             )
-        return [self._row("bore", f"at least {'; '.join(parts)}")] if parts else []
+        if parts:
+            return [self._row("bore", f"at least {'; '.join(parts)}")]
+        return []
 
     def _write_pins(self) -> list[str]:
         """Write the loads of the four pins, side by side."""
@@ -583,11 +638,9 @@ class _Block:
                 ("  RMS", means),
             ]
         )
-        return (
-            [*lines, "  peak and RMS are those of these positions"]
-            if facts.kind == "list"
-            else lines
-        )
+        if facts.kind == "list":
+            return [*lines, "  peak and RMS are those of these positions"]
+        return lines
 
     def _write_bending(self) -> list[str]:
         """Write the largest bending moment of each bar.
@@ -638,7 +691,9 @@ class _Block:
 
     def _beyond(self, name: str) -> str:
         """Write that a peak is that of the positions, where it is."""
-        return " (of these positions)" if self._is_rough(name) else ""
+        if self._is_rough(name):
+            return " (of these positions)"
+        return ""
 
     def _is_rough(self, name: str) -> bool:
         """Tell whether a peak is that of the positions alone.
@@ -655,7 +710,8 @@ class _Block:
 
         It writes what rounding does too.
         """
-        facts, lines = self.facts, list[str]()
+        facts = self.facts
+        lines = list[str]()
         pins = [
             pin
             for pin, name in zip(facts.pins, PIN_FORCES, strict=False)
@@ -678,7 +734,10 @@ class _Block:
                 "of these instants"
             )
         if facts.between.reversals:
-            unit = "rad" if facts.solution.at.stroke is None else "m"
+            if facts.solution.at.stroke is None:
+                unit = "rad"
+            else:
+                unit = "m"
             places = ", ".join(  # of a motion law too by its angle, not by its time
                 f"{self._value(place, unit, self.longest if unit == 'm' else None)}"
                 f" ({pin})"
@@ -691,13 +750,15 @@ class _Block:
         lines += self._warn()
         lines += list_gas_notes(facts.scene, facts.solution, self.units)
         if facts.error is not None:
-            below = (
-                f"below 1e{math.ceil(math.log10(facts.error)):+03d}"
-                if facts.error
-                else "zero"
-            )
+            if facts.error:
+                below = f"below 1e{math.ceil(math.log10(facts.error)):+03d}"
+            else:
+                below = "zero"
             limit = _HALF_OF_LAST * 10.0 ** (1 - self.digits) / 10.0
-            changed = "none of these" if facts.error < limit else "some"
+            if facts.error < limit:
+                changed = "none of these"
+            else:
+                changed = "some"
             lines.append(
                 f"rounding changes {changed} digits (worst error bar {below} of the"
                 " value)"
@@ -709,7 +770,8 @@ class _Block:
 
         It names the collinear bars that cost them.
         """
-        solution, drive = self.facts.solution, self.facts.drive
+        solution = self.facts.solution
+        drive = self.facts.drive
         if (
             drive is None
             or drive.error is None
@@ -730,7 +792,10 @@ class _Block:
             return []
         worst = int(np.nanargmax(share))
         digits = max(math.floor(-math.log10(share[worst])), 0)
-        place = solution.at.places if solution.time is None else solution.time
+        if solution.time is None:
+            place = solution.at.places
+        else:
+            place = solution.time
         start = (
             f"{digits} digits left of {drive.symbol} at"
             f" {self._place(float(place[worst]))}"
@@ -738,7 +803,8 @@ class _Block:
         commanded = LOST[solution.at.bar]
         sines = {commanded: solution.condition[worst]}
         if solution.drive is not None:
-            lever, sine = solution.drive_condition[worst], sines[commanded]
+            lever = solution.drive_condition[worst]
+            sine = sines[commanded]
             return [
                 f"{start}: of its lever {lever:.2g}, of the sine of bars {commanded}"
                 f" {sine:.2g} is left"
@@ -784,10 +850,14 @@ def write_motor(
     duty = find_duty(between)
     if duty is None:
         return None
-    si = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}
+    if solution.drive is None:
+        si = DUTY_UNITS
+    else:
+        si = {**DUTY_UNITS, "peak_speed": "m/s"}
     shown = {name: find_unit_in(unit, units) for name, unit in si.items()}
     numbers = {name: getattr(duty, name) for name in si}
-    force, angle = find_unit_in("N", units)[1], find_unit_in("rad", units)[1]
+    force = find_unit_in("N", units)[1]
+    angle = find_unit_in("rad", units)[1]
     loads = {
         pin: (bearing_load(between.bounded(name), pin), bearing_load(solution, pin))
         for pin, name in PIN_FORCE.items()

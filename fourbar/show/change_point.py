@@ -32,7 +32,8 @@ def find_limits(scene: Scene, solution: Solution) -> Solution | None:
     """
     if solution.F12 is None or solution.status_code[0] != CHANGE_POINT:
         return None
-    at, law = solution.at, scene.motion.law
+    at = solution.at
+    law = scene.motion.law
     if at.stroke is not None or at.independent is not None:
         return None
     step = STEP

@@ -49,9 +49,9 @@ class Column(NamedTuple):
             return ""
         if below == "1":
             return above
-        return (
-            f"{above}/({below})" if " " in below or "/" in below else f"{above}/{below}"
-        )
+        if " " in below or "/" in below:
+            return f"{above}/({below})"
+        return f"{above}/{below}"
 
     def shown(self, units: Conversion) -> Array:
         """Return the values in the unit that they are shown in."""
@@ -96,28 +96,37 @@ def read_column(scene: Scene, solution: Solution, name: str) -> Column:
 def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
     """Return the SI unit of a number of each position and its values."""
     if name == "time":
-        values = compute_times(solution) if solution.time is None else solution.time
+        if solution.time is None:
+            values = compute_times(solution)
+        else:
+            values = solution.time
         if values is None:
             raise InputError(
                 "--columns", name, "the positions are passed at no one speed: no time"
             )
         return "s", values
-    stem, axis = name, None
+    stem = name
+    axis = None
     if name[-2:] in AXES:
-        stem, axis = name[:-2], AXES[name[-2:]]
+        stem = name[:-2]
+        axis = AXES[name[-2:]]
     quantities = _list_quantities(solution)
     if stem not in quantities or (axis is not None and is_scalar(stem)):
         close = get_close_matches(name, ["time", *quantities], 1)
-        hint = f'did you mean "{close[0]}"? ' if close else ""
+        if close:
+            hint = f'did you mean "{close[0]}"? '
+        else:
+            hint = ""
         raise InputError(
             "--columns",
             name,
             f"unknown; {hint}quantities are {', '.join(['time', *quantities])}; "
             "F12_x is a component, omega_4/omega_2 a ratio",
         )
-    values = (
-        derive(solution, stem) if stem in DERIVED_NAMES else find_values(solution, stem)
-    )
+    if stem in DERIVED_NAMES:
+        values = derive(solution, stem)
+    else:
+        values = find_values(solution, stem)
     if values is None:
         raise InputError(
             "--columns", name, "was not evaluated: the scene states no speed"

@@ -53,7 +53,8 @@ def _compute_ratio(solution: Solution, bar: int) -> Array:
     A, B = (vector[..., 0] + 1j * vector[..., 1] for vector in (solution.A, solution.B))
     assert solution.ground is not None
     length, angle = solution.ground
-    coupler, output = B - A, B - length * np.exp(1j * np.asarray(angle))
+    coupler = B - A
+    output = B - length * np.exp(1j * np.asarray(angle))
     by_pins = {
         3: -cross(A, output) / cross(coupler, output),
         4: cross(A, coupler) / cross(output, coupler),

@@ -112,10 +112,14 @@ def shaking_moment(solution: Solution) -> Array:
             distance * (np.cos(angle) * force[..., 1] - np.sin(angle) * force[..., 0])
         )
 
-    F14, drive = _require(solution, "F14"), solution.drive
+    F14 = _require(solution, "F14")
+    drive = solution.drive
     assert solution.ground is not None
     length, angle = solution.ground
-    of_drive = -_require(solution, "torque") if drive is None else np.zeros(())
+    if drive is None:
+        of_drive = -_require(solution, "torque")
+    else:
+        of_drive = np.zeros(())
     for point in (
         [] if drive is None else [point for _, point in drive.ends if point.bar == 1]
     ):
@@ -173,15 +177,11 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
     drive = read_drive(solution)
     if drive.values is None or not np.isfinite(drive.values).any():
         return None
-    power, closed, linear = (
-        _require(solution, "power"),
-        is_once_round(solution),
-        solution.drive is not None,
-    )
-    peak, rms = (
-        _find_peak(_require(solution, drive.keys.value)),
-        _find_rms(solution, drive.values),
-    )
+    power = _require(solution, "power")
+    closed = is_once_round(solution)
+    linear = solution.drive is not None
+    peak = _find_peak(_require(solution, drive.keys.value))
+    rms = _find_rms(solution, drive.values)
     energy_in, energy_out = _integrate_power(solution, power)
     return MotorDuty(
         peak_torque=None if linear else peak,
@@ -204,7 +204,8 @@ def is_once_round(solution: Solution) -> Any:
     repeats after two turns. Speed and acceleration must repeat too: a motion law may
     end at another speed than it begins with.
     """
-    angle, bar = solution.at.angle, solution.at.bar
+    angle = solution.at.angle
+    bar = solution.at.bar
     if angle.shape[-1] == 1:
         return np.zeros(angle.shape[:-1], dtype=bool)
     assert solution.lengths is not None
@@ -241,19 +242,17 @@ def _integrate_power(
     solution: Solution, power: Array
 ) -> tuple[float | None, float | None]:
     """Integrate the positive and the negative part of the power, each over time."""
-    stroke, bar = solution.at.stroke, solution.at.bar
+    stroke = solution.at.stroke
+    bar = solution.at.bar
     if solution.time is not None:
         spans = np.diff(solution.time)
     else:
-        speed = (
-            getattr(solution, f"omega_{bar}")
-            if stroke is None
-            else solution.stroke_speed
-        )
-        steps, speed = (
-            np.diff(solution.at.places),
-            np.broadcast_to(np.asarray(speed), power.shape)[..., :-1],
-        )
+        if stroke is None:
+            speed = getattr(solution, f"omega_{bar}")
+        else:
+            speed = solution.stroke_speed
+        steps = np.diff(solution.at.places)
+        speed = np.broadcast_to(np.asarray(speed), power.shape)[..., :-1]
         spans = np.abs(
             np.divide(
                 steps, speed, out=np.full(speed.shape, np.nan), where=speed != 0.0
@@ -295,7 +294,9 @@ def _reduce(reduce: Any, values: Array) -> Any:
 
 def _make_plain(value: Any) -> Any:
     """Return a number, or of a study an array (m,)."""
-    return float(value) if np.ndim(value) == 0 else value
+    if np.ndim(value) == 0:
+        return float(value)
+    return value
 
 
 class Driving(NamedTuple):
@@ -315,14 +316,15 @@ class Driving(NamedTuple):
 
 def read_drive(solution: Solution) -> Driving:
     """Return torque or force of the drive, with its error bar."""
-    names, symbol, word, speed = (
-        COUPLE,
-        f"T{solution.drive_bar}",
-        "torque",
-        f"omega_{solution.drive_bar}",
-    )
+    names = COUPLE
+    symbol = f"T{solution.drive_bar}"
+    word = "torque"
+    speed = f"omega_{solution.drive_bar}"
     if solution.drive is not None:
-        names, symbol, word, speed = LINE, "F", "drive force", "stroke_speed"
+        names = LINE
+        symbol = "F"
+        word = "drive force"
+        speed = "stroke_speed"
     values, error = (getattr(solution, name) for name in names[:2])
     return Driving(word, symbol, UNITS[names.value], values, error, names, speed)
 

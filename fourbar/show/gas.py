@@ -113,7 +113,8 @@ def _locate_crossings(
     if not assembled.any():
         return places
     rows = rows[assembled]
-    low, high = at.places[rows], at.places[rows + 1]
+    low = at.places[rows]
+    high = at.places[rows + 1]
     before = _measure(scene, spring, _command_between(scene, at, low)) > end
 
     def is_as_before(middle: Array) -> NDArray[np.bool_]:
@@ -136,12 +137,18 @@ def _write_stretch(solution: Solution, stretch: _Stretch, units: Conversion) -> 
     """Write a stretch as "from theta_2 = 61.2 deg on"."""
     start, stop = stretch
     if solution.time is not None:
-        name, unit = "t", "s"
+        name = "t"
+        unit = "s"
     else:
         name = solution.commanded
-        unit = "rad" if solution.at.stroke is None else "m"
+        if solution.at.stroke is None:
+            unit = "rad"
+        else:
+            unit = "m"
     if start is None and stop is None:
-        return "here" if len(solution) == 1 else "throughout"
+        if len(solution) == 1:
+            return "here"
+        return "throughout"
     ends = [
         "" if place is None else f"{name} = {write_short(place, unit, units)}"
         for place in stretch

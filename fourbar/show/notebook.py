@@ -62,10 +62,8 @@ def _list_facts(scene: Scene, units: Conversion) -> list[tuple[str, str]]:
         )
     speed = "positions only"
     if motion.speed is not None:
-        omega, alpha = (
-            write_value(motion.speed, "rad/s", units),
-            write_value(motion.acceleration, "rad/s^2", units),
-        )
+        omega = write_value(motion.speed, "rad/s", units)
+        alpha = write_value(motion.acceleration, "rad/s^2", units)
         speed = f"ω{motion.bar} = {omega}, α{motion.bar} = {alpha}"
     acting = [f"load on bar {load.bar}" for load in scene.loads] + [
         effect.key for effect in scene.effects
@@ -87,11 +85,10 @@ def show_solution(solution: Solution, units: Conversion = DEGREES) -> str:
         )
     cells = list_columns(solution, units)
     count = len(solution)
-    places = (
-        list(range(count))
-        if count <= 2 * SHOWN
-        else [*range(SHOWN), *range(count - SHOWN, count)]
-    )
+    if count <= 2 * SHOWN:
+        places = list(range(count))
+    else:
+        places = [*range(SHOWN), *range(count - SHOWN, count)]
     head = "".join(
         f"<th>{escape(name.strip()).replace(chr(10), '<br>')}</th>" for name in cells
     )

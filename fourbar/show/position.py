@@ -33,10 +33,14 @@ class PositionSheet:
     """
 
     def __init__(self, scene: Scene, solution: Solution, units: Conversion) -> None:
-        self.scene, self.units = scene, units
+        self.scene = scene
+        self.units = units
         limits = find_limits(scene, solution)
         self.has_limits = limits is not None
-        self.solution = solution if limits is None else limits
+        if limits is None:
+            self.solution = solution
+        else:
+            self.solution = limits
 
     def write_bars(self) -> list[str]:
         """Write angle, speed and acceleration of the moving bars."""
@@ -55,7 +59,10 @@ class PositionSheet:
                 largest = max(largest, np.nanmax(np.square(speeds), initial=0.0))
             numbers = drop_rounding(numbers, largest)
             factor, name = choose_unit(0.0, unit, self.units)
-            form = ".4f" if letter == "theta" else f".{POSITION_DIGITS}g"
+            if letter == "theta":
+                form = ".4f"
+            else:
+                form = f".{POSITION_DIGITS}g"
             columns[f"{letter}, {name}"] = _write_numbers(factor * numbers, form)
         rows = [_write_row("", columns)]
         for index, bar in enumerate(MOVING_BARS):
@@ -131,7 +138,10 @@ class PositionSheet:
         for name in ("transmission", "omega_3/omega_2", "omega_4/omega_2"):
             values = derive(self.solution, name)
             assert values is not None
-            label = "transmission angle" if name == "transmission" else name
+            if name == "transmission":
+                label = "transmission angle"
+            else:
+                label = name
             rows.append(self._write_number(label, values, DERIVED_NAMES[name].unit))
         rows.append(self._write_advantage())
         rows += [*self._write_force_ratios(), *self._write_drive_ratios()]
@@ -215,14 +225,18 @@ class PositionSheet:
         """Write the components of a vector, and its size."""
         factor, name = choose_unit(largest, unit, self.units)
         numbers = drop_rounding(vector, largest)
-        size = [float(np.hypot(*numbers))] if sized else []
+        if sized:
+            size = [float(np.hypot(*numbers))]
+        else:
+            size = []
         cells = _write_numbers(factor * np.array([*numbers, *size]))
         return _write_row(label, [*cells, *([] if sized else [""]), name])
 
     def _write_number(
         self, label: str, values: Array, unit: str, after: str = ""
     ) -> str:
-        factor, name = 1.0, ""
+        factor = 1.0
+        name = ""
         if unit in ("rad", "1"):  # of turns and of ratios, which are about 1
             values = drop_rounding(values, 1.0)
         if unit != "1":

@@ -57,7 +57,12 @@ def write_type(
     bars, not of the output alone.
     """
     mobility = classify(linkage)
-    relation = "<" if mobility.surplus > 0.0 else ">" if mobility.surplus < 0.0 else "="
+    if mobility.surplus > 0.0:
+        relation = "<"
+    elif mobility.surplus < 0.0:
+        relation = ">"
+    else:
+        relation = "="
     outer = min(linkage.lengths) + max(linkage.lengths)
     factor, unit = (
         (1.0, "") if units is None else choose_unit(max(linkage.lengths), "m", units)
@@ -83,7 +88,8 @@ def write_type_json(linkage: FourBar) -> str:
 
     Positions are as `LimitPosition` has them.
     """
-    mobility, more = classify(linkage), dict[str, object]()
+    mobility = classify(linkage)
+    more = dict[str, object]()
     if mobility.barker is not None:
         transmission = transmission_extremes(linkage)
         more = {
@@ -164,22 +170,31 @@ def _explain_turning(
 
     The two others would have to be collinear, stretched or folded.
     """
-    reach, d, length = reach_of(linkage, bar), linkage.ground, linkage.lengths[bar - 1]
+    reach = reach_of(linkage, bar)
+    d = linkage.ground
+    length = linkage.lengths[bar - 1]
     (one, x), (two, y) = (
         (BAR_NAMES[k], linkage.lengths[k - 1]) for k in MOVING_BARS if k != bar
     )
-    name, touches = (
-        BAR_NAMES[bar],
-        reach.beyond_stretched == 0.0 or reach.beyond_folded == 0.0,
-    )
-    when = "are in line at change points alone" if touches else "are never in line"
+    name = BAR_NAMES[bar]
+    touches = reach.beyond_stretched == 0.0 or reach.beyond_folded == 0.0
+    if touches:
+        when = "are in line at change points alone"
+    else:
+        when = "are never in line"
     yield f"{name}: no limits, {one} and {two} {when}:"
-    relation = "=" if reach.beyond_stretched == 0.0 else "<"
+    if reach.beyond_stretched == 0.0:
+        relation = "="
+    else:
+        relation = "<"
     yield (
         f"    ground + {name} = {write(d + length)} {relation} {one} + {two} ="
         f" {write(x + y)}"
     )
-    relation = "=" if reach.beyond_folded == 0.0 else ">"
+    if reach.beyond_folded == 0.0:
+        relation = "="
+    else:
+        relation = ">"
     yield (
         f"    |ground - {name}| = {write(abs(d - length))} {relation} |{one} - {two}| ="
         f" {write(abs(x - y))}"
@@ -209,8 +224,13 @@ def find_largest(derivatives: Sensitivity, quantity: str) -> float:
     It is NaN if no position has one.
     """
     value = derivatives.value(quantity)
-    size = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
-    return float(np.nanmax(size)) if np.isfinite(size).any() else math.nan
+    if value.ndim == 1:
+        size = np.abs(value)
+    else:
+        size = np.hypot(*value.T)
+    if np.isfinite(size).any():
+        return float(np.nanmax(size))
+    return math.nan
 
 
 def write_sensitivity(derivatives: Sensitivity) -> str:
@@ -372,7 +392,8 @@ def _name_assemblies(rest: Equilibria) -> Equilibria:
     linkage = scene.linkage
 
     def name(place: RestPosition) -> RestPosition:
-        theta_2, sign = np.array([place.theta_2]), np.array([place.branch], np.int8)
+        theta_2 = np.array([place.theta_2])
+        sign = np.array([place.branch], np.int8)
         assembly = with_signs(linkage, Command(theta_2, sign, None, 0.0)).branch[0]
         return place._replace(branch=int(assembly))
 
@@ -398,7 +419,10 @@ def _count_equilibria(rest: Equilibria, reached: int, units: Conversion) -> list
     grid = (
         f"found between {rest.samples} positions where Q changes its sign or touches 0"
     )
-    within = "" if reached == len(rest.found) else " in this sweep"
+    if reached == len(rest.found):
+        within = ""
+    else:
+        within = " in this sweep"
     lines = [f"{_write_count(reached)}{within} without friction,", grid]
     if rest.not_decided:
         angles = " and ".join(
@@ -433,11 +457,9 @@ def _write_holding(rest: Equilibria, units: Conversion) -> tuple[list[str], Any]
     """Write what holds the scene's positions, thinned out to what can be read."""
     positions = rest.positions
     drive = read_drive(positions)
-    values, low, high = (
-        drive.values,
-        getattr(positions, drive.keys.low),
-        getattr(positions, drive.keys.high),
-    )
+    values = drive.values
+    low = getattr(positions, drive.keys.low)
+    high = getattr(positions, drive.keys.high)
     assert values is not None
     unit, factor = find_unit_in(drive.unit, units)
     heads = ["theta_2 (deg)", f"{drive.name} ({unit})"]
@@ -453,11 +475,17 @@ def _write_holding(rest: Equilibria, units: Conversion) -> tuple[list[str], Any]
     rows = list(zip(*map(write_cells, columns), released, strict=True))[
         :: -(-len(positions) // MOST_ROWS)
     ]
-    on = "" if positions.drive is not None else f" on bar {positions.drive_bar}"
+    if positions.drive is not None:
+        on = ""
+    else:
+        on = f" on bar {positions.drive_bar}"
     lines = [f"{drive.name}{on} that holds it at rest, and how it moves when released"]
     if np.isfinite(values).any():
         most = int(np.nanargmax(np.abs(values)))
-        largest = "largest" if low is None else "largest without friction"
+        if low is None:
+            largest = "largest"
+        else:
+            largest = "largest without friction"
         lines.append(
             f"{largest}: {factor * values[most]:.6g} {unit} at theta_2 ="
             f" {_write_degrees(positions.theta_2[most])} deg"
@@ -488,7 +516,9 @@ def _write_range(ends: tuple[RestPosition, RestPosition]) -> str:
     if first.branch == last.branch and abs(apart) < _SAME_PLACE:
         return "everywhere on its circuit"
     text = f"{_write_degrees(first.theta_2)} to {_write_degrees(last.theta_2)}"
-    return text if first.branch == last.branch else f"{text} through a limit"
+    if first.branch == last.branch:
+        return text
+    return f"{text} through a limit"
 
 
 _SAME_PLACE = 1e-9

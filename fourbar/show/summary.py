@@ -121,7 +121,9 @@ class Between(NamedTuple):
 
         It is the sweep alone if one grows without bound.
         """
-        return self.sweep if self.growing.intersection(names) else self.solution
+        if self.growing.intersection(names):
+            return self.sweep
+        return self.solution
 
 
 def list_sizes(solution: Solution) -> dict[str, Array]:
@@ -165,9 +167,13 @@ def locate_between(scene: Scene, solution: Solution) -> Between:
         )
         turned = np.argmax(slips * slips[:, :1] <= 0.0, axis=1)
         rows = np.arange(len(pins))
-        low, high = places[rows, turned - 1], places[rows, turned]
+        low = places[rows, turned - 1]
+        high = places[rows, turned]
     merged = _merge(scene, solution, np.concatenate([low, high]))
-    angles = low if scene.motion.law is None else scene.motion.law.at(low)[0]
+    if scene.motion.law is None:
+        angles = low
+    else:
+        angles = scene.motion.law.at(low)[0]
     peaks, growing = _find_largest(scene, merged, list_sizes)
     reversals = sorted(zip(angles.tolist(), pins, strict=True))
     return Between(solution, _merge(scene, merged, peaks), reversals, growing)
@@ -197,7 +203,8 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, _BarBending]:
     def list_moments(solution: Solution) -> dict[str, Array]:
         return {bar: np.abs(bending.moment) for bar, bending in find(solution).items()}
 
-    growing, searched = {str(bar) for bar in MOVING_BARS}, [(solution, find(solution))]
+    growing = {str(bar) for bar in MOVING_BARS}
+    searched = [(solution, find(solution))]
     if _has_between(scene, solution):
         places, growing = _find_largest(
             scene, solution, list_moments, _BENDING_PEAKS, _BENDING_ROUNDS
@@ -212,10 +219,8 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, _BarBending]:
             searched[:1] if grows else searched
         ):  # the peak of another bar may stand beside a pole
             moment, x = largest[str(bar)]
-            peak, row = (
-                _find_peak(solution, np.abs(moment)),
-                int(np.argmax(np.nan_to_num(np.abs(moment), nan=-1.0))),
-            )
+            peak = _find_peak(solution, np.abs(moment))
+            row = int(np.argmax(np.nan_to_num(np.abs(moment), nan=-1.0)))
             if bar not in bending or peak.value > bending[bar].peak.value:
                 bending[bar] = _BarBending(peak, float(x[row]), solution, row, grows)
     return bending
@@ -292,7 +297,8 @@ def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array,
 
     Each has the pin and its ends.
     """
-    places, steps = solution.at.places, list[tuple[str, int, int]]()
+    places = solution.at.places
+    steps = list[tuple[str, int, int]]()
     for pin in sorted({pin for effect in scene.effects for pin in effect.dry_pins}):
         slip = np.nan_to_num(_compute_slip(solution, pin))
         moving = np.flatnonzero(np.abs(slip) > AT_REST * np.abs(slip).max())
@@ -316,14 +322,17 @@ def _find_largest(
 
     The names of those that grow are returned too.
     """
-    places, peaks = solution.at.places, list[tuple[str, int, int, int]]()
+    places = solution.at.places
+    peaks = list[tuple[str, int, int, int]]()
     passed = _find_dead_points(scene, solution)
     present = sizes(solution)
     for name, size in present.items():
         padded = np.concatenate(
             [[-1.0], np.nan_to_num(size, nan=-1.0, posinf=-1.0), [-1.0]]
         )
-        before, here, after = padded[:-2], padded[1:-1], padded[2:]
+        before = padded[:-2]
+        here = padded[1:-1]
+        after = padded[2:]
         tops = np.flatnonzero(
             (here >= before)
             & (here >= after)
@@ -342,12 +351,15 @@ def _find_largest(
         ):  # towards a gap a magnitude may grow without a local maximum
             if padded[i + 1] * padded[j + 1] < 0.0:
                 peaks.append((name, i if padded[j + 1] < 0.0 else j, i, j))
-    rows, names = np.arange(len(peaks)), [name for name, *_ in peaks]
+    rows = np.arange(len(peaks))
+    names = [name for name, *_ in peaks]
     top, start, stop = (
         np.array([peak[k] for peak in peaks], dtype=int) for k in (1, 2, 3)
     )
     opens = ~(solution.assembled[start] & solution.assembled[stop])
-    low, high, peak_places = places[start], places[stop], places[top]
+    low = places[start]
+    high = places[stop]
+    peak_places = places[top]
     reached = [np.array([present[name][i] for name, i, *_ in peaks])]
     for _ in range(rounds if len(peaks) else 0):
         cut = _cut(low, high)
@@ -487,9 +499,12 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
 
     At least one position assembles.
     """
-    between, kind = locate_between(scene, solution), _find_kind(scene, solution)
-    places, codes = _list_places(solution), solution.status_code
-    fine, stretches = solution, list[tuple[float | None, float | None]]()
+    between = locate_between(scene, solution)
+    kind = _find_kind(scene, solution)
+    places = _list_places(solution)
+    codes = solution.status_code
+    fine = solution
+    stretches = list[tuple[float | None, float | None]]()
     if smooth := kind in ("sweep", "turn", "law"):
         fine, stretches = _solve_finely(scene, places)
         if stretches and kind == "turn":
@@ -506,7 +521,10 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
     mu = math.asin(min(1.0, math.sqrt(max(least.value, 0.0))))
     released = scene.motion.free is not None
     bending = locate_bending(scene, between)
-    drive = None if released or solution.F12 is None else read_drive(solution)
+    if released or solution.F12 is None:
+        drive = None
+    else:
+        drive = read_drive(solution)
     peak = None
     if drive is not None and np.isfinite(drive.values).any():  # type: ignore[arg-type]
         located = between.bounded(drive.keys.value)
@@ -587,7 +605,9 @@ def _list_places(solution: Solution) -> Array:
 
     It is the time for a motion over time.
     """
-    return solution.at.places if solution.time is None else solution.time
+    if solution.time is None:
+        return solution.at.places
+    return solution.time
 
 
 def _find_extreme(values: Array, places: Array, sign: int, smooth: bool) -> Peak:
@@ -596,18 +616,18 @@ def _find_extreme(values: Array, places: Array, sign: int, smooth: bool) -> Peak
     Of a smooth curve it is the top of the parabola through it and its neighbours.
     """
     i = int(np.nanargmax(values))
-    value, place = float(values[i]), float(places[i])
-    beside, inside = slice(i - 1, i + 2), 0 < i < len(values) - 1
+    value = float(values[i])
+    place = float(places[i])
+    beside = slice(i - 1, i + 2)
+    inside = 0 < i < len(values) - 1
     if (
         smooth
         and inside
         and np.isfinite(values[beside]).all()
         and np.isclose(*np.diff(places[beside]))
     ):
-        rise, bend = (
-            values[i + 1] - values[i - 1],
-            values[i + 1] - 2.0 * values[i] + values[i - 1],
-        )
+        rise = values[i + 1] - values[i - 1]
+        bend = values[i + 1] - 2.0 * values[i] + values[i - 1]
         if bend < 0.0:
             value -= float(rise * rise / (8.0 * bend))
             place -= float(0.5 * rise / bend * 0.5 * (places[i + 1] - places[i - 1]))
@@ -621,20 +641,27 @@ def _list_stretches(
 
     The position formula locates the ends.
     """
-    closes, places = fine.assembled, fine.at.places
+    closes = fine.assembled
+    places = fine.at.places
     if closes.all():
         return []
     if places[0] > places[-1]:  # from the smallest place on
-        closes, places = closes[::-1], places[::-1]
-    ends: list[float | None] = [None] if closes[0] else []
+        closes = closes[::-1]
+        places = places[::-1]
+    if closes[0]:
+        ends: list[float | None] = [None]
+    else:
+        ends = []
     for i in np.flatnonzero(closes[1:] != closes[:-1]):
-        low, high = places[i], places[i + 1]
+        low = places[i]
+        high = places[i + 1]
         for _ in range(_END_ROUNDS):
             cut = np.linspace(low, high, CUTS + 1)
             first = int(
                 np.argmax(_solve_at(scene, cut, "position").assembled != closes[i])
             )
-            low, high = cut[max(first - 1, 0)], cut[first]
+            low = cut[max(first - 1, 0)]
+            high = cut[first]
         ends.append(float(low if closes[i] else high))
     ends += [None] if closes[-1] else []
     return list(zip(ends[::2], ends[1::2], strict=True))
@@ -670,14 +697,18 @@ def _join_stretches(solution: Solution, fine: Solution, bar: int) -> Array:
     distances = _list_places(fine)[known] - _list_places(solution)[first]
     nearest = known[np.argmin(np.abs(distances))]
     angles += TURN * np.round((own[first] - angles[nearest]) / TURN)
-    low, high = math.inf, -math.inf
+    low = math.inf
+    high = -math.inf
     for stretch in np.split(known, np.flatnonzero(np.diff(known) > 1) + 1):
-        start, stop = angles[stretch].min(), angles[stretch].max()
+        start = angles[stretch].min()
+        stop = angles[stretch].max()
         if low < high:
             turns = _find_turns(start, stop, low, high)
             angles[stretch] += TURN * turns
-            start, stop = start + TURN * turns, stop + TURN * turns
-        low, high = min(low, start), max(high, stop)
+            start = start + TURN * turns
+            stop = stop + TURN * turns
+        low = min(low, start)
+        high = max(high, stop)
     return angles
 
 
@@ -700,7 +731,8 @@ def find_duty(between: Between) -> MotorDuty | None:
 
     A peak without a bound is that of the positions.
     """
-    duty, drive = motor_duty(between.sweep), read_drive(between.sweep)
+    duty = motor_duty(between.sweep)
+    drive = read_drive(between.sweep)
     if duty is None:
         return None
 
@@ -752,7 +784,8 @@ def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]
 
     The angles are all that it reaches on its branch.
     """
-    positions, first = solution.at, int(np.argmax(solution.assembled))
+    positions = solution.at
+    first = int(np.argmax(solution.assembled))
     here = float(positions.angle[first])
     intervals = find_intervals(scene.linkage, positions.bar)
     low, high = min(

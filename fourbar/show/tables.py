@@ -130,7 +130,10 @@ def print_positions(
     shown, left_out = make_table(solution, width, units, every=step, cells=cells)
     notes = []
     if step > 1:
-        more = "; --all shows each" if every is None else ""
+        if every is None:
+            more = "; --all shows each"
+        else:
+            more = ""
         notes.append(
             f"shown: every {step}{_write_ordinal(step)} of the {len(solution)}"
             f" positions{more}"
@@ -235,7 +238,10 @@ def _list_parts(solution: Solution, name: str) -> dict[str, Array]:
         return {name: values}
     sizes = np.hypot(values[:, 0], values[:, 1])
     x, y = drop_rounding(values, sizes[:, None]).T
-    size = {f"|{name}|": sizes} if has_size(name) else {}
+    if has_size(name):
+        size = {f"|{name}|": sizes}
+    else:
+        size = {}
     return {**size, f"{name}_x": x, f"{name}_y": y}
 
 
@@ -267,7 +273,10 @@ def make_table(
             break
         kept.append(name)
     rows = list(zip(*(cells[name] for name in kept), strict=True))
-    last = rows[-1:] if (len(rows) - 1) % every else []
+    if (len(rows) - 1) % every:
+        last = rows[-1:]
+    else:
+        last = []
     left_out = [name.split("\n")[0] for name in cells if name not in kept]
     return make_plain_table(kept, rows[::every] + last, gap=GAP - 1), left_out
 
@@ -279,7 +288,10 @@ def write_cells(values: Array, form: str = ".6g") -> list[str]:
     """
     sizes = np.abs(values[np.isfinite(values)])
     # not the largest, which may stand beside a pole
-    usual = float(np.percentile(sizes, 90.0)) if sizes.size else 0.0
+    if sizes.size:
+        usual = float(np.percentile(sizes, 90.0))
+    else:
+        usual = 0.0
     return [write_cell(value, form) for value in drop_rounding(values, usual).tolist()]
 
 

@@ -69,7 +69,8 @@ def write_text(spreads: Tolerances, units: Conversion = DEGREES) -> str:
         ),
         "deviation of the samples; the variance there is due to",
     ]
-    rows, (angle_unit, of_angle) = [], find_unit_in("rad", units)
+    rows = []
+    angle_unit, of_angle = find_unit_in("rad", units)
     for part in list_shown_parts(spreads):
         spread = spreads.spreads[part]
         if not np.isfinite(spread.worst).any():

@@ -70,11 +70,10 @@ def units(text: str) -> Conversion:
                 ),
                 "",
             )
-            reason = (
-                f"is no unit of a result{hint}"
-                if unit is None
-                else f"is the second unit for {unit}"
-            )
+            if unit is None:
+                reason = f"is no unit of a result{hint}"
+            else:
+                reason = f"is the second unit for {unit}"
             raise InputError("units", name, f"{reason}; {ALLOWED}")
         stated[unit] = name.replace(".", " ")
     mass = stated.get("kg", "")
@@ -109,9 +108,9 @@ def suit_units(length: str) -> Conversion:
     """
     from fourbar.quantities.units import IMPERIAL, find_unit
 
-    return (
-        units("imperial") if find_unit(length, "m").casefold() in IMPERIAL else COMMON
-    )
+    if find_unit(length, "m").casefold() in IMPERIAL:
+        return units("imperial")
+    return COMMON
 
 
 def units_of_length(length: str) -> Conversion:
@@ -172,9 +171,14 @@ def _suit_rotation(stated: str, unit: str) -> Conversion:
     if turned == "rpm":
         return {"rad/s": COMMON["rad/s"]}
     angle = turned.removesuffix("/s")
-    factor = 1.0 if angle == "rad" else DEGREES["rad"][1]
+    if angle == "rad":
+        factor = 1.0
+    else:
+        factor = DEGREES["rad"][1]
     rates = {"rad/s": (f"{angle}/s", factor), "rad/s^2": (f"{angle}/s^2", factor)}
-    return rates if unit == "rad/s" else {unit: rates[unit]}
+    if unit == "rad/s":
+        return rates
+    return {unit: rates[unit]}
 
 
 def find_length(document: Mapping[str, Any]) -> object:
@@ -217,7 +221,9 @@ def write_cell(number: float, form: str) -> str:
     if not math.isfinite(number):
         return "-"
     text = format(number, form)
-    return text.removeprefix("-") if float(text) == 0.0 else text
+    if float(text) == 0.0:
+        return text.removeprefix("-")
+    return text
 
 
 def write_digits(value: float, digits: int = DIGITS) -> str:

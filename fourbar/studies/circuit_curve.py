@@ -172,10 +172,8 @@ class CircuitCurve:
         """Mark where psi, within a radius, lies in the sweep, if one is stated."""
         if self.sweep is None or self.sweep[1] - self.sweep[0] >= TURN:
             return np.ones(psi.shape, dtype=bool)
-        middle, half = (
-            0.5 * (self.sweep[0] + self.sweep[1]) - self.theta_1,
-            0.5 * (self.sweep[1] - self.sweep[0]),
-        )
+        middle = 0.5 * (self.sweep[0] + self.sweep[1]) - self.theta_1
+        half = 0.5 * (self.sweep[1] - self.sweep[0])
         away = psi - middle - TURN * np.rint((psi - middle) / TURN)
         return np.asarray(np.abs(away) <= half + radius + AT_END)
 
@@ -190,7 +188,8 @@ class CircuitCurve:
         sines = np.sin(points[:, 1])
         passed = np.zeros(len(points), dtype=bool)
         for low, high, sign in self._list_runs():
-            middle, half = 0.5 * (low + high), 0.5 * (high - low)
+            middle = 0.5 * (low + high)
+            half = 0.5 * (high - low)
             apart = np.abs(
                 np.remainder(points[:, 0] - middle + math.pi, TURN) - math.pi
             )
@@ -284,7 +283,8 @@ class CircuitCurve:
         mu = transmission(self.ratios, psi)
         on_circuit = np.remainder(psi - self.low, TURN) < self.high - self.low
         on_circuit &= np.abs(np.sin(mu)) > AT_END
-        psi, mu = psi[on_circuit], mu[on_circuit]
+        psi = psi[on_circuit]
+        mu = mu[on_circuit]
         return np.concatenate(
             [
                 np.stack([psi, branch * self.side(psi) * mu], axis=1)
@@ -318,11 +318,9 @@ class CircuitCurve:
         Q = _compute_generalised_force(
             self.scene, self.case.terms, on_curve(self.lengths, self.theta_1, psi, mu)
         )
-        return (
-            np.broadcast_to(Q.slopes[0], len(points))
-            if isinstance(Q, Sloped)
-            else np.zeros(len(points))
-        )
+        if isinstance(Q, Sloped):
+            return np.broadcast_to(Q.slopes[0], len(points))
+        return np.zeros(len(points))
 
     def size(self, points: Array) -> Array:
         """Sum of the absolute terms of Q."""
@@ -345,9 +343,9 @@ class CircuitCurve:
 
         Without a sweep theta_2 is counted from the circuit's range.
         """
-        position, from_ = (
-            self.state(point[None]).position,
-            self.low if self.sweep is None else self.sweep[0] - self.theta_1 - AT_END,
+        position = self.state(point[None]).position
+        from_ = (
+            self.low if self.sweep is None else self.sweep[0] - self.theta_1 - AT_END
         )
         theta_2 = (
             self.theta_1
@@ -393,11 +391,14 @@ def on_curve(lengths: Loop, theta_1: Number, psi: Number, mu: Number) -> State:
     ['20.298', '57.325']
     """
     d, a, b, c = lengths[:4]
-    u1, u2 = polar(1.0, theta_1), polar(1.0, theta_1) * polar(1.0, psi)
+    u1 = polar(1.0, theta_1)
+    u2 = polar(1.0, theta_1) * polar(1.0, psi)
     diagonal = u1 * _less_turned(d, a, psi)
     u3 = diagonal / _less_turned(b, c, mu)
-    u4, h2 = u3 * polar(1.0, mu), np.sin(mu)
-    h3, h4 = (a / b) * sine(u4, u2), (a / c) * sine(u3, u2)
+    u4 = u3 * polar(1.0, mu)
+    h2 = np.sin(mu)
+    h3 = (a / b) * sine(u4, u2)
+    h4 = (a / c) * sine(u3, u2)
     k = Coefficients(
         h2, h3, h4, h2 - h3, (a / b) * (d / c) * np.sin(psi), 0.0, 0.0, 0.0
     )

@@ -127,7 +127,9 @@ class Sensitivity:
         """
         name = self._find_whole(quantity)
         values: Array = find_values(self.solution, name)
-        return values if quantity == name else split_parts(name, values)[quantity]
+        if quantity == name:
+            return values
+        return split_parts(name, values)[quantity]
 
     def to_pandas(self) -> "DataFrame":
         """Make a table, a row for each number and position.
@@ -171,7 +173,8 @@ class Sensitivity:
 
         A pin force counts by its magnitude.
         """
-        value, rows = self.value(quantity), []
+        value = self.value(quantity)
+        rows = []
         for (key, entry), number in zip(
             self.keys.items(), self.numbers.tolist(), strict=True
         ):
@@ -270,7 +273,9 @@ def sensitivity(scene: Scene) -> Sensitivity:
             scene.motion.angle,
             "has no sensitivities: the limit moves with the lengths",
         )
-    commanded, solution, entries = command(scene), solve(scene), list_entries(scene)
+    commanded = command(scene)
+    solution = solve(scene)
+    entries = list_entries(scene)
     moving = commanded.speed is not None
     if not moving:  # positions depend on these alone
         of_positions = ("lengths", "points", "drive")
@@ -282,16 +287,18 @@ def sensitivity(scene: Scene) -> Sensitivity:
     keys = {
         theta: SceneNumber((), scene.motion.numbers[scene.motion.commanded].unit)
     } | entries
-    most = np.nan if commanded.stroke is None else float(commanded.stroke.max())
+    if commanded.stroke is None:
+        most = np.nan
+    else:
+        most = float(commanded.stroke.max())
     numbers = [
         most if key == theta else read_place(scene, entry.place)
         for key, entry in keys.items()
     ]
-    forces = (
-        FORCES
-        if any(effect.loaded_pins for effect in scene.effects)
-        else (*FORCES, "drive_condition")
-    )
+    if any(effect.loaded_pins for effect in scene.effects):
+        forces = FORCES
+    else:
+        forces = (*FORCES, "drive_condition")
     names = [
         name
         for name in solution.evaluated()
@@ -361,9 +368,13 @@ class _SlopedPath(Path):
         The angle is in rad.
         """
         psi = q - self.theta_1
-        s, k = np.sin(0.5 * psi), np.cos(0.5 * psi)
+        s = np.sin(0.5 * psi)
+        k = np.cos(0.5 * psi)
         opposite = self.bar == 4
-        squares = (k * k, s * s, -(s * k)) if opposite else (s * s, k * k, s * k)
+        if opposite:
+            squares = (k * k, s * s, -(s * k))
+        else:
+            squares = (s * s, k * k, s * k)
         # a sign has no slope: the linkages beside keep the assembly
         side = find_side(without_slopes(psi), self.passing, opposite=opposite)
         return compute_factors(self.lengths, *squares, side)

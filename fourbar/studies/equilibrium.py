@@ -160,7 +160,8 @@ def equilibrium(scene: Scene) -> Equilibria:
         samples = curve.samples()
         zeros = _find_zeros(curve, samples)
         order = curve.order(zeros.points)
-        points, sizes = zeros.points[order], zeros.size[order]
+        points = zeros.points[order]
+        sizes = zeros.size[order]
         held: list[_CircuitRange] = []
         if any(term.dry_pins for term in curve.case.terms):
             held = _list_ranges(curve, partial(_holds, curve), points)
@@ -224,15 +225,22 @@ def _describe(
     `size`: of the terms of Q about there.
     """
     state = curve.state(point[None])
-    bar = 4 if abs(state.k.h2[0]) < STILL * abs(state.k.h4[0]) else 2
+    if abs(state.k.h2[0]) < STILL * abs(state.k.h4[0]):
+        bar = 4
+    else:
+        bar = 2
     square = float(state.k[bar - 2][0]) ** 2
     along_curve = float(curve.slope(point[None])[0])
     moving = _drop_rounding(state.k)
     inertias = inertia(curve.lengths.a, curve.case.bodies, state.position, moving)
-    slope, J = along_curve / square, float(np.sum(inertias)) / square
+    slope = along_curve / square
+    J = float(np.sum(inertias)) / square
     stability = "undecided"
     if abs(along_curve) > _A_JUMP * size:  # never of NaN
-        stability = "stable" if slope < 0.0 else "unstable"
+        if slope < 0.0:
+            stability = "stable"
+        else:
+            stability = "unstable"
     frequency = None
     if stability == "stable" and J > 0.0:
         frequency = math.sqrt(-slope / J) / TURN
@@ -296,7 +304,9 @@ def _make_grid(curve: CircuitCurve, points: Array) -> _Grid:
         second[in_row] = np.roll(first[in_row], -1)
     gap = np.remainder(tau[second] - tau[first], TURN)
     near = gap < 2.5 * TURN / SAMPLES
-    first, second, gap = first[near], second[near], gap[near]
+    first = first[near]
+    second = second[near]
+    gap = gap[near]
     size = np.array(curve.size(points))
     around = size.copy()
     around[first] = np.maximum(around[first], size[second])
@@ -331,7 +341,8 @@ def _find_zeros(curve: CircuitCurve, points: Array) -> _Zeros:
     for point in curve.singular:  # nothing moves there, so that Q vanishes
         near = np.abs(np.sin(0.5 * (zeros - point))) < _AT_CHANGE_POINT
         apart = ~near.all(axis=1)
-        zeros, size = zeros[apart], size[apart]
+        zeros = zeros[apart]
+        size = size[apart]
     return _Zeros(zeros, size)
 
 
@@ -340,11 +351,14 @@ def _find_least_sizes(curve: CircuitCurve, grid: _Grid) -> tuple[_Zeros, Array]:
 
     Returns the places where Q touches zero, and those where it has the other sign.
     """
-    first, second, slope = grid.first, grid.second, curve.slope(grid.points)
+    first = grid.first
+    second = grid.second
+    slope = curve.slope(grid.points)
     one_sign = grid.Q[first] * grid.Q[second] > 0.0
     turning = one_sign & (slope[first] * slope[second] < 0.0)
     turning &= ~grid.idle[first] & ~grid.idle[second]
-    tau, branch = grid.tau[turning], grid.branch[turning]
+    tau = grid.tau[turning]
+    branch = grid.branch[turning]
     start = slope[first][turning]
 
     def slopes_as_at_start(tau: Array) -> NDArray[np.bool_]:
@@ -361,10 +375,12 @@ def _find_least_sizes(curve: CircuitCurve, grid: _Grid) -> tuple[_Zeros, Array]:
 
 def _find_sign_changes(curve: CircuitCurve, grid: _Grid) -> _Zeros:
     """Find the zeros between points at which Q has two signs; a jump is none."""
-    first, second = grid.first, grid.second
+    first = grid.first
+    second = grid.second
     between = grid.Q[first] * grid.Q[second] < 0.0
     between &= ~grid.idle[first] & ~grid.idle[second]
-    tau, branch = grid.tau[between], grid.branch[between]
+    tau = grid.tau[between]
+    branch = grid.branch[between]
     start = grid.Q[first][between]
 
     def has_sign_of_start(tau: Array) -> NDArray[np.bool_]:
@@ -382,7 +398,8 @@ def _add_friction(curve: CircuitCurve, points: Array, side: int) -> Array:
 
     It is infinite where friction jams.
     """
-    state, force = curve.state(points), np.empty(len(points))
+    state = curve.state(points)
+    force = np.empty(len(points))
     along = np.abs(state.k.h2) >= np.abs(
         state.k.h4
     )  # the torque that balances Q, on the bar that turns faster
@@ -413,7 +430,8 @@ def _moves(curve: CircuitCurve, points: Array) -> NDArray[np.int8]:
     It is the sign of the change of theta_2, 0 where they stay.
     """
     state = curve.state(points)
-    ahead, back = _add_friction(curve, points, 1), _add_friction(curve, points, -1)
+    ahead = _add_friction(curve, points, 1)
+    back = _add_friction(curve, points, -1)
     level = NOTHING * curve.size(points)
     sense = np.where(ahead > level, 1, np.where(back < -level, -1, 0))
     return np.asarray(sense * np.sign(state.k.h2), dtype=np.int8)
@@ -470,11 +488,10 @@ def _list_ranges(
             )
             if curve.full and stop.theta_2 < one.theta_2:
                 stop = stop._replace(theta_2=stop.theta_2 + TURN)
-            ends = (
-                (stop, one)
-                if not curve.full and one.branch == stop.branch == -1
-                else (one, stop)
-            )
+            if not curve.full and one.branch == stop.branch == -1:
+                ends = (stop, one)
+            else:
+                ends = (one, stop)
             width = float(np.remainder(high - low, TURN))
             ranges.append(_CircuitRange(ends, row, low, width, int(count)))
     return ranges
@@ -516,5 +533,6 @@ def bisect(
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         held = holds(middle)
-        low, high = np.where(held, middle, low), np.where(held, high, middle)
+        low = np.where(held, middle, low)
+        high = np.where(held, high, middle)
     return low, high

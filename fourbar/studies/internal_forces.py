@@ -134,9 +134,12 @@ class _Beam(NamedTuple):
             M += np.where(
                 acts, force.imag[:, None] * (x - foot[:, None]) - couple[:, None], 0.0
             )
-        s, rest = np.clip(x, 0.0, self.length), np.maximum(x - self.length, 0.0)
-        along, across = self.pull.real[:, None], self.pull.imag[:, None]
-        omega, alpha = self.omega[:, None], self.alpha[:, None]
+        s = np.clip(x, 0.0, self.length)
+        rest = np.maximum(x - self.length, 0.0)
+        along = self.pull.real[:, None]
+        across = self.pull.imag[:, None]
+        omega = self.omega[:, None]
+        alpha = self.alpha[:, None]
         sheared = -self.density * s * (across + 0.5 * alpha * s)
         N += self.density * s * (along - 0.5 * np.square(omega) * s)
         V += sheared
@@ -154,12 +157,11 @@ class _Beam(NamedTuple):
         n = len(self.foot)
         ends = np.broadcast_to([0.0, self.length], (n, 2))
         feet = np.sort(np.concatenate([self.foot, ends], axis=1), axis=1)
-        places, moments = (
-            [feet, feet],
-            [self.at(feet)[2], self.at(feet, before=True)[2]],
-        )
+        places = [feet, feet]
+        moments = [self.at(feet)[2], self.at(feet, before=True)[2]]
         if self.density > 0.0:
-            across, bend = self.pull.imag[:, None], 0.5 * self.alpha[:, None]
+            across = self.pull.imag[:, None]
+            bend = 0.5 * self.alpha[:, None]
             single = self.at(feet)[1] / self.density + feet * (
                 across + bend * feet
             )  # forces at feet only
@@ -171,7 +173,8 @@ class _Beam(NamedTuple):
                 )
                 places.append(np.where(inside, root, feet))
                 moments.append(np.where(inside, self.at(places[-1])[2], 0.0))
-        x, M = np.concatenate(places, axis=1), np.concatenate(moments, axis=1)
+        x = np.concatenate(places, axis=1)
+        M = np.concatenate(moments, axis=1)
         worst = np.argmax(np.nan_to_num(np.abs(M), nan=-1.0), axis=1)[:, None]
         finite = np.isfinite(M).all(axis=1)
         return Bending(
@@ -206,7 +209,10 @@ class _Recorder(Actions):
         """Record a force on the bar, world axes."""
         if bar == self.bar:
             back = np.conj(self.state.direction(bar))
-            place = point if beyond is None else point + beyond * back
+            if beyond is None:
+                place = point
+            else:
+                place = point + beyond * back
             self.items.append((place, force * back, 0.0))
 
     def couple(self, bar: int, moment: Any) -> None:
@@ -236,14 +242,16 @@ class _Recorder(Actions):
 
 def _collect(scene: Scene, solution: Solution, bar: int) -> _Beam:
     """Collect all that acts on a bar."""
-    described, n = scene.linkage.bar(bar), len(solution)
+    described = scene.linkage.bar(bar)
+    n = len(solution)
     with np.errstate(all="ignore"):
         case = Case.of(scene, solution.at.bar).begin_with(solution.at)
         state, _ = case.at(solution.at)
         recorder = _Recorder(state, scene, bar)
         _record_pins(recorder, solution)
         _record_drive(recorder, scene, solution)
-        gravity, back = 0.0j, np.conj(state.direction(bar))
+        gravity = 0.0j
+        back = np.conj(state.direction(bar))
         uniform = described.inertia is None and described.centre is None
         terms: tuple[Any, ...] = case.terms
         for term in terms:
@@ -287,7 +295,10 @@ def _collect(scene: Scene, solution: Solution, bar: int) -> _Beam:
         foot, force, couple = _sum_by_foot(
             recorder.items, np.zeros(n), SAME * described.length
         )
-        density = described.mass / described.length if uniform else 0.0
+        if uniform:
+            density = described.mass / described.length
+        else:
+            density = 0.0
         return _Beam(
             described.length,
             foot,
@@ -308,7 +319,9 @@ def _sum_by_foot(
 
     Feet, forces and couples are (n, f) each.
     """
-    feet, forces, couples = list[Array](), list[Any](), list[Array]()
+    feet = list[Array]()
+    forces = list[Any]()
+    couples = list[Array]()
     for place, force, couple in items:
         foot = zero + np.real(place)
         beside = couple + cross(
@@ -323,11 +336,9 @@ def _sum_by_foot(
             len(feet),
         )
         if k == len(feet):
-            feet, forces, couples = (
-                [*feet, foot],
-                [*forces, 0.0j * zero],
-                [*couples, zero],
-            )
+            feet = [*feet, foot]
+            forces = [*forces, 0.0j * zero]
+            couples = [*couples, zero]
         forces[k], couples[k] = forces[k] + force, couples[k] + beside
     return np.stack(feet, axis=1), np.stack(forces, axis=1), np.stack(couples, axis=1)
 
@@ -347,9 +358,15 @@ def _record_pins(recorder: _Recorder, solution: Solution) -> None:
     for pin in ENDS[recorder.bar]:
         name = PIN_FORCE[pin]
         force = getattr(solution, name)
-        sign = 1.0 if name[2] == str(recorder.bar) else -1.0
+        if name[2] == str(recorder.bar):
+            sign = 1.0
+        else:
+            sign = -1.0
         back = np.conj(recorder.state.direction(recorder.bar))
-        place = 0.0 if pin == ENDS[recorder.bar][0] else recorder.length
+        if pin == ENDS[recorder.bar][0]:
+            place = 0.0
+        else:
+            place = recorder.length
         recorder.items.append(
             (place, sign * (force[:, 0] + 1j * force[:, 1]) * back, 0.0)
         )

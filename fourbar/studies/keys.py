@@ -252,7 +252,10 @@ def find_misfit(scene: Scene, entry: SceneNumber, tolerance: Tolerance) -> str |
             "first"
         )
     if entry.bound != ANY and tolerance.reach >= number:
-        three = "three sigma of it " if tolerance.sigma else ""
+        if tolerance.sigma:
+            three = "three sigma of it "
+        else:
+            three = ""
         itself = write_in_units(entry.unit, number)
         return f"{three}must be less than the number itself, {itself}"
     return None
@@ -286,7 +289,8 @@ def read_numbers(scene: Scene) -> dict[str, Any]:
 
 def replace_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
     """Copy the scene with some of its numbers replaced, by key."""
-    entries, changed = list_entries(scene), scene
+    entries = list_entries(scene)
+    changed = scene
     for key, number in numbers.items():
         changed = replace_place(changed, entries[key].place, number)
     return changed
@@ -312,4 +316,6 @@ def replace_place(holder: Any, place: Place, values: Any) -> Any:
     if isinstance(holder, Bar) and name == "centre" and old is None:
         old = holder.mass_centre
     new = copy_with(holder, **{name: replace_place(old, tuple(rest), values)})
-    return copy_with(new, mass=new.weigh()) if isinstance(new, Bar) else new
+    if isinstance(new, Bar):
+        return copy_with(new, mass=new.weigh())
+    return new

@@ -50,7 +50,10 @@ def find_positions(scene: Scene, wanted: list[tuple[str, float]]) -> Command:
     """
     if scene.motion.free is not None:
         return _join([_find_released(scene, *entry) for entry in wanted])
-    find = _find_places if scene.motion.law is None else _find_times
+    if scene.motion.law is None:
+        find = _find_places
+    else:
+        find = _find_times
     places = [place for entry in wanted for place in find(scene, *entry)]
     return command_at(scene, np.array(places))
 
@@ -129,7 +132,8 @@ def _list_candidates(scene: Scene, name: str, value: float) -> list[float]:
     # first
     turned = [place + turns * TURN for place in candidates for turns in (0, 1, -1)]
     sweep = command(scene).angle
-    low, high = float(sweep.min()) - SAME, float(sweep.max()) + SAME
+    low = float(sweep.min()) - SAME
+    high = float(sweep.max()) + SAME
     return sorted(turned, key=lambda place: not low <= place <= high)
 
 
@@ -144,7 +148,8 @@ def _find_times(scene: Scene, name: str, value: float) -> list[float]:
     """Find the times at which a motion by a law passes a value."""
     law = scene.motion.law
     assert law is not None
-    start, stop = law.time[0], law.time[-1]
+    start = law.time[0]
+    stop = law.time[-1]
     if name == "time":
         if not start <= value <= stop:
             raise NotAssembledError(
@@ -181,7 +186,8 @@ def _find_crossings(name: str, gaps: Array) -> NDArray[np.intp]:
 
     A zero counts once, with the step that ends there.
     """
-    before, after = gaps[:-1], gaps[1:]
+    before = gaps[:-1]
+    after = gaps[1:]
     near = name not in ANGLES or np.abs(after - before) < 0.5 * math.pi
     return np.flatnonzero((before != 0.0) & (before * after <= 0.0) & near)
 

@@ -120,7 +120,10 @@ class Sloped(NDArrayOperatorsMixin):
         for by, number in zip(_RULES[function](values, *plain), inputs, strict=True):
             if isinstance(number, Sloped):
                 unchanged = isinstance(by, float) and by == 1.0
-                term = number.slopes if unchanged else by * number.slopes
+                if unchanged:
+                    term = number.slopes
+                else:
+                    term = by * number.slopes
                 slopes = term if slopes is None else slopes + term
         return Sloped(values, slopes)
 
@@ -149,12 +152,16 @@ def _refuse(name: str) -> LimitError:
 
 def take_values(number: Any) -> Any:
     """Return the values without their slopes."""
-    return number.values if isinstance(number, Sloped) else number
+    if isinstance(number, Sloped):
+        return number.values
+    return number
 
 
 def take_slopes(number: Any) -> Any:
     """Return the slopes; of a constant 0."""
-    return number.slopes if isinstance(number, Sloped) else 0.0
+    if isinstance(number, Sloped):
+        return number.slopes
+    return 0.0
 
 
 def _choose_where(mask: Any, x: Any, y: Any) -> Sloped:

@@ -135,7 +135,9 @@ class Tolerances:
 
     def describe_seed(self) -> str:
         """Say where the random numbers came from."""
-        return "a generator's" if self.seed is None else f"seed {self.seed}"
+        if self.seed is None:
+            return "a generator's"
+        return f"seed {self.seed}"
 
     def _title(self) -> str:
         drawn = f"{self.samples} samples ({self.describe_seed()})"
@@ -238,7 +240,8 @@ def tolerances(
         )
     if progress is not None:
         progress(0.0)
-    slopes, study = sensitivity(scene), _make_members(scene, samples, seed)
+    slopes = sensitivity(scene)
+    study = _make_members(scene, samples, seed)
     n = len(slopes.solution)
     names = list(slopes.by)
     values = {name: split_parts(name, slopes.value(name)) for name in names}
@@ -247,7 +250,8 @@ def tolerances(
         for name, parts in values.items()
         for part in parts
     }
-    without, gone = np.zeros(n, dtype=np.intp), np.zeros(len(study), dtype=bool)
+    without = np.zeros(n, dtype=np.intp)
+    gone = np.zeros(len(study), dtype=bool)
     nominal_closes = slopes.solution.status_code != NOT_ASSEMBLED
     for columns, extra in _list_blocks(study, scene, samples, nominal_closes):
         pieces: Any = (
@@ -321,7 +325,8 @@ def _list_blocks(
 
     The start of the motion comes first if an effect counts from it.
     """
-    n, first = study.at.angle.shape[1], int(np.argmax(closes))
+    n = study.at.angle.shape[1]
+    first = int(np.argmax(closes))
     begins = [first] if scene.counts_turns else []
     size = max(1, AT_ONCE // samples)
     for start in range(0, n, size):
@@ -334,7 +339,8 @@ def _compute_first_order(slopes_of: Sensitivity, part: str) -> Spread:
 
     Those of the samples are still to come.
     """
-    scene, nominal = slopes_of.scene, slopes_of.value(part)
+    scene = slopes_of.scene
+    nominal = slopes_of.value(part)
     slopes = np.array(
         [slopes_of.of(part, tolerance.key) for tolerance in scene.tolerances]
     )

@@ -79,11 +79,16 @@ class Study:
         """
         commanded = self.at
         request = find_requested(self.scene, commanded, stage, out)
-        results, evaluated = Results(request), None
-        (m, n), block = request.shape, request.block
+        results = Results(request)
+        evaluated = None
+        m, n = request.shape
+        block = request.block
         with np.errstate(all="ignore"):
             for rows in split(m, max(1, block // n)):
-                begins = self.begin(rows) if request.asks_forces else self.scene
+                if request.asks_forces:
+                    begins = self.begin(rows)
+                else:
+                    begins = self.scene
                 for columns in split(n, block):
                     scene = self.members(rows, columns.stop - columns.start, begins)
                     case = Case.of(scene, commanded.bar, side).beside(self.scene)
@@ -127,10 +132,12 @@ class Study:
 
         A motion begins where the member first assembles.
         """
-        scene, commanded = self.scene, self.at
+        scene = self.scene
+        commanded = self.at
         if not scene.counts_turns:
             return scene
-        count, n = rows.stop - rows.start, commanded.angle.shape[1]
+        count = rows.stop - rows.start
+        n = commanded.angle.shape[1]
         flat = _take_members(commanded, rows, slice(0, n)).angle
         half, _ = Case.of(self.members(rows, n, scene), commanded.bar).half_angle(
             flat, None
@@ -187,7 +194,9 @@ def _find_turns(effects: Iterable[Effect]) -> dict[int, Any]:
 
 
 def _repeat(values: Array, count: int) -> Array:
-    return values if count == 1 else np.repeat(values, count)
+    if count == 1:
+        return values
+    return np.repeat(values, count)
 
 
 def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
@@ -224,7 +233,8 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
             "a free motion",
             "is integrated for one linkage; a study prescribes theta_2",
         )
-    entries, theta = list_entries(scene), command_key(scene)
+    entries = list_entries(scene)
+    theta = command_key(scene)
     arrays = {
         key: _read_numbers(key, value, [*entries, theta])
         for key, value in values.items()
@@ -270,7 +280,10 @@ def _list_commands(
 
     It is from the angles or strokes and the numbers that vary.
     """
-    motion: Any = scene.motion if scene.motion.law is None else command(scene)
+    if scene.motion.law is None:
+        motion: Any = scene.motion
+    else:
+        motion = command(scene)
     angle = np.broadcast_to(angles, (m, angles.shape[1]))
     speed, acceleration = (
         numbers[f"motion.{name}"][:, None] if f"motion.{name}" in numbers else number
@@ -310,22 +323,19 @@ def _read_numbers(key: str, value: Any, keys: list[str]) -> Array:
         )
     most = 2 if key in COMMAND_KEYS else 1
     if array.ndim > most:
-        allowed = (
-            "must have the shape (n,) or (m, n)"
-            if most == 2
-            else "must have the shape (m,)"
-        )
+        if most == 2:
+            allowed = "must have the shape (n,) or (m, n)"
+        else:
+            allowed = "must have the shape (m,)"
         raise InputError(key, f"shape {array.shape}", allowed)
     return array.astype(float)
 
 
 def _shorten(value: Any) -> object:
     """Shorten a value to what one line shows."""
-    return (
-        f"{type(value).__name__} of shape {value.shape}"
-        if isinstance(value, np.ndarray)
-        else value
-    )
+    if isinstance(value, np.ndarray):
+        return f"{type(value).__name__} of shape {value.shape}"
+    return value
 
 
 def _read_angles(scene: Scene, arrays: Mapping[str, Array], key: str) -> Array:

@@ -37,7 +37,8 @@ octave below what serves.
 TIME_CONSTANTS = (3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0, 120.0, 300.0)
 FIRST_ORDER = ("Euler", "implicit", "implicitfast", "discrete")
 _FIRST_ORDER_TIME_CONSTANTS = (2.0, 3.0, 6.0, 12.0)
-ROUNDS, STEPS = 15, 400
+ROUNDS = 15
+STEPS = 400
 LAB = Path(__file__).parent
 TYPES = tuple(kind for kind in DrawnType if kind is not DrawnType.ROCKER_CRANK)
 _SPEEDS = (-1.0, 3.0)
@@ -54,7 +55,9 @@ POSITIONS, _DENSER, SEARCHED = 36, 4, 2
 """Intervals of the scene. The answer is judged at a multiple of them, and the search
 decides at another.
 """
-_NEEDED_MET, _NEEDED_CHEAP, _CHEAP = 0.95, 0.80, 3.0
+_NEEDED_MET = 0.95
+_NEEDED_CHEAP = 0.80
+_CHEAP = 3.0
 
 
 def time_relative_costs(setup: TrialSetup) -> dict[tuple[str, bool], float]:
@@ -152,7 +155,9 @@ class AdviceCase:
 
         An error that is rightly called unreachable counts too.
         """
-        return self.error <= self.asked if self.reached else math.isnan(self.cheapest)
+        if self.reached:
+            return self.error <= self.asked
+        return math.isnan(self.cheapest)
 
     @property
     def cheap(self) -> bool:
@@ -176,10 +181,13 @@ def draw_scene(seed: int, index: int) -> tuple[Scene, float]:
     alpha = float(rng.choice([0.0, omega**2 * rng.uniform(-_GENTLE, _GENTLE)]))
     sweep = scene.motion.theta_2
     assert isinstance(sweep, Sweep)
-    start, stop = sweep.start, sweep.stop
+    start = sweep.start
+    stop = sweep.stop
     if not turns_fully(scene.linkage):
-        middle, half = (start + stop) / 2.0, WINDOW * (stop - start) / 2.0
-        start, stop = middle - half, middle + half
+        middle = (start + stop) / 2.0
+        half = WINDOW * (stop - start) / 2.0
+        start = middle - half
+        stop = middle + half
     motion = Motion(Sweep(start, stop, POSITIONS), omega, alpha, scene.motion.branch)
     return replace(scene, motion=motion), float(10.0 ** rng.uniform(*ERRORS))
 
@@ -200,7 +208,8 @@ def measure_case(
     """Ask for advice, judge it at denser positions, and search exhaustively."""
     scene, required = draw_scene(seed, index)
     advice = advise(scene, required)
-    dense, searched = _make_denser(scene, _DENSER), _make_denser(scene, SEARCHED)
+    dense = _make_denser(scene, _DENSER)
+    searched = _make_denser(scene, SEARCHED)
     error = judge_trial(
         dense, TrialSetup(dense, command(dense)).try_out(advice.best.settings)
     ).worst
@@ -220,9 +229,9 @@ def _compute_wilson(successes: int, n: int) -> float:
     """Compute the lower bound of the Wilson score interval of a proportion, at 95 %."""
     from scipy.stats import binomtest
 
-    return (
-        float(binomtest(successes, n).proportion_ci(0.95, "wilson").low) if n else 0.0
-    )
+    if n:
+        return float(binomtest(successes, n).proportion_ci(0.95, "wilson").low)
+    return 0.0
 
 
 def _find_enough(missed: int) -> int:
@@ -242,7 +251,8 @@ def measure(seed: int, count: int, out: Path) -> Iterator[AdviceCase]:
     Those that an interrupted run left are read.
     """
     with Store(out, {"seed": seed, **name_code(LAB)}).held() as store:
-        done, first = store.done(), draw_scene(seed, 0)[0]
+        done = store.done()
+        first = draw_scene(seed, 0)[0]
         costs: dict[tuple[str, bool], float] = {}
         for index in range(count):
             if index not in done:
@@ -289,7 +299,8 @@ def study(count: int, seed: int, out: Path) -> int:
             console=Console(stderr=True),
         )
     )
-    met, cheap = sum(case.met for case in cases), sum(case.cheap for case in cases)
+    met = sum(case.met for case in cases)
+    cheap = sum(case.cheap for case in cases)
     unreachable = sum(not case.reached for case in cases)
     ratios = sorted(
         case.cost / case.cheapest
@@ -316,9 +327,12 @@ def study(count: int, seed: int, out: Path) -> int:
         f" (needed {_NEEDED_CHEAP})"
     )
     if ratios:
-        median, high = ratios[len(ratios) // 2], ratios[int(0.95 * (len(ratios) - 1))]
+        median = ratios[len(ratios) // 2]
+        high = ratios[int(0.95 * (len(ratios) - 1))]
         click.echo(
             f"cost over the cheapest: median {median:.2f}, 95 % below {high:.2f}, most"
             f" {ratios[-1]:.2f}"
         )
-    return 0 if bound >= _NEEDED_MET and share >= _NEEDED_CHEAP else 1
+    if bound >= _NEEDED_MET and share >= _NEEDED_CHEAP:
+        return 0
+    return 1

@@ -73,13 +73,13 @@ ALONE = 20
 """Calls of one position each."""
 _PER_SCENE = 50_000
 """Positions in whose stead one random scene is judged: twenty of them by default."""
-ALL, _ANGLES_ALONE = "formulas, all 11 unknowns", "positions only"
-_SYSTEM, FLOOR = "13x13 assembled and solved", "floor: tangent, root, two arctan"
-FORCES, BARS, ONE = (
-    "solve to forces, points too",
-    "solve with error bars",
-    "one position to forces",
-)
+ALL = "formulas, all 11 unknowns"
+_ANGLES_ALONE = "positions only"
+_SYSTEM = "13x13 assembled and solved"
+FLOOR = "floor: tangent, root, two arctan"
+FORCES = "solve to forces, points too"
+BARS = "solve with error bars"
+ONE = "one position to forces"
 JUDGED = "a scene judged by the exact engines"
 _ASKED = 200
 """Positions that an adapter and a plain loop answer."""
@@ -113,7 +113,9 @@ class _SpeedLimit(NamedTuple):
 
     def holds(self, measured: float) -> bool:
         """Compare a measured number with the limit; NaN does not hold."""
-        return measured >= self.bound if self.sign == ">=" else measured <= self.bound
+        if self.sign == ">=":
+            return measured >= self.bound
+        return measured <= self.bound
 
 
 LIMITS = {
@@ -353,18 +355,18 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> in
 
 def measure(positions: int, rounds: int, largest: int) -> Measured:
     """Measure the ratios of LIMITS and ns per position, and the times by how many."""
-    scene, command = make_example(), make_command(positions)
-    limits, swing = (
-        make_example(_WITH_LIMITS),
-        make_command(positions, *choose_range(_WITH_LIMITS)),
-    )
-    everything, angles = allocate(UNKNOWNS, command), allocate(ANGLES, command)
-    batch, solved = (
-        min(positions, _THIRTEEN_BATCH),
-        make_command(min(positions, SOLVED)),
-    )
-    bodies, many = make_bodies(scene, make_command(batch)), len(solved.theta_2)
-    alone, lone = make_example(theta_2=1.0), make_bodies(scene, make_command(1))
+    scene = make_example()
+    command = make_command(positions)
+    limits = make_example(_WITH_LIMITS)
+    swing = make_command(positions, *choose_range(_WITH_LIMITS))
+    everything = allocate(UNKNOWNS, command)
+    angles = allocate(ANGLES, command)
+    batch = min(positions, _THIRTEEN_BATCH)
+    solved = make_command(min(positions, SOLVED))
+    bodies = make_bodies(scene, make_command(batch))
+    many = len(solved.theta_2)
+    alone = make_example(theta_2=1.0)
+    lone = make_bodies(scene, make_command(1))
     peers = collect_loops()
     actions: dict[str, tuple[int, Callable[[], object]]] = {
         ALL: (positions, lambda: solve(scene, at=command, out=everything)),
@@ -402,7 +404,8 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
     rows = {name: 1e9 * times[name] / count for name, (count, _) in actions.items()}
     by_positions = time_positions(peers.here, largest, rounds)
     by_linkages = time_linkages(positions, rounds)
-    cost, most = by_positions["NumPy"], max(by_linkages[STUDY])
+    cost = by_positions["NumPy"]
+    most = max(by_linkages[STUDY])
     exact = [engine for engine in ENGINES if not engine.through_time]
     if not any(engine.missing() for engine in exact):
         rows[JUDGED] = 1e9 * _time_judging(exact, max(1, positions // _PER_SCENE))
@@ -428,7 +431,8 @@ def _compare_adapters(rounds: int) -> dict[str, float]:
 
     Both read the same quantities.
     """
-    scene, command = make_example(), make_command(_ASKED)
+    scene = make_example()
+    command = make_command(_ASKED)
     adapters = {engine.name: engine for engine in ENGINES}
     actions: dict[str, Callable[[], object]] = {}
     for library, (name, make_loop) in _PLAIN_LOOPS.items():
@@ -449,7 +453,8 @@ def _read_plainly(loop: PlainLoop, command: Command) -> list[object]:
 
     It reads the places, angles, rates and accelerations.
     """
-    tree, inverse = loop.tree, loop.inverse
+    tree = loop.tree
+    inverse = loop.inverse
     answered: list[object] = []
 
     def inverse_and_read(q: Array, v: Array, a: Array) -> Array:

@@ -137,11 +137,9 @@ class _MatrixRow:
 def name_row(engine: str, version: str) -> str:
     """Name an engine with its version before the way in which it is used."""
     program, colon, way = engine.partition(":")
-    return (
-        engine
-        if not version or version in engine
-        else f"{program} {version}{colon}{way}"
-    )
+    if not version or version in engine:
+        return engine
+    return f"{program} {version}{colon}{way}"
 
 
 def read_reasons(file: Path) -> dict[str, str]:
@@ -165,7 +163,9 @@ class Benchmark:
         problems: Iterable[str],
         out: Path,
     ) -> None:
-        self.engines, self.reasons, self.out = list(engines), reasons, out
+        self.engines = list(engines)
+        self.reasons = reasons
+        self.out = out
         self.problems = {
             name: read_problem(PROBLEMS / f"{name}.json") for name in problems
         }
@@ -254,13 +254,20 @@ class Benchmark:
             for key in ("ask", "scene", "command", "times")
             if key in problem
         }
-        entry, name = row.entry, problem["problem"]
+        entry = row.entry
+        name = problem["problem"]
         for steps in (
             entry.steps if problem["ask"] == "answer" and entry.steps else (None,)
         ):
-            asked: dict[str, Any] = {"name": setting} if setting else {}
+            if setting:
+                asked: dict[str, Any] = {"name": setting}
+            else:
+                asked = {}
             asked |= {} if steps is None else {"steps_per_turn": steps}
-            stem = name if steps is None else f"{name}-{steps}"
+            if steps is None:
+                stem = name
+            else:
+                stem = f"{name}-{steps}"
             full = question | ({"setting": asked} if asked else {})
             yield self._take_or_ask(
                 row, label, stem, {"schema": RESULT, "problem": name}, full, running
@@ -280,7 +287,10 @@ class Benchmark:
         The result is stored; one that broke down is asked for again.
         """
         file = self.out / "results" / re.sub(r"[^\w.-]+", "-", label) / f"{stem}.json"
-        result = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+        if file.is_file():
+            result = json.loads(file.read_text(encoding="utf-8"))
+        else:
+            result = {}
         if result.get("version") != row.text("version") or result.get(
             "reason", ""
         ).startswith("broke down"):
@@ -308,10 +318,8 @@ class Benchmark:
         try:
             judged = judge(problem, result)
         except InputError as error:
-            cell.letters, cell.reason = (
-                MISSING,
-                f"an answer that cannot be judged: {error}",
-            )
+            cell.letters = MISSING
+            cell.reason = f"an answer that cannot be judged: {error}"
             return
         levels = find_levels([row for row in judged if row.level != MISSING])
         reactions, drive = (
@@ -334,7 +342,9 @@ class Benchmark:
         It is that of the longest name that the row begins with.
         """
         names = [name for name in self.reasons if label.startswith(name)]
-        return self.reasons[max(names, key=len)] if names else ""
+        if names:
+            return self.reasons[max(names, key=len)]
+        return ""
 
     def list_rows(self) -> list[list[Any]]:
         """List the rows of the table, problem by problem.
@@ -344,7 +354,8 @@ class Benchmark:
         table: list[list[Any]] = []
         for problem in self.problems:
             for label, row in self.rows.items():
-                cell, version = row.cells[problem], row.text("version")
+                cell = row.cells[problem]
+                version = row.text("version")
                 if not cell.runs:
                     line = [
                         problem,
@@ -362,10 +373,12 @@ class Benchmark:
                 for run in cell.runs:
                     finest = run is cell.runs[-1]
                     for quantity, error, level in run.numbers:
-                        reason = (
-                            cell.reason if finest and level not in ("A", "") else ""
-                        )
-                        reason = "not read" if level == MISSING else reason
+                        if finest and level not in ("A", ""):
+                            reason = cell.reason
+                        else:
+                            reason = ""
+                        if level == MISSING:
+                            reason = "not read"
                         table.append(
                             [
                                 problem,
@@ -582,7 +595,8 @@ def _find_order(runs: list[Run]) -> float | None:
     """
     if len(runs) < 2:
         return None
-    errors, steps = [], []
+    errors = []
+    steps = []
     for run in runs[-2:]:
         errors += [
             float(error) for quantity, error, _ in run.numbers if quantity == "torque"

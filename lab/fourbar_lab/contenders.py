@@ -56,11 +56,9 @@ MOST_LOOPED = 1000
 """Linkages that are solved one after the other. Beyond them the cost of one no longer
 changes.
 """
-STUDY, POSITIONS, _LOOPED = (
-    "study, NumPy",
-    "one linkage, as many positions",
-    "one after the other",
-)
+STUDY = "study, NumPy"
+POSITIONS = "one linkage, as many positions"
+_LOOPED = "one after the other"
 LINKAGE = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
 """Crank-rocker a = 0.1, b = 0.25, c = 0.22, d = 0.3 m, uniform bars."""
 
@@ -130,7 +128,8 @@ def _make_solve_loop() -> Loop:
     scene = make_example()
 
     def call(theta_2: Any, out: Any) -> None:
-        rows, into = iter(range(len(out))), {}
+        rows = iter(range(len(out)))
+        into = {}
         for name in UNKNOWNS:
             row = next(rows)
             into[name] = out[row : next(rows) + 1].T if name in VECTORS else out[row]
@@ -184,8 +183,10 @@ def time_positions(peers: dict[str, Loop], largest: int, rounds: int) -> Times:
     """
     times: Times = {name: {} for name in peers}
     for n in [10**k for k in range(3, 9) if 10**k <= largest]:
-        at_once, calls = min(n, AT_ONCE), max(1, SHORTEST // n, n // AT_ONCE)
-        theta_2, out = make_command(at_once).theta_2, np.zeros((15, at_once))
+        at_once = min(n, AT_ONCE)
+        calls = max(1, SHORTEST // n, n // AT_ONCE)
+        theta_2 = make_command(at_once).theta_2
+        out = np.zeros((15, at_once))
         actions = {name: partial(loop, theta_2, out) for name, loop in peers.items()}
         for name, value in time_interleaved(
             actions, rounds if n <= AT_ONCE else 1, calls

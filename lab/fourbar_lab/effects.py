@@ -264,11 +264,10 @@ def effects(engines: str, only: str | None, out: Path | None) -> int:
     from rich.progress import track
 
     wanted = tuple(name.strip() for name in engines.split(","))
-    chosen = (
-        tuple(EFFECTS)
-        if only is None
-        else tuple(dict.fromkeys(["none", *only.split(",")]))
-    )
+    if only is None:
+        chosen = tuple(EFFECTS)
+    else:
+        chosen = tuple(dict.fromkeys(["none", *only.split(",")]))
     for option, names, allowed in (
         ("--engines", wanted, WORKLOADS),
         ("--only", chosen, EFFECTS),

@@ -59,7 +59,8 @@ def _spread_masses(spread: float) -> Ranges:
     )
 
 
-_EVEN, UNEVEN = _spread_masses(0.0), _spread_masses(3.0)
+_EVEN = _spread_masses(0.0)
+UNEVEN = _spread_masses(3.0)
 
 
 def _draw_anywhere(rng: np.random.Generator) -> DrawnLinkage:
@@ -103,9 +104,11 @@ def _draw_near_change_point(rng: np.random.Generator) -> DrawnLinkage:
         lengths = (x, y, x, y)
         straight = float(rng.choice([0.0, math.pi]))
     elif kind == 1:  # kite a = b, c = d
-        lengths, straight = (x, y, y, x), math.pi
+        lengths = (x, y, y, x)
+        straight = math.pi
     elif kind == 2:  # kite a = d, b = c
-        lengths, straight = (x, x, y, y), 0.0
+        lengths = (x, x, y, y)
+        straight = 0.0
     else:
         # multiples of 2^-20 so that d + a = b + c, or d - a = b - c, holds exactly
         d, a, b = (
@@ -120,7 +123,8 @@ def _draw_near_change_point(rng: np.random.Generator) -> DrawnLinkage:
         )
     distance = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-8, 0))
     if rng.random() < 0.3:
-        k, missed = int(rng.integers(0, 4)), 0.1 * distance**2
+        k = int(rng.integers(0, 4))
+        missed = 0.1 * distance**2
         if missed < _BESIDE_ROUNDING:
             missed = 0.0
         lengths = tuple(
@@ -146,7 +150,8 @@ ANYWHERE = RandomFamily(_draw_anywhere, _EVEN)
 def scales(rng: np.random.Generator) -> Scene:
     """Multiply all lengths by 1e-9..1e9."""
     scene = ANYWHERE.draw(rng)
-    link, k = scene.linkage, float(10.0 ** rng.uniform(-9, 9))
+    link = scene.linkage
+    k = float(10.0 ** rng.uniform(-9, 9))
     bars = []
     for number in MOVING_BARS:
         bar = link.bar(number)
@@ -233,7 +238,8 @@ def springs(rng: np.random.Generator) -> Scene:
     )
     places = solve(marked, "position").points
     distance = math.hypot(*(places["Q"] - places["P"])[0])
-    stiffness, preload = float(rng.uniform(10.0, 1000.0)), 0.0
+    stiffness = float(rng.uniform(10.0, 1000.0))
+    preload = 0.0
     if rng.random() < 0.5:
         preload = float(rng.uniform(-0.5, 2.0)) * stiffness * distance
     spring = Spring(
@@ -254,7 +260,8 @@ def torsion(rng: np.random.Generator) -> Scene:
     zero by chance says nothing of the bar.
     """
     scene = massless(rng)
-    solution, pin = solve(scene, "position"), str(rng.choice(["A", "B", "O4"]))
+    solution = solve(scene, "position")
+    pin = str(rng.choice(["A", "B", "O4"]))
     assert solution.theta_3 is not None and solution.theta_4 is not None
     theta = (
         scene.linkage.ground_angle,
@@ -263,7 +270,8 @@ def torsion(rng: np.random.Generator) -> Scene:
         solution.theta_4[0],
     )
     first, second = PINS[pin]
-    stiffness, preload = float(rng.uniform(0.1, 10.0)), 0.0
+    stiffness = float(rng.uniform(0.1, 10.0))
+    preload = 0.0
     if rng.random() < 0.5:
         preload = float(rng.uniform(-2.0, 2.0)) * stiffness
     turns = math.tau * float(rng.choice([0, 0, int(rng.integers(-100, 100))]))
@@ -299,10 +307,15 @@ def tables(rng: np.random.Generator) -> Scene:
         (angle - before, angle + after), (first, first + rise * (before + after))
     )
     turns = int(rng.choice([0, 1, -1, int(10.0 ** rng.uniform(0.0, 9.0))]))
-    size, arm = float(rng.uniform(0.1, 10.0)), float(rng.uniform(0.0, 1.0))
+    size = float(rng.uniform(0.1, 10.0))
+    arm = float(rng.uniform(0.0, 1.0))
     turned = (float(x) for x in rng.uniform(-3.0, 3.0, 2))
-    frame, moment = str(rng.choice(["world", "bar"])), float(rng.choice([0.0, size]))
-    form = "arm" if frame == "world" else "from_centre"
+    frame = str(rng.choice(["world", "bar"]))
+    moment = float(rng.choice([0.0, size]))
+    if frame == "world":
+        form = "arm"
+    else:
+        form = "from_centre"
     place: Any = {form: (arm, next(turned))}
     load = Load(
         int(rng.choice(MOVING_BARS)),
@@ -373,8 +386,10 @@ def pushes(rng: np.random.Generator) -> Scene:
 
     It acts along a fixed or turning line.
     """
-    bar, frame = int(rng.choice(MOVING_BARS)), str(rng.choice(FRAMES))
-    place, direction = _draw_place(bar, rng, 0.05), float(rng.uniform(-3.0, 3.0))
+    bar = int(rng.choice(MOVING_BARS))
+    frame = str(rng.choice(FRAMES))
+    place = _draw_place(bar, rng, 0.05)
+    direction = float(rng.uniform(-3.0, 3.0))
     drive = PointDrive(place, direction, frame)
     return replace(ANYWHERE.draw(rng), drive_bar=None, drive=drive)  # type: ignore[arg-type]
 
@@ -385,18 +400,18 @@ def _near_pins(rng: np.random.Generator) -> Scene:
     The end is at 1e-1 to 1e-11 m from the pin that joins its two bars. The line of the
     force then passes the pin at that distance, though its other end lies far off.
     """
-    scene, pin = massless(rng), str(rng.choice(list(PINS)))
+    scene = massless(rng)
+    pin = str(rng.choice(list(PINS)))
     near = {"O2": 1, "A": 3, "B": 3, "O4": 4}[pin]
     (far,) = {*PINS[pin]} - {near}
-    distance, angle = (
-        float(10.0 ** rng.uniform(-11.0, -1.0)),
-        float(rng.uniform(-3.0, 3.0)),
-    )
+    distance = float(10.0 ** rng.uniform(-11.0, -1.0))
+    angle = float(rng.uniform(-3.0, 3.0))
     if pin == SECOND_PIN[near]:
         distance, angle = cmath.polar(
             scene.linkage.lengths[near - 1] - cmath.rect(distance, angle)
         )
-    start, end = Place(near, (distance, angle)), _draw_place(far, rng, 0.1)
+    start = Place(near, (distance, angle))
+    end = _draw_place(far, rng, 0.1)
     if rng.random() < 0.5:
         start, end = end, start
     kind = rng.integers(0, 3)
@@ -405,10 +420,8 @@ def _near_pins(rng: np.random.Generator) -> Scene:
             bar: replace(scene.linkage.bar(bar), centre=(0.0, 0.0))
             for bar in MOVING_BARS
         }
-        force, frame = (
-            (1.0, float(rng.uniform(-3.0, 3.0))),
-            str(rng.choice(["world", "bar"])),
-        )
+        force = (1.0, float(rng.uniform(-3.0, 3.0)))
+        frame = str(rng.choice(["world", "bar"]))
         linkage = FourBar(
             scene.linkage.ground, bars[2], bars[3], bars[4], scene.linkage.ground_angle
         )
@@ -423,7 +436,8 @@ def _near_pins(rng: np.random.Generator) -> Scene:
             drive_bar=None,  # type: ignore[arg-type]
             drive=LinearDrive(start, end),
         )
-    stiffness, length = float(rng.uniform(10.0, 1000.0)), float(rng.uniform(0.0, 2.0))
+    stiffness = float(rng.uniform(10.0, 1000.0))
+    length = float(rng.uniform(0.0, 2.0))
     return replace(scene, effects=(Springs((Spring(start, end, stiffness, length),)),))
 
 

@@ -112,11 +112,10 @@ def draw_fuzz_scene(seed: int, index: int) -> Scene:
             scene = FAMILIES[index % 2 == 1].draw(rng)
         except InputError:
             continue
-        alpha = (
-            float(rng.uniform(-10.0, 10.0))
-            if rng.random() < 1.0 / 3.0
-            else scene.motion.alpha_2
-        )
+        if rng.random() < 1.0 / 3.0:
+            alpha = float(rng.uniform(-10.0, 10.0))
+        else:
+            alpha = scene.motion.alpha_2
         return replace(scene, motion=scene.motion.replace(acceleration=alpha))
 
 
@@ -146,9 +145,9 @@ def _draw_lengths(rng: np.random.Generator, hard: bool) -> Any:
     if choice < 0.1:
         return (x[0], x[1], x[0], x[1])
     if choice < 0.2:
-        return (
-            (x[0], x[1], x[1], x[0]) if rng.random() < 0.5 else (x[0], x[0], x[1], x[1])
-        )
+        if rng.random() < 0.5:
+            return (x[0], x[1], x[1], x[0])
+        return (x[0], x[0], x[1], x[1])
     if choice < 0.35:
         return (
             x[0],
@@ -181,7 +180,10 @@ def _draw_angles(
     d, a, b, c = lengths
     choice = rng.random()
     if choice < 0.5:
-        diagonal = b + c if rng.random() < 0.5 else abs(b - c)
+        if rng.random() < 0.5:
+            diagonal = b + c
+        else:
+            diagonal = abs(b - c)
         cosine = (a * a + d * d - diagonal**2) / (2 * a * d)
         base = math.acos(min(1.0, max(-1.0, cosine)))
         psi = float(rng.choice([-1.0, 1.0])) * base + rng.choice(
@@ -208,7 +210,8 @@ def shrink_scene(scene: Scene, fails: Callable[[Scene], bool]) -> Scene:
                 try:
                     simpler_scene = loads("\n".join(simpler))
                     if fails(simpler_scene):
-                        scene, lines = simpler_scene, simpler
+                        scene = simpler_scene
+                        lines = simpler
                         break
                 except FourBarError:  # no scene any more
                     continue
@@ -222,7 +225,8 @@ def _list_simpler(lines: list[str], number: int) -> Iterator[list[str]]:
 
     Or put a simpler entry in the line.
     """
-    line, until = lines[number], number + 1
+    line = lines[number]
+    until = number + 1
     if line.startswith("["):
         until = next(
             (i for i in range(until, len(lines)) if lines[i].startswith("[")),
@@ -231,11 +235,10 @@ def _list_simpler(lines: list[str], number: int) -> Iterator[list[str]]:
     if not line.startswith(_NEEDED):
         yield [*lines[:number], *lines[until:]]
     key, _, value = line.partition(" = ")
-    entries = (
-        [f"{key} = {json.dumps(each)}" for each in json.loads(value)]
-        if value.startswith('["')
-        else []
-    )
+    if value.startswith('["'):
+        entries = [f"{key} = {json.dumps(each)}" for each in json.loads(value)]
+    else:
+        entries = []
     for digits in DIGITS:
         entries.append(
             NUMBER.sub(
@@ -281,11 +284,9 @@ def _check_file(scene: Scene) -> list[str]:
     It must be the same scene to the last digit.
     """
     again = dump(loads(dump(scene)))
-    return (
-        []
-        if again == dump(scene)
-        else ["file: a scene that was written and read is another one"]
-    )
+    if again == dump(scene):
+        return []
+    return ["file: a scene that was written and read is another one"]
 
 
 def _check_assembly(scene: Scene, commanded: Command, solution: Solution) -> list[str]:
@@ -316,12 +317,10 @@ def _check_assembly(scene: Scene, commanded: Command, solution: Solution) -> lis
 
 
 def _check_engines(question: Question) -> list[str]:
-    scene, commanded, solution, rows = (
-        question.scene,
-        question.at,
-        question.solution,
-        list(check_identities(question)),
-    )
+    scene = question.scene
+    commanded = question.at
+    solution = question.solution
+    rows = list(check_identities(question))
     for engine in EXACT:
         answer = ask_at(engine.start(), scene, commanded)
         held = make_demands(engine, scene, commanded, answer)
@@ -414,7 +413,8 @@ def fuzz(scenes: int, seed: int, workers: int, out: Path) -> int:
     for chunk in track(running, "fuzzing", total=chunks, console=console):
         wrong |= chunk
     for number in sorted(wrong, key=int)[:SHOWN]:
-        source, scene = wrong[number][0], draw_fuzz_scene(seed, int(number))
+        source = wrong[number][0]
+        scene = draw_fuzz_scene(seed, int(number))
         if not source.startswith(LOST):  # shrinking would end this process too
             scene = shrink_scene(
                 scene, lambda candidate: bool(list_findings(candidate))

@@ -96,7 +96,8 @@ def _mutate_files(
 def _mutate(text: str, rng: np.random.Generator, originals: Sequence[str]) -> str:
     if not text:
         return _PIECES[int(rng.integers(len(_PIECES)))]
-    start, length = int(rng.integers(len(text))), int(rng.geometric(0.1))
+    start = int(rng.integers(len(text)))
+    length = int(rng.geometric(0.1))
     lines = text.splitlines(keepends=True)
     line = int(rng.integers(len(lines)))
     match int(rng.integers(7)):
@@ -124,7 +125,10 @@ def _mutate(text: str, rng: np.random.Generator, originals: Sequence[str]) -> st
             return text[:start] + donor[int(rng.integers(len(donor))) :]
         case _:  # a digit changed
             digits = [i for i, character in enumerate(text) if character.isdigit()]
-            start = digits[int(rng.integers(len(digits)))] if digits else 0
+            if digits:
+                start = digits[int(rng.integers(len(digits)))]
+            else:
+                start = 0
             return text[:start] + str(int(rng.integers(10))) + text[start + 1 :]
 
 
@@ -149,7 +153,9 @@ def try_out(text: str) -> str:
     except Exception as error:
         return f"{type(error).__name__}: {error}"
     took = time.perf_counter() - start
-    return f"took {took:.1f} s" if took > _HANG else ""
+    if took > _HANG:
+        return f"took {took:.1f} s"
+    return ""
 
 
 @click.command()

@@ -114,7 +114,10 @@ def _list_failing(names: list[str]) -> dict[str, list[str]]:
     failing = {}
     for name in names or FAULT_SCENES:
         simulated = name.startswith("simulated")
-        offered = HARD_ENGINES if name.startswith("to full accuracy") else ENGINES
+        if name.startswith("to full accuracy"):
+            offered = HARD_ENGINES
+        else:
+            offered = ENGINES
         engines = [engine for engine in offered if simulated or not engine.through_time]
         rows = judge(
             name, FAULT_SCENES[name], engines, derived=name.startswith("derived")

@@ -111,7 +111,8 @@ def compile_mutants(module: ModuleType) -> Iterator[Mutant]:
                 inner for statement in definition.body for inner in ast.walk(statement)
             ):
                 for field, changed in _list_changes(node):
-                    original, before = getattr(node, field), ast.unparse(node)
+                    original = getattr(node, field)
+                    before = ast.unparse(node)
                     setattr(node, field, changed)
                     code = _find_code(
                         compile(tree, inspect.getfile(module), "exec"), qualified
@@ -257,7 +258,8 @@ def is_caught(
 ) -> bool:
     """Check a scene: whether any comparison or identity fails."""
     question = Question("", scene, command)
-    solution, rows = question.solution, list(check_identities(question))
+    solution = question.solution
+    rows = list(check_identities(question))
     for engine, answer in answers:
         rows += Comparison(
             "", scene, answer, solution, make_demands(engine, scene, command, answer)
@@ -343,8 +345,10 @@ def command(module: str | None, most: int) -> int:
         raise _HangError
 
     before = signal.signal(signal.SIGALRM, alarm)
-    tried, shown = make_baselines(), Console(stderr=True)
-    changing, missed = 0, list[str]()
+    tried = make_baselines()
+    shown = Console(stderr=True)
+    changing = 0
+    missed = list[str]()
     for name in [module] if module else MODULES:
         chosen = list(compile_mutants(import_module(f"fourbar.formulas.{name}")))
         if most and len(chosen) > most:
@@ -367,7 +371,8 @@ def command(module: str | None, most: int) -> int:
             f"{name}: {count - len(survivors)} of {count} caught, of {len(chosen)}"
             " mutants tried"
         )
-        changing, missed = changing + count, missed + survivors
+        changing = changing + count
+        missed = missed + survivors
     signal.signal(signal.SIGALRM, before)
     for line in missed:
         click.echo(f"not caught: {line}")
@@ -375,4 +380,6 @@ def command(module: str | None, most: int) -> int:
         f"the harness catches {changing - len(missed)} of {changing} mutants that"
         " change a number"
     )
-    return HOLDS if changing and len(missed) <= (1.0 - LEAST) * changing else FAILED
+    if changing and len(missed) <= (1.0 - LEAST) * changing:
+        return HOLDS
+    return FAILED

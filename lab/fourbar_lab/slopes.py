@@ -50,7 +50,8 @@ def _compute_exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
     They are differences in balls. No output where the loop does not close, no
     derivative where the drive has no torque.
     """
-    numbers, angle = list_numbers(scene), command_key(scene)
+    numbers = list_numbers(scene)
+    angle = command_key(scene)
     make_balls(scene, numbers[angle])  # sets the precision
     steps = {
         key: arb(abs(number) or 1.0) * arb(2) ** -STEP_BITS
@@ -109,11 +110,9 @@ def differentiate(scene: Scene) -> dict[str, Any]:
 def judge_slopes(scene: Scene, tally: Tally, sample: str) -> None:
     """Compare the derivatives at one position with those of the reference."""
     tally.samples += 1
-    (values, exact), slopes, numbers = (
-        _compute_exact_slopes(scene),
-        differentiate(scene),
-        list_numbers(scene),
-    )
+    values, exact = _compute_exact_slopes(scene)
+    slopes = differentiate(scene)
+    numbers = list_numbers(scene)
     if not values:
         tally.not_assembled += 1
         if np.nan_to_num(slopes["F12"]).any():

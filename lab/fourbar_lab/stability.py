@@ -61,7 +61,10 @@ def judge(scene: Scene, tally: Tally, sample: str) -> None:
     """Compare one position with the reference."""
     tally.samples += 1
     angle = float(np.asarray(scene.motion.angle))
-    drive = "torque" if scene.drive is None else "drive_force"
+    if scene.drive is None:
+        drive = "torque"
+    else:
+        drive = "drive_force"
     internal = (
         scene.drive is not None
         and scene.drive.has_stroke
@@ -87,7 +90,8 @@ def judge(scene: Scene, tally: Tally, sample: str) -> None:
                 or name.endswith("_error")
             ):
                 continue
-            own, rate = np.ravel(solution[name])[index], sensitivity[component]
+            own = np.ravel(solution[name])[index]
+            rate = sensitivity[component]
             if (
                 internal and name in PIN_FORCES
             ):  # a component that the drive has no part in is left of larger ones

@@ -101,7 +101,9 @@ def list_components(name: str) -> list[tuple[str, Any]]:
 
     Their index in its array is listed too.
     """
-    return [(f"{name}_x", 0), (f"{name}_y", 1)] if name in VECTORS else [(name, 0)]
+    if name in VECTORS:
+        return [(f"{name}_x", 0), (f"{name}_y", 1)]
+    return [(name, 0)]
 
 
 def compute_ratio(
@@ -111,18 +113,19 @@ def compute_ratio(
 
     It is 0 where the balls cannot tell it from the truth.
     """
-    error = value - float(ours) if math.isfinite(ours) else math.inf
+    if math.isfinite(ours):
+        error = value - float(ours)
+    else:
+        error = math.inf
     size = abs(float(value.mid()))
     if name.startswith("theta"):
-        error, size = (
-            (
-                math.remainder(float(error), 2.0 * math.pi)
-                if math.isfinite(ours)
-                else error
-            ),
-            1.0,
-        )
-    wrong = abs(float(error)) if value.rad() < abs(error) else 0.0
+        if math.isfinite(ours):
+            error = math.remainder(float(error), 2.0 * math.pi)
+        size = 1.0
+    if value.rad() < abs(error):
+        wrong = abs(float(error))
+    else:
+        wrong = 0.0
     return float(find_used(wrong, _compute_allowed(size, sensitivity))), wrong
 
 

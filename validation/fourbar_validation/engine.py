@@ -66,7 +66,10 @@ def open_engine(entry: str) -> tuple[_Factory, dict[str, Any]]:
         hello["version"] = ""
 
     def make(error: float | None = None, **setting: Any) -> Any:
-        laid_out = engine if error is None else adjust_engines((engine,), error)[0]
+        if error is None:
+            laid_out = engine
+        else:
+            laid_out = adjust_engines((engine,), error)[0]
         return _apply_setting(laid_out.start(), setting, ())
 
     return make, hello
@@ -82,11 +85,9 @@ def _apply_setting(engine: Any, setting: dict[str, Any], names: Sequence[str]) -
             f"it has no setting {setting['name']!r}; it has:"
             f" {', '.join(names) or 'none'}"
         )
-    return (
-        engine.at_setting(**setting)
-        if setting and hasattr(engine, "at_setting")
-        else engine
-    )
+    if setting and hasattr(engine, "at_setting"):
+        return engine.at_setting(**setting)
+    return engine
 
 
 def _open_class(entry: str) -> tuple[_Factory, dict[str, Any]]:
@@ -153,7 +154,10 @@ def answer(make: _Factory, question: dict[str, Any]) -> dict[str, Any]:
         scene = protocol.release_from_json(
             scene, question["command"], question["times"]
         )
-        step = {"step": float(question["step"])} if "step" in question else {}
+        if "step" in question:
+            step = {"step": float(question["step"])}
+        else:
+            step = {}
         return protocol.released_to_json(
             make(**step).release(scene, np.array(question["times"]))
         )
@@ -163,11 +167,9 @@ def answer(make: _Factory, question: dict[str, Any]) -> dict[str, Any]:
     except LimitError as limit:
         return {"refusal": str(limit)}
     if question["ask"] == "slopes":
-        return (
-            {"slopes": engine.slopes(scene)}
-            if hasattr(engine, "slopes")
-            else {"refusal": "it has no derivatives"}
-        )
+        if hasattr(engine, "slopes"):
+            return {"slopes": engine.slopes(scene)}
+        return {"refusal": "it has no derivatives"}
     if not hasattr(engine, "answer"):
         return {"refusal": "it integrates released motions alone"}
     if refusal := explain_refusal(engine, command):

@@ -68,11 +68,14 @@ def draw_axes(axes: "Axes", view: View) -> Array:
     Returns what the curves are drawn over.
     """
     axis = view.axis
-    over, here = axis.values, axis.factor * float(view.here.at.places[0])
+    over = axis.values
+    here = axis.factor * float(view.here.at.places[0])
     axes.set_xlabel(f"{axis.label} ({axis.unit.strip()})")
-    low, high = float(over[0]), float(over[-1])
+    low = float(over[0])
+    high = float(over[-1])
     if high == low:
-        low, high = low - 1.0, high + 1.0
+        low = low - 1.0
+        high = high + 1.0
     axes.set_xlim(low, high)
     if axis.unit == "°":
         set_degree_ticks(axes.xaxis, high - low)
@@ -80,8 +83,14 @@ def draw_axes(axes: "Axes", view: View) -> Array:
         np.diff(np.concatenate([[False], ~view.sweep.assembled, [False]]).astype(int))
     )
     for first, after in closed.reshape(-1, 2):
-        start = low if first == 0 else 0.5 * (over[first - 1] + over[first])
-        stop = high if after == len(over) else 0.5 * (over[after - 1] + over[after])
+        if first == 0:
+            start = low
+        else:
+            start = 0.5 * (over[first - 1] + over[first])
+        if after == len(over):
+            stop = high
+        else:
+            stop = 0.5 * (over[after - 1] + over[after])
         axes.axvspan(
             start, stop, fc="#f1f1f1", ec=FAINT, hatch="////", lw=0.0, zorder=0
         )
@@ -109,7 +118,8 @@ def find_poles(view: View) -> _Indices:
     if view.scene.motion.free is not None:  # no drive, no pole
         return np.array([], dtype=np.intp)
     if view.scene.drive is not None:
-        case, state = Case.of(view.scene, s.at.bar), compute_state(view.scene, s.at)
+        case = Case.of(view.scene, s.at.bar)
+        state = compute_state(view.scene, s.at)
         assert case.drive is not None
         with np.errstate(all="ignore"):
             sine = case.drive.leverage(state, case.sines(state.position))[0]
@@ -149,11 +159,9 @@ def choose_limit(values: list[Array]) -> float | None:
     if size.size == 0:
         return None
     ordinary = float(np.percentile(size, ORDINARY))
-    return (
-        CLIPPED * ordinary
-        if ordinary > 0.0 and size.max() > OUTLIER * ordinary
-        else None
-    )
+    if ordinary > 0.0 and size.max() > OUTLIER * ordinary:
+        return CLIPPED * ordinary
+    return None
 
 
 def clip(
@@ -174,11 +182,10 @@ def clip(
     index = find_peak_index(worst)
     if abs(worst[index]) <= limit:
         return
-    words = (
-        view.axis.words(view.sweep.at.places[index], 5)
-        if view.time is None
-        else f"t = {view.time[index]:.4g} s"
-    )
+    if view.time is None:
+        words = view.axis.words(view.sweep.at.places[index], 5)
+    else:
+        words = f"t = {view.time[index]:.4g} s"
     edge = f"{write_number(limit * factor)} {name_of_unit}"
     largest = write_quantity(worst[index], unit, view.units)
     if unit == "1":
@@ -235,12 +242,11 @@ def _draw_rates(
 
     Those of the commanded bar are left out if they are zero.
     """
-    over, driven = draw_axes(axes, view), view.sweep.at.bar
+    over = draw_axes(axes, view)
+    driven = view.sweep.at.bar
     name = {"omega": "ω", "alpha": "α"}[letter]
-    digits, others = (
-        {2: "₂", 3: "₃", 4: "₄"},
-        [bar for bar in MOVING_BARS if bar != driven],
-    )
+    digits = {2: "₂", 3: "₃", 4: "₄"}
+    others = [bar for bar in MOVING_BARS if bar != driven]
     curves = {
         name + digits[bar]: getattr(view.sweep, f"{letter}_{bar}") for bar in others
     }
@@ -312,10 +318,8 @@ def _draw_points(axes: "Axes", view: View, letter: str, unit: str, title: str) -
     for (name, values), dashes in zip(
         curves.items(), cycle(("-", "--", "-.", ":")), strict=False
     ):
-        colour, width = (
-            looks.get(name, FORCE_COLOURS["F43"]),
-            2.0 if name in view.sweep.points else 1.2,
-        )
+        colour = looks.get(name, FORCE_COLOURS["F43"])
+        width = 2.0 if name in view.sweep.points else 1.2
         axes.plot(
             over,
             factor * values,
@@ -340,16 +344,19 @@ def _draw_drive(
     axes: "Axes", view: View, name: str, letter: str, unit: str, what: str
 ) -> None:
     """Draw a quantity of the drive, with its poles."""
-    over, bar, poles = draw_axes(axes, view), view.scene.drive_bar, find_poles(view)
-    values, everywhere = (
-        getattr(view.sweep, name),
-        [getattr(branch.sweep, name) for branch in view.alike],
-    )
+    over = draw_axes(axes, view)
+    bar = view.scene.drive_bar
+    poles = find_poles(view)
+    values = getattr(view.sweep, name)
+    everywhere = [getattr(branch.sweep, name) for branch in view.alike]
     limit = choose_limit(everywhere)
     factor, shown_unit = choose_unit(
         limit or find_greatest(*everywhere), unit, view.units
     )
-    symbol = f"${letter}_{bar}$" if bar else f"${letter}$"
+    if bar:
+        symbol = f"${letter}_{bar}$"
+    else:
+        symbol = f"${letter}$"
     plot_between_poles(axes, over, factor * values, poles, color=INK, label=symbol)
     for index in poles:
         axes.axvline(
@@ -359,11 +366,10 @@ def _draw_drive(
             ls=(0, (1, 1.5)),
         )
     if poles.size:
-        poles_of = (
-            f"torque on bar {bar} ({_POLE_REASON[bar]})"
-            if bar
-            else "drive's force (its line has no lever)"
-        )
+        if bar:
+            poles_of = f"torque on bar {bar} ({_POLE_REASON[bar]})"
+        else:
+            poles_of = "drive's force (its line has no lever)"
         note(view, f"Dotted: poles of the {poles_of}.")
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     axes.set(
@@ -387,11 +393,17 @@ def mark_peak(axes: "Axes", over: Array, values: Array, unit: str) -> None:
     if not np.isfinite(values).any():
         return
     index = find_peak_index(values)
-    place, peak = float(over[index]), float(values[index])
+    place = float(over[index])
+    peak = float(values[index])
     axes.plot(place, peak, "o", ms=5.0, mew=1.1, ls="none", zorder=5, **OPEN)
     low, high = axes.get_xlim()
     share = (place - low) / (high - low)
-    side = "left" if share < 0.25 else "right" if share > 0.75 else "center"
+    if share < 0.25:
+        side = "left"
+    elif share > 0.75:
+        side = "right"
+    else:
+        side = "center"
     axes.margins(y=0.18)  # room for the words
     axes.annotate(
         f"{write_number(peak)} {unit}",
@@ -407,7 +419,10 @@ def mark_peak(axes: "Axes", over: Array, values: Array, unit: str) -> None:
 def draw_drive(axes: "Axes", view: View) -> None:
     """Draw the torque or force of the drive."""
     drive = read_drive(view.sweep)
-    what = "Torque" if view.scene.drive is None else "Force"
+    if view.scene.drive is None:
+        what = "Torque"
+    else:
+        what = "Force"
     _draw_drive(axes, view, drive.keys.value, drive.symbol[0], drive.unit, what)
 
 
@@ -537,7 +552,8 @@ def find_free_place(mu: Array) -> float:
     It is a part of the axis's length; the remark stands at 40 deg.
     """
     half = _REMARK / 2.0
-    best, clearance = 1.0 - half, -1.0
+    best = 1.0 - half
+    clearance = -1.0
     for place in np.linspace(1.0 - half, half, 25):
         part = mu[
             int((place - half) * len(mu)) : max(1, math.ceil((place + half) * len(mu)))
@@ -546,7 +562,8 @@ def find_free_place(mu: Array) -> float:
             part[np.isfinite(part)] - _RECOMMENDED - 3.0
         )  # the remark stands on the line
         if away.size and away.min() > clearance:
-            best, clearance = float(place), float(away.min())
+            best = float(place)
+            clearance = float(away.min())
     return best
 
 
@@ -557,16 +574,19 @@ def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
     """
     if view.time is not None:
         return []
-    positions, marked = view.sweep.at, list[tuple[list[float], list[float], str, str]]()
+    positions = view.sweep.at
+    marked = list[tuple[list[float], list[float], str, str]]()
     degrees = np.degrees(positions.angle)
     order = np.argsort(degrees)
-    margin = (
-        1.5 * float(np.median(np.abs(np.diff(degrees)))) if len(degrees) > 1 else 0.0
-    )
+    if len(degrees) > 1:
+        margin = 1.5 * float(np.median(np.abs(np.diff(degrees))))
+    else:
+        margin = 0.0
     one, follower = (bar for bar in MOVING_BARS if bar != positions.bar)
     signs = with_signs(view.scene.linkage, positions).branch
     for bar in sorted({2, 4, positions.bar}, key=lambda bar: bar != positions.bar):
-        turned, heights = list[float](), list[float]()
+        turned = list[float]()
+        heights = list[float]()
         for limit in limit_positions(view.scene.linkage, bar):
             theta = {2: limit.theta_2, 3: limit.theta_3, 4: limit.theta_4}
             sign = math.copysign(1.0, math.sin(theta[follower] - theta[one]))
@@ -598,7 +618,8 @@ def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
 
 def _list_inside(angles: Array, angle: float, margin: float) -> list[float]:
     """List an angle (rad) and its full turns that lie in the sweep, degrees."""
-    low, high = float(angles.min()) - margin, float(angles.max()) + margin
+    low = float(angles.min()) - margin
+    high = float(angles.max()) + margin
     start = math.degrees(angle)
     first = math.ceil((low - start) / 360.0)
     return [
@@ -621,8 +642,10 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
     """
     from matplotlib.ticker import MaxNLocator
 
-    force, look = getattr(view.sweep, name), choose_force_line(name)
-    direction, size_here = np.arctan2(force[:, 1], force[:, 0]), np.hypot(*force.T)
+    force = getattr(view.sweep, name)
+    look = choose_force_line(name)
+    direction = np.arctan2(force[:, 1], force[:, 0])
+    size_here = np.hypot(*force.T)
     everywhere = _list_force_sizes(view, (name,))
     limit = choose_limit(everywhere)
     top = limit or 1.08 * find_greatest(*everywhere) or 1.0
@@ -637,7 +660,10 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
     finite = np.isfinite(direction)
     free = _find_free_direction(direction[finite])
     direction[finite] = np.unwrap(direction[finite])
-    size = np.where(size_here <= top, size_here, np.nan) if limit else size_here
+    if limit:
+        size = np.where(size_here <= top, size_here, np.nan)
+    else:
+        size = size_here
     plot_between_poles(axes, direction, factor * size, poles, **look)
     axes.plot(
         direction[dots],

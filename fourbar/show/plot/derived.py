@@ -53,7 +53,8 @@ def _list_values(view: View, name: str) -> list[Array]:
 
 def draw_shaking_force(axes: "Axes", view: View) -> None:
     """Draw the force on the frame: its size and its components."""
-    over, poles = draw_axes(axes, view), find_poles(view)
+    over = draw_axes(axes, view)
+    poles = find_poles(view)
     vectors = _list_values(view, "shaking_force")
     x, y = vectors[0].T
     curves = {"|F|": np.hypot(x, y), "F_x": x, "F_y": y}
@@ -72,7 +73,8 @@ def draw_shaking_force(axes: "Axes", view: View) -> None:
 
 def draw_shaking_moment(axes: "Axes", view: View) -> None:
     """Draw the moment on the frame about O2."""
-    over, poles = draw_axes(axes, view), find_poles(view)
+    over = draw_axes(axes, view)
+    poles = find_poles(view)
     moments = _list_values(view, "shaking_moment")
     limit = choose_limit(moments)
     factor, unit = choose_unit(limit or find_greatest(*moments), "N m", view.units)
@@ -123,7 +125,8 @@ def draw_centres(axes: "Axes", view: View, labels: Labels) -> None:
     middle = pins.mean(axis=0)
     reach = WINDOW * max(view.scene.linkage.lengths)
     for name, colour, dashes in (("I13", POINT, "-"), ("I24", INK, (0, (4, 1.5)))):
-        path, here = derive(view.sweep, name), derive(view.here, name)
+        path = derive(view.sweep, name)
+        here = derive(view.here, name)
         assert path is not None
         assert here is not None
         away = np.hypot(*(path - middle).T)

@@ -221,18 +221,21 @@ def draw_figure(
                 value,
                 f"must be left out of {figure}; it shows in {', '.join(TAKERS[key])}",
             )
-    position = None if position is None else require("position", position)
+    if position is None:
+        position = None
+    else:
+        position = require("position", position)
     with apply_style():
-        scenes = (
-            [set_branch(scene, sign) for sign in (1, -1)]
-            if branches == "both"
-            else [scene]
-        )
+        if branches == "both":
+            scenes = [set_branch(scene, sign) for sign in (1, -1)]
+        else:
+            scenes = [scene]
         if position is None and len(scenes) > 1:
             position = choose_common_position(scenes)
         views = [make_view(branch, position) for branch in scenes]
         for shown in views:
-            shown.units, shown.dimensions = units, dimensions
+            shown.units = units
+            shown.dimensions = dimensions
             shown.others = [view for view in views if view is not shown]
             _look_between(shown)
         return Drawing(_compose(painter, size, views))

@@ -128,13 +128,12 @@ def choose_frames(shown: View, count: int) -> list[int]:
 
     They are the segment that assembles around the drawn position.
     """
-    closes, positions = shown.sweep.assembled, shown.sweep.at
+    closes = shown.sweep.assembled
+    positions = shown.sweep.at
     here = int(np.argmin(np.abs(positions.places - shown.here.at.places[0])))
     gaps = np.flatnonzero(~closes)
-    first, last = (
-        max(gaps[gaps < here], default=-1) + 1,
-        min(gaps[gaps > here], default=len(closes)) - 1,
-    )
+    first = max(gaps[gaps < here], default=-1) + 1
+    last = min(gaps[gaps > here], default=len(closes)) - 1
     if shown.time is not None:
         return [round(i) for i in np.linspace(first, last, count)]
     if abs(positions.angle[last] - positions.angle[first] - math.tau) < 1e-6:
@@ -153,11 +152,10 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
     axes = figure.subplots()
     figure.suptitle(shorten_text(shown.scene.title, 70), **TITLE)
     draw_paths(axes, shown, Labels())
-    move_vectors = (
-        symbols.draw_vectors(axes, shown, sweep, factor, size)
-        if moving and shown.moves
-        else None
-    )
+    if moving and shown.moves:
+        move_vectors = symbols.draw_vectors(axes, shown, sweep, factor, size)
+    else:
+        move_vectors = None
     passing: list[Any] = []
 
     def put(index: int) -> Labels:
@@ -187,7 +185,8 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
         put(index)
         if move_vectors is not None:
             move_vectors(index)
-        axis, places = shown.axis, sweep.at.places
+        axis = shown.axis
+        places = sweep.at.places
         theta = f"{axis.factor * places[index]:.1f}".replace("-", "−")
         caption = rf"{axis.label} = {theta}{axis.unit}"
         if shown.time is not None:

@@ -80,10 +80,8 @@ def list_actions(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
 
     With d'Alembert's they add up to zero.
     """
-    pins, turned = (
-        place_of(view.scene.linkage, view.here, 0, 1.0).pins,
-        view.state().direction(bar),
-    )
+    pins = place_of(view.scene.linkage, view.here, 0, 1.0).pins
+    turned = view.state().direction(bar)
     arrows: list[Arrow] = []
     couples: list[Couple] = []
     for pin in ENDS[bar]:
@@ -178,7 +176,8 @@ def _take_one(vector: Any) -> complex:
 
 def _record_actions(view: View) -> _ActionRecorder:
     """Record what a drive that exerts a force, loads and effects put on the bars."""
-    scene, state = view.scene.settled(), view.state()
+    scene = view.scene.settled()
+    state = view.state()
     recorder = _ActionRecorder(scene, state)
     if scene.drive is not None and scene.motion.free is None:
         recorder.name = "$F$"
@@ -218,7 +217,10 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
         (abs(arrow.force) for *_, arrows, _ in freed for arrow in arrows), default=0.0
     )
     longest = max(view.scene.linkage.bar(bar).length for bar in MOVING_BARS)
-    scale = 0.75 * longest / biggest if biggest > 0.0 else 0.0
+    if biggest > 0.0:
+        scale = 0.75 * longest / biggest
+    else:
+        scale = 0.0
     # one window size: the bars, too, are to one scale
     span = WINDOW * max(
         float(np.ptp(_reach(v, bar, arrows, scale), axis=0).max())
@@ -268,11 +270,10 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
         column[2].set_xlabel(f"$x$ from ${pin_name(ENDS[bar][0]).strip('$')}$ ({unit})")
         largest = write_quantity(worst.peak.value, "N m", view.units)
         foot = write_quantity(worst.x, "m", view.units)
-        spread = (
-            "weight and inertia as a uniform bar's"
-            if forces.uniform
-            else "weight and inertia at G"
-        )
+        if forces.uniform:
+            spread = "weight and inertia as a uniform bar's"
+        else:
+            spread = "weight and inertia at G"
         note(view, f"Bar {bar}: largest |M| = {largest} at x = {foot}, {spread}.")
     note(
         view, "x runs along the line between the pins, y to its left; N > 0 is tension."
@@ -281,7 +282,8 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
 
 def _reach(view: View, bar: int, arrows: list[Arrow], scale: float) -> Points:
     """List every point that a bar's panel has to show, from the bar's first pin, m."""
-    described, u = view.scene.linkage.bar(bar), view.state().direction(bar)
+    described = view.scene.linkage.bar(bar)
+    u = view.state().direction(bar)
     points = [0.0j, _take_one(described.length * u), _take_one(described.to_centre * u)]
     for arrow in arrows:
         points += [arrow.at, arrow.at + scale * arrow.force]
@@ -300,7 +302,8 @@ def _draw_one(
 ) -> None:
     pins = place_of(view.scene.linkage, view.here, 0, 1.0).pins
     along = pins[ENDS[bar][1]] - pins[ENDS[bar][0]]
-    end, middle = split_components(along), split_components(0.5 * along)
+    end = split_components(along)
+    middle = split_components(0.5 * along)
     line = ([0.0, end[0]], [0.0, end[1]])
     axes.plot(
         *line,
@@ -324,10 +327,8 @@ def _draw_one(
             short.append(f"{plain} = {write_quantity(size, 'N', view.units)}")
             continue
         draw_plate(axes, bar, (0.0j, arrow.at, along), labels)
-        foot, tip = (
-            split_components(arrow.at),
-            split_components(arrow.at + scale * arrow.force),
-        )
+        foot = split_components(arrow.at)
+        tip = split_components(arrow.at + scale * arrow.force)
         look = {
             **HEADED,
             "color": arrow.colour,
@@ -398,7 +399,8 @@ def _scale_bar(axes: "Axes", scale: float, biggest: float, units: Conversion) ->
         )
         / factor
     )
-    x, y = axes.get_xlim()[0], axes.get_ylim()[0]
+    x = axes.get_xlim()[0]
+    y = axes.get_ylim()[0]
     axes.plot(
         [x, x + scale * round_force],
         [y, y],

@@ -74,7 +74,12 @@ class Labels:
         for label in self.wanted:
             dx, dy = (p - q for p, q in zip(label.at, label.shun, strict=True))
             away = max(math.hypot(dx, dy), 1e-300)
-            side = "center" if abs(dx) < 0.5 * away else "left" if dx > 0.0 else "right"
+            if abs(dx) < 0.5 * away:
+                side = "center"
+            elif dx > 0.0:
+                side = "left"
+            else:
+                side = "right"
             text = label.axes.annotate(
                 label.text,
                 label.at,
@@ -136,12 +141,14 @@ class Labels:
             half = (0.5 * extent.width + per_point, 0.5 * extent.height + per_point)
             x, y = axes.transData.transform(label.at)
             sx, sy = axes.transData.transform(label.shun)
-            away = math.atan2(y - sy, x - sx) if (x, y) != (sx, sy) else math.pi / 2
-            dots = (
-                np.concatenate(samples[id(axes)])
-                if id(axes) in samples
-                else np.empty((0, 3))
-            )
+            if (x, y) != (sx, sy):
+                away = math.atan2(y - sy, x - sx)
+            else:
+                away = math.pi / 2
+            if id(axes) in samples:
+                dots = np.concatenate(samples[id(axes)])
+            else:
+                dots = np.empty((0, 3))
             boxes = [box for owner, box in taken if owner is axes]
             panel = axes.get_window_extent().extents
             centre = _choose_spot(
@@ -187,7 +194,8 @@ def _sample_line(points: np.ndarray, per_point: float) -> np.ndarray:
 
     A mark is a line that ends where it begins.
     """
-    pieces, step = [], STEP * per_point
+    pieces = []
+    step = STEP * per_point
     for p, q in pairwise(points):
         if not (np.all(np.isfinite(p)) and np.all(np.isfinite(q))):
             continue
@@ -195,7 +203,9 @@ def _sample_line(points: np.ndarray, per_point: float) -> np.ndarray:
             pieces.append(p + _MARK * per_point * RING)
         share = np.linspace(0.0, 1.0, 2 + int(min(np.hypot(*(q - p)) / step, 2000)))
         pieces.append(p + share[:, None] * (q - p))
-    return np.concatenate(pieces) if pieces else np.empty((0, 2))
+    if pieces:
+        return np.concatenate(pieces)
+    return np.empty((0, 2))
 
 
 def _choose_spot(
@@ -212,16 +222,17 @@ def _choose_spot(
 
     Among equal ones the nearest and most outward is taken.
     """
-    best, best_cost, edge = point, math.inf, 0.5 * per_point * dots[:, 2]
+    best = point
+    best_cost = math.inf
+    edge = 0.5 * per_point * dots[:, 2]
     for reach in _REACH:
         for k in range(DIRECTIONS):
             angle = away + (k + 1) // 2 * (1 if k % 2 else -1) * math.tau / DIRECTIONS
-            cosine, sine = math.cos(angle), math.sin(angle)
+            cosine = math.cos(angle)
+            sine = math.sin(angle)
             gap = (reach + mark) * per_point
-            x, y = (
-                point[0] + cosine * (gap + half[0]),
-                point[1] + sine * (gap + half[1]),
-            )
+            x = point[0] + cosine * (gap + half[0])
+            y = point[1] + sine * (gap + half[1])
             hit = (np.abs(dots[:, 0] - x) < half[0] + edge) & (
                 np.abs(dots[:, 1] - y) < half[1] + edge
             )
@@ -240,5 +251,6 @@ def _choose_spot(
                 + 0.05 * k
             )
             if cost < best_cost:
-                best, best_cost = (x, y), cost
+                best = (x, y)
+                best_cost = cost
     return best

@@ -95,10 +95,12 @@ def draw_mechanism(
         )
     pins = {name: split_components(pin) for name, pin in place.pins.items()}
     centre = sum(place.pins.values()) / 4.0
-    middle, drawn = split_components(centre), []
+    middle = split_components(centre)
+    drawn = []
     for number in MOVING_BARS:
         start, stop = ENDS[number]
-        (x, y), colour = zip(pins[start], pins[stop], strict=True), BAR_COLOURS[number]
+        x, y = zip(pins[start], pins[stop], strict=True)
+        colour = BAR_COLOURS[number]
         drawn += axes.plot(x, y, color=colour, lw=4.5, solid_capstyle="round", zorder=4)
         labels.keep_off(axes, pins[start], pins[stop], width=4.5)
         labels.add(
@@ -133,7 +135,8 @@ def draw_mechanism(
         first, last = (place.pins[pin] for pin in ENDS[carrier])
         drawn += draw_plate(axes, carrier, (first, corner, last), labels)
     for number in MOVING_BARS:
-        bar, colour = view.scene.linkage.bar(number), BAR_COLOURS[number]
+        bar = view.scene.linkage.bar(number)
+        colour = BAR_COLOURS[number]
         if bar.mass == 0.0:
             continue
         G = place.point(number, bar.to_centre)
@@ -148,11 +151,10 @@ def draw_mechanism(
         for line in shown.lines:
             labels.keep_off(axes, *line)
         if shown.label is not None:
-            away = (
-                split_components(complex(*shown.label) - shown.away)
-                if shown.away
-                else middle
-            )
+            if shown.away:
+                away = split_components(complex(*shown.label) - shown.away)
+            else:
+                away = middle
             labels.add(
                 Label(
                     axes,
@@ -197,10 +199,8 @@ def draw_plate(
     along = (point - first) / (last - first)
     if abs(along.imag) < _ON_BAR and -_ON_BAR < along.real < 1.0 + _ON_BAR:
         return []
-    shape, colour = (
-        [split_components(corner) for corner in corners],
-        BAR_COLOURS.get(bar, MUTED),
-    )
+    shape = [split_components(corner) for corner in corners]
+    colour = BAR_COLOURS.get(bar, MUTED)
     labels.keep_off(axes, *shape)
     shade = to_rgba(colour, 0.08 if bar > 1 else 0.0)
     return [
@@ -229,7 +229,8 @@ def draw_support(axes: "Axes", pin: Point, size: float, labels: Labels) -> None:
     """Draw the hatched support under a fixed pin."""
     from matplotlib.patches import Polygon, Rectangle
 
-    (x, y), wide = pin, 1.7 * size
+    x, y = pin
+    wide = 1.7 * size
     foot = y - wide
     axes.add_patch(
         Polygon(
@@ -256,7 +257,9 @@ def draw_support(axes: "Axes", pin: Point, size: float, labels: Labels) -> None:
 def _write_bar_name(view: View, number: int) -> str:
     """Write the number of a bar, with its length where dimensions are wanted."""
     length = write_quantity(view.scene.linkage.lengths[number - 1], "m", view.units)
-    return f"{number}: {length}" if view.dimensions else str(number)
+    if view.dimensions:
+        return f"{number}: {length}"
+    return str(number)
 
 
 def scale_of(view: View) -> tuple[float, str, float]:
@@ -292,7 +295,9 @@ def scale_of(view: View) -> tuple[float, str, float]:
 
 def pin_name(name: str) -> str:
     """Write a pin as it is typeset."""
-    return f"${name[0]}_{name[1]}$" if len(name) == 2 else f"${name}$"
+    if len(name) == 2:
+        return f"${name[0]}_{name[1]}$"
+    return f"${name}$"
 
 
 _COUPLER_CURVES: tuple[tuple[str, Any], ...] = (
@@ -352,7 +357,8 @@ def draw_paths(axes: "Axes", view: View, labels: Labels) -> None:
             *[(float(x), float(y)) for x, y in scaled[:: max(1, len(scaled) // 120)]],
         )
     pins = locate_pins(view, factor)
-    O2, O4 = pins["O2"], pins["O4"]
+    O2 = pins["O2"]
+    O4 = pins["O4"]
     axes.plot(
         *zip(O2, O4, strict=True), color=MUTED, lw=1.0, ls=(0, (8, 3, 2, 3)), zorder=1
     )
@@ -381,7 +387,10 @@ def _list_paths(view: View) -> list[tuple[Array, str, Any, str]]:
     traced = trace(view)
     sweep = traced.solution
     massive = view.scene.linkage.coupler.mass > 0.0
-    middle = sweep.G3 if massive else 0.5 * (sweep.A + sweep.B)
+    if massive:
+        middle = sweep.G3
+    else:
+        middle = 0.5 * (sweep.A + sweep.B)
     paths: list[tuple[Array, str, Any, str]] = [
         (sweep.A, BAR_COLOURS[2], (0, (1, 2)), "path of $A$"),
         (sweep.B, BAR_COLOURS[4], (0, (3, 2)), "path of $B$"),
@@ -413,10 +422,8 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     If it has none, they are of points along its line and off it.
     """
     factor, unit, _ = scale_of(view)
-    pins, names = (
-        locate_pins(view, factor),
-        [point.name for point in view.scene.points if point.bar == 3],
-    )
+    pins = locate_pins(view, factor)
+    names = [point.name for point in view.scene.points if point.bar == 3]
     traced = trace(view)
     for (name, points), (colour, dashes) in zip(
         _list_coupler_points(traced.solution, names),
@@ -460,11 +467,10 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
         title = "Coupler curves of the circuit"
     axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
     _show_drawing_coordinates(axes, view, factor)
-    heading = (
-        "point of the coupler"
-        if names
-        else "point along AB (and off it), in lengths of the coupler"
-    )
+    if names:
+        heading = "point of the coupler"
+    else:
+        heading = "point along AB (and off it), in lengths of the coupler"
     axes.legend(
         loc="upper center",
         bbox_to_anchor=(0.5, -0.14),
@@ -497,9 +503,8 @@ def _list_coupler_points(
         (0.5, 0.5),
         (0.5, -0.5),
     ):
-        name = (
-            {0.0: "$A$", 1.0: "$B$"}.get(u, f"{u:g}")
-            if v == 0.0
-            else f"{u:g}, {v:+g}".replace("-", "−")
-        )
+        if v == 0.0:
+            name = {0.0: "$A$", 1.0: "$B$"}.get(u, f"{u:g}")
+        else:
+            name = f"{u:g}, {v:+g}".replace("-", "−")
         yield name, sweep.A + u * along + v * across

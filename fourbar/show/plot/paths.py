@@ -55,7 +55,10 @@ def trace(view: View) -> Trace:
     circuit = motion.commanded == "theta_2" and not isinstance(motion.angle, Sweep)
     solution = view.sweep
     for steps in STEPS:
-        at = _list_circuit(view, steps) if circuit else _list_range(view, steps)
+        if circuit:
+            at = _list_circuit(view, steps)
+        else:
+            at = _list_range(view, steps)
         solution = solve(view.scene, "position", at=at)
         followed = [solution.A, solution.B, *solution.points.values()]
         if all(_longest_chord(points) <= _CHORD for points in followed):
@@ -64,7 +67,8 @@ def trace(view: View) -> Trace:
 
 
 def _list_circuit(view: View, steps: int) -> Command:
-    linkage, here = view.scene.linkage, view.here
+    linkage = view.scene.linkage
+    here = view.here
     number = int(find_circuit(linkage, here.theta_2, here.branch)[0])
     theta_2, assembly, _ = list_circuit(
         linkage, number, view.scene.motion.branch, steps
@@ -90,7 +94,9 @@ def _longest_chord(points: Array) -> float:
     It is a part of the path's extent.
     """
     chords, extent = _measure(points)
-    return float(np.nanmax(chords, initial=0.0)) / extent if extent else 0.0
+    if extent:
+        return float(np.nanmax(chords, initial=0.0)) / extent
+    return 0.0
 
 
 def _thin(path: Array) -> Array:

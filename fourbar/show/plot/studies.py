@@ -113,12 +113,16 @@ def _list_positions(axes: "Axes", spreads: Tolerances, units: Conversion) -> Any
 
 
 def _draw_band(axes: "Axes", spreads: Tolerances, part: str, units: Conversion) -> None:
-    spread, over = spreads.spreads[part], _list_positions(axes, spreads, units)
+    spread = spreads.spreads[part]
+    over = _list_positions(axes, spreads, units)
     ends = [spread.low, spread.high, spread.least, spread.greatest]
     away = [end - spread.nominal for end in ends]
     sizes = np.abs(np.concatenate([*away, spread.worst]))
     sizes = sizes[np.isfinite(sizes)]
-    most = 1.1 * float(np.percentile(sizes, _OFF_SCALE)) if sizes.size else 0.0
+    if sizes.size:
+        most = 1.1 * float(np.percentile(sizes, _OFF_SCALE))
+    else:
+        most = 0.0
     factor, unit = choose_unit(most, find_part_unit(part), units)
     colour = FORCE_COLOURS.get(part.strip("|"), INK)
     axes.fill_between(
@@ -139,7 +143,8 @@ def _draw_shares(
 ) -> None:
     from matplotlib.transforms import offset_copy
 
-    spread, over = spreads.spreads[part], _list_positions(axes, spreads, units)
+    spread = spreads.spreads[part]
+    over = _list_positions(axes, spreads, units)
     with np.errstate(all="ignore"):
         shares = 100.0 * spread.shares / spread.shares.sum(axis=0)
     order = np.argsort(-np.nan_to_num(shares).sum(axis=1))

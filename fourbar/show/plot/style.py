@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-INK, MUTED, FAINT = "#1a1a1a", "#6b6b6b", "#d9d9d9"
+INK = "#1a1a1a"
+MUTED = "#6b6b6b"
+FAINT = "#d9d9d9"
 POINT = "#8A3B78"
 """Colour of the scene's own points."""
 # Okabe and Ito's palette: distinguished by colour-blind readers, and by lightness and
@@ -185,7 +187,9 @@ class Drawing:
 def shorten_text(text: str, width: int) -> str:
     """Shorten a stranger's text to one line of at most `width` characters."""
     line = clean_line(text)
-    return line if len(line) <= width else line[: width - 1].rstrip() + "…"
+    if len(line) <= width:
+        return line
+    return line[: width - 1].rstrip() + "…"
 
 
 def find_greatest(*values: Array) -> float:

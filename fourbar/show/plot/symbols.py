@@ -35,7 +35,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Point = tuple[float, float]
-LOAD, SPRING, PIN = "#8A3B78", "#6b5b00", "#4d5b70"
+LOAD = "#8A3B78"
+SPRING = "#6b5b00"
+PIN = "#4d5b70"
 COLOURS = {
     **{
         "force": LOAD,
@@ -126,7 +128,8 @@ class Symbol(NamedTuple):
 
 def list_acting(scene: Scene) -> list[Symbol]:
     """List everything that acts, the drive first; nothing that has no size."""
-    symbols, scene = [], scene.settled()
+    symbols = []
+    scene = scene.settled()
     if scene.drive is not None and scene.motion.free is None:
         symbols.append(_make_drive(scene.drive))
     elif scene.motion.free is None:
@@ -141,7 +144,10 @@ def list_acting(scene: Scene) -> list[Symbol]:
     for number, load in enumerate(scene.loads, 1):
         G = scene.linkage.bar(load.bar).to_centre
         if load.force is not None and load.force[0] != 0.0:
-            arm = 0.0j if load.arm is None else cmath.rect(*load.arm)
+            if load.arm is None:
+                arm = 0.0j
+            else:
+                arm = cmath.rect(*load.arm)
             symbols.append(
                 Symbol(
                     "force",
@@ -189,7 +195,8 @@ def _make_drive(drive: ForceDrive) -> Symbol:
     if isinstance(drive, LinearDrive):
         return _join_ends("cylinder", "F", drive)
     assert isinstance(drive, PointDrive)
-    bar, at = drive.place.bar, drive.place.vector()
+    bar = drive.place.bar
+    at = drive.place.vector()
     direction = cmath.rect(1.0, drive.direction)
     turns = drive.frame == "bar"
     return Symbol("push", "F", bar, at, vector=direction, turns=turns)
@@ -264,7 +271,10 @@ def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) ->
         1: cmath.rect(1.0, linkage.ground_angle),
         **{k: cmath.rect(1.0, angle) for k, angle in angles.items()},
     }
-    torque = float("nan") if solution.torque is None else float(solution.torque[index])
+    if solution.torque is None:
+        torque = float("nan")
+    else:
+        torque = float(solution.torque[index])
     pins = {"O2": 0.0j, "A": A, "B": B, "O4": O4}
     return Pose({1: 0.0j, 2: 0.0j, 3: A, 4: O4}, u, pins, factor, angles[2], torque)
 
@@ -335,7 +345,8 @@ def split_components(z: complex) -> Point:
 def _draw_line(
     axes: "Axes", drawn: _DrawnSymbol, points: Any, colour: str, width: float
 ) -> None:
-    x, y = np.real(points), np.imag(points)
+    x = np.real(points)
+    y = np.imag(points)
     drawn.artists += axes.plot(
         x, y, color=colour, lw=width, zorder=3.5
     )  # over supports, under the bars
@@ -363,7 +374,8 @@ def _draw_arrow(
 def _draw_force(
     axes: "Axes", symbol: Symbol, place: Pose, size: float, drawn: _DrawnSymbol
 ) -> None:
-    tail, sign = place.tail(symbol), symbol.sign(place.theta_2)
+    tail = place.tail(symbol)
+    sign = symbol.sign(place.theta_2)
     if sign == 0.0:
         return
     tip = tail + sign * LENGTHS["force"] * size * place.direction(
@@ -406,7 +418,10 @@ def _turn(
 def _draw_zigzag(start: complex, end: complex, width: float) -> Any:
     """Draw a coil spring seen from the side: straight ends, teeth between."""
     along = end - start
-    across = 1j * along / abs(along) * width if along else 0.0
+    if along:
+        across = 1j * along / abs(along) * width
+    else:
+        across = 0.0
     teeth = [start, start + 0.15 * along]
     teeth += [
         start + (0.15 + 0.7 * (k + 0.5) / COILS) * along + (-1) ** k * across

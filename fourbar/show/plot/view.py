@@ -169,11 +169,12 @@ def list_sweep(scene: Scene) -> Command:
         return stated.part(np.argsort(stated.places, kind="stable"))
     wide = command_at(scene, default_places(scene, float(stated.angle[0])))
     # the same position may lie whole turns away from the default range
-    turns = (
-        np.round((0.5 * (wide.angle[0] + wide.angle[-1]) - stated.angle) / math.tau)
-        if stated.stroke is None
-        else 0.0
-    )
+    if stated.stroke is None:
+        turns = np.round(
+            (0.5 * (wide.angle[0] + wide.angle[-1]) - stated.angle) / math.tau
+        )
+    else:
+        turns = 0.0
     places = np.unique(np.concatenate([wide.places, stated.places + turns * math.tau]))
     return command_at(scene, places)
 
@@ -203,7 +204,9 @@ def choose_common_position(scenes: "list[Scene]") -> float | None:
         return None
     sweeps = [solve(scene, at=list_sweep(scene)) for scene in scenes]
     sweeps = [sweep for sweep in sweeps if sweep.assembled.any()]
-    return _choose_position(sweeps) if sweeps else None
+    if sweeps:
+        return _choose_position(sweeps)
+    return None
 
 
 def describe_change_points(motion: Solution) -> str:
@@ -272,11 +275,13 @@ def _view_motion(scene: Scene, position: float | None) -> View:
     """
     sweep = solve(scene)
     _require_assembled(sweep)
-    angle, name = sweep.at.angle, sweep.commanded
+    angle = sweep.at.angle
+    name = sweep.commanded
     if position is None:
         index = int(np.argmax(sweep.assembled))
     else:
-        low, high = math.degrees(np.min(angle)), math.degrees(np.max(angle))
+        low = math.degrees(np.min(angle))
+        high = math.degrees(np.max(angle))
         if not low <= math.degrees(position) <= high:
             raise NotAssembledError(
                 f"the motion does not pass {name} = {math.degrees(position):.6g} deg:"
@@ -299,7 +304,10 @@ def _choose_position(sweeps: "list[Solution]") -> float:
     ).reshape(-1, 2)
     run = slice(*ends[int(np.argmax(ends[:, 1] - ends[:, 0]))])
     places = sweeps[0].at.places[run]
-    lead = _LEAD if sweeps[0].at.stroke is None else math.inf
+    if sweeps[0].at.stroke is None:
+        lead = _LEAD
+    else:
+        lead = math.inf
     quality = np.full(len(places), np.inf)
     for sweep in sweeps:
         for condition in (sweep.condition, sweep.drive_condition):

@@ -72,10 +72,8 @@ class _DrakeTree(Tree):
                 part.mass, np.array([*part.centre, 0.0]), about_g
             )
             body = self.body[part.bar] = plant.AddRigidBody(f"bar{part.bar}", inertia)
-            joint_frame, bearer = (
-                RigidTransform(np.array([*part.first_pin, 0.0])),
-                self.body[part.bearer].body_frame(),
-            )
+            joint_frame = RigidTransform(np.array([*part.first_pin, 0.0]))
+            bearer = self.body[part.bearer].body_frame()
             frame = plant.AddFrame(
                 FixedOffsetFrame(f"first_pin{part.bar}", bearer, joint_frame)
             )

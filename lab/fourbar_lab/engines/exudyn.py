@@ -160,12 +160,14 @@ class ExudynBars(Loaded):
         ):
             coordinates[self.turn[bar]] = angle
         self.state.SetODE2Coordinates(coordinates)
-        jacobian, gap = self._read_constraint_jacobian(), self._read_constraint_gap()
+        jacobian = self._read_constraint_jacobian()
+        gap = self._read_constraint_gap()
         coordinates[self.shifts] = np.linalg.solve(
             jacobian[_OTHER_ROWS][:, self.shifts], -gap[_OTHER_ROWS]
         )
         self.state.SetODE2Coordinates(coordinates)
-        self.q, self.jacobians = coordinates, jacobian
+        self.q = coordinates
+        self.jacobians = jacobian
 
     def _read_constraint_gap(self) -> Array:
         self.solver.ComputeAlgebraicEquations(self.mbs, False)
@@ -194,22 +196,18 @@ class ExudynBars(Loaded):
 
         Pins O2, A and O4 are kept closed.
         """
-        turns, pins, b = (
-            list(self.turn.values()),
-            self.jacobians[_OTHER_ROWS],
-            self.jacobians[_B_ROWS],
-        )
+        turns = list(self.turn.values())
+        pins = self.jacobians[_OTHER_ROWS]
+        b = self.jacobians[_B_ROWS]
         shifts = np.linalg.solve(pins[:, self.shifts], -pins[:, turns])
         by_angle = b[:, turns] + b[:, self.shifts] @ shifts
         return np.column_stack((by_angle[:, 0] + by_angle[:, 1], by_angle[:, 1:]))
 
     def angle(self, bar: int) -> float:
         """Read its coordinate, within half a turn; the ground's line as described."""
-        return (
-            self.ground_angle
-            if bar == 1
-            else math.remainder(self.q[self.turn[bar]], math.tau)
-        )
+        if bar == 1:
+            return self.ground_angle
+        return math.remainder(self.q[self.turn[bar]], math.tau)
 
     def _read_output(self, kind: Any, name: str) -> Array:
         bar, local = self.local[name]
@@ -232,7 +230,9 @@ class ExudynBars(Loaded):
 
     def velocity(self, bar: int) -> float:
         """Read that of its coordinate; the ground has none."""
-        return 0.0 if bar == 1 else float(self.v[self.turn[bar]])
+        if bar == 1:
+            return 0.0
+        return float(self.v[self.turn[bar]])
 
     def alpha(self, bar: int) -> float:
         """Read that of its coordinate."""
@@ -249,10 +249,8 @@ class ExudynBars(Loaded):
         """
         if self.behind is not None:
             self._move_behind()
-        of_drive, commanded = (
-            self._read_constraint_jacobian(),
-            np.eye(SIZE)[-1],
-        )  # a cylinder's is that of closed pins
+        of_drive = self._read_constraint_jacobian()
+        commanded = np.eye(SIZE)[-1]  # a cylinder's is that of closed pins
         jacobian = np.vstack((of_drive[:-1], np.eye(SIZE)[self.turn[bar]]))
         try:
             self.v = v = solve_refined(jacobian, commanded * speed)

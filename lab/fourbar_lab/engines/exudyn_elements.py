@@ -38,7 +38,8 @@ class Bodies:
     """
 
     def __init__(self, mbs: Any, linkage: FourBar) -> None:
-        self.mbs, self.ground_angle = mbs, linkage.ground_angle
+        self.mbs = mbs
+        self.ground_angle = linkage.ground_angle
         self.node: dict[int, Any] = {1: mbs.AddNode(NodePointGround())}
         self.body: dict[int, Any] = {1: mbs.AddObject(ObjectGround())}
         for part in list_parts(linkage):
@@ -74,7 +75,8 @@ class Bodies:
 
         They are rotated by an angle from its line.
         """
-        cos, sin = math.cos(turn), math.sin(turn)
+        cos = math.cos(turn)
+        sin = math.sin(turn)
         frame = [
             [cos, -sin, 0.0, 0.0],
             [sin, cos, 0.0, 0.0],

@@ -70,11 +70,9 @@ def find_refusal(scene: Scene) -> str:
                 f"bar {number} has no mass; OpenSim takes no such body at the end of a"
                 " chain, and drops its inertia"
             )
-    return (
-        ""
-        if about_first_pin(scene.linkage.input)
-        else "bar 2 has no inertia about O2; Simbody divides by it"
-    )
+    if about_first_pin(scene.linkage.input):
+        return ""
+    return "bar 2 has no inertia about O2; Simbody divides by it"
 
 
 class _OpenSimBars(Loaded):
@@ -180,7 +178,8 @@ class _OpenSimBars(Loaded):
         element.setForceFunctions(*_make_constants())
         element.setTorqueFunctions(*_make_constants())
         self.model.addForce(element)
-        force, torque = element.updForceFunctions(), element.updTorqueFunctions()
+        force = element.updForceFunctions()
+        torque = element.updTorqueFunctions()
         return [
             osim.Constant.safeDownCast(x)
             for x in (force.get(0), force.get(1), torque.get(2))
@@ -225,7 +224,8 @@ class _OpenSimBars(Loaded):
         )
 
     def _compute_station_jacobian(self, name: str) -> Array:
-        (bar, place), matrix = self.local[name], osim.Matrix()
+        bar, place = self.local[name]
+        matrix = osim.Matrix()
         self.matter.calcStationJacobian(
             self.state,
             self.body[bar].getMobilizedBodyIndex(),
@@ -292,7 +292,8 @@ class _OpenSimBars(Loaded):
         self.state.setTime(acceleration)
         self.state.setU(make_vector(turns * speed))
         self.model.realizeVelocity(self.state)
-        bias, matrix = osim.Vector(), osim.Matrix()
+        bias = osim.Vector()
+        matrix = osim.Matrix()
         self.matter.calcBiasForAccelerationConstraints(self.state, bias)
         self.matter.calcProjectedMInv(self.state, matrix)
         sizes = np.linalg.svd(np.array(matrix.to_numpy())[:3, :3], compute_uv=False)
@@ -326,12 +327,10 @@ class _OpenSimBars(Loaded):
         until its multipliers hold nothing but rounding.
         """
         self.act()
-        pin_a, drive, closing, before = (
-            self.point("end2"),
-            0.0,
-            np.zeros(2),
-            (math.inf, math.inf),
-        )
+        pin_a = self.point("end2")
+        drive = 0.0
+        closing = np.zeros(2)
+        before = (math.inf, math.inf)
         seen: set[tuple[float, float]] = set()
         for number in range(PASSES):
             for bar, wrench in self.wrenches.items():
@@ -341,8 +340,10 @@ class _OpenSimBars(Loaded):
                 self.state.getTime()
             )  # Simbody computes again what depends on it
             self.model.realizeAcceleration(self.state)
-            couple, force = self._couple_of_command(), self._compute_closing_force()
-            drive, closing = drive + couple / leverage, closing + force
+            couple = self._couple_of_command()
+            force = self._compute_closing_force()
+            drive = drive + couple / leverage
+            closing = closing + force
             self.work(couple / leverage)
             self.push(2, force, pin_a)
             self.push(3, -force, pin_a)
@@ -373,11 +374,9 @@ class _OpenSimBars(Loaded):
 
     def velocity(self, bar: int) -> float:
         """Read that of a body; the ground has none."""
-        return (
-            0.0
-            if bar == 1
-            else float(self.body[bar].getAngularVelocityInGround(self.state).get(2))
-        )
+        if bar == 1:
+            return 0.0
+        return float(self.body[bar].getAngularVelocityInGround(self.state).get(2))
 
     def alpha(self, bar: int) -> float:
         """Read it from the accelerations of the coordinates."""
@@ -404,7 +403,8 @@ class _OpenSimBars(Loaded):
 
         They are the constraint's; on bodies the force is -G^T lambda.
         """
-        on_bodies, on_mobilities = osim.VectorOfSpatialVec(), osim.Vector()
+        on_bodies = osim.VectorOfSpatialVec()
+        on_mobilities = osim.Vector()
         multipliers = self.state.getMultipliers()
         self.matter.calcConstraintForcesFromMultipliers(
             self.state, multipliers, on_bodies, on_mobilities

@@ -24,7 +24,8 @@ from fourbar_validation.engines.description import list_parts, rotate
 class Dart(Simulator):
     """DART's own time stepping; its closing constraint offers no force."""
 
-    name, version = "DART", version("dartpy")
+    name = "DART"
+    version = version("dartpy")
     changed = (
         "built in Python; the input carries a light flywheel as an inertia about its"
         " own pin"
@@ -37,8 +38,10 @@ class Dart(Simulator):
 
         Torque and forces are those with which the last step began.
         """
-        begin, inertia = start(scene), size_flywheel(scene, LIGHT)
-        world, linkage = dartpy.simulation.World(), dartpy.dynamics.Skeleton("four_bar")
+        begin = start(scene)
+        inertia = size_flywheel(scene, LIGHT)
+        world = dartpy.simulation.World()
+        linkage = dartpy.dynamics.Skeleton("four_bar")
         bodies: dict[int, Any] = {}
         for part, angle, speed in zip(
             list_parts(scene.linkage), begin.qpos, begin.qvel, strict=True
@@ -72,10 +75,8 @@ class Dart(Simulator):
         def advance(steps: int) -> tuple[Any, float]:
             for _ in range(steps - 1):
                 world.step()
-            q, speed = (
-                np.array(linkage.getPositions()),
-                float(linkage.getVelocities()[0]),
-            )
+            q = np.array(linkage.getPositions())
+            speed = float(linkage.getVelocities()[0])
             world.step()
             return q, speed
 

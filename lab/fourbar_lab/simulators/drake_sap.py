@@ -30,7 +30,8 @@ from fourbar_validation.engines.description import FIRST_PIN, rotate
 class DrakeSap(Simulator):
     """Drake's discrete plant with the SAP solver."""
 
-    name, version = "Drake, SAP", version("drake")
+    name = "Drake, SAP"
+    version = version("drake")
     changed = (
         "a flywheel is the rotor of an actuator; by default a loop of four joints is"
         " refused, so a ball constraint stands in for the fourth (its force is not"
@@ -60,8 +61,10 @@ class DrakeSap(Simulator):
 
         The flywheel is the rotor of an actuator on O2.
         """
-        timestep, written_for = course.timestep, self.settings[self.setting]
-        begin, inertia = start(scene), size_flywheel(scene, LIGHT)
+        timestep = course.timestep
+        written_for = self.settings[self.setting]
+        begin = start(scene)
+        inertia = size_flywheel(scene, LIGHT)
         plant = MultibodyPlant(timestep)
         plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
         if written_for == "gazebo":
@@ -96,10 +99,8 @@ class DrakeSap(Simulator):
                 joint.get_angle(context) + q
                 for joint, q in zip(joints, begin.qpos, strict=True)
             ]
-            theta, speed = (
-                [angles[0], angles[0] + angles[1], angles[2]],
-                joints[0].get_angular_rate(context),
-            )
+            theta = [angles[0], angles[0] + angles[1], angles[2]]
+            speed = joints[0].get_angular_rate(context)
             reactions = plant.get_reaction_forces_output_port().Eval(context)
             on_child = (
                 reactions[int(joint.index())].translational()[:2] for joint in joints

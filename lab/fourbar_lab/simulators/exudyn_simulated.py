@@ -20,7 +20,8 @@ from fourbar_lab.simulators.motion import Course, Instant, Readings, Simulator, 
 class ExudynIntegrators(Simulator):
     """Exudyn's implicit integrators."""
 
-    name, version = "Exudyn", version("exudyn")
+    name = "Exudyn"
+    version = version("exudyn")
     changed = (
         "built with its Python interface; the drive is a coordinate constraint whose"
         " offset follows the time"
@@ -36,13 +37,16 @@ class ExudynIntegrators(Simulator):
 
         Multipliers, speeds and accelerations are all of the end of a step.
         """
-        begin, bars = start(scene), ExudynBars(scene)
+        begin = start(scene)
+        bars = ExudynBars(scene)
         if bars.terms:
             raise LimitError(
                 "Exudyn's own simulation has gravity, viscous pins and springs alone"
             )
-        mbs, state = bars.mbs, bars.state
-        theta_2, omega_2 = begin.qpos[0], begin.qvel[0]
+        mbs = bars.mbs
+        state = bars.state
+        theta_2 = begin.qpos[0]
+        omega_2 = begin.qvel[0]
         bars.place(begin.qpos)
         speeds = np.linalg.solve(bars.jacobians, omega_2 * np.eye(SIZE)[-1])
         initial = exu.ConfigurationType.Initial
@@ -56,7 +60,8 @@ class ExudynIntegrators(Simulator):
         )
         state.SetODE2Coordinates(bars.q, configuration=initial)
         state.SetODE2Coordinates_t(speeds, configuration=initial)
-        readings, done = Readings(), 0
+        readings = Readings()
+        done = 0
 
         def read(system: Any, t: float) -> bool:
             nonlocal done

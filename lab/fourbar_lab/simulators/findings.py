@@ -57,7 +57,9 @@ def _read_outcome(done: Ended) -> str:
     """Return what a script's end says; a traceback is no "fixed"."""
     if not done.failed:
         return "holds"
-    return FIXED if done.last == FIXED else f"not run: {done.last}"
+    if done.last == FIXED:
+        return FIXED
+    return f"not run: {done.last}"
 
 
 def read(script: Path) -> Reproduction:

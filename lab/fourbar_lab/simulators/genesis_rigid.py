@@ -34,7 +34,8 @@ genesis.init(
 class GenesisRigid(Simulator):
     """Genesis' rigid solver; it reports no pin force but the closing one."""
 
-    name, version = "Genesis", version("genesis-world")
+    name = "Genesis"
+    version = version("genesis-world")
     device = torch.cuda.get_device_name() if torch.cuda.is_available() else "CPU"
     changed = (
         "precision 64; timestep, gravity and the keyframe's speeds are set by hand; a"
@@ -70,15 +71,14 @@ class GenesisRigid(Simulator):
         world.step()  # compiled before the clock runs
         world.reset()
         bars.set_dofs_velocity(np.array(start(scene).qvel))
-        armature, solver = float(bars.get_dofs_armature()[0]), world.sim.rigid_solver
+        armature = float(bars.get_dofs_armature()[0])
+        solver = world.sim.rigid_solver
 
         def advance(steps: int) -> tuple[Any, float]:
             for _ in range(steps - 1):
                 world.step()
-            q, speed = (
-                bars.get_qpos().cpu().numpy().copy(),
-                float(bars.get_dofs_velocity()[0]),
-            )
+            q = bars.get_qpos().cpu().numpy().copy()
+            speed = float(bars.get_dofs_velocity()[0])
             world.step()
             return q, speed
 

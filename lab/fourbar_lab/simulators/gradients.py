@@ -39,7 +39,8 @@ def assemble(scene: Scene, theta_2: float, reader: str) -> ClosedState:
     It has the speed there.
     """
     written = text(scene, STEPS, reader)
-    loop, (model, data) = ClosedLoop(written), open_model(written)
+    loop = ClosedLoop(written)
+    model, data = open_model(written)
     q = Assembler(loop).find(theta_2, scene.motion.branch)
     assert q is not None
     loop.set_state(q, scene.motion.omega_2 or 0.0)

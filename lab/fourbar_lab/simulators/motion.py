@@ -114,10 +114,8 @@ class Simulator:
     """True if `states` evaluates positions that are set one by one."""
 
     def __init__(self) -> None:
-        self.setting, self.steps = (
-            next(iter(self.settings)),
-            None if self.single_states else STEPS,
-        )
+        self.setting = next(iter(self.settings))
+        self.steps = None if self.single_states else STEPS
 
     def at_setting(
         self,
@@ -129,10 +127,8 @@ class Simulator:
         if error is not None:
             raise LimitError("it knows no law of its error: ask for steps_per_turn")
         chosen = copy.copy(self)
-        chosen.setting, chosen.steps = (
-            name or self.setting,
-            steps_per_turn or self.steps,
-        )
+        chosen.setting = name or self.setting
+        chosen.steps = steps_per_turn or self.steps
         return chosen
 
     def through(self, scene: Scene, course: Course) -> Readings:
@@ -148,7 +144,10 @@ class Simulator:
         n = len(command.angle)
         rows: NDArray[np.intp] = np.arange(n)
         steps = self.steps
-        how = "single states" if steps is None else f"{steps}/rev"
+        if steps is None:
+            how = "single states"
+        else:
+            how = f"{steps}/rev"
         setting = f"{self.setting}, {how}"
         try:
             if steps is None:
@@ -156,7 +155,8 @@ class Simulator:
                 readings = self.states(scene)
             else:
                 led, course = lay_out(scene, command, steps)
-                rows, readings = course.rows, self.through(led, course)
+                rows = course.rows
+                readings = self.through(led, course)
         except (
             InputError,
             LimitError,
@@ -274,7 +274,8 @@ def run_through(
     `advance`: so many steps further, by the clock; what it returns is read.
     `clock`: of the processor; of a GPU that of the wall.
     """
-    readings, done = Readings(), 0
+    readings = Readings()
+    done = 0
     for stop in course.stops:
         began = clock()
         reached = advance(stop - done)
@@ -290,7 +291,8 @@ def start(scene: Scene) -> Start:
     Its speeds are those of the free body. No simulator starts from what the formulas
     computed.
     """
-    commanded, omega_2 = command(scene), scene.motion.omega_2 or 0.0
+    commanded = command(scene)
+    omega_2 = scene.motion.omega_2 or 0.0
     closed = close(scene.linkage, commanded.theta_2, commanded.branch)
     usable = np.flatnonzero(closed.assembled)
     if not len(usable):
@@ -304,7 +306,8 @@ def start(scene: Scene) -> Start:
     omega = move(
         scene.linkage, theta[0], np.array([omega_2]), np.zeros(1), *theta[1:]
     ).omega
-    q, v = [float(x[0]) for x in theta], [float(omega[bar][0]) for bar in (2, 3, 4)]
+    q = [float(x[0]) for x in theta]
+    v = [float(omega[bar][0]) for bar in (2, 3, 4)]
     return Start(
         (q[0], q[1] - q[0], q[2]),
         (v[0], v[1] - v[0], v[2]),
@@ -317,7 +320,9 @@ def find_gravity(scene: Scene) -> tuple[float, float, float]:
     fields = [
         find_field(effect) for effect in scene.effects if isinstance(effect, Gravity)
     ]
-    return (*fields[0], 0.0) if fields else (0.0, 0.0, 0.0)
+    if fields:
+        return (*fields[0], 0.0)
+    return (0.0, 0.0, 0.0)
 
 
 @contextmanager

@@ -44,7 +44,9 @@ def text(scene: Scene, steps: int, simulator: str | None, **settings: Any) -> st
         SIMULATORS[reader], timestep=find_timestep(scene, steps), **settings
     )
     written = write_mjcf(scene, changed, reader, start=start(scene))
-    return written if simulator is not None else remove_attributes(written, _BY_DEFAULT)
+    if simulator is not None:
+        return written
+    return remove_attributes(written, _BY_DEFAULT)
 
 
 def reading(
@@ -76,7 +78,8 @@ def states_of(written: str, scene: Scene) -> list[tuple[Array, Array]]:
 
     It is Newton on the gap, and speeds by its Jacobian.
     """
-    loop, states = ClosedLoop(written), []
+    loop = ClosedLoop(written)
+    states = []
     position = Assembler(loop)
     for theta_2 in command(scene).theta_2.tolist():
         if (q := position.find(theta_2, scene.motion.branch)) is not None:
@@ -88,7 +91,8 @@ def states_of(written: str, scene: Scene) -> list[tuple[Array, Array]]:
 class MujocoFile(Simulator):
     """MuJoCo with the generated file."""
 
-    name, version = "MuJoCo", mujoco.__version__
+    name = "MuJoCo"
+    version = mujoco.__version__
     changed = (
         "nothing; the softness of its default constraints is deliberate, and documented"
     )
@@ -107,7 +111,8 @@ class MujocoFile(Simulator):
     def states(self, scene: Scene) -> Readings:
         """Evaluate single states, each set by itself."""
         written = text(scene, STEPS, self.settings[self.setting])
-        (model, data), readings = open_model(written), Readings()
+        model, data = open_model(written)
+        readings = Readings()
         for q, v in states_of(written, scene):
             data.qpos[:], data.qvel[:] = q, v
             readings.read(scene, _evaluated(model, data))

@@ -40,7 +40,8 @@ def advance(model: Any, state: Any, steps: int) -> Any:
 class MujocoMjx(Simulator):
     """MJX in JAX, which takes a GPU where it has one."""
 
-    name, version = "MJX-JAX", version("mujoco-mjx")
+    name = "MJX-JAX"
+    version = version("mujoco-mjx")
     device = (
         "CPU" if jax.default_backend() == "cpu" else str(jax.devices()[0].device_kind)
     )
@@ -57,7 +58,8 @@ class MujocoMjx(Simulator):
     def through(self, scene: Scene, course: Course) -> Readings:
         """Run through a course."""
         model, data = open_model(text(scene, course.steps, self.settings[self.setting]))
-        theirs, state = mjx.put_model(model), mjx.put_data(model, data)
+        theirs = mjx.put_model(model)
+        state = mjx.put_data(model, data)
         jax.block_until_ready(
             advance(theirs, state, 1)
         )  # compiled before the clock runs
@@ -75,11 +77,9 @@ class MujocoMjx(Simulator):
         """Evaluate single states, each set by itself."""
         written = text(scene, STEPS, self.settings[self.setting])
         model, data = open_model(written)
-        theirs, state, readings = (
-            mjx.put_model(model),
-            mjx.put_data(model, data),
-            Readings(),
-        )
+        theirs = mjx.put_model(model)
+        state = mjx.put_data(model, data)
+        readings = Readings()
         for q, v in states_of(written, scene):
             placed = state.replace(qpos=jax.numpy.array(q), qvel=jax.numpy.array(v))
             readings.read(scene, _evaluated(model, forward(theirs, placed)))
@@ -121,7 +121,8 @@ def _evaluated(model: Any, state: Any) -> Instant:
         np.array(x) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force)
     )
     inner = getattr(state, "_impl", state)
-    closing, on_bodies = np.array(inner.efc_force)[:2], np.array(inner.cfrc_int)
+    closing = np.array(inner.efc_force)[:2]
+    on_bodies = np.array(inner.cfrc_int)
     return reading(
         model,
         q,
@@ -141,7 +142,9 @@ def _slopes(
     As trees these differ in what is no number of theirs.
     """
     model, data, q, v = gradients.assemble(scene, theta_2, "mjx")
-    inputs, by, state = (mjx.put_model(model), q, v), {}, (0.0,) * 4
+    inputs = (mjx.put_model(model), q, v)
+    by = {}
+    state = (0.0,) * 4
     for key in gradients.list_keys(scene):
         more, less = (
             jax.tree.leaves((mjx.put_model(side.model), side.qpos, side.qvel))

@@ -32,7 +32,8 @@ _ON_GPU = warp.get_preferred_device().is_cuda
 class MujocoWarp(Simulator):
     """MuJoCo Warp with the generated file, on a GPU if there is one."""
 
-    name, version = "MuJoCo Warp", getattr(mjw, "__version__", "")
+    name = "MuJoCo Warp"
+    version = getattr(mjw, "__version__", "")
     device = str(warp.get_preferred_device().name)
     made_for = "many worlds at once on a GPU"
     changed = (
@@ -56,7 +57,8 @@ class MujocoWarp(Simulator):
         """Run through a course."""
         model, data = open_model(text(scene, course.steps, "warp"))
         times, worlds = self.settings[self.setting]
-        theirs, state = mjw.put_model(model), mjw.put_data(model, data, nworld=worlds)
+        theirs = mjw.put_model(model)
+        state = mjw.put_data(model, data, nworld=worlds)
         mjw.step(
             theirs, mjw.put_data(model, data, nworld=worlds)
         )  # compiled before the clock runs
@@ -66,7 +68,10 @@ class MujocoWarp(Simulator):
                 mjw.step(theirs, state)
             warp.synchronize()
 
-        clock = time.perf_counter if _ON_GPU else time.process_time
+        if _ON_GPU:
+            clock = time.perf_counter
+        else:
+            clock = time.process_time
         readings = run_through(
             scene,
             course,
@@ -81,11 +86,9 @@ class MujocoWarp(Simulator):
         """Evaluate single states, each set by itself."""
         written = text(scene, STEPS, "warp")
         model, data = open_model(written)
-        theirs, state, readings = (
-            mjw.put_model(model),
-            mjw.put_data(model, data),
-            Readings(),
-        )
+        theirs = mjw.put_model(model)
+        state = mjw.put_data(model, data)
+        readings = Readings()
         for q, v in states_of(written, scene):
             state.qpos.assign(np.array([q], dtype=np.float32))
             state.qvel.assign(np.array([v], dtype=np.float32))
@@ -101,7 +104,8 @@ class MujocoWarp(Simulator):
         """
         _, theta_2 = gradients.choose_quarter(scene)
         model, data, q, v = gradients.assemble(scene, theta_2, "warp")
-        theirs, state = mjw.put_model(model), mjw.put_data(model, data)
+        theirs = mjw.put_model(model)
+        state = mjw.put_data(model, data)
         state.qpos.assign(np.array([q], dtype=np.float32))
         state.qvel.assign(np.array([v], dtype=np.float32))
         inputs = {name: getattr(theirs, name) for name in NUMBERS} | {

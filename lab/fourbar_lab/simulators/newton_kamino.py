@@ -38,7 +38,8 @@ ground.
 class NewtonKamino(Simulator):
     """Newton's SolverKamino."""
 
-    name, version = "Newton, Kamino", version("newton")
+    name = "Newton, Kamino"
+    version = version("newton")
     device = str(warp.get_preferred_device().name)
     made_for = "many worlds at once on a GPU"
     changed = (
@@ -60,7 +61,8 @@ class NewtonKamino(Simulator):
 
         Forces are those of a step, with the state in which it began.
         """
-        begin, inertia = start(scene), size_flywheel(scene, LIGHT)
+        begin = start(scene)
+        inertia = size_flywheel(scene, LIGHT)
         carried = replace(scene, effects=(*scene.effects, Flywheel(inertia, 2)))
         builder = newton.ModelBuilder()
         with write_temp(write_usd(carried, begin), "four_bar.usda") as file:
@@ -69,8 +71,10 @@ class NewtonKamino(Simulator):
         config = newton.solvers.SolverKamino.Config()
         for name, value in self.settings[self.setting].items():
             setattr(config.padmm, name, value)
-        solver, control = newton.solvers.SolverKamino(model, config), model.control()
-        now, then = model.state(), model.state()
+        solver = newton.solvers.SolverKamino(model, config)
+        control = model.control()
+        now = model.state()
+        then = model.state()
         speeds = now.joint_qd.numpy()
         speeds[:3] = begin.qvel
         now.joint_qd.assign(speeds)
@@ -86,7 +90,8 @@ class NewtonKamino(Simulator):
             for _ in range(steps - 1):
                 solver.step(now, then, control, None, course.timestep)
                 now, then = then, now
-            theta, speed = directions(now), float(now.joint_qd.numpy()[0])
+            theta = directions(now)
+            speed = float(now.joint_qd.numpy()[0])
             solver.step(now, then, control, None, course.timestep)
             now, then = then, now
             return theta, speed

@@ -24,7 +24,8 @@ from fourbar_lab.simulators.mujoco_c import reading, text
 class NewtonMujoco(Simulator):
     """Newton's SolverMuJoCo."""
 
-    name, version = "Newton, MuJoCo solver", version("newton")
+    name = "Newton, MuJoCo solver"
+    version = version("newton")
     device = str(warp.get_preferred_device().name)
     made_for = "many worlds at once on a GPU"
     changed = (
@@ -39,8 +40,10 @@ class NewtonMujoco(Simulator):
         with write_temp(text(scene, course.steps, "newton"), "four_bar.xml") as file:
             builder.add_mjcf(file)
         model = builder.finalize(device=warp.get_preferred_device())
-        solver, control = newton.solvers.SolverMuJoCo(model), model.control()
-        now, then = model.state(), model.state()
+        solver = newton.solvers.SolverMuJoCo(model)
+        control = model.control()
+        now = model.state()
+        then = model.state()
         speeds = now.joint_qd.numpy()
         speeds[:3] = start(scene).qvel
         now.joint_qd.assign(speeds)

@@ -78,7 +78,8 @@ class _Impulses:
     """
 
     def __init__(self, tree: PinocchioTree, timestep: float, solver: str) -> None:
-        self.tree, self.h = tree, timestep
+        self.tree = tree
+        self.h = timestep
         self.model, self.data = tree.model, tree.model.createData()
         ends = [
             (tree.joint[bar], self.model.frames[tree.frame[f"end{bar}"]].placement)
@@ -105,7 +106,10 @@ class _Impulses:
 
     def step(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Compute the speeds a step later, and F43 in the mean of the step."""
-        model, data, h, none = self.model, self.data, self.h, np.zeros(3)
+        model = self.model
+        data = self.data
+        h = self.h
+        none = np.zeros(3)
         pin.crba(model, data, q, pin.Convention.WORLD)
         free = v + h * pin.aba(model, data, q, v, none)
         self.closure.calc(model, data, self.closure_data[0])
@@ -140,7 +144,8 @@ class _Impulses:
 class PinocchioSolvers(Simulator):
     """Pinocchio's solvers of closed loops."""
 
-    name, version = "Pinocchio", pin.__version__
+    name = "Pinocchio"
+    version = pin.__version__
     changed = (
         "the tree is built in Python; around its acceleration solvers (proximal"
         " settings 1e-14, 1e-8, 10) stands RK4, around its impulse solvers (tolerances"
@@ -156,16 +161,16 @@ class PinocchioSolvers(Simulator):
 
     def through(self, scene: Scene, course: Course) -> Readings:
         """Run through a course, carried by a flywheel."""
-        solver, begin, tree = (
-            self.settings[self.setting],
-            start(scene),
-            PinocchioTree(scene),
-        )
+        solver = self.settings[self.setting]
+        begin = start(scene)
+        tree = PinocchioTree(scene)
         if isinstance(solver, str):
             return _run_by_impulses(
                 scene, course, _Impulses(tree, course.timestep, solver)
             )
-        q, v, inertia = np.array(begin.qpos), np.array(begin.qvel), size_flywheel(scene)
+        q = np.array(begin.qpos)
+        v = np.array(begin.qvel)
+        inertia = size_flywheel(scene)
         loop = solver(tree, _SOFTNESS_STEPS * course.timestep)
 
         def advance(steps: int) -> tuple[Array, Array]:
@@ -195,7 +200,9 @@ class PinocchioSolvers(Simulator):
         solver = self.settings[self.setting]
         if isinstance(solver, str):
             raise LimitError("an impulse solver has no single states")
-        tree, readings, inertia = PinocchioTree(scene), Readings(), size_flywheel(scene)
+        tree = PinocchioTree(scene)
+        readings = Readings()
+        inertia = size_flywheel(scene)
         loop = solver(tree, _SOFTNESS_STEPS * find_timestep(scene, STEPS))
         tree.model.armature = np.array([inertia, 0.0, 0.0])
         for theta_2 in list_positions(scene).theta_2.tolist():
@@ -208,8 +215,10 @@ class PinocchioSolvers(Simulator):
 
 
 def _run_by_impulses(scene: Scene, course: Course, loop: _Impulses) -> Readings:
-    begin, inertia = start(scene), size_flywheel(scene, LIGHT)
-    q, v = np.array(begin.qpos), np.array(begin.qvel)
+    begin = start(scene)
+    inertia = size_flywheel(scene, LIGHT)
+    q = np.array(begin.qpos)
+    v = np.array(begin.qvel)
 
     def advance(steps: int) -> tuple[Array, ...]:
         """Return the state in which the last step began, its acceleration and force."""

@@ -97,7 +97,9 @@ def _answer_released(solution: Solution) -> tuple[dict[str, Any], dict[str, Any]
 
     It errs as a time that is off; angle, speed and forces err with it.
     """
-    time, omega, alpha = solution.time, solution.omega_2, solution.alpha_2
+    time = solution.time
+    omega = solution.omega_2
+    alpha = solution.alpha_2
     assert (
         time is not None
         and omega is not None
@@ -105,7 +107,8 @@ def _answer_released(solution: Solution) -> tuple[dict[str, Any], dict[str, Any]
         and solution.force_error is not None
     )
     angle = PROMISED * max(1.0, float(time[-1] - time[0]) / _PROMISED_FOR)
-    late, n = angle / float(np.abs(omega).max()), len(time)
+    late = angle / float(np.abs(omega).max())
+    n = len(time)
     answers: dict[str, Any] = {
         name: getattr(solution, name) for name in ("theta_2", "omega_2", *PIN_FORCES)
     }
@@ -139,7 +142,8 @@ def _measure_period(
         ends = np.column_stack([theta, omega, alpha])[i : i + 2]
         ends[:, 0] -= level
         roots = BPoly.from_derivatives(time[i : i + 2], ends)
-        low, high = time[i], time[i + 1]
+        low = time[i]
+        high = time[i + 1]
         while (middle := 0.5 * (low + high)) not in (low, high):
             low, high = (middle, high) if roots(middle) < 0.0 else (low, middle)
         passages.append(high)

@@ -36,7 +36,8 @@ def _write_urdf(scene: Scene) -> str:
         turned = " ".join(
             f'{axes}="{part.inertia!r}"' for axes in ("ixx", "iyy", "izz")
         )
-        (x, y), (pin_x, pin_y) = part.centre, part.first_pin
+        x, y = part.centre
+        pin_x, pin_y = part.first_pin
         links += [
             f'<link name="{BAR_NAMES[part.bar]}"><inertial>',
             f'<origin xyz="{x!r} {y!r} 0"/>',
@@ -56,7 +57,8 @@ def _write_urdf(scene: Scene) -> str:
 class PyBullet(Simulator):
     """Bullet through its Python interface."""
 
-    name, version = "PyBullet", version("pybullet")
+    name = "PyBullet"
+    version = version("pybullet")
     changed = "built from URDF, which holds no loop, and a point constraint"
     settings: ClassVar[dict[str, dict[str, float]]] = {
         "its defaults": {},
@@ -113,11 +115,9 @@ class PyBullet(Simulator):
                 return before
 
             def read(before: list[Any]) -> Instant:
-                after, q, speed = (
-                    bullet.getJointState(body, 0),
-                    [state[0] for state in before],
-                    before[0][1],
-                )
+                after = bullet.getJointState(body, 0)
+                q = [state[0] for state in before]
+                speed = before[0][1]
                 force = [
                     -part for part in bullet.getConstraintState(ball)[:2]
                 ]  # it speaks of the force on the child

@@ -108,35 +108,42 @@ def solve(
             mpf(scene["lengths"][name]) for name in ("crank", "rod", "offset")
         )
         g = _direct(*scene.get("effects", {}).get("gravity", (0.0, 0.0)))
-        theta, omega, alpha = mpf(theta_2), mpf(omega_2), mpf(alpha_2)
+        theta = mpf(theta_2)
+        omega = mpf(omega_2)
+        alpha = mpf(alpha_2)
         sine = (offset - a * mp.sin(theta)) / b
         cosine = branch * mp.sqrt(1 - sine * sine)
-        crank, rod = a * mp.expj(theta), b * mpc(cosine, sine)
+        crank = a * mp.expj(theta)
+        rod = b * mpc(cosine, sine)
         omega_3 = -omega * crank.real / rod.real
         alpha_3 = (
             omega**2 * crank.imag - alpha * crank.real + omega_3**2 * rod.imag
         ) / rod.real
         at_A = (1j * alpha - omega**2) * crank
         at_B = at_A + (1j * alpha_3 - omega_3**2) * rod
-        forces, moments, arms = [], [], []
+        forces = []
+        moments = []
+        arms = []
         for name, line, rate, growth, start in (
             ("crank", crank, omega, alpha, 0),
             ("rod", rod, omega_3, alpha_3, at_A),
             ("slider", 0, 0, 0, at_B),
         ):
             bar = scene["bars"].get(name, {})
-            mass, length = mpf(bar.get("mass", 0.0)), abs(line)
+            mass = mpf(bar.get("mass", 0.0))
+            length = abs(line)
             r, phi = bar.get("centre", (0.5 * length, 0.0))
-            arm = r * mp.expj(phi) * line / length if length else mpc(0)
+            if length:
+                arm = r * mp.expj(phi) * line / length
+            else:
+                arm = mpc(0)
             forces.append(mass * (start + (1j * growth - rate**2) * arm - g))
             moments.append(mpf(bar.get("inertia", mass * length**2 / 12)) * growth)
             arms.append(arm)
         for load in scene.get("loads", ()):  # at the mass centre
             forces[load["bar"] - 2] -= _direct(*load["force"])
-        A, y = (
-            mp.zeros(8, 8),
-            mp.zeros(8, 1),
-        )  # F12 x y, F32 x y, F43 x y, guide, torque
+        A = mp.zeros(8, 8)
+        y = mp.zeros(8, 1)  # F12 x y, F32 x y, F43 x y, guide, torque
         for row, terms in enumerate(
             (
                 {0: 1, 2: 1},
@@ -159,7 +166,8 @@ def solve(
             A[7, column], A[7, column + 1] = -factor * arm.imag, factor * arm.real
         y[7] = moments[1]
         x = [float(value) for value in mp.lu_solve(A, y)]
-        angle, stroke = float(mp.atan2(sine, cosine)), float((crank + rod).real)
+        angle = float(mp.atan2(sine, cosine))
+        stroke = float((crank + rod).real)
     return {
         "theta_3": angle,
         "stroke": stroke,
@@ -178,6 +186,7 @@ def _direct(size: float, direction: float) -> Any:
     """
     from mpmath import mp, mpc, mpf
 
-    x, y = mp.cos(direction), mp.sin(direction)
+    x = mp.cos(direction)
+    y = mp.sin(direction)
     least = mpf(2) ** -53
     return mpf(size) * mpc(x if abs(x) > least else 0, y if abs(y) > least else 0)

@@ -71,9 +71,11 @@ def describe(
 
     That is the field of gravity and the force on the slider.
     """
-    lengths, bodies = scene["lengths"], []
+    lengths = scene["lengths"]
+    bodies = []
     for name in ("crank", "rod", "slider"):
-        bar, length = scene.get("bars", {}).get(name, {}), lengths.get(name, 0.0)
+        bar = scene.get("bars", {}).get(name, {})
+        length = lengths.get(name, 0.0)
         mass = bar.get("mass", 0.0)
         r, phi = bar.get("centre", (0.5 * length, 0.0))
         bodies.append(
@@ -102,7 +104,8 @@ def _direct(size: float, angle: float) -> Array:
 
 def answer(make: Callable[..., _CutLoop], question: dict[str, Any]) -> dict[str, Any]:
     """Answer the positions of a question."""
-    scene, command = question["scene"], question["command"]
+    scene = question["scene"]
+    command = question["command"]
     tree = make(*describe(scene))
     _, (crank, rod, _), *_ = describe(scene)
     rows: dict[str, list[Any]] = {name: [] for name in ANSWERS}
@@ -160,7 +163,8 @@ def serve(
 ) -> None:
     """Answer line by line."""
     for line in questions:
-        question, reply = json.loads(line), hello
+        question = json.loads(line)
+        reply = hello
         if question["ask"] == "answer":
             try:
                 reply = answer(question)

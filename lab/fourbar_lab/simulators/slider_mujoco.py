@@ -48,7 +48,8 @@ class MujocoSlider:
             "</mujoco>",
         ]
         self.model = mujoco.MjModel.from_xml_string("\n".join(lines))
-        self.data, self.push = mujoco.MjData(self.model), push
+        self.data = mujoco.MjData(self.model)
+        self.push = push
         self.bodies = [self.model.body(name).id for name in ("crank", "rod", "slider")]
         self.sites = [self.model.site(name).id for name in ("end", "slider")]
 
@@ -63,7 +64,8 @@ class MujocoSlider:
 
         These are its Jacobian, and its acceleration at none of q.
         """
-        slopes, rates = np.zeros((2, 3, 3)), np.zeros((2, 3, 3))
+        slopes = np.zeros((2, 3, 3))
+        rates = np.zeros((2, 3, 3))
         for slope, rate, site in zip(slopes, rates, self.sites, strict=True):
             mujoco.mj_jacSite(self.model, self.data, slope, None, site)
             body = self.model.site_bodyid[site]
@@ -94,10 +96,8 @@ class MujocoSlider:
         for body, force, site in zip(
             self.bodies[1:], (closing, self.push - closing), self.sites, strict=True
         ):
-            arm, pull = (
-                self.data.site_xpos[site] - self.data.xipos[body],
-                np.array([*force, 0.0]),
-            )
+            arm = self.data.site_xpos[site] - self.data.xipos[body]
+            pull = np.array([*force, 0.0])
             self.data.xfrc_applied[body] = [*pull, *np.cross(arm, pull)]
         self.data.qacc[:] = a
         mujoco.mj_rnePostConstraint(self.model, self.data)

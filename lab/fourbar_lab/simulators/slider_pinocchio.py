@@ -20,7 +20,8 @@ class PinocchioSlider:
         push: Array,
     ) -> None:
         crank, rod, offset = lengths
-        self.model, self.push = pin.Model(), push
+        self.model = pin.Model()
+        self.push = push
         self.model.gravity = pin.Motion(np.array([*field, 0.0, 0.0, 0.0, 0.0]))
         joints = (
             (pin.JointModelRZ(), 0, (0.0, 0.0)),

@@ -245,7 +245,9 @@ class _CheapestSearch:
     """Settings tried on one scene, for one required error."""
 
     def __init__(self, scene: Scene, error: float, setup: TrialSetup) -> None:
-        self.scene, self.error, self.setup = scene, error, setup
+        self.scene = scene
+        self.error = error
+        self.setup = setup
         self.attempts: list[Attempt] = []
         self.reading_cost = 0.0
         """CPU time of a reading, in steps as those of `Attempt.step_cost`."""
@@ -265,7 +267,10 @@ class _CheapestSearch:
         if self._list_served():
             self._try_kinds()
         served = self._list_served()
-        best = min(served, key=self._work) if served else _find_nearest(self.attempts)
+        if served:
+            best = min(served, key=self._work)
+        else:
+            best = _find_nearest(self.attempts)
         return _Advice(self.error, best, tuple(self.attempts), bool(served))
 
     def _work(self, attempt: Attempt) -> float:
@@ -294,7 +299,8 @@ class _CheapestSearch:
             tc = settings.time_constant_steps
             if n < FEWEST_STEPS or part < 1.0 / _CLOSE_ENOUGH:
                 continue
-            kind, cost = KINDS[name], costs[name]
+            kind = KINDS[name]
+            cost = costs[name]
             if self._serves(self._try(n, tc, kind, cost)):
                 self._bisect(tc, n / _CLOSE_ENOUGH, serves=n, kind=kind, cost=cost)
 
@@ -343,7 +349,10 @@ class _CheapestSearch:
         for _ in range(_MOST_TRIALS):
             attempt = self._try(n, tc, kind, cost)
             ratio = attempt.errors.worst / (MARGIN * self.error)
-            step = ratio ** (1.0 / ORDER) if ratio < float("inf") else 2.0
+            if ratio < float("inf"):
+                step = ratio ** (1.0 / ORDER)
+            else:
+                step = 2.0
             if self._serves(attempt):
                 serves = n
                 ahead = n * min(max(step, 0.4), 1.0 / _CLOSE_ENOUGH)
@@ -354,7 +363,8 @@ class _CheapestSearch:
                     and self._is_floored(last, attempt)
                 ):
                     return
-                fails, last = n, attempt
+                fails = n
+                last = attempt
                 ahead = n * min(max(step, _CLOSE_ENOUGH), 3.0)
                 if attempt.steps >= MOST_STEPS:
                     return
@@ -407,8 +417,12 @@ class _CheapestSearch:
 
 def _find_speed_error(setup: TrialSetup, trial: Trial) -> float:
     """Find the greatest deviation of the speed from the commanded one, relative."""
-    theta_2, omega_2 = trial.at.theta_2, np.asarray(trial.at.omega_2, float)
-    first = theta_2.min() if setup.omega > 0.0 else theta_2.max()
+    theta_2 = trial.at.theta_2
+    omega_2 = np.asarray(trial.at.omega_2, float)
+    if setup.omega > 0.0:
+        first = theta_2.min()
+    else:
+        first = theta_2.max()
     squared = setup.omega**2 + 2.0 * setup.alpha * (theta_2 - first)
     due = np.sqrt(np.maximum(squared, 0.0))
     return float(np.max(np.abs(np.abs(omega_2) - due)) / np.max(due))
@@ -424,7 +438,10 @@ def _advise_robot(
     """Print what to type into a robot's file for an error; return the exit status."""
     from fourbar.files import load
 
-    scene = load(files[0]) if len(files) == 2 else None
+    if len(files) == 2:
+        scene = load(files[0])
+    else:
+        scene = None
     measurement = measure_robot(files[-1], options, scene, assets)
     reached = True
     for measured in measurement.loops:
@@ -492,7 +509,8 @@ def command(
     loaded = [(scene, load(scene)) for scene in scenes]
     if output is not None:
         require_file(output, *scenes)
-    rows, reached = [], True
+    rows = []
+    reached = True
     for file, scene in loaded:
         try:
             setup = TrialSetup(scene, choose_positions(scene))

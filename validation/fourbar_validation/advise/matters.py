@@ -171,8 +171,14 @@ def measure_influences(
     influences = []
     for name, changed, varied, why in _describe_changes(scene, settings):
         worst, at_steps = _measure(scene, setup, varied)
-        times = worst / before if before > 0.0 and math.isfinite(before) else math.nan
-        growth = at_steps / before_at_steps if before_at_steps > 0.0 else math.nan
+        if before > 0.0 and math.isfinite(before):
+            times = worst / before
+        else:
+            times = math.nan
+        if before_at_steps > 0.0:
+            growth = at_steps / before_at_steps
+        else:
+            growth = math.nan
         reason = why(setup, times, growth)
         influences.append(SettingInfluence(name, changed, worst, times, reason))
     return sorted(
@@ -205,7 +211,8 @@ def _describe_changes(
     scene: Scene, settings: Settings
 ) -> Iterator[tuple[str, str, Settings, Reason]]:
     """Say what is changed to what, and what a growth of the error would come from."""
-    steps, tc = settings.steps_per_revolution, settings.time_constant_steps
+    steps = settings.steps_per_revolution
+    tc = settings.time_constant_steps
     window = max(settings.steps_per_window // 2, 1)
     coarse = replace(
         settings, steps_per_revolution=steps / 2.0, steps_per_window=window
@@ -277,7 +284,8 @@ def _explain_timestep(setup: TrialSetup, times: float, growth: float) -> str:
 
 def _find_yielding(scene: Scene, what: str) -> str:
     """Describe what makes a soft closure yield in this scene."""
-    loads, masses = compute_load_ratio(scene), compute_mass_ratio(scene.linkage)
+    loads = compute_load_ratio(scene)
+    masses = compute_mass_ratio(scene.linkage)
     if masses > LIGHT:
         return (
             f"{what} is soft at the lighter of coupler and output, whose inertia is"

@@ -67,7 +67,10 @@ def compute_errors(
         formulas = solve(scene, "force", at=command)
     worst = {}
     for field in QUANTITIES:
-        name = name_driving(scene) if field == "torque" else field
+        if field == "torque":
+            name = name_driving(scene)
+        else:
+            name = field
         ours = getattr(formulas, name)
         scale = scale_of(name, scene, formulas, ours)
         error = find_error(name, ours, quantities[name][judged], scale)

@@ -112,11 +112,14 @@ class _BarWrenches(NamedTuple):
         """
         none = np.zeros_like(self.p[2])
         if pin == "A":
-            F32, F43 = none, self.p[3]
+            F32 = none
+            F43 = self.p[3]
         elif pin == "B":
-            F32, F43 = -self.p[3], none
+            F32 = -self.p[3]
+            F43 = none
         else:
-            F32, F43 = -self.p[3] - self.p[4], -self.p[4]
+            F32 = -self.p[3] - self.p[4]
+            F43 = -self.p[4]
         return {
             "F12": self.p[2] - F32,
             "F32": F32,
@@ -154,8 +157,10 @@ def _turn_by_quarter(v: Array) -> Array:
 
 def turn(v: Array, angle: Array) -> Array:
     """Turn vectors, (n, 2), by an angle, rad."""
-    x, y = v[:, 0], v[:, 1]
-    cosine, sine = np.cos(angle), np.sin(angle)
+    x = v[:, 0]
+    y = v[:, 1]
+    cosine = np.cos(angle)
+    sine = np.sin(angle)
     return np.stack((cosine * x - sine * y, sine * x + cosine * y), axis=1)
 
 
@@ -163,12 +168,16 @@ def find_wrenches(scene: Scene, right: Solution) -> _BarWrenches:
     """Compute what each bar needs of its pins, from the right forces."""
     theta_1 = scene.linkage.ground_angle
     O4 = scene.linkage.ground * np.array([[np.cos(theta_1), np.sin(theta_1)]])
-    A, B = right.A, right.B
+    A = right.A
+    B = right.B
     first = {2: np.zeros_like(A), 3: A, 4: O4 + np.zeros_like(A)}
     second = {2: A, 3: B, 4: B}
     F12, F32, F43, F14 = (getattr(right, name) for name in PIN_FORCES)
     acting = {2: (F12, F32), 3: (-F32, F43), 4: (F14, -F43)}
-    arms, bars, p, q = {}, {}, {}, {}
+    arms = {}
+    bars = {}
+    p = {}
+    q = {}
     for bar in MOVING_BARS:
         G = getattr(right, f"G{bar}")
         arms[bar], bars[bar] = G - first[bar], second[bar] - first[bar]
@@ -251,7 +260,8 @@ class _Calculation:
         right = self.right
         with np.errstate(divide="ignore", invalid="ignore"):
             gain = np.asarray(right.alpha_2) / np.asarray(right.omega_2)
-        wrenches, moved = self.wrenches, Values()
+        wrenches = self.wrenches
+        moved = Values()
         for bar in (3, 4):
             alpha = gain * getattr(right, f"omega_{bar}")
             more = alpha - getattr(right, f"alpha_{bar}")
@@ -264,7 +274,8 @@ class _Calculation:
     def _accelerations_of_centres(self) -> Iterator[Mistake]:
         """Leave out a part of the acceleration of each G about its bar's first pin."""
         right = self.right
-        centripetal, tangential = {}, {}
+        centripetal = {}
+        tangential = {}
         for bar in MOVING_BARS:
             omega, alpha = (
                 np.broadcast_to(getattr(right, f"{rate}_{bar}"), len(right))
@@ -280,7 +291,8 @@ class _Calculation:
             "alpha x r has the wrong sign in a_G": (tangential, -2.0),
         }
         for text, (part, times) in parts.items():
-            wrenches, moved = self.wrenches, Values()
+            wrenches = self.wrenches
+            moved = Values()
             for bar in MOVING_BARS:
                 wrenches, a_G = self._accelerate(wrenches, bar, times * part[bar])
                 moved |= a_G
@@ -392,7 +404,8 @@ def _state_with_forces(
 
 def _find_impulses(judge: Judge) -> Iterator[Mistake]:
     """Fit one time by which all forces and the torque are multiplied."""
-    ours, theirs = [], []
+    ours = []
+    theirs = []
     for key in judge.table.values:
         if name_quantity(key) in FORCES:
             mask = judge.where(key)
@@ -400,20 +413,30 @@ def _find_impulses(judge: Judge) -> Iterator[Mistake]:
             theirs.append(judge.table.values[key][mask].ravel())
     if len(ours) < ENOUGH:
         return
-    x, y = np.concatenate(ours), np.concatenate(theirs)
+    x = np.concatenate(ours)
+    y = np.concatenate(theirs)
     stated = np.isfinite(y)
-    x, y = x[stated], y[stated]
+    x = x[stated]
+    y = y[stated]
     with np.errstate(all="ignore"):
         squares = float(x @ x)
-        time = float(x @ y) / squares if squares else math.nan
+        if squares:
+            time = float(x @ y) / squares
+        else:
+            time = math.nan
     if len(x) < ENOUGH:
         return
     if not 0.0 < time < 1.0:
         return
 
     def predict(quantity: str, right: Solution) -> Array | None:
-        values = getattr(right, quantity, None) if quantity in FORCES else None
-        return None if values is None else np.asarray(time * values)
+        if quantity in FORCES:
+            values = getattr(right, quantity, None)
+        else:
+            values = None
+        if values is None:
+            return None
+        return np.asarray(time * values)
 
     text = f"impulses in place of forces: every force and the torque times {time:.4g} s"
     yield Mistake(text, predict, times=2.0)
@@ -484,7 +507,10 @@ def _find_other_branch(judge: Judge) -> Iterator[Mistake]:
         ours, theirs = (getattr(one, quantity, None) for one in (right, other))
         if ours is None or theirs is None:
             return None
-        mask = later[:, None] if quantity in VECTORS else later
+        if quantity in VECTORS:
+            mask = later[:, None]
+        else:
+            mask = later
         return np.asarray(np.where(mask, theirs, ours))
 
     yield Mistake(f"the other branch from theta_2 = {here:.4g} deg on", predict)

@@ -68,11 +68,9 @@ class Judgement:
     @property
     def status(self) -> int:
         """Exit status; nothing compared is no success."""
-        return (
-            FAILED
-            if self.differing or self.not_assembled or not self.compared
-            else HOLDS
-        )
+        if self.differing or self.not_assembled or not self.compared:
+            return FAILED
+        return HOLDS
 
     def sentence(self) -> str:
         """Write how many numbers agree, exactly and within the stated tolerance."""
@@ -139,7 +137,10 @@ def _require_information(judge: Judge) -> None:
             continue
         unit = judge.table.units[key]
         of_angle = name_quantity(key).startswith("theta")
-        largest = np.pi if of_angle else float(magnitude(judge.ours(key))[mask].max())
+        if of_angle:
+            largest = np.pi
+        else:
+            largest = float(magnitude(judge.ours(key))[mask].max())
         rounding = float(judge.table.rounding[key][mask].min())
         theirs = magnitude(np.nan_to_num(judge.table.values[key]))[mask]
         if 0.0 < largest <= rounding and float(theirs.max()) <= rounding:
@@ -172,7 +173,10 @@ def judge_table(
     differing = sorted(
         key for key in table.values if table.label(key) in differing_quantities
     )
-    explanations = explain(judge, differing) if differing else []
+    if differing:
+        explanations = explain(judge, differing)
+    else:
+        explanations = []
     return Judgement(findings, judge.without_answer(), explanations, tolerance)
 
 
@@ -340,9 +344,10 @@ def check(
     for option, value in (("--rtol", rtol), ("--atol", atol)):
         if value is not None and not 0.0 <= value < math.inf:
             raise InputError(option, value, "must be a finite number >= 0")
-    tolerance = (
-        None if rtol is None and atol is None else Allowance(rtol or 0.0, atol or 0.0)
-    )
+    if rtol is None and atol is None:
+        tolerance = None
+    else:
+        tolerance = Allowance(rtol or 0.0, atol or 0.0)
     stated = load(scene)
     table = table.from_pin(stated.origin)
     judgement = judge_table(stated, table, tolerance)
@@ -412,11 +417,10 @@ def show(judgement: Judgement, table: TheirTable, name: str) -> None:
     if differing and not any(
         explanation.complete for explanation in judgement.explanations
     ):
-        together = (
-            "these together explain all of it"
-            if judgement.together()
-            else "no single known mistake explains it"
-        )
+        if judgement.together():
+            together = "these together explain all of it"
+        else:
+            together = "no single known mistake explains it"
         console.print(together)
     console.print(f"[bold]{judgement.sentence()}[/]")
 

@@ -55,7 +55,9 @@ class Difference:
     @property
     def price(self) -> str:
         """Write the cost with its quantity."""
-        return "-" if self.cost is None else f"{self.cost:.1e} {self.quantity}".strip()
+        if self.cost is None:
+            return "-"
+        return f"{self.cost:.1e} {self.quantity}".strip()
 
     def line(self) -> str:
         """Write the entry with both values."""
@@ -66,7 +68,10 @@ class Difference:
 
     def cells(self) -> tuple[str, ...]:
         """Return the cells of a row of the page."""
-        key = f"{self.key} ({self.written})" if self.written else self.key
+        if self.written:
+            key = f"{self.key} ({self.written})"
+        else:
+            key = self.key
         return (
             self.price,
             key,
@@ -87,7 +92,8 @@ def find_differences(
     )
     differences = []
     for key in [*theirs, *(key for key in generated if key not in theirs)]:
-        ours, yours_entry = generated.get(key), theirs.get(key)
+        ours = generated.get(key)
+        yours_entry = theirs.get(key)
         if (ours is None or yours_entry is None) and not (
             key.startswith(ONE_SIDED) or key.endswith(".motor")
         ):
@@ -101,11 +107,10 @@ def find_differences(
         )
         if _is_same(key, mine, yours, length):
             continue
-        written = (
-            f"{yours_entry.element} {yours_entry.attribute}".strip()
-            if yours_entry is not None
-            else ""
-        )
+        if yours_entry is not None:
+            written = f"{yours_entry.element} {yours_entry.attribute}".strip()
+        else:
+            written = ""
         differences.append(
             Difference(key, mine, yours, _remark(key, mine, yours), written)
         )
@@ -176,7 +181,8 @@ def _is_same(key: str, ours: Value | None, theirs: Value | None, length: float) 
         or ours == theirs
     ):
         return ours == theirs
-    first, second = np.atleast_1d(ours), np.atleast_1d(theirs)
+    first = np.atleast_1d(ours)
+    second = np.atleast_1d(theirs)
     if first.shape != second.shape:
         return False
     if key.endswith("angle"):
@@ -186,8 +192,16 @@ def _is_same(key: str, ours: Value | None, theirs: Value | None, length: float) 
             )
         )
     placed = any(part in key for part in ("centre", "plane", ".point", ".path"))
-    floor = length if placed else 1.0 if key.startswith(("gravity", "loads")) else 0.0
-    same = _SAME_SOFTNESS if key == "closure.softness" else SAME
+    if placed:
+        floor = length
+    elif key.startswith(("gravity", "loads")):
+        floor = 1.0
+    else:
+        floor = 0.0
+    if key == "closure.softness":
+        same = _SAME_SOFTNESS
+    else:
+        same = SAME
     return bool(
         np.all(
             np.abs(first - second)

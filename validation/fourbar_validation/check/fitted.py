@@ -77,12 +77,15 @@ def _find_ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
     by_ratio: dict[tuple[str, float], set[str]] = {}
     for key in differing:
         mask = judge.where(key)
-        ours, theirs = judge.ours(key)[mask], judge.table.values[key][mask]
+        ours = judge.ours(key)[mask]
+        theirs = judge.table.values[key][mask]
         stated = np.isfinite(theirs)
-        ours, theirs = ours[stated], theirs[stated]
+        ours = ours[stated]
+        theirs = theirs[stated]
         if not mask.any() or not (squares := float(ours @ ours)):
             continue
-        announced, unit = judge.table.units[key], UNITS[name_quantity(key)]
+        announced = judge.table.units[key]
+        unit = UNITS[name_quantity(key)]
         near = float(ours @ theirs) / squares
         ratio_found = _name_ratio(
             judge, key, announced.text, announced.factor, unit, near
@@ -113,7 +116,10 @@ def _name_ratio(
             and abs(ratio) != 1.0
             and judge.explained(key, ratio * judge.ours(key))
         ):
-            reversed_too = ", and reversed" if near < 0.0 else ""
+            if near < 0.0:
+                reversed_too = ", and reversed"
+            else:
+                reversed_too = ""
             return (
                 (
                     f"units: numbers in {unit_tried} where {announced} was announced"
@@ -136,7 +142,9 @@ def _round_ratio(judge: Judge, key: str, near: float) -> tuple[str, float] | Non
     if power and judge.explained(key, ten * judge.ours(key)):
         return f"every number is {'-' if near < 0.0 else ''}10^{power} times ours", ten
     fits = judge.explained(key, near * judge.ours(key), CARRIED)
-    return (f"every number is {near:.5g} times ours", near) if fits else None
+    if fits:
+        return (f"every number is {near:.5g} times ours", near)
+    return None
 
 
 def _try_exchanged(differing: list[str]) -> Iterator[Mistake]:
@@ -216,19 +224,24 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
                 ]
             )
             slope = float(moves @ moves)
-            factor = 1.0 + float(moves @ theirs) / slope if slope else math.nan
+            if slope:
+                factor = 1.0 + float(moves @ theirs) / slope
+            else:
+                factor = math.nan
             if not VANISHING < factor < math.inf or factor == 1.0:
                 continue
-            plain = (
-                next((f for f in _FACTORS if abs(factor / f - 1.0) < PLAIN), None)
-                if word == inertia[0]
-                else None
-            )
+            if word == inertia[0]:
+                plain = next(
+                    (f for f in _FACTORS if abs(factor / f - 1.0) < PLAIN), None
+                )
+            else:
+                plain = None
             for f in (factor,) if plain is None else (plain, factor):
                 wrong = solve(scaled(f), "force", at=judge.at)
-                what = (
-                    f"{_FACTORS[f]}" if f == plain else f"{f:.6g} times ours (fitted)"
-                )
+                if f == plain:
+                    what = f"{_FACTORS[f]}"
+                else:
+                    what = f"{f:.6g} times ours (fitted)"
                 yield Mistake(
                     f"{name} {what}",
                     lambda quantity, right, wrong=wrong: getattr(wrong, quantity, None),  # type: ignore[misc]
@@ -263,7 +276,10 @@ def _scale_gravity(scene: Scene, f: float) -> Scene:
 
 
 def _scale_load(scene: Scene, load: Load, f: float) -> Scene:
-    force = None if load.force is None else (f * load.force[0], load.force[1])
+    if load.force is None:
+        force = None
+    else:
+        force = (f * load.force[0], load.force[1])
     scaled = replace(load, force=force, moment=f * load.moment)
     return replace(
         scene,
@@ -285,7 +301,8 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
 
     def residuals(offsets: Array, rows: NDArray[np.int_]) -> Array:
         """Write one line for each offset."""
-        command, m = judge.at, len(offsets)
+        command = judge.at
+        m = len(offsets)
         many: dict[str, Any] = {
             name: np.tile(values[rows], m)
             for name in ("angle", "branch", "speed", "acceleration")
@@ -346,7 +363,8 @@ def _try_order(judge: Judge) -> Iterator[Mistake]:
 
     Each row of theirs goes to the nearest of ours.
     """
-    table, n = judge.table, len(judge.at.theta_2)
+    table = judge.table
+    n = len(judge.at.theta_2)
     keys = [
         key for key in table.values if judge.where(key).all() and judge.size(key).all()
     ]
@@ -354,13 +372,14 @@ def _try_order(judge: Judge) -> Iterator[Mistake]:
         return
     apart = np.zeros((n, n))
     for key in keys:
-        ours, theirs, scale = judge.ours(key), table.values[key], judge.size(key).max()
+        ours = judge.ours(key)
+        theirs = table.values[key]
+        scale = judge.size(key).max()
         for i in range(n):
-            filled = (
-                np.where(np.isnan(theirs[i]), ours, theirs[i])
-                if ours.ndim == 2
-                else np.full(n, theirs[i])
-            )
+            if ours.ndim == 2:
+                filled = np.where(np.isnan(theirs[i]), ours, theirs[i])
+            else:
+                filled = np.full(n, theirs[i])
             apart[i] += compute_difference(name_quantity(key), ours, filled) / scale
     nearest = np.argmin(apart, axis=1)
     if len(np.unique(nearest)) < n - 1 or np.array_equal(
@@ -384,5 +403,10 @@ def _try_order(judge: Judge) -> Iterator[Mistake]:
 
 
 def _take_rows(quantity: str, right: Solution, rows: Array) -> Array | None:
-    values = None if quantity == "theta_2" else getattr(right, quantity, None)
-    return None if values is None else np.asarray(values[rows])
+    if quantity == "theta_2":
+        values = None
+    else:
+        values = getattr(right, quantity, None)
+    if values is None:
+        return None
+    return np.asarray(values[rows])

@@ -135,7 +135,9 @@ class Judge:
         values: Array = getattr(
             self.right if solution is None else solution, name_quantity(key)
         )
-        return magnitude(values) if key.startswith("|") else values
+        if key.startswith("|"):
+            return magnitude(values)
+        return values
 
     def where(self, key: str) -> Mask:
         """Mark the rows in which both have a number, (n,)."""
@@ -231,7 +233,8 @@ class Judge:
         """List every number that the table states where the formulas have one."""
         findings = []
         for key, theirs in self.table.values.items():
-            ours, label = self.ours(key), self.table.label(key)
+            ours = self.ours(key)
+            label = self.table.label(key)
             error, allowed, apart = self.judged(key, ours)
             permitted = self.permitted(key, ours)
             for i in np.flatnonzero(self.where(key)).tolist():
@@ -241,7 +244,10 @@ class Judge:
                     for values in (theirs, ours)
                 )
                 numbers = (float(error[i]), float(allowed[i]), float(apart[i]))
-                most = None if permitted is None else float(permitted[i])
+                if permitted is None:
+                    most = None
+                else:
+                    most = float(permitted[i])
                 findings.append(
                     Discrepancy(
                         self.table.lines[i],
@@ -344,8 +350,6 @@ class Mistake:
         None if it predicts none.
         """
         predicted = self.predict(name_quantity(key), right)
-        return (
-            magnitude(predicted)
-            if predicted is not None and key.startswith("|")
-            else predicted
-        )
+        if predicted is not None and key.startswith("|"):
+            return magnitude(predicted)
+        return predicted

@@ -70,7 +70,9 @@ def _change_column(
     right: Solution,
 ) -> Array | None:
     values = getattr(right, quantity, None)
-    return change(values) if applies(quantity) and values is not None else None
+    if applies(quantity) and values is not None:
+        return change(values)
+    return None
 
 
 def _subtract_angle_of(bar: int, quantity: str, right: Solution) -> Array | None:
@@ -80,7 +82,9 @@ def _subtract_angle_of(bar: int, quantity: str, right: Solution) -> Array | None
     values, base = (
         getattr(right, name, None) for name in (quantity, f"{quantity[:-1]}{bar}")
     )
-    return None if values is None or base is None else np.asarray(values - base)
+    if values is None or base is None:
+        return None
+    return np.asarray(values - base)
 
 
 def _take_from(wrong: Solution, quantity: str, right: Solution) -> Array | None:
@@ -229,9 +233,11 @@ def _change_loads(scene: Scene) -> Iterator[tuple[str, Scene]]:
     for i, (name, load) in enumerate(zip(names, scene.loads, strict=True)):
         if load.force is None or load.arm is not None:
             continue
-        other, how = "bar", "turns with the bar"
+        other = "bar"
+        how = "turns with the bar"
         if load.frame == "bar":
-            other, how = "world", "is kept"
+            other = "world"
+            how = "is kept"
         moved = (*scene.loads[:i], replace(load, frame=other), *scene.loads[i + 1 :])
         yield f"{name}: its direction {how}", replace(scene, loads=moved)
 
@@ -251,28 +257,34 @@ def _change_bars(scene: Scene) -> Iterator[tuple[str, Scene]]:
 
 
 def _reverse(load: Load) -> Load:
-    force = None if load.force is None else (-load.force[0], load.force[1])
+    if load.force is None:
+        force = None
+    else:
+        force = (-load.force[0], load.force[1])
     return replace(load, force=force, moment=-load.moment)
 
 
 def _measure_from_other_pin(bar: Bar) -> Bar | None:
     r, phi = bar.mass_centre
-    x, y = bar.length - r * np.cos(phi), r * np.sin(phi)
-    return (
-        replace(bar, centre=(float(np.hypot(x, y)), float(np.arctan2(y, x))))
-        if bar.mass
-        else None
-    )
+    x = bar.length - r * np.cos(phi)
+    y = r * np.sin(phi)
+    if bar.mass:
+        return replace(bar, centre=(float(np.hypot(x, y)), float(np.arctan2(y, x))))
+    return None
 
 
 def _rotate(bar: Bar) -> Bar | None:
     r, phi = bar.mass_centre
-    return replace(bar, centre=(r, phi + np.pi)) if bar.mass and r else None
+    if bar.mass and r:
+        return replace(bar, centre=(r, phi + np.pi))
+    return None
 
 
 def _mirror(bar: Bar) -> Bar | None:
     r, phi = bar.mass_centre
-    return replace(bar, centre=(r, -phi)) if bar.mass and r and np.sin(phi) else None
+    if bar.mass and r and np.sin(phi):
+        return replace(bar, centre=(r, -phi))
+    return None
 
 
 _BAR_MISTAKES: tuple[tuple[str, Callable[[Bar], Bar | None]], ...] = (
@@ -368,7 +380,9 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
         list_hypotheses(judge.scene, judge.at),
         find_fitted(judge, differing),
     ):
-        explained, nearer, broken = [], [], False
+        explained = []
+        nearer = []
+        broken = False
         for key in table.values:
             predicted = mistake.prediction(key, judge.right)
             if predicted is None or np.array_equal(

@@ -106,9 +106,10 @@ class _CostOfModel:
     def cells(self) -> tuple[str, ...]:
         """Return the rows under HEADINGS; a row without an error says why."""
         row = self.row
-        verdict = (
-            row.verdict if not math.isnan(row.error) else f"{row.verdict}: {row.reason}"
-        )
+        if not math.isnan(row.error):
+            verdict = row.verdict
+        else:
+            verdict = f"{row.verdict}: {row.reason}"
         return (
             row.quantity,
             write_number(row.error),
@@ -206,10 +207,8 @@ def examine_model(
         tolerance = hold_simulated(wanted, "what this file may be wrong by")
     file = read_robot(mjcf, assets)
     with examine_guarded(mjcf) as examined:
-        generated, theirs = (
-            examined(_EXAMINE, scene, None, {}),
-            examined(_EXAMINE, scene, file, dict(names)),
-        )
+        generated = examined(_EXAMINE, scene, None, {})
+        theirs = examined(_EXAMINE, scene, file, dict(names))
         ours = {
             (row.engine, row.quantity): row.error
             for row in _list_rows(name, scene, generated.answers, SIMULATED)
@@ -228,11 +227,10 @@ def examine_model(
             differences = _price(
                 name, scene, file, theirs, differences, rows, tolerance, examined
             )
-    unread = (
-        [f"not looked at: {', '.join(parts)}"]
-        if (parts := list_unread(file.text))
-        else []
-    )
+    if parts := list_unread(file.text):
+        unread = [f"not looked at: {', '.join(parts)}"]
+    else:
+        unread = []
     return ModelReport(order(differences), costs, [*theirs.notes, *unread])
 
 
@@ -334,7 +332,10 @@ def show(report: ModelReport, mjcf: Path, out: Path) -> None:
             title=f"what it costs, {escape(method)}: error",
         )
         for shown, cost in zip(table.rows, costs, strict=True):
-            shown.style = "bold red" if cost.row.failed else ""
+            if cost.row.failed:
+                shown.style = "bold red"
+            else:
+                shown.style = ""
         console.print(table)
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / "theirs.md", write_markdown(report, mjcf))
@@ -426,10 +427,12 @@ def command(
     if len(files) > 2:
         raise click.UsageError("give one FILE.xml, and SCENE before it or not")
     theirs = files[-1]
-    name, scene = "", None
+    name = ""
+    scene = None
     if len(files) == 2:
         suite = read_scene_files(files[:1])
-        name, scene = suite.name(0), suite.scene(0)
+        name = suite.name(0)
+        scene = suite.scene(0)
     if mimic is not None:
         if scene is None:
             raise click.UsageError("--mimic needs the SCENE of the loop")

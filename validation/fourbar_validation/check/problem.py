@@ -22,12 +22,14 @@ from fourbar_validation.compare.rows import make_plain, write_one_line
 from fourbar_validation.compare.tolerance import EPS, K, magnitude
 from fourbar_validation.engines import protocol
 
-SCHEMA, RESULT = "fourbar-problem/3", "fourbar-result/1"
+SCHEMA = "fourbar-problem/3"
+RESULT = "fourbar-result/1"
 LEVELS = {"A": 1e-9, "B": 1e-6, "C": 1e-3}
 """Largest error of each level, over the largest value; D is worse. Error bars of the
 problem are allowed.
 """
-WORSE, MISSING = "D", "-"
+WORSE = "D"
+MISSING = "-"
 GROUPS = {
     "reactions": (*PIN_FORCES, "guide_force"),
     "torque": ("torque", "drive_force"),
@@ -107,7 +109,8 @@ def judge(problem: dict[str, Any], answered: dict[str, Any]) -> list[Judged]:
 
     One that is missing has the level "-".
     """
-    answers, errors = problem["answers"], problem["errors"]
+    answers = problem["answers"]
+    errors = problem["errors"]
     if answered.get("at") is not None:
         answers, errors = _answer_at(problem, answered["at"])
     return [
@@ -142,7 +145,10 @@ def collect_answers(solution: Solution) -> tuple[dict[str, Array], dict[str, Arr
 
     They have their error bars.
     """
-    drive = "torque" if solution.drive_force is None else "drive_force"
+    if solution.drive_force is None:
+        drive = "torque"
+    else:
+        drive = "drive_force"
     angle = K * EPS / solution.condition
     assert solution.force_error is not None
     bars = {
@@ -173,10 +179,8 @@ def _judge_quantity(name: str, values: Any, errors: Any, theirs: Any) -> Judged:
         difference = np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi
     else:
         size = float(magnitude(np.atleast_1d(ours)).max()) or 1.0
-    off, bars = (
-        magnitude(difference) / size,
-        np.atleast_1d(np.array(errors, dtype=float)) / size,
-    )
+    off = magnitude(difference) / size
+    bars = np.atleast_1d(np.array(errors, dtype=float)) / size
     level = next(
         (
             level
@@ -211,7 +215,8 @@ def check_problem(problem_file: Path, result_file: Path) -> int:
 
     problem = read_problem(problem_file)
     answered = read_result(result_file, problem)
-    rows, console = judge(problem, answered), Console(soft_wrap=True)
+    rows = judge(problem, answered)
+    console = Console(soft_wrap=True)
     engine = escape(make_plain(str(answered.get("engine", "")))) or "a result"
     cells = [
         (
@@ -239,4 +244,6 @@ def check_problem(problem_file: Path, result_file: Path) -> int:
     console.print(
         f"of the largest value, angles in rad: {limits}, D worse; - no answer"
     )
-    return HOLDS if levels and not set(levels.values()) & {WORSE, MISSING} else FAILED
+    if levels and not set(levels.values()) & {WORSE, MISSING}:
+        return HOLDS
+    return FAILED

@@ -161,7 +161,9 @@ class TheirTable:
             for letter, gone in zip("xy", np.isnan(values).T, strict=False)
             if not gone.all()
         ]
-        return f"{key}_{letters[0]}" if values.ndim == 2 and len(letters) == 1 else key
+        if values.ndim == 2 and len(letters) == 1:
+            return f"{key}_{letters[0]}"
+        return key
 
     def stated(self, key: str) -> NDArray[np.bool_]:
         """Mark the rows in which a quantity has any number, (n,)."""
@@ -220,11 +222,10 @@ def read_table(path: Path) -> TheirTable:
         if len(cells) < len(headings) or any(
             cell.strip() for cell in cells[len(headings) :]
         ):
-            beside = (
-                "; with decimal commas, semicolons between them"
-                if len(cells) > len(headings)
-                else ""
-            )
+            if len(cells) > len(headings):
+                beside = "; with decimal commas, semicolons between them"
+            else:
+                beside = ""
             raise InputError(
                 f"line {line}", cells, f"needs {len(headings)} cells{beside}", str(path)
             )
@@ -245,10 +246,8 @@ def read_table(path: Path) -> TheirTable:
         for index, (name, _) in columns.items()
         if np.isnan(numbers[name]).all()
     }
-    lines, rounded = (
-        [line for line, _ in rows],
-        _find_rounding(halves["theta_2"], units["theta_2"]),
-    )
+    lines = [line for line, _ in rows]
+    rounded = _find_rounding(halves["theta_2"], units["theta_2"])
     table = TheirTable(numbers["theta_2"], {}, {}, {}, lines, rounded, left_out, notes)
     for name in names:
         if name != "theta_2" and not np.isnan(numbers[name]).all():
@@ -341,7 +340,8 @@ def _put(
             unit,
         )
         return
-    vector, axis = name[:-2], "xy".index(name[-1])
+    vector = name[:-2]
+    axis = "xy".index(name[-1])
     values = table.values.setdefault(vector, np.full((len(numbers), 2), np.nan))
     values[:, axis] = numbers
     table.rounding[vector] = np.hypot(table.rounding.get(vector, 0.0), halves)
@@ -400,7 +400,10 @@ def _remove_comments(text: str) -> str:
     first = next(
         (i for i, line in enumerate(lines) if line.strip() and not of_comment[i]), 0
     )
-    words = re.sub(r"\d[eE][-+]?\d", "", lines[first]) if lines else ""
+    if lines:
+        words = re.sub(r"\d[eE][-+]?\d", "", lines[first])
+    else:
+        words = ""
     has_header = re.search(r"[^\W\d_]", words)
     for i, line in enumerate(lines):
         if not of_comment[i]:
@@ -468,11 +471,15 @@ def _read_columns(
     renamings: dict[str, str] = {}
     for index, heading in enumerate(headings):
         match = _HEADING.fullmatch(heading.strip())
-        name = match["name"] + (match["letter"] or "") if match else heading.strip()
+        if match:
+            name = match["name"] + (match["letter"] or "")
+        else:
+            name = heading.strip()
         name = _find_name(name)
-        quantity = (
-            name[:-2] if name[-2:] in ("_x", "_y") and name[:-2] in VECTORS else name
-        )
+        if name[-2:] in ("_x", "_y") and name[:-2] in VECTORS:
+            quantity = name[:-2]
+        else:
+            quantity = name
         if not name and index >= len(headings) - 1:
             continue  # an empty cell that a spreadsheet leaves at the end of a line
         if match is None or quantity in NOT_JUDGED or quantity not in UNITS:
@@ -482,7 +489,10 @@ def _read_columns(
                 left_out[column] += f": {renaming}"
                 renamings[column] = renaming
             continue
-        below = unit_line[index].strip(" []()") if index < len(unit_line) else ""
+        if index < len(unit_line):
+            below = unit_line[index].strip(" []()")
+        else:
+            below = ""
         text = (match["square"] or match["round"] or below).strip()
         columns[index] = (
             f"|{name}|" if name in VECTORS else name,

@@ -130,7 +130,9 @@ def null_nan(value: object) -> object:
 
     No greatest error is NaN by it, and every reader takes it for none.
     """
-    return None if isinstance(value, float) and math.isnan(value) else value
+    if isinstance(value, float) and math.isnan(value):
+        return None
+    return value
 
 
 def read_columns(path: Path) -> Iterator[Row]:
@@ -164,7 +166,10 @@ def count_rows(path: Path) -> int:
 
 def _read_batches(path: Path, columns: list[str]) -> Iterator[list[list[Any]]]:
     with ExitStack() as files:
-        batches = _read_parquet if path.suffix == ".parquet" else _read_text
+        if path.suffix == ".parquet":
+            batches = _read_parquet
+        else:
+            batches = _read_text
         for batch in batches(path, columns, files):
             yield [batch.column(name).to_pylist() for name in columns]
 

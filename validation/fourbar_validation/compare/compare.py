@@ -216,10 +216,8 @@ class Comparison:
             }
         judged = self._compare([name for name in STAGE_OF if name in names])
         alarms = [self._row("watch", FAILS, alarm) for alarm in answer.alarms]
-        numbers, decided = (
-            sum(one.numbers for one in judged),
-            sum(one.decided for one in judged),
-        )
+        numbers = sum(one.numbers for one in judged)
+        decided = sum(one.decided for one in judged)
         rows = [self._compare_assembled(), *(one.row for one in judged), *alarms]
         if numbers:  # a scene of which most numbers are undecided does not hold
             reason = f"{numbers - decided} of {numbers} numbers are undecided"
@@ -236,19 +234,23 @@ class Comparison:
 
     def closure(self) -> Row:
         """Check that the engine's angles close the loop."""
-        answer, linkage = self.answer, self.scene.linkage
+        answer = self.answer
+        linkage = self.scene.linkage
         assert answer.at is not None and answer.assembled is not None
-        theta_2 = (
-            answer.at.angle
-            if answer.at.commanded == "theta_2"
-            else answer.quantities["theta_2"]
-        )
-        theta_3, theta_4 = answer.quantities["theta_3"], answer.quantities["theta_4"]
+        if answer.at.commanded == "theta_2":
+            theta_2 = answer.at.angle
+        else:
+            theta_2 = answer.quantities["theta_2"]
+        theta_3 = answer.quantities["theta_3"]
+        theta_4 = answer.quantities["theta_4"]
         condition = 1.0 / count_half_turns(linkage.ground_angle, theta_2)
         allowed = (
             IDENTITY if answer.setting == "exact" else self.demands.tolerance
         ).factor / condition
-        reason = f"identity: {CLOSURE}" if answer.assembled.any() else NOWHERE
+        if answer.assembled.any():
+            reason = f"identity: {CLOSURE}"
+        else:
+            reason = NOWHERE
         gap = find_gap(linkage, theta_2, theta_3, theta_4)
         return Row.judged(
             self._who,
@@ -323,17 +325,18 @@ class Comparison:
 
     def _compare_assembled(self) -> Row:
         """Compare where both close the loop."""
-        theirs, ours, command = self.answer.assembled, self.formulas, self.answer.at
+        theirs = self.answer.assembled
+        ours = self.formulas
+        command = self.answer.at
         assert theirs is not None and command is not None
         differ = (theirs != ours.assembled) & ~mark_touching(
             self.scene.linkage, command.angle, command.bar
         )
         count = np.count_nonzero(differ)
-        reason = (
-            f"{count} of {len(differ)} positions differ"
-            if count
-            else "the same positions"
-        )
+        if count:
+            reason = f"{count} of {len(differ)} positions differ"
+        else:
+            reason = "the same positions"
         return Row.judged(
             self._who, "assembled", float(count) * differ, 0.0, reason, ours.theta_2
         )
@@ -356,11 +359,11 @@ class Comparison:
 
         None if neither side has the quantity.
         """
-        formulas, scene, tolerance = self.formulas, self.scene, self.demands.tolerance
-        ours, theirs = (
-            getattr(formulas, quantity, None),
-            self.answer.quantities.get(quantity),
-        )
+        formulas = self.formulas
+        scene = self.scene
+        tolerance = self.demands.tolerance
+        ours = getattr(formulas, quantity, None)
+        theirs = self.answer.quantities.get(quantity)
         if theirs is None and self._solution is not None:
             if quantity == "drive_condition" and any(
                 effect.loaded_pins for effect in scene.effects
@@ -371,13 +374,15 @@ class Comparison:
         if ours is None and theirs is None:  # the scene states positions only
             return None
         if ours is None or theirs is None:
-            missing = "no answer" if theirs is None else "the formulas have no answer"
+            if theirs is None:
+                missing = "no answer"
+            else:
+                missing = "the formulas have no answer"
             return _Judged(self._row(quantity, FAILS, missing))
-        mask, closed = (
-            self._closed & _mark_stated(quantity, formulas, ours),
-            self._count,
-        )
-        stated, note = int(np.count_nonzero(mask)), ""
+        mask = self._closed & _mark_stated(quantity, formulas, ours)
+        closed = self._count
+        stated = int(np.count_nonzero(mask))
+        note = ""
         if stated < closed:
             unstated = _count(formulas.status_code[self._closed & ~mask])
             if not stated:
@@ -489,7 +494,10 @@ class Comparison:
         missing = [name for name in quantities if name not in self.scales]
         if missing:
             ours, theirs = self._sizes
-            reference = None if theirs is None else theirs.formulas
+            if theirs is None:
+                reference = None
+            else:
+                reference = theirs.formulas
             sizes = take_smallest_scales(missing, ours, theirs)
             for name, size in zip(missing, sizes, strict=True):
                 condition = take_strictest_condition(
@@ -504,8 +512,14 @@ class Comparison:
     @cached_property
     def _sizes(self) -> tuple[Sizes, Sizes | None]:
         """Sizes by the formulas and by the reference, if there is one."""
-        reference = self._solution if self.reference is None else self.reference
-        theirs = None if reference is None else Sizes(self.scene, reference)
+        if self.reference is None:
+            reference = self._solution
+        else:
+            reference = self.reference
+        if reference is None:
+            theirs = None
+        else:
+            theirs = Sizes(self.scene, reference)
         return Sizes(self.scene, self.formulas), theirs
 
 
@@ -604,7 +618,10 @@ def judge_errors(
         return _WorstPosition(index, UNDECIDED, why, errors.allowed[index], 0)
     if not beyond.any():
         return errors.agreeing(int(_find_worst_used(errors)))
-    expected = np.zeros_like(errors.error) if predicted is None else predicted
+    if predicted is None:
+        expected = np.zeros_like(errors.error)
+    else:
+        expected = predicted
     bound = np.maximum(errors.allowed, TIMES_PREDICTED * expected)
     used = find_used(errors.error, bound)
     # where a first-order prediction reaches the value itself, no digit is left to judge
@@ -612,14 +629,17 @@ def judge_errors(
     lost = beyond & np.isfinite(errors.error) & hopeless
     used[lost] = np.minimum(used[lost], 1.0)
     index = int(np.argmax(np.where(beyond, used, -1.0)))
-    error, foreseen = errors.error[index], expected[index]
+    error = errors.error[index]
+    foreseen = expected[index]
     if math.isnan(error):
-        verdict, why = FAILS, "NaN"
+        verdict = FAILS
+        why = "NaN"
     elif lost[index]:
         verdict = UNDECIDED
         why = f"an error of {foreseen:.1e} of the value is predicted"
     elif predicted is None:
-        verdict, why = FAILS, errors.tolerance.explain(errors.condition[index])
+        verdict = FAILS
+        why = errors.tolerance.explain(errors.condition[index])
     elif used[index] <= 1.0:
         verdict = DEGRADED
         why = f"{error:.1e} of {foreseen:.1e} predicted for this position{method}"

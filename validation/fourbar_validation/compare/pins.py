@@ -20,7 +20,9 @@ def find_centre(bar: Bar) -> tuple[float, float]:
 
     They are as stated, or mid-bar.
     """
-    return bar.centre if bar.centre is not None else (bar.length / 2.0, 0.0)
+    if bar.centre is not None:
+        return bar.centre
+    return (bar.length / 2.0, 0.0)
 
 
 def find_mass(bar: Bar) -> float:

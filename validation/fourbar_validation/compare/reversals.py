@@ -166,7 +166,8 @@ def _bisect(
         )
         return solve(scene, stage, at=moved, side=side)
 
-    low, high = float(command.theta_2[i]), float(command.theta_2[j])
+    low = float(command.theta_2[i])
+    high = float(command.theta_2[j])
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         if middle in (low, high):

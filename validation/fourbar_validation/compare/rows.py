@@ -157,7 +157,10 @@ class Row:
             float(x[index] if len(x) > 1 else x[0]) for x in numbers
         )
         worst = float(errors[index])
-        verdict = AGREES if math.isfinite(worst) and worst <= bound else FAILS
+        if math.isfinite(worst) and worst <= bound:
+            verdict = AGREES
+        else:
+            verdict = FAILS
         if where is not None and not where.any():
             verdict = UNDECIDED
         return cls(
@@ -199,8 +202,10 @@ def make_breakdown(
             "the engine crashed its process (exit code"
             f" {getattr(error, 'exitcode', None) or 0})"
         )
+    elif isinstance(error, EngineError):
+        reason = str(error)
     else:
-        reason = str(error) if isinstance(error, EngineError) else say_error(error)
+        reason = say_error(error)
     return Row.unmeasured(scene, engine, part, "all", FAILS, reason)
 
 
@@ -219,11 +224,9 @@ def write_one_line(text: str) -> str:
     The middle of a long text is left out.
     """
     line = make_plain(" ".join(text.split()))
-    return (
-        line
-        if len(line) <= LONGEST
-        else f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
-    )
+    if len(line) <= LONGEST:
+        return line
+    return f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
 
 
 def make_plain(text: str) -> str:
@@ -249,14 +252,16 @@ def _write_cell_text(cell: str) -> str:
 
     An apostrophe stands before what begins a formula.
     """
-    return f"'{cell}" if cell.startswith(_FORMULA) and len(cell) > 1 else cell
+    if cell.startswith(_FORMULA) and len(cell) > 1:
+        return f"'{cell}"
+    return cell
 
 
 def read_cell_text(cell: str) -> str:
     """Give back what `_write_cell_text` was given."""
-    return (
-        cell[1:] if cell.startswith(tuple("'" + first for first in _FORMULA)) else cell
-    )
+    if cell.startswith(tuple("'" + first for first in _FORMULA)):
+        return cell[1:]
+    return cell
 
 
 COLUMNS = tuple(column.name for column in fields(Row))
@@ -299,7 +304,9 @@ def write_csv(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
 def _write_cell(value: object) -> object:
     if isinstance(value, bool):
         return "true" if value else "false"
-    return None if isinstance(value, float) and math.isnan(value) else value
+    if isinstance(value, float) and math.isnan(value):
+        return None
+    return value
 
 
 MADE_OF = {column.name: column.type for column in fields(Row) if column.init}
@@ -373,13 +380,11 @@ class Counts:
     @property
     def word(self) -> str:
         """Return the verdict for a cell of a table."""
-        return (
-            f"{self[FAILS]} fail"
-            if self[FAILS]
-            else "nothing compared"
-            if self.nothing
-            else "holds"
-        )
+        if self[FAILS]:
+            return f"{self[FAILS]} fail"
+        if self.nothing:
+            return "nothing compared"
+        return "holds"
 
     @property
     def headline(self) -> str:
@@ -399,7 +404,8 @@ class Counts:
 
         "all hold" is stated only of what was compared.
         """
-        total, failed = self.compared, self[FAILS]
+        total = self.compared
+        failed = self[FAILS]
         if failed:
             verdict = (
                 f"FAILS: {failed} of {total} comparisons{self._write_where()} do not"
@@ -410,7 +416,10 @@ class Counts:
         else:
             verdict = f"All {total} comparisons{self._write_where()} hold"
         if self.nothing:
-            held = [f"{total} of the formulas' own identities hold"] if total else []
+            if total:
+                held = [f"{total} of the formulas' own identities hold"]
+            else:
+                held = []
         else:
             held = self._write_worded(_COMPARED_VERDICTS)
         apart = self._write_worded((UNDECIDED, REFUSES))
@@ -422,11 +431,10 @@ class Counts:
     def _write_where(self) -> str:
         if not self.scenes:
             return ""
-        share = (
-            ""
-            if self.nothing or self.scenes_compared == self.scenes
-            else f"{self.scenes_compared} of "
-        )
+        if self.nothing or self.scenes_compared == self.scenes:
+            share = ""
+        else:
+            share = f"{self.scenes_compared} of "
         return f" on {share}{self.scenes} scene{'s' if self.scenes != 1 else ''}"
 
     def _write_worded(self, verdicts: Iterable[str]) -> list[str]:

@@ -53,7 +53,8 @@ class Sizes:
     """
 
     def __init__(self, scene: Scene, formulas: Solution) -> None:
-        self.scene, self.formulas = state_from_pins(scene), formulas
+        self.scene = state_from_pins(scene)
+        self.formulas = formulas
         self._sums: dict[str, Array] = {}
 
     def scale(self, quantity: str, values: Array) -> Array:
@@ -62,7 +63,8 @@ class Sizes:
 
     def scales(self, quantities: Sequence[str], values: Sequence[Array]) -> Array:
         """Compute what the errors of several quantities are divided by, (q, n)."""
-        formulas, units = self.formulas, [UNITS[quantity] for quantity in quantities]
+        formulas = self.formulas
+        units = [UNITS[quantity] for quantity in quantities]
         scales = np.ones((len(units), len(formulas)))
         sized = [i for i, unit in enumerate(units) if unit not in ("rad", "1")]
         if not sized:
@@ -93,7 +95,10 @@ class Sizes:
         judged by another's scale.
         """
         unit = UNITS[quantity]
-        key = quantity if unit in _OF_EACH_BAR else f"{unit} {_choose_bars(quantity)}"
+        if unit in _OF_EACH_BAR:
+            key = quantity
+        else:
+            key = f"{unit} {_choose_bars(quantity)}"
         if key not in self._sums:
             with np.errstate(divide="ignore", invalid="ignore"):
                 terms = TERMS[unit](quantity, self)
@@ -127,22 +132,18 @@ def _sum_speeds(quantity: str, sizes: Sizes) -> Array:
     _, a, b, c = sizes.scene.linkage.lengths
     assert formulas.omega_2 is not None
     omega_2 = np.abs(formulas.omega_2)
-    return (
-        omega_2
-        if quantity == "omega_2"
-        else a * omega_2 / ((b if quantity == "omega_3" else c) * formulas.condition)
-    )
+    if quantity == "omega_2":
+        return omega_2
+    return a * omega_2 / ((b if quantity == "omega_3" else c) * formulas.condition)
 
 
 def _sum_angular_accelerations(quantity: str, sizes: Sizes) -> Array:
     formulas = sizes.formulas
     _, a, b, c = sizes.scene.linkage.lengths
-    w2, w3, w4, a2 = (
-        formulas.omega_2,
-        formulas.omega_3,
-        formulas.omega_4,
-        formulas.alpha_2,
-    )
+    w2 = formulas.omega_2
+    w3 = formulas.omega_3
+    w4 = formulas.omega_4
+    a2 = formulas.alpha_2
     assert w2 is not None and w3 is not None and w4 is not None and a2 is not None
     if quantity == "alpha_2":
         return np.abs(a2)
@@ -154,12 +155,16 @@ def _sum_angular_accelerations(quantity: str, sizes: Sizes) -> Array:
 
 def _choose_bars(quantity: str) -> tuple[int, ...]:
     """Choose the bars whose motion is a term of a point's velocity or acceleration."""
-    return (2,) if quantity in OF_THE_INPUT else MOVING_BARS
+    if quantity in OF_THE_INPUT:
+        return (2,)
+    return MOVING_BARS
 
 
 def _sum_velocities(quantity: str, sizes: Sizes) -> Array:
-    scene, formulas = sizes.scene, sizes.formulas
-    total, drive = np.zeros(len(formulas)), _compute_drive_arms(scene)
+    scene = sizes.scene
+    formulas = sizes.formulas
+    total = np.zeros(len(formulas))
+    drive = _compute_drive_arms(scene)
     for number in _choose_bars(quantity):
         arm = (
             scene.linkage.bar(number).length
@@ -171,13 +176,12 @@ def _sum_velocities(quantity: str, sizes: Sizes) -> Array:
 
 
 def _sum_accelerations(quantity: str, sizes: Sizes) -> Array:
-    scene, formulas = sizes.scene, sizes.formulas
+    scene = sizes.scene
+    formulas = sizes.formulas
     total = np.zeros(len(formulas))
     for number in _choose_bars(quantity):
-        omega, alpha = (
-            getattr(formulas, f"omega_{number}"),
-            getattr(formulas, f"alpha_{number}"),
-        )
+        omega = getattr(formulas, f"omega_{number}")
+        alpha = getattr(formulas, f"alpha_{number}")
         total += (scene.linkage.bar(number).length + _compute_arm(scene, number)) * (
             omega * omega + np.abs(alpha)
         )
@@ -185,7 +189,8 @@ def _sum_accelerations(quantity: str, sizes: Sizes) -> Array:
 
 
 def _sum_forces(_: str, sizes: Sizes) -> Array:
-    scene, formulas = sizes.scene, sizes.formulas
+    scene = sizes.scene
+    formulas = sizes.formulas
     assert formulas.drive_condition is not None
     gain = 1.0
     if scene.drive is not None:  # a short lever makes the force as many times larger
@@ -246,10 +251,8 @@ def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
     total = np.zeros(len(formulas))
     for number in MOVING_BARS:
         bar = scene.linkage.bar(number)
-        acceleration, alpha = (
-            getattr(formulas, f"a_G{number}"),
-            getattr(formulas, f"alpha_{number}"),
-        )
+        acceleration = getattr(formulas, f"a_G{number}")
+        alpha = getattr(formulas, f"alpha_{number}")
         lever = 1.0 + abs(find_centre(bar)[0]) / bar.length
         total += (
             lever * find_mass(bar) * magnitude(acceleration)
@@ -286,9 +289,10 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     if answer.at is None or not has_angles(answer):
         return None
     answered = answer.quantities
-    theta_2 = (
-        answer.at.angle if answer.at.commanded == "theta_2" else answered["theta_2"]
-    )
+    if answer.at.commanded == "theta_2":
+        theta_2 = answer.at.angle
+    else:
+        theta_2 = answered["theta_2"]
     theta = {2: theta_2, 3: answered["theta_3"], 4: answered["theta_4"]}
     known: dict[str, Any] = {name: answered[name] for name in UNITS if name in answered}
     if answer.at.speed is not None:
@@ -361,7 +365,8 @@ def _find_velocities(
     """
 
     def swung(bar: int, distance: float, angle: float) -> Array:
-        speed, direction = distance * known[f"omega_{bar}"], theta[bar] + angle
+        speed = distance * known[f"omega_{bar}"]
+        direction = theta[bar] + angle
         return np.stack((-speed * np.sin(direction), speed * np.cos(direction)), axis=1)
 
     velocities = {
@@ -370,7 +375,10 @@ def _find_velocities(
     }
     for bar in MOVING_BARS:
         centre = swung(bar, *find_centre(linkage.bar(bar)))
-        moved = centre + velocities["v_A"] if bar == 3 else centre
+        if bar == 3:
+            moved = centre + velocities["v_A"]
+        else:
+            moved = centre
         velocities[f"v_G{bar}"] = moved
     return velocities
 
@@ -380,11 +388,9 @@ def take_strictest_condition(
 ) -> Array:
     """Take the better of two conditions of a quantity at each position, (n,)."""
     ours = find_condition(quantity, linkage, formulas)
-    return (
-        ours
-        if reference is None
-        else np.fmin(np.fmax(ours, find_condition(quantity, linkage, reference)), 1.0)
-    )
+    if reference is None:
+        return ours
+    return np.fmin(np.fmax(ours, find_condition(quantity, linkage, reference)), 1.0)
 
 
 def take_smallest_scales(
@@ -407,6 +413,7 @@ def take_smallest_scales(
     }
     if answered:
         rows = list(answered)
-        names, numbers = [quantities[i] for i in rows], list(answered.values())
+        names = [quantities[i] for i in rows]
+        numbers = list(answered.values())
         scales[rows] = np.fmin(scales[rows], theirs.scales(names, numbers))
     return scales

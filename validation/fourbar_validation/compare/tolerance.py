@@ -174,21 +174,17 @@ def find_condition(quantity: str, linkage: FourBar, formulas: Solution) -> Array
 
     It is s for positions and s^2 for what follows, times lever and drive.
     """
-    s, unit, bar, commanded = (
-        formulas.condition,
-        UNITS[quantity],
-        formulas.at.bar,
-        formulas.at.condition,
-    )
+    s = formulas.condition
+    unit = UNITS[quantity]
+    bar = formulas.at.bar
+    commanded = formulas.at.condition
     if quantity in (
         OF_THE_INPUT if bar == 2 else (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}")
     ):
         # a stroke commands the bar as far as its cylinder has a lever
-        return (
-            np.ones_like(s)
-            if commanded is None
-            else np.asarray(commanded ** POWER[unit], dtype=float)
-        )
+        if commanded is None:
+            return np.ones_like(s)
+        return np.asarray(commanded ** POWER[unit], dtype=float)
     condition = find_lever(linkage, bar) * s ** POWER[unit]
     if formulas.stroke is not None and (
         quantity in _OF_DIRECTION or unit in ("N", "N m", "W")
@@ -323,7 +319,8 @@ def find_used(error: Array | float, allowed: Array | float) -> Array:
 
     It is infinite if the error is not finite, and 0 if the error is 0.
     """
-    error, allowed = np.asarray(error, dtype=float), np.asarray(allowed, dtype=float)
+    error = np.asarray(error, dtype=float)
+    allowed = np.asarray(allowed, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         share = np.where(error == 0.0, 0.0, error / allowed)
     return np.where(np.isfinite(error) & ~np.isnan(share), share, np.inf)

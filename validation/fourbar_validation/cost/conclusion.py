@@ -13,7 +13,8 @@ from fourbar_validation.cost.study import EXACT, FORMULAS, STEPPED, CostPoint
 DEFAULT = "MuJoCo's defaults"
 """Label of the point that a new user gets."""
 _DEFAULT_LADDER = "Euler, MuJoCo's defaults"
-FOUR_DIGITS, SIX_DIGITS = 1e-4, 1e-6
+FOUR_DIGITS = 1e-4
+SIX_DIGITS = 1e-6
 DIGITS = {FOUR_DIGITS: "Four digits", SIX_DIGITS: "Six digits"}
 NAMES = {"torque": "driving torque", "force": "worst pin force"}
 Curves = Mapping[str, Sequence[CostPoint]]
@@ -53,7 +54,8 @@ def find_default(curves: Curves) -> CostPoint | None:
 
 def _write_time(point: CostPoint) -> str:
     """Write the time of a simulated second, and of a revolution."""
-    second, revolution = point.seconds_per_second, point.seconds_per_revolution
+    second = point.seconds_per_second
+    revolution = point.seconds_per_revolution
     return f"{1e3 * second:.2g} ms ({1e3 * revolution:.2g} ms a revolution)"
 
 

@@ -63,7 +63,8 @@ def cost(scenes: tuple[Path, ...], out: Path, verbose: bool) -> int:
     fitted: list[ErrorLaw] = []
     rows: list[tuple[str, ...]] = []
     for index in range(len(files)):
-        name, scene = files.name(index), files.scene(index)
+        name = files.name(index)
+        scene = files.scene(index)
         setup = TrialSetup(scene, command_of(scene))
         study = CostStudy(name, scene, out / name)
         curves = dict(
@@ -106,7 +107,9 @@ def cost(scenes: tuple[Path, ...], out: Path, verbose: bool) -> int:
         Console().print(make_table(head, rows, show_edge=False))
     if not fitted:
         click.echo("Nothing was compared: no law has points enough for a fit.")
-    return HOLDS if fitted and all(law.holds for law in fitted) else FAILED
+    if fitted and all(law.holds for law in fitted):
+        return HOLDS
+    return FAILED
 
 
 def _print_details(
@@ -165,7 +168,10 @@ def write_subtitle(scene: Scene, title: str) -> str:
     """Describe what was run, in one line under the statement of a picture."""
     acting = [type(effect).__name__.lower() for effect in scene.effects]
     acting += ["loads"] if scene.loads else []
-    omega = "" if scene.motion.omega_2 is None else f", {scene.motion.omega_2:g} rad/s"
+    if scene.motion.omega_2 is None:
+        omega = ""
+    else:
+        omega = f", {scene.motion.omega_2:g} rad/s"
     return f"{title}{omega}{', ' + ' and '.join(acting) if acting else ''}"
 
 
@@ -175,7 +181,9 @@ def _write_price(curves: Mapping[str, Sequence[CostPoint]], error: float) -> str
     A dash stands where nothing reaches it.
     """
     point = find_cheapest(curves, "worst", error)
-    return "-" if point is None else f"{1e3 * point.seconds_per_second:.2g}"
+    if point is None:
+        return "-"
+    return f"{1e3 * point.seconds_per_second:.2g}"
 
 
 def list_front(curves: Mapping[str, Sequence[CostPoint]]) -> list[tuple[str, ...]]:

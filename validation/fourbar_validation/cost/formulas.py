@@ -108,15 +108,16 @@ def make_bodies(scene: Scene, command: Command) -> thirteen.FreeBodies:
 
     Moments are about the mass centres.
     """
-    state, parts = (
-        compute_state(scene, command),
-        list_bodies(scene.linkage, scene.effects),
-    )
+    state = compute_state(scene, command)
+    parts = list_bodies(scene.linkage, scene.effects)
     n = len(state.theta_2)
     placed = scene.settled()
     actions = Actions(state, parts).add((*placed.loads, *placed.effects))
     acting = actions.wrenches(Wrenches())
-    first, second, force, moment = {}, {}, {}, {}
+    first = {}
+    second = {}
+    force = {}
+    moment = {}
     for k, body in zip(MOVING_BARS, parts, strict=True):
         centre = body.z * state.direction(k)
         first[k] = _stack(-centre, n)
@@ -138,7 +139,8 @@ def evaluate_balls(
     from fourbar_validation.engines.balls import collect_inputs, compute_outputs
 
     command = with_signs(scene.linkage, command)
-    before, ctx.prec = ctx.prec, bits
+    before = ctx.prec
+    ctx.prec = bits
     try:
         outputs = []
         for theta_2, branch in zip(
@@ -191,7 +193,10 @@ def compare_with_reference(
 def _compute_difference(ours: Any, exact: Any) -> float:
     from flint import arb
 
-    ball = ours if isinstance(ours, arb) else arb(float(ours))
+    if isinstance(ours, arb):
+        ball = ours
+    else:
+        ball = arb(float(ours))
     return abs(float((ball - exact).mid()))
 
 

@@ -36,7 +36,8 @@ _MIXES = 1.0 / 30.0
 """Part of the least error from which on a rest flattens a slope. The rest does not
 depend on the setting.
 """
-FIRST_ORDER, _FOURTH_ORDER = 1.0, 4.0
+FIRST_ORDER = 1.0
+_FOURTH_ORDER = 4.0
 _EXPECTED_ORDER = dict.fromkeys(
     ("Euler", "implicit", "implicitfast", "discrete"), FIRST_ORDER
 ) | {"RK4": _FOURTH_ORDER}
@@ -179,13 +180,10 @@ def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
     """
     jumps = []
     for i, point in enumerate(points[1:], 1):
-        value, before = (
-            _read(point, quantity),
-            [
-                _read(point_before, quantity)
-                for point_before in points[max(i - 2, 0) : i]
-            ],
-        )
+        value = _read(point, quantity)
+        before = [
+            _read(point_before, quantity) for point_before in points[max(i - 2, 0) : i]
+        ]
         # two sources that cancel make a dip, and its far side is no jump; a motion that
         # is lost again is one
         if before[-1] < TOO_LARGE and not value <= _JUMP * (
@@ -210,10 +208,8 @@ def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
         ("MuJoCo at one state in (1-d)/d", one_state, 1.0),
     ]
     for integrator, order in _EXPECTED_ORDER.items():
-        points, name = (
-            curves.get(f"{integrator}, tc held", ()),
-            f"order of {integrator} in the timestep",
-        )
+        points = curves.get(f"{integrator}, tc held", ())
+        name = f"order of {integrator} in the timestep"
         laws += [
             _fit_law(name, quantity, points, order, by_steps=True)
             for quantity in QUANTITIES
@@ -245,7 +241,10 @@ def _fit_law(
     *,
     by_steps: bool = False,
 ) -> ErrorLaw:
-    least = (find_floor(points, quantity) or 0.0) if by_steps else 0.0
+    if by_steps:
+        least = find_floor(points, quantity) or 0.0
+    else:
+        least = 0.0
     ordered = sorted(
         (p for p in points if p.setting_value > 0.0),
         key=lambda p: p.setting_value if by_steps else -p.setting_value,

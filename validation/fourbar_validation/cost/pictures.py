@@ -49,7 +49,9 @@ class Look(NamedTuple):
     dashes: Any = "solid"
 
 
-_DASHED, _DOTTED, LONG = (0, (4, 2)), (0, (1, 1.5)), (0, (7, 2, 1.5, 2))
+_DASHED = (0, (4, 2))
+_DOTTED = (0, (1, 1.5))
+LONG = (0, (7, 2, 1.5, 2))
 INTEGRATORS = {
     "Euler": Look("Euler, tc held", _ORANGE, "s", _DASHED),
     "implicitfast": Look("implicitfast, tc held", _PINK, "v", _DOTTED),
@@ -307,8 +309,12 @@ def write_statement(curves: Curves, quantity: str) -> str:
 
     It is the error at the steps and between them.
     """
-    four, default = find_cheapest(curves, quantity, 1e-4), find_default(curves)
-    name = NAMES[quantity].split()[-1] if quantity == "torque" else "pin force"
+    four = find_cheapest(curves, quantity, 1e-4)
+    default = find_default(curves)
+    if quantity == "torque":
+        name = NAMES[quantity].split()[-1]
+    else:
+        name = "pin force"
     parts = []
     if four is not None:
         parts.append(

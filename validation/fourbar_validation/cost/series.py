@@ -110,7 +110,10 @@ def _trace_steps(
     """
 
     def at(n: float) -> Settings:
-        tc = settings.time_constant_steps if held is None else held * n
+        if held is None:
+            tc = settings.time_constant_steps
+        else:
+            tc = held * n
         return replace(settings, steps_per_revolution=n, time_constant_steps=tc)
 
     return trace(name, "{:g} steps a revolution", steps, at, closure, drive)
@@ -151,7 +154,9 @@ PLAIN = replace(BEST, pad=None, time_constant_steps=10.0)
 
 
 def _choose_ladder(integrator: str) -> tuple[int, ...]:
-    return STEPS if integrator == "RK4" else _MORE_STEPS
+    if integrator == "RK4":
+        return STEPS
+    return _MORE_STEPS
 
 
 def _vary_default_closure(integrator: str, speed: float) -> Curve:

@@ -47,7 +47,9 @@ REQUIRED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
 ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
 VERSION = 8
 """Version of what is tried; parts made with another version are made again."""
-EXACT, STEPPED, FORMULAS = "exact", "stepped", "formulas"
+EXACT = "exact"
+STEPPED = "stepped"
+FORMULAS = "formulas"
 PINOCCHIO = "Pinocchio, rnea and multipliers"
 MUJOCO_INVERSE = "MuJoCo, mj_inverse and multipliers"
 T = TypeVar("T")
@@ -119,7 +121,9 @@ class CostStudy:
     """The parts of a study of one scene, each in its own file."""
 
     def __init__(self, name: str, scene: Scene, folder: Path) -> None:
-        self.name, self.scene, self.folder = name, scene, folder
+        self.name = name
+        self.scene = scene
+        self.folder = folder
         self.command = command_of(scene)
         self.left_out: list[str] = []
         self._rigs: dict[tuple[bool, bool, bool], TrialSetup] = {}
@@ -156,7 +160,8 @@ class CostStudy:
                 try:
                     points = unit()
                 except (FourBarError, NotImplementedError) as error:
-                    points, reasons = [], [f"{name}: {error}"]
+                    points = []
+                    reasons = [f"{name}: {error}"]
                 self.left_out += reasons
                 store.put(number, [[asdict(point) for point in points], reasons])
                 yield name, points
@@ -186,10 +191,8 @@ class CostStudy:
                     else command.theta_2.max()
                 )
                 before -= math.copysign(2.0 * math.pi, command.omega_2)  # type: ignore[arg-type]
-                angle, branch = (
-                    np.append(command.theta_2, before),
-                    np.append(command.branch, command.branch[0]),
-                )
+                angle = np.append(command.theta_2, before)
+                branch = np.append(command.branch, command.branch[0])
                 command = command._replace(angle=angle, branch=branch)
             self._rigs[slow, bare, settled] = TrialSetup(scene, command)
         return self._rigs[slow, bare, settled]
@@ -259,7 +262,8 @@ class CostStudy:
 
     def _try_recommended(self) -> list[CostPoint]:
         """Try what the advice gives for each required error, where it is reached."""
-        setup, spots = self.setup(), []
+        setup = self.setup()
+        spots = []
         for required in REQUIRED:
             advice = advise(self.scene, required, setup)
             if advice.reached:
@@ -313,7 +317,10 @@ class CostStudy:
             except (NotImplementedError, AssertionError) as error:
                 self.left_out.append(f"{label}: {error}")
                 continue
-            command = few if label == "50 digits" else self.command
+            if label == "50 digits":
+                command = few
+            else:
+                command = self.command
             times = [
                 time_call(partial(method, self.scene, command)) for _ in range(ROUNDS)
             ]

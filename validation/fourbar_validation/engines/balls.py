@@ -71,7 +71,8 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
 
     The position is of the commanded angle.
     """
-    link, motion = scene.linkage, scene.motion
+    link = scene.linkage
+    motion = scene.motion
     d, a, b, c = link.lengths
     values = {"d": d, "a": a, "b": b, "c": c, "theta_1": link.ground_angle}
     values |= dict(
@@ -140,7 +141,10 @@ def _collect_place(
 ) -> dict[str, float]:
     """Collect the two numbers that state a place, under two names."""
     stated = find_stated(scene, place)
-    pair = stated.from_centre if stated.from_pin is None else stated.from_pin
+    if stated.from_pin is None:
+        pair = stated.from_centre
+    else:
+        pair = stated.from_pin
     assert pair is not None
     return {distance: pair[0], angle: pair[1]}
 
@@ -159,7 +163,9 @@ def _place_from_pin(
     `w`: directions of the bars; `centre`: vectors from their first pins to G.
     """
     arm = w[stated.bar] * polar(distance, angle)
-    return arm if stated.from_centre is None else centre[stated.bar] + arm
+    if stated.from_centre is None:
+        return arm
+    return centre[stated.bar] + arm
 
 
 def make_balls(scene: Scene, angle: float, **motion: float) -> Values:
@@ -187,9 +193,13 @@ def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
         D = d e^{i theta_1} - b e^{i theta_3} of bars 2 and 4,
         D = d e^{i theta_1} + c e^{i theta_4} of bars 3 and 2, bar 2 reversed.
     """
-    bar, d = _find_commanded(x), x["d"]
+    bar = _find_commanded(x)
+    d = x["d"]
     held, b, c = {2: ("a", "b", "c"), 3: ("b", "a", "c"), 4: ("c", "b", "a")}[bar]
-    held, b, c, side = x[held], x[b], x[c], 1 if bar == 4 else -1
+    held = x[held]
+    b = x[b]
+    c = x[c]
+    side = 1 if bar == 4 else -1
     w = polar(arb(1), x[f"theta_{bar}"])
     D = polar(d, x["theta_1"]) + side * held * w
     # |D|^2 by the angle between ground and input: where they are in line it is exact,
@@ -203,13 +213,11 @@ def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
         return None
     first = acb(K, branch * discriminant.sqrt()) * D / (2 * b * squared)
     second = (b * first - D) / c
-    return (
-        (w, first, second)
-        if bar == 2
-        else (first, w, second)
-        if bar == 3
-        else (-second, first, w)
-    )
+    if bar == 2:
+        return (w, first, second)
+    if bar == 3:
+        return (first, w, second)
+    return (-second, first, w)
 
 
 def _find_commanded(x: Values) -> int:
@@ -231,8 +239,14 @@ def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:
 
     Vectors are name_x, name_y; None if the loop does not close.
     """
-    x = _turn_by_stroke(scene, inputs) if "stroke" in inputs else inputs
-    directions = None if x is None else closure(x, branch)
+    if "stroke" in inputs:
+        x = _turn_by_stroke(scene, inputs)
+    else:
+        x = inputs
+    if x is None:
+        directions = None
+    else:
+        directions = closure(x, branch)
     if x is None or directions is None:
         return None
     w = dict(zip(MOVING_BARS, directions, strict=True))
@@ -252,7 +266,10 @@ def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:
     y |= {f"omega_{bar}": bars.omega[bar] for bar in MOVING_BARS}
     y |= {f"alpha_{bar}": bars.alpha[bar] for bar in MOVING_BARS}
     _put(y, bars.points())
-    line = _find_line(scene, x, bars) if scene.drive else None
+    if scene.drive:
+        line = _find_line(scene, x, bars)
+    else:
+        line = None
     if line is None:
         drive, y["drive_condition"], speed = (
             "torque",
@@ -334,7 +351,10 @@ class _BallBars(NamedTuple):
 
 def _move(x: Values, w: dict[int, Complex], commanded: int) -> _BallBars:
     """Move the bars: two linear systems of the differentiated loop."""
-    a, b, c, zero = x["a"], x["b"], x["c"], acb(0)
+    a = x["a"]
+    b = x["b"]
+    c = x["c"]
+    zero = acb(0)
     side = {2: a * w[2], 3: b * w[3], 4: -c * w[4]}  # sides of the loop
     first, second = (bar for bar in MOVING_BARS if bar != commanded)
 
@@ -343,11 +363,9 @@ def _move(x: Values, w: dict[int, Complex], commanded: int) -> _BallBars:
 
         The sum of i side rate is `total`.
         """
-        u, v, rest = (
-            acb(0, 1) * side[first],
-            acb(0, 1) * side[second],
-            total - acb(0, stated) * side[commanded],
-        )
+        u = acb(0, 1) * side[first]
+        v = acb(0, 1) * side[second]
+        rest = total - acb(0, stated) * side[commanded]
         solved = _solve_linear(
             [[u.real, v.real], [u.imag, v.imag]], [rest.real, rest.imag]
         )
@@ -360,7 +378,8 @@ def _move(x: Values, w: dict[int, Complex], commanded: int) -> _BallBars:
     tip = {2: a * w[2], 3: b * w[3], 4: c * w[4]}
     first_pin = {1: zero, 2: zero, 3: tip[2], 4: polar(x["d"], x["theta_1"])}
     centre = {bar: w[bar] * polar(x[f"r{bar}"], x[f"phi{bar}"]) for bar in MOVING_BARS}
-    v_A, a_A = acb(0, omega[2]) * tip[2], acb(-omega[2] * omega[2], alpha[2]) * tip[2]
+    v_A = acb(0, omega[2]) * tip[2]
+    a_A = acb(-omega[2] * omega[2], alpha[2]) * tip[2]
     at_rest = {2: zero, 4: zero}
     return _BallBars(
         w, omega, alpha, tip, first_pin, centre, at_rest | {3: v_A}, at_rest | {3: a_A}
@@ -554,7 +573,8 @@ def _turn_by_stroke(scene: Scene, x: Values) -> Values | None:
     With l and r from the pin to the ends: s^2 = l^2 + r^2 - 2 l r cos beta, twice
     differentiated.
     """
-    drive, motion = scene.drive, scene.motion
+    drive = scene.drive
+    motion = scene.motion
     assert isinstance(drive, LinearDrive) and motion.side is not None
     (_, on_ground), (bar, on_bar) = sorted(
         zip((drive.start.bar, drive.end.bar), ENDS, strict=True)
@@ -567,15 +587,19 @@ def _turn_by_stroke(scene: Scene, x: Values) -> Values | None:
     fixed = polar(x[on_ground], x[f"{on_ground}_angle"] + x["theta_1"])
     if bar == 4:
         fixed -= polar(x["d"], x["theta_1"])
-    s, speed, length, reach = x["stroke"], x["stroke_speed"], abs(held), abs(fixed)
+    s = x["stroke"]
+    speed = x["stroke_speed"]
+    length = abs(held)
+    reach = abs(fixed)
     cosine = (length**2 + reach**2 - s**2) / (2 * length * reach)
     if abs(cosine) > 1:
         return None
-    beta, side = (
-        cosine.acos(),
-        1 if motion.side == "left" else -1,
+    beta = cosine.acos()
+    side = (
+        1 if motion.side == "left" else -1
     )  # to the left the stroke grows with the angle
-    across, along = length * reach * beta.sin(), length * reach * cosine
+    across = length * reach * beta.sin()
+    along = length * reach * cosine
     rate = s * speed / across
     growth = (speed**2 + s * x["stroke_acceleration"] - along * rate**2) / across
     lever = across / s / (length if length > reach else reach)
@@ -619,9 +643,11 @@ def _find_line(scene: Scene, x: Values, bars_in_motion: _BallBars) -> _BallLine:
 
     The ground's are among them.
     """
-    drive, first_pin = scene.drive, bars_in_motion.first_pin
+    drive = scene.drive
+    first_pin = bars_in_motion.first_pin
     assert drive is not None
-    w, centre = bars_in_motion.directions(x), bars_in_motion.centre
+    w = bars_in_motion.directions(x)
+    centre = bars_in_motion.centre
     arms = {
         place.bar: _place_from_pin(
             find_stated(scene, place), x[name], x[f"{name}_angle"], w, centre
@@ -650,7 +676,9 @@ def _compute_condition(
     sin(theta_2 - theta_3)). L is the sum of what each end could move: r on bar 2, a + r
     a/b on bar 3, r a/c on bar 4, `tip` is A.
     """
-    a, b, c = x["a"], x["b"], x["c"]
+    a = x["a"]
+    b = x["b"]
+    c = x["c"]
     turning = {1: arb(0), 2: sines[2], 3: -a / b * sines[3], 4: -a / c * sines[4]}
     foot = {1: acb(0), 2: acb(0), 3: acb(0, turning[2]) * tip, 4: acb(0)}
     most = {1: (0, 0), 2: (0, 1), 3: (a, a / b), 4: (0, a / c)}

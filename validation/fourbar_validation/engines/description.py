@@ -71,14 +71,15 @@ def reduce_angle(angle: float) -> float:
 
     Sums with others then lose none of its digits.
     """
-    return (
-        angle if abs(angle) <= math.pi else math.atan2(math.sin(angle), math.cos(angle))
-    )
+    if abs(angle) <= math.pi:
+        return angle
+    return math.atan2(math.sin(angle), math.cos(angle))
 
 
 def rotate(angle: float, x: float, y: float) -> tuple[float, float]:
     """Rotate (x, y) along and across a line at an angle (rad) into world axes."""
-    cos, sin = math.cos(angle), math.sin(angle)
+    cos = math.cos(angle)
+    sin = math.sin(angle)
     return rotate_by(((cos, -sin), (sin, cos)), x, y)
 
 
@@ -92,7 +93,8 @@ def rotate_by(
 
 def find_field(gravity: Gravity) -> tuple[float, float]:
     """Return (g_x, g_y), m/s^2; the angle counts from +x, counter-clockwise."""
-    x, y = math.cos(gravity.angle), math.sin(gravity.angle)
+    x = math.cos(gravity.angle)
+    y = math.sin(gravity.angle)
     return gravity.magnitude * (x if abs(x) > _TELLS else 0.0), gravity.magnitude * (
         y if abs(y) > _TELLS else 0.0
     )
@@ -123,7 +125,8 @@ class Part(NamedTuple):
 
 def list_parts(linkage: FourBar) -> list[Part]:
     """Describe bars 2, 3 on 2, and 4."""
-    theta_1, d = linkage.ground_angle, linkage.ground
+    theta_1 = linkage.ground_angle
+    d = linkage.ground
     first_pins = {
         2: (1, (0.0, 0.0)),
         3: (2, (linkage.input.length, 0.0)),
@@ -157,7 +160,9 @@ def place(point: Any, ground_angle: float) -> tuple[float, float]:
     It is along and across the bar's line; on the ground it is in world axes.
     """
     offset = resolve(point.distance, point.angle)
-    return rotate(ground_angle, *offset) if point.bar == 1 else offset
+    if point.bar == 1:
+        return rotate(ground_angle, *offset)
+    return offset
 
 
 def list_speeds(command: Command) -> tuple[Array, Array]:

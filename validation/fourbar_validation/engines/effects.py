@@ -92,15 +92,21 @@ def _apply_torsion(effect: "Torsion", bars: Loaded) -> None:
 def _apply_springs(effect: "Springs", bars: Loaded) -> None:
     """Pull at the engine's own places of the two points."""
     for spring in effect.springs:
-        one, second = bars.end(spring.start), bars.end(spring.end)
-        x, y = second[0] - one[0], second[1] - one[1]
+        one = bars.end(spring.start)
+        second = bars.end(spring.end)
+        x = second[0] - one[0]
+        y = second[1] - one[1]
         distance = math.hypot(x, y)
         if spring.preload == spring.stiffness * spring.length:
             per_metre = spring.stiffness
         else:
             tension = spring.preload + spring.stiffness * (distance - spring.length)
-            per_metre = tension / distance if distance else math.nan
-        x, y = per_metre * x, per_metre * y
+            if distance:
+                per_metre = tension / distance
+            else:
+                per_metre = math.nan
+        x = per_metre * x
+        y = per_metre * y
         bars.push(spring.start.bar, (x, y), one)
         bars.push(spring.end.bar, (-x, -y), second)
 
@@ -118,7 +124,10 @@ def _load(load: "Load", bars: Loaded) -> None:
 
     A couple is applied too.
     """
-    factor = 1.0 if load.table is None else look_up(load.table, bars.angle(2))
+    if load.table is None:
+        factor = 1.0
+    else:
+        factor = look_up(load.table, bars.angle(2))
     if load.force is not None:
         force = resolve(*load.force)
         if load.frame == "bar":
@@ -143,7 +152,8 @@ def look_up(table: "Table", theta_2: float) -> float:
         math.fmod(theta_2 - table.theta_2[0], math.tau) + math.tau, math.tau
     )
     k = min(max(bisect.bisect_right(table.theta_2, angle), 1), len(table.theta_2) - 1)
-    (a, b), (f, g) = table.theta_2[k - 1 : k + 1], table.factor[k - 1 : k + 1]
+    a, b = table.theta_2[k - 1 : k + 1]
+    f, g = table.factor[k - 1 : k + 1]
     return (f * (b - angle) + g * (angle - a)) / (b - a)
 
 

@@ -99,7 +99,8 @@ def read_engines_of(file: Path) -> dict[str, Entry]:
 
 
 def _read_entry(file: Path, table: object) -> Entry:
-    texts, lists = ("name", "adapter", "python", "setting"), ("command", "requires")
+    texts = ("name", "adapter", "python", "setting")
+    lists = ("command", "requires")
     if not isinstance(table, dict) or not table.get("name"):
         raise InputError(
             "engine", table, "must be a table [[engine]] with a name", str(file)
@@ -136,14 +137,16 @@ def make_environment(entry: Entry, cache: Path = _CACHE) -> str:
     """
     if not entry.requires and not entry.python:
         return sys.executable
-    python = shutil.which(entry.python) if entry.python else sys.executable
+    if entry.python:
+        python = shutil.which(entry.python)
+    else:
+        python = sys.executable
     if python is None:
         raise DependencyError(f"{entry.name}: no {entry.python} is found")
-    needed = (
-        [text for text in requires("fourbar") or [] if "extra ==" not in text]
-        if entry.python
-        else []
-    )
+    if entry.python:
+        needed = [text for text in requires("fourbar") or [] if "extra ==" not in text]
+    else:
+        needed = []
     wanted = [*entry.requires, *needed]
     key = hashlib.sha256(
         repr((python, sys.version_info[:2], sys.prefix, wanted)).encode()
@@ -219,4 +222,6 @@ def start_engine(
         setting["name"] = entry.setting
     if entry.steps:
         setting["steps_per_turn"] = entry.steps[-1]
-    return guest.at_setting(**setting) if setting else guest
+    if setting:
+        return guest.at_setting(**setting)
+    return guest

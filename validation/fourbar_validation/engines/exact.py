@@ -45,11 +45,9 @@ class BallArithmetic:
             for q in COMPARED_QUANTITIES
             if command.omega_2 is not None or q.startswith("theta")
         ]
-        out, assembled, (omega, alpha) = (
-            make_blank(n, names),
-            np.zeros(n, dtype=bool),
-            list_speeds(command),
-        )
+        out = make_blank(n, names)
+        assembled = np.zeros(n, dtype=bool)
+        omega, alpha = list_speeds(command)
         for i in range(n):
             motion = {"omega_2": float(omega[i]), "alpha_2": float(alpha[i])}
             exact = make_balls(scene, float(command.theta_2[i]), **motion)
@@ -119,7 +117,8 @@ def shift_to(linkage: FourBar, theta_2: float, sin_mu: float) -> Any:
 
     with mp.workdps(DIGITS):
         d, a, b, c = map(mpf, linkage.lengths)
-        theta_1, shifts = mpf(linkage.ground_angle), []
+        theta_1 = mpf(linkage.ground_angle)
+        shifts = []
         cos_mu = mp.sqrt(max(1 - mpf(sin_mu) ** 2, 0))
         for side in (2 * b * c * cos_mu, -2 * b * c * cos_mu):
             cosine = (d * d + a * a - b * b - c * c + side) / (2 * a * d)
@@ -129,13 +128,14 @@ def shift_to(linkage: FourBar, theta_2: float, sin_mu: float) -> Any:
                 ]
         shifts = [shift - 2 * mp.pi * mp.nint(shift / (2 * mp.pi)) for shift in shifts]
         nearest = min(shifts, key=abs, default=mp.inf)
-        return (
-            nearest
-            if abs(nearest)
-            <= ROUNDINGS * EPS * max(1.0, abs(theta_2), abs(linkage.ground_angle))
-            else None
-        )
+        if abs(nearest) <= ROUNDINGS * EPS * max(
+            1.0, abs(theta_2), abs(linkage.ground_angle)
+        ):
+            return nearest
+        return None
 
 
 def _to_double(ball: Any) -> float:
-    return math.nan if ball is None else float(ball.mid())
+    if ball is None:
+        return math.nan
+    return float(ball.mid())

@@ -239,9 +239,9 @@ def _answer_positions(
 
 def _place_line(scene: Scene, motion: BodyMotion) -> DriveLine | None:
     theta = {bar: np.angle(motion.unit[bar]) for bar in MOVING_BARS}
-    return (
-        None if scene.drive is None else place_line(scene.linkage, scene.drive, theta)
-    )
+    if scene.drive is None:
+        return None
+    return place_line(scene.linkage, scene.drive, theta)
 
 
 def move(
@@ -259,12 +259,12 @@ def move(
     """
     d, a, b, c = linkage.lengths
     n = len(theta_2)
-    u_1, u_2 = np.exp(1j * linkage.ground_angle), np.exp(1j * theta_2)
-    u_3, u_4 = np.exp(1j * theta_3), np.exp(1j * theta_4)
-    length, round_ = (
-        {2: a, 3: b, 4: c},
-        {2: u_2, 3: u_3, 4: -u_4},
-    )  # bar 4 is gone along from B to O4
+    u_1 = np.exp(1j * linkage.ground_angle)
+    u_2 = np.exp(1j * theta_2)
+    u_3 = np.exp(1j * theta_3)
+    u_4 = np.exp(1j * theta_4)
+    length = {2: a, 3: b, 4: c}
+    round_ = {2: u_2, 3: u_3, 4: -u_4}  # bar 4 is gone along from B to O4
     others = [number for number in MOVING_BARS if number != bar]
     jacobian = np.stack(
         [_split_components(round_[number]) for number in others], axis=-1
@@ -325,7 +325,8 @@ def _solve_unit_couples(
     Returns also the loads of these pins as complex numbers (n, p, 1 + p), mu r of each
     (m), and the residual.
     """
-    pins, wrenches = list_sliding_pins(scene), sum_acting(scene, motion)
+    pins = list_sliding_pins(scene)
+    wrenches = sum_acting(scene, motion)
     _add_inertia(motion, wrenches)
     columns = [_make_right_sides(motion.linkage, wrenches)]
     for pin in pins:
@@ -373,7 +374,8 @@ def _count_at_position(F: Complex, C: Complex, k: Array) -> int:
         return 0
     if np.abs(np.linalg.eigvals(k[:, None] * np.abs(C))).max() < 1.0:
         return 1
-    rng, n = np.random.default_rng(0), _FRICTION_STARTS
+    rng = np.random.default_rng(0)
+    n = _FRICTION_STARTS
     size = float((k * np.abs(F)).max()) or 1.0
     x = (
         size
@@ -399,7 +401,8 @@ def _add_inertia(motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """
     for number in MOVING_BARS:
         bar = motion.linkage.bar(number)
-        arm, alpha = motion.to_centre(number), motion.alpha[number]
+        arm = motion.to_centre(number)
+        alpha = motion.alpha[number]
         wrenches.push(number, -find_mass(bar) * motion.swing(number, arm), 0.0)
         wrenches.couple(number, -about_first_pin(bar) * alpha)
     wrenches.push(
@@ -457,7 +460,8 @@ def solve_system(matrix: Array, right: Array) -> tuple[Array, float]:
     x = np.full(right.shape, np.nan)
     finite = np.asarray(np.isfinite(matrix).all(axis=(1, 2)))
     finite[finite] = np.linalg.det(matrix[finite]) != 0.0
-    matrix, right = matrix[finite], right[finite]
+    matrix = matrix[finite]
+    right = right[finite]
     x[finite] = solve_refined(matrix, right)
     terms = np.abs(matrix) @ np.abs(x[finite]) + np.abs(right)
     remaining = np.abs(right - matrix @ x[finite]) / np.where(terms == 0.0, 1.0, terms)
@@ -530,10 +534,8 @@ def _solve_couples(
     """
     for _ in range(_FRICTION_STEPS):
         size, matrix = _compute_friction_jacobian(F, C, k, x)
-        gap, terms = (
-            k * size - x,
-            k * (np.abs(F) + (np.abs(C) * x[:, None, :]).sum(axis=-1)),
-        )
+        gap = k * size - x
+        terms = k * (np.abs(F) + (np.abs(C) * x[:, None, :]).sum(axis=-1))
         settled = (np.abs(gap) <= _FRICTION_SETTLED * terms).all(axis=1)
         step = solve_system(matrix, gap[..., None])[0][..., 0]
         moving = ~settled & np.isfinite(step).all(axis=1)

@@ -71,11 +71,13 @@ def close(
     held = {2: -a, 3: -b, 4: c}[bar]
     b, c = {2: (b, c), 3: (a, c), 4: (b, a)}[bar]
     diagonal = ground + held * np.exp(1j * theta)
-    e, phi = np.abs(diagonal), np.angle(diagonal)
+    e = np.abs(diagonal)
+    phi = np.angle(diagonal)
     closed = ROUNDING * sum(linkage.lengths)
     # the gap is least where bars 3 and 4 lie along the diagonal
     possible = np.maximum(e - (b + c), abs(b - c) - e) <= closed
-    angles, gap = np.full((2, len(e)), np.nan), np.full(len(e), np.nan)
+    angles = np.full((2, len(e)), np.nan)
+    gap = np.full(len(e), np.nan)
     for alpha, beta in [
         (_compute_angle_between(e, b, c), _compute_angle_between(e, c, b)),
         *np.radians(STARTS),
@@ -106,10 +108,8 @@ def _compute_angle_between(e: Array, near: float, far: float) -> Array:
 
     Bars 3 and 4 are never collinear.
     """
-    above, below = (
-        (e - near + far) * (far + near - e),
-        (e + near - far) * (e + near + far),
-    )
+    above = (e - near + far) * (far + near - e)
+    below = (e + near - far) * (e + near + far)
     angle = 2.0 * np.arctan2(
         np.sqrt(np.maximum(above, 0.0)), np.sqrt(np.maximum(below, 0.0))
     )
@@ -155,7 +155,8 @@ def _solve_newton(
         part = np.minimum(
             1.0, LONGEST_STEP / np.maximum(np.abs(step).max(axis=0), LONGEST_STEP)
         )
-        pending, moved = np.arange(len(moving)), np.zeros(len(moving), dtype=bool)
+        pending = np.arange(len(moving))
+        moved = np.zeros(len(moving), dtype=bool)
         for _ in range(HALVINGS):
             indices = moving[pending]
             trial = theta[:, indices] + part[pending] * step[:, pending]
@@ -194,8 +195,12 @@ def measure_cylinder(scene: Scene) -> tuple[complex, complex]:
     on_ground, on_bar = sorted(
         (place for _, place in drive.ends), key=lambda place: place.bar
     )
-    d, theta_1 = scene.linkage.ground, scene.linkage.ground_angle
-    pivot = complex(*resolve(d, theta_1)) if on_bar.bar == 4 else 0.0j
+    d = scene.linkage.ground
+    theta_1 = scene.linkage.ground_angle
+    if on_bar.bar == 4:
+        pivot = complex(*resolve(d, theta_1))
+    else:
+        pivot = 0.0j
     return (
         complex(*resolve(on_bar.distance, on_bar.angle)),
         complex(*place(on_ground, theta_1)) - pivot,
@@ -217,18 +222,18 @@ def find_angle(
     def across(theta: Array) -> Array:
         return np.asarray(arm * np.exp(1j * theta) - ground)
 
-    low, high = np.zeros(len(command.stroke)), np.full(len(command.stroke), np.pi)
+    low = np.zeros(len(command.stroke))
+    high = np.full(len(command.stroke), np.pi)
     for _ in range(_STROKE_HALVINGS):
         middle = 0.5 * (low + high)
         short = np.abs(across(towards + sense * middle)) < command.stroke
-        low, high = np.where(short, middle, low), np.where(short, high, middle)
+        low = np.where(short, middle, low)
+        high = np.where(short, high, middle)
     theta = towards + sense * 0.5 * (low + high)
     if motion.stroke_speed is None:
         return command._replace(angle=theta, speed=None)
-    line, velocity = (
-        across(theta),
-        1j * arm * np.exp(1j * theta),
-    )  # velocity of the end, per rad/s
+    line = across(theta)
+    velocity = 1j * arm * np.exp(1j * theta)  # velocity of the end, per rad/s
     stroke = np.abs(line)
     with np.errstate(all="ignore"):
         slope = (np.conj(line) * velocity).real / stroke

@@ -291,7 +291,8 @@ def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
     begins = with_signs(scene.linkage, command(scene))
     if np.ptp(begins.branch) != 0:
         return None
-    link, gone = scene.linkage, np.zeros(len(motion.theta_2), dtype=bool)
+    link = scene.linkage
+    gone = np.zeros(len(motion.theta_2), dtype=bool)
     ends = np.concatenate((begins.theta_2, motion.theta_2))
     steps = math.ceil(float(np.ptp(ends)) / FOLLOWED) + 1
     path = np.unique(np.concatenate((ends, np.linspace(ends.min(), ends.max(), steps))))
@@ -302,10 +303,8 @@ def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
     theta = {1: np.full(len(path), link.ground_angle), 2: path}
     theta |= {bar: np.unwrap(closed.theta[bar - 3][closed.assembled]) for bar in (3, 4)}
     start = begins.theta_2[on_path][0]
-    first, places = (
-        int(np.searchsorted(path, start)),
-        np.clip(np.searchsorted(path, motion.theta_2), 0, len(path) - 1),
-    )
+    first = int(np.searchsorted(path, start))
+    places = np.clip(np.searchsorted(path, motion.theta_2), 0, len(path) - 1)
     for pin, _, rest, _ in springs:
         i, j = PINS[pin]
         away = theta[j] - theta[i] - rest

@@ -90,7 +90,10 @@ class Guest(Engine):
         Without `name` it keeps its named setting.
         """
         name = setting.pop("name", self.setting)
-        asked = {"name": name, **setting} if name else setting
+        if name:
+            asked = {"name": name, **setting}
+        else:
+            asked = setting
         return replace(self, setting=name, start=partial(self.start, setting=asked))  # type: ignore[call-arg]
 
 
@@ -113,9 +116,11 @@ def name_guests(
 
     Each has its entry and the name that it is given.
     """
-    names, guests = {FORMULAS, *known}, list[Guest]()
+    names = {FORMULAS, *known}
+    guests = list[Guest]()
     for entry, chosen, program in entries:
-        hello, trouble = Hello(_name_program(entry, program)), ""
+        hello = Hello(_name_program(entry, program))
+        trouble = ""
         try:
             hello = ask_hello(program)
         except InputError as error:
@@ -200,11 +205,10 @@ def serve(
     entry: str, seconds: float | None = None, python: str = sys.executable
 ) -> Program:
     """Make the program that serves one of our adapters, or a class of the user's."""
-    ours = (
-        []
-        if CHECKOUT is None
-        else [str(CHECKOUT), str(PACKAGE.parent), str(CHECKOUT / "lab")]
-    )
+    if CHECKOUT is None:
+        ours = []
+    else:
+        ours = [str(CHECKOUT), str(PACKAGE.parent), str(CHECKOUT / "lab")]
     path = os.pathsep.join(filter(None, [*ours, os.environ.get("PYTHONPATH", "")]))
     return Program(
         (python, "-m", "fourbar_validation.engine", entry),
@@ -349,14 +353,18 @@ class GuestClient:
         trouble: str = "",
         setting: dict[str, Any] | None = None,
     ) -> None:
-        self.name, self._program, self._hello, self._trouble = (
-            name,
-            program,
-            hello,
-            trouble,
-        )
-        self._setting = {"setting": setting} if setting else {}
-        self.commands = COMMANDS if trouble else hello.commands
+        self.name = name
+        self._program = program
+        self._hello = hello
+        self._trouble = trouble
+        if setting:
+            self._setting = {"setting": setting}
+        else:
+            self._setting = {}
+        if trouble:
+            self.commands = COMMANDS
+        else:
+            self.commands = hello.commands
         self.step: float | None = None
         """Step of a released motion, s."""
 
@@ -401,11 +409,9 @@ class GuestClient:
         name = self._setting.get("setting", {}).get("name")
         if name is not None and name not in self._hello.settings:
             return f"the engine's hello does not list {name!r} in settings"
-        return (
-            f"the engine's hello does not list {', '.join(lacking)} in effects"
-            if lacking
-            else ""
-        )
+        if lacking:
+            return f"the engine's hello does not list {', '.join(lacking)} in effects"
+        return ""
 
     def _ask(self, question: dict[str, Any], positions: int) -> dict[str, Any]:
         running = _RUNNING.setdefault(self._program, Running(self._program))

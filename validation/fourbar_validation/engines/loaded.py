@@ -136,11 +136,9 @@ class Loaded(EngineBars, Protocol):
 
         An engine calls this once it has its bars and what acts on them.
         """
-        self.ground_angle, self.drive_bar, self.terms = (
-            scene.linkage.ground_angle,
-            scene.drive_bar,
-            terms,
-        )
+        self.ground_angle = scene.linkage.ground_angle
+        self.drive_bar = scene.drive_bar
+        self.terms = terms
         self.force_drive, self.driving = scene.drive, name_driving(scene)
         self.loaded = [pin for effect in scene.effects for pin in effect.loaded_pins]
 
@@ -181,7 +179,9 @@ class Loaded(EngineBars, Protocol):
 
     def first_pin(self, bar: int) -> Pair:
         """Locate the first pin of a bar (O2, O2, A, O4 of bars 1, 2, 3, 4), m."""
-        return (0.0, 0.0) if bar == 1 else self.locate(f"first_pin{bar}")
+        if bar == 1:
+            return (0.0, 0.0)
+        return self.locate(f"first_pin{bar}")
 
     def end(self, point: "Place") -> Pair:
         """Locate an end of a spring or a place of the drive, m."""
@@ -236,7 +236,9 @@ class Loaded(EngineBars, Protocol):
         On the ground it does nothing.
         """
         if bar != 1:
-            (x, y), (x_0, y_0), (f_x, f_y) = point, self.first_pin(bar), force
+            x, y = point
+            x_0, y_0 = self.first_pin(bar)
+            f_x, f_y = force
             wrench = self.wrenches[bar]
             wrench[0] += f_x
             wrench[1] += f_y
@@ -259,7 +261,8 @@ class Loaded(EngineBars, Protocol):
         The result is empty where friction jams. Effects that depend on the load of a
         pin are given the loads of the pass before, until they repeat.
         """
-        self.pin_loads, before = {}, math.inf
+        self.pin_loads = {}
+        before = math.inf
         forces = balanced()
         for _ in range(PASSES if self.loaded else 0):
             loads = {pin: math.hypot(*forces[FORCE_AT[pin]]) for pin in self.loaded}
@@ -272,9 +275,12 @@ class Loaded(EngineBars, Protocol):
                 return forces
             if not most < _DIVERGED:
                 break
-            before, self.pin_loads = change, loads
+            before = change
+            self.pin_loads = loads
             forces = balanced()
-        return self._grow(balanced) if self.loaded else forces
+        if self.loaded:
+            return self._grow(balanced)
+        return forces
 
     def _grow(self, balanced: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         """Grow friction from none, where passes run away.
@@ -296,17 +302,16 @@ class Loaded(EngineBars, Protocol):
             before = math.inf
             for _ in range(STEPS):
                 forces, settled_loads = passed(share * loads)
-                most, change = (
-                    float(settled_loads.max()),
-                    float(np.abs(settled_loads - loads).max()),
-                )
+                most = float(settled_loads.max())
+                change = float(np.abs(settled_loads - loads).max())
                 if (
                     not most < _DIVERGED
                     or change <= REPEATED * most
                     or before <= change <= ROUNDED * most
                 ):
                     break
-                nudge, before = NUDGE * most, change
+                nudge = NUDGE * most
+                before = change
                 moved = [
                     (passed(share * (loads + nudge * one))[1] - settled_loads) / nudge
                     for one in unit

@@ -78,7 +78,8 @@ class Assembler:
     """Assembles a tree at commanded angles of a bar, one after another."""
 
     def __init__(self, tree: Assembled, bar: int = 2) -> None:
-        self.tree, self.bar = tree, bar
+        self.tree = tree
+        self.bar = bar
         # measured once, with the bars laid down along +x
         tree.place((0.0, 0.0, 0.0))
         points = {name: complex(*place) for name, place in tree.positions().items()}
@@ -87,7 +88,8 @@ class Assembler:
             3: points["B"] - points["A"],
             4: points["B4"] - points["O4"],
         }
-        self.ground, self.along = points["O4"], along[bar]
+        self.ground = points["O4"]
+        self.along = along[bar]
         self.near, self.far = (abs(along[other]) for other in _CLOSING[bar])
         lengths = abs(self.ground), abs(self.along), self.near, self.far
         self.closed = ROUNDING * sum(lengths)
@@ -138,10 +140,8 @@ class Assembler:
 
 def _compute_triangle_angle(e: float, near: float, far: float) -> float:
     """Compute the angle between the sides e and near, by half-angle tangents."""
-    above, below = (
-        (e - near + far) * (far + near - e),
-        (e + near - far) * (e + near + far),
-    )
+    above = (e - near + far) * (far + near - e)
+    below = (e + near - far) * (e + near + far)
     return 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
 
 
@@ -164,9 +164,11 @@ def _close_gap(
         if (
             bar == 3
         ):  # bar 2 turns alone where its own joint turns and that of bar 3 turns back
-            a, c = e - a, f - c
+            a = e - a
+            c = f - c
         elif bar == 4:
-            b, d = e - a, f - c
+            b = e - a
+            d = f - c
         return x, y, a, b, c, d, a * d - b * c
 
     def moved(q: Angles, one: float, turned: float) -> Angles:
@@ -237,7 +239,9 @@ class Exact:
         names += [f"{name_driving(scene)}_inertia"] if bars.alone and moves else []
 
         def read(q: Angles, speed: float, acceleration: float) -> Values:
-            points, theta_3, theta_4 = bars.positions(), bars.angle(3), bars.angle(4)
+            points = bars.positions()
+            theta_3 = bars.angle(3)
+            theta_4 = bars.angle(4)
             values: Values = {
                 name: points[name] for name in ("A", "B", "G2", "G3", "G4")
             }
@@ -280,16 +284,15 @@ def read_each(
 
     Return that, where it assembles, and the greatest gap, m.
     """
-    n, (omega, alpha) = len(command.angle), list_speeds(command)
+    n = len(command.angle)
+    omega, alpha = list_speeds(command)
     missing: dict[str, Any] = {
         name: (math.nan, math.nan) if name in VECTORS else math.nan for name in names
     }
-    rows, assembled, gap, position = (
-        [missing] * n,
-        np.zeros(n, dtype=bool),
-        0.0,
-        Assembler(bars, command.bar),
-    )
+    rows = [missing] * n
+    assembled = np.zeros(n, dtype=bool)
+    gap = 0.0
+    position = Assembler(bars, command.bar)
     for i, (theta, branch) in enumerate(
         zip(command.angle.tolist(), command.branch.tolist(), strict=True)
     ):

@@ -119,7 +119,9 @@ class PinocchioTree(Tree):
 
     def accelerations(self, names: Iterable[str]) -> list[list[float]]:
         """Return those of frames."""
-        model, data, frame = self.model, self.data, self.frame
+        model = self.model
+        data = self.data
+        frame = self.frame
         return [
             pin.getFrameClassicalAcceleration(
                 model, data, frame[name], WORLD
@@ -215,15 +217,14 @@ class ClosedTree:
         None if it does not close.
         """
         q = Assembler(self.tree).find(theta_2, branch)
-        return (
-            None
-            if q is None
-            else (np.array(q), solve_closed(self.tree.jacobian(), omega_2))
-        )
+        if q is None:
+            return None
+        return (np.array(q), solve_closed(self.tree.jacobian(), omega_2))
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Any:
         """Accelerate the closed loop under loads, effects and the flywheel's motor."""
-        model, data = self.tree.model, self.data
+        model = self.tree.model
+        data = self.data
         return pin.constraintDynamics(
             model, data, q, v, tau, self.models, self.closure_data, self.proximal
         ).copy()
@@ -250,7 +251,8 @@ def make_step(f: Acceleration, q: Array, v: Array, h: float) -> tuple[Array, Arr
 class PinocchioReleased:
     """Free motion of the closed loop with a fixed step, s."""
 
-    name, version = NAME, pin.__version__
+    name = NAME
+    version = pin.__version__
 
     def __init__(self, step: float = 2e-3) -> None:
         self.step = step
@@ -264,7 +266,8 @@ class PinocchioReleased:
             return ReleasedAnswer.refused(
                 NAME, setting, "in forward dynamics only gravity has a model here"
             )
-        tree, none = PinocchioTree(scene), np.zeros(3)
+        tree = PinocchioTree(scene)
+        none = np.zeros(3)
         start = with_signs(scene.linkage, command(scene))
         loop = ClosedTree(tree, TIME_CONSTANT_STEPS * self.step)
         state = loop.start(
@@ -274,7 +277,9 @@ class PinocchioReleased:
             return ReleasedAnswer.refused(
                 NAME, setting, "the loop does not close at the start"
             )
-        (q, v), rows, now = state, [], 0.0
+        q, v = state
+        rows = []
+        now = 0.0
         for t in times:
             steps = math.ceil((t - now) / self.step - 1e-6)
             for _ in range(steps):
@@ -282,10 +287,8 @@ class PinocchioReleased:
                     lambda q, v: loop.acceleration(q, v, none), q, v, (t - now) / steps
                 )
             now = float(t)
-            energy, data = (
-                pin.computeMechanicalEnergy(tree.model, tree.data, q, v),
-                tree.data,
-            )
+            energy = pin.computeMechanicalEnergy(tree.model, tree.data, q, v)
+            data = tree.data
             rows.append(
                 (q[0], v[0], energy, data.kinetic_energy + abs(data.potential_energy))
             )

@@ -28,7 +28,9 @@ class PinocchioLoop(PlainLoop):
 
     def look(self, q: Array) -> tuple[float, float, Array]:
         """Return the gap, m, and its derivative, (2, 3)."""
-        model, data, (one, two) = self.model, self.data, self.ends
+        model = self.model
+        data = self.data
+        one, two = self.ends
         pin.computeJointJacobians(model, data, q)
         pin.updateFramePlacements(model, data)
         jacobian = (
@@ -40,7 +42,9 @@ class PinocchioLoop(PlainLoop):
 
     def drift(self, q: Array, v: Array) -> tuple[float, float]:
         """Return the acceleration of the gap where the joints do not accelerate."""
-        model, data, (one, two) = self.model, self.data, self.ends
+        model = self.model
+        data = self.data
+        one, two = self.ends
         pin.forwardKinematics(model, data, q, v, AT_REST)
         x, y, _ = (
             pin.getFrameClassicalAcceleration(model, data, one, WORLD).linear
@@ -53,7 +57,8 @@ class PinocchioLoop(PlainLoop):
         tree = self.tree
         if not self.loaded:
             return np.asarray(pin.rnea(self.model, self.data, q, v, a))
-        tree.v, tree.a = v, a
+        tree.v = v
+        tree.a = a
         tree.act()
         for bar, (x, y, moment) in tree.wrenches.items():
             force, couple = tree.external_force[bar]

@@ -119,12 +119,14 @@ def _predict_error(
     and where rounding decides whether the loop closes; but there angles and places are
     bounded by how far the loop opens, and what the input alone decides loses nothing.
     """
-    n, (omega, alpha) = len(command.theta_2), list_speeds(command)
+    n = len(command.theta_2)
+    omega, alpha = list_speeds(command)
     command = with_signs(scene.linkage, command)
     errors = np.full(n, np.nan)
     touching = mark_touching(scene.linkage, command.theta_2)
     for i in range(n) if mask is None else np.flatnonzero(mask).tolist():
-        theta_2, branch = float(command.theta_2[i]), int(command.branch[i])
+        theta_2 = float(command.theta_2[i])
+        branch = int(command.branch[i])
         moved = _compute_sensitivity(
             scene, theta_2, branch, float(omega[i]), float(alpha[i])
         )

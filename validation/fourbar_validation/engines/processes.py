@@ -40,7 +40,10 @@ def bound_memory(process: int = 0) -> None:
         ValueError, OSError
     ):  # a hard limit below it, or a process that ended
         _, hard = prlimit(process, RLIMIT_DATA)
-        soft = WORKER_MEMORY if hard < 0 else min(WORKER_MEMORY, hard)
+        if hard < 0:
+            soft = WORKER_MEMORY
+        else:
+            soft = min(WORKER_MEMORY, hard)
         prlimit(process, RLIMIT_DATA, (soft, hard))
 
 
@@ -68,10 +71,8 @@ def run_to_end(
     variables: Mapping[str, str] | None = None,
 ) -> Ended:
     """Run a command to its end, with these variables added to the environment."""
-    line, environment = (
-        [str(part) for part in command],
-        {**os.environ, "PYTHONUTF8": "1", **(variables or {})},
-    )
+    line = [str(part) for part in command]
+    environment = {**os.environ, "PYTHONUTF8": "1", **(variables or {})}
     try:
         done = subprocess.run(
             line,
@@ -235,11 +236,9 @@ class Program:
 
     def limit(self, positions: int) -> float:
         """Return the seconds within which a question is answered."""
-        return (
-            SECONDS + SECONDS_PER_POSITION * positions
-            if self.seconds is None
-            else self.seconds
-        )
+        if self.seconds is None:
+            return SECONDS + SECONDS_PER_POSITION * positions
+        return self.seconds
 
 
 @dataclass(eq=False)
@@ -299,10 +298,8 @@ class Running:
             json.dumps({"id": self._number, **question}, allow_nan=False).encode()
             + b"\n"
         )
-        seconds, most = (
-            self.program.limit(positions),
-            LONGEST_LINE + _BYTES_PER_POSITION * positions,
-        )
+        seconds = self.program.limit(positions)
+        most = LONGEST_LINE + _BYTES_PER_POSITION * positions
         answered = threading.Event()
         watch = threading.Thread(
             target=self._watch, args=(process, seconds, answered), daemon=True
@@ -355,7 +352,8 @@ class Running:
             start_new_session=True,
         )
         bound_memory(self._process.pid)
-        self._number, self._stopped = 0, ""
+        self._number = 0
+        self._stopped = ""
         return self._process
 
     def _watch(
@@ -385,7 +383,10 @@ class Running:
 
         It is kept as what this process prints.
         """
-        text = b"" if self._errors is None else _take_written(self._errors)
+        if self._errors is None:
+            text = b""
+        else:
+            text = _take_written(self._errors)
         _print_kept(text)
         return text
 
@@ -402,19 +403,27 @@ class Running:
         except subprocess.TimeoutExpired:
             return EngineError("closed its standard output")
         reason = find_reason(self._take_errors().decode(errors="backslashreplace"))
-        said = f": {write_one_line(reason)}" if reason else ""
+        if reason:
+            said = f": {write_one_line(reason)}"
+        else:
+            said = ""
         if status in _KILLED:
             return _KilledError(f"was killed{said}")
-        how = f"exit status {status}" if status >= 0 else f"ended by signal {-status}"
+        if status >= 0:
+            how = f"exit status {status}"
+        else:
+            how = f"ended by signal {-status}"
         return EngineError(how + " in the middle of a line" * bool(reply) + said)
 
     def end(self) -> None:
         """End the program and all that it started."""
-        process, self._process = self._process, None
+        process = self._process
+        self._process = None
         if process is not None:
             _stop(process)
             self._take_errors()
-            errors, self._errors = self._errors, None
+            errors = self._errors
+            self._errors = None
             for stream in (process.stdin, process.stdout, errors):
                 with suppress(OSError):
                     assert stream is not None

@@ -76,7 +76,9 @@ def _take_numbers(value: Any) -> Any:
         return {key: _take_numbers(entry) for key, entry in value.items()}
     if isinstance(value, list):
         return [_take_numbers(entry) for entry in value]
-    return value.value if isinstance(value, Written) else value
+    if isinstance(value, Written):
+        return value.value
+    return value
 
 
 def scene_from_json(data: Any) -> Scene:
@@ -97,15 +99,11 @@ def command_to_json(scene: Scene, command: Command) -> dict[str, Any]:
     The place is an angle or a stroke.
     """
     if command.stroke is None:
-        names, values = (
-            COMMANDS[command.bar],
-            (command.angle, command.speed, command.acceleration),
-        )
+        names = COMMANDS[command.bar]
+        values = (command.angle, command.speed, command.acceleration)
     else:
-        names, values = (
-            STROKE_COMMAND,
-            (command.stroke, command.stroke_speed, scene.motion.acceleration),
-        )
+        names = STROKE_COMMAND
+        values = (command.stroke, command.stroke_speed, scene.motion.acceleration)
     place, speed, acceleration = names
     data = {place: _write_numbers(values[0])}
     if values[1] is not None:
@@ -131,9 +129,9 @@ def command_to_json(scene: Scene, command: Command) -> dict[str, Any]:
 
 
 def _write_numbers(value: Any) -> Any:
-    return (
-        float(value) if np.ndim(value) == 0 else np.asarray(value, dtype=float).tolist()
-    )
+    if np.ndim(value) == 0:
+        return float(value)
+    return np.asarray(value, dtype=float).tolist()
 
 
 def command_from_json(scene: Scene, data: Any) -> tuple[Scene, Command]:
@@ -171,8 +169,12 @@ def command_from_json(scene: Scene, data: Any) -> tuple[Scene, Command]:
         "branch": int(branch[0]),
     }
     scene = replace(scene, motion=Motion(**stated))
-    omega, alpha = rates.get(speed), rates.get(acceleration, 0.0)
-    time = _read_list("time", data["time"], n) if data.get("time") is not None else None
+    omega = rates.get(speed)
+    alpha = rates.get(acceleration, 0.0)
+    if data.get("time") is not None:
+        time = _read_list("time", data["time"], n)
+    else:
+        time = None
     command = Command(
         places,
         branch,
@@ -215,11 +217,10 @@ def _refuse_unknown(data: dict[str, Any], allowed: tuple[str, ...]) -> None:
 
 
 def _read_list(name: str, value: Any, n: int | None = None) -> Array:
-    wanted = (
-        "must be a list of one finite number or more"
-        if n is None
-        else f"must be a list of {n} finite numbers"
-    )
+    if n is None:
+        wanted = "must be a list of one finite number or more"
+    else:
+        wanted = f"must be a list of {n} finite numbers"
     if not isinstance(value, list) or not value or len(value) not in (n or len(value),):
         raise InputError(f"command.{name}", value, wanted)
     array = _make_array(value)
@@ -240,7 +241,10 @@ def _read_rate(name: str, value: Any, n: int) -> float | Array:
 
 
 def _read_branch(value: Any, n: int) -> Any:
-    branches = value if isinstance(value, list) else [value] * n
+    if isinstance(value, list):
+        branches = value
+    else:
+        branches = [value] * n
     if len(branches) != n or any(
         type(branch) is not int or branch not in (1, -1) for branch in branches
     ):
@@ -293,9 +297,9 @@ def _make_array(values: Iterable[Any]) -> Array | None:
         return None
     # a number beyond the doubles reads as infinity, and NaN is no JSON: no value is
     # null
-    return (
-        array if np.isfinite(array).sum() == len(values) - values.count(None) else None
-    )
+    if np.isfinite(array).sum() == len(values) - values.count(None):
+        return array
+    return None
 
 
 def answer_to_json(scene: Scene, command: Command, answer: Answer) -> dict[str, Any]:
@@ -332,9 +336,10 @@ def _write_array(array: Array) -> list[Any]:
         raise TypeError(f"an answer holds real numbers, not {numbers.dtype}")
     array = numbers.astype(float)
     finite = np.isfinite(array)
-    values: Any = (
-        array if finite.all() else np.where(finite, array, np.full(array.shape, None))
-    )
+    if finite.all():
+        values: Any = array
+    else:
+        values = np.where(finite, array, np.full(array.shape, None))
     return values.tolist()  # type: ignore[no-any-return]
 
 
@@ -451,7 +456,9 @@ def _read_assembled(value: Any, quantities: dict[str, Array], n: int) -> Any:
             np.isfinite(array).reshape(n, -1).any(axis=1)
             for array in quantities.values()
         ]
-        return np.any(valued, axis=0) if valued else np.zeros(n, dtype=bool)
+        if valued:
+            return np.any(valued, axis=0)
+        return np.zeros(n, dtype=bool)
     if (
         not isinstance(value, list)
         or len(value) != n
@@ -465,7 +472,8 @@ def read_motion(data: Any, command: Command) -> Command:
     """Read the motion that an engine made; left out: the command."""
     if data is None:
         return command
-    names, n = _find_names(data), len(command.angle)
+    names = _find_names(data)
+    n = len(command.angle)
     if names not in (
         KINDS_OF_COMMAND[:-1]
         if command.stroke is not None
@@ -479,13 +487,19 @@ def read_motion(data: Any, command: Command) -> Command:
     bar = next(
         bar for bar, commanded_names in COMMANDS.items() if commanded_names == names
     )
-    branch = _read_branch(data["branch"], n) if "branch" in data else command.branch
+    if "branch" in data:
+        branch = _read_branch(data["branch"], n)
+    else:
+        branch = command.branch
     speed, acceleration = (
         _read_rate(key, data[key], n) if data.get(key) is not None else None
         for key in names[1:]
     )
     if acceleration is None:
-        acceleration = command.acceleration if command.stroke is None else 0.0
+        if command.stroke is None:
+            acceleration = command.acceleration
+        else:
+            acceleration = 0.0
     made = Command(
         _read_list(names[0], data[names[0]], n), branch, speed, acceleration, bar=bar
     )
@@ -524,18 +538,20 @@ def require_near(made: Command, command: Command) -> None:
     )
     # the positions of a command are independent; an engine that runs through time is
     # faster by what accelerates it
-    faster = (
-        float(np.sqrt(1.0 + 2.0 * acceleration * np.ptp(command.angle) / speed**2))
-        if speed
-        else 1.0
-    )
+    if speed:
+        faster = float(
+            np.sqrt(1.0 + 2.0 * acceleration * np.ptp(command.angle) / speed**2)
+        )
+    else:
+        faster = 1.0
     sizes = (1.0, speed, speed**2 + acceleration)
     allowances = (_FURTHEST, _FURTHEST + faster - 1.0, _FURTHEST + faster**2 - 1.0)
     names = ("angle", "speed", "acceleration")
     for key, name, size, most in zip(
         COMMANDS[command.bar], names, sizes, allowances, strict=True
     ):
-        value, commanded = getattr(made, name), getattr(command, name)
+        value = getattr(made, name)
+        commanded = getattr(command, name)
         if value is not None and not np.abs(value - commanded).max() <= most * size:
             allowed = f"must be within {most * size:g} of the command"
             raise InputError(f"at.{key}", None, allowed)

@@ -113,7 +113,9 @@ class Engine:
 
     def missing(self) -> str | None:
         """Say why it cannot answer in this environment, if it cannot."""
-        return find_missing(self.library) if self.library else None
+        if self.library:
+            return find_missing(self.library)
+        return None
 
 
 EXTRA = {"mujoco": "validation", "pinocchio": "validation", "flint": "validation"}
@@ -265,7 +267,10 @@ def hold_fully(engine: Engine) -> Engine:
     """
     if engine.tolerance not in (EQUIVALENCE, FULL_ACCURACY):
         return engine
-    unstated = predict_from_data if engine.nearby else predict_for_any_method
+    if engine.nearby:
+        unstated = predict_from_data
+    else:
+        unstated = predict_for_any_method
     return replace(
         engine, tolerance=FULL_ACCURACY, predictor=engine.predictor or unstated
     )
@@ -329,7 +334,10 @@ def make_demands(
         `nearby` may answer again within the rounding of theta_2 where an error is
         beyond the tolerance.
     """
-    nearby = None if formulas is None else make_nearby(engine, scene, command, formulas)
+    if formulas is None:
+        nearby = None
+    else:
+        nearby = make_nearby(engine, scene, command, formulas)
     method = ""
     if engine.predictor is predict_for_any_method:
         method = _ANY_METHOD
@@ -390,7 +398,8 @@ def make_nearby(
     omega, alpha = list_speeds(command)
 
     def answer(mask: Mask) -> dict[str, Array]:
-        adapter, out = engine.start(), make_blank(len(mask), COMPARED_QUANTITIES)
+        adapter = engine.start()
+        out = make_blank(len(mask), COMPARED_QUANTITIES)
         for i in np.flatnonzero(mask & np.isfinite(formulas.sin_mu)).tolist():
             shift = shift_to(
                 scene.linkage, float(command.theta_2[i]), float(formulas.sin_mu[i])

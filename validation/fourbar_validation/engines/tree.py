@@ -105,7 +105,8 @@ class Tree(Loaded, Protocol):
     # methods that follow from these
     def gap(self) -> tuple[float, float]:
         """Return B on bar 3 minus B on bar 4."""
-        (x, y), (x_4, y_4) = self.locate("end3"), self.locate("end4")
+        x, y = self.locate("end3")
+        x_4, y_4 = self.locate("end4")
         return x - x_4, y - y_4
 
     def jacobian(self) -> Array:
@@ -126,7 +127,8 @@ class Tree(Loaded, Protocol):
 
     def moving(self, v: Array, a: Array) -> None:
         """Take speeds and accelerations of the coordinates, for all that follows."""
-        self.v, self.a = v, a
+        self.v = v
+        self.a = a
         self.set_motion(v, a)
 
     def drift(self, v: Array) -> Pair:
@@ -198,7 +200,8 @@ class Tree(Loaded, Protocol):
 
         def balanced() -> dict[str, Any]:
             unknowns = solve(self.torques())
-            loop_force, drive = unknowns[:2], float(unknowns[2])
+            loop_force = unknowns[:2]
+            drive = float(unknowns[2])
             return {
                 **self.forces(loop_force, drive),
                 "F43": loop_force,
@@ -254,7 +257,9 @@ def solve_closed(
     """
     (e, a, b), (f, c, d) = jacobian.tolist()
     p, q, r = turn.tolist()
-    u, v, w = a * d - b * c, b * f - e * d, e * c - a * f
+    u = a * d - b * c
+    v = b * f - e * d
+    w = e * c - a * f
     det = p * u + q * v + r * w
     if det == 0.0:
         raise np.linalg.LinAlgError("the bars are in one line")
@@ -276,8 +281,11 @@ def solve_multipliers(jacobian: Array, turn: Array, needed: Array) -> Array:
     find the matrix singular there.
     """
     (a, b, c), (d, e, f) = jacobian.tolist()
-    (p, q, r), (x, y, z) = turn.tolist(), needed.tolist()
-    u, v, w = b * f - c * e, c * d - a * f, a * e - b * d
+    p, q, r = turn.tolist()
+    x, y, z = needed.tolist()
+    u = b * f - c * e
+    v = c * d - a * f
+    w = a * e - b * d
     det = p * u + q * v + r * w
     if det == 0.0:
         raise np.linalg.LinAlgError("the torque is at a pole")

@@ -57,11 +57,9 @@ def explain_difference(figure: PublishedFigure) -> str:
     if figure.reproduced():
         decimals = len(figure.printed.partition(".")[2])
         return f"{text}: gives {figure.made:.{min(decimals + 1, 12)}f}"
-    return (
-        f"{text} (no computation gives these digits)"
-        if is_explained(figure)
-        else f"{text}: does not give this"
-    )
+    if is_explained(figure):
+        return f"{text} (no computation gives these digits)"
+    return f"{text}: does not give this"
 
 
 def check(show_all: bool) -> int:
@@ -75,7 +73,8 @@ def check(show_all: bool) -> int:
     console = Console(highlight=False, markup=False)
     counts: Counter[tuple[str, str]] = Counter()
     met: Counter[str] = Counter()
-    unexplained, reproduced = [], 0
+    unexplained = []
+    reproduced = 0
     console.print(
         "Printed figures that differ from ours, and why:"
         if not show_all
@@ -129,7 +128,9 @@ def check(show_all: bool) -> int:
         console.print(f"No erratum explains {len(unexplained)} of the differences.")
     if not sum(sums):
         console.print("Nothing was compared: there is no figure.")
-    return FAILED if unexplained or not sum(sums) else HOLDS
+    if unexplained or not sum(sums):
+        return FAILED
+    return HOLDS
 
 
 HEAD = (
@@ -163,14 +164,14 @@ def list_ladder_rows() -> list[tuple[str, ...]]:
 
     rows = []
     for erratum, x in climb_ladder():
-        did, right = (
-            "nothing wrong: SI, uniform bars m (L^2 + w^2)/12",
-            "the answer of this project",
-        )
+        did = "nothing wrong: SI, uniform bars m (L^2 + w^2)/12"
+        right = "the answer of this project"
         if erratum in ERRATA:
-            did, right = f"#{erratum} {ERRATA[erratum].title}", ERRATA[erratum].right
+            did = f"#{erratum} {ERRATA[erratum].title}"
+            right = ERRATA[erratum].right
         elif erratum:
-            did, right = "I_G3, I_G4 as printed in the manual, ten digits", "see #3"
+            did = "I_G3, I_G4 as printed in the manual, ten digits"
+            right = "see #3"
         rows.append((did, right, *write(x)))
         if erratum in tables:
             rows.append(("", "as printed:", *write(tables[erratum])))

@@ -67,10 +67,13 @@ def compare(printed: str, value: float, noise: float = 0.0) -> str:
 
     It is rounded, truncated, or it differs.
     """
-    theirs, ours = Decimal(printed), Decimal(value)
+    theirs = Decimal(printed)
+    ours = Decimal(value)
     unit = Decimal(1).scaleb(int(theirs.as_tuple().exponent))
     if ours.quantize(unit, ROUND_HALF_EVEN) == theirs or abs(ours - theirs) <= Decimal(
         noise
     ):
         return "rounded"
-    return "truncated" if ours.quantize(unit, ROUND_DOWN) == theirs else "differs"
+    if ours.quantize(unit, ROUND_DOWN) == theirs:
+        return "truncated"
+    return "differs"

@@ -141,7 +141,10 @@ def compute_inertia(bar: int, about_long_axis: bool = False) -> float:
 
     It is m (L^2 + w^2)/12, or m w^2/12 as the thesis has it.
     """
-    across = 0.0 if about_long_axis else LENGTHS[bar - 1] ** 2
+    if about_long_axis:
+        across = 0.0
+    else:
+        across = LENGTHS[bar - 1] ** 2
     return MASSES[bar] * (across + WIDTH**2) / 12.0
 
 
@@ -196,8 +199,14 @@ def make_equations(
             compute_inertia(4, errors.inertia_about_long_axis),
         )
     about_G = {2: INERTIA_2, 3: inertias[0], 4: inertias[1]}
-    per_mass = 1.0 if errors.mass_times_acceleration_unscaled else TO_N
-    per_inertia = 1.0 if errors.inertia_times_alpha_unscaled else TO_N
+    if errors.mass_times_acceleration_unscaled:
+        per_mass = 1.0
+    else:
+        per_mass = TO_N
+    if errors.inertia_times_alpha_unscaled:
+        per_inertia = 1.0
+    else:
+        per_inertia = TO_N
     force = {bar: per_mass * MASSES[bar] * k.a_G[bar] for bar in MOVING_BARS}
     moment = {
         bar: np.array([per_inertia * about_G[bar] * k.alpha[bar] - COUPLE])

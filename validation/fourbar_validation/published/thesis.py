@@ -101,10 +101,8 @@ def _list_half_angle_constants() -> Iterator[PublishedFigure]:
     k1 cos + k2 sin + k3 + e^2 = 0, A t^2 + B t + C = 0, t = tan(theta/2).
     """
     theta_2 = math.radians(90.0)
-    x, y = (
-        a * math.cos(theta_2) + d * math.cos(THETA_1),
-        a * math.sin(theta_2) + d * math.sin(THETA_1),
-    )
+    x = a * math.cos(theta_2) + d * math.cos(THETA_1)
+    y = a * math.sin(theta_2) + d * math.sin(THETA_1)
     roots = {branch: compute_motion(np.array([theta_2]), branch) for branch in (1, -1)}
     angles = {
         "theta3_1": float(roots[1].theta_3[0]),
@@ -113,7 +111,9 @@ def _list_half_angle_constants() -> Iterator[PublishedFigure]:
         "theta4_2": to_ours(float(roots[1].theta_4[0])),
     }
     for name, length, second in (("theta4", c, b), ("theta3", b, c)):
-        k1, k2, k3 = 2.0 * length * x, 2.0 * length * y, x * x + y * y - second**2
+        k1 = 2.0 * length * x
+        k2 = 2.0 * length * y
+        k3 = x * x + y * y - second**2
         ours = {
             "k1": k1,
             "k2": k2,
@@ -137,7 +137,8 @@ def _list_half_angle_constants() -> Iterator[PublishedFigure]:
 def _list_simulation_window() -> Iterator[PublishedFigure]:
     """List the manual's window: angles e1..e4 in rad and deg, of theta_2 = 0."""
     s = compute_motion(np.array([0.0]))
-    theta_3, theta_4 = float(s.theta_3[0]), to_ours(float(s.theta_4[0]))
+    theta_3 = float(s.theta_3[0])
+    theta_4 = to_ours(float(s.theta_4[0]))
     ours = {
         "e1_rad": THETA_1,
         "e2_rad": 0.0,
@@ -260,7 +261,8 @@ def _compute_our_kinematics(k: Kinematics) -> dict[str, float]:
 
 def _list_slips(k: Kinematics) -> dict[str, tuple[tuple[str, ...], float]]:
     """List the figures that the errata touch, with the value that these lead to."""
-    x, y = k.a_G[3][0] + k.slip, k.a_G[3][1]
+    x = k.a_G[3][0] + k.slip
+    y = k.a_G[3][1]
     return {
         "A_G3/A_i": (("4",), k.a_G[3][0] - k.a_A[0] + k.slip),
         "A_G3_i": (("4",), x),
@@ -272,7 +274,8 @@ def _list_slips(k: Kinematics) -> dict[str, tuple[tuple[str, ...], float]]:
 
 def list_kinematics(k: Kinematics) -> Iterator[PublishedFigure]:
     """List section 4.12, and the manual's table of the program's 17 digits."""
-    ours, slips = _compute_our_kinematics(k), _list_slips(k)
+    ours = _compute_our_kinematics(k)
+    slips = _list_slips(k)
     by_hand = {
         "R23_j": (("12",), _compute_cut_arm(k, 6)),
         "R43_j": (("12",), -_compute_cut_arm(k, 6)),
@@ -380,7 +383,8 @@ def _list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
 
 def list_unknowns() -> Iterator[PublishedFigure]:
     """List the 13 unknowns, of the program (the manual's table) and of section 5.7."""
-    right, steps = compute_right_unknowns(), climb_ladder()
+    right = compute_right_unknowns()
+    steps = climb_ladder()
     names = tuple(name for name, _, _ in STEPS if name in "12345" and name)
     for key, label, step, last in (
         ("manual_program_dynamic", "manual, unknowns", -2, ()),

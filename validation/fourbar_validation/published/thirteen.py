@@ -28,13 +28,20 @@ class FreeBodies(NamedTuple):
     """I alpha minus the moments about G that act besides the pins', N m, (n,)."""
 
 
-F12, F32, F23, F43, F14, F34, TORQUE = 0, 2, 4, 6, 8, 10, 12
+F12 = 0
+F32 = 2
+F23 = 4
+F43 = 6
+F14 = 8
+F34 = 10
+TORQUE = 12
 
 
 def assemble(bodies: FreeBodies, drive_bar: int) -> tuple[Array, Array]:
     """Assemble the matrices (n, 13, 13) and right-hand sides (n, 13)."""
     n = len(bodies.inertia_moment[2])
-    matrix, right = np.zeros((n, 13, 13)), np.zeros((n, 13))
+    matrix = np.zeros((n, 13, 13))
+    right = np.zeros((n, 13))
     for row, bar, first, second in (
         (0, 2, F12, F32),
         (3, 3, F23, F43),

@@ -112,7 +112,8 @@ def _write_table(
         for scene, entries in about.scenes.items()
     }
     kinds = MADE_OF | {"times_formulas": float}
-    word, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
+    word = pa.dictionary(pa.int32(), pa.string())
+    number = pa.float64()
     names = [*run, *MADE_OF, "scene_hash", "times_formulas"]
     schema = pa.schema(
         [(name, number if kinds.get(name) is float else word) for name in names]
@@ -175,7 +176,8 @@ def report_differences(
     from rich.console import Console
     from rich.progress import track
 
-    before, after = open_run(old, "OLD"), open_run(new, "NEW")
+    before = open_run(old, "OLD")
+    after = open_run(new, "NEW")
     names = find_renamed(before.about.scenes, after.about.scenes)
     keep = _is_chosen(
         chosen or {},
@@ -226,7 +228,8 @@ def _is_chosen(
         if text is None:
             continue
         names = {name.strip() for name in text.split(",") if name.strip()}
-        missing, offered = set(names), set[str]()
+        missing = set(names)
+        offered = set[str]()
         for word in words(_CHOICES[option]):
             missing.discard(word)
             if len(offered) < NAMED:
@@ -235,11 +238,12 @@ def _is_chosen(
             raise InputError(
                 f"--{option}", name, "must be among " + ", ".join(sorted(offered))
             )
-        both = (
-            {name for pair in renamed.items() if names & {*pair} for name in pair}
-            if option == "only"
-            else set()
-        )
+        if option == "only":
+            both = {
+                name for pair in renamed.items() if names & {*pair} for name in pair
+            }
+        else:
+            both = set()
         wanted[_CHOICES[option]] = names | both
     return lambda row: all(
         getattr(row, column) in names for column, names in wanted.items()
@@ -285,7 +289,10 @@ def _require_as_strict(run: Recorded, target: Path) -> None:
     accepted = open_run(target, "--to")
     weakened = list_weakened(accepted.about.rules, run.about.rules)
     if weakened:
-        more = f", and {len(weakened) - 1} more" if len(weakened) > 1 else ""
+        if len(weakened) > 1:
+            more = f", and {len(weakened) - 1} more"
+        else:
+            more = ""
         raise InputError(
             "RESULTS",
             str(run.table.parent),
@@ -320,8 +327,14 @@ def accept_command(
     RESULTS is the run's folder. Later runs are compared with it. It is kept in DIR, and
     its rows are appended to DIR/history.parquet, a table for pandas or DuckDB.
     """
-    folder = results if results.is_dir() else results.parent
-    target = folder.absolute().parent / ACCEPTED if to is None else to
+    if results.is_dir():
+        folder = results
+    else:
+        folder = results.parent
+    if to is None:
+        target = folder.absolute().parent / ACCEPTED
+    else:
+        target = to
     if target.resolve() == folder.resolve():
         raise InputError(
             "--to", str(target), "must be another folder than that of the results"
@@ -334,11 +347,10 @@ def accept_command(
     run = open_run(results)
     counts = Counts(run.rows())
     if counts.status != HOLDS and not even_failing:
-        why = (
-            f"{counts[FAILS]} comparisons fail"
-            if counts[FAILS]
-            else "nothing was compared"
-        )
+        if counts[FAILS]:
+            why = f"{counts[FAILS]} comparisons fail"
+        else:
+            why = "nothing was compared"
         raise InputError(
             "RESULTS", str(results), f"must hold, or say --even-failing: {why}"
         )
@@ -359,7 +371,8 @@ def accept_command(
         }
         append(target / HISTORY, run.about, list(run.rows()), times)
     accept(run, target)
-    history = (
-        f"too many for {HISTORY}" if too_long else f"appended to {target / HISTORY}"
-    )
+    if too_long:
+        history = f"too many for {HISTORY}"
+    else:
+        history = f"appended to {target / HISTORY}"
     click.echo(f"accepted: {target} ({counts.total} rows; {history})")

@@ -89,17 +89,17 @@ def compare_row(
     """
     round_off = math.nan
     if old is None:
-        kind = (
-            Kind.NEW_FAILURE if new is not None and new.verdict == FAILS else Kind.NEW
-        )
+        if new is not None and new.verdict == FAILS:
+            kind = Kind.NEW_FAILURE
+        else:
+            kind = Kind.NEW
     elif new is None and not asked:
         kind = Kind.NOT_RUN
     elif new is None:
-        kind = (
-            Kind.GONE_FAILURE
-            if old.verdict == FAILS and old.quantity in WHOLE
-            else Kind.GONE
-        )
+        if old.verdict == FAILS and old.quantity in WHOLE:
+            kind = Kind.GONE_FAILURE
+        else:
+            kind = Kind.GONE
     else:
         round_off = (
             ROUND_OFF
@@ -108,18 +108,19 @@ def compare_row(
         )
         kind = _choose_kind(old, new, round_off)
         if differs is not None:
-            kind = (
-                Kind.NEW_FAILURE
-                if new.verdict == FAILS and old.verdict != FAILS
-                else differs
-            )
+            if new.verdict == FAILS and old.verdict != FAILS:
+                kind = Kind.NEW_FAILURE
+            else:
+                kind = differs
     return Change(kind, key, old, new, round_off)
 
 
 def _choose_kind(old: Row, new: Row, round_off: float) -> Kind:
     if old.verdict != new.verdict:
         worse = VERDICTS.index(new.verdict) > VERDICTS.index(old.verdict)
-        return Kind.VERDICT_WORSE if worse else Kind.VERDICT_BETTER
+        if worse:
+            return Kind.VERDICT_WORSE
+        return Kind.VERDICT_BETTER
     if (
         not new.compared
         or old.error == new.error

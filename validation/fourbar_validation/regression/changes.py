@@ -270,9 +270,10 @@ def compare_runs(
     )
     answering = {FORMULAS} | engines | (new[0].engines or set())
     for scene, before, after in _merge_scenes(_rename_scenes(old[1], names), new[1]):
-        run_for = (
-            scene in new[0].scenes if new[0].scenes else bool(after) or not engines
-        )
+        if new[0].scenes:
+            run_for = scene in new[0].scenes
+        else:
+            run_for = bool(after) or not engines
         rows = _index_rows(scene, before), _index_rows(scene, after)
         differences.add(
             _compare_scene(*rows, answering if run_for else set(), scenes.get(scene))
@@ -351,11 +352,15 @@ def _compare_scene(
     renamed = _pair_settings(before, after)
     changes = []
     for key in sorted((before.keys() | after.keys()) - set(renamed.values())):
-        differs = Kind.OTHER_SETTING if key in renamed else None
+        if key in renamed:
+            differs = Kind.OTHER_SETTING
+        else:
+            differs = None
         if change is not None:
-            differs = (
-                Kind.OTHER_POSITIONS if change.positions_alone else Kind.OTHER_SCENE
-            )
+            if change.positions_alone:
+                differs = Kind.OTHER_POSITIONS
+            else:
+                differs = Kind.OTHER_SCENE
         new = after.get(renamed.get(key, key))
         changes.append(
             compare_row(
@@ -379,10 +384,8 @@ def _pair_settings(
             groups.setdefault((key[0], key[1], key[3]), []).append(key)
         return {name: group[0] for name, group in groups.items() if len(group) == 1}
 
-    old, new = (
-        index_single(before.keys() - after.keys()),
-        index_single(after.keys() - before.keys()),
-    )
+    old = index_single(before.keys() - after.keys())
+    new = index_single(after.keys() - before.keys())
     return {
         old[name]: new[name]
         for name in old.keys() & new.keys()
@@ -397,7 +400,10 @@ def _list_surroundings(
 
     What a record cannot say is listed too.
     """
-    pairs = [("commit", old.commit, new.commit)] if old.commit and new.commit else []
+    if old.commit and new.commit:
+        pairs = [("commit", old.commit, new.commit)]
+    else:
+        pairs = []
     pairs += _take_both(old.versions, new.versions)
     pairs.append(("machine", old.machine, new.machine))
     pairs += [
@@ -406,11 +412,10 @@ def _list_surroundings(
     suites = [about.settings.get("suite", "not recorded")[:12] for about in (old, new)]
     notes = []
     if suites[0] != suites[1] and not (old.scenes and new.scenes):
-        silent = (
-            "neither run says"
-            if not (old.scenes or new.scenes)
-            else "the older record does not say"
-        )
+        if not (old.scenes or new.scenes):
+            silent = "neither run says"
+        else:
+            silent = "the older record does not say"
         notes.append(
             f"the scenes' hash is another ({suites[0]} -> {suites[1]}), and {silent}"
             " what they ask: a scene that changed cannot be named, rows are compared by"

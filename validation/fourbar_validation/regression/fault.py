@@ -48,7 +48,10 @@ class Group:
             for name, n in self.quantities.most_common(6)
         )
         more = ", ..." if len(self.quantities) > 6 else ""
-        cause = f", {self._write_cause()}" if self.cause else ""
+        if self.cause:
+            cause = f", {self._write_cause()}"
+        else:
+            cause = ""
         return (
             f"{self.engine}, {self.scenes} of {self.of_scenes} scenes, {self.rows} rows"
             f" ({names}{more}){cause}"
@@ -133,7 +136,9 @@ class Fault:
 
 
 def _rank_severity(group: Group) -> tuple[bool, float]:
-    return group.worst.severity if group.worst is not None else (False, 0.0)
+    if group.worst is not None:
+        return group.worst.severity
+    return (False, 0.0)
 
 
 def _is_compared_exactly(row: Row | None) -> bool:
@@ -156,11 +161,10 @@ def _write_cause(change: Change) -> str:
         change.kind in (Kind.VERDICT_WORSE, Kind.VERDICT_BETTER, Kind.NEW_FAILURE)
         and change.new is not None
     ):
-        came = (
-            f"{change.old.verdict} -> {change.new.verdict}"
-            if change.old is not None
-            else change.new.verdict
-        )
+        if change.old is not None:
+            came = f"{change.old.verdict} -> {change.new.verdict}"
+        else:
+            came = change.new.verdict
         return f"{came}: {change.new.reason}"
     return ""
 

@@ -31,12 +31,10 @@ SHIPPED = Path(__file__).parent
 """Folder of the accepted state of this project's models."""
 T = TypeVar("T")
 ACCEPTED = "accepted"
-TABLE, COLUMNS, ABOUT, TIMINGS = (
-    "results.csv",
-    "results.parquet",
-    "record.json",
-    "timings.csv",
-)
+TABLE = "results.csv"
+COLUMNS = "results.parquet"
+ABOUT = "record.json"
+TIMINGS = "timings.csv"
 TABLES = (TABLE, COLUMNS, TIMINGS)
 UNFINISHED = "run.json"
 """File that a run keeps in its folder until it is finished."""
@@ -66,7 +64,9 @@ class About:
     def engines(self) -> set[str] | None:
         """Return the engines that were run; None if the record does not say."""
         names = self.settings.get("engines")
-        return None if names is None else set(filter(None, names.split(", ")))
+        if names is None:
+            return None
+        return set(filter(None, names.split(", ")))
 
 
 def describe_run(
@@ -296,11 +296,10 @@ def open_run(path: Path, key: str = "RESULTS") -> Recorded:
             "must be of a run that was finished: run it again, and it is resumed",
         )
     record = table.parent / ABOUT
-    run = (
-        _open_described(record, table, key)
-        if record.is_file()
-        else Recorded(NOTHING_KNOWN, table, key=key)
-    )
+    if record.is_file():
+        run = _open_described(record, table, key)
+    else:
+        run = Recorded(NOTHING_KNOWN, table, key=key)
     if next(run.rows(), None) is None:
         raise InputError(
             key, str(table), "must hold at least one comparison: it has none"
@@ -316,7 +315,8 @@ def _open_described(record: Path, table: Path, key: str) -> Recorded:
     try:
         kept = json.loads(record.read_text(encoding="utf-8"))
         stated = kept.pop("sha256", None)
-        about, tables = _make_record(kept), kept.get("tables")
+        about = _make_record(kept)
+        tables = kept.get("tables")
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
         raise InputError(key, str(record), "is not a record written by `run`") from None
     if stated is None and tables is None:

@@ -44,19 +44,24 @@ def write_verdict(diff: Differences) -> str:
     if diff.weakened:
         rules = len(diff.weakened)
         counts.insert(0, f"{rules} rule{'s' if rules > 1 else ''} weaker")
-    head = f"{many} regression{'s' if many > 1 else ''}" if many else "No regression"
+    if many:
+        head = f"{many} regression{'s' if many > 1 else ''}"
+    else:
+        head = "No regression"
     if diff.nothing and not many:
         head = "Nothing was compared"
     elif diff.strange:
         head = f"Runs of two suites: {head[:1].lower()}{head[1:]}"
-    rows = (
-        f"{diff.compared} of {diff.rows}"
-        if diff.compared < diff.rows
-        else f"{diff.rows}"
-    )
+    if diff.compared < diff.rows:
+        rows = f"{diff.compared} of {diff.rows}"
+    else:
+        rows = f"{diff.rows}"
     if diff.baseline:
         head += f" against {diff.baseline}"
-    moved = f" in {rows} rows: {', '.join(counts)}" if counts else ""
+    if counts:
+        moved = f" in {rows} rows: {', '.join(counts)}"
+    else:
+        moved = ""
     return f"{head}{moved}. New run: {diff.counts.sentence()}"
 
 
@@ -66,13 +71,17 @@ def _write_line(change: Change) -> str:
     if change.old is None:
         assert change.new is not None
         error = write_number(change.new.error)
-        why = f": {change.new.reason}" if not change.new.passed else ""
+        if not change.new.passed:
+            why = f": {change.new.reason}"
+        else:
+            why = ""
         return f"{name}: {change.new.verdict}, error {error}{why}"
     if change.new is None:
         return (
             f"{name}: was {change.old.verdict}, error {write_number(change.old.error)}"
         )
-    old, new = change.old, change.new
+    old = change.old
+    new = change.new
     words = f"{name}: error {write_number(old.error)} -> {write_number(new.error)}"
     if old.verdict != new.verdict:
         words += f", {old.verdict} -> {new.verdict} ({new.reason})"
@@ -169,7 +178,10 @@ def _write_cells(changes: Sequence[Change]) -> list[tuple[str, ...]]:
             (write_number(row.error), row.verdict) if row else ("", "")
             for row in (change.old, change.new)
         )
-        why = f": {change.new.reason}" if change.new and not change.new.passed else ""
+        if change.new and not change.new.passed:
+            why = f": {change.new.reason}"
+        else:
+            why = ""
         cells.append(
             (
                 scene,
@@ -220,7 +232,8 @@ def write_junit(diff: Differences) -> str:
 def _list_cases(diff: Differences) -> Iterator[JunitCase]:
     for change in diff.changes:
         scene, engine, setting, quantity = change.key
-        name, kind = (scene, f"{scene}.{engine} {setting}", quantity), change.kind.value
+        name = (scene, f"{scene}.{engine} {setting}", quantity)
+        kind = change.kind.value
         if change.regression or (change.new is not None and change.new.failed):
             yield JunitCase(*name, "failure", kind, _write_line(change))
         elif change.new is None:

@@ -24,14 +24,16 @@ from fourbar_validation.engines.registry import Engine
 
 Rules = dict[str, dict[str, str]]
 """What stands under each name, as entries of text."""
-FACTOR, CLASS, _REASON, _CONDITIONED = "factor", "class", "reason", "over the condition"
-_PREDICTED, ANSWERS, _BOUNDARY, _IN_TIME = (
-    "prediction",
-    "answers",
-    "boundary",
-    "through time",
-)
-_YES, NO = "yes", "no"
+FACTOR = "factor"
+CLASS = "class"
+_REASON = "reason"
+_CONDITIONED = "over the condition"
+_PREDICTED = "prediction"
+ANSWERS = "answers"
+_BOUNDARY = "boundary"
+_IN_TIME = "through time"
+_YES = "yes"
+NO = "no"
 _LOOSER = 1.0 + 1e-9
 """Factor by which a number of a rule has grown if it is another one."""
 NOTABLE = 10.0
@@ -97,7 +99,8 @@ def list_weakened(old: Mapping[str, Mapping[str, str]], new: Rules) -> list[Weak
     """
     weakened = []
     for name in sorted(old.keys() & new.keys()):
-        before, after = old[name], new[name]
+        before = old[name]
+        after = new[name]
         for what in before.keys() & after.keys():
             if before[what] != after[what] and _is_weaker(what, before, after):
                 weakened.append(Weakening(name, what, before[what], after[what]))
@@ -141,7 +144,8 @@ def find_weakened_row(old: Row, new: Row) -> Weakening | None:
     """
     if not old.verdict == new.verdict == AGREES or new.allowed <= old.allowed:
         return None
-    before, after = find_class(old), find_class(new)
+    before = find_class(old)
+    after = find_class(new)
     if not before or not after or before == after:
         return None
     return Weakening(new.engine, CLASS, before, after)

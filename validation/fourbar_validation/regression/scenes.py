@@ -91,12 +91,11 @@ class SceneChange:
 
 def _shorten(old: str, new: str) -> str:
     """Write a unit that both have once: "0.048 -> 0.05 kg m^2"."""
-    (number, _, unit), (_, _, new_unit) = old.partition(" "), new.partition(" ")
-    return (
-        f"{number} -> {new}"
-        if unit and unit == new_unit and "," not in old
-        else f"{old} -> {new}"
-    )
+    number, _, unit = old.partition(" ")
+    _, _, new_unit = new.partition(" ")
+    if unit and unit == new_unit and "," not in old:
+        return f"{number} -> {new}"
+    return f"{old} -> {new}"
 
 
 def find_renamed(
@@ -122,7 +121,8 @@ def list_scene_changes(
     """List the scenes of both runs that ask something else now."""
     changes = []
     for name in sorted(old.keys() & new.keys()):
-        before, after = old[name], new[name]
+        before = old[name]
+        after = new[name]
         entries = tuple(
             (key, before.get(key, "not stated"), after.get(key, "not stated"))
             for key in dict.fromkeys((*before, *after))

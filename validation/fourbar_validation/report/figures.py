@@ -90,7 +90,8 @@ def _draw_linkage(name: str, scene: Scene, solution: Solution) -> str:
         np.argmax(np.where(solution.status_code == OK, solution.condition, -1.0))
     )
     with apply_style():
-        figure, labels = Figure(figsize=(3.1, 2.9), layout="constrained"), Labels()
+        figure = Figure(figsize=(3.1, 2.9), layout="constrained")
+        labels = Labels()
         here = solve(scene, "position", at=solution.at.part(slice(best, best + 1)))
         axes = figure.subplots()
         draw_linkage(axes, View(scene, solution, here), labels)
@@ -116,7 +117,10 @@ def _draw_answers(record: Record, solution: Solution) -> str:
         for answer in record.answers
         if answer.refusal is None and answer.quantities
     ]
-    drive = COUPLE.value if solution.drive is None else LINE.value
+    if solution.drive is None:
+        drive = COUPLE.value
+    else:
+        drive = LINE.value
     shown = ANGLES
     if solution.F32 is not None:
         shown = (drive, _find_largest_force(solution))
@@ -180,7 +184,8 @@ def _draw_values(
     """
     good = solution.status_code == OK
     ours = np.where(good, _take_plain(quantity, getattr(solution, quantity)), np.nan)
-    base, line = _choose_base(solution, None), ours
+    base = _choose_base(solution, None)
+    line = ours
     if jumps:
         theta_2, line = break_curve(
             solution.theta_2,
@@ -218,7 +223,8 @@ def _draw_errors(
     """
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-    good, scene = solution.status_code == OK, record.scene
+    good = solution.status_code == OK
+    scene = record.scene
     assert scene is not None
     if choose_style(answers[0].engine).simulated:
         held_to = (
@@ -236,19 +242,21 @@ def _draw_errors(
         lw=1.1,
         ls=(0, (5, 2)),
     )
-    low, high = float(np.nanmin(allowed[good])), float(np.nanmax(allowed[good]))
+    low = float(np.nanmin(allowed[good]))
+    high = float(np.nanmax(allowed[good]))
     for turn, answer in enumerate(answers):
-        formulas = solution if answer.at is None else solve(scene, at=answer.at)
+        if answer.at is None:
+            formulas = solution
+        else:
+            formulas = solve(scene, at=answer.at)
         mine = getattr(formulas, quantity)
         size = scale_of(quantity, scene, formulas, mine)
         error = find_error(quantity, mine, answer.quantities[quantity], size)
         places = find_worst_of_segments(error, turn / len(answers))
         if not len(places):
             continue
-        x, heights = (
-            _choose_base(solution, answer.at)[places],
-            np.maximum(error[places], FLOOR),
-        )
+        x = _choose_base(solution, answer.at)[places]
+        heights = np.maximum(error[places], FLOOR)
         axes.plot(x, heights, **_mark(answer, 3.2) | {"mew": 0.8})
         worst = int(np.argmax(heights))
         axes.plot(
@@ -260,7 +268,8 @@ def _draw_errors(
             mec=choose_style(answer.engine).colour,
             mew=0.9,
         )
-        low, high = min(low, float(heights.min())), max(high, float(heights.max()))
+        low = min(low, float(heights.min()))
+        high = max(high, float(heights.max()))
     axes.set_yscale("log")
     axes.set_ylim(low / 4.0, 5.0 * high)
     axes.yaxis.set_major_locator(LogLocator(numticks=5))
@@ -315,7 +324,9 @@ def _take_plain(quantity: str, values: Array) -> Array:
     """Take a scalar as it is (angles in degrees), the magnitude of a vector."""
     if quantity in ANGLES:
         return np.degrees(values)
-    return magnitude(values) if values.ndim == 2 else values
+    if values.ndim == 2:
+        return magnitude(values)
+    return values
 
 
 def _label(quantity: str, solution: Solution) -> str:
@@ -324,7 +335,9 @@ def _label(quantity: str, solution: Solution) -> str:
     if quantity == "torque":
         return f"T{solution.drive_bar} (N m)".translate(_SUBSCRIPT)
     name = quantity.replace("theta_", "θ").translate(_SUBSCRIPT)
-    return f"{name} (°)" if quantity in ANGLES else f"|{quantity}| (N)"
+    if quantity in ANGLES:
+        return f"{name} (°)"
+    return f"|{quantity}| (N)"
 
 
 def _choose_base(solution: Solution, command: Command | None) -> Array:

@@ -59,7 +59,8 @@ class Approach:
 
 def list_approaches() -> list[Approach]:
     """List a toggle, a pole of T4 and a change point."""
-    rocker, crank = draw_linkage(ROCKER, 1), draw_linkage(CRANK, 0)
+    rocker = draw_linkage(ROCKER, 1)
+    crank = draw_linkage(CRANK, 0)
     (limit, stretched), *_ = find_collinear_3_4(rocker)
     (pole, branch), *_ = find_collinear_2_3(crank)
     lengths, _, (_, half_turn) = CHANGE_POINTS["parallelogram"]

@@ -165,4 +165,6 @@ def build(package: str) -> str:
     except PackageNotFoundError:
         return ""
     files = sorted(line for line in lines if line.partition(",")[0].endswith(_BUILT))
-    return hashlib.sha256("\n".join(files).encode()).hexdigest()[:16] if files else ""
+    if files:
+        return hashlib.sha256("\n".join(files).encode()).hexdigest()[:16]
+    return ""

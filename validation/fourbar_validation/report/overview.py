@@ -26,7 +26,9 @@ OWN_ENGINES = (FORMULAS, *DERIVED)
 """Engines whose rows check fourbar against itself. They are identities, and functions
 other than `solve`.
 """
-TORQUE, PINS, MOTION = "torque", "pin forces", "motion"
+TORQUE = "torque"
+PINS = "pin forces"
+MOTION = "motion"
 GROUPS = (TORQUE, PINS, MOTION)
 """Columns of the table."""
 DRIVES = ("torque", LINE.value)
@@ -73,7 +75,8 @@ class _OverviewCell:
     def add(self, row: Row, used: float) -> None:
         """Take in a row."""
         if used > self.used:
-            self.row, self.used = row, used
+            self.row = row
+            self.used = used
 
     @property
     def failed(self) -> bool:
@@ -142,7 +145,10 @@ class _Kind:
 
 def _name_place(row: Row) -> str:
     """Write the scene of a row and its position."""
-    where = "" if math.isnan(row.theta_2) else f" {math.degrees(row.theta_2):.4g} deg"
+    if math.isnan(row.theta_2):
+        where = ""
+    else:
+        where = f" {math.degrees(row.theta_2):.4g} deg"
     return f"{row.scene}{where}"
 
 
@@ -217,7 +223,10 @@ class Overview:
         """
         asked: dict[str, dict[str, bool]] = {}
         for row in rows:
-            name = "torque" if row.quantity in DRIVES else row.quantity
+            if row.quantity in DRIVES:
+                name = "torque"
+            else:
+                name = row.quantity
             if row.engine not in OWN_ENGINES and name in ("torque", *PIN_FORCES):
                 asked.setdefault(row.engine, {})[name] = row.verdict in HOLDING_VERDICTS
         whole = len(PIN_FORCES) + 1

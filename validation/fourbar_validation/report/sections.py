@@ -52,7 +52,8 @@ def collect_sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
     The former are of this run or in OUT/hard, the latter in OUT/cost. Those of this run
     have their picture, and the limits of the engines with them.
     """
-    results, sections = out / HARD / "results.csv", []
+    results = out / HARD / "results.csv"
+    sections = []
     if hard is not None:
         from fourbar_validation.report.hard_picture import draw_picture
 
@@ -91,7 +92,10 @@ def collect_hard_cases(rows: Iterable[Row], picture: str | None = None) -> Secti
         if scenes[family.name]
     ]
     headings = ("family", "scenes", *VERDICTS, "verdict", "what must happen")
-    figures = [SectionFigure(_ALT, CAPTION, svg=picture)] if picture else []
+    if picture:
+        figures = [SectionFigure(_ALT, CAPTION, svg=picture)]
+    else:
+        figures = []
     return Section(
         HARD,
         "Hard cases",

@@ -88,7 +88,8 @@ class _EngineLine:
             and used > self.used
             and (row.quantity != "undecided" or row.failed)
         ):
-            self.worst, self.used = row, used
+            self.worst = row
+            self.used = used
 
 
 OWN = "our own consistency"
@@ -167,7 +168,10 @@ class Summary:
         bad = [row for row in scene.rows if row.failed]
         self.failures += bad[: _FAILURES_KEPT - len(self.failures)]
         for row, used in zip(scene.rows, compute_shares(scene.rows), strict=True):
-            name = OWN if row.engine in OWN_ENGINES else row.engine
+            if row.engine in OWN_ENGINES:
+                name = OWN
+            else:
+                name = row.engine
             self._engines.setdefault(name, _EngineLine(name)).add(row, used)
         compared, loose = _count_compared(scene.rows)
         self.pairs, self.loose = self.pairs + compared, self.loose + len(loose)
@@ -204,7 +208,8 @@ class Summary:
         """Add what was drawn and measured of a scene that is shown."""
         for scene in self.shown:
             if scene.name == drawn.name:
-                scene.figure, scene.thumbnail = drawn.figure, drawn.thumbnail
+                scene.figure = drawn.figure
+                scene.thumbnail = drawn.thumbnail
         self._add_orders(drawn)
 
     def _add_times(self, scene: Record) -> None:
@@ -228,11 +233,10 @@ class Summary:
     @property
     def verdict(self) -> str:
         """Say it in one sentence."""
-        not_run = (
-            f"; not run: {', '.join(engine for engine, _ in self.missing)}"
-            if self.missing
-            else ""
-        )
+        if self.missing:
+            not_run = f"; not run: {', '.join(engine for engine, _ in self.missing)}"
+        else:
+            not_run = ""
         return self.counts.sentence() + not_run
 
     @property
@@ -240,7 +244,10 @@ class Summary:
         """Say the verdict in plain words: where it is not green, whose fault it is."""
         words = self._say_first_cause()
         if weaker := self.overview.weaker:
-            more = f", and {len(weaker) - 1} more" if len(weaker) > 1 else ""
+            if len(weaker) > 1:
+                more = f", and {len(weaker) - 1} more"
+            else:
+                more = ""
             rules = f"{weaker[0]}{more}, against {self.overview.baseline}"
             return f"WEAKER RULE: {rules}. {words}"
         return words
@@ -251,14 +258,23 @@ class Summary:
             missing = ", ".join(engine for engine, _ in self.missing)
             return self.counts.headline + (f"; not run: {missing}" if missing else "")
         more = len(causes) - 1
-        others = f", and {more} more cause{'s' if more > 1 else ''}" if more else ""
+        if more:
+            others = f", and {more} more cause{'s' if more > 1 else ''}"
+        else:
+            others = ""
         first = causes[0]
-        named = first.engine if first.engine not in OWN_ENGINES else "fourbar itself"
+        if first.engine not in OWN_ENGINES:
+            named = first.engine
+        else:
+            named = "fourbar itself"
         what = f"{named} is wrong: {first.text}, in {first.scenes} scene"
         what += f"{'s' if first.scenes > 1 else ''}; "
         if first.worst.quantity != "all":
             what += f"worst {first.worst.quantity} of "
-        since = f" {self.overview.since}" if self.overview.since else ""
+        if self.overview.since:
+            since = f" {self.overview.since}"
+        else:
+            since = ""
         return f"FAILS: {what}{first.place}{others}.{since}"
 
     @property
@@ -309,8 +325,14 @@ class Summary:
             version = self.stated.get(
                 line.name, versions.get(line.name.partition("-")[0], "")
             )
-            line.version = "" if line.name.endswith(f" {version}") else version
-            engine = FORMULAS if line.name == OWN else line.name
+            if line.name.endswith(f" {version}"):
+                line.version = ""
+            else:
+                line.version = version
+            if line.name == OWN:
+                engine = FORMULAS
+            else:
+                engine = line.name
             if times := self._times.get(engine):
                 line.microseconds, line.times_formulas = map(
                     median, zip(*times, strict=True)
@@ -351,11 +373,9 @@ class Summary:
         They are at most ORDERS_SHOWN, lowest first.
         """
         few = len(self._orders) <= _ORDERS_SHOWN
-        return (
-            self._orders
-            if few
-            else nlargest(_ORDERS_SHOWN, self._orders, key=_find_lowest)
-        )
+        if few:
+            return self._orders
+        return nlargest(_ORDERS_SHOWN, self._orders, key=_find_lowest)
 
     @property
     def shown(self) -> list[Record]:
@@ -458,7 +478,9 @@ def _find_worst(rows: Sequence[Row]) -> list[Worst]:
 
 def _keep_largest(most: int, entries: list[T], key: Callable[[T], float]) -> list[T]:
     """Cut the list to its largest once it is twice too long."""
-    return entries if len(entries) <= 2 * most else nlargest(most, entries, key=key)
+    if len(entries) <= 2 * most:
+        return entries
+    return nlargest(most, entries, key=key)
 
 
 def _find_lowest(order: tuple[str, dict[str, float]]) -> float:

@@ -65,17 +65,13 @@ def write_share(value: float) -> str:
     """Write error/allowed in two digits."""
     if math.isinf(value):
         return "∞"
-    return (
-        "0"
-        if value == 0.0
-        else (
-            "<0.01"
-            if value < 0.01
-            else f"{value:.2f}"
-            if value < 10.0
-            else f"{value:.1e}"
-        )
-    )
+    if value == 0.0:
+        return "0"
+    if value < 0.01:
+        return "<0.01"
+    if value < 10.0:
+        return f"{value:.2f}"
+    return f"{value:.1e}"
 
 
 def write_number(value: float) -> str:
@@ -83,7 +79,9 @@ def write_number(value: float) -> str:
 
     A dash stands for no number.
     """
-    return "-" if math.isnan(value) else f"{value:.2e}"
+    if math.isnan(value):
+        return "-"
+    return f"{value:.2e}"
 
 
 def count_or_size(value: float) -> str:
@@ -95,4 +93,6 @@ def count_or_size(value: float) -> str:
         return "-"
     if value == 0.0 or (float(value).is_integer() and abs(value) < PLAIN[1]):
         return f"{value:.0f}"
-    return f"{value:.3g}" if PLAIN[0] <= abs(value) < 1000.0 else f"{value:.2e}"
+    if PLAIN[0] <= abs(value) < 1000.0:
+        return f"{value:.3g}"
+    return f"{value:.2e}"

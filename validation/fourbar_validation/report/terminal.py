@@ -170,4 +170,6 @@ def make_table(
 
 def write_short(value: float) -> str:
     """Write two digits: the table fits 80 columns, and results.csv has them all."""
-    return "-" if math.isnan(value) else f"{value:.1e}"
+    if math.isnan(value):
+        return "-"
+    return f"{value:.1e}"

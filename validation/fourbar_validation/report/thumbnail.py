@@ -27,7 +27,8 @@ MARKS = 7
 
 def draw_thumbnail(record: Record) -> str | None:
     """Draw linkage and torque as one SVG; None where nothing assembles."""
-    solution, scene = record.solution, record.scene
+    solution = record.solution
+    scene = record.scene
     if scene is None or solution is None or not np.any(solution.status_code == OK):
         return None
     width = LINKAGE + _CURVE
@@ -43,10 +44,12 @@ def _draw_linkage(record: Record, solution: Solution) -> str:
     assert record.scene is not None
     good = solution.status_code == OK
     best = int(np.argmax(np.where(good, solution.condition, -1.0)))
-    d, theta_1 = record.scene.linkage.ground, record.scene.linkage.ground_angle
+    d = record.scene.linkage.ground
+    theta_1 = record.scene.linkage.ground_angle
     O4 = (d * np.cos(theta_1), d * np.sin(theta_1))
     pins = np.array([(0.0, 0.0), solution.A[best], solution.B[best], O4])
-    low, high = pins.min(axis=0), pins.max(axis=0)
+    low = pins.min(axis=0)
+    high = pins.max(axis=0)
     room = np.array([LINKAGE, HEIGHT]) - 2.0 * EDGE - 4.0
     scale = float(np.min(room / np.maximum(high - low, 1e-300)))
     middle = 0.5 * np.array([LINKAGE, HEIGHT])
@@ -62,10 +65,16 @@ def _draw_linkage(record: Record, solution: Solution) -> str:
 
 def _draw_curve(record: Record, solution: Solution) -> str:
     """Draw the formulas' torque as a band, and each engine's as marks on it."""
-    name = COUPLE.value if solution.drive is None else LINE.value
+    if solution.drive is None:
+        name = COUPLE.value
+    else:
+        name = LINE.value
     assert record.scene is not None
     released = record.scene.motion.free is not None  # no torque acts
-    ours = None if released else getattr(solution, name, None)
+    if released:
+        ours = None
+    else:
+        ours = getattr(solution, name, None)
     good = solution.status_code == OK
     if ours is None or np.count_nonzero(good) < 2:
         return ""
@@ -89,7 +98,8 @@ def _draw_curve(record: Record, solution: Solution) -> str:
 
 def _write_path(x: Array, y: Array) -> list[str]:
     """Write a path that is broken where there is no value."""
-    parts, pen = [], "M"
+    parts = []
+    pen = "M"
     for across, up in zip(x.tolist(), y.tolist(), strict=True):
         if np.isfinite(up):
             parts.append(f"{pen}{across:.1f} {up:.1f}")

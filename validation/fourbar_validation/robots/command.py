@@ -49,7 +49,10 @@ def _write_closure(closure: RobotClosure) -> str:
         angle = math.degrees(closure.misaligned)
         parts.append(f"axes {angle if angle > ROUND_OFF else 0.0:.2g} deg apart")
     if closure.gap is not None:
-        gap = closure.gap if closure.gap > ROUND_OFF else 0.0
+        if closure.gap > ROUND_OFF:
+            gap = closure.gap
+        else:
+            gap = 0.0
         parts.append(f"gap {write_length(gap) if gap else 0} mm")
     parts.append(f"solref {_join(closure.solref)}")
     parts.append(f"solimp {_join(closure.solimp)}")

@@ -128,7 +128,8 @@ class _RobotReading:
                 raise self._refuse(
                     word, "is not allowed: an MJCF needs no document type"
                 )
-        parsed, depth = ET.iterparse(io.StringIO(text), ("start", "end")), 0
+        parsed = ET.iterparse(io.StringIO(text), ("start", "end"))
+        depth = 0
         try:
             for event, _ in parsed:
                 depth += 1 if event == "start" else -1
@@ -202,7 +203,8 @@ class _RobotReading:
 
     def _take_meshes(self, root: ET.Element) -> None:
         """Read each mesh, and give its file a plain name in the text."""
-        folder, strip = "", False
+        folder = ""
+        strip = False
         for compiler in root.iter("compiler"):
             for name in FOLDERS[:2]:
                 folder = compiler.attrib.pop(name, folder)

@@ -33,7 +33,8 @@ from fourbar_validation.robots.options import read_pose, read_speed
 _MEASURE = "fourbar_validation.engines.mujoco.robots.measure:measure_loops"
 LIMIT = 600.0
 """s; a busy machine takes several times the two minutes of an idle one."""
-STATES, THROUGH_TIME = "single states", "through time"
+STATES = "single states"
+THROUGH_TIME = "through time"
 _SLIP = 1e-9
 """Part of the speeds below which a pin with dry friction is at rest. It may then rub
 either way.
@@ -58,7 +59,9 @@ class _InsideError:
         """The error over the largest size; infinite without an answer."""
         if not math.isfinite(self.error):
             return math.inf
-        return self.error / self.largest if self.largest else 0.0
+        if self.largest:
+            return self.error / self.largest
+        return 0.0
 
     def cells(self) -> tuple[str, ...]:
         """Return method, quantity, error, its relative size, and place, as text."""
@@ -132,13 +135,17 @@ def _compare(
         sizes = np.where(judged & reversing, 0.0, sizes)
         worst = int(np.argmax(sizes))
         largest = float(np.max(measure_sizes(ours)[judged], initial=0.0))
-        error = math.inf if answer.lost else float(sizes[worst])
+        if answer.lost:
+            error = math.inf
+        else:
+            error = float(sizes[worst])
         yield _InsideError(method, name, error, largest, rows[worst].joint)
 
 
 def _turn(vectors: Array, angle: float) -> Array:
     """Turn vectors (n, 2) counter-clockwise."""
-    cos, sin = math.cos(angle), math.sin(angle)
+    cos = math.cos(angle)
+    sin = math.sin(angle)
     return np.asarray(vectors @ np.array([[cos, sin], [-sin, cos]]))
 
 

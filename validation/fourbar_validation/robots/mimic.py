@@ -92,7 +92,8 @@ def measure_mimic(
     with examine_guarded(path) as examined:
         equality: JointEquality = examined(READ, file, joint, scene)
     positions = np.unique(command(scene).theta_2)
-    low, high = float(positions[0]), float(positions[-1])
+    low = float(positions[0])
+    high = float(positions[-1])
     if len(positions) < FEWEST:
         raise InputError(
             "motion.theta_2",
@@ -205,7 +206,8 @@ def fit_minimax(x: Array, y: Array, degree: int) -> tuple[float, ...]:
 
 def show_mimic(report: _MimicReport) -> None:
     """Print what the polynomial of the file loses, and the best of each degree."""
-    equality, own = report.equality, report.file
+    equality = report.equality
+    own = report.file
     low, high = (f"{math.degrees(angle):.6g}" for angle in report.swing)
     _say(
         f"{equality.follower} follows {equality.leader} by polycoef"

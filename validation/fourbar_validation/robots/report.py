@@ -91,7 +91,10 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[Block]:
         names = ", ".join(loop.switched_off)
         yield f"switched off, because it ties its bars to joints that are held: {names}"
     left_out = find_left_out(loop)
-    size = f"{left_out:.1e}" if left_out > ROUND_OFF else f"less than {ROUND_OFF:g}"
+    if left_out > ROUND_OFF:
+        size = f"{left_out:.1e}"
+    else:
+        size = f"less than {ROUND_OFF:g}"
     yield (
         f"with rigid pins the robot differs from the formulas by {size} of the largest:"
         " what the scene leaves out; the rest is MuJoCo's soft constraint"
@@ -141,7 +144,8 @@ def _describe_torn(loop: LoopMeasurement) -> Iterator[Block]:
 
 def describe_advice(advice: SettingsAdvice) -> Iterator[Block]:
     """Describe what to type, what it reaches, and what each setting does alone."""
-    before, best = advice.before, advice.best
+    before = advice.before
+    best = advice.best
     if not best.changes:
         yield f"The file is within {advice.wanted:g} as it is."
     elif advice.reached:

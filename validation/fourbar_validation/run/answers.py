@@ -51,7 +51,9 @@ def compare_answer(question: Question, engine: Engine, answer: Answer) -> list[R
     """
     if answer.at is not None and answer.at is not question.at:
         question = Question(question.name, question.scene, answer.at)
-    name, scene, formulas = question.name, question.scene, question.solution
+    name = question.name
+    scene = question.scene
+    formulas = question.solution
     held = make_demands(engine, scene, question.at, answer, formulas)
     comparison = Comparison(
         name, scene, answer, formulas, held, question.reference, question.scales
@@ -229,10 +231,8 @@ def compare_inertia(question: Question) -> Iterator[Row]:
 
 
 def _check_inertia(question: Question, bare: Question, engine: Engine) -> Iterator[Row]:
-    answer, (loaded, _) = (
-        bare.answer(engine),
-        question.answered.get(engine.name, (None, 0.0)),
-    )
+    answer = bare.answer(engine)
+    loaded, _ = question.answered.get(engine.name, (None, 0.0))
     if answer.refusal is not None and loaded is not None and loaded.refusal is not None:
         return  # the refusal has its row
     drive = name_driving(question.scene)
@@ -245,11 +245,10 @@ def _check_inertia(question: Question, bare: Question, engine: Engine) -> Iterat
         question.causes[engine.name] = find_causes(bare, answer, engine.tolerance)
     if rows:  # a failure besides the torque, or in place of it, is not left out
         worst = max(rows, key=lambda row: VERDICTS.index(row.verdict))
-        reason = (
-            worst.reason
-            if worst.quantity in (drive, "all")
-            else f"{worst.quantity}: {worst.reason}"
-        )
+        if worst.quantity in (drive, "all"):
+            reason = worst.reason
+        else:
+            reason = f"{worst.quantity}: {worst.reason}"
         yield replace(worst, quantity=f"{drive}_inertia", reason=reason)
 
 

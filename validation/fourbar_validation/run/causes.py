@@ -42,7 +42,10 @@ def find_causes(question: Question, answer: Answer, tolerance: ErrorBound) -> li
     causes = []
     for explanation in explanations:
         if explanation.complete:
-            of_columns = "" if explanation.whole else ", ".join(explanation.quantities)
+            if explanation.whole:
+                of_columns = ""
+            else:
+                of_columns = ", ".join(explanation.quantities)
             causes.append(f"{explanation.text}: {of_columns}".removesuffix(": "))
     return causes
 
@@ -57,7 +60,10 @@ def make_table(answer: Answer, tolerance: ErrorBound) -> TheirTable:
     rows = slice(MOST_POSITIONS)
     theta_2 = np.asarray(answer.at.angle[rows], dtype=float)
     blank = ~answer.assembled[rows]
-    slack = tolerance.factor if not tolerance.conditioned else ROUND_OFF
+    if not tolerance.conditioned:
+        slack = tolerance.factor
+    else:
+        slack = ROUND_OFF
     values: dict[str, Array] = {}
     rounding: dict[str, Array] = {}
     for name, numbers in answer.quantities.items():
@@ -66,8 +72,14 @@ def make_table(answer: Answer, tolerance: ErrorBound) -> TheirTable:
         kept = np.array(numbers[rows], dtype=float)
         kept[blank] = np.nan
         size = magnitude(kept)
-        largest = float(np.nanmax(size, initial=0.0)) if len(size) else 0.0
-        scale = 1.0 if UNITS[name] in ("rad", "1") else largest
+        if len(size):
+            largest = float(np.nanmax(size, initial=0.0))
+        else:
+            largest = 0.0
+        if UNITS[name] in ("rad", "1"):
+            scale = 1.0
+        else:
+            scale = largest
         values[name] = kept
         rounding[name] = np.full(len(theta_2), max(slack, ROUND_OFF) * scale)
     units = {name: Unit(UNITS[name], 1.0) for name in values}

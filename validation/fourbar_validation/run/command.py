@@ -133,7 +133,10 @@ def command(**stated: Any) -> int:
 
     request = Request(**stated)
     request.require_consistent()
-    part = None if request.part is None else RunPart.read(request.part)
+    if request.part is None:
+        part = None
+    else:
+        part = RunPart.read(request.part)
     plan = make_plan(request)
     if part is not None:
         scenes = plan.count_scenes(plan.list_chunks(part))

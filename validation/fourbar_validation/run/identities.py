@@ -76,7 +76,9 @@ NEAR = 1e-6
 
 def check_identities(question: Question) -> Iterator[Row]:
     """Check each equation that the stage of the solution allows."""
-    solution, command, linkage = question.solution, question.at, question.scene.linkage
+    solution = question.solution
+    command = question.at
+    linkage = question.scene.linkage
     closing = solution.assembled & (solution.status_code != OVERFLOW)
     gap = find_gap(linkage, solution.theta_2, solution.theta_3, solution.theta_4)
     yield _make_row(question, "closure", CLOSURE, gap, closing)
@@ -97,8 +99,10 @@ def _check_sweep(question: Question) -> Row:
     an interval narrower than four degrees it leaves out a quarter of that, which is
     half of the sweep.
     """
-    command, linkage = question.at, question.scene.linkage
-    start, stop = float(command.theta_2[0]), float(command.theta_2[-1])
+    command = question.at
+    linkage = question.scene.linkage
+    start = float(command.theta_2[0])
+    stop = float(command.theta_2[-1])
     if (start, stop) == (0.0, 2.0 * np.pi):
         missed = np.maximum(-find_margin(linkage, command.theta_2), 0.0)
     else:
@@ -121,7 +125,10 @@ def _make_row(
     condition = 1.0 / count_half_turns(
         question.scene.linkage.ground_angle, question.at.angle
     )
-    reason = f"identity: {equation}" if judged.any() else NOWHERE
+    if judged.any():
+        reason = f"identity: {equation}"
+    else:
+        reason = NOWHERE
     return question.row(
         quantity, error, IDENTITY.factor / condition, reason, judged, condition
     )
@@ -163,7 +170,8 @@ def _check_sums(question: Question) -> Iterator[Row]:
 
     Likewise the moments of the same about O2 with the torque.
     """
-    scene, solution = question.scene, question.solution
+    scene = question.scene
+    solution = question.solution
     assert (
         solution.F12 is not None
         and solution.F14 is not None
@@ -171,7 +179,10 @@ def _check_sums(question: Question) -> Iterator[Row]:
     )
     assert solution.F32 is not None and solution.F43 is not None
     actions, O4 = _sum_actions(question)
-    drive = COUPLE.value if solution.drive is None else LINE.value
+    if solution.drive is None:
+        drive = COUPLE.value
+    else:
+        drive = LINE.value
     balance = _Balance()
     if solution.torque is not None:
         balance.couple(solution.torque)
@@ -208,10 +219,8 @@ def _check_sums(question: Question) -> Iterator[Row]:
     # here as in the answer
     judged &= ~question.reversing(IDENTITY.factor)
     yield _check_power(question, drive, judged)
-    forces, moments = (
-        divide(magnitude(balance.force), force_size),
-        divide(np.abs(balance.moment), moment_size),
-    )
+    forces = divide(magnitude(balance.force), force_size)
+    moments = divide(np.abs(balance.moment), moment_size)
     yield _make_row(
         question, "force_sum", "F12 + F14 + loads = sum of m a_G", forces, judged
     )
@@ -225,7 +234,9 @@ def _sum_actions(question: Question) -> tuple[Actions, Array]:
 
     Another evaluation of them is not used; the place of O4 is returned too.
     """
-    scene, command, solution = question.scene, question.at, question.solution
+    scene = question.scene
+    command = question.at
+    solution = question.solution
     state = compute_state(scene, command)
     speeds = {
         f"omega_{bar}": getattr(solution, f"omega_{bar}")
@@ -277,7 +288,8 @@ def check_status(question: Question) -> Iterator[Row]:
 
     Another derivation has none there.
     """
-    reference, free_body = question.reference, question.free_body
+    reference = question.reference
+    free_body = question.free_body
     if reference is not None and question.at.speed is not None:
         yield compare_status(question, reference, *_solve_exactly(question))
     elif reference is None and (free_body is None or free_body.refusal is None):
@@ -290,7 +302,8 @@ def _solve_exactly(question: Question) -> tuple[_OfSome | None, _OfSome | None]:
 
     The number of solutions that friction has is given too.
     """
-    scene, command = question.scene, question.at
+    scene = question.scene
+    command = question.at
     unknown = (
         command.remainder is not None
         or command.commanded != "theta_2"
@@ -328,11 +341,13 @@ def compare_status(
     does not close; near 0 it decides whether they are singular. None: nothing is.
     `solutions`: how many solutions loaded friction has at some positions.
     """
-    scene, formulas = question.scene, question.solution
+    scene = question.scene
+    formulas = question.solution
     differ = np.zeros(len(formulas), dtype=bool)
     large = _mark_large(scene, reference)
     for quantity in STAGES:
-        ours, theirs = getattr(formulas, quantity), getattr(reference, quantity)
+        ours = getattr(formulas, quantity)
+        theirs = getattr(reference, quantity)
         if ours is None or theirs is None:
             continue
         sound = (
@@ -379,15 +394,17 @@ def compare_status(
     if solutions is not None and len(ok := np.flatnonzero(formulas.status_code == OK)):
         some = spread_evenly(ok, SAMPLE)
         differ[some] |= solutions(some) > 1
-    index, wrong = find_worst(differ.astype(float)), np.count_nonzero(differ)
+    index = find_worst(differ.astype(float))
+    wrong = np.count_nonzero(differ)
     stated = ", ".join(
         f"{count} {name}"
         for name, count in Counter(formulas.status).items()
         if name != "ok"
     )
-    reason = (
-        f"the formulas state: {stated}" if stated else "every position has its values"
-    )
+    if stated:
+        reason = f"the formulas state: {stated}"
+    else:
+        reason = "every position has its values"
     if differ.any():
         reason = (
             f"{wrong} positions differ, the first is {formulas.status[index]}; {reason}"

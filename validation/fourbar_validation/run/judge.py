@@ -164,7 +164,8 @@ def judge(
     simulations and changes no row. `derived`: check the functions other than `solve`
     too (studies, sensitivities, SDF and USD), which takes a second.
     """
-    question, free = ask(name, scene, engines), scene.motion.free is not None
+    question = ask(name, scene, engines)
+    free = scene.motion.free is not None
     question.order = order
     begin = time.perf_counter()
     question.solution  # noqa: B018 - timed
@@ -231,14 +232,13 @@ def _select_needed(engines: Iterable[Engine], question: Question) -> Iterator[En
     for engine in engines:
         reason = None
         if command.speed is None:
-            reason = (
-                None
-                if engine.positions
-                else (
+            if engine.positions:
+                reason = None
+            else:
+                reason = (
                     "the scene states positions only, and this engine computes only"
                     " forces"
                 )
-            )
         elif engine.through_time and not np.any(command.speed):
             reason = "the commanded speed is 0: nothing moves through time"
         elif engine.through_time and len(command.angle) == 1:

@@ -42,7 +42,8 @@ class _Gathered:
     """Finished tasks of one run that lie in several folders."""
 
     def __init__(self, plan: Plan, folders: Sequence[Path], parts: int) -> None:
-        self._plan, self._parts = plan, parts
+        self._plan = plan
+        self._parts = parts
         self._stores: dict[int, Store] = {}
         """Store of each task."""
         self._damaged: list[str] = []

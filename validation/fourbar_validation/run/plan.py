@@ -115,7 +115,10 @@ class Plan:
     def draw_at_once(self) -> bool:
         """Return whether scenes are drawn as they are judged, because there are few."""
         suite = self.suite
-        without_pictures = len(suite.not_drawn) if isinstance(suite, Files) else 0
+        if isinstance(suite, Files):
+            without_pictures = len(suite.not_drawn)
+        else:
+            without_pictures = 0
         return self.options.drawn and len(suite) - without_pictures <= PICTURED
 
     @property

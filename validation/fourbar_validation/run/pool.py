@@ -95,7 +95,10 @@ def _judge_by_engine(
     for engines in ([], *([engine] for engine in job.engines)):
         outcome = attempt(replace(job, engines=engines))
         if isinstance(outcome, Record):
-            record = outcome if record is None else record.joined(outcome)
+            if record is None:
+                record = outcome
+            else:
+                record = record.joined(outcome)
         else:
             breakdowns.append(
                 make_breakdown(

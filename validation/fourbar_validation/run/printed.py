@@ -90,7 +90,8 @@ def compare_points(
 
     `least`: the condition from which on they are judged.
     """
-    link, n = scene.linkage, len(reference)
+    link = scene.linkage
+    n = len(reference)
     zero = np.zeros(n)
     theta = {
         1: zero + link.ground_angle,
@@ -115,18 +116,15 @@ def compare_points(
         3: swing(2, link.input.length, 0.0),
         4: [link.ground * np.exp(1j * theta[1]), 0.0 * zero, 0.0 * zero],
     }
-    error, sizes = np.zeros(n), Sizes(scene, reference)
+    error = np.zeros(n)
+    sizes = Sizes(scene, reference)
     usable = (solution.status_code == OK) & (reference.condition >= least)
     usable &= find_condition("F12", link, reference) * NOTHING_TO_TELL > EPS
     for point in state_from_pins(scene).points:
-        arms, first_pin = (
-            swing(point.bar, *point.place.polar_from_pin()),
-            first_pins.get(point.bar, [zero, zero, zero]),
-        )
-        tables, like = (
-            (solution.points, solution.velocity, solution.acceleration),
-            ("B", "v_B", "a_B"),
-        )
+        arms = swing(point.bar, *point.place.polar_from_pin())
+        first_pin = first_pins.get(point.bar, [zero, zero, zero])
+        tables = (solution.points, solution.velocity, solution.acceleration)
+        like = ("B", "v_B", "a_B")
         for ours, kind, arm, at_foot in zip(tables, like, arms, first_pin, strict=True):
             if point.name in ours:
                 theirs = np.stack(((arm + at_foot).real, (arm + at_foot).imag), axis=1)
@@ -158,7 +156,9 @@ def check_blocks(question: Question) -> Iterator[Row]:
 
     The ends of its blocks are held against the scene's own sweep.
     """
-    scene, command, solution = question.scene, question.at, question.solution
+    scene = question.scene
+    command = question.at
+    solution = question.solution
     if command.speed is None or command.remainder is not None:
         return
     n = len(command.angle)
@@ -189,7 +189,8 @@ def check_blocks(question: Question) -> Iterator[Row]:
     with np.errstate(all="ignore"):  # beyond the range of doubles there is no size
         scales = Sizes(scene, solution).scales([*expected], [*expected.values()])
     for (quantity, ours), scale in zip(expected.items(), scales, strict=True):
-        one, due = found[quantity][ends], ours[long[ends]]
+        one = found[quantity][ends]
+        due = ours[long[ends]]
         finite = np.isfinite(magnitude(due))
         error[finite != np.isfinite(magnitude(one))] = np.inf
         size = scale[long[ends]]
@@ -220,7 +221,9 @@ def check_error_bars(question: Question) -> Iterator[Row]:
 
     No bar may be larger than what a comparison is allowed.
     """
-    scene, command, solution = question.scene, question.at, question.solution
+    scene = question.scene
+    command = question.at
+    solution = question.solution
     if (
         command.omega_2 is None
         or command.remainder is not None
@@ -240,13 +243,14 @@ def check_error_bars(question: Question) -> Iterator[Row]:
     ]
     indices = np.union1d(spread_evenly(usable, SAMPLE), nearest).astype(int)
     sampled = select_positions(command, indices)
-    exact, ours = (
-        ask_at(BallArithmetic(), scene, sampled),
-        solve(scene, "error", at=sampled),
-    )
+    exact = ask_at(BallArithmetic(), scene, sampled)
+    ours = solve(scene, "error", at=sampled)
     reference = make_reference(scene, exact)
     sizes = Sizes(scene, ours)
-    of_balls = None if reference is None else Sizes(scene, reference)
+    if reference is None:
+        of_balls = None
+    else:
+        of_balls = Sizes(scene, reference)
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
         width = getattr(ours, bar)
         true = np.max(
@@ -329,8 +333,10 @@ def check_residual(question: Question) -> Iterator[Row]:
 
     It may not be more, and somewhere not less.
     """
-    scene, solution = question.scene, question.solution
-    residual, terms = solution.friction_residual, np.zeros(len(solution))
+    scene = question.scene
+    solution = question.solution
+    residual = solution.friction_residual
+    terms = np.zeros(len(solution))
     if question.at.speed is None or residual is None:
         return
     assert solution.drive_condition is not None
@@ -375,15 +381,18 @@ def check_law(question: Question) -> Iterator[Row]:
     and by the ends alone. Angle, speed and acceleration of every position, and the
     conditions on the pieces, by the worst of them.
     """
-    law, command = question.scene.motion.law, question.at
+    law = question.scene.motion.law
+    command = question.at
     if law is None or command.time is None:
         return
     assert isinstance(command.speed, np.ndarray)
     if isinstance(law, Rise):
         yield _check_rise(question, law)
         return
-    t, angle = np.array(law.time), np.array(law.angle)
-    h, rise = np.diff(t), np.diff(angle) / np.diff(t)
+    t = np.array(law.time)
+    angle = np.array(law.angle)
+    h = np.diff(t)
+    rise = np.diff(angle) / np.diff(t)
     speed = law.at(t)[1]
     first = (6.0 * rise - 4.0 * speed[:-1] - 2.0 * speed[1:]) / h
     last = (-6.0 * rise + 2.0 * speed[:-1] + 4.0 * speed[1:]) / h
@@ -439,7 +448,8 @@ def _check_rise(question: Question, law: Rise) -> Row:
     command = question.at
     assert command.time is not None
     assert command.speed is not None
-    (rise, duration), start = law.rise, getattr(law, f"theta_{law.bar}")
+    rise, duration = law.rise
+    start = getattr(law, f"theta_{law.bar}")
     parts = [(0.0, duration, rise)]
     if law.fall is not None:
         parts.append((duration + law.dwell, law.fall, -rise))
@@ -466,7 +476,8 @@ def _restate_law(kind: str, u: Array) -> tuple[Array, Array, Array]:
     """Compute a standard law from 0 to 1 and its two derivatives in other forms."""
     v = 1.0 - u
     if kind == "cycloidal":
-        sine, cosine = np.sin(np.pi * u), np.cos(np.pi * u)
+        sine = np.sin(np.pi * u)
+        cosine = np.cos(np.pi * u)
         return (
             u - sine * cosine / np.pi,
             2.0 * sine * sine,

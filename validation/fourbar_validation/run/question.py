@@ -104,11 +104,9 @@ class Question:
         """
         try:
             with np.errstate(all="ignore"):
-                return (
-                    None
-                    if self.free_body is None
-                    else make_reference(self.scene, self.free_body)
-                )
+                if self.free_body is None:
+                    return None
+                return make_reference(self.scene, self.free_body)
         except ArithmeticError:
             return None
 
@@ -126,7 +124,8 @@ class Question:
         """Ask an engine, once."""
         if engine.name not in self.answered:
             with keep_printed(self.output, engine.name):
-                adapter, begin = self.adapter(engine), time.perf_counter()
+                adapter = self.adapter(engine)
+                begin = time.perf_counter()
                 if refusal := explain_refusal(adapter, self.at):
                     answer = Answer(engine.name, "exact", refusal=refusal)
                 else:
@@ -161,7 +160,10 @@ class Question:
         `where`: positions that are held to it; none of them: undecided.
         `theta_2`: of the errors; left out: of the command.
         """
-        place = self.at.angle if theta_2 is None else theta_2
+        if theta_2 is None:
+            place = self.at.angle
+        else:
+            place = theta_2
         who = (self.name, FORMULAS, "exact")
         return Row.judged(
             who, quantity, error, allowed, reason, place, condition, where

@@ -95,7 +95,8 @@ class _Pendulum(NamedTuple):
         """
         from scipy.special import ellipj, ellipk, ellipkinc
 
-        k, sense = self.W / self.J, math.copysign(1.0, self.omega_0)
+        k = self.W / self.J
+        sense = math.copysign(1.0, self.omega_0)
         bottom = math.sqrt(
             self.omega_0**2 + 2.0 * k * (1.0 + math.cos(self.phi_0))
         )  # speed at the lowest point
@@ -157,7 +158,9 @@ def check_released(question: Question) -> Iterator[Row]:
     The forces of each instant are compared too. The motion goes on through limit
     positions and change points.
     """
-    name, scene, solution = question.name, question.scene, question.solution
+    name = question.name
+    scene = question.scene
+    solution = question.solution
     free = scene.motion.free
     assert free is not None and solution.omega_2 is not None
     times = np.linspace(0.0, free.duration, free.steps + 1)
@@ -181,7 +184,10 @@ def check_released(question: Question) -> Iterator[Row]:
         begin = time.perf_counter()
         fine = start(step).release(scene, times)
         seconds = time.perf_counter() - begin
-        coarse = None if fine.refusal else start(2.0 * step).release(scene, times)
+        if fine.refusal:
+            coarse = None
+        else:
+            coarse = start(2.0 * step).release(scene, times)
         question.timings.append(
             Timing(name, fine.engine, fine.setting, len(times), seconds)
         )
@@ -208,8 +214,13 @@ def _compare_forces(question: Question) -> Iterator[Row]:
     theta_2, omega_2 and alpha_2; that these balance without a torque is the equation of
     motion.
     """
-    name, scene, solution = question.name, question.scene, question.solution
-    none = solution.torque if solution.drive is None else solution.drive_force
+    name = question.name
+    scene = question.scene
+    solution = question.solution
+    if solution.drive is None:
+        none = solution.torque
+    else:
+        none = solution.drive_force
     assert (
         solution.omega_2 is not None
         and solution.alpha_2 is not None
@@ -269,7 +280,8 @@ def _compare_forces_by(
     engine: Engine, driven: Question, solution: Solution
 ) -> list[Row]:
     """Compare what one engine answers to the motion as a prescribed one."""
-    answer, scene = driven.answer(engine), driven.scene
+    answer = driven.answer(engine)
+    scene = driven.scene
     if answer.refusal is not None:
         return [
             Row.unmeasured(
@@ -314,11 +326,10 @@ def _prescribe(
     friction = next(
         (effect for effect in scene.effects if isinstance(effect, Friction)), None
     )
-    resting = (
-        np.flatnonzero(command.omega_2 == 0.0)
-        if friction is not None
-        else np.empty(0, dtype=int)
-    )
+    if friction is not None:
+        resting = np.flatnonzero(command.omega_2 == 0.0)
+    else:
+        resting = np.empty(0, dtype=int)
     moving = np.setdiff1d(np.arange(len(command.theta_2)), resting)
     if len(moving):
         yield scene, moving
@@ -332,10 +343,8 @@ def _prescribe(
     for first in resting[np.unique(numbers, axis=0, return_index=True)[1]].tolist():
         index = np.array([first])
         here = select_positions(command, index)
-        needed, begins = (
-            FreeBody().answer(bare, here).quantities["torque"][0],
-            float(np.sign(here.alpha_2)[0]),
-        )
+        needed = FreeBody().answer(bare, here).quantities["torque"][0]
+        begins = float(np.sign(here.alpha_2)[0])
         turning = FreeBody().answer(bare, here._replace(speed=np.ones(1))).quantities
         rate = {1: 0.0, 2: 1.0, 3: turning["omega_3"][0], 4: turning["omega_4"][0]}
         slips = {
@@ -365,7 +374,8 @@ def _make_rows(
     coarse: ReleasedAnswer | None,
     truth: _Truth,
 ) -> list[Row]:
-    free, n = question.scene.motion.free, len(truth.theta_2)
+    free = question.scene.motion.free
+    n = len(truth.theta_2)
     assert free is not None
     who = (question.name, fine.engine, fine.setting)
     if fine.refusal is not None:
@@ -394,38 +404,33 @@ def _make_rows(
     }
     rows = []
     for name, values in numbers(fine).items():
-        right, size = (
-            right_and_size[name][0],
-            replace_zero_size(np.array(right_and_size[name][1])),
-        )
-        error, expected = divide(np.abs(values - right), size), 0.0
+        right = right_and_size[name][0]
+        size = replace_zero_size(np.array(right_and_size[name][1]))
+        error = divide(np.abs(values - right), size)
+        expected = 0.0
         if coarse is not None:
             coarser = numbers(coarse)[name]
             alike = len(coarser) == len(values)
-            expected = (
-                float(divide(np.abs(values - coarser).max(), size))
-                if alike
-                else math.nan
-            )
+            if alike:
+                expected = float(divide(np.abs(values - coarser).max(), size))
+            else:
+                expected = math.nan
         index = find_worst(error)
         full = FULL[name] * max(1.0, free.duration / UNIT)
         allowed = max(full, TIMES_PREDICTED * expected)
         if error[index] <= full:
-            verdict, reason = AGREES, f"a free motion of {free.duration:g} s"
+            verdict = AGREES
+            reason = f"a free motion of {free.duration:g} s"
         elif not (error[index] <= allowed and math.isfinite(expected)):
-            verdict, reason = (
-                FAILS,
-                f"{error[index]:.1e} where {expected:.1e} was predicted",
-            )
+            verdict = FAILS
+            reason = f"{error[index]:.1e} where {expected:.1e} was predicted"
         elif expected >= 1.0:
-            verdict, reason = (
-                UNDECIDED,
-                f"an error of {expected:.1e} of the value is predicted",
-            )
+            verdict = UNDECIDED
+            reason = f"an error of {expected:.1e} of the value is predicted"
         else:
-            verdict, reason = (
-                DEGRADED,
-                f"{error[index]:.1e} of {expected:.1e} predicted from twice the step",
+            verdict = DEGRADED
+            reason = (
+                f"{error[index]:.1e} of {expected:.1e} predicted from twice the step"
             )
         place = float(fine.theta_2[index])
         rows.append(

@@ -97,10 +97,15 @@ def write_outcome(
 
     `read`: returns the results of a task.
     """
-    suite, engines, options = plan.suite, plan.engines, plan.options
+    suite = plan.suite
+    engines = plan.engines
+    options = plan.options
     summary = plan.summarise()
     first_lines = _collect(plan, read, out, summary, progress)
-    pictured = {record.name for record in summary.pictured} if options.drawn else set()
+    if options.drawn:
+        pictured = {record.name for record in summary.pictured}
+    else:
+        pictured = set()
     shown = [
         index
         for index in range(len(suite))
@@ -114,8 +119,12 @@ def write_outcome(
             progress.advance(DRAWING, 1)
     about = describe_run(engines, suite.fingerprint(), describe_scenes(suite))
     write_about(about, out)
-    summary.date, summary.commit = about.date, about.commit
-    summary.asked = make_plain(suite.name(0)) if len(suite) == 1 else ""
+    summary.date = about.date
+    summary.commit = about.commit
+    if len(suite) == 1:
+        summary.asked = make_plain(suite.name(0))
+    else:
+        summary.asked = ""
     if options.against is not None:
         before = open_run(options.against, "--against")
         overview = summary.overview
@@ -153,7 +162,10 @@ def find_since(failure: Row | None, before: Recorded) -> str:
         if (row.scene, row.engine) != (failure.scene, failure.engine):
             continue
         if row.quantity == failure.quantity:
-            held = "It failed too in" if row.failed else "It held in"
+            if row.failed:
+                held = "It failed too in"
+            else:
+                held = "It held in"
             return f"{held} {before.describe()}."
         answered = True
     if answered and failure.quantity == "all":

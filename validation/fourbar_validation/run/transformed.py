@@ -145,7 +145,8 @@ class _Few:
     @cached_property
     def sizes(self) -> _QuantitySizes:
         """Return the sizes of all quantities."""
-        sizes, linkage = Sizes(self.scene, self.solution), self.scene.linkage
+        sizes = Sizes(self.scene, self.solution)
+        linkage = self.scene.linkage
         conditions = [
             find_condition(name, linkage, self.solution) for name in self.quantities
         ]
@@ -187,12 +188,16 @@ class _Few:
 
     def row(self, name: str, transformation: "_Transformation") -> Row:
         """Make the row of a transformation, of the quantity that is worst."""
-        errors, first = transformation.measure(self), 0
+        errors = transformation.measure(self)
+        first = 0
         if transformation.of_forces:
             first = self.forces.start
         theta_1 = self.scene.linkage.ground_angle
         condition = 1.0 / count_half_turns(theta_1, self.command.angle)
-        allowed = 0.0 if transformation.exact else EQUIVALENCE.factor / condition
+        if transformation.exact:
+            allowed = 0.0
+        else:
+            allowed = EQUIVALENCE.factor / condition
         worst = find_worst(errors[:, self.fit].max(axis=1))
         return self.question.row(
             name,
@@ -225,7 +230,9 @@ def _take_few(question: Question) -> _Few:
 
     Raises NotAskedError where it cannot be stated otherwise.
     """
-    solution, at, scene = question.solution, question.at, question.scene
+    solution = question.solution
+    at = question.at
+    scene = question.scene
     if at.speed is None:
         raise NotAskedError("the scene states positions only")
     if at.stroke is not None or at.time is not None:
@@ -292,7 +299,8 @@ def _solve(scene: Scene, command: Command) -> Solution:
 
     Springs count their turns from there.
     """
-    bar, branch = command.bar, int(command.branch[0])
+    bar = command.bar
+    branch = int(command.branch[0])
     begin: Any = {f"theta_{bar}": float(command.angle[0]), "branch": branch}
     return solve(replace(scene, motion=Motion(**begin)), "force", at=command)
 
@@ -353,13 +361,17 @@ def _from_other_end(length: float, pair: tuple[float, float]) -> tuple[float, fl
 
 def _convert_load(load: Load, to: _Conversion, linkage: FourBar) -> Load:
     force = None
-    bar = _OTHER_BAR[load.bar] if to.exchanged else load.bar
+    if to.exchanged:
+        bar = _OTHER_BAR[load.bar]
+    else:
+        bar = load.bar
     places: dict[str, Any] = {}
     if load.force is not None:
         # a direction from the bar's line turns with the coupler's line
-        turned = (
-            math.pi if to.exchanged and load.bar == 3 and load.frame == "bar" else 0.0
-        )
+        if to.exchanged and load.bar == 3 and load.frame == "bar":
+            turned = math.pi
+        else:
+            turned = 0.0
         force = (
             to.length * load.force[0],
             to.direction(load.force[1], load.frame) + turned,
@@ -421,7 +433,8 @@ def _convert_torsion(effect: Torsion, to: _Conversion, linkage: FourBar) -> Tors
     rows = []
     square = to.length * to.length
     for pin, stiffness, rest, preload in effect.springs:
-        sense, line = to.sense, 0.0
+        sense = to.sense
+        line = 0.0
         if to.exchanged:
             sense = -1.0 if pin in ("A", "B") else 1.0
             line = -math.pi
@@ -437,7 +450,10 @@ def _convert_torsion(effect: Torsion, to: _Conversion, linkage: FourBar) -> Tors
 
 
 def _convert_flywheel(effect: Flywheel, to: _Conversion, linkage: FourBar) -> Flywheel:
-    bar = _OTHER_BAR[effect.bar] if to.exchanged else effect.bar
+    if to.exchanged:
+        bar = _OTHER_BAR[effect.bar]
+    else:
+        bar = effect.bar
     return Flywheel(to.length * to.length * effect.inertia, bar)
 
 
@@ -482,7 +498,8 @@ def _convert(scene: Scene, to: _Conversion) -> Scene:
     theta_1 = to.sense * link.ground_angle + to.turn
     drive_bar = scene.drive_bar
     if to.exchanged:
-        bars, theta_1 = bars[::-1], theta_1 + math.pi
+        bars = bars[::-1]
+        theta_1 = theta_1 + math.pi
         drive_bar = _OTHER_BAR.get(drive_bar, drive_bar)
     two, three, four = bars
     terms = [
@@ -514,7 +531,9 @@ def _measure_mirrored(few: _Few) -> Array:
         values = np.array(getattr(other, name))
         if name in PIN_FORCES:
             return values * [1.0, -1.0]
-        return values if name in ("drive_force", "power") else -values
+        if name in ("drive_force", "power"):
+            return values
+        return -values
 
     return few.compare(convert)
 
@@ -531,7 +550,9 @@ def _measure_turned(few: _Few) -> Array:
         if name in PIN_FORCES:
             turned = (values @ [1.0, 1j]) * np.exp(-1j * TURNED)
             return np.stack((turned.real, turned.imag), axis=1)
-        return values - TURNED if name.startswith("theta") else values
+        if name.startswith("theta"):
+            return values - TURNED
+        return values
 
     return few.compare(convert)
 
@@ -604,7 +625,8 @@ def _measure_split_masses(few: _Few) -> Array:
     if not any(bar.mass for bar in scene.linkage.moving):
         raise NotAskedError("no bar has a mass")
     weight = tuple(effect for effect in scene.effects if isinstance(effect, Gravity))
-    loaded, bare = scene, replace(scene, loads=(), effects=weight)
+    loaded = scene
+    bare = replace(scene, loads=(), effects=weight)
     parts = [
         replace(part, linkage=_take_part(scene.linkage, share))
         for part, share in ((loaded, PART), (bare, 1.0 - PART))
@@ -618,7 +640,10 @@ def _take_part(linkage: FourBar, part: float) -> FourBar:
     for bar in linkage.moving:
         assert bar.inertia is not None and bar.centre is not None
         mass = part * bar.mass
-        apart = APART * math.sqrt(bar.inertia / bar.mass) if bar.mass else 0.0
+        if bar.mass:
+            apart = APART * math.sqrt(bar.inertia / bar.mass)
+        else:
+            apart = 0.0
         # the inertia of both parts about the common centre, less what their distance
         # makes
         rest = bar.inertia - PART * (1.0 - PART) * bar.mass * apart * apart
@@ -646,7 +671,8 @@ def _measure_sum(few: _Few, parts: Sequence[Scene], bare: Scene | None = None) -
     names = few.quantities[few.forces]
     solved = [few.solve(part) for part in parts]
     none = None if bare is None else few.solve(bare)
-    totals, summed = [], []
+    totals = []
+    summed = []
     for name in names:
         of_parts = [np.array(getattr(part, name)) for part in solved]
         total = np.sum(of_parts, axis=0)

@@ -35,7 +35,8 @@ BARS = Ranges(
 )
 Scenes = Iterator[tuple[str, Scene]]
 _ROCKERS = (DrawnType.DOUBLE_ROCKER, DrawnType.TRIPLE_ROCKER)
-CRANK, ROCKER = DrawnType.CRANK_ROCKER, DrawnType.TRIPLE_ROCKER
+CRANK = DrawnType.CRANK_ROCKER
+ROCKER = DrawnType.TRIPLE_ROCKER
 REGULAR = (0.5, 0.4, 0.3)
 """rad from the singular position: positions that set the scale of each quantity."""
 TOGGLE = tuple(10.0**-k for k in range(1, 13))
@@ -97,13 +98,15 @@ def _compute_corners(side: float, second_side: float, opposite: float) -> list[f
 
     They are of either sign, if it closes.
     """
-    cosine = (
-        (side * side + second_side * second_side - opposite * opposite)
-        / (2 * side * second_side)
-        if second_side
-        else 2.0
-    )
-    return [math.acos(cosine), -math.acos(cosine)] if abs(cosine) < 1.0 else []
+    if second_side:
+        cosine = (side * side + second_side * second_side - opposite * opposite) / (
+            2 * side * second_side
+        )
+    else:
+        cosine = 2.0
+    if abs(cosine) < 1.0:
+        return [math.acos(cosine), -math.acos(cosine)]
+    return []
 
 
 def find_collinear_3_4(lengths: Lengths) -> list[tuple[float, bool]]:
@@ -149,7 +152,9 @@ def _find_parallel_2_4(lengths: Lengths) -> list[tuple[float, int]]:
 
 def _find_side(one: complex, second: complex) -> int:
     """Return the sign of the rotation from one direction to another."""
-    return 1 if (one.conjugate() * second).imag > 0.0 else -1
+    if (one.conjugate() * second).imag > 0.0:
+        return 1
+    return -1
 
 
 def toggle(*, distances: tuple[float, ...] = TOGGLE, seeds: range = range(2)) -> Scenes:
@@ -186,7 +191,10 @@ def _approach_poles(
     )
     for seed in seeds:
         lengths = draw_linkage(CRANK, seed)
-        poles = _find_parallel_2_4(lengths) if bar == 3 else find_collinear_2_3(lengths)
+        if bar == 3:
+            poles = _find_parallel_2_4(lengths)
+        else:
+            poles = find_collinear_2_3(lengths)
         for number, (psi, branch) in enumerate(poles[:3]):
             yield (
                 f"{seed} {number}",
@@ -250,7 +258,9 @@ def _miss_grashof(
     """
     for gap in gaps:
         for sign in (1.0, -1.0):
-            d, a, b = 0.4, 0.1, 0.25
+            d = 0.4
+            a = 0.1
+            b = 0.25
             scene = dress((d, a, b, d + a - b + sign * gap))
             sweep = Sweep(
                 scene.linkage.ground_angle,
@@ -348,9 +358,10 @@ def scale_loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:
     for k in exponents:
         scaled = []
         for load in base.loads:
-            force = (
-                None if load.force is None else (load.force[0] * 10.0**k, load.force[1])
-            )
+            if load.force is None:
+                force = None
+            else:
+                force = (load.force[0] * 10.0**k, load.force[1])
             scaled.append(replace(load, force=force, moment=load.moment * 10.0**k))
         yield f"1e{k:+d}", replace(base, loads=tuple(scaled))
 

@@ -55,11 +55,9 @@ def draw_product(*draws: Draw) -> Draw:
     return lambda rng: math.prod(draw(rng) for draw in draws)
 
 
-_ANY_ANGLE, _ANY_PART, _EITHER_SIGN = (
-    draw_uniform(-math.pi, math.pi),
-    draw_uniform(0.0, 1.0),
-    draw_uniform(-1.0, 1.0),
-)
+_ANY_ANGLE = draw_uniform(-math.pi, math.pi)
+_ANY_PART = draw_uniform(0.0, 1.0)
+_EITHER_SIGN = draw_uniform(-1.0, 1.0)
 _ANY_SPEED = draw_decades(-1.0, 2.0)
 
 
@@ -155,7 +153,10 @@ def draw_scene(
     loads = tuple(
         _draw_load(rng, linkage, weight, ranges) for _ in range(int(rng.integers(0, 3)))
     )
-    effects: list[Any] = [Gravity()] if rng.random() < ranges.gravity else []
+    if rng.random() < ranges.gravity:
+        effects: list[Any] = [Gravity()]
+    else:
+        effects = []
     couple = 0.1 * weight * max(moving)
     for kind, share in ((Viscous, ranges.viscous), (Friction, ranges.friction)):
         if rng.random() < share:
@@ -391,8 +392,10 @@ _MACHINE_FAMILIES = {
 def draw_random_scene(seed: int, index: int, types: tuple[DrawnType, ...]) -> Scene:
     """Draw a scene of one of the types, taken in turn; without types an uneven one."""
     rng = np.random.default_rng([seed, index])
-    family, name = _UNEVEN_FAMILY, UNEVEN_TYPE
+    family = _UNEVEN_FAMILY
+    name = UNEVEN_TYPE
     if types:
         kind = types[index % len(types)]
-        family, name = _MACHINE_FAMILIES[kind], kind.value
+        family = _MACHINE_FAMILIES[kind]
+        name = kind.value
     return replace(family.draw(rng), title=f"{name} {index}")

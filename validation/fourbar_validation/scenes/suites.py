@@ -170,7 +170,10 @@ def _count_positions(scene: Scene, file: Path) -> int:
     require_steps(scene.motion, MOST_POSITIONS, "in a run", str(file))
     for stated in (scene.motion.angle, scene.motion.law, scene.motion.free):
         if isinstance(stated, (Sweep, Law, Rise, Free)):
-            seconds = stated.duration if isinstance(stated, Free) else 0.0
+            if isinstance(stated, Free):
+                seconds = stated.duration
+            else:
+                seconds = 0.0
             if seconds > _MOST_SECONDS:
                 allowed = (
                     f"must not exceed {_MOST_SECONDS:g} s in a run: engines go through"
@@ -205,11 +208,10 @@ def read_suite(path: Path) -> Files:
         lines = [
             line.partition("#")[0].strip() for line in text.splitlines()
         ]  # one entry each; # begins a comment
-        entries = (
-            tomllib.loads(text).get("scenes")
-            if path.suffix == ".toml"
-            else [line for line in lines if line]
-        )
+        if path.suffix == ".toml":
+            entries = tomllib.loads(text).get("scenes")
+        else:
+            entries = [line for line in lines if line]
     except (ValueError, RecursionError):  # no TOML
         raise refuse(path.name, "is no list of scenes") from None
     if not isinstance(entries, list) or not all(

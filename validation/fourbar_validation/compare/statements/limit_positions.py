@@ -156,9 +156,12 @@ def _compare_change_points(linkage: FourBar) -> Finding:
     """
     d, a, b, c = (Fraction(length) for length in linkage.lengths)
     missing = {0.0: abs(abs(d - a) - abs(b - c)), math.pi: abs(d + a - b - c)}
-    stated, wrong, decided = mobility.change_points(linkage), 0, 0
+    stated = mobility.change_points(linkage)
+    wrong = 0
+    decided = 0
     for psi, gap in missing.items():
-        part, angle = float(gap / (d + a + b + c)), linkage.ground_angle + psi
+        part = float(gap / (d + a + b + c))
+        angle = linkage.ground_angle + psi
         allowed = EQUIVALENCE.factor * max(1.0, abs(angle))
         here = any(
             abs(math.remainder(point - angle, TURN)) <= allowed for point in stated
@@ -176,7 +179,8 @@ def _compute_step_beyond(linkage: FourBar, theta_2: float) -> float:
     The loop then closes, or misses, by BEYOND more.
     """
     d, a, *_ = linkage.lengths
-    psi, little = theta_2 - linkage.ground_angle, _BEYOND * sum(linkage.lengths)
+    psi = theta_2 - linkage.ground_angle
+    little = _BEYOND * sum(linkage.lengths)
     e = max(abs(d - a * np.exp(1j * psi)), little)
     # e grows by d a sin(psi)/e to first order, by d a/(2 e) to second where the bar
     # lies along the ground
@@ -205,7 +209,8 @@ class _Trial(NamedTuple):
     @property
     def places(self) -> list[Place]:
         """Places of the command."""
-        theta_2, branch = self.command.theta_2.tolist(), self.command.branch.tolist()
+        theta_2 = self.command.theta_2.tolist()
+        branch = self.command.branch.tolist()
         return list(zip(theta_2, branch, strict=True))
 
 
@@ -215,18 +220,14 @@ def _try_bar(linkage: FourBar, bar: int) -> _Trial:
         linkage.ground, linkage.bar(bar), second, third, linkage.ground_angle
     )
     shift = math.pi if bar == 4 else 0.0  # the loop runs along bar 4 from B to O4
-    spans, full = (
-        mobility.find_intervals(linkage, bar),
-        mobility.turns_fully(linkage, bar),
-    )
+    spans = mobility.find_intervals(linkage, bar)
+    full = mobility.turns_fully(linkage, bar)
     expected = [((start + stop) / 2.0, True) for start, stop in spans]
     # that the loop closes up to its limits is seen where the limit positions themselves
     # are examined
     for i, (start, stop) in enumerate(() if full else spans):
-        before, after = (
-            (start - spans[i - 1][1]) % TURN,
-            (spans[i + 1 - len(spans)][0] - stop) % TURN,
-        )
+        before = (start - spans[i - 1][1]) % TURN
+        after = (spans[i + 1 - len(spans)][0] - stop) % TURN
         expected.append(
             (
                 start - min(_compute_step_beyond(first, start + shift), 0.5 * before),
@@ -397,11 +398,10 @@ def compare_ranges(
             closes = answer.assembled
         wrong = tried.decidable & (closes != tried.inside)
         angle = float(tried.angles[int(np.argmax(wrong))])
-        what = (
-            f"bar {bar} at {angle!r} rad: the engine finds the opposite"
-            if wrong.any()
-            else "closes where stated"
-        )
+        if wrong.any():
+            what = f"bar {bar} at {angle!r} rad: the engine finds the opposite"
+        else:
+            what = "closes where stated"
         yield Finding(float(np.count_nonzero(wrong)), 0.0, angle, what)
         yield from tried.findings
     yield _compare_change_points(stated.linkage)
@@ -506,17 +506,13 @@ def _check_dead_centres(
             f"branch of a limit of bar {bar}",
         )
     for limit in stated.dead_centres(bar):
-        what, place = (
-            f"bar {bar} at theta_2 = {limit.theta_2!r}",
-            (limit.theta_2, limit.branch),
-        )
+        what = f"bar {bar} at theta_2 = {limit.theta_2!r}"
+        place = (limit.theta_2, limit.branch)
         theta_3, theta_4, omega_3, omega_4 = (
             seen[place][q] for q in ("theta_3", "theta_4", "omega_3", "omega_4")
         )
-        sine, speed = (
-            abs(math.sin(theta_4 - theta_3)),
-            max(1.0, abs(omega_3), abs(omega_4)),
-        )
+        sine = abs(math.sin(theta_4 - theta_3))
+        speed = max(1.0, abs(omega_3), abs(omega_4))
         digits = find_lever(linkage) * sine
         if digits * NOTHING_TO_TELL <= EPS:
             continue

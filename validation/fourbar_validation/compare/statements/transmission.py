@@ -197,11 +197,9 @@ def _list_claims(over: StatedOver, answer: Answer) -> Iterator[_Claim]:
 
     It is held against the engine's angles and speeds.
     """
-    command, linkage, drive = (
-        over.command,
-        over.scene.linkage,
-        over.scene.drive_bar or 2,
-    )
+    command = over.command
+    linkage = over.scene.linkage
+    drive = over.scene.drive_bar or 2
     assert command.omega_2 is not None and answer.assembled is not None
     theta = {
         2: command.theta_2,
@@ -290,8 +288,12 @@ def _compute_to_singular(scene: Scene, command: Command) -> Array:
 
     Bars that must not be collinear are so there; inf if there is none.
     """
-    drive, always = scene.drive_bar or 2, _find_collinear(scene.linkage)
-    dead = mobility.limit_positions(scene.linkage, drive) if drive != 2 else ()
+    drive = scene.drive_bar or 2
+    always = _find_collinear(scene.linkage)
+    if drive != 2:
+        dead = mobility.limit_positions(scene.linkage, drive)
+    else:
+        dead = ()
     theta_2 = command.theta_2
     nearest = np.full(theta_2.shape, math.inf)
     for point, side in [
@@ -366,8 +368,10 @@ def _find_strokes(linkage: FourBar) -> tuple[float, tuple[float, float]] | None:
 
 
 def _compare_time_ratio(stated: StatedTransmission, seen: Seen) -> Iterator[Finding]:
-    linkage, strokes = stated.linkage, stated.strokes
-    ratio, theta_1 = mobility.time_ratio(linkage), linkage.ground_angle
+    linkage = stated.linkage
+    strokes = stated.strokes
+    ratio = mobility.time_ratio(linkage)
+    theta_1 = linkage.ground_angle
     agree = (strokes is None) == (ratio is None)
     yield Finding(float(not agree), 0.0, theta_1, "whether there is a time ratio")
     if strokes is not None and ratio is not None:

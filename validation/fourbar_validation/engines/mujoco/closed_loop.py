@@ -133,7 +133,8 @@ class ClosedLoop(Assembled):
 
     def positions(self) -> dict[str, Array]:
         """Locate pins O4 and A, and B at the end of bar 3 and of bar 4, (2,), m."""
-        x, names = self.data.site_xpos, {"O4": "O4", "A": "A", "B": "B3", "B4": "B4"}
+        x = self.data.site_xpos
+        names = {"O4": "O4", "A": "A", "B": "B3", "B4": "B4"}
         return {name: x[self.site[site]][:2].copy() for name, site in names.items()}
 
     def branch(self, bar: int = 2) -> int:
@@ -199,13 +200,9 @@ class ClosedLoop(Assembled):
 
     def given(self) -> float:
         """Return the acceleration that the flywheel's motor is given, rad/s^2."""
-        return (
-            0.0
-            if self.drive is None
-            else float(
-                self.data.actuator_force[self.drive] / self.model.dof_armature[O2]
-            )
-        )
+        if self.drive is None:
+            return 0.0
+        return float(self.data.actuator_force[self.drive] / self.model.dof_armature[O2])
 
     def crank_torque(self) -> float:
         """Return T2, N m.
@@ -213,7 +210,10 @@ class ClosedLoop(Assembled):
         It is what the flywheel gives the crank, and the motor next to it.
         """
         flywheel = -self.model.dof_armature[O2] * self.data.qacc[O2]
-        motor = 0.0 if self.drive is None else self.data.actuator_force[self.drive]
+        if self.drive is None:
+            motor = 0.0
+        else:
+            motor = self.data.actuator_force[self.drive]
         return float(flywheel + motor)
 
     def drive_column(self, drive_bar: int | None) -> Array:
@@ -250,7 +250,10 @@ class ClosedLoop(Assembled):
         """
         if drive_bar is not None:
             return 0.0
-        (start, end), line, stroke, v = ENDS, self.line(), self.stroke(), self.data.qvel
+        start, end = ENDS
+        line = self.line()
+        stroke = self.stroke()
+        v = self.data.qvel
         x, y = (self.jacobian_at(end) - self.jacobian_at(start)) @ v
         across = (line[0] * y - line[1] * x) / stroke
         return float(
@@ -260,7 +263,8 @@ class ClosedLoop(Assembled):
 
     def rate_at(self, site: str) -> Array:
         """Return the rate of `jacobian_at` at the present speeds, (2, nv)."""
-        dot, number = np.zeros((3, self.model.nv)), self.site[site]
+        dot = np.zeros((3, self.model.nv))
+        number = self.site[site]
         body = self.model.site_bodyid[number]
         mujoco.mj_jacDot(
             self.model, self.data, dot, None, self.data.site_xpos[number], body
@@ -278,7 +282,10 @@ class ClosedLoop(Assembled):
             (self.site[end] for end in ENDS),
             key=lambda site: self.model.site_bodyid[site] == ground,
         )
-        pivot = self.data.site_xpos[self.site["O4"]] if bar == 4 else np.zeros(3)
+        if bar == 4:
+            pivot = self.data.site_xpos[self.site["O4"]]
+        else:
+            pivot = np.zeros(3)
         x, y = (complex(*(self.data.site_xpos[site] - pivot)[:2]) for site in ends)
         return x, y
 
@@ -353,8 +360,14 @@ def solve_couple_elsewhere(
     correction = light.model.dof_armature[O2] * (happened - alpha_2)
     column = loop.drive_column(drive_bar)[: d.qvel.size]
     speed = float(column @ d.qvel)
-    guess = crank_torque * d.qvel[O2] / speed if speed else crank_torque
-    trials = (0.5 * guess, 1.5 * guess) if guess else (-1.0, 1.0)
+    if speed:
+        guess = crank_torque * d.qvel[O2] / speed
+    else:
+        guess = crank_torque
+    if guess:
+        trials = (0.5 * guess, 1.5 * guess)
+    else:
+        trials = (-1.0, 1.0)
     return light.solve_drive(drive_bar, happened, trials, correction)
 
 
@@ -372,7 +385,8 @@ def solve_couple(
     loses digits: each refinement, from where the couple before leads, brings some of
     them back.
     """
-    at_low, at_high = acceleration(low), acceleration(high)
+    at_low = acceleration(low)
+    at_high = acceleration(high)
     slope = (at_high - at_low) / (high - low)
     if slope == 0.0 or not np.isfinite(slope):
         return None

@@ -67,7 +67,9 @@ def find_couple(
         return acceleration(size)
 
     bracketed = bracket_couple(repeatable, wanted, trial, NOISE * sought)
-    return math.nan if bracketed is None else bracketed
+    if bracketed is None:
+        return math.nan
+    return bracketed
 
 
 def bracket_couple(
@@ -96,5 +98,6 @@ def bracket_couple(
                 couple = float(brentq(miss, nearer, farther, xtol=abs(trial) * 1e-15))
                 left = abs(miss(couple))
                 return couple if left <= allowed else None
-        above, below = size, -size
+        above = size
+        below = -size
     return None

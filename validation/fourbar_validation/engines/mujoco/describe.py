@@ -100,7 +100,10 @@ def describe_model(topology: Topology, flywheel: float = 0.0) -> Described:
     )
     for name in OPTIONS:
         setting = getattr(model.opt, name)
-        kind = KINDS[name](setting).name.partition("_")[2] if name in KINDS else ""
+        if name in KINDS:
+            kind = KINDS[name](setting).name.partition("_")[2]
+        else:
+            kind = ""
         described[f"option.{name}"] = ModelEntry(
             WORDS.get(kind, kind) or _read_numbers(setting), "option", name
         )
@@ -134,7 +137,9 @@ def _read_numbers(entry: object) -> Value:
 
 
 def _name_element(tag: str, name: str, number: int) -> str:
-    return f'{tag} "{name}"' if name else f"{tag} {number} (unnamed)"
+    if name:
+        return f'{tag} "{name}"'
+    return f"{tag} {number} (unnamed)"
 
 
 def _describe_bar(topology: Topology, bar: int, flywheel: float) -> Described:
@@ -143,12 +148,16 @@ def _describe_bar(topology: Topology, bar: int, flywheel: float) -> Described:
     The place is from the first pin; all that is welded to the bar is included. The
     armature of a hinge on the ground turns with the bar, and is inertia of it.
     """
-    model, data = topology.model, topology.data
+    model = topology.model
+    data = topology.data
     parts = np.flatnonzero(model.body_weldid == topology.root[bar])
     masses = model.body_mass[parts]
     mass = float(masses.sum())
     places = np.array([topology.in_plane(data.xipos[part]) for part in parts])
-    centre = masses @ places / mass if mass else places[0]
+    if mass:
+        centre = masses @ places / mass
+    else:
+        centre = places[0]
     inertia = 0.0
     for part, part_mass, place in zip(parts, masses, places, strict=True):
         across = data.ximat[part].reshape(3, 3).T @ topology.normal
@@ -158,15 +167,12 @@ def _describe_bar(topology: Topology, bar: int, flywheel: float) -> Described:
         )
     arm = centre - topology.in_plane(topology.world(data, bar, FIRST_PIN[bar]))
     x, y = topology.line(data, bar)
-    angle = (
-        math.remainder(math.atan2(arm[1], arm[0]) - math.atan2(y, x), math.tau)
-        if arm.any()
-        else 0.0
-    )
-    key, element = (
-        f"bars.{BAR_NAMES[bar]}",
-        f'body "{model.body(topology.root[bar]).name}"',
-    )
+    if arm.any():
+        angle = math.remainder(math.atan2(arm[1], arm[0]) - math.atan2(y, x), math.tau)
+    else:
+        angle = 0.0
+    key = f"bars.{BAR_NAMES[bar]}"
+    element = f'body "{model.body(topology.root[bar]).name}"'
     values = {
         "mass": mass,
         "inertia": inertia,
@@ -199,16 +205,15 @@ def _find_armature(topology: Topology, pin: str) -> float:
 
 def _describe_pin(topology: Topology, pin: str) -> Described:
     """Describe what acts at a pin; nothing acts where the loop is cut."""
-    model, key = topology.model, f"pins.{pin}"
+    model = topology.model
+    key = f"pins.{pin}"
     joint = topology.hinge.get(pin)
     if joint is None:
         return {f"{key}.{name}": ModelEntry(0.0) for name in PIN} | {
             f"{key}.range": ModelEntry(FREE)
         }
-    dof, element = (
-        int(model.jnt_dofadr[joint]),
-        _name_element("joint", model.joint(joint).name, joint),
-    )
+    dof = int(model.jnt_dofadr[joint])
+    element = _name_element("joint", model.joint(joint).name, joint)
     described = {}
     for name, (field, attribute, flag) in PIN.items():
         if name == "armature" and pin in _GROUND_PINS:
@@ -235,12 +240,16 @@ def _describe_pin(topology: Topology, pin: str) -> Described:
     described[f"{key}.range"] = ModelEntry(
         FREE if stops is None else stops, element, "range"
     )
-    sense = "counter-clockwise" if topology.sense[pin] > 0 else "clockwise"
+    if topology.sense[pin] > 0:
+        sense = "counter-clockwise"
+    else:
+        sense = "clockwise"
     return described | {f"{key}.positive": ModelEntry(sense, element, "axis")}
 
 
 def _describe_closure(topology: Topology) -> Described:
-    model, number = topology.model, topology.closure
+    model = topology.model
+    number = topology.closure
     described = {
         "closure.pin": ModelEntry(topology.cut),
         "closure.by": ModelEntry(topology.closed_by),
@@ -287,7 +296,8 @@ def _describe_loads(topology: Topology) -> Described:
     the bar's first pin, which tell where the force acts. The drive is taken off, and is
     no load.
     """
-    model, data = topology.model, topology.data
+    model = topology.model
+    data = topology.data
     sums: dict[str, Array] = {}
     described: Described = {}
     for i in sorted({*range(len(model.actuator_trntype))} - {*topology.drives()}):
@@ -295,7 +305,8 @@ def _describe_loads(topology: Topology) -> Described:
         if not bias.any():
             continue  # it exerts what it is told to, and it is told nothing
         number, frame = (int(index) for index in model.actuator_trnid[i])
-        gear, kind = model.actuator_gear[i], model.actuator_trntype[i]
+        gear = model.actuator_gear[i]
+        kind = model.actuator_trntype[i]
         element = _name_element("actuator", model.actuator(i).name, i)
         if kind == mujoco.mjtTrn.mjTRN_JOINT:
             pin = next(pin for pin, joint in topology.hinge.items() if joint == number)
@@ -340,14 +351,13 @@ def _describe_loads(topology: Topology) -> Described:
             )
     for key, (fx, fy, couple, turning, along) in sums.items():
         squared = fx * fx + fy * fy
-        point = (
-            (
+        if squared:
+            point = (
                 (fx * along + fy * turning) / squared,
                 (fy * along - fx * turning) / squared,
             )
-            if squared
-            else (0.0, 0.0)
-        )
+        else:
+            point = (0.0, 0.0)
         described[f"{key}.force"] = ModelEntry((float(fx), float(fy)))
         described[f"{key}.point"] = ModelEntry((float(point[0]), float(point[1])))
         described[f"{key}.couple"] = ModelEntry(
@@ -363,7 +373,8 @@ def _read_bias(model: mujoco.MjModel, actuator: int) -> Array:
     that have no control, those are read whose force is constant: a cogging without a
     period.
     """
-    bias, kinds = model.actuator_biasprm[actuator, :3], mujoco.mjtBias
+    bias = model.actuator_biasprm[actuator, :3]
+    kinds = mujoco.mjtBias
     if model.actuator_biastype[actuator] == kinds.mjBIAS_AFFINE:
         return np.array(bias)
     direct = getattr(kinds, "mjBIAS_DCMOTOR", None)
@@ -379,15 +390,14 @@ def _name_tendon(topology: Topology, number: int) -> str:
 
     Otherwise it is named by the bars that it runs between.
     """
-    model, joints = (
-        topology.model,
-        {joint: pin for pin, joint in topology.hinge.items()},
-    )
+    model = topology.model
+    joints = {joint: pin for pin, joint in topology.hinge.items()}
     parts = []
     for wrap in range(
         model.tendon_adr[number], model.tendon_adr[number] + model.tendon_num[number]
     ):
-        kind, index = mujoco.mjtWrap(model.wrap_type[wrap]), int(model.wrap_objid[wrap])
+        kind = mujoco.mjtWrap(model.wrap_type[wrap])
+        index = int(model.wrap_objid[wrap])
         if kind == mujoco.mjtWrap.mjWRAP_JOINT:
             parts.append(joints[index])
         elif kind == mujoco.mjtWrap.mjWRAP_SITE:
@@ -403,11 +413,9 @@ def _describe_tendons(topology: Topology) -> Described:
 
     Their paths tell several between the same bars apart.
     """
-    model, data, tendons = (
-        topology.model,
-        topology.data,
-        list[tuple[str, tuple[float, ...], int]](),
-    )
+    model = topology.model
+    data = topology.data
+    tendons = list[tuple[str, tuple[float, ...], int]]()
     rest: dict[int, float] = {}
     for i in range(model.ntendon):
         path = []
@@ -455,7 +463,10 @@ def _describe_tendons(topology: Topology) -> Described:
                 written,
             )
         if model.tendon_stiffness[i]:
-            end = ".springlength angle" if i in rest else ".springlength"
+            if i in rest:
+                end = ".springlength angle"
+            else:
+                end = ".springlength"
             lengths = tuple(
                 float(length) + rest.get(i, 0.0)
                 for length in model.tendon_lengthspring[i]
@@ -529,10 +540,8 @@ def _set_attribute(root: ET.Element, entry: ModelEntry, key: str, value: Value) 
         "springref",
         "springlength",
     ):  # described from the bars' lines
-        stated, described = (
-            float(element.attrib[entry.attribute]),
-            np.atleast_1d(entry.value)[0],
-        )
+        stated = float(element.attrib[entry.attribute])
+        described = np.atleast_1d(entry.value)[0]
         value = stated + float(np.atleast_1d(value)[0]) - float(described)
     element.set(entry.attribute, _write_value(value))
     flags = {"range": "limit"} | {
@@ -547,7 +556,10 @@ def _set_attribute(root: ET.Element, entry: ModelEntry, key: str, value: Value) 
 def _write_value(value: Value) -> str:
     if isinstance(value, str):
         return value
-    numbers = value if isinstance(value, tuple) else (value,)
+    if isinstance(value, tuple):
+        numbers = value
+    else:
+        numbers = (value,)
     return " ".join(
         repr(int(number)) if number == int(number) else repr(number)
         for number in numbers
@@ -628,7 +640,8 @@ def _set_load(
         for part, entry in load.items()
     }
     wanted = was | {name: np.atleast_1d(0.0 if value is None else value)}
-    body, actuators = _find(root, f'body "{bar}"'), ET.SubElement(root, "actuator")
+    body = _find(root, f'body "{bar}"')
+    actuators = ET.SubElement(root, "actuator")
     for number, (parts, sign) in enumerate(((was, -1.0), (wanted, 1.0))):
         (fx, fy), (x, y) = (
             np.resize(parts[part], 2) * 1.0 for part in ("force", "point")
@@ -640,7 +653,10 @@ def _set_load(
             pos=_write_value((float(x), float(y), 0.0)),
         )
         gear = sign * np.array((fx, fy, 0.0, 0.0, 0.0, parts["couple"][0]))
-        frame = {"refsite": "O2"} if axes == "world axes" else {}
+        if axes == "world axes":
+            frame = {"refsite": "O2"}
+        else:
+            frame = {}
         ET.SubElement(
             actuators,
             "general",
@@ -662,7 +678,8 @@ def mend_entry(topology: Topology, key: str, value: Value | None) -> bool:
     stop and the motors at a pin are removed, the loop is made as stiff as MuJoCo lets
     it be, and a setting gets its value.
     """
-    model, (subject, _, rest) = topology.model, key.partition(".")
+    model = topology.model
+    subject, _, rest = key.partition(".")
     pin, _, what = rest.partition(".")
     if key == "contacts":
         model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)

@@ -76,17 +76,17 @@ class _Actuated(Driven):
     def __init__(
         self, mjcf: str, omega: float, position: float, velocity: float
     ) -> None:
-        self.kp, self.kv = position, velocity
+        self.kp = position
+        self.kv = velocity
         super().__init__(mjcf, omega)
 
     def add_drive(self, root: ET.Element) -> None:
         """Add kp (act - theta_2) + kv (omega - omega_2), act integrating omega."""
-        kp, kv = (
-            self.kp * self.flywheel * self.omega**2,
-            self.kv * self.flywheel * abs(self.omega),
-        )
+        kp = self.kp * self.flywheel * self.omega**2
+        kv = self.kv * self.flywheel * abs(self.omega)
         actuators = root.find("actuator")
-        actuators = ET.SubElement(root, "actuator") if actuators is None else actuators
+        if actuators is None:
+            actuators = ET.SubElement(root, "actuator")
         servo = {"dyntype": "integrator"} if kp else {}
         servo |= {"gaintype": "fixed", "gainprm": numbers(kp), "biastype": "affine"}
         ET.SubElement(
@@ -130,7 +130,8 @@ class WheelEquality(Driven):
 
     def add_drive(self, root: ET.Element) -> None:
         """Add the wheel last, so that O2, A, O4 stay the first degrees of freedom."""
-        ground, equality = root.find(".//body[@name='ground']"), root.find("equality")
+        ground = root.find(".//body[@name='ground']")
+        equality = root.find("equality")
         assert ground is not None and equality is not None
         wheel = ET.SubElement(ground, "body", name="wheel")
         ET.SubElement(wheel, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")

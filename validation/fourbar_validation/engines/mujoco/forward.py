@@ -48,7 +48,8 @@ FRICTION = (
 class MujocoForward:
     """Free motion of the closed loop with a fixed step, s."""
 
-    name, version = RELEASED, mujoco.__version__
+    name = RELEASED
+    version = mujoco.__version__
 
     def __init__(self, step: float = 1e-3) -> None:
         self.step = step
@@ -82,10 +83,8 @@ class MujocoForward:
         loop.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
         loop.set_state(q_0, scene.motion.omega_2 or 0.0)
         rows = []
-        stepper, work = (
-            Stepper(loop.model, loop.data, timestep),
-            _Work(loop.model, loop.data, timestep),
-        )
+        stepper = Stepper(loop.model, loop.data, timestep)
+        work = _Work(loop.model, loop.data, timestep)
 
         for t in times:
             stepper.to(float(t), lambda _: work.add())
@@ -112,7 +111,10 @@ class _Work:
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, timestep: float
     ) -> None:
-        self.model, self.data, self.timestep, self.done = model, data, timestep, 0.0
+        self.model = model
+        self.data = data
+        self.timestep = timestep
+        self.done = 0.0
         damped = model.dof_damping.any() or model.tendon_damping.any()
         dry = model.dof_frictionloss.any() or model.tendon_frictionloss.any()
         self.any = bool(model.nu or damped or dry)
@@ -157,19 +159,16 @@ class MujocoOneState:
         if isinstance(scene.drive, PointDrive):
             return Answer(self.name, "", refusal=NO_PUSH)
         began = time.perf_counter()
-        setting = (
-            "extrapolated"
-            if len(self.impedances) > 1
-            else f"d = {self.impedances[0]:g}"
-        )
+        if len(self.impedances) > 1:
+            setting = "extrapolated"
+        else:
+            setting = f"d = {self.impedances[0]:g}"
         try:
             rungs = [_compute_at_impedance(scene, command, d) for d in self.impedances]
         except InputError as error:
             return Answer(ONE_STATE, setting, refusal=str(error))
-        values, assembled = (
-            extrapolate(self.impedances, [rung for rung, _ in rungs]),
-            rungs[0][1],
-        )
+        values = extrapolate(self.impedances, [rung for rung, _ in rungs])
+        assembled = rungs[0][1]
         return Answer(
             ONE_STATE,
             setting,
@@ -209,10 +208,8 @@ def _compute_at_impedance(
     """Compute torque and pin forces at every position that assembles."""
     # no flywheel: the torque is on the driven bar itself
     settings = Settings(timestep=1e-3, impedance=d, pad=None, flywheel=0.0)
-    loop, drive = (
-        ClosedLoop(write_mjcf(scene, settings, keyframe=False)),
-        name_driving(scene),
-    )
+    loop = ClosedLoop(write_mjcf(scene, settings, keyframe=False))
+    drive = name_driving(scene)
 
     def read(q: Angles, omega_2: float, alpha_2: float) -> Values:
         loop.set_state(unwind(scene, q), omega_2)

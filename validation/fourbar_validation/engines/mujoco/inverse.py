@@ -53,7 +53,8 @@ def _compile_bars() -> mujoco.MjModel:
     for part in list_parts(uniform(1.0, 1.0, 1.0, 1.0)):
         body = bodies[part.bar] = bodies[part.bearer].add_body(name=f"bar{part.bar}")
         body.explicitinertial = True
-        body.mass, body.inertia = part.mass, [part.inertia] * 3
+        body.mass = part.mass
+        body.inertia = [part.inertia] * 3
         body.add_joint(
             name=FIRST_PIN[part.bar],
             type=mujoco.mjtJoint.mjJNT_HINGE,
@@ -102,8 +103,11 @@ class MujocoTree(Tree):
         self.joint_force = {
             bar: data.cfrc_int[body, 3:5] for bar, body in self.body.items()
         }
-        self.qpos, self.qvel, self.qacc = data.qpos, data.qvel, data.qacc
-        self.xfrc_applied, self.qfrc_inverse = data.xfrc_applied, data.qfrc_inverse
+        self.qpos = data.qpos
+        self.qvel = data.qvel
+        self.qacc = data.qacc
+        self.xfrc_applied = data.xfrc_applied
+        self.qfrc_inverse = data.qfrc_inverse
         self.model_gravity = model.opt.gravity
         self._jac = np.zeros((3, 3))
         self._jacobians, self._rates = np.zeros((2, model.nsite, 3, 3))
@@ -159,13 +163,17 @@ class MujocoTree(Tree):
 
     def accelerations(self, names: Iterable[str]) -> list[list[float]]:
         """Return J a + (dJ/dt) v of sites."""
-        model, data, count = self.model, self.data, 0
+        model = self.model
+        data = self.data
+        count = 0
         for name, J, rate in zip(names, self._jacobians, self._rates, strict=False):
-            site, body = self.site[name], self.body[int(name[-1])]
+            site = self.site[name]
+            body = self.body[int(name[-1])]
             mujoco.mj_jacSite(model, data, J, None, site)
             mujoco.mj_jacDot(model, data, rate, None, self.in_space[name], body)
             count += 1
-        J, rate = self._jacobians[:count], self._rates[:count]
+        J = self._jacobians[:count]
+        rate = self._rates[:count]
         accelerations: list[list[float]] = (J @ self.a + rate @ self.v)[:, :2].tolist()
         return accelerations
 

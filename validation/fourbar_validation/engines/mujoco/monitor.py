@@ -116,7 +116,8 @@ class ResidualMonitor:
     """Looks at a simulated motion with the bars alone, sample after sample."""
 
     def __init__(self, bars: ClosedLoop, drive_bar: int | None) -> None:
-        self.bars, self.drive_bar = bars, drive_bar
+        self.bars = bars
+        self.drive_bar = drive_bar
         self.drive = (COUPLE if drive_bar else LINE).value
         model = self.bars.model
         model.dof_armature[:] = 0.0
@@ -172,7 +173,10 @@ class ResidualMonitor:
             PIN_FORCES, float(np.linalg.norm(loop_force - seen.answer["F43"]))
         )
         for name, error in remaining.items():
-            size = seen.needed if name == COUPLE.value else seen.answer[name]
+            if name == COUPLE.value:
+                size = seen.needed
+            else:
+                size = seen.answer[name]
             expected[name] += min(error, _EXCUSED * float(np.linalg.norm(size)))
         return expected
 
@@ -198,12 +202,12 @@ class ResidualMonitor:
         d.qpos[:], d.qvel[:], d.qacc[:] = q, v, a
         mujoco.mj_inverse(bars.model, d)
         mujoco.mj_fwdActuation(bars.model, d)
-        jacobian, gap = bars.jacobian(), np.array(bars.gap())
-        rate_3, rate_4 = bars.rate_at("B3"), bars.rate_at("B4")
-        needed, drive = (
-            d.qfrc_inverse - d.qfrc_actuator,
-            bars.drive_column(self.drive_bar),
-        )
+        jacobian = bars.jacobian()
+        gap = np.array(bars.gap())
+        rate_3 = bars.rate_at("B3")
+        rate_4 = bars.rate_at("B4")
+        needed = d.qfrc_inverse - d.qfrc_actuator
+        drive = bars.drive_column(self.drive_bar)
         answer: dict[str, Array] = {}
         for name, x in (("theta", q), ("omega", v), ("alpha", a)):
             answer[f"{name}_3"], answer[f"{name}_4"] = x[O2] + x[A], x[O4]
@@ -238,7 +242,9 @@ class ResidualMonitor:
 
         It is closed in position, velocity and acceleration.
         """
-        q, v, a = q.copy(), v.copy(), a.copy()
+        q = q.copy()
+        v = v.copy()
+        a = a.copy()
         others = [A, O4]
         q[others] -= np.linalg.solve(self.bars.jacobian()[:, others], seen.gap)
         motion = self._motion(q, v, a)

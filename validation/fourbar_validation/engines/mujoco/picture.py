@@ -13,7 +13,8 @@ import os
 import subprocess
 import sys
 
-WIDTH, HEIGHT = 480, 360
+WIDTH = 480
+HEIGHT = 360
 SECONDS = 120.0
 """A picture takes half of one; a driver that takes this long for a handful hangs."""
 MOST = 8

@@ -23,7 +23,8 @@ class MujocoInverseLoop(PlainLoop):
 
     def look(self, q: Array) -> tuple[float, float, Array]:
         """Return the gap, m, and its derivative, (2, 3)."""
-        model, data = self.model, self.data
+        model = self.model
+        data = self.data
         data.qpos[:] = q
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
@@ -34,7 +35,8 @@ class MujocoInverseLoop(PlainLoop):
 
     def drift(self, q: Array, v: Array) -> tuple[float, float]:
         """Return the acceleration of the gap where the joints do not accelerate."""
-        model, data = self.model, self.data
+        model = self.model
+        data = self.data
         data.qvel[:] = v
         mujoco.mj_comVel(model, data)
         for end, rate, body in zip(self.at, self.rates, self.bodies, strict=True):

@@ -75,7 +75,9 @@ class SteadySegment:
 
         There are at least as many steps as positions; any where there is but one.
         """
-        return self.run.timestep(settings, at_least=self.width) if self.width else 1e-3
+        if self.width:
+            return self.run.timestep(settings, at_least=self.width)
+        return 1e-3
 
     def seconds(self, index: int) -> float:
         """Return the time at which it passes a position.
@@ -101,12 +103,14 @@ class LawSegment:
         self, law: Law | Rise, command: Command, segment: Sequence[int]
     ) -> None:
         assert command.time is not None
-        self.law, self.time = law, command.time
+        self.law = law
+        self.time = command.time
         self.began, ends = (
             float(command.time[segment[0]]),
             float(command.time[segment[-1]]),
         )
-        self.intervals, self.duration = len(segment) - 1, ends - self.began
+        self.intervals = len(segment) - 1
+        self.duration = ends - self.began
         self.omega = float(law.at(np.array([self.began]))[1][0])
         self.knots = list(law.time)
         self.at_knots = law.at(np.array(law.time))[2].tolist()
@@ -138,7 +142,9 @@ class LawSegment:
 
         That of a rise is its own.
         """
-        instant, t, f = self.began + seconds, self.knots, self.at_knots
+        instant = self.began + seconds
+        t = self.knots
+        f = self.at_knots
         if isinstance(self.law, Rise):
             return float(self.law.at(np.array([instant]))[2][0])
         k = min(max(bisect.bisect_right(t, instant), 1), len(t) - 1)
@@ -182,7 +188,10 @@ class Stepper:
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, timestep: float
     ) -> None:
-        self.model, self.data, self.timestep, self.done = model, data, timestep, 0
+        self.model = model
+        self.data = data
+        self.timestep = timestep
+        self.done = 0
 
     def to(self, seconds: float, each: Callable[[float], None] | None = None) -> None:
         """Step on to the step nearest to a time.
@@ -228,12 +237,10 @@ class SimulatedRun:
         start: tuple[float, float, float],
         timestep: float,
     ) -> None:
-        self.scene, self.loop, self.light, self.motion_segment = (
-            scene,
-            loop,
-            light,
-            motion_segment,
-        )
+        self.scene = scene
+        self.loop = loop
+        self.light = light
+        self.motion_segment = motion_segment
         wound = unwind(scene, start)
         self.turns = wound[O2] - start[O2]
         """Whole turns by which MuJoCo's theta_2 is ahead, rad. Springs at pins count
@@ -245,11 +252,9 @@ class SimulatedRun:
 
     def progress(self) -> float:
         """Return the angle or stroke of what moves as commanded."""
-        return (
-            self.loop.stroke()
-            if (bar := self.motion_segment.bar) is None
-            else self.loop.angle(bar)
-        )
+        if (bar := self.motion_segment.bar) is None:
+            return self.loop.stroke()
+        return self.loop.angle(bar)
 
     def to(self, index: int) -> None:
         """Step on to the step nearest to a position."""
@@ -327,7 +332,10 @@ class Lead:
         self.loop = loop = ClosedLoop(
             write_mjcf(still, replace(RECIPE, timestep=1e-3), keyframe=False)
         )
-        self.bar = None if command.stroke is not None else command.bar
+        if command.stroke is not None:
+            self.bar = None
+        else:
+            self.bar = command.bar
         """Number of the commanded bar; None if the stroke is commanded."""
         if command.stroke is not None:
             command = find_angle(command, motion, *loop.cylinder(command.bar))
@@ -379,7 +387,8 @@ class Lead:
         MuJoCo is evaluating the state.
         """
         loop = copy(self.loop)
-        loop.model, loop.data = model, data
+        loop.model = model
+        loop.data = data
         drift = (loop.rate_at("B3") - loop.rate_at("B4")) @ data.qvel
         due = self.acceleration - loop.drive_drift(self.bar)
         return float(
@@ -445,13 +454,18 @@ def take_full_size(scene: Scene) -> Scene:
     loads = []
     for load in scene.loads:
         peak = _find_peak(load)
-        force = None if load.force is None else (load.force[0] * peak, load.force[1])
+        if load.force is None:
+            force = None
+        else:
+            force = (load.force[0] * peak, load.force[1])
         loads.append(replace(load, force=force, moment=load.moment * peak, table=None))
     return replace(scene, loads=tuple(loads))
 
 
 def _find_peak(load: Load) -> float:
-    return 1.0 if load.table is None else max(map(abs, load.table.factor)) or 1.0
+    if load.table is None:
+        return 1.0
+    return max(map(abs, load.table.factor)) or 1.0
 
 
 def evaluate_loads(scene: Scene) -> dict[str, ActuatorForce]:
@@ -461,14 +475,19 @@ def evaluate_loads(scene: Scene) -> dict[str, ActuatorForce]:
     """
 
     def force_of(load: Load) -> ActuatorForce:
-        table, peak = load.table, _find_peak(load)
+        table = load.table
+        peak = _find_peak(load)
         assert table is not None
-        first, last = table.theta_2[0], table.theta_2[-1]
+        first = table.theta_2[0]
+        last = table.theta_2[-1]
 
         def factor(_: mujoco.MjModel, d: mujoco.MjData) -> float:
             angle = first + (float(d.qpos[O2]) - first) % math.tau
             if angle > last:  # the stages of a step may look beyond the end of a table
-                angle = last if angle - last < first + math.tau - angle else first
+                if angle - last < first + math.tau - angle:
+                    angle = last
+                else:
+                    angle = first
             return look_up(table, angle) / peak
 
         return factor
@@ -489,9 +508,11 @@ def clip_angles(scene: Scene, theta_2: Array) -> Array:
     for load in scene.loads:
         if load.table is None:
             continue
-        first, last = load.table.theta_2[0], load.table.theta_2[-1]
+        first = load.table.theta_2[0]
+        last = load.table.theta_2[-1]
         angle = first + np.remainder(inside - first, math.tau)
-        over, under = angle - last, first + math.tau - angle
+        over = angle - last
+        under = first + math.tau - angle
         outside = over > 0.0
         if not (~outside | (np.minimum(over, under) < OVERRUN)).all():
             raise LimitError(

@@ -53,7 +53,8 @@ def compare_shipped(name: str, scene: Scene, command: Command) -> Row | None:
         NotAssembledError,
     ):  # no file is shipped; the simulation's own row says why
         return None
-    d, size = loop.data, math.fsum(scene.linkage.lengths)
+    d = loop.data
+    size = math.fsum(scene.linkage.lengths)
     errors: list[tuple[float, str]] = []
 
     def closed(what: str) -> None:
@@ -123,11 +124,10 @@ def compare_shipped(name: str, scene: Scene, command: Command) -> Row | None:
         )
     mujoco.mj_step(loop.model, d, STEPS)
     lost = d.time < 0.5 * STEPS * loop.model.opt.timestep
-    speed = (
-        math.inf
-        if lost
-        else abs(float(d.qvel[O2]) - moving) / (SPEED * max(abs(omega), abs(moving)))
-    )
+    if lost:
+        speed = math.inf
+    else:
+        speed = abs(float(d.qvel[O2]) - moving) / (SPEED * max(abs(omega), abs(moving)))
     errors.append(
         (
             speed,
@@ -155,4 +155,6 @@ def _find_not_driven(
         return FASTEST.reason
     ahead = np.array([theta_2, theta_2 + omega_2 * seconds])
     least = compute_least_sine(scene.linkage, ahead, np.array([True, True]))
-    return None if least >= NEAREST_TOGGLE.boundary else NEAREST_TOGGLE.reason
+    if least >= NEAREST_TOGGLE.boundary:
+        return None
+    return NEAREST_TOGGLE.reason

@@ -106,7 +106,8 @@ class MujocoSimulated:
         scene = state_from_pins(scene)
         if isinstance(scene.drive, PointDrive):
             return Answer(self.name, "", refusal=NO_PUSH)
-        began, lead = time.perf_counter(), None
+        began = time.perf_counter()
+        lead = None
         try:
             if scene.motion.free is not None:
                 raise LimitError("a free motion has no commanded sweep")
@@ -117,7 +118,8 @@ class MujocoSimulated:
                 )
             if command.bar != 2 or command.stroke is not None:
                 lead = Lead(scene, command)
-                scene, command = lead.scene, lead.command
+                scene = lead.scene
+                command = lead.command
             _require_run(scene, command if lead is None else lead.of_input)
             answer = _Simulation(self.settings, scene, command, lead).answer()
         except (
@@ -135,7 +137,10 @@ class MujocoSimulated:
 
 def _require_run(scene: Scene, command: Command) -> None:
     """Raise LimitError where this motion of the input is not simulated."""
-    law = scene.motion.law if command.time is not None else None
+    if command.time is not None:
+        law = scene.motion.law
+    else:
+        law = None
     if law is None and any(np.ptp(values) != 0.0 for values in list_speeds(command)):
         raise LimitError(
             "omega_2 or alpha_2 differs from position to position: that is no one"
@@ -208,11 +213,17 @@ class _Simulation:
         *,
         bounded: bool = True,
     ) -> None:
-        self.bounded, self.lead = bounded, lead
-        self.settings, self.command, self.law = settings, command, scene.motion.law
+        self.bounded = bounded
+        self.lead = lead
+        self.settings = settings
+        self.command = command
+        self.law = scene.motion.law
         # the text is that of the command, which a caller may have given instead of the
         # scene's own
-        self.scene = _make_run_scene(scene, command) if lead is None else scene
+        if lead is None:
+            self.scene = _make_run_scene(scene, command)
+        else:
+            self.scene = scene
         self.supplied = evaluate_loads(scene)
         n = len(command.angle)
         values, speed = (
@@ -235,17 +246,17 @@ class _Simulation:
 
     def answer(self) -> Answer:
         """Answer over all positions."""
-        bar, linkage = self.command.bar, self.scene.linkage
+        bar = self.command.bar
+        linkage = self.scene.linkage
         position = Assembler(
             ClosedLoop(self._write_text(1e-3)), bar
         )  # kinematics alone: the timestep plays no part
         assembled = find_assembled(position, self.command, self.order)
         closes = np.array([angles is not None for angles in assembled])
-        least = (
-            compute_least_sine(linkage, self.command.theta_2, closes)
-            if self.lead is None
-            else self.lead.least_sine()
-        )
+        if self.lead is None:
+            least = compute_least_sine(linkage, self.command.theta_2, closes)
+        else:
+            least = self.lead.least_sine()
         if self.bounded and least < NEAREST_TOGGLE.boundary:
             raise LimitError(
                 f"|sin(theta_4 - theta_3)| falls to {least:.1e};"
@@ -311,7 +322,10 @@ class _Simulation:
 
     def _write_text(self, timestep: float, flywheel: float | None = None) -> str:
         """Write the generated MJCF without its keyframe."""
-        heavy = self.settings.flywheel if flywheel is None else flywheel
+        if flywheel is None:
+            heavy = self.settings.flywheel
+        else:
+            heavy = flywheel
         settings = replace(
             self.settings, timestep=timestep, timestep_scale=1.0, flywheel=heavy
         )
@@ -319,7 +333,8 @@ class _Simulation:
 
     def _closes_between(self, position: Assembler, one: int, second: int) -> bool:
         """Tell whether the loop closes everywhere between two positions."""
-        start, stop = float(self.command.angle[one]), float(self.command.angle[second])
+        start = float(self.command.angle[one])
+        stop = float(self.command.angle[second])
         pieces = int(np.ceil(abs(stop - start) / FINE))
         branch = int(self.command.branch[one])
         return all(
@@ -347,11 +362,10 @@ class _Simulation:
             }
         with supply_forces(supplied):
             loop = self._compile_loop(timestep, supplied)
-            light = (
-                None
-                if self.scene.drive_bar == 2
-                else self._compile_loop(timestep, supplied, LIGHT_FLYWHEEL)
-            )
+            if self.scene.drive_bar == 2:
+                light = None
+            else:
+                light = self._compile_loop(timestep, supplied, LIGHT_FLYWHEEL)
             monitor = ResidualMonitor(
                 self._compile_loop(timestep, supplied), self.scene.drive_bar
             )
@@ -376,11 +390,10 @@ class _Simulation:
         self.branch[index] = loop.branch(self.command.bar)
         torque, pins = run.read()
         if torque is None:
-            drive = (
-                "the cylinder"
-                if self.scene.drive
-                else f"the couple on bar {self.scene.drive_bar}"
-            )
+            if self.scene.drive:
+                drive = "the cylinder"
+            else:
+                drive = f"the couple on bar {self.scene.drive_bar}"
             raise LimitError(f"{drive} does not move the input: a pole of its size")
         values: Values = {name_driving(self.scene): torque, **pins}
         if self.scene.drive is not None:
@@ -438,7 +451,10 @@ def observe_order(
         )
         for scale in (4.0, 2.0)
     ]
-    ratio = errors[0] / errors[1] if errors[1] else math.inf
+    if errors[1]:
+        ratio = errors[0] / errors[1]
+    else:
+        ratio = math.inf
     return (
         errors[0],
         errors[1],

@@ -68,7 +68,8 @@ from fourbar_validation.engines.mujoco.runner import (
 from fourbar_validation.engines.mujoco.topology import Topology, find_topology
 from fourbar_validation.engines.tree import solve_closed
 
-ONE_STATE, THROUGH_TIME = "mjcf-one-state", "mjcf-simulated"
+ONE_STATE = "mjcf-one-state"
+THROUGH_TIME = "mjcf-simulated"
 POSITIONS = 37
 """Positions taken of a sweep: a file is judged as a whole, not position by position."""
 MOST_STEPS = 400_000
@@ -214,7 +215,8 @@ def examine_changed(
     The file is without a drive, and first as it is. None stands for an entry that
     cannot be set alone. After PRICING seconds the rest are not evaluated either.
     """
-    start, answered = time.perf_counter(), list[list[Answer] | None]()
+    start = time.perf_counter()
+    answered = list[list[Answer] | None]()
     file = RobotFile(GENERATED, write_mjcf(scene, drive="none"))
     generated = describe_model(_compile_topology(file, {}, scene))
     texts = (set_entry(file.text, generated, key, value) for key, value in changes)
@@ -243,7 +245,8 @@ def examine_mended(
 
     None if it cannot be.
     """
-    start, answered = time.perf_counter(), list[list[Answer] | None]()
+    start = time.perf_counter()
+    answered = list[list[Answer] | None]()
     seen = _compile_topology(file, names, scene)
     for key, value in changes:
         answers = None
@@ -266,7 +269,8 @@ def predict_softness(
     it grows by itself, so the error is measured without anything to compare the file
     with. Empty where no connect or weld closes the loop.
     """
-    answers, seen = [], _compile_topology(file, names, scene)
+    answers = []
+    seen = _compile_topology(file, names, scene)
     if seen.closure is None:
         return {}
     for times in (1.0, 2.0):
@@ -313,7 +317,8 @@ def _choose_positions(command: Command) -> Command:
             " motion through time"
         )
     keep = np.unique(np.linspace(0, n - 1, min(n, POSITIONS)).round().astype(int))
-    omega_2, alpha_2 = float(np.max(command.omega_2)), float(np.max(command.alpha_2))
+    omega_2 = float(np.max(command.omega_2))
+    alpha_2 = float(np.max(command.alpha_2))
     return Command(command.theta_2[keep], command.branch[keep], omega_2, alpha_2)
 
 
@@ -347,14 +352,14 @@ class _UserLoop(Assembled):
             topology.to_joints,
             np.linalg.inv(topology.to_joints),
         )
-        self.crank = (
-            None
-            if topology.cut == "O2"
-            else int(self.model.jnt_dofadr[topology.hinge["O2"]])
-        )
-        self.armature = (
-            0.0 if self.crank is None else float(self.model.dof_armature[self.crank])
-        )
+        if topology.cut == "O2":
+            self.crank = None
+        else:
+            self.crank = int(self.model.jnt_dofadr[topology.hinge["O2"]])
+        if self.crank is None:
+            self.armature = 0.0
+        else:
+            self.armature = float(self.model.dof_armature[self.crank])
         self.flywheel = self._find_flywheel()
         """Part of the armature that keeps the speed, kg m^2. Its torque is that of the
         drive.
@@ -397,7 +402,10 @@ class _UserLoop(Assembled):
                 f"its drive {model.actuator(i).name!r} on pin O2 is taken off: the"
                 " torque is solved for"
             )
-        cylinders = self.topology.cylinders() if self.scene.drive is not None else []
+        if self.scene.drive is not None:
+            cylinders = self.topology.cylinders()
+        else:
+            cylinders = []
         if self.scene.drive is not None and len(cylinders) != 1:
             counted = f"{len(cylinders)} actuators with a control on tendons"
             raise InputError(
@@ -454,10 +462,8 @@ class _UserLoop(Assembled):
         """Return the derivative of the gap by x, (2, 3)."""
         rows = []
         for bar in PINS[self.topology.cut]:
-            body, place = (
-                self.topology.root[bar],
-                self.topology.world(self.data, bar, self.topology.cut),
-            )
+            body = self.topology.root[bar]
+            place = self.topology.world(self.data, bar, self.topology.cut)
             mujoco.mj_jac(self.model, self.data, self._jac, None, place, body)
             rows.append(self.topology.axes @ self._jac @ self.to_joints)
         return np.asarray(rows[0] - rows[1])
@@ -487,7 +493,8 @@ class _UserLoop(Assembled):
 
         The couple of the driven bar is solved for.
         """
-        data, drive = self.data, self.scene.drive_bar
+        data = self.data
+        drive = self.scene.drive_bar
         active = data.eq_active.copy()
         mujoco.mj_resetData(self.model, data)
         data.eq_active[:] = active
@@ -533,11 +540,10 @@ class _UserLoop(Assembled):
         """
         couple = find_couple(self.model, self.data, acceleration, wanted)
         if couple is None:
-            what = (
-                "its cylinder"
-                if self.cylinder is not None
-                else f"a couple on bar {self.scene.drive_bar}"
-            )
+            if self.cylinder is not None:
+                what = "its cylinder"
+            else:
+                what = f"a couple on bar {self.scene.drive_bar}"
             raise LimitError(f"{what} does not move the crank of this model")
         if math.isnan(couple):
             theta_2 = math.degrees(self.topology.angles(self.data)[0])
@@ -554,7 +560,8 @@ class _UserLoop(Assembled):
 
         NaN at a cut pin that no connect or weld holds.
         """
-        data, topology = self.data, self.topology
+        data = self.data
+        topology = self.topology
         on: dict[tuple[int, int], Array] = {}
         for pin in topology.hinge:
             child, parent = topology.turning(pin)
@@ -573,7 +580,8 @@ class _UserLoop(Assembled):
                 (data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY)
                 & (data.efc_id == topology.closure)
             )
-            force = topology.in_plane(data.efc_force[rows[:3]]) if len(rows) else force
+            if len(rows):
+                force = topology.in_plane(data.efc_force[rows[:3]])
             if topology.first == bars[0]:
                 on[bars[1], bars[0]] = force
             else:
@@ -615,11 +623,10 @@ def _answer_one_state(loop: _UserLoop, command: Command) -> Answer:
             f"{contacts} contacts at a position where nothing but pins should touch"
         )
     if loop.unreached:
-        what = (
-            "the cylinder"
-            if loop.cylinder is not None
-            else f"bar {loop.scene.drive_bar}"
-        )
+        if loop.cylinder is not None:
+            what = "the cylinder"
+        else:
+            what = f"bar {loop.scene.drive_bar}"
         places = ", ".join(dict.fromkeys(loop.unreached))
         loop.notes.append(
             f"nothing on {what} gives the commanded acceleration at theta_2 ="
@@ -651,7 +658,8 @@ def answer_through_time(loop: _UserLoop, command: Command) -> Answer:
     if len(segment) < 2:
         raise LimitError("nowhere do two neighbouring positions assemble in this file")
     run = choose_run(command.theta_2[segment], command.omega_2, command.alpha_2)
-    timestep, sense = float(model.opt.timestep), loop.topology.sense["O2"]
+    timestep = float(model.opt.timestep)
+    sense = loop.topology.sense["O2"]
     steps = run.time(run.stop) / timestep
     if not 1.0 <= steps <= MOST_STEPS:
         raise LimitError(
@@ -664,10 +672,8 @@ def answer_through_time(loop: _UserLoop, command: Command) -> Answer:
     names = [*list_unknowns(loop.scene), *MADE]
     # the loop starts exactly closed: only after the first step has it begun to yield
     segment = segment[1:]
-    out, seen = (
-        make_blank(len(segment), names),
-        {"closure_gap_m": 0.0, "speed_error": 0.0},
-    )
+    out = make_blank(len(segment), names)
+    seen = {"closure_gap_m": 0.0, "speed_error": 0.0}
     alarms: list[str] = []
     stepper = Stepper(model, data, timestep)
     for i, index in enumerate(segment):

@@ -34,7 +34,9 @@ _MOST_BODIES = 8
 def _find_body(model: mujoco.MjModel, name: str) -> int | None:
     """Find the body of a name, by what it is welded to; None where there is none."""
     number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
-    return int(model.body_weldid[number]) if number >= 0 else None
+    if number >= 0:
+        return int(model.body_weldid[number])
+    return None
 
 
 def list_bodies(model: mujoco.MjModel) -> str:
@@ -121,7 +123,9 @@ class Topology:
 
     def drives(self) -> list[int]:
         """List the actuators that turn pin O2."""
-        return self.list_actuators(self.hinge["O2"]) if "O2" in self.hinge else []
+        if "O2" in self.hinge:
+            return self.list_actuators(self.hinge["O2"])
+        return []
 
     def list_actuators(self, joint: int) -> list[int]:
         """List the actuators on a joint."""
@@ -136,7 +140,8 @@ class Topology:
 
         It is from the line of its bearer to its bar's.
         """
-        model, joint = self.model, self.hinge[pin]
+        model = self.model
+        joint = self.hinge[pin]
         if not self._is_limited(joint):
             return None
         turned = model.jnt_range[joint] - model.qpos0[model.jnt_qposadr[joint]]
@@ -220,11 +225,11 @@ class Topology:
         """Return advice on names; where all were stated, which they are."""
         if any(role not in self.names for role in roles):
             return f"; {advice}"
-        return (
-            "; stated: " + ", ".join(f"{role}={self.names[role]}" for role in roles)
-            if roles
-            else ""
-        )
+        if roles:
+            return "; stated: " + ", ".join(
+                f"{role}={self.names[role]}" for role in roles
+            )
+        return ""
 
     def _find_in_bar(self, bar: int, world: Array) -> Array:
         body = self.root[bar]
@@ -242,7 +247,8 @@ class Topology:
 
         Two sites may mark it instead.
         """
-        model, kinds = self.model, mujoco.mjtEq
+        model = self.model
+        kinds = mujoco.mjtEq
         for number in range(model.neq):
             kind = kinds(model.eq_type[number])
             if (
@@ -257,9 +263,13 @@ class Topology:
             for bar, (_, world) in zip(bars, ends, strict=True):
                 assert bar is not None
                 self.point[bar, self.cut] = self._find_in_bar(bar, world)
-            self.closure, self.first = number, bars[0]
+            self.closure = number
+            self.first = bars[0]
             by_sites = model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE
-            word = "connect" if kind == kinds.mjEQ_CONNECT else "weld"
+            if kind == kinds.mjEQ_CONNECT:
+                word = "connect"
+            else:
+                word = "weld"
             self.closed_by = f"{word} of {'sites' if by_sites else 'body anchors'}"
             return
         for role, bar in zip(("B3", "B4"), PINS["B"], strict=True):
@@ -338,7 +348,8 @@ class Topology:
         x, y = self.axes
         y = -y if behind else y
         angle = (-self.ground_angle if behind else self.ground_angle) - ground_angle
-        cos, sin = math.cos(angle), math.sin(angle)
+        cos = math.cos(angle)
+        sin = math.sin(angle)
         axes = np.array([cos * x + sin * y, cos * y - sin * x])
         return Topology(self.model, self.names, axes)
 
@@ -364,7 +375,8 @@ class Topology:
     def turned_back(self, bar: int, vector: Array) -> tuple[float, float]:
         """Resolve a vector along a bar's line in the rest state and to its left."""
         x, y = self.in_plane(vector)
-        cos, sin = math.cos(self._line[bar]), math.sin(self._line[bar])
+        cos = math.cos(self._line[bar])
+        sin = math.sin(self._line[bar])
         return float(cos * x + sin * y), float(cos * y - sin * x)
 
     def _convert_to_joints(self) -> Array:
@@ -473,11 +485,10 @@ def find_topology(
             except InputError as error:
                 refused.append(error.allowed)
     if not guesses:
-        few = (
-            "it has fewer bodies on hinges"
-            if len(free) < len(missing)
-            else "no connect, weld or pair of sites closes it"
-        )
+        if len(free) < len(missing):
+            few = "it has fewer bodies on hinges"
+        else:
+            few = "no connect, weld or pair of sites closes it"
         why = refused[0] if refused else few
         nowhere = (
             f"no body is named {', '.join(missing) or 'B3, B4'}, and no guess makes a"

@@ -187,7 +187,8 @@ class TrialSetup:
         motion = scene.motion.replace(
             angle=command.theta_2, speed=self.omega, acceleration=self.alpha
         )
-        self.scene, self.command = replace(scene, motion=motion), command
+        self.scene = replace(scene, motion=motion)
+        self.command = command
         order = order_in_time(command.theta_2, None, self.omega)
         position = Assembler(
             ClosedLoop(write_mjcf(self.scene, Settings(timestep=1e-3), keyframe=False))
@@ -289,10 +290,12 @@ class TrialSetup:
         samples = [index for segment in self.segments for index in segment]
         names = (*MADE, name_driving(self.scene), *PIN_FORCES)
         out = make_blank(len(samples), names)
-        trial, first = Trial(self.command), 0
+        trial = Trial(self.command)
+        first = 0
         with _silence():
             for segment in self.segments:
-                before, rows = trial.steps, slice(first, first + len(segment))
+                before = trial.steps
+                rows = slice(first, first + len(segment))
                 self._run(
                     segment,
                     settings,
@@ -418,17 +421,22 @@ class SimulatedToError:
         There are more while its own residuals say so.
         """
         steps, tc = guess(self.error)
-        spent, runs = 0.0, 0
+        spent = 0.0
+        runs = 0
         for _ in range(ROUNDS):
             answer = MujocoSimulated(make_settings(steps, tc)).answer(scene, command)
             if answer.refusal is not None:
                 return answer
-            spent, runs = spent + answer.evidence["steps"], runs + 1
+            spent = spent + answer.evidence["steps"]
+            runs = runs + 1
             expected = compute_expected_error(scene, answer)
             if expected <= MARGIN * self.error and not answer.alarms:
                 break
             ratio = expected / (MARGIN * self.error)
-            growth = ratio ** (1.0 / ORDER) if np.isfinite(ratio) else _MOST_GROWTH
+            if np.isfinite(ratio):
+                growth = ratio ** (1.0 / ORDER)
+            else:
+                growth = _MOST_GROWTH
             growth = min(max(growth, _LEAST_GROWTH), _MOST_GROWTH)
             # a run has at least as many steps as it has positions to read
             steps_made = float(
@@ -451,11 +459,10 @@ def compute_expected_error(scene: Scene, answer: Answer) -> float:
         if name not in COMPARED_QUANTITIES:
             continue
         values = answer.quantities[name]
-        sizes = (
-            np.where(np.isfinite(values), 1.0, np.nan)
-            if name.startswith("theta")
-            else magnitude(values)
-        )
+        if name.startswith("theta"):
+            sizes = np.where(np.isfinite(values), 1.0, np.nan)
+        else:
+            sizes = magnitude(values)
         finite = np.isfinite(sizes)
         if name == "torque" and scene.drive_bar != 2:
             finite &= mark_turning(answer.quantities[f"omega_{scene.drive_bar}"])
@@ -463,4 +470,6 @@ def compute_expected_error(scene: Scene, answer: Answer) -> float:
             worst = float(
                 np.maximum(worst, divide(predicted[finite].max(), sizes[finite].max()))
             )  # NaN stays NaN
-    return worst if np.isfinite(worst) else float("inf")
+    if np.isfinite(worst):
+        return worst
+    return float("inf")

@@ -51,7 +51,8 @@ def internal_forces(question: Question) -> list[Row]:
     """
     scene = take_few(question)
     command = command_of(scene)
-    answer, solution = ask_free_bodies(scene, command), fourbar.solve(scene)
+    answer = ask_free_bodies(scene, command)
+    solution = fourbar.solve(scene)
     motion = move_bars(scene, command, answer)
     rows = []
     for bar in MOVING_BARS:
@@ -145,7 +146,10 @@ class Piece(BodyWrenches):
         """Add a couple between two bars at their pin."""
         if self.bar in PINS[pin]:
             length = self.motion.linkage.bar(self.bar).length
-            self.place = 0.0 if ENDS[self.bar][0] == pin else length
+            if ENDS[self.bar][0] == pin:
+                self.place = 0.0
+            else:
+                self.place = length
             super().twist_at(pin, couple)
             self.place = 0.0
 
@@ -155,7 +159,8 @@ def free_piece(
 ) -> Piece:
     """Free the piece of a bar beyond a cut."""
     described = scene.linkage.bar(bar)
-    piece, length = Piece(bar, cut, motion), described.length
+    piece = Piece(bar, cut, motion)
+    length = described.length
     uniform = described.inertia is None and described.centre is None
     for pin in ENDS[bar]:
         name = PIN_FORCE[pin]
@@ -184,7 +189,10 @@ def free_piece(
             * radius
             * np.hypot(*answer.quantities[PIN_FORCE[pin]].T),
         )
-    a_pin: Any = motion.swing(2, motion.first_pin[3]) if bar == 3 else 0.0
+    if bar == 3:
+        a_pin: Any = motion.swing(2, motion.first_pin[3])
+    else:
+        a_pin = 0.0
     if uniform:
         for start, end in ((0.0, cut), (cut, length)):
             _push_rigid(
@@ -211,7 +219,8 @@ def _push_rigid(
     The piece is that of a rigid bar between two places.
     """
     start, end = ends
-    middle, bar = 0.5 * (start + end), piece.bar
+    middle = 0.5 * (start + end)
+    bar = piece.bar
     arm = middle * piece.motion.unit[bar]
     piece.push(bar, mass * (gravity - a_pin - piece.motion.swing(bar, arm)), arm)
     piece.place = middle

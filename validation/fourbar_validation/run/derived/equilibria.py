@@ -75,7 +75,8 @@ def equilibria(question: Question) -> Iterator[Row]:
     scene = _at_rest(question.scene)
     if missing := find_missing("flint"):
         raise NotAskedError(missing)
-    theta_2, answer = _list_samples(question), fourbar.equilibrium(question.scene)
+    theta_2 = _list_samples(question)
+    answer = fourbar.equilibrium(question.scene)
     if answer.indifferent:
         raise NotAskedError("the linkage is indifferent")
     branches: tuple[int, ...] = (1, -1)
@@ -144,32 +145,29 @@ def _list_samples(question: Question) -> Array:
 
     They are all that it reaches from the first one, of a sweep those in it.
     """
-    solution, motion, linkage = (
-        question.solution,
-        question.scene.motion,
-        question.scene.linkage,
-    )
-    swept, turn = solution.theta_2[solution.assembled], 2.0 * math.pi
+    solution = question.solution
+    motion = question.scene.motion
+    linkage = question.scene.linkage
+    swept = solution.theta_2[solution.assembled]
+    turn = 2.0 * math.pi
     if not len(swept):
         raise NotAskedError("the linkage assembles at none of its positions")
-    first, away = float(swept[0]), math.inf
+    first = float(swept[0])
+    away = math.inf
     for start, stop in find_intervals(
         linkage
     ):  # at an end of one it is in it but for rounding
         middle = first - math.remainder(first - 0.5 * (start + stop), turn)
         if (outside := abs(first - middle) - 0.5 * (stop - start)) < away:
-            low, high, away = (
-                middle - 0.5 * (stop - start),
-                middle + 0.5 * (stop - start),
-                outside,
-            )
+            low = middle - 0.5 * (stop - start)
+            high = middle + 0.5 * (stop - start)
+            away = outside
     if isinstance(motion.angle, Sweep) or motion.law is not None:
         if turns_fully(linkage):
-            low, high = first - 2.0 * turn, first + 2.0 * turn
-        low, high = (
-            max(low, float(swept.min())),
-            min(high, float(swept.max()), float(swept.min()) + turn),
-        )
+            low = first - 2.0 * turn
+            high = first + 2.0 * turn
+        low = max(low, float(swept.min()))
+        high = min(high, float(swept.max()), float(swept.min()) + turn)
     return np.arange(low + _OFF_GRID * turn / SAMPLES, high, turn / SAMPLES)
 
 
@@ -210,10 +208,8 @@ def _count_missed(
     step that one may be in or not is not counted, nor one at an end of which 320 bits
     find another sign than the free bodies, or none.
     """
-    counted, open_steps = (
-        np.zeros(len(torque) - 1, dtype=int),
-        ~np.isfinite(torque[:-1] * torque[1:]),
-    )
+    counted = np.zeros(len(torque) - 1, dtype=int)
+    open_steps = ~np.isfinite(torque[:-1] * torque[1:])
     for angle, off in places:
         turned = theta_2[0] + np.remainder(angle - theta_2[0], 2.0 * np.pi)
         index = int(np.searchsorted(theta_2, turned)) - 1
@@ -247,7 +243,8 @@ def _judge(scene: Scene, equilibrium: Equilibrium) -> tuple[float, dict[str, flo
     It gives too by how much the equilibrium may be off, rad. No errors where nothing is
     decided: that near to a singular position first order predicts nothing.
     """
-    place, bar = equilibrium.place, int(equilibrium.angle[-1])
+    place = equilibrium.place
+    bar = int(equilibrium.angle[-1])
     theta = {2: place.theta_2, 3: place.theta_3, 4: place.theta_4}
     one, further = (theta[k] for k in MOVING_BARS if k != bar)
     held = _derive(scene, bar, theta[bar], 1 if np.sin(further - one) > 0.0 else -1)
@@ -263,7 +260,10 @@ def _judge(scene: Scene, equilibrium: Equilibrium) -> tuple[float, dict[str, flo
         K * EPS * x.size / abs(x.value) if x.value else math.inf
         for x in (slope, inertia)
     ]
-    off = K * EPS * torque.size / abs(slope.value) if part[0] < 1.0 else math.inf
+    if part[0] < 1.0:
+        off = K * EPS * torque.size / abs(slope.value)
+    else:
+        off = math.inf
     if part[0] < FIRST_ORDER:
         stable = slope.value > 0.0
         if (equilibrium.stability == "stable") != stable or (
@@ -272,11 +272,10 @@ def _judge(scene: Scene, equilibrium: Equilibrium) -> tuple[float, dict[str, flo
             errors["frequency"] = math.inf
         elif stable and part[1] < FIRST_ORDER:
             frequency = math.sqrt(slope.value / inertia.value) / (2.0 * math.pi)
-            apart = (
-                math.inf
-                if equilibrium.frequency is None
-                else abs(equilibrium.frequency - frequency)
-            )
+            if equilibrium.frequency is None:
+                apart = math.inf
+            else:
+                apart = abs(equilibrium.frequency - frequency)
             errors["frequency"] = apart / frequency / (0.5 * sum(part)) * K * EPS
         elif equilibrium.frequency is not None and part[1] >= 1.0:
             errors["frequency"] = math.inf  # of an inertia that is rounding
@@ -284,7 +283,11 @@ def _judge(scene: Scene, equilibrium: Equilibrium) -> tuple[float, dict[str, flo
 
 
 def _divide(apart: float, size: float) -> float:
-    return abs(apart) / size if size else (0.0 if apart == 0.0 else math.inf)
+    if size:
+        return abs(apart) / size
+    if apart == 0.0:
+        return 0.0
+    return math.inf
 
 
 def _derive(
@@ -314,7 +317,8 @@ def _derive(
         if load.table
         for name in OF_PIECE
     }
-    step, commanded = arb(2) ** -STEP_BITS, f"theta_{bar}"
+    step = arb(2) ** -STEP_BITS
+    commanded = f"theta_{bar}"
 
     def derive(**changed: Any) -> tuple[list[Any], dict[str, Any], Any] | None:
         """Return torque, slope, inertia and angles; all outputs; and a ratio.

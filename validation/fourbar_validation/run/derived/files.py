@@ -89,7 +89,8 @@ def _judge_file(
         return [
             Row.unmeasured(question.name, engine, "exact", "all", REFUSES, str(limit))
         ]
-    theirs, rows = _build_scene(held, opened), []
+    theirs = _build_scene(held, opened)
+    rows = []
     with np.errstate(all="ignore"):
         for turns in held.turns:
             answer = ask_free_bodies(
@@ -114,7 +115,8 @@ def _build_scene(held: Contents, scene: Scene) -> Scene:
 
     Its motion and drive are those of another scene.
     """
-    bodies, pins = held.bodies, held.pins
+    bodies = held.bodies
+    pins = held.pins
     span = pins["O4"] - pins["O2"]
     ends = {
         "input": pins["A"] - pins["O2"],
@@ -152,22 +154,20 @@ def _read_sdf(text: str) -> Contents:
     for link in root.iter("link"):
         x, y, _, _, _, turn = numbers(link, "pose")
         centre = complex(*numbers(link, "inertial/pose")[:2])
-        (mass,), (inertia,) = (
-            numbers(link, "inertial/mass"),
-            numbers(link, "inertial/inertia/izz"),
-        )
+        (mass,) = numbers(link, "inertial/mass")
+        (inertia,) = numbers(link, "inertial/inertia/izz")
         bodies[link.get("name", "")] = _FileBody(
             complex(x, y), turn, mass, inertia, centre
         )
     pins: dict[str, complex] = {}
     dynamics: dict[str, dict[str, float]] = {"damping": {}, "friction": {}}
     for joint in root.iter("joint"):
-        pin, child = joint.get("name", ""), bodies[joint.findtext("child", "")]
-        pose = (
-            complex(*numbers(joint, "pose")[:2])
-            if joint.find("pose") is not None
-            else 0j
-        )
+        pin = joint.get("name", "")
+        child = bodies[joint.findtext("child", "")]
+        if joint.find("pose") is not None:
+            pose = complex(*numbers(joint, "pose")[:2])
+        else:
+            pose = 0j
         pins[pin] = child.place + pose * cmath.rect(1.0, child.turn)
         for name, at_pins in dynamics.items():
             if joint.find(f"axis/dynamics/{name}") is not None:
@@ -181,11 +181,9 @@ def _read_sdf(text: str) -> Contents:
 def _read_usd(text: str) -> Contents:
     def numbers(block: str, key: str) -> list[float]:
         match = re.search(rf"{re.escape(key)} = (.*)", block)
-        return (
-            [float(number) for number in re.findall(NUMBER, match[1])]
-            if match
-            else [math.nan] * 4
-        )
+        if match:
+            return [float(number) for number in re.findall(NUMBER, match[1])]
+        return [math.nan] * 4
 
     def turn(block: str, key: str) -> float:
         w, _, _, z = numbers(block, key)
@@ -204,15 +202,14 @@ def _read_usd(text: str) -> Contents:
             complex(*numbers(block, f"{key}")[:2])
             for key in ("xformOp:translate", "physics:centerOfMass")
         )
-        mass, inertia = (
-            numbers(block, "physics:mass")[0],
-            numbers(block, "physics:diagonalInertia")[2],
-        )
+        mass = numbers(block, "physics:mass")[0]
+        inertia = numbers(block, "physics:diagonalInertia")[2]
         bodies[bar] = _FileBody(
             place, turn(block, "xformOp:orient"), mass, inertia, centre
         )
     size = sum(abs(body.place) + abs(body.centre) for body in bodies.values())
-    pins, at_joints = {}, {"ground": 0.0}
+    pins = {}
+    at_joints = {"ground": 0.0}
     for pin in ("O2", "A", "O4", "B"):
         block = blocks[pin]
         ends = {
@@ -233,10 +230,8 @@ def _read_usd(text: str) -> Contents:
         else:
             at_joints[names[1]] = at_joints[names[0]] + between
     closing = at_joints | {"coupler": at_joints["coupler at B"]}
-    (pull,), direction = (
-        numbers(blocks["physics"], "physics:gravityMagnitude"),
-        "physics:gravityDirection",
-    )
+    (pull,) = numbers(blocks["physics"], "physics:gravityMagnitude")
+    direction = "physics:gravityDirection"
     gravity = pull * complex(*numbers(blocks["physics"], direction)[:2])
     return Contents(
         bodies,

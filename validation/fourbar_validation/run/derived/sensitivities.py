@@ -56,7 +56,8 @@ def furnish(scene: Scene, question: Question) -> Scene:
 
     The load is as large as the scene's forces.
     """
-    coupler, first = scene.linkage.coupler, float(question.solution.theta_2[0])
+    coupler = scene.linkage.coupler
+    first = float(question.solution.theta_2[0])
     if not scene.points:
         arms = {
             bar: (0.6 * scene.linkage.bar(bar).length, 0.4 * bar) for bar in (2, 3, 4)
@@ -72,10 +73,8 @@ def furnish(scene: Scene, question: Question) -> Scene:
         and positive.size
         and scene.motion.law is None
     ):
-        force, table = (
-            0.5 * float(np.median(positive)),
-            Table(tuple(first + x for x in _CORNERS), (1.0, -0.5, 2.0, 1.0)),
-        )
+        force = 0.5 * float(np.median(positive))
+        table = Table(tuple(first + x for x in _CORNERS), (1.0, -0.5, 2.0, 1.0))
         load = Load(
             3,
             (force, 0.3),
@@ -91,7 +90,8 @@ def furnish(scene: Scene, question: Question) -> Scene:
 def study(question: Question) -> list[Row]:
     """Judge a square study in which every number varies, member by member."""
     scene = furnish(take_few(question), question)
-    places, key = np.asarray(scene.motion.angle), command_key(scene)
+    places = np.asarray(scene.motion.angle)
+    key = command_key(scene)
     apart = APART
     if is_near_change_point(scene.linkage):
         apart = _APART_NEAR_CHANGE_POINT
@@ -197,7 +197,8 @@ def sensitivity(question: Question) -> list[Row]:
         first, second = (
             _subtract(name, up[name], down[name]) for up, down in (near, far)
         )
-        slope, coarse = (8.0 * first - second) / (12.0 * STEP), first / (2.0 * STEP)
+        slope = (8.0 * first - second) / (12.0 * STEP)
+        coarse = first / (2.0 * STEP)
         terms = np.array(
             [step * derivatives.of(name, key) for key, step in directions.items()]
         )
@@ -235,13 +236,15 @@ def tolerances(question: Question) -> list[Row]:
     They are those of the scene, or those that the run gives it.
     """
     scene = take_few(question)
-    width, names = _GIVEN * min(scene.linkage.lengths), ("input", "coupler", "output")
+    width = _GIVEN * min(scene.linkage.lengths)
+    names = ("input", "coupler", "output")
     defaults = (
         fourbar.Tolerance(f"lengths.{name}", width, name == "output") for name in names
     )
     scene = replace(scene, tolerances=(scene.tolerances or tuple(defaults))[:MOST])
     _require_beside(scene)
-    spread, expected = fourbar.tolerances(scene, SAMPLES), _compute_expected(scene)
+    spread = fourbar.tolerances(scene, SAMPLES)
+    expected = _compute_expected(scene)
     errors: dict[str, Array] = {}
     for name in (*UNKNOWNS, LINE.value):
         parts = [
@@ -329,7 +332,8 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
             for part, values in parts.items()
         }
 
-    weights, off = [], []
+    weights = []
+    off = []
     nodes = [
         [(0.0, 1.0 - 2.0 * w), (x, w), (-x, w)]
         for x, w in (_NODES[tolerance.sigma] for tolerance in scene.tolerances)
@@ -349,7 +353,8 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
         h = SMALL * max(abs(numbers[tolerance.key].number), tolerance.width)
         up, down = (changed({tolerance.key: change}) for change in (h, -h))
         slopes.append({part: (up[part] - down[part]) / (2.0 * h) for part in nominal})
-    rng, w = np.random.default_rng(0), np.array(weights)[:, None]
+    rng = np.random.default_rng(0)
+    w = np.array(weights)[:, None]
     drawn = [
         rng.normal(size=DRAWN) if tolerance.sigma else rng.uniform(-1.0, 1.0, DRAWN)
         for tolerance in scene.tolerances
@@ -370,7 +375,8 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
         first_order = np.sqrt((variances * (slope * widths) ** 2).sum(axis=0))
         bent = divide(np.abs(deviation - first_order), deviation)
         bent = np.maximum(bent, divide(np.abs(mean), deviation) ** 2)
-        percentiles, straight = np.full((2, len(mean)), np.nan), bent <= STRAIGHT
+        percentiles = np.full((2, len(mean)), np.nan)
+        straight = bent <= STRAIGHT
         if straight.any():
             percentiles[:, straight] = np.percentile(
                 samples @ (slope * widths)[:, straight], (1.0, 99.0), axis=0
@@ -383,7 +389,9 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
 def _compute_off(spread: Spread, expected: Expected, slight: float) -> Array:
     """Compute by what part the figures of a spread are off, (n,)."""
     bent = expected.bent
-    every, near, straight = bent >= 0.0, bent <= _NEARLY_STRAIGHT, bent <= STRAIGHT
+    every = bent >= 0.0
+    near = bent <= _NEARLY_STRAIGHT
+    straight = bent <= STRAIGHT
     pairs = [
         (spread.worst, expected.worst, expected.worst, 1.0, every),
         (spread.first_order, expected.first_order, expected.first_order, 1.0, every),

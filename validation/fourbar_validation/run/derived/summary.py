@@ -128,7 +128,9 @@ class _SummaryJudge:
 
         The last position of a closed motion is its first.
         """
-        return slice(None, -1) if self.closed else slice(None)
+        if self.closed:
+            return slice(None, -1)
+        return slice(None)
 
     def ask(self, places: Any) -> Answer:
         """Ask the free bodies at other positions of the motion."""
@@ -190,7 +192,8 @@ def _summarize(question: Question) -> Facts:
 
     Raises NotAskedError if its motion has nothing between its positions, or poles.
     """
-    scene, solution = question.scene, question.solution
+    scene = question.scene
+    solution = question.solution
     listed = isinstance(scene.motion.angle, (float, np.ndarray, FromLimit))
     if listed or len(solution) < 2 or scene.motion.free is not None:
         raise NotAskedError("no sweep or motion law that has a summary")
@@ -239,7 +242,8 @@ def _find_work(judged: _SummaryJudge, answer: Answer) -> tuple[Array, Array]:
 
 def _judge_drive(judged: _SummaryJudge) -> None:
     """Judge peak, mean, power and energies of the drive, as printed and in the JSON."""
-    facts, entry = judged.facts, judged.motor
+    facts = judged.facts
+    entry = judged.motor
     assert facts.peak is not None and facts.duty is not None
     values, speed = _find_work(judged, judged.own)
     if np.abs(values).max() == 0.0:
@@ -278,7 +282,10 @@ def _judge_energy(judged: _SummaryJudge, entry: dict[str, Any], power: Array) ->
     if at.time is not None:
         spans = np.diff(at.time)
     else:
-        speed = at.speed if at.stroke is None else at.stroke_speed
+        if at.stroke is None:
+            speed = at.speed
+        else:
+            speed = at.stroke_speed
         speeds = np.broadcast_to(np.asarray(speed, float), power.shape)[:-1]
         if not np.all(speeds):
             return

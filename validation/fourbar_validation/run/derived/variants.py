@@ -71,7 +71,9 @@ def take_few(question: Question) -> Scene:
 
     Raises NotAskedError where there are none.
     """
-    scene, command, solution = question.scene, question.at, question.solution
+    scene = question.scene
+    command = question.at
+    solution = question.solution
     if scene.motion.law is not None:
         raise NotAskedError("a motion law has no positions of its own choice")
     reference = question.reference
@@ -175,11 +177,10 @@ class SceneFile:
         for key, change in changes.items():
             table, last = _place(tables, key)
             old = table[last]
-            moved = (
-                [_change_entry(entry, change) for entry in old]
-                if isinstance(old, list)
-                else None
-            )
+            if isinstance(old, list):
+                moved = [_change_entry(entry, change) for entry in old]
+            else:
+                moved = None
             table[last] = _change_entry(old, change) if moved is None else moved
         lines = self._lines | {
             key: _write_line(key, value) for key, value in tables.items()
@@ -202,7 +203,9 @@ def _place(document: Any, key: str) -> tuple[Any, Any]:
 
 def _change_entry(quantity: str | float, change: float) -> str | float:
     number, _, unit = str(quantity).partition(" ")
-    return f"{float(number) + change!r} {unit}" if unit else float(number) + change
+    if unit:
+        return f"{float(number) + change!r} {unit}"
+    return float(number) + change
 
 
 def _write_line(key: str, value: Any) -> str:
@@ -212,11 +215,9 @@ def _write_line(key: str, value: Any) -> str:
 def _write_toml(value: Any) -> str:
     if isinstance(value, dict):
         return "{" + ", ".join(_write_line(*entry) for entry in value.items()) + "}"
-    return (
-        "[" + ",\n".join(map(_write_toml, value)) + "]"
-        if isinstance(value, list)
-        else json.dumps(value)
-    )
+    if isinstance(value, list):
+        return "[" + ",\n".join(map(_write_toml, value)) + "]"
+    return json.dumps(value)
 
 
 def ask_free_bodies(scene: Scene, command: Command | None = None) -> Answer:
@@ -357,7 +358,9 @@ def take_member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
     def take(value: Any) -> Any:
         if isinstance(value, dict):
             return {name: values[index] for name, values in value.items()}
-        return value[index] if isinstance(value, np.ndarray) else value
+        if isinstance(value, np.ndarray):
+            return value[index]
+        return value
 
     taken = {field.name: take(getattr(study, field.name)) for field in fields(study)}
     taken |= {"at": study.at.part(index), "ground": None, "lengths": None}

@@ -247,4 +247,6 @@ def _write(value: object) -> str:
     """Write a value as MJCF does."""
     if isinstance(value, tuple):
         return " ".join(f"{number:.6g}" for number in value)
-    return value if isinstance(value, str) else f"{value:.6g}"
+    if isinstance(value, str):
+        return value
+    return f"{value:.6g}"

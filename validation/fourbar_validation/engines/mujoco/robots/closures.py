@@ -136,7 +136,8 @@ def describe_equality(model: mujoco.MjModel, number: int) -> str:
     if model.equality(number).name:
         return str(model.equality(number).name)
     kind = KINDS.get(int(model.eq_type[number]))
-    first, second = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
+    first = int(model.eq_obj1id[number])
+    second = int(model.eq_obj2id[number])
     if kind in ("connect", "weld"):
         names = [name_body(model, body) for body in find_tied_bodies(model, number)]
     elif kind == "joint":
@@ -162,7 +163,8 @@ class _ClosureEnd:
 
 def _find_ends(posed: PosedRobot, number: int) -> tuple[_ClosureEnd, _ClosureEnd]:
     """Locate both ends of a connect or a weld."""
-    model, data = posed.model, posed.data
+    model = posed.model
+    data = posed.data
     bodies = find_tied_bodies(model, number)
     if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
         sites = (int(model.eq_obj1id[number]), int(model.eq_obj2id[number]))
@@ -203,9 +205,10 @@ class _Chain:
                 joints = list_joints(self.model, body)
                 moving = [joint for joint in joints if joint not in finder.held]
                 for place, joint in reversed(list(enumerate(moving))):
-                    bearer = (
-                        None if place else finder.root[find_parent(self.model, body)]
-                    )
+                    if place:
+                        bearer = None
+                    else:
+                        bearer = finder.root[find_parent(self.model, body)]
                     side.append((joint, finder.root[body], bearer))
             sides.append(side)
         for joint, _, bearer in sides[0]:
@@ -215,7 +218,10 @@ class _Chain:
         downward = list(reversed(sides[1]))
         for place, (joint, _, _) in enumerate(downward):
             self.joints.append(joint)
-            deeper = downward[place + 1][2] if place + 1 < len(downward) else None
+            if place + 1 < len(downward):
+                deeper = downward[place + 1][2]
+            else:
+                deeper = None
             last = place + 1 == len(downward)
             self.bars.append(finder.root[second] if last else deeper)
 
@@ -229,8 +235,10 @@ class _Finder:
     """Four-bars of one posed model."""
 
     def __init__(self, posed: PosedRobot, options: PoseOptions) -> None:
-        self.posed, self.options = posed, options
-        self.model, self.data = posed.model, posed.data
+        self.posed = posed
+        self.options = options
+        self.model = posed.model
+        self.data = posed.data
         self.held = {find_joint(self.model, name, "--hold") for name in options.held}
         self.root = find_roots(self.model, self.held)
         self.before = mujoco.MjData(self.model)
@@ -284,7 +292,9 @@ class _Finder:
             describe_equality(self.model, other) for other in range(self.model.neq)
         ]
         same = [other for other, text in enumerate(names) if text == name]
-        return name if len(same) == 1 else f"{name}-{same.index(number) + 1}"
+        if len(same) == 1:
+            return name
+        return f"{name}-{same.index(number) + 1}"
 
     def _is_pin(self, number: int) -> bool:
         """Return True for a connect, and for a weld that lets its bodies turn."""
@@ -295,7 +305,8 @@ class _Finder:
     def _describe_mimic(self, number: int) -> str:
         """Write which joint follows which, by which polynomial."""
         model = self.model
-        first, second = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
+        first = int(model.eq_obj1id[number])
+        second = int(model.eq_obj2id[number])
         coefficients = " ".join(f"{c:.6g}" for c in model.eq_data[number, :5])
         follower = name_joint(model, first)
         if second < 0:
@@ -374,7 +385,10 @@ class _Finder:
         names = [name_joint(self.model, j) for j in chain.joints]
         count = NUMBERS.get(hinges, f"{hinges} hinges")
         if freedoms <= 0:
-            closer = "" if is_pin else "a weld that leaves no freedom: "
+            if is_pin:
+                closer = ""
+            else:
+                closer = "a weld that leaves no freedom: "
             return f"{closer}{count} in a plane cannot move"
         motors = self._list_motors(chain.joints)
         driven = {joint for joint, _ in motors}
@@ -395,12 +409,13 @@ class _Finder:
         candidates.sort(key=lambda name: name not in springs)
         shared = self._list_shared(chain, number)
         also = f"; {shared}" if shared else ""
-        by = (
-            f", driven by {len(motors)} motors "
-            f"({', '.join(self._name_motor(*motor) for motor in motors)})"
-            if len(motors) > 1
-            else ""
-        )
+        if len(motors) > 1:
+            by = (
+                f", driven by {len(motors)} motors "
+                f"({', '.join(self._name_motor(*motor) for motor in motors)})"
+            )
+        else:
+            by = ""
         if freedoms == 2:
             which = f"--hold {candidates[0]}"
             others = candidates[1:]
@@ -434,7 +449,9 @@ class _Finder:
             carried = {self._find_bar(end.body, bars) for end in ends}
             if len(carried - {None}) and len(carried) > 1:
                 names.append(self._name(other))
-        return f"{', '.join(names)} ties its bars too" if names else ""
+        if names:
+            return f"{', '.join(names)} ties its bars too"
+        return ""
 
     def _find_bar(self, body: int, bars: set[int]) -> int | None:
         """Return the bar that carries a body, however far down.
@@ -449,7 +466,8 @@ class _Finder:
 
     def _list_motors(self, joints: Sequence[int]) -> list[tuple[int, int]]:
         """List (joint, actuator) of what takes a control and acts on these joints."""
-        model, transmission = self.model, mujoco.mjtTrn
+        model = self.model
+        transmission = mujoco.mjtTrn
         motors = []
         for number in range(model.nu):
             kind = transmission(int(model.actuator_trntype[number]))
@@ -575,7 +593,10 @@ class _Finder:
             return chosen, [
                 f"the motor on {names} acts between two moving bars: {taken}"
             ]
-        acts = f"{by} acts on it" if by else "no motor acts on it"
+        if by:
+            acts = f"{by} acts on it"
+        else:
+            acts = "no motor acts on it"
         return chosen, [f"{acts}: {taken}"]
 
     def _find_pushed(self, at_ground: list[int], number: int) -> tuple[int | None, str]:
@@ -661,8 +682,11 @@ class _Layout:
         hinges: dict[str, int],
         equality: int,
     ) -> None:
-        self.finder, self.bodies, self.hinges = finder, bodies, hinges
-        self.model, self.data = finder.model, finder.data
+        self.finder = finder
+        self.bodies = bodies
+        self.hinges = hinges
+        self.model = finder.model
+        self.data = finder.data
         self.ends = _find_ends(finder.posed, equality)
         self.remarks: list[str] = []
         self.senses: dict[str, float] = {}

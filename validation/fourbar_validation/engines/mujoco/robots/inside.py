@@ -219,9 +219,12 @@ class LoopInside:
         ------
         LimitError : the loop does not close at its theta_2, or no couple moves it.
         """
-        model, data = self.model, self.data
-        qpos, qvel = qpos.copy(), qvel.copy()
-        theta_2, omega_2 = self.angle(qpos), float(self.sense * qvel[self.drive])
+        model = self.model
+        data = self.data
+        qpos = qpos.copy()
+        qvel = qvel.copy()
+        theta_2 = self.angle(qpos)
+        omega_2 = float(self.sense * qvel[self.drive])
         closed = self.state(theta_2, omega_2)
         if closed is None:
             raise LimitError(f"the loop does not close at theta_2 = {theta_2:.6g} rad")
@@ -253,7 +256,8 @@ class LoopInside:
 
         Their dry friction has not reached its couple.
         """
-        model, data = self.model, self.data
+        model = self.model
+        data = self.data
         rubbing = (
             data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
         )
@@ -282,12 +286,14 @@ class LoopInside:
 
         Return all accelerations too, (nv,).
         """
-        model, data = self.closure, self.closing
+        model = self.closure
+        data = self.closing
         data.qpos[:], data.qvel[:] = state.qpos, state.qvel
         mujoco.mj_forward(model, data)
         rows = data.efc_J.reshape(-1, model.nv)[: data.nefc]
         # MuJoCo's reference is -(dJ/dt) v - B (J v) - K I r
-        damper, spring = data.efc_KBIP[: data.nefc, 1], data.efc_KBIP[: data.nefc, 0]
+        damper = data.efc_KBIP[: data.nefc, 1]
+        spring = data.efc_KBIP[: data.nefc, 0]
         spring = spring * data.efc_KBIP[: data.nefc, 2]
         drift = data.efc_aref[: data.nefc] + damper * (rows @ state.qvel)
         drift = drift + spring * data.efc_pos[: data.nefc]
@@ -312,7 +318,8 @@ class LoopInside:
 
         The hinges are those that are not driven.
         """
-        model, data = self.model, self.data
+        model = self.model
+        data = self.data
         accelerations = start.copy()
         mujoco.mj_forward(model, data)
         loads = data.qfrc_actuator.copy()
@@ -337,7 +344,8 @@ class LoopInside:
                 moved[dof] += size
                 slopes[:, column] = (forces(moved) - left)[passive] / size
             step = np.linalg.lstsq(slopes, -left[passive], rcond=None)[0]
-            part, before = 1.0, np.abs(left[passive]).max()
+            part = 1.0
+            before = np.abs(left[passive]).max()
             while True:
                 moved = accelerations.copy()
                 moved[passive] += part * step
@@ -347,7 +355,8 @@ class LoopInside:
                 part *= 0.5
             if np.abs(trial[passive]).max() >= before:
                 break
-            accelerations, left = moved, trial
+            accelerations = moved
+            left = trial
         forces(accelerations)
         return np.asarray(left)
 
@@ -370,7 +379,8 @@ class LoopInside:
                 force, bar = self._read_closure(data, pin)
             else:
                 body = int(self.model.jnt_bodyid[joint])
-                force, bar = self._read_hinge(data, body), self._find_bar(body, pin)
+                force = self._read_hinge(data, body)
+                bar = self._find_bar(body, pin)
             sign = 1.0 if bar == _FORCE_ON[name] else -1.0
             forces[name] = sign * (axes @ force)
         return forces
@@ -501,7 +511,9 @@ class LoopInside:
         if stiffness > 0.0:
             return float(stiffness)
         # stated as -stiffness and -damping: that of a critically damped closure
-        return 2.0 / abs(float(damping)) if damping else 0.0
+        if damping:
+            return 2.0 / abs(float(damping))
+        return 0.0
 
     def answer_under_torque(
         self, theta_2: Iterable[float], torque: float, seconds: float

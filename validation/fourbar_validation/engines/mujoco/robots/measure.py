@@ -84,10 +84,16 @@ def measure_loops(
             loops = [min(loops, key=lambda one: min(_miss_lengths(scene, one)))]
         measured = []
         for one in loops:
-            loop = one if scene is None else _turn_to(scene, posed, one, options)
+            if scene is None:
+                loop = one
+            else:
+                loop = _turn_to(scene, posed, one, options)
             made = make_scene(compiled, posed, loop, options.speed, loop.name)
             stated = made.scene if scene is None else scene
-            remarks = made.remarks if scene is None else loop.remarks
+            if scene is None:
+                remarks = made.remarks
+            else:
+                remarks = loop.remarks
             share = 1.0 / len(loops)
             measurement = _measure_loop(posed.model, loop, stated, options, file, share)
             measured.append(replace(measurement, remarks=(*remarks,)))
@@ -149,7 +155,8 @@ def _measure_loop(
         )
     closing = motion._replace(theta_2=tuple(row.theta_2 for row in states.rows))
     through: InsideAnswer | None = None
-    refusal, influence = "", math.nan
+    refusal = ""
+    influence = math.nan
     try:
         if motion.omega_2 == 0.0 or len(closing.theta_2) < 2:
             raise LimitError("nothing moves: a sweep at a speed is needed")
@@ -210,7 +217,8 @@ def _compare(one: InsideAnswer, other: InsideAnswer) -> float:
     It is over the largest of each quantity. Each is the error at its own state: the
     motions differ too, and near a limit position the forces with them.
     """
-    scales, worst = one.scales(), 0.0
+    scales = one.scales()
+    worst = 0.0
     if one.lost or other.lost:
         return math.inf
     for name, scale in scales.items():

@@ -152,7 +152,9 @@ def _find_line(
         if directions:
             first, *others = directions
             spread = (abs(math.remainder(one - first, math.tau)) for one in others)
-            return first if max(spread, default=0.0) <= _SAME_LENGTH else None
+            if max(spread, default=0.0) <= _SAME_LENGTH:
+                return first
+            return None
     return None
 
 

@@ -74,7 +74,10 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
     tied = {*closing.joints, *fixed}
     outside = [joint for joint in _find_outside(model, stated) if joint in tied]
     names = _list_some([name_joint(model, joint) for joint in outside])
-    notes = [f"outside their ranges {origin}: {names}"] if outside else []
+    if outside:
+        notes = [f"outside their ranges {origin}: {names}"]
+    else:
+        notes = []
     before = closing.size(stated)
     if before <= CLOSED and not set(outside) - fixed:
         return PosedRobot(model, _evaluate(model, stated), stated, tuple(notes))
@@ -156,7 +159,8 @@ def _list_bounds(model: mujoco.MjModel) -> tuple[Array, Array]:
 
     It is infinite if it has none.
     """
-    low, high = np.full(model.nv, -np.inf), np.full(model.nv, np.inf)
+    low = np.full(model.nv, -np.inf)
+    high = np.full(model.nv, np.inf)
     for joint in range(model.njnt):
         if model.jnt_limited[joint] and int(model.jnt_type[joint]) in UNITS:
             dof = model.jnt_dofadr[joint]
@@ -174,7 +178,10 @@ def _evaluate(model: mujoco.MjModel, qpos: Array) -> mujoco.MjData:
 
 
 def _list_some(names: list[str], most: int = 6) -> str:
-    more = f" and {len(names) - most} more" if len(names) > most else ""
+    if len(names) > most:
+        more = f" and {len(names) - most} more"
+    else:
+        more = ""
     return ", ".join(names[:most]) + more
 
 
@@ -194,7 +201,10 @@ class _Closing:
 
     def _list_dofs(self, joint: int) -> list[int]:
         first = int(self.model.jnt_dofadr[joint])
-        count = 3 if int(self.model.jnt_type[joint]) == BALL else 1
+        if int(self.model.jnt_type[joint]) == BALL:
+            count = 3
+        else:
+            count = 1
         return list(range(first, first + count))
 
     def _residuals(self) -> tuple[Array, Array]:
@@ -247,10 +257,8 @@ class _Closing:
         qpos = start.copy()
         for joint in self.joints:
             if int(self.model.jnt_type[joint]) in UNITS:
-                address, dof = (
-                    self.model.jnt_qposadr[joint],
-                    int(self.model.jnt_dofadr[joint]),
-                )
+                address = self.model.jnt_qposadr[joint]
+                dof = int(self.model.jnt_dofadr[joint])
                 qpos[address] = np.clip(qpos[address], self.low[dof], self.high[dof])
         return qpos
 
@@ -272,7 +280,8 @@ class _Closing:
 
 def _list_tied_joints(model: mujoco.MjModel) -> list[int]:
     """List the joints on which an active equality depends."""
-    kinds, joints = mujoco.mjtEq, set[int]()
+    kinds = mujoco.mjtEq
+    joints = set[int]()
     for number in range(model.neq):
         if not model.eq_active0[number]:
             continue

@@ -192,7 +192,9 @@ def _miss_output(scene: Scene, theta_1: float, theta_2: float, theta_4: float) -
     branch = with_signs(linkage, Command(angle, sign, None, 0.0)).branch
     output = float(close(linkage, angle, branch).theta[1, 0])
     away = output - linkage.ground_angle - (theta_4 - theta_1)
-    return abs(math.remainder(away, math.tau)) if math.isfinite(away) else math.inf
+    if math.isfinite(away):
+        return abs(math.remainder(away, math.tau))
+    return math.inf
 
 
 def is_seen_from_behind(
@@ -225,7 +227,9 @@ class _SceneOfLoop:
     def __init__(
         self, compiled: CompiledRobot, posed: PosedRobot, loop: RobotLoop
     ) -> None:
-        self.model, self.data, self.loop = posed.model, posed.data, loop
+        self.model = posed.model
+        self.data = posed.data
+        self.loop = loop
         self.remarks: list[str] = []
         ground = self.data.xmat[loop.bodies[1][0]].reshape(3, 3)
         self.normal = ground @ loop.axis
@@ -241,7 +245,8 @@ class _SceneOfLoop:
 
     def write_parts(self) -> tuple[str, ...]:
         """Say which joint is which pin, which body which bar, and what is held."""
-        model, loop = self.model, self.loop
+        model = self.model
+        loop = self.loop
         closing = loop.name if loop.cut else ""
         hinges = {pin: name_joint(model, joint) for pin, joint in loop.hinges.items()}
         pins = (f"{pin} {hinges.get(pin, closing)}" for pin in PAIRS)
@@ -318,7 +323,8 @@ class _SceneOfLoop:
 
     def _lump(self, bar: int) -> _Lump:
         """Sum what a bar carries."""
-        model, data = self.model, self.data
+        model = self.model
+        data = self.data
         bodies = self.carried[bar]
         masses = model.body_mass[bodies]
         mass = float(masses.sum())
@@ -335,7 +341,8 @@ class _SceneOfLoop:
 
     def _list_armature(self) -> dict[str, float]:
         """Return the armature of each hinge that has any, by its pin, kg m^2."""
-        model, armature = self.model, dict[str, float]()
+        model = self.model
+        armature = dict[str, float]()
         for pin, joint in self.loop.hinges.items():
             size = _reflect_armature(model, joint)
             if size:
@@ -391,7 +398,8 @@ class _SceneOfLoop:
         A scene counts its rest angle within half a turn where the motion begins; the
         couple of whole turns beyond is a preload.
         """
-        model, loop = self.model, self.loop
+        model = self.model
+        loop = self.loop
         if not is_enabled(model, "spring", "passive"):
             return
         for pin, joint in hinges.items():
@@ -416,7 +424,8 @@ class _SceneOfLoop:
 
         They act where the bodies have them.
         """
-        model, data = self.model, self.data
+        model = self.model
+        data = self.data
         if not hasattr(model, "body_gravcomp"):
             return
         for bar in MOVING_BARS:
@@ -426,7 +435,8 @@ class _SceneOfLoop:
             if not force:
                 continue
             place = self._find_polar(bar, lifted @ data.xipos[bodies] / lifted.sum())
-            size, angle = round_off(abs(force)), _round_angle(cmath.phase(force))
+            size = round_off(abs(force))
+            angle = _round_angle(cmath.phase(force))
             from_pin = (round_off(place[0]), _round_angle(place[1]))
             yield Load(bar, (size, angle), from_pin=from_pin)
 
@@ -438,9 +448,11 @@ class _SceneOfLoop:
         theta_2 = self.loop.angles[1]
         low, high = self._find_range("O2", theta_2)
         first, last = _find_assembling(linkage, theta_2)
-        low, high = max(low, first), min(high, last)
+        low = max(low, first)
+        high = min(high, last)
         if math.isinf(low) and math.isinf(high):
-            low, high = theta_2, theta_2 + math.tau
+            low = theta_2
+            high = theta_2 + math.tau
         low, high = max(low, high - math.tau), min(high, low + math.tau)
         reach = np.linspace(low, high, SAMPLES + 1)
         angles = np.union1d(reach, [theta_2])
@@ -475,7 +487,8 @@ class _SceneOfLoop:
 
         They are in rad. `beta`: that in the pose.
         """
-        model, loop = self.model, self.loop
+        model = self.model
+        loop = self.loop
         joint = loop.hinges[pin]
         if not model.jnt_limited[joint] or not is_enabled(model, "limit", "constraint"):
             return -math.inf, math.inf
@@ -506,7 +519,8 @@ class _SceneOfLoop:
 
         `theta_2`: that of the pose, counted in the turns of the sweep.
         """
-        theta_1, theta_4 = linkage.ground_angle, self.loop.angles[3]
+        theta_1 = linkage.ground_angle
+        theta_4 = self.loop.angles[3]
         apart = [
             _miss_output(
                 Scene(linkage, Motion(branch=branch)), theta_1, theta_2, theta_4
@@ -525,7 +539,8 @@ class _SceneOfLoop:
 
     def _remark_what_is_left_out(self, lumps: dict[int, _Lump]) -> None:
         """Name what acts on the loop and is not in the scene."""
-        model, loop = self.model, self.loop
+        model = self.model
+        loop = self.loop
         across = float(self.gravity @ self.normal)
         weights = {bar: abs(lump.mass * across) for bar, lump in lumps.items()}
         if abs(across) > _ACROSS * float(np.linalg.norm(self.gravity)):
@@ -570,7 +585,8 @@ class _SceneOfLoop:
 
         The motor of the driven hinge is left out.
         """
-        model, bodies = self.model, {b for c in self.carried.values() for b in c}
+        model = self.model
+        bodies = {b for c in self.carried.values() for b in c}
         joints = {*self.loop.hinges.values()}
         for number in range(model.ntendon):
             start = int(model.tendon_adr[number])

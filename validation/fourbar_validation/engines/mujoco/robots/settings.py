@@ -88,12 +88,14 @@ def _set_settings(
         changed.eq_solimp[equality] = settings.solimp
     option = changed.opt
     option.timestep = settings.timestep
-    integrators, solvers = mujoco.mjtIntegrator, mujoco.mjtSolver
+    integrators = mujoco.mjtIntegrator
+    solvers = mujoco.mjtSolver
     option.integrator = int(
         getattr(integrators, f"mjINT_{settings.integrator.upper()}")
     )
     option.solver = int(getattr(solvers, f"mjSOL_{settings.solver.upper()}"))
-    option.iterations, option.tolerance = settings.iterations, settings.tolerance
+    option.iterations = settings.iterations
+    option.tolerance = settings.tolerance
     return changed
 
 
@@ -107,7 +109,8 @@ class SettingsSearch:
         motion: LoopMotion,
         share: float = 1.0,
     ) -> None:
-        self.model, self.loop = model, loop
+        self.model = model
+        self.loop = loop
         self.motion = motion.thin_out(POSITIONS)
         self.own = read_settings(model, loop)
         self.tried: dict[RobotSettings, TriedSettings] = {}
@@ -133,7 +136,8 @@ class SettingsSearch:
         try:
             states = _find_worst(inside.answer_states(*motion))
             answer = inside.answer_through_time(*motion)
-            through, seconds = _find_worst(answer), answer.seconds_per_step
+            through = _find_worst(answer)
+            seconds = answer.seconds_per_step
             gap = max((row.gap for row in answer.rows), default=math.inf)
         except LimitError:
             pass  # too many steps, or a loop that the settings tear
@@ -162,8 +166,14 @@ class SettingsSearch:
         Those of the file come first.
         """
         own = self.own
-        constant = own.solref[0] if own.solref[0] > 0.0 else _FIRST_CONSTANT
-        ratio = own.solref[1] if own.solref[0] > 0.0 else 1.0
+        if own.solref[0] > 0.0:
+            constant = own.solref[0]
+        else:
+            constant = _FIRST_CONSTANT
+        if own.solref[0] > 0.0:
+            ratio = own.solref[1]
+        else:
+            ratio = 1.0
         shortest = FEWEST * own.timestep
         constants = {max(factor * constant, shortest) for factor in _FASTER}
         faster = sorted((one for one in constants if one < constant), reverse=True)
