@@ -393,6 +393,8 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
     version = summary.versions["mujoco"]
     row_of_table = r"MuJoCo \S+ (simulated )?- 2\.5e-07 of 1e-05 - \d"
     assert re.search(row_of_table, words), words
+    # the numbers say what they are
+    assert "error of allowed torque pin forces motion compared" in words
     assert "without an engine: 2 statements" in words and "all hold" in words
     assert "study" not in words, "what is no engine's stands in no row"
     assert "not compared: 1: 1 where a check does not apply" in words

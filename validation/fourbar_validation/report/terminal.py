@@ -86,7 +86,7 @@ def _make_overview(summary: Summary) -> "Table":
     shown = Table(
         box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True, padding=(0, 1)
     )
-    shown.add_column("", overflow="fold", ratio=1)
+    shown.add_column("error of allowed", overflow="fold", ratio=1)
     for heading in (*GROUPS, "compared"):
         shown.add_column(heading, justify="right", no_wrap=True)
     for line in summary.lines:
