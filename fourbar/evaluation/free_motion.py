@@ -121,11 +121,19 @@ def release(scene: Scene) -> Released:
     """
     expect("scene", scene, Scene)
     free = scene.motion.free
-    start = command(scene)
     if free is None:
         raise InputError(
             "motion.free", None, "is needed for a release: its duration and steps"
         )
+    return release_at(scene, np.linspace(0.0, free.duration, free.steps + 1))
+
+
+def release_at(scene: Scene, times: Array) -> Released:
+    """Compute the motion of a released linkage at other times, as `release` does.
+
+    `times`: (n,) rising from 0, s.
+    """
+    start = command(scene)
     if len(start.angle) != 1:
         raise InputError(
             f"motion.{start.commanded}",
@@ -139,7 +147,7 @@ def release(scene: Scene) -> Released:
         float(start.angle[0]),
         scene.motion.speed or 0.0,
         int(start.branch[0]),
-        np.linspace(0.0, free.duration, free.steps + 1),
+        times,
         bar=start.bar,
     )
     if scene.counts_turns:

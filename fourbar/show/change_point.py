@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from fourbar.errors import InputError
+from fourbar.evaluation.free_motion import release_at
 from fourbar.quantities import CHANGE_POINT, PIN_FORCES
-from fourbar.scene import Scene, command_at
+from fourbar.scene import Command, Scene, command_at
 from fourbar.solution import Array, Solution
 from fourbar.solving import solve
 
@@ -23,41 +25,84 @@ ZERO = 1e-9
 """Part of the forces below which a limit is zero."""
 
 
+_HALF = 1e-6
+"""Part of a stroke over which the turn of its bar is measured: the third power of it is
+lost, and the rounding over it is 1e-10.
+"""
+
+
+class NoSideError(Exception):
+    """A change point of which a side cannot be asked; says why."""
+
+
 def find_limits(scene: Scene, solution: Solution) -> Solution | None:
     """Return the solution of one position with the limits of its pin forces.
 
     They are those from both sides of a change point; a force without one keeps NaN.
-    None elsewhere, and where a side cannot be asked: of a released motion, a commanded
-    stroke, and the ends and standstills of a law.
+    None elsewhere, and without forces.
+
+    Raises NoSideError where a side cannot be asked: where a law or a release begins or
+    ends, or stands still, and where a cylinder has no lever.
     """
     if solution.F12 is None or solution.status_code[0] != CHANGE_POINT:
         return None
-    at = solution.at
-    law = scene.motion.law
-    if at.stroke is not None or at.independent is not None:
-        return None
-    step = STEP
-    if law is not None:
-        speed = np.abs(np.ravel(np.asarray(at.speed, dtype=float)))[0]
-        if speed == 0.0:
-            return None
-        step = STEP / float(speed)
     multiples = np.array([[sign * m for m in (*NEAR, *_FAR)] for sign in (-1.0, 1.0)])
-    places = float(at.places[0]) + step * multiples
-    if (
-        law is not None
-        and not law.time[0] <= places.min() < places.max() <= law.time[-1]
-    ):
-        return None
-    beside = solve(scene, "force", at=command_at(scene, places.ravel()))
+    places = _list_places(scene, solution, np.sort(multiples.ravel()))
+    beside = solve(scene, "force", at=places)
+    order = np.argsort(np.argsort(multiples.ravel(), kind="stable"))
     forces = {
-        name: np.reshape(getattr(beside, name), (2, 2, 3, 2)) for name in PIN_FORCES
+        name: np.reshape(getattr(beside, name)[order], (2, 2, 3, 2))
+        for name in PIN_FORCES
     }
     size = max(np.abs(values[:, 1, -1]).max() for values in forces.values())
     limits: dict[str, Any] = {
         name: _extrapolate(values, size)[None] for name, values in forces.items()
     }
     return replace(solution, **limits)
+
+
+def _list_places(scene: Scene, solution: Solution, multiples: Array) -> Command:
+    """List the positions at multiples of the step, which rise.
+
+    Along a motion over time the bar has the speed and acceleration of each instant.
+    """
+    at, motion = solution.at, scene.motion
+    here = float(at.places[0])
+    if motion.law is None and motion.free is None:
+        step = STEP if at.stroke is None else _find_step_of_stroke(scene, here)
+        try:
+            return command_at(scene, here + step * multiples)
+        except InputError as error:
+            raise NoSideError("the cylinder is at an end of its range") from error
+    moving = "the law" if motion.free is None else "the release"
+    speed = float(np.abs(np.ravel(np.asarray(at.speed, dtype=float)))[0])
+    if speed == 0.0:
+        raise NoSideError(f"{moving} stands still there")
+    assert at.time is not None
+    times = float(np.ravel(at.time)[0]) + STEP / speed * multiples
+    one_side = NoSideError(f"{moving} begins or ends there, and has one side alone")
+    if motion.free is not None:
+        if times[0] < 0.0:
+            raise one_side
+        released = release_at(scene, np.array([0.0, *times])).command
+        if len(released.angle) <= len(times):
+            raise one_side
+        return released.part(slice(1, None))
+    assert motion.law is not None
+    if not motion.law.time[0] <= times[0] < times[-1] <= motion.law.time[-1]:
+        raise one_side
+    return command_at(scene, times)
+
+
+def _find_step_of_stroke(scene: Scene, stroke: float) -> float:
+    """Return the change of the stroke that turns its bar by `STEP`, m."""
+    low, high = stroke * (1.0 - _HALF), stroke * (1.0 + _HALF)
+    try:
+        angles = command_at(scene, np.array([low, high])).angle
+    except InputError as error:
+        raise NoSideError("the cylinder is at an end of its range") from error
+    turned = abs(float(angles[1] - angles[0]))
+    return STEP * (high - low) / turned
 
 
 def _extrapolate(values: Array, size: float) -> Array:

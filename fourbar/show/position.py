@@ -10,7 +10,7 @@ import numpy as np
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import DERIVED_NAMES
 from fourbar.scene import Scene
-from fourbar.show.change_point import find_limits
+from fourbar.show.change_point import NoSideError, find_limits
 from fourbar.show.columns import read_column
 from fourbar.show.derived import derive
 from fourbar.show.units import POSITION_DIGITS, choose_unit, drop_rounding, write_cell
@@ -35,7 +35,13 @@ class PositionSheet:
     def __init__(self, scene: Scene, solution: Solution, units: Conversion) -> None:
         self.scene = scene
         self.units = units
-        limits = find_limits(scene, solution)
+        self.without_side = ""
+        """Why a side of a change point cannot be asked for its pin forces."""
+        limits = None
+        try:
+            limits = find_limits(scene, solution)
+        except NoSideError as error:
+            self.without_side = str(error)
         self.has_limits = limits is not None
         if limits is None:
             self.solution = solution
@@ -127,6 +133,10 @@ class PositionSheet:
             rows.append(_write_row("shaking moment", cells))
         if self.has_limits:
             rows.append(_say_limits([*forces.values()]))
+        if self.without_side:
+            rows.append(
+                f"on the change point pin forces have no value: {self.without_side}"
+            )
         return rows
 
     def write_ratios(self) -> list[str]:

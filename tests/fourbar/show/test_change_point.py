@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.effects import Place
 from fourbar.scene import command_at
 from fourbar.show.position import PositionSheet
 from fourbar.show.units import units
+from fourbar.studies.passing import find_positions
 from tests.fourbar.show.test_position import SIX_DIGITS, numbers
 
 PARALLELOGRAM = fourbar.FourBar(
@@ -58,7 +60,62 @@ def test_pin_forces_that_have_no_bound_on_a_change_point_have_no_value() -> None
     assert rows[-1] == "on the change point no pin force has a limit"
 
 
-def test_nothing_is_said_of_limits_where_a_law_begins() -> None:
+def ask_forces(scene: fourbar.Scene, name: str, value: float) -> list[str]:
+    """Return the rows of pin forces where a named quantity has a value."""
+    solution = fourbar.solve(scene, at=find_positions(scene, [(name, value)]))
+    assert solution.status == ["change_point"]
+    return PositionSheet(scene, solution, units("N m")).write_pin_forces()
+
+
+def test_a_commanded_stroke_has_the_limits_of_the_angle_that_it_commands() -> None:
+    """At rest, along a cylinder at right angles to the line of all bars.
+
+    Weights along the line ask for no force of the cylinder.
+    """
+    ends = Place(1, (0.2, -0.5 * np.pi)), Place(2, (0.06, 0.0))
+    along = fourbar.Gravity(9.81, 0.0)
+    swept = fourbar.Sweep(0.19, 0.22, 6)
+    motion = fourbar.Motion(stroke=swept, side="right", stroke_speed=0.0)
+    scene = fourbar.Scene(
+        PARALLELOGRAM,
+        motion,
+        drive=fourbar.LinearDrive(*ends),
+        effects=(along,),
+    )
+    rows = ask_forces(scene, "stroke", float(np.hypot(0.2, 0.06)))
+    assert rows[-1] == "on the change point: the limits from both sides"
+    by_angle = fourbar.Scene(PARALLELOGRAM, fourbar.Motion(0.0, 0.0), effects=(along,))
+    assert rows == ask_forces(by_angle, "theta_2", 0.0)
+
+
+@pytest.mark.parametrize("direction", [0.0, -0.5 * np.pi])
+def test_a_release_has_the_limits_of_its_own_motion(direction: float) -> None:
+    """No torque acts: forces are bounded under any weight.
+
+    On the frame the bars act with their weights less m a. Each arm turns about the
+    same angle, so that half of it all is at each pin.
+    """
+    scene = fourbar.Scene(
+        PARALLELOGRAM,
+        fourbar.Motion(0.5, 6.0, free=fourbar.Free(2.0, 100)),
+        effects=(fourbar.Gravity(9.81, direction),),
+    )
+    at = find_positions(scene, [("theta_2", 0.0)])
+    solution = fourbar.solve(scene, at=at)
+    rows = ask_forces(scene, "theta_2", 0.0)
+    assert rows[-1] == "on the change point: the limits from both sides"
+    of_the_arms = np.array([0.1, 0.3, 0.1])
+    accelerations = [getattr(solution, f"a_G{bar}")[0] for bar in (2, 3, 4)]
+    lost = of_the_arms @ np.array(accelerations)
+    weight = 9.81 * 0.5 * np.array([np.cos(direction), np.sin(direction)])
+    shaking = numbers(rows[5])[:2]
+    assert shaking == pytest.approx(weight - lost, rel=SIX_DIGITS, abs=1e-6)
+    assert numbers(rows[1])[:2] == pytest.approx(
+        [-0.5 * x for x in shaking], rel=SIX_DIGITS, abs=1e-6
+    )
+
+
+def test_the_reason_is_said_where_a_law_begins() -> None:
     law = fourbar.Rise("cycloidal", (1.0, 1.0), theta_2=0.0)
     scene = fourbar.Scene(
         PARALLELOGRAM,
@@ -68,5 +125,24 @@ def test_nothing_is_said_of_limits_where_a_law_begins() -> None:
     start = fourbar.solve(scene, at=command_at(scene, np.array([0.0])))
     assert start.status == ["change_point"]
     rows = PositionSheet(scene, start, units("N m")).write_pin_forces()
-    assert not any("limit" in row for row in rows)
+    assert rows[-1] == (
+        "on the change point pin forces have no value: the law stands still there"
+    )
     assert numbers(rows[1]) == []
+
+
+@pytest.mark.parametrize(
+    ("omega", "why"),
+    [
+        (6.0, "the release begins or ends there, and has one side alone"),
+        (0.0, "the release stands still there"),
+    ],
+)
+def test_the_reason_is_said_where_a_release_begins(omega: float, why: str) -> None:
+    scene = fourbar.Scene(
+        PARALLELOGRAM,
+        fourbar.Motion(0.0, omega, free=fourbar.Free(1.0, 10)),
+        effects=(fourbar.Gravity(9.81, 0.0),),
+    )
+    rows = ask_forces(scene, "time", 0.0)
+    assert rows[-1].endswith(f"pin forces have no value: {why}")
