@@ -47,14 +47,16 @@ def name_unit(unit: str, otherwise: str | None = None) -> str:
     return _UNITS.get({}).get(unit, (otherwise or unit, 1.0))[0]
 
 
-def write_in_units(unit: str, *values: float, digits: int = 6) -> str:
+def write_in_units(
+    unit: str, *values: float, digits: int = 6, between: str = ", "
+) -> str:
     """Write numbers of an SI unit in the unit of messages, which follows them.
 
     >>> write_in_units("m", 0.0254, 0.3)
     '0.0254, 0.3 m'
     """
     name, factor = _UNITS.get({}).get(unit, (unit, 1.0))
-    numbers = ", ".join(f"{factor * value:.{digits}g}" for value in values)
+    numbers = between.join(f"{factor * value:.{digits}g}" for value in values)
     return f"{numbers} {name}".rstrip()
 
 

@@ -70,11 +70,12 @@ class Table:
                 "needs two or more angles and as many factors",
             )
         if any(b <= a for a, b in pairwise(angles)):
-            raise InputError(f"{key}.theta_2", angles, "must rise")
+            raise InputError(f"{key}.theta_2", angles, "must rise", unit="rad")
         object.__setattr__(self, "theta_2", angles)
         object.__setattr__(self, "factor", factors)
         if angles[-1] - angles[0] > TURN and not self.covers_a_turn:
-            raise InputError(f"{key}.theta_2", angles, "must not exceed one turn")
+            allowed = "must not exceed one turn"
+            raise InputError(f"{key}.theta_2", angles, allowed, unit="rad")
         if self.covers_a_turn and factors[0] != factors[-1]:
             raise InputError(
                 f"{key}.factor",
@@ -195,16 +196,16 @@ class Load(Effect):
                 "loads", " and ".join(forms), "a force acts at one place: state one"
             )
         if forms and self.force is None:
-            ((name, value),) = forms.items()
+            (name,) = forms
             raise InputError(
-                f"loads.{name}", value, "needs a force: state one, or leave this out"
+                f"loads.{name}", None, "needs a force: state one, or leave this out"
             )
         if self.arm is not None and self.frame == "bar":
             allowed = (
                 "is in world axes, for a force of fixed direction; where the force "
                 "turns with the bar state from_pin or from_centre"
             )
-            raise InputError("loads.arm", self.arm, allowed)
+            raise InputError("loads.arm", None, allowed)
         if not forms and self.force is not None:
             object.__setattr__(self, "from_centre", (0.0, 0.0))
 

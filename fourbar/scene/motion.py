@@ -231,7 +231,7 @@ class Law(_OverTime):
             )
             raise InputError(key, (len(time), len(angles)), allowed)
         if any(b <= a for a, b in pairwise(time)):
-            raise InputError(f"{key}.time", time, "must rise")
+            raise InputError(f"{key}.time", time, "must rise", unit="s")
         self._require_steps()
         object.__setattr__(self, "time", time)
         object.__setattr__(self, theta, angles)
@@ -337,9 +337,11 @@ class Rise(_OverTime):
         if getattr(self, f"theta_{self.bar}") is None:
             raise InputError(f"{key}.theta_2", None, "the first angle is missing")
         if not self.rise[1] > 0.0:
-            raise InputError(f"{key}.rise", self.rise[1], "must last longer than 0 s")
+            allowed = "must last longer than 0 s"
+            raise InputError(f"{key}.rise", self.rise[1], allowed, unit="s")
         if self.rest > 0.0 and self.fall is None:
-            raise InputError(f"{key}.rest", self.rest, "needs a fall before it")
+            allowed = "needs a fall before it"
+            raise InputError(f"{key}.rest", self.rest, allowed, unit="s")
         self._require_steps()
 
     @property
@@ -602,11 +604,12 @@ def _require_strokes(stroke: Any) -> Any:
     if not isinstance(stroke, Sweep):
         stroke = require_numbers("motion.stroke", stroke, "must be finite lengths", "m")
     if isinstance(stroke, Sweep):
-        ends = (stroke.start, stroke.stop)
+        ends = np.array([stroke.start, stroke.stop])
     else:
-        ends = stroke
-    if not np.all(np.asarray(ends) > 0.0):
-        raise InputError("motion.stroke", stroke, "must be above 0 m")
+        ends = np.asarray(stroke)
+    least = float(ends.min(initial=math.inf))
+    if not least > 0.0:
+        raise InputError("motion.stroke", least, "must be above 0", unit="m")
     return stroke
 
 

@@ -614,11 +614,11 @@ def command_at(scene: Scene, places: Array) -> Command:
         inside = (places >= least) & (places <= most)
         if not inside.all():
             stroke = float(places[np.argmin(inside)])
+            extent = write_in_units("m", least, most, between=" to ")
             raise InputError(
                 "motion.stroke",
                 stroke,
-                f"this cylinder can have {write_in_units('m', least)} to"
-                f" {write_in_units('m', most)}",
+                f"this cylinder can have {extent}",
                 unit="m",
             )
         return command_stroke(scene, places, motion.speed, motion.acceleration)

@@ -297,13 +297,14 @@ class _Block:
         """
         linkage = self.facts.scene.linkage
         motion = self.facts.scene.motion
+        points = change_points(linkage, motion.bar)
+        lines = []
         if (miss := find_miss(linkage)) is not None:
             gap = self._value(miss[0], "m")
-            return [f"misses a {miss[1]} by {gap}: it has no change point"]
-        points = change_points(linkage, motion.bar)
+            has = "one change point, not two" if points else "no change point"
+            lines.append(f"misses a {miss[1]} by {gap}: it has {has}")
         if not points:
-            return []
-        lines = []
+            return lines
         if motion.bar == 3 and classify(linkage).name == PARALLELOGRAM:
             lines.append(
                 "no theta_3 moves the parallelogram, whose coupler does not turn"

@@ -889,7 +889,7 @@ BY_STROKE = BY_STROKE.replace('omega_2 = "60 rpm"', 'stroke_speed = "1 in/s"') +
         (INCHES.replace('"5 in"', '"50 in"'), "of the other three, 10.5 in"),
         (INCHES.replace('"2 in"', "2"), 'did you mean "2 in"?'),
         (INCHES.replace('"1 lb"', '"1 in"'), 'like "1 lb"'),
-        (BY_STROKE, "motion.stroke = 1 in: this cylinder can have 2 in to 4 in"),
+        (BY_STROKE, "motion.stroke = 1 in: this cylinder can have 2 to 4 in"),
         (INCHES + RAM.replace('"1 in"', '"0 in"'), "drive.to = 'bar 2 at 0 in'"),
         (
             INCHES + GAS_SPRING.replace('"2 in"', '"6 in"'),
