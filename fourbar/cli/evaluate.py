@@ -220,7 +220,7 @@ def _choose_form(table: bool, as_json: bool, as_csv: bool, out: Path | None) -> 
     default=None,
     help="Unit of the angles (default: degrees; rad in JSON and CSV).",
 )
-@given.own_units_option("those of the file; SI in CSV and JSON")
+@given.units_option("those of the file; SI in CSV and JSON")
 @click.option(
     "--pressure",
     metavar="P",
@@ -445,7 +445,7 @@ def _print_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
     help="Seed of the quasi-random samples.",
 )
 @given.json_option
-@given.units_option
+@given.units_option("those of the file; SI in JSON")
 @click.option(
     "-o",
     "--out",
@@ -458,7 +458,7 @@ def tolerance(
     samples: int | None,
     seed: int,
     as_json: bool,
-    units: Conversion,
+    units: Conversion | None,
     out: Path | None,
 ) -> None:
     """Compute what the [tolerances] do to the results, and which does most."""
@@ -479,19 +479,17 @@ def tolerance(
         )
     if (spreads.without == spreads.samples).all():
         raise _assembles_nowhere(scene, stated)
+    named = given.suit_units() if units is None else units
     if out is not None:
-        draw_tolerances(spreads, out, units)
-    given.print_to(
-        (
-            shown.write_json(spreads)
-            if as_json
-            else shown.write_text(spreads, {**DEGREES, **units})
-        ),
-        None,
-    )
+        draw_tolerances(spreads, out, named)
+    if as_json:
+        text = shown.write_json(spreads)
+    else:
+        text = shown.write_text(spreads, {**DEGREES, **named})
+    given.print_to(text, None)
 
 
-def _refuse_units_of_json(as_json: bool, units: Conversion) -> None:
+def _refuse_units_of_json(as_json: bool, units: Conversion | None) -> None:
     if as_json and units:
         raise click.UsageError(
             "--json has SI units and radians; --units changes the table only"

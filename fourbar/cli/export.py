@@ -129,7 +129,7 @@ _without_loads_option = click.option(
 @click.option(
     "--dimensions", is_flag=True, help="Write the lengths of the bars at them."
 )
-@given.own_units_option()
+@given.units_option()
 def plot(
     scene: Path,
     out: Path,
@@ -191,7 +191,7 @@ def _find_place(scene: Scene, text: str) -> float:
 @click.option(
     "--vectors", is_flag=True, help="Draw velocity and acceleration at the points."
 )
-@given.own_units_option()
+@given.units_option()
 def animate(
     scene: Path,
     out: Path,

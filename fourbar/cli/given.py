@@ -44,13 +44,6 @@ out_option = click.option(
     "-o", "--out", type=FILE, required=True, metavar="FILE", help="Write to FILE."
 )
 TABLES = (".txt", ".json")
-units_option = click.option(
-    "--units",
-    default="SI",
-    callback=_read_units,
-    metavar="UNITS",
-    help='Units: SI (default), imperial, or a list like "mm N.mm deg".',
-)
 at_option = click.option(
     "--at",
     "at",
@@ -60,7 +53,7 @@ at_option = click.option(
 )
 
 
-def own_units_option(default: str = "those of the file") -> Callable[..., Any]:
+def units_option(default: str = "those of the file") -> Callable[..., Any]:
     """Make --units of a command whose default, which the help states, is not SI."""
     told = f'Units: SI, imperial or a list like "mm N.mm deg" (default: {default}).'
     return click.option("--units", callback=_read_units, metavar="UNITS", help=told)

@@ -14,7 +14,7 @@ import numpy as np
 from fourbar.errors import DependencyError, InputError
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNITS
 from fourbar.scene import Scene
-from fourbar.show.tables import make_plain_table, show_running, write_table
+from fourbar.show.tables import make_plain_table, show_running, wrap_line, write_table
 from fourbar.solution import DEGREES, Array, Conversion, find_unit_in
 from fourbar.studies.spread import BAND, PARTED, Spread, Tolerances, tolerances
 from fourbar.writing import write_object
@@ -65,9 +65,9 @@ def write_text(spreads: Tolerances, units: Conversion = DEGREES) -> str:
         *_describe_counts(spreads, units),
         (
             "each quantity at the position where its first-order worst case (worst) is"
-            " largest; sigma is the standard"
+            " largest; sigma is the standard deviation of the samples; the variance"
+            " there is due to"
         ),
-        "deviation of the samples; the variance there is due to",
     ]
     rows = []
     angle_unit, of_angle = find_unit_in("rad", units)
@@ -105,7 +105,8 @@ def write_text(spreads: Tolerances, units: Conversion = DEGREES) -> str:
     table = make_plain_table(
         (*heads, "\nleast", "\ngreatest", "worst\n+-"), rows, left=("",), gap=0
     )
-    return write_table(spreads.scene.title, lines, table)
+    wrapped = [part for line in lines for part in wrap_line(line)]
+    return write_table(spreads.scene.title, wrapped, table)
 
 
 def _describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[str]:

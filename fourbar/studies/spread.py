@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 from fourbar.errors import DependencyError, InputError, expect, say_install
 from fourbar.quantities import NOT_ASSEMBLED, PIN_FORCES
 from fourbar.scene import Command, Scene, command
-from fourbar.solution import Array, find_values, split_parts
+from fourbar.solution import (
+    Array,
+    Solution,
+    find_unit,
+    find_values,
+    is_scalar,
+    split_parts,
+)
 from fourbar.solving import solve
 from fourbar.studies.derivatives import Sensitivity, sensitivity
 from fourbar.studies.keys import (
@@ -265,7 +272,7 @@ def tolerances(
         without[columns] = np.count_nonzero(code, axis=0)
         gone |= ((code == NOT_ASSEMBLED) & nominal_closes[columns]).any(axis=1)
         for name in names:
-            number = find_values(solution, name)[:, -width:]
+            number = _find_drawn(scene, solution, name)[:, -width:]
             if name.startswith(
                 "theta_"
             ):  # each member counts its turns from its own first position
@@ -286,6 +293,17 @@ def tolerances(
         int(gone.sum()),
         invalid,
     )
+
+
+def _find_drawn(scene: Scene, solution: Solution, name: str) -> Array:
+    """Return a quantity of the members, places in the coordinates of the drawing.
+
+    The solution of a study knows of no drawing.
+    """
+    values: Array = find_values(solution, name)
+    if find_unit(name) == "m" and not is_scalar(name) and any(scene.origin):
+        return values + scene.origin
+    return values
 
 
 def _make_members(scene: Scene, samples: int, seed: int | np.random.Generator) -> Study:

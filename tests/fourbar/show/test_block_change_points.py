@@ -17,6 +17,7 @@ from fourbar.cli import group
 from fourbar.formulas.mobility import classify, find_miss, meet_change_points
 from fourbar.show.block import write_block
 from fourbar.show.studies import write_equilibria
+from fourbar.show.units import COMMON
 
 HANGING = """
 [lengths]
@@ -234,7 +235,8 @@ def test_a_parallelogram_that_is_missed_by_one_equality_keeps_a_change_point(
     """Opposite bars differ by 2e-4 both: a + d = b + c is within the rounding."""
     text = state(("22.3607 mm", "44.9998 mm", "22.3605 mm", "45.0002 mm"))
     scene = read(tmp_path, text)
-    lines = write_block(scene, fourbar.solve(scene))
+    in_mm = {**COMMON, **fourbar.units("mm")}
+    lines = write_block(scene, fourbar.solve(scene), in_mm)
     miss = "misses a parallelogram by 0.0006 mm: it has one change point, not two"
     found = [line for line in lines if "change point" in line]
     assert found[:2] == [miss, "change point at theta_2 = 180 deg"], lines

@@ -222,7 +222,7 @@ def test_the_command_prints_draws_and_writes(
     )
     assert status(["tolerance", str(scene), "--samples", "64"]) == 0
     assert re.search(
-        r"^v_x +m ", capsys.readouterr().out, re.M
+        r"^v_x +mm ", capsys.readouterr().out, re.M
     )  # a place, though v_ begins a velocity
     assert status(["tolerance", str(scene), "-o", "t.bmp"]) == 2
     scene.write_text(text)
@@ -241,3 +241,37 @@ def test_the_share_that_is_done_is_told_from_the_start_and_reaches_all_of_it() -
         and len(told) > 3
         and np.all(np.diff(told) > 0.0)
     )
+
+
+DRAWN = """\
+title = "Drawn away from the origin"
+[pins]
+O2 = ["40 in", "8 in"]
+A = ["40 in", "12 in"]
+B = ["47 in", "10 in"]
+O4 = ["50 in", "10 in"]
+[points]
+P = { bar = 3, drawn = ["45 in", "11 in"] }
+[motion]
+theta_2 = "drawn"
+[tolerances]
+"lengths.coupler" = "0.01 in"
+"""
+
+
+def test_samples_of_a_drawing_have_its_coordinates_and_units(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The nominal place is as drawn, and the samples lie about it."""
+    (tmp_path / "drawn.toml").write_text(DRAWN)
+    assert status(["tolerance", str(tmp_path / "drawn.toml"), "--samples", "64"]) == 0
+    printed = capsys.readouterr().out
+    for name, drawn in (("P_x", 45.0), ("P_y", 11.0)):
+        row = re.search(rf"^{name} +in +(.*)$", printed, re.M)
+        assert row is not None, printed
+        _, nominal, sigma, *band, _ = map(float, row[1].split())
+        assert nominal == drawn
+        assert band == pytest.approx([drawn] * 4, abs=0.03)
+        assert 0.001 < sigma < 0.02
+    above = printed[: printed.index("  theta_2")].splitlines()
+    assert max(map(len, above)) <= 80
