@@ -25,12 +25,13 @@ from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS, say_error
 from fourbar_validation.compare.tolerance import TOUCHING_MARGIN, find_margin
 from fourbar_validation.engines import workers as worker_processes
+from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.registry import ENGINES, hold_fully, make_demands
 from fourbar_validation.places import CHECKOUT
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.run.answers import check_statements
 from fourbar_validation.run.identities import check_identities
-from fourbar_validation.run.question import Question, ask_at
+from fourbar_validation.run.question import Question
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.random import (
     PUSHED,

@@ -31,11 +31,12 @@ from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.compare.scales import make_reference
+from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import NAME as FREE_BODY
 from fourbar_validation.engines.registry import ENGINES, Engine, make_demands
 from fourbar_validation.run.answers import check_statements
 from fourbar_validation.run.identities import check_identities, compare_status
-from fourbar_validation.run.question import Question, ask_at
+from fourbar_validation.run.question import Question
 
 PAIRS = (
     *(

@@ -47,6 +47,24 @@ TURN = crank_rocker(
 """A turn of the crank-rocker with points on coupler and output."""
 
 
+def low_parallelogram(steps: int = 8, **changes: object) -> fourbar.Scene:
+    """A parallelogram that stays below its ground's line, beyond a change point.
+
+    It is "open", and the sine between bars 3 and 4 is negative all the way. Told the
+    name of the assembly in place of that sign, an engine answers the antiparallelogram.
+    """
+    ground_angle = 0.2
+    linkage = replace(fourbar.uniform(0.3, 0.1, 0.3, 0.1), ground_angle=ground_angle)
+    start, stop = np.radians([200.0, 340.0]) + ground_angle
+    parts: dict[str, object] = {
+        "linkage": linkage,
+        "motion": fourbar.Motion(fourbar.Sweep(start, stop, steps), 6.0),
+        "effects": (fourbar.Gravity(),),
+        "title": "parallelogram below its ground",
+    }
+    return fourbar.Scene(**{**parts, **changes})  # type: ignore[arg-type]
+
+
 def thesis(theta_2: object = None) -> fourbar.Scene:
     """The thesis's model mechanism, uniform bars 2.54 cm wide.
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.scene import Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar.studies.keys import command_key, list_entries, read_place, replace_numbers
 from fourbar_lab.simulators.motion import start
 from fourbar_lab.simulators.mujoco_c import text
@@ -41,7 +41,9 @@ def assemble(scene: Scene, theta_2: float, reader: str) -> ClosedState:
     written = text(scene, STEPS, reader)
     loop = ClosedLoop(written)
     model, data = open_model(written)
-    q = Assembler(loop).find(theta_2, scene.motion.branch)
+    assembly = np.array([scene.motion.branch], dtype=np.int8)
+    told = with_signs(scene.linkage, Command(np.array([theta_2]), assembly, None, 0.0))
+    q = Assembler(loop).find(theta_2, int(told.branch[0]))
     assert q is not None
     loop.set_state(q, scene.motion.omega_2 or 0.0)
     return ClosedState(model, data, loop.data.qpos.copy(), loop.data.qvel.copy())

@@ -21,7 +21,7 @@ from fourbar.errors import InputError, LimitError, NotAssembledError
 from fourbar.mjcf import RECIPE
 from fourbar.mjcf.document import Start, choose_run
 from fourbar.quantities import PIN_FORCES
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene, command, with_signs
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.engines.description import find_field, list_speeds
 from fourbar_validation.engines.free_body import move
@@ -246,11 +246,9 @@ def lay_out(scene: Scene, command: Command, steps: int) -> tuple[Scene, Course]:
 
 def _closes(scene: Scene, theta_2: Array) -> bool:
     """Tell whether the linkage closes at all these angles, and far from a toggle."""
-    closed = close(
-        scene.linkage,
-        theta_2,
-        np.full(len(theta_2), scene.motion.branch, dtype=np.int8),
-    )
+    assembly = np.full(len(theta_2), scene.motion.branch, dtype=np.int8)
+    told = with_signs(scene.linkage, Command(theta_2, assembly, None, 0.0))
+    closed = close(scene.linkage, theta_2, told.branch)
     return bool(
         closed.assembled.all()
         and np.abs(np.sin(closed.theta[1] - closed.theta[0])).min() > _FROM_TOGGLE
@@ -291,7 +289,7 @@ def start(scene: Scene) -> Start:
     Its speeds are those of the free body. No simulator starts from what the formulas
     computed.
     """
-    commanded = command(scene)
+    commanded = with_signs(scene.linkage, command(scene))
     omega_2 = scene.motion.omega_2 or 0.0
     closed = close(scene.linkage, commanded.theta_2, commanded.branch)
     usable = np.flatnonzero(closed.assembled)

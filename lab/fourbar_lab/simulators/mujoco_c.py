@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import mujoco
 
 from fourbar.mjcf import SIMULATORS, write_mjcf
-from fourbar.scene import Scene, command
+from fourbar.scene import Scene, command, with_signs
 from fourbar_lab.simulators.motion import (
     STEPS,
     Course,
@@ -81,8 +81,9 @@ def states_of(written: str, scene: Scene) -> list[tuple[Array, Array]]:
     loop = ClosedLoop(written)
     states = []
     position = Assembler(loop)
-    for theta_2 in command(scene).theta_2.tolist():
-        if (q := position.find(theta_2, scene.motion.branch)) is not None:
+    told = with_signs(scene.linkage, command(scene))
+    for theta_2, sign in zip(told.theta_2.tolist(), told.branch.tolist(), strict=True):
+        if (q := position.find(theta_2, sign)) is not None:
             loop.set_state(q, scene.motion.omega_2 or 0.0)
             states.append((loop.data.qpos.copy(), loop.data.qvel.copy()))
     return states

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from fourbar.errors import LimitError
 from fourbar.mjcf import size_flywheel
-from fourbar.scene import Scene
+from fourbar.scene import Scene, with_signs
 from fourbar.scene import command as list_positions
 from fourbar_lab.simulators.motion import (
     LIGHT,
@@ -205,10 +205,11 @@ class PinocchioSolvers(Simulator):
         inertia = size_flywheel(scene)
         loop = solver(tree, _SOFTNESS_STEPS * find_timestep(scene, STEPS))
         tree.model.armature = np.array([inertia, 0.0, 0.0])
-        for theta_2 in list_positions(scene).theta_2.tolist():
-            state = loop.start(
-                theta_2, scene.motion.branch, scene.motion.omega_2 or 0.0
-            )
+        told = with_signs(scene.linkage, list_positions(scene))
+        for theta_2, sign in zip(
+            told.theta_2.tolist(), told.branch.tolist(), strict=True
+        ):
+            state = loop.start(theta_2, sign, scene.motion.omega_2 or 0.0)
             if state is not None:
                 readings.read(scene, _evaluated(tree, loop, inertia, *state))
         return readings

@@ -21,7 +21,7 @@ from fourbar.mjcf.assembly import write_sdf
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar_lab import benchmark
-from fourbar_lab.simulators import gradients, motion
+from fourbar_lab.simulators import gradients, motion, mujoco_c
 from fourbar_lab.simulators.motion import Course, Instant, Readings, Simulator
 from fourbar_lab.simulators.problems import PROBLEMS
 from fourbar_validation.check.problem import judge, read_problem
@@ -29,6 +29,7 @@ from fourbar_validation.engine import open_engine, serve
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.environments import read_engines_of
 from fourbar_validation.engines.free_body import FreeBody
+from tests.support.scenes import low_parallelogram
 from tests.whole.test_imports import ROOT, imported
 
 EXACT = 1e-10
@@ -118,6 +119,22 @@ def test_a_simulator_starts_from_its_own_assembly_without_the_formulas() -> None
             begin.qpos[0] == (math.tau if branch > 0 else 0.0)
             and begin.qvel[0] == -10.0 * branch
         )
+
+
+def test_beyond_a_change_point_a_simulator_starts_in_the_assembly_that_is_stated() -> (
+    None
+):
+    """Of a parallelogram bars 2 and 4 stay parallel there, and the coupler level."""
+    scene = low_parallelogram()
+    for qpos in (
+        motion.start(scene).qpos,
+        *(q for q, _ in mujoco_c.states_of(write_mjcf(scene), scene)),
+        gradients.assemble(scene, 4.0, "mujoco").qpos,
+    ):
+        theta_2, of_3_to_2, theta_4 = qpos
+        level = theta_2 + of_3_to_2 - scene.linkage.ground_angle
+        assert abs(math.remainder(theta_4 - theta_2, math.tau)) < 1e-12
+        assert abs(math.remainder(level, math.tau)) < 1e-12
 
 
 class Rigid(Simulator):

@@ -54,6 +54,7 @@ from fourbar_validation.engines.processes import WORKER_MEMORY
 from fourbar_validation.robots import guard
 from tests.support.robots import answer_of
 from tests.support.robots import examine_text as examine
+from tests.support.scenes import low_parallelogram
 
 CRANK_ROCKER = fourbar.load(Path(__file__).parents[3] / "models" / "crank_rocker.toml")
 GENERATED = write_mjcf(CRANK_ROCKER)
@@ -78,6 +79,17 @@ measured.
 @cache
 def generated(scene: Scene) -> Examined:
     return examine(scene, None, {})
+
+
+def test_a_file_is_held_to_the_assembly_that_is_stated_beyond_a_change_point() -> None:
+    """Both for single states and through time: the generated file is right."""
+    scene = low_parallelogram()
+    for how in (ONE_STATE, THROUGH_TIME):
+        answer = answer_of(generated(scene), how)
+        s = solve(scene, "force", at=answer.at)
+        for name in TORQUE_AND_PINS:
+            ours, theirs = getattr(s, name), answer.quantities[name]
+            assert np.abs(theirs - ours).max() < 1e-8 * np.abs(ours).max(), (how, name)
 
 
 def values(examined: Examined) -> dict[str, Value]:

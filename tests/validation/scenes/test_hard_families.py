@@ -13,14 +13,15 @@ import pytest
 
 import fourbar
 import fourbar_validation.run.question
-from fourbar.mjcf import RECIPE, Settings
+from fourbar.mjcf import RECIPE, Settings, write_mjcf
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, VERDICTS
-from fourbar_validation.compare.tolerance import FULL_ACCURACY
+from fourbar_validation.compare.tolerance import EPS, FULL_ACCURACY, K, magnitude
+from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.limits import LIMITS
-from fourbar_validation.engines.mujoco import simulate
+from fourbar_validation.engines.mujoco import shipped, simulate
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.shipped import compare_shipped
 from fourbar_validation.engines.prediction import (
@@ -52,6 +53,8 @@ from tests.support.engine_limits import MEASURED, Measured
 from tests.support.scenes import crank_rocker
 
 EXACT = tuple(w for w in HARD_ENGINES if not w.through_time)
+AT_CHANGE_POINTS = dict(families.approach_change_point(distances=(1e-2, 1e-8)))
+THROUGH_CHANGE_POINTS = dict(families.sweep_change_point(steps=16))
 SWEEP = crank_rocker(
     motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 30), 10.0)
 )
@@ -79,7 +82,20 @@ def test_a_scene_of_each_family_holds(family: Family) -> None:
     few = (
         scene if not isinstance(scene.motion.theta_2, fourbar.Sweep) else _fewer(scene)
     )
-    rows = judge(name, few, EXACT).rows
+    require_no_failure(name, few)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*AT_CHANGE_POINTS, *THROUGH_CHANGE_POINTS])
+def test_every_kind_of_change_point_holds_on_both_sides_and_in_both_assemblies(
+    name: str,
+) -> None:
+    require_no_failure(name, (AT_CHANGE_POINTS | THROUGH_CHANGE_POINTS)[name])
+
+
+def require_no_failure(name: str, scene: Scene) -> None:
+    """No row of any check and engine fails, the file as it is shipped included."""
+    rows = judge(name, scene, HARD_ENGINES).rows
     assert {row.verdict for row in rows} <= set(VERDICTS)
     assert [row for row in rows if row.verdict == FAILS] == []
 
@@ -187,6 +203,49 @@ def test_an_answer_nearby_has_the_sine_of_the_formulas() -> None:
     assert nearby is not None
     np.testing.assert_allclose(
         nearby(np.ones(3, dtype=bool))["sin_mu"], formulas.sin_mu, rtol=1e-15
+    )
+
+
+@pytest.mark.parametrize("kind", families.CHANGE_POINTS)
+def test_beyond_a_change_point_an_answer_nearby_is_one_of_the_same_assembly(
+    kind: str,
+) -> None:
+    """Pin forces grow as 1/distance there: the last digit of theta_2 is asked about.
+
+    On the far side the sign of the sine is not that of the assembly's name.
+    """
+    lengths, points = families.CHANGE_POINTS[kind]
+    away = 1e-8 * np.array([-1.0, 1.0])
+    for psi in points:
+        for branch in (1, -1):
+            near = set_angles(dress(lengths), psi + away, branch)
+            command, formulas = fourbar.command(near), fourbar.solve(near, "force")
+            balls = ask_at(HARD_ENGINES[0].start(), near, command).quantities["F43"]
+            nearby = make_nearby(HARD_ENGINES[0], near, command, formulas)
+            assert nearby is not None and formulas.F43 is not None
+            again = nearby(np.ones(2, dtype=bool))["F43"]
+            size = magnitude(formulas.F43)
+            assert (magnitude(formulas.F43 - balls) <= 1e-7 * size).all()
+            assert (magnitude(formulas.F43 - again) <= K * EPS * size).all()
+
+
+@pytest.mark.parametrize("name", AT_CHANGE_POINTS)
+def test_the_file_opens_in_the_assembly_that_is_stated_beyond_a_change_point_too(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = AT_CHANGE_POINTS[name]
+    row = compare_shipped(name, scene, fourbar.command(scene))
+    assert row is not None and row.verdict != FAILS, row
+    assert row.error < 1.0
+
+    def write_other(scene: Scene) -> str:
+        motion = scene.motion.replace(branch=-scene.motion.branch)
+        return write_mjcf(replace(scene, motion=motion))
+
+    monkeypatch.setattr(shipped, "write_mjcf", write_other)
+    other = compare_shipped(name, scene, fourbar.command(scene))
+    assert (
+        other is not None and other.verdict == FAILS and "as it opens" in other.reason
     )
 
 

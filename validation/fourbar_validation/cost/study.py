@@ -17,7 +17,7 @@ import numpy as np
 from fourbar.errors import FourBarError, LimitError
 from fourbar.files import dump
 from fourbar.formulas.mobility import turns_fully
-from fourbar.scene import Command, Scene, with_signs
+from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar_validation.advise.advise import advise
 from fourbar_validation.advise.matters import judge_trial
@@ -29,6 +29,7 @@ from fourbar_validation.advise.worst_errors import (
 )
 from fourbar_validation.cost import formulas
 from fourbar_validation.cost.series import SLOW, Curve, Spot, design_curves
+from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.mujoco.trial import Trial, TrialSetup
 from fourbar_validation.engines.plain_loop import PlainLoop
 from fourbar_validation.report.machine import list_versions
@@ -354,9 +355,8 @@ class CostStudy:
             except LimitError as error:
                 self.left_out.append(f"{label}: {error}")
                 continue
-            signed = with_signs(self.scene.linkage, command)
-            errors = compute_errors(self.scene, command, loop.answer(signed))
-            times = [time_call(partial(loop.answer, signed)) for _ in range(ROUNDS)]
+            errors = compute_errors(self.scene, command, loop.answer(command))
+            times = [time_call(partial(loop.answer, command)) for _ in range(ROUNDS)]
             points.append(
                 self._make_point("inverse", EXACT, label, errors, times, len(rows))
             )
@@ -376,8 +376,7 @@ class CostStudy:
         tried.append(("MuJoCo at one state, extrapolated", MujocoOneState(), 0.0))
         points = []
         for label, engine, softness in tried:
-            signed = with_signs(self.scene.linkage, self.command)
-            answer = engine.answer(self.scene, signed)
+            answer = ask_at(engine, self.scene, self.command)
             if answer.refusal is not None:
                 raise LimitError(f"{engine.name}: {answer.refusal}")
             assert answer.assembled is not None

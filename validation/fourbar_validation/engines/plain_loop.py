@@ -20,7 +20,7 @@ import numpy as np
 
 from fourbar.errors import LimitError
 from fourbar.quantities import PIN_FORCES
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.engines.description import list_speeds
@@ -42,7 +42,7 @@ class PlainLoop:
     def __init__(self, build: Callable[[Scene], Any], scene: Scene) -> None:
         if scene.drive is not None:
             raise LimitError("the plain loop has a couple on a bar, no cylinder")
-        tree = build(state_from_pins(scene))
+        self.linkage, tree = scene.linkage, build(state_from_pins(scene))
         if tree.loaded:
             raise LimitError("the plain loop does not iterate over loads of pins")
         self.tree, self.model, self.data = tree, tree.model, tree.data
@@ -54,9 +54,8 @@ class PlainLoop:
         torque = np.empty(n)
         forces = {name: np.empty((n, 2)) for name in PIN_FORCES}
         speeds, accelerations = (values.tolist() for values in list_speeds(command))
-        start = Assembler(self.tree).find(
-            float(command.theta_2[0]), int(command.branch[0])
-        )
+        first = with_signs(self.linkage, command.part(slice(0, 1)))
+        start = Assembler(self.tree).find(float(first.theta_2[0]), int(first.branch[0]))
         if start is None:
             raise LimitError("the loop does not close at the first position")
         q = np.array(start)

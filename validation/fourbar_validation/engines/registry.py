@@ -35,6 +35,7 @@ from fourbar_validation.compare.tolerance import (
     ErrorBound,
     Mask,
 )
+from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.description import list_speeds
 from fourbar_validation.engines.exact import BallArithmetic, find_refusal, shift_to
 from fourbar_validation.engines.free_body import FreeBody
@@ -413,7 +414,7 @@ def make_nearby(
                     alpha[row],
                     shift,
                 )
-                for name, values in adapter.answer(scene, moved).quantities.items():
+                for name, values in ask_at(adapter, scene, moved).quantities.items():
                     out[name][row] = values
         return out
 

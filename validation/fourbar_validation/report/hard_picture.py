@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from fourbar.quantities import OK
-from fourbar.scene import Command, Scene, with_signs
+from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar.solving import solve
-from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.tolerance import (
     EPS,
     TIMES_PREDICTED,
@@ -23,6 +23,7 @@ from fourbar_validation.compare.tolerance import (
     find_error,
     magnitude,
 )
+from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.prediction import predict_in_world_axes
 from fourbar_validation.engines.registry import HARD_ENGINES, Engine
 from fourbar_validation.report.svg import choose_style, write_svg
@@ -63,7 +64,7 @@ def list_approaches() -> list[Approach]:
     crank = draw_linkage(CRANK, 0)
     (limit, stretched), *_ = find_collinear_3_4(rocker)
     (pole, branch), *_ = find_collinear_2_3(crank)
-    lengths, _, (_, half_turn) = CHANGE_POINTS["parallelogram"]
+    lengths, (_, half_turn) = CHANGE_POINTS["parallelogram"]
     near = _DISTANCES[_DISTANCES >= 0.99e-8]
     inward = -1.0 if stretched else 1.0
     return [
@@ -77,7 +78,7 @@ def list_approaches() -> list[Approach]:
             set_angles(dress(crank), pole + _DISTANCES, branch, drive_bar=4),
             _DISTANCES,
         ),
-        # on the branch that crosses: the one that stays parallel is regular
+        # it stays a parallelogram: its motion is regular, its pin forces are not
         Approach(
             "change point of a parallelogram",
             set_angles(dress(lengths), half_turn + near, 1),
@@ -93,7 +94,7 @@ def list_errors(
 
     None if it refuses.
     """
-    command = with_signs(scene.linkage, command_of(scene))
+    command = command_of(scene)
     if engine.through_time:
         psi = np.abs(command.theta_2 - command.theta_2[0]) - abs(
             command.theta_2[-1] - command.theta_2[0]
@@ -103,16 +104,14 @@ def list_errors(
             command.branch[-psi > _SIMULATED_FROM],
             *command[2:4],
         )
-    answer: Answer = engine.start().answer(scene, command)
+    answer = ask_at(engine.start(), scene, command)
     if (
         answer.refusal is not None
         or quantity not in answer.quantities
         or answer.at is None
     ):
         return None
-    # an engine is told the sign of the sine, `solve` the assembly: each of the other
-    at = with_signs(scene.linkage, answer.at)
-    ours = solve(scene, "force", at=at)
+    ours = solve(scene, "force", at=answer.at)
     values = getattr(ours, quantity)
     error = find_error(quantity, values, answer.quantities[quantity], magnitude(values))
     keep = (ours.status_code == OK) & np.isfinite(error)

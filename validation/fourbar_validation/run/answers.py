@@ -23,7 +23,7 @@ from fourbar_validation.compare.statements.limit_positions import look, make_wor
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.registry import Engine, make_demands, make_prediction
 from fourbar_validation.run.causes import find_causes
-from fourbar_validation.run.question import Question, remove_angles
+from fourbar_validation.run.question import Question
 
 
 def compare_answers(question: Question) -> Iterator[Row]:
@@ -85,9 +85,7 @@ def _observe_order(question: Question, engine: Engine) -> dict[str, float]:
         )  # a refusal has none
 
     assert engine.order is not None
-    coarse, fine, order = engine.order(
-        question.scene, remove_angles(question.at), error
-    )
+    coarse, fine, order = engine.order(question.scene, question.at, error)
     seen = {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
     return (
         seen if all(map(math.isfinite, seen.values())) else {}

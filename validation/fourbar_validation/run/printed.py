@@ -40,6 +40,7 @@ from fourbar_validation.compare.tolerance import (
     magnitude,
     sum_lengths,
 )
+from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.description import list_speeds
 from fourbar_validation.engines.exact import BallArithmetic, find_refusal
 from fourbar_validation.engines.free_body import move
@@ -48,7 +49,6 @@ from fourbar_validation.engines.prediction import predict_from_data
 from fourbar_validation.engines.registry import find_missing
 from fourbar_validation.run.question import (
     Question,
-    ask_at,
     select_positions,
     spread_evenly,
 )

@@ -5,13 +5,13 @@ The answer of the formulas is among them; all are computed once.
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.scene import Command, Scene, with_signs
+from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.compare.answer import Adapter, Answer, explain_refusal
@@ -24,9 +24,9 @@ from fourbar_validation.compare.reversals import (
 from fourbar_validation.compare.rows import FORMULAS, Row, make_breakdown, make_plain
 from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import Array, Mask
+from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.processes import keep_printed
-from fourbar_validation.engines.protocol import require_near
 from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.report.record import Record, Timing
 
@@ -224,36 +224,6 @@ def spread_evenly(
     if inside:
         places = np.linspace(0, last, count + 2)[1:-1]
     return np.asarray(indices[np.unique(places.astype(int))])
-
-
-def ask_at(adapter: Adapter, scene: Scene, command: Command) -> Answer:
-    """Give an engine what is commanded, with the sign of its sine.
-
-    The sign is at each position; nothing else of the formulas is given.
-    """
-    bare = remove_angles(with_signs(scene.linkage, command))
-    answer = adapter.answer(scene, bare)
-    if answer.at is bare:
-        return replace(answer, at=command)
-    if answer.at is None:
-        return answer
-    if command.stroke is not None:
-        require_near(answer.at, command)
-    return replace(answer, at=with_signs(scene.linkage, answer.at))
-
-
-def remove_angles(command: Command) -> Command:
-    """Put NaN for the bar's motion in a command by a stroke.
-
-    The formulas computed it from the stroke.
-    """
-    if command.stroke is None:
-        return command
-    unknown = np.full_like(command.angle, np.nan)
-    speed = None if command.speed is None else unknown
-    return command._replace(
-        angle=unknown, speed=speed, acceleration=unknown, condition=None, lost=None
-    )
 
 
 def select_positions(command: Command, indices: NDArray[np.intp]) -> Command:

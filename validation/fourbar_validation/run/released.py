@@ -40,6 +40,7 @@ from fourbar_validation.compare.tolerance import (
     find_worst,
     replace_zero_size,
 )
+from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.guests import Guest
 from fourbar_validation.engines.registry import Engine, find_missing, make_demands
@@ -343,9 +344,10 @@ def _prescribe(
     for first in resting[np.unique(numbers, axis=0, return_index=True)[1]].tolist():
         index = np.array([first])
         here = select_positions(command, index)
-        needed = FreeBody().answer(bare, here).quantities["torque"][0]
+        needed = ask_at(FreeBody(), bare, here).quantities["torque"][0]
         begins = float(np.sign(here.alpha_2)[0])
-        turning = FreeBody().answer(bare, here._replace(speed=np.ones(1))).quantities
+        at_one = here._replace(speed=np.ones(1))
+        turning = ask_at(FreeBody(), bare, at_one).quantities
         rate = {1: 0.0, 2: 1.0, 3: turning["omega_3"][0], 4: turning["omega_4"][0]}
         slips = {
             pin: rate[PINS[pin][1]] - rate[PINS[pin][0]] for pin, _ in friction.torques

@@ -214,14 +214,15 @@ def _driven_output(*, steps: int = 180, seeds: range = range(2)) -> Scenes:
             yield f"{seed} {name}", replace(scene, motion=motion, drive_bar=4)
 
 
-CHANGE_POINTS: dict[str, tuple[Lengths, int, tuple[float, ...]]] = {
-    "parallelogram": ((0.3, 0.1, 0.3, 0.1), 1, (0.0, math.pi)),
-    "antiparallelogram": ((0.3, 0.1, 0.3, 0.1), -1, (0.0, math.pi)),
-    "kite a = b": ((0.3, 0.1, 0.1, 0.3), 1, (math.pi,)),
-    "kite a = d": ((0.1, 0.1, 0.3, 0.3), 1, (0.0,)),
+CHANGE_POINTS: dict[str, tuple[Lengths, tuple[float, ...]]] = {
+    "parallelogram": ((0.3, 0.1, 0.3, 0.1), (0.0, math.pi)),
+    "parallelogram a > d": ((0.1, 0.3, 0.1, 0.3), (0.0, math.pi)),
+    "kite a = b": ((0.3, 0.1, 0.1, 0.3), (math.pi,)),
+    "kite a = d": ((0.1, 0.1, 0.3, 0.3), (0.0,)),
+    "a + d = b + c": ((0.4, 0.1, 0.27, 0.23), (math.pi,)),
 }
-"""Lengths, branch just beyond psi = 0, change points psi. The kite a = d has A on O4 at
-its own.
+"""Lengths and change points psi. "Open" a parallelogram stays one, "crossed" it is the
+antiparallelogram. The kite a = d has A on O4 at its change point.
 """
 
 
@@ -230,7 +231,7 @@ def approach_change_point(*, distances: tuple[float, ...] = CHANGE) -> Scenes:
     offsets = np.array(
         [*(-x for x in (*REGULAR, *distances)), *distances[::-1], *REGULAR[::-1]]
     )
-    for kind, (lengths, _, points) in CHANGE_POINTS.items():
+    for kind, (lengths, points) in CHANGE_POINTS.items():
         for psi in points:
             for branch, name in BRANCH_NAMES.items():
                 yield (
@@ -239,9 +240,9 @@ def approach_change_point(*, distances: tuple[float, ...] = CHANGE) -> Scenes:
                 )
 
 
-def _sweep_change_point(*, steps: int = 145) -> Scenes:
+def sweep_change_point(*, steps: int = 145) -> Scenes:
     """Sweep two turns through the change points in both assemblies."""
-    for kind, (lengths, _, _) in CHANGE_POINTS.items():
+    for kind, (lengths, _) in CHANGE_POINTS.items():
         for branch, name in BRANCH_NAMES.items():
             scene = dress(lengths)
             start = scene.linkage.ground_angle + 0.3
@@ -433,7 +434,7 @@ FAMILIES = tuple(
         "pole-T4": lambda: _approach_poles(bar=4),
         "driven-output": _driven_output,
         "change-point": approach_change_point,
-        "change-point-through": _sweep_change_point,
+        "change-point-through": sweep_change_point,
         "near-grashof": _miss_grashof,
         "bar-ratio": _shorten_crank,
         "mass-ratio": _vary_mass_ratio,

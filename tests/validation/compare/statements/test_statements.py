@@ -19,13 +19,13 @@ from fourbar_validation import Answer
 from fourbar_validation.compare.rows import REFUSES, Row
 from fourbar_validation.compare.statements import limit_positions
 from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.mujoco.inverse import MujocoInverse
 from fourbar_validation.engines.pinocchio import PinocchioInverse
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.run.answers import check_statements
 from fourbar_validation.run.judge import judge
-from fourbar_validation.run.question import ask_at
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.scenes import crank_rocker
 

@@ -7,16 +7,20 @@ from fourbar.scene import command
 from fourbar_validation.advise.worst_errors import compute_errors
 from fourbar_validation.engines.mujoco.plain_loop import MujocoInverseLoop
 from fourbar_validation.scenes.suites import MODELS
-from tests.support.scenes import crank_rocker, thesis
+from tests.support.scenes import crank_rocker, low_parallelogram, thesis
 
 
 def test_it_answers_to_round_off() -> None:
-    """Where bar 2 or 3 is driven, close to limits.
+    """Where bar 2 or 3 is driven, close to limits, beyond a change point.
 
     Loads are placed from any origin.
     """
     scenes = [crank_rocker(drive_bar=bar) for bar in (2, 3)]
-    scenes += [thesis(np.radians([100.0, 135.0])), load(MODELS / "crank_rocker.toml")]
+    scenes += [
+        low_parallelogram(),
+        thesis(np.radians([100.0, 135.0])),
+        load(MODELS / "crank_rocker.toml"),
+    ]
     for scene in scenes:
         rows = command(scene)
         assert (

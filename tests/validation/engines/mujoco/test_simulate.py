@@ -25,7 +25,7 @@ from fourbar_validation.run.answers import compare_answer
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import Question
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
-from tests.support.scenes import crank_rocker, thesis
+from tests.support.scenes import crank_rocker, low_parallelogram, thesis
 from tests.validation.engines.test_engines import commanded
 
 TURN = fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 90)
@@ -211,6 +211,20 @@ def test_error_falls_with_the_fourth_power_of_the_timestep() -> None:
 
     coarse, fine, order = observe_order(posed, fourbar.command(posed), error)
     assert fine < coarse and 3.0 < order < 6.0, (coarse, fine, order)
+
+
+def test_the_order_is_of_the_assembly_that_is_stated_beyond_a_change_point() -> None:
+    posed = low_parallelogram(steps=4)
+    seen = []
+
+    def error(answer: Answer) -> float:
+        s = fourbar.solve(posed, at=answer.at)
+        assert s.torque is not None
+        seen.append(np.abs(answer.quantities["torque"] - s.torque).max())
+        return float(seen[-1] / np.abs(s.torque).max())
+
+    observe_order(posed, fourbar.command(posed), error)
+    assert len(seen) == 2 and max(seen) < 1e-3
 
 
 def test_a_residual_that_is_no_number_raises_its_alarm(

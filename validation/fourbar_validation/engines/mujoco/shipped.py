@@ -10,10 +10,10 @@ import numpy as np
 
 from fourbar.errors import InputError, LimitError, NotAssembledError
 from fourbar.mjcf import write_mjcf
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar_validation.compare.rows import FAILS, UNDECIDED, Row
-from fourbar_validation.compare.tolerance import EPS, SIMULATED, K
+from fourbar_validation.compare.tolerance import EPS, SIMULATED, K, wrap_angle
 from fourbar_validation.engines.limits import (
     FASTEST,
     NEAREST_TOGGLE,
@@ -62,10 +62,13 @@ def compare_shipped(name: str, scene: Scene, command: Command) -> Row | None:
         errors.append(
             (math.hypot(*loop.gap()) / (OPEN * size), f"{what}: the loop is open")
         )
+        here = _find_commanded(command, float(d.qpos[O2]), omega)
+        # of an assembly the sign changes at a change point
+        sign = int(with_signs(scene.linkage, here).branch[0])
         errors.append(
             (
-                0.0 if loop.branch() in command.branch else math.inf,
-                f"{what}: not {BRANCH_NAMES[int(command.branch[0])]}",
+                0.0 if loop.branch() == sign else math.inf,
+                f"{what}: not {BRANCH_NAMES[int(here.branch[0])]}",
             )
         )
 
@@ -73,9 +76,7 @@ def compare_shipped(name: str, scene: Scene, command: Command) -> Row | None:
     closed("as it opens")
     mujoco.mj_resetDataKeyframe(loop.model, d, 0)
     closed("keyframe")
-    first = command.theta_2[
-        np.argmin(np.abs(np.angle(np.exp(1j * (command.theta_2 - d.qpos[O2])))))
-    ]
+    [first] = _find_commanded(command, float(d.qpos[O2]), omega).theta_2
     apart = abs(math.remainder(float(first - d.qpos[O2]), math.tau))
     errors.append(
         (
@@ -141,6 +142,19 @@ def compare_shipped(name: str, scene: Scene, command: Command) -> Row | None:
     return Row.judged(
         (name, NAME, "shipped"), QUANTITY, error, 1.0, reason, float(d.qpos[O2])
     )
+
+
+def _find_commanded(command: Command, theta_2: float, omega_2: float) -> Command:
+    """Find the commanded position at an angle of bar 2, whatever turn it is of.
+
+    It is the nearest; of several turns the first in the direction of motion, where the
+    file begins.
+    """
+    apart = np.abs(wrap_angle(command.theta_2 - theta_2))
+    rounding = K * EPS * np.maximum(1.0, np.abs(command.theta_2))
+    nearest = np.flatnonzero(apart <= apart.min() + rounding)
+    in_time = math.copysign(1.0, omega_2) * command.theta_2[nearest]
+    return command.part(nearest[[np.argmin(in_time)]])
 
 
 def _find_worst(errors: list[tuple[float, str]]) -> tuple[float, str]:

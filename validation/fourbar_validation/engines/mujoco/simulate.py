@@ -20,6 +20,7 @@ from fourbar.scene import Command, Scene
 from fourbar.scene.motion import COMMANDS, Motion
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.pins import state_from_pins
+from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.description import (
     list_speeds,
     list_unknowns,
@@ -445,9 +446,15 @@ def observe_order(
     """
     errors = [
         error(
-            MujocoSimulated(
-                replace(RECIPE, timestep_scale=scale, time_constant_steps=80.0 / scale)
-            ).answer(scene, command)
+            ask_at(
+                MujocoSimulated(
+                    replace(
+                        RECIPE, timestep_scale=scale, time_constant_steps=80.0 / scale
+                    )
+                ),
+                scene,
+                command,
+            )
         )
         for scale in (4.0, 2.0)
     ]

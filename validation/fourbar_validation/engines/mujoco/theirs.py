@@ -25,7 +25,7 @@ from fourbar.errors import FourBarError, InputError, LimitError
 from fourbar.linkage import PINS
 from fourbar.mjcf import choose_run, size_flywheel, write_mjcf
 from fourbar.quantities import PIN_FORCES
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene import command as command_of
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.tolerance import magnitude
@@ -615,8 +615,9 @@ def _answer_one_state(loop: _UserLoop, command: Command) -> Answer:
         contacts = max(contacts, int(loop.data.ncon))
         return values
 
+    told = with_signs(loop.scene.linkage, command)
     out, assembled, gap = read_each(
-        loop, command, [*list_unknowns(loop.scene), *MADE], read
+        loop, told, [*list_unknowns(loop.scene), *MADE], read
     )
     if contacts:
         loop.notes.append(
@@ -649,9 +650,10 @@ def answer_through_time(loop: _UserLoop, command: Command) -> Answer:
         )
     assert isinstance(command.omega_2, float) and isinstance(command.alpha_2, float)
     position = Assembler(loop)
+    told = with_signs(loop.scene.linkage, command)
     order = order_in_time(command.theta_2, None, command.omega_2)
     segment = max(
-        split_segments(find_assembled(position, command, order), order),
+        split_segments(find_assembled(position, told, order), order),
         key=len,
         default=[],
     )
@@ -666,7 +668,7 @@ def answer_through_time(loop: _UserLoop, command: Command) -> Answer:
             f"its timestep of {timestep:g} s makes {steps:.3g} steps of the motion;"
             f" must be 1 to {MOST_STEPS}"
         )
-    position.find(float(command.theta_2[segment[0]]), int(command.branch[segment[0]]))
+    position.find(float(told.theta_2[segment[0]]), int(told.branch[segment[0]]))
     data.qpos[:], data.qvel[:] = loop.data.qpos, loop.speeds(command.omega_2)
     heavy = max(loop.armature, size_flywheel(loop.scene))
     names = [*list_unknowns(loop.scene), *MADE]

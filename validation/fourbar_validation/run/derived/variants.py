@@ -34,6 +34,7 @@ from fourbar_validation.compare.tolerance import (
     magnitude,
     sum_lengths,
 )
+from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import make_prediction
 from fourbar_validation.run.printed import compare_points
@@ -41,7 +42,6 @@ from fourbar_validation.run.question import (
     FREE_BODY,
     NotAskedError,
     Question,
-    ask_at,
     spread_evenly,
 )
 
