@@ -133,6 +133,37 @@ def opened(scene: fourbar.Scene) -> tuple[mujoco.MjModel, mujoco.MjData]:
     return model, data
 
 
+@pytest.mark.parametrize("branch", [1, -1])
+@pytest.mark.parametrize(
+    ("lengths", "points"),
+    [
+        ((0.3, 0.1, 0.3, 0.1), (0.0, math.pi)),
+        ((0.3, 0.1, 0.1, 0.3), (0.0, math.pi)),
+        ((0.1, 0.1, 0.3, 0.3), (0.0,)),
+        ((0.4, 0.1, 0.27, 0.23), (math.pi,)),
+    ],
+    ids=["parallelogram", "kite a = b", "kite a = d", "a + d = b + c"],
+)
+def test_the_file_opens_in_the_assembly_beyond_change_points(
+    lengths: tuple[float, ...], points: tuple[float, ...], branch: int
+) -> None:
+    """Pin B lies left of the diagonal from A to O4 in the open assembly's first half.
+
+    It changes its side at each change point that the input passes, and at no other
+    angle. The pins are read from MuJoCo's own points.
+    """
+    linkage = replace(fourbar.uniform(*lengths), ground_angle=0.3)
+    for psi in (-2.5, -0.5, 0.5, 2.5, 3.8, 6.0, 6.8):
+        turns = [point + math.tau * k for point in points for k in (-1, 0, 1)]
+        passed = sum((at > 0.5) != (at > psi) for at in turns)
+        motion = fourbar.Motion(0.3 + psi, 5.0, branch=branch)
+        _, data = opened(fourbar.Scene(linkage, motion))
+        O4, A, B = (data.site(name).xpos[:2] for name in ("O4", "A", "B3"))
+        left = np.cross([*(O4 - A), 0.0], [*(B - A), 0.0])[2]
+        assert np.sign(left) == branch * (-1) ** passed, psi
+        assert gap(data) < OPEN
+
+
 def sprung() -> fourbar.Scene:
     """Springs that count whole turns.
 

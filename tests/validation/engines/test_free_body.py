@@ -23,12 +23,14 @@ from fourbar.effects import (
     Place,
     Spring,
     Springs,
+    Torsion,
     Viscous,
 )
 from fourbar.linkage import PINS
 from fourbar.quantities import LINE_QUANTITIES, STAGE_OF
 from fourbar.scene import Scene, command
 from fourbar_validation.engines import free_body, free_body_closure, free_body_effects
+from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody, continue_couples
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
@@ -53,6 +55,26 @@ def answered(scene: Scene) -> dict[str, Any]:
     return answer.quantities
 
 
+@pytest.mark.parametrize("pin", ["O2", "O4"])
+def test_a_spring_is_wound_along_the_assembly_through_change_points(pin: str) -> None:
+    """Of a parallelogram bars 2 and 4 turn together: each winds by what bar 2 turns.
+
+    Also where all positions have one sign, and change points lie between them.
+    """
+    rest, begin = 0.1, 0.3
+    for turned in (np.linspace(0.0, 2.0 * math.tau, 25), math.tau * np.arange(3)):
+        scene = Scene(
+            RECTANGLE,
+            fourbar.Motion(begin + turned, 6.0),
+            effects=(Torsion(((pin, 2.0, rest, 0.0),)),),
+        )
+        torque = ask_at(FreeBody(), scene, command(scene)).quantities["torque"]
+        wound = begin + turned - rest > math.pi
+        np.testing.assert_array_equal(np.isnan(torque), wound)
+        due = 2.0 * (begin + turned - rest)[~wound]
+        np.testing.assert_allclose(torque[~wound], due, rtol=1e-9)
+
+
 def test_it_imports_the_description_and_nothing_of_the_formulas() -> None:
     allowed = (
         "fourbar.linkage",
@@ -65,6 +87,7 @@ def test_it_imports_the_description_and_nothing_of_the_formulas() -> None:
         "fourbar_validation.engines.description",
         "fourbar_validation.compare.line",
         "fourbar_validation.compare.pins",
+        "fourbar_validation.engines.linear",
     )  # which import these alone
     allowed += ("fourbar.quantities",)  # names
     standard = {"collections", "dataclasses", "math", "typing"}

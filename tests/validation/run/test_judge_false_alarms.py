@@ -121,6 +121,33 @@ def test_what_is_wrong_by_more_than_is_predicted_fails(
     assert {row.verdict for row in rows if row.quantity == "omega_3"} == {FAILS}
 
 
+def test_an_exact_zero_needs_no_error_bar(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bars 2 and 3 of a crossed kite turn together, bar 4 rests: no torque is needed.
+
+    The balls' terms cancel to 1e-95 of themselves. What doubles leave still shows.
+    """
+    kite = fourbar.uniform(0.3, 0.1, 0.1, 0.3)
+    spring = fourbar.effects.Torsion((("A", 2.0, 0.1, 0.0),))
+    motion = Motion(np.array([1.0, 2.0, 4.0]), 6.0, branch=-1)
+    scene = fourbar.Scene(kite, motion, effects=(spring,))
+    true, added = printed.solve, 0.0
+
+    def judged() -> str:
+        rows = printed.check_error_bars(Question("", scene, fourbar.command(scene)))
+        return {row.quantity: row.verdict for row in rows}["torque_error"]
+
+    def with_more(scene: Scene, *stage: str, **keywords: object) -> Solution:
+        solution: Solution = true(scene, *stage, **keywords)  # type: ignore[arg-type]
+        assert solution.torque is not None
+        solution.torque[1] += added
+        return solution
+
+    monkeypatch.setattr(printed, "solve", with_more)
+    assert judged() == AGREES
+    added = 1e-30
+    assert judged() == FAILS
+
+
 def test_an_error_bar_of_no_error_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = replace(FAULT_SCENES["crank-rocker"], motion=Motion(POSITIONS, 10.0))
     true = printed.solve

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.scene import Scene, command, with_signs
+from fourbar.scene import Command, Scene, command, with_signs
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.pins import find_centre, find_mass
 from fourbar_validation.engines.description import PINS, declares
@@ -277,8 +277,8 @@ def _interpolate_factor(table: Any, theta_2: Array) -> Array:
 def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
     """Find where a torsion spring is wound by more than half a turn from its rest.
 
-    It is followed from the motion's start. None where no spring counts turns, or the
-    motion changes its branch.
+    It is followed from the motion's start, in its assembly. None where no spring counts
+    turns.
     """
     springs = [
         spring
@@ -288,15 +288,15 @@ def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
     ]
     if not springs or scene.motion.free is not None:
         return None
-    begins = with_signs(scene.linkage, command(scene))
-    if np.ptp(begins.branch) != 0:
-        return None
+    begins = command(scene)
     link = scene.linkage
     gone = np.zeros(len(motion.theta_2), dtype=bool)
     ends = np.concatenate((begins.theta_2, motion.theta_2))
     steps = math.ceil(float(np.ptp(ends)) / FOLLOWED) + 1
     path = np.unique(np.concatenate((ends, np.linspace(ends.min(), ends.max(), steps))))
-    closed = close(link, path, np.full(len(path), begins.branch[0]))
+    assembly = np.full(len(path), scene.motion.branch, dtype=np.int8)
+    told = with_signs(link, Command(path, assembly, None, 0.0))
+    closed = close(link, path, told.branch)
     path = path[closed.assembled]
     if not (on_path := np.isin(begins.theta_2, path)).any():
         return gone

@@ -59,6 +59,10 @@ nearest to a rest are added.
 """
 BARS = 10.0
 """Error bars: 2 in 100 million normal errors exceed ten of them."""
+_BALLS_EXACT_TO = 2.0**-256
+"""Part of a size that 320-bit balls may leave of an exact zero, whose error bar is 0. A
+torque is the sum of terms that cancel; 64 bits are left for that.
+"""
 _ROUNDED_SOMEWHERE = 20
 """Positions with loaded friction of which one at least leaves a residual. By rounding
 half of them do.
@@ -280,7 +284,8 @@ def check_error_bars(question: Question) -> Iterator[Row]:
                 axis=0,
             )
             wide = np.where(beyond, divide(width, expected), wide)
-        share = np.where(tells, np.maximum(divide(true, BARS * width), wide), 0.0)
+        allowed = BARS * width + _BALLS_EXACT_TO * size
+        share = np.where(tells, np.maximum(divide(true, allowed), wide), 0.0)
         share[tells & ~np.isfinite(width)] = np.inf
         index = find_worst(share)
         reason = (

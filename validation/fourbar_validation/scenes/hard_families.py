@@ -217,7 +217,7 @@ def _driven_output(*, steps: int = 180, seeds: range = range(2)) -> Scenes:
 CHANGE_POINTS: dict[str, tuple[Lengths, tuple[float, ...]]] = {
     "parallelogram": ((0.3, 0.1, 0.3, 0.1), (0.0, math.pi)),
     "parallelogram a > d": ((0.1, 0.3, 0.1, 0.3), (0.0, math.pi)),
-    "kite a = b": ((0.3, 0.1, 0.1, 0.3), (math.pi,)),
+    "kite a = b": ((0.3, 0.1, 0.1, 0.3), (0.0, math.pi)),
     "kite a = d": ((0.1, 0.1, 0.3, 0.3), (0.0,)),
     "a + d = b + c": ((0.4, 0.1, 0.27, 0.23), (math.pi,)),
 }

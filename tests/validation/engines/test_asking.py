@@ -1,0 +1,59 @@
+"""What an engine is told, and at what its answer is taken."""
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.engines.asking import ask_at
+from fourbar_validation.scenes.suites import MODELS
+from tests.support.scenes import crank_rocker
+
+
+class Told:
+    """An engine that keeps what it is told, and answers at a motion of its own."""
+
+    name, commands = "told", ("theta_2", "stroke")
+    at: Command | None = None
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        self.command = command
+        return Answer(self.name, "exact", at=self.at or command)
+
+
+@pytest.mark.parametrize("branch", [1, -1])
+def test_an_engine_is_told_the_sign_and_answers_at_the_assembly(branch: int) -> None:
+    """With a single change point the sign is back after two turns alone.
+
+    A motion that the engine made is named by its assembly too.
+    """
+    linkage = fourbar.uniform(0.4, 0.1, 0.27, 0.23)
+    angles = np.radians([90.0, 270.0, 450.0, 630.0])
+    scene = Scene(linkage, fourbar.Motion(angles, 3.0, branch=branch))
+    command, engine = fourbar.command(scene), Told()
+    assert ask_at(engine, scene, command).at is command
+    assert engine.command.branch.tolist() == [branch, -branch, -branch, branch]
+    engine.at = engine.command._replace(angle=angles + 1e-3)
+    made = ask_at(engine, scene, command).at
+    assert made is not None and made.branch.tolist() == [branch] * 4
+
+
+def test_an_engine_is_not_told_the_angles_that_the_formulas_found_from_a_stroke() -> (
+    None
+):
+    scene = fourbar.load(MODELS / "capabilities" / "stroke_input.toml")
+    command, engine = fourbar.command(scene), Told()
+    ask_at(engine, scene, command)
+    assert np.isfinite(command.angle).all() and np.isnan(engine.command.angle).all()
+    assert np.isnan(np.asarray(engine.command.speed)).all()
+    assert engine.command.condition is None and engine.command.lost is None
+    assert engine.command.stroke is not None
+    assert np.isfinite(engine.command.stroke).all()
+
+
+def test_without_a_stroke_the_angles_are_the_command() -> None:
+    scene, engine = crank_rocker(), Told()
+    command = fourbar.command(scene)
+    ask_at(engine, scene, command)
+    np.testing.assert_array_equal(engine.command.angle, command.angle)
