@@ -164,8 +164,9 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
                 on = "along a line"
             else:
                 on = "at a point"
+        of = f" {self.title!r}" if self.title else ""
         lines = [
-            f"Solution {self.title!r}: {describe_extent(self.theta_2)}, drive {on}",
+            f"Solution{of}: {describe_extent(self.theta_2)}, drive {on}",
             "status: "
             + ", ".join(f"{count} {name}" for name, count in counts if count),
             *(

@@ -34,6 +34,15 @@ def test_a_quantity_is_found_by_its_name() -> None:
         iter(solution)
 
 
+def test_a_scene_without_a_title_leaves_no_empty_quotes() -> None:
+    scene = crank_rocker()
+    named, unnamed = (
+        repr(fourbar.solve(replace(scene, title=title))) for title in ("press", "")
+    )
+    assert named.startswith("Solution 'press': ")
+    assert unnamed.startswith("Solution: ")
+
+
 def test_a_solution_is_frozen() -> None:
     solution = fourbar.solve(crank_rocker())
     for name in ("torque", "scene", "title"):

@@ -106,7 +106,7 @@ function refresh() {
   byId("pace").textContent = pace();
   byId("theta").max = grid.length - 1;
   byId("theta").disabled = grid.length < 2;
-  byId("branch").parentElement.hidden = single() || lineAddress !== "";
+  byId("branch").parentElement.hidden = byId("branch-key").hidden = oneBranch();
   const [what, symbol] = AXES[axis().name];
   byId("axis").textContent = `${what} ${symbol}`;
   byId("over").textContent = timed() ? "Over time" : `Over ${symbol}`;
@@ -136,8 +136,10 @@ function toggle(id) {
   const box = byId(id);
   if (!box.disabled) { box.checked = !box.checked; box.dispatchEvent(new Event("change")); }
 }
+// Whether there is no other branch to choose: the motion has one, or it is a field of the scene, as in the workbench.
+const oneBranch = () => single() || lineAddress !== "";
 function chooseBranch(value) {
-  if (lineAddress) return;   // there it is a field of the scene
+  if (oneBranch()) return;
   const wasPlaying = playing;
   if (playing) play(false);
   branch = value;

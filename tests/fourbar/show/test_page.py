@@ -178,6 +178,10 @@ def test_a_free_motion_plays_once_in_its_own_time(browse) -> None:
     s = fourbar.solve(RELEASED)
     assert not driver.find_element("id", "branch").is_displayed()
     assert not driver.find_element("id", "torque").is_displayed()
+    # it has one branch: no key promises another, and none takes the linkage away
+    assert not driver.find_element("id", "branch-key").is_displayed()
+    driver.find_element("id", "picture").send_keys("b")
+    assert state_of(driver, "branch") == 1
     rows = clockwork(driver, 20)  # 0.95 s: the first frame starts the clock
     np.testing.assert_allclose(
         s.time[rows], 0.05 * np.arange(20), atol=0.011
@@ -494,6 +498,7 @@ def test_keyboard_drives_it(turning) -> None:
         state_of(driver, "branch") == 1
     )  # single letters act only on the picture in focus
     driver.execute_script("document.getElementById('picture').focus()")
+    assert driver.find_element("id", "branch-key").is_displayed()
     press("b", "f")
     assert state_of(driver, "branch") == -1
     assert not state_of(driver, "document.getElementById('show-forces').checked")
