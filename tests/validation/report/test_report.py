@@ -22,12 +22,20 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.quantities import PIN_FORCES
+from fourbar.scene import command
+from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, Row, write_rows
+from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines import guests
 from fourbar_validation.engines.registry import ENGINES, WORK, load_further
 from fourbar_validation.engines.table import choose_engines, fill_table
 from fourbar_validation.report import svg
-from fourbar_validation.report.figures import STRETCHES, find_worst_of_segments
+from fourbar_validation.report.figures import (
+    STRETCHES,
+    draw_scene_figure,
+    find_worst_of_segments,
+)
 from fourbar_validation.report.html import ALL_OPEN, Section, write_html, write_markdown
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import OWN, Summary
@@ -412,6 +420,28 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
         == "| largest error of allowed | torque | pin forces | motion | compared |"
     )
     assert table[2].startswith(f"| MuJoCo {version}, simulated | - | 2.5e-07 of 1e-05")
+
+
+def test_the_picture_shows_the_pin_force_that_fails() -> None:
+    """Without a failure it shows the largest."""
+    scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))
+    solution = fourbar.solve(scene, "force")
+    sizes = {name: magnitude(getattr(solution, name)).max() for name in PIN_FORCES}
+    largest = max(sizes, key=sizes.__getitem__)
+    other = min(sizes, key=sizes.__getitem__)
+    answer = Answer(
+        "free-body", "exact", command(scene), quantities={"torque": solution.torque}
+    )
+    for name in PIN_FORCES:
+        answer.quantities[name] = getattr(solution, name)
+    record = Record("demo", scene, solution=solution, answers=[answer])
+    assert f"|{largest}|" in (draw_scene_figure(record) or "")
+    record.rows = [
+        fail(replace(OF_MINE, quantity=other), error=0.5),
+        fail(replace(OF_MINE, quantity=largest)),
+    ]
+    drawn = draw_scene_figure(record) or ""
+    assert f"|{other}|" in drawn and f"|{largest}|" not in drawn
 
 
 def record_of(name: str, rows: list[Row], **parts: object) -> Record:

@@ -28,6 +28,7 @@ from fourbar_validation.compare.tolerance import (
     magnitude,
 )
 from fourbar_validation.report.record import Record
+from fourbar_validation.report.summary import compute_shares
 from fourbar_validation.report.svg import (
     ALLOWED,
     BAND,
@@ -123,7 +124,7 @@ def _draw_answers(record: Record, solution: Solution) -> str:
         drive = LINE.value
     shown = ANGLES
     if solution.F32 is not None:
-        shown = (drive, _find_largest_force(solution))
+        shown = (drive, _choose_force(record, solution))
     if record.scene is not None and record.scene.motion.free is not None:
         shown = _MOTION_AND_FORCE
     return "".join(
@@ -131,8 +132,15 @@ def _draw_answers(record: Record, solution: Solution) -> str:
     )
 
 
-def _find_largest_force(solution: Solution) -> str:
-    """Name the pin whose force is the largest over the positions that have a value."""
+def _choose_force(record: Record, solution: Solution) -> str:
+    """Name the pin force that a reader wants to see.
+
+    It is the one that fails most, or else the largest over the positions that have a
+    value.
+    """
+    failing = [row for row in record.rows if row.failed and row.quantity in PIN_FORCES]
+    if failing:
+        return failing[int(np.argmax(compute_shares(failing)))].quantity
     good = solution.status_code == OK
     return max(
         PIN_FORCES,
