@@ -16,6 +16,7 @@ COMMANDS = {
     "stability": "fourbar_lab.stability:stability",
     "bench": "fourbar_lab.bench:bench",
     "effects": "fourbar_lab.effects:effects",
+    "worlds": "fourbar_lab.worlds:command",
     "advice": "fourbar_lab.advice:study",
     "fuzz": "fourbar_lab.fuzz:fuzz",
     "fuzz-files": "fourbar_lab.fuzz_files:fuzz_files",

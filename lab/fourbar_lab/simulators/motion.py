@@ -27,6 +27,8 @@ from fourbar_validation.engines.description import find_field, list_speeds
 from fourbar_validation.engines.free_body import move
 from fourbar_validation.engines.free_body_closure import close
 
+Floats = NDArray[np.floating[Any]]
+"""Array in the precision of a simulator."""
 STEPS = 628
 """Steps in a turn where no setting states them."""
 LIGHT = replace(RECIPE, flywheel=30.0)
@@ -92,6 +94,19 @@ class Readings:
         self.gap = float(np.maximum(self.gap, gap))  # NaN stays NaN
 
 
+class Worlds(NamedTuple):
+    """Single states of one model in many worlds, evaluated by one call."""
+
+    evaluate: Callable[[], Any]
+    """Evaluates the states where they lie, and returns when all are done."""
+    exchange: Callable[[], tuple[Floats, ...]]
+    """Sets the states from NumPy's arrays, evaluates them, and copies the results back:
+    qpos, qvel, qacc, actuator_force, closing force and cfrc_int, a row a world.
+    """
+    read: Callable[[tuple[Floats, ...]], Readings]
+    """Reads the last worlds, one for each position of the scene."""
+
+
 class Simulator:
     """Base of the simulators.
 
@@ -102,6 +117,7 @@ class Simulator:
     name: str
     version = ""
     device = "CPU"
+    on_gpu = False
     made_for = ""
     changed = ""
     """Changes to the simulator's input or defaults that were needed."""
@@ -130,6 +146,12 @@ class Simulator:
         chosen.setting = name or self.setting
         chosen.steps = steps_per_turn or self.steps
         return chosen
+
+    def choose_clock(self) -> Callable[[], float]:
+        """Choose the clock of the wall on a GPU, and of the processor elsewhere."""
+        if self.on_gpu:
+            return time.perf_counter
+        return time.process_time
 
     def through(self, scene: Scene, course: Course) -> Readings:
         """Run through a course."""
@@ -162,6 +184,20 @@ class Simulator:
             LimitError,
         ) as limit:  # InputError: a scene that no file for this simulator can hold
             return Answer(self.name, setting, refusal=str(limit))
+        return self.make_answer(scene, command, setting, readings, rows)
+
+    def make_answer(
+        self,
+        scene: Scene,
+        command: Command,
+        setting: str,
+        readings: Readings,
+        rows: NDArray[np.intp],
+    ) -> Answer:
+        """Make an answer of readings, at the motion that was made.
+
+        `rows`: reading of each position of the command, (n,).
+        """
         if len(readings.instants) != len(set(rows.tolist())):
             raise NotAssembledError(
                 f"{len(readings.instants)} of {len(set(rows.tolist()))} positions were"
@@ -190,7 +226,7 @@ class Simulator:
             self.name,
             setting,
             made,
-            np.ones(n, bool),
+            np.ones(len(rows), bool),
             values,
             evidence={"gap": gap},
             shared=self.changed,

@@ -8,15 +8,18 @@ from functools import partial
 from typing import Any, ClassVar
 
 import mujoco
+import numpy as np
 
 from fourbar.mjcf import SIMULATORS, write_mjcf
 from fourbar.scene import Scene, command, with_signs
 from fourbar_lab.simulators.motion import (
     STEPS,
     Course,
+    Floats,
     Instant,
     Readings,
     Simulator,
+    Worlds,
     find_timestep,
     run_through,
     start,
@@ -89,6 +92,34 @@ def states_of(written: str, scene: Scene) -> list[tuple[Array, Array]]:
     return states
 
 
+def repeat_states(written: str, scene: Scene, worlds: int) -> tuple[Array, Array]:
+    """Repeat the scene's assembled positions over many worlds.
+
+    Returns qpos and qvel, a row a world; the last world has the last position.
+    """
+    q, v = map(np.array, zip(*states_of(written, scene), strict=True))
+    return np.resize(q, (worlds, q.shape[1])), np.resize(v, (worlds, v.shape[1]))
+
+
+def read_last(scene: Scene, model: Any, results: tuple[Floats, ...]) -> Readings:
+    """Read the last worlds, one for each position of the scene.
+
+    Raises ArithmeticError if a number of any world is not finite.
+    """
+    if not all(np.isfinite(array).all() for array in results):
+        raise ArithmeticError("a world diverged")
+    drive = model.actuator("drive").id
+    bars = find_bars(model)
+    count = len(command(scene).theta_2)
+    last = [array[-count:].astype(float) for array in results]
+    readings = Readings()
+    for q, v, a, forces, closing, borne in zip(*last, strict=True):
+        readings.read(
+            scene, reading(model, q, v, a, forces[drive], closing, borne[bars])
+        )
+    return readings
+
+
 class MujocoFile(Simulator):
     """MuJoCo with the generated file."""
 
@@ -118,6 +149,32 @@ class MujocoFile(Simulator):
             data.qpos[:], data.qvel[:] = q, v
             readings.read(scene, _evaluated(model, data))
         return readings
+
+    def in_worlds(self, scene: Scene, worlds: int) -> Worlds:
+        """Prepare single states of many worlds, one after the other on one core."""
+        written = text(scene, STEPS, self.settings[self.setting])
+        model, data = open_model(written)
+        q, v = repeat_states(written, scene, worlds)
+        shapes = ((model.nv,), (model.nu,), (2,), (model.nbody, 6))
+        results = tuple(np.empty((worlds, *shape)) for shape in shapes)
+
+        def evaluate() -> tuple[Floats, ...]:
+            for world in range(worlds):
+                data.qpos[:] = q[world]
+                data.qvel[:] = v[world]
+                mujoco.mj_forward(model, data)
+                mujoco.mj_rnePostConstraint(model, data)
+                evaluated = (
+                    data.qacc,
+                    data.actuator_force,
+                    data.efc_force[:2],
+                    data.cfrc_int,
+                )
+                for array, value in zip(results, evaluated, strict=True):
+                    array[world] = value
+            return q, v, *results
+
+        return Worlds(evaluate, evaluate, partial(read_last, scene, model))
 
 
 def _evaluated(model: Any, data: Any) -> Instant:

@@ -14,12 +14,21 @@ from fourbar_lab.simulators import gradients
 from fourbar_lab.simulators.motion import (
     STEPS,
     Course,
+    Floats,
     Instant,
     Readings,
     Simulator,
+    Worlds,
     run_through,
 )
-from fourbar_lab.simulators.mujoco_c import find_bars, reading, states_of, text
+from fourbar_lab.simulators.mujoco_c import (
+    find_bars,
+    read_last,
+    reading,
+    repeat_states,
+    states_of,
+    text,
+)
 from fourbar_validation.engines.mujoco.closed_loop import open_model
 
 jax.config.update("jax_enable_x64", True)
@@ -37,14 +46,22 @@ def advance(model: Any, state: Any, steps: int) -> Any:
     return jax.lax.fori_loop(0, steps, lambda _, now: mjx.step(model, now), state)
 
 
+@jax.jit  # type: ignore[untyped-decorator]
+@partial(jax.vmap, in_axes=(None, None, 0, 0))
+def _forward_all(model: Any, state: Any, q: Any, v: Any) -> tuple[Any, ...]:
+    """Evaluate states, and return what torque and pin forces are read from."""
+    now = forward(model, state.replace(qpos=q, qvel=v))
+    inner = getattr(now, "_impl", now)
+    return now.qacc, now.actuator_force, inner.efc_force[:2], inner.cfrc_int
+
+
 class MujocoMjx(Simulator):
     """MJX in JAX, which takes a GPU where it has one."""
 
     name = "MJX-JAX"
     version = version("mujoco-mjx")
-    device = (
-        "CPU" if jax.default_backend() == "cpu" else str(jax.devices()[0].device_kind)
-    )
+    on_gpu = jax.default_backend() != "cpu"
+    device = str(jax.devices()[0].device_kind) if on_gpu else "CPU"
     changed = "a closure of two timesteps (--for mjx), and jax_enable_x64"
     settings: ClassVar[dict[str, str]] = {
         "written for MJX": "mjx",
@@ -70,7 +87,11 @@ class MujocoMjx(Simulator):
             return state
 
         return run_through(
-            scene, course, further, lambda now: _evaluated(model, forward(theirs, now))
+            scene,
+            course,
+            further,
+            lambda now: _evaluated(model, forward(theirs, now)),
+            self.choose_clock(),
         )
 
     def states(self, scene: Scene) -> Readings:
@@ -84,6 +105,34 @@ class MujocoMjx(Simulator):
             placed = state.replace(qpos=jax.numpy.array(q), qvel=jax.numpy.array(v))
             readings.read(scene, _evaluated(model, forward(theirs, placed)))
         return readings
+
+    def in_worlds(self, scene: Scene, worlds: int, double: bool = True) -> Worlds:
+        """Prepare single states of many worlds, in double or single precision.
+
+        In single precision the file is that for Warp, whose flywheel is light: beside
+        the heavy one the linkage's accelerations keep no digit.
+        """
+        reader = "warp"
+        if double:
+            reader = self.settings[self.setting]
+        written = text(scene, STEPS, reader)
+        model, data = open_model(written)
+        q, v = repeat_states(written, scene, worlds)
+        with jax.enable_x64(double):
+            theirs = mjx.put_model(model)
+            state = mjx.put_data(model, data)
+            placed = jax.numpy.array(q), jax.numpy.array(v)
+
+        def evaluate(states: tuple[Any, Any] = placed) -> Any:
+            with jax.enable_x64(double):
+                return jax.block_until_ready(_forward_all(theirs, state, *states))
+
+        def exchange() -> tuple[Floats, ...]:
+            with jax.enable_x64(double):
+                states = jax.numpy.array(q), jax.numpy.array(v)
+            return tuple(map(np.array, (*states, *evaluate(states))))
+
+        return Worlds(evaluate, exchange, partial(read_last, scene, model))
 
     def slopes(self, scene: Scene) -> list[dict[str, Any]]:
         """Differentiate the driving torque forwards and backwards.

@@ -4,7 +4,7 @@
 says.
 """
 
-import time
+from functools import partial
 from typing import Any, ClassVar
 
 import mujoco_warp as mjw
@@ -16,17 +16,25 @@ from fourbar_lab.simulators import gradients
 from fourbar_lab.simulators.motion import (
     STEPS,
     Course,
+    Floats,
     Instant,
     Readings,
     Simulator,
+    Worlds,
     run_through,
 )
-from fourbar_lab.simulators.mujoco_c import find_bars, reading, states_of, text
+from fourbar_lab.simulators.mujoco_c import (
+    find_bars,
+    read_last,
+    reading,
+    repeat_states,
+    states_of,
+    text,
+)
 from fourbar_validation.engines.mujoco.closed_loop import open_model
 
 NUMBERS = ("body_mass", "body_inertia", "body_ipos", "site_pos", "dof_armature")
 """Fields of a model that change with a bar's length or mass, or with theta_2."""
-_ON_GPU = warp.get_preferred_device().is_cuda
 
 
 class MujocoWarp(Simulator):
@@ -34,53 +42,38 @@ class MujocoWarp(Simulator):
 
     name = "MuJoCo Warp"
     version = getattr(mjw, "__version__", "")
+    on_gpu = bool(warp.get_preferred_device().is_cuda)
     device = str(warp.get_preferred_device().name)
     made_for = "many worlds at once on a GPU"
     changed = (
         "a light flywheel and no pads (--for warp): single precision; midphase may not"
         " be switched off"
     )
-    settings: ClassVar[dict[str, tuple[int, int]]] = {
-        "forward twice": (2, 1),
-        "forward once": (1, 1),
-        **(
-            {f"forward twice, {worlds} worlds": (2, worlds) for worlds in (64, 4096)}
-            if _ON_GPU
-            else {}
-        ),
-    }
-    """Number of evaluations of a state and of simulated worlds. The last world is read.
-    """
+    settings: ClassVar[dict[str, int]] = {"forward twice": 2, "forward once": 1}
+    """Number of evaluations of a state."""
     single_states = True
 
     def through(self, scene: Scene, course: Course) -> Readings:
         """Run through a course."""
         model, data = open_model(text(scene, course.steps, "warp"))
-        times, worlds = self.settings[self.setting]
+        times = self.settings[self.setting]
         theirs = mjw.put_model(model)
-        state = mjw.put_data(model, data, nworld=worlds)
-        mjw.step(
-            theirs, mjw.put_data(model, data, nworld=worlds)
-        )  # compiled before the clock runs
+        state = mjw.put_data(model, data)
+        # compiled before the clock runs
+        mjw.step(theirs, mjw.put_data(model, data))
 
         def advance(steps: int) -> None:
             for _ in range(steps):
                 mjw.step(theirs, state)
             warp.synchronize()
 
-        if _ON_GPU:
-            clock = time.perf_counter
-        else:
-            clock = time.process_time
-        readings = run_through(
+        return run_through(
             scene,
             course,
             advance,
             lambda _: _evaluated(model, theirs, state, times),
-            clock,
+            self.choose_clock(),
         )
-        readings.seconds /= worlds
-        return readings
 
     def states(self, scene: Scene) -> Readings:
         """Evaluate single states, each set by itself."""
@@ -93,9 +86,50 @@ class MujocoWarp(Simulator):
             state.qpos.assign(np.array([q], dtype=np.float32))
             state.qvel.assign(np.array([v], dtype=np.float32))
             readings.read(
-                scene, _evaluated(model, theirs, state, self.settings[self.setting][0])
+                scene, _evaluated(model, theirs, state, self.settings[self.setting])
             )
         return readings
+
+    def in_worlds(self, scene: Scene, worlds: int) -> Worlds:
+        """Prepare single states of many worlds.
+
+        On a GPU the kernels are launched as one graph.
+        """
+        written = text(scene, STEPS, "warp")
+        model, data = open_model(written)
+        q, v = (
+            array.astype(np.float32) for array in repeat_states(written, scene, worlds)
+        )
+        theirs = mjw.put_model(model)
+        state = mjw.put_data(model, data, nworld=worlds)
+        state.qpos.assign(q)
+        state.qvel.assign(v)
+        launch = partial(_forward, theirs, state, self.settings[self.setting])
+        # compiled before a graph of the launches is made
+        launch()
+        if self.on_gpu:
+            with warp.ScopedCapture() as capture:
+                launch()
+            launch = partial(warp.capture_launch, capture.graph)
+
+        def evaluate() -> None:
+            launch()
+            warp.synchronize()
+
+        def exchange() -> tuple[Floats, ...]:
+            state.qpos.assign(q)
+            state.qvel.assign(v)
+            evaluate()
+            return (
+                q,
+                v,
+                state.qacc.numpy(),
+                state.actuator_force.numpy(),
+                state.efc.force.numpy()[:, :2],
+                state.cfrc_int.numpy(),
+            )
+
+        return Worlds(evaluate, exchange, partial(read_last, scene, model))
 
     def slopes(self, scene: Scene) -> list[dict[str, Any]]:
         """Differentiate the driving torque at a set state.
@@ -146,10 +180,15 @@ class MujocoWarp(Simulator):
         ]
 
 
-def _evaluated(model: Any, theirs: Any, state: Any, times: int) -> Instant:
+def _forward(theirs: Any, state: Any, times: int) -> None:
+    """Evaluate the states so many times, and what every body bears."""
     for _ in range(times):
         mjw.forward(theirs, state)
     mjw.rne_postconstraint(theirs, state)
+
+
+def _evaluated(model: Any, theirs: Any, state: Any, times: int) -> Instant:
+    _forward(theirs, state, times)
     arrays = (state.qpos, state.qvel, state.qacc, state.actuator_force, state.cfrc_int)
     q, v, a, drive, on_bodies = (x.numpy()[-1].astype(float) for x in arrays)
     closing = state.efc.force.numpy()[-1, :2].astype(float)

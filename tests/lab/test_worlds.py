@@ -1,0 +1,198 @@
+"""Many positions in one call: what is timed, and what is judged.
+
+MJX and MuJoCo Warp need not be there. Where they are, they run on any device.
+"""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fourbar.errors import BAD_INPUT, BROKEN, HOLDS
+from fourbar_lab import worlds
+from fourbar_lab.cli import status
+from fourbar_lab.simulators import mujoco_c
+from fourbar_lab.simulators.mujoco_c import MujocoFile, repeat_states
+from fourbar_lab.worlds import CONTENDERS, FORMULAS, WorldsCost, list_rows, measure
+from tests.lab.simulators.test_simulators import ask_position
+from tests.whole.test_imports import ROOT
+
+MUJOCO = "MuJoCo, one core"
+EXACT = 1e-10
+"""Error of single states of MuJoCo with the generated file; measured 2e-12."""
+SINGLE = 0.03
+"""Error of MuJoCo Warp in single precision; measured 1.1e-2 on a CPU and 6.1e-3 on a
+GPU.
+"""
+WITHOUT_VELOCITY = (0.4, 0.8)
+"""Errors of MJX, which leaves (dJ/dt) v out; measured 0.49 and 0.65."""
+TWO_TURNS = 50
+"""Worlds that hold each of the 25 positions twice."""
+
+
+def check_errors(name: str, torque: float, force: float) -> None:
+    """Check errors against what is known of a contender."""
+    low, high = 0.0, SINGLE
+    if name == MUJOCO:
+        high = EXACT
+    elif "MJX" in name:
+        low, high = WITHOUT_VELOCITY
+    assert low < torque < high, name
+    assert low < force < high, name
+
+
+def test_the_last_worlds_are_judged_and_every_world_has_a_state() -> None:
+    cost = measure(MUJOCO, TWO_TURNS)
+    check_errors(MUJOCO, cost.torque, cost.force)
+    assert min(cost.seconds, cost.exchanged, cost.first) > 0.0
+    scene, command = ask_position()
+    written = mujoco_c.text(scene, 100, "mujoco")
+    q, v = repeat_states(written, scene, TWO_TURNS)
+    turned = np.remainder(q[:, 0] - np.resize(command.theta_2, TWO_TURNS), math.tau)
+    assert np.minimum(turned, math.tau - turned).max() < 1e-12
+    assert len(v) == TWO_TURNS
+
+
+def test_a_world_that_is_not_finite_fails() -> None:
+    scene, _ = ask_position()
+    prepared = MujocoFile().in_worlds(scene, TWO_TURNS)
+    results = prepared.exchange()
+    prepared.read(results)
+    # not among the worlds that are judged
+    results[2][0] = np.nan
+    with pytest.raises(ArithmeticError, match="diverged"):
+        prepared.read(results)
+
+
+def test_a_wrong_world_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = MujocoFile.in_worlds
+
+    def with_an_error(self: MujocoFile, scene: Any, count: int) -> Any:
+        prepared = plain(self, scene, count)
+
+        def exchange() -> Any:
+            results = prepared.exchange()
+            # the closing force of the last position
+            results[4][-1] *= 1.1
+            return results
+
+        return prepared._replace(exchange=exchange)
+
+    monkeypatch.setattr(MujocoFile, "in_worlds", with_an_error)
+    cost = measure(MUJOCO, TWO_TURNS)
+    assert cost.force > 1e-3 and cost.torque < EXACT
+
+
+def test_times_are_divided_by_those_of_the_formulas() -> None:
+    costs = [
+        WorldsCost(FORMULAS, 1000, 2e-4, 2e-4, 0.01),
+        WorldsCost(MUJOCO, 1000, 6e-3, 8e-3, 0.1, 1e-12, 3e-12),
+        WorldsCost(FORMULAS, 10_000, 1e-3, 1e-3, 0.02),
+        WorldsCost("MuJoCo Warp, single precision", 1000, 1e-4, 3e-4, 43.0, 0.01, 0.1),
+        WorldsCost(MUJOCO, 10_000, 5e-2, 6e-2, 0.2, 2e-12, math.nan),
+    ]
+    columns, rows = list_rows(costs)
+    assert columns[1:3] == ["1 000", "10 000"]
+    assert rows == [
+        [FORMULAS, "200 ns", "100 ns", "reference", "reference", "0.02"],
+        [MUJOCO, "30 (40)", "50 (60)", "2.0e-12", "nan", "0.2"],
+        [
+            "MuJoCo Warp, single precision",
+            "0.5 (1.5)",
+            "failed",
+            "1.0e-02",
+            "1.0e-01",
+            "43",
+        ],
+    ]
+
+
+def test_without_a_gpu_nothing_is_claimed_of_one(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(worlds, "load_simulator", lambda _: MujocoFile)
+    out = tmp_path / "worlds.md"
+    assert status(["worlds", "--worlds", str(TWO_TURNS), "-o", str(out)]) == BROKEN
+    printed, page = capsys.readouterr().out, out.read_text(encoding="utf-8")
+    for name, contender in CONTENDERS.items():
+        line = f"{name}: not run: no GPU"
+        assert (line in printed) == (line in page) == contender.needs_gpu
+    assert f"| {MUJOCO} |" in page and "| MuJoCo Warp" not in page
+
+
+class Elsewhere(MujocoFile):
+    """MuJoCo in the place of a simulator for GPUs."""
+
+    def in_worlds(self, scene: Any, count: int, double: bool = True) -> Any:
+        return super().in_worlds(scene, count)
+
+
+@pytest.mark.parametrize("on_gpu", [True, False])
+def test_with_a_gpu_or_on_any_device_all_are_run(
+    on_gpu: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(Elsewhere, "on_gpu", on_gpu)
+    monkeypatch.setattr(worlds, "load_simulator", lambda _: Elsewhere)
+    words = ["worlds", "--worlds", str(TWO_TURNS)]
+    if not on_gpu:
+        words.append("--any-device")
+    assert status(words) == HOLDS
+    printed = capsys.readouterr().out
+    assert "not run" not in printed
+    for name in CONTENDERS:
+        assert f"{name}, {TWO_TURNS} worlds: " in printed
+
+
+def test_what_is_not_installed_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuse(adapter: str) -> type[MujocoFile]:
+        if "warp" in adapter:
+            raise ModuleNotFoundError("No module named 'warp'")
+        return MujocoFile
+
+    monkeypatch.setattr(worlds, "load_simulator", refuse)
+    assert status(["worlds", "--worlds", str(TWO_TURNS)]) == BROKEN
+    assert "not run: No module named 'warp'" in capsys.readouterr().out
+
+
+def test_a_call_that_fails_costs_its_own_row(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(*_: Any) -> None:
+        raise MemoryError("out of memory")
+
+    monkeypatch.setattr(worlds, "measure", fail)
+    assert status(["worlds", "--worlds", str(TWO_TURNS)]) == BROKEN
+    printed = capsys.readouterr().out
+    assert f"{MUJOCO}, {TWO_TURNS} worlds: failed: out of memory" in printed
+    assert FORMULAS in printed
+
+
+@pytest.mark.parametrize("text", ["30", "0", "many", ""])
+def test_worlds_are_whole_turns(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert status(["worlds", "--worlds", text]) == BAD_INPUT
+    assert "must be multiples of 25" in capsys.readouterr().err
+
+
+def test_the_page_states_errors_that_hold() -> None:
+    page = (ROOT / "docs" / "cost.md").read_text(encoding="utf-8")
+    table = page.partition("<!-- data worlds -->")[2].partition("<!-- end -->")[0]
+    rows = {}
+    for line in table.strip().splitlines()[2:]:
+        name, *cells = (cell.strip() for cell in line.strip("|").split("|"))
+        rows[name] = cells
+    assert list(rows) == [FORMULAS, *CONTENDERS]
+    for name in CONTENDERS:
+        check_errors(name, *map(float, rows[name][-3:-1]))
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", [name for name in CONTENDERS if name != MUJOCO])
+def test_each_simulator_that_is_installed_evaluates_worlds(name: str) -> None:
+    module = CONTENDERS[name].adapter.partition(":")[0]
+    pytest.importorskip(f"fourbar_lab.simulators.{module}", exc_type=ImportError)
+    cost = measure(name, TWO_TURNS)
+    check_errors(name, cost.torque, cost.force)
