@@ -122,7 +122,10 @@ def to_si(text: str, unit: str) -> float:
     if not name:
         raise UnitError(UNIT_MISSING)
     if turning := TURNING.search(name):
-        sign = "" if turning[1].casefold() not in ("cw", "clockwise") else "-"
+        # -84 rad/s cw turns counter-clockwise
+        clockwise = turning[1].casefold() in ("cw", "clockwise")
+        backwards = number_text[0].startswith("-")
+        sign = "-" if clockwise != backwards else ""
         plain = f"{sign}{number_text[0].lstrip('+-')} {name[: turning.start()]}"
         raise UnitError(
             f'the sign says how it turns, counter-clockwise is positive: "{plain}"'

@@ -344,15 +344,13 @@ class CircuitCurve:
         Without a sweep theta_2 is counted from the circuit's range.
         """
         position = self.state(point[None]).position
-        from_ = (
-            self.low if self.sweep is None else self.sweep[0] - self.theta_1 - AT_END
-        )
-        theta_2 = (
-            self.theta_1
-            + from_
-            + math.remainder(point[0] - from_ - math.pi, TURN)
-            + math.pi
-        )
+        middle = self.low + math.pi
+        if self.sweep is not None:
+            first, last = self.sweep
+            middle = first + 0.5 * min(last - first, TURN) - self.theta_1
+        # an end may lie beyond the sweep by a rounding
+        psi = middle + math.remainder(point[0] - middle, TURN)
+        theta_2 = self.theta_1 + psi
         theta_3, theta_4 = (float(np.angle(u)[0]) for u in (position.u3, position.u4))
         sine = math.sin(point[1])
         return RestPosition(

@@ -17,6 +17,7 @@ from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.motion import COMMANDS, SIDES, STROKE_COMMAND, Motion
 from fourbar.scene.scene import Independent, default_places
+from fourbar.solution import compute_times
 from fourbar.solving import solve
 
 ANGLES = tuple(names[0] for names in COMMANDS.values())
@@ -65,9 +66,7 @@ def _find_places(scene: Scene, name: str, value: float) -> list[float]:
         _require_assembled(scene, name, value)
         return [value]
     if name == "time":
-        raise InputError(
-            "at", name, "needs a motion over time: state motion.law or motion.free"
-        )
+        return [_find_place_of_sweep(scene, value)]
     places: list[float] = []
     for place in _list_candidates(scene, name, value):
         if any(_is_same(motion.commanded, place, other) for other in places):
@@ -86,6 +85,25 @@ def _find_places(scene: Scene, name: str, value: float) -> list[float]:
             f" {_write_place(name, high, _GRID_DIGITS)}"
         )
     return sorted(places)
+
+
+def _find_place_of_sweep(scene: Scene, time: float) -> float:
+    """Find what a steady sweep commands at a time."""
+    sweep = solve(scene, "position")
+    times = compute_times(sweep)
+    if times is None:
+        raise InputError(
+            "at",
+            "time",
+            "needs a motion over time: a sweep at one speed, motion.law or motion.free",
+        )
+    last = float(times.max())
+    if not 0.0 <= time <= last:
+        raise NotAssembledError(
+            f"{_say('time', time)}: the sweep goes from 0 to {last:.6g} s"
+        )
+    order = np.argsort(times)
+    return float(np.interp(time, times[order], sweep.at.places[order]))
 
 
 def _require_assembled(scene: Scene, name: str, value: float) -> None:

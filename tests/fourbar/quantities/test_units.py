@@ -252,7 +252,13 @@ def test_units_are_read_as_people_write_them(
 
 @pytest.mark.parametrize(
     ("text", "plain"),
-    [("84 rad/s cw", "-84 rad/s"), ("84 rpm CW", "-84 rpm"), ("5 rpm ccw", "5 rpm")],
+    [
+        ("84 rad/s cw", "-84 rad/s"),
+        ("84 rpm CW", "-84 rpm"),
+        ("5 rpm ccw", "5 rpm"),
+        ("-5 N m cw", "5 N m"),
+        ("-5 rpm ccw", "-5 rpm"),
+    ],
 )
 def test_a_sense_of_turning_is_a_sign(text: str, plain: str) -> None:
     with pytest.raises(UnitError, match=f'positive: "{plain}"'):

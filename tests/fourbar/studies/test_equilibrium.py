@@ -346,6 +346,20 @@ def test_beside_a_change_point_nothing_is_taken_for_a_rest(
         assert stabilities == ["stable"] * 2 + ["unstable"] * 2
 
 
+def test_a_balanced_linkage_is_indifferent_over_its_sweep_as_it_is_stated() -> None:
+    """A parallelogram lamp and a spring of no free length: k = m g l/(r h)."""
+    arms = Bar(0.3), Bar(0.06, 2.0), Bar(0.3)
+    linkage = FourBar(0.06, *arms, 0.5 * math.pi)
+    post = Place(1, (0.1, 0.0))
+    stiffness = 2.0 * 9.81 * 0.3 / (0.08 * 0.1)
+    spring = Springs((Spring(post, Place(2, (0.08, 0.0)), stiffness),))
+    swept = Sweep(math.radians(-40.0), math.radians(60.0), 10)
+    scene = Scene(linkage, Motion(swept), effects=(DOWN, spring))
+    ((first, last),) = equilibrium(scene).indifferent
+    ends = math.degrees(first.theta_2), math.degrees(last.theta_2)
+    assert ends == pytest.approx((-40.0, 60.0), abs=1e-9)
+
+
 def test_what_has_no_answer_says_so() -> None:
     assert (
         equilibrium(crank_as_pendulum()).indifferent

@@ -25,6 +25,7 @@ LAW = crank_rocker(
         law=fourbar.Law((0.0, 1.0, 2.0), (0.3, 2.0, 0.5), steps=20, ends="rest")
     )
 )
+SWEPT = fourbar.Sweep(0.2, 1.2, 10)
 DROPPED = crank_rocker(
     motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(1.0, 50)),
     effects=(fourbar.Gravity(),),
@@ -62,14 +63,26 @@ def test_a_place_out_of_range_is_refused_with_the_range() -> None:
         find_positions(thesis(), [("theta_2", math.radians(30.0))])
     with pytest.raises(NotAssembledError, match="no position of this assembly"):
         find_positions(crank_rocker(), [("theta_4", 0.0)])
-    with pytest.raises(InputError, match="needs a motion over time: state motion"):
-        find_positions(crank_rocker(), [("time", 1.0)])
+    still = replace(crank_rocker(), motion=fourbar.Motion(SWEPT))
+    with pytest.raises(InputError, match="needs a motion over time: a sweep at one"):
+        find_positions(still, [("time", 1.0)])
     with pytest.raises(NotAssembledError, match="it stays within"):
         find_positions(LAW, [("theta_2", 3.0)])
     with pytest.raises(NotAssembledError, match="goes from 0 to 2 s"):
         find_positions(LAW, [("time", 3.0)])
     with pytest.raises(NotAssembledError, match="lasts 1 s"):
         find_positions(DROPPED, [("time", 3.0)])
+
+
+@pytest.mark.parametrize("omega", [0.5, -0.5])
+def test_a_steady_sweep_has_a_place_at_each_time(omega: float) -> None:
+    """A backward sweep begins at its other end, as its column of times has it."""
+    scene = replace(crank_rocker(), motion=fourbar.Motion(SWEPT, omega))
+    found = find_positions(scene, [("time", 1.3)])
+    begin = SWEPT.start if omega > 0.0 else SWEPT.stop
+    assert found.angle == pytest.approx([begin + 1.3 * omega], abs=1e-12)
+    with pytest.raises(NotAssembledError, match=r"the sweep goes from 0 to 2 s"):
+        find_positions(scene, [("time", 2.1)])
 
 
 def test_a_law_passes_an_angle_up_and_down() -> None:
