@@ -107,6 +107,31 @@ def test_every_engine_is_judged_through_limits_and_change_points(
         assert row(rows, engine, "theta_2").error < BEFORE_THE_LINE
 
 
+@pytest.mark.parametrize("branch", [1, -1])
+def test_a_linkage_that_friction_holds_beyond_a_change_point_is_judged_as_it_stands(
+    branch: int,
+) -> None:
+    """The couples of dry friction that hold it are those of its own assembly."""
+    friction = fourbar.effects.Friction.at(O2=5.0, A=5.0, B=5.0, O4=5.0)
+    motion = fourbar.Motion(
+        np.radians(250.0), 0.0, branch=branch, free=fourbar.Free(0.1, 2)
+    )
+    scene = Scene(
+        fourbar.uniform(0.3, 0.1, 0.3, 0.1),
+        motion,
+        effects=(fourbar.Gravity(), friction),
+    )
+    solution = solve(scene)
+    assert solution.omega_2 is not None and not solution.omega_2.any()
+    rows = judge("held", scene).rows
+    assert {row.engine for row in rows if row.quantity == "F43"} >= {
+        "pinocchio-inverse",
+        "mujoco-inverse",
+        "free-body",
+    }
+    assert [row for row in rows if row.verdict == FAILS] == []
+
+
 def answering(monkeypatch: pytest.MonkeyPatch, change: Any) -> list[Row]:
     """The rows of Pinocchio where its answer is changed."""
     from fourbar_validation.engines.pinocchio import PinocchioReleased
