@@ -48,14 +48,17 @@ const element = (name, attributes = {}, ...inner) => {
 };
 
 function field(path, value, example) {
-  const key = path[path.length - 1], words = choicesOf(path), id = fieldId(path), long = ["title", "source"].includes(key);
+  const key = path[path.length - 1], words = choicesOf(path), id = fieldId(path);
   const needed = key === "side" || key === "bar" && example === undefined, without = `(${words?.find(([word]) => word === String(example))?.[1] ?? "left out"})`;
   const input = words ? element("select", { id }, ...needed ? [] : [new Option(without, "")], ...words.map(([word, name]) => new Option(name, word))) : element("input", { id, placeholder: example ?? "", spellcheck: false, autocomplete: "off" });
   input.value = value ?? "";
   input.setAttribute("aria-describedby", `${id}!`);
   let gesture = "";
   input.addEventListener("focus", () => { gesture = `type:${id}:${++typing}`; });
-  input.addEventListener("blur", () => { if (!unsettled(input)) input.value = entryAt(plain, path) ?? ""; });
+  input.addEventListener("blur", () => {
+    if (!unsettled(input)) input.value = entryAt(plain, path) ?? "";
+    widen(input);
+  });
   const changed = () => ask({ do: "set", path, value: input.value, gesture }, path);
   input.addEventListener("input", changed);
   const by = (direction, event) => {
@@ -70,7 +73,16 @@ function field(path, value, example) {
     if (event.key === "Escape") restore(input);
   });
   input.addEventListener("wheel", event => { if (document.activeElement === input) by(event.deltaY < 0 ? 1 : -1, event); }, { passive: false });
-  return element("label", { className: long ? "field long" : "field" }, labelOf(path), input, element("span", { id: `${id}!`, className: "warning", hidden: true }));
+  const made = element("label", { className: "field" }, labelOf(path), input, element("span", { id: `${id}!`, className: "warning", hidden: true }));
+  widen(input);
+  return made;
+}
+
+// A value that half the width would cut off has the whole: 98.595131725659 in without its unit says little.
+const HALF = 14;   // characters that half the width shows
+function widen(input) {
+  const whole = ["title", "source"].some(name => input.id === fieldId([name])) || input.value.length > HALF;
+  input.parentElement.classList.toggle("long", whole);
 }
 
 // A number a hundredth larger or smaller, in round steps; the unit stays. Null where there is no number.
@@ -176,7 +188,7 @@ function showFields() {
   for (const input of byId("fields").querySelectorAll("[id^='field:']:is(input,select)")) {
     if (input === document.activeElement && !input.dataset.follows || unsettled(input)) continue;
     const value = entryAt(plain, entryPath(input));
-    if (!scalar(value ?? null) || input.value === String(value ?? "")) continue;
-    input.value = value ?? "";
+    if (scalar(value ?? null) && input.value !== String(value ?? "")) input.value = value ?? "";
+    widen(input);
   }
 }

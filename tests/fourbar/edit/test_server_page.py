@@ -701,6 +701,28 @@ def test_choosing_another_commanded_angle_keeps_the_position(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("width", [1440, 400])
+def test_no_number_of_the_scene_is_cut_off_in_its_field(
+    chromium, opened, tmp_path: Path, width: int
+) -> None:
+    """The pump-jack states a ground of 98.595131725659 in, which no half line holds."""
+    path, driver = tmp_path / "pump.toml", chromium
+    path.write_text((MODELS / "gallery" / "pump_jack.toml").read_text())
+    resize(driver, width)
+    open_scene(driver, opened(path))
+    cut_off = (
+        "[...document.querySelectorAll('#fields input')].filter(e => e.value"
+        " && e.id !== 'field:source' && e.scrollWidth > e.clientWidth).map(e => e.id)"
+    )
+    ground = driver.find_element("id", "field:lengths/ground")
+    assert ground.get_attribute("value") == "98.595131725659 in"
+    assert driver.execute_script(f"return {cut_off}") == []
+    type_into(driver, "field:lengths/input", f"24.0000000000001 in{Keys.TAB}")
+    wait_for(driver, "plain.lengths.input === '24.0000000000001 in'")
+    wait_for(driver, f"!{cut_off}.length")
+
+
+@pytest.mark.slow
 def test_a_change_beyond_ten_times_is_no_percentage(
     chromium, opened, tmp_path: Path
 ) -> None:
