@@ -31,7 +31,7 @@ from fourbar.effects import (
     Viscous,
 )
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
-from fourbar.quantities import OK, PIN_FORCES, UNITS
+from fourbar.quantities import OK, PIN_FORCES, STAGE_OF, UNITS
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
@@ -59,6 +59,7 @@ from fourbar_validation.compare.tolerance import (
     mark_touching,
     sum_lengths,
 )
+from fourbar_validation.engines.loop import make_blank
 from fourbar_validation.run.question import NotAskedError, Question, spread_evenly
 
 SAMPLE = 5
@@ -162,11 +163,15 @@ class _Few:
         return with_signs(self.scene.linkage, self.command).branch
 
     def solve(self, scene: Scene, **changed: Any) -> Solution:
-        """Solve another scene at the same positions.
+        """Solve another scene at the same positions for the quantities compared.
 
         Some entries of the command are changed.
         """
-        return _solve(scene, self.command._replace(**changed))
+        return _solve(scene, self.command._replace(**changed), self.quantities)
+
+    def solve_forces(self, scene: Scene) -> Solution:
+        """Solve another scene at the same positions for forces and torques alone."""
+        return _solve(scene, self.command, self.quantities[self.forces])
 
     def solve_alike(self, scene: Scene, sense: int, **changed: Any) -> Solution:
         """Solve another scene whose loop lies on the same side, or on the other.
@@ -178,7 +183,7 @@ class _Few:
         the same in both scenes, the name of the assembly need not be.
         """
         signed = self.command._replace(branch=sense * self._signs, **changed)
-        return _solve(scene, with_signs(scene.linkage, signed))
+        return _solve(scene, with_signs(scene.linkage, signed), self.quantities)
 
     def compare(self, convert: Callable[[str], Array]) -> Array:
         """Compare all quantities with those of another scene, converted; (q, n)."""
@@ -294,15 +299,23 @@ def _mark_long_springs(scene: Scene, solution: Solution) -> Mask:
     return long
 
 
-def _solve(scene: Scene, command: Command) -> Solution:
+def _solve(
+    scene: Scene, command: Command, names: Sequence[str] | None = None
+) -> Solution:
     """Solve a scene whose motion begins at the first position.
 
-    Springs count their turns from there.
+    Springs count their turns from there. `names`: quantities to evaluate; None: all.
     """
     bar = command.bar
     branch = int(command.branch[0])
     begin: Any = {f"theta_{bar}": float(command.angle[0]), "branch": branch}
-    return solve(replace(scene, motion=Motion(**begin)), "force", at=command)
+    begun = replace(scene, motion=Motion(**begin))
+    if names is None or len(command.angle) == 1:
+        # one position is solved in Python's own numbers, into arrays it is not, and
+        # "scaled" demands the same digits
+        return solve(begun, "force", at=command)
+    evaluated = [name for name in names if name in STAGE_OF]
+    return solve(begun, at=command, out=make_blank(len(command.angle), evaluated))
 
 
 def _make_plain(bar: Bar) -> Bar:
@@ -669,8 +682,8 @@ def _measure_sum(few: _Few, parts: Sequence[Scene], bare: Scene | None = None) -
     What a bare scene has, if there is one, is taken off.
     """
     names = few.quantities[few.forces]
-    solved = [few.solve(part) for part in parts]
-    none = None if bare is None else few.solve(bare)
+    solved = [few.solve_forces(part) for part in parts]
+    none = None if bare is None else few.solve_forces(bare)
     totals = []
     summed = []
     for name in names:
