@@ -59,10 +59,11 @@ class BallArithmetic:
                 continue
             assembled[i] = True
             for name, array in out.items():
-                axes = ("_x", "_y") if name in VECTORS else ("",)
-                array[i] = np.squeeze(
-                    [_to_double(values.get(name + axis)) for axis in axes]
-                )
+                if name in VECTORS:
+                    array[i, 0] = _to_double(values.get(f"{name}_x"))
+                    array[i, 1] = _to_double(values.get(f"{name}_y"))
+                else:
+                    array[i] = _to_double(values.get(name))
         return Answer(
             NAME,
             "exact",

@@ -6,7 +6,7 @@ It is what an exact engine answers.
 import cmath
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,6 +41,8 @@ from fourbar_validation.engines.free_body_closure import (
 from fourbar_validation.engines.loaded import Assembled, EngineBars, Values
 
 _START_ANGLES = np.radians(STARTS).tolist()
+_LAST_STEP = 1e-9
+"""A step (rad) after which the gap is at its rounding: Newton's method squares it."""
 _SHORTEST_STEP = 2.0**-40
 """A step halved this often moves nothing that a gap above the rounding could tell."""
 NOT_ANSWERED = frozenset(
@@ -116,12 +118,12 @@ class Assembler:
         )
         for alpha, beta in (triangle, *_START_ANGLES):
             first, second = phi + branch * alpha, phi + math.pi - branch * beta
-            around = {
-                2: (theta, first, second),
-                3: (first, theta, second),
-                4: (second + math.pi, first, theta),
-            }
-            theta_2, theta_3, theta_4 = around[bar]
+            if bar == 2:
+                theta_2, theta_3, theta_4 = theta, first, second
+            elif bar == 3:
+                theta_2, theta_3, theta_4 = first, theta, second
+            else:
+                theta_2, theta_3, theta_4 = second + math.pi, first, theta
             q = (
                 theta_2,
                 math.remainder(theta_3 - theta_2, math.tau),
@@ -145,6 +147,20 @@ def _compute_triangle_angle(e: float, near: float, far: float) -> float:
     return 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
 
 
+def _turn_others(
+    q: Angles, bar: int, theta_3: float, one: float, other: float
+) -> Angles:
+    """Turn the two bars that close the loop, the commanded one held.
+
+    `theta_3`: direction of bar 3, held where it is commanded.
+    """
+    if bar == 2:
+        return q[0], q[1] + one, q[2] + other
+    if bar == 3:
+        return q[0] + one, theta_3 - (q[0] + one), q[2] + other
+    return q[0] + other, q[1] + (one - other), q[2]
+
+
 def _close_gap(
     tree: Assembled, q: Angles, branch: int, closed: float, bar: int = 2
 ) -> Angles | None:
@@ -152,8 +168,8 @@ def _close_gap(
 
     The determinant of the gap's derivative by the angles of the others, for bar 2 -b c
     sin(theta_4 - theta_3), has the branch's sign. A step is halved until the gap falls
-    and the sign is kept; the last one is taken where nothing smaller than `closed` (m)
-    falls any further.
+    and the sign is kept; it ends with a step that is at most _LAST_STEP, or where a gap
+    smaller than `closed` (m) falls no further.
     """
     theta_3 = q[0] + q[1]
 
@@ -171,13 +187,6 @@ def _close_gap(
             d = f - c
         return x, y, a, b, c, d, a * d - b * c
 
-    def moved(q: Angles, one: float, turned: float) -> Angles:
-        if bar == 2:
-            return q[0], q[1] + one, q[2] + turned
-        if bar == 3:
-            return q[0] + one, theta_3 - (q[0] + one), q[2] + turned
-        return q[0] + turned, q[1] + (one - turned), q[2]
-
     state = look(q)
     if state[6] * branch >= 0.0:
         return None
@@ -185,9 +194,10 @@ def _close_gap(
         x, y, a, b, c, d, det = state
         first, second = (b * y - d * x) / det, (c * x - a * y) / det
         size = math.hypot(x, y)
-        part = min(1.0, LONGEST_STEP / max(abs(first), abs(second), LONGEST_STEP))
+        longest = max(abs(first), abs(second))
+        part = min(1.0, LONGEST_STEP / max(longest, LONGEST_STEP))
         while True:
-            trial = moved(q, part * first, part * second)
+            trial = _turn_others(q, bar, theta_3, part * first, part * second)
             trial_state = look(trial)
             if (
                 math.hypot(trial_state[0], trial_state[1]) < size
@@ -199,6 +209,8 @@ def _close_gap(
                 tree.place(q)
                 return q if size <= closed else None
         q, state = trial, trial_state
+        if longest <= _LAST_STEP:
+            break
     return q if math.hypot(state[0], state[1]) <= closed else None
 
 
@@ -239,21 +251,17 @@ class Exact:
         names += [f"{name_driving(scene)}_inertia"] if bars.alone and moves else []
 
         def read(q: Angles, speed: float, acceleration: float) -> Values:
-            points = bars.positions()
             theta_3 = bars.angle(3)
             theta_4 = bars.angle(4)
-            values: Values = {
-                name: points[name] for name in ("A", "B", "G2", "G3", "G4")
-            }
-            values |= {
-                "theta_3": theta_3,
-                "theta_4": theta_4,
-                "sin_mu": math.sin(theta_4 - theta_3),
-            }
-            values |= {"theta_2": bars.angle(2)} if solved_motion else {}
-            return values | (
-                bars.move(command.bar, speed, acceleration) if moves else {}
-            )
+            values: Values = dict(bars.positions())
+            values["theta_3"] = theta_3
+            values["theta_4"] = theta_4
+            values["sin_mu"] = math.sin(theta_4 - theta_3)
+            if solved_motion:
+                values["theta_2"] = bars.angle(2)
+            if moves:
+                values |= bars.move(command.bar, speed, acceleration)
+            return values
 
         out, assembled, gap = read_each(bars, command, names, read)
         if reason := bars.refusal():
@@ -271,7 +279,7 @@ class Exact:
         return answer
 
 
-Read = Callable[[Angles, float, float], Mapping[str, Any]]
+Read = Callable[[Angles, float, float], dict[str, Any]]
 """Function from the bars' angles to values by name. It has speed and acceleration of
 the commanded bar.
 """
@@ -285,7 +293,7 @@ def read_each(
     Return that, where it assembles, and the greatest gap, m.
     """
     n = len(command.angle)
-    omega, alpha = list_speeds(command)
+    omega, alpha = (rates.tolist() for rates in list_speeds(command))
     missing: dict[str, Any] = {
         name: (math.nan, math.nan) if name in VECTORS else math.nan for name in names
     }
@@ -298,7 +306,7 @@ def read_each(
     ):
         if (q := position.find(theta, branch)) is not None:
             assembled[i], gap = True, max(gap, math.hypot(*bars.gap()))
-            rows[i] = {**missing, **read(q, float(omega[i]), float(alpha[i]))}
+            rows[i] = missing | read(q, omega[i], alpha[i])
     return (
         {name: np.array([row[name] for row in rows], float) for name in missing},
         assembled,
