@@ -31,13 +31,14 @@ def make_like(values: Number, model: Number) -> Number:
 def is_any(mask: Number) -> bool:
     """Return True if a mask holds anywhere.
 
-    For one value `np.any` takes fifty times as long.
+    For one value `np.any` takes fifty times as long, for a few `mask.any` five times
+    as long as a count.
     """
     if type(mask) is bool:
         return mask
     if isinstance(mask, PLAIN):
         return bool(mask)
-    return bool(mask.any())
+    return bool(np.count_nonzero(mask))
 
 
 def is_zero(x: Number) -> Number:

@@ -656,6 +656,8 @@ def _mark_stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
     After an overflow these are the quantities computed before it.
     """
     code = formulas.status_code
+    if np.all(code == OK):
+        return np.ones(len(code), dtype=bool)
     if quantity in _OF_FORCES:
         # A jam at rest concerns the motion that would begin, so its forces are stated.
         # Forces with several solutions are not: an engine may find another one, or not

@@ -141,6 +141,8 @@ class Statements(NamedTuple):
     transmission: transmission.StatedTransmission
     over: transmission.StatedOver | None
     """None where the motion has no speed."""
+    places: list[limit_positions.Place]
+    """Places where an engine is asked."""
 
     @classmethod
     def of(cls, scene: Scene, at: Command | None) -> "Statements":
@@ -149,11 +151,11 @@ class Statements(NamedTuple):
         if at is not None and at.omega_2 is not None:
             over = transmission.StatedOver.of(scene, at)
         linkage = scene.linkage
-        return cls(
-            limit_positions.StatedLimits.of(linkage),
-            transmission.StatedTransmission.of(linkage),
-            over,
-        )
+        limits = limit_positions.StatedLimits.of(linkage)
+        of_angle = transmission.StatedTransmission.of(linkage)
+        places = limit_positions.choose_places(limits)
+        places += transmission.choose_places(of_angle)
+        return cls(limits, of_angle, over, places)
 
 
 def check_statements(
@@ -179,10 +181,7 @@ def check_statements(
         stated.over is not None and stated.over.command is not answer.at
     ):
         stated = Statements.of(scene, answer.at)
-    limits, of_angle, over = stated
-    places = limit_positions.choose_places(limits) + transmission.choose_places(
-        of_angle
-    )
+    limits, of_angle, over, places = stated
     seen = look(engine, scene.linkage, places)
     findings = {
         "range": limit_positions.compare_ranges(limits, engine, seen),

@@ -281,18 +281,17 @@ def _compute_inwards(linkage: FourBar, theta_2: float) -> float:
     return step if ahead > behind else -step
 
 
-def _mark_collinear(linkage: FourBar, bar: int) -> list[bool]:
-    """Mark the limits of a bar at which all bars are collinear.
+def _list_limits(
+    linkage: FourBar, bar: int
+) -> list[tuple[mobility.LimitPosition, bool]]:
+    """List the limits of a bar, each with True if all bars are collinear there.
 
     Rounding counts as collinear.
     """
-    angles = np.array(
-        [limit.theta_2 for limit in mobility.limit_positions(linkage, bar)]
-    )
-    return [
-        bool(touches)
-        for touches in np.abs(find_margin(linkage, angles)) <= TOUCHING_MARGIN
-    ]
+    limits = mobility.limit_positions(linkage, bar)
+    angles = np.array([limit.theta_2 for limit in limits])
+    touching = np.abs(find_margin(linkage, angles)) <= TOUCHING_MARGIN
+    return list(zip(limits, touching.tolist(), strict=True))
 
 
 class _Passage(NamedTuple):
@@ -346,11 +345,13 @@ class StatedLimits(NamedTuple):
     """Limits of bar 2, and the small angle that it turns from each. At the limit
     rounding decides if the loop closes.
     """
-    collinear: dict[int, list[bool]]
-    """True for each limit of bars 3 and 4 at which all bars are collinear. Rounding
+    limits: dict[int, list[tuple[mobility.LimitPosition, bool]]]
+    """Limits of bars 3 and 4, each with True if all bars are collinear there. Rounding
     counts as collinear.
     """
     passages: list[_Passage]
+    change_points: Finding
+    """Finding from comparing the change points with exact sums of the lengths."""
 
     @classmethod
     def of(cls, linkage: FourBar) -> "StatedLimits":
@@ -364,19 +365,17 @@ class StatedLimits(NamedTuple):
             linkage,
             trials,
             inside,
-            {bar: _mark_collinear(linkage, bar) for bar in (3, 4)},
+            {bar: _list_limits(linkage, bar) for bar in (3, 4)},
             list(_list_passages(linkage)),
+            _compare_change_points(linkage),
         )
 
     def dead_centres(self, bar: int) -> list[mobility.LimitPosition]:
         """Select the limits of a bar that are of one branch, as they should be."""
-        limits = zip(
-            mobility.limit_positions(self.linkage, bar),
-            self.collinear[bar],
-            strict=True,
-        )
         return [
-            limit for limit, collinear in limits if not collinear and limit.branch != 0
+            limit
+            for limit, collinear in self.limits[bar]
+            if not collinear and limit.branch != 0
         ]
 
 
@@ -404,7 +403,7 @@ def compare_ranges(
             what = "closes where stated"
         yield Finding(float(np.count_nonzero(wrong)), 0.0, angle, what)
         yield from tried.findings
-    yield _compare_change_points(stated.linkage)
+    yield stated.change_points
 
 
 def choose_places(stated: StatedLimits) -> list[Place]:
@@ -493,9 +492,7 @@ def _check_dead_centres(
 ) -> Iterator[Finding]:
     """Check that the other two bars are in one line there, and the bar is at rest."""
     linkage = stated.linkage
-    for limit, collinear in zip(
-        mobility.limit_positions(linkage, bar), stated.collinear[bar], strict=True
-    ):
+    for limit, collinear in stated.limits[bar]:
         signs = (
             (0, 1, -1) if collinear else (1, -1)
         )  # all bars collinear: rounding decides
