@@ -211,9 +211,10 @@ def _solve_alone(case: Case, commanded: Command, request: _Requested) -> Results
     """
     if request.shape != (1,) or request.out is not None:
         return None
-    position = commanded.part((0,))
-    angle: Any = position.angle.item()  # Python's own numbers halve a formula's time
-    position = position._replace(angle=angle)
+    angle: Any
+    angle, *others = commanded.part((0,))
+    # Python's own numbers halve a formula's time
+    position = Command(angle.item(), *others)
     try:
         codes, values, _ = evaluate(case, position, request.last_stage, request.wanted)
     except ArithmeticError:

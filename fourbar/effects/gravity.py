@@ -35,7 +35,8 @@ class Gravity(Effect):
         one with a slope: error bars and derivatives need the small ones.
         """
         u = polar(1.0, self.angle)
-        along, across = (part * (1.0 + abs(part) != 1.0) for part in (u.real, u.imag))
+        along = u.real * (1.0 + abs(u.real) != 1.0)
+        across = u.imag * (1.0 + abs(u.imag) != 1.0)
         return self.magnitude * vector(along, across)
 
     @property

@@ -337,7 +337,7 @@ def _compute_unresolved(
     dF/dq by a step that is short against the distance to the limit, which is some s^2
     (s the sine of the command). NaN where no double lies a step away.
     """
-    step = STEP * np.square(np.abs(state.sine))
+    step = STEP * (state.sine * state.sine)
     moved = state.q + step
     step = moved - state.q
     shifted = case.assemble(
