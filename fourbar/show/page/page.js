@@ -173,9 +173,15 @@ new ResizeObserver(() => { if (Math.max(280, picture.parentElement.clientWidth) 
 
 // The bars as a sheet lists them: about G the inertia, from the first pin the place of G along the bar and to its left.
 const BAR_NAMES = { 1: "ground", 2: "input", 3: "coupler", 4: "output" };
+// An inertia has the units of mass and length where the mass has one of its own, as in pounds and inches.
+function inertiaUnit() {
+  const mass = data.units.kg;
+  return mass ? [`${mass[0]} ${unit.name}\u00b2`, mass[1] * unit.factor ** 2] : ["kg m\u00b2", 1];
+}
 function listBars() {
-  const body = byId("bars").querySelector("tbody");
+  const body = byId("bars").querySelector("tbody"), [inertiaName, inertiaFactor] = inertiaUnit();
   body.replaceChildren();
+  byId("inertia-unit").textContent = inertiaName;
   for (const k of [1, 2, 3, 4]) {
     const line = body.insertRow(), [mass, inertia] = data.bars[k] ?? [null, null], centre = data.centres[k];
     const heading = document.createElement("th");
@@ -183,7 +189,8 @@ function listBars() {
     heading.textContent = `${k} ${BAR_NAMES[k]}`;
     line.append(heading);
     const place = centre ? centre.map(z => text(z * unit.factor)).join(", ") : "\u2013";
-    for (const shownText of [text(lengths[k - 1] * unit.factor), text(mass), text(inertia), place]) line.insertCell().textContent = shownText;
+    const shownMass = text(inUnit("kg", mass)), shownInertia = text(inertia === null ? null : inertia * inertiaFactor);
+    for (const shownText of [text(lengths[k - 1] * unit.factor), shownMass, shownInertia, place]) line.insertCell().textContent = shownText;
   }
 }
 

@@ -722,6 +722,30 @@ def test_a_scene_without_bands_says_why_or_shows_nothing(browse) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("names", "head", "mass", "inertia"),
+    [
+        ("imperial", "mass lb inertia lb in²", 0.45359237, 0.45359237 * 0.0254**2),
+        ("mm N", "mass kg inertia kg m²", 1.0, 1.0),
+    ],
+)
+def test_the_bars_of_the_sheet_have_the_units_of_its_heads(
+    browse, names: str, head: str, mass: float, inertia: float
+) -> None:
+    """`mass`, `inertia`: the units of the heads in kg and kg m^2."""
+    scene = crank_rocker()
+    driver = browse(animate.write_page(scene, units=fourbar.units(names)))
+    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    table = driver.find_element("id", "bars")
+    assert head in table.text
+    rows = table.find_elements("css selector", "tbody tr")
+    for moving, row in zip((2, 3, 4), rows[1:], strict=True):
+        bar = scene.linkage.bar(moving)
+        cells = [number(cell.text) for cell in row.find_elements("tag name", "td")[1:3]]
+        stated = [bar.mass / mass, bar.moment_of_inertia / inertia]
+        assert cells == pytest.approx(stated, rel=PRINTED)
+
+
 CLEAR_OF_ITS_BAR = """
 go(arguments[1]);
 const [bar, box] = [parts.bars[arguments[0]], parts.label[arguments[0]].getBBox()];

@@ -347,7 +347,7 @@ class Overview:
             kinds = ", ".join(
                 f"{count} {kind}" for kind, count in self.not_compared.most_common()
             )
-            notes.append(f"not compared: {total}: {kinds}")
+            notes.append(f"{total} not compared: {kinds}")
         return notes
 
 
