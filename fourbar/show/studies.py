@@ -363,7 +363,7 @@ def _write_resting(
         "frequency\n(Hz)",
     ]
     rows = [_write_equilibrium(position, units) for position in found]
-    table = make_plain_table(heads, rows, left=("branch", "", "by"))
+    table = make_plain_table(heads, rows, left=("branch", "", "by"), gap=0)
     held = [
         f"friction holds {_write_range(position.held)} about theta_2 ="
         f" {_write_degrees(position.place.theta_2)} deg"

@@ -497,6 +497,7 @@ def test_equilibria_are_printed_in_the_units_of_the_file(
     slope = M * 9.81 * R / (pound * 9.80665 * inch)
     assert f"{J:.6g}" in printed and f"{slope:.6g}" in printed
     assert "torque (lbf in)" in printed
+    assert max(map(len, printed.splitlines())) <= WIDTH
 
 
 def crossings(time: np.ndarray, angle: np.ndarray, middle: float) -> float:
