@@ -2,7 +2,8 @@
 
 These are sizes, components, and ratios of any two. `torque` and `omega_4` are numbers,
 `F12` and `v_B` the sizes of vectors, `F12_x` a component, `A` a place with two
-coordinates, `omega_4/omega_2` a ratio.
+coordinates, `omega_4/omega_2` a ratio, `F_jaw/F_handle` that of the forces along the
+paths of two points.
 """
 
 from dataclasses import replace
@@ -28,6 +29,8 @@ from fourbar.solution import (
 from fourbar.solving import solve
 
 AXES = {"_x": 0, "_y": 1}
+_ALONG = "F_"
+"""Begins the name of a force along the path of a point."""
 
 
 class Column(NamedTuple):
@@ -81,6 +84,9 @@ def read_column(scene: Scene, solution: Solution, name: str) -> Column:
     if name in DERIVED_NAMES or "/" not in name:
         return Column(name, *_find_number(solution, name))
     above, _, below = (part.strip() for part in name.partition("/"))
+    if _is_force_along_path(solution, above) and _is_force_along_path(solution, below):
+        # by virtual work the forces are as the speeds, the other way round
+        above, below = (f"v_{part.removeprefix(_ALONG)}" for part in (below, above))
     of = solution
     if _is_velocity(above) and _is_velocity(below):
         of = _solve_at_unit_speed(scene, solution)
@@ -121,7 +127,8 @@ def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
             "--columns",
             name,
             f"unknown; {hint}quantities are {', '.join(['time', *quantities])}; "
-            "F12_x is a component, omega_4/omega_2 a ratio",
+            "F12_x is a component, omega_4/omega_2 a ratio, F_P/F_Q that of the forces"
+            " along the paths of two points",
         )
     if stem in DERIVED_NAMES:
         values = derive(solution, stem)
@@ -162,6 +169,11 @@ def _is_velocity(name: str) -> bool:
     """Return True for a quantity that grows with the speed of the command."""
     stem = name[:-2] if name[-2:] in AXES else name
     return stem.startswith("v_") or STAGE_OF.get(stem) == "velocity"
+
+
+def _is_force_along_path(solution: Solution, name: str) -> bool:
+    """Return True for "F_handle": the force along the path of a point of the scene."""
+    return name.startswith(_ALONG) and name.removeprefix(_ALONG) in solution.points
 
 
 def _solve_at_unit_speed(scene: Scene, solution: Solution) -> Solution:

@@ -320,7 +320,8 @@ def _find_largest(
 ) -> tuple[Array, set[str]]:
     """Find the places of the local maxima of each magnitude.
 
-    The names of those that grow are returned too.
+    The names of those that grow are returned too. A pole close beside the positions
+    looks like one between them after few rounds, so that more follow then.
     """
     places = solution.at.places
     peaks = list[tuple[str, int, int, int]]()
@@ -361,7 +362,10 @@ def _find_largest(
     high = places[stop]
     peak_places = places[top]
     reached = [np.array([present[name][i] for name, i, *_ in peaks])]
-    for _ in range(rounds if len(peaks) else 0):
+    growing = np.zeros(0, dtype=bool)
+    for count in range(ROUNDS if len(peaks) else 0):
+        if count >= rounds and not growing.any():
+            break
         cut = _cut(low, high)
         inside = sizes(_solve_at(scene, cut.ravel()))
         values = np.array(
@@ -380,9 +384,8 @@ def _find_largest(
             cut[rows, np.clip(best + step, 0, CUTS)] for step in (0, -1, 1)
         )
         reached.append(values[rows, best])
-    growing = np.zeros(0, dtype=bool)
-    if len(peaks):
-        growing = _find_growing(reached, values, best)
+        if count + 1 >= rounds:
+            growing = _find_growing(reached, values, best)
     kept = (
         ~growing & (reached[-1] > reached[0]) & ~opens
     )  # beside a gap other magnitudes grow

@@ -146,6 +146,17 @@ def test_pliers_have_their_advantage_without_a_speed(
     assert row_of(text, "F_jaw/F_handle")[0] == pytest.approx(31.969, rel=PRINTED)
 
 
+def test_pliers_have_their_force_ratio_over_a_sweep(ask: Steps, tmp_path: Path) -> None:
+    """At 49 deg it is the one of the position; by the speeds of both points."""
+    sweep = 'theta_2 = { from = "49 deg", to = "55 deg", steps = 3 }'
+    assert 'theta_2 = "49 deg"' in PLIERS
+    (tmp_path / "pliers.toml").write_text(PLIERS.replace('theta_2 = "49 deg"', sweep))
+    names = "theta_2,F_jaw/F_handle,v_handle/v_jaw"
+    rows = list_columns(ask("analyze", "pliers.toml", "--columns", names))
+    assert rows[0][1] == pytest.approx(31.969, rel=PRINTED)
+    assert all(forces == speeds for _, forces, speeds in rows)
+
+
 def test_four_pins_and_the_speed_of_the_output_as_they_are_drawn(
     ask: Steps, tmp_path: Path
 ) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.effects import Place, PointDrive
 from fourbar.show.block import write_block, write_motor
 from fourbar.show.summary import Facts, locate_between, summarize
 from tests.support.scenes import CYLINDER, crank_rocker
@@ -192,3 +193,28 @@ def test_a_pole_between_two_positions_that_rise_past_it_is_found(speed: float) -
         hidden += int(size[0] < size[1] < size[2] or size[0] > size[1] > size[2])
         assert "torque" in find_facts(scene).between.growing
     assert hidden > 3
+
+
+@pytest.mark.parametrize(("last", "grows"), [(0.0, False), (-2.0, True)])
+def test_a_pole_just_beyond_the_last_position_is_none_between(
+    last: float, grows: bool
+) -> None:
+    """A toggle clamp whose bars 2 and 3 would be in line at -6e-5 deg.
+
+    The force on bar 4 is then large at 0 deg, and bounded.
+    """
+    scene = fourbar.from_pins((0.0, 0.0), (0.04, 0.002), (0.08, 0.0), (0.08, -0.06))
+    motion = fourbar.Motion(
+        fourbar.Sweep(math.atan2(2.0, 40.0), math.radians(last), 4),
+        0.0,
+        branch=scene.motion.branch,
+    )
+    pad = Place(4, (0.1, 0.0))
+    loads = (fourbar.Load(2, (100.0, -0.5 * math.pi), from_pin=(0.16, 0.4)),)
+    drive = PointDrive(pad, 0.0)
+    scene = replace(scene, motion=motion, loads=loads, drive=drive, drive_bar=None)
+    facts = find_facts(scene)
+    assert facts.bending[4].grows == grows
+    assert ("drive_force" in facts.between.growing) == grows
+    said = "without bound" in write(scene)
+    assert said == grows
