@@ -351,7 +351,7 @@ class Effect:
         It is a second derivation and uses nothing of `act`.
 
         `bars`: of `engines.loaded.Loaded`, with `push`, `couple`, `angle`, `velocity`,
-        `alpha`, `rotate`, `point`.
+        `alpha`, `rotate`, `point`, `first_pin`, `pin_loads`.
         """
         raise NotImplementedError
 
@@ -365,8 +365,10 @@ class Effect:
     def size(self, linkage: FourBar, solution: Any) -> Any:
         """Return the size of its forces, N, one number or (n,).
 
-        It is the scale by which a force counts as zero. Effects of this package have
-        none: the harness states theirs itself.
+        It is the scale by which a force counts as zero. The harness asks it of effects
+        that are not part of the package, and needs it for every comparison. Effects of
+        the package leave it out: the harness states their sizes itself, in
+        `fourbar_validation/compare/effects.py`.
         """
         raise NotImplementedError
 

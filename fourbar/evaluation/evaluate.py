@@ -2,9 +2,9 @@
 
 The stages are kinematics, forces and error bars; what has no value has a status. The
 error bar of a force is its distance to the value that the same formulas give in longer
-numbers, or what these resolve there, if that is more. The stated numbers of bars,
-loads, effects and command are taken as exact; everything else is computed again, in
-numbers that round at most a thousandth as much as doubles.
+numbers, or what these do not resolve there, if that is more. The stated numbers of
+bars, loads, effects and command are taken as exact; everything else is computed again,
+in numbers that round at most a thousandth as much as doubles.
 """
 
 import cmath
@@ -55,7 +55,7 @@ _LONG_EPS = float(np.finfo(np.longdouble).eps)
 """Distance of long doubles beside 1."""
 ROUNDINGS = 16.0
 """Roundings of a chain of formulas that count in full. Some fifty move a result by
-sqrt(50) = 7; here that is doubled.
+sqrt(50) = 7, as a random walk; 16 is a little more than twice that.
 """
 STEP = 2.0**-14
 """Part of s^2 by which an angle is moved for a slope. A force changes by that part, of

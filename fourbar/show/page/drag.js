@@ -52,14 +52,12 @@ function handleOf() {
     refresh();
   };
   for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) circle.addEventListener(name, end);
-  circle.addEventListener("blur", () => { circle.gesture = null; });
   circle.addEventListener("keydown", event => {
     const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
     if (!way) return;
     event.preventDefault(); event.stopPropagation();
     const far = event.shiftKey ? 10 : 2;
-    circle.gesture = { ...circle.given, gesture: `keys:${++drags}` };
-    holding = circle.gesture;
+    holding = { ...circle.given, gesture: `keys:${++drags}` };
     dragged([circle.given.place[0] + far * way[0], circle.given.place[1] + far * way[1]]);
     holding = null;
   });

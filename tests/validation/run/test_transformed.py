@@ -12,6 +12,7 @@ from fourbar.linkage import FourBar
 from fourbar_validation.run import transformed
 from fourbar_validation.run.judge import ask
 from fourbar_validation.run.transformed import (
+    _CONVERTED,
     SCALE,
     TRANSFORMATIONS,
     _Conversion,
@@ -265,3 +266,9 @@ def test_a_place_of_the_coupler_is_read_from_its_other_pin() -> None:
     assert to.place(Place(2, (0.07, 0.4)), linkage) == Place(4, (0.07, 0.4))
     assert to.place(Place(1, (0.3, 0.0)), linkage).from_pin == pytest.approx((0.0, 0.0))
     assert SCALE == 128.0
+
+
+def test_every_effect_of_the_package_can_be_stated_otherwise() -> None:
+    """Without a conversion every scene with the effect would silently lose the check."""
+    packaged = {getattr(fourbar.effects, name) for name in fourbar.effects.FILE_OF}
+    assert {*_CONVERTED} == {fourbar.Load, *packaged}

@@ -607,7 +607,8 @@ def judge_errors(
 ) -> _WorstPosition:
     """Judge errors by the allowed error.
 
-    Larger ones are judged by TIMES_PREDICTED times the predicted one. An error that is
+    Larger ones are judged by TIMES_PREDICTED times the predicted one, which the row
+    then states as `allowed`. An error that is
     no number fails. `predicted` is None where nothing predicts it; `method` says for
     which method it is predicted.
     """

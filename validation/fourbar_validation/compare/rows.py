@@ -27,7 +27,7 @@ VERDICTS = (AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS)
 HOLDING_VERDICTS = (AGREES, DEGRADED)
 _COMPARED_VERDICTS = (*HOLDING_VERDICTS, FAILS)
 """Verdicts of comparisons that took place. In the others no digit is left to decide by,
-or the engine declared a limit.
+the engine declared a limit, or the formulas state no value.
 """
 
 FORMULAS = "formulas"

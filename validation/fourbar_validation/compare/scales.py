@@ -386,7 +386,10 @@ def _find_velocities(
 def take_strictest_condition(
     quantity: str, linkage: FourBar, formulas: Solution, reference: Solution | None
 ) -> Array:
-    """Take the better of two conditions of a quantity at each position, (n,)."""
+    """Take the better of two conditions of a quantity at each position, (n,).
+
+    The better one allows the smaller error.
+    """
     ours = find_condition(quantity, linkage, formulas)
     if reference is None:
         return ours

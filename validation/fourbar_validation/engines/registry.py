@@ -312,7 +312,7 @@ FOLDERS = tuple(
     if spec is not None
     for folder in spec.submodule_search_locations or ()
 )
-"""Folder of the lab, whose engines.toml a run reads too. None if the lab is not
+"""Folder of the lab, whose engines.toml a run reads too. Empty if the lab is not
 installed.
 """
 
@@ -326,7 +326,7 @@ def make_demands(
 ) -> Demands:
     """Return what an answer is held to: the engine's tolerance and quantities.
 
-    The errors predicted for it are allowed.
+    Ten times the errors predicted for it are allowed too (`TIMES_PREDICTED`).
 
     Parameters
     ----------

@@ -127,7 +127,8 @@ def command(**stated: Any) -> int:
     """Judge scenes and write a report.
 
     Without SCENES the run judges those of models/ and models/capabilities/. It writes
-    results.csv, timings.csv, report.md and report.html.
+    results.parquet, results.csv, timings.csv, record.json, report.html, report.md and,
+    if an engine printed anything, output.txt.
     """
     from fourbar_validation.report.terminal import print_table
 

@@ -161,8 +161,8 @@ def judge(
     """Make every check of one scene.
 
     `order`: measure the observed order of what is simulated, which takes two more
-    simulations and changes no row. `derived`: check the functions other than `solve`
-    too (studies, sensitivities, SDF and USD), which takes a second.
+    simulations and changes no row. `derived`: make the derived checks of `CHECKS`
+    too, those of functions other than `solve`, which takes a second.
     """
     question = ask(name, scene, engines)
     free = scene.motion.free is not None

@@ -31,8 +31,9 @@ from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.report.record import Record, Timing
 
 FREE_BODY = next(engine for engine in ENGINES if engine.name == FreeBody.name)
-"""The free-body solution supplies the condition numbers. No allowed error then depends
-on the formulas it tests.
+"""The free-body solution supplies a second set of condition numbers and sizes. The
+stricter of both sets counts, so that a mistake of the formulas alone cannot widen an
+allowed error.
 """
 
 
@@ -98,9 +99,10 @@ class Question:
 
     @cached_property
     def reference(self) -> Solution | None:
-        """Conditions and sizes by free bodies, the reference of every comparison.
+        """Return the free bodies' solution, for a second set of conditions and sizes.
 
-        None: an answer has its own.
+        A comparison takes the stricter of these and those of the formulas. None if the
+        free bodies break down; the answer that is judged then supplies the second set.
         """
         try:
             with np.errstate(all="ignore"):
