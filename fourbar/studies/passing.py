@@ -76,7 +76,9 @@ def _find_places(scene: Scene, name: str, value: float) -> list[float]:
         if math.isfinite(reached) and _is_same(name, reached, value):
             places.append(place)
     if not places:
-        whole = solve(scene, "position", at=command_at(scene, default_places(scene)))
+        # of the range that the scene's own motion is in
+        places_of_range = default_places(scene, float(command(scene).angle[0]))
+        whole = solve(scene, "position", at=command_at(scene, places_of_range))
         values = _require_values(getattr(whole, name), name)
         low, high = _find_extent(values)
         raise NotAssembledError(

@@ -4,6 +4,7 @@ Solved back, of every kind of motion.
 """
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -127,3 +128,25 @@ def test_a_stroke_is_found_where_an_angle_is_commanded() -> None:
     assert solved == pytest.approx(value, abs=LOCATED)
     back = find_positions(scene, [("theta_4", float(fourbar.solve(scene).theta_4[3]))])
     assert back.stroke is not None and len(back.stroke) >= 1
+
+
+def test_the_range_of_a_refusal_is_that_of_the_motion_and_not_the_other_one() -> None:
+    """Bar 2 has two ranges; the scene moves in the second.
+
+    There the extent of bar 4 is that of its positions.
+    """
+    linkage = fourbar.FourBar(
+        0.3, fourbar.Bar(0.2), fourbar.Bar(0.25), fourbar.Bar(0.1)
+    )
+    ranges = fourbar.limit_positions(linkage)
+    assert len(ranges) == 4
+    low, high = sorted(2.0 * math.pi - limit.theta_2 for limit in ranges[:2])
+    inside = fourbar.Sweep(low + 0.1, high - 0.1, 20)
+    scene = fourbar.Scene(linkage, fourbar.Motion(inside))
+    theta_4 = np.degrees(fourbar.solve(scene).theta_4)
+    middle = math.radians(0.5 * (theta_4.min() + theta_4.max()))
+    with pytest.raises(NotAssembledError, match="no position") as caught:
+        find_positions(scene, [("theta_4", middle + math.pi)])
+    ends = re.findall(r"(-?[\d.]+) deg", str(caught.value))[-2:]
+    least, most = map(float, ends)
+    assert least <= theta_4.min() and theta_4.max() <= most

@@ -13,6 +13,7 @@ import pytest
 import fourbar
 from fourbar.effects import Place
 from fourbar.evaluation.case import Case
+from fourbar.files import loads
 from fourbar.scene import Scene, command
 from fourbar.studies import derivatives
 from fourbar.studies.keys import read_numbers
@@ -478,3 +479,37 @@ def test_a_check_that_raises_costs_its_own_rows_alone(
         FAILS,
     )
     assert len(all_rows) > 3
+
+
+LIFT = """\
+[pins]
+O2 = ["1 m", "2 m"]
+A = ["1.8 m", "2.3 m"]
+B = ["2.3 m", "2.3 m"]
+O4 = ["1.5 m", "2 m"]
+[bars.coupler]
+mass = "200 kg"
+[motion]
+stroke = { from = "drawn", to = "75 cm", steps = 12 }
+side = "drawn"
+stroke_speed = "5 cm/s"
+[drive]
+from = { bar = 1, drawn = ["1.5 m", "1.9 m"] }
+to = { bar = 2, drawn = ["1.6 m", "2.225 m"] }
+[points]
+edge = { bar = 3, drawn = ["2.4 m", "2.4 m"] }
+[effects]
+gravity = ["9.81 m/s^2", "-90 deg"]
+"""
+
+
+@pytest.mark.parametrize("check", ["sensitivity", "tolerances", "study"])
+def test_a_drawn_scene_is_judged_by_the_lengths_that_follow(check: str) -> None:
+    """Its file has pins; the numbers that vary are lengths and polar pairs."""
+    rows = rows_of(loads(LIFT), check)
+    assert not failing(rows)
+    judged = {row.quantity for row in rows if row.compared}
+    assert judged >= {"theta_4", "drive_force", "F12"}
+    if check == "sensitivity":
+        # by pins alone it would be six, of which no length
+        assert all(row.reason.endswith("in 17 numbers") for row in rows)

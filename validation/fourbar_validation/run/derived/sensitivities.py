@@ -87,9 +87,18 @@ def furnish(scene: Scene, question: Question) -> Scene:
     return scene
 
 
+def _take_few_by_lengths(question: Question) -> Scene:
+    """Take the scene at a few of its positions, stated by lengths and polar pairs.
+
+    The numbers that vary then stand in its file, and places are from O2, as those of
+    the free bodies are.
+    """
+    return replace(take_few(question), drawing=None, coordinates=())
+
+
 def study(question: Question) -> list[Row]:
     """Judge a square study in which every number varies, member by member."""
-    scene = furnish(take_few(question), question)
+    scene = furnish(_take_few_by_lengths(question), question)
     places = np.asarray(scene.motion.angle)
     key = command_key(scene)
     apart = APART
@@ -174,7 +183,7 @@ def sensitivity(question: Question) -> list[Row]:
 
     They are along one direction.
     """
-    scene = take_few(question)
+    scene = _take_few_by_lengths(question)
     derivatives = fourbar.sensitivity(scene)
     file = SceneFile(scene)
     directions = {
@@ -235,7 +244,7 @@ def tolerances(question: Question) -> list[Row]:
 
     They are those of the scene, or those that the run gives it.
     """
-    scene = take_few(question)
+    scene = _take_few_by_lengths(question)
     width = _GIVEN * min(scene.linkage.lengths)
     names = ("input", "coupler", "output")
     defaults = (
