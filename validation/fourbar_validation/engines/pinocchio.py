@@ -28,6 +28,8 @@ from fourbar_validation.engines.loop import Assembler, Exact
 from fourbar_validation.engines.tree import Tree, solve_closed
 
 WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+_UPRIGHT = np.eye(3)
+"""Rotation of a joint or frame whose axes are those of its bearer."""
 
 
 class PinocchioTree(Tree):
@@ -159,7 +161,7 @@ PinocchioInverse = partial(Exact, "pinocchio-inverse", PinocchioTree)
 
 
 def _place_at(x: float, y: float) -> Any:
-    return pin.SE3(np.eye(3), np.array([x, y, 0.0]))
+    return pin.SE3(_UPRIGHT, np.array([x, y, 0.0]))
 
 
 NAME = "pinocchio-forward"

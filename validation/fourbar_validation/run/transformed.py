@@ -30,7 +30,7 @@ from fourbar.effects import (
     Torsion,
     Viscous,
 )
-from fourbar.linkage import MOVING_BARS, Bar, FourBar
+from fourbar.linkage import MOVING_BARS, Bar, FourBar, copy_with
 from fourbar.quantities import OK, PIN_FORCES, STAGE_OF, UNITS
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene.motion import Motion
@@ -309,7 +309,8 @@ def _solve(
     bar = command.bar
     branch = int(command.branch[0])
     begin: Any = {f"theta_{bar}": float(command.angle[0]), "branch": branch}
-    begun = replace(scene, motion=Motion(**begin))
+    # only the motion is new, and it is checked
+    begun = copy_with(scene, motion=Motion(**begin))
     if names is None or len(command.angle) == 1:
         # one position is solved in Python's own numbers, into arrays it is not, and
         # "scaled" demands the same digits
@@ -618,10 +619,10 @@ def _measure_superposed(few: _Few) -> Array:
     _require_linear(scene)
     if len(scene.loads) + len(scene.effects) < 2:
         raise NotAskedError("the scene has fewer than two loads and effects")
-    bare = replace(scene, loads=(), effects=())
+    bare = copy_with(scene, loads=(), effects=())
     alone = [
-        *(replace(bare, loads=(load,)) for load in scene.loads),
-        *(replace(bare, effects=(effect,)) for effect in scene.effects),
+        *(copy_with(bare, loads=(load,)) for load in scene.loads),
+        *(copy_with(bare, effects=(effect,)) for effect in scene.effects),
     ]
     return _measure_sum(few, alone, bare)
 
