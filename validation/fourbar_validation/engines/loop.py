@@ -41,8 +41,6 @@ from fourbar_validation.engines.free_body_closure import (
 from fourbar_validation.engines.loaded import Assembled, EngineBars, Values
 
 _START_ANGLES = np.radians(STARTS).tolist()
-_LAST_STEP = 1e-9
-"""A step (rad) after which the gap is at its rounding: Newton's method squares it."""
 _SHORTEST_STEP = 2.0**-40
 """A step halved this often moves nothing that a gap above the rounding could tell."""
 NOT_ANSWERED = frozenset(
@@ -168,8 +166,9 @@ def _close_gap(
 
     The determinant of the gap's derivative by the angles of the others, for bar 2 -b c
     sin(theta_4 - theta_3), has the branch's sign. A step is halved until the gap falls
-    and the sign is kept; it ends with a step that is at most _LAST_STEP, or where a gap
-    smaller than `closed` (m) falls no further.
+    and the sign is kept; the last one is taken where nothing smaller than `closed` (m)
+    falls any further: an answer that stops a step earlier has other last digits, which
+    near a change point decide whether forces can be told.
     """
     theta_3 = q[0] + q[1]
 
@@ -194,8 +193,7 @@ def _close_gap(
         x, y, a, b, c, d, det = state
         first, second = (b * y - d * x) / det, (c * x - a * y) / det
         size = math.hypot(x, y)
-        longest = max(abs(first), abs(second))
-        part = min(1.0, LONGEST_STEP / max(longest, LONGEST_STEP))
+        part = min(1.0, LONGEST_STEP / max(abs(first), abs(second), LONGEST_STEP))
         while True:
             trial = _turn_others(q, bar, theta_3, part * first, part * second)
             trial_state = look(trial)
@@ -209,8 +207,6 @@ def _close_gap(
                 tree.place(q)
                 return q if size <= closed else None
         q, state = trial, trial_state
-        if longest <= _LAST_STEP:
-            break
     return q if math.hypot(state[0], state[1]) <= closed else None
 
 
