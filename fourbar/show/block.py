@@ -33,6 +33,7 @@ from fourbar.show.units import (
     POSITION_DIGITS,
     ROUND_OFF,
     choose_unit,
+    drop_rounding,
     write_digits,
     write_short,
 )
@@ -441,10 +442,11 @@ class _Block:
                 rms = duty.rms_force
             else:
                 rms = duty.rms_torque
-            beyond = self._beyond(drive.keys.value)
+            rms = self._without_rounding(rms or 0.0)
+            beyond = "" if self._is_balanced() else self._beyond(drive.keys.value)
             row = (
                 f"peak {row} at {self._place(facts.peak.place)}{beyond}, RMS"
-                f" {self._value(rms or 0.0, drive.unit)}"
+                f" {self._value(rms, drive.unit)}"
             )
         lines.append(self._row(word, row))
         if facts.held is not None:
@@ -474,10 +476,19 @@ class _Block:
             error = max(error, np.nanmax(drive.error, initial=0.0))
         return 0.0 if abs(value) <= error else value
 
-    def _find_round_off(self) -> float:
-        """Return the rounding of inertial torques (forces).
+    def _is_balanced(self) -> bool:
+        """Tell whether the drive has nothing to do: its peak is rounding alone."""
+        peak = self.facts.peak
+        if peak is None or not peak.value:
+            return False
+        return not self._without_rounding(peak.value)
 
-        At a change point an error bar is less.
+    def _find_round_off(self) -> float:
+        """Return the rounding of the torques (forces) that the drive sums.
+
+        They are inertial ones, and usual pin forces at the longest bar. At a change
+        point an error bar is less, and where springs balance weights, as far as their
+        numbers are rounded.
         """
         solution = self.facts.solution
         bars = self.facts.scene.linkage.moving
@@ -485,8 +496,13 @@ class _Block:
         for number, bar in zip(MOVING_BARS, bars, strict=True):
             a_G = getattr(solution, f"a_G{number}")
             inertial += bar.mass * float(np.nanmax(np.hypot(*a_G.T), initial=0.0))
+        usual = 0.0
+        for name in PIN_FORCES:
+            sizes = np.hypot(*getattr(solution, name).T)
+            if np.isfinite(sizes).any():
+                usual = max(usual, float(np.nanmedian(sizes)))
         lever = 1.0 if self.facts.linear else self.longest
-        return ROUND_OFF * inertial * lever
+        return ROUND_OFF * max(inertial, usual) * lever
 
     def _write_power(self) -> list[str]:
         """Write power and energy of the drive, and what a motor must have."""
@@ -501,7 +517,7 @@ class _Block:
             if one:
                 return [self._row("power", self._value(one, "W"))]
             return []
-        if not duty.peak_power > 0.0:
+        if not duty.peak_power > 0.0 or self._is_balanced():
             return []
         peak = self._value(duty.peak_power, "W")
         row = f"peak {peak}{self._beyond('power')}"
@@ -628,9 +644,13 @@ class _Block:
         facts, loads = self.facts, self.facts.pins.values()
         if not loads:
             return []
-        peaks = self._cells([load.peak.value for load in loads], "N")
-        places = [self._place(load.peak.place, named=False) for load in loads]
-        means = self._cells([load.rms for load in loads], "N")
+        sizes = self._without_small([load.peak.value for load in loads])
+        peaks = self._cells(sizes, "N")
+        places = [
+            self._place(load.peak.place, named=False) if size else "-"
+            for load, size in zip(loads, sizes, strict=True)
+        ]
+        means = self._cells(self._without_small([load.rms for load in loads]), "N")
         lines = _align(
             [
                 ("pins", list(facts.pins)),
@@ -677,6 +697,14 @@ class _Block:
         cells = iter(self._cells(stated, "Pa"))
         return ["-" if value is None else next(cells) for value in stresses.values()]
 
+    @staticmethod
+    def _without_small(values: list[float]) -> list[float]:
+        """Return zero for what is rounding of the largest of their kind."""
+        numbers = np.array(values)
+        largest = np.nanmax(np.abs(numbers), initial=0.0)
+        cleaned: list[float] = drop_rounding(numbers, largest).tolist()
+        return cleaned
+
     def _cells(self, values: list[float], unit: str) -> list[str]:
         """Write quantities of one kind with the prefix of the largest.
 
@@ -713,10 +741,11 @@ class _Block:
         """
         facts = self.facts
         lines = list[str]()
+        sizes = self._without_small([load.peak.value for load in facts.pins.values()])
         pins = [
             pin
-            for pin, name in zip(facts.pins, PIN_FORCES, strict=False)
-            if self._is_rough(name)
+            for pin, name, size in zip(facts.pins, PIN_FORCES, sizes, strict=False)
+            if size and self._is_rough(name)
         ]
         bars = [
             f"bar {bar}"
@@ -750,7 +779,9 @@ class _Block:
             )
         lines += self._warn()
         lines += list_gas_notes(facts.scene, facts.solution, self.units)
-        if facts.error is not None:
+        if facts.drive is not None and self._is_balanced():
+            lines.append(f"the {facts.drive.name} is zero within rounding")
+        elif facts.error is not None:
             if facts.error:
                 below = f"below 1e{math.ceil(math.log10(facts.error)):+03d}"
             else:
@@ -783,9 +814,10 @@ class _Block:
         # of those that matter: one that passes through zero has no digits, and needs
         # none
         with np.errstate(invalid="ignore"):
-            share = drive.error / np.maximum(
-                np.abs(drive.values), np.nanmedian(np.abs(drive.values))
-            )
+            sizes = np.abs(drive.values)
+            reference = np.maximum(sizes, np.nanmedian(sizes))
+            reference[reference == 0.0] = np.nan
+            share = drive.error / reference
         largest = np.nanmax(np.abs(drive.values), initial=0.0)
         if self._without_rounding(float(largest)) == 0.0:  # nothing has digits to lose
             return []

@@ -28,6 +28,7 @@ from fourbar.show.duty import (
     motor_duty,
     read_drive,
 )
+from fourbar.show.units import ROUND_OFF
 from fourbar.solution import Array, Solution
 from fourbar.solving import solve
 from fourbar.studies.internal_forces import Bending, internal_forces
@@ -138,10 +139,19 @@ def list_sizes(solution: Solution) -> dict[str, Array]:
         "speed": drive.speed_key,
     }
     forces = {name: np.hypot(*getattr(solution, name).T) for name in PIN_FORCES}
-    return {
-        **{name: np.abs(getattr(solution, key)) for name, key in keys.items()},
-        **forces,
-    }
+    works = {name: np.abs(getattr(solution, key)) for name, key in keys.items()}
+    # what a balanced linkage leaves of a load is rounding, and has no peak
+    largest = np.max([*forces.values()], axis=0)
+    for size in forces.values():
+        size[size <= ROUND_OFF * largest] = 0.0
+    lever = 1.0
+    if solution.drive is None and solution.scene is not None:
+        lever = max(solution.scene.linkage.lengths)
+    with np.errstate(invalid="ignore"):
+        idle = works[drive.keys.value] <= ROUND_OFF * largest * lever
+    for name in (drive.keys.value, "power"):
+        works[name] = np.where(idle, 0.0, works[name])
+    return {**works, **forces}
 
 
 def locate_between(scene: Scene, solution: Solution) -> Between:
@@ -829,13 +839,10 @@ def _find_error(solution: Solution, drive: Driving | None) -> float | None:
     shares = []
     for error, size in pairs:
         solved = np.isfinite(error) & np.isfinite(size) & (solution.status_code == OK)
-        if solved.any() and size[solved].max() > 0.0:
-            shares.append(
-                float(
-                    (
-                        error[solved]
-                        / np.maximum(size[solved], np.median(size[solved]))
-                    ).max()
-                )
-            )
+        usual = np.median(size[solved]) if solved.any() else 0.0
+        reference = np.maximum(size, usual)
+        # where most are exactly zero, so may be one with an error bar
+        solved &= reference > 0.0
+        if solved.any():
+            shares.append(float((error[solved] / reference[solved]).max()))
     return max(shares, default=None)

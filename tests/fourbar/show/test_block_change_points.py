@@ -323,6 +323,30 @@ def test_equilibria_are_named_as_a_scene_states_their_assembly(name: str) -> Non
         assert abs(torque[0]) <= PRINTED * abs(float(slope))
 
 
+def test_a_lamp_that_a_spring_balances_shows_zeros_and_not_their_rounding() -> None:
+    """A spring of no free length: k = m g l/(r h). Bars 3 and 4 share no load."""
+    arms = (fourbar.Bar(0.3), fourbar.Bar(0.06, 2.0), fourbar.Bar(0.3))
+    linkage = fourbar.FourBar(0.06, *arms, 0.5 * math.pi)
+    stiffness = 2.0 * 9.81 * 0.3 / (0.08 * 0.1)
+    ends = fourbar.Place(1, (0.1, 0.0)), fourbar.Place(2, (0.08, 0.0))
+    springs = fourbar.Springs((fourbar.Spring(*ends, stiffness),))
+    swept = fourbar.Sweep(math.radians(-40.0), math.radians(60.0), 10)
+    for omega in (0.0, 1e-9):
+        scene = fourbar.Scene(
+            linkage,
+            fourbar.Motion(swept, omega),
+            effects=(fourbar.Gravity(), springs),
+        )
+        lines = write_block(scene, fourbar.solve(scene, "error"))
+        text = "\n".join(lines)
+        torque = next(line for line in lines if line.startswith("  torque"))
+        assert torque.startswith("  torque   peak 0 N m at"), torque
+        assert torque.endswith(", RMS 0 N m"), torque
+        assert "the torque is zero within rounding" in lines
+        for word in ("without bound", "motor", "some digits", "nN"):
+            assert word not in text
+
+
 def test_rounding_is_written_as_zero() -> None:
     """A massless rocker is a two-force bar, and bars without mass need no torque."""
     linkage = fourbar.FourBar(

@@ -513,3 +513,19 @@ def test_a_drawn_scene_is_judged_by_the_lengths_that_follow(check: str) -> None:
     if check == "sensitivity":
         # by pins alone it would be six, of which no length
         assert all(row.reason.endswith("in 17 numbers") for row in rows)
+
+
+def test_what_a_balanced_linkage_leaves_of_a_torque_is_not_judged() -> None:
+    """A lamp that a spring of no free length balances: k = m g l/(r h)."""
+    arms = (fourbar.Bar(0.3), fourbar.Bar(0.06, 2.0), fourbar.Bar(0.3))
+    linkage = fourbar.FourBar(0.06, *arms, 0.5 * np.pi)
+    stiffness = 2.0 * 9.81 * 0.3 / (0.08 * 0.1)
+    spring = fourbar.Spring(Place(1, (0.1, 0.0)), Place(2, (0.08, 0.0)), stiffness)
+    scene = Scene(
+        linkage,
+        fourbar.Motion(fourbar.Sweep(-0.7, 1.0, 10), 0.0),
+        effects=(fourbar.Gravity(), fourbar.Springs((spring,))),
+    )
+    rows = rows_of(scene, "summary")
+    assert {row.quantity for row in rows} >= {"ranges", "pins"}
+    assert not failing(rows)

@@ -60,6 +60,10 @@ _LEAST_CONDITION = 1e-2
 """Condition below which a motion counts as one with poles. Beside a pole peaks are
 those of the positions.
 """
+_NOTHING = 1e-13
+"""Part of the largest pin force, at the longest bar of a torque, below which a load is
+its rounding: a balanced linkage needs no torque.
+"""
 _REPEATS = 1e-9
 """Greatest difference, rad, of angles of which one repeats the other, and of rates in
 parts of the largest.
@@ -246,7 +250,8 @@ def _judge_drive(judged: _SummaryJudge) -> None:
     entry = judged.motor
     assert facts.peak is not None and facts.duty is not None
     values, speed = _find_work(judged, judged.own)
-    if np.abs(values).max() == 0.0:
+    lever = 1.0 if facts.linear else max(judged.scene.linkage.lengths)
+    if np.abs(values).max() <= _NOTHING * _find_largest_load(judged) * lever:
         return
     power = values * speed
     name = name_driving(judged.scene)
@@ -271,6 +276,12 @@ def _judge_drive(judged: _SummaryJudge) -> None:
             judged.add_excess("peaks", entry[key] / most - 1.0 - BETWEEN)
     _judge_energy(judged, entry, power)
     _judge_bore(judged, fine_values)
+
+
+def _find_largest_load(judged: _SummaryJudge) -> float:
+    """Find the largest pin force of the free bodies, N."""
+    sizes = [magnitude(judged.own.quantities[name]) for name in PIN_FORCE.values()]
+    return float(np.max(sizes))
 
 
 def _judge_energy(judged: _SummaryJudge, entry: dict[str, Any], power: Array) -> None:
@@ -325,7 +336,7 @@ def _judge_pins(judged: _SummaryJudge) -> None:
     for pin, name in PIN_FORCE.items():
         load = facts.pins[pin]
         own = magnitude(judged.own.quantities[name])
-        if own.max() == 0.0:
+        if own.max() <= _NOTHING * _find_largest_load(judged):
             continue
         mean = math.sqrt(np.square(own[judged.counted]).mean())
         judged.add_value("pins", load.rms, mean)
