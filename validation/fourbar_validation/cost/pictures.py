@@ -13,13 +13,17 @@ from fourbar.show.plot.style import Drawing, apply_style
 from fourbar.writing import write_text
 from fourbar_validation.advise.worst_errors import QUANTITIES
 from fourbar_validation.cost.conclusion import (
+    DIGITS,
+    FOUR_DIGITS,
     NAMES,
+    SIX_DIGITS,
     find_cheapest,
     find_default,
     list_stepped,
     write_short,
 )
 from fourbar_validation.cost.laws import TOO_LARGE, find_jumps, find_pareto
+from fourbar_validation.cost.series import BEST
 from fourbar_validation.cost.study import (
     EXACT,
     FORMULAS,
@@ -232,6 +236,7 @@ def draw_work_precision(curves: Curves, quantity: str, title: str) -> Any:
         place = _locate([default], quantity)
         axes.plot(*place, marker="*", ms=16, color=_ORANGE, mec=INK, mew=0.8, zorder=5)
         _name(labels, axes, default, quantity, "Euler, 2 ms")
+    _mark_price(labels, axes, curves, quantity)
     for point in (point for row in curves.values() for point in row):
         _mark_exact(labels, axes, point, quantity)
     axes.set_ylabel(f"error of the {NAMES[quantity]}, of its scale", labelpad=1.0)
@@ -307,28 +312,57 @@ SHORT = {
 def write_statement(curves: Curves, quantity: str) -> str:
     """Say what the picture means, by the criterion of its front.
 
-    It is the error at the steps and between them.
+    It is the error at the steps and between them. The digits are six, or four where no
+    setting reaches six.
     """
-    four = find_cheapest(curves, quantity, 1e-4)
+    digits, cheapest = _find_price(curves, quantity)
     default = find_default(curves)
     if quantity == "torque":
         name = NAMES[quantity].split()[-1]
     else:
         name = "pin force"
     parts = []
-    if four is not None:
+    if cheapest is not None:
         parts.append(
-            f"Four digits of {name} cost {1e3 * four.seconds_per_second:.2g} ms "
+            f"{digits} of {name} cost {1e3 * cheapest.seconds_per_second:.2g} ms "
             "a simulated second"
         )
     if default is not None:
         error = getattr(default.errors, quantity)
         if math.isfinite(error):
-            parts.append(
-                f"the defaults pay {1e3 * default.seconds_per_second:.2g} ms "
-                f"for an error of {write_short(error)}"
-            )
+            parts.append(f"MuJoCo's defaults have an error of {write_short(error)}")
     return ";\n".join(parts) or f"Error of the {NAMES[quantity]} against its cost"
+
+
+def _find_price(curves: Curves, quantity: str) -> tuple[str, CostPoint | None]:
+    """Find the cheapest point of the most digits that are asked for and reached.
+
+    Return the words for the digits too.
+    """
+    for error in (SIX_DIGITS, FOUR_DIGITS):
+        point = find_cheapest(curves, quantity, error)
+        if point is not None:
+            return DIGITS[error], point
+    return "", None
+
+
+def _mark_price(labels: Labels, axes: Any, curves: Curves, quantity: str) -> None:
+    """Ring the point that the title prices, with its digits and time."""
+    digits, point = _find_price(curves, quantity)
+    if point is None:
+        return
+    axes.plot(
+        *_locate([point], quantity),
+        ls="none",
+        marker="o",
+        ms=12,
+        mfc="none",
+        mec=INK,
+        mew=1.4,
+        zorder=6,
+    )
+    text = f"{digits.lower()}, {1e3 * point.seconds_per_second:.2g} ms"
+    _name(labels, axes, point, quantity, text)
 
 
 def _measure_distance(curves: Curves, quantity: str) -> float:
@@ -424,8 +458,7 @@ def _draw_softness(curves: Curves, title: str) -> Any:
     figure, axes = _draw_single(
         curves,
         title,
-        "A soft closure is wrong in proportion to\n1 - d, and most where the linkage is"
-        " slow",
+        "The error goes as 1 - d; under loads a slow\nlinkage sags, which is far worse",
         SOFTNESS,
         lambda point: point.setting_value,
         "1 - d (d: impedance of solimp; MuJoCo's own 0.9)",
@@ -439,7 +472,8 @@ def _draw_solver(curves: Curves, title: str) -> Any:
     figure, axes = _draw_single(
         curves,
         title,
-        "Beside a heavy flywheel Newton's solver needs\na tolerance of 0",
+        f"Beside a flywheel of {write_short(BEST.flywheel)} Newton's solver needs\n"
+        "a tolerance of 0",
         SOLVERS,
         lambda point: point.setting_value or NONE,
         "tolerance of the solver",
