@@ -168,10 +168,15 @@ def _state_place(
 def state_motion(
     read: Reader, motion: Any, drawing: DrawnPins, line: LinearDrive | None
 ) -> Any:
-    """Replace the word "drawn" of a motion by the drawn angle, stroke or side."""
+    """Replace the word "drawn" of a motion by the drawn angle, stroke or side.
+
+    A side that is left out of a commanded stroke is the drawn one.
+    """
     if not isinstance(motion, dict):
         return motion
     stated = dict(motion)
+    if any(name in stated for name in STROKE_COMMAND):
+        stated.setdefault("side", DRAWN)
     if stated.get("side") == DRAWN and line is not None:
         stated["side"] = _find_side(drawing, line)
     for name in (*ANGLES, STROKE_COMMAND[0]):

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from fourbar.errors import InputError, name_unit
-from fourbar.linkage import ANY, REQUIRED, Declared, is_within
+from fourbar.linkage import ANY, BAR_NAMES, REQUIRED, Declared, is_within
 from fourbar.quantities.units import UNIT_MISSING, UnitError, to_si
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
@@ -113,6 +113,14 @@ class Reader:
             raise self.refuse(
                 key, value, f"must be a whole number from {least} to {most}"
             )
+        return value
+
+    def bar(self, key: str, value: object, least: int = 2) -> int:
+        """Read the number of a bar; 1, the ground, where `least` is 1."""
+        if value not in range(least, 5) or not isinstance(value, int):
+            numbers = [f"{bar} ({BAR_NAMES[bar]})" for bar in range(least, 5)]
+            allowed = f"must be {', '.join(numbers[:-1])} or {numbers[-1]}"
+            raise self.refuse(key, value, allowed)
         return value
 
     def number(self, key: str, value: object) -> float:

@@ -66,7 +66,7 @@ def read_stated_place(
         bar = entry.get("bar", bars[name])
     else:
         bar = entry.get("bar")
-    place = Place(read.whole(f"{key}.bar", bar, least, 4))
+    place = Place(read.bar(f"{key}.bar", bar, least))
     if name is not None:
         if place.bar != bars[name]:
             allowed = f"the point {name} is on bar {bars[name]}"

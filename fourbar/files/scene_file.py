@@ -256,7 +256,7 @@ def _read_drive(
             raise read.refuse(f"drive.{name}", entry[name], _A_LINE)
         return None, LinearDrive(*_read_ends(read, "drive", entry, bars))
     if not entry.keys() & {*PLACES_OF_ENDS, "direction", "frame"}:
-        return read.whole("drive.bar", entry.get("bar", 2), 2, 4), None
+        return read.bar("drive.bar", entry.get("bar", 2)), None
     place = read_stated_place(read, "drive", entry, bars, 2)
     if place == Place(place.bar):
         raise read.refuse("drive.point", None, _A_POINT)

@@ -65,11 +65,11 @@ _GLUED = re.compile(r"(kg|g|N)(m|mm|cm)(?=$|[\^²*])")
 RAISED = re.compile("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")
 DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _FRACTION = re.compile(
-    r"(?:([0-9]{1,6})[ -])?([0-9]{1,6})/([1-9][0-9]{0,5})(?=[ A-Za-z'\"′″])"
+    r"([+-]?)(?:([0-9]{1,6})[ -])?([0-9]{1,6})/([1-9][0-9]{0,5})(?=[ A-Za-z'\"′″])"
 )
-"""1/2 or 12 1/2, as inches are written."""
-_FEET = re.compile(r"([0-9]{1,6}) ?['′’][ -]?(?=[0-9.][^'′’]*[\"″”]$)")
-"""The feet of 1'6", 1' 6 1/2" or 1'-6.5"."""
+"""1/2 or -12 1/2, as inches are written; the sign is that of the sum."""
+_FEET = re.compile(r"([+-]?)([0-9]{1,6}) ?['′’][ -]?(?=[0-9.][^'′’]*[\"″”]$)")
+"""The feet of 1'6", 1' 6 1/2" or -1'-6.5"; the sign is that of the sum."""
 NUMBER = re.compile(
     r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})"
     r"(?:[eE][+-]?[0-9]{1,3})?(?![0-9.])"
@@ -141,13 +141,10 @@ def to_si(text: str, unit: str) -> float:
             f'"{name}" does not convert to {unit}{_suggest(number_text[0], name, unit)}'
         )
     try:
-        number = (
-            Fraction(number_text[0])
-            if number_text.re is NUMBER
-            else int(number_text[1] or 0)
-            + Fraction(f"{number_text[2]}/{number_text[3]}")
-        )
-        number += 12 * int(feet[1]) if feet else 0
+        number = _read_number(number_text)
+        if feet:
+            inches = 12 * int(feet[2]) + number
+            number = -inches if feet[1] == "-" else inches
         value = float(number * factor / wanted)
     except OverflowError:
         value = math.inf
@@ -169,6 +166,15 @@ def write_quantity(quantity: Any) -> Any:
     if isinstance(numbers, list):
         return [f"{number!r} {unit}" for number in numbers]
     return f"{numbers!r} {unit}"
+
+
+def _read_number(text: re.Match[str]) -> Fraction:
+    """Return the number that `NUMBER` or `_FRACTION` matched."""
+    if text.re is NUMBER:
+        return Fraction(text[0])
+    sign, whole, above, below = text.groups()
+    size = int(whole or 0) + Fraction(f"{above}/{below}")
+    return -size if sign == "-" else size
 
 
 def find_unit(text: object, otherwise: str) -> str:

@@ -27,6 +27,7 @@ from fourbar.solution import (
     find_unit,
     find_unit_in,
     has_size,
+    shift_to_drawing,
 )
 
 if TYPE_CHECKING:
@@ -214,9 +215,12 @@ def _list_motion(solution: Solution) -> Iterator[tuple[str, str, Array]]:
 
     Each has its name, SI unit and values.
     """
-    moving = {"": solution.points, "v_": solution.velocity, "a_": solution.acceleration}
-    for start, arrays in moving.items():
-        for name, vector in arrays.items():
+    for name, place in solution.points.items():
+        x, y = shift_to_drawing(solution, place).T
+        yield f"{name}_x", "m", x
+        yield f"{name}_y", "m", y
+    for start, vectors in (("v_", solution.velocity), ("a_", solution.acceleration)):
+        for name, vector in vectors.items():
             unit = find_unit(start + name)
             yield f"{start}{name}_x", unit, vector[:, 0]
             yield f"{start}{name}_y", unit, vector[:, 1]

@@ -948,3 +948,22 @@ def test_an_output_angle_out_of_range_is_refused_with_the_range(
     high, low = (180.0 - math.degrees(math.acos(cosine)) for cosine in cosines)
     assert code == BAD_INPUT
     assert f"theta_4 goes from {low:.4g} deg to {high:.4g} deg" in err
+
+
+def test_points_in_the_table_have_the_coordinates_of_the_drawing(
+    run: Fourbar, tmp_path: Path
+) -> None:
+    """O2 is not the origin of the drawing; `--at` and CSV have its coordinates too."""
+    file = tmp_path / "drawn.toml"
+    file.write_text(
+        '[pins]\nO2 = ["100 mm", "20 mm"]\nA = ["100 mm", "120 mm"]\n'
+        'B = ["275 mm", "70 mm"]\nO4 = ["350 mm", "70 mm"]\n'
+        '[points]\nP = { bar = 2, drawn = ["150 mm", "80 mm"] }\n'
+        '[motion]\ntheta_2 = "drawn"\nomega_2 = "0 rad/s"\n'
+    )
+    code, out, _ = run("analyze", file, "--table")
+    lines = [line.split() for line in out.splitlines()]
+    (heading,) = (line for line in lines if "P_x" in line)
+    row = lines[lines.index(heading) + 1]
+    assert code == 0
+    assert [row[heading.index(name)] for name in ("P_x", "P_y")] == ["150", "80"]

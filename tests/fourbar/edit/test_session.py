@@ -157,7 +157,7 @@ def test_what_the_file_refuses_is_refused_in_its_words_and_the_last_good_state_s
         (["lengths", "input"], "", "is missing"),
         (["lengths", "ground"], "9 m", "lengths"),
         (["motion", "theta_2", "steps"], "many", "must be a whole number"),
-        (["drive", "bar"], "7", "must be a whole number from 2 to 4"),
+        (["drive", "bar"], "7", "must be 2 (input), 3 (coupler) or 4 (output)"),
         (["nothing", "here"], "1", "unknown key"),
     ):
         told = session.do({"do": "set", "path": place, "value": value})

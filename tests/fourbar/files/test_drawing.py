@@ -174,6 +174,12 @@ def test_the_stroke_and_the_side_of_a_cylinder_are_drawn() -> None:
     assert here.B[0] == pytest.approx([0.175, 0.05], abs=1e-13)
 
 
+def test_a_side_that_is_left_out_is_the_drawn_one() -> None:
+    text = (DRAWN + CYLINDER).replace('side = "drawn"\n', "")
+    assert "side" not in text
+    assert loads(text).motion.side == loads(DRAWN + CYLINDER).motion.side
+
+
 def test_a_scene_that_was_changed_since_is_written_by_its_lengths() -> None:
     scene = loads(DRAWN)
     crossed = fourbar.Scene(

@@ -109,7 +109,7 @@ MISTAKES = [
     ("lengths without a finite sum", '"0.25 m"\noutput = "0.22 m"', '"1.7e308 m"\noutput = "1.7e308 m"', ["lengths"]),
     ("branch misspelt", '"open"', '"opne"', ["motion.branch", "opne", 'did you mean "open"?', '"crossed"']),
     ("branch as a sign", '"open"', "1", ["motion.branch", '"open" or "crossed"']),
-    ("drive on the ground", "[drive]\nbar = 2", "[drive]\nbar = 1", ["drive.bar", "1", "from 2 to 4"]),
+    ("drive on the ground", "[drive]\nbar = 2", "[drive]\nbar = 1", ["drive.bar", "1", "must be 2 (input), 3 (coupler) or 4"]),
     ("drive as text", "[drive]\nbar = 2", '[drive]\nbar = "2"', ["drive.bar", "'2'"]),
     ("drive as truth", "[drive]\nbar = 2", "[drive]\nbar = true", ["drive.bar", "True"]),
     ("load on the ground", "bar = 4", "bar = 1", ["loads[0].bar", "1"]),

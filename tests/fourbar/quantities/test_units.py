@@ -203,6 +203,11 @@ def test_every_unit_is_its_fraction(name: str) -> None:
         ("1' 6 1/2\"", Fraction(37, 2)),
         ("1'-6.5\"", Fraction(37, 2)),
         ("0\u203212\u2033", 12),
+        ("-1'6\"", -18),
+        ("-1 1/2 in", Fraction(-3, 2)),
+        ("-1-1/2 in", Fraction(-3, 2)),
+        ("-3/8 in", Fraction(-3, 8)),
+        ("+3/8 in", Fraction(3, 8)),
     ],
 )
 def test_feet_and_inches_are_one_length(text: str, inches: Fraction | int) -> None:
@@ -210,7 +215,7 @@ def test_feet_and_inches_are_one_length(text: str, inches: Fraction | int) -> No
 
 
 @pytest.mark.parametrize(
-    "text", ["1'6", "1'6'", "6\"1'", "1'6 lb", "1'-\"", '1\'6""', "-1'6\""]
+    "text", ["1'6", "1'6'", "6\"1'", "1'6 lb", "1'-\"", '1\'6""', "1'-6-\""]
 )
 def test_what_is_no_length_in_feet_and_inches_is_refused(text: str) -> None:
     with pytest.raises(UnitError):

@@ -166,9 +166,9 @@ WRONG = {
     ),
     "no bar": (
         'P = { from_pin = ["1 m", "0 deg"] }',
-        "is missing; must be a whole number from 1 to 4",
+        "is missing; must be 1 (ground), 2 (input), 3 (coupler) or 4 (output)",
     ),
-    "a fifth bar": ('P = { bar = 5, from_pin = ["1 m", "0 deg"] }', "from 1 to 4"),
+    "a fifth bar": ('P = { bar = 5, from_pin = ["1 m", "0 deg"] }', "1 (ground)"),
     "another key": (
         'P = { bar = 3, from_pni = ["1 m", "0 deg"] }',
         'did you mean "from_pin"?',
