@@ -449,6 +449,8 @@ def _advise_robot(
         assert measured.advice is not None
         for block in describe_advice(measured.advice):
             show(block)
+        for remark in measured.remarks:
+            click.echo(make_plain(f"note: {measured.name}: {remark}"))
         reached &= measured.advice.reached
     for note in measurement.notes:
         click.echo(make_plain(f"note: {note}"))

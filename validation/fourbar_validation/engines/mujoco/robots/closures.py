@@ -519,11 +519,13 @@ class _Finder:
         by_pin = dict(zip(PAIRS, pins, strict=True))
         hinges = {pin: joint for pin, joint in by_pin.items() if joint is not None}
         bodies = dict(zip((1, 2, 3, 4), groups, strict=True))
-        layout = _Layout(self, bodies, hinges, number)
+        layout = _Layout(self, self.posed, bodies, hinges, number)
         cut = next((pin for pin, joint in by_pin.items() if joint is None), None)
         reason = layout.measure(cut)
         if reason:
             return None, reason
+        before = _Layout(self, self.stated, bodies, hinges, number)
+        before.measure(cut)
         closures, tied = self._sort_equalities(number, bodies, layout, cut)
         rigid = [other for other in tied if isinstance(other, str)]
         if rigid:
@@ -546,6 +548,7 @@ class _Finder:
                 misaligned=self._measure_axes(chain)[0] or 0.0,
                 lengths=layout.lengths,
                 angles=layout.angles,
+                stated_angles=before.angles,
                 qpos=self.data.qpos.copy(),
                 held=tuple(j for j in range(self.model.njnt) if j not in moving),
                 motors=tuple(dict.fromkeys(actuator for _, actuator in motors)),
@@ -678,6 +681,7 @@ class _Layout:
     def __init__(
         self,
         finder: _Finder,
+        posed: PosedRobot,
         bodies: dict[int, tuple[int, ...]],
         hinges: dict[str, int],
         equality: int,
@@ -685,9 +689,9 @@ class _Layout:
         self.finder = finder
         self.bodies = bodies
         self.hinges = hinges
-        self.model = finder.model
-        self.data = finder.data
-        self.ends = _find_ends(finder.posed, equality)
+        self.model = posed.model
+        self.data = posed.data
+        self.ends = _find_ends(posed, equality)
         self.remarks: list[str] = []
         self.senses: dict[str, float] = {}
         self.points: dict[tuple[int, str], Array] = {}

@@ -20,6 +20,7 @@ and dry friction in full: that couple and these pin forces are what MuJoCo's are
 compared with, in the same model.
 """
 
+import cmath
 import math
 import time
 from collections.abc import Iterable, Sequence
@@ -159,12 +160,12 @@ class LoopInside:
         qpos = self._last.copy()
         for angle in np.linspace(start, theta_2, strides + 1)[1:]:
             qpos[self.address] = self.position(float(angle))
-            if not self._close_gap(qpos):
+            if not self.close_gap(qpos):
                 return None
         self._last = qpos.copy()
         return qpos
 
-    def _close_gap(self, qpos: Array) -> bool:
+    def close_gap(self, qpos: Array) -> bool:
         """Move the hinges that are not driven until the residual is least.
 
         The residual is that of the closure. Tell whether it is closed.
@@ -180,6 +181,15 @@ class LoopInside:
                 joint = int(self.model.dof_jntid[dof])
                 qpos[self.model.jnt_qposadr[joint]] += part
         return bool(np.abs(residual).max() <= max(OPEN, self._skew()))
+
+    def measure_transmission(self, qpos: Array) -> float:
+        """Return how well the hinges that are not driven close the gap in a pose, m.
+
+        It is zero where the bars of pin B are in line.
+        """
+        _, jacobian = self._evaluate_closure(qpos)
+        sizes = np.linalg.svd(jacobian[:, self.passive], compute_uv=False)
+        return float(sizes[1])
 
     def _skew(self) -> float:
         """Return what axes that are not parallel leave of the gap, m."""
@@ -488,7 +498,7 @@ class LoopInside:
         spent = 0.0
         # the loop starts exactly closed, and takes some time constants to yield as far
         # as it does
-        settled = min(SETTLED * self.find_constant(), 0.5 * instants[-1])
+        settled = settling_time(self.find_constant(), instants[-1])
         for instant in instants[1:]:
             if instant < settled:
                 continue
@@ -507,13 +517,7 @@ class LoopInside:
 
     def find_constant(self) -> float:
         """Return the time constant of the closure, s."""
-        stiffness, damping = self.model.eq_solref[self.loop.equality]
-        if stiffness > 0.0:
-            return float(stiffness)
-        # stated as -stiffness and -damping: that of a critically damped closure
-        if damping:
-            return 2.0 / abs(float(damping))
-        return 0.0
+        return find_time_constant(self.model, self.loop.equality)
 
     def answer_under_torque(
         self, theta_2: Iterable[float], torque: float, seconds: float
@@ -552,6 +556,51 @@ class LoopInside:
             assert worst is not None
             states.append(worst)
         return states
+
+
+def find_time_constant(model: mujoco.MjModel, equality: int) -> float:
+    """Return the time constant of an equality, s."""
+    stiffness, damping = model.eq_solref[equality]
+    if stiffness > 0.0:
+        return float(stiffness)
+    # stated as -stiffness and -damping: that of a critically damped closure
+    if damping:
+        return 2.0 / abs(float(damping))
+    return 0.0
+
+
+def settling_time(constant: float, seconds: float) -> float:
+    """Return the time after which a loop that starts closed has yielded, s.
+
+    Parameters
+    ----------
+    constant : time constant of its closure, s.
+    seconds : duration of the motion, s.
+    """
+    return min(SETTLED * constant, 0.5 * seconds)
+
+
+def reflect(model: mujoco.MjModel, loop: RobotLoop) -> Array:
+    """Return the pose of the other assembly at the same angle of bar 2, (nq,).
+
+    Bars 3 and 4 are reflected in the line from A to O4, and the gap of the engine is
+    closed from there.
+    """
+    ground, crank = loop.lengths[:2]
+    theta_1, theta_2, theta_3, theta_4 = loop.angles
+    line = cmath.rect(ground, theta_1) - cmath.rect(crank, theta_2)
+    turned_3, turned_4 = (
+        math.remainder(2.0 * (cmath.phase(line) - theta), math.tau)
+        for theta in (theta_3, theta_4)
+    )
+    turns = {"A": turned_3, "B": turned_4 - turned_3, "O4": turned_4}
+    qpos = loop.qpos.copy()
+    for pin, turn in turns.items():
+        if pin in loop.hinges:
+            address = model.jnt_qposadr[loop.hinges[pin]]
+            qpos[address] += loop.senses[pin] * math.remainder(turn, math.tau)
+    LoopInside(model, loop).close_gap(qpos)
+    return qpos
 
 
 def _find_instant(start: float, angle: float, omega: float, alpha: float) -> float:

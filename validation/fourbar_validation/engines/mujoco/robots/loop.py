@@ -3,6 +3,7 @@
 They are plain data, without MuJoCo.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,6 +12,11 @@ from fourbar.linkage import BAR_NAMES
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
 
+FLAT = 2e-3
+"""rad; where the outputs of both assemblies are nearer the pose does not tell which it
+is: a loop that is closed to 1e-12 m leaves about half as much open where its bars are
+in line.
+"""
 PAIRS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
 """The two bars that meet at each pin."""
 
@@ -80,6 +86,8 @@ class RobotLoop:
     """Lengths of ground, input, coupler and output, m."""
     angles: tuple[float, ...]
     """theta_1 to theta_4 in the pose, rad."""
+    stated_angles: tuple[float, ...]
+    """The same before the loops were closed, rad."""
     qpos: Array
     """Joint positions of the whole model in the pose, (nq,)."""
     held: tuple[int, ...]
@@ -95,6 +103,15 @@ class RobotLoop:
         """Joint that is driven; pin O2 is always a hinge."""
         return self.hinges["O2"]
 
+    @property
+    def is_flat(self) -> bool:
+        """Tell whether the bars of pin B were in line before the loops were closed.
+
+        The pose then does not tell the assembly.
+        """
+        _, _, theta_3, theta_4 = self.stated_angles
+        return abs(math.sin(theta_4 - theta_3)) <= FLAT
+
     def seen_from_behind(self) -> "RobotLoop":
         """Return the loop with the other normal of its plane.
 
@@ -104,6 +121,7 @@ class RobotLoop:
             self,
             axis=-self.axis,
             angles=tuple(-angle for angle in self.angles),
+            stated_angles=tuple(-angle for angle in self.stated_angles),
             senses={pin: -sense for pin, sense in self.senses.items()},
         )
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from fourbar.errors import InputError, LimitError
 from fourbar.scene import Scene, command
-from fourbar_validation.engines.mujoco.robots.ancestry import name_joint
 from fourbar_validation.engines.mujoco.robots.answers import (
     InsideAnswer,
     LoopMeasurement,
@@ -29,11 +28,13 @@ from fourbar_validation.engines.mujoco.robots.closures import (
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.inside import HEAVY, LoopInside
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile, RobotLoop
-from fourbar_validation.engines.mujoco.robots.pose import PosedRobot, pose_robot
-from fourbar_validation.engines.mujoco.robots.scene import (
-    is_seen_from_behind,
-    make_scene,
+from fourbar_validation.engines.mujoco.robots.onto_scene import (
+    close_onto,
+    find_turn,
+    miss_lengths,
 )
+from fourbar_validation.engines.mujoco.robots.pose import pose_robot
+from fourbar_validation.engines.mujoco.robots.scene import make_scene
 from fourbar_validation.engines.mujoco.robots.settings import (
     SettingsSearch,
     read_settings,
@@ -48,8 +49,6 @@ _CONSTANTS = 10.0
 """Time constants of the closure during which the torque acts. The loop has then yielded
 as far as it does.
 """
-ALIKE = 1e-6
-"""Difference of logarithms of lengths below which two ways round fit a scene alike."""
 _LIGHTER = 0.1
 """Factor on what holds the other joints, to see what it matters."""
 
@@ -81,14 +80,14 @@ def measure_loops(
             why = reasons or "the file has no equality that closes a loop"
             raise InputError("MJCF", None, f"has no planar four-bar: {why}")
         if scene is not None and options.loop is None:
-            loops = [min(loops, key=lambda one: min(_miss_lengths(scene, one)))]
+            loops = [min(loops, key=lambda one: min(miss_lengths(scene, one)))]
         measured = []
         for one in loops:
             if scene is None:
-                loop = one
+                loop, robot = one, posed
             else:
-                loop = _turn_to(scene, posed, one, options)
-            made = make_scene(compiled, posed, loop, options.speed, loop.name)
+                loop, robot = close_onto(scene, posed, one, options.pose)
+            made = make_scene(compiled, robot, loop, options.speed, loop.name)
             stated = made.scene if scene is None else scene
             if scene is None:
                 remarks = made.remarks
@@ -100,37 +99,6 @@ def measure_loops(
     notes = [*compiled.notes, *posed.notes]
     notes += [f"MuJoCo warns: {warning}" for warning in warnings]
     return RobotMeasurement(tuple(measured), tuple(notes))
-
-
-def _turn_to(
-    scene: Scene, posed: PosedRobot, loop: RobotLoop, options: MeasureOptions
-) -> RobotLoop:
-    """Return the loop as the scene has it.
-
-    Its input is driven, and its plane is seen from the same side.
-    """
-    apart, turned = _miss_lengths(scene, loop)
-    output = loop.hinges.get("O4")
-    if options.pose.drive is None and output is not None and turned < apart - ALIKE:
-        pose = replace(options.pose, drive=name_joint(posed.model, output))
-        loop = choose_loop(find_closures(posed, pose), loop.name)
-    theta_1, theta_2, _, theta_4 = loop.angles
-    behind = is_seen_from_behind(scene, theta_1, theta_2, theta_4)
-    return loop.seen_from_behind() if behind else loop
-
-
-def _miss_lengths(scene: Scene, loop: RobotLoop) -> tuple[float, float]:
-    """Return by how much a loop's lengths miss those of a scene.
-
-    The loop is as it is driven, and driven at its output.
-    """
-    ground, *moving = np.log(loop.lengths)
-    wanted = np.log(scene.linkage.lengths)
-    apart, turned = (
-        float(np.abs(wanted - lengths).sum())
-        for lengths in ([ground, *moving], [ground, *reversed(moving)])
-    )
-    return apart, turned
 
 
 def _measure_loop(
@@ -145,7 +113,7 @@ def _measure_loop(
     if options.speed is not None:
         scene = replace(scene, motion=scene.motion.replace(speed=options.speed))
     inside = LoopInside(model, loop)
-    turned = _find_turn(scene, loop)
+    turned = find_turn(scene, loop)
     motion = _choose_motion(scene, turned).thin_out(POSITIONS)
     states = inside.answer_states(*motion)
     if not states.rows:
@@ -190,16 +158,6 @@ def _measure_loop(
         torn,
         advice,
     )
-
-
-def _find_turn(scene: Scene, loop: RobotLoop) -> float:
-    """Return the angle from a scene's axes to those of the loop's plane, rad.
-
-    Whole turns bring it near the pose.
-    """
-    turned = loop.angles[0] - scene.linkage.ground_angle
-    middle = float(np.mean(command(scene).theta_2)) + turned
-    return turned - math.tau * round((middle - loop.angles[1]) / math.tau)
 
 
 def _choose_motion(scene: Scene, turned: float) -> LoopMotion:

@@ -94,11 +94,39 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
             f"the loops are closed again by least squares: {_list_some(moved)} moved"
         )
     elif after > OPEN:
-        notes.append(
-            "no pose near this one closes all loops within the joints' ranges; what "
-            f"is left is {1e3 * after:.3g} mm or mrad: state one by --pose or --key"
-        )
+        left = f"what is left is {1e3 * after:.3g} mm or mrad"
+        notes.append(_say_open(model, options, stated, left))
     return PosedRobot(model, _evaluate(model, closed), stated, tuple(notes))
+
+
+def _say_open(
+    model: mujoco.MjModel, options: PoseOptions, stated: Array, left: str
+) -> str:
+    """Say why no pose near the stated one closes all loops.
+
+    Joints that --pose states are held, which is the reason where no joint has a range
+    and the loops close without that.
+    """
+    held = {find_joint(model, name, "--hold") for name in options.held}
+    free = _Closing(model, held)
+    closes = free.size(free.close(stated)) <= OPEN
+    ranges = any(model.jnt_limited[joint] for joint in free.joints)
+    if options.joints and closes and not ranges:
+        return (
+            f"{_list_some([*options.joints])} stay where --pose states them, and the"
+            f" other joints cannot close all loops around them; {left}: state fewer"
+            " joints, or more digits"
+        )
+    within = " within the joints' ranges" if ranges else ""
+    return (
+        f"no pose near this one closes all loops{within}; {left}: state one by --pose"
+        " or --key"
+    )
+
+
+def move_to(posed: PosedRobot, qpos: Array) -> PosedRobot:
+    """Return a robot whose loops are closed in another pose."""
+    return PosedRobot(posed.model, _evaluate(posed.model, qpos), qpos, posed.notes)
 
 
 def find_joint(model: mujoco.MjModel, name: str, option: str) -> int:

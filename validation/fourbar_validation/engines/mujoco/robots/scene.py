@@ -43,7 +43,9 @@ from fourbar_validation.engines.mujoco.robots.compiled import (
     compile_robot,
     list_unknown_parts,
 )
+from fourbar_validation.engines.mujoco.robots.inside import reflect
 from fourbar_validation.engines.mujoco.robots.loop import (
+    FLAT,
     PAIRS,
     LoopScene,
     PoseOptions,
@@ -56,14 +58,11 @@ from fourbar_validation.engines.mujoco.robots.pose import (
     pose_robot,
 )
 
+NAMES = {OPEN: "open", CROSSED: "crossed"}
+"""Names of the assemblies, by the branch of a motion."""
 DIGITS = 12
 """Significant digits of a number of the scene. Those beyond are round-off of the
 compiler.
-"""
-_FLAT = 2e-3
-"""rad; where the outputs of both assemblies are nearer the pose does not tell which it
-is: a loop that is closed to 1e-12 m leaves about half as much open where its bars are
-in line.
 """
 STEPS = 120
 """Intervals of the sweep."""
@@ -171,6 +170,18 @@ def _sum_over_motors(
     return total
 
 
+def write_pose(model: mujoco.MjModel, loop: RobotLoop, qpos: Array) -> str:
+    """Write the hinges of a loop in a pose as the value of --pose.
+
+    The digits close the loop to 1e-8 of its bars.
+    """
+    parts = []
+    for joint in sorted(loop.hinges.values()):
+        angle = math.degrees(qpos[model.jnt_qposadr[joint]])
+        parts.append(f"{name_joint(model, joint)}={round(angle, 6):.10g}deg")
+    return ",".join(parts)
+
+
 def round_off(number: float) -> float:
     """Round to the digits that a compiled model has."""
     return float(f"{number:.{DIGITS}g}")
@@ -181,7 +192,7 @@ def _round_angle(angle: float) -> float:
     return round(angle, DIGITS) + 0.0
 
 
-def _miss_output(scene: Scene, theta_1: float, theta_2: float, theta_4: float) -> float:
+def miss_output(scene: Scene, theta_1: float, theta_2: float, theta_4: float) -> float:
     """Return by how much the output of a scene misses that of a loop, rad.
 
     The loop is in its pose; infinite if it is open.
@@ -205,8 +216,8 @@ def is_seen_from_behind(
     In its pose the loop then has the output of a scene. All angles turn the other way
     there.
     """
-    missed = _miss_output(scene, theta_1, theta_2, theta_4)
-    missed_behind = _miss_output(scene, -theta_1, -theta_2, -theta_4)
+    missed = miss_output(scene, theta_1, theta_2, theta_4)
+    missed_behind = miss_output(scene, -theta_1, -theta_2, -theta_4)
     return missed_behind < missed - _SAME_OUTPUT
 
 
@@ -522,16 +533,24 @@ class _SceneOfLoop:
         theta_1 = linkage.ground_angle
         theta_4 = self.loop.angles[3]
         apart = [
-            _miss_output(
+            miss_output(
                 Scene(linkage, Motion(branch=branch)), theta_1, theta_2, theta_4
             )
             for branch in (OPEN, CROSSED)
         ]
-        if not abs(apart[0] - apart[1]) > _FLAT:
+        if not abs(apart[0] - apart[1]) > FLAT:
             text = "the bars of pin B are in line in this pose: open is taken"
             self._remark(f"{text}; --pose states another")
             return OPEN
-        return OPEN if apart[0] < apart[1] else CROSSED
+        branch = OPEN if apart[0] < apart[1] else CROSSED
+        if self.loop.is_flat:
+            pose = write_pose(self.model, self.loop, reflect(self.model, self.loop))
+            self._remark(
+                "the bars of pin B are in line in the pose before closing, which does"
+                f" not tell the assembly: it closed to the {NAMES[branch]} one;"
+                f" --pose {pose} closes to the other"
+            )
+        return branch
 
     def _remark(self, text: str) -> None:
         if text not in self.remarks:
