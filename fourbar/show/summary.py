@@ -335,6 +335,7 @@ def _find_largest(
     """
     places = solution.at.places
     peaks = list[tuple[str, int, int, int]]()
+    towards_pole = list[tuple[str, int, int, int]]()
     passed = _find_dead_points(scene, solution)
     present = sizes(solution)
     for name, size in present.items():
@@ -361,13 +362,20 @@ def _find_largest(
             range(len(places))
         ):  # towards a gap a magnitude may grow without a local maximum
             if padded[i + 1] * padded[j + 1] < 0.0:
-                peaks.append((name, i if padded[j + 1] < 0.0 else j, i, j))
+                beside = (name, i if padded[j + 1] < 0.0 else j, i, j)
+                peaks.append(beside)
+                # a maximum on the way would hide the pole of a change point
+                if solution.assembled[i] and solution.assembled[j]:
+                    towards_pole.append(beside)
+    inward = np.repeat([False, True], [len(peaks), len(towards_pole)])
+    peaks += towards_pole
     rows = np.arange(len(peaks))
     names = [name for name, *_ in peaks]
     top, start, stop = (
         np.array([peak[k] for peak in peaks], dtype=int) for k in (1, 2, 3)
     )
-    opens = ~(solution.assembled[start] & solution.assembled[stop])
+    opens = inward | ~(solution.assembled[start] & solution.assembled[stop])
+    begins = solution.assembled[start] & ~(inward & (top == stop))
     low = places[start]
     high = places[stop]
     peak_places = places[top]
@@ -384,9 +392,7 @@ def _find_largest(
                 for k, n in enumerate(names)
             ]
         )
-        inwards = np.abs(
-            np.arange(CUTS + 1) - np.where(solution.assembled[start], 0, CUTS)[:, None]
-        )
+        inwards = np.abs(np.arange(CUTS + 1) - np.where(begins, 0, CUTS)[:, None])
         best = np.argmax(
             np.where(opens[:, None] & (values >= 0.0), inwards, values), axis=1
         )

@@ -14,6 +14,7 @@ from click.testing import CliRunner
 
 import fourbar
 from fourbar.cli import group
+from fourbar.files import loads
 from fourbar.formulas.mobility import classify, find_miss, meet_change_points
 from fourbar.show.block import write_block
 from fourbar.show.studies import write_equilibria
@@ -390,3 +391,31 @@ def test_a_kite_on_its_change_point_shows_zeros_and_not_their_rounding() -> None
     assert "-0.0000" not in text
     assert re.search(r"transmission angle +0 deg", text)
     assert re.search(r"torque +0 N m", text)
+
+
+FRICTION = """
+[lengths]
+ground = "60 mm"
+input = "180 mm"
+coupler = "60 mm"
+output = "180 mm"
+[bars.coupler]
+mass = "3 kg"
+[motion]
+theta_4 = { from = "-40 deg", to = "40 deg", steps = STEPS }
+omega_4 = "-0.2 rad/s"
+[drive]
+bar = 4
+[effects]
+gravity = ["9.81 m/s^2", "-90 deg"]
+pin_friction = { O4 = { coefficient = 0.12, radius = "6 mm" } }
+"""
+
+
+@pytest.mark.parametrize("steps", [8, 80, 81])
+def test_a_torque_that_grows_behind_a_maximum_has_no_peak(steps: int) -> None:
+    """The pins' friction grows with their load towards the change point."""
+    scene = loads(FRICTION.replace("STEPS", str(steps)))
+    lines = write_block(scene, fourbar.solve(scene, "error"))
+    (torque,) = (line for line in lines if line.startswith("  torque"))
+    assert "(of these positions)" in torque
