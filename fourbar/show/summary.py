@@ -336,7 +336,7 @@ def _find_largest(
     places = solution.at.places
     peaks = list[tuple[str, int, int, int]]()
     towards_pole = list[tuple[str, int, int, int]]()
-    passed = _find_dead_points(scene, solution)
+    passed = _find_dead_points(scene, solution) + _find_change_points(solution)
     present = sizes(solution)
     for name, size in present.items():
         padded = np.concatenate(
@@ -409,6 +409,13 @@ def _find_largest(
         peak_places[kept],
         {name for name, grows in zip(names, growing, strict=True) if grows},
     )
+
+
+def _find_change_points(solution: Solution) -> list[int]:
+    """List the steps within which the linkage passes a change point."""
+    sine = np.nan_to_num(solution.sin_mu)
+    steps: list[int] = np.flatnonzero(sine[:-1] * sine[1:] < 0.0).tolist()
+    return steps
 
 
 def _find_dead_points(scene: Scene, solution: Solution) -> list[int]:
