@@ -229,6 +229,19 @@ def test_beyond_a_change_point_an_answer_nearby_is_one_of_the_same_assembly(
             assert (magnitude(formulas.F43 - again) <= K * EPS * size).all()
 
 
+def test_the_balls_know_a_coupler_that_does_not_turn() -> None:
+    """Of a parallelogram omega_3 is a ball about 0, at some positions about 0 exactly.
+
+    The power of python-flint is NaN there, and so were all accelerations and forces.
+    """
+    name = "parallelogram a > d open"
+    scene = dict(families.sweep_change_point())[name]
+    command = fourbar.command(scene).part(slice(15, 25))
+    answered = ask_at(HARD_ENGINES[0].start(), scene, command).quantities
+    for quantity in ("alpha_3", "alpha_4", "F43", "torque"):
+        assert np.isfinite(answered[quantity]).all(), quantity
+
+
 @pytest.mark.parametrize("name", AT_CHANGE_POINTS)
 def test_the_file_opens_in_the_assembly_that_is_stated_beyond_a_change_point_too(
     name: str, monkeypatch: pytest.MonkeyPatch

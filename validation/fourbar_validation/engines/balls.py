@@ -46,6 +46,15 @@ def wedge(u: Complex, v: Complex) -> Ball:
     return (u.conjugate() * v).imag
 
 
+def square(ball: Ball) -> Ball:
+    """Return the square as a product.
+
+    The power of python-flint 0.9 is NaN of a ball about 0 exactly, such as the speed of
+    a bar that does not turn.
+    """
+    return ball * ball
+
+
 def dot(u: Complex, v: Complex) -> Ball:
     """Return u_x v_x + u_y v_y."""
     return (u.conjugate() * v).real
@@ -373,7 +382,7 @@ def _move(x: Values, w: dict[int, Complex], commanded: int) -> _BallBars:
 
     # a probe opens the loop by slip, m/s, and jerk, m/s^2
     omega = rates(x[f"omega_{commanded}"], x.get("slip", zero))
-    centripetal = sum((side[bar] * omega[bar] ** 2 for bar in MOVING_BARS), zero)
+    centripetal = sum((side[bar] * square(omega[bar]) for bar in MOVING_BARS), zero)
     alpha = rates(x[f"alpha_{commanded}"], x.get("jerk", zero) + centripetal)
     tip = {2: a * w[2], 3: b * w[3], 4: c * w[4]}
     first_pin = {1: zero, 2: zero, 3: tip[2], 4: polar(x["d"], x["theta_1"])}
@@ -601,7 +610,9 @@ def _turn_by_stroke(scene: Scene, x: Values) -> Values | None:
     across = length * reach * beta.sin()
     along = length * reach * cosine
     rate = s * speed / across
-    growth = (speed**2 + s * x["stroke_acceleration"] - along * rate**2) / across
+    growth = (
+        square(speed) + s * x["stroke_acceleration"] - along * square(rate)
+    ) / across
     lever = across / s / (length if length > reach else reach)
     turned = {
         f"theta_{bar}": fixed.arg() - held.arg() + side * beta,
