@@ -23,23 +23,23 @@ import fourbar
 from fourbar.quantities import PIN_FORCES
 from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.linkage import (
+    choose_drawing_scale,
     draw_mechanism,
     draw_support,
     locate_pins,
-    scale_of,
 )
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     INK,
     MUTED,
-    OPEN,
+    RING_MARK,
     add_dark_form,
     apply_style,
 )
 from fourbar.show.plot.view import make_view
 from fourbar.writing import write_text
 from fourbar_lab.benchmark import DIFFERENTIATED as LOOP
-from fourbar_lab.benchmark import draw_work_precision, name_row, read_work
+from fourbar_lab.benchmark import draw_panels, name_row, read_work
 from fourbar_lab.simulators.findings import read_findings
 from fourbar_validation.check.problem import MISSING, WORSE
 from fourbar_validation.compare.rows import read_cell_text
@@ -297,7 +297,7 @@ def draw_problem(name: str) -> str:
             view = make_view(
                 fourbar.load(PROBLEMS / f"{name}.toml"), SHOWN_AT.get(name)
             )
-            factor, _, size = scale_of(view)
+            factor, _, size = choose_drawing_scale(view)
             pins = locate_pins(view, factor)
             axes.plot(
                 *zip(pins["O2"], pins["O4"], strict=True),
@@ -356,7 +356,9 @@ def draw_slider_crank(axes: Any, problem: dict[str, Any], labels: Labels) -> Non
         )
         labels.keep_off(axes, *ends, width=4.5)
     for pin, point in pins.items():
-        axes.plot(*[[value] for value in point], "o", ms=6.0, mew=1.2, zorder=6, **OPEN)
+        axes.plot(
+            *[[value] for value in point], "o", ms=6.0, mew=1.2, zorder=6, **RING_MARK
+        )
         labels.add(
             Label(
                 axes,
@@ -411,5 +413,5 @@ if __name__ == "__main__":
         write_text(DOCS / page_name, text(page_name))
     for file in PROBLEMS.glob("*.json"):
         write_text(FIGURES / f"{file.stem}.svg", draw_problem(file.stem))
-    work = draw_work_precision(read_work(read_table()))
+    work = draw_panels(read_work(read_table()))
     write_text(TABLE.with_suffix(".svg"), write_alone(work, "benchmark"))

@@ -14,11 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import command
 from fourbar.show.plot.style import apply_style
 from fourbar.solving import solve
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.tolerance import EPS, K, find_condition
 from fourbar_validation.cost.pictures import (
     GRID,
@@ -31,7 +30,7 @@ from fourbar_validation.cost.pictures import (
 from fourbar_validation.cost.study import PINOCCHIO
 from fourbar_validation.engines.registry import HARD_ENGINES
 from fourbar_validation.report.hard_picture import list_approaches, list_errors
-from fourbar_validation.report.svg import LIGHT, choose_style, write_alone
+from fourbar_validation.report.svg import LIGHT_COLOURS, choose_style, write_alone
 
 DOCS = Path(__file__).parent
 TARGET = DOCS / "cost"
@@ -122,7 +121,9 @@ def draw_effects() -> Any:
     )
     axes = figure.add_axes((0.24, 0.1, 0.7, 0.62))
     names = sorted(effects, key=effects.__getitem__)
-    bars = axes.barh(names, [effects[name] for name in names], color=LIGHT["--e1"])
+    bars = axes.barh(
+        names, [effects[name] for name in names], color=LIGHT_COLOURS["--e1"]
+    )
     axes.bar_label(bars, fmt="%.0f %%", fontsize=TEXT, color=INK, padding=3)
     axes.set_facecolor(figure.get_facecolor())
     axes.tick_params(labelsize=TEXT, color=GRID, labelcolor=INK)
@@ -178,7 +179,7 @@ def draw_small_accuracy(study: Path) -> Any:
     ):
         points = [point for point in read_points(study, curve) if point[1] < 1.0]
         x, y, _ = zip(*points, strict=True)
-        colour, marker = LIGHT[look[0]], look[1]
+        colour, marker = LIGHT_COLOURS[look[0]], look[1]
         axes.loglog(x, y, color=colour, marker=marker, ms=3.5, lw=1.2)
         beside = len(x) // 2
         axes.annotate(
@@ -218,7 +219,9 @@ def draw_small_effects() -> Any:
     effects = read_effects()
     figure, axes = make_small("What effects add to a step, %")
     names = sorted(effects, key=effects.__getitem__)
-    bars = axes.barh(names, [effects[name] for name in names], color=LIGHT["--e1"])
+    bars = axes.barh(
+        names, [effects[name] for name in names], color=LIGHT_COLOURS["--e1"]
+    )
     axes.bar_label(bars, fmt="%.0f", fontsize=7.5, color=INK, padding=2)
     axes.margins(x=0.12)
     set_small(axes, "RK4 in MuJoCo")
@@ -231,7 +234,12 @@ def draw_small_hard() -> Any:
     for condition, error, engine in list_hard_points():
         if engine == "pinocchio-inverse":
             axes.plot(
-                condition, error, ls="none", marker="o", ms=3, color=LIGHT["--e1"]
+                condition,
+                error,
+                ls="none",
+                marker="o",
+                ms=3,
+                color=LIGHT_COLOURS["--e1"],
             )
     ends = np.array([NO_DIGITS, 1.0])
     axes.loglog(ends, K * EPS / ends, color=INK, lw=1.2)

@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING, TextIO
 if TYPE_CHECKING:
     import click
 
-LONGEST_SHOWN = 160
+LONGEST_VALUE = 160
 """Characters of a value that an error repeats."""
 
 
-_UNITS = ContextVar[Mapping[str, tuple[str, float]]]("units of messages")
+_MESSAGE_UNITS = ContextVar[Mapping[str, tuple[str, float]]]("units of messages")
 """Name and factor of the unit in which messages state numbers of each SI unit."""
 
 
@@ -32,11 +32,11 @@ def state_messages_in(units: Mapping[str, tuple[str, float]]) -> Iterator[None]:
 
     A reader compares them with the file, which is seldom in SI units.
     """
-    token = _UNITS.set(units)
+    token = _MESSAGE_UNITS.set(units)
     try:
         yield
     finally:
-        _UNITS.reset(token)
+        _MESSAGE_UNITS.reset(token)
 
 
 def name_unit(unit: str, otherwise: str | None = None) -> str:
@@ -44,7 +44,7 @@ def name_unit(unit: str, otherwise: str | None = None) -> str:
 
     `otherwise`: the unit where messages have none for it; left out: the SI unit.
     """
-    return _UNITS.get({}).get(unit, (otherwise or unit, 1.0))[0]
+    return _MESSAGE_UNITS.get({}).get(unit, (otherwise or unit, 1.0))[0]
 
 
 def write_in_units(
@@ -55,7 +55,7 @@ def write_in_units(
     >>> write_in_units("m", 0.0254, 0.3)
     '0.0254, 0.3 m'
     """
-    name, factor = _UNITS.get({}).get(unit, (unit, 1.0))
+    name, factor = _MESSAGE_UNITS.get({}).get(unit, (unit, 1.0))
     numbers = between.join(f"{factor * value:.{digits}g}" for value in values)
     return f"{numbers} {name}".rstrip()
 
@@ -102,9 +102,9 @@ class InputError(FourBarError):
             else:
                 numbers = (value,)
             shown = write_in_units(unit, *map(float, numbers))
-        if len(shown) > LONGEST_SHOWN:  # of a long path the end says which
+        if len(shown) > LONGEST_VALUE:  # of a long path the end says which
             shown = (
-                f"{shown[: LONGEST_SHOWN // 2 - 3]}...{shown[-LONGEST_SHOWN // 2 :]}"
+                f"{shown[: LONGEST_VALUE // 2 - 3]}...{shown[-LONGEST_VALUE // 2 :]}"
             )
         prefix = f"{file}: " if file else ""
         super().__init__(
@@ -216,24 +216,26 @@ def run(
     except SystemExit as left:
         return _read_exit(left, streams)
     except (click.exceptions.Abort, KeyboardInterrupt):
-        return _say("interrupted", INTERRUPTED)
+        return _print_error("interrupted", INTERRUPTED)
     except click.ClickException as error:
-        return _say(error.format_message(), BAD_INPUT)
+        return _print_error(error.format_message(), BAD_INPUT)
     except DependencyError as error:
-        return _say(str(error), BROKEN)
+        return _print_error(str(error), BROKEN)
     except FourBarError as error:
-        return _say(str(error), BAD_INPUT)
+        return _print_error(str(error), BAD_INPUT)
     except ModuleNotFoundError as error:
-        return _say(f"{error.name} is not installed: {say_install(extra)}", BROKEN)
+        return _print_error(
+            f"{error.name} is not installed: {say_install(extra)}", BROKEN
+        )
     except OSError as error:
         file = (
             error.filename2 or error.filename or "output"
         )  # of a file that is put in place the second is its place
-        return _say(f"{file}: {error.strerror or error}", BROKEN)
+        return _print_error(f"{file}: {error.strerror or error}", BROKEN)
     except Exception as error:
         if "--traceback" in words or os.environ.get("FOURBAR_TRACEBACK"):
             raise
-        return _say(
+        return _print_error(
             f"internal error: {type(error).__name__}: {error} (FOURBAR_TRACEBACK=1"
             " shows where)",
             BROKEN,
@@ -250,12 +252,12 @@ def _read_exit(raised: SystemExit, streams: tuple[TextIO, ...]) -> int:
     if sys.stdout is not streams[0]:
         if any(map(_is_unread, streams)):
             return HOLDS
-        return _say("a pipe inside the program broke", BROKEN)
+        return _print_error("a pipe inside the program broke", BROKEN)
     if isinstance(raised.__context__, BrokenPipeError):
         return HOLDS
     if raised.code is None or isinstance(raised.code, int):
         return raised.code or HOLDS
-    return _say(raised.code, BROKEN)
+    return _print_error(raised.code, BROKEN)
 
 
 def _is_unread(stream: TextIO) -> bool:
@@ -285,7 +287,7 @@ def _flush() -> None:
         )  # or the interpreter reports it at its end
 
 
-def _say(message: str, status: int) -> int:
+def _print_error(message: str, status: int) -> int:
     import click
 
     click.echo("error: " + clean_line(message), err=True)

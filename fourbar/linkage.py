@@ -31,9 +31,9 @@ SECOND_PIN = {bar: second for bar, (_, second) in ENDS.items()}
 _NO_NUMBERS = (bool, str, bytes, complex)
 """Types that `require` rejects although `float` may read them."""
 A_BRANCH = "must be +1 (open) or -1 (crossed)"
-MOST_STEPS = 100_000_000
+MOST_INTERVALS = 100_000_000
 """Intervals of any motion or curve."""
-ANY, AT_LEAST_ZERO, POSITIVE = (
+ANY_NUMBER, AT_LEAST_ZERO, POSITIVE = (
     "a finite number",
     "a finite number >= 0",
     "a finite number > 0",
@@ -50,7 +50,7 @@ def is_within(number: float, bound: str) -> bool:
     return True
 
 
-def require(key: str, value: object, unit: str = "1", bound: str = ANY) -> float:
+def require(key: str, value: object, unit: str = "1", bound: str = ANY_NUMBER) -> float:
     """Return the value as a float, or raise an InputError that says what is allowed.
 
     `unit`: of the number; a text like "48 cm" and a `pint.Quantity` are converted to
@@ -94,9 +94,9 @@ def _read_quantity(value: object) -> object:
     """
     if not hasattr(value, "magnitude") or not hasattr(value, "units"):
         return value
-    from fourbar.quantities.units import write_quantity
+    from fourbar.quantities.units import write_pint_quantity
 
-    text: object = write_quantity(value)
+    text: object = write_pint_quantity(value)
     return text
 
 
@@ -136,7 +136,7 @@ def require_bar(key: str, value: object) -> int:
     return require_whole(key, value, MOVING_BARS, "must be 2, 3 or 4")
 
 
-REQUIRED = object()
+REQUIRED_NUMBER = object()
 """Mark that replaces a default: the number has to be stated."""
 
 
@@ -147,8 +147,8 @@ class Declared(NamedTuple):
     """
 
     unit: str
-    bound: str = ANY
-    left_out: Any = REQUIRED
+    bound: str = ANY_NUMBER
+    left_out: Any = REQUIRED_NUMBER
     """Value where a scene file leaves it out."""
     pair: str = ""
     """Unit of the second number of a pair, "rad" for an angle; empty for one number."""
@@ -161,7 +161,7 @@ class Declared(NamedTuple):
     @property
     def bounds(self) -> tuple[str, str]:
         """Bounds of both numbers of a pair; an angle has none."""
-        return self.bound, ANY if self.pair == "rad" else self.bound
+        return self.bound, ANY_NUMBER if self.pair == "rad" else self.bound
 
 
 def require_pair(key: str, value: Any, by: Declared) -> tuple[float, float]:
@@ -361,7 +361,7 @@ class FourBar:
     ground_angle: float = 0.0
     numbers: ClassVar[dict[str, Declared]] = {
         "ground": Declared("m", POSITIVE),
-        "ground_angle": Declared("rad", ANY, 0.0),
+        "ground_angle": Declared("rad", ANY_NUMBER, 0.0),
     }
 
     def __post_init__(self) -> None:

@@ -22,6 +22,7 @@ from fourbar.quantities import (
     STATUS_NAMES,
     STROKE,
     UNITS,
+    Array,
     Quantities,
 )
 from fourbar.scene import Command, Scene
@@ -35,14 +36,12 @@ from fourbar.writing import (
     write_text,
 )
 
-Array = NDArray[np.float64]
-
 if TYPE_CHECKING:
     from pandas import DataFrame
 
     from fourbar.effects import ForceDrive
 
-SCHEMA = "fourbar-analyze/1"
+ANALYZE_SCHEMA = "fourbar-analyze/1"
 Conversion = Mapping[str, tuple[str, float]]
 """Units to show: for an SI unit another unit and the factor to it. A unit that is left
 out stays.
@@ -170,7 +169,8 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
             "status: "
             + ", ".join(f"{count} {name}" for name, count in counts if count),
             *(
-                f"{name}: {write_between(values)} {find_unit(name.strip('|'))}"
+                f"{name}: {write_between(values)}"
+                f" {find_unit_of_quantity(name.strip('|'))}"
                 for name, values in shown.items()
             ),
         ]
@@ -302,10 +302,12 @@ def write_json(solution: Solution, units: Conversion = SI, **more: Any) -> str:
     """
     names = _list_quantities(solution)
     return write_object(
-        SCHEMA,
+        ANALYZE_SCHEMA,
         title=solution.title,
         angle_unit=find_unit_in("rad", units)[0],
-        units={name: find_unit_in(find_unit(name), units)[0] for name in names},
+        units={
+            name: find_unit_in(find_unit_of_quantity(name), units)[0] for name in names
+        },
         status=solution.status,
         branch=solution.branch,
         **{name: find_values(solution, name, units) for name in names},
@@ -408,7 +410,7 @@ def _list_scalars(solution: Solution, units: Conversion = SI) -> list[_ScalarCol
     quantities |= load_show("derived").list_derived(solution, units)
     columns = []
     for name, values in quantities.items():
-        unit, _ = find_unit_in(find_unit(name), units)
+        unit, _ = find_unit_in(find_unit_of_quantity(name), units)
         if units and unit != "1":
             named = f" [{unit}]"
         else:
@@ -518,7 +520,7 @@ def _list_quantities(solution: "Solution") -> list[str]:
     return names + [f"{start}{name}" for name in points for start in ("", "v_", "a_")]
 
 
-def find_unit(name: str) -> str:
+def find_unit_of_quantity(name: str) -> str:
     """Return the SI unit of a quantity or of a point of the scene.
 
     Of a point it is that of its path, velocity or acceleration.
@@ -535,7 +537,7 @@ def find_values(solution: Solution, name: str, units: Conversion = SI) -> Any:
     scene's drawing.
     """
     values = _find_si(solution, name)
-    unit = find_unit(name)
+    unit = find_unit_of_quantity(name)
     if values is not None and unit == "m" and not is_scalar(name):
         values = shift_to_drawing(solution, values)
     if values is None or unit not in units:

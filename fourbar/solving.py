@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
-from fourbar.evaluation.case import BLOCK, Case
+from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK, Case
 from fourbar.evaluation.evaluate import (
     ERROR,
     FORCE,
@@ -33,17 +33,18 @@ from fourbar.quantities import (
     STAGES,
     STROKE,
     UNITS,
+    Array,
 )
 from fourbar.scene import Command, Scene, command
-from fourbar.scene.motion import COMMANDS
+from fourbar.scene.motion import COMMAND_NAMES
 from fourbar.scene.numbers import POINT_STAGES
 from fourbar.scene.scene import Independent, with_signs
-from fourbar.solution import Array, Solution, unwrap
+from fourbar.solution import Solution, unwrap
 
-_LONG_BLOCK = BLOCK // 4
+_LONG_BLOCK = POSITIONS_OF_A_BLOCK // 4
 """Positions with error bars evaluated at a time. Longer numbers fill the cache sooner.
 """
-Part = tuple[Any, ...]
+StudyPart = tuple[Any, ...]
 """Index of some positions in the arrays of all."""
 
 
@@ -96,7 +97,7 @@ def solve(
         return _require_study(scene, at).solve(stage, out=out, side=side)
     change_points: tuple[float, ...] | None = None
     if at is not None:
-        _require_command(at)
+        _require_command_at(at)
         commanded = at
     elif scene.motion.free is not None:
         from fourbar.evaluation.free_motion import release
@@ -135,7 +136,7 @@ class _Requested(NamedTuple):
     def block(self) -> int:
         """Number of positions evaluated at a time."""
         if self.last_stage < ERROR:
-            return BLOCK
+            return POSITIONS_OF_A_BLOCK
         return _LONG_BLOCK
 
     @property
@@ -161,7 +162,7 @@ class Results:
         self.reverses = False
         """True if sin(theta_4 - theta_3) may have another sign than the branch."""
 
-    def store(self, case: Case, evaluated: Evaluated, part: Part) -> None:
+    def store(self, case: Case, evaluated: Evaluated, part: StudyPart) -> None:
         """Write what was evaluated.
 
         What is no number has the status that says so.
@@ -278,11 +279,11 @@ def _require_study(study: object, at: Command | None) -> ManyScenes:
     return study
 
 
-def _require_command(commanded: Command) -> None:
+def _require_command_at(commanded: Command) -> None:
     """Raise an InputError where a command is none."""
     expect("at", commanded, Command)
     require_bar("at.bar", commanded.bar)
-    angle, speed, acceleration = COMMANDS[commanded.bar]
+    angle, speed, acceleration = COMMAND_NAMES[commanded.bar]
     expect(f"at.{angle}", commanded.angle, np.ndarray)
     expect("at.independent", commanded.independent, Independent, type(None))
     n = commanded.angle.size
@@ -494,7 +495,7 @@ def _unwrap_angles(arrays: Mapping[str, Array], bar: int) -> None:
 
     The commanded angle stays as it is stated.
     """
-    commanded = COMMANDS[bar][0]
+    commanded = COMMAND_NAMES[bar][0]
     for name in ("theta_2", *ANGLES):
         if name in arrays and name != commanded:
             unwrap(arrays[name])

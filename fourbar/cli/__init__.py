@@ -7,19 +7,26 @@ import click
 from fourbar import __version__
 from fourbar.cli.evaluate import (
     analyze,
-    classify,
-    equilibrium,
+    classify_command,
+    equilibrium_command,
     new,
     tolerance,
 )
-from fourbar.cli.export import animate, edit, mjcf, plot, sdf, usd
+from fourbar.cli.export import (
+    animate,
+    edit_command,
+    mjcf,
+    plot,
+    sdf_command,
+    usd_command,
+)
 from fourbar.errors import run
 
 SECTIONS = {
-    "Begin": (new, edit),
-    "Look": (classify, analyze, plot, animate),
-    "Export": (mjcf, sdf, usd),
-    "Study": (tolerance, equilibrium),
+    "Begin": (new, edit_command),
+    "Look": (classify_command, analyze, plot, animate),
+    "Export": (mjcf, sdf_command, usd_command),
+    "Study": (tolerance, equilibrium_command),
 }
 """Commands by what they are for, in the order of the help."""
 

@@ -10,14 +10,15 @@ import click
 from fourbar.cli import given
 from fourbar.errors import InputError, NotAssembledError, state_messages_in
 from fourbar.linkage import POSITIVE
+from fourbar.quantities import Array
 from fourbar.scene import Scene
-from fourbar.solution import DEGREES, SI, Array, Conversion, Solution
+from fourbar.solution import DEGREES, SI, Conversion, Solution
 
 if TYPE_CHECKING:
     from fourbar.show.columns import Column
 
 
-@click.command()
+@click.command("classify")
 @click.argument("lengths", nargs=4, metavar="D A B C")
 @click.option(
     "--all",
@@ -26,8 +27,8 @@ if TYPE_CHECKING:
     help="Print the limits of all bars, not only of the output.",
 )
 @given.json_option
-@given.text_option(*given.TABLES)
-def classify(
+@given.text_option(*given.TABLE_ENDINGS)
+def classify_command(
     lengths: tuple[str, ...], everything: bool, as_json: bool, out: Path | None
 ) -> None:
     """Classify a linkage by its lengths: which bars turn, and how far.
@@ -61,9 +62,9 @@ def classify(
 
 
 @click.command()
-@click.argument("file", type=given.FILE, required=False)
+@click.argument("file", type=given.FILE_PATH, required=False)
 @click.option(
-    "-o", "--out", type=given.FILE, metavar="FILE", help="Name of the new file."
+    "-o", "--out", type=given.FILE_PATH, metavar="FILE", help="Name of the new file."
 )
 @click.option(
     "--lengths",
@@ -161,7 +162,7 @@ def _read_pins(text: str, unit: str | None) -> dict[str, tuple[str, str]]:
     }
 
 
-def _choose_form(table: bool, as_json: bool, as_csv: bool, out: Path | None) -> str:
+def _choose_output(table: bool, as_json: bool, as_csv: bool, out: Path | None) -> str:
     """Choose between "summary", "table", "json" and "csv".
 
     The options decide, or the ending of the file.
@@ -234,7 +235,7 @@ def _choose_form(table: bool, as_json: bool, as_csv: bool, out: Path | None) -> 
         " units; without --at, --units and --degrees."
     ),
 )
-@given.text_option(*given.TABLES, ".csv")
+@given.text_option(*given.TABLE_ENDINGS, ".csv")
 def analyze(  # noqa: PLR0913 - one for each option
     scene: Path,
     at: tuple[str, ...],
@@ -254,7 +255,7 @@ def analyze(  # noqa: PLR0913 - one for each option
     If the scene states one position, or --at names one, everything about it is printed.
     A FILE that ends in .csv or .json asks for that form.
     """
-    form = _choose_form(table or every is not None, as_json, decimal is not None, out)
+    form = _choose_output(table or every is not None, as_json, decimal is not None, out)
     if columns is not None and form == "json":
         raise click.UsageError("--columns are those of a table or of CSV")
     if columns is not None and form == "summary":
@@ -298,7 +299,7 @@ def _choose_units(
     """
     for_reading = form in ("summary", "table")
     if units is None:
-        shown = dict(given.suit_units() if for_reading else SI)
+        shown = dict(given.suit_file_units() if for_reading else SI)
     else:
         shown = {**(DEGREES if for_reading else SI), **units}
     if degrees:
@@ -342,7 +343,7 @@ def _write_positions(
 ) -> str:
     """Write every position, as JSON, CSV or a table, whose columns may be named."""
     from fourbar.show.block import write_motor
-    from fourbar.show.columns import read_columns
+    from fourbar.show.columns import choose_columns
     from fourbar.show.gas import list_gas_notes
     from fourbar.show.tables import print_positions
     from fourbar.solution import write_csv, write_json
@@ -352,7 +353,7 @@ def _write_positions(
     if names is None:
         columns = []
     else:
-        columns = read_columns(scene, solution, names)
+        columns = choose_columns(scene, solution, names)
     if form == "json":
         motor = write_motor(scene, solution, units)
         notes = list_gas_notes(scene, solution, units)
@@ -449,7 +450,7 @@ def _print_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
 @click.option(
     "-o",
     "--out",
-    type=given.FILE,
+    type=given.FILE_PATH,
     metavar="PLOT",
     help="Draw the bands into PLOT (svg, png or pdf).",
 )
@@ -475,17 +476,20 @@ def tolerance(
         show_running("samples are solved") as progress,
     ):
         spreads = tolerances(
-            stated, SAMPLES if samples is None else samples, seed, progress=progress
+            stated,
+            SAMPLES if samples is None else samples,
+            seed,
+            progress=progress,
         )
     if (spreads.without == spreads.samples).all():
         raise _assembles_nowhere(scene, stated)
-    named = given.suit_units() if units is None else units
+    named = given.suit_file_units() if units is None else units
     if out is not None:
         draw_tolerances(spreads, out, named)
     if as_json:
-        text = shown.write_json(spreads)
+        text = shown.write_spreads_json(spreads)
     else:
-        text = shown.write_text(spreads, {**DEGREES, **named})
+        text = shown.write_spreads(spreads, {**DEGREES, **named})
     given.print_to(text, None)
 
 
@@ -496,11 +500,11 @@ def _refuse_units_of_json(as_json: bool, units: Conversion | None) -> None:
         )
 
 
-@click.command()
+@click.command("equilibrium")
 @given.scene_argument
 @given.json_option
-@given.text_option(*given.TABLES)
-def equilibrium(scene: Path, as_json: bool, out: Path | None) -> None:
+@given.text_option(*given.TABLE_ENDINGS)
+def equilibrium_command(scene: Path, as_json: bool, out: Path | None) -> None:
     """Find positions of rest, stability, frequency, and what holds the others."""
     from fourbar.show.studies import write_equilibria, write_equilibria_json
     from fourbar.show.tables import show_running
@@ -511,5 +515,5 @@ def equilibrium(scene: Path, as_json: bool, out: Path | None) -> None:
     if as_json:
         text = write_equilibria_json(described.title, rest)
     else:
-        text = write_equilibria(described.title, rest, given.suit_units())
+        text = write_equilibria(described.title, rest, given.suit_file_units())
     given.print_to(text, out)

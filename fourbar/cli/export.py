@@ -56,14 +56,14 @@ def _scene_or_lengths(command: Callable[..., None]) -> Callable[..., None]:
             metavar="D A B C",
             help="Lengths of ground, input, coupler, output, m.",
         ),
-        click.argument("scene", type=given.FILE, required=False),
+        click.argument("scene", type=given.FILE_PATH, required=False),
     ):
         command = add(command)
     return command
 
 
 @contextmanager
-def _describe(
+def _open_or_make_scene(
     scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None, out: Path
 ) -> Iterator[Scene]:
     """Open the scene, or make one of the lengths; its defaults are told at the end."""
@@ -153,7 +153,7 @@ def plot(
             figure,
             position=place,
             branches=branches,
-            units=given.suit_units() if units is None else units,
+            units=given.suit_file_units() if units is None else units,
             dimensions=dimensions,
         )
 
@@ -201,7 +201,7 @@ def animate(
     units: Conversion | None,
 ) -> None:
     """Animate a scene as a web page (.html) or a film (.gif, .mp4)."""
-    from fourbar.show.animate import write
+    from fourbar.show.animate import write_animation
 
     attached = {}
     for entry in pictures:
@@ -210,12 +210,12 @@ def animate(
             raise InputError("--picture", entry, "must be like coupler=FILE")
         attached[bar] = file
     with given.open_scene(scene) as described, given.show_waiting(described):
-        write(
+        write_animation(
             described,
             out,
             pictures=attached,
             seconds=seconds,
-            units=given.suit_units() if units is None else units,
+            units=given.suit_file_units() if units is None else units,
             vectors=vectors,
         )
 
@@ -254,12 +254,12 @@ def mjcf(
     """Write a scene, or four lengths, as MJCF for MuJoCo and its kin."""
     from fourbar import mjcf as writer
 
-    with _describe(scene, lengths, omega, out) as described:
+    with _open_or_make_scene(scene, lengths, omega, out) as described:
         text = writer.write_mjcf_for(described, simulator, drive, plane)
         given.print_to(text, out)
 
 
-@click.command()
+@click.command("sdf")
 @_scene_or_lengths
 @click.option(
     "--for",
@@ -272,7 +272,7 @@ def mjcf(
 @_without_loads_option
 @_plane_options
 @given.text_option(".sdf", ".world", ".xml", required=True)
-def sdf(
+def sdf_command(
     scene: Path | None,
     lengths: tuple[str, ...] | None,
     omega: str | None,
@@ -284,17 +284,17 @@ def sdf(
     """Write a scene, or four lengths, as SDF for Gazebo or Drake."""
     from fourbar.mjcf.assembly import write_sdf as written
 
-    with _describe(scene, lengths, omega, out) as described:
+    with _open_or_make_scene(scene, lengths, omega, out) as described:
         text = written(described, reader, without_loads=without_loads, plane=plane)
         given.print_to(text, out)
 
 
-@click.command()
+@click.command("usd")
 @_scene_or_lengths
 @_without_loads_option
 @_plane_options
 @given.text_option(".usda", ".usd", required=True)
-def usd(
+def usd_command(
     scene: Path | None,
     lengths: tuple[str, ...] | None,
     omega: str | None,
@@ -305,13 +305,13 @@ def usd(
     """Write a scene, or four lengths, as USD text (.usda) for Newton."""
     from fourbar.mjcf.assembly import write_usd as written
 
-    with _describe(scene, lengths, omega, out) as described:
+    with _open_or_make_scene(scene, lengths, omega, out) as described:
         text = written(described, without_loads=without_loads, plane=plane)
         given.print_to(text, out)
 
 
-@click.command()
-@click.argument("scene", type=given.FILE, required=False)
+@click.command("edit")
+@click.argument("scene", type=given.FILE_PATH, required=False)
 @click.option(
     "--port",
     type=click.IntRange(0, 65535),
@@ -320,14 +320,16 @@ def usd(
 )
 @click.option(
     "--exports",
-    type=given.FILE,
+    type=given.FILE_PATH,
     metavar="FOLDER",
     help="Folder of exports and reports (default: SCENE_exports).",
 )
 @click.option(
     "--no-browser", is_flag=True, help="Print the address and open no browser."
 )
-def edit(scene: Path | None, port: int, exports: Path | None, no_browser: bool) -> None:
+def edit_command(
+    scene: Path | None, port: int, exports: Path | None, no_browser: bool
+) -> None:
     """Edit a scene, or a new one, in the browser; torque and forces follow each change.
 
     Ctrl-C ends it, and so does a minute and a half without a page.

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from fourbar.errors import InputError, state_messages_in
-from fourbar.linkage import ANY, POSITIVE, require
+from fourbar.linkage import ANY_NUMBER, POSITIVE, require
 from fourbar.scene import Scene
 from fourbar.solution import Conversion
 
@@ -17,9 +17,9 @@ _SCENE_TEXT = "fourbar.scene_text"
 """Key of the scene file's text in the context of a command. Standard input is read
 once.
 """
-MOST_POSITIONS = 1_000_000
+MOST_PRINTED = 1_000_000
 """Positions that `analyze` prints: about a gigabyte of text."""
-FILE = click.Path(path_type=Path)
+FILE_PATH = click.Path(path_type=Path)
 _KEYS_OF_A_SCENE = (
     "motion",
     "lengths",
@@ -39,11 +39,11 @@ def _read_units(
     return None if text is None else units(text)
 
 
-scene_argument = click.argument("scene", type=FILE)
+scene_argument = click.argument("scene", type=FILE_PATH)
 out_option = click.option(
-    "-o", "--out", type=FILE, required=True, metavar="FILE", help="Write to FILE."
+    "-o", "--out", type=FILE_PATH, required=True, metavar="FILE", help="Write to FILE."
 )
-TABLES = (".txt", ".json")
+TABLE_ENDINGS = (".txt", ".json")
 at_option = click.option(
     "--at",
     "at",
@@ -81,7 +81,7 @@ def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:
     return click.option(
         "-o",
         "--out",
-        type=FILE,
+        type=FILE_PATH,
         required=required,
         callback=require_ending,
         metavar="FILE",
@@ -117,20 +117,20 @@ def open_scene(path: Path) -> Iterator[Scene]:
     looked at before anything is solved, which may take minutes. Mistakes that show only
     then name the file too.
     """
-    from fourbar.files import loads, read_text
+    from fourbar.files import loads, read_scene_text
     from fourbar.scene.motion import require_steps
     from fourbar.show.units import units_of_text
     from fourbar.writing import require_file
 
     context = click.get_current_context()
-    text = read_text(path)
+    text = read_scene_text(path)
     context.meta[_SCENE_TEXT] = text
     with state_messages_in(units_of_text(text)):
         scene = loads(text, str(path))
         out = context.params.get("out")
         if out is not None:
             require_file(out, path)
-        require_steps(scene.motion, MOST_POSITIONS, "here", str(path))
+        require_steps(scene.motion, MOST_PRINTED, "here", str(path))
         try:
             yield scene
         except InputError as error:
@@ -145,10 +145,12 @@ def show_waiting(scene: Scene) -> Iterator[None]:
     if scene.motion.free is None:
         yield
         return
-    from fourbar.evaluation.free_motion import STEPS
+    from fourbar.evaluation.free_motion import MOST_INTEGRATION_STEPS
     from fourbar.show.tables import show_running
 
-    with show_running(f"the free motion is integrated, in {STEPS} steps at most"):
+    with show_running(
+        f"the free motion is integrated, in {MOST_INTEGRATION_STEPS} steps at most"
+    ):
         yield
 
 
@@ -161,7 +163,7 @@ def read_lengths(texts: tuple[str, ...]) -> list[float]:
     ]
 
 
-def suit_units() -> Conversion:
+def suit_file_units() -> Conversion:
     """Return the units that suit the file of `open_scene`."""
     from fourbar.show.units import units_of_text
 
@@ -177,7 +179,7 @@ def is_bare(text: str) -> bool:
     return True
 
 
-def read_number(key: str, text: str, unit: str, bound: str = ANY) -> float:
+def read_number(key: str, text: str, unit: str, bound: str = ANY_NUMBER) -> float:
     """Read a number of the command line: bare in SI, or with a unit."""
     return require(key, float(text) if is_bare(text) else text, unit, bound)
 
@@ -187,15 +189,15 @@ def read_position(scene: Scene, text: str) -> tuple[str, float]:
 
     Without a name the number is what the scene commands.
     """
-    from fourbar.studies.passing import PLACES
+    from fourbar.studies.passing import STATED_POSITIONS
 
     name, equals, value = text.rpartition("=")
     if equals:
         name = name.strip()
     else:
         name = scene.motion.commanded
-    if name not in PLACES:
-        allowed = f"must be one of {', '.join(PLACES)}"
+    if name not in STATED_POSITIONS:
+        allowed = f"must be one of {', '.join(STATED_POSITIONS)}"
         raise InputError("--at", name, f'{allowed}, like "theta_4=30 deg"')
     if value.strip() == "drawn":
         return name, _read_drawn(scene, name, text)

@@ -16,15 +16,15 @@ from tomlkit.items import AoT, InlineTable, Item, Table, Whitespace
 from fourbar.effects import Load, list_kinds
 from fourbar.effects.load import FRAMES
 from fourbar.errors import InputError
-from fourbar.files.scene_text import BRANCHES
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, REQUIRED, Bar
-from fourbar.scene.motion import COMMANDS, SIDES, SPLINES, STROKE_COMMAND, Motion
+from fourbar.files.scene_text import BRANCH_OF_NAME
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, REQUIRED_NUMBER, Bar
+from fourbar.scene.motion import COMMAND_NAMES, SIDES, SPLINES, STROKE_COMMAND, Motion
 from fourbar.scene.numbers import Point
 
-Path = Sequence[str | int]
-WORDS = {
+KeyPath = Sequence[str | int]
+WORDS_OF_ENTRIES = {
     **{
-        "branch": [*BRANCHES],
+        "branch": [*BRANCH_OF_NAME],
         "side": [*SIDES],
         "ends": [*SPLINES],
     },
@@ -86,7 +86,7 @@ def list_offers() -> dict[str, Any]:
     bars = {number: f"{number} {name}" for number, name in BAR_NAMES.items()}
     return offers | {
         "commands": _offer_commands(),
-        "words": WORDS,
+        "words": WORDS_OF_ENTRIES,
         "pairs": pairs,
         "bars": bars,
     }
@@ -104,7 +104,7 @@ def _offer_bars(offers: dict[str, Any]) -> None:
                 else:
                     value = [*_SECTION]
                 offers["parts"].append({"at": ["bars", bar, name], "value": value})
-            elif number.left_out is not REQUIRED:
+            elif number.left_out is not REQUIRED_NUMBER:
                 fields.setdefault(bar, {})[name] = EXAMPLES[number.unit]
 
 
@@ -115,7 +115,7 @@ def _offer_commands() -> dict[str, Any]:
             f"angle \u03b8{chr(0x2080 + bar)} of the {BAR_NAMES[bar]}",
             {"branch": "open"},
         )
-        for bar, names in COMMANDS.items()
+        for bar, names in COMMAND_NAMES.items()
     }
     commands = angles | {
         STROKE_COMMAND: ("stroke of the cylinder", {"side": "left", "branch": "open"})
@@ -148,7 +148,7 @@ class SceneDocument:
         """Write the file."""
         return tomlkit.dumps(self.tree)
 
-    def at(self, path: Path) -> Any:
+    def at(self, path: KeyPath) -> Any:
         """Return the entry at a path of keys and indices; None where there is none."""
         entry: Any = self.tree
         for step in path:
@@ -158,7 +158,7 @@ class SceneDocument:
                 return None
         return entry
 
-    def set(self, path: Path, text: str) -> None:
+    def set(self, path: KeyPath, text: str) -> None:
         """State one entry as it is typed; an empty text removes it.
 
         The value is a text, or a number where the file has one.
@@ -182,17 +182,17 @@ class SceneDocument:
                 (
                     text
                     if isinstance(example, str) or example is None
-                    else _read_number(text)
+                    else _read_plain_number(text)
                 ),
             )
 
-    def put(self, path: Path, value: Any) -> None:
+    def put(self, path: KeyPath, value: Any) -> None:
         """State an entry and the tables that contain it; an index of -1 appends."""
         *into, last = path
         holder = self._find_holder(into)
         if isinstance(last, int) and last < 0:
             holder.append(
-                _make_table(value, tomlkit.nl())
+                _make_toml_table(value, tomlkit.nl())
                 if isinstance(holder, AoT)
                 else _write_inline(value)
             )
@@ -211,16 +211,16 @@ class SceneDocument:
                 value, dict
             )  # at the top of the file; anywhere else in one line
             if own_table:
-                new = _make_table(value)
+                new = _make_toml_table(value)
             else:
                 new = _write_inline(value)
-            holder[last] = new if old is None else _make_like(old, value)
+            holder[last] = new if old is None else _make_item_like(old, value)
         else:
             raise InputError(
                 name_entry(path), value, "has no table that it could stand in"
             )
 
-    def remove(self, path: Path) -> None:
+    def remove(self, path: KeyPath) -> None:
         """Take an entry away, and a table that it leaves empty."""
         *into, last = path
         holder = self.at(into)
@@ -230,7 +230,7 @@ class SceneDocument:
         if into and not len(holder) and into[0] not in ("lengths", "motion"):
             self.remove(into)
 
-    def _find_holder(self, path: Path) -> Any:
+    def _find_holder(self, path: KeyPath) -> Any:
         holder = self.at(path)
         if holder is not None:
             return holder
@@ -252,7 +252,7 @@ def name_entry(path: Iterable[str | int]) -> str:
     return ".".join(map(str, path))
 
 
-def _find_table(table: Any, path: Path) -> Any:
+def _find_table(table: Any, path: KeyPath) -> Any:
     for step in path:
         if isinstance(table, dict):
             table = table.get(step)
@@ -261,7 +261,7 @@ def _find_table(table: Any, path: Path) -> Any:
     return table
 
 
-def _read_number(text: str) -> int | float | str:
+def _read_plain_number(text: str) -> int | float | str:
     """Return a number without a unit.
 
     A text that is no number stays a text, which the reader of the file refuses.
@@ -274,7 +274,7 @@ def _read_number(text: str) -> int | float | str:
     return text
 
 
-def _make_like(old: Any, value: Any) -> Any:
+def _make_item_like(old: Any, value: Any) -> Any:
     """Return the value as an item, with the comment and blanks of the old item."""
     made = tomlkit.item(_write_inline(value))
     if isinstance(old, Item):
@@ -286,7 +286,7 @@ def _make_like(old: Any, value: Any) -> Any:
     return made
 
 
-def _make_table(entries: dict[str, Any], *after: Whitespace) -> Table:
+def _make_toml_table(entries: dict[str, Any], *after: Whitespace) -> Table:
     made = tomlkit.table()
     for key, value in entries.items():
         made[key] = _write_inline(value)

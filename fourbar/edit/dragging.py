@@ -11,17 +11,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.edit.document import Path, SceneDocument
+from fourbar.edit.document import KeyPath, SceneDocument
 from fourbar.effects import ForceDrive, Place, Springs
 from fourbar.errors import InputError
-from fourbar.files.drawing import DRAWN
+from fourbar.files.drawing import DRAWN_WORD
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
 from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Command, Scene
 from fourbar.scene.drawing import DrawnPins
 from fourbar.solving import solve
 
-PINS = ("A", "B", "O4")
+DRAGGED_PINS = ("A", "B", "O4")
 _SAME_ANGLE = 1e-9
 """rad. Difference below which the position shown is the one that is drawn."""
 _LEAST_DIGITS = 1e-12
@@ -33,7 +33,7 @@ class _Handle(NamedTuple):
 
     name: str
     """Name of the handle for a reader."""
-    path: Path
+    path: KeyPath
     """Path of the handle's pair (distance, angle) in the file."""
     bar: int
     at: complex
@@ -43,7 +43,7 @@ class _Handle(NamedTuple):
     """The pair itself, m."""
     turns: bool = True
     """True if the pair's angle turns with the bar."""
-    force: Path | None = None
+    force: KeyPath | None = None
     """Path of the force whose arrow stands here."""
     force_turns: bool = False
     """True if the force's direction turns with the bar."""
@@ -108,7 +108,7 @@ def _hold_drive(drive: ForceDrive, scene: Scene) -> list[_Handle]:
     return [_hold_place("point of drive", ("drive",), place, scene)]
 
 
-def _hold_ends(name: str, path: Path, line: Any, scene: Scene) -> list[_Handle]:
+def _hold_ends(name: str, path: KeyPath, line: Any, scene: Scene) -> list[_Handle]:
     """List the handles of both ends of a line between two bars."""
     return [
         _hold_place(f"{end} of {name}", (*path, end), place, scene)
@@ -116,7 +116,7 @@ def _hold_ends(name: str, path: Path, line: Any, scene: Scene) -> list[_Handle]:
     ]
 
 
-def _hold_place(name: str, path: Path, place: Place | None, scene: Scene) -> _Handle:
+def _hold_place(name: str, path: KeyPath, place: Place | None, scene: Scene) -> _Handle:
     """Make the handle of a place by the form in which it is stated.
 
     The handle of a named point is that of the point.
@@ -208,7 +208,7 @@ def drag(
             )
             document.put(
                 (*handle.force, 1),
-                _write_angle(document.at((*handle.force, 1)), angle, 0.02),
+                _write_dragged_angle(document.at((*handle.force, 1)), angle, 0.02),
             )
             return
     raise InputError(
@@ -221,8 +221,10 @@ def drag(
 def _drag_pin(
     document: SceneDocument, dragged: Dragged, pins: dict[str, complex]
 ) -> None:
-    if dragged.what not in PINS:
-        raise InputError("drag", dragged.what, "must be one of " + ", ".join(PINS))
+    if dragged.what not in DRAGGED_PINS:
+        raise InputError(
+            "drag", dragged.what, "must be one of " + ", ".join(DRAGGED_PINS)
+        )
     lengths = {
         "A": {"input": "O2"},
         "B": {"coupler": "A", "output": "O4"},
@@ -241,7 +243,7 @@ def _drag_pin(
         key = ("lengths", "ground_angle")
         document.put(
             key,
-            _write_angle(
+            _write_dragged_angle(
                 document.at(key),
                 angle,
                 dragged.grain / max(abs(dragged.to), dragged.grain),
@@ -256,8 +258,10 @@ def _drag_drawn_pin(
 
     Raises InputError at another position than the one that is drawn.
     """
-    if dragged.what not in PINS:
-        raise InputError("drag", dragged.what, "must be one of " + ", ".join(PINS))
+    if dragged.what not in DRAGGED_PINS:
+        raise InputError(
+            "drag", dragged.what, "must be one of " + ", ".join(DRAGGED_PINS)
+        )
     drawn = drawing.angle(2)
     if abs(math.remainder(dragged.theta_2 - drawn, 2.0 * math.pi)) > _SAME_ANGLE:
         raise InputError(
@@ -277,9 +281,9 @@ def parse_place(stated: Any, drawing: DrawnPins | None = None, bar: int = 1) -> 
 
     The entry is polar, by x and y, or as drawn.
     """
-    if isinstance(stated, dict) and DRAWN in stated:
+    if isinstance(stated, dict) and DRAWN_WORD in stated:
         assert drawing is not None  # the scene was read
-        x, y = (to_si(text, "m") for text in stated[DRAWN])
+        x, y = (to_si(text, "m") for text in stated[DRAWN_WORD])
         return drawing.into_bar(bar, (x, y))
     if isinstance(stated, dict):
         return complex(to_si(stated["x"], "m"), to_si(stated["y"], "m"))
@@ -287,7 +291,7 @@ def parse_place(stated: Any, drawing: DrawnPins | None = None, bar: int = 1) -> 
 
 
 def put_place(
-    document: SceneDocument, path: Path, place: complex, grain: float, by: str = ""
+    document: SceneDocument, path: KeyPath, place: complex, grain: float, by: str = ""
 ) -> None:
     """State a place as the file does, in its units.
 
@@ -299,10 +303,10 @@ def put_place(
         before = "xy"
     else:
         before = "polar"
-    if isinstance(old, dict) and DRAWN in old:  # a place of its bar from now on
+    if isinstance(old, dict) and DRAWN_WORD in old:  # a place of its bar from now on
         by = by or "xy"
-        before = DRAWN
-    first = {"xy": "x", DRAWN: DRAWN}.get(before, 0)
+        before = DRAWN_WORD
+    first = {"xy": "x", DRAWN_WORD: DRAWN_WORD}.get(before, 0)
     length = document.at((*path, first))
     if isinstance(length, list):
         length = length[0]
@@ -319,7 +323,9 @@ def put_place(
     else:
         size = abs(place)
         old_angle = document.at((*path, 1)) if before == "polar" else None
-        angle = _write_angle(old_angle, cmath.phase(place), grain / max(size, grain))
+        angle = _write_dragged_angle(
+            old_angle, cmath.phase(place), grain / max(size, grain)
+        )
         parts = {0: _write_like(length, size, grain, "m", "m"), 1: angle}
         stated = list(parts.values())
     if old is None or (by or before) != before:
@@ -329,7 +335,7 @@ def put_place(
             document.put((*path, step), text)
 
 
-def _write_angle(old: object, angle: float, grain: float) -> str:
+def _write_dragged_angle(old: object, angle: float, grain: float) -> str:
     return _write_like(old, angle, grain, "rad", "deg")
 
 

@@ -38,9 +38,9 @@ _ENDINGS = {
     "page": "html",
 }
 """Ending of the file by the name of the format."""
-CHECKOUT = Path(__file__).parents[2]
-HARNESS = "fourbar_validation"
-SHOWN = 30
+CHECKOUT_FOLDER = Path(__file__).parents[2]
+HARNESS_PACKAGE = "fourbar_validation"
+LAST_LINES = 30
 """Lines of what the harness prints."""
 TICK = 0.5
 """s, between two reports of progress."""
@@ -118,7 +118,7 @@ class Exports:
     def write(self, scene: Scene, name: str, units: Conversion) -> Path:
         """Write one export and return its path; InputError for an unknown format."""
         from fourbar.mjcf import write_mjcf_for
-        from fourbar.show.animate import write
+        from fourbar.show.animate import write_animation
         from fourbar.show.plot import draw
 
         if name not in _ENDINGS:
@@ -130,7 +130,7 @@ class Exports:
         elif name == "mjcf":  # which has units of its own
             write_text(path, write_mjcf_for(scene))
         elif name == "page":
-            write(scene, path, units=units)
+            write_animation(scene, path, units=units)
         else:
             draw(scene, path, units=units)
         return path
@@ -152,9 +152,9 @@ def find_harness() -> list[str]:
     Raises DependencyError if there is none.
     """
     engines = all(importlib.util.find_spec(name) for name in ("mujoco", "pinocchio"))
-    if engines and importlib.util.find_spec(HARNESS):
-        return [sys.executable, "-m", HARNESS]
-    if engines and (CHECKOUT / "validation" / "__main__.py").is_file():
+    if engines and importlib.util.find_spec(HARNESS_PACKAGE):
+        return [sys.executable, "-m", HARNESS_PACKAGE]
+    if engines and (CHECKOUT_FOLDER / "validation" / "__main__.py").is_file():
         return [sys.executable, "-m", "validation"]
     raise DependencyError(
         "the harness with MuJoCo and Pinocchio is not installed:"
@@ -198,7 +198,7 @@ class HarnessRun:
                 {
                     "check": {
                         "seconds": time.monotonic() - began,
-                        "lines": lines[:SHOWN],
+                        "lines": lines[:LAST_LINES],
                         **more,
                     }
                 }
@@ -220,7 +220,7 @@ class HarnessRun:
                 ),
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
-                cwd=CHECKOUT if command[-1] == "validation" else None,
+                cwd=CHECKOUT_FOLDER if command[-1] == "validation" else None,
                 start_new_session=True,  # so that it ends with all that it starts
             )
             assert self.process.stdout is not None

@@ -16,9 +16,9 @@ from pathlib import Path
 
 from fourbar.errors import InputError
 
-ENDING = ".edit.html"
+REDIRECT_ENDING = ".edit.html"
 _ADDRESS = re.compile(r"url=(http://127\.0\.0\.1:\d+/[A-Za-z0-9_-]+/)\"")
-PAGE = """<!DOCTYPE html>
+REDIRECT_PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="referrer" content="no-referrer">
 <meta http-equiv="refresh" content="0; url={address}">
 <title>The workbench</title></head>
@@ -34,7 +34,7 @@ class Redirect:
     """The page of one scene file; whoever holds its lock serves the file."""
 
     def __init__(self, scene: Path) -> None:
-        self.scene, self.path = scene, scene.with_name(scene.name + ENDING)
+        self.scene, self.path = scene, scene.with_name(scene.name + REDIRECT_ENDING)
         self.handle: int | None = None
 
     def claim(self) -> bool:
@@ -54,7 +54,7 @@ class Redirect:
                     )
                     raise InputError("scene file", str(self.scene), reason) from None
                 handle, name = tempfile.mkstemp(
-                    suffix=ENDING
+                    suffix=REDIRECT_ENDING
                 )  # nothing can be written next to the scene, no state either
                 self.path = Path(name)
             if not _lock(handle):
@@ -73,7 +73,7 @@ class Redirect:
     def write(self, address: str) -> None:
         """Lead to an address."""
         assert self.handle is not None
-        os.write(self.handle, PAGE.format(address=address).encode())
+        os.write(self.handle, REDIRECT_PAGE.format(address=address).encode())
 
     def read(self) -> str:
         """Return the address that another server has written.

@@ -46,13 +46,13 @@ GONE = 90.0
 """Time from the last page's leaving to the server's end, s. A page in the background
 looks for the server once a minute.
 """
-SETTLED = 0.15
+ERROR_BAR_DELAY = 0.15
 """s without a change, after which error bars follow."""
-STILL = 1.0
+SPREAD_DELAY = 1.0
 """Time without a change after which the spreads of tolerances are sampled, s. Sampling
 takes seconds.
 """
-KEPT = 0.3
+SAVING_DELAY = 0.3
 """s, after which a change is written to the state file."""
 
 
@@ -151,8 +151,10 @@ class Workbench:
                 about,
                 to=line if alone or "refused" in about or "ask" in about else None,
             )
-        self.later("settle", SETTLED, lambda: asyncio.create_task(self._settle()))
-        self.later("keep", KEPT, lambda: self.one.submit(self._keep))
+        self.later(
+            "settle", ERROR_BAR_DELAY, lambda: asyncio.create_task(self._settle())
+        )
+        self.later("keep", SAVING_DELAY, lambda: self.one.submit(self._keep))
 
     def _compare(self) -> dict[str, Any]:
         try:
@@ -207,7 +209,7 @@ class Workbench:
             self.tell(about)
             self.later(
                 "sample",
-                STILL,
+                SPREAD_DELAY,
                 lambda: asyncio.create_task(self._sample(state, about["data"])),
             )
 

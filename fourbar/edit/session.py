@@ -18,23 +18,23 @@ from fourbar.edit.document import SceneDocument, list_offers, name_entry
 from fourbar.edit.dragging import Dragged, drag, parse_place, put_place, write_rounded
 from fourbar.edit.exports import Exports, evaluate_scene
 from fourbar.errors import FourBarError, InputError, state_messages_in
-from fourbar.files import loads, read_text
-from fourbar.files.drawing import DRAWN
+from fourbar.files import loads, read_scene_text
+from fourbar.files.drawing import DRAWN_WORD
 from fourbar.files.fields import Reader
-from fourbar.files.scene_file import LARGEST_FILE
-from fourbar.files.scene_text import BRANCHES, write_drawn_scene, write_new_scene
+from fourbar.files.scene_file import LARGEST_SCENE_FILE
+from fourbar.files.scene_text import BRANCH_OF_NAME, write_drawn_scene, write_new_scene
 from fourbar.linkage import PINS, POSITIVE
 from fourbar.quantities.units import UnitError, find_unit, to_si
 from fourbar.scene import Scene
-from fourbar.scene.motion import COMMANDS, SIDES, STROKE_COMMAND, require_steps
+from fourbar.scene.motion import COMMAND_NAMES, SIDES, STROKE_COMMAND, require_steps
 from fourbar.show.units import find_length, units, units_of_scene, units_of_text
 from fourbar.solution import Conversion, Solution, find_unit_in
 from fourbar.solving import solve
 from fourbar.studies.keys import list_entries, read_place
 from fourbar.writing import read_bytes, write_bytes
 
-SCHEMA = "fourbar-edit/2"
-ENDING = ".edit"
+EDIT_SCHEMA = "fourbar-edit/2"
+STATE_ENDING = ".edit"
 _MOST_STATES = 500
 """Number of states that undo and redo reach."""
 MOST_CHARACTERS = 10_000_000
@@ -43,7 +43,7 @@ MOST_CHARACTERS = 10_000_000
 """
 MOST_KEPT = 20
 """Number of states that are kept to compare with, the one at the start among them."""
-MOST_POSITIONS = 100_000
+MOST_SOLVED_ANEW = 100_000
 """Largest number of positions that are solved anew on a change, in a second. A mistyped
 step count must not fill the memory.
 """
@@ -53,7 +53,7 @@ NEW = ("300 mm", "100 mm", "250 mm", "220 mm")
 """Ground, input, coupler and output of a new scene."""
 _AS_THE_FILE = "as the file"
 """Units of results that follow those of lengths.ground."""
-UNITS = (
+OFFERED_UNITS = (
     _AS_THE_FILE,
     "SI",
     "imperial",
@@ -84,12 +84,12 @@ class Session:
             Path(os.path.realpath(path)),
             Exports(exports, path.stem),
         )
-        self.state_file = self.path.with_name(self.path.name + ENDING)
+        self.state_file = self.path.with_name(self.path.name + STATE_ENDING)
         self.token = secrets.token_urlsafe(32)  # of this process alone
         self.unit_names = _AS_THE_FILE
         self.pressure_text = ""
         if self.path.exists():
-            text = read_text(self.path)
+            text = read_scene_text(self.path)
         else:
             text = write_new_scene(NEW)
         self.disk = self._read_disk()
@@ -110,7 +110,7 @@ class Session:
         data = read_bytes(self.state_file, "state file", LARGEST_STATE)
         try:
             state = json.loads(data)
-            if state["schema"] != SCHEMA:
+            if state["schema"] != EDIT_SCHEMA:
                 raise ValueError(f"schema {str(state['schema'])[:60]!r}")
             self.texts, self.place = (
                 [str(text) for text in state["texts"]],
@@ -122,8 +122,8 @@ class Session:
                 str(state["units"]),
                 state["disk"],
             )
-            _require_units(self.unit_names)
-            self.pressure_text = _read_pressure(state.get("pressure", ""))
+            _require_readable_units(self.unit_names)
+            self.pressure_text = _read_typed_pressure(state.get("pressure", ""))
             if self.place < 0 or self.reference not in self.kept:
                 raise ValueError("it names a state that it does not hold")
             self.now = self.read(self.texts[self.place])
@@ -146,7 +146,7 @@ class Session:
         """Write the state file, readable by its owner alone as the scene may be."""
         state = {
             **{
-                "schema": SCHEMA,
+                "schema": EDIT_SCHEMA,
                 "disk": self.disk,
                 "texts": self.texts,
                 "place": self.place,
@@ -178,7 +178,7 @@ class Session:
     def units(self) -> Conversion:
         """Units of results: as chosen, or those of the file."""
         if self.unit_names != _AS_THE_FILE:
-            return _read_units(self.unit_names)
+            return _cached_units(self.unit_names)
         return units_of_scene(self.now.plain)
 
     @property
@@ -203,18 +203,20 @@ class Session:
 
     def _read_disk(self) -> str | None:
         if self.path.exists():
-            return _hash_text(read_bytes(self.path, "scene file", LARGEST_FILE))
+            return _hash_text(read_bytes(self.path, "scene file", LARGEST_SCENE_FILE))
         return None
 
     def read(self, text: str) -> SceneState:
         """Read the text of a scene; InputError where the workbench takes none such."""
-        if len(text.encode()) > LARGEST_FILE:
+        if len(text.encode()) > LARGEST_SCENE_FILE:
             raise InputError(
-                "scene file", len(text), f"must not exceed {LARGEST_FILE} bytes"
+                "scene file", len(text), f"must not exceed {LARGEST_SCENE_FILE} bytes"
             )
         with state_messages_in(units_of_text(text)):
             scene = loads(text, str(self.path))
-        require_steps(scene.motion, MOST_POSITIONS, "in the workbench", str(self.path))
+        require_steps(
+            scene.motion, MOST_SOLVED_ANEW, "in the workbench", str(self.path)
+        )
         return SceneState(text, scene, tomllib.loads(text))
 
     # ---- what a page asks for ----
@@ -311,13 +313,13 @@ class Session:
             self.document = SceneDocument(now.text)
 
 
-_read_units = cache(units)
+_cached_units = cache(units)
 
 
-def _require_units(name: str) -> None:
+def _require_readable_units(name: str) -> None:
     """Raise InputError for units that cannot be read."""
     if name != _AS_THE_FILE:
-        _read_units(name)
+        _cached_units(name)
 
 
 def _hash_text(data: bytes) -> str:
@@ -358,7 +360,7 @@ def _suit_entry(value: Any, plain: dict[str, Any]) -> Any:
     return value
 
 
-def _add(session: Session, asked: dict[str, Any]) -> None:
+def _add_element(session: Session, asked: dict[str, Any]) -> None:
     part = list_offers()["parts"][int(asked["part"])]
     name = str(asked.get("name", ""))
     path = [name if step == "" else step for step in part["at"]]
@@ -374,7 +376,7 @@ def _add(session: Session, asked: dict[str, Any]) -> None:
     session.change(lambda document: document.put(path, value))
 
 
-def _drag(session: Session, asked: dict[str, Any]) -> None:
+def _drag_point(session: Session, asked: dict[str, Any]) -> None:
     numbers = {
         name: float(asked[name])
         for name in ("grain", "theta_2", "stretch")
@@ -394,14 +396,14 @@ def _drag(session: Session, asked: dict[str, Any]) -> None:
     )
 
 
-def _write_text(session: Session, asked: dict[str, Any]) -> None:
+def _replace_text(session: Session, asked: dict[str, Any]) -> None:
     text = session.read(
         str(asked["text"])
     ).text  # refused in the words of the file's reader
     session.change(lambda document: document.become(text))
 
 
-def _move(session: Session, by: int) -> None:
+def _move_in_history(session: Session, by: int) -> None:
     place = session.place + by
     if not 0 <= place < len(session.texts):
         raise InputError("history", place, "no further state to undo or redo")
@@ -411,7 +413,7 @@ def _move(session: Session, by: int) -> None:
     session.document = SceneDocument(session.now.text)
 
 
-def _keep(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
+def _keep_state(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     numbers = (int(kept.split()[1]) for kept in session.kept if kept != "start")
     name = f"state {max(numbers, default=0) + 1}"
     session.kept[name] = session.now.text
@@ -429,13 +431,13 @@ def _refer(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     return {"refer": True}
 
 
-def _choose_units(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    _require_units(name := str(asked["units"]))
+def _change_units(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
+    _require_readable_units(name := str(asked["units"]))
     session.unit_names = name
     return {"refer": True}
 
 
-def _read_pressure(text: str) -> str:
+def _read_typed_pressure(text: str) -> str:
     """Return a pressure as it was typed; InputError where it is none."""
     if text.strip():
         Reader("workbench").quantity("pressure", text, "Pa", POSITIVE)
@@ -443,17 +445,17 @@ def _read_pressure(text: str) -> str:
 
 
 def _state_pressure(session: Session, asked: dict[str, Any]) -> None:
-    session.pressure_text = _read_pressure(str(asked["pressure"]))
+    session.pressure_text = _read_typed_pressure(str(asked["pressure"]))
 
 
-def _command(session: Session, asked: dict[str, Any]) -> None:
+def _command_other(session: Session, asked: dict[str, Any]) -> None:
     """Command another bar, or the cylinder.
 
     The range is what the present motion covers of it without turning back.
     """
     place = str(asked["command"])
     names = {
-        **{names[0]: names for names in COMMANDS.values()},
+        **{names[0]: names for names in COMMAND_NAMES.values()},
         STROKE_COMMAND[0]: STROKE_COMMAND,
     }
     if place not in names:
@@ -507,9 +509,9 @@ def _command(session: Session, asked: dict[str, Any]) -> None:
             ["motion", names[place][1]],
             write_rounded(rate, abs(rate) / 100.0, rate_unit),
         )
-    pose, distances = _read_pose(before, middle), dict[str, float]()
+    pose, distances = _read_bar_directions(before, middle), dict[str, float]()
     # a drawing states the assembly by its pins, and refuses a branch beside them
-    branches = [""] if document.at(["pins"]) is not None else list(BRANCHES)
+    branches = [""] if document.at(["pins"]) is not None else list(BRANCH_OF_NAME)
     sides = SIDES if place == "stroke" else [""]
     for branch, side in product(branches, sides):
         if branch:
@@ -517,13 +519,13 @@ def _command(session: Session, asked: dict[str, Any]) -> None:
         if side:
             document.put(["motion", "side"], side)
         after = solve(session.read(document.text()).scene, "position")
-        distance = np.abs(_read_pose(after, len(after) // 2) - pose).sum()
+        distance = np.abs(_read_bar_directions(after, len(after) // 2) - pose).sum()
         distances[document.text()] = float(np.nan_to_num(distance, nan=np.inf))
     text = min(distances, key=distances.__getitem__)
     session.change(lambda changed: changed.become(text))
 
 
-def _read_pose(solution: Solution, index: int) -> Any:
+def _read_bar_directions(solution: Solution, index: int) -> Any:
     """Return the directions of the three moving bars at one position."""
     return np.exp(
         1j
@@ -564,7 +566,7 @@ def _restate(session: Session, asked: dict[str, Any]) -> None:
     stated = session.document.at(path)
     if by not in ("xy", "polar") or stated is None:
         raise InputError(name_entry(path), by, 'must be stated by "xy" or "polar"')
-    if isinstance(stated, dict) and DRAWN in stated:
+    if isinstance(stated, dict) and DRAWN_WORD in stated:
         raise InputError(name_entry(path), by, "is stated in the drawing")
     place = parse_place(stated)
     session.change(
@@ -572,7 +574,7 @@ def _restate(session: Session, asked: dict[str, Any]) -> None:
     )
 
 
-def _draw(session: Session, asked: dict[str, Any]) -> None:
+def _draw_pins(session: Session, asked: dict[str, Any]) -> None:
     """State four pins in the plane, given in a unit, in place of those of the file."""
     unit = str(asked["unit"])
     grain = float(asked["grain"])
@@ -602,7 +604,7 @@ def _draw(session: Session, asked: dict[str, Any]) -> None:
     session.change(alter)
 
 
-def _save(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
+def _save_file(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     """Write the file; where it is another one than was read, only on demand."""
     if session._read_disk() != session.disk and not asked.get("over"):
         return {
@@ -627,22 +629,22 @@ _ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] 
         lambda of: of.set(asked["path"], str(asked["value"])),
         str(asked.get("gesture", "")),
     ),
-    "add": _add,
+    "add": _add_element,
     "remove": lambda session, asked: session.change(
         lambda document: document.remove(asked["path"])
     ),
-    "drag": _drag,
-    "text": _write_text,
-    "undo": lambda session, asked: _move(session, -1),
-    "redo": lambda session, asked: _move(session, 1),
-    "keep": _keep,
+    "drag": _drag_point,
+    "text": _replace_text,
+    "undo": lambda session, asked: _move_in_history(session, -1),
+    "redo": lambda session, asked: _move_in_history(session, 1),
+    "keep": _keep_state,
     "refer": _refer,
-    "units": _choose_units,
+    "units": _change_units,
     "pressure": _state_pressure,
-    "command": _command,
+    "command": _command_other,
     "restate": _restate,
-    "draw": _draw,
-    "save": _save,
+    "draw": _draw_pins,
+    "save": _save_file,
     "export": _export,
     "bodies": lambda session, asked: {
         "bodies": session.exports.free_bodies(
@@ -655,7 +657,7 @@ _ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] 
             name: _suit_entry(list_offers()[name], session.now.plain)
             for name in ("fields", "commands")
         }
-        | {"units": UNITS},
+        | {"units": OFFERED_UNITS},
         "file": session.path.name,
         "fresh": session.fresh,
         "refer": True,

@@ -11,19 +11,19 @@ from numpy.typing import NDArray
 from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.arithmetic import Number, cross, is_any, polar, select
 from fourbar.formulas.motion import State
-from fourbar.formulas.pin_forces import Bodies, Body, PinForces, Wrenches
+from fourbar.formulas.pin_forces import Body, MovingBodies, PinForces, Wrenches
 from fourbar.linkage import PINS, Declared, FourBar, require
 from fourbar.quantities import Array
 
 Joints = tuple[float, float, float]
 """Angles of pins O2, A, O4, rad."""
-AT_REST = 50.0 * 2.0**-52
+LARGEST_SLIP_AT_REST = 50.0 * 2.0**-52
 """Largest slip that counts as zero, relative to the sum of the input's coefficient and
 of the two that it is the difference of; less is round-off.
 """
 
 
-def list_bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> Bodies:
+def list_bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> MovingBodies:
     """List the inertial properties of bars 2, 3, 4.
 
     The inertia that effects add, such as that of a flywheel, is included.
@@ -50,9 +50,9 @@ class Actions:
         them with.
     """
 
-    def __init__(self, state: State, bodies: Bodies, side: Number = 0) -> None:
+    def __init__(self, state: State, bodies: MovingBodies, side: Number = 0) -> None:
         self.state: State = state
-        self.bodies: Bodies = bodies
+        self.bodies: MovingBodies = bodies
         self.side: Number = side
         self.forces: dict[int, Any] = {}
         """Resultants of the bars on which any acts, complex, N."""
@@ -246,7 +246,9 @@ class Actions:
         """
         i, j = PINS[pin]
         h = self.state.coefficient
-        return abs(self.state.slip(pin)) > AT_REST * (abs(h(2)) + abs(h(i)) + abs(h(j)))
+        return abs(self.state.slip(pin)) > LARGEST_SLIP_AT_REST * (
+            abs(h(2)) + abs(h(i)) + abs(h(j))
+        )
 
     def wrenches(self, inertia: Wrenches) -> Wrenches:
         """Sum everything that acts on each bar.

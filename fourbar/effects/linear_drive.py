@@ -14,7 +14,7 @@ import numpy as np
 from fourbar.effects.effect import Actions
 from fourbar.effects.force_drive import ForceDrive
 from fourbar.effects.place import Place, require_ends
-from fourbar.effects.spring import COINCIDE
+from fourbar.effects.spring import COINCIDENT_POINTS
 from fourbar.errors import InputError, write_in_units
 from fourbar.formulas.arithmetic import Number, is_any
 from fourbar.formulas.motion import State
@@ -106,7 +106,7 @@ class LinearDrive(ForceDrive):
             sum(state.lengths[:4]) + abs(self.start.distance) + abs(self.end.distance)
         )
         none = abs(lever) * stroke <= NO_DIGIT_LEFT * most * away
-        meet = stroke <= COINCIDE * away
+        meet = stroke <= COINCIDENT_POINTS * away
         if not is_any(none | meet):
             return None
         return np.where(meet, NO_DIRECTION, np.where(none, NO_LEVER, OK))
@@ -120,6 +120,8 @@ def _list_bars(linkage: FourBar, point: Place) -> set[int]:
     length = linkage.lengths[point.bar - 1]
     places = zip(ENDS[point.bar], (0.0, length), strict=True)
     pins = [
-        pin for pin, along in places if abs(point.in_bar - along) <= COINCIDE * length
+        pin
+        for pin, along in places
+        if abs(point.in_bar - along) <= COINCIDENT_POINTS * length
     ]
     return {point.bar}.union(*(PINS[pin] for pin in pins))

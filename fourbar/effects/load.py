@@ -23,6 +23,7 @@ from fourbar.formulas.arithmetic import (
     split_sum,
 )
 from fourbar.formulas.longer import shorten
+from fourbar.formulas.mobility import TURN
 from fourbar.formulas.motion import State
 from fourbar.linkage import (
     Declared,
@@ -33,7 +34,6 @@ from fourbar.linkage import (
     require_numbers,
 )
 
-TURN = 2.0 * math.pi
 _BEYOND_TURN = 2.0 * PI_LOW
 """2 pi less TURN, rad: what counts after many turns."""
 FRAMES = ("world", "bar")

@@ -28,22 +28,22 @@ from fourbar.formulas.pin_forces import PinForces
 from fourbar.linkage import AT_LEAST_ZERO, PIN_FORCE, Declared
 from fourbar.quantities import JAMMED, OK, SEVERAL, Array
 
-ONE, NONE, MANY = range(3)
+ONE_SOLUTION, NO_SOLUTION, MANY = range(3)
 """Number of solutions of the friction equations."""
-ROUNDING = 32.0 * 2.0**-52
+ROUNDING_OF_X = 32.0 * 2.0**-52
 """Change of x, relative, that is the rounding of its evaluation."""
-STEPS = 200
+CONTRACTION_STEPS = 200
 """Steps of the contraction, each of which halves the error at a spectral radius of 1/2.
 Newton's steps end it long before.
 """
-SAME = 1e-6
+SAME_SOLUTION = 1e-6
 """Two solutions found by the search are the same if they differ by less, relative."""
-SETTLED = 1e-12
+SETTLED_START = 1e-12
 """Relative change by which a start of the search has settled. The last two steps remove
 what that leaves.
 """
-STARTS = 64
-SEARCHED = 256
+SEARCH_STARTS = 64
+LEAST_SEARCHED = 256
 """Least number of problems among which equal ones are searched once. Many are equal
 where many ranges are cut at one dead point.
 """
@@ -152,7 +152,9 @@ class PinFriction(PinRows):
             for pin, couple in couples.items()
         ]
         status = np.where(
-            sliding.number == ONE, OK, np.where(sliding.number == NONE, JAMMED, SEVERAL)
+            sliding.number == ONE_SOLUTION,
+            OK,
+            np.where(sliding.number == NO_SOLUTION, JAMMED, SEVERAL),
         ).astype(np.uint8)
         return SolvedFriction(
             loaded,
@@ -213,7 +215,7 @@ class _Sliding(NamedTuple):
     x: Array
     """(n, p), N m; the only or the least solution, NaN where there is none."""
     number: NDArray[np.uint8]
-    """(n,), ONE, NONE or MANY."""
+    """(n,), ONE_SOLUTION, NO_SOLUTION or MANY."""
     from_jamming: Array
     """(n,), in (0, 1]: the least stretch of the equations' slope, 0 where they jam."""
 
@@ -226,7 +228,7 @@ def solve_sliding(F: Array, C: Array, k: Array) -> _Sliding:
     n, p = F.shape[:2]
     finite = np.isfinite(F).all(axis=(1, 2)) & np.isfinite(C).all(axis=(1, 2, 3))
     x = np.full((n, p), np.nan)
-    count = np.full(n, ONE, dtype=np.uint8)
+    count = np.full(n, ONE_SOLUTION, dtype=np.uint8)
     if p == 1:
         with np.errstate(invalid="ignore", divide="ignore"):
             x[:, 0], counted = _solve_quadratic(F[:, 0], C[:, 0, 0], k[:, 0])
@@ -238,8 +240,8 @@ def solve_sliding(F: Array, C: Array, k: Array) -> _Sliding:
         sure = np.flatnonzero(finite & (radius < 1.0))
         x[sure] = _iterate(F[sure], C[sure], k[sure], np.zeros((len(sure), p)))
         unsure = np.flatnonzero(finite & ~(radius < 1.0))
-        for start in range(0, len(unsure), SEARCHED):
-            some = unsure[start : start + SEARCHED]
+        for start in range(0, len(unsure), LEAST_SEARCHED):
+            some = unsure[start : start + LEAST_SEARCHED]
             numbers = np.concatenate(
                 [
                     array[some].reshape(len(some), math.prod(array.shape[1:]))
@@ -284,11 +286,11 @@ def _solve_quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.ui
     low = np.fmin(first, second)
     high = np.fmax(first, second)
     x = np.where(a < 0.0, high, low)
-    count = np.full(len(x), ONE, dtype=np.uint8)
-    count[~(a < 0.0) & ((under < 0.0) | (b >= 0.0)) & (c > 0.0)] = NONE
+    count = np.full(len(x), ONE_SOLUTION, dtype=np.uint8)
+    count[~(a < 0.0) & ((under < 0.0) | (b >= 0.0)) & (c > 0.0)] = NO_SOLUTION
     count[(a > 0.0) & (under > 0.0) & (b < 0.0)] = MANY
     x = np.where(c == 0.0, 0.0, x)
-    x[count == NONE] = np.nan
+    x[count == NO_SOLUTION] = np.nan
     return x, count
 
 
@@ -315,7 +317,7 @@ def _compute_step(gap: Array, slope: Array) -> Array:
 def _iterate(F: Array, C: Array, k: Array, x: Array) -> Array:
     """Take Newton's step if it lessens the gap, otherwise that of the contraction."""
     done = np.zeros(len(x), dtype=bool)
-    for _ in range(STEPS):
+    for _ in range(CONTRACTION_STEPS):
         right, slope = _compute_right_side(F, C, k, x)
         newton = np.maximum(x + _compute_step(right - x, slope), 0.0)
         plain_gap = np.abs(_compute_right_side(F, C, k, right)[0] - right).max(axis=1)
@@ -326,7 +328,7 @@ def _iterate(F: Array, C: Array, k: Array, x: Array) -> Array:
         new = np.where(
             done[:, None], x, new
         )  # solved problems keep their digits while others go on
-        done |= np.abs(new - x).max(axis=1, initial=0.0) <= ROUNDING * new.max(
+        done |= np.abs(new - x).max(axis=1, initial=0.0) <= ROUNDING_OF_X * new.max(
             axis=1, initial=0.0
         )
         x = new
@@ -346,7 +348,7 @@ def _search(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.int_]]:
         [
             np.ones(p),
             np.eye(p) + 0.01,
-            np.random.default_rng(0).uniform(0.0, 1.0, (STARTS // p, p)),
+            np.random.default_rng(0).uniform(0.0, 1.0, (SEARCH_STARTS // p, p)),
         ]
     )
     starts = np.vstack(
@@ -371,7 +373,7 @@ def _search(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.int_]]:
         )
         x[moving], before[moving] = new, last
         moving = moving[
-            least_change > SETTLED * new.max(axis=1)
+            least_change > SETTLED_START * new.max(axis=1)
         ]  # the others stand still or alternate
     right, _ = _compute_right_side(F[problem], C[problem], k[problem], x)
     solves = np.abs(right - x).max(axis=1) <= 1e-9 * np.maximum(
@@ -380,10 +382,12 @@ def _search(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.int_]]:
     x = x.reshape(n, -1, p)
     solves = solves.reshape(n, -1)
     least = x[np.arange(n), np.argmin(np.where(solves, x.sum(axis=2), np.inf), axis=1)]
-    apart = np.abs(x - least[:, None]).max(axis=2) > SAME * np.maximum(
+    apart = np.abs(x - least[:, None]).max(axis=2) > SAME_SOLUTION * np.maximum(
         x.max(axis=2), least.max(axis=1)[:, None]
     )
     count = np.where(
-        (solves & apart).any(axis=1), MANY, np.where(solves.any(axis=1), ONE, NONE)
+        (solves & apart).any(axis=1),
+        MANY,
+        np.where(solves.any(axis=1), ONE_SOLUTION, NO_SOLUTION),
     )
-    return np.where(count[:, None] == NONE, np.nan, least), count
+    return np.where(count[:, None] == NO_SOLUTION, np.nan, least), count

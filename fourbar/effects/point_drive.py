@@ -14,7 +14,7 @@ from fourbar.effects.effect import Actions
 from fourbar.effects.force_drive import ForceDrive
 from fourbar.effects.load import require_frame
 from fourbar.effects.place import Place, require_place
-from fourbar.effects.spring import COINCIDE
+from fourbar.effects.spring import COINCIDENT_POINTS
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import Number, is_any, polar
 from fourbar.formulas.motion import State
@@ -71,7 +71,7 @@ class PointDrive(ForceDrive):
         """Raise InputError where the point is a fixed pin."""
         bar = self.place.bar
         distance = abs(self.place.distance)
-        if bar != 3 and distance <= COINCIDE * linkage.bar(bar).length:
+        if bar != 3 and distance <= COINCIDENT_POINTS * linkage.bar(bar).length:
             allowed = "is a fixed pin, at which a force does no work: state another"
             raise InputError("drive", f"the first pin of bar {bar}", allowed)
 

@@ -23,15 +23,15 @@ from fourbar.linkage import (
 )
 from fourbar.quantities import NO_DIRECTION, OK
 
-COINCIDE = 16.0 * 2.0**-52
+COINCIDENT_POINTS = 16.0 * 2.0**-52
 """Part of the paths from O2, bar by bar, below which two points count as one. There is
 no direction between them.
 """
-STROKE = Declared("m", POSITIVE)
+STROKE_FIELD = Declared("m", POSITIVE)
 """By how much a gas spring can be shortened."""
 GAS = {
     "extended": Declared("m", POSITIVE),
-    "stroke": STROKE,
+    "stroke": STROKE_FIELD,
     **dict.fromkeys(
         ("extended_force", "compressed_force"), Declared("N", AT_LEAST_ZERO)
     ),
@@ -79,7 +79,7 @@ class Spring:
         check_numbers(self, "effects.springs")
         if self.stroke is not None:
             key = "effects.springs.stroke"
-            stroke = require(key, self.stroke, *STROKE[:2])
+            stroke = require(key, self.stroke, *STROKE_FIELD[:2])
             if stroke >= self.length:
                 longest = write_in_units("m", self.length)
                 allowed = f"must be less than the length, {longest}"
@@ -208,7 +208,7 @@ class Springs(Effect):
                 + abs(spring.start.distance)
                 + abs(spring.end.distance)
             )
-            coincide = np.abs(across) <= COINCIDE * away
+            coincide = np.abs(across) <= COINCIDENT_POINTS * away
             here = coincide & (spring.slack != 0.0)
             codes = select(here, NO_DIRECTION, OK if codes is None else codes)
         return codes

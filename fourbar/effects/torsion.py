@@ -12,7 +12,7 @@ from fourbar.effects.effect import Actions, Joints, PinRows
 from fourbar.errors import LimitError, expect
 from fourbar.formulas.arithmetic import Number, angle, wrap_angle
 from fourbar.formulas.motion import State
-from fourbar.formulas.path import ROLES
+from fourbar.formulas.path import ROLES_OF_BARS
 from fourbar.formulas.position import reorder_lengths
 from fourbar.linkage import PINS, POSITIVE, Declared, FourBar
 from fourbar.quantities import OK, WOUND, Array
@@ -163,7 +163,7 @@ def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
     turned = (
         math.pi if bar == 4 else 0.0
     )  # turn of the ground, and of the coupler with it
-    u2, u3, u4 = (state.direction(role) for role in ROLES[bar])
+    u2, u3, u4 = (state.direction(role) for role in ROLES_OF_BARS[bar])
     theta_3 = np.angle(u3) + turned
     theta_4 = np.angle(u4)
     theta_1 = theta_1 + turned
@@ -187,7 +187,7 @@ def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
     )
     return {
         1: np.full_like(theta_2, theta_1 - turned),
-        **dict(zip(ROLES[bar], angles, strict=True)),
+        **dict(zip(ROLES_OF_BARS[bar], angles, strict=True)),
     }
 
 

@@ -9,9 +9,9 @@ from fourbar.effects.effect import Actions, SolvedFriction, list_bodies
 from fourbar.formulas.arithmetic import U, angle, is_any, select
 from fourbar.formulas.longer import change_numbers, lengthen
 from fourbar.formulas.motion import Coefficients, State, rates
-from fourbar.formulas.path import NO_DIGIT_LEFT, Path, prepare_path
+from fourbar.formulas.path import NO_DIGIT_LEFT, LoopPath, prepare_path
 from fourbar.formulas.pin_forces import (
-    Bodies,
+    MovingBodies,
     PinForces,
     Wrenches,
     about_first_pin,
@@ -29,17 +29,17 @@ if TYPE_CHECKING:
     from fourbar.effects import Effect, ForceDrive
 
 
-BLOCK = 8000
+POSITIONS_OF_A_BLOCK = 8000
 """Positions evaluated at a time, measured: fewer pay for calls, more leave the cache.
 Of 8192 an array of complex numbers is a little more than the C library hands out again
 without asking the system for fresh pages, and from 10 000 on OpenBLAS starts threads
 for the squares by which `is_finite` looks for what is no number.
 """
-UNDECIDED = 32.0 * U
+NEEDS_DIGITS = 32.0 * U
 """A factor of Heron's formula smaller than this times its terms is evaluated in many
 digits: in doubles it is wrong by at most about 12 U times them.
 """
-A_PERTURBATION = 1e-3
+LARGEST_PERTURBATION = 1e-3
 """Part of the sum of the lengths: a member of a study that misses a change point of the
 nominal linkage by more is a linkage of its own.
 """
@@ -49,7 +49,7 @@ _NO_MOTION = Coefficients(*[np.nan] * 8)
 
 
 def _find_undecided(
-    factor: Any, constant: Any, size: Any, part: float = UNDECIDED
+    factor: Any, constant: Any, size: Any, part: float = NEEDS_DIGITS
 ) -> Any:
     """Mark where doubles cannot decide the sign of a factor of Heron's formula.
 
@@ -100,10 +100,10 @@ class Case(NamedTuple):
 
     linkage: FourBar
     lengths: Loop
-    bodies: Bodies
+    bodies: MovingBodies
     terms: "tuple[Effect, ...]"
     drive_bar: int
-    path: Path
+    path: LoopPath
     points: tuple[tuple[str, int, Any], ...] = ()
     """Points of the scene: name, bar, and place in the bar's frame, complex, m. The
     frame begins at the bar's first pin.
@@ -154,7 +154,7 @@ class Case(NamedTuple):
             Loop(*nominal.linkage.lengths, 0.0, 0.0), 0.0, self.path.bar
         ).passing
         d, a, b, c, E1, E2 = self.path.lengths
-        small = A_PERTURBATION * (d + a + b + c) ** 2
+        small = LARGEST_PERTURBATION * (d + a + b + c) ** 2
         own = self.path.passing
         passing = Passing(
             own.outer | (root.outer & (abs(E1) <= small)),
@@ -419,7 +419,7 @@ class Case(NamedTuple):
         return low, high, np.any(jammed, axis=0) if jammed else None
 
 
-def _restore_unit(linkage: FourBar, path: Path) -> Loop:
+def _restore_unit(linkage: FourBar, path: LoopPath) -> Loop:
     """Return the lengths in m, and what they decide together in m^2."""
     square = path.unit * path.unit
     return Loop(*linkage.lengths, path.lengths.E1 * square, path.lengths.E2 * square)
@@ -512,7 +512,7 @@ class _FreeBodies(NamedTuple):
         return actions.at_pins(pins)
 
 
-def compute_state(scene: Scene, commanded: Command) -> State:
+def compute_shown_state(scene: Scene, commanded: Command) -> State:
     """Compute the positions of a command and their motion, for what shows them."""
     with np.errstate(all="ignore"):
         return Case.of(scene, commanded.bar).at(commanded)[0]

@@ -21,7 +21,7 @@ from fourbar.formulas import longer as longer_numbers
 from fourbar.formulas.arithmetic import U, angle, is_any, select
 from fourbar.formulas.longer import lengthen, shorten
 from fourbar.formulas.motion import State
-from fourbar.formulas.path import NO_DIGIT_LEFT, Path
+from fourbar.formulas.path import NO_DIGIT_LEFT, LoopPath
 from fourbar.formulas.position import HalfAngle
 from fourbar.quantities import (
     ANGLES,
@@ -53,11 +53,11 @@ FORCE = STAGES.index("force")
 ERROR = STAGES.index("error")
 _LONG_EPS = float(np.finfo(np.longdouble).eps)
 """Distance of long doubles beside 1."""
-ROUNDINGS = 16.0
+ROUNDINGS_IN_FULL = 16.0
 """Roundings of a chain of formulas that count in full. Some fifty move a result by
 sqrt(50) = 7, as a random walk; 16 is a little more than twice that.
 """
-STEP = 2.0**-14
+SLOPE_STEP = 2.0**-14
 """Part of s^2 by which an angle is moved for a slope. A force changes by that part, of
 which doubles keep digits.
 """
@@ -134,7 +134,7 @@ def evaluate_released(
 
 
 def _compute_codes(
-    path: Path, sine: Any, half: HalfAngle, command: Command, unit: float = 1.0
+    path: LoopPath, sine: Any, half: HalfAngle, command: Command, unit: float = 1.0
 ) -> Any:
     """Compute the status of each position from the sine of the transmission angle.
 
@@ -333,11 +333,11 @@ def _compute_unresolved(
     Near a limit, or beside a spring's free length, their own rounding shows in a
     double's digits. Where a double is as far off by coincidence, its distance to the
     long double is no bound. What rounding does follows from the slope:
-        dF = (dF/dq) max(|q|, 1) LONG_EPS ROUNDINGS,
+        dF = (dF/dq) max(|q|, 1) LONG_EPS ROUNDINGS_IN_FULL,
     dF/dq by a step that is short against the distance to the limit, which is some s^2
     (s the sine of the command). NaN where no double lies a step away.
     """
-    step = STEP * (state.sine * state.sine)
+    step = SLOPE_STEP * (state.sine * state.sine)
     moved = state.q + step
     step = moved - state.q
     shifted = case.assemble(
@@ -358,7 +358,7 @@ def _compute_unresolved(
     )
     with np.errstate(all="ignore"):
         share = np.divide(
-            ROUNDINGS * _LONG_EPS * np.fmax(np.abs(state.q), 1.0),
+            ROUNDINGS_IN_FULL * _LONG_EPS * np.fmax(np.abs(state.q), 1.0),
             np.where(step >= _LEAST_STEP * np.fmax(np.abs(state.q), 1.0), step, np.nan),
         )
         *pins, drive = (np.abs(after - before) * share for before, after in pairs)
@@ -459,7 +459,7 @@ SCALAR_FORMULAS: dict[str, Callable[[State], Any]] = {
     "alpha_4": lambda state: state.moving.alpha_4,
 }
 """Formulas of the scalars that come before the forces, by name."""
-PLACES = frozenset(
+POINT_VECTORS = frozenset(
     start + name for start in POINT_STAGES for name in ("A", "B", "G2", "G3", "G4")
 )
 """Names of the vectors before the forces, at the pins and mass centres."""
@@ -478,7 +478,7 @@ def list_kinematics(case: Case, state: State, wanted: Set[str]) -> dict[str, Any
         if case.drive.has_stroke:
             of_line["stroke"] = stroke
         values |= {name: value for name, value in of_line.items() if name in wanted}
-    if not case.points and wanted.isdisjoint(PLACES):
+    if not case.points and wanted.isdisjoint(POINT_VECTORS):
         return values
     lengths = case.lengths
     two, three, four = case.bodies

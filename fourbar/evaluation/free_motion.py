@@ -50,12 +50,12 @@ works with a smaller one.
 """
 _CHANGE_OVER = 0.5
 """Part of the other angle's sine below which the angle is changed."""
-STEPS = 200_000
+MOST_INTEGRATION_STEPS = 200_000
 """A motion that needs more steps than this is given up, after a few minutes: some
 hundred turns of the fastest bar take a thousand, so it is thousands of turns long, or
 something makes it infinitely fast.
 """
-VANISHING = 2.0**-300
+VANISHING_SPEED = 2.0**-300
 """Speed at which viscous damping vanishes and dry friction has its direction."""
 
 
@@ -169,7 +169,7 @@ def release_at(scene: Scene, times: Array) -> Released:
     return released
 
 
-def _make_plain(numbers: Any) -> Any:
+def _convert_to_floats(numbers: Any) -> Any:
     """Convert numbers to those of Python.
 
     With these a formula of one position is several times quicker.
@@ -185,7 +185,7 @@ class _Reading:
     def __init__(self, linkage: FourBar, bar: int) -> None:
         path = prepare_path(loop(*linkage.lengths), linkage.ground_angle, bar)
         self.path = path._replace(
-            lengths=_make_plain(path.lengths),
+            lengths=_convert_to_floats(path.lengths),
             u1=complex(path.u1),
             unit=float(path.unit),
         )
@@ -204,7 +204,7 @@ class _Reading:
     def _at(self, q: float) -> tuple[Position, Coefficients]:
         half = self.path.half_angle(q)
         try:
-            return self._by(q, _make_plain(half))
+            return self._by(q, _convert_to_floats(half))
         except ZeroDivisionError:  # NumPy's numbers give inf or NaN instead
             return self._by(q, half)
 
@@ -213,7 +213,7 @@ class _Reading:
         # are then infinite, and another bar is taken
         position, k, _ = self.path.close(q, half, self.branch, margin=-1.0)
         if self.path.may_stay_parallel:
-            return (_make_plain(position), _make_plain(k))
+            return (_convert_to_floats(position), _convert_to_floats(k))
         return (position, k)
 
 
@@ -251,7 +251,7 @@ def integrate(
     Raises
     ------
     InputError : the linkage does not assemble at theta_2, or the motion takes more than
-        STEPS steps.
+        MOST_INTEGRATION_STEPS steps.
     LimitError : friction that depends on the pin forces acts.
     FourBarError : nothing that moves has inertia, or the motion cannot be continued.
     DependencyError : SciPy is not installed.
@@ -262,10 +262,12 @@ def integrate(
             "a free motion cannot carry friction that depends on the pin forces"
         )
     with np.errstate(invalid="ignore", divide="ignore", over="ignore", under="ignore"):
-        return _Run(linkage, terms, theta, omega, branch, bar).integrate(times)
+        return _IntegrationRun(linkage, terms, theta, omega, branch, bar).integrate(
+            times
+        )
 
 
-class _Run:
+class _IntegrationRun:
     """One integration: its angle, and what has been reported so far."""
 
     def __init__(
@@ -280,8 +282,10 @@ class _Run:
         self.linkage = linkage
         self.terms = terms
         self.bar = bar
-        self.lengths = _make_plain(loop(*linkage.lengths))
-        two, three, four = (_make_plain(body) for body in list_bodies(linkage, terms))
+        self.lengths = _convert_to_floats(loop(*linkage.lengths))
+        two, three, four = (
+            _convert_to_floats(body) for body in list_bodies(linkage, terms)
+        )
         self.bodies: tuple[Body, Body, Body] = two, three, four
         self.readings = {each: _Reading(linkage, each) for each in (2, 4)}
         if bar != 3:
@@ -373,7 +377,7 @@ class _Run:
         q = float(self.y[0])
         return [
             self._compute_generalised_force(q, *self._at(), rate)
-            for rate in (VANISHING, -VANISHING)
+            for rate in (VANISHING_SPEED, -VANISHING_SPEED)
         ]
 
     def _compute_rates(self, _: float, y: Array) -> list[float]:
@@ -382,7 +386,7 @@ class _Run:
         position, k = self.reading.evaluate(q)
         # friction keeps its sense beyond a standstill, at which the step is then cut
         if self.side:
-            moving = self.side * max(self.side * rate, VANISHING)
+            moving = self.side * max(self.side * rate, VANISHING_SPEED)
         else:
             moving = rate
         Q = self._compute_generalised_force(q, position, k, moving)
@@ -501,10 +505,10 @@ class _Run:
                     f"the free motion cannot be continued beyond {self.t:.9g} s:"
                     f" {message}"
                 )
-            if self.steps > STEPS:
+            if self.steps > MOST_INTEGRATION_STEPS:
                 allowed = (
-                    f"this motion is followed for {STEPS} steps, here to {self.t:.6g}"
-                    " s; make it shorter"
+                    f"this motion is followed for {MOST_INTEGRATION_STEPS} steps,"
+                    f" here to {self.t:.6g} s; make it shorter"
                 )
                 raise InputError("motion.free.duration", float(self.times[-1]), allowed)
             dense = _interpolate(solver)

@@ -14,20 +14,20 @@ from fourbar.errors import InputError
 from fourbar.files.fields import Reader
 from fourbar.formulas.mobility import count_equalities, meet_change_points
 from fourbar.linkage import BAR_NAMES, ENDS, MOVING_BARS, PINS, Bar, FourBar
-from fourbar.quantities.units import find_rounding
+from fourbar.quantities.units import half_unit_of_text
 from fourbar.scene import Scene, command_at
 from fourbar.scene.drawing import DrawnPins
-from fourbar.scene.motion import BRANCH_NAMES, COMMANDS, STROKE_COMMAND, Motion
+from fourbar.scene.motion import BRANCH_NAMES, COMMAND_NAMES, STROKE_COMMAND, Motion
 from fourbar.solving import solve
 
-DRAWN = "drawn"
+DRAWN_WORD = "drawn"
 """Word that stands for the drawn angle, stroke or side; key of a drawn place."""
 _STANDS_ALONE = "must be left out: `drawn` states the place"
-APART = 0.05
+PINS_APART = 0.05
 """Distance of the pins from the drawing above which no motion has that assembly. It is
 a part of the longest bar.
 """
-ANGLES = {names[0]: bar for bar, names in COMMANDS.items()}
+BAR_OF_ANGLE = {names[0]: bar for bar, names in COMMAND_NAMES.items()}
 """Bars by the names of their angles."""
 _NUMBERS_OF_BARS = {name: bar for bar, name in BAR_NAMES.items()}
 
@@ -104,7 +104,7 @@ def meet_lengths(drawing: DrawnPins, pins: dict[str, Any]) -> tuple[float, ...]:
 
     `pins`: x and y of each pin as they are written.
     """
-    last = {pin: [find_rounding(text, "m") for text in pins[pin]] for pin in PINS}
+    last = {pin: [half_unit_of_text(text, "m") for text in pins[pin]] for pin in PINS}
     moved = {pin: math.hypot(*roundings) for pin, roundings in last.items()}
     lengths = tuple(drawing.length(bar) for bar in ENDS)
     roundings = tuple(moved[first] + moved[second] for first, second in ENDS.values())
@@ -131,13 +131,13 @@ def _state_places(
         return value
     number = value.get("bar")
     own = number if isinstance(number, int) and number in BAR_NAMES else bar
-    if DRAWN in value:
+    if DRAWN_WORD in value:
         place = _state_place(read, key, value, drawing, own)
         if len(value) == 1:
             return place
         if "from_pin" in value:
             raise read.refuse(f"{key}.from_pin", value["from_pin"], _STANDS_ALONE)
-        value = {name: entry for name, entry in value.items() if name != DRAWN}
+        value = {name: entry for name, entry in value.items() if name != DRAWN_WORD}
         value["from_pin"] = place
     stated = {}
     for name, entry in value.items():
@@ -158,10 +158,12 @@ def _state_place(
         allowed = (
             f'must name the bar it is of: {key} = {{ bar = 3, drawn = ["x", "y"] }}'
         )
-        raise read.refuse(f"{key}.{DRAWN}", value[DRAWN], allowed)
+        raise read.refuse(f"{key}.{DRAWN_WORD}", value[DRAWN_WORD], allowed)
     if key.endswith((".from_centre", ".arm")):
         raise read.refuse(key, value, "a place of the drawing is written from_pin")
-    z = drawing.into_bar(bar, read_point(read, f"{key}.{DRAWN}", value[DRAWN]))
+    z = drawing.into_bar(
+        bar, read_point(read, f"{key}.{DRAWN_WORD}", value[DRAWN_WORD])
+    )
     return {"x": f"{z.real!r} m", "y": f"{z.imag!r} m"}
 
 
@@ -176,28 +178,29 @@ def state_motion(
         return motion
     stated = dict(motion)
     if any(name in stated for name in STROKE_COMMAND):
-        stated.setdefault("side", DRAWN)
-    if stated.get("side") == DRAWN and line is not None:
-        stated["side"] = _find_side(drawing, line)
-    for name in (*ANGLES, STROKE_COMMAND[0]):
+        stated.setdefault("side", DRAWN_WORD)
+    if stated.get("side") == DRAWN_WORD and line is not None:
+        stated["side"] = _find_side_of_cylinder(drawing, line)
+    for name in (*BAR_OF_ANGLE, STROKE_COMMAND[0]):
         place = stated.get(name)
         drawn = find_drawn(drawing, line, name)
         if drawn is None:
             continue
-        text = f"{drawn!r} {'rad' if name in ANGLES else 'm'}"
-        if place == DRAWN:
+        text = f"{drawn!r} {'rad' if name in BAR_OF_ANGLE else 'm'}"
+        if place == DRAWN_WORD:
             stated[name] = text
         elif isinstance(place, dict):
             stated[name] = {
-                end: text if entry == DRAWN else entry for end, entry in place.items()
+                end: text if entry == DRAWN_WORD else entry
+                for end, entry in place.items()
             }
     return stated
 
 
 def find_drawn(drawing: DrawnPins, line: ForceDrive | None, name: str) -> float | None:
     """Return the drawn angle or stroke of this name, rad or m, or None."""
-    if name in ANGLES:
-        return drawing.angle(ANGLES[name])
+    if name in BAR_OF_ANGLE:
+        return drawing.angle(BAR_OF_ANGLE[name])
     if name != STROKE_COMMAND[0] or not isinstance(line, LinearDrive):
         return None
     start, end = _draw_ends(drawing, line)
@@ -214,7 +217,7 @@ def _draw_ends(drawing: DrawnPins, line: LinearDrive) -> tuple[complex, complex]
     )
 
 
-def _find_side(drawing: DrawnPins, line: LinearDrive) -> str | None:
+def _find_side_of_cylinder(drawing: DrawnPins, line: LinearDrive) -> str | None:
     """Find the side of a cylinder's end on its bar.
 
     It is None if the cylinder does not join the ground to a bar.
@@ -238,7 +241,7 @@ def choose_assembly(scene: Scene, drawing: DrawnPins) -> Scene:
     for branch in BRANCH_NAMES:
         on_branch = replace(scene, motion=scene.motion.replace(branch=branch))
         stated: dict[str, Any] = {
-            COMMANDS[bar][0]: drawing.angle(bar),
+            COMMAND_NAMES[bar][0]: drawing.angle(bar),
             "branch": branch,
         }
         turned = replace(on_branch, motion=Motion(**stated))
@@ -248,10 +251,10 @@ def choose_assembly(scene: Scene, drawing: DrawnPins) -> Scene:
         gap = float(np.abs(pins - wanted).sum())
         gaps.setdefault(gap if math.isfinite(gap) else math.inf, on_branch)
     nearest = min(gaps)
-    if APART * max(scene.linkage.lengths) < nearest < math.inf:
+    if PINS_APART * max(scene.linkage.lengths) < nearest < math.inf:
         raise InputError(
             f"motion.theta_{bar}",
-            DRAWN,
+            DRAWN_WORD,
             f"in the assembly that is drawn the {BAR_NAMES[bar]} stands still: "
             "command another bar",
         )

@@ -10,11 +10,11 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from fourbar.errors import InputError, name_unit
-from fourbar.linkage import ANY, BAR_NAMES, REQUIRED, Declared, is_within
+from fourbar.linkage import ANY_NUMBER, BAR_NAMES, REQUIRED_NUMBER, Declared, is_within
 from fourbar.quantities.units import UNIT_MISSING, UnitError, to_si
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
-LONGEST_SHOWN = 60
+LONGEST_FIELD = 60
 _FOREIGN = (
     *("crank", "slider", "rod", "piston", "rail", "cam", "gear", "offset"),
     *("link5", "bar5", "dyad", "precision_points"),
@@ -26,7 +26,12 @@ ELSEWHERE = (
     "Exudyn; "
 )
 """Address for people with another mechanism."""
-DIRECTIONS = {"up": "90 deg", "down": "-90 deg", "left": "180 deg", "right": "0 deg"}
+DIRECTION_WORDS = {
+    "up": "90 deg",
+    "down": "-90 deg",
+    "left": "180 deg",
+    "right": "0 deg",
+}
 """Words for directions, as the suggestions of an error know them."""
 _MEANT = {
     **{"weight": "mass", "torque": "moment", "couple": "moment"},
@@ -60,7 +65,7 @@ class Reader:
         """Make the error for an entry, or a missing one (None), with the file."""
         return InputError(
             key,
-            _shorten(value),
+            _shorten_for_error(value),
             f"{'is missing; ' if value is None else ''}{allowed}",
             self.file,
         )
@@ -80,7 +85,7 @@ class Reader:
                 if name in _FOREIGN:
                     hint = ELSEWHERE
                 else:
-                    hint = _suggest(name, names)
+                    hint = _suggest_word(name, names)
                 allowed = f"unknown key; {hint}allowed: {', '.join(names)}"
                 raise self.refuse(_join_key(key, name), entry, allowed)
         return value
@@ -98,7 +103,7 @@ class Reader:
             raise self.refuse(
                 key,
                 value,
-                f"{_suggest(value, words)}must be "
+                f"{_suggest_word(value, words)}must be "
                 + " or ".join(f'"{word}"' for word in words),
             )
         return value
@@ -140,7 +145,7 @@ class Reader:
         key: str,
         value: object,
         unit: str,
-        bound: str = ANY,
+        bound: str = ANY_NUMBER,
         default: float | None = None,
     ) -> float:
         """Read a number in `unit`; with unit "1" it has none.
@@ -173,15 +178,15 @@ class Reader:
             return to_si(value, unit)
         except UnitError as error:
             hint = ""
-            if unit == "rad" and value.casefold() in DIRECTIONS:
-                hint = f'did you mean "{DIRECTIONS[value.casefold()]}"? '
+            if unit == "rad" and value.casefold() in DIRECTION_WORDS:
+                hint = f'did you mean "{DIRECTION_WORDS[value.casefold()]}"? '
             elif str(error) == UNIT_MISSING:
                 hint = f'did you mean "{value.strip()} {likely}"? '
             raise self.refuse(key, value, f"{error}; {hint}{wanted}") from None
 
     def declared(self, key: str, value: object, by: Declared) -> Any:
         """Read a number, or a magnitude with its angle, as it is declared."""
-        if value is None and by.left_out is not REQUIRED:
+        if value is None and by.left_out is not REQUIRED_NUMBER:
             return by.left_out
         if by.pair:
             return self.pair(key, value, by)
@@ -285,12 +290,12 @@ def write_pair(
     return [write_quantity(first, unit), write_quantity(second, of_second)]
 
 
-def _suggest(word: object, names: list[str]) -> str:
+def _suggest_word(word: object, names: list[str]) -> str:
     """Suggest the valid word that is nearest to one that is not, or means the same."""
     if isinstance(word, str) and _MEANT.get(word) in names:
         return f'did you mean "{_MEANT[word]}"? '
     if isinstance(word, str):
-        close = difflib.get_close_matches(word[:LONGEST_SHOWN], names, 1)
+        close = difflib.get_close_matches(word[:LONGEST_FIELD], names, 1)
     else:
         close = []
     if close:
@@ -305,22 +310,22 @@ def _join_key(key: str, name: str) -> str:
     """
     if not BARE_KEY.fullmatch(name):
         name = repr(
-            name if len(name) <= LONGEST_SHOWN else name[:LONGEST_SHOWN] + "..."
+            name if len(name) <= LONGEST_FIELD else name[:LONGEST_FIELD] + "..."
         )
     return f"{key}.{name}" if key else name
 
 
-def _shorten(value: object) -> object:
+def _shorten_for_error(value: object) -> object:
     """Shorten a value to what an error line shows: never long or deep."""
     if isinstance(value, str):
-        return value[: 2 * LONGEST_SHOWN]
+        return value[: 2 * LONGEST_FIELD]
     if isinstance(value, dict):
         return _Words(f"a table of {len(value)} entries")
     if isinstance(value, list):
         if len(value) <= 3 and all(
             isinstance(entry, (str, float, bool)) for entry in value
         ):
-            return [_shorten(entry) for entry in value]
+            return [_shorten_for_error(entry) for entry in value]
         return _Words(f"a list of {len(value)} entries")
     if isinstance(value, int) and value.bit_length() > 64:
         return _Words("a huge whole number")

@@ -30,7 +30,7 @@ from fourbar.effects import (
 from fourbar.effects.effect import PinRows
 from fourbar.effects.load import FRAMES
 from fourbar.effects.place import AT_FIRST_PIN, STATED_PLACES, settler
-from fourbar.effects.spring import GAS, STROKE
+from fourbar.effects.spring import GAS, STROKE_FIELD
 from fourbar.errors import InputError, expect
 from fourbar.files.drawing import (
     choose_assembly,
@@ -45,15 +45,16 @@ from fourbar.files.place import (
     read_stated_place,
     read_table_with_place,
 )
-from fourbar.files.scene_text import BARS, BRANCHES, SIGMA
+from fourbar.files.scene_text import BAR_NUMBERS, BRANCH_OF_NAME, SIGMA
 from fourbar.formulas.mobility import meet_change_points
-from fourbar.linkage import BAR_NAMES, MOST_STEPS, PINS, POSITIVE, Bar, FourBar
-from fourbar.quantities.units import find_rounding
+from fourbar.linkage import BAR_NAMES, MOST_INTERVALS, PINS, POSITIVE, Bar, FourBar
+from fourbar.quantities import Array
+from fourbar.quantities.units import half_unit_of_text
 from fourbar.scene import Scene
 from fourbar.scene.motion import (
-    COMMANDS,
+    COMMAND_NAMES,
     DEFAULT_STEPS,
-    KINDS,
+    RISE_LAWS,
     SPLINES,
     STROKE_COMMAND,
     Free,
@@ -65,7 +66,6 @@ from fourbar.scene.motion import (
 )
 from fourbar.scene.numbers import Point, Tolerance
 from fourbar.scene.pictures import Picture
-from fourbar.solution import Array
 from fourbar.studies.keys import (
     COMMAND_KEYS,
     find_misfit,
@@ -73,18 +73,18 @@ from fourbar.studies.keys import (
     refuse_key,
 )
 
-LARGEST_FILE = 500_000
+LARGEST_SCENE_FILE = 500_000
 """Bytes; a scene takes about a thousand."""
-MOST_DOTS = 100
+MOST_DOTS_OF_A_LINE = 100
 """Largest number of dots in one line. The TOML reader's time grows with the square of a
 dotted key's parts.
 """
-LONGEST_LINE = 60
+LONGEST_SHOWN_LINE = 60
 """Characters shown of a line that cannot be read."""
 _MOST_LOADS = 1000
 """Each load is a term at every position."""
 _MOST_SPRINGS = 1000
-TABLES = (
+SCENE_TABLES = (
     "title",
     "source",
     "lengths",
@@ -99,7 +99,7 @@ TABLES = (
 )
 _A_LINE = "a drive along a line has from and to alone"
 _A_POINT = "a force acts at a place: state point, from_pin or from_centre"
-MOST_POINTS = 1000
+MOST_POINTS_OF_A_SCENE = 1000
 """Each is three columns of every table."""
 
 
@@ -111,7 +111,7 @@ def load(path: str | Path | IO[str] | IO[bytes]) -> Scene:
     that is wrong.
     """
     if isinstance(path, str | Path):
-        return loads(read_text(path), str(path))
+        return loads(read_scene_text(path), str(path))
     if not hasattr(path, "read"):
         expect("path", path, str, Path)
     return _read_stream(path)
@@ -124,9 +124,11 @@ def _read_stream(stream: IO[str] | IO[bytes]) -> Scene:
         shown = name
     else:
         shown = "stream"
-    content = stream.read(LARGEST_FILE + 1)
-    if len(content) > LARGEST_FILE:
-        raise InputError("scene file", shown, f"must not exceed {LARGEST_FILE} bytes")
+    content = stream.read(LARGEST_SCENE_FILE + 1)
+    if len(content) > LARGEST_SCENE_FILE:
+        raise InputError(
+            "scene file", shown, f"must not exceed {LARGEST_SCENE_FILE} bytes"
+        )
     if isinstance(content, bytes):
         try:
             content = content.decode("utf-8-sig")
@@ -136,9 +138,9 @@ def _read_stream(stream: IO[str] | IO[bytes]) -> Scene:
     return loads(content.replace("\r\n", "\n"), shown)
 
 
-def read_text(path: str | Path) -> str:
+def read_scene_text(path: str | Path) -> str:
     """Read the text of a scene file, of standard input for `-`, or of a pipe."""
-    return writing.read_text(path, "scene file", LARGEST_FILE, pipes=True)
+    return writing.read_text(path, "scene file", LARGEST_SCENE_FILE, pipes=True)
 
 
 def loads(text: str, name: str = "scene") -> Scene:
@@ -148,11 +150,11 @@ def loads(text: str, name: str = "scene") -> Scene:
     """
     shown = name if name.isprintable() else repr(name)
     for number, line in enumerate(text.split("\n"), 1):
-        if line.count(".") > MOST_DOTS:
+        if line.count(".") > MOST_DOTS_OF_A_LINE:
             raise InputError(
                 "TOML",
                 line[:40],
-                f"line {number} holds more than {MOST_DOTS} dots",
+                f"line {number} holds more than {MOST_DOTS_OF_A_LINE} dots",
                 shown,
             )
     try:
@@ -179,20 +181,20 @@ def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
     if place is None:
         return InputError(
             "TOML",
-            text[:LONGEST_LINE],
+            text[:LONGEST_SHOWN_LINE],
             f"cannot be read: {' '.join(reason.split())[:120]}",
             shown,
         )
     line = int(place[1] or len(lines))
     column = int(place[2] or len(lines[-1]) + 1)
-    start = max(0, column - 1 - LONGEST_LINE // 2)
-    value = lines[line - 1][start : start + LONGEST_LINE].strip()
+    start = max(0, column - 1 - LONGEST_SHOWN_LINE // 2)
+    value = lines[line - 1][start : start + LONGEST_SHOWN_LINE].strip()
     why = " ".join(reason[: place.start()].split())[:120]
     for bare in _UNQUOTED.finditer(lines[line - 1]):
         if bare.start(1) < column <= bare.end(1) + 1:
             why = (
                 "a number with a unit stands in quotes, like"
-                f' "{bare[1].strip()[:LONGEST_LINE]}"'
+                f' "{bare[1].strip()[:LONGEST_SHOWN_LINE]}"'
             )
     return InputError(
         f"line {line}, column {column}", value, f"cannot be read as TOML: {why}", shown
@@ -201,7 +203,7 @@ def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
 
 def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     """Read the scene of a file's tables; `folder`: of its pictures."""
-    top = read.table("", document, TABLES)
+    top = read.table("", document, SCENE_TABLES)
     drawing = read_drawing(read, top)
     if drawing is not None:
         top = state_lengths(read, top, drawing)
@@ -266,9 +268,11 @@ def _read_drive(
 
 
 def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
-    if not isinstance(value, dict) or len(value) > MOST_POINTS:
+    if not isinstance(value, dict) or len(value) > MOST_POINTS_OF_A_SCENE:
         raise read.refuse(
-            "points", value, f"must be a table of points, at most {MOST_POINTS}"
+            "points",
+            value,
+            f"must be a table of points, at most {MOST_POINTS_OF_A_SCENE}",
         )
     points = []
     for name, point in value.items():
@@ -293,7 +297,7 @@ def _read_pictures(
         Picture(
             number, read.text(f"bars.{name}.picture", bars[name]["picture"]), folder
         )
-        for name, number in BARS.items()
+        for name, number in BAR_NUMBERS.items()
         if "picture" in bars.get(name, {})
     )
 
@@ -305,11 +309,11 @@ def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
     length = read.numbers(
         "lengths", lengths, dict.fromkeys(BAR_NAMES.values(), Bar.numbers["length"])
     )
-    length = _meet_change_points(length, lengths)
-    tables = read.table("bars", top.get("bars", {}), BARS)
+    length = _meet_stated_equalities(length, lengths)
+    tables = read.table("bars", top.get("bars", {}), BAR_NUMBERS)
     bars = {
         name: _read_bar(read, f"bars.{name}", tables.get(name, {}), length[name])
-        for name in BARS
+        for name in BAR_NUMBERS
     }
     ground = read.numbers("lengths", lengths, FourBar.numbers)
     return FourBar(
@@ -321,7 +325,7 @@ def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
     )
 
 
-def _meet_change_points(
+def _meet_stated_equalities(
     length: dict[str, float], stated: dict[str, Any]
 ) -> dict[str, float]:
     """Return the lengths with the equalities that their last decimals miss."""
@@ -329,7 +333,7 @@ def _meet_change_points(
     d, a, b, c = (length[name] for name in names)
     if not math.isfinite(d + a + b + c):  # refused where they are put together
         return length
-    roundings = [find_rounding(stated[name], "m") for name in names]
+    roundings = [half_unit_of_text(stated[name], "m") for name in names]
     met = meet_change_points((d, a, b, c), tuple(roundings))  # type: ignore[arg-type]
     return dict(zip(names, met, strict=True))
 
@@ -357,7 +361,7 @@ def _read_bar(read: Reader, key: str, value: object, length: float) -> Bar:
 
 
 def _read_motion(read: Reader, value: object) -> Motion:
-    numbers = [name for names in COMMANDS.values() for name in names]
+    numbers = [name for names in COMMAND_NAMES.values() for name in names]
     entry = read.table(
         "motion",
         value,
@@ -365,8 +369,8 @@ def _read_motion(read: Reader, value: object) -> Motion:
     )
     stated = [name for name in numbers if name in entry]
     arguments: dict[str, Any] = {
-        "branch": BRANCHES[
-            read.choice("motion.branch", entry.get("branch", "open"), BRANCHES)
+        "branch": BRANCH_OF_NAME[
+            read.choice("motion.branch", entry.get("branch", "open"), BRANCH_OF_NAME)
         ],
     }
     if of_stroke := [name for name in (*STROKE_COMMAND, "side") if name in entry]:
@@ -387,7 +391,7 @@ def _read_motion(read: Reader, value: object) -> Motion:
             if int(name[-1]) != bar:
                 allowed = f"{stated[0]} commands bar {bar}; one bar is commanded"
                 raise read.refuse(f"motion.{name}", entry[name], allowed)
-        place, speed, acceleration = COMMANDS[bar]
+        place, speed, acceleration = COMMAND_NAMES[bar]
         unit = "rad"
     if place in entry or of_stroke:
         arguments[place] = _read_places(read, f"motion.{place}", entry.get(place), unit)
@@ -403,7 +407,7 @@ def _read_motion(read: Reader, value: object) -> Motion:
         )
         arguments["free"] = Free(
             duration,
-            read.whole("motion.free.steps", released.get("steps"), 1, MOST_STEPS),
+            read.whole("motion.free.steps", released.get("steps"), 1, MOST_INTERVALS),
         )
     if "law" in entry:
         arguments["law"] = _read_law(read, entry["law"])
@@ -412,14 +416,16 @@ def _read_motion(read: Reader, value: object) -> Motion:
 
 def _read_steps(read: Reader, key: str, entry: Mapping[str, Any]) -> int:
     """Read the number of steps of a motion, which has a default."""
-    return read.whole(f"{key}.steps", entry.get("steps", DEFAULT_STEPS), 1, MOST_STEPS)
+    return read.whole(
+        f"{key}.steps", entry.get("steps", DEFAULT_STEPS), 1, MOST_INTERVALS
+    )
 
 
 def _read_law(read: Reader, value: object) -> Law | Rise:
     key = "motion.law"
     if isinstance(value, dict) and "kind" in value:
         return _read_rise(read, key, value)
-    angles = [names[0] for names in COMMANDS.values()]
+    angles = [names[0] for names in COMMAND_NAMES.values()]
     entry = read.table(key, value, ("time", *angles, "steps", "ends"))
     stated = [name for name in angles if name in entry] or angles[:1]
     return Law(
@@ -436,7 +442,7 @@ def _read_law(read: Reader, value: object) -> Law | Rise:
 def _read_rise(read: Reader, key: str, value: object) -> Rise:
     """Read a rise, a dwell, a fall and a rest by a standard law."""
     entry = read.table(key, value, ("kind", *Rise.numbers, "steps"))
-    kind = read.choice(f"{key}.kind", entry["kind"], KINDS)
+    kind = read.choice(f"{key}.kind", entry["kind"], RISE_LAWS)
     steps = _read_steps(read, key, entry)
     return Rise(kind, steps=steps, **read.numbers(key, entry, Rise.numbers))
 
@@ -568,7 +574,7 @@ def _read_springs(
         else:
             stated = read.numbers(path, row, Spring.numbers)
             if "stroke" in row:
-                stroke = read.declared(f"{path}.stroke", row["stroke"], STROKE)
+                stroke = read.declared(f"{path}.stroke", row["stroke"], STROKE_FIELD)
                 stated["stroke"] = stroke
         try:
             springs.append(

@@ -43,10 +43,10 @@ from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Law, Motion, Rise, Swe
 from fourbar.studies.keys import find_misfit, list_entries
 from fourbar.writing import write_text
 
-BRANCHES = {name: branch for branch, name in BRANCH_NAMES.items()}
+BRANCH_OF_NAME = {name: branch for branch, name in BRANCH_NAMES.items()}
 SIGMA = "sigma"
 """Word of a tolerance that is a standard deviation."""
-BARS = {BAR_NAMES[number]: number for number in MOVING_BARS}
+BAR_NUMBERS = {BAR_NAMES[number]: number for number in MOVING_BARS}
 
 
 def save(scene: Scene, path: str | Path) -> None:
@@ -76,7 +76,7 @@ def dump(scene: Scene) -> str:
         for key, value in {"title": scene.title, "source": scene.source}.items()
         if value
     }
-    described = describe(scene)
+    described = list_scene_tables(scene)
     motion = _write_motion(scene.motion)
     points = {
         point.name: {"bar": point.bar, **write_numbers(point)} for point in scene.points
@@ -89,7 +89,7 @@ def dump(scene: Scene) -> str:
     tables: list[tuple[str, dict[str, Any]]] = [
         ("", top),
         *_write_lengths(scene, described["lengths"], motion),
-        *((f"bars.{name}", bars[name]) for name in BARS if name in bars),
+        *((f"bars.{name}", bars[name]) for name in BAR_NUMBERS if name in bars),
         ("motion", motion),
         ("drive", described["drive"]),
         ("points", points),
@@ -97,7 +97,9 @@ def dump(scene: Scene) -> str:
         ("effects", described["effects"]),
         ("tolerances", _write_tolerances(scene)),
     ]
-    return "\n".join(_write_table(name, entries) for name, entries in tables if entries)
+    return "\n".join(
+        _write_toml_table(name, entries) for name, entries in tables if entries
+    )
 
 
 def _add_strokes(effects: dict[str, Any], scene: Scene) -> None:
@@ -155,7 +157,7 @@ def _restore_coordinates(
                 }
 
 
-def describe(scene: Scene) -> dict[str, Any]:
+def list_scene_tables(scene: Scene) -> dict[str, Any]:
     """Write lengths, bars, drive, loads and effects as a file's tables.
 
     A bar that states nothing is left out.
@@ -175,7 +177,8 @@ def describe(scene: Scene) -> dict[str, Any]:
             "a scene file holds one effect of each kind",
         )
     bars = {
-        name: _write_bar(scene.linkage.bar(number)) for name, number in BARS.items()
+        name: _write_bar(scene.linkage.bar(number))
+        for name, number in BAR_NUMBERS.items()
     }
     return {
         "lengths": lengths,
@@ -332,28 +335,31 @@ def _write_place(place: Place) -> dict[str, Any]:
     }
 
 
-def _write_table(name: str, entries: dict[str, Any]) -> str:
+def _write_toml_table(name: str, entries: dict[str, Any]) -> str:
     """Write one TOML table."""
     heading = f"[{name}]\n" if name else ""
     return heading + "".join(
-        f"{key} = {_write_value(key, value)}\n" for key, value in entries.items()
+        f"{key} = {_write_toml_value(key, value)}\n" for key, value in entries.items()
     )
 
 
-def _write_value(key: str, value: object) -> str:
+def _write_toml_value(key: str, value: object) -> str:
     """Write a TOML value; strings escape as in JSON, and DEL too."""
     if isinstance(value, dict):
         return (
             "{ "
             + ", ".join(
-                f"{name} = {_write_value(key, entry)}" for name, entry in value.items()
+                f"{name} = {_write_toml_value(key, entry)}"
+                for name, entry in value.items()
             )
             + " }"
         )
     if isinstance(value, list):
         # one line each where there are many, so that no line holds more than MOST_DOTS
         between = ", " if len(value) <= 3 else ",\n  "
-        return "[" + between.join(_write_value(key, entry) for entry in value) + "]"
+        return (
+            "[" + between.join(_write_toml_value(key, entry) for entry in value) + "]"
+        )
     if not isinstance(value, str):
         return repr(value)
     try:
@@ -444,7 +450,7 @@ _METRIC_EXAMPLES = {
     "damping": "0.01 N m s/rad",
 }
 """What the comments of a new file show, and its gravity."""
-_EXAMPLES = {
+_EXAMPLES_IN_UNITS = {
     unit: {**_METRIC_EXAMPLES, "centre": centre, "place": place, "moment": moment}
     for unit, centre, place, moment in (
         ("mm", "100 mm", "50 mm", "150 N mm"),
@@ -475,7 +481,7 @@ def _fill_in(
 
     `unit`: of its lengths, in which the comments are too.
     """
-    examples = _EXAMPLES.get(unit, _EXAMPLES["m"])
+    examples = _EXAMPLES_IN_UNITS.get(unit, _EXAMPLES_IN_UNITS["m"])
     if unit.casefold() in IMPERIAL:
         examples = _IMPERIAL_EXAMPLES
     length = to_si(f"1 {examples['long']}", "m")

@@ -11,7 +11,7 @@ import numpy as np
 
 Number = Any
 """A float, or an array that broadcasts over positions and linkages."""
-PLAIN = (int, np.generic)
+PLAIN_TYPES = (int, np.generic)
 """One truth value or code."""
 _NUMPY = (np.ndarray, np.generic)
 _DOUBLES = {float, np.float64}
@@ -36,7 +36,7 @@ def is_any(mask: Number) -> bool:
     """
     if type(mask) is bool:
         return mask
-    if isinstance(mask, PLAIN):
+    if isinstance(mask, PLAIN_TYPES):
         return bool(mask)
     return bool(np.count_nonzero(mask))
 
@@ -56,7 +56,7 @@ def select(mask: Number, x: Number, y: Number) -> Number:
 
     A single truth value returns one of them as it is.
     """
-    if isinstance(mask, PLAIN):
+    if isinstance(mask, PLAIN_TYPES):
         return x if mask else y
     return np.where(mask, x, y)
 

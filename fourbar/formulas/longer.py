@@ -24,7 +24,7 @@ _HALF_PI_LOWEST = -1.4973849048591833e-33
 """pi/2 less the two doubles nearest to it."""
 _SPLITTER = 2.0**27 + 1.0
 """Splits the 53 bits of a double into two halves."""
-TERMS = 27
+SERIES_TERMS = 27
 """Terms of the series of sine and cosine up to an eighth of a turn. The next ones are
 below 1e-32.
 """
@@ -118,9 +118,9 @@ class Pair(NDArrayOperatorsMixin):
     def __array_ufunc__(
         self, function: Any, method: str, *inputs: Any, **options: Any
     ) -> Any:
-        if method != "__call__" or options or function not in FUNCTIONS:
+        if method != "__call__" or options or function not in LONGER_FUNCTIONS:
             return NotImplemented
-        return FUNCTIONS[function](
+        return LONGER_FUNCTIONS[function](
             *(x if isinstance(x, Pair) else Pair(np.asarray(x), 0.0) for x in inputs)
         )
 
@@ -149,7 +149,7 @@ def _renew(high: Any, low: Any) -> Pair:
     return Pair(total, low - (total - high))
 
 
-def _add(x: Any, y: Any) -> Any:
+def _add_longer(x: Any, y: Any) -> Any:
     high, lost = split_sum(x.high, y.high)
     low, lost_again = split_sum(x.low, y.low)
     first = _renew(high, lost + low)
@@ -175,25 +175,27 @@ def _multiply(x: Any, y: Any) -> Any:
     if not np.iscomplexobj(x.high) and not np.iscomplexobj(y.high):
         return _multiply_real(x, y)
     if not np.iscomplexobj(y.high):
-        return _join(_multiply_real(x.real, y), _multiply_real(x.imag, y))
+        return _join_parts(_multiply_real(x.real, y), _multiply_real(x.imag, y))
     if not np.iscomplexobj(x.high):
         return _multiply(y, x)
     along = _multiply_real(x.real, y.real) - _multiply_real(x.imag, y.imag)
-    return _join(along, _multiply_real(x.real, y.imag) + _multiply_real(x.imag, y.real))
+    return _join_parts(
+        along, _multiply_real(x.real, y.imag) + _multiply_real(x.imag, y.real)
+    )
 
 
-def _join(x: Any, y: Any) -> Any:
+def _join_parts(x: Any, y: Any) -> Any:
     """Make complex numbers of their parts."""
     return Pair(x.high + 1j * y.high, x.low + 1j * y.low)
 
 
-def _divide(x: Any, y: Any) -> Any:
+def _divide_longer(x: Any, y: Any) -> Any:
     if np.iscomplexobj(y.high):
         return _multiply(x, y.conjugate()) / (
             _multiply_real(y.real, y.real) + _multiply_real(y.imag, y.imag)
         )
     if np.iscomplexobj(x.high):
-        return _join(_divide(x.real, y), _divide(x.imag, y))
+        return _join_parts(_divide_longer(x.real, y), _divide_longer(x.imag, y))
     first = x.high / y.high
     second = (x - _multiply_real(Pair(first, 0.0), y)).high / y.high
     third = (x - _multiply_real(_renew(first, second), y)).high / y.high
@@ -206,7 +208,7 @@ def _root(x: Any) -> Any:
     return _renew(near, np.where(near == 0.0, 0.0, lost / (2.0 * near)))
 
 
-def _turn(x: Any) -> tuple[Any, Any]:
+def _sine_and_cosine(x: Any) -> tuple[Any, Any]:
     """Compute sine and cosine by their series, of what quarter turns leave."""
     quarters = np.rint(x.high / (0.5 * np.pi))
     rest = x
@@ -214,7 +216,7 @@ def _turn(x: Any) -> tuple[Any, Any]:
         rest = rest - _multiply_real(Pair(quarters, 0.0), Pair(np.asarray(part), 0.0))
     square = _multiply_real(rest, rest)
     sums = []
-    for last in (TERMS, TERMS - 1):
+    for last in (SERIES_TERMS, SERIES_TERMS - 1):
         total = Pair(np.ones_like(rest.high), np.zeros_like(rest.high))
         for k in range(last, 1, -2):
             total = 1.0 - square * total / float(k * (k - 1))
@@ -227,14 +229,14 @@ def _turn(x: Any) -> tuple[Any, Any]:
     return _choose(turned[0], -sine, sine), _choose(turned[1], -cosine, cosine)
 
 
-def _find_angle(y: Any, x: Any) -> Any:
+def _arctangent(y: Any, x: Any) -> Any:
     near = Pair(np.arctan2(y.high, x.high), 0.0)
-    sine, cosine = _turn(near)
+    sine, cosine = _sine_and_cosine(near)
     lost = (y * cosine - x * sine) / (x * cosine + y * sine)
     return _choose(np.isfinite(lost.high), near + lost, near)
 
 
-def _find_size(x: Any) -> Any:
+def _size_of_longer(x: Any) -> Any:
     if not np.iscomplexobj(x.high):
         return _choose(x.high < 0.0, -x, x)
     unit = np.ldexp(
@@ -245,7 +247,7 @@ def _find_size(x: Any) -> Any:
     return _root(along * along + across * across) * unit
 
 
-def _compare(function: Any) -> Callable[[Any, Any], Any]:
+def _make_comparison(function: Any) -> Callable[[Any, Any], Any]:
     return lambda x, y: function((x - y).high, 0.0)
 
 
@@ -253,23 +255,23 @@ def _take_remainder(x: Any, y: Any) -> Any:
     return x - y * np.floor(x.high / y.high)
 
 
-FUNCTIONS: dict[Any, Callable[..., Any]] = {
-    np.add: _add,
-    np.subtract: lambda x, y: _add(x, -y),
+LONGER_FUNCTIONS: dict[Any, Callable[..., Any]] = {
+    np.add: _add_longer,
+    np.subtract: lambda x, y: _add_longer(x, -y),
     np.multiply: _multiply,
-    np.divide: _divide,
+    np.divide: _divide_longer,
     np.negative: lambda x: Pair(-x.high, -x.low),
     np.sqrt: _root,
-    np.sin: lambda x: _turn(x)[0],
-    np.cos: lambda x: _turn(x)[1],
-    np.tan: lambda x: _divide(*_turn(x)),
-    np.arctan2: _find_angle,
-    np.absolute: _find_size,
+    np.sin: lambda x: _sine_and_cosine(x)[0],
+    np.cos: lambda x: _sine_and_cosine(x)[1],
+    np.tan: lambda x: _divide_longer(*_sine_and_cosine(x)),
+    np.arctan2: _arctangent,
+    np.absolute: _size_of_longer,
     np.conjugate: lambda x: x.conjugate(),
     np.remainder: _take_remainder,
     np.fmod: lambda x, y: x - y * np.trunc(x.high / y.high),
     **{
-        function: _compare(function)
+        function: _make_comparison(function)
         for function in (
             np.less,
             np.less_equal,

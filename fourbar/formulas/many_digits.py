@@ -17,14 +17,14 @@ from fourbar.formulas.position import (
 )
 from fourbar.linkage import FourBar
 
-DIGITS = 120
+WORKING_DIGITS = 120
 """The angle of a limit position near a change point keeps half of them."""
 _RESIDUE = 1e-55
 """Relative part that so many digits leave of a factor which is zero at the limit.
 """
 
 
-def half_angle(
+def exact_half_angle(
     linkage: FourBar,
     theta_2: float,
     offset: Any = None,
@@ -52,7 +52,7 @@ def half_angle(
     def own(number: Any) -> Any:
         return mpf(float(number[member] if np.ndim(number) else number))
 
-    with mp.workdps(DIGITS):
+    with mp.workdps(WORKING_DIGITS):
         d, a, b, c = (
             own(length) / own(unit) for length in reorder_lengths(bar, linkage.lengths)
         )
@@ -96,7 +96,7 @@ def decide_half_angles(
     Each number is rounded once to its own kind.
 
     `lost`: what a theta_2 that was computed leaves out as a double, rad; for the others
-    see `half_angle`.
+    see `exact_half_angle`.
     """
     flat = np.ravel(theta_2)
     shape = np.shape(theta_2)
@@ -105,7 +105,7 @@ def decide_half_angles(
     mask[index] = True
     high, low = np.zeros((2, 5, flat.size))
     for i in index:
-        *numbers, _ = half_angle(
+        *numbers, _ = exact_half_angle(
             linkage, float(flat[i]), offset, unit, i, bar, left_out[i]
         )
         for row, value in enumerate(numbers):
@@ -134,7 +134,7 @@ def limit_remainder(
     """
     from mpmath import mp, mpf
 
-    with mp.workdps(DIGITS):
+    with mp.workdps(WORKING_DIGITS):
         d, a, b, c = map(mpf, reorder_lengths(bar, linkage.lengths))
         theta_1 = mpf(linkage.ground_angle) + (mp.pi if bar == 4 else 0)
         exact = []

@@ -20,13 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import expect
-from fourbar.formulas.path import ROLES, prepare_path
+from fourbar.formulas.path import ROLES_OF_BARS, prepare_path
 from fourbar.formulas.position import TOUCHING, find_parallel_pairs, loop
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar, require_bar
 
 Array = NDArray[np.float64]
+
 TURN = 2.0 * math.pi
-MARGIN = math.radians(1.0)
+ANGLE_FROM_LIMITS = math.radians(1.0)
 """Angle that `choose_range` leaves out at each end of an interval. No speeds exist at a
 limit itself.
 """
@@ -54,7 +55,7 @@ class LimitPosition(NamedTuple):
 
 
 class Reach(NamedTuple):
-    """Bar k against the rest of the loop, in the unit of `choose_unit`.
+    """Bar k against the rest of the loop, in the unit of `choose_power_of_two`.
 
     Sums within rounding of 0 are 0.
     """
@@ -108,7 +109,7 @@ class Reach(NamedTuple):
         return 2.0 * at_near, 2.0 * at_far
 
 
-def choose_unit(linkage: FourBar) -> float:
+def choose_power_of_two(linkage: FourBar) -> float:
     """Return a power of two near the longest bar, m."""
     expect("linkage", linkage, FourBar)
     return math.ldexp(1.0, math.frexp(max(linkage.lengths))[1])
@@ -117,7 +118,7 @@ def choose_unit(linkage: FourBar) -> float:
 def reach_of(linkage: FourBar, bar: int = 2) -> Reach:
     """Return bar 2, 3 or 4 against the rest of the loop; InputError for another bar."""
     bar = require_bar("bar", bar)
-    unit = choose_unit(
+    unit = choose_power_of_two(
         linkage
     )  # exact, and no product of lengths leaves the range of doubles
     d, *moving = (length / unit for length in linkage.lengths)
@@ -228,7 +229,7 @@ def choose_range(
     """Choose the range of a commanded bar's angle for a scene that names none, rad.
 
     0..2 pi where the bar turns fully; otherwise the first of `find_intervals`, or the
-    one that holds an angle, shrunk by MARGIN at each end.
+    one that holds an angle, shrunk by ANGLE_FROM_LIMITS at each end.
     """
     if turns_fully(linkage, bar):
         return 0.0, TURN
@@ -240,7 +241,7 @@ def choose_range(
         and (holding - interval[0]) % TURN <= interval[1] - interval[0]
     )
     start, stop = next(held, every[0])
-    margin = min(MARGIN, (stop - start) / _NARROW)
+    margin = min(ANGLE_FROM_LIMITS, (stop - start) / _NARROW)
     return start + margin, stop - margin
 
 
@@ -375,7 +376,7 @@ _GRASHOF = {
 """Barker's code and name by the number of the shortest bar. That bar turns fully
 against all others.
 """
-CHANGE_POINT = {1: "SCCC", 2: "SCRR", 3: "SRCR", 4: "SRRC"}
+CHANGE_POINT_TYPES = {1: "SCCC", 2: "SCRR", 3: "SRCR", 4: "SRRC"}
 PARALLELOGRAM = "parallelogram"
 _NEARLY = 1e-3
 """Miss of a change point, over the sum of the lengths, up to which it is reported."""
@@ -426,7 +427,7 @@ def classify(linkage: FourBar, within: float = TOUCHING) -> LinkageType:
     Source: C. R. Barker, A complete classification of planar four-bar linkages,
     Mechanism and Machine Theory 20 (1985).
     """
-    unit = choose_unit(linkage)
+    unit = choose_power_of_two(linkage)
     lengths = dict(
         zip(BAR_NAMES, (length / unit for length in linkage.lengths), strict=True)
     )
@@ -478,7 +479,9 @@ def classify(linkage: FourBar, within: float = TOUCHING) -> LinkageType:
             pairs = ("ground and output", "input and coupler")
         return found(13, "S2X", f"kite (equal: {pairs[0]}; {pairs[1]})")
     return found(
-        8 + shortest, CHANGE_POINT[shortest], f"change-point {_GRASHOF[shortest][1]}"
+        8 + shortest,
+        CHANGE_POINT_TYPES[shortest],
+        f"change-point {_GRASHOF[shortest][1]}",
     )
 
 
@@ -498,7 +501,7 @@ def name_assembly(linkage: FourBar, bar: int = 2, branch: int = 1) -> str:
     path = prepare_path(loop(*linkage.lengths), linkage.ground_angle, bar)
     parallel, folded = find_parallel_pairs(path.lengths, branch)
     if folded:
-        return f"{name}, {BAR_NAMES[ROLES[bar][2]]} at rest"
+        return f"{name}, {BAR_NAMES[ROLES_OF_BARS[bar][2]]} at rest"
     if name == PARALLELOGRAM and not parallel:
         return "antiparallelogram"
     return name

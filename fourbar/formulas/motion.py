@@ -15,7 +15,7 @@ import numpy as np
 from fourbar.formulas.arithmetic import Number, is_any, select, vector
 from fourbar.formulas.position import Loop, Passing, Position
 
-FAST = 4.0
+TURNS_FAST = 4.0
 """Value of |d^2 - a^2|/e^2, twice |1/2 - t|, from which the triangle turns fast.
 Its side e then turns fast against the bars.
 """
@@ -91,18 +91,18 @@ def coefficients(lengths: Loop, position: Position) -> Coefficients:
 
 
 def _may_turn_fast(lengths: Loop) -> Number:
-    """Return True if |d^2 - a^2| > FAST e^2 where e is shortest."""
-    return lengths.d + lengths.a > FAST * abs(lengths.d - lengths.a)
+    """Return True if |d^2 - a^2| > TURNS_FAST e^2 where e is shortest."""
+    return lengths.d + lengths.a > TURNS_FAST * abs(lengths.d - lengths.a)
 
 
 def _find_fast_turns(lengths: Loop, position: Position) -> Number:
     """Mark where t and x g/e^2 are large and cancel.
 
-    There |d^2 - a^2| > FAST e^2, and x S and y root have the same sign.
+    There |d^2 - a^2| > TURNS_FAST e^2, and x S and y root have the same sign.
     """
     d, a, b, c, _, _ = lengths
     y = (d - a) * (d + a)
-    return (abs(y) > FAST * position.e2) & (
+    return (abs(y) > TURNS_FAST * position.e2) & (
         (y * position.root) * ((b - c) * position.half.sk) > 0.0
     )
 
@@ -139,7 +139,7 @@ def take_sines_of_rates(lengths: Loop, position: Position, k: Coefficients) -> P
     )
 
 
-def put_parallel_pairs(k: Coefficients, first: Number, second: Number) -> Coefficients:
+def put_parallel_speeds(k: Coefficients, first: Number, second: Number) -> Coefficients:
     """Put in the exact coefficients of bars that stay parallel.
 
     h3, h4 = 0, 1 where `first`; 1, 0 where `second`.

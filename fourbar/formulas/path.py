@@ -36,7 +36,7 @@ from fourbar.formulas.motion import (
     rates,
     take_sines_of_rates,
 )
-from fourbar.formulas.motion import put_parallel_pairs as parallel_motion
+from fourbar.formulas.motion import put_parallel_speeds as parallel_motion
 from fourbar.formulas.position import (
     HalfAngle,
     Loop,
@@ -56,11 +56,11 @@ from fourbar.linkage import FourBar
 
 NO_DIGIT_LEFT = 16.0 * 2.0**-53
 """|sin mu| at or below this: the directions of bars 3 and 4 are the same in doubles."""
-ROLES = {2: (2, 3, 4), 3: (3, 2, 4), 4: (4, 3, 2)}
+ROLES_OF_BARS = {2: (2, 3, 4), 3: (3, 2, 4), 4: (4, 3, 2)}
 """The bars that are input, coupler and output of the loop read from a bar; and back."""
 
 
-class Path(NamedTuple):
+class LoopPath(NamedTuple):
     """The loop as it is read from the bar whose angle is independent."""
 
     bar: int
@@ -244,7 +244,7 @@ class Path(NamedTuple):
         """
         if position.half is None:
             return drive_sine(position, drive_bar)
-        role = ROLES[self.bar][drive_bar - 2]
+        role = ROLES_OF_BARS[self.bar][drive_bar - 2]
         if role == 2:
             if self.bar == 2:
                 return position.sin_mu
@@ -264,7 +264,7 @@ class Path(NamedTuple):
         )  # the two bars have changed places
 
 
-def prepare_path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
+def prepare_path(lengths: Loop, theta_1: Number, bar: int = 2) -> LoopPath:
     """Prepare the path in the angle of bar 2, 3 or 4."""
     d, a, b, c, _, _ = lengths
     unit = power_of_two(0.25 * (d + a + b + c))
@@ -274,7 +274,7 @@ def prepare_path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
     meets = is_any(passing.outer & passing.inner)
     if bar == 4:
         u1 = -u1
-    return Path(bar, reordered, theta_1, u1, unit, meets, passing)
+    return LoopPath(bar, reordered, theta_1, u1, unit, meets, passing)
 
 
 def count_turns(lengths: tuple[Number, Number, Number, Number], bar: int) -> Number:

@@ -30,7 +30,7 @@ class Body(NamedTuple):
     z: Number
 
 
-Bodies = tuple[Body, Body, Body]
+MovingBodies = tuple[Body, Body, Body]
 """Inertial properties of bars 2, 3, 4."""
 
 
@@ -79,7 +79,7 @@ def about_first_pin(body: Body) -> Number:
 
 
 def inertia_wrenches(
-    a: Number, bodies: Bodies, position: Position, moving: Rates
+    a: Number, bodies: MovingBodies, position: Position, moving: Rates
 ) -> tuple[Wrenches, Number]:
     """Compute d'Alembert's force -m a_G and moment on each bar.
 

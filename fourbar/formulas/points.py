@@ -24,7 +24,7 @@ from fourbar.formulas.path import compute_state, prepare_path
 from fourbar.formulas.position import Loop
 from fourbar.linkage import (
     A_BRANCH,
-    MOST_STEPS,
+    MOST_INTERVALS,
     FourBar,
     require,
     require_bar,
@@ -59,7 +59,7 @@ def point_coefficients(
     expect("z", z, complex, float, int, np.number)
     require("z", z.real)
     require("z", z.imag)
-    moving = _compute_state(linkage, theta_2, branch)
+    moving = _compute_checked_state(linkage, theta_2, branch)
     return PointCoefficients(moving.velocity(bar, z), moving.acceleration(bar, z))
 
 
@@ -96,7 +96,7 @@ def instant_centres(
 
     Source: R. L. Norton, Design of Machinery, ch. 6.
     """
-    here = _compute_state(linkage, theta_2, branch)
+    here = _compute_checked_state(linkage, theta_2, branch)
     position = here.position
     O4 = linkage.ground * position.u1 + 0.0 * position.u2
     A = here.foot(3)
@@ -170,8 +170,8 @@ def coupler_curve(
     steps = require_whole(
         "steps",
         steps,
-        range(4, MOST_STEPS + 1, 4),
-        f"must be a multiple of 4 up to {MOST_STEPS}",
+        range(4, MOST_INTERVALS + 1, 4),
+        f"must be a multiple of 4 up to {MOST_INTERVALS}",
     )
     theta_2, assembly, turns = list_circuit(linkage, circuit, branch, steps)
     curve = compute_state(linkage, theta_2, assembly).point(3, point)
@@ -211,7 +211,7 @@ def list_circuit(
     return theta_2, np.repeat((branch, -branch), len(out)), 0
 
 
-def _compute_state(linkage: FourBar, theta_2: object, branch: object) -> State:
+def _compute_checked_state(linkage: FourBar, theta_2: object, branch: object) -> State:
     """Compute the state at positions given by a user, after checking them."""
     expect("linkage", linkage, FourBar)
     angles = require_numbers("theta_2", theta_2)

@@ -13,12 +13,12 @@ Dynamical analysis of machines (1930).
 
 from fourbar.formulas.arithmetic import Number, dot, is_any
 from fourbar.formulas.motion import Coefficients
-from fourbar.formulas.pin_forces import Bodies, about_first_pin
+from fourbar.formulas.pin_forces import MovingBodies, about_first_pin
 from fourbar.formulas.position import Position
 
 
 def inertia(
-    a: Number, bodies: Bodies, position: Position, k: Coefficients
+    a: Number, bodies: MovingBodies, position: Position, k: Coefficients
 ) -> tuple[Number, Number]:
     """Compute the equivalent inertia J = sum of m |dG/dq|^2 + I h_k^2, kg m^2.
 
@@ -37,7 +37,7 @@ def inertia(
 
 
 def half_slope(
-    a: Number, bodies: Bodies, position: Position, k: Coefficients
+    a: Number, bodies: MovingBodies, position: Position, k: Coefficients
 ) -> Number:
     """Compute J'/2 = sum of m G'.G'' + I h_k h_k', kg m^2/rad.
 

@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 from fourbar.errors import LimitError, clean_line
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
 from fourbar.mjcf.document import NOTES, Start, find_start
-from fourbar.mjcf.model import join, require_carriable, write_rounded
+from fourbar.mjcf.model import require_carriable, write_exactly, write_six_digits
 from fourbar.mjcf.plane import LEVEL, Plane
 from fourbar.scene import Scene, require_input
 
@@ -123,17 +123,21 @@ def _write_comment(
         *([notes["without_loads"]] if scene.loads else []),
     ]
     if plane.is_moved:
-        axes = ", ".join(f"({write_rounded(*axis)})" for axis in plane.rotation.T)
+        axes = ", ".join(f"({write_six_digits(*axis)})" for axis in plane.rotation.T)
         origin = plane.origin
         gravity = plane.turn(*assembly.gravity)
         tilted = notes["tilted"].strip()
         lines.append(
-            tilted.format(axes=axes, origin=join(*origin), gravity=join(*gravity))
+            tilted.format(
+                axes=axes,
+                origin=write_exactly(*origin),
+                gravity=write_exactly(*gravity),
+            )
         )
     return "\n".join([*lines, notes[reader].strip()])
 
 
-DRAKE = "http://drake.mit.edu"
+DRAKE_NAMESPACE = "http://drake.mit.edu"
 """Namespace of the elements that only Drake reads."""
 
 
@@ -176,7 +180,10 @@ def write_sdf(
     omega_2, at_A, omega_4 = numbers[3:]
     root = ET.Element(
         "sdf",
-        {"version": "1.9", **({"xmlns:drake": DRAKE} if reader == "drake" else {})},
+        {
+            "version": "1.9",
+            **({"xmlns:drake": DRAKE_NAMESPACE} if reader == "drake" else {}),
+        },
     )
     if reader == "gazebo":
         at_B = f", joint B {omega_2 + at_A - omega_4!r} rad/s"
@@ -187,10 +194,10 @@ def write_sdf(
     ).splitlines():
         root.append(ET.Comment(f" {line} "))
     world = ET.SubElement(root, "world", name="four_bar")
-    ET.SubElement(world, "gravity").text = join(*plane.turn(*gravity))
+    ET.SubElement(world, "gravity").text = write_exactly(*plane.turn(*gravity))
     model = ET.SubElement(world, "model", name=clean_line(scene.title) or "four-bar")
     if plane.is_moved:
-        place = join(*plane.origin, *plane.roll_pitch_yaw)
+        place = write_exactly(*plane.origin, *plane.roll_pitch_yaw)
         ET.SubElement(model, "pose").text = place
     _add_link(model, BAR_NAMES[1], 0j, 0.0, 1.0, 1.0, 0j)
     _add_joint(model, "ground_on_world", "fixed", "world", BAR_NAMES[1])
@@ -220,7 +227,7 @@ def write_sdf(
         joint = _add_joint(
             model, "B", "revolute", BAR_NAMES[4], BAR_NAMES[3], dynamics.get("B", {})
         )
-        ET.SubElement(joint, "pose").text = join(
+        ET.SubElement(joint, "pose").text = write_exactly(
             length_3, 0, 0, 0, 0, 0
         )  # in the frame of its child
     else:
@@ -228,7 +235,7 @@ def write_sdf(
         for key, value in (("body_A", BAR_NAMES[3]), ("body_B", BAR_NAMES[4])):
             ET.SubElement(ball, f"drake:ball_constraint_{key}").text = value
         for key, length in (("p_AP", length_3), ("p_BQ", length_4)):
-            ET.SubElement(ball, f"drake:ball_constraint_{key}").text = join(
+            ET.SubElement(ball, f"drake:ball_constraint_{key}").text = write_exactly(
                 length, 0.0, 0.0
             )
     ET.indent(root)
@@ -245,17 +252,21 @@ def _add_link(
     centre: complex,
 ) -> None:
     link = ET.SubElement(model, "link", name=name)
-    ET.SubElement(link, "pose").text = join(foot.real, foot.imag, 0, 0, 0, turn)
+    ET.SubElement(link, "pose").text = write_exactly(
+        foot.real, foot.imag, 0, 0, 0, turn
+    )
     inertial = ET.SubElement(link, "inertial")
-    ET.SubElement(inertial, "pose").text = join(centre.real, centre.imag, 0, 0, 0, 0)
-    ET.SubElement(inertial, "mass").text = join(mass)
+    ET.SubElement(inertial, "pose").text = write_exactly(
+        centre.real, centre.imag, 0, 0, 0, 0
+    )
+    ET.SubElement(inertial, "mass").text = write_exactly(mass)
     tensor = ET.SubElement(inertial, "inertia")
     for axes in (
         "ixx",
         "iyy",
         "izz",
     ):  # izz alone acts in the plane; three equal ones are a possible body
-        ET.SubElement(tensor, axes).text = join(inertia)
+        ET.SubElement(tensor, axes).text = write_exactly(inertia)
     for axes in ("ixy", "ixz", "iyz"):
         ET.SubElement(tensor, axes).text = "0"
 
@@ -277,7 +288,7 @@ def _add_joint(
         if dynamics:
             values = ET.SubElement(axis, "dynamics")
             for key, value in dynamics.items():
-                ET.SubElement(values, key).text = join(value)
+                ET.SubElement(values, key).text = write_exactly(value)
     return joint
 
 
@@ -305,16 +316,17 @@ def write_usd(
     bodies = []
     for number in MOVING_BARS:
         bar = linkage.bar(number)
+        place = plane.place(*_split_point(foot[number]))
         bodies.append(f"""    def Xform "{BAR_NAMES[number]}" (
         prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"]
     )
     {{
         float physics:mass = {bar.mass!r}
-        point3f physics:centerOfMass = {_place(bar.to_centre)}
+        point3f physics:centerOfMass = {_place_in_plane(bar.to_centre)}
         float3 physics:diagonalInertia = ({", ".join([repr(inertia[number])] * 3)})
         quatf physics:principalAxes = (1, 0, 0, 0)
-        double3 xformOp:translate = {_write(plane.place(*_split(foot[number])))}
-        quatd xformOp:orient = {_write(plane.turn_on(turn[number]))}
+        double3 xformOp:translate = {_write_tuple(place)}
+        quatd xformOp:orient = {_write_tuple(plane.turn_on(turn[number]))}
         uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:orient"]
     }}
 """)
@@ -331,19 +343,19 @@ def write_usd(
             "O4": foot[4],
         }[pin]
         relative = turn[follower] - turn[one]
-        on_first = (*_split(on_one), 0.0)
+        on_first = (*_split_point(on_one), 0.0)
         turn_on_first = LEVEL.turn_on(relative)
         if one == 1:  # the world, whose axes are not the plane's
-            on_first = plane.place(*_split(on_one))
+            on_first = plane.place(*_split_point(on_one))
             turn_on_first = plane.turn_on(relative)
         joints.append(f"""    def PhysicsRevoluteJoint "{pin}"
     {{
         uniform token physics:axis = "Z"
         {"" if one == 1 else f"rel physics:body0 = </four_bar/{BAR_NAMES[one]}>"}
         rel physics:body1 = </four_bar/{BAR_NAMES[follower]}>
-        point3f physics:localPos0 = {_write(on_first)}
-        quatf physics:localRot0 = {_write(turn_on_first)}
-        point3f physics:localPos1 = {_place(complex(along))}
+        point3f physics:localPos0 = {_write_tuple(on_first)}
+        quatf physics:localRot0 = {_write_tuple(turn_on_first)}
+        point3f physics:localPos1 = {_place_in_plane(complex(along))}
         quatf physics:localRot1 = (1, 0, 0, 0)
         bool physics:excludeFromArticulation = {"true" if pin == "B" else "false"}
     }}
@@ -365,7 +377,7 @@ def write_usd(
 
 def PhysicsScene "physics"
 {{
-    vector3f physics:gravityDirection = {_write(down)}
+    vector3f physics:gravityDirection = {_write_tuple(down)}
     float physics:gravityMagnitude = {pull!r}
 }}
 
@@ -378,15 +390,15 @@ def Xform "four_bar" (
 """
 
 
-def _split(point: complex) -> tuple[float, float]:
+def _split_point(point: complex) -> tuple[float, float]:
     return point.real, point.imag
 
 
-def _place(point: complex) -> str:
-    return _write((*_split(point), 0.0))
+def _place_in_plane(point: complex) -> str:
+    return _write_tuple((*_split_point(point), 0.0))
 
 
-def _write(numbers: Iterable[float]) -> str:
+def _write_tuple(numbers: Iterable[float]) -> str:
     """Write a tuple of USD, every digit; whole zeros short."""
     texts = (repr(number) if number else "0" for number in numbers)
     return f"({', '.join(texts)})"

@@ -25,25 +25,24 @@ from fourbar.mjcf.model import (
     Model,
     Settings,
     add_appearance,
-    join,
     make_constant_motor,
     make_motor,
     make_servo,
     require_carriable,
     unwind,
+    write_exactly,
 )
 from fourbar.mjcf.plane import LEVEL, Plane
-from fourbar.quantities import OK
+from fourbar.quantities import OK, Array
 from fourbar.scene import Command, Scene, command, require_input
 from fourbar.scene.motion import Motion
-from fourbar.solution import Array
 from fourbar.solving import solve
 
 NOTES: dict[str, Any] = tomllib.loads(
     files("fourbar.mjcf").joinpath("notes.toml").read_text(encoding="utf-8")
 )
 """Comments in the model files: how to start them, and where their numbers stand."""
-AT_REST = 1.0
+SPEED_LAID_OUT_FOR = 1.0
 """rad/s that flywheel and timestep are laid out for where the scene states no speed."""
 SETTLING = 2.0
 """Time constant with which the servo starts the input from rest, in timesteps. The
@@ -66,7 +65,7 @@ QUICK = 1.0
 less than 1e-15 rad/s^2 (mjMINVAL): below about this acceleration there is no second
 one, and stiff pads leave errors of up to 1e-3.
 """
-LIGHT = 100.0
+LIGHT_BAR_RATIO = 100.0
 """Mass ratio of coupler and output above which `fit_pad` makes the pad smaller. The
 closure then softens by the ratio more than by the loads: the error of the inertial
 torque was 3e-5 for 10 g against 14.5 kg, and 3e-3 for 1 g.
@@ -172,14 +171,18 @@ def write_mjcf(
     if start is not None:
         frame = ET.SubElement(root, "keyframe")
         ET.SubElement(
-            frame, "key", name="start", qpos=join(*start.qpos), qvel=join(*start.qvel)
+            frame,
+            "key",
+            name="start",
+            qpos=write_exactly(*start.qpos),
+            qvel=write_exactly(*start.qvel),
         )
-    _move(root, plane)
+    _move_into_plane(root, plane)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _move(root: ET.Element, plane: Plane) -> None:
+def _move_into_plane(root: ET.Element, plane: Plane) -> None:
     """Move the model into its plane, and say so in a comment."""
     if plane.is_moved:
         plane.move_mjcf(root)
@@ -196,7 +199,7 @@ def _shift_world(root: ET.Element, origin: tuple[float, float]) -> None:
         for name in {"pos", "fromto"} & element.attrib.keys() or {"pos"}:
             numbers = [float(x) for x in element.get(name, "0 0 0").split()]
             shifted = [x + (*origin, 0.0)[i % 3] for i, x in enumerate(numbers)]
-            element.set(name, join(*shifted))
+            element.set(name, write_exactly(*shifted))
 
 
 def _find_cylinder(scene: Scene, drive: Drive) -> LinearDrive | None:
@@ -243,7 +246,7 @@ def _write_comments(
     bar = scene.drive_bar
     lines: list[str] = [
         notes.get(f"{reader}_{kind}", notes[kind]).format(bar=bar)
-        for kind in ("opens", *_list_kinds(scene, drive))
+        for kind in ("opens", *_list_note_keys(scene, drive))
     ]
     if reader == "genesis" and (names := _list_left_out_by_genesis(scene)):
         lines.append(notes["genesis_without"].format(names=", ".join(names)))
@@ -262,7 +265,7 @@ def _write_comments(
     return [*lines, *numbers["after"]]
 
 
-def _list_kinds(scene: Scene, drive: Drive) -> list[str]:
+def _list_note_keys(scene: Scene, drive: Drive) -> list[str]:
     """List the keys of the notes that hold for the motion and the drive of a file."""
     linear = isinstance(scene.drive, LinearDrive)
     if scene.motion.free is not None:
@@ -330,7 +333,9 @@ def _leave_out_flywheel(scene: Scene, settings: Settings) -> Settings:
     linkage takes little energy out.
     """
     by_loads = compute_load_ratio(scene) * _compute_acceleration_scale(scene)
-    speed = math.sqrt((scene.motion.omega_2 or 0.0) ** 2 + by_loads) or AT_REST
+    speed = (
+        math.sqrt((scene.motion.omega_2 or 0.0) ** 2 + by_loads) or SPEED_LAID_OUT_FOR
+    )
     settings = replace(
         settings,
         flywheel=0.0,
@@ -351,7 +356,7 @@ def fit_pad(scene: Scene) -> float:
     _, a, b, c = scene.linkage.lengths
     least_sag = _SOFT_PAD / math.sqrt(
         (1.0 + compute_load_ratio(scene))
-        * max(1.0, compute_mass_ratio(scene.linkage) / LIGHT)
+        * max(1.0, compute_mass_ratio(scene.linkage) / LIGHT_BAR_RATIO)
     )
     acceleration = (
         _compute_acceleration_scale(scene) * a / max(b, c)
@@ -380,7 +385,11 @@ def _compute_acceleration_scale(scene: Scene) -> float:
 
     The accelerations of all bars grow with it.
     """
-    return float(max((scene.motion.omega_2 or AT_REST) ** 2, abs(scene.motion.alpha_2)))
+    return float(
+        max(
+            (scene.motion.omega_2 or SPEED_LAID_OUT_FOR) ** 2, abs(scene.motion.alpha_2)
+        )
+    )
 
 
 def _sum_inertia(linkage: FourBar) -> float:
@@ -527,7 +536,7 @@ def find_start(scene: Scene) -> Start:
     return Start(
         (theta[0], theta[1] - theta[0], theta[2]),
         (omega[0], omega[1] - omega[0], omega[2]),
-        choose_run(theta_2, speed or AT_REST, alpha if speed else 0.0),
+        choose_run(theta_2, speed or SPEED_LAID_OUT_FOR, alpha if speed else 0.0),
     )
 
 
@@ -541,14 +550,14 @@ SINGLE = replace(RECIPE, flywheel=1e3, pad=None)
 """Settings for single precision. A flywheel of 1e8 and fitted pads lose the closing
 force entirely there.
 """
-FAST = replace(RECIPE, time_constant_steps=2.0)
+SHORT_TIME_CONSTANT = replace(RECIPE, time_constant_steps=2.0)
 """Settings for a `connect` without (dJ/dt) v. With a short time constant the position
 error soon makes up for it.
 """
 SIMULATORS = {
     "mujoco": RECIPE,
     "warp": SINGLE,
-    "mjx": FAST,
+    "mjx": SHORT_TIME_CONSTANT,
     "genesis": RECIPE,
     "newton": SINGLE,
 }

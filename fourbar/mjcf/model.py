@@ -65,11 +65,11 @@ _FOVY = 45.0
 """Vertical field of view, deg."""
 _ASPECT = 4.0 / 3.0
 """Narrowest window that shows the whole linkage."""
-MARGIN = 1.15
+PICTURE_MARGIN = 1.15
 """Width and height of the picture over those of the linkage."""
 
 
-def write_rounded(*numbers: float) -> str:
+def write_six_digits(*numbers: float) -> str:
     """Write numbers that nothing is computed from, in six digits."""
     return " ".join(f"{number:.6g}" for number in numbers)
 
@@ -100,7 +100,7 @@ def compute_frame(linkage: FourBar) -> _CameraView:
     right = max(a, x + c)
     low = min(-a, y - c)
     high = max(a, y + c)
-    half = MARGIN * max(0.5 * (high - low), 0.5 * (right - left) / _ASPECT)
+    half = PICTURE_MARGIN * max(0.5 * (high - low), 0.5 * (right - left) / _ASPECT)
     return _CameraView(0.5 * (left + right), 0.5 * (low + high), half)
 
 
@@ -110,8 +110,8 @@ def add_appearance(root: ET.Element, linkage: FourBar) -> None:
     ET.SubElement(
         root,
         "statistic",
-        extent=write_rounded(seen.distance / 1.5),
-        center=write_rounded(seen.x, seen.y, 0),
+        extent=write_six_digits(seen.distance / 1.5),
+        center=write_six_digits(seen.x, seen.y, 0),
     )
     visual = ET.SubElement(root, "visual")
     # the viewer's free camera starts at 1.5 extents from the centre; -90 deg looks
@@ -147,7 +147,7 @@ def add_appearance(root: ET.Element, linkage: FourBar) -> None:
 def _add_camera(world: ET.Element, linkage: FourBar) -> None:
     """Add the camera `plane`, and a light at the same place."""
     seen = compute_frame(linkage)
-    place = write_rounded(seen.x, seen.y, seen.distance)
+    place = write_six_digits(seen.x, seen.y, seen.distance)
     shining = {"diffuse": ".2 .2 .2", "specular": ".1 .1 .1"}  # with the headlight 1
     shining |= {"directional": "true", "castshadow": "false"}
     ET.SubElement(world, "light", shining, name="light", pos=place, dir="0 0 -1")
@@ -156,9 +156,9 @@ def _add_camera(world: ET.Element, linkage: FourBar) -> None:
 
 CYLINDER = "cylinder"
 """Name of the tendon of a linear drive, and of the actuator on it."""
-FLOOR = 1e-15
+LEAST_MASS = 1e-15
 """mjMINVAL: MuJoCo refuses a moving body of less mass (kg) or inertia (kg m^2)."""
-COLOURS = {
+RGBA_OF_BARS = {
     1: "0.45 0.45 0.48 1",
     2: "0.12 0.47 0.71 1",
     3: "1 0.5 0.05 1",
@@ -177,7 +177,7 @@ _THICKNESS = 0.02
 """Radius of a bar's capsule, as a part of the longest bar."""
 
 
-def join(*numbers: float) -> str:
+def write_exactly(*numbers: float) -> str:
     """Write numbers so that they read back bit for bit."""
     return " ".join(repr(float(number)).removesuffix(".0") for number in numbers)
 
@@ -203,7 +203,7 @@ def _make_passive(force: float) -> dict[str, str]:
 
     The force is in N, or a factor on the gear of the motor.
     """
-    return {**_PASSIVE, "cogging": join(force, 0.0, math.pi / 2.0)}
+    return {**_PASSIVE, "cogging": write_exactly(force, 0.0, math.pi / 2.0)}
 
 
 def make_constant_motor(force: float) -> dict[str, str]:
@@ -212,7 +212,11 @@ def make_constant_motor(force: float) -> dict[str, str]:
     There is none if the force is 0.
     """
     if force:
-        return {**_UNCONTROLLED, "joint": "O2", "biasprm": join(force, 0.0, 0.0)}
+        return {
+            **_UNCONTROLLED,
+            "joint": "O2",
+            "biasprm": write_exactly(force, 0.0, 0.0),
+        }
     return {}
 
 
@@ -221,7 +225,11 @@ def make_servo(gain: float, omega: float) -> dict[str, str]:
 
     Without a control it turns at omega, and there it is idle.
     """
-    return {**_UNCONTROLLED, "joint": "O2", "biasprm": join(gain * omega, 0.0, -gain)}
+    return {
+        **_UNCONTROLLED,
+        "joint": "O2",
+        "biasprm": write_exactly(gain * omega, 0.0, -gain),
+    }
 
 
 def make_motor(bar: int | None, most: float) -> dict[str, str]:
@@ -237,14 +245,14 @@ def make_motor(bar: int | None, most: float) -> dict[str, str]:
         placed = {"joint": FIRST_PIN[bar]}
     if bar == 3:
         placed = {"site": "B3", "gear": "0 0 0 0 0 1"}
-    return {**placed, "ctrlrange": join(-most, most), "ctrllimited": "false"}
+    return {**placed, "ctrlrange": write_exactly(-most, most), "ctrllimited": "false"}
 
 
 _A_MILLIONTH = 1e-6
 """Least mass of a bar as a fraction of the heaviest one. Simulations hold down to 1e-11
 of it, and forces move by about this part.
 """
-ALONE = 1e-3
+MASS_OF_MASSLESS_BARS = 1e-3
 """kg, where no bar has a mass."""
 
 
@@ -255,9 +263,9 @@ def require_carriable(linkage: FourBar) -> None:
     """
     heaviest = max(linkage.bar(number).mass for number in MOVING_BARS)
     if heaviest:
-        enough = max(_A_MILLIONTH * heaviest, 2.0 * FLOOR)
+        enough = max(_A_MILLIONTH * heaviest, 2.0 * LEAST_MASS)
     else:
-        enough = ALONE
+        enough = MASS_OF_MASSLESS_BARS
     if heaviest:
         part = "a millionth of the heaviest bar's"
     else:
@@ -268,7 +276,7 @@ def require_carriable(linkage: FourBar) -> None:
             ("mass", bar.mass, "kg"),
             ("inertia", bar.moment_of_inertia, "kg m^2"),
         ):
-            if value < FLOOR:
+            if value < LEAST_MASS:
                 mass = write_in_units("kg", float(f"{enough:.2g}"))
                 instead = f'mass = "{mass}" ({part}) and no inertia stated'
                 allowed = (
@@ -346,12 +354,12 @@ class Model:
         """
         s = self.settings
         options = {
-            "timestep": join(self.timestep),
+            "timestep": write_exactly(self.timestep),
             "integrator": s.integrator,
             "solver": s.solver,
-            "tolerance": join(s.tolerance),
+            "tolerance": write_exactly(s.tolerance),
             "iterations": str(s.iterations),
-            **{key: join(*value) for key, value in self.option.items()},
+            **{key: write_exactly(*value) for key, value in self.option.items()},
         }
         option = ET.SubElement(root, "option", options)
         unneeded = list(_NEVER_NEEDED)
@@ -368,7 +376,7 @@ class Model:
         ET.SubElement(ground, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
         self._add_capsule(ground, 1, self.linkage.ground, -2.0 * self.radius)
         ET.SubElement(
-            ground, "site", name="O2", pos="0 0 0", size=write_rounded(self.radius)
+            ground, "site", name="O2", pos="0 0 0", size=write_six_digits(self.radius)
         )
         self._add_site(ground, "O4", *self.O4)
         crank = self._add_bar(ground, 2, (0.0, 0.0), armature=flywheel)
@@ -384,22 +392,28 @@ class Model:
         """
         bar = self.linkage.bar(number)
         pin = FIRST_PIN[number]
-        body = ET.SubElement(parent, "body", name=BAR_NAMES[number], pos=join(*at, 0.0))
+        body = ET.SubElement(
+            parent, "body", name=BAR_NAMES[number], pos=write_exactly(*at, 0.0)
+        )
         if self.rest is not None:
             angle = self.rest[number - 2]
-            body.set("axisangle", join(0.0, 0.0, 1.0, angle))
+            body.set("axisangle", write_exactly(0.0, 0.0, 1.0, angle))
             drive["ref"] = angle
         # only the z-component acts in the plane; three equal ones satisfy the triangle
         # inequality
         ET.SubElement(
             body,
             "inertial",
-            pos=join(bar.to_centre.real, bar.to_centre.imag, 0.0),
-            mass=join(bar.mass),
-            diaginertia=join(*[bar.moment_of_inertia + self.inertia[number]] * 3),
+            pos=write_exactly(bar.to_centre.real, bar.to_centre.imag, 0.0),
+            mass=write_exactly(bar.mass),
+            diaginertia=write_exactly(
+                *[bar.moment_of_inertia + self.inertia[number]] * 3
+            ),
         )
         numbers = {**drive, **self.pin[pin]}
-        joint = {key: join(*np.atleast_1d(value)) for key, value in numbers.items()}
+        joint = {
+            key: write_exactly(*np.atleast_1d(value)) for key, value in numbers.items()
+        }
         ET.SubElement(
             body, "joint", {"name": pin, "type": "hinge", "axis": "0 0 1", **joint}
         )
@@ -415,7 +429,7 @@ class Model:
             # massless and welded: it only moves the point at which MuJoCo measures how
             # soft the closure may be
             end = ET.SubElement(body, "body", name=f"{BAR_NAMES[number]}_pad")
-            place = join(self.settings.pad * bar.length, 0.0, 0.0)
+            place = write_exactly(self.settings.pad * bar.length, 0.0, 0.0)
             ET.SubElement(end, "inertial", pos=place, mass="0", diaginertia="0 0 0")
         self._add_site(end, f"B{number}", bar.length)
         return body
@@ -425,8 +439,8 @@ class Model:
             body,
             "site",
             name=name,
-            pos=join(x, y, 0.0),
-            size=write_rounded(self.radius),
+            pos=write_exactly(x, y, 0.0),
+            size=write_six_digits(self.radius),
         )
 
     def _add_capsule(
@@ -442,10 +456,10 @@ class Model:
         shape = {
             "name": BAR_NAMES[number],
             "type": "capsule",
-            "size": write_rounded(self.radius, length / 2.0),
-            "pos": write_rounded(cos * length / 2.0, sin * length / 2.0, z),
-            "zaxis": write_rounded(cos, sin, 0.0),
-            "rgba": COLOURS[number],
+            "size": write_six_digits(self.radius, length / 2.0),
+            "pos": write_six_digits(cos * length / 2.0, sin * length / 2.0, z),
+            "zaxis": write_six_digits(cos, sin, 0.0),
+            "rgba": RGBA_OF_BARS[number],
         }
         ET.SubElement(body, "geom", shape, mass="0", contype="0", conaffinity="0")
 
@@ -453,8 +467,8 @@ class Model:
         """Close the loop at B."""
         s = self.settings
         pair = {"name": "B", "site1": "B3", "site2": "B4"}
-        solref = join(s.time_constant_steps * self.timestep, 1.0)
-        solimp = join(s.impedance, s.impedance, 0.001, 0.5, 2.0)
+        solref = write_exactly(s.time_constant_steps * self.timestep, 1.0)
+        solimp = write_exactly(s.impedance, s.impedance, 0.001, 0.5, 2.0)
         ET.SubElement(
             ET.SubElement(root, "equality"),
             "connect",
@@ -473,7 +487,8 @@ class Model:
         tendons = ET.SubElement(root, "tendon")
         if self.pin["B"]:
             attributes = {
-                key: join(*np.atleast_1d(value)) for key, value in self.pin["B"].items()
+                key: write_exactly(*np.atleast_1d(value))
+                for key, value in self.pin["B"].items()
             }
             fixed = ET.SubElement(tendons, "fixed", {"name": "B", **attributes})
             for joint, coefficient in (("O2", -1), ("A", -1), ("O4", 1)):
@@ -483,8 +498,10 @@ class Model:
                 root, tendons, f"spring_{index}", spring.start, spring.end
             )
             if _is_slack_somewhere(spring):
-                tendon.set("stiffness", join(spring.stiffness))
-                tendon.set("springlength", join(-spring.slack / spring.stiffness))
+                tendon.set("stiffness", write_exactly(spring.stiffness))
+                tendon.set(
+                    "springlength", write_exactly(-spring.slack / spring.stiffness)
+                )
         if self.cylinder is not None:
             self._add_line(
                 root, tendons, CYLINDER, self.cylinder.start, self.cylinder.end
@@ -552,12 +569,12 @@ class Model:
             if passive:
                 tendon = root.find(f"tendon/spatial[@name='{name}']")
                 assert tendon is not None
-                tendon.set("stiffness", join(spring.stiffness))
+                tendon.set("stiffness", write_exactly(spring.stiffness))
                 tendon.set("springlength", "0")
                 preload = _make_passive(-spring.slack)
                 ET.SubElement(actuators, "dcmotor", {**preload, **placed})
                 continue
-            tension = join(-spring.slack, 0.0 - spring.stiffness, 0.0)
+            tension = write_exactly(-spring.slack, 0.0 - spring.stiffness, 0.0)
             ET.SubElement(
                 actuators, "general", {**_UNCONTROLLED, **placed}, biasprm=tension
             )
@@ -574,7 +591,7 @@ class Model:
             placed = {"name": f"load_{index}", "site": f"load_{index}"}
             if load.frame == "world":
                 placed["refsite"] = "O2"
-            placed["gear"] = join(fx, fy, 0.0, 0.0, 0.0, couple)
+            placed["gear"] = write_exactly(fx, fy, 0.0, 0.0, 0.0, couple)
             if passive:
                 ET.SubElement(actuators, "dcmotor", {**_make_passive(1.0), **placed})
                 continue

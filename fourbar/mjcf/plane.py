@@ -11,7 +11,7 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.linkage import require
-from fourbar.mjcf.model import join
+from fourbar.mjcf.model import write_exactly
 from fourbar.quantities import Array
 
 Vector = tuple[float, float, float]
@@ -135,21 +135,27 @@ class Plane:
         statistic = root.find("statistic")
         assert option is not None
         assert statistic is not None
-        gravity = _read_numbers(option.get("gravity", "0 0 0"))
-        option.set("gravity", join(*self.turn(*gravity)))
+        gravity = _read_vector(option.get("gravity", "0 0 0"))
+        option.set("gravity", write_exactly(*self.turn(*gravity)))
         statistic.set(
-            "center", join(*self.place(*_read_numbers(statistic.attrib["center"])))
+            "center",
+            write_exactly(*self.place(*_read_vector(statistic.attrib["center"]))),
         )
-        turned = join(*self.quaternion)
+        turned = write_exactly(*self.quaternion)
         for body in root.iterfind("worldbody/body"):
-            body.set("pos", join(*self.place(*_read_numbers(body.get("pos", "0 0 0")))))
+            body.set(
+                "pos",
+                write_exactly(*self.place(*_read_vector(body.get("pos", "0 0 0")))),
+            )
             body.set("quat", turned)
         for tag in ("light", "camera"):
             for element in root.iterfind(f"worldbody/{tag}"):
-                place = _read_numbers(element.attrib["pos"])
-                element.set("pos", join(*self.place(*place)))
+                place = _read_vector(element.attrib["pos"])
+                element.set("pos", write_exactly(*self.place(*place)))
         for light in root.iterfind("worldbody/light"):
-            light.set("dir", join(*self.turn(*_read_numbers(light.attrib["dir"]))))
+            light.set(
+                "dir", write_exactly(*self.turn(*_read_vector(light.attrib["dir"])))
+            )
         for camera in root.iterfind("worldbody/camera"):
             camera.set("quat", turned)
 
@@ -160,7 +166,7 @@ def _require_three(name: str, value: object) -> tuple[float, ...]:
     return tuple(value)
 
 
-def _read_numbers(text: str) -> Vector:
+def _read_vector(text: str) -> Vector:
     x, y, z = map(float, text.split())
     return x, y, z
 

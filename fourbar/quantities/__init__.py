@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
 
 
 class Quantity(NamedTuple):
@@ -35,7 +36,7 @@ def _scalar(*line: str | None) -> Any:
     return field(default=None, metadata={"line": ("scalar", *line)})
 
 
-def _vector(*line: str | None) -> Any:
+def _declare_vector(*line: str | None) -> Any:
     """Declare a vector at each position: unit, stage, meaning and group."""
     return field(default=None, metadata={"line": ("vector", *line)})
 
@@ -58,15 +59,15 @@ class Quantities:
     condition: Array = _scalar(
         "1", "position", "motion condition |sin_mu|, in (0, 1]; 1 is best"
     )
-    A: Array = _vector("m", "position", "pin of input and coupler")
-    B: Array = _vector("m", "position", "pin of coupler and output")
-    G2: Array = _vector("m", "position", "mass centre of the input")
-    G3: Array = _vector("m", "position", "mass centre of the coupler")
-    G4: Array = _vector("m", "position", "mass centre of the output")
+    A: Array = _declare_vector("m", "position", "pin of input and coupler")
+    B: Array = _declare_vector("m", "position", "pin of coupler and output")
+    G2: Array = _declare_vector("m", "position", "mass centre of the input")
+    G3: Array = _declare_vector("m", "position", "mass centre of the coupler")
+    G4: Array = _declare_vector("m", "position", "mass centre of the output")
     stroke: Array | None = _scalar(
         "m", "position", "distance of the linear drive's ends", "linear drive"
     )
-    drive_line: Array | None = _vector(
+    drive_line: Array | None = _declare_vector(
         "1",
         "position",
         "unit vector from its one end to the other, or of the force at a point",
@@ -81,11 +82,11 @@ class Quantities:
     omega_4: Array | None = _scalar(
         "rad/s", "velocity", "angular velocity of the output", "unknown"
     )
-    v_A: Array | None = _vector("m/s", "velocity", "velocity of A")
-    v_B: Array | None = _vector("m/s", "velocity", "velocity of B")
-    v_G2: Array | None = _vector("m/s", "velocity", "velocity of G2")
-    v_G3: Array | None = _vector("m/s", "velocity", "velocity of G3")
-    v_G4: Array | None = _vector("m/s", "velocity", "velocity of G4")
+    v_A: Array | None = _declare_vector("m/s", "velocity", "velocity of A")
+    v_B: Array | None = _declare_vector("m/s", "velocity", "velocity of B")
+    v_G2: Array | None = _declare_vector("m/s", "velocity", "velocity of G2")
+    v_G3: Array | None = _declare_vector("m/s", "velocity", "velocity of G3")
+    v_G4: Array | None = _declare_vector("m/s", "velocity", "velocity of G4")
     stroke_speed: Array | None = _scalar(
         "m/s",
         "velocity",
@@ -101,21 +102,21 @@ class Quantities:
     alpha_4: Array | None = _scalar(
         "rad/s^2", "acceleration", "angular acceleration of the output", "unknown"
     )
-    a_A: Array | None = _vector("m/s^2", "acceleration", "acceleration of A")
-    a_B: Array | None = _vector("m/s^2", "acceleration", "acceleration of B")
-    a_G2: Array | None = _vector("m/s^2", "acceleration", "acceleration of G2")
-    a_G3: Array | None = _vector("m/s^2", "acceleration", "acceleration of G3")
-    a_G4: Array | None = _vector("m/s^2", "acceleration", "acceleration of G4")
-    F12: Array | None = _vector(
+    a_A: Array | None = _declare_vector("m/s^2", "acceleration", "acceleration of A")
+    a_B: Array | None = _declare_vector("m/s^2", "acceleration", "acceleration of B")
+    a_G2: Array | None = _declare_vector("m/s^2", "acceleration", "acceleration of G2")
+    a_G3: Array | None = _declare_vector("m/s^2", "acceleration", "acceleration of G3")
+    a_G4: Array | None = _declare_vector("m/s^2", "acceleration", "acceleration of G4")
+    F12: Array | None = _declare_vector(
         "N", "force", "force of ground on the input, at O2", "unknown"
     )
-    F32: Array | None = _vector(
+    F32: Array | None = _declare_vector(
         "N", "force", "force of the coupler on the input, at A", "unknown"
     )
-    F43: Array | None = _vector(
+    F43: Array | None = _declare_vector(
         "N", "force", "force of the output on the coupler, at B", "unknown"
     )
-    F14: Array | None = _vector(
+    F14: Array | None = _declare_vector(
         "N", "force", "force of ground on the output, at O4", "unknown"
     )
     torque: Array | None = _scalar(
@@ -175,7 +176,7 @@ UNKNOWNS = tuple(q.name for q in QUANTITIES if q.group == "unknown")
 """Every unknown of a position, in the order of the mechanics."""
 
 
-DERIVED = (
+DERIVED_QUANTITIES = (
     Quantity(
         "shaking_force", "vector", "N", "force", "force of bars and drive on the frame"
     ),
@@ -190,7 +191,7 @@ DERIVED = (
     Quantity("I24", "vector", "m", "position", "instant centre of bars 2 and 4"),
 )
 """Quantities that follow from those of a solution; tables, plots and CSV have them."""
-DERIVED_NAMES = {q.name: q for q in DERIVED}
+DERIVED_NAMES = {q.name: q for q in DERIVED_QUANTITIES}
 
 
 class DriveNames(NamedTuple):
@@ -214,7 +215,7 @@ LINE_QUANTITIES = (
 """Every quantity that exists only where the drive is a force."""
 STROKE = "stroke"
 """Quantity of a linear drive that a force at a point does not have."""
-FORCES = (*PIN_FORCES, COUPLE.value, LINE.value, "power")
+FORCE_NAMES = (*PIN_FORCES, COUPLE.value, LINE.value, "power")
 DRY_FRICTION_QUANTITIES = tuple(q.name for q in QUANTITIES if q.group == "dry friction")
 PIN_LOAD_QUANTITIES = tuple(q.name for q in QUANTITIES if q.group == "pin loads")
 STATUS_NAMES = (

@@ -18,8 +18,8 @@ import numpy as np
 
 from fourbar.errors import InputError
 
-FILE = files("fourbar.quantities").joinpath("units.toml")
-DEFINITIONS: str = tomllib.loads(FILE.read_text(encoding="utf-8"))["definitions"]
+UNITS_FILE = files("fourbar.quantities").joinpath("units.toml")
+DEFINITIONS: str = tomllib.loads(UNITS_FILE.read_text(encoding="utf-8"))["definitions"]
 """Unit definitions in the form of the units library."""
 _JOINED = re.compile(r"(?<=[A-Za-z])[.-](?=[A-Za-z])")
 """N.mm, lbf-in: a product."""
@@ -58,23 +58,23 @@ _PREFIXED_ANGLE = re.compile(
     r"(?<![A-Za-z])(?!m|µ|u|grad)[A-Za-zµ]{1,2}rad(?![A-Za-z])"
 )
 """Grad, krad: a prefix before an angle. Nobody means one but milli- and micro-."""
-TURNING = re.compile(r"\s*\b(c?cw|(?:anti|counter)?-?clockwise)$", re.IGNORECASE)
+TURNING_SENSE = re.compile(r"\s*\b(c?cw|(?:anti|counter)?-?clockwise)$", re.IGNORECASE)
 """A sense of turning after a unit: the sign states it."""
 _GLUED = re.compile(r"(kg|g|N)(m|mm|cm)(?=$|[\^²*])")
 """kgm^2: a product without a sign between its factors."""
-RAISED = re.compile("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")
-DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+RAISED_TEXT = re.compile("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")
+SUPERSCRIPT_DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _FRACTION = re.compile(
     r"([+-]?)(?:([0-9]{1,6})[ -])?([0-9]{1,6})/([1-9][0-9]{0,5})(?=[ A-Za-z'\"′″])"
 )
 """1/2 or -12 1/2, as inches are written; the sign is that of the sum."""
 _FEET = re.compile(r"([+-]?)([0-9]{1,6}) ?['′’][ -]?(?=[0-9.][^'′’]*[\"″”]$)")
 """The feet of 1'6", 1' 6 1/2" or -1'-6.5"; the sign is that of the sum."""
-NUMBER = re.compile(
+NUMBER_TEXT = re.compile(
     r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})"
     r"(?:[eE][+-]?[0-9]{1,3})?(?![0-9.])"
 )
-UNIT = re.compile(
+UNIT_TEXT = re.compile(
     r"(?:[A-Za-zµμ°_]++(?:0(?![0-9]))?"
     r"(?:(?:\^|\*\*)-?[1-9](?![0-9])|[²³])?|[·*/()]|\s)++"
 )
@@ -105,11 +105,11 @@ def to_si(text: str, unit: str) -> float:
     text = text.strip()
     feet = _FEET.match(text)
     text = text[feet.end() :] if feet else text
-    number_text = _FRACTION.match(text) or NUMBER.match(text)
+    number_text = _FRACTION.match(text) or NUMBER_TEXT.match(text)
     if number_text is None:
         raise UnitError("there is no finite number")
-    name = RAISED.sub(
-        lambda power: f"^{power[0].translate(DIGITS)}",
+    name = RAISED_TEXT.sub(
+        lambda power: f"^{power[0].translate(SUPERSCRIPT_DIGITS)}",
         text[number_text.end() :].translate(_SIGNS),
     ).strip()
     if name.startswith(","):
@@ -121,7 +121,7 @@ def to_si(text: str, unit: str) -> float:
         raise UnitError(f"a comma is no part of a number{hint}")
     if not name:
         raise UnitError(UNIT_MISSING)
-    if turning := TURNING.search(name):
+    if turning := TURNING_SENSE.search(name):
         # -84 rad/s cw turns counter-clockwise
         clockwise = turning[1].casefold() in ("cw", "clockwise")
         backwards = number_text[0].startswith("-")
@@ -154,7 +154,7 @@ def to_si(text: str, unit: str) -> float:
     return -0.0 if value == 0.0 and number_text[0].startswith("-") else value
 
 
-def write_quantity(quantity: Any) -> Any:
+def write_pint_quantity(quantity: Any) -> Any:
     """Write a quantity of the units library as text like "48 cm".
 
     An array of numbers becomes a list of such texts. The text is read as any other is:
@@ -169,8 +169,8 @@ def write_quantity(quantity: Any) -> Any:
 
 
 def _read_number(text: re.Match[str]) -> Fraction:
-    """Return the number that `NUMBER` or `_FRACTION` matched."""
-    if text.re is NUMBER:
+    """Return the number that `NUMBER_TEXT` or `_FRACTION` matched."""
+    if text.re is NUMBER_TEXT:
         return Fraction(text[0])
     sign, whole, above, below = text.groups()
     size = int(whole or 0) + Fraction(f"{above}/{below}")
@@ -180,7 +180,7 @@ def _read_number(text: re.Match[str]) -> Fraction:
 def find_unit(text: object, otherwise: str) -> str:
     """Return the unit that a text has; another one where it has none."""
     last = _FEET.sub("", str(text).strip())  # the inches of 1'6"
-    number_text = _FRACTION.match(last) or NUMBER.match(last)
+    number_text = _FRACTION.match(last) or NUMBER_TEXT.match(last)
     if number_text:
         unit = last[number_text.end() :].strip()
     else:
@@ -189,7 +189,7 @@ def find_unit(text: object, otherwise: str) -> str:
     return unit or otherwise
 
 
-def find_rounding(text: object, unit: str) -> float:
+def half_unit_of_text(text: object, unit: str) -> float:
     """Return half a unit of the last decimal of the number in a text, in `unit`.
 
     It is 0 for a number without decimals.
@@ -198,7 +198,7 @@ def find_rounding(text: object, unit: str) -> float:
     if _FRACTION.match(last):
         number_text = None
     else:
-        number_text = NUMBER.match(last)
+        number_text = NUMBER_TEXT.match(last)
     if number_text is None:
         return 0.0
     digits, _, power = number_text[0].lower().partition("e")
@@ -282,7 +282,7 @@ def _load_registry() -> Any:
 def _find_factor(name: str) -> tuple[Fraction, dict[str, Fraction]]:
     """Return what one of the unit is in base units, and its dimension."""
     name = _JOINED.sub(" ", name.rstrip("."))
-    if len(name) > _LONGEST_UNIT or not UNIT.fullmatch(name):
+    if len(name) > _LONGEST_UNIT or not UNIT_TEXT.fullmatch(name):
         raise UnitError("the unit cannot be read")
     registry = _load_registry()
     if angle := _PREFIXED_ANGLE.search(name):

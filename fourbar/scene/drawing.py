@@ -7,9 +7,9 @@ from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import cross
 from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, PINS, require
 
-IN_LINE = 1e-12
+PINS_IN_LINE = 1e-12
 """Part of the drawing's size within which four pins lie in one line: a change point."""
-Place = tuple[float, float]
+PlanePoint = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,10 +20,10 @@ class DrawnPins:
     in one line: on a change point a drawing does not tell one assembly from the other.
     """
 
-    O2: Place
-    A: Place
-    B: Place
-    O4: Place
+    O2: PlanePoint
+    A: PlanePoint
+    B: PlanePoint
+    O4: PlanePoint
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -47,7 +47,7 @@ class DrawnPins:
             abs(cross(self.vector(first), self.vector(second)))
             for first, second in ((1, 2), (1, 4), (2, 3))
         )
-        if max(across) <= IN_LINE * size * size:
+        if max(across) <= PINS_IN_LINE * size * size:
             raise InputError(
                 "pins",
                 tuple(PINS),
@@ -55,7 +55,7 @@ class DrawnPins:
                 "draw the linkage in another position",
             )
 
-    def place(self, pin: str) -> Place:
+    def place(self, pin: str) -> PlanePoint:
         """Return the place of a pin, m."""
         x, y = getattr(self, pin)
         return x, y
@@ -87,7 +87,7 @@ class DrawnPins:
             (ground + turned - angle) / (2.0 * math.pi)
         )
 
-    def into_bar(self, bar: int, place: Place) -> complex:
+    def into_bar(self, bar: int, place: PlanePoint) -> complex:
         """Return a place of the drawing in the frame of a bar, m.
 
         It is from the first pin, along + i across.

@@ -23,7 +23,7 @@ from fourbar.formulas.mobility import TURN
 from fourbar.linkage import (
     A_BRANCH,
     AT_LEAST_ZERO,
-    MOST_STEPS,
+    MOST_INTERVALS,
     MOVING_BARS,
     POSITIVE,
     Declared,
@@ -37,11 +37,11 @@ from fourbar.quantities import Array
 OPEN = 1
 CROSSED = -1
 BRANCH_NAMES = {OPEN: "open", CROSSED: "crossed"}
-FASTEST = math.sqrt(sys.float_info.max)
+LARGEST_SPEED = math.sqrt(sys.float_info.max)
 """Largest speed, rad/s. The square of a greater one is beyond the range of a double,
 and so is every acceleration.
 """
-COMMANDS = {
+COMMAND_NAMES = {
     bar: (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}") for bar in MOVING_BARS
 }
 """Names of the commanded angle, speed and acceleration by bar."""
@@ -53,14 +53,17 @@ bar's pivot to the end on the ground, and is seen towards the latter.
 """
 DEFAULT_STEPS = 360
 """Number of steps of the default range, which is swept if a motion names no angle."""
-STEPS = (range(1, MOST_STEPS + 1), f"must be a whole number from 1 to {MOST_STEPS}")
+ALLOWED_STEPS = (
+    range(1, MOST_INTERVALS + 1),
+    f"must be a whole number from 1 to {MOST_INTERVALS}",
+)
 """Allowed numbers of intervals of any motion, and how an error says so."""
 SPLINES = {"free": "not-a-knot", "rest": "clamped", "periodic": "periodic"}
 """End conditions of a law's spline: none, at rest, or one period of a motion."""
 _FEWEST_POINTS = {"free": 4, "rest": 2, "periodic": 3}
 """Number of points that determine the cubic pieces."""
-MOST_POINTS = 100_000
-KINDS = ("cycloidal", "345")
+MOST_LISTED_POSITIONS = 100_000
+RISE_LAWS = ("cycloidal", "345")
 """Standard laws of a rise."""
 
 
@@ -86,7 +89,9 @@ class Sweep:
                 f"must be within the range of doubles from {self.start!r}",
             )
         set_field(
-            self, "steps", require_whole("motion.theta_2.steps", self.steps, *STEPS)
+            self,
+            "steps",
+            require_whole("motion.theta_2.steps", self.steps, *ALLOWED_STEPS),
         )
 
 
@@ -130,7 +135,9 @@ class Free:
             require("motion.free.duration", self.duration, "s", POSITIVE),
         )
         object.__setattr__(
-            self, "steps", require_whole("motion.free.steps", self.steps, *STEPS)
+            self,
+            "steps",
+            require_whole("motion.free.steps", self.steps, *ALLOWED_STEPS),
         )
 
 
@@ -166,7 +173,7 @@ class _OverTime:
 
     def _require_steps(self: Any) -> None:
         """Check the number of intervals; InputError for what is none."""
-        steps = require_whole("motion.law.steps", self.steps, *STEPS)
+        steps = require_whole("motion.law.steps", self.steps, *ALLOWED_STEPS)
         object.__setattr__(self, "steps", steps)
 
     @property
@@ -223,11 +230,11 @@ class Law(_OverTime):
         )
         if (
             len(time) != len(angles)
-            or not _FEWEST_POINTS[self.ends] <= len(time) <= MOST_POINTS
+            or not _FEWEST_POINTS[self.ends] <= len(time) <= MOST_LISTED_POSITIONS
         ):
             allowed = (
-                f"needs {_FEWEST_POINTS[self.ends]} to {MOST_POINTS} times and as many"
-                " angles"
+                f"needs {_FEWEST_POINTS[self.ends]} to {MOST_LISTED_POSITIONS} times"
+                " and as many angles"
             )
             raise InputError(key, (len(time), len(angles)), allowed)
         if any(b <= a for a, b in pairwise(time)):
@@ -321,7 +328,9 @@ class Rise(_OverTime):
     theta_3: float | None = None
     theta_4: float | None = None
     numbers: ClassVar[dict[str, Declared]] = {
-        **{names[0]: Declared("rad", left_out=None) for names in COMMANDS.values()},
+        **{
+            names[0]: Declared("rad", left_out=None) for names in COMMAND_NAMES.values()
+        },
         "rise": Declared("rad", pair="s"),
         "dwell": Declared("s", AT_LEAST_ZERO, 0.0),
         "fall": Declared("s", POSITIVE, None),
@@ -330,8 +339,8 @@ class Rise(_OverTime):
 
     def __post_init__(self) -> None:
         key = "motion.law"
-        if not isinstance(self.kind, str) or self.kind not in KINDS:
-            allowed = "must be " + " or ".join(f'"{kind}"' for kind in KINDS)
+        if not isinstance(self.kind, str) or self.kind not in RISE_LAWS:
+            allowed = "must be " + " or ".join(f'"{kind}"' for kind in RISE_LAWS)
             raise InputError(f"{key}.kind", self.kind, allowed)
         check_numbers(self, key)
         if getattr(self, f"theta_{self.bar}") is None:
@@ -379,7 +388,7 @@ def _part(kind: str, time: Array, duration: float) -> tuple[Array, Array, Array]
     return place, speed / duration, acceleration / (duration * duration)
 
 
-def _read_number(name: str, place: int) -> Any:
+def _make_number_property(name: str, place: int) -> Any:
     """Make the property that reads a number of the command by its name.
 
     It is None (an acceleration: 0) if the command has another name.
@@ -446,22 +455,22 @@ class Motion:
     side: str | None
     numbers: ClassVar[dict[str, Declared]] = {
         name: Declared(f"{unit}{per}")
-        for unit, commands in (("rad", COMMANDS.values()), ("m", [STROKE_COMMAND]))
+        for unit, commands in (("rad", COMMAND_NAMES.values()), ("m", [STROKE_COMMAND]))
         for names in commands
         for name, per in zip(names, ("", "/s", "/s^2"), strict=True)
     }
-    theta_2: ClassVar[Any] = _read_number("theta_2", 0)
-    theta_3: ClassVar[Any] = _read_number("theta_3", 0)
-    theta_4: ClassVar[Any] = _read_number("theta_4", 0)
-    stroke: ClassVar[Any] = _read_number("stroke", 0)
-    omega_2: ClassVar[Any] = _read_number("omega_2", 1)
-    omega_3: ClassVar[Any] = _read_number("omega_3", 1)
-    omega_4: ClassVar[Any] = _read_number("omega_4", 1)
-    stroke_speed: ClassVar[Any] = _read_number("stroke_speed", 1)
-    alpha_2: ClassVar[Any] = _read_number("alpha_2", 2)
-    alpha_3: ClassVar[Any] = _read_number("alpha_3", 2)
-    alpha_4: ClassVar[Any] = _read_number("alpha_4", 2)
-    stroke_acceleration: ClassVar[Any] = _read_number("stroke_acceleration", 2)
+    theta_2: ClassVar[Any] = _make_number_property("theta_2", 0)
+    theta_3: ClassVar[Any] = _make_number_property("theta_3", 0)
+    theta_4: ClassVar[Any] = _make_number_property("theta_4", 0)
+    stroke: ClassVar[Any] = _make_number_property("stroke", 0)
+    omega_2: ClassVar[Any] = _make_number_property("omega_2", 1)
+    omega_3: ClassVar[Any] = _make_number_property("omega_3", 1)
+    omega_4: ClassVar[Any] = _make_number_property("omega_4", 1)
+    stroke_speed: ClassVar[Any] = _make_number_property("stroke_speed", 1)
+    alpha_2: ClassVar[Any] = _make_number_property("alpha_2", 2)
+    alpha_3: ClassVar[Any] = _make_number_property("alpha_3", 2)
+    alpha_4: ClassVar[Any] = _make_number_property("alpha_4", 2)
+    stroke_acceleration: ClassVar[Any] = _make_number_property("stroke_acceleration", 2)
 
     def __init__(  # noqa: PLR0913 - the keywords of a command, of any bar
         self,
@@ -490,7 +499,7 @@ class Motion:
         }
         stated = _find_bar("motion", angles)
         bar = (stated or 2) if law is None else law.bar
-        names = COMMANDS[bar]
+        names = COMMAND_NAMES[bar]
         numbers = angles[bar]
         if stroke is not None or side is not None or stroke_speed is not None:
             if (
@@ -596,7 +605,7 @@ class Motion:
         """
         if self.commanded == "stroke":
             return STROKE_COMMAND
-        return COMMANDS[self.bar]
+        return COMMAND_NAMES[self.bar]
 
 
 def _require_strokes(stroke: Any) -> Any:
@@ -634,7 +643,7 @@ def _require_command(
     if speed is not None:
         speed = require(f"motion.{omega}", speed, per_second)
         if not math.isfinite(speed * speed):
-            fastest = write_in_units(per_second, FASTEST)
+            fastest = write_in_units(per_second, LARGEST_SPEED)
             allowed = f"must be below {fastest}: every acceleration has its square"
             raise InputError(f"motion.{omega}", speed, allowed, unit=per_second)
     return angle, speed, require(f"motion.{alpha}", acceleration, growth)

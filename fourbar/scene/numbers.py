@@ -26,7 +26,7 @@ from fourbar.linkage import (
 from fourbar.quantities import DERIVED_NAMES, UNITS
 from fourbar.scene.motion import Motion
 
-LONGEST_NAME = 40
+LONGEST_POINT_NAME = 40
 POINT_STAGES = {"": "position", "v_": "velocity", "a_": "acceleration"}
 """Quantities evaluated for a point: the prefix of the name and the stage."""
 
@@ -59,14 +59,14 @@ class Point:
         if (
             not plain
             or self.name.startswith(("v_", "a_"))
-            or len(self.name) > LONGEST_NAME
+            or len(self.name) > LONGEST_POINT_NAME
         ):
             allowed = (
                 "must be a word of letters, digits and _, not beginning with a digit,"
                 " v_ or a_"
             )
             raise InputError("points", self.name, allowed)
-        if {self.name, f"{self.name}_x", f"{self.name}_y"} & COLUMNS:
+        if {self.name, f"{self.name}_x", f"{self.name}_y"} & TAKEN_NAMES:
             raise InputError(
                 self.key, self.name, "is the name of a quantity; a point needs another"
             )
@@ -95,7 +95,7 @@ class Point:
         return f"points.{self.name}"
 
 
-COLUMNS = frozenset(
+TAKEN_NAMES = frozenset(
     (
         *UNITS,
         *DERIVED_NAMES,
@@ -116,20 +116,20 @@ COLUMNS = frozenset(
 
 _THREE_SIGMA = 3.0
 """Half width of a normal distribution in a worst case, in standard deviations."""
-LENGTHS = {
+LENGTH_NUMBERS = {
     **FourBar.numbers,
     **{BAR_NAMES[bar]: Bar.numbers["length"] for bar in MOVING_BARS},
 }
 
 
-def find_unit(key: str) -> str | None:
+def find_unit_of_key(key: str) -> str | None:
     """Return the unit of the number that a key of a scene file names.
 
     None: no scene has such a number.
     """
     table, *names = key.split(".")
     tables = {
-        "lengths": LENGTHS,
+        "lengths": LENGTH_NUMBERS,
         "bars": Bar.numbers,
         "motion": Motion.numbers,
         "points": Point.numbers,
@@ -171,7 +171,7 @@ class Tolerance:
 
     def __post_init__(self) -> None:
         expect("tolerances", self.key, str)
-        unit = find_unit(self.key)
+        unit = find_unit_of_key(self.key)
         if unit is None and isinstance(self.width, str):
             raise InputError(f"tolerances.{self.key}", self.width, "unknown key")
         object.__setattr__(

@@ -13,14 +13,14 @@ from fourbar.errors import InputError, expect
 from fourbar.linkage import BAR_NAMES, require_bar
 from fourbar.writing import read_bytes
 
-LARGEST = 2_000_000
+LARGEST_PICTURE = 2_000_000
 """Bytes of one picture: a page with three of them still opens quickly."""
-LONGEST_NAME = 200
+LONGEST_FILE_NAME = 200
 _RASTER = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 """First bytes of the formats that may be attached. SVG may not, because it can carry
 scripts.
 """
-ALLOWED = (
+ALLOWED_PICTURE = (
     "must be the name of a PNG or JPEG file next to the scene file or below its folder,"
     ' like "coupler.png"'
 )
@@ -59,9 +59,9 @@ class Picture:
             not parts
             or not plain
             or not self.name.isprintable()
-            or len(self.name) > LONGEST_NAME
+            or len(self.name) > LONGEST_FILE_NAME
         ):
-            raise InputError(self.key, self.name, ALLOWED)
+            raise InputError(self.key, self.name, ALLOWED_PICTURE)
 
     @property
     def key(self) -> str:
@@ -78,7 +78,9 @@ class Picture:
         file = (folder / self.name).resolve()
         if not file.is_relative_to(folder):
             raise InputError(
-                self.key, self.name, f"leads out of the scene's folder; {ALLOWED}"
+                self.key,
+                self.name,
+                f"leads out of the scene's folder; {ALLOWED_PICTURE}",
             )
         return encode_picture(self.key, file, self.name)
 
@@ -109,7 +111,7 @@ def encode_picture(key: str, path: str | Path, shown: str | None = None) -> str:
     neither.
     """
     name = str(path) if shown is None else shown
-    content = read_bytes(path, key, LARGEST, shown=name)
+    content = read_bytes(path, key, LARGEST_PICTURE, shown=name)
     kind = next(
         (kind for magic, kind in _RASTER.items() if content.startswith(magic)), None
     )

@@ -25,7 +25,7 @@ from fourbar.formulas.arithmetic import (
 )
 from fourbar.formulas.longer import change_numbers, lengthen, shorten
 from fourbar.formulas.mobility import (
-    MARGIN,
+    ANGLE_FROM_LIMITS,
     choose_range,
     find_limit_angles,
     turns_fully,
@@ -36,7 +36,7 @@ from fourbar.linkage import BAR_NAMES, FourBar, copy_with, require_bar
 from fourbar.quantities import Array
 from fourbar.scene.drawing import DrawnPins
 from fourbar.scene.motion import (
-    COMMANDS,
+    COMMAND_NAMES,
     DEFAULT_STEPS,
     SIDES,
     STROKE_COMMAND,
@@ -349,7 +349,7 @@ class Command(NamedTuple):
     def commanded(self) -> str:
         """Name of what is commanded: the angle, or the stroke."""
         if self.stroke is None:
-            return COMMANDS[self.bar][0]
+            return COMMAND_NAMES[self.bar][0]
         return STROKE_COMMAND[0]
 
     @property
@@ -526,7 +526,7 @@ def default_places(scene: Scene, holding: float | None = None) -> Array:
     steps = DEFAULT_STEPS
     if scene.motion.stroke is not None:
         triangle = _find_triangle(scene.linkage, scene.settled_drive())
-        half = 0.5 * np.array([MARGIN, np.pi - MARGIN])
+        half = 0.5 * np.array([ANGLE_FROM_LIMITS, np.pi - ANGLE_FROM_LIMITS])
         twice_mean = 2.0 * np.sqrt(triangle.length * triangle.reach)
         first, last = np.hypot(
             triangle.length - triangle.reach, twice_mean * np.sin(half)

@@ -21,10 +21,10 @@ import numpy as np
 
 from fourbar.errors import InputError, NotAssembledError
 from fourbar.files import dump
-from fourbar.files.scene_text import BARS
+from fourbar.files.scene_text import BAR_NUMBERS
 from fourbar.formulas.mobility import classify
 from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import ANGLES, DERIVED_NAMES, OK, PIN_FORCES
+from fourbar.quantities import ANGLES, DERIVED_NAMES, OK, PIN_FORCES, Array
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.pictures import encode_picture
 from fourbar.show.derived import derive
@@ -41,7 +41,7 @@ from fourbar.show.plot.view import (
 )
 from fourbar.show.tolerances import collect_tolerances
 from fourbar.show.units import choose_unit
-from fourbar.solution import SI, Array, Conversion, Solution
+from fourbar.solution import SI, Conversion, Solution
 from fourbar.solving import solve
 from fourbar.writing import null_nan, write_text
 
@@ -54,7 +54,7 @@ _WATCHED = (1.5, 60.0)
 RATES = tuple(f"{letter}_{bar}" for letter in ("omega", "alpha") for bar in MOVING_BARS)
 CENTRES = ("I13", "I24")
 """Places that lie at infinity now and then: a figure has them, no curve."""
-SCALARS = (
+ANIMATED_SCALARS = (
     *ANGLES,
     "condition",
     *RATES,
@@ -324,7 +324,7 @@ def _collect_columns(solution: Solution) -> dict[str, Any]:
     columns: dict[str, Any] = {"sign": solution.branch.tolist()}
     if (solution.status_code != OK).any():
         columns["status"] = solution.status
-    for name in (*SCALARS, *PIN_FORCES):
+    for name in (*ANIMATED_SCALARS, *PIN_FORCES):
         values = getattr(solution, name)
         if values is not None:
             columns[name] = values
@@ -343,16 +343,18 @@ def _encode_pictures(
     """
     encoded = {}
     for name, path in pictures.items():
-        if name not in BARS:
-            raise InputError("picture", name, "must name one of " + ", ".join(BARS))
-        encoded[BARS[name]] = encode_picture(f"picture.{name}", path)
+        if name not in BAR_NUMBERS:
+            raise InputError(
+                "picture", name, "must name one of " + ", ".join(BAR_NUMBERS)
+            )
+        encoded[BAR_NUMBERS[name]] = encode_picture(f"picture.{name}", path)
     by_bar = {
         picture.bar: picture for picture in scene.pictures if picture.bar not in encoded
     }
     return encoded | {bar: picture.data_uri() for bar, picture in by_bar.items()}
 
 
-FORMATS = ("html", "gif", "mp4")
+ANIMATION_FORMATS = ("html", "gif", "mp4")
 _SCRIPTS = (
     "numbers.js",
     "picture.js",
@@ -365,7 +367,7 @@ _LIVE_SCRIPTS = ("fields.js", "drag.js", "edit.js")
 """Additional scripts of the workbench."""
 
 
-def write(
+def write_animation(
     scene: Scene,
     path: str | Path,
     *,
@@ -396,7 +398,7 @@ def write(
     DependencyError : a film without matplotlib, or MP4 without ffmpeg.
     """
     target = Path(path)
-    kind = format_of(path, FORMATS)
+    kind = format_of(path, ANIMATION_FORMATS)
     if kind == "html":
         write_text(target, write_page(scene, pictures or {}, units, vectors))
         return

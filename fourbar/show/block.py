@@ -26,12 +26,12 @@ from fourbar.show.duty import DUTY_UNITS, bearing_load, describe_drive
 from fourbar.show.gas import list_gas_notes
 from fourbar.show.position import PositionSheet
 from fourbar.show.summary import Facts, find_duty, locate_between, summarize
-from fourbar.show.tables import WIDTH, wrap_line
+from fourbar.show.tables import BLOCK_WIDTH, wrap_line
 from fourbar.show.units import (
     COMMON,
-    DIGITS,
     POSITION_DIGITS,
-    ROUND_OFF,
+    SHOWN_AS_ZERO,
+    SHOWN_DIGITS,
     choose_unit,
     drop_rounding,
     write_digits,
@@ -41,9 +41,9 @@ from fourbar.solution import Conversion, Solution, find_unit_in
 
 _TIED = "\u00a0"
 """Stands between a number and its unit until the lines are broken."""
-COLUMN = 12
+LEAST_COLUMN = 12
 """Least width of a column."""
-LABEL = 11
+INDENT = 11
 """Width of what stands before a row."""
 _HALF_OF_LAST = 0.5
 """Part of the last digit shown from which on an error bar changes it."""
@@ -51,7 +51,7 @@ _FEW_DIGITS = 1e-8
 """Error bar over the value from which on the block says where digits are lost. Half of
 the digits of a double are lost then.
 """
-ALIKE = 1e-3
+OF_ONE_PREFIX = 1e-3
 """Ratio of the smallest to the largest of several quantities that share a prefix. Below
 it each has a prefix of its own.
 """
@@ -61,7 +61,7 @@ nearer to zero than that is zero.
 """
 _NO_ANGLE = 1e-14
 """rad; rounding of an angle of a turn."""
-LOST = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
+BARS_IN_LINE = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
 """Bars that are in line where a command of a bar, or a drive on it, loses digits."""
 
 
@@ -83,10 +83,10 @@ def write_block(
     pressure : pressure of a cylinder, Pa; adds the bore that it needs.
     headed : begin with the linkage.
     """
-    return _Block(summarize(scene, solution), units).write(pressure, headed=headed)
+    return _SceneBlock(summarize(scene, solution), units).write(pressure, headed=headed)
 
 
-class _Block:
+class _SceneBlock:
     """The facts of a scene and the units that they are written in."""
 
     def __init__(self, facts: Facts, units: Conversion) -> None:
@@ -95,7 +95,7 @@ class _Block:
         if facts.kind == "position":
             self.digits = POSITION_DIGITS
         else:
-            self.digits = DIGITS
+            self.digits = SHOWN_DIGITS
         self.longest = max(facts.scene.linkage.lengths)
         if facts.kind in ("law", "released"):
             self.symbol = "t"
@@ -212,7 +212,7 @@ class _Block:
         name = f"{self._name_linkage()}:"
         lengths = self._write_lengths()
         line = f"{name} {lengths}"
-        if len(line) <= WIDTH:
+        if len(line) <= BLOCK_WIDTH:
             lines = [line]
         else:
             lines = [name, f"    {lengths}"]
@@ -502,7 +502,7 @@ class _Block:
             if np.isfinite(sizes).any():
                 usual = max(usual, float(np.nanmedian(sizes)))
         lever = 1.0 if self.facts.linear else self.longest
-        return ROUND_OFF * max(inertial, usual) * lever
+        return SHOWN_AS_ZERO * max(inertial, usual) * lever
 
     def _write_power(self) -> list[str]:
         """Write power and energy of the drive, and what a motor must have."""
@@ -712,7 +712,7 @@ class _Block:
         """
         sizes = [abs(value) for value in values if value]
         largest = max(sizes, default=0.0)
-        alike = min(sizes, default=0.0) >= ALIKE * largest
+        alike = min(sizes, default=0.0) >= OF_ONE_PREFIX * largest
         return [
             self._value(value, unit, largest if alike or not value else None)
             for value in values
@@ -833,7 +833,7 @@ class _Block:
             f"{digits} digits left of {drive.symbol} at"
             f" {self._place(float(place[worst]))}"
         )
-        commanded = LOST[solution.at.bar]
+        commanded = BARS_IN_LINE[solution.at.bar]
         sines = {commanded: solution.condition[worst]}
         if solution.drive is not None:
             lever = solution.drive_condition[worst]
@@ -842,7 +842,7 @@ class _Block:
                 f"{start}: of its lever {lever:.2g}, of the sine of bars {commanded}"
                 f" {sine:.2g} is left"
             ]
-        sines[LOST[solution.drive_bar]] = solution.drive_condition[worst]
+        sines[BARS_IN_LINE[solution.drive_bar]] = solution.drive_condition[worst]
         bars = min(sines, key=lambda pair: sines[pair])
         gap = math.asin(min(sines[bars], 1.0))
         apart = write_short(gap, "rad", self.units, digits=2)
@@ -850,14 +850,14 @@ class _Block:
 
     @staticmethod
     def _row(label: str, text: str) -> str:
-        return f"  {label:<{LABEL - 2}}{text}"
+        return f"  {label:<{INDENT - 2}}{text}"
 
 
 def _align(rows: list[tuple[str, list[str]]]) -> list[str]:
     """Write rows of a label and cells that stand below each other."""
-    width = max(COLUMN, 2 + max(len(cell) for _, cells in rows for cell in cells))
+    width = max(LEAST_COLUMN, 2 + max(len(cell) for _, cells in rows for cell in cells))
     return [
-        f"{label:<{LABEL}}{''.join(f'{cell:<{width}}' for cell in cells)}".rstrip()
+        f"{label:<{INDENT}}{''.join(f'{cell:<{width}}' for cell in cells)}".rstrip()
         for label, cells in rows
     ]
 

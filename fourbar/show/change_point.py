@@ -7,21 +7,21 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.evaluation.free_motion import release_at
-from fourbar.quantities import CHANGE_POINT, PIN_FORCES
+from fourbar.quantities import CHANGE_POINT, PIN_FORCES, Array
 from fourbar.scene import Command, Scene, command_at
-from fourbar.solution import Array, Solution
+from fourbar.solution import Solution
 from fourbar.solving import solve
 
-STEP = 2e-4
+ANGLE_STEP = 2e-4
 """rad, of the commanded bar. Forces are read at multiples of it on both sides. A
 parabola through three of them meets a limit within the third power, and rounding, which
-grows beside a change point as 1/STEP, is 1e-11 of them.
+grows beside a change point as 1/ANGLE_STEP, is 1e-11 of them.
 """
-NEAR, _FAR = (1.0, 2.0, 3.0), (2.0, 4.0, 6.0)
+PARABOLA_STEPS, _FAR = (1.0, 2.0, 3.0), (2.0, 4.0, 6.0)
 """Multiples of the step at which each of two parabolas meets the forces of a side."""
-SAME = 1e-6
+SAME_LIMIT = 1e-6
 """Part of the forces within which four extrapolations are one limit: as is shown."""
-ZERO = 1e-9
+ZERO_LIMIT = 1e-9
 """Part of the forces below which a limit is zero."""
 
 
@@ -46,7 +46,9 @@ def find_limits(scene: Scene, solution: Solution) -> Solution | None:
     """
     if solution.F12 is None or solution.status_code[0] != CHANGE_POINT:
         return None
-    multiples = np.array([[sign * m for m in (*NEAR, *_FAR)] for sign in (-1.0, 1.0)])
+    multiples = np.array(
+        [[sign * m for m in (*PARABOLA_STEPS, *_FAR)] for sign in (-1.0, 1.0)]
+    )
     places = _list_places(scene, solution, np.sort(multiples.ravel()))
     beside = solve(scene, "force", at=places)
     order = np.argsort(np.argsort(multiples.ravel(), kind="stable"))
@@ -56,7 +58,7 @@ def find_limits(scene: Scene, solution: Solution) -> Solution | None:
     }
     size = max(np.abs(values[:, 1, -1]).max() for values in forces.values())
     limits: dict[str, Any] = {
-        name: _extrapolate(values, size)[None] for name, values in forces.items()
+        name: _extrapolate_force(values, size)[None] for name, values in forces.items()
     }
     return replace(solution, **limits)
 
@@ -69,7 +71,7 @@ def _list_places(scene: Scene, solution: Solution, multiples: Array) -> Command:
     at, motion = solution.at, scene.motion
     here = float(at.places[0])
     if motion.law is None and motion.free is None:
-        step = STEP if at.stroke is None else _find_step_of_stroke(scene, here)
+        step = ANGLE_STEP if at.stroke is None else _find_step_of_stroke(scene, here)
         try:
             return command_at(scene, here + step * multiples)
         except InputError as error:
@@ -79,7 +81,7 @@ def _list_places(scene: Scene, solution: Solution, multiples: Array) -> Command:
     if speed == 0.0:
         raise NoSideError(f"{moving} stands still there")
     assert at.time is not None
-    times = float(np.ravel(at.time)[0]) + STEP / speed * multiples
+    times = float(np.ravel(at.time)[0]) + ANGLE_STEP / speed * multiples
     one_side = NoSideError(f"{moving} begins or ends there, and has one side alone")
     if motion.free is not None:
         if times[0] < 0.0:
@@ -95,17 +97,17 @@ def _list_places(scene: Scene, solution: Solution, multiples: Array) -> Command:
 
 
 def _find_step_of_stroke(scene: Scene, stroke: float) -> float:
-    """Return the change of the stroke that turns its bar by `STEP`, m."""
+    """Return the change of the stroke that turns its bar by `ANGLE_STEP`, m."""
     low, high = stroke * (1.0 - _HALF), stroke * (1.0 + _HALF)
     try:
         angles = command_at(scene, np.array([low, high])).angle
     except InputError as error:
         raise NoSideError("the cylinder is at an end of its range") from error
     turned = abs(float(angles[1] - angles[0]))
-    return STEP * (high - low) / turned
+    return ANGLE_STEP * (high - low) / turned
 
 
-def _extrapolate(values: Array, size: float) -> Array:
+def _extrapolate_force(values: Array, size: float) -> Array:
     """Extrapolate a force to the change point, (2,); NaN where it has no limit.
 
     Parameters
@@ -116,7 +118,7 @@ def _extrapolate(values: Array, size: float) -> Array:
     first, second, third = np.moveaxis(values, 2, 0)
     met = 3.0 * first - 3.0 * second + third
     apart = np.ptp(met, axis=(0, 1)).max()
-    if not apart <= SAME * size:
+    if not apart <= SAME_LIMIT * size:
         return np.full(2, np.nan)
     limit = met[:, 0].mean(axis=0)
-    return np.where(np.abs(limit) <= ZERO * size, 0.0, limit)
+    return np.where(np.abs(limit) <= ZERO_LIMIT * size, 0.0, limit)

@@ -13,22 +13,21 @@ from typing import NamedTuple
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.quantities import DERIVED_NAMES, STAGE_OF
+from fourbar.quantities import DERIVED_NAMES, STAGE_OF, Array
 from fourbar.scene import Command, Scene, command_at, with_signs
 from fourbar.show.derived import derive
 from fourbar.solution import (
-    Array,
     Conversion,
     Solution,
     compute_times,
-    find_unit,
     find_unit_in,
+    find_unit_of_quantity,
     find_values,
     is_scalar,
 )
 from fourbar.solving import solve
 
-AXES = {"_x": 0, "_y": 1}
+COLUMN_AXES = {"_x": 0, "_y": 1}
 _ALONG = "F_"
 """Begins the name of a force along the path of a point."""
 
@@ -64,7 +63,7 @@ class Column(NamedTuple):
         return self.values * (above / below)
 
 
-def read_columns(scene: Scene, solution: Solution, names: str) -> list[Column]:
+def choose_columns(scene: Scene, solution: Solution, names: str) -> list[Column]:
     """Read the columns of a list like "theta_2,torque,F12,omega_4/omega_2".
 
     Raises InputError for a name that no quantity has, and for one that was not
@@ -73,14 +72,16 @@ def read_columns(scene: Scene, solution: Solution, names: str) -> list[Column]:
     columns: list[Column] = []
     for name in (word.strip() for word in names.split(",")):
         if _is_place(solution, name):
-            columns += [read_column(scene, solution, f"{name}{axis}") for axis in AXES]
+            columns += [
+                read_column(scene, solution, f"{name}{axis}") for axis in COLUMN_AXES
+            ]
         else:
             columns.append(read_column(scene, solution, name))
     return columns
 
 
 def read_column(scene: Scene, solution: Solution, name: str) -> Column:
-    """Read one column by its name; InputError as of `read_columns`."""
+    """Read one column by its name; InputError as of `choose_columns`."""
     if name in DERIVED_NAMES or "/" not in name:
         return Column(name, *_find_number(solution, name))
     above, _, below = (part.strip() for part in name.partition("/"))
@@ -113,10 +114,10 @@ def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
         return "s", values
     stem = name
     axis = None
-    if name[-2:] in AXES:
+    if name[-2:] in COLUMN_AXES:
         stem = name[:-2]
-        axis = AXES[name[-2:]]
-    quantities = _list_quantities(solution)
+        axis = COLUMN_AXES[name[-2:]]
+    quantities = _list_column_quantities(solution)
     if stem not in quantities or (axis is not None and is_scalar(stem)):
         close = get_close_matches(name, ["time", *quantities], 1)
         if close:
@@ -139,15 +140,15 @@ def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
             "--columns", name, "was not evaluated: the scene states no speed"
         )
     if axis is not None:
-        return find_unit(stem), values[..., axis]
+        return find_unit_of_quantity(stem), values[..., axis]
     if is_scalar(stem):
-        return find_unit(stem), values
+        return find_unit_of_quantity(stem), values
     if _is_place(solution, stem):
         raise InputError("--columns", name, f"is a place: {name}_x or {name}_y")
-    return find_unit(stem), np.hypot(values[..., 0], values[..., 1])
+    return find_unit_of_quantity(stem), np.hypot(values[..., 0], values[..., 1])
 
 
-def _list_quantities(solution: Solution) -> list[str]:
+def _list_column_quantities(solution: Solution) -> list[str]:
     """List the quantities that a scene has, those of its points among them.
 
     Derived ones of another drive are left out.
@@ -161,13 +162,13 @@ def _list_quantities(solution: Solution) -> list[str]:
 
 def _is_place(solution: Solution, name: str) -> bool:
     """Return True for a point or an instant centre."""
-    known = name in _list_quantities(solution)
-    return known and not is_scalar(name) and find_unit(name) == "m"
+    known = name in _list_column_quantities(solution)
+    return known and not is_scalar(name) and find_unit_of_quantity(name) == "m"
 
 
 def _is_velocity(name: str) -> bool:
     """Return True for a quantity that grows with the speed of the command."""
-    stem = name[:-2] if name[-2:] in AXES else name
+    stem = name[:-2] if name[-2:] in COLUMN_AXES else name
     return stem.startswith("v_") or STAGE_OF.get(stem) == "velocity"
 
 

@@ -1,7 +1,8 @@
 """Quantities that follow from those of a solution.
 
-These are shaking, ratios of speeds, instant centres. `fourbar.quantities.DERIVED`
-declares them; tables, CSV, plots and the workbench show them.
+These are shaking, ratios of speeds, instant centres. They are
+declared in `fourbar.quantities.DERIVED_QUANTITIES`; tables, CSV, plots and the
+workbench show them.
 """
 
 from collections.abc import Callable
@@ -10,15 +11,9 @@ import numpy as np
 
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.quantities import DERIVED_NAMES
-from fourbar.show.duty import read_drive, shaking_force, shaking_moment
-from fourbar.solution import (
-    Array,
-    Conversion,
-    Solution,
-    find_unit_in,
-    shift_to_drawing,
-)
+from fourbar.quantities import DERIVED_NAMES, Array
+from fourbar.show.duty import read_drive_demand, shaking_force, shaking_moment
+from fourbar.solution import Conversion, Solution, find_unit_in, shift_to_drawing
 from fourbar.studies.points import instant_centres
 
 
@@ -28,7 +23,10 @@ def derive(solution: Solution, name: str) -> Array | None:
     It is None if its stage was not evaluated. NaN marks a position where it has no
     value: a ratio at a dead centre of bar 2, a centre at infinity.
     """
-    if DERIVED_NAMES[name].stage == "force" and read_drive(solution).values is None:
+    if (
+        DERIVED_NAMES[name].stage == "force"
+        and read_drive_demand(solution).values is None
+    ):
         return None
     with np.errstate(all="ignore"):
         values = _COMPUTE[name](solution)

@@ -10,13 +10,13 @@ import numpy as np
 
 from fourbar.effects.effect import Actions, list_bodies
 from fourbar.errors import DependencyError, InputError, expect, say_install
-from fourbar.evaluation.case import compute_state
+from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.path import count_turns
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PIN_FORCE
-from fourbar.quantities import COUPLE, LINE, UNITS, DriveNames
+from fourbar.quantities import COUPLE, LINE, UNITS, Array, DriveNames
 from fourbar.scene import Command, Scene, with_signs
-from fourbar.solution import Array, Solution
+from fourbar.solution import Solution
 
 _SAME_RATE = 1e-9
 """Difference of two rates of a spline that is round-off, over its largest value. The
@@ -92,9 +92,9 @@ def shaking_force(solution: Solution) -> Array:
     It is F21 + F41 = -(F12 + F14). A linear drive with an end on the ground adds its
     own; a spring pulls there besides.
     """
-    return -(_require(solution, "F12") + _require(solution, "F14")) + _find_push(
-        solution
-    )
+    return -(
+        _require_quantity(solution, "F12") + _require_quantity(solution, "F14")
+    ) + _find_push(solution)
 
 
 def shaking_moment(solution: Solution) -> Array:
@@ -112,12 +112,12 @@ def shaking_moment(solution: Solution) -> Array:
             distance * (np.cos(angle) * force[..., 1] - np.sin(angle) * force[..., 0])
         )
 
-    F14 = _require(solution, "F14")
+    F14 = _require_quantity(solution, "F14")
     drive = solution.drive
     assert solution.ground is not None
     length, angle = solution.ground
     if drive is None:
-        of_drive = -_require(solution, "torque")
+        of_drive = -_require_quantity(solution, "torque")
     else:
         of_drive = np.zeros(())
     for point in (
@@ -135,8 +135,8 @@ def _find_push(solution: Solution) -> Array:
         return np.zeros((*solution.theta_2.shape, 2))
     return np.asarray(
         sense
-        * _require(solution, "drive_force")[..., None]
-        * _require(solution, "drive_line")
+        * _require_quantity(solution, "drive_force")[..., None]
+        * _require_quantity(solution, "drive_line")
     )
 
 
@@ -147,13 +147,15 @@ def bearing_load(solution: Solution, pin: str) -> BearingLoad:
     """
     if not isinstance(pin, str) or pin not in PIN_FORCE:
         raise InputError("pin", pin, "must be one of " + ", ".join(PIN_FORCE))
-    force = _require(solution, PIN_FORCE[pin])
+    force = _require_quantity(solution, PIN_FORCE[pin])
     load = np.hypot(force[..., 0], force[..., 1])
     load = np.where(np.isfinite(load), load, np.nan)
     worst = np.argmax(np.nan_to_num(load, nan=-1.0), axis=-1)[..., None]
     theta_2 = np.where(np.isfinite(load), solution.theta_2, np.nan)
     place = np.take_along_axis(theta_2, worst, axis=-1)[..., 0]
-    return BearingLoad(_find_peak(load), _find_rms(solution, load), _make_plain(place))
+    return BearingLoad(
+        _find_peak_value(load), _find_rms(solution, load), _reduce_to_number(place)
+    )
 
 
 def motor_duty(solution: Solution) -> MotorDuty | None:
@@ -174,20 +176,20 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
         study of one.
     """
     expect("solution", solution, Solution)
-    drive = read_drive(solution)
+    drive = read_drive_demand(solution)
     if drive.values is None or not np.isfinite(drive.values).any():
         return None
-    power = _require(solution, "power")
+    power = _require_quantity(solution, "power")
     closed = is_once_round(solution)
     linear = solution.drive is not None
-    peak = _find_peak(_require(solution, drive.keys.value))
+    peak = _find_peak_value(_require_quantity(solution, drive.keys.value))
     rms = _find_rms(solution, drive.values)
     energy_in, energy_out = _integrate_power(solution, power)
     return MotorDuty(
         peak_torque=None if linear else peak,
         rms_torque=None if linear else rms,
-        peak_speed=_find_peak(_require(solution, drive.speed_key)),
-        peak_power=_find_peak(power),
+        peak_speed=_find_peak_value(_require_quantity(solution, drive.speed_key)),
+        peak_power=_find_peak_value(power),
         rms_power=_find_rms(solution, power),
         energy_in=energy_in,
         energy_out=energy_out,
@@ -228,7 +230,7 @@ def _repeats(rate: Array) -> Any:
     return gap <= _SAME_RATE * np.max(np.abs(rate), axis=-1)
 
 
-def _require(solution: Solution, name: str) -> Array:
+def _require_quantity(solution: Solution, name: str) -> Array:
     expect("solution", solution, Solution)
     values: Array | None = getattr(solution, name)
     if values is None:
@@ -266,12 +268,13 @@ def _integrate_power(
     if not moves.any():
         return None, None
     energy_in, energy_out = (
-        _make_plain(np.where(moves, np.nansum(part, axis=-1), np.nan)) for part in parts
+        _reduce_to_number(np.where(moves, np.nansum(part, axis=-1), np.nan))
+        for part in parts
     )
     return energy_in, energy_out
 
 
-def _find_peak(values: Array) -> Any:
+def _find_peak_value(values: Array) -> Any:
     return _reduce(np.nanmax, np.abs(values))
 
 
@@ -282,17 +285,17 @@ def _find_rms(solution: Solution, values: Array) -> Any:
     """
     repeated = np.arange(values.shape[-1]) == values.shape[-1] - 1
     once = np.where(is_once_round(solution)[..., None] & repeated, np.nan, values)
-    return _make_plain(np.sqrt(_reduce(np.nanmean, np.square(once))))
+    return _reduce_to_number(np.sqrt(_reduce(np.nanmean, np.square(once))))
 
 
 def _reduce(reduce: Any, values: Array) -> Any:
     """Reduce over the positions that have a value; NaN where none has."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of a member without any
-        return _make_plain(reduce(values, axis=-1))
+        return _reduce_to_number(reduce(values, axis=-1))
 
 
-def _make_plain(value: Any) -> Any:
+def _reduce_to_number(value: Any) -> Any:
     """Return a number, or of a study an array (m,)."""
     if np.ndim(value) == 0:
         return float(value)
@@ -314,7 +317,7 @@ class Driving(NamedTuple):
     """Name of the speed of the driven bar, or of the stroke."""
 
 
-def read_drive(solution: Solution) -> Driving:
+def read_drive_demand(solution: Solution) -> Driving:
     """Return torque or force of the drive, with its error bar."""
     names = COUPLE
     symbol = f"T{solution.drive_bar}"
@@ -371,7 +374,7 @@ def compute_energies(scene: Scene, motion: Solution) -> _Energies:
     assert motion.time is not None and motion.omega_2 is not None
     scene = scene.settled()
     of_input = Command(motion.theta_2, motion.branch, motion.omega_2, 0.0)
-    state = compute_state(scene, with_signs(scene.linkage, of_input))
+    state = compute_shown_state(scene, with_signs(scene.linkage, of_input))
     groups = {
         "loads": scene.loads,
         **{effect.key: (effect,) for effect in scene.effects},

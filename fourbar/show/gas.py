@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects import Spring, Springs
-from fourbar.evaluation.case import compute_state
+from fourbar.evaluation.case import compute_shown_state
+from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command_at
 from fourbar.show.units import write_short
-from fourbar.solution import Array, Conversion, Solution
+from fourbar.solution import Conversion, Solution
 from fourbar.studies.equilibrium import bisect
 
-AT_END = 1e-6
+AT_END_OF_STROKE = 1e-6
 """Part of a gas spring's length within which it is at its end. A scene that states the
 end as a place has fewer digits than that.
 """
@@ -29,7 +30,7 @@ def list_gas_notes(scene: Scene, solution: Solution, units: Conversion) -> list[
     for number, spring in enumerate(_list_springs(scene), 1):
         if spring.stroke is None:
             continue
-        distance = _measure(scene, spring, solution.at)
+        distance = _measure_end_distance(scene, spring, solution.at)
         distance = np.where(solution.assembled, distance, np.nan)
         for sign, end, word in (
             (1.0, spring.length, "longer than its extended length of"),
@@ -39,7 +40,7 @@ def list_gas_notes(scene: Scene, solution: Solution, units: Conversion) -> list[
                 "shorter than its compressed length of",
             ),
         ):
-            room = AT_END * spring.length
+            room = AT_END_OF_STROKE * spring.length
             with np.errstate(invalid="ignore"):
                 beyond = sign * (distance - end) > room
             stretches = _list_stretches(scene, solution, spring, end, beyond)
@@ -64,9 +65,9 @@ def _list_springs(scene: Scene) -> tuple[Spring, ...]:
     return ()
 
 
-def _measure(scene: Scene, spring: Spring, at: Command) -> Array:
+def _measure_end_distance(scene: Scene, spring: Spring, at: Command) -> Array:
     """Measure how far the ends of a spring are apart at each position, m."""
-    state = compute_state(scene, at)
+    state = compute_shown_state(scene, at)
     across = spring.end.locate(state) - spring.start.locate(state)
     return np.broadcast_to(np.abs(across), at.places.shape)
 
@@ -115,10 +116,14 @@ def _locate_crossings(
     rows = rows[assembled]
     low = at.places[rows]
     high = at.places[rows + 1]
-    before = _measure(scene, spring, _command_between(scene, at, low)) > end
+    before = (
+        _measure_end_distance(scene, spring, _command_between(scene, at, low)) > end
+    )
 
     def is_as_before(middle: Array) -> NDArray[np.bool_]:
-        distance = _measure(scene, spring, _command_between(scene, at, middle))
+        distance = _measure_end_distance(
+            scene, spring, _command_between(scene, at, middle)
+        )
         return np.equal(distance > end, before)
 
     low, high = bisect(is_as_before, low, high)

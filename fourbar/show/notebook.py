@@ -10,12 +10,12 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.duty import describe_drive
 from fourbar.show.plot import draw_figure
-from fourbar.show.tables import list_columns, write_value
+from fourbar.show.tables import list_columns, write_with_unit
 from fourbar.show.units import units as read_units
 from fourbar.solution import DEGREES, SI, Conversion, Solution
 from fourbar.writing import describe_extent
 
-SHOWN = 5
+POSITIONS_AT_EITHER_END = 5
 """Positions shown at either end of a long sweep."""
 
 
@@ -56,14 +56,14 @@ def _list_facts(scene: Scene, units: Conversion) -> list[tuple[str, str]]:
         facts.append(
             (
                 name,
-                write_value(length, "m", units)
-                + (f", {write_value(mass, 'kg', units)}" if mass else ""),
+                write_with_unit(length, "m", units)
+                + (f", {write_with_unit(mass, 'kg', units)}" if mass else ""),
             )
         )
     speed = "positions only"
     if motion.speed is not None:
-        omega = write_value(motion.speed, "rad/s", units)
-        alpha = write_value(motion.acceleration, "rad/s^2", units)
+        omega = write_with_unit(motion.speed, "rad/s", units)
+        alpha = write_with_unit(motion.acceleration, "rad/s^2", units)
         speed = f"ω{motion.bar} = {omega}, α{motion.bar} = {alpha}"
     acting = [f"load on bar {load.bar}" for load in scene.loads] + [
         effect.key for effect in scene.effects
@@ -85,17 +85,23 @@ def show_solution(solution: Solution, units: Conversion = DEGREES) -> str:
         )
     cells = list_columns(solution, units)
     count = len(solution)
-    if count <= 2 * SHOWN:
+    if count <= 2 * POSITIONS_AT_EITHER_END:
         places = list(range(count))
     else:
-        places = [*range(SHOWN), *range(count - SHOWN, count)]
+        places = [
+            *range(POSITIONS_AT_EITHER_END),
+            *range(count - POSITIONS_AT_EITHER_END, count),
+        ]
     head = "".join(
         f"<th>{escape(name.strip()).replace(chr(10), '<br>')}</th>" for name in cells
     )
     lines = []
     for place in places:
-        if count > 2 * SHOWN and place == count - SHOWN:
-            more = f"… {count - 2 * SHOWN} more …"
+        if (
+            count > 2 * POSITIONS_AT_EITHER_END
+            and place == count - POSITIONS_AT_EITHER_END
+        ):
+            more = f"… {count - 2 * POSITIONS_AT_EITHER_END} more …"
             lines.append(
                 f'<tr><td colspan="{len(cells)}"'
                 f' style="text-align:center">{more}</td></tr>'

@@ -8,15 +8,15 @@ from collections.abc import Iterable
 import numpy as np
 
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
-from fourbar.quantities import DERIVED_NAMES
+from fourbar.quantities import DERIVED_NAMES, Array
 from fourbar.scene import Scene
 from fourbar.show.change_point import NoSideError, find_limits
 from fourbar.show.columns import read_column
 from fourbar.show.derived import derive
 from fourbar.show.units import POSITION_DIGITS, choose_unit, drop_rounding, write_cell
-from fourbar.solution import Array, Conversion, Solution, find_values
+from fourbar.solution import Conversion, Solution, find_values
 
-LABEL, _CELL = 15, 15
+LABEL_WIDTH, _CELL = 15, 15
 """Width of a label and of a cell: four of them and a unit are 80 columns."""
 _NUMBER_LABEL = 22
 """Width of the label of a number that stands alone."""
@@ -69,7 +69,7 @@ class PositionSheet:
                 form = ".4f"
             else:
                 form = f".{POSITION_DIGITS}g"
-            columns[f"{letter}, {name}"] = _write_numbers(factor * numbers, form)
+            columns[f"{letter}, {name}"] = _write_cells_of(factor * numbers, form)
         rows = [_write_row("", columns)]
         for index, bar in enumerate(MOVING_BARS):
             cells = (cells[index] for cells in columns.values())
@@ -129,7 +129,7 @@ class PositionSheet:
             arm = max(self.scene.linkage.lengths)
             moment = drop_rounding(moment, largest * arm)
             factor, name = choose_unit(abs(float(moment[0])), "N m", self.units)
-            cells = [*_write_numbers(factor * moment), "", "", f"{name} about O2"]
+            cells = [*_write_cells_of(factor * moment), "", "", f"{name} about O2"]
             rows.append(_write_row("shaking moment", cells))
         if self.has_limits:
             rows.append(_say_limits([*forces.values()]))
@@ -239,7 +239,7 @@ class PositionSheet:
             size = [float(np.hypot(*numbers))]
         else:
             size = []
-        cells = _write_numbers(factor * np.array([*numbers, *size]))
+        cells = _write_cells_of(factor * np.array([*numbers, *size]))
         return _write_row(label, [*cells, *([] if sized else [""]), name])
 
     def _write_number(
@@ -252,7 +252,7 @@ class PositionSheet:
         if unit != "1":
             factor, name = choose_unit(abs(float(values[0])), unit, self.units)
             name = f" {name}"
-        (text,) = _write_numbers(factor * values)
+        (text,) = _write_cells_of(factor * values)
         return f"{label:<{_NUMBER_LABEL}}{text}{name}{after}"
 
 
@@ -266,9 +266,10 @@ def _say_limits(forces: list[Array]) -> str:
     return "on the change point: the limits from both sides; - has none"
 
 
-def _write_numbers(numbers: Array, form: str = f".{POSITION_DIGITS}g") -> list[str]:
+def _write_cells_of(numbers: Array, form: str = f".{POSITION_DIGITS}g") -> list[str]:
     return [write_cell(number, form) for number in numbers.tolist()]
 
 
 def _write_row(label: str, cells: Iterable[str]) -> str:
-    return f"{label:<{LABEL}}{''.join(f'{cell:<{_CELL}}' for cell in cells)}".rstrip()
+    row = "".join(f"{cell:<{_CELL}}" for cell in cells)
+    return f"{label:<{LABEL_WIDTH}}{row}".rstrip()

@@ -26,17 +26,17 @@ from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar
 from fourbar.quantities import COUPLE, LINE, NOT_ASSEMBLED, PIN_FORCES, SINGULAR
 from fourbar.scene import Command, with_signs
 from fourbar.scene.motion import BRANCH_NAMES
-from fourbar.show.duty import read_drive
+from fourbar.show.duty import read_drive_demand
 from fourbar.show.gas import list_gas_notes
 from fourbar.show.tables import (
-    MOST_ROWS,
+    MOST_ROWS_PRINTED,
     make_plain_table,
     wrap_line,
     write_cells,
     write_table,
 )
 from fourbar.show.units import COMMON, choose_unit
-from fourbar.solution import Conversion, find_unit, find_unit_in
+from fourbar.solution import Conversion, find_unit_in, find_unit_of_quantity
 from fourbar.studies.circuit_curve import RestPosition
 from fourbar.studies.derivatives import Sensitivity
 from fourbar.studies.equilibrium import Equilibria, Equilibrium
@@ -275,7 +275,9 @@ def write_sensitivity(derivatives: Sensitivity) -> str:
     for key in rank_numbers(derivatives, names):
         rows.append([key, *(f"{changes[name].get(key, 0.0):.3g}" for name in names)])
     table = make_plain_table(
-        ["", *(f"{name}\n{find_unit(name)}" for name in names)], rows, left=("",)
+        ["", *(f"{name}\n{find_unit_of_quantity(name)}" for name in names)],
+        rows,
+        left=("",),
     )
     return write_table(derivatives.solution.title, lines, table)
 
@@ -456,7 +458,7 @@ def _list_notes(rest: Equilibria, units: Conversion) -> list[str]:
 def _write_holding(rest: Equilibria, units: Conversion) -> tuple[list[str], Any]:
     """Write what holds the scene's positions, thinned out to what can be read."""
     positions = rest.positions
-    drive = read_drive(positions)
+    drive = read_drive_demand(positions)
     values = drive.values
     low = getattr(positions, drive.keys.low)
     high = getattr(positions, drive.keys.high)
@@ -473,7 +475,7 @@ def _write_holding(rest: Equilibria, units: Conversion) -> tuple[list[str], Any]
         for status, no, move in zip(positions.status, still, rest.moves, strict=True)
     ]
     rows = list(zip(*map(write_cells, columns), released, strict=True))[
-        :: -(-len(positions) // MOST_ROWS)
+        :: -(-len(positions) // MOST_ROWS_PRINTED)
     ]
     if positions.drive is not None:
         on = ""
@@ -533,7 +535,7 @@ def _write_degrees(angle: float) -> str:
 
 def write_equilibria_json(title: str, rest: Equilibria) -> str:
     """Write one object, SI and rad."""
-    positions, keys = rest.positions, read_drive(rest.positions).keys
+    positions, keys = rest.positions, read_drive_demand(rest.positions).keys
     return write_object(
         _EQUILIBRIUM_SCHEMA,
         title=title,

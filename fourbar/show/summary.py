@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fourbar.formulas.mobility import TURN, find_intervals
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
-from fourbar.quantities import COUPLE, LINE, OK, PIN_FORCES, STATUS_NAMES
+from fourbar.quantities import COUPLE, LINE, OK, PIN_FORCES, STATUS_NAMES, Array
 from fourbar.scene import Scene, command_at
 from fourbar.scene.motion import Motion
 from fourbar.show.duty import (
@@ -26,16 +26,16 @@ from fourbar.show.duty import (
     bearing_load,
     is_once_round,
     motor_duty,
-    read_drive,
+    read_drive_demand,
 )
-from fourbar.show.units import ROUND_OFF
-from fourbar.solution import Array, Solution
+from fourbar.show.units import SHOWN_AS_ZERO
+from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar.studies.internal_forces import Bending, internal_forces
 
 CUTS = 40
 """Parts into which one call of `solve` cuts every interval that is looked at."""
-ROUNDS = 5
+LOCATING_ROUNDS = 5
 """Calls of `solve` to locate a reversal or a peak. From steps of 5 degrees a reversal
 is located to 5e-8 degrees, a peak to 1.6e-6 degrees.
 """
@@ -50,9 +50,9 @@ GROWING = 1e-3
 """Growth over the last two calls above which a quantity has a pole. It is a part of the
 value; less growth is that of a maximum.
 """
-AT_REST = 1e-12
+SLIP_AT_REST = 1e-12
 """Part of its largest slip below which a pin is at rest at a position."""
-FINE = 7200
+RANGE_POSITIONS = 7200
 """Positions at which ranges are looked for, by the position formula alone."""
 _INSET = 1e-9
 """Part of a range that is left out at its limit positions. These may not assemble as
@@ -66,11 +66,11 @@ _AS_WIDE = 1e-6
 """Difference below which ranges of angles are equally wide, rad. An end in its last
 digits leaves some 1e-8.
 """
-IN_LINE = 1e-6
+ZERO_TRANSMISSION_ANGLE = 1e-6
 """Transmission angle that counts as zero, rad. At a limit, a place in its last digits
 leaves some 1e-8.
 """
-Sizes = Callable[[Solution], dict[str, Array]]
+ComputeSizes = Callable[[Solution], dict[str, Array]]
 """List magnitudes at the positions of a solution, by name."""
 
 
@@ -132,7 +132,7 @@ def list_sizes(solution: Solution) -> dict[str, Array]:
 
     These are torque, power and speed of the drive, and pin forces.
     """
-    drive = read_drive(solution)
+    drive = read_drive_demand(solution)
     keys = {
         drive.keys.value: drive.keys.value,
         "power": "power",
@@ -143,12 +143,12 @@ def list_sizes(solution: Solution) -> dict[str, Array]:
     # what a balanced linkage leaves of a load is rounding, and has no peak
     largest = np.max([*forces.values()], axis=0)
     for size in forces.values():
-        size[size <= ROUND_OFF * largest] = 0.0
+        size[size <= SHOWN_AS_ZERO * largest] = 0.0
     lever = 1.0
     if solution.drive is None and solution.scene is not None:
         lever = max(solution.scene.linkage.lengths)
     with np.errstate(invalid="ignore"):
-        idle = works[drive.keys.value] <= ROUND_OFF * largest * lever
+        idle = works[drive.keys.value] <= SHOWN_AS_ZERO * largest * lever
     for name in (drive.keys.value, "power"):
         works[name] = np.where(idle, 0.0, works[name])
     return {**works, **forces}
@@ -166,12 +166,12 @@ def locate_between(scene: Scene, solution: Solution) -> Between:
     if not _has_between(scene, solution):
         return Between(solution, solution, [], {COUPLE.value, LINE.value, *PIN_FORCES})
     pins, low, high = _find_reversing(scene, solution)
-    for _ in range(ROUNDS if pins else 0):
-        places = _cut(low, high)
+    for _ in range(LOCATING_ROUNDS if pins else 0):
+        places = _cut_range(low, high)
         inside = _solve_at(scene, places.ravel(), "velocity")
         slips = np.array(
             [
-                _compute_slip(inside, pin).reshape(places.shape)[row]
+                _slip_of_pin(inside, pin).reshape(places.shape)[row]
                 for row, pin in enumerate(pins)
             ]
         )
@@ -184,7 +184,7 @@ def locate_between(scene: Scene, solution: Solution) -> Between:
         angles = low
     else:
         angles = scene.motion.law.at(low)[0]
-    peaks, growing = _find_largest(scene, merged, list_sizes)
+    peaks, growing = _find_peaks(scene, merged, list_sizes)
     reversals = sorted(zip(angles.tolist(), pins, strict=True))
     return Between(solution, _merge(scene, merged, peaks), reversals, growing)
 
@@ -204,7 +204,7 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, _BarBending]:
         forces = [np.hypot(*getattr(solution, name).T) for name in PIN_FORCES]
         size = longest * np.max(forces, axis=0)
         return {
-            str(bar): _drop_rounding(
+            str(bar): _drop_bending_round_off(
                 internal_forces(scene, solution, bar, np.zeros(1)).largest, size
             )
             for bar in MOVING_BARS
@@ -216,7 +216,7 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, _BarBending]:
     growing = {str(bar) for bar in MOVING_BARS}
     searched = [(solution, find(solution))]
     if _has_between(scene, solution):
-        places, growing = _find_largest(
+        places, growing = _find_peaks(
             scene, solution, list_moments, _BENDING_PEAKS, _BENDING_ROUNDS
         )
         if len(places):
@@ -250,7 +250,7 @@ def _list_stresses(
     return stresses
 
 
-def _drop_rounding(bending: Bending, size: Array) -> Bending:
+def _drop_bending_round_off(bending: Bending, size: Array) -> Bending:
     """Return bending moments with zero where they are rounding of the pin forces.
 
     A two-force bar has none.
@@ -274,7 +274,7 @@ def _solve_at(scene: Scene, places: Array, stage: str = "force") -> Solution:
     return solve(scene, stage, at=command_at(scene, places))
 
 
-def _cut(low: Array, high: Array) -> Array:
+def _cut_range(low: Array, high: Array) -> Array:
     return low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, CUTS + 1)
 
 
@@ -294,7 +294,7 @@ def _merge(
     return _solve_at(scene, merged[order], stage)
 
 
-def _compute_slip(solution: Solution, pin: str) -> Array:
+def _slip_of_pin(solution: Solution, pin: str) -> Array:
     """Compute omega_j - omega_i of the bars that meet at a pin."""
     first, second = (
         0.0 if bar == 1 else getattr(solution, f"omega_{bar}") for bar in PINS[pin]
@@ -310,8 +310,8 @@ def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array,
     places = solution.at.places
     steps = list[tuple[str, int, int]]()
     for pin in sorted({pin for effect in scene.effects for pin in effect.dry_pins}):
-        slip = np.nan_to_num(_compute_slip(solution, pin))
-        moving = np.flatnonzero(np.abs(slip) > AT_REST * np.abs(slip).max())
+        slip = np.nan_to_num(_slip_of_pin(solution, pin))
+        moving = np.flatnonzero(np.abs(slip) > SLIP_AT_REST * np.abs(slip).max())
         steps += [
             (pin, i, j)
             for i, j in pairwise(moving.tolist())
@@ -321,12 +321,12 @@ def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array,
     return [pin for pin, *_ in steps], places[first], places[last]
 
 
-def _find_largest(
+def _find_peaks(
     scene: Scene,
     solution: Solution,
-    sizes: Sizes,
+    sizes: ComputeSizes,
     most: int = _MOST_PEAKS,
-    rounds: int = ROUNDS,
+    rounds: int = LOCATING_ROUNDS,
 ) -> tuple[Array, set[str]]:
     """Find the places of the local maxima of each magnitude.
 
@@ -381,14 +381,14 @@ def _find_largest(
     peak_places = places[top]
     reached = [np.array([present[name][i] for name, i, *_ in peaks])]
     growing = np.zeros(0, dtype=bool)
-    for count in range(ROUNDS if len(peaks) else 0):
+    for count in range(LOCATING_ROUNDS if len(peaks) else 0):
         if count >= rounds and not growing.any():
             break
-        cut = _cut(low, high)
-        inside = sizes(_solve_at(scene, cut.ravel()))
+        cut_range = _cut_range(low, high)
+        inside = sizes(_solve_at(scene, cut_range.ravel()))
         values = np.array(
             [
-                np.nan_to_num(inside[n].reshape(cut.shape)[k], nan=-1.0)
+                np.nan_to_num(inside[n].reshape(cut_range.shape)[k], nan=-1.0)
                 for k, n in enumerate(names)
             ]
         )
@@ -397,7 +397,7 @@ def _find_largest(
             np.where(opens[:, None] & (values >= 0.0), inwards, values), axis=1
         )
         peak_places, low, high = (
-            cut[rows, np.clip(best + step, 0, CUTS)] for step in (0, -1, 1)
+            cut_range[rows, np.clip(best + step, 0, CUTS)] for step in (0, -1, 1)
         )
         reached.append(values[rows, best])
         if count + 1 >= rounds:
@@ -428,7 +428,7 @@ def _find_dead_points(scene: Scene, solution: Solution) -> list[int]:
         return []
     one = np.ones(len(solution))
     moving = solve(scene, "velocity", at=at._replace(speed=one, acceleration=0.0 * one))
-    speed = np.nan_to_num(getattr(moving, read_drive(moving).speed_key))
+    speed = np.nan_to_num(getattr(moving, read_drive_demand(moving).speed_key))
     steps: list[int] = np.flatnonzero(speed[:-1] * speed[1:] < 0.0).tolist()
     return steps
 
@@ -527,7 +527,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
     """
     between = locate_between(scene, solution)
     kind = _find_kind(scene, solution)
-    places = _list_places(solution)
+    places = _list_commanded(solution)
     codes = solution.status_code
     fine = solution
     stretches = list[tuple[float | None, float | None]]()
@@ -538,7 +538,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
 
     def find_range(values: Array) -> tuple[Peak, Peak]:
         low, high = (
-            _find_extreme(sign * values, _list_places(fine), sign, smooth)
+            _find_extreme(sign * values, _list_commanded(fine), sign, smooth)
             for sign in (-1, 1)
         )
         return low, high
@@ -550,11 +550,11 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
     if released or solution.F12 is None:
         drive = None
     else:
-        drive = read_drive(solution)
+        drive = read_drive_demand(solution)
     peak = None
     if drive is not None and np.isfinite(drive.values).any():  # type: ignore[arg-type]
         located = between.bounded(drive.keys.value)
-        peak = _find_peak(located, read_drive(located).values)
+        peak = _find_peak(located, read_drive_demand(located).values)
     return Facts(
         scene=scene,
         solution=solution,
@@ -566,7 +566,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
         angles={
             bar: find_range(_join_stretches(solution, fine, bar)) for bar in MOVING_BARS
         },
-        transmission=Peak(mu if mu > IN_LINE else 0.0, least.place),
+        transmission=Peak(mu if mu > ZERO_TRANSMISSION_ANGLE else 0.0, least.place),
         stretches=stretches,
         drive=drive if peak is not None else None,
         peak=peak,
@@ -581,7 +581,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
             None if solution.stroke is None else _find_stroke_limits(scene, solution)
         ),
         between=between,
-        error=_find_error(solution, drive),
+        error=_find_largest_error_bar(solution, drive),
     )
 
 
@@ -590,7 +590,7 @@ def _find_rates(solution: Solution, *, smooth: bool) -> dict[int, tuple[Peak, Pe
 
     They follow what is commanded.
     """
-    places, rates = _list_places(solution), dict[int, tuple[Peak, Peak]]()
+    places, rates = _list_commanded(solution), dict[int, tuple[Peak, Peak]]()
     if solution.omega_4 is None or len(solution) == 1:
         return rates
     moved = () if solution.time is not None else (solution.at.bar,)
@@ -626,7 +626,7 @@ def _find_kind(scene: Scene, solution: Solution) -> str:
     return "turn" if once_round else "sweep"
 
 
-def _list_places(solution: Solution) -> Array:
+def _list_commanded(solution: Solution) -> Array:
     """List the commanded angle or stroke at each position.
 
     It is the time for a motion over time.
@@ -660,7 +660,7 @@ def _find_extreme(values: Array, places: Array, sign: int, smooth: bool) -> Peak
     return Peak(sign * value, place)
 
 
-def _list_stretches(
+def _list_assembled_stretches(
     scene: Scene, fine: Solution
 ) -> list[tuple[float | None, float | None]]:
     """List where the linkage assembles within a sweep.
@@ -682,12 +682,14 @@ def _list_stretches(
         low = places[i]
         high = places[i + 1]
         for _ in range(_END_ROUNDS):
-            cut = np.linspace(low, high, CUTS + 1)
+            cut_range = np.linspace(low, high, CUTS + 1)
             first = int(
-                np.argmax(_solve_at(scene, cut, "position").assembled != closes[i])
+                np.argmax(
+                    _solve_at(scene, cut_range, "position").assembled != closes[i]
+                )
             )
-            low = cut[max(first - 1, 0)]
-            high = cut[first]
+            low = cut_range[max(first - 1, 0)]
+            high = cut_range[first]
         ends.append(float(low if closes[i] else high))
     ends += [None] if closes[-1] else []
     return list(zip(ends[::2], ends[1::2], strict=True))
@@ -700,8 +702,10 @@ def _solve_finely(
 
     The ends of its stretches are among them.
     """
-    fine = _solve_at(scene, np.linspace(places[0], places[-1], FINE + 1), "position")
-    stretches = _list_stretches(scene, fine)
+    fine = _solve_at(
+        scene, np.linspace(places[0], places[-1], RANGE_POSITIONS + 1), "position"
+    )
+    stretches = _list_assembled_stretches(scene, fine)
     ends = [end for stretch in stretches for end in stretch if end is not None]
     return _merge(scene, fine, np.array(ends), "position"), stretches
 
@@ -720,7 +724,7 @@ def _join_stretches(solution: Solution, fine: Solution, bar: int) -> Array:
     known = np.flatnonzero(np.isfinite(angles))
     own = getattr(solution, f"theta_{bar}")
     first = int(np.flatnonzero(np.isfinite(own))[0])
-    distances = _list_places(fine)[known] - _list_places(solution)[first]
+    distances = _list_commanded(fine)[known] - _list_commanded(solution)[first]
     nearest = known[np.argmin(np.abs(distances))]
     angles += TURN * np.round((own[first] - angles[nearest]) / TURN)
     low = math.inf
@@ -758,7 +762,7 @@ def find_duty(between: Between) -> MotorDuty | None:
     A peak without a bound is that of the positions.
     """
     duty = motor_duty(between.sweep)
-    drive = read_drive(between.sweep)
+    drive = read_drive_demand(between.sweep)
     if duty is None:
         return None
 
@@ -790,7 +794,7 @@ def _find_peak(solution: Solution, values: Array | None) -> Peak:
     """Find the value of largest magnitude, and its place."""
     assert values is not None
     worst = int(np.nanargmax(np.abs(values)))
-    return Peak(float(values[worst]), float(_list_places(solution)[worst]))
+    return Peak(float(values[worst]), float(_list_commanded(solution)[worst]))
 
 
 def _list_pin_loads(solution: Solution, between: Between) -> dict[str, _PinLoad]:
@@ -819,7 +823,9 @@ def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]
     )
     width = high - low
     low = here - ((here - low) % TURN if width < TURN else 0.5 * TURN)
-    angles = np.linspace(low + _INSET * width, low + (1.0 - _INSET) * width, FINE + 1)
+    angles = np.linspace(
+        low + _INSET * width, low + (1.0 - _INSET) * width, RANGE_POSITIONS + 1
+    )
     motion = Motion(
         **{f"theta_{positions.bar}": angles},  # type: ignore[arg-type]
         branch=int(positions.branch[first]),
@@ -829,14 +835,14 @@ def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]
     if positions.stroke is not None:  # its side ends where the stroke turns back
         place = int(np.argmin(np.abs(angles - here)))
         steps = np.sign(np.diff(stroke))
-        way = steps[min(place, FINE - 1)]
+        way = steps[min(place, RANGE_POSITIONS - 1)]
         turns = np.flatnonzero(steps != way)
         start = turns[turns < place].max(initial=-1) + 1
-        stroke = stroke[start : turns[turns >= place].min(initial=FINE) + 1]
+        stroke = stroke[start : turns[turns >= place].min(initial=RANGE_POSITIONS) + 1]
     return float(np.nanmin(stroke)), float(np.nanmax(stroke))
 
 
-def _find_error(solution: Solution, drive: Driving | None) -> float | None:
+def _find_largest_error_bar(solution: Solution, drive: Driving | None) -> float | None:
     """Find the largest error bar over its value.
 
     Where the value passes through zero, it is over the median.

@@ -13,19 +13,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fourbar.errors import clean_line
-from fourbar.quantities import ANGLES, DERIVED_NAMES, OK, PIN_FORCES, UNITS
+from fourbar.quantities import ANGLES, DERIVED_NAMES, OK, PIN_FORCES, UNITS, Array
 from fourbar.show.columns import Column
 from fourbar.show.derived import derive
-from fourbar.show.duty import read_drive
+from fourbar.show.duty import read_drive_demand
 from fourbar.show.units import drop_rounding, write_cell
 from fourbar.solution import (
     DEGREES,
-    Array,
     Conversion,
     Solution,
     compute_times,
-    find_unit,
     find_unit_in,
+    find_unit_of_quantity,
     has_size,
     shift_to_drawing,
 )
@@ -34,17 +33,17 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
-WIDTH = 80
+BLOCK_WIDTH = 80
 """Columns of a printed block."""
 MOST_DIGITS = 16
 """Largest number of significant digits of a double."""
 GAP = 2
 """Blanks between two columns of the table, the divider among them."""
-MOST_ROWS = 40
+MOST_ROWS_PRINTED = 40
 """Rows of the table on a terminal if --every does not state them. They can be read at a
 glance.
 """
-STEPS = (1, 2, 5, 10, 15, 20, 30, 45, 60, 90)
+ROW_STEPS = (1, 2, 5, 10, 15, 20, 30, 45, 60, 90)
 """Steps of the rows on a terminal. Of a longer sweep it is a multiple of the last."""
 
 
@@ -71,9 +70,9 @@ def write_table(
 
 def wrap_line(line: str) -> list[str]:
     """Break a line that is wider than a block; what follows is indented."""
-    if len(line) <= WIDTH:
+    if len(line) <= BLOCK_WIDTH:
         return [line]
-    return wrap(line, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
+    return wrap(line, BLOCK_WIDTH, subsequent_indent="    ", break_on_hyphens=False)
 
 
 def make_plain_table(
@@ -148,11 +147,11 @@ def print_positions(
 
 
 def _choose_step(count: int) -> int:
-    """Show every so many of the positions, so that no more than MOST_ROWS are."""
-    wanted = math.ceil((count - 1) / (MOST_ROWS - 1))
+    """Show every so many positions, so that no more than MOST_ROWS_PRINTED are."""
+    wanted = math.ceil((count - 1) / (MOST_ROWS_PRINTED - 1))
     return next(
-        (step for step in STEPS if step >= wanted),
-        STEPS[-1] * math.ceil(wanted / STEPS[-1]),
+        (step for step in ROW_STEPS if step >= wanted),
+        ROW_STEPS[-1] * math.ceil(wanted / ROW_STEPS[-1]),
     )
 
 
@@ -162,7 +161,7 @@ def _write_ordinal(number: int) -> str:
     return {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
 
 
-def write_value(number: float, unit: str, units: Conversion) -> str:
+def write_with_unit(number: float, unit: str, units: Conversion) -> str:
     """Write a number of an SI unit with six digits and the unit it is shown in."""
     name, factor = find_unit_in(unit, units)
     return f"{number * factor + 0.0:.6g} {name}"
@@ -188,7 +187,7 @@ def list_columns(
     if solution.time is not None:
         add("time", "s", solution.time)
     add("theta_2", "rad", solution.theta_2)
-    drive = read_drive(solution)
+    drive = read_drive_demand(solution)
     if drive.values is not None:
         if solution.time is None:  # released, it has no drive: its torque is rounding
             add(drive.symbol, drive.unit, drive.values)
@@ -199,13 +198,13 @@ def list_columns(
         add(name, unit, values)
     shown["sin mu\n"] = write_cells(solution.sin_mu)
     if solution.time is None and drive.values is not None and drive.error is not None:
-        shown[f"digits\nof {drive.symbol[0]}"] = _count_digits(
+        shown[f"digits\nof {drive.symbol[0]}"] = _count_torque_digits(
             drive.values, drive.error
         )
     if solution.time is None and (time := compute_times(solution)) is not None:
         add("time", "s", time)
     for name, quantity in DERIVED_NAMES.items():
-        for part, values in _list_parts(solution, name).items():
+        for part, values in _list_columns_of(solution, name).items():
             add(part, quantity.unit, values)
     return shown
 
@@ -221,7 +220,7 @@ def _list_motion(solution: Solution) -> Iterator[tuple[str, str, Array]]:
         yield f"{name}_y", "m", y
     for start, vectors in (("v_", solution.velocity), ("a_", solution.acceleration)):
         for name, vector in vectors.items():
-            unit = find_unit(start + name)
+            unit = find_unit_of_quantity(start + name)
             yield f"{start}{name}_x", unit, vector[:, 0]
             yield f"{start}{name}_y", unit, vector[:, 1]
     for name in ANGLES:
@@ -233,7 +232,7 @@ def _list_motion(solution: Solution) -> Iterator[tuple[str, str, Array]]:
             yield name, UNITS[name], getattr(solution, name)
 
 
-def _list_parts(solution: Solution, name: str) -> dict[str, Array]:
+def _list_columns_of(solution: Solution, name: str) -> dict[str, Array]:
     """List a derived quantity as columns: components, of a force the size first."""
     values = derive(solution, name)
     if values is None:
@@ -299,7 +298,7 @@ def write_cells(values: Array, form: str = ".6g") -> list[str]:
     return [write_cell(value, form) for value in drop_rounding(values, usual).tolist()]
 
 
-def _count_digits(torque: Array, error: Array) -> list[str]:
+def _count_torque_digits(torque: Array, error: Array) -> list[str]:
     """Count the digits of the torque that are not round-off."""
     with np.errstate(all="ignore"):
         digits = np.clip(np.floor(np.log10(np.abs(torque) / error)), 0, MOST_DIGITS)

@@ -12,11 +12,17 @@ from typing import Any
 import numpy as np
 
 from fourbar.errors import DependencyError, InputError
-from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNITS
+from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNITS, Array
 from fourbar.scene import Scene
 from fourbar.show.tables import make_plain_table, show_running, wrap_line, write_table
-from fourbar.solution import DEGREES, Array, Conversion, find_unit_in
-from fourbar.studies.spread import BAND, PARTED, Spread, Tolerances, tolerances
+from fourbar.solution import DEGREES, Conversion, find_unit_in
+from fourbar.studies.spread import (
+    BAND_PERCENTILES,
+    PARTED,
+    Spread,
+    Tolerances,
+    tolerances,
+)
 from fourbar.writing import write_object
 
 PAGE_SAMPLES = 2048
@@ -25,7 +31,7 @@ fiftieth of the deviation.
 """
 _MOST_RUNS = 5
 """Intervals of theta_2 that one line names."""
-SCHEMA = "fourbar-tolerance/1"
+TOLERANCE_SCHEMA = "fourbar-tolerance/1"
 
 
 def list_shown_parts(spreads: Tolerances) -> list[str]:
@@ -56,7 +62,7 @@ def find_part_unit(part: str) -> str:
     return unit
 
 
-def write_text(spreads: Tolerances, units: Conversion = DEGREES) -> str:
+def write_spreads(spreads: Tolerances, units: Conversion = DEGREES) -> str:
     """Write one row for each quantity.
 
     Above stands what was tried and what the variance of each is due to.
@@ -99,8 +105,8 @@ def write_text(spreads: Tolerances, units: Conversion = DEGREES) -> str:
         f"theta_2\n{angle_unit}",
         "\nnominal",
         "\nsigma",
-        f"\n{BAND[0]:g} %",
-        f"\n{BAND[1]:g} %",
+        f"\n{BAND_PERCENTILES[0]:g} %",
+        f"\n{BAND_PERCENTILES[1]:g} %",
     )
     table = make_plain_table(
         (*heads, "\nleast", "\ngreatest", "worst\n+-"), rows, left=("",), gap=0
@@ -122,13 +128,13 @@ def _describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[s
     lines = [f"{count}, {drawn}, {n} positions"]
     if spreads.invalid:
         lines.append(
-            f"{_write_share(spreads.invalid, spreads)} have an impossible dimension,"
-            " such as a length below 0"
+            f"{_write_share_of_members(spreads.invalid, spreads)} have an impossible"
+            " dimension, such as a length below 0"
         )
     if spreads.apart:
         lines.append(
-            f"{_write_share(spreads.apart, spreads)} do not assemble at some position"
-            " at which the nominal linkage does"
+            f"{_write_share_of_members(spreads.apart, spreads)} do not assemble at some"
+            " position at which the nominal linkage does"
         )
     lines += [
         line
@@ -138,7 +144,7 @@ def _describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[s
     return lines
 
 
-def _write_share(count: int, spreads: Tolerances) -> str:
+def _write_share_of_members(count: int, spreads: Tolerances) -> str:
     return (
         f"{count} of {spreads.samples} samples"
         f" ({100.0 * count / spreads.samples:.3g} %)"
@@ -238,7 +244,7 @@ def collect_tolerances(
     }
 
 
-def write_json(spreads: Tolerances) -> str:
+def write_spreads_json(spreads: Tolerances) -> str:
     """Write one object in SI units and rad.
 
     Arrays are over the positions, null where there is no value.
@@ -246,7 +252,7 @@ def write_json(spreads: Tolerances) -> str:
     stated = spreads.scene.tolerances
     keys = [tolerance.key for tolerance in stated]
     return write_object(
-        SCHEMA,
+        TOLERANCE_SCHEMA,
         title=spreads.scene.title,
         samples=spreads.samples,
         seed=spreads.seed,

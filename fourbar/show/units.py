@@ -13,13 +13,26 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.linkage import MOVING_BARS
-from fourbar.solution import DEGREES, SI, Array, Conversion, find_unit_in
+from fourbar.quantities import Array
+from fourbar.solution import DEGREES, SI, Conversion, find_unit_in
 
-ALLOWED = 'must be "SI", "imperial" or a list like "mm N N.mm deg rpm"'
+ALLOWED_UNITS = 'must be "SI", "imperial" or a list like "mm N N.mm deg rpm"'
 _PRESETS = {"si": "", "imperial": "in lbf lbf.in lb deg rpm hp psi"}
-STATED = ("m", "N", "N m", "kg", "rad", "rad/s", "rad/s^2", "m/s", "m/s^2", "W", "Pa")
+STATABLE_UNITS = (
+    "m",
+    "N",
+    "N m",
+    "kg",
+    "rad",
+    "rad/s",
+    "rad/s^2",
+    "m/s",
+    "m/s^2",
+    "W",
+    "Pa",
+)
 """The SI units for which another one can be stated, each of a dimension of its own."""
-DERIVED = {"m/s": ("m", "{}/s"), "m/s^2": ("m", "{}/s^2"), "J": ("N m", "{}")}
+FOLLOWING_UNITS = {"m/s": ("m", "{}/s"), "m/s^2": ("m", "{}/s^2"), "J": ("N m", "{}")}
 """Units that follow another one if not stated. Energy follows the unit of torque,
 speeds that of length.
 """
@@ -54,13 +67,13 @@ def units(text: str) -> Conversion:
     Raises InputError for what is no unit of a result, and for two of one dimension.
     """
     if not isinstance(text, str):
-        raise InputError("units", text, ALLOWED)
+        raise InputError("units", text, ALLOWED_UNITS)
     from fourbar.quantities.units import to_si
 
     stated: dict[str, str] = {}
     for name in _PRESETS.get(text.casefold(), text).replace(",", " ").split():
-        why = {unit: _explain_refusal(name, unit) for unit in STATED}
-        unit = next((unit for unit in STATED if not why[unit]), None)
+        why = {unit: _explain_unit(name, unit) for unit in STATABLE_UNITS}
+        unit = next((unit for unit in STATABLE_UNITS if not why[unit]), None)
         if unit is None or unit in stated:
             hint = next(
                 (
@@ -74,7 +87,7 @@ def units(text: str) -> Conversion:
                 reason = f"is no unit of a result{hint}"
             else:
                 reason = f"is the second unit for {unit}"
-            raise InputError("units", name, f"{reason}; {ALLOWED}")
+            raise InputError("units", name, f"{reason}; {ALLOWED_UNITS}")
         stated[unit] = name.replace(".", " ")
     mass = stated.get("kg", "")
     if mass.casefold() in _POUNDS and "N" not in stated:
@@ -82,7 +95,7 @@ def units(text: str) -> Conversion:
         raise InputError(
             "units", mass, f"{reason}: write lbf for pounds-force, or both"
         )
-    for unit, (base, form) in DERIVED.items():
+    for unit, (base, form) in FOLLOWING_UNITS.items():
         if base in stated and unit not in stated:
             stated[unit] = form.format(stated[base])
     return {
@@ -90,7 +103,7 @@ def units(text: str) -> Conversion:
     } or SI
 
 
-def _explain_refusal(name: str, unit: str) -> str:
+def _explain_unit(name: str, unit: str) -> str:
     """Explain why a name is no unit for another one; empty where it is."""
     from fourbar.quantities.units import UnitError, to_si
 
@@ -205,15 +218,15 @@ def choose_unit(largest: float, unit: str, units: Conversion = SI) -> tuple[floa
     return 1.0 / size, prefix + unit
 
 
-ROUND_OFF = 1e-13
+SHOWN_AS_ZERO = 1e-13
 """Part of the largest number of its kind below which a number is shown as zero."""
-DIGITS, POSITION_DIGITS = 4, 6
+SHOWN_DIGITS, POSITION_DIGITS = 4, 6
 """Significant digits of a number of a summary, and of one about a single position."""
 
 
 def drop_rounding(values: Array, largest: float | Array) -> Array:
     """Return numbers with zero for what is rounding of the largest of their kind."""
-    return np.where(np.abs(values) <= ROUND_OFF * largest, 0.0, values)
+    return np.where(np.abs(values) <= SHOWN_AS_ZERO * largest, 0.0, values)
 
 
 def write_cell(number: float, form: str) -> str:
@@ -226,7 +239,7 @@ def write_cell(number: float, form: str) -> str:
     return text
 
 
-def write_digits(value: float, digits: int = DIGITS) -> str:
+def write_digits(value: float, digits: int = SHOWN_DIGITS) -> str:
     """Write a number with some significant digits.
 
     There is no exponent up to a million.
@@ -239,7 +252,7 @@ def write_short(
     unit: str,
     units: Conversion,
     largest: float | None = None,
-    digits: int = DIGITS,
+    digits: int = SHOWN_DIGITS,
 ) -> str:
     """Write a quantity with some significant digits and a unit that suits.
 

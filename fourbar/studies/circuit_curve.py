@@ -32,19 +32,19 @@ from fourbar.formulas.mobility import (
 )
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.position import Loop, Position, half_angle, loop
+from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, with_signs
 from fourbar.scene.motion import Sweep
-from fourbar.solution import Array
 from fourbar.solving import solve
 from fourbar.studies.sloped import Sloped
 
-SAMPLES = 3600
+POSITIONS_OF_A_BRANCH = 3600
 """Positions of a whole branch that are looked at for friction and for zeros."""
-NOTHING = 1e-11
+ROUND_OFF_OF_Q = 1e-11
 """Fraction of the sum of the absolute terms of Q that is round-off. A Q no larger than
 this everywhere is zero.
 """
-AT_END = 1e-12
+AT_END_OF_SWEEP = 1e-12
 """rad; an equilibrium so near to an end of the sweep is in it."""
 
 
@@ -175,7 +175,7 @@ class CircuitCurve:
         middle = 0.5 * (self.sweep[0] + self.sweep[1]) - self.theta_1
         half = 0.5 * (self.sweep[1] - self.sweep[0])
         away = psi - middle - TURN * np.rint((psi - middle) / TURN)
-        return np.asarray(np.abs(away) <= half + radius + AT_END)
+        return np.asarray(np.abs(away) <= half + radius + AT_END_OF_SWEEP)
 
     def reached(self, points: Array) -> NDArray[np.bool_]:
         """Mark the points that the sweep passes, all of them without a sweep.
@@ -193,7 +193,9 @@ class CircuitCurve:
             apart = np.abs(
                 np.remainder(points[:, 0] - middle + math.pi, TURN) - math.pi
             )
-            here = (apart <= half + AT_END) & (sign * sines >= -AT_END)
+            here = (apart <= half + AT_END_OF_SWEEP) & (
+                sign * sines >= -AT_END_OF_SWEEP
+            )
             passed |= here
         return passed
 
@@ -267,7 +269,10 @@ class CircuitCurve:
 
         Limits and change points are left out.
         """
-        tau = np.linspace(0.0, TURN, SAMPLES, endpoint=False) + 0.5 * TURN / SAMPLES
+        tau = (
+            np.linspace(0.0, TURN, POSITIONS_OF_A_BRANCH, endpoint=False)
+            + 0.5 * TURN / POSITIONS_OF_A_BRANCH
+        )
         points = np.concatenate([self.point(tau, branch) for branch in self.rows])
         points = points[self.inside(points[:, 0], np.zeros(1))]
         return np.concatenate([points, self.ends()])
@@ -282,7 +287,7 @@ class CircuitCurve:
         psi = np.array(self.sweep) - self.theta_1
         mu = transmission(self.ratios, psi)
         on_circuit = np.remainder(psi - self.low, TURN) < self.high - self.low
-        on_circuit &= np.abs(np.sin(mu)) > AT_END
+        on_circuit &= np.abs(np.sin(mu)) > AT_END_OF_SWEEP
         psi = psi[on_circuit]
         mu = mu[on_circuit]
         return np.concatenate(
@@ -329,7 +334,9 @@ class CircuitCurve:
 
     def level(self, points: Array) -> NDArray[np.bool_]:
         """Mark points where Q is zero within round-off."""
-        return np.asarray(np.abs(self.force(points)) <= NOTHING * self.size(points))
+        return np.asarray(
+            np.abs(self.force(points)) <= ROUND_OFF_OF_Q * self.size(points)
+        )
 
     def in_rows(self, tau: Array, branch: Array) -> Array:
         """Compute points of several rows."""
@@ -357,7 +364,7 @@ class CircuitCurve:
             float(theta_2),
             theta_3,
             theta_4,
-            0 if abs(sine) < AT_END else int(math.copysign(1.0, sine)),
+            0 if abs(sine) < AT_END_OF_SWEEP else int(math.copysign(1.0, sine)),
         )
 
 

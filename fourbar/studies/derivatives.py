@@ -16,10 +16,10 @@ from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.evaluation.evaluate import list_kinematics
 from fourbar.formulas.arithmetic import Number, polar, without_slopes
-from fourbar.formulas.path import Path
+from fourbar.formulas.path import LoopPath
 from fourbar.formulas.position import HalfAngle, compute_factors, find_side
 from fourbar.quantities import (
-    FORCES,
+    FORCE_NAMES,
     NOT_ASSEMBLED,
     OK,
     PIN_FORCES,
@@ -27,12 +27,13 @@ from fourbar.quantities import (
     STAGE_OF,
     STAGES,
     STATUS_NAMES,
+    Array,
 )
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.numbers import POINT_STAGES
 from fourbar.scene.scene import compute_bar_motion
-from fourbar.solution import Array, Solution, find_values, split_parts
+from fourbar.solution import Solution, find_values, split_parts
 from fourbar.solving import solve
 from fourbar.studies.keys import (
     SceneNumber,
@@ -47,7 +48,7 @@ from fourbar.writing import list_names, make_data_frame, make_html, write_betwee
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-AT_ONCE = 512
+POSITIONS_AT_ONCE = 512
 """Positions at a time. Each number is then as many rows as the scene has numbers, and
 stays in the cache.
 """
@@ -296,9 +297,9 @@ def sensitivity(scene: Scene) -> Sensitivity:
         for key, entry in keys.items()
     ]
     if any(effect.loaded_pins for effect in scene.effects):
-        forces = FORCES
+        forces = FORCE_NAMES
     else:
-        forces = (*FORCES, "drive_condition")
+        forces = (*FORCE_NAMES, "drive_condition")
     names = [
         name
         for name in solution.evaluated()
@@ -331,8 +332,8 @@ def sensitivity(scene: Scene) -> Sensitivity:
             ):  # what is left out carries the slope of its length too
                 sloped = read_place(seeded, entry.place) + _make_unit_slope(number, p)
                 seeded = replace_place(seeded, entry.place, sloped)
-        for start in range(0, len(regular), AT_ONCE):
-            index = regular[start : start + AT_ONCE]
+        for start in range(0, len(regular), POSITIONS_AT_ONCE):
+            index = regular[start : start + POSITIONS_AT_ONCE]
             derived, held = _compute_derivatives(
                 seeded, keys, commanded, index, by.keys(), moving
             )
@@ -353,7 +354,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
     )
 
 
-class _SlopedPath(Path):
+class _SlopedPath(LoopPath):
     """The same path by sine and cosine.
 
     Near 180 deg a tangent is large, and slopes through it are differences of large

@@ -23,22 +23,22 @@ from numpy.typing import NDArray
 
 from fourbar.errors import expect
 from fourbar.formulas.mobility import (
-    MARGIN,
+    ANGLE_FROM_LIMITS,
     TURN,
     Circuit,
     turns_fully,
 )
 from fourbar.formulas.motion import Coefficients
 from fourbar.formulas.torque import inertia
-from fourbar.quantities import JAMMED, NOT_ASSEMBLED, SINGULAR
+from fourbar.quantities import JAMMED, NOT_ASSEMBLED, SINGULAR, Array
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import DEFAULT_STEPS, Motion
 from fourbar.scene.scene import default_places
-from fourbar.solution import Array, Solution
+from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar.studies.circuit_curve import (
-    NOTHING,
-    SAMPLES,
+    POSITIONS_OF_A_BRANCH,
+    ROUND_OFF_OF_Q,
     CircuitCurve,
     RestPosition,
     of_input,
@@ -49,11 +49,11 @@ _A_JUMP = 1e-6
 """Fraction of the sum of the absolute terms above which a sign change is a jump. A
 torsion spring wound by half a turn makes Q jump, which is no zero.
 """
-STILL = 1e-3
+STANDING_BAR = 1e-3
 """Ratio of the turns of bars 2 and 4 below which bar 2 stands at a limit. theta_4 then
 takes the place of theta_2.
 """
-ROUNDING = 1e-6
+ROUNDING_OF_A_TURN = 1e-6
 """Part of the fastest bar's turn below which the turn of a bar is rounding: where the
 input stands at a limit, an angle of 16 digits leaves its turn some 1e-8.
 """
@@ -61,7 +61,7 @@ _A_RANGE = 3
 """Samples in a row where Q is nothing: fewer may be a zero that falls on one."""
 _AT_CHANGE_POINT = 1e-4
 """rad; nearer to a change point nothing is decided: the curve crosses itself there."""
-HALVINGS = 60
+HALVINGS_OF_A_STEP = 60
 """Halvings of the distance between two samples down to its last digits."""
 
 
@@ -170,7 +170,7 @@ def equilibrium(scene: Scene) -> Equilibria:
             around = next(
                 (part.ends for part in held if _is_inside(curve, point, part)), None
             )
-            equilibria.append(_describe(curve, point, size, around))
+            equilibria.append(_describe_equilibrium(curve, point, size, around))
         singular = tuple(curve.place(np.array(point)) for point in curve.singular)
         positions = _solve_at_rest(scene, curve.circuit)
         psi = positions.theta_2 - curve.theta_1
@@ -199,7 +199,7 @@ def _solve_at_rest(scene: Scene, circuit: Circuit) -> Solution:
             theta_2 = default_places(replace(scene, motion=Motion()))
         else:
             low, high = circuit.theta_2
-            margin = min(MARGIN, 0.25 * (high - low))
+            margin = min(ANGLE_FROM_LIMITS, 0.25 * (high - low))
             theta_2 = np.linspace(low + margin, high - margin, DEFAULT_STEPS + 1)
         commanded = Command(
             theta_2,
@@ -214,7 +214,7 @@ def _solve_at_rest(scene: Scene, circuit: Circuit) -> Solution:
     )
 
 
-def _describe(
+def _describe_equilibrium(
     curve: CircuitCurve,
     point: Array,
     size: float,
@@ -225,13 +225,13 @@ def _describe(
     `size`: of the terms of Q about there.
     """
     state = curve.state(point[None])
-    if abs(state.k.h2[0]) < STILL * abs(state.k.h4[0]):
+    if abs(state.k.h2[0]) < STANDING_BAR * abs(state.k.h4[0]):
         bar = 4
     else:
         bar = 2
     square = float(state.k[bar - 2][0]) ** 2
     along_curve = float(curve.slope(point[None])[0])
-    moving = _drop_rounding(state.k)
+    moving = _drop_standing_bar(state.k)
     inertias = inertia(curve.lengths.a, curve.case.bodies, state.position, moving)
     slope = along_curve / square
     J = float(np.sum(inertias)) / square
@@ -251,13 +251,13 @@ def _describe(
     )
 
 
-def _drop_rounding(k: Coefficients) -> Coefficients:
+def _drop_standing_bar(k: Coefficients) -> Coefficients:
     """Return the coefficients with zero for a bar that stands at a limit.
 
     The square of what rounding leaves there is no inertia.
     """
     h = np.array([k.h2, k.h3, k.h4])
-    h[np.abs(h) < ROUNDING * np.abs(h).max(axis=0)] = 0.0
+    h[np.abs(h) < ROUNDING_OF_A_TURN * np.abs(h).max(axis=0)] = 0.0
     return k._replace(h2=h[0], h3=h[1], h4=h[2])
 
 
@@ -303,7 +303,7 @@ def _make_grid(curve: CircuitCurve, points: Array) -> _Grid:
         in_row = row[first] == number
         second[in_row] = np.roll(first[in_row], -1)
     gap = np.remainder(tau[second] - tau[first], TURN)
-    near = gap < 2.5 * TURN / SAMPLES
+    near = gap < 2.5 * TURN / POSITIONS_OF_A_BRANCH
     first = first[near]
     second = second[near]
     gap = gap[near]
@@ -312,7 +312,7 @@ def _make_grid(curve: CircuitCurve, points: Array) -> _Grid:
     around[first] = np.maximum(around[first], size[second])
     around[second] = np.maximum(around[second], size[first])
     Q = curve.force(points)
-    idle = np.abs(Q) <= NOTHING * around
+    idle = np.abs(Q) <= ROUND_OFF_OF_Q * around
     branch = np.array(curve.rows, dtype=float)[row[first]]
     return _Grid(points, Q, around, idle, first, second, tau[first], gap, branch)
 
@@ -368,7 +368,7 @@ def _find_least_sizes(curve: CircuitCurve, grid: _Grid) -> tuple[_Zeros, Array]:
     least = curve.in_rows(after, branch)
     Q = curve.force(least)
     size = grid.size[first][turning]
-    touches = np.abs(Q) <= NOTHING * size
+    touches = np.abs(Q) <= ROUND_OFF_OF_Q * size
     passed = Q * grid.Q[first][turning] < 0.0
     return _Zeros(least[touches], size[touches]), least[passed & ~touches]
 
@@ -432,7 +432,7 @@ def _moves(curve: CircuitCurve, points: Array) -> NDArray[np.int8]:
     state = curve.state(points)
     ahead = _add_friction(curve, points, 1)
     back = _add_friction(curve, points, -1)
-    level = NOTHING * curve.size(points)
+    level = ROUND_OFF_OF_Q * curve.size(points)
     sense = np.where(ahead > level, 1, np.where(back < -level, -1, 0))
     return np.asarray(sense * np.sign(state.k.h2), dtype=np.int8)
 
@@ -453,17 +453,28 @@ def _list_ranges(
             return curve.inside(points[:, 0], np.zeros(1)) & holds(points)
 
         tau = np.concatenate(
-            [(np.arange(SAMPLES) + 0.5) * (TURN / SAMPLES), own_tau[own_row == row]]
+            [
+                (np.arange(POSITIONS_OF_A_BRANCH) + 0.5)
+                * (TURN / POSITIONS_OF_A_BRANCH),
+                own_tau[own_row == row],
+            ]
         )
         order = np.argsort(tau)
-        tau, inside = tau[order], (there(tau) | (np.arange(len(tau)) >= SAMPLES))[order]
+        tau, inside = (
+            tau[order],
+            (there(tau) | (np.arange(len(tau)) >= POSITIONS_OF_A_BRANCH))[order],
+        )
         if inside.all():
             first, last = curve.point(
                 np.array([0.0, math.nextafter(TURN, 0.0)]), branch
             )
             ranges.append(
                 _CircuitRange(
-                    (curve.place(first), curve.place(last)), row, 0.0, TURN, SAMPLES
+                    (curve.place(first), curve.place(last)),
+                    row,
+                    0.0,
+                    TURN,
+                    POSITIONS_OF_A_BRANCH,
                 )
             )
             continue
@@ -530,7 +541,7 @@ def bisect(
 
     It holds at the lower end of the interval alone.
     """
-    for _ in range(HALVINGS):
+    for _ in range(HALVINGS_OF_A_STEP):
         middle = 0.5 * (low + high)
         held = holds(middle)
         low = np.where(held, middle, low)

@@ -15,7 +15,6 @@ foot.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, list_bodies
 from fourbar.errors import InputError, expect
@@ -23,16 +22,16 @@ from fourbar.evaluation.case import Case
 from fourbar.formulas.arithmetic import cross, polar
 from fourbar.formulas.motion import State
 from fourbar.linkage import ENDS, PIN_FORCE, PINS, require_bar, require_numbers
+from fourbar.quantities import Array, ComplexArray
 from fourbar.scene import Scene
-from fourbar.solution import Array, Solution
+from fourbar.solution import Solution
 
 _STATIONS = 41
 """Equal stations from pin to pin, where none are given."""
-SAME = 1e-9
+SAME_FOOT = 1e-9
 """Part of the bar's length within which two feet are one. A load and the inertia, both
 at G, differ by round-off.
 """
-Complex = NDArray[np.complex128]
 
 
 class Bending(NamedTuple):
@@ -94,7 +93,7 @@ def internal_forces(
         x = np.atleast_1d(
             require_numbers("stations", stations, "must be finite lengths", "m")
         )
-    beam = _collect(scene, solution, bar)
+    beam = _collect_acting(scene, solution, bar)
     rows = np.broadcast_to(x, (len(solution), len(x)))
     return InternalForces(x, *beam.at(rows), beam.uniform, beam.find_largest())
 
@@ -107,13 +106,13 @@ class _Beam(NamedTuple):
 
     length: float
     foot: Array
-    force: Complex
+    force: ComplexArray
     """Force in the bar's axes, x + i y."""
     couple: Array
     uniform: bool
     density: float
     """Mass per length of a uniform bar, kg/m; otherwise 0."""
-    pull: Complex
+    pull: ComplexArray
     """Acceleration of the first pin less gravity, in the bar's axes, m/s^2, (n,)."""
     omega: Array
     alpha: Array
@@ -124,7 +123,7 @@ class _Beam(NamedTuple):
         `before`: without what acts at x itself.
         """
         N, V, M = (np.zeros(x.shape) for _ in range(3))
-        end = x + (-SAME if before else SAME) * self.length
+        end = x + (-SAME_FOOT if before else SAME_FOOT) * self.length
         for foot, force, couple in zip(
             self.foot.T, self.force.T, self.couple.T, strict=True
         ):
@@ -165,7 +164,7 @@ class _Beam(NamedTuple):
             single = self.at(feet)[1] / self.density + feet * (
                 across + bend * feet
             )  # forces at feet only
-            roots = _solve_quadratic(bend, across, -single)
+            roots = _solve_stable_quadratic(bend, across, -single)
             after = np.concatenate([feet[:, 1:], feet[:, -1:]], axis=1)
             for root in roots:
                 inside = (
@@ -185,7 +184,7 @@ class _Beam(NamedTuple):
         )
 
 
-def _solve_quadratic(a: Array, b: Array, c: Array) -> tuple[Array, Array]:
+def _solve_stable_quadratic(a: Array, b: Array, c: Array) -> tuple[Array, Array]:
     """Solve a x^2 + b x + c = 0 without cancellation; NaN where no root is real."""
     with np.errstate(all="ignore"):
         q = -0.5 * (b + np.copysign(np.sqrt(b * b - 4.0 * a * c), b))
@@ -240,7 +239,7 @@ class _Recorder(Actions):
         self.pull_ends(start, end, force)
 
 
-def _collect(scene: Scene, solution: Solution, bar: int) -> _Beam:
+def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
     """Collect all that acts on a bar."""
     described = scene.linkage.bar(bar)
     n = len(solution)
@@ -259,7 +258,7 @@ def _collect(scene: Scene, solution: Solution, bar: int) -> _Beam:
                 gravity = gravity + term.field
                 continue
             if term.key == "load" and term.bar == bar:
-                recorder.place = _find_couple(term, described.to_centre, back)
+                recorder.place = _couple_place(term, described.to_centre, back)
             term.act(recorder, state)
             recorder.place = 0.0j
             term.act_known(
@@ -293,7 +292,7 @@ def _collect(scene: Scene, solution: Solution, bar: int) -> _Beam:
                 if on == bar
             ]
         foot, force, couple = _sum_by_foot(
-            recorder.items, np.zeros(n), SAME * described.length
+            recorder.items, np.zeros(n), SAME_FOOT * described.length
         )
         if uniform:
             density = described.mass / described.length
@@ -314,7 +313,7 @@ def _collect(scene: Scene, solution: Solution, bar: int) -> _Beam:
 
 def _sum_by_foot(
     items: list[tuple[Any, Any, Any]], zero: Array, same: float
-) -> tuple[Array, Complex, Array]:
+) -> tuple[Array, ComplexArray, Array]:
     """Sum what acts at the same foot at every position.
 
     Feet, forces and couples are (n, f) each.
@@ -343,7 +342,7 @@ def _sum_by_foot(
     return np.stack(feet, axis=1), np.stack(forces, axis=1), np.stack(couples, axis=1)
 
 
-def _find_couple(load: Any, G: Any, back: Any) -> Any:
+def _couple_place(load: Any, G: Any, back: Any) -> Any:
     """Return where the couple of a load acts in the bar's axes.
 
     It is where its force acts, or else G.

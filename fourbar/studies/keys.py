@@ -11,7 +11,7 @@ from fourbar.effects.effect import PinRows
 from fourbar.effects.place import STATED_PLACES
 from fourbar.errors import InputError, expect, write_in_units
 from fourbar.linkage import (
-    ANY,
+    ANY_NUMBER,
     AT_LEAST_ZERO,
     BAR_NAMES,
     MOVING_BARS,
@@ -46,26 +46,28 @@ another form in a study.
 """
 _BY_MATERIAL = ("density", "section", "diameter")
 """Numbers of a bar that are varied only where the scene states them."""
-Place = tuple[str | int, ...]
+NumberPath = tuple[str | int, ...]
 """Attributes and indices that lead from a scene to one of its numbers."""
 
 
 class SceneNumber(NamedTuple):
     """One number of a scene."""
 
-    place: Place
+    place: NumberPath
     unit: str
-    bound: str = ANY
+    bound: str = ANY_NUMBER
 
     def holds(self, values: Any) -> Any:
         """Mark the numbers that a scene would accept."""
-        low = {ANY: True, AT_LEAST_ZERO: values >= 0.0, POSITIVE: values > 0.0}[
+        low = {ANY_NUMBER: True, AT_LEAST_ZERO: values >= 0.0, POSITIVE: values > 0.0}[
             self.bound
         ]
         return np.isfinite(values) & low
 
 
-def _list_numbers(description: Any, key: str, place: Place) -> dict[str, SceneNumber]:
+def _list_entries(
+    description: Any, key: str, place: NumberPath
+) -> dict[str, SceneNumber]:
     """List the entries of the numbers that a description states.
 
     A magnitude and its angle are two.
@@ -80,7 +82,10 @@ def _list_numbers(description: Any, key: str, place: Place) -> dict[str, SceneNu
 
 
 def _make_pair(
-    key: str, place: Place, by: Declared, names: tuple[str | int, str | int] = (0, 1)
+    key: str,
+    place: NumberPath,
+    by: Declared,
+    names: tuple[str | int, str | int] = (0, 1),
 ) -> dict[str, SceneNumber]:
     """Make the two entries of a pair, mostly a magnitude with its angle."""
     parts = zip(names, by.units, by.bounds, strict=True)
@@ -90,7 +95,7 @@ def _make_pair(
     }
 
 
-def _list_effect(effect: Any, key: str, place: Place) -> dict[str, SceneNumber]:
+def _list_effect(effect: Any, key: str, place: NumberPath) -> dict[str, SceneNumber]:
     """List the entries of an effect under its key, at its place."""
     if isinstance(effect, Gravity):
         of_gravity = effect.numbers["magnitude"]._replace(pair="rad")
@@ -104,16 +109,16 @@ def _list_effect(effect: Any, key: str, place: Place) -> dict[str, SceneNumber]:
             for column, (name, declared) in enumerate(effect.numbers.items(), 1)
         }
     if not isinstance(effect, Springs):
-        return _list_numbers(effect, key, place)
+        return _list_entries(effect, key, place)
     entries = dict[str, SceneNumber]()
     for index, spring in enumerate(effect.springs):
         spring_place = (*place, "springs", index)
-        entries |= _list_numbers(spring, f"{key}.{index}", spring_place)
+        entries |= _list_entries(spring, f"{key}.{index}", spring_place)
         entries |= _list_ends(spring, f"{key}.{index}", spring_place)
     return entries
 
 
-def _list_ends(line: Any, key: str, place: Place) -> dict[str, SceneNumber]:
+def _list_ends(line: Any, key: str, place: NumberPath) -> dict[str, SceneNumber]:
     """List the entries of both ends of a line between two bars."""
     entries = dict[str, SceneNumber]()
     for name, end in (("from", "start"), ("to", "end")):
@@ -129,7 +134,7 @@ def _list_drive(drive: Any) -> dict[str, SceneNumber]:
     return place | {"drive.direction": SceneNumber(("drive", "direction"), "rad")}
 
 
-def _list_place(stated: Any, key: str, place: Place) -> dict[str, SceneNumber]:
+def _list_place(stated: Any, key: str, place: NumberPath) -> dict[str, SceneNumber]:
     """List the entries of the form in which a place is stated.
 
     A named point has its entries elsewhere.
@@ -146,7 +151,7 @@ def _list_bar(bar: Bar, number: int) -> dict[str, SceneNumber]:
 
     Its cross-section is as it is stated; with a density there is no mass.
     """
-    entries = _list_numbers(Bar, "", ("linkage", BAR_NAMES[number]))
+    entries = _list_entries(Bar, "", ("linkage", BAR_NAMES[number]))
     absent = {name for name in _BY_MATERIAL if getattr(bar, name) is None}
     if bar.density is not None:
         absent.add("mass")
@@ -160,7 +165,7 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
 
     What is commanded is not among them.
     """
-    of_ground = _list_numbers(FourBar, "lengths", ("linkage",))
+    of_ground = _list_entries(FourBar, "lengths", ("linkage",))
     bars = {
         BAR_NAMES[bar]: _list_bar(scene.linkage.bar(bar), bar) for bar in MOVING_BARS
     }
@@ -183,7 +188,7 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
     if scene.drive is not None:
         entries |= _list_drive(scene.drive)
     for index, load in enumerate(scene.loads):
-        numbers = _list_numbers(load, f"loads.{index}", ("loads", index))
+        numbers = _list_entries(load, f"loads.{index}", ("loads", index))
         entries |= {
             key: entry
             for key, entry in numbers.items()
@@ -251,7 +256,7 @@ def find_misfit(scene: Scene, entry: SceneNumber, tolerance: Tolerance) -> str |
             "is the tolerance of a number that the scene leaves out: state the number "
             "first"
         )
-    if entry.bound != ANY and tolerance.reach >= number:
+    if entry.bound != ANY_NUMBER and tolerance.reach >= number:
         if tolerance.sigma:
             three = "three sigma of it "
         else:
@@ -261,7 +266,7 @@ def find_misfit(scene: Scene, entry: SceneNumber, tolerance: Tolerance) -> str |
     return None
 
 
-def read_place(value: Any, place: Place) -> Any:
+def read_place(value: Any, place: NumberPath) -> Any:
     """Read the number at a place; what a bar leaves out is that of a uniform one."""
     for name in place:
         if isinstance(name, int):
@@ -296,7 +301,7 @@ def replace_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
     return changed
 
 
-def replace_place(holder: Any, place: Place, values: Any) -> Any:
+def replace_place(holder: Any, place: NumberPath, values: Any) -> Any:
     """Copy with one number replaced; what a constructor checks is not checked again."""
     if not place:
         return values

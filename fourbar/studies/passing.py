@@ -15,23 +15,23 @@ from fourbar.errors import InputError, NotAssembledError, write_in_units
 from fourbar.formulas.mobility import TURN, find_intervals
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at
-from fourbar.scene.motion import COMMANDS, SIDES, STROKE_COMMAND, Motion
+from fourbar.scene.motion import COMMAND_NAMES, SIDES, STROKE_COMMAND, Motion
 from fourbar.scene.scene import Independent, default_places
 from fourbar.solution import compute_times
 from fourbar.solving import solve
 
-ANGLES = tuple(names[0] for names in COMMANDS.values())
-PLACES = (*ANGLES, STROKE_COMMAND[0], "time")
+COMMANDED_ANGLES = tuple(names[0] for names in COMMAND_NAMES.values())
+STATED_POSITIONS = (*COMMANDED_ANGLES, STROKE_COMMAND[0], "time")
 """Names by which a position may be stated."""
-SAME = 1e-6
+SAME_POSITION = 1e-6
 """rad, or part of a length: two places that the formulas give in two ways are one."""
 _GRID_DIGITS = 4
 """Digits of an end of a range that is read from the positions of the default sweep."""
-FINE = 2000
+LAW_INSTANTS = 2000
 """Instants of a motion by a law among which passings are looked for."""
 LAST_DIGIT = 1e-15
 """Relative width at which a time is located."""
-ROUNDS = 60
+HALVINGS_OF_A_PASSING = 60
 """Halvings of an interval: each passing is located to the last digits."""
 
 
@@ -40,8 +40,9 @@ def find_positions(scene: Scene, wanted: list[tuple[str, float]]) -> Command:
 
     Parameters
     ----------
-    wanted : names among `PLACES` and values, rad, m or s. Each gives the positions of
-        the scene's assembly that have it, of a motion over time those that it passes,
+    wanted : names among `STATED_POSITIONS` and values, rad, m or s. Each gives the
+        positions of the scene's assembly that have it, of a motion over time those
+        that it passes,
         of a released one the first.
 
     Raises
@@ -50,7 +51,7 @@ def find_positions(scene: Scene, wanted: list[tuple[str, float]]) -> Command:
     NotAssembledError : no position has the value; the message says the range.
     """
     if scene.motion.free is not None:
-        return _join([_find_released(scene, *entry) for entry in wanted])
+        return _join_commands([_find_released(scene, *entry) for entry in wanted])
     if scene.motion.law is None:
         find = _find_places
     else:
@@ -69,11 +70,11 @@ def _find_places(scene: Scene, name: str, value: float) -> list[float]:
         return [_find_place_of_sweep(scene, value)]
     places: list[float] = []
     for place in _list_candidates(scene, name, value):
-        if any(_is_same(motion.commanded, place, other) for other in places):
+        if any(_is_same_position(motion.commanded, place, other) for other in places):
             continue
         here = solve(scene, "position", at=command_at(scene, np.array([place])))
         reached = getattr(here, name)[0]
-        if math.isfinite(reached) and _is_same(name, reached, value):
+        if math.isfinite(reached) and _is_same_position(name, reached, value):
             places.append(place)
     if not places:
         # of the range that the scene's own motion is in
@@ -82,9 +83,9 @@ def _find_places(scene: Scene, name: str, value: float) -> list[float]:
         values = _require_values(getattr(whole, name), name)
         low, high = _find_extent(values)
         raise NotAssembledError(
-            f"{_say(name, value)}: no position of this assembly has it; {name} goes"
-            f" from {_write_place(name, low, _GRID_DIGITS)} to"
-            f" {_write_place(name, high, _GRID_DIGITS)}"
+            f"{_say_position(name, value)}: no position of this assembly has it;"
+            f" {name} goes from {_write_position(name, low, _GRID_DIGITS)} to"
+            f" {_write_position(name, high, _GRID_DIGITS)}"
         )
     return sorted(places)
 
@@ -102,7 +103,7 @@ def _find_place_of_sweep(scene: Scene, time: float) -> float:
     last = float(times.max())
     if not 0.0 <= time <= last:
         raise NotAssembledError(
-            f"{_say('time', time)}: the sweep goes from 0 to {last:.6g} s"
+            f"{_say_position('time', time)}: the sweep goes from 0 to {last:.6g} s"
         )
     order = np.argsort(times)
     return float(np.interp(time, times[order], sweep.at.places[order]))
@@ -117,7 +118,8 @@ def _require_assembled(scene: Scene, name: str, value: float) -> None:
     if solve(scene, "position", at=at).assembled[0]:
         return
     raise NotAssembledError(
-        f"{_say(name, value)}: the linkage does not assemble there; {say_range(scene)}"
+        f"{_say_position(name, value)}: the linkage does not assemble there;"
+        f" {say_range(scene)}"
     )
 
 
@@ -146,22 +148,22 @@ def _list_candidates(scene: Scene, name: str, value: float) -> list[float]:
             place = getattr(found, commanded)
             if place is not None and math.isfinite(place[0]):
                 candidates.append(float(place[0]))
-    if commanded not in ANGLES:
+    if commanded not in COMMANDED_ANGLES:
         return candidates
     # with one change point an assembly repeats after two turns; the sweep's own turn
     # first
     turned = [place + turns * TURN for place in candidates for turns in (0, 1, -1)]
     sweep = command(scene).angle
-    low = float(sweep.min()) - SAME
-    high = float(sweep.max()) + SAME
+    low = float(sweep.min()) - SAME_POSITION
+    high = float(sweep.max()) + SAME_POSITION
     return sorted(turned, key=lambda place: not low <= place <= high)
 
 
-def _is_same(name: str, first: float, second: float) -> bool:
+def _is_same_position(name: str, first: float, second: float) -> bool:
     """Return True if two values of an angle (whole turns apart) or a stroke are one."""
-    if name in ANGLES:
-        return abs(math.remainder(first - second, TURN)) <= SAME
-    return abs(first - second) <= SAME * abs(second)
+    if name in COMMANDED_ANGLES:
+        return abs(math.remainder(first - second, TURN)) <= SAME_POSITION
+    return abs(first - second) <= SAME_POSITION * abs(second)
 
 
 def _find_times(scene: Scene, name: str, value: float) -> list[float]:
@@ -173,7 +175,8 @@ def _find_times(scene: Scene, name: str, value: float) -> list[float]:
     if name == "time":
         if not start <= value <= stop:
             raise NotAssembledError(
-                f"{_say(name, value)}: the law goes from {start:.6g} to {stop:.6g} s"
+                f"{_say_position(name, value)}:"
+                f" the law goes from {start:.6g} to {stop:.6g} s"
             )
         return [value]
 
@@ -181,14 +184,16 @@ def _find_times(scene: Scene, name: str, value: float) -> list[float]:
         solution = solve(scene, "position", at=command_at(scene, times))
         return _require_values(getattr(solution, name), name)
 
-    grid = np.unique([*np.linspace(start, stop, FINE + 1), *law.time])
+    grid = np.unique([*np.linspace(start, stop, LAW_INSTANTS + 1), *law.time])
     gaps = _measure_gaps(name, read(grid), value)
 
     def gap(time: float) -> float:
         return float(_measure_gaps(name, read(np.array([time])), value)[0])
 
     times = [float(start)] if gaps[0] == 0.0 else []
-    times += [_bisect(gap, *grid[row : row + 2]) for row in _find_crossings(name, gaps)]
+    times += [
+        _bisect_gap(gap, *grid[row : row + 2]) for row in _find_crossings(name, gaps)
+    ]
     if not times:
         raise _never_passed(name, value, read(grid))
     return times
@@ -196,7 +201,7 @@ def _find_times(scene: Scene, name: str, value: float) -> list[float]:
 
 def _measure_gaps(name: str, values: Array, value: float) -> Array:
     """Return how far values lie from one, of angles within half a turn."""
-    if name in ANGLES:
+    if name in COMMANDED_ANGLES:
         return np.asarray(np.angle(np.exp(1j * (values - value))))
     return values - value
 
@@ -208,14 +213,14 @@ def _find_crossings(name: str, gaps: Array) -> NDArray[np.intp]:
     """
     before = gaps[:-1]
     after = gaps[1:]
-    near = name not in ANGLES or np.abs(after - before) < 0.5 * math.pi
+    near = name not in COMMANDED_ANGLES or np.abs(after - before) < 0.5 * math.pi
     return np.flatnonzero((before != 0.0) & (before * after <= 0.0) & near)
 
 
-def _bisect(gap: Callable[[float], float], low: float, high: float) -> float:
+def _bisect_gap(gap: Callable[[float], float], low: float, high: float) -> float:
     """Bisect an interval in which a gap changes its sign."""
     start = gap(low)
-    for _ in range(ROUNDS):
+    for _ in range(HALVINGS_OF_A_PASSING):
         middle = 0.5 * (low + high)
         if gap(middle) * start > 0.0:
             low = middle
@@ -227,8 +232,8 @@ def _bisect(gap: Callable[[float], float], low: float, high: float) -> float:
 def _never_passed(name: str, value: float, values: Array) -> NotAssembledError:
     low, high = _find_extent(values)
     return NotAssembledError(
-        f"{_say(name, value)}: the motion does not pass it; it stays within "
-        f"{_write_place(name, low)} and {_write_place(name, high)}"
+        f"{_say_position(name, value)}: the motion does not pass it; it stays within "
+        f"{_write_position(name, low)} and {_write_position(name, high)}"
     )
 
 
@@ -242,13 +247,13 @@ def _require_values(values: Array | None, name: str) -> Array:
     return values
 
 
-def _say(name: str, value: float) -> str:
+def _say_position(name: str, value: float) -> str:
     """Say a place as the command line has it."""
-    return f"at {name} = {_write_place(name, value)}"
+    return f"at {name} = {_write_position(name, value)}"
 
 
-def _write_place(name: str, value: float, digits: int = 6) -> str:
-    if name in ANGLES:
+def _write_position(name: str, value: float, digits: int = 6) -> str:
+    if name in COMMANDED_ANGLES:
         return f"{math.degrees(value):.{digits}g} deg"
     return write_in_units("s" if name == "time" else "m", value, digits=digits)
 
@@ -274,7 +279,7 @@ def _find_released(scene: Scene, name: str, value: float) -> Command:
             return run(free.duration, 1).part(slice(0, 1))
         if not 0.0 < value <= free.duration:
             raise NotAssembledError(
-                f"{_say(name, value)}: the release lasts {free.duration:.6g} s"
+                f"{_say_position(name, value)}: the release lasts {free.duration:.6g} s"
             )
         return _take_last(run(value, 1), value)
     whole = run(free.duration, free.steps)
@@ -307,11 +312,13 @@ def _take_last(motion: Command, time: float) -> Command:
     """Take the last instant; NotAssembledError where the motion had stopped before."""
     assert motion.time is not None
     if motion.time[-1] != time:
-        raise NotAssembledError(f"{_say('time', time)}: the motion has stopped before")
+        raise NotAssembledError(
+            f"{_say_position('time', time)}: the motion has stopped before"
+        )
     return motion.part(slice(-1, None))
 
 
-def _join(commands: list[Command]) -> Command:
+def _join_commands(commands: list[Command]) -> Command:
     """Join instants of one released motion."""
     fields = (_join_field(values) for values in zip(*commands, strict=True))
     return Command(*fields)

@@ -54,7 +54,7 @@ def instant_centres(
     assert solution.ground is not None
     length, angle = solution.ground
     O4 = length * (np.cos(angle) + 1j * np.sin(angle)) + 0.0 * A
-    along = [_direction(vector) for vector in (O4, A, B - A, B - O4)]
+    along = [_direction_of(vector) for vector in (O4, A, B - A, B - O4)]
     return points.locate_centres(O4, A, B, *along)
 
 
@@ -62,7 +62,7 @@ def _as_complex(vector: Array) -> NDArray[np.complex128]:
     return np.asarray(vector[..., 0] + 1j * vector[..., 1])
 
 
-def _direction(vector: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _direction_of(vector: NDArray[np.complex128]) -> NDArray[np.complex128]:
     return np.asarray(vector / np.abs(vector))
 
 

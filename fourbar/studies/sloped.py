@@ -33,7 +33,7 @@ _RULES: dict[Any, _Rule] = {
     np.remainder: lambda z, x, y: (1.0, (z - x) / y),
     np.fmod: lambda z, x, y: (1.0, (z - x) / y),
 }
-STEPS = (
+STEP_FUNCTIONS = (
     np.sign,
     np.floor,
     np.rint,
@@ -111,7 +111,7 @@ class Sloped(NDArrayOperatorsMixin):
             mantissa, exponent = np.frexp(self.values)
             return Sloped(mantissa, np.ldexp(self.slopes, -exponent)), exponent
         plain = [take_values(number) for number in inputs]
-        if function in STEPS:
+        if function in STEP_FUNCTIONS:
             return function(*plain)
         if function not in _RULES:
             raise _refuse(function.__name__)
@@ -136,14 +136,14 @@ class Sloped(NDArrayOperatorsMixin):
     def __array_function__(
         self, function: Any, types: Any, args: Sequence[Any], options: Any
     ) -> Any:
-        if function not in FUNCTIONS or options:
+        if function not in SLOPED_FUNCTIONS or options:
             raise _refuse(function.__name__)
-        return FUNCTIONS[function](*args)
+        return SLOPED_FUNCTIONS[function](*args)
 
 
 def _refuse(name: str) -> LimitError:
     """Return the error for a function that has no rule."""
-    followed = ", ".join(rule.__name__ for rule in (*_RULES, *STEPS))
+    followed = ", ".join(rule.__name__ for rule in (*_RULES, *STEP_FUNCTIONS))
     return LimitError(
         f"derivatives cannot follow numpy.{name}; an effect may use "
         f"absolute, angle, where, {followed}"
@@ -171,7 +171,7 @@ def _choose_where(mask: Any, x: Any, y: Any) -> Sloped:
     )
 
 
-FUNCTIONS: dict[Any, Callable[..., Any]] = {
+SLOPED_FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.where: _choose_where,
     np.angle: lambda z: np.arctan2(z.imag, z.real),
     np.searchsorted: lambda points, x, side: np.searchsorted(points, x.values, side),

@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import DependencyError, InputError, expect, say_install
-from fourbar.quantities import NOT_ASSEMBLED, PIN_FORCES
+from fourbar.quantities import NOT_ASSEMBLED, PIN_FORCES, Array
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import (
-    Array,
     Solution,
-    find_unit,
+    find_unit_of_quantity,
     find_values,
     is_scalar,
     split_parts,
@@ -44,9 +43,9 @@ if TYPE_CHECKING:
 
 SAMPLES = 8192
 _MOST_SAMPLES = 10_000_000
-BAND = (1.0, 99.0)
+BAND_PERCENTILES = (1.0, 99.0)
 """Percentiles of the band."""
-AT_ONCE = 200_000
+EVALUATED_AT_ONCE = 200_000
 """Members times positions: about 40 quantities of them are 70 MB."""
 PARTED = 0.1
 """First order and samples part where their standard deviations differ by more than this
@@ -272,7 +271,7 @@ def tolerances(
         without[columns] = np.count_nonzero(code, axis=0)
         gone |= ((code == NOT_ASSEMBLED) & nominal_closes[columns]).any(axis=1)
         for name in names:
-            number = _find_drawn(scene, solution, name)[:, -width:]
+            number = _find_in_drawing(scene, solution, name)[:, -width:]
             if name.startswith(
                 "theta_"
             ):  # each member counts its turns from its own first position
@@ -295,13 +294,13 @@ def tolerances(
     )
 
 
-def _find_drawn(scene: Scene, solution: Solution, name: str) -> Array:
+def _find_in_drawing(scene: Scene, solution: Solution, name: str) -> Array:
     """Return a quantity of the members, places in the coordinates of the drawing.
 
     The solution of a study knows of no drawing.
     """
     values: Array = find_values(solution, name)
-    if find_unit(name) == "m" and not is_scalar(name) and any(scene.origin):
+    if find_unit_of_quantity(name) == "m" and not is_scalar(name) and any(scene.origin):
         return values + scene.origin
     return values
 
@@ -346,7 +345,7 @@ def _list_blocks(
     n = study.at.angle.shape[1]
     first = int(np.argmax(closes))
     begins = [first] if scene.counts_turns else []
-    size = max(1, AT_ONCE // samples)
+    size = max(1, EVALUATED_AT_ONCE // samples)
     for start in range(0, n, size):
         columns = slice(start, min(start + size, n))
         yield columns, np.array([*begins, *range(columns.start, columns.stop)])
@@ -392,7 +391,9 @@ def _fill(spread: Spread, columns: slice, sampled: Array) -> None:
         spread.deviation[columns] = (
             sampled - np.nan_to_num(spread.nominal[columns])
         ).std(axis=0)
-        spread.low[columns], spread.high[columns] = np.percentile(sampled, BAND, axis=0)
+        spread.low[columns], spread.high[columns] = np.percentile(
+            sampled, BAND_PERCENTILES, axis=0
+        )
         spread.least[columns], spread.greatest[columns] = (
             sampled.min(axis=0),
             sampled.max(axis=0),

@@ -12,12 +12,12 @@ from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.evaluation.evaluate import evaluate
 from fourbar.linkage import convert_to_unit
-from fourbar.quantities import INVALID, NOT_ASSEMBLED
+from fourbar.quantities import INVALID, NOT_ASSEMBLED, Array
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
-from fourbar.scene.numbers import find_unit
+from fourbar.scene.numbers import find_unit_of_key
 from fourbar.scene.scene import command_stroke
-from fourbar.solution import Array, Solution
+from fourbar.solution import Solution
 from fourbar.solving import Results, find_requested, make_solution, split
 from fourbar.studies.keys import (
     COMMAND_KEYS,
@@ -29,11 +29,11 @@ from fourbar.studies.keys import (
 )
 from fourbar.writing import describe_extent, list_names
 
-LENGTHS = tuple(
+LENGTH_KEYS = tuple(
     f"lengths.{name}"
     for name in ("ground", "input", "coupler", "output", "ground_angle")
 )
-NEAR_A_CHANGE_POINT = 1e-12
+LEAST_MISS = 1e-12
 """Least miss of a change point that rounding cannot remove. It is relative to the sum
 of the lengths, squared.
 """
@@ -119,7 +119,7 @@ class Study:
             begins,
             {key: _repeat(values[rows], count) for key, values in self.values.items()},
         )
-        for index, turns in _find_turns(scene.effects).items():
+        for index, turns in _find_pin_turns(scene.effects).items():
             scene = replace_place(
                 scene,
                 ("effects", index, "turns"),
@@ -153,7 +153,7 @@ class Study:
             .begin_at(start)
             .terms[len(scene.loads) :]
         )
-        for index, turns in _find_turns(counted).items():
+        for index, turns in _find_pin_turns(counted).items():
             scene = replace_place(scene, ("effects", index, "turns"), turns)
         return scene
 
@@ -182,7 +182,7 @@ def _take_members(commanded: Command, rows: slice, columns: slice) -> Command:
     return Command(*(flat(value) for value in commanded))
 
 
-def _find_turns(effects: Iterable[Effect]) -> dict[int, Any]:
+def _find_pin_turns(effects: Iterable[Effect]) -> dict[int, Any]:
     """Find the whole turns of each pin by the index of the effect.
 
     They are for effects that depend on where the motion begins.
@@ -236,7 +236,7 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
     entries = list_entries(scene)
     theta = command_key(scene)
     arrays = {
-        key: _read_numbers(key, value, [*entries, theta])
+        key: _read_members(key, value, [*entries, theta])
         for key, value in values.items()
     }
     angles = _read_angles(scene, arrays, theta)
@@ -309,17 +309,17 @@ def _list_commands(
     return command_stroke(varied, angle, speed, acceleration)
 
 
-def _read_numbers(key: str, value: Any, keys: list[str]) -> Array:
+def _read_members(key: str, value: Any, keys: list[str]) -> Array:
     """Return the array given for a key, (m,) or (1,); the angles as they are."""
     if key not in keys:
-        raise refuse_key(key, _shorten(value), keys)
+        raise refuse_key(key, _shorten_for_line(value), keys)
     try:
-        array = np.asarray(convert_to_unit(key, value, find_unit(key) or "1"))
+        array = np.asarray(convert_to_unit(key, value, find_unit_of_key(key) or "1"))
     except ValueError:  # rows of different lengths
         raise InputError(key, "a ragged list", "must be an array of numbers") from None
     if array.dtype.kind not in "iuf" or array.size == 0:
         raise InputError(
-            key, _shorten(value), "must be an array of numbers, at least one"
+            key, _shorten_for_line(value), "must be an array of numbers, at least one"
         )
     most = 2 if key in COMMAND_KEYS else 1
     if array.ndim > most:
@@ -331,7 +331,7 @@ def _read_numbers(key: str, value: Any, keys: list[str]) -> Array:
     return array.astype(float)
 
 
-def _shorten(value: Any) -> object:
+def _shorten_for_line(value: Any) -> object:
     """Shorten a value to what one line shows."""
     if isinstance(value, np.ndarray):
         return f"{type(value).__name__} of shape {value.shape}"

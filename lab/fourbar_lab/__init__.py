@@ -2,3 +2,7 @@
 
 No verdict needs them.
 """
+
+from pathlib import Path
+
+LAB_FOLDER = Path(__file__).parent

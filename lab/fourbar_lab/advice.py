@@ -18,7 +18,8 @@ from fourbar.formulas.mobility import turns_fully
 from fourbar.mjcf import Settings
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion, Sweep
-from fourbar_validation.advise.advise import MOST_STEPS, advise
+from fourbar_lab import LAB_FOLDER
+from fourbar_validation.advise.advise import MOST_STEPS_OF_A_RUN, advise
 from fourbar_validation.advise.matters import judge_trial
 from fourbar_validation.cost.study import time_in_turns
 from fourbar_validation.engines.mujoco.trial import (
@@ -30,28 +31,27 @@ from fourbar_validation.report.machine import name_code
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 
-COARSE, FINE = 2.0, 2.0 ** (1.0 / 3.0)
+COARSE, STEP_RATIOS = 2.0, 2.0 ** (1.0 / 3.0)
 """Ratios of the ladder of steps. They are factors of two first, then thirds of an
 octave below what serves.
 """
-TIME_CONSTANTS = (3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0, 120.0, 300.0)
-FIRST_ORDER = ("Euler", "implicit", "implicitfast", "discrete")
+TIME_CONSTANTS_TRIED = (3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0, 120.0, 300.0)
+STEPPED_INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete")
 _FIRST_ORDER_TIME_CONSTANTS = (2.0, 3.0, 6.0, 12.0)
-ROUNDS = 15
-STEPS = 400
-LAB = Path(__file__).parent
+TIMED_ROUNDS = 15
+STEPS_OF_A_TIMING = 400
 TYPES = tuple(kind for kind in DrawnType if kind is not DrawnType.ROCKER_CRANK)
 _SPEEDS = (-1.0, 3.0)
 """log10 of rad/s."""
-ERRORS = (-7.0, -2.0)
+REQUIRED_ERRORS = (-7.0, -2.0)
 """log10 of the required error."""
-WINDOW = 0.8
+PART_OF_THE_RANGE = 0.8
 """Part of the range of a rocker that is run through: away from its limits."""
 _GENTLE = 0.02
 """Value of |alpha_2|/omega_2^2. Over a turn the speed changes by an eighth and never
 vanishes.
 """
-POSITIONS, _DENSER, SEARCHED = 36, 4, 2
+INTERVALS, _DENSER, INTERVALS_SEARCHED = 36, 4, 2
 """Intervals of the scene. The answer is judged at a multiple of them, and the search
 decides at another.
 """
@@ -65,13 +65,18 @@ def time_relative_costs(setup: TrialSetup) -> dict[tuple[str, bool], float]:
 
     The times are medians of interleaved rounds.
     """
-    kinds = [("RK4", True), ("RK4", False), *((name, False) for name in FIRST_ORDER)]
+    kinds = [
+        ("RK4", True),
+        ("RK4", False),
+        *((name, False) for name in STEPPED_INTEGRATORS),
+    ]
     clocks = {
         kind: setup.make_clocks(_change_kind(kind, make_settings(628.0, 20.0)))[0]
         for kind in kinds
     }
     times = time_in_turns(
-        {kind: partial(clock, STEPS) for kind, clock in clocks.items()}, ROUNDS
+        {kind: partial(clock, STEPS_OF_A_TIMING) for kind, clock in clocks.items()},
+        TIMED_ROUNDS,
     )
     reference = median(times["RK4", True])
     return {kind: median(values) / reference for kind, values in times.items()}
@@ -83,7 +88,7 @@ def _change_kind(kind: tuple[str, bool], settings: Settings) -> Settings:
     return replace(settings, integrator=integrator, pad=settings.pad if pads else None)
 
 
-def find_cheapest(
+def try_all_settings(
     setup: TrialSetup, error: float, costs: Mapping[tuple[str, bool], float]
 ) -> float | None:
     """Try every integrator, with and without pads, over time constants and steps.
@@ -94,12 +99,12 @@ def find_cheapest(
     best: float | None = None
     for kind, ratio in costs.items():
         fourth_order = kind[0] == "RK4"
-        for tc in TIME_CONSTANTS if fourth_order else _FIRST_ORDER_TIME_CONSTANTS:
-            most = MOST_STEPS if best is None else best / ratio
+        for tc in TIME_CONSTANTS_TRIED if fourth_order else _FIRST_ORDER_TIME_CONSTANTS:
+            most = MOST_STEPS_OF_A_RUN if best is None else best / ratio
             if (
                 not fourth_order
                 and best is not None
-                and not _serves(setup, kind, tc, most / FINE, error)
+                and not _serves(setup, kind, tc, most / STEP_RATIOS, error)
             ):
                 continue  # not even with as many steps as the best costs
             steps = _find_least_steps(setup, kind, tc, most, error)
@@ -117,7 +122,7 @@ def _find_least_steps(
         if _serves(setup, kind, tc, n, error):
             finer = (
                 steps
-                for steps in (n / FINE**2, n / FINE)
+                for steps in (n / STEP_RATIOS**2, n / STEP_RATIOS)
                 if _serves(setup, kind, tc, steps, error)
             )
             return int(next(finer, n) + 0.5)
@@ -170,7 +175,7 @@ class AdviceCase:
         return not self.cost > _CHEAP * self.cheapest
 
 
-def draw_scene(seed: int, index: int) -> tuple[Scene, float]:
+def draw_advised_scene(seed: int, index: int) -> tuple[Scene, float]:
     """Draw a linkage away from its limits, with a random speed and error.
 
     The error is the one that is required of it.
@@ -185,11 +190,11 @@ def draw_scene(seed: int, index: int) -> tuple[Scene, float]:
     stop = sweep.stop
     if not turns_fully(scene.linkage):
         middle = (start + stop) / 2.0
-        half = WINDOW * (stop - start) / 2.0
+        half = PART_OF_THE_RANGE * (stop - start) / 2.0
         start = middle - half
         stop = middle + half
-    motion = Motion(Sweep(start, stop, POSITIONS), omega, alpha, scene.motion.branch)
-    return replace(scene, motion=motion), float(10.0 ** rng.uniform(*ERRORS))
+    motion = Motion(Sweep(start, stop, INTERVALS), omega, alpha, scene.motion.branch)
+    return replace(scene, motion=motion), float(10.0 ** rng.uniform(*REQUIRED_ERRORS))
 
 
 def _make_denser(scene: Scene, times: int) -> Scene:
@@ -206,14 +211,16 @@ def measure_case(
     seed: int, index: int, costs: dict[tuple[str, bool], float]
 ) -> AdviceCase:
     """Ask for advice, judge it at denser positions, and search exhaustively."""
-    scene, required = draw_scene(seed, index)
+    scene, required = draw_advised_scene(seed, index)
     advice = advise(scene, required)
     dense = _make_denser(scene, _DENSER)
-    searched = _make_denser(scene, SEARCHED)
+    searched = _make_denser(scene, INTERVALS_SEARCHED)
     error = judge_trial(
         dense, TrialSetup(dense, command(dense)).try_out(advice.best.settings)
     ).worst
-    cheapest = find_cheapest(TrialSetup(searched, command(searched)), required, costs)
+    cheapest = try_all_settings(
+        TrialSetup(searched, command(searched)), required, costs
+    )
     cost = advice.best.steps * advice.best.step_cost
     return AdviceCase(
         index,
@@ -245,14 +252,14 @@ def _find_enough(missed: int) -> int:
     return n
 
 
-def measure(seed: int, count: int, out: Path) -> Iterator[AdviceCase]:
+def measure_cases(seed: int, count: int, out: Path) -> Iterator[AdviceCase]:
     """Yield the cases, each kept as it comes.
 
     Those that an interrupted run left are read.
     """
-    with Store(out, {"seed": seed, **name_code(LAB)}).held() as store:
+    with Store(out, {"seed": seed, **name_code(LAB_FOLDER)}).held() as store:
         done = store.done()
-        first = draw_scene(seed, 0)[0]
+        first = draw_advised_scene(seed, 0)[0]
         costs: dict[tuple[str, bool], float] = {}
         for index in range(count):
             if index not in done:
@@ -266,7 +273,7 @@ def measure(seed: int, count: int, out: Path) -> Iterator[AdviceCase]:
             yield AdviceCase(**store.read(index)[0])
 
 
-@click.command()
+@click.command("advice")
 @click.option(
     "--count",
     type=click.IntRange(min=1),
@@ -281,7 +288,7 @@ def measure(seed: int, count: int, out: Path) -> Iterator[AdviceCase]:
     type=click.Path(path_type=Path, file_okay=False),
     default=Path("results/advise-study"),
 )
-def study(count: int, seed: int, out: Path) -> int:
+def advice_command(count: int, seed: int, out: Path) -> int:
     """Measure the advice on random linkages.
 
     Exit with status 1 if it is not met, or not cheap often enough. That it is met often
@@ -293,7 +300,7 @@ def study(count: int, seed: int, out: Path) -> int:
 
     cases = list(
         track(
-            measure(seed, count, out),
+            measure_cases(seed, count, out),
             "advising",
             total=count,
             console=Console(stderr=True),

@@ -15,24 +15,23 @@ from typing import NamedTuple
 
 import click
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import BROKEN, FAILED, HOLDS
-from fourbar.evaluation.case import BLOCK
+from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK
 from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import Bar, FourBar
-from fourbar.quantities import ANGLES, UNKNOWNS
+from fourbar.quantities import ANGLES, UNKNOWNS, Array
 from fourbar.scene import Command
 from fourbar.show.plot.style import format_of
 from fourbar.solving import solve
 from fourbar_lab.contenders import (
-    POSITIONS,
+    ONE_LINKAGE,
     STUDY,
     Times,
     allocate,
     collect_loops,
+    command_positions,
     draw_bench,
-    make_command,
     make_example,
     time_interleaved,
     time_linkages,
@@ -45,12 +44,10 @@ from fourbar_validation.engines.plain_loop import PlainLoop
 from fourbar_validation.engines.registry import ENGINES, Engine, Later
 from fourbar_validation.published.thirteen import solve_thirteen
 from fourbar_validation.report.machine import name_machine
-from fourbar_validation.report.terminal import make_table
+from fourbar_validation.report.terminal import make_words_table
 from fourbar_validation.run.judge import judge_for_report
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
-
-Array = NDArray[np.float64]
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _WITH_LIMITS = FourBar(0.3, Bar(0.25, 0.2), Bar(0.1, 0.5), Bar(0.22, 0.4))
@@ -69,18 +66,18 @@ SOLVED = 100_000
 """Positions where every array is allocated, and for the error bars. The numbers of
 error bars take ten times as long.
 """
-ALONE = 20
+SINGLE_CALLS = 20
 """Calls of one position each."""
 _PER_SCENE = 50_000
 """Positions in whose stead one random scene is judged: twenty of them by default."""
 ALL = "formulas, all 11 unknowns"
 _ANGLES_ALONE = "positions only"
 _SYSTEM = "13x13 assembled and solved"
-FLOOR = "floor: tangent, root, two arctan"
-FORCES = "solve to forces, points too"
-BARS = "solve with error bars"
-ONE = "one position to forces"
-JUDGED = "a scene judged by the exact engines"
+FLOOR_OF_TIMES = "floor: tangent, root, two arctan"
+TO_FORCES = "solve to forces, points too"
+WITH_ERROR_BARS = "solve with error bars"
+ONE_POSITION = "one position to forces"
+JUDGED_SCENE = "a scene judged by the exact engines"
 _ASKED = 200
 """Positions that an adapter and a plain loop answer."""
 
@@ -118,7 +115,7 @@ class _SpeedLimit(NamedTuple):
         return measured <= self.bound
 
 
-LIMITS = {
+SPEED_LIMITS = {
     "13x13 / formulas": _SpeedLimit(
         ">=",
         5.0,
@@ -138,13 +135,13 @@ LIMITS = {
         6.0,
         "the rest of two angles is arithmetic on arrays of a block",
         _ANGLES_ALONE,
-        FLOOR,
+        FLOOR_OF_TIMES,
     ),
     "solve to forces / formulas": _SpeedLimit(
         "<=",
         2.0,
         "new arrays and the points come on top, no second evaluation",
-        FORCES,
+        TO_FORCES,
         ALL,
     ),
     "solve with error bars / to forces": _SpeedLimit(
@@ -152,14 +149,14 @@ LIMITS = {
         10.0,
         "the same formulas once more, in longer numbers, which the processor takes one"
         " by one",
-        BARS,
-        FORCES,
+        WITH_ERROR_BARS,
+        TO_FORCES,
     ),
     "one position / its 13x13": _SpeedLimit(
         "<=",
         6.0,
         "some hundred steps of Python, where the system is a few calls of LAPACK's",
-        ONE,
+        ONE_POSITION,
         "13x13 of one position",
     ),
     "one position with error bars / to forces": _SpeedLimit(
@@ -167,7 +164,7 @@ LIMITS = {
         4.5,
         "the same formulas once more, in numbers of NumPy's own",
         "one position with error bars",
-        ONE,
+        ONE_POSITION,
     ),
     "study of linkages / positions": _SpeedLimit(
         "<=", 2.0, "a member is a column of the same arrays as a position"
@@ -182,8 +179,8 @@ LIMITS = {
         "<=",
         350.0,
         "35 ms where a position takes 0.1 ms: two million scenes a night on 20 cores",
-        JUDGED,
-        ONE,
+        JUDGED_SCENE,
+        ONE_POSITION,
     ),
     **{
         f"{library}'s adapter / a plain loop": _SpeedLimit(
@@ -241,7 +238,7 @@ def import_cost() -> float:
 
 def _measure_memory(n: int) -> float:
     """Measure the MB allocated at the peak beyond arguments and results."""
-    command = make_command(n)
+    command = command_positions(n)
     out = allocate(UNKNOWNS, command)
     tracemalloc.start()
     solve(make_example(), at=command, out=out)
@@ -257,8 +254,8 @@ def _make_floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
     """
 
     def action() -> None:
-        for start in range(0, len(theta_2), BLOCK):
-            part = slice(start, start + BLOCK)
+        for start in range(0, len(theta_2), POSITIONS_OF_A_BLOCK):
+            part = slice(start, start + POSITIONS_OF_A_BLOCK)
             t = np.tan(theta_2[part])
             root = np.sqrt(np.abs(t, out=t), out=t)
             for angle in out.values():
@@ -300,18 +297,18 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> in
             line, env=os.environ | dict.fromkeys(ONE_THREAD, "1"), check=False
         ).returncode
         return status if status >= 0 else BROKEN  # below 0: a signal ended it
-    measurement = measure(positions, rounds, largest)
+    measurement = measure_speed(positions, rounds, largest)
     rows: list[tuple[str, ...]] = []
     broken: list[str] = []
     for what, measured in measurement.rows.items():
-        limit = LIMITS.get(what)
+        limit = SPEED_LIMITS.get(what)
         if limit is None:
             rows.append(
                 (
                     what,
                     (
                         f"{1e-6 * measured:.1f} ms"
-                        if what == JUDGED
+                        if what == JUDGED_SCENE
                         else f"{measured:.1f} ns/position"
                     ),
                 )
@@ -332,7 +329,9 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> in
         f"{positions} positions, one core, medians of {rounds} interleaved rounds;"
         f" {name_machine()}"
     )
-    console.print(make_table(("what", "measured", "needed", ""), rows, title=title))
+    console.print(
+        make_words_table(("what", "measured", "needed", ""), rows, title=title)
+    )
     for title, times in (
         (_OVER_POSITIONS, measurement.over_positions),
         (_OVER_LINKAGES, measurement.over_linkages),
@@ -343,7 +342,7 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> in
             [who, *(f"{timed[n]:.4g}" if n in timed else "" for n in counts)]
             for who, timed in times.items()
         ]
-        console.print(make_table(head, cells, title=title))
+        console.print(make_words_table(head, cells, title=title))
     for who, reason in measurement.not_run.items():
         click.echo(f"not run: {who}: {reason}")
     if picture is not None:
@@ -353,26 +352,26 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> in
     return FAILED if broken else HOLDS
 
 
-def measure(positions: int, rounds: int, largest: int) -> Measured:
-    """Measure the ratios of LIMITS and ns per position, and the times by how many."""
+def measure_speed(positions: int, rounds: int, largest: int) -> Measured:
+    """Measure the ratios of SPEED_LIMITS, ns per position, and times by how many."""
     scene = make_example()
-    command = make_command(positions)
+    command = command_positions(positions)
     limits = make_example(_WITH_LIMITS)
-    swing = make_command(positions, *choose_range(_WITH_LIMITS))
+    swing = command_positions(positions, *choose_range(_WITH_LIMITS))
     everything = allocate(UNKNOWNS, command)
     angles = allocate(ANGLES, command)
     batch = min(positions, _THIRTEEN_BATCH)
-    solved = make_command(min(positions, SOLVED))
-    bodies = make_bodies(scene, make_command(batch))
+    solved = command_positions(min(positions, SOLVED))
+    bodies = make_bodies(scene, command_positions(batch))
     many = len(solved.theta_2)
     alone = make_example(theta_2=1.0)
-    lone = make_bodies(scene, make_command(1))
+    lone = make_bodies(scene, command_positions(1))
     peers = collect_loops()
     actions: dict[str, tuple[int, Callable[[], object]]] = {
         ALL: (positions, lambda: solve(scene, at=command, out=everything)),
         _ANGLES_ALONE: (positions, lambda: solve(scene, at=command, out=angles)),
         _SYSTEM: (batch, lambda: solve_thirteen(bodies, 2)),
-        FLOOR: (positions, _make_floor(command.theta_2, angles)),
+        FLOOR_OF_TIMES: (positions, _make_floor(command.theta_2, angles)),
         "input between limits: all": (
             positions,
             lambda: solve(limits, at=swing, out=everything),
@@ -381,16 +380,19 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
             positions,
             lambda: solve(limits, at=swing, out=angles),
         ),
-        FORCES: (many, lambda: solve(scene, "force", at=solved)),
-        BARS: (many, lambda: solve(scene, "error", at=solved)),
+        TO_FORCES: (many, lambda: solve(scene, "force", at=solved)),
+        WITH_ERROR_BARS: (many, lambda: solve(scene, "error", at=solved)),
         "13x13 of one position": (
-            ALONE,
-            lambda: [solve_thirteen(lone, 2) for _ in range(ALONE)],
+            SINGLE_CALLS,
+            lambda: [solve_thirteen(lone, 2) for _ in range(SINGLE_CALLS)],
         ),
-        ONE: (ALONE, lambda: [solve(alone) for _ in range(ALONE)]),
+        ONE_POSITION: (
+            SINGLE_CALLS,
+            lambda: [solve(alone) for _ in range(SINGLE_CALLS)],
+        ),
         "one position with error bars": (
-            ALONE,
-            lambda: [solve(alone, "error") for _ in range(ALONE)],
+            SINGLE_CALLS,
+            lambda: [solve(alone, "error") for _ in range(SINGLE_CALLS)],
         ),
     }
     if "C" in peers.here:
@@ -408,16 +410,16 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
     most = max(by_linkages[STUDY])
     exact = [engine for engine in ENGINES if not engine.through_time]
     if not any(engine.missing() for engine in exact):
-        rows[JUDGED] = 1e9 * _time_judging(exact, max(1, positions // _PER_SCENE))
+        rows[JUDGED_SCENE] = 1e9 * _time_judging(exact, max(1, positions // _PER_SCENE))
         rows |= _compare_adapters(rounds)
     rows |= {
         name: rows[row.of] / rows[row.over]
-        for name, row in LIMITS.items()
+        for name, row in SPEED_LIMITS.items()
         if {row.of, row.over} <= rows.keys()
     }
     rows |= {
         "study of linkages / positions": (
-            by_linkages[STUDY][most] / by_linkages[POSITIONS][most]
+            by_linkages[STUDY][most] / by_linkages[ONE_LINKAGE][most]
         ),
         "growth from 1000 positions on": max(cost.values()) / cost[min(cost)],
         "memory beyond the result, MB": _measure_memory(min(positions, 1_000_000)),
@@ -432,7 +434,7 @@ def _compare_adapters(rounds: int) -> dict[str, float]:
     Both read the same quantities.
     """
     scene = make_example()
-    command = make_command(_ASKED)
+    command = command_positions(_ASKED)
     adapters = {engine.name: engine for engine in ENGINES}
     actions: dict[str, Callable[[], object]] = {}
     for library, (name, make_loop) in _PLAIN_LOOPS.items():

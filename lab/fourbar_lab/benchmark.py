@@ -27,14 +27,14 @@ from fourbar_validation.check.problem import (
     MISSING,
     RESULT,
     find_levels,
-    judge,
+    judge_answers,
     read_problem,
 )
 from fourbar_validation.compare.answer import EngineError
-from fourbar_validation.compare.rows import say_error, write_csv, write_one_line
+from fourbar_validation.compare.rows import say_error, write_csv_rows, write_one_line
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.environments import (
-    FILE,
+    ENGINES_FILE,
     Entry,
     prepare_program,
     read_engines_of,
@@ -46,7 +46,7 @@ from fourbar_validation.report.machine import name_machine
 from fourbar_validation.report.svg import (
     BAND,
     INK,
-    LIGHT,
+    LIGHT_COLOURS,
     PAPER,
     set_frame,
     write_alone,
@@ -54,13 +54,13 @@ from fourbar_validation.report.svg import (
 )
 from fourbar_validation.report.templating import render
 
-ENGINES = Path(__file__).parent / FILE
+BENCHMARKED_ENGINES = Path(__file__).parent / ENGINES_FILE
 REFUSED = "R"
 DIFFERENTIATED = "crank_rocker"
 """Problem whose errors are drawn over time. An engine that has derivatives is asked for
 them at it.
 """
-COLUMNS = (
+BENCHMARK_COLUMNS = (
     "problem",
     "engine",
     "version",
@@ -79,7 +79,7 @@ that the rest of its name names.
 """
 
 
-class Run(NamedTuple):
+class BenchmarkRun(NamedTuple):
     """One answer: of several timesteps each is one."""
 
     setting: str
@@ -89,7 +89,7 @@ class Run(NamedTuple):
     """Quantity, error, level."""
 
 
-class Work(NamedTuple):
+class TimedWork(NamedTuple):
     """What a run through time cost, and how exact it was."""
 
     seconds: float
@@ -107,7 +107,7 @@ class _MatrixCell:
     are reactions and motion.
     """
     reason: str = ""
-    runs: list[Run] = field(default_factory=list)
+    runs: list[BenchmarkRun] = field(default_factory=list)
     order: float | None = None
     """Power of the timestep with which the torque's error fell in the last step."""
     script: str = ""
@@ -298,7 +298,7 @@ class Benchmark:
                 **stated,
                 "engine": label,
                 "version": row.text("version"),
-                **_ask(running, question),
+                **_ask_question(running, question),
             }
             file.parent.mkdir(parents=True, exist_ok=True)
             write_text(file, json.dumps(result))
@@ -316,7 +316,7 @@ class Benchmark:
             )
             return
         try:
-            judged = judge(problem, result)
+            judged = judge_answers(problem, result)
         except InputError as error:
             cell.letters = MISSING
             cell.reason = f"an answer that cannot be judged: {error}"
@@ -333,7 +333,9 @@ class Benchmark:
         gap = result.get("evidence", {}).get("gap")
         numbers += [] if gap is None else [("gap at B", f"{gap:.1e}", "")]
         seconds = float(result.get("seconds", result["asked_for"]))
-        cell.runs.append(Run(str(result.get("setting", "exact")), seconds, numbers))
+        cell.runs.append(
+            BenchmarkRun(str(result.get("setting", "exact")), seconds, numbers)
+        )
         cell.order = _find_order(cell.runs)
 
     def _explain(self, label: str) -> str:
@@ -415,22 +417,22 @@ class Benchmark:
     def write(self) -> None:
         """Write the table and the page."""
         table = self.list_rows()
-        write_text(self.out / "benchmark.csv", write_csv(COLUMNS, table))
+        write_text(self.out / "benchmark.csv", write_csv_rows(BENCHMARK_COLUMNS, table))
         rows = {
             name_row(label, row.text("version")): row
             for label, row in self.rows.items()
         }
-        lines = read_work(dict(zip(COLUMNS, row, strict=True)) for row in table)
+        lines = read_work(
+            dict(zip(BENCHMARK_COLUMNS, row, strict=True)) for row in table
+        )
         page = {
             "machine": name_machine(),
             "problems": self.problems,
             "rows": rows,
-            "chart": (
-                write_svg(draw_work_precision(lines), "benchmark") if lines else ""
-            ),
+            "chart": (write_svg(draw_panels(lines), "benchmark") if lines else ""),
         }
         if lines:
-            picture = write_alone(draw_work_precision(lines), "benchmark")
+            picture = write_alone(draw_panels(lines), "benchmark")
             write_text(self.out / "benchmark.svg", picture)
         write_text(
             self.out / "benchmark.html",
@@ -438,7 +440,7 @@ class Benchmark:
         )
 
 
-FAMILIES = {
+PANELS = {
     "Pinocchio": ("Pinocchio",),
     "MuJoCo": ("MuJoCo",),
     "Descendants of MuJoCo": ("MJX-JAX", "MuJoCo Warp", "Newton: MuJoCo", "Genesis"),
@@ -447,14 +449,14 @@ FAMILIES = {
     "Others": ("",),
 }
 """Panels of the picture, and what the names of their engines begin with."""
-VERSION = re.compile(r" \d[\d.]*")
+VERSION_IN_A_NAME = re.compile(r" \d[\d.]*")
 """Version within the name of a row."""
 _FAMILY_COLOURS = ("--e1", "--e3", "--e4", "--e2", "--e8", "--e9")
 _MARKERS = "os^DvP"
 """Markers of the settings of a family, one after the other."""
 
 
-def read_work(table: Iterable[Mapping[str, Any]]) -> dict[str, list[Work]]:
+def read_work(table: Iterable[Mapping[str, Any]]) -> dict[str, list[TimedWork]]:
     """Read processor time and worst error of torque and pin forces of every run."""
     errors: dict[str, dict[float, list[float]]] = {}
     for row in table:
@@ -465,27 +467,27 @@ def read_work(table: Iterable[Mapping[str, Any]]) -> dict[str, list[Work]]:
             runs = errors.setdefault(name, {})
             runs.setdefault(float(row["seconds"]), []).append(float(row["error"]))
     return {
-        name: [Work(seconds, float(np.nanmax(of))) for seconds, of in runs.items()]
+        name: [TimedWork(seconds, float(np.nanmax(of))) for seconds, of in runs.items()]
         for name, runs in errors.items()
     }
 
 
-def find_family(name: str) -> str:
+def find_panel(name: str) -> str:
     """Find the panel of an engine: that of the longest beginning of its name."""
     beginnings = {
-        beginning: family for family, names in FAMILIES.items() for beginning in names
+        beginning: family for family, names in PANELS.items() for beginning in names
     }
-    plain = VERSION.sub("", name)
+    plain = VERSION_IN_A_NAME.sub("", name)
     return beginnings[max(filter(plain.startswith, beginnings), key=len)]
 
 
-def draw_work_precision(lines: Mapping[str, list[Work]]) -> Any:
+def draw_panels(lines: Mapping[str, list[TimedWork]]) -> Any:
     """Draw error over processor time: a panel a family, the others in grey."""
     from matplotlib.figure import Figure
 
-    present = {find_family(name) for name in lines}
-    colours = dict(zip(FAMILIES, _FAMILY_COLOURS, strict=True))
-    shown = [family for family in FAMILIES if family in present]
+    present = {find_panel(name) for name in lines}
+    colours = dict(zip(PANELS, _FAMILY_COLOURS, strict=True))
+    shown = [family for family in PANELS if family in present]
     rows = math.ceil(len(shown) / 2)
     size = (7.7, 3.1 * rows)
     figure = Figure(figsize=size, layout="constrained", facecolor=PAPER)
@@ -498,11 +500,11 @@ def draw_work_precision(lines: Mapping[str, list[Work]]) -> Any:
         axes.tick_params(which="both", labelcolor=INK)
         markers = cycle(_MARKERS)
         for name, points in lines.items():
-            own = find_family(name) == family
+            own = find_panel(name) == family
             look: dict[str, Any] = {"color": BAND, "linewidth": 0.8, "zorder": 1.5}
             if own:
                 look = {
-                    "color": LIGHT[colours[family]],
+                    "color": LIGHT_COLOURS[colours[family]],
                     "linewidth": 1.5,
                     "zorder": 3.0,
                 }
@@ -527,7 +529,7 @@ def _list_needs(problem: dict[str, Any]) -> set[str]:
     return needs | ({"release"} if problem["ask"] == "release" else set())
 
 
-def _ask(running: Running, question: dict[str, Any]) -> dict[str, Any]:
+def _ask_question(running: Running, question: dict[str, Any]) -> dict[str, Any]:
     """Ask one question; what came of it as entries of a result."""
     positions = len(question.get("times", question["command"].get("theta_2", [])))
     began = time.perf_counter()
@@ -588,7 +590,7 @@ def compare_slopes(
     return compared
 
 
-def _find_order(runs: list[Run]) -> float | None:
+def _find_order(runs: list[BenchmarkRun]) -> float | None:
     """Return the order of the torque's error in the timestep.
 
     It is from the last two runs; None if there is none.
@@ -631,7 +633,7 @@ def _find_order(runs: list[Run]) -> float | None:
 @click.option(
     "--time-limit", default=600.0, show_default=True, help="Seconds for each question."
 )
-def command(
+def benchmark_command(
     engines: Path | None, problems: tuple[str, ...], out: Path, time_limit: float
 ) -> None:
     """Ask every engine every problem of models/problems.
@@ -646,11 +648,11 @@ def command(
             raise InputError(
                 "--problem", name, f"must be one of {', '.join(list_problems())}"
             )
-    entries = read_engines_of(engines or ENGINES)
+    entries = read_engines_of(engines or BENCHMARKED_ENGINES)
     out.mkdir(parents=True, exist_ok=True)
     benchmark = Benchmark(
         entries.values(),
-        read_reasons(engines or ENGINES),
+        read_reasons(engines or BENCHMARKED_ENGINES),
         problems or list_problems(),
         out,
     )

@@ -11,27 +11,27 @@ from fourbar import __version__
 from fourbar.errors import run
 from fourbar_validation.cli import LazyGroup
 
-PROGRAM = "python -m fourbar_lab"
-COMMANDS = {
+LAB_PROGRAM = "python -m fourbar_lab"
+LAB_COMMANDS = {
     "stability": "fourbar_lab.stability:stability",
     "bench": "fourbar_lab.bench:bench",
     "effects": "fourbar_lab.effects:effects",
     "worlds": "fourbar_lab.worlds:command",
-    "advice": "fourbar_lab.advice:study",
+    "advice": "fourbar_lab.advice:advice_command",
     "fuzz": "fourbar_lab.fuzz:fuzz",
     "fuzz-files": "fourbar_lab.fuzz_files:fuzz_files",
-    "faults": "fourbar_lab.faults:command",
-    "mutants": "fourbar_lab.mutants:command",
-    "findings": "fourbar_lab.simulators.findings:command",
-    "write": "fourbar_lab.write:command",
-    "problems": "fourbar_lab.simulators.problems:command",
-    "benchmark": "fourbar_lab.benchmark:command",
+    "faults": "fourbar_lab.faults:faults_command",
+    "mutants": "fourbar_lab.mutants:mutants_command",
+    "findings": "fourbar_lab.simulators.findings:findings_command",
+    "write": "fourbar_lab.write:write_command",
+    "problems": "fourbar_lab.simulators.problems:problems_command",
+    "benchmark": "fourbar_lab.benchmark:benchmark_command",
 }
 
 
 @click.group(
     cls=LazyGroup,
-    modules=COMMANDS,
+    modules=LAB_COMMANDS,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -57,4 +57,4 @@ def status(arguments: list[str] | None = None) -> int:
 
     An error becomes one line on standard error.
     """
-    return run(group, PROGRAM, arguments)
+    return run(group, LAB_PROGRAM, arguments)

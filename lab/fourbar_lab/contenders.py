@@ -15,10 +15,9 @@ from statistics import median
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar import Bar, FourBar, Gravity, Motion, Scene, vary
-from fourbar.quantities import UNKNOWNS, VECTORS
+from fourbar.quantities import UNKNOWNS, VECTORS, Array
 from fourbar.scene import Command
 from fourbar.show.plot.style import Drawing, apply_style
 from fourbar.solving import solve
@@ -28,10 +27,9 @@ from fourbar_validation.report.machine import name_machine
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 Times = dict[str, dict[int, float]]
 """ns for each, by who and by how many."""
-Loop = Callable[[Array, Array], None]
+TimedLoop = Callable[[Array, Array], None]
 """Writes theta_3, theta_4, omega_3, omega_4, alpha_3, alpha_4, F12, F32, F43, F14 (two
 rows each) and the torque at n angles into an array (15, n).
 """
@@ -45,11 +43,11 @@ _LOOKS = (
     ("#8A3B78", "D"),
 )
 """Colours and marks in the order of the contenders."""
-AT_ONCE = 1_000_000
+POSITIONS_OF_ONE_CALL = 1_000_000
 """Positions of a call. More are evaluated in pieces of this many, so that their memory
 is bounded (150 MB).
 """
-SHORTEST = 200_000
+LEAST_POSITIONS = 200_000
 """Positions of one timing: fewer are evaluated as often as makes so many."""
 _MOST_LINKAGES = 100_000
 MOST_LOOPED = 1000
@@ -57,20 +55,22 @@ MOST_LOOPED = 1000
 changes.
 """
 STUDY = "study, NumPy"
-POSITIONS = "one linkage, as many positions"
+ONE_LINKAGE = "one linkage, as many positions"
 _LOOPED = "one after the other"
-LINKAGE = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
+CONTENDED_LINKAGE = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
 """Crank-rocker a = 0.1, b = 0.25, c = 0.22, d = 0.3 m, uniform bars."""
 
 
 class _Peers(NamedTuple):
     """Libraries that can be run here, and the reasons why the others were not run."""
 
-    here: dict[str, Loop]
+    here: dict[str, TimedLoop]
     not_run: dict[str, str]
 
 
-def make_example(linkage: FourBar = LINKAGE, theta_2: float | None = 0.0) -> Scene:
+def make_example(
+    linkage: FourBar = CONTENDED_LINKAGE, theta_2: float | None = 0.0
+) -> Scene:
     """Build the scene that is timed.
 
     It is a crank at 10 rad/s with gravity and the drive on the input; theta_2 None: its
@@ -79,7 +79,7 @@ def make_example(linkage: FourBar = LINKAGE, theta_2: float | None = 0.0) -> Sce
     return Scene(linkage, Motion(theta_2, 10.0), 2, (), (Gravity(),))
 
 
-def make_command(n: int, start: float = 0.0, stop: float = 2.0 * np.pi) -> Command:
+def command_positions(n: int, start: float = 0.0, stop: float = 2.0 * np.pi) -> Command:
     """Command n positions, over a revolution unless specified otherwise."""
     return Command(
         np.linspace(start, stop, n), np.broadcast_to(np.int8(1), (n,)), 10.0, 0.0
@@ -116,7 +116,10 @@ def collect_loops() -> _Peers:
 
     Each writes into arrays that exist.
     """
-    loops: dict[str, Loop | str] = {"NumPy": _make_solve_loop(), "C": _compile_loop()}
+    loops: dict[str, TimedLoop | str] = {
+        "NumPy": _make_solve_loop(),
+        "C": _compile_loop(),
+    }
     reasons = {name: loop for name, loop in loops.items() if isinstance(loop, str)}
     return _Peers(
         {name: loop for name, loop in loops.items() if not isinstance(loop, str)},
@@ -124,7 +127,7 @@ def collect_loops() -> _Peers:
     )
 
 
-def _make_solve_loop() -> Loop:
+def _make_solve_loop() -> TimedLoop:
     scene = make_example()
 
     def call(theta_2: Any, out: Any) -> None:
@@ -133,12 +136,14 @@ def _make_solve_loop() -> Loop:
         for name in UNKNOWNS:
             row = next(rows)
             into[name] = out[row : next(rows) + 1].T if name in VECTORS else out[row]
-        solve(scene, at=make_command(len(theta_2))._replace(angle=theta_2), out=into)
+        solve(
+            scene, at=command_positions(len(theta_2))._replace(angle=theta_2), out=into
+        )
 
     return call
 
 
-def _compile_loop() -> Loop | str:
+def _compile_loop() -> TimedLoop | str:
     """Compile the loop; the reason where that fails."""
     compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
     if compiler is None:
@@ -176,20 +181,20 @@ def _compile_loop() -> Loop | str:
     return call
 
 
-def time_positions(peers: dict[str, Loop], largest: int, rounds: int) -> Times:
+def time_positions(peers: dict[str, TimedLoop], largest: int, rounds: int) -> Times:
     """Time a position, in ns, for 1000, 10 000, ... of them.
 
     They are written into arrays that exist.
     """
     times: Times = {name: {} for name in peers}
     for n in [10**k for k in range(3, 9) if 10**k <= largest]:
-        at_once = min(n, AT_ONCE)
-        calls = max(1, SHORTEST // n, n // AT_ONCE)
-        theta_2 = make_command(at_once).theta_2
+        at_once = min(n, POSITIONS_OF_ONE_CALL)
+        calls = max(1, LEAST_POSITIONS // n, n // POSITIONS_OF_ONE_CALL)
+        theta_2 = command_positions(at_once).theta_2
         out = np.zeros((15, at_once))
         actions = {name: partial(loop, theta_2, out) for name, loop in peers.items()}
         for name, value in time_interleaved(
-            actions, rounds if n <= AT_ONCE else 1, calls
+            actions, rounds if n <= POSITIONS_OF_ONE_CALL else 1, calls
         ).items():
             times[name][n] = 1e9 * value / at_once
     return times
@@ -201,7 +206,7 @@ def time_linkages(largest: int, rounds: int) -> Times:
     They are solved as a study, and one after the other.
     """
     scene = make_example(theta_2=1.0)
-    times: Times = {STUDY: {}, POSITIONS: {}, _LOOPED: {}}
+    times: Times = {STUDY: {}, ONE_LINKAGE: {}, _LOOPED: {}}
 
     def study(lengths: Any) -> None:
         solve(vary(scene, {"lengths.coupler": lengths}))
@@ -217,7 +222,7 @@ def time_linkages(largest: int, rounds: int) -> Times:
         lengths = np.linspace(0.24, 0.26, m)
         actions: dict[str, Callable[[], object]] = {
             STUDY: partial(study, lengths),
-            POSITIONS: partial(solve, scene, at=make_command(m)),
+            ONE_LINKAGE: partial(solve, scene, at=command_positions(m)),
         }
         if m <= MOST_LOOPED:
             actions[_LOOPED] = partial(looped, lengths)

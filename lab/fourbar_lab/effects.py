@@ -26,9 +26,9 @@ from fourbar_validation.cost.study import time_call, time_in_turns
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.report.machine import describe_setup
 from fourbar_validation.report.templating import render
-from fourbar_validation.report.terminal import make_table
+from fourbar_validation.report.terminal import make_words_table
 
-LENGTHS = 'ground = "30 cm"\ninput = "10 cm"\ncoupler = "25 cm"\noutput = "22 cm"'
+LENGTHS_TEXT = 'ground = "30 cm"\ninput = "10 cm"\ncoupler = "25 cm"\noutput = "22 cm"'
 EFFECTS: dict[str, kinds.Effect | None] = {
     "none": None,
     "gravity": kinds.Gravity(9.81),
@@ -63,7 +63,7 @@ EFFECTS: dict[str, kinds.Effect | None] = {
     ),
 }
 EFFECTS |= {
-    key: loads(f"[lengths]\n{LENGTHS}\n[effects]\n{kind.example}").effects[0]
+    key: loads(f"[lengths]\n{LENGTHS_TEXT}\n[effects]\n{kind.example}").effects[0]
     for key, kind in kinds.list_kinds().items()
     if key not in EFFECTS
 }
@@ -79,9 +79,9 @@ NO_COUNTERPART = {
 DEFAULT_FLAGS = "none, MuJoCo's default flags"
 _LEFT_ON = "none, {} left on"
 """One flag of MuJoCo as it is by default, the others as the generated MJCF has them."""
-POSITIONS = 1000
+POSITIONS_OF_A_CALL = 1000
 """Positions of the formulas in one unit of work, as they take arrays."""
-ROUNDS = 31
+PAIRS_OF_RUNS = 31
 """Pairs of runs, first one ahead and then the other."""
 _AMOUNTS = {
     "formulas": 40,
@@ -92,14 +92,14 @@ _AMOUNTS = {
 """Units of work of one run. It takes 10 to 20 ms, long against the clock's resolution
 and short against disturbances.
 """
-ABOUT = (
+CAPTION_OF_THE_TABLE = (
     "Processor time of a position, of a step of the simulation (RK4), in us without"
     " effects; with an effect relative to that: the median of the ratios of"
     " neighbouring runs and their middle half."
 )
 
 
-def make_scene(effect: str, positions: int) -> Scene:
+def make_effect_scene(effect: str, positions: int) -> Scene:
     """Build a crank-rocker of uniform bars with one effect."""
     linkage = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
     acting = EFFECTS[effect]
@@ -114,8 +114,8 @@ def make_scene(effect: str, positions: int) -> Scene:
 
 
 def _prepare_formulas(effect: str) -> Callable[[int], Any]:
-    """Prepare pin forces and torque at POSITIONS positions, a given number of times."""
-    scene = make_scene(effect, POSITIONS)
+    """Prepare pin forces and torque at POSITIONS_OF_A_CALL positions, some times."""
+    scene = make_effect_scene(effect, POSITIONS_OF_A_CALL)
     return lambda amount: [solve(scene, "force") for _ in range(amount)]
 
 
@@ -123,7 +123,7 @@ def prepare_simulation(effect: str) -> Callable[[int], Any]:
     """Prepare a given number of steps of the generated MJCF."""
     from fourbar_validation.engines.mujoco.closed_loop import make_stepper
 
-    text = write_mjcf(make_scene(effect if effect in EFFECTS else "none", 91))
+    text = write_mjcf(make_effect_scene(effect if effect in EFFECTS else "none", 91))
     if effect == DEFAULT_FLAGS:
         text = re.sub(r"<flag [^>]*/>", "", text)
     elif effect not in EFFECTS:
@@ -137,7 +137,7 @@ def _list_flags() -> dict[str, str]:
 
     The key is the name of the workload that leaves one on.
     """
-    flags = re.findall(r'(\w+)="disable"', write_mjcf(make_scene("none", 91)))
+    flags = re.findall(r'(\w+)="disable"', write_mjcf(make_effect_scene("none", 91)))
     return {_LEFT_ON.format(flag): flag for flag in flags}
 
 
@@ -146,7 +146,7 @@ def _prepare_answers(name: str, effect: str) -> Callable[[int], Any]:
     adapter = next(engine for engine in ENGINES if engine.name == name).start()
 
     def work(amount: int) -> None:
-        scene = make_scene(effect, amount)
+        scene = make_effect_scene(effect, amount)
         adapter.answer(scene, command(scene))
 
     return work
@@ -178,7 +178,7 @@ class EffectCost(NamedTuple):
     """The middle half of the pairs lies between low and high."""
 
 
-def measure(engine: str, effect: str, rounds: int = ROUNDS) -> EffectCost:
+def measure_effect(engine: str, effect: str, rounds: int = PAIRS_OF_RUNS) -> EffectCost:
     """Time neighbouring runs with and without an effect.
 
     Both meet the same disturbances.
@@ -192,7 +192,7 @@ def measure(engine: str, effect: str, rounds: int = ROUNDS) -> EffectCost:
         work()
     clocks = {which: partial(time_call, work) for which, work in works.items()}
     bare, loaded = map(np.array, time_in_turns(clocks, rounds).values())
-    units = amount * (POSITIONS if engine == "formulas" else 1)
+    units = amount * (POSITIONS_OF_A_CALL if engine == "formulas" else 1)
     return EffectCost(
         engine,
         effect,
@@ -201,7 +201,7 @@ def measure(engine: str, effect: str, rounds: int = ROUNDS) -> EffectCost:
     )
 
 
-def list_rows(costs: Iterable[EffectCost]) -> tuple[list[str], list[list[str]]]:
+def list_cost_rows(costs: Iterable[EffectCost]) -> tuple[list[str], list[list[str]]]:
     """List the engines, and for each effect its name and a cell for each engine."""
     by_name = {(one.engine, one.effect): one for one in costs}
     engines = list(dict.fromkeys(engine for engine, _ in by_name))
@@ -279,16 +279,18 @@ def effects(engines: str, only: str | None, out: Path | None) -> int:
         if engine.name in wanted and (reason := engine.missing()):
             raise DependencyError(f"{engine.name}: {reason}")
     costs = [
-        measure(*pair)
+        measure_effect(*pair)
         for pair in track(
             list_pairs(wanted, chosen), description="timing", transient=True
         )
     ]
-    columns, rows = list_rows(costs)
-    Console().print(make_table(["effect", *columns], rows, caption=ABOUT))
+    columns, rows = list_cost_rows(costs)
+    Console().print(
+        make_words_table(["effect", *columns], rows, caption=CAPTION_OF_THE_TABLE)
+    )
     if out is not None:
         what = {
-            "about": ABOUT,
+            "about": CAPTION_OF_THE_TABLE,
             "head": ["", *columns],
             "rows": rows,
             "setup": describe_setup(),

@@ -60,7 +60,7 @@ def _spread_masses(spread: float) -> Ranges:
 
 
 _EVEN = _spread_masses(0.0)
-UNEVEN = _spread_masses(3.0)
+UNEVEN_DRAWERS = _spread_masses(3.0)
 
 
 def _draw_anywhere(rng: np.random.Generator) -> DrawnLinkage:
@@ -163,7 +163,7 @@ def scales(rng: np.random.Generator) -> Scene:
                 (bar.mass_centre[0] * k, bar.mass_centre[1]),
             )
         )
-    loads = tuple(_scale_load(load, k) for load in scene.loads)
+    loads = tuple(_scale_load_with_lengths(load, k) for load in scene.loads)
     return replace(
         scene,
         linkage=FourBar(link.ground * k, bars[0], bars[1], bars[2], link.ground_angle),
@@ -171,7 +171,7 @@ def scales(rng: np.random.Generator) -> Scene:
     )
 
 
-def _scale_load(load: Load, k: float) -> Load:
+def _scale_load_with_lengths(load: Load, k: float) -> Load:
     """Return the load of a linkage whose lengths are k times as large."""
     scaled: Any = {
         form: (place[0] * k, place[1])
@@ -441,11 +441,11 @@ def _near_pins(rng: np.random.Generator) -> Scene:
     return replace(scene, effects=(Springs((Spring(start, end, stiffness, length),)),))
 
 
-FAMILIES: dict[str, Callable[[np.random.Generator], Scene]] = {
+FAMILY_DRAWERS: dict[str, Callable[[np.random.Generator], Scene]] = {
     "random": ANYWHERE.draw,
     "limit": RandomFamily(_draw_near_limit, _EVEN).draw,
     "change_point": RandomFamily(_draw_near_change_point, _EVEN).draw,
-    "ratios": RandomFamily(_draw_with_ratios, UNEVEN).draw,
+    "ratios": RandomFamily(_draw_with_ratios, UNEVEN_DRAWERS).draw,
     "scales": scales,
     "speeds": speeds,
     "springs": springs,

@@ -30,7 +30,7 @@ from fourbar.scene.motion import CROSSED, Free, FromLimit, Law, Motion, Rise, Sw
 from fourbar.scene.numbers import Point
 from fourbar_validation.scenes.suites import read_default_suite
 
-CRANK = FourBar(
+CRANK_ROCKER_LINKAGE = FourBar(
     0.3,
     Bar(0.1, 0.2, centre=(0.04, 0.4)),
     Bar(0.25, 0.5, 0.004, (0.13, 0.3)),
@@ -44,31 +44,33 @@ _ROUND_AND_FLAT = FourBar(
     Bar(0.25, density=2700.0, section=(0.02, 0.005)),
     Bar(0.22, 0.4),
 )
-ROCKER = FourBar(0.3, Bar(0.25, 0.7), Bar(0.1, 1.3), Bar(0.22, 0.9))
-TURN = Motion(Sweep(0.1, 0.1 + 2.0 * math.pi, 24), 10.0, 5.0)
+ROCKER_CRANK_LINKAGE = FourBar(0.3, Bar(0.25, 0.7), Bar(0.1, 1.3), Bar(0.22, 0.9))
+MOTION_OF_A_TURN = Motion(Sweep(0.1, 0.1 + 2.0 * math.pi, 24), 10.0, 5.0)
 LOADS = (
     Load(4, (3.0, 0.7), arm=(0.05, 1.0)),
     Load(3, (2.0, -0.4), from_centre=(0.06, 0.5), moment=0.1, frame="bar"),
     Load(2, (1.0, 0.3), from_pin=(0.07, -0.2)),
 )
 _WEIGHT = Gravity(9.81, -1.3)
-POINTS = (
+POINTS_OF_BARS = (
     Point("P", 3, (0.1, 0.7)),
     Point("Q", 4, (0.05, -0.3)),
     Point("R", 2, (0.03, 0.2)),
 )
-CRANK_ROCKER = Scene(CRANK, TURN, 2, LOADS, (_WEIGHT,), points=POINTS)
+CRANK_ROCKER = Scene(
+    CRANK_ROCKER_LINKAGE, MOTION_OF_A_TURN, 2, LOADS, (_WEIGHT,), points=POINTS_OF_BARS
+)
 FAULT_SCENES: dict[str, Scene] = {
     "crank-rocker": CRANK_ROCKER,
     "coupler driven": replace(
-        CRANK_ROCKER, motion=TURN.replace(branch=CROSSED), drive_bar=3
+        CRANK_ROCKER, motion=MOTION_OF_A_TURN.replace(branch=CROSSED), drive_bar=3
     ),
     "output driven": replace(
         CRANK_ROCKER, motion=Motion(Sweep(0.5, 1.5, 12), -10.0, 5.0), drive_bar=4
     ),
     "cylinder": replace(
         CRANK_ROCKER,
-        motion=TURN.replace(branch=CROSSED),
+        motion=MOTION_OF_A_TURN.replace(branch=CROSSED),
         drive_bar=None,  # type: ignore[arg-type]
         drive=LinearDrive(Place(2, (0.17, -1.1)), Place(4, (0.09, 0.7))),
     ),
@@ -118,28 +120,38 @@ FAULT_SCENES: dict[str, Scene] = {
         drive_bar=None,  # type: ignore[arg-type]
         drive=LinearDrive(Place(1, (0.17, -1.1)), Place(3, (0.09, 0.7))),
     ),
-    "slender bars": Scene(_SLENDER, TURN),
-    "drag link": Scene(uniform(0.08, 0.24, 0.2, 0.26), TURN, 4, effects=(Gravity(),)),
-    "limited": Scene(ROCKER, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(_WEIGHT,)),
+    "slender bars": Scene(_SLENDER, MOTION_OF_A_TURN),
+    "drag link": Scene(
+        uniform(0.08, 0.24, 0.2, 0.26), MOTION_OF_A_TURN, 4, effects=(Gravity(),)
+    ),
+    "limited": Scene(
+        ROCKER_CRANK_LINKAGE, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(_WEIGHT,)
+    ),
     "parallelogram": Scene(
         FourBar(0.3, Bar(0.1, 0.2), Bar(0.3, 0.5), Bar(0.1, 0.4)),
         Motion(Sweep(-1.0, 1.1, 14), 4.0, branch=-1),
         effects=(_WEIGHT,),
     ),
     "near a limit": Scene(
-        ROCKER,
-        Motion(limit_positions(ROCKER)[0].theta_2 + np.array([1e-2, 1e-3]), 1.0),
+        ROCKER_CRANK_LINKAGE,
+        Motion(
+            limit_positions(ROCKER_CRANK_LINKAGE)[0].theta_2 + np.array([1e-2, 1e-3]),
+            1.0,
+        ),
         effects=(_WEIGHT,),
     ),
     "nearest to a limit": Scene(
-        ROCKER,
-        Motion(limit_positions(ROCKER)[0].theta_2 + np.array([1e-3, 1e-13]), 1.0),
+        ROCKER_CRANK_LINKAGE,
+        Motion(
+            limit_positions(ROCKER_CRANK_LINKAGE)[0].theta_2 + np.array([1e-3, 1e-13]),
+            1.0,
+        ),
         effects=(_WEIGHT,),
     ),
     "a hair from a limit": Scene(
-        ROCKER, Motion(FromLimit(1, 1e-9), 1.0), effects=(_WEIGHT,)
+        ROCKER_CRANK_LINKAGE, Motion(FromLimit(1, 1e-9), 1.0), effects=(_WEIGHT,)
     ),
-    "positions": Scene(CRANK, Motion(Sweep(0.0, 6.0, 12))),
+    "positions": Scene(CRANK_ROCKER_LINKAGE, Motion(Sweep(0.0, 6.0, 12))),
     "damped": replace(
         CRANK_ROCKER,
         effects=(
@@ -177,7 +189,7 @@ FAULT_SCENES: dict[str, Scene] = {
         CRANK_ROCKER, effects=(Flywheel(0.003, 2), Torsion.at(A=(0.5, 0.2, 0.1)))
     ),
     "wound": Scene(
-        CRANK,
+        CRANK_ROCKER_LINKAGE,
         Motion(Sweep(0.0, 9.0, 30), 5.0),
         effects=(Torsion.at(O2=(0.5, 1.0, 0.1)),),
     ),
@@ -188,7 +200,7 @@ FAULT_SCENES: dict[str, Scene] = {
         CRANK_ROCKER, effects=(_WEIGHT, PinFriction.at(B=(0.3, 0.03))), drive_bar=4
     ),
     "at rest": Scene(
-        CRANK,
+        CRANK_ROCKER_LINKAGE,
         Motion(Sweep(0.1, 6.0, 12), 0.0),
         2,
         LOADS,
@@ -209,7 +221,7 @@ FAULT_SCENES: dict[str, Scene] = {
         ),
     ),
     "law": Scene(
-        CRANK,
+        CRANK_ROCKER_LINKAGE,
         Motion(
             law=Law(
                 (0.0, 0.2, 0.5, 0.9, 1.2),
@@ -221,7 +233,8 @@ FAULT_SCENES: dict[str, Scene] = {
         effects=(_WEIGHT,),
     ),
     "law at rest": Scene(
-        CRANK, Motion(law=Law((0.0, 0.3, 0.7, 1.0), (0.3, 1.0, 2.2, 3.0), 16, "rest"))
+        CRANK_ROCKER_LINKAGE,
+        Motion(law=Law((0.0, 0.3, 0.7, 1.0), (0.3, 1.0, 2.2, 3.0), 16, "rest")),
     ),
     "rises": Scene(
         _ROUND_AND_FLAT,
@@ -232,36 +245,41 @@ FAULT_SCENES: dict[str, Scene] = {
         _ROUND_AND_FLAT, Motion(law=Rise("345", (1.2, 0.4), 0.3, 0.1, steps=24))
     ),
     "free law": Scene(
-        CRANK, Motion(law=Law((0.0, 0.3, 0.7, 1.0, 1.4), (0.3, 1.0, 2.2, 3.0, 3.3), 16))
+        CRANK_ROCKER_LINKAGE,
+        Motion(law=Law((0.0, 0.3, 0.7, 1.0, 1.4), (0.3, 1.0, 2.2, 3.0, 3.3), 16)),
     ),
-    "released": Scene(CRANK, Motion(1.0, 3.0, free=Free(0.5, 50)), effects=(_WEIGHT,)),
+    "released": Scene(
+        CRANK_ROCKER_LINKAGE, Motion(1.0, 3.0, free=Free(0.5, 50)), effects=(_WEIGHT,)
+    ),
     "released, damped": Scene(
-        CRANK,
+        CRANK_ROCKER_LINKAGE,
         Motion(1.0, 3.0, free=Free(0.5, 50)),
         2,
         (Load(4, moment=0.1),),
         (_WEIGHT, Viscous.at(O4=0.01, B=0.003), Friction.at(O2=0.02)),
     ),
     "released, pushed from G": Scene(
-        CRANK,
+        CRANK_ROCKER_LINKAGE,
         Motion(1.0, 3.0, free=Free(0.5, 50)),
         2,
         (Load(3, (2.0, -0.4), from_centre=(0.06, 0.5), frame="bar"),),
     ),
     "double rocker released": Scene(
-        ROCKER,
+        ROCKER_CRANK_LINKAGE,
         Motion(math.radians(50.0), 0.0, free=Free(1.0, 100)),
         effects=(Gravity(),),
     ),
     "several solutions": Scene(
-        CRANK,
+        CRANK_ROCKER_LINKAGE,
         Motion(np.array([2.3, 2.5]), 10.0),
         effects=(PinFriction.at(A=(50.0, 0.01)),),
     ),
     "near a reversal": Scene(
-        CRANK,
+        CRANK_ROCKER_LINKAGE,
         Motion(
-            limit_positions(CRANK, 4)[0].theta_2 + np.array([1.0, 1e-2, 1e-4]), 10.0
+            limit_positions(CRANK_ROCKER_LINKAGE, 4)[0].theta_2
+            + np.array([1.0, 1e-2, 1e-4]),
+            10.0,
         ),
         effects=(Friction.at(O4=0.03),),
     ),
@@ -274,31 +292,31 @@ FAULT_SCENES: dict[str, Scene] = {
         # within a hundredth of where both are in line
         Motion(0.99 * 2.0 * math.asin(0.0045), 10.0),
     ),
-    "left open": Scene(ROCKER, Motion(omega_2=3.0)),
+    "left open": Scene(ROCKER_CRANK_LINKAGE, Motion(omega_2=3.0)),
     "many turns away": Scene(
-        CRANK,
+        CRANK_ROCKER_LINKAGE,
         Motion(Sweep(20.0, 22.0, 10), 5.0),
         effects=(Torsion.at(O2=(0.5, 1.0, 0.1)),),
     ),
     "ends of a spring nearly meet": Scene(
-        CRANK,
+        CRANK_ROCKER_LINKAGE,
         Motion(1.0 + np.array([1e-5, 0.1, 1.0]), 10.0),
         effects=(
             Springs((Spring(Place(1, (0.1, 0.8)), Place(2, (0.1, 0.0)), 80.0, 0.05),)),
         ),
     ),
     "held by friction": Scene(
-        CRANK,
+        CRANK_ROCKER_LINKAGE,
         Motion(1.0, 0.0, free=Free(0.5, 5)),
         effects=(_WEIGHT, Friction.at(B=0.3, O2=2.0)),
     ),
     "held in the end": Scene(
-        CRANK,
+        CRANK_ROCKER_LINKAGE,
         Motion(1.0, 3.0, free=Free(1.0, 20)),
         effects=(_WEIGHT, Friction.at(A=0.3, O4=1.0)),
     ),
     "from rest against friction": Scene(
-        CRANK,
+        CRANK_ROCKER_LINKAGE,
         Motion(1.0, 0.0, free=Free(0.5, 20)),
         effects=(_WEIGHT, Friction.at(A=0.01, O4=0.02)),
     ),
@@ -318,13 +336,15 @@ FAULT_SCENES: dict[str, Scene] = {
         3,
         effects=(_WEIGHT,),
     ),
-    "derived": Scene(_SLENDER, TURN, effects=(_WEIGHT,), points=POINTS),
-    "derived, limited": Scene(
-        ROCKER, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(_WEIGHT,)
+    "derived": Scene(
+        _SLENDER, MOTION_OF_A_TURN, effects=(_WEIGHT,), points=POINTS_OF_BARS
     ),
-    "derived, loaded": Scene(_SLENDER, TURN, 2, LOADS, (_WEIGHT,)),
+    "derived, limited": Scene(
+        ROCKER_CRANK_LINKAGE, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(_WEIGHT,)
+    ),
+    "derived, loaded": Scene(_SLENDER, MOTION_OF_A_TURN, 2, LOADS, (_WEIGHT,)),
     "simulated": Scene(
-        CRANK,
+        CRANK_ROCKER_LINKAGE,
         Motion(Sweep(0.1, 6.0, 12), 10.0),
         2,
         LOADS,
@@ -337,18 +357,18 @@ FAULT_SCENES: dict[str, Scene] = {
         ),
     ),
     "simulated, dry": Scene(
-        CRANK,
+        CRANK_ROCKER_LINKAGE,
         Motion(Sweep(0.1, 3.0, 8), 10.0),
         effects=(Friction.at(A=0.05, B=0.04), Torsion.at(O4=(0.3, 1.2, -0.05))),
     ),
     "simulated cylinder": Scene(
-        CRANK,
+        CRANK_ROCKER_LINKAGE,
         Motion(Sweep(0.1, 3.0, 8), 10.0),
         loads=LOADS,
         drive=LinearDrive(Place(1, (0.17, -1.1)), Place(3, (0.09, 0.7))),
     ),
     "simulated stroke": Scene(
-        CRANK,
+        CRANK_ROCKER_LINKAGE,
         Motion(
             stroke=Sweep(0.25, 0.35, 8),
             stroke_speed=0.2,
@@ -359,7 +379,10 @@ FAULT_SCENES: dict[str, Scene] = {
         drive=LinearDrive(Place(1, (0.3, 2.2)), Place(2, (0.12, 0.4))),
     ),
     "simulated, quickening": Scene(
-        CRANK, Motion(Sweep(0.1, 3.0, 8), 10.0, 20.0), 4, effects=(Flywheel(0.003, 4),)
+        CRANK_ROCKER_LINKAGE,
+        Motion(Sweep(0.1, 3.0, 8), 10.0, 20.0),
+        4,
+        effects=(Flywheel(0.003, 4),),
     ),
 }
 """Scenes by the name under which an entry of faults.toml tries its fault; scenes called

@@ -17,15 +17,15 @@ from fourbar_lab import injection
 from fourbar_lab.injection import read_faults
 from fourbar_validation.engines.processes import Ended, run_to_end
 from fourbar_validation.engines.workers import apply_each
-from fourbar_validation.places import CHECKOUT, FORMULAS, PACKAGE
+from fourbar_validation.places import CHECKOUT, FORMULAS_FOLDER, PACKAGE
 
 _TESTS_FAIL = 1
 """Exit status of pytest where a test fails."""
 TEST_SECONDS = 10.0
 """Processor time within which the tests of what judges must fail, s."""
-CHUNK = 8
+FAULTS_OF_A_PROCESS = 8
 """Faults of one process, which loads the engines once."""
-SECONDS = 300
+FAULT_SECONDS = 300
 """Time after which a run with a fault is ended, s. That counts as a failure; a run
 takes some three seconds.
 """
@@ -48,11 +48,15 @@ def _inject(*arguments: str) -> Ended:
     """Run the module that injects, in a process of its own."""
     packages = dict.fromkeys(
         str(folder)
-        for folder in (FORMULAS.parent, PACKAGE.parent, Path(__file__).parents[1])
+        for folder in (
+            FORMULAS_FOLDER.parent,
+            PACKAGE.parent,
+            Path(__file__).parents[1],
+        )
     )
     line = [sys.executable, "-P", injection.__file__, *arguments]
     variables = {"PYTHONPATH": os.pathsep.join(packages)}
-    return run_to_end(line, seconds=SECONDS, folder=CHECKOUT, variables=variables)
+    return run_to_end(line, seconds=FAULT_SECONDS, folder=CHECKOUT, variables=variables)
 
 
 def try_judging_fault(number: int) -> str | None:
@@ -115,8 +119,8 @@ def _try_every_fault(workers: int) -> Iterator[tuple[str, str | None]]:
     )
     yield "no fault", f"the harness fails without one: {failing}" if failing else None
     chunks = [
-        range(start, min(start + CHUNK, len(entries)))
-        for start in range(0, len(entries), CHUNK)
+        range(start, min(start + FAULTS_OF_A_PROCESS, len(entries)))
+        for start in range(0, len(entries), FAULTS_OF_A_PROCESS)
     ]
     for chunk, outcomes in zip(
         chunks, apply_each(try_in_turn, chunks, workers), strict=True
@@ -135,7 +139,7 @@ def _try_every_fault(workers: int) -> Iterator[tuple[str, str | None]]:
 
 @click.command()
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1))
-def command(workers: int) -> int:
+def faults_command(workers: int) -> int:
     """Make each fault of faults.toml, one at a time; each must be caught.
 
     Those in formulas, effects, MJCF and engines must fail a comparison, those in what

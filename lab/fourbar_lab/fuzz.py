@@ -21,9 +21,10 @@ from fourbar.errors import FourBarError, InputError
 from fourbar.files import dump, loads, save
 from fourbar.scene import Command, Scene, command, with_signs
 from fourbar.solution import Solution
+from fourbar_lab import LAB_FOLDER
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS, say_error
-from fourbar_validation.compare.tolerance import TOUCHING_MARGIN, find_margin
+from fourbar_validation.compare.tolerance import TOUCHING_MARGIN, compute_closing_margin
 from fourbar_validation.engines import workers as worker_processes
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.registry import ENGINES, hold_fully, make_demands
@@ -44,10 +45,10 @@ from fourbar_validation.scenes.random import (
     draw_uniform,
 )
 
-POSITIONS = 2
+POSITIONS_OF_A_SCENE = 2
 _SIZES = {False: draw_decades(-0.7, 0.7), True: draw_decades(-6.0, 6.0)}
 """Lengths, masses, speeds and loads: ordinary, adversarial."""
-ORDINARY = Ranges(
+ORDINARY_RANGES = Ranges(
     pushed=PUSHED,
     mass=_SIZES[False],
     inertia=draw_uniform(0.02, 0.4),
@@ -60,35 +61,34 @@ ORDINARY = Ranges(
     friction=0.1,
 )
 RANGES = {
-    False: ORDINARY,
+    False: ORDINARY_RANGES,
     True: replace(
-        ORDINARY,
+        ORDINARY_RANGES,
         mass=draw_chance(0.85, _SIZES[True]),
-        inertia=draw_chance(0.85, ORDINARY.inertia),
+        inertia=draw_chance(0.85, ORDINARY_RANGES.inertia),
         centre=draw_product(
-            ORDINARY.centre, draw_chance(0.2, draw_decades(0.0, 3.0), 1.0)
+            ORDINARY_RANGES.centre, draw_chance(0.2, draw_decades(0.0, 3.0), 1.0)
         ),
         ground_angle=lambda rng: float(
             rng.choice([0.0, math.pi, rng.uniform(-3.2, 3.2)])
         ),
-        load=draw_product(ORDINARY.load, _SIZES[True]),
+        load=draw_product(ORDINARY_RANGES.load, _SIZES[True]),
         speed=draw_chance(0.95, _SIZES[True]),
     ),
 }
 """Distributions from which the scenes are drawn: ordinary, adversarial."""
-KEPT = (
+COUNTEREXAMPLES = (
     Path("results/counterexamples")
     if CHECKOUT is None
     else CHECKOUT / "tests" / "counterexamples"
 )
-DIGITS = (1, 2, 3, 6, 10)
-ROUNDS = 4
-NUMBER = re.compile(r'(?<=")-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?= )')
+DIGITS_OF_A_LENGTH = (1, 2, 3, 6, 10)
+SHRINKING_ROUNDS = 4
+NUMBER_BEFORE_A_UNIT = re.compile(r'(?<=")-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?= )')
 """Pattern of the number of a quantity, before its unit."""
 _NEEDED = ("[motion]", "theta_2", "omega_2")
 """A scene without them has no torque, and fails for another reason."""
-LAB = Path(__file__).parent
-EXACT = tuple(
+EXACT_ENGINES = tuple(
     hold_fully(w)
     for w in ENGINES
     if w.name in ("pinocchio-inverse", "mujoco-inverse", "free-body")
@@ -96,10 +96,10 @@ EXACT = tuple(
 """The exact engines, held to full accuracy. Or they are held to what was predicted for
 the position.
 """
-CHUNK = 200
+SCENES_OF_A_CHUNK = 200
 """Scenes per task: some seconds, which is what an interruption costs."""
-SHOWN = 20
-LOST = "worker:"
+FAILURES_PRINTED = 20
+WORKER_LOST = "worker:"
 """Beginning of the discrepancy of a scene that killed its worker. It is that of one
 that never came back too.
 """
@@ -110,7 +110,7 @@ def draw_fuzz_scene(seed: int, index: int) -> Scene:
     rng = np.random.default_rng([seed, index])
     while True:
         try:
-            scene = FAMILIES[index % 2 == 1].draw(rng)
+            scene = FUZZED_FAMILIES[index % 2 == 1].draw(rng)
         except InputError:
             continue
         if rng.random() < 1.0 / 3.0:
@@ -120,23 +120,25 @@ def draw_fuzz_scene(seed: int, index: int) -> Scene:
         return replace(scene, motion=scene.motion.replace(acceleration=alpha))
 
 
-def _draw_linkage(hard: bool, rng: np.random.Generator) -> DrawnLinkage:
+def _draw_fuzzed_linkage(hard: bool, rng: np.random.Generator) -> DrawnLinkage:
     size = _SIZES[hard](rng)
-    lengths = tuple(float(x * size) for x in _draw_lengths(rng, hard))
+    lengths = tuple(float(x * size) for x in _draw_fuzzed_lengths(rng, hard))
     return (
         lengths,
-        lambda rng, linkage: linkage.ground_angle + _draw_angles(rng, hard, lengths),
+        lambda rng, linkage: (
+            linkage.ground_angle + _draw_fuzzed_angles(rng, hard, lengths)
+        ),
     )
 
 
-FAMILIES = {
-    hard: RandomFamily(partial(_draw_linkage, hard), RANGES[hard])
+FUZZED_FAMILIES = {
+    hard: RandomFamily(partial(_draw_fuzzed_linkage, hard), RANGES[hard])
     for hard in (False, True)
 }
 """Families of the scenes: ordinary, adversarial."""
 
 
-def _draw_lengths(rng: np.random.Generator, hard: bool) -> Any:
+def _draw_fuzzed_lengths(rng: np.random.Generator, hard: bool) -> Any:
     """Draw (ground, input, coupler, output), some of them special.
 
     They are equal, in extreme ratios, or near s + l = p + q.
@@ -168,14 +170,14 @@ def _draw_lengths(rng: np.random.Generator, hard: bool) -> Any:
     return x
 
 
-def _draw_angles(
+def _draw_fuzzed_angles(
     rng: np.random.Generator, hard: bool, lengths: tuple[float, ...]
 ) -> Any:
     """Draw theta_2 - theta_1, anywhere or at a special place.
 
     It may be near a limit position, a change point, or many turns away.
     """
-    psi = rng.uniform(-3.2, 3.2, POSITIONS)
+    psi = rng.uniform(-3.2, 3.2, POSITIONS_OF_A_SCENE)
     if not hard:
         return psi
     d, a, b, c = lengths
@@ -188,12 +190,12 @@ def _draw_angles(
         cosine = (a * a + d * d - diagonal**2) / (2 * a * d)
         base = math.acos(min(1.0, max(-1.0, cosine)))
         psi = float(rng.choice([-1.0, 1.0])) * base + rng.choice(
-            [-1.0, 1.0], POSITIONS
-        ) * 10.0 ** rng.uniform(-14, -1, POSITIONS)
+            [-1.0, 1.0], POSITIONS_OF_A_SCENE
+        ) * 10.0 ** rng.uniform(-14, -1, POSITIONS_OF_A_SCENE)
     elif choice < 0.6:
         psi = float(rng.choice([0.0, math.pi])) + rng.choice(
-            [-1.0, 0.0, 1.0], POSITIONS
-        ) * 10.0 ** rng.uniform(-9, -1, POSITIONS)
+            [-1.0, 0.0, 1.0], POSITIONS_OF_A_SCENE
+        ) * 10.0 ** rng.uniform(-9, -1, POSITIONS_OF_A_SCENE)
     elif choice < 0.65:
         psi = psi + 2 * math.pi * rng.integers(-1000, 1000)
     return psi
@@ -202,7 +204,7 @@ def _draw_angles(
 def shrink_scene(scene: Scene, fails: Callable[[Scene], bool]) -> Scene:
     """Simplify a scene by one change of its file at a time while it fails."""
     lines = dump(scene).splitlines()
-    for _ in range(ROUNDS):
+    for _ in range(SHRINKING_ROUNDS):
         before = lines
         for number in reversed(
             range(len(lines))
@@ -240,9 +242,9 @@ def _list_simpler(lines: list[str], number: int) -> Iterator[list[str]]:
         entries = [f"{key} = {json.dumps(each)}" for each in json.loads(value)]
     else:
         entries = []
-    for digits in DIGITS:
+    for digits in DIGITS_OF_A_LENGTH:
         entries.append(
-            NUMBER.sub(
+            NUMBER_BEFORE_A_UNIT.sub(
                 lambda match, digits=digits: f"{float(match[0]):.{digits}g}",  # type: ignore[misc]
                 line,
             )
@@ -252,7 +254,9 @@ def _list_simpler(lines: list[str], number: int) -> Iterator[list[str]]:
             yield [*lines[:number], entry, *lines[number + 1 :]]
 
 
-def keep(scene: Scene, name: str, folder: Path = KEPT) -> Path:
+def keep_counterexample(
+    scene: Scene, name: str, folder: Path = COUNTEREXAMPLES
+) -> Path:
     """Write a counter-example where the tests find it."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{name}.toml"
@@ -296,13 +300,16 @@ def _check_assembly(scene: Scene, commanded: Command, solution: Solution) -> lis
     There is no position where the loop does not close, and none is missing where it
     does.
     """
-    from fourbar_validation.engines.balls import closure, make_balls
+    from fourbar_validation.engines.balls import compute_directions, make_balls
 
     problems = []
-    margin = np.abs(find_margin(scene.linkage, commanded.theta_2))
+    margin = np.abs(compute_closing_margin(scene.linkage, commanded.theta_2))
     signs = with_signs(scene.linkage, commanded).branch
     for i, theta_2 in enumerate(commanded.theta_2):
-        closes = closure(make_balls(scene, float(theta_2)), int(signs[i])) is not None
+        closes = (
+            compute_directions(make_balls(scene, float(theta_2)), int(signs[i]))
+            is not None
+        )
         if closes != bool(solution.assembled[i]) and margin[i] > TOUCHING_MARGIN:
             problems.append(
                 f"assembled: the formulas say {bool(solution.assembled[i])} at theta_2"
@@ -322,7 +329,7 @@ def _check_engines(question: Question) -> list[str]:
     commanded = question.at
     solution = question.solution
     rows = list(check_identities(question))
-    for engine in EXACT:
+    for engine in EXACT_ENGINES:
         answer = ask_at(engine.start(), scene, commanded)
         held = make_demands(engine, scene, commanded, answer)
         rows += Comparison("", scene, answer, solution, held).rows()
@@ -340,35 +347,37 @@ def _check_engines(question: Question) -> list[str]:
     return [f"{row.engine} {row.quantity}: {row.reason}" for row in failed]
 
 
-def examine(seed: int, index: int) -> list[str]:
+def examine_scene(seed: int, index: int) -> list[str]:
     """Examine the scene of a number."""
     return list_findings(draw_fuzz_scene(seed, index))
 
 
 def _find_lost(_: int, error: BaseException, __: object) -> list[str]:
-    return [f"{LOST} {say_error(error)}"]
+    return [f"{WORKER_LOST} {say_error(error)}"]
 
 
-def run(
+def examine_scenes(
     count: int, seed: int, out: Path, workers: int
 ) -> Iterator[dict[str, list[str]]]:
     """Examine the scenes chunk by chunk, what is wrong by number.
 
     Chunks of an interrupted run are read.
     """
-    with Store(out, {"seed": seed, **name_code(LAB)}).held() as store:
+    with Store(out, {"seed": seed, **name_code(LAB_FOLDER)}).held() as store:
         chunks = {
-            min(start + CHUNK, count): range(start, min(start + CHUNK, count))
-            for start in range(0, count, CHUNK)
+            min(start + SCENES_OF_A_CHUNK, count): range(
+                start, min(start + SCENES_OF_A_CHUNK, count)
+            )
+            for start in range(0, count, SCENES_OF_A_CHUNK)
         }
         done = store.done() & chunks.keys()
         yield from (store.read(stop)[0] for stop in sorted(done))
         todo = [chunk for chunk in chunks.items() if chunk[0] not in done]
         for stop, outcomes in worker_processes.apply_over_processes(
-            partial(examine, seed),
+            partial(examine_scene, seed),
             todo,
             workers,
-            seconds=worker_processes.SECONDS,
+            seconds=worker_processes.SCENE_SECONDS,
             instead=_find_lost,
         ):
             wrong = {
@@ -409,20 +418,20 @@ def fuzz(scenes: int, seed: int, workers: int, out: Path) -> int:
 
     console = Console(stderr=True)
     wrong: dict[str, list[str]] = {}
-    chunks = -(-scenes // CHUNK)
-    running = run(scenes, seed, out, workers)
+    chunks = -(-scenes // SCENES_OF_A_CHUNK)
+    running = examine_scenes(scenes, seed, out, workers)
     for chunk in track(running, "fuzzing", total=chunks, console=console):
         wrong |= chunk
-    for number in sorted(wrong, key=int)[:SHOWN]:
+    for number in sorted(wrong, key=int)[:FAILURES_PRINTED]:
         source = wrong[number][0]
         scene = draw_fuzz_scene(seed, int(number))
-        if not source.startswith(LOST):  # shrinking would end this process too
+        if not source.startswith(WORKER_LOST):  # shrinking would end this process too
             scene = shrink_scene(
                 scene, lambda candidate: bool(list_findings(candidate))
             )
             source = list_findings(scene)[0]
         title = f"found by fuzzing, seed {seed}, scene {number}"
-        path = keep(
+        path = keep_counterexample(
             replace(scene, title=title, source=source), f"seed_{seed}_scene_{number}"
         )
         console.print(f"scene {number}: {wrong[number][0]}\n  kept as {path.name}")

@@ -17,7 +17,7 @@ from fourbar_validation.scenes.suites import list_model_files
 
 _HANG = 5.0
 """Seconds; a scene file takes milliseconds."""
-MOST_POSITIONS = 10_000
+MOST_POSITIONS_OF_A_FILE = 10_000
 """Positions that a mutated file may ask for here. It may have 10^8 of them, but only
 the reading of it is tried.
 """
@@ -142,7 +142,7 @@ def try_out(text: str) -> str:
         scene = loads(text, "mutant.toml")
         if scene.motion.free is None:
             commanded = command(scene)
-            if len(commanded.theta_2) <= MOST_POSITIONS:
+            if len(commanded.theta_2) <= MOST_POSITIONS_OF_A_FILE:
                 solve(scene, find_last_stage(scene), at=commanded)
     except FourBarError as error:
         if "\n" in str(error):

@@ -19,7 +19,7 @@ from types import CodeType
 from typing import Any
 
 FAULTS = Path(__file__).parent / "faults.toml"
-PACKAGES = ("fourbar", "fourbar_validation")
+CHANGEABLE_PACKAGES = ("fourbar", "fourbar_validation")
 """Packages that an entry may change, in the checkout or as they are installed."""
 
 
@@ -64,7 +64,9 @@ def _find_file(name: str) -> Path:
     """Find a file of a package that is not imported."""
     package, _, rest = name.partition("/")
     spec = importlib.machinery.PathFinder.find_spec(package)
-    assert package in PACKAGES and spec is not None and spec.origin is not None, name
+    assert (
+        package in CHANGEABLE_PACKAGES and spec is not None and spec.origin is not None
+    ), name
     return Path(spec.origin).parent / rest
 
 
@@ -144,7 +146,7 @@ def _run_tests(entry: dict[str, Any]) -> dict[str, float]:
     return {"status": int(status), "seconds": time.process_time()}
 
 
-def main() -> None:
+def inject_and_judge() -> None:
     """Inject the fault of each number, check its test scenes, print what fails."""
     if sys.argv[1:2] == ["--tests"]:
         print(json.dumps(_run_tests(read_faults("judging")[int(sys.argv[2])])))
@@ -155,7 +157,7 @@ def main() -> None:
         for name in [
             name
             for name in sys.modules
-            if name.partition(".")[0] in (*PACKAGES, "fourbar_lab")
+            if name.partition(".")[0] in (*CHANGEABLE_PACKAGES, "fourbar_lab")
         ]:
             del sys.modules[
                 name
@@ -171,4 +173,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    inject_and_judge()

@@ -38,7 +38,7 @@ from fourbar_validation.run.answers import check_statements
 from fourbar_validation.run.identities import check_identities, compare_status
 from fourbar_validation.run.question import Question
 
-PAIRS = (
+EXCHANGED_OPERATORS = (
     *(
         (ast.Add, ast.Sub),
         (ast.Mult, ast.Div),
@@ -55,13 +55,15 @@ PAIRS = (
     ),
 )
 OTHER: dict[type, type] = (
-    {a: b for a, b in PAIRS} | {b: a for a, b in PAIRS} | {ast.Pow: ast.Mult}
+    {a: b for a, b in EXCHANGED_OPERATORS}
+    | {b: a for a, b in EXCHANGED_OPERATORS}
+    | {ast.Pow: ast.Mult}
 )
 """Replacement of each operator."""
 _CHANGES = 1e-9
-SECONDS = 20
+MUTANT_SECONDS = 20
 """Time after which a mutant hangs. The run would be stopped, which is a failure too."""
-LEAST = 0.95
+LEAST_CAUGHT = 0.95
 """Share of the mutants that must be caught."""
 MODULES = (
     "arithmetic",
@@ -73,8 +75,8 @@ MODULES = (
     "mobility",
     "transmission",
 )
-SCENES = 10
-EXACT = ("pinocchio-inverse", "mujoco-inverse", FREE_BODY)
+SCENES_OF_A_MUTANT = 10
+EXACT_ENGINE_NAMES = ("pinocchio-inverse", "mujoco-inverse", FREE_BODY)
 
 
 class Mutant(NamedTuple):
@@ -178,7 +180,10 @@ def choose_scenes() -> list[Scene]:
     )
     from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 
-    chosen = [draw_random_scene(0, index, tuple(DrawnType)) for index in range(SCENES)]
+    chosen = [
+        draw_random_scene(0, index, tuple(DrawnType))
+        for index in range(SCENES_OF_A_MUTANT)
+    ]
     chosen.append(sweep_turn(dress((0.3, 0.1, 0.25, 0.22)), 12))
     chosen += [
         scene
@@ -294,7 +299,9 @@ def make_baselines() -> list[Baseline]:
     for scene in choose_scenes():
         command = command_of(scene)
         answers = [
-            (w, ask_at(w.start(), scene, command)) for w in ENGINES if w.name in EXACT
+            (w, ask_at(w.start(), scene, command))
+            for w in ENGINES
+            if w.name in EXACT_ENGINE_NAMES
         ]
         if is_caught(scene, command, answers):
             raise RuntimeError(f"the harness fails without a mutant: {scene.title}")
@@ -305,7 +312,7 @@ def make_baselines() -> list[Baseline]:
 def judge_mutant(mutant: Mutant, tried: Sequence[Baseline]) -> bool | None:
     """Return whether a mutant is caught, or None where it changes nothing."""
     differs = False
-    signal.alarm(SECONDS)
+    signal.alarm(MUTANT_SECONDS)
     try:
         with np.errstate(all="ignore"), mutant.active():
             for scene, command, answers, before in tried:
@@ -328,7 +335,7 @@ def judge_mutant(mutant: Mutant, tried: Sequence[Baseline]) -> bool | None:
     type=click.IntRange(0),
     help="At most this many of each module.",
 )
-def command(module: str | None, most: int) -> int:
+def mutants_command(module: str | None, most: int) -> int:
     """Change operators and numbers of the formulas, one at a time.
 
     95 % of those that matter must fail the harness. A change matters that alters a
@@ -381,6 +388,6 @@ def command(module: str | None, most: int) -> int:
         f"the harness catches {changing - len(missed)} of {changing} mutants that"
         " change a number"
     )
-    if changing and len(missed) <= (1.0 - LEAST) * changing:
+    if changing and len(missed) <= (1.0 - LEAST_CAUGHT) * changing:
         return HOLDS
     return FAILED

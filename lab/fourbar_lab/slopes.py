@@ -16,6 +16,7 @@ import numpy as np
 from flint import arb
 
 from fourbar.effects import Friction
+from fourbar.linkage import PINS
 from fourbar.scene import Scene, command, with_signs
 from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.keys import (
@@ -23,20 +24,19 @@ from fourbar.studies.keys import (
     read_numbers,
     replace_numbers,
 )
-from fourbar_lab.tally import Tally, compute_ratio, is_untold, list_components
+from fourbar_lab.tally import Tally, error_over_allowed, is_untold, list_components
 from fourbar_validation.engines.balls import (
     STEP_BITS,
-    Values,
+    BallValues,
     compute_outputs,
     make_balls,
 )
-from fourbar_validation.engines.description import PINS
 
 Slopes = dict[str, dict[str, tuple[Any, float]]]
 """Derivatives by output and key: each as a ball, with sum |x_j ds/dx_j|."""
 
 
-def list_numbers(scene: Scene) -> dict[str, float]:
+def list_numbers_by_key(scene: Scene) -> dict[str, float]:
     """List every number that a scene of one position states, its angle too, by key."""
     return {
         **read_numbers(scene),
@@ -44,13 +44,13 @@ def list_numbers(scene: Scene) -> dict[str, float]:
     }
 
 
-def _compute_exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
+def _compute_exact_slopes(scene: Scene) -> tuple[BallValues, Slopes]:
     """Return every output, and its derivatives and theirs by every number.
 
     They are differences in balls. No output where the loop does not close, no
     derivative where the drive has no torque.
     """
-    numbers = list_numbers(scene)
+    numbers = list_numbers_by_key(scene)
     angle = command_key(scene)
     make_balls(scene, numbers[angle])  # sets the precision
     steps = {
@@ -60,7 +60,7 @@ def _compute_exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
 
     sign = int(with_signs(scene.linkage, command(scene)).branch[0])
 
-    def moved(*keys: str) -> Values:
+    def moved(*keys: str) -> BallValues:
         changed: dict[str, Any] = dict(numbers)
         for key in keys:
             changed[key] = changed[key] + steps[key]
@@ -103,7 +103,7 @@ def _compute_exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
 def differentiate(scene: Scene) -> dict[str, Any]:
     """Differentiate by every number by `sensitivity`; a row for each number."""
     derivatives = sensitivity(scene)
-    rows = [list(derivatives.keys).index(key) for key in list_numbers(scene)]
+    rows = [list(derivatives.keys).index(key) for key in list_numbers_by_key(scene)]
     return {name: of[rows, 0] for name, of in derivatives.by.items()}
 
 
@@ -112,7 +112,7 @@ def judge_slopes(scene: Scene, tally: Tally, sample: str) -> None:
     tally.samples += 1
     values, exact = _compute_exact_slopes(scene)
     slopes = differentiate(scene)
-    numbers = list_numbers(scene)
+    numbers = list_numbers_by_key(scene)
     if not values:
         tally.not_assembled += 1
         if np.nan_to_num(slopes["F12"]).any():
@@ -144,12 +144,12 @@ def judge_slopes(scene: Scene, tally: Tally, sample: str) -> None:
                 rate += together / (abs(number) or 1.0)
                 tally.note(
                     component,
-                    compute_ratio("", np.ravel(row)[index], value, rate)[0],
+                    error_over_allowed("", np.ravel(row)[index], value, rate)[0],
                     f"{sample} by {key}",
                 )
 
 
-def _is_held(scene: Scene, values: Values) -> bool:
+def _is_held(scene: Scene, values: BallValues) -> bool:
     """Return whether dry friction holds a pin at rest.
 
     Torque and pin forces then have no derivative.

@@ -19,23 +19,23 @@ from fourbar.scene import Command, Scene, command, with_signs
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
 from fourbar.solving import solve
-from fourbar_lab.families import FAMILIES
+from fourbar_lab.families import FAMILY_DRAWERS
 from fourbar_lab.slopes import judge_slopes
 from fourbar_lab.tally import (
+    BAR_FACTORS,
     HALF_A_DIGIT,
-    TOO_LARGE,
     Tally,
-    compute_ratio,
+    error_over_allowed,
     list_components,
 )
 from fourbar_validation.compare.tolerance import find_used
 from fourbar_validation.engines.prediction import compute_reference
 from fourbar_validation.engines.workers import apply_each
-from fourbar_validation.report.terminal import make_table
+from fourbar_validation.report.terminal import make_words_table
 
-FULL = 10_000
+SAMPLES_OF_A_FAMILY = 10_000
 """Samples per family of the full set."""
-CHUNK = 250
+SAMPLES_OF_A_TASK = 250
 """Samples per task: about a second."""
 WIDE = 160
 """Columns of text for the table of all families where no terminal limits them."""
@@ -57,7 +57,7 @@ def solve_position(scene: Scene, angle: float) -> dict[str, Any]:
     }
 
 
-def judge(scene: Scene, tally: Tally, sample: str) -> None:
+def judge_sample(scene: Scene, tally: Tally, sample: str) -> None:
     """Compare one position with the reference."""
     tally.samples += 1
     angle = float(np.asarray(scene.motion.angle))
@@ -74,7 +74,7 @@ def judge(scene: Scene, tally: Tally, sample: str) -> None:
         warnings.simplefilter("always")
         solution = solve_position(scene, angle)
     tally.warned += [f"{sample}: {warning.message}" for warning in caught]
-    exact = compute_reference(scene, find_sign(scene), angle)
+    exact = compute_reference(scene, find_command_sign(scene), angle)
     if exact is None:
         tally.not_assembled += 1
         if math.isfinite(solution[drive]):
@@ -96,7 +96,9 @@ def judge(scene: Scene, tally: Tally, sample: str) -> None:
                 internal and name in PIN_FORCES
             ):  # a component that the drive has no part in is left of larger ones
                 rate = max(sensitivity[other] for other, _ in list_components(name))
-            part, errors[component] = compute_ratio(name, own, values[component], rate)
+            part, errors[component] = error_over_allowed(
+                name, own, values[component], rate
+            )
             tally.note(component, part, sample)
     if drive not in values:
         tally.no_torque += 1
@@ -114,11 +116,11 @@ def judge(scene: Scene, tally: Tally, sample: str) -> None:
             tally.too_small.get(name, 0.0), float(find_used(error, bar))
         )
         tally.too_large[name] = tally.too_large.get(name, 0) + (
-            bar > TOO_LARGE * max(error, HALF_A_DIGIT * size)
+            bar > BAR_FACTORS * max(error, HALF_A_DIGIT * size)
         )
 
 
-def run(
+def judge_samples(
     family: str,
     samples: range,
     seed: int = 0,
@@ -137,14 +139,16 @@ def run(
     """
     tally = Tally()
     for number in samples:
-        rng = np.random.default_rng([seed, list(FAMILIES).index(family), number])
-        scene = _feed_back(FAMILIES[family](rng), bar)
+        rng = np.random.default_rng([seed, list(FAMILY_DRAWERS).index(family), number])
+        scene = _feed_back(FAMILY_DRAWERS[family](rng), bar)
         if scene is not None:
-            (judge_slopes if derivatives else judge)(scene, tally, f"{family} {number}")
+            (judge_slopes if derivatives else judge_sample)(
+                scene, tally, f"{family} {number}"
+            )
     return tally
 
 
-def find_sign(scene: Scene) -> int:
+def find_command_sign(scene: Scene) -> int:
     """Find the sign of the sine of the scene's command at its first position."""
     return int(with_signs(scene.linkage, command(scene)).branch[0])
 
@@ -183,14 +187,16 @@ def _read_commanded(solution: Solution, bar: int) -> tuple[float, float, float, 
     return theta, omega, alpha, math.sin(other - one)
 
 
-def _run(seed: int, bar: int, derivatives: bool, task: tuple[str, range]) -> Tally:
-    return run(*task, seed, bar, derivatives=derivatives)
+def _judge_task(
+    seed: int, bar: int, derivatives: bool, task: tuple[str, range]
+) -> Tally:
+    return judge_samples(*task, seed, bar, derivatives=derivatives)
 
 
 @click.command()
 @click.option(
     "--samples",
-    default=FULL,
+    default=SAMPLES_OF_A_FAMILY,
     show_default=True,
     type=click.IntRange(1),
     help="Samples per family.",
@@ -199,7 +205,7 @@ def _run(seed: int, bar: int, derivatives: bool, task: tuple[str, range]) -> Tal
     "--family",
     "families",
     multiple=True,
-    type=click.Choice(list(FAMILIES)),
+    type=click.Choice(list(FAMILY_DRAWERS)),
     help="Only these (repeatable).",
 )
 @click.option("--seed", default=0, show_default=True)
@@ -231,12 +237,13 @@ def stability(
     from rich.console import Console
     from rich.progress import track
 
-    chosen = families or tuple(FAMILIES)
+    chosen = families or tuple(FAMILY_DRAWERS)
     parts = [
-        range(start, min(start + CHUNK, samples)) for start in range(0, samples, CHUNK)
+        range(start, min(start + SAMPLES_OF_A_TASK, samples))
+        for start in range(0, samples, SAMPLES_OF_A_TASK)
     ]
     tasks = [(family, part) for family in chosen for part in parts]
-    results = apply_each(partial(_run, seed, bar, derivatives), tasks, jobs)
+    results = apply_each(partial(_judge_task, seed, bar, derivatives), tasks, jobs)
     tallies = {family: Tally() for family in chosen}
     for (family, _), tally in track(
         zip(tasks, results, strict=True), "samples", total=len(tasks)
@@ -279,7 +286,7 @@ def stability(
         )
         rows.append(
             (
-                f"% {name} > {TOO_LARGE:.0f} x error",
+                f"% {name} > {BAR_FACTORS:.0f} x error",
                 *(f"{share:.2f}" for share in shares),
             )
         )
@@ -301,7 +308,7 @@ def stability(
         f"largest error / (8 eps (|y| + sum |x dy/dx|)), {samples} samples each, seed"
         f" {seed}{of}"
     )
-    console.print(make_table(("output", *chosen), rows, title=title))
+    console.print(make_words_table(("output", *chosen), rows, title=title))
     for family, tally in tallies.items():
         for name, (part, sample) in tally.worst.items():
             if part > 1.0:

@@ -11,12 +11,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fourbar.quantities import VECTORS
-from fourbar_validation.compare.tolerance import find_used
+from fourbar_validation.compare.tolerance import EPS, find_used
 
-EPS = 2.0**-52
-FACTOR = 8.0
+FACTOR_ON_EPS = 8.0
 """Factor on eps in the allowed error, as the contract states it."""
-TOO_SMALL, TOO_LARGE = 10.0, 100.0
+TOO_SMALL, BAR_FACTORS = 10.0, 100.0
 """Factors by which an error bar may miss the error. It may be smaller (never) and
 larger (in one of USELESS samples).
 """
@@ -50,7 +49,7 @@ class Tally:
     too_small: dict[str, float] = field(default_factory=dict)
     """Error bar: largest error/bar."""
     too_large: dict[str, int] = field(default_factory=dict)
-    """Error bar: samples in which it is more than TOO_LARGE times the error."""
+    """Error bar: samples in which it is more than BAR_FACTORS times the error."""
     warned: list[str] = field(default_factory=list)
 
     def add(self, other: "Tally") -> None:
@@ -106,7 +105,7 @@ def list_components(name: str) -> list[tuple[str, Any]]:
     return [(name, 0)]
 
 
-def compute_ratio(
+def error_over_allowed(
     name: str, ours: float, value: Any, sensitivity: float
 ) -> tuple[float, float]:
     """Compute an error over what is allowed, and the error.
@@ -141,4 +140,4 @@ def is_untold(sine: Any, sensitivity: float) -> bool:
 
 def _compute_allowed(size: float, sensitivity: float) -> float:
     """Return 8 eps (|y| + sum |x_i dy/dx_i|)."""
-    return FACTOR * EPS * (size + sensitivity)
+    return FACTOR_ON_EPS * EPS * (size + sensitivity)

@@ -21,12 +21,12 @@ from fourbar.solving import solve
 from fourbar.writing import write_text
 from fourbar_lab.contenders import allocate
 from fourbar_lab.simulators.problems import PROBLEMS
-from fourbar_validation.check.problem import judge, read_problem
+from fourbar_validation.check.problem import judge_answers, read_problem
 from fourbar_validation.compare.rows import write_one_line
 from fourbar_validation.engines import protocol
 from fourbar_validation.report.machine import describe_setup
 from fourbar_validation.report.templating import render
-from fourbar_validation.report.terminal import make_table
+from fourbar_validation.report.terminal import make_words_table
 
 _PROBLEM = "crank_rocker"
 """Problem whose positions are repeated over the worlds."""
@@ -143,7 +143,7 @@ def _judge_forces(
     problem: dict[str, Any], result: dict[str, Any]
 ) -> tuple[float, float]:
     """Return the errors of the torque and of the worst pin force."""
-    errors = {row.quantity: row.error for row in judge(problem, result)}
+    errors = {row.quantity: row.error for row in judge_answers(problem, result)}
     # NaN stays NaN
     force = np.max([errors[name] for name in PIN_FORCES])
     return errors["torque"], float(force)
@@ -261,7 +261,7 @@ def command(worlds: str, any_device: bool, out: Path | None) -> int:
                 continue
             click.echo(f"{what}: {1e9 * costs[-1].seconds / number:.0f} ns a position")
     columns, rows = list_rows(costs)
-    Console().print(make_table(columns, rows, caption=_ABOUT))
+    Console().print(make_words_table(columns, rows, caption=_ABOUT))
     for line in not_run:
         click.echo(line)
     setup = "; ".join((describe_setup(), *_list_devices()))

@@ -16,8 +16,8 @@ from fourbar.writing import write_text
 from fourbar_validation.places import find_checkout
 from fourbar_validation.scenes.suites import list_model_files
 
-NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-ROUND_OFF = 1e-12
+NUMBER_IN_AN_MJCF = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+STATE_ROUND_OFF = 1e-12
 """Part by which the assembled state may differ. It is computed, and another
 processor's sine may end it in another digit.
 """
@@ -31,19 +31,24 @@ def find_stale(files: Iterable[Path]) -> list[Path]:
     stale = []
     for file in files:
         xml = file.with_suffix(".xml")
-        if not xml.is_file() or not _is_same(
+        if not xml.is_file() or not _is_same_model(
             xml.read_text(encoding="utf-8"), write_mjcf(load(file))
         ):
             stale.append(file)
     return stale
 
 
-def _is_same(one: str, other: str) -> bool:
-    if NUMBER.split(one) != NUMBER.split(other):
+def _is_same_model(one: str, other: str) -> bool:
+    if NUMBER_IN_AN_MJCF.split(one) != NUMBER_IN_AN_MJCF.split(other):
         return False
-    numbers = zip(NUMBER.findall(one), NUMBER.findall(other), strict=True)
+    numbers = zip(
+        NUMBER_IN_AN_MJCF.findall(one), NUMBER_IN_AN_MJCF.findall(other), strict=True
+    )
     return all(
-        a == b or math.isclose(float(a), float(b), rel_tol=ROUND_OFF, abs_tol=ROUND_OFF)
+        a == b
+        or math.isclose(
+            float(a), float(b), rel_tol=STATE_ROUND_OFF, abs_tol=STATE_ROUND_OFF
+        )
         for a, b in numbers
     )
 
@@ -57,7 +62,7 @@ def write_models(files: Iterable[Path]) -> list[Path]:
 
 
 @click.command()
-def command() -> None:
+def write_command() -> None:
     """Write the MJCF of every scene in models/ for which it is stale."""
     find_checkout("write")
     for file in write_models(list_model_files()):

@@ -11,7 +11,7 @@ import pytest
 import fourbar
 from fourbar.scene import command
 from fourbar_lab import advice
-from fourbar_lab.advice import find_cheapest
+from fourbar_lab.advice import try_all_settings
 from fourbar_lab.cli import status as ended
 from fourbar_validation.advise import advise
 from fourbar_validation.engines.mujoco.trial import TrialSetup
@@ -34,10 +34,12 @@ def test_unseen_linkages_are_served_and_not_at_three_times_the_cheapest() -> Non
 def test_the_search_knows_when_nothing_serves() -> None:
     scene = turning(positions=12)
     setup = TrialSetup(scene, command(scene))
-    assert find_cheapest(setup, 1e-3, {("RK4", True): 1.0}) is not None
+    assert try_all_settings(setup, 1e-3, {("RK4", True): 1.0}) is not None
     trials: list[object] = []
     setup.try_out = lambda settings: trials.append(settings) or hopeless(scene)  # type: ignore[method-assign,func-returns-value]
-    assert find_cheapest(setup, 1e-3, {("RK4", True): 1.0}) is None and len(trials) > 50
+    assert (
+        try_all_settings(setup, 1e-3, {("RK4", True): 1.0}) is None and len(trials) > 50
+    )
 
 
 def hopeless(scene: fourbar.Scene) -> object:
@@ -79,13 +81,13 @@ def test_a_measure_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(advice, "measure_case", case)
     monkeypatch.setattr(advice, "time_relative_costs", lambda setup: {})
     out = tmp_path / "study"
-    list(advice.measure(3, 2, out))
-    cases = list(advice.measure(3, 4, out))
+    list(advice.measure_cases(3, 2, out))
+    cases = list(advice.measure_cases(3, 4, out))
     assert (
         made == [0, 1, 2, 3]
         and [measured.index for measured in cases] == made
         and all(measured.met for measured in cases)
     )
     made.clear()
-    list(advice.measure(4, 1, out))  # another seed starts over
+    list(advice.measure_cases(4, 1, out))  # another seed starts over
     assert made == [0]

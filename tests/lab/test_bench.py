@@ -14,7 +14,7 @@ from fourbar.errors import HOLDS
 from fourbar.quantities import UNKNOWNS
 from fourbar.solving import solve
 from fourbar_lab import bench, contenders
-from fourbar_lab.contenders import make_command, make_example
+from fourbar_lab.contenders import command_positions, make_example
 
 ROUNDING = 1e-11
 """Relative to the largest of each unknown: a few hundred roundings."""
@@ -31,8 +31,8 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 def test_every_limit_is_of_a_row_that_is_measured(tmp_path: Path) -> None:
-    measured = bench.measure(1000, 1, 10_000)
-    assert bench.LIMITS.keys() - measured.not_run.keys() <= measured.rows.keys()
+    measured = bench.measure_speed(1000, 1, 10_000)
+    assert bench.SPEED_LIMITS.keys() - measured.not_run.keys() <= measured.rows.keys()
     numbers = [
         measured.rows,
         *measured.over_positions.values(),
@@ -57,7 +57,7 @@ def test_every_limit_is_of_a_row_that_is_measured(tmp_path: Path) -> None:
 def test_every_contender_finds_the_same_unknowns(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    scene, command = make_example(), make_command(500)
+    scene, command = make_example(), command_positions(500)
     solution = solve(scene, at=command)
     expected = np.concatenate(
         [np.atleast_2d(getattr(solution, name).T) for name in UNKNOWNS]
@@ -77,8 +77,8 @@ def test_every_contender_finds_the_same_unknowns(
 def test_more_positions_than_fit_are_evaluated_in_pieces(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(contenders, "AT_ONCE", 1000)
-    monkeypatch.setattr(contenders, "SHORTEST", 1)
+    monkeypatch.setattr(contenders, "POSITIONS_OF_ONE_CALL", 1000)
+    monkeypatch.setattr(contenders, "LEAST_POSITIONS", 1)
     sizes: list[int] = []
     times = contenders.time_positions(
         {"it": lambda theta_2, out: sizes.append(len(theta_2))}, 10_000, 1
@@ -94,7 +94,7 @@ def test_what_is_missing_is_named_with_its_reason(
     assert set(peers.here) == {"NumPy"} and set(peers.not_run) == {"C"}
     rows = {"growth from 1000 positions on": 1.0}
     monkeypatch.setattr(
-        bench, "measure", lambda *_: bench.Measured(rows, {}, {}, peers.not_run)
+        bench, "measure_speed", lambda *_: bench.Measured(rows, {}, {}, peers.not_run)
     )
     for variable in bench.ONE_THREAD:
         monkeypatch.setenv(variable, "1")
@@ -105,22 +105,24 @@ def test_what_is_missing_is_named_with_its_reason(
     )
 
 
-@pytest.mark.parametrize("name", bench.LIMITS)
+@pytest.mark.parametrize("name", bench.SPEED_LIMITS)
 @pytest.mark.parametrize("spoiled", [math.nan, "beyond", None])
 def test_what_is_beyond_its_limit_fails_with_the_reason(
     name: str, spoiled: float | str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rows = {what: limit.bound for what, limit in bench.LIMITS.items()} | {
+    rows = {what: limit.bound for what, limit in bench.SPEED_LIMITS.items()} | {
         "all, 1000 positions": 100.0
     }
-    limit = bench.LIMITS[name]
+    limit = bench.SPEED_LIMITS[name]
     if spoiled is not None:
         rows[name] = (
             math.nan
             if spoiled != "beyond"
             else limit.bound * (0.99 if limit.sign == ">=" else 1.01)
         )
-    monkeypatch.setattr(bench, "measure", lambda *_: bench.Measured(rows, {}, {}, {}))
+    monkeypatch.setattr(
+        bench, "measure_speed", lambda *_: bench.Measured(rows, {}, {}, {})
+    )
     for variable in bench.ONE_THREAD:
         monkeypatch.setenv(variable, "1")
     process = CliRunner().invoke(bench.bench, standalone_mode=False)

@@ -12,17 +12,17 @@ from pathlib import Path
 import pytest
 
 from fourbar_lab.benchmark import (
-    ENGINES,
-    FAMILIES,
+    BENCHMARKED_ENGINES,
+    PANELS,
     REFUSED,
-    find_family,
+    find_panel,
     name_row,
     read_reasons,
     read_work,
 )
 from fourbar_lab.cli import status
 from fourbar_lab.simulators.problems import PROBLEMS
-from fourbar_validation.check.problem import judge, read_problem, read_result
+from fourbar_validation.check.problem import judge_answers, read_problem, read_result
 from fourbar_validation.compare.rows import read_cell_text
 from fourbar_validation.engines.environments import read_engines, read_engines_of
 from tests.whole.test_imports import ROOT
@@ -124,13 +124,18 @@ def test_what_was_answered_is_not_asked_again(folder: Path) -> None:
     assert run(folder, "crank_rocker") == first
     file = folder / "out" / "results" / "mine" / "crank_rocker.json"
     problem = read_problem(PROBLEMS / "crank_rocker.json")
-    assert {row.level for row in judge(problem, read_result(file, problem))} == {"A"}
+    assert {
+        row.level for row in judge_answers(problem, read_result(file, problem))
+    } == {"A"}
     file.unlink()
     assert run(folder, "crank_rocker")["mine", "crank_rocker"] == "-"
 
 
 def test_the_engines_of_the_lab_are_entries_that_a_run_finds_too() -> None:
-    engines, reasons = read_engines_of(ENGINES), read_reasons(ENGINES)
+    engines, reasons = (
+        read_engines_of(BENCHMARKED_ENGINES),
+        read_reasons(BENCHMARKED_ENGINES),
+    )
     assert len(engines) >= 25 and engines.items() <= read_engines([]).items()
     assert not [name for name in engines if "," in name], (
         "`run --engines` takes a comma-separated list"
@@ -295,15 +300,15 @@ def test_the_picture_has_every_run_through_time_in_the_panel_of_its_family() -> 
         lines = read_work(csv.DictReader(file))
     picture = table.with_suffix(".svg").read_text(encoding="utf-8")
     assert len(lines) > 15
-    assert {find_family(name) for name in lines} == set(FAMILIES)
-    assert all(f">{text}<" in picture for text in (*lines, *FAMILIES))
+    assert {find_panel(name) for name in lines} == set(PANELS)
+    assert all(f">{text}<" in picture for text in (*lines, *PANELS))
     for name, family in (
         ("MuJoCo 4.0.0: simulated", "MuJoCo"),
         ("MuJoCo Warp 4.0.0: simulated", "Descendants of MuJoCo"),
         ("Newton 1.8.0: MuJoCo solver", "Descendants of MuJoCo"),
         ("Newton 1.8.0: Kamino", "Others"),
     ):
-        assert find_family(name) == family
+        assert find_panel(name) == family
     # the worst of torque and pin forces, of each number of steps
     exact = lines["Pinocchio 4.1.0: constraintDynamics"]
     assert [len(lines["Newton 1.8.0: Kamino"]), len(exact)] == [2, 3]

@@ -14,8 +14,15 @@ import pytest
 
 import fourbar.formulas.mobility
 from fourbar.files import loads
+from fourbar_lab import LAB_FOLDER
 from fourbar_lab import fuzz as examine
-from fourbar_lab.fuzz import KEPT, LAB, draw_fuzz_scene, keep, run, shrink_scene
+from fourbar_lab.fuzz import (
+    COUNTEREXAMPLES,
+    draw_fuzz_scene,
+    examine_scenes,
+    keep_counterexample,
+    shrink_scene,
+)
 from fourbar_validation.compare.compare import Demands
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.run.store import Store
@@ -26,7 +33,7 @@ SEED = 0
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "path", sorted(KEPT.glob("*.toml")), ids=lambda path: path.stem
+    "path", sorted(COUNTEREXAMPLES.glob("*.toml")), ids=lambda path: path.stem
 )
 def test_a_kept_counterexample_holds(path: Path) -> None:
     assert examine.list_findings(loads(path.read_text(encoding="utf-8"))) == []
@@ -34,7 +41,7 @@ def test_a_kept_counterexample_holds(path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_stretch_of_scenes_holds() -> None:
-    assert not [number for number in range(60) if examine.examine(SEED, number)]
+    assert not [number for number in range(60) if examine.examine_scene(SEED, number)]
 
 
 def test_a_scene_depends_on_its_number_alone() -> None:
@@ -82,7 +89,7 @@ def test_an_error_of_a_billionth_is_found_and_shrunk(
         scene, lambda candidate: bool(examine.list_findings(candidate))
     )
     assert len(small.loads) + len(small.effects) < 3 and examine.list_findings(small)
-    kept = keep(small, "billionth", tmp_path)
+    kept = keep_counterexample(small, "billionth", tmp_path)
     assert examine.list_findings(loads(kept.read_text(encoding="utf-8")))
 
 
@@ -112,12 +119,12 @@ def test_a_force_that_vanishes_is_held_to_its_prediction(
     It is judged in newtons, and not left unjudged.
     """
     scene = loads(
-        (KEPT / "bar_with_all_mass_stands_for_an_instant.toml").read_text(
+        (COUNTEREXAMPLES / "bar_with_all_mass_stands_for_an_instant.toml").read_text(
             encoding="utf-8"
         )
     )
     engine = next(
-        engine for engine in examine.EXACT if engine.name == "pinocchio-inverse"
+        engine for engine in examine.EXACT_ENGINES if engine.name == "pinocchio-inverse"
     )
     solution = fourbar.solve(scene, "force")
     assert solution.F12 is not None and not solution.F12.any()
@@ -158,14 +165,14 @@ def test_a_position_that_does_not_close_is_a_finding(
 def test_an_interrupted_run_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fourbar_lab.fuzz.CHUNK", 4)
-    first = run(12, 1, tmp_path, 1)
+    monkeypatch.setattr("fourbar_lab.fuzz.SCENES_OF_A_CHUNK", 4)
+    first = examine_scenes(12, 1, tmp_path, 1)
     next(first)
     first.close()
-    with Store(tmp_path, {"seed": 1, **name_code(LAB)}).held() as store:
+    with Store(tmp_path, {"seed": 1, **name_code(LAB_FOLDER)}).held() as store:
         assert store.done() >= {4}
         store.put(4, [{"0": ["left by the run before"]}])
-    findings = list(run(12, 1, tmp_path, 1))
+    findings = list(examine_scenes(12, 1, tmp_path, 1))
     assert len(findings) == 3 and findings[0] == {"0": ["left by the run before"]}
 
 
@@ -173,9 +180,9 @@ def test_an_interrupted_run_goes_on(
 def test_a_scene_that_kills_its_worker_costs_itself_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(examine, "examine", dies_in_scene_2)
-    (finding,) = run(4, 1, tmp_path, 1)
-    assert finding.keys() == {"2"} and finding["2"][0].startswith(examine.LOST)
+    monkeypatch.setattr(examine, "examine_scene", dies_in_scene_2)
+    (finding,) = examine_scenes(4, 1, tmp_path, 1)
+    assert finding.keys() == {"2"} and finding["2"][0].startswith(examine.WORKER_LOST)
 
 
 def dies_in_scene_2(seed: int, index: int) -> list[str]:

@@ -46,7 +46,7 @@ def test_without_a_mutant_the_harness_holds() -> None:
         answers = [
             (w, harness.ask_at(w.start(), scene, command))
             for w in harness.ENGINES
-            if w.name in harness.EXACT
+            if w.name in harness.EXACT_ENGINE_NAMES
         ]
         assert not is_caught(scene, command, answers)
 
@@ -58,7 +58,7 @@ def test_the_harness_alone_catches_a_wrong_sign(
     answers = [
         (w, harness.ask_at(w.start(), SCENE, command))
         for w in harness.ENGINES
-        if w.name in harness.EXACT
+        if w.name in harness.EXACT_ENGINE_NAMES
     ]
     assert not is_caught(SCENE, command, answers)
     true = harness.solve

@@ -11,9 +11,9 @@ import pytest
 
 import fourbar
 from fourbar.show.block import write_block
-from fourbar_lab.families import ANYWHERE, FAMILIES
+from fourbar_lab.families import ANYWHERE, FAMILY_DRAWERS
 from fourbar_lab.slopes import judge_slopes
-from fourbar_lab.stability import run
+from fourbar_lab.stability import judge_samples
 from fourbar_lab.tally import CHANCE, TOO_SMALL, USELESS, Tally, is_by_chance
 
 pytestmark = pytest.mark.slow  # random campaigns
@@ -91,11 +91,11 @@ theta_2 - theta_1 had lost nothing.
 
 @pytest.fixture(scope="module")
 def tallies() -> dict[str, Tally]:
-    return {family: run(family, range(SAMPLES)) for family in FAMILIES}
+    return {family: judge_samples(family, range(SAMPLES)) for family in FAMILY_DRAWERS}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", FAMILY_DRAWERS)
 def test_every_output_is_within_what_the_inputs_last_digits_do(
     family: str, tallies: dict[str, Tally]
 ) -> None:
@@ -108,11 +108,11 @@ def test_every_output_is_within_what_the_inputs_last_digits_do(
 
 
 @pytest.mark.parametrize("bar", [3, 4])
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", FAMILY_DRAWERS)
 def test_fed_back_as_a_command_of_another_bar_every_output_returns_within_it_too(
     family: str, bar: int
 ) -> None:
-    tally = run(family, range(FED_BACK), bar=bar)
+    tally = judge_samples(family, range(FED_BACK), bar=bar)
     assert tally.samples > FED_BACK / 2 and not tally.not_assembled and not tally.warned
     assert not {
         name: entry for name, entry in tally.worst.items() if not entry[0] <= 1.0
@@ -122,7 +122,7 @@ def test_fed_back_as_a_command_of_another_bar_every_output_returns_within_it_too
 
 
 def test_derivatives_are_within_what_the_inputs_last_digits_do_to_them() -> None:
-    tally = run("random", range(6), derivatives=True)
+    tally = judge_samples("random", range(6), derivatives=True)
     assert tally.holds() and not tally.untold
     assert {"torque", "F12_x", "theta_4", "a_B_y"} <= tally.worst.keys()
 
@@ -132,7 +132,7 @@ def test_the_power_of_a_bar_that_hardly_turns_has_its_digits() -> None:
 
     Of torque times speed the derivative by theta_2 was 1.05 of what is allowed.
     """
-    assert run("ratios", range(2, 3), derivatives=True).holds()
+    assert judge_samples("ratios", range(2, 3), derivatives=True).holds()
 
 
 @pytest.mark.slow
@@ -182,7 +182,7 @@ def test_the_numbers_of_a_table_are_inputs() -> None:
 
     3.9 of what the other inputs allow.
     """
-    assert run("tables", range(8523, 8524)).holds()
+    assert judge_samples("tables", range(8523, 8524)).holds()
 
 
 def test_a_pull_between_two_bars_stays_out_of_the_force_at_a_third() -> None:
@@ -190,7 +190,7 @@ def test_a_pull_between_two_bars_stays_out_of_the_force_at_a_third() -> None:
 
     In their sums 1.45 of what is allowed.
     """
-    assert run("springs", range(2515, 2516)).holds()
+    assert judge_samples("springs", range(2515, 2516)).holds()
 
 
 def test_error_bars_are_neither_too_small_nor_useless(
@@ -235,7 +235,7 @@ def test_a_share_is_one_that_chance_explains() -> None:
     [(f, *sample) for f, bad in ONCE_BAD.items() for sample in bad],
 )
 def test_samples_that_once_were_bad(family: str, seed: int, number: int) -> None:
-    tally = run(family, range(number, number + 1), seed)
+    tally = judge_samples(family, range(number, number + 1), seed)
     assert all(ratio <= 1.0 for ratio, _ in tally.worst.values())
     assert all(ratio <= TOO_SMALL for ratio in tally.too_small.values())
 
@@ -244,7 +244,7 @@ def test_samples_that_once_were_bad(family: str, seed: int, number: int) -> None
 def test_bars_that_stay_parallel_are_charged_what_the_subtraction_lost_alone(
     number: int,
 ) -> None:
-    tally = run("change_point", range(number, number + 1))
+    tally = judge_samples("change_point", range(number, number + 1))
     assert not any(tally.too_large.values())
     assert all(ratio <= TOO_SMALL for ratio in tally.too_small.values())
 
@@ -258,7 +258,7 @@ def test_an_angle_without_a_value_is_beyond_what_is_allowed(
         return solution
 
     monkeypatch.setattr("fourbar_lab.stability.solve", lost)
-    tally = run("random", range(2))
+    tally = judge_samples("random", range(2))
     assert (
         tally.worst["theta_3"][0] == np.inf
         and tally.worst["theta_4"][0] <= 1.0
@@ -267,9 +267,9 @@ def test_an_angle_without_a_value_is_beyond_what_is_allowed(
 
 
 def test_a_tally_adds_up() -> None:
-    tally, parts = run("random", range(12)), Tally()
+    tally, parts = judge_samples("random", range(12)), Tally()
     for part in (range(5), range(5, 12)):
-        parts.add(run("random", part))
+        parts.add(judge_samples("random", part))
     assert parts == tally
 
 

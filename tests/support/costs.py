@@ -1,17 +1,17 @@
 """Points of a study of the cost, of stated errors."""
 
-from fourbar_validation.advise.worst_errors import QUANTITIES, WorstErrors
-from fourbar_validation.cost.study import STEPPED, CostPoint
+from fourbar_validation.advise.worst_errors import ERROR_NAMES, WorstErrors
+from fourbar_validation.cost.study import STEPPED_MOTION, CostPoint
 
 
 def point(
-    steps: float, worst: float, curve: str = "c", kind: str = STEPPED
+    steps: float, worst: float, curve: str = "c", kind: str = STEPPED_MOTION
 ) -> CostPoint:
     """Return a point with one error of all quantities.
 
     It takes a microsecond a step.
     """
-    errors = WorstErrors(*[worst] * len(QUANTITIES))
+    errors = WorstErrors(*[worst] * len(ERROR_NAMES))
     return CostPoint(
         curve,
         kind,

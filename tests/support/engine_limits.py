@@ -25,14 +25,14 @@ from fourbar_validation.engines.limits import (
     LIGHTEST,
     NEAREST_CENTRE,
     NEAREST_TOGGLE,
-    PROXIMAL,
+    PROXIMAL_BOUNDARY,
     SLOWEST,
     Boundary,
 )
 from fourbar_validation.engines.mujoco import simulate
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.scenes.hard_families import (
-    draw_linkage,
+    draw_lengths_of_type,
     dress,
     replace_bars,
     scale_loads,
@@ -61,7 +61,7 @@ def _near_toggle(sine: float) -> bool:
 
     |sin mu| has this value at its end.
     """
-    d, a, b, c = draw_linkage(DrawnType.TRIPLE_ROCKER, 1)
+    d, a, b, c = draw_lengths_of_type(DrawnType.TRIPLE_ROCKER, 1)
     cosine = -math.sqrt(1.0 - sine * sine)
     squared = b * b + c * c - 2.0 * b * c * cosine
     psi = math.acos((d * d + a * a - squared) / (2.0 * d * a))
@@ -136,12 +136,12 @@ def _proximal(mu: float) -> bool:
     It has this proximal parameter.
     """
     scene = replace(_base(), loads=(), motion=Motion(1.0, 3.0))
-    kept = pinocchio.PROXIMAL
+    kept = pinocchio.PROXIMAL_SETTINGS
     try:
-        pinocchio.PROXIMAL = (kept[0], mu, kept[2] if mu else 1)
+        pinocchio.PROXIMAL_SETTINGS = (kept[0], mu, kept[2] if mu else 1)
         released = pinocchio.PinocchioReleased().release(scene, np.array([0.0, 0.01]))
     finally:
-        pinocchio.PROXIMAL = kept
+        pinocchio.PROXIMAL_SETTINGS = kept
     return bool(np.isfinite(released.theta_2).all())
 
 
@@ -154,5 +154,5 @@ MEASURED = (
     Measured(HEAVIEST, 1e10, 1e11, _loaded),
     Measured(NEAREST_CENTRE, 2e-6, 5e-7, _centre_kept),
     Measured(LIGHTEST, 1.001e-15, 0.999e-15, _compiles),
-    Measured(PROXIMAL, 1e-8, 0.0, _proximal),
+    Measured(PROXIMAL_BOUNDARY, 1e-8, 0.0, _proximal),
 )

@@ -19,7 +19,7 @@ from flint import arb, arb_series, ctx
 
 from fourbar import FourBar, Gravity, Load, Viscous
 from fourbar.linkage import MOVING_BARS, PINS
-from fourbar_validation.engines.balls import closure
+from fourbar_validation.engines.balls import compute_directions
 
 BITS = 256
 """Near a change point the terms of 1/(t . M t) grow as SINGULAR^-ORDER = 1e-34, and
@@ -172,7 +172,7 @@ class Equations:
     ) -> tuple[list[Ball], list[Ball]]:
         """Angles and speeds; not at a limit position."""
         x = dict(zip(("d", "a", "b", "c"), self.lengths, strict=True))
-        closed = closure(
+        closed = compute_directions(
             x | {"theta_1": arb(linkage.ground_angle), "theta_2": arb(theta_2)}, branch
         )
         assert closed is not None

@@ -10,7 +10,7 @@ import numpy as np
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
-from fourbar_validation.engines.mujoco.theirs import Examined, examine
+from fourbar_validation.engines.mujoco.theirs import Examined, examine_file
 
 Point = tuple[float, float]
 TILT = (0.3, -0.2, 0.7, 0.5)
@@ -113,7 +113,7 @@ def examine_text(scene: Scene, text: str | None, names: Mapping[str, str]) -> Ex
     None: the file generated from the scene.
     """
     file = None if text is None else RobotFile(Path("theirs.xml"), text)
-    return examine(scene, file, names)
+    return examine_file(scene, file, names)
 
 
 def answer_of(examined: Examined, how: str) -> Answer:

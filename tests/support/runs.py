@@ -8,7 +8,7 @@ from fourbar_validation.compare.rows import Row, sort_rows, write_results
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import Engine
-from fourbar_validation.regression.changes import KEPT, Differences, compare_runs
+from fourbar_validation.regression.changes import ROWS_LISTED, Differences, compare_runs
 from fourbar_validation.regression.record import (
     About,
     describe_run,
@@ -44,7 +44,9 @@ def read_run(path: Path) -> tuple[About, list[Row]]:
 
 
 def compare_rows(
-    old: tuple[About, Iterable[Row]], new: tuple[About, Iterable[Row]], kept: int = KEPT
+    old: tuple[About, Iterable[Row]],
+    new: tuple[About, Iterable[Row]],
+    kept: int = ROWS_LISTED,
 ) -> Differences:
     """Two runs compared whose rows stand in any order."""
     before, after = (sort_rows(run[1]) for run in (old, new))

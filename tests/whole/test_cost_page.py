@@ -106,13 +106,13 @@ def read_words(svg: str) -> set[str]:
 def test_the_pictures_are_those_that_few_points_draw(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(study, "ROUNDS", 2)
-    monkeypatch.setattr(study, "REQUIRED", (1e-2, 1e-4))
+    monkeypatch.setattr(study, "TIMINGS_OF_A_SETTING", 2)
+    monkeypatch.setattr(study, "ERRORS_ADVISED", (1e-2, 1e-4))
     looks = (
-        pictures.METHODS,
-        pictures.INTEGRATORS,
+        pictures.METHOD_LOOKS,
+        pictures.INTEGRATOR_LOOKS,
         pictures.TIMESTEPS,
-        pictures.SOFTNESS,
+        pictures.SOFTNESS_LOOKS,
         pictures.SOLVERS,
     )
     wanted = {look.curve for group in looks for look in group.values()}

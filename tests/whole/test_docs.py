@@ -26,7 +26,7 @@ from fourbar.cli import status
 from fourbar.effects import list_kinds
 from fourbar.errors import FAILED, HOLDS
 from fourbar.files import load
-from fourbar_lab.cli import COMMANDS as LABS
+from fourbar_lab.cli import LAB_COMMANDS as LABS
 from fourbar_lab.effects import EFFECTS
 from fourbar_validation.cli import COMMANDS
 from fourbar_validation.cli import status as harness

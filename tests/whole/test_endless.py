@@ -94,7 +94,7 @@ def test_a_free_motion_without_end_is_given_up_with_its_reason(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "released.toml").write_text(RELEASED)
-    monkeypatch.setattr(free_motion, "STEPS", 500)
+    monkeypatch.setattr(free_motion, "MOST_INTEGRATION_STEPS", 500)
     for command, ending in (("analyze", "csv"), ("plot", "svg"), ("animate", "html")):
         out = tmp_path / f"out.{ending}"
         assert (

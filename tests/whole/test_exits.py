@@ -324,7 +324,7 @@ def test_samples_that_compare_nothing_are_status_1(
         tally.not_assembled += 1
 
     judge_here(monkeypatch)
-    monkeypatch.setattr("fourbar_lab.stability.judge", open_loop)
+    monkeypatch.setattr("fourbar_lab.stability.judge_sample", open_loop)
     assert LAB(STABILITY) == FAILED
     assert "random: nothing was compared" in capsys.readouterr().out
 
@@ -336,7 +336,7 @@ def test_a_ratio_that_is_not_reached_is_status_1(
         monkeypatch.setenv(name, "1")
     rows = {"growth from 1000 positions on": 1.1, "floor": 1.0}
     monkeypatch.setattr(
-        "fourbar_lab.bench.measure", lambda *_: Measured(rows, {}, {}, {})
+        "fourbar_lab.bench.measure_speed", lambda *_: Measured(rows, {}, {}, {})
     )
     assert LAB(["bench"]) == HOLDS
     rows["growth from 1000 positions on"] = 2.0
@@ -422,7 +422,7 @@ def test_every_command_is_in_the_table_of_processes() -> None:
     assert tried == {
         *(("fourbar", name) for name in fourbar.cli.group.commands),
         *(("validation", name) for name in fourbar_validation.cli.COMMANDS),
-        *(("fourbar_lab", name) for name in fourbar_lab.cli.COMMANDS),
+        *(("fourbar_lab", name) for name in fourbar_lab.cli.LAB_COMMANDS),
     }
 
 

@@ -21,7 +21,7 @@ from fourbar.scene import Command, Scene
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
-from fourbar_validation.compare.rows import COLUMNS, FAILS
+from fourbar_validation.compare.rows import FAILS, RESULT_COLUMNS
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.processes import WORKER_MEMORY, bound_memory
 from fourbar_validation.engines.registry import Engine
@@ -145,7 +145,7 @@ def test_differences_hold_hostile_names_as_text(
         (tmp_path / folder).mkdir()
         with (tmp_path / folder / "results.csv").open("w", newline="") as file:
             writer = csv.writer(file)
-            writer.writerow(COLUMNS)
+            writer.writerow(RESULT_COLUMNS)
             writer.writerow([name, name[:7], "exact", "torque", *cells, name, 1.0, 1.0])
         about = {"versions": {name: folder}, "machine": name + folder, "settings": {}}
         (tmp_path / folder / "record.json").write_text(json.dumps(about))
@@ -176,7 +176,7 @@ def test_differences_hold_hostile_names_as_text(
 def test_what_is_no_table_of_results_is_one_line(
     text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    good = ",".join(COLUMNS) + "\n"
+    good = ",".join(RESULT_COLUMNS) + "\n"
     for rows, record in (
         (text, "{}"),
         (good + "x,y\n", "{}"),
@@ -359,7 +359,9 @@ def test_running_out_of_memory_costs_its_own_row(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
-    monkeypatch.setattr(fourbar_validation.run.plan, "CHUNK", {True: 2, False: 2})
+    monkeypatch.setattr(
+        fourbar_validation.run.plan, "SCENES_OF_A_TASK", {True: 2, False: 2}
+    )
     greedy = Engine("greedy", Greedy, EQUIVALENCE)
     run(suite, tmp_path / "run", (*EXACT, greedy), RunOptions(workers=1, drawn=False))
     failing = [

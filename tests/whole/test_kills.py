@@ -38,7 +38,7 @@ from fourbar_validation.run.store import RunningError, Store
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import (
     AS_LONG_AS,
-    MOST_POSITIONS,
+    MOST_POSITIONS_OF_A_SCENE,
     Files,
     Random,
     Suite,
@@ -101,13 +101,15 @@ def judge_all(
 def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fourbar_validation.run.plan, "CHUNK", {True: 2, False: 2})
+    monkeypatch.setattr(
+        fourbar_validation.run.plan, "SCENES_OF_A_TASK", {True: 2, False: 2}
+    )
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     hangs = 2.0 * max(
         1.0, load / (os.cpu_count() or 1)
     )  # s; a busy machine is given longer
     moody = Engine("moody", Moody, EQUIVALENCE)
-    monkeypatch.setattr(workers, "SECONDS", hangs)
+    monkeypatch.setattr(workers, "SCENE_SECONDS", hangs)
     judge_all(Few(), tmp_path / "run", (*EXACT, moody))
     rows = list(read_columns(tmp_path / "run" / "results.csv"))
     failing = {
@@ -178,7 +180,9 @@ def test_the_bytes_do_not_depend_on_the_workers(
     tmp_path: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """None, in order, or two."""
-    monkeypatch.setattr(fourbar_validation.run.plan, "CHUNK", {False: IN_A_CHUNK})
+    monkeypatch.setattr(
+        fourbar_validation.run.plan, "SCENES_OF_A_TASK", {False: IN_A_CHUNK}
+    )
     judge_all(Random(COUNT, 0, TYPES), tmp_path, workers=2)
     for name in ("results.csv", "results.parquet"):
         assert (tmp_path / name).read_bytes() == (undisturbed / name).read_bytes()
@@ -568,14 +572,18 @@ def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(
         '[bars.output]\nmass = "1 kg"\n'
     )
     path = tmp_path / "long.toml"
-    path.write_text(f"{lengths}{masses}[motion]\n{motion % (MOST_POSITIONS - 1)}\n")
+    path.write_text(
+        f"{lengths}{masses}[motion]\n{motion % (MOST_POSITIONS_OF_A_SCENE - 1)}\n"
+    )
     a_second = AS_LONG_AS if key == "motion.free" else 0
-    assert read_scene_files([path]).positions == MOST_POSITIONS + a_second
-    path.write_text(f"{lengths}{masses}[motion]\n{motion % MOST_POSITIONS}\n")
+    assert read_scene_files([path]).positions == MOST_POSITIONS_OF_A_SCENE + a_second
+    path.write_text(
+        f"{lengths}{masses}[motion]\n{motion % MOST_POSITIONS_OF_A_SCENE}\n"
+    )
     with pytest.raises(
         InputError,
         match=(
-            rf"{key}.steps = {MOST_POSITIONS}: must be below {MOST_POSITIONS} in a run"
+            rf"{key}.steps = {MOST_POSITIONS_OF_A_SCENE}: must be below {MOST_POSITIONS_OF_A_SCENE} in a run"
         ),
     ):
         read_scene_files([path])

@@ -16,7 +16,7 @@ import fourbar_validation.cli
 from fourbar import errors
 from fourbar.quantities import QUANTITIES
 from fourbar_validation import Answer
-from fourbar_validation.compare.rows import COLUMNS
+from fourbar_validation.compare.rows import RESULT_COLUMNS
 
 KEPT = Path(__file__).with_name("public.txt")
 API = Path(__file__).parents[2] / "docs" / "api.py"
@@ -83,7 +83,9 @@ def public() -> str:
         f"quantity {quantity.name}: {quantity.unit}, {quantity.stage}, {quantity.kind}"
         for quantity in QUANTITIES
     ]
-    return "\n".join([*lines, f"columns of results: {', '.join(COLUMNS)}"]) + "\n"
+    return (
+        "\n".join([*lines, f"columns of results: {', '.join(RESULT_COLUMNS)}"]) + "\n"
+    )
 
 
 def test_nothing_public_changes_unnoticed() -> None:

@@ -11,7 +11,7 @@ from fourbar import Motion, Scene, Sweep, command, solve, uniform
 from fourbar.effects import PinFriction
 from fourbar.formulas.pin_forces import PinForces
 from fourbar.quantities import (
-    FORCES,
+    FORCE_NAMES,
     LINE_QUANTITIES,
     PIN_FORCES,
     QUANTITIES,
@@ -21,7 +21,7 @@ from fourbar.quantities import (
 from fourbar.solution import Solution
 from fourbar_validation.cli import status
 from fourbar_validation.compare.columns import read_columns
-from fourbar_validation.compare.rows import COLUMNS, FORMULAS, IDENTITIES, Row
+from fourbar_validation.compare.rows import FORMULAS, IDENTITIES, RESULT_COLUMNS, Row
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.mujoco.shipped import QUANTITY as SHIPPED
 from fourbar_validation.engines.registry import (
@@ -31,12 +31,12 @@ from fourbar_validation.engines.registry import (
     load_further,
 )
 from fourbar_validation.engines.table import choose_engines
-from fourbar_validation.regression.change import WHOLE
+from fourbar_validation.regression.change import WHOLE_ENGINE
 from fourbar_validation.regression.record import ACCEPTED, find_baseline
 from fourbar_validation.run.answers import check_statements
-from fourbar_validation.run.derived.summary import ROWS
+from fourbar_validation.run.derived.summary import ROW_NAMES
 from fourbar_validation.run.judge import CHECKS
-from fourbar_validation.run.released import FORWARD, FULL
+from fourbar_validation.run.released import FORWARD, RELEASED_ERRORS
 from fourbar_validation.run.run import RunOptions, run
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
@@ -84,7 +84,7 @@ def test_every_column_is_described_with_its_type() -> None:
     described = dict(
         re.findall(r"^\| `(\w+)` \| (string|double|boolean) \|", PAGE, re.MULTILINE)
     )
-    assert tuple(described) == COLUMNS
+    assert tuple(described) == RESULT_COLUMNS
     assert {field.name: field.type for field in dataclasses.fields(Row)} == {
         k: TYPES[t] for k, t in described.items()
     }
@@ -130,7 +130,17 @@ def test_every_quantity_of_a_scene_is_described(results: Path) -> None:
     of_positions = {q.name for q in QUANTITIES}
     assert (
         set(described)
-        == ({*IDENTITIES, *WHOLE, *FULL, *stated, SHIPPED, *OF_A_SCENE, *ROWS})
+        == (
+            {
+                *IDENTITIES,
+                *WHOLE_ENGINE,
+                *RELEASED_ERRORS,
+                *stated,
+                SHIPPED,
+                *OF_A_SCENE,
+                *ROW_NAMES,
+            }
+        )
         - of_positions
     )
     shipped = {
@@ -175,9 +185,10 @@ def test_a_solution_has_the_shapes_of_the_table_and_no_other_quantity() -> None:
 def test_the_formulas_name_the_pin_forces_as_the_table_does() -> None:
     assert PinForces._fields == PIN_FORCES == ("F12", "F32", "F43", "F14")
     assert (
-        tuple(name for name in UNKNOWNS if name not in FORCES) + FORCES[:5] == UNKNOWNS
+        tuple(name for name in UNKNOWNS if name not in FORCE_NAMES) + FORCE_NAMES[:5]
+        == UNKNOWNS
     )
-    assert FORCES[5:] == ("drive_force", "power")
+    assert FORCE_NAMES[5:] == ("drive_force", "power")
 
 
 def test_the_parquet_file_holds_the_rows_of_the_table(results: Path) -> None:

@@ -12,19 +12,19 @@ import click
 
 from fourbar import __version__
 from fourbar.errors import run
-from fourbar_validation.places import PROGRAM
+from fourbar_validation.places import HARNESS_PROGRAM
 
 COMMANDS = {
-    "run": "fourbar_validation.run.command:command",
-    "collect": "fourbar_validation.run.parts:command",
+    "run": "fourbar_validation.run.command:run_command",
+    "collect": "fourbar_validation.run.parts:collect_command",
     "accept": "fourbar_validation.regression.accept:accept_command",
-    "compare": "fourbar_validation.regression.accept:compare",
-    "check": "fourbar_validation.check:check",
-    "loops": "fourbar_validation.robots.command:command",
-    "check-mjcf": "fourbar_validation.check.mjcf:command",
+    "compare": "fourbar_validation.regression.accept:compare_command",
+    "check": "fourbar_validation.check:check_command",
+    "loops": "fourbar_validation.robots.command:robot_command",
+    "check-mjcf": "fourbar_validation.check.mjcf:check_mjcf_command",
     "published": "fourbar_validation.published.comparison:published",
     "cost": "fourbar_validation.cost.cost:cost",
-    "advise": "fourbar_validation.advise.advise:command",
+    "advise": "fourbar_validation.advise.advise:advise_command",
 }
 
 
@@ -97,4 +97,4 @@ def status(arguments: list[str] | None = None) -> int:
 
     An error becomes one line on standard error.
     """
-    return run(group, PROGRAM, arguments, "validation")
+    return run(group, HARNESS_PROGRAM, arguments, "validation")

@@ -15,7 +15,7 @@ import fourbar
 from fourbar.errors import FourBarError
 
 PACKAGE = Path(__file__).resolve().parent
-FORMULAS = Path(fourbar.__file__).resolve().parent
+FORMULAS_FOLDER = Path(fourbar.__file__).resolve().parent
 CHECKOUT = None if (PACKAGE / "models" / "problems").is_dir() else PACKAGE.parents[1]
 """The folder of pyproject.toml, models, tests and docs. None if the package is
 installed, with the models in it.
@@ -33,7 +33,7 @@ def find_program(started: str) -> str:
     return "fourbar-validation"
 
 
-PROGRAM = find_program(sys.argv[0] if sys.argv else "")
+HARNESS_PROGRAM = find_program(sys.argv[0] if sys.argv else "")
 """Command that started the harness."""
 
 
@@ -62,7 +62,7 @@ def import_path() -> Iterator[str]:
         )
         return
     with TemporaryDirectory(prefix="fourbar-") as folder:
-        for package in (FORMULAS, PACKAGE):
+        for package in (FORMULAS_FOLDER, PACKAGE):
             copytree(
                 package,
                 Path(folder) / package.name,

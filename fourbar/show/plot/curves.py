@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.evaluation.case import Case, compute_state
+from fourbar.evaluation.case import Case, compute_shown_state
 from fourbar.formulas.mobility import limit_positions
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import with_signs
 from fourbar.show.derived import derive
-from fourbar.show.duty import compute_energies, read_drive
+from fourbar.show.duty import compute_energies, read_drive_demand
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     BAR_DASHES,
@@ -28,25 +28,24 @@ from fourbar.show.plot.style import (
     FORCE_DASHES,
     INK,
     MUTED,
-    OPEN,
+    RING_MARK,
     choose_force_line,
-    find_greatest,
     find_peak_index,
+    largest_magnitude,
     place_legend,
     set_degree_ticks,
+    write_labelled_quantity,
     write_number,
-    write_quantity,
 )
 from fourbar.show.plot.view import View, collect_point_vectors
 from fourbar.show.units import choose_unit
-from fourbar.solution import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.projections.polar import PolarAxes
 
 
-ORDINARY = 95.0
+ORDINARY_PERCENTILE = 95.0
 """Percentile of the magnitudes that counts as the ordinary size of a curve ..."""
 OUTLIER = 3.0
 """... and the multiple of it that a curve must exceed to be clipped."""
@@ -119,7 +118,7 @@ def find_poles(view: View) -> _Indices:
         return np.array([], dtype=np.intp)
     if view.scene.drive is not None:
         case = Case.of(view.scene, s.at.bar)
-        state = compute_state(view.scene, s.at)
+        state = compute_shown_state(view.scene, s.at)
         assert case.drive is not None
         with np.errstate(all="ignore"):
             sine = case.drive.leverage(state, case.sines(state.position))[0]
@@ -158,7 +157,7 @@ def choose_limit(values: list[Array]) -> float | None:
     size = np.concatenate([np.abs(value[np.isfinite(value)]) for value in values])
     if size.size == 0:
         return None
-    ordinary = float(np.percentile(size, ORDINARY))
+    ordinary = float(np.percentile(size, ORDINARY_PERCENTILE))
     if ordinary > 0.0 and size.max() > OUTLIER * ordinary:
         return CLIPPED * ordinary
     return None
@@ -178,7 +177,7 @@ def clip(
     factor, name_of_unit = choose_unit(limit, unit, view.units)
     lowest = min(float(np.nanmin(value)) for value in curves.values())
     axes.set_ylim(0.0 if lowest >= 0.0 else -limit * factor, limit * factor)
-    name, worst = max(curves.items(), key=lambda item: find_greatest(item[1]))
+    name, worst = max(curves.items(), key=lambda item: largest_magnitude(item[1]))
     index = find_peak_index(worst)
     if abs(worst[index]) <= limit:
         return
@@ -187,7 +186,7 @@ def clip(
     else:
         words = f"t = {view.time[index]:.4g} s"
     edge = f"{write_number(limit * factor)} {name_of_unit}"
-    largest = write_quantity(worst[index], unit, view.units)
+    largest = write_labelled_quantity(worst[index], unit, view.units)
     if unit == "1":
         edge, largest = (text.removesuffix(" 1") for text in (edge, largest))
     note(
@@ -297,7 +296,9 @@ draw_accelerations = partial(
 )
 
 
-def _draw_points(axes: "Axes", view: View, letter: str, unit: str, title: str) -> None:
+def _draw_point_sizes(
+    axes: "Axes", view: View, letter: str, unit: str, title: str
+) -> None:
     """Draw the sizes at A, B, the mass centres and the scene's own points."""
     over = draw_axes(axes, view)
     curves = {
@@ -308,7 +309,7 @@ def _draw_points(axes: "Axes", view: View, letter: str, unit: str, title: str) -
     }
     limit = choose_limit(list(curves.values()))
     factor, shown_unit = choose_unit(
-        limit or find_greatest(*curves.values()), unit, view.units
+        limit or largest_magnitude(*curves.values()), unit, view.units
     )
     looks = {
         "A": BAR_COLOURS[2],
@@ -334,9 +335,11 @@ def _draw_points(axes: "Axes", view: View, letter: str, unit: str, title: str) -
     place_legend(axes, 6)
 
 
-draw_speeds = partial(_draw_points, letter="v", unit="m/s", title="Speeds of points")
+draw_speeds = partial(
+    _draw_point_sizes, letter="v", unit="m/s", title="Speeds of points"
+)
 draw_point_accelerations = partial(
-    _draw_points, letter="a", unit="m/s^2", title="Accelerations of points"
+    _draw_point_sizes, letter="a", unit="m/s^2", title="Accelerations of points"
 )
 
 
@@ -351,7 +354,7 @@ def _draw_drive(
     everywhere = [getattr(branch.sweep, name) for branch in view.alike]
     limit = choose_limit(everywhere)
     factor, shown_unit = choose_unit(
-        limit or find_greatest(*everywhere), unit, view.units
+        limit or largest_magnitude(*everywhere), unit, view.units
     )
     if bar:
         symbol = f"${letter}_{bar}$"
@@ -395,7 +398,7 @@ def mark_peak(axes: "Axes", over: Array, values: Array, unit: str) -> None:
     index = find_peak_index(values)
     place = float(over[index])
     peak = float(values[index])
-    axes.plot(place, peak, "o", ms=5.0, mew=1.1, ls="none", zorder=5, **OPEN)
+    axes.plot(place, peak, "o", ms=5.0, mew=1.1, ls="none", zorder=5, **RING_MARK)
     low, high = axes.get_xlim()
     share = (place - low) / (high - low)
     if share < 0.25:
@@ -418,7 +421,7 @@ def mark_peak(axes: "Axes", over: Array, values: Array, unit: str) -> None:
 
 def draw_drive(axes: "Axes", view: View) -> None:
     """Draw the torque or force of the drive."""
-    drive = read_drive(view.sweep)
+    drive = read_drive_demand(view.sweep)
     if view.scene.drive is None:
         what = "Torque"
     else:
@@ -452,7 +455,7 @@ def draw_forces(axes: "Axes", view: View) -> None:
     sizes = {name: np.hypot(*getattr(view.sweep, name).T) for name in FORCE_COLOURS}
     everywhere = _list_force_sizes(view)
     limit = choose_limit(everywhere)
-    factor, unit = choose_unit(limit or find_greatest(*everywhere), "N", view.units)
+    factor, unit = choose_unit(limit or largest_magnitude(*everywhere), "N", view.units)
     poles = find_poles(view)
     for name, values in sizes.items():
         look = choose_force_line(name)
@@ -470,7 +473,7 @@ def draw_energy(axes: "Axes", view: View) -> None:
     shared = [
         compute_energies(branch.scene, branch.sweep) for branch in view.others
     ] + [energies]
-    most = find_greatest(
+    most = largest_magnitude(
         *(
             values
             for energy in shared
@@ -539,7 +542,7 @@ def draw_transmission(axes: "Axes", view: View) -> None:
             label=name,
             clip_on=False,
             zorder=5,
-            **OPEN,
+            **RING_MARK,
         )
     axes.set(ylabel=r"transmission angle $\mu$ (°)", title="Transmission angle")
     if view.time is None:
@@ -629,7 +632,7 @@ def _list_inside(angles: Array, angle: float, margin: float) -> list[float]:
 
 EVERY = 60.0
 """Dots on a hodograph stand this far apart in the commanded angle, deg ..."""
-MOST_DOTS = 12
+MOST_DOTS_OF_A_CURVE = 12
 """... or, over time or a stroke, a round number that gives no more than these."""
 _LONG_NUMBERS = 2000.0
 """Smallest number too wide for four of its kind along a radius."""
@@ -648,7 +651,7 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
     size_here = np.hypot(*force.T)
     everywhere = _list_force_sizes(view, (name,))
     limit = choose_limit(everywhere)
-    top = limit or 1.08 * find_greatest(*everywhere) or 1.0
+    top = limit or 1.08 * largest_magnitude(*everywhere) or 1.0
     factor, unit = choose_unit(top, "N", view.units)
     poles = find_poles(view)
     over = view.axis.values
@@ -674,7 +677,7 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
         ls="none",
     )
     first = int(np.argmax(np.isfinite(size)))
-    start = {**OPEN, "mec": look["color"]}
+    start = {**RING_MARK, "mec": look["color"]}
     axes.plot(
         direction[[first]],
         factor * size[[first]],
@@ -684,7 +687,7 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
         zorder=5,
         **start,
     )
-    if limit and find_greatest(size_here) > limit:
+    if limit and largest_magnitude(size_here) > limit:
         note(
             view,
             f"Hodographs of {name} clipped at {write_number(factor * top)} {unit}.",
@@ -718,7 +721,7 @@ def _choose_spacing(view: View) -> tuple[float, str]:
     every = next(
         share * step
         for share in (0.1, 0.2, 0.5, 1.0)
-        if duration <= MOST_DOTS * share * step
+        if duration <= MOST_DOTS_OF_A_CURVE * share * step
     )
     return every, f"{every:g}{axis.unit}"
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fourbar.quantities import Array
 from fourbar.show.derived import derive
 from fourbar.show.plot.curves import (
     choose_limit,
@@ -18,19 +19,18 @@ from fourbar.show.plot.curves import (
     plot_between_poles,
 )
 from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.linkage import draw_mechanism, locate_pins, scale_of
+from fourbar.show.plot.linkage import choose_drawing_scale, draw_mechanism, locate_pins
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     BAR_DASHES,
     INK,
     MUTED,
     POINT,
-    find_greatest,
+    largest_magnitude,
     place_legend,
 )
 from fourbar.show.plot.view import View
 from fourbar.show.units import choose_unit
-from fourbar.solution import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,7 +40,7 @@ _SYMBOLS = {
     "omega_4/omega_2": "ω₄/ω₂",
     "mechanical_advantage": "T₄/T₂",
 }
-WINDOW = 1.5
+FARTHEST_CENTRE = 1.5
 """Instant centres are drawn up to this multiple of the linkage's size from it."""
 
 
@@ -60,7 +60,7 @@ def draw_shaking_force(axes: "Axes", view: View) -> None:
     curves = {"|F|": np.hypot(x, y), "F_x": x, "F_y": y}
     sizes = [np.hypot(*vector.T) for vector in vectors]
     limit = choose_limit(sizes)
-    factor, unit = choose_unit(limit or find_greatest(*sizes), "N", view.units)
+    factor, unit = choose_unit(limit or largest_magnitude(*sizes), "N", view.units)
     looks = ((INK, "-"), (BAR_COLOURS[2], (0, (4, 1.5))), (BAR_COLOURS[4], (0, (1, 1))))
     for (name, values), (colour, dashes) in zip(curves.items(), looks, strict=True):
         look = {"color": colour, "ls": dashes, "label": f"${name}$"}
@@ -77,7 +77,7 @@ def draw_shaking_moment(axes: "Axes", view: View) -> None:
     poles = find_poles(view)
     moments = _list_values(view, "shaking_moment")
     limit = choose_limit(moments)
-    factor, unit = choose_unit(limit or find_greatest(*moments), "N m", view.units)
+    factor, unit = choose_unit(limit or largest_magnitude(*moments), "N m", view.units)
     plot_between_poles(axes, over, factor * moments[0], poles, color=INK)
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     axes.set(ylabel=f"$M$ ({unit})", title="Shaking moment about $O_2$")
@@ -120,10 +120,10 @@ def _draw_ratios(axes: "Axes", view: View, names: dict[int, str]) -> None:
 
 def draw_centres(axes: "Axes", view: View, labels: Labels) -> None:
     """Draw the paths of the instant centres I13 and I24 near the linkage."""
-    factor, unit, _ = scale_of(view)
+    factor, unit, _ = choose_drawing_scale(view)
     pins = np.array([*locate_pins(view, 1.0).values()])
     middle = pins.mean(axis=0)
-    reach = WINDOW * max(view.scene.linkage.lengths)
+    reach = FARTHEST_CENTRE * max(view.scene.linkage.lengths)
     for name, colour, dashes in (("I13", POINT, "-"), ("I24", INK, (0, (4, 1.5)))):
         path = derive(view.sweep, name)
         here = derive(view.here, name)
@@ -147,4 +147,7 @@ def draw_centres(axes: "Axes", view: View, labels: Labels) -> None:
     title = f"Instant centres at {view.at}"
     axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
     place_legend(axes)
-    note(view, f"Centres further than {WINDOW:g} longest bars away are left out.")
+    note(
+        view,
+        f"Centres further than {FARTHEST_CENTRE:g} longest bars away are left out.",
+    )

@@ -16,7 +16,7 @@ from fourbar.show.plot import curves, derived, freebody, linkage, studies
 from fourbar.show.plot.curves import draw_transmission
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import (
-    CAPTION,
+    CAPTION_STYLE,
     TITLE,
     Drawing,
     apply_style,
@@ -93,7 +93,7 @@ def _draw_points(figure: "SubFigure", shown: View, labels: Labels) -> None:
     curves.draw_point_accelerations(panels["accelerations"], shown)
 
 
-def _draw_single(paint: Callable[[Any, View], None]) -> _Painter:
+def _draw_one_panel(paint: Callable[[Any, View], None]) -> _Painter:
     return lambda figure, shown, labels: paint(figure.subplots(), shown)
 
 
@@ -129,12 +129,12 @@ FIGURES: dict[str, tuple[_Painter, tuple[float, float], bool]] = {
     ),
     "kinematics": (_draw_kinematics, (5.6, 6.8), False),
     "points": (_draw_points, (11.0, 5.6), True),
-    "torque": (_draw_single(curves.draw_drive), (5.6, 3.2), True),
-    "stroke": (_draw_single(curves.draw_stroke), (5.6, 3.2), False),
-    "forces": (_draw_single(curves.draw_forces), (5.6, 3.2), True),
+    "torque": (_draw_one_panel(curves.draw_drive), (5.6, 3.2), True),
+    "stroke": (_draw_one_panel(curves.draw_stroke), (5.6, 3.2), False),
+    "forces": (_draw_one_panel(curves.draw_forces), (5.6, 3.2), True),
     "hodograph": (_draw_hodographs, (6.4, 6.6), True),
-    "energy": (_draw_single(curves.draw_energy), (5.6, 3.2), True),
-    "transmission": (_draw_single(draw_transmission), (5.6, 3.2), False),
+    "energy": (_draw_one_panel(curves.draw_energy), (5.6, 3.2), True),
+    "transmission": (_draw_one_panel(draw_transmission), (5.6, 3.2), False),
     "shaking": (
         _draw_rows(derived.draw_shaking_force, derived.draw_shaking_moment),
         (5.6, 5.4),
@@ -290,7 +290,7 @@ def _compose(
             **TITLE,
         )
         if caption := textwrap.fill(" ".join(shown.notes), int(size[0] * 18.5)):
-            part.supxlabel(caption, linespacing=1.35, **CAPTION)
+            part.supxlabel(caption, linespacing=1.35, **CAPTION_STYLE)
     _share_limits([part.axes for part in parts])
     labels.settle(figure)
     return figure

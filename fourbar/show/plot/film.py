@@ -14,9 +14,9 @@ from fourbar.scene import Scene
 from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.linkage import (
+    choose_drawing_scale,
     draw_mechanism,
     draw_paths,
-    scale_of,
     write_path_legend,
 )
 from fourbar.show.plot.style import TITLE, apply_style, shorten_text
@@ -30,13 +30,13 @@ if TYPE_CHECKING:
 
 FRAMES_PER_SECOND = 25
 _MAX_FRAMES = 1500
-SIZE = (6.4, 5.6)
-DPI = 100
+FILM_SIZE = (6.4, 5.6)
+FILM_DPI = 100
 SWEEP_SECONDS = 6.0
 """Duration of a film of a sweep if no other is stated, s."""
-WINDOW = 24
+WINDOW_POSITIONS = 24
 """Positions whose symbols the window is made to hold."""
-SHORTEST = 1.0
+SHORTEST_FILM = 1.0
 """A motion through time shorter than this, s, is slowed down to be seen."""
 
 
@@ -91,7 +91,9 @@ def write_film(
             seconds = SWEEP_SECONDS
             if shown.time is not None:
                 duration = float(shown.time[-1] - shown.time[0])
-                seconds = min(max(duration, SHORTEST), _MAX_FRAMES / FRAMES_PER_SECOND)
+                seconds = min(
+                    max(duration, SHORTEST_FILM), _MAX_FRAMES / FRAMES_PER_SECOND
+                )
         figure, move = _make_stage(shown, moving)
         order = choose_frames(shown, max(2, round(seconds * FRAMES_PER_SECOND)))
         writer: Any = PillowWriter(fps=FRAMES_PER_SECOND)
@@ -113,7 +115,7 @@ def write_film(
                         figure, move, frames=order, cache_frame_data=False
                     )
                     film.save(
-                        str(draft), writer=writer, dpi=DPI, progress_callback=told
+                        str(draft), writer=writer, dpi=FILM_DPI, progress_callback=told
                     )
             except (subprocess.CalledProcessError, BrokenPipeError):
                 raise DependencyError(
@@ -147,8 +149,8 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
     from matplotlib.figure import Figure
 
     sweep = shown.sweep
-    factor, unit, size = scale_of(shown)
-    figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
+    factor, unit, size = choose_drawing_scale(shown)
+    figure = Figure(figsize=FILM_SIZE, dpi=FILM_DPI, layout="constrained")
     axes = figure.subplots()
     figure.suptitle(shorten_text(shown.scene.title, 70), **TITLE)
     draw_paths(axes, shown, Labels())
@@ -169,7 +171,7 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
 
     closes = np.flatnonzero(sweep.assembled)
     for index in closes[
-        :: max(1, len(closes) // WINDOW)
+        :: max(1, len(closes) // WINDOW_POSITIONS)
     ]:  # the window holds what acts at every position
         for _, line, _ in put(int(index)).lines:
             axes.update_datalim(line)

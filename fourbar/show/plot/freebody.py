@@ -23,12 +23,12 @@ from fourbar.show.plot.style import (
     HEADED,
     INK,
     MUTED,
-    OPEN,
-    find_greatest,
+    RING_MARK,
+    largest_magnitude,
     write_force_name,
-    write_quantity,
+    write_labelled_quantity,
 )
-from fourbar.show.plot.symbols import place_of, split_components
+from fourbar.show.plot.symbols import place_of, split_complex
 from fourbar.show.plot.view import View, where_in_words
 from fourbar.show.summary import locate_bending, locate_between
 from fourbar.show.units import choose_unit
@@ -39,15 +39,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import SubFigure
 
-_PANEL, LINE = 3.4, 0.16
+_PANEL, LINE_HEIGHT = 3.4, 0.16
 """Heights of a bar's panel and of a line of its couples, inches."""
-WINDOW = 1.3
+LABEL_SPACE = 1.3
 """The window is this much wider than what it shows: space for the labels."""
 Points = NDArray[np.float64]
-FINE = 401
+STATIONS_DRAWN = 401
 """Stations along a bar."""
-NOWHERE = "they have a value at none of the positions"
-SHOWN = 0.02
+WITHOUT_VALUES = "they have a value at none of the positions"
+LEAST_DRAWN_FORCE = 0.02
 """Share of the largest force below which a force is named in the caption only. Its
 arrow would be shorter than its head.
 """
@@ -211,7 +211,12 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
         (v, bar, *list_actions(v, bar)) for v in view.alike for bar in MOVING_BARS
     ]  # those of this view first
     panels, below = figure.subplots(
-        2, 3, height_ratios=[_PANEL, LINE * max(len(couples) for *_, couples in freed)]
+        2,
+        3,
+        height_ratios=[
+            _PANEL,
+            LINE_HEIGHT * max(len(couples) for *_, couples in freed),
+        ],
     )
     biggest = max(
         (abs(arrow.force) for *_, arrows, _ in freed for arrow in arrows), default=0.0
@@ -222,7 +227,7 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
     else:
         scale = 0.0
     # one window size: the bars, too, are to one scale
-    span = WINDOW * max(
+    span = LABEL_SPACE * max(
         float(np.ptp(_reach(v, bar, arrows, scale), axis=0).max())
         for v, bar, arrows, _ in freed
     )
@@ -249,9 +254,9 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
     panels = figure.subplots(3, 3, sharex="col")
     bending = locate_bending(view.scene, locate_between(view.scene, view.sweep))
     if not bending:
-        raise InputError("figure", "bars", f"needs forces, and {NOWHERE}")
+        raise InputError("figure", "bars", f"needs forces, and {WITHOUT_VALUES}")
     for column, (bar, worst) in zip(panels.T, bending.items(), strict=True):
-        x = np.linspace(0.0, view.scene.linkage.bar(bar).length, FINE)
+        x = np.linspace(0.0, view.scene.linkage.bar(bar).length, STATIONS_DRAWN)
         forces = internal_forces(view.scene, worst.solution, bar, x)
         factor, unit = choose_unit(float(x[-1]), "m", view.units)
         place = view.axis.words(float(worst.solution.at.places[worst.row]))
@@ -259,7 +264,7 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
             column, {"N": "N", "V": "N", "M": "N m"}.items(), strict=True
         ):
             curve = getattr(forces, name)[worst.row]
-            scale, shown = choose_unit(find_greatest(curve), si, view.units)
+            scale, shown = choose_unit(largest_magnitude(curve), si, view.units)
             axes.plot(factor * x, scale * curve, color=BAR_COLOURS[bar])
             axes.fill_between(
                 factor * x, scale * curve, color=BAR_COLOURS[bar], alpha=0.15, lw=0.0
@@ -268,8 +273,8 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
             axes.set_ylabel(f"${name}$ ({shown})")
         column[0].set_title(f"Bar {bar} ({BAR_NAMES[bar]})\n{place}")
         column[2].set_xlabel(f"$x$ from ${pin_name(ENDS[bar][0]).strip('$')}$ ({unit})")
-        largest = write_quantity(worst.peak.value, "N m", view.units)
-        foot = write_quantity(worst.x, "m", view.units)
+        largest = write_labelled_quantity(worst.peak.value, "N m", view.units)
+        foot = write_labelled_quantity(worst.x, "m", view.units)
         if forces.uniform:
             spread = "weight and inertia as a uniform bar's"
         else:
@@ -287,7 +292,7 @@ def _reach(view: View, bar: int, arrows: list[Arrow], scale: float) -> Points:
     points = [0.0j, _take_one(described.length * u), _take_one(described.to_centre * u)]
     for arrow in arrows:
         points += [arrow.at, arrow.at + scale * arrow.force]
-    return np.array([split_components(point) for point in points])
+    return np.array([split_complex(point) for point in points])
 
 
 def _draw_one(
@@ -302,8 +307,8 @@ def _draw_one(
 ) -> None:
     pins = place_of(view.scene.linkage, view.here, 0, 1.0).pins
     along = pins[ENDS[bar][1]] - pins[ENDS[bar][0]]
-    end = split_components(along)
-    middle = split_components(0.5 * along)
+    end = split_complex(along)
+    middle = split_complex(0.5 * along)
     line = ([0.0, end[0]], [0.0, end[1]])
     axes.plot(
         *line,
@@ -315,20 +320,20 @@ def _draw_one(
     )
     labels.keep_off(axes, (0.0, 0.0), end, width=5.0)
     for name, (x, y) in zip(ENDS[bar], ((0.0, 0.0), end), strict=True):
-        axes.plot([x], [y], "o", ms=5.5, mew=1.1, zorder=6, **OPEN)
+        axes.plot([x], [y], "o", ms=5.5, mew=1.1, zorder=6, **RING_MARK)
         labels.add(Label(axes, pin_name(name), (x, y), middle, MUTED, 8.0, 2.5))
     short: list[str] = []
     for arrow in arrows:
         size = abs(arrow.force)
-        if size < SHOWN * biggest:
+        if size < LEAST_DRAWN_FORCE * biggest:
             plain = re.sub(r"[$_{}]", "", arrow.text.replace("\\,", " ")).replace(
                 "-", "−"
             )
-            short.append(f"{plain} = {write_quantity(size, 'N', view.units)}")
+            short.append(f"{plain} = {write_labelled_quantity(size, 'N', view.units)}")
             continue
         draw_plate(axes, bar, (0.0j, arrow.at, along), labels)
-        foot = split_components(arrow.at)
-        tip = split_components(arrow.at + scale * arrow.force)
+        foot = split_complex(arrow.at)
+        tip = split_complex(arrow.at + scale * arrow.force)
         look = {
             **HEADED,
             "color": arrow.colour,
@@ -342,7 +347,7 @@ def _draw_one(
         labels.add(
             Label(
                 axes,
-                f"{arrow.text} = {write_quantity(size, 'N', view.units)}",
+                f"{arrow.text} = {write_labelled_quantity(size, 'N', view.units)}",
                 tip,
                 foot,
                 arrow.colour,
@@ -354,7 +359,7 @@ def _draw_one(
     centre = view.scene.linkage.bar(bar)
     if centre.mass > 0.0:
         G = _take_one(centre.to_centre * view.state().direction(bar))
-        x, y = split_components(G)
+        x, y = split_complex(G)
         draw_plate(axes, bar, (0.0j, G, along), labels)
         draw_mass_centre(axes, (x, y), 6.0)
         labels.add(Label(axes, f"$G_{bar}$", (x, y), middle, MUTED, 8.0, 3.0))
@@ -371,7 +376,7 @@ def _write_couples(axes: "Axes", view: View, couples: list[Couple]) -> None:
     """Write one line for each couple."""
     lines = []
     for couple in couples:
-        size = write_quantity(abs(couple.moment), "N m", view.units)
+        size = write_labelled_quantity(abs(couple.moment), "N m", view.units)
         lines.append(f"{'↺' if couple.moment > 0.0 else '↻'} {couple.text} = {size}")
     axes.set_axis_off()
     look: dict[str, Any] = {

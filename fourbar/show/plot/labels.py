@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.text import Annotation
 
-Point = tuple[float, float]
+DrawnPoint = tuple[float, float]
 _Box = tuple[float, float, float, float]
 _REACH = (7.0, 11.0, 16.0, 23.0, 32.0, 44.0)
 """Distances from the point to the label's edge that are tried, typographic points."""
-DIRECTIONS = 16
+LABEL_DIRECTIONS = 16
 _LED = 15.0
 """Distance from which a label is led to its point by a thin line, points. The points
 are typographic.
@@ -31,8 +31,8 @@ class Label:
 
     axes: "Axes"
     text: str
-    at: Point
-    shun: Point
+    at: DrawnPoint
+    shun: DrawnPoint
     colour: str = INK
     size: float = 8.5
     dots_clear: float = 0.0
@@ -47,13 +47,13 @@ class Labels:
     """
 
     wanted: list[Label] = field(default_factory=list)
-    lines: list[tuple["Axes", list[Point], float]] = field(default_factory=list)
+    lines: list[tuple["Axes", list[DrawnPoint], float]] = field(default_factory=list)
 
     def add(self, label: Label) -> None:
         """Request a label; it is placed by `settle`."""
         self.wanted.append(label)
 
-    def keep_off(self, axes: "Axes", *points: Point, width: float = 1.0) -> None:
+    def keep_off(self, axes: "Axes", *points: DrawnPoint, width: float = 1.0) -> None:
         """Keep labels off lines, given by their points; twice the same point is a mark.
 
         A broad line (`width` in typographic points) counts by what of it would be
@@ -182,9 +182,9 @@ class Labels:
                 )
 
 
-STEP, _MARK = 3.0, 4.5
+POINT_DISTANCE, _MARK = 3.0, 4.5
 """Distance of the points along a line, and radius of a mark, typographic points."""
-RING = np.array(
+RING_POINTS = np.array(
     [(math.cos(k * math.tau / 12), math.sin(k * math.tau / 12)) for k in range(12)]
 )
 
@@ -195,12 +195,12 @@ def _sample_line(points: np.ndarray, per_point: float) -> np.ndarray:
     A mark is a line that ends where it begins.
     """
     pieces = []
-    step = STEP * per_point
+    step = POINT_DISTANCE * per_point
     for p, q in pairwise(points):
         if not (np.all(np.isfinite(p)) and np.all(np.isfinite(q))):
             continue
         if np.array_equal(p, q):
-            pieces.append(p + _MARK * per_point * RING)
+            pieces.append(p + _MARK * per_point * RING_POINTS)
         share = np.linspace(0.0, 1.0, 2 + int(min(np.hypot(*(q - p)) / step, 2000)))
         pieces.append(p + share[:, None] * (q - p))
     if pieces:
@@ -209,15 +209,15 @@ def _sample_line(points: np.ndarray, per_point: float) -> np.ndarray:
 
 
 def _choose_spot(
-    point: Point,
+    point: DrawnPoint,
     away: float,
-    half: Point,
+    half: DrawnPoint,
     dots: np.ndarray,
     boxes: list[_Box],
     per_point: float,
     mark: float,
     inside: _Box,
-) -> Point:
+) -> DrawnPoint:
     """Choose the centre of the label: the candidate that covers least.
 
     Among equal ones the nearest and most outward is taken.
@@ -226,8 +226,10 @@ def _choose_spot(
     best_cost = math.inf
     edge = 0.5 * per_point * dots[:, 2]
     for reach in _REACH:
-        for k in range(DIRECTIONS):
-            angle = away + (k + 1) // 2 * (1 if k % 2 else -1) * math.tau / DIRECTIONS
+        for k in range(LABEL_DIRECTIONS):
+            angle = (
+                away + (k + 1) // 2 * (1 if k % 2 else -1) * math.tau / LABEL_DIRECTIONS
+            )
             cosine = math.cos(angle)
             sine = math.sin(angle)
             gap = (reach + mark) * per_point

@@ -11,35 +11,35 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.linkage import ENDS, MOVING_BARS
+from fourbar.quantities import Array
 from fourbar.show.plot import symbols
-from fourbar.show.plot.labels import Label, Labels
+from fourbar.show.plot.labels import DrawnPoint, Label, Labels
 from fourbar.show.plot.paths import trace
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     INK,
     MUTED,
-    OPEN,
     POINT,
-    find_greatest,
-    write_quantity,
+    RING_MARK,
+    largest_magnitude,
+    write_labelled_quantity,
 )
 from fourbar.show.plot.symbols import (
     Pose,
     draw_vectors,
     list_acting,
     place_of,
-    split_components,
+    split_complex,
 )
 from fourbar.show.plot.view import View
 from fourbar.show.units import choose_unit
-from fourbar.solution import Array, Solution
+from fourbar.solution import Solution
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
 
-Point = tuple[float, float]
 _ON_BAR = 1e-3
 """Part of a bar's length below which a point seems to lie on the bar's line."""
 
@@ -70,13 +70,13 @@ def _show_drawing_coordinates(axes: "Axes", view: View, factor: float) -> None:
             )
 
 
-def locate_pins(view: View, factor: float = 1.0) -> dict[str, Point]:
+def locate_pins(view: View, factor: float = 1.0) -> dict[str, DrawnPoint]:
     """Locate the pins at the drawn position, in the order O2, A, B, O4, m.
 
     Or in the unit that the factor makes of it.
     """
     place = place_of(view.scene.linkage, view.here, 0, factor)
-    return {name: split_components(pin) for name, pin in place.pins.items()}
+    return {name: split_complex(pin) for name, pin in place.pins.items()}
 
 
 def draw_mechanism(
@@ -87,15 +87,15 @@ def draw_mechanism(
     Return what was drawn. Labels are asked for, each away from what it names; whoever
     calls places them.
     """
-    factor, _, size = scale_of(view)
+    factor, _, size = choose_drawing_scale(view)
     place = place_of(view.scene.linkage, solution, index, factor)
     if view.sweep.stroke is not None:
         place = place._replace(
             barrel=symbols.BARREL * factor * float(np.nanmin(view.sweep.stroke))
         )
-    pins = {name: split_components(pin) for name, pin in place.pins.items()}
+    pins = {name: split_complex(pin) for name, pin in place.pins.items()}
     centre = sum(place.pins.values()) / 4.0
-    middle = split_components(centre)
+    middle = split_complex(centre)
     drawn = []
     for number in MOVING_BARS:
         start, stop = ENDS[number]
@@ -116,22 +116,22 @@ def draw_mechanism(
         )
     for name, point in pins.items():
         drawn += axes.plot(
-            *[[v] for v in point], "o", ms=6.0, mew=1.2, zorder=6, **OPEN
+            *[[v] for v in point], "o", ms=6.0, mew=1.2, zorder=6, **RING_MARK
         )
         labels.add(Label(axes, pin_name(name), point, middle, INK, 9.0, 2.5))
     for name, path in solution.points.items():
-        here = split_components(factor * complex(*path[index]))
+        here = split_complex(factor * complex(*path[index]))
         drawn += axes.plot(
             *[[v] for v in here],
             "D",
             ms=4.5,
             mew=1.2,
             zorder=8,
-            **{**OPEN, "mec": POINT},
+            **{**RING_MARK, "mec": POINT},
         )
         labels.keep_off(axes, here, here)
         labels.add(Label(axes, name, here, middle, POINT, 8.5, 2.5))
-    for carrier, corner in _list_carried(view, place):
+    for carrier, corner in _list_off_bars(view, place):
         first, last = (place.pins[pin] for pin in ENDS[carrier])
         drawn += draw_plate(axes, carrier, (first, corner, last), labels)
     for number in MOVING_BARS:
@@ -140,19 +140,19 @@ def draw_mechanism(
         if bar.mass == 0.0:
             continue
         G = place.point(number, bar.to_centre)
-        here = split_components(G)
+        here = split_complex(G)
         drawn += draw_mass_centre(axes, here)
         labels.keep_off(axes, here, here)
-        beyond = split_components(2.0 * G - centre)  # across the bar from its number
+        beyond = split_complex(2.0 * G - centre)  # across the bar from its number
         labels.add(Label(axes, f"$G_{number}$", here, beyond, colour, 8.0, 3.0))
     for symbol in list_acting(view.scene):
-        shown = symbols.draw(axes, symbol, place, size)
+        shown = symbols.draw_symbol(axes, symbol, place, size)
         drawn += shown.artists
         for line in shown.lines:
             labels.keep_off(axes, *line)
         if shown.label is not None:
             if shown.away:
-                away = split_components(complex(*shown.label) - shown.away)
+                away = split_complex(complex(*shown.label) - shown.away)
             else:
                 away = middle
             labels.add(
@@ -161,14 +161,14 @@ def draw_mechanism(
                     shown.text,
                     shown.label,
                     away,
-                    symbols.COLOURS.get(symbol.kind, symbols.PIN),
+                    symbols.SYMBOL_COLOURS.get(symbol.kind, symbols.PIN_COLOUR),
                     8.0,
                 )
             )
     return drawn
 
 
-def _list_carried(view: View, place: Pose) -> Iterator[tuple[int, complex]]:
+def _list_off_bars(view: View, place: Pose) -> Iterator[tuple[int, complex]]:
     """List what may lie off its bar.
 
     These are points, mass centres, and where forces, moments and springs act.
@@ -199,7 +199,7 @@ def draw_plate(
     along = (point - first) / (last - first)
     if abs(along.imag) < _ON_BAR and -_ON_BAR < along.real < 1.0 + _ON_BAR:
         return []
-    shape = [split_components(corner) for corner in corners]
+    shape = [split_complex(corner) for corner in corners]
     colour = BAR_COLOURS.get(bar, MUTED)
     labels.keep_off(axes, *shape)
     shade = to_rgba(colour, 0.08 if bar > 1 else 0.0)
@@ -212,7 +212,9 @@ def draw_plate(
     ]
 
 
-def draw_mass_centre(axes: "Axes", point: Point, ms: float = 7.0) -> "list[Line2D]":
+def draw_mass_centre(
+    axes: "Axes", point: DrawnPoint, ms: float = 7.0
+) -> "list[Line2D]":
     """Draw the quartered circle that marks a mass centre."""
     from matplotlib.path import Path
 
@@ -225,7 +227,7 @@ def draw_mass_centre(axes: "Axes", point: Point, ms: float = 7.0) -> "list[Line2
     return marks
 
 
-def draw_support(axes: "Axes", pin: Point, size: float, labels: Labels) -> None:
+def draw_support(axes: "Axes", pin: DrawnPoint, size: float, labels: Labels) -> None:
     """Draw the hatched support under a fixed pin."""
     from matplotlib.patches import Polygon, Rectangle
 
@@ -256,19 +258,21 @@ def draw_support(axes: "Axes", pin: Point, size: float, labels: Labels) -> None:
 
 def _write_bar_name(view: View, number: int) -> str:
     """Write the number of a bar, with its length where dimensions are wanted."""
-    length = write_quantity(view.scene.linkage.lengths[number - 1], "m", view.units)
+    length = write_labelled_quantity(
+        view.scene.linkage.lengths[number - 1], "m", view.units
+    )
     if view.dimensions:
         return f"{number}: {length}"
     return str(number)
 
 
-def scale_of(view: View) -> tuple[float, str, float]:
+def choose_drawing_scale(view: View) -> tuple[float, str, float]:
     """Choose the factor to the unit of length, that unit, and a support's size.
 
     Both branches have the same.
     """
     most = max(
-        find_greatest(
+        largest_magnitude(
             v.sweep.A, v.sweep.B, v.sweep.G3, *np.array(list(locate_pins(v).values()))
         )
         for v in view.alike
@@ -317,7 +321,7 @@ def draw_linkage(
 
     `moving`: with velocities.
     """
-    factor, unit, size = scale_of(view)
+    factor, unit, size = choose_drawing_scale(view)
     pins = locate_pins(view, factor)
     draw_paths(axes, view, labels)
     if view.dimensions:
@@ -348,7 +352,7 @@ def draw_linkage(
 
 def draw_paths(axes: "Axes", view: View, labels: Labels) -> None:
     """Draw what does not move: paths of points, ground line and supports."""
-    factor, _, size = scale_of(view)
+    factor, _, size = choose_drawing_scale(view)
     for path, colour, dashes, name in _list_paths(view):
         scaled = factor * path
         axes.plot(*scaled.T, color=colour, lw=1.0, ls=dashes, zorder=2, label=name)
@@ -421,7 +425,7 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
 
     If it has none, they are of points along its line and off it.
     """
-    factor, unit, _ = scale_of(view)
+    factor, unit, _ = choose_drawing_scale(view)
     pins = locate_pins(view, factor)
     names = [point.name for point in view.scene.points if point.bar == 3]
     traced = trace(view)
@@ -453,11 +457,13 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
         axes.plot(
             *zip(pins["A"], (x, y), pins["B"], strict=True), lw=0.8, ls=":", **faint
         )
-        axes.plot([x], [y], "D", ms=4.5, mew=1.2, zorder=8, **{**OPEN, "mec": POINT})
+        axes.plot(
+            [x], [y], "D", ms=4.5, mew=1.2, zorder=8, **{**RING_MARK, "mec": POINT}
+        )
         labels.keep_off(axes, pins["A"], (x, y), pins["B"])
         labels.add(Label(axes, name, (x, y), pins["A"], POINT, 8.5, 2.5))
     for name, (x, y) in pins.items():
-        axes.plot([x], [y], "o", ms=4.5, mew=1.0, zorder=5, **OPEN)
+        axes.plot([x], [y], "o", ms=4.5, mew=1.0, zorder=5, **RING_MARK)
         if name in ("O2", "O4"):
             labels.add(Label(axes, pin_name(name), (x, y), (0.0, 1e9), INK, 8.5, 2.0))
     labels.keep_off(axes, *pins.values())

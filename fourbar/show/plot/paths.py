@@ -9,13 +9,14 @@ import numpy as np
 
 from fourbar.formulas.mobility import find_circuit
 from fourbar.formulas.points import list_circuit
+from fourbar.quantities import Array
 from fourbar.scene import Command, command_at
 from fourbar.scene.motion import Sweep
 from fourbar.show.plot.view import View
-from fourbar.solution import Array, Solution
+from fourbar.solution import Solution
 from fourbar.solving import solve
 
-STEPS = (1440, 7200, 36_000, 180_000)
+STEPS_OF_A_PATH = (1440, 7200, 36_000, 180_000)
 """Steps that are tried until no chord is long, each a multiple of 4."""
 _CHORD = 1.0 / 150.0
 """Longest chord of a path, as a part of its extent. No corner is seen in a printed
@@ -54,9 +55,9 @@ def trace(view: View) -> Trace:
         return Trace(view.sweep, circuit=False)
     circuit = motion.commanded == "theta_2" and not isinstance(motion.angle, Sweep)
     solution = view.sweep
-    for steps in STEPS:
+    for steps in STEPS_OF_A_PATH:
         if circuit:
-            at = _list_circuit(view, steps)
+            at = _list_circuit_commands(view, steps)
         else:
             at = _list_range(view, steps)
         solution = solve(view.scene, "position", at=at)
@@ -66,7 +67,7 @@ def trace(view: View) -> Trace:
     return Trace(solution, circuit)
 
 
-def _list_circuit(view: View, steps: int) -> Command:
+def _list_circuit_commands(view: View, steps: int) -> Command:
     linkage = view.scene.linkage
     here = view.here
     number = int(find_circuit(linkage, here.theta_2, here.branch)[0])
@@ -81,7 +82,7 @@ def _list_range(view: View, steps: int) -> Command:
     return command_at(view.scene, np.linspace(places[0], places[-1], steps + 1))
 
 
-def _measure(points: Array) -> tuple[Array, float]:
+def _measure_chords(points: Array) -> tuple[Array, float]:
     """Return the chord of each step of a path, NaN beside a gap, and its extent, m."""
     chords = np.hypot(*np.diff(points, axis=0).T)
     extent = np.nanmax(np.nanmax(points, axis=0) - np.nanmin(points, axis=0))
@@ -93,7 +94,7 @@ def _longest_chord(points: Array) -> float:
 
     It is a part of the path's extent.
     """
-    chords, extent = _measure(points)
+    chords, extent = _measure_chords(points)
     if extent:
         return float(np.nanmax(chords, initial=0.0)) / extent
     return 0.0
@@ -104,7 +105,7 @@ def _thin(path: Array) -> Array:
 
     Gaps and ends stay.
     """
-    chords, extent = _measure(path)
+    chords, extent = _measure_chords(path)
     step = 0.5 * _CHORD * extent
     gap = np.isnan(path).any(axis=1)
     if step == 0.0:

@@ -13,15 +13,15 @@ from fourbar.errors import InputError
 from fourbar.scene import command
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import (
-    CAPTION,
+    CAPTION_STYLE,
     FAINT,
     FORCE_COLOURS,
     INK,
     TITLE,
     Drawing,
     apply_style,
-    find_greatest,
     format_of,
+    largest_magnitude,
     set_degree_ticks,
     shorten_text,
 )
@@ -29,9 +29,9 @@ from fourbar.show.plot.view import View, axis_of
 from fourbar.show.studies import find_largest, list_shown, rank_numbers
 from fourbar.show.tolerances import describe_parted, find_part_unit, list_shown_parts
 from fourbar.show.units import choose_unit
-from fourbar.solution import SI, Conversion, find_unit
+from fourbar.solution import SI, Conversion, find_unit_of_quantity
 from fourbar.studies.derivatives import sensitivity
-from fourbar.studies.spread import BAND, Tolerances
+from fourbar.studies.spread import BAND_PERCENTILES, Tolerances
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -89,7 +89,8 @@ def draw_tolerances(
             f"{title}: what the tolerances do ({spreads.samples} samples)", **TITLE
         )
         caption = (
-            f"Deviation from the nominal. Filled: {BAND[0]:g} to {BAND[1]:g} % of the"
+            f"Deviation from the nominal. Filled: {BAND_PERCENTILES[0]:g} to"
+            f" {BAND_PERCENTILES[1]:g} % of the"
             " samples; thin: least and greatest sampled; dashed: first-order worst"
             " case."
         )
@@ -98,12 +99,13 @@ def draw_tolerances(
             *(line for part in parts if (line := describe_parted(spreads, part))),
         ]
         figure.supxlabel(
-            "\n".join(textwrap.fill(line, 52 * columns) for line in lines), **CAPTION
+            "\n".join(textwrap.fill(line, 52 * columns) for line in lines),
+            **CAPTION_STYLE,
         )
         Drawing(figure).save(path)
 
 
-def _list_positions(axes: "Axes", spreads: Tolerances, units: Conversion) -> Any:
+def _lay_out_positions(axes: "Axes", spreads: Tolerances, units: Conversion) -> Any:
     over = axis_of(spreads.scene, command(spreads.scene), units)
     axes.set_xlim(over.values.min(), over.values.max())
     if over.unit == "°":
@@ -114,7 +116,7 @@ def _list_positions(axes: "Axes", spreads: Tolerances, units: Conversion) -> Any
 
 def _draw_band(axes: "Axes", spreads: Tolerances, part: str, units: Conversion) -> None:
     spread = spreads.spreads[part]
-    over = _list_positions(axes, spreads, units)
+    over = _lay_out_positions(axes, spreads, units)
     ends = [spread.low, spread.high, spread.least, spread.greatest]
     away = [end - spread.nominal for end in ends]
     sizes = np.abs(np.concatenate([*away, spread.worst]))
@@ -132,7 +134,7 @@ def _draw_band(axes: "Axes", spreads: Tolerances, part: str, units: Conversion) 
         axes.plot(over, factor * line, color=colour, lw=0.7)
     for sign in (1.0, -1.0):
         axes.plot(over, sign * factor * spread.worst, color=INK, lw=0.9, ls=(0, (4, 2)))
-    if sizes.size and find_greatest(sizes) > 2.0 * most > 0.0:
+    if sizes.size and largest_magnitude(sizes) > 2.0 * most > 0.0:
         axes.set_ylim(-factor * most, factor * most)
     axes.axhline(0.0, color=INK, lw=0.6)
     axes.set(ylabel=f"deviation ({unit})", title=part)
@@ -144,7 +146,7 @@ def _draw_shares(
     from matplotlib.transforms import offset_copy
 
     spread = spreads.spreads[part]
-    over = _list_positions(axes, spreads, units)
+    over = _lay_out_positions(axes, spreads, units)
     with np.errstate(all="ignore"):
         shares = 100.0 * spread.shares / spread.shares.sum(axis=0)
     order = np.argsort(-np.nan_to_num(shares).sum(axis=1))
@@ -180,7 +182,9 @@ def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
     for axes, name in zip(panels, names, strict=True):
         changes = {row.key: abs(row.change) for row in derivatives.influences(name)}
         sizes = np.array([changes.get(key, 0.0) for key in keys])
-        factor, unit = choose_unit(sizes.max(initial=0.0), find_unit(name), shown.units)
+        factor, unit = choose_unit(
+            sizes.max(initial=0.0), find_unit_of_quantity(name), shown.units
+        )
         axes.barh(
             range(len(keys)),
             factor * sizes,
@@ -196,7 +200,7 @@ def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
         axes.grid(False, axis="y")
         axes.locator_params(axis="x", nbins=3)
         most, own_unit = choose_unit(
-            find_largest(derivatives, name), find_unit(name), shown.units
+            find_largest(derivatives, name), find_unit_of_quantity(name), shown.units
         )
         text = f"largest\n{most * find_largest(derivatives, name):.3g} {own_unit}"
         axes.text(

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.errors import DependencyError, InputError, clean_line, expect, say_install
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import PIN_FORCES, Array
 from fourbar.show.units import choose_unit
-from fourbar.solution import SI, Array, Conversion
+from fourbar.solution import SI, Conversion
 from fourbar.writing import STANDARD_STREAM, write_bytes
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ TITLE: dict[str, Any] = {
     "x": 0.012,
     "ha": "left",
 }
-CAPTION: dict[str, Any] = {
+CAPTION_STYLE: dict[str, Any] = {
     "parse_math": False,
     "size": 6.8,
     "color": MUTED,
@@ -76,7 +76,7 @@ CAPTION: dict[str, Any] = {
     "ha": "left",
 }
 """Styles of the texts of a whole figure, above and below its panels."""
-OPEN: dict[str, Any] = {"mfc": "white", "mec": INK}
+RING_MARK: dict[str, Any] = {"mfc": "white", "mec": INK}
 """A mark that is a ring."""
 HEADED: dict[str, Any] = {
     "arrowstyle": "-|>",
@@ -85,8 +85,8 @@ HEADED: dict[str, Any] = {
     "shrinkB": 0.0,
 }
 """An arrow from end to end."""
-STYLE = Path(__file__).with_name("fourbar.mplstyle")
-DPI = 200
+STYLE_FILE = Path(__file__).with_name("fourbar.mplstyle")
+PICTURE_DPI = 200
 FORMATS = ("svg", "png", "pdf")
 
 
@@ -96,7 +96,7 @@ _ONE_AT_A_TIME = RLock()
 
 @contextmanager
 def apply_style() -> Iterator[None]:
-    """Apply the settings of `STYLE` for the time of one drawing.
+    """Apply the settings of `STYLE_FILE` for the time of one drawing.
 
     Raises DependencyError where matplotlib is not installed.
     """
@@ -108,7 +108,9 @@ def apply_style() -> Iterator[None]:
         ) from None
     with _ONE_AT_A_TIME, mpl.rc_context():
         mpl.rcdefaults()  # a user's matplotlibrc does not change a published figure
-        mpl.rcParams.update(mpl.rc_params_from_file(STYLE, use_default_template=False))
+        mpl.rcParams.update(
+            mpl.rc_params_from_file(STYLE_FILE, use_default_template=False)
+        )
         yield
 
 
@@ -130,7 +132,7 @@ def format_of(path: str | Path, formats: tuple[str, ...] = FORMATS) -> str:
     return kind
 
 
-METADATA: dict[str, dict[str, Any]] = {
+PICTURE_METADATA: dict[str, dict[str, Any]] = {
     "svg": {"Date": None, "Creator": "fourbar"},
     "pdf": {"CreationDate": None, "Producer": None, "Creator": "fourbar"},
     "png": {"Software": "fourbar"},
@@ -179,7 +181,10 @@ class Drawing:
         buffer = io.BytesIO()
         with apply_style():
             self.figure.savefig(
-                buffer, format=file_format, dpi=DPI, metadata=METADATA[file_format]
+                buffer,
+                format=file_format,
+                dpi=PICTURE_DPI,
+                metadata=PICTURE_METADATA[file_format],
             )
         return buffer.getvalue()
 
@@ -192,7 +197,7 @@ def shorten_text(text: str, width: int) -> str:
     return line[: width - 1].rstrip() + "…"
 
 
-def find_greatest(*values: Array) -> float:
+def largest_magnitude(*values: Array) -> float:
     """Return the largest finite magnitude, or 0."""
     flat = np.concatenate([np.abs(np.ravel(value)) for value in values])
     flat = flat[np.isfinite(flat)]
@@ -204,7 +209,7 @@ def find_peak_index(values: Array) -> int:
     return int(np.nanargmax(np.where(np.isfinite(values), np.abs(values), np.nan)))
 
 
-RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+RAISED_CHARACTERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def write_number(value: float) -> str:
@@ -216,10 +221,12 @@ def write_number(value: float) -> str:
         text = f"{value:.{max(0, 2 - size)}f}"
         return text.replace("-", "−")
     mantissa, exponent = f"{value:.2e}".split("e")
-    return f"{mantissa}·10".replace("-", "−") + str(int(exponent)).translate(RAISED)
+    return f"{mantissa}·10".replace("-", "−") + str(int(exponent)).translate(
+        RAISED_CHARACTERS
+    )
 
 
-def write_quantity(value: float, unit: str, units: Conversion = SI) -> str:
+def write_labelled_quantity(value: float, unit: str, units: Conversion = SI) -> str:
     """Write a quantity of an SI unit in a unit, or with the prefix that suits it."""
     factor, name = choose_unit(abs(value), unit, units)
     return f"{write_number(factor * value)} {name}"

@@ -27,21 +27,21 @@ from fourbar.effects.effect import PinRows
 from fourbar.linkage import FIRST_PIN, FourBar
 from fourbar.scene import Scene
 from fourbar.show.plot.curves import choose_limit
-from fourbar.show.plot.style import HEADED, INK, MUTED, find_greatest
+from fourbar.show.plot.labels import DrawnPoint
+from fourbar.show.plot.style import HEADED, INK, MUTED, largest_magnitude
 from fourbar.show.plot.view import View, collect_point_vectors
 from fourbar.solution import Solution
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Point = tuple[float, float]
-LOAD = "#8A3B78"
+LOAD_COLOUR = "#8A3B78"
 SPRING = "#6b5b00"
-PIN = "#4d5b70"
-COLOURS = {
+PIN_COLOUR = "#4d5b70"
+SYMBOL_COLOURS = {
     **{
-        "force": LOAD,
-        "moment": LOAD,
+        "force": LOAD_COLOUR,
+        "moment": LOAD_COLOUR,
         "drive": INK,
         "push": INK,
         "gravity": MUTED,
@@ -53,11 +53,17 @@ COLOURS = {
         "flywheel": MUTED,
     },
 }
-LENGTHS = {"force": 7.0, "moment": 2.6, "drive": 3.2, "flywheel": 4.0, "torsion": 2.2}
+SYMBOL_SIZES = {
+    "force": 7.0,
+    "moment": 2.6,
+    "drive": 3.2,
+    "flywheel": 4.0,
+    "torsion": 2.2,
+}
 """Length of an arrow and radii, in sizes of a support. Other rings around pins have
-RING.
+RING_RADII.
 """
-RING = {"viscous": 1.5, "friction": 1.8, "pin_friction": 1.8}
+RING_RADII = {"viscous": 1.5, "friction": 1.8, "pin_friction": 1.8}
 _NAMED_AT = {
     "viscous": -0.4,
     "friction": 0.4,
@@ -75,7 +81,7 @@ SMALLEST, _SHARE = 0.5, 0.12
 there that it may take.
 """
 _ARROWS = {"v": ("#0B6E99", "velocity"), "a": ("#B3261E", "acceleration")}
-LONGEST = 7.0
+LONGEST_ARROW = 7.0
 """Length of an arrow, in sizes of a support. The largest of the sweep has it; if values
 diverge, all that are as large.
 """
@@ -253,10 +259,10 @@ class _DrawnSymbol:
     """Parts of a drawing that one symbol has added."""
 
     artists: list[Any] = field(default_factory=list)
-    lines: list[list[Point]] = field(default_factory=list)
+    lines: list[list[DrawnPoint]] = field(default_factory=list)
     """Lines that labels avoid and that a window has to show."""
     text: str = ""
-    label: Point | None = None
+    label: DrawnPoint | None = None
     """Place of the text; None: it is placed already."""
     away: complex = 0.0j
     """Direction from there outwards, of length 1."""
@@ -279,9 +285,12 @@ def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) ->
     return Pose({1: 0.0j, 2: 0.0j, 3: A, 4: O4}, u, pins, factor, angles[2], torque)
 
 
-def draw(axes: "Axes", symbol: Symbol, place: Pose, size: float) -> _DrawnSymbol:
+def draw_symbol(axes: "Axes", symbol: Symbol, place: Pose, size: float) -> _DrawnSymbol:
     """Draw one symbol at one position; `size` is that of a support."""
-    drawn, colour = _DrawnSymbol(text=symbol.name), COLOURS.get(symbol.kind, PIN)
+    drawn, colour = (
+        _DrawnSymbol(text=symbol.name),
+        SYMBOL_COLOURS.get(symbol.kind, PIN_COLOUR),
+    )
     if symbol.kind == "gravity":
         _draw_gravity(axes, symbol, drawn)
     elif symbol.end is not None:
@@ -299,8 +308,8 @@ def draw(axes: "Axes", symbol: Symbol, place: Pose, size: float) -> _DrawnSymbol
                 4.5,
             )
             drawn.text, drawn.away = f"${symbol.name}$", 1j * along
-            drawn.label = split_components(start + 0.5 * place.barrel * along)
-        x, y = zip(*map(split_components, (start, end)), strict=True)
+            drawn.label = split_complex(start + 0.5 * place.barrel * along)
+        x, y = zip(*map(split_complex, (start, end)), strict=True)
         drawn.artists += axes.plot(x, y, "o", ms=3.5, color=colour, zorder=5.5)
     elif symbol.kind in ("force", "push"):
         _draw_force(axes, symbol, place, size, drawn)
@@ -316,11 +325,14 @@ def draw(axes: "Axes", symbol: Symbol, place: Pose, size: float) -> _DrawnSymbol
             turn = 1.0 if math.isnan(place.torque) else float(np.sign(place.torque))
             drawn.text = f"$T_{symbol.bar}$"
         size = place.small(symbol.pin or FIRST_PIN[symbol.bar], size)
-        _turn(axes, centre, LENGTHS[symbol.kind] * size, turn, colour, drawn)
+        _draw_turning_arrow(
+            axes, centre, SYMBOL_SIZES[symbol.kind] * size, turn, colour, drawn
+        )
     else:
         centre, size = place.pins[symbol.pin], place.small(symbol.pin, size)
         radius = size * (
-            RING.get(symbol.kind) or LENGTHS.get(symbol.kind, _RING_OF_OTHERS)
+            RING_RADII.get(symbol.kind)
+            or SYMBOL_SIZES.get(symbol.kind, _RING_OF_OTHERS)
         )
         spiral = symbol.kind == "torsion"
         turned = np.linspace(0.0, (2.5 if spiral else 1.0) * math.tau, 90)
@@ -333,11 +345,11 @@ def draw(axes: "Axes", symbol: Symbol, place: Pose, size: float) -> _DrawnSymbol
             2.2 if symbol.kind == "flywheel" else 1.2,
         )
         drawn.away = cmath.rect(1.0, _NAMED_AT.get(symbol.kind, _NAME_OF_OTHERS))
-        drawn.label = split_components(centre + radius * drawn.away)
+        drawn.label = split_complex(centre + radius * drawn.away)
     return drawn
 
 
-def split_components(z: complex) -> Point:
+def split_complex(z: complex) -> DrawnPoint:
     """Split z into x and y."""
     return (z.real, z.imag)
 
@@ -359,16 +371,16 @@ def _draw_arrow(
     from matplotlib.patches import FancyArrowPatch
 
     arrow = FancyArrowPatch(
-        split_components(tail),
-        split_components(tip),
+        split_complex(tail),
+        split_complex(tip),
         zorder=8,
         color=colour,
         mutation_scale=10.0,
         **HEADED,
     )
     drawn.artists.append(axes.add_patch(arrow))
-    axes.update_datalim([split_components(tail), split_components(tip)])
-    drawn.lines.append([split_components(tail), split_components(tip)])
+    axes.update_datalim([split_complex(tail), split_complex(tip)])
+    drawn.lines.append([split_complex(tail), split_complex(tip)])
 
 
 def _draw_force(
@@ -378,14 +390,14 @@ def _draw_force(
     sign = symbol.sign(place.theta_2)
     if sign == 0.0:
         return
-    tip = tail + sign * LENGTHS["force"] * size * place.direction(
+    tip = tail + sign * SYMBOL_SIZES["force"] * size * place.direction(
         symbol
     ) * symbol.vector / abs(symbol.vector)
-    _draw_arrow(axes, tail, tip, COLOURS[symbol.kind], drawn)
-    drawn.label, drawn.away = split_components(tip), (tip - tail) / abs(tip - tail)
+    _draw_arrow(axes, tail, tip, SYMBOL_COLOURS[symbol.kind], drawn)
+    drawn.label, drawn.away = split_complex(tip), (tip - tail) / abs(tip - tail)
 
 
-def _turn(
+def _draw_turning_arrow(
     axes: "Axes",
     centre: complex,
     radius: float,
@@ -410,7 +422,7 @@ def _turn(
         drawn,
     )
     drawn.label, drawn.away = (
-        split_components(complex(points[20])),
+        split_complex(complex(points[20])),
         complex(points[20] - centre) / radius,
     )
 
@@ -436,7 +448,7 @@ def _draw_gravity(axes: "Axes", symbol: Symbol, drawn: _DrawnSymbol) -> None:
     if size == 0.0:
         return
     x, y = (24.0 * part / size for part in (symbol.vector.real, symbol.vector.imag))
-    style = {**HEADED, "color": COLOURS["gravity"], "lw": 1.3}
+    style = {**HEADED, "color": SYMBOL_COLOURS["gravity"], "lw": 1.3}
     corner: dict[str, Any] = {
         "xycoords": "axes fraction",
         "textcoords": "offset points",
@@ -449,7 +461,7 @@ def _draw_gravity(axes: "Axes", symbol: Symbol, drawn: _DrawnSymbol) -> None:
             "$g$",
             xy=middle,
             xytext=(-x - 8.0, -y),
-            color=COLOURS["gravity"],
+            color=SYMBOL_COLOURS["gravity"],
             size=9.0,
             **corner,
         ),
@@ -471,7 +483,7 @@ def draw_vectors(
             np.hypot(*values.T)
             for values in collect_point_vectors(view.scene, view.sweep, letter).values()
         ]
-        if not (top := choose_limit(sizes) or find_greatest(*sizes)):
+        if not (top := choose_limit(sizes) or largest_magnitude(*sizes)):
             continue
         vectors = collect_point_vectors(view.scene, solution, letter)
         feet = [
@@ -483,7 +495,7 @@ def draw_vectors(
             for name in vectors
         ]
         shafts = [
-            LONGEST * size * v / np.maximum(np.hypot(*v.T), top)[:, None]
+            LONGEST_ARROW * size * v / np.maximum(np.hypot(*v.T), top)[:, None]
             for v in vectors.values()
         ]
         tips = np.concatenate(

@@ -10,13 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from fourbar.errors import NotAssembledError, write_in_units
-from fourbar.evaluation.case import compute_state
+from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS
+from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at, default_places
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.units import choose_unit
-from fourbar.solution import Array, Conversion, Solution
+from fourbar.solution import Conversion, Solution
 from fourbar.solving import solve
 
 CLEAR = 0.3
@@ -89,7 +90,7 @@ class View:
 
     def state(self) -> State:
         """Return the kinematics at the position drawn."""
-        return compute_state(self.scene, self.here.at)
+        return compute_shown_state(self.scene, self.here.at)
 
 
 class Axis(NamedTuple):
@@ -243,7 +244,7 @@ def make_view(scene: Scene, position: float | None = None) -> View:
         return _view_motion(scene, position)
     positions = list_sweep(scene)
     sweep = solve(scene, at=positions)
-    _require_assembled(sweep)
+    _require_drawable(sweep)
     stated = command(scene)
     if position is None and len(stated.angle) == 1:
         position = float(stated.places[0])
@@ -260,7 +261,7 @@ def make_view(scene: Scene, position: float | None = None) -> View:
     return shown
 
 
-def _require_assembled(sweep: Solution) -> None:
+def _require_drawable(sweep: Solution) -> None:
     if not sweep.assembled.any():
         raise NotAssembledError(
             "nothing to draw: the linkage assembles at none of the scene's positions"
@@ -274,7 +275,7 @@ def _view_motion(scene: Scene, position: float | None) -> View:
     to the position.
     """
     sweep = solve(scene)
-    _require_assembled(sweep)
+    _require_drawable(sweep)
     angle = sweep.at.angle
     name = sweep.commanded
     if position is None:

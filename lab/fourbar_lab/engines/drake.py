@@ -22,17 +22,17 @@ from pydrake.multibody.tree import (
 )
 
 from fourbar.errors import LimitError
+from fourbar.quantities import Array
 from fourbar.scene import Scene
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.description import (
-    FIRST_PIN,
-    about_first_pin,
+    PIN_OF_MOVING_BAR,
     find_unknown,
-    list_parts,
+    inertia_about_first_pin,
+    list_moving_parts,
     rotate_by,
 )
-from fourbar_validation.engines.effects import has_term, list_acting
-from fourbar_validation.engines.loaded import Pair
+from fourbar_validation.engines.effects import has_term, list_wrenches
+from fourbar_validation.engines.loaded import Components
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.tree import Tree
 
@@ -40,15 +40,15 @@ _BY_SPEEDS = JacobianWrtVariable.kV
 UP = (0.0, 0.0, 1.0)
 
 
-def find_refusal(scene: Scene) -> str:
+def find_limit_of_drake(scene: Scene) -> str:
     """Name the declared limit that a scene meets, if any."""
     if reason := find_unknown(scene, has_term, forces=True):
         return reason
-    for number in FIRST_PIN:
+    for number in PIN_OF_MOVING_BAR:
         bar = scene.linkage.bar(number)
         if bar.mass == 0.0:
             return f"bar {number} has no mass; the reaction port of Drake divides by it"
-        if number != 2 and about_first_pin(bar) == 0.0:
+        if number != 2 and inertia_about_first_pin(bar) == 0.0:
             return (
                 f"bar {number} has no inertia about its pin; the reaction port of Drake"
                 " divides by it"
@@ -60,13 +60,13 @@ class _DrakeTree(Tree):
     """The open tree, built from the description."""
 
     def __init__(self, scene: Scene) -> None:
-        if reason := find_refusal(scene):
+        if reason := find_limit_of_drake(scene):
             raise LimitError(reason)
         self.plant = plant = MultibodyPlant(time_step=0.0)
         self.body: dict[int, Any] = {1: plant.world_body()}
         self.joint: dict[int, Any] = {}
         self.local: dict[str, tuple[Any, Array]] = {}
-        for part in list_parts(scene.linkage):
+        for part in list_moving_parts(scene.linkage):
             about_g = RotationalInertia(*[part.inertia] * 3)
             inertia = SpatialInertia.MakeFromCentralInertia(
                 part.mass, np.array([*part.centre, 0.0]), about_g
@@ -77,7 +77,9 @@ class _DrakeTree(Tree):
             frame = plant.AddFrame(
                 FixedOffsetFrame(f"first_pin{part.bar}", bearer, joint_frame)
             )
-            joint = RevoluteJoint(FIRST_PIN[part.bar], frame, body.body_frame(), UP)
+            joint = RevoluteJoint(
+                PIN_OF_MOVING_BAR[part.bar], frame, body.body_frame(), UP
+            )
             self.joint[part.bar] = plant.AddJoint(joint)
             self.local |= {
                 name: (body.body_frame(), np.array([*place, 0.0]))
@@ -85,7 +87,7 @@ class _DrakeTree(Tree):
             }
         plant.Finalize()
         self.context, self.world = plant.CreateDefaultContext(), plant.world_frame()
-        self.ready(scene, list_acting(scene, self))
+        self.ready(scene, list_wrenches(scene, self))
         plant.mutable_gravity_field().set_gravity_vector(np.array([*self.field, 0.0]))
 
     def place(self, q: Sequence[float]) -> None:
@@ -157,7 +159,7 @@ class _DrakeTree(Tree):
         )
         return self.balancing
 
-    def carried(self) -> dict[int, Pair]:
+    def carried(self) -> dict[int, Components]:
         """Read the reaction port, which finds the accelerations once more.
 
         It uses what acts and what the motion needs.

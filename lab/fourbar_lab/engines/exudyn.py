@@ -36,23 +36,23 @@ from exudyn.itemInterface import (
 from fourbar.effects import PointDrive
 from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
+from fourbar.quantities import Array
 from fourbar.scene import Scene
-from fourbar_lab.engines.exudyn_elements import ELEMENT_OF, Bodies
-from fourbar_validation.compare.answer import Array
+from fourbar_lab.engines.exudyn_elements import ELEMENT_OF, ExudynBodies
 from fourbar_validation.engines.description import (
     ON_BARS,
-    POINTS,
+    PART_POINTS,
     find_unknown,
-    list_parts,
+    list_moving_parts,
     place,
     reduce_angle,
 )
-from fourbar_validation.engines.effects import has_term, list_acting
+from fourbar_validation.engines.effects import has_term, list_wrenches
 from fourbar_validation.engines.linear import solve_refined
-from fourbar_validation.engines.loaded import Loaded, Values
+from fourbar_validation.engines.loaded import BarValues, Loaded
 from fourbar_validation.engines.loop import Exact
 
-SIZE = 9
+EXUDYN_SIZE = 9
 """Coordinates, and constraints."""
 _B_ROWS, _OTHER_ROWS = [4, 5], [0, 1, 2, 3, 6, 7]
 """Rows of pin B and of the others among the constraints. They are in the order of
@@ -84,9 +84,9 @@ class ExudynBars(Loaded):
         exu.config.printToConsole = False
         self.container = exu.SystemContainer()
         self.mbs = mbs = self.container.AddSystem()
-        bodies = Bodies(mbs, scene.linkage)
+        bodies = ExudynBodies(mbs, scene.linkage)
         self.body = bodies.body
-        of_bar = {part.bar: part for part in list_parts(scene.linkage)}
+        of_bar = {part.bar: part for part in list_moving_parts(scene.linkage)}
         self.local = {
             name: (part.bar, [*xy, 0.0])
             for part in of_bar.values()
@@ -124,7 +124,7 @@ class ExudynBars(Loaded):
         for effect in scene.effects:
             if effect.key in ELEMENT_OF:
                 ELEMENT_OF[effect.key](effect, bodies)
-        self.ready(scene, list_acting(scene, self, ELEMENT_OF))
+        self.ready(scene, list_wrenches(scene, self, ELEMENT_OF))
         self.load = {}
         for bar in MOVING_BARS:
             mass = mbs.AddMarker(MarkerBodyMass(bodyNumber=self.body[bar]))
@@ -145,7 +145,7 @@ class ExudynBars(Loaded):
         self.turn = {
             bar: self.state.GetObjectLTGODE2(self.body[bar])[2] for bar in MOVING_BARS
         }
-        self.shifts = [i for i in range(SIZE) if i not in self.turn.values()]
+        self.shifts = [i for i in range(EXUDYN_SIZE) if i not in self.turn.values()]
 
     def place(self, q: Sequence[float]) -> None:
         """Set the bars' angles; the pins O2, A and O4 are closed.
@@ -154,7 +154,7 @@ class ExudynBars(Loaded):
         """
         of_3_to_2, theta_4 = q[1:]
         theta_2 = reduce_angle(q[0])
-        coordinates = np.zeros(SIZE)
+        coordinates = np.zeros(EXUDYN_SIZE)
         for bar, angle in zip(
             MOVING_BARS, (theta_2, theta_2 + of_3_to_2, theta_4), strict=True
         ):
@@ -171,11 +171,11 @@ class ExudynBars(Loaded):
 
     def _read_constraint_gap(self) -> Array:
         self.solver.ComputeAlgebraicEquations(self.mbs, False)
-        return np.array(self.solver.GetSystemResidual())[SIZE:]
+        return np.array(self.solver.GetSystemResidual())[EXUDYN_SIZE:]
 
     def _read_constraint_jacobian(self) -> Array:
         self.solver.SetSystemJacobian(
-            np.zeros((2 * SIZE, 2 * SIZE))
+            np.zeros((2 * EXUDYN_SIZE, 2 * EXUDYN_SIZE))
         )  # the computed values are added to it
         self.solver.ComputeJacobianAE(
             self.mbs,
@@ -184,7 +184,7 @@ class ExudynBars(Loaded):
             scalarFactor_ODE1=0.0,
             velocityLevel=False,
         )
-        return np.array(self.solver.GetSystemJacobian())[SIZE:, :SIZE]
+        return np.array(self.solver.GetSystemJacobian())[EXUDYN_SIZE:, :EXUDYN_SIZE]
 
     def gap(self) -> tuple[float, float]:
         """Return B on bar 3 minus B on bar 4, from the constraint of pin B."""
@@ -240,9 +240,9 @@ class ExudynBars(Loaded):
 
     def positions(self) -> dict[str, Array]:
         """Locate the points of the bars."""
-        return {name: self.point(point) for name, point in POINTS.items()}
+        return {name: self.point(point) for name, point in PART_POINTS.items()}
 
-    def move(self, bar: int, speed: float, acceleration: float) -> Values:
+    def move(self, bar: int, speed: float, acceleration: float) -> BarValues:
         """Return speeds, accelerations and multipliers.
 
         Empty where a toggle leaves them 0/0.
@@ -250,12 +250,12 @@ class ExudynBars(Loaded):
         if self.behind is not None:
             self._move_behind()
         of_drive = self._read_constraint_jacobian()
-        commanded = np.eye(SIZE)[-1]  # a cylinder's is that of closed pins
-        jacobian = np.vstack((of_drive[:-1], np.eye(SIZE)[self.turn[bar]]))
+        commanded = np.eye(EXUDYN_SIZE)[-1]  # a cylinder's is that of closed pins
+        jacobian = np.vstack((of_drive[:-1], np.eye(EXUDYN_SIZE)[self.turn[bar]]))
         try:
             self.v = v = solve_refined(jacobian, commanded * speed)
             self.state.SetODE2Coordinates_t(v)
-            self.state.SetODE2Coordinates_tt(np.zeros(SIZE))
+            self.state.SetODE2Coordinates_tt(np.zeros(EXUDYN_SIZE))
             at_b = self.acceleration("end3") - self.acceleration("end4")
             drift = np.concatenate(
                 (np.zeros(2), self.acceleration("end2"), at_b, np.zeros(3))
@@ -264,7 +264,7 @@ class ExudynBars(Loaded):
         except np.linalg.LinAlgError:
             return {}
         self.state.SetODE2Coordinates_tt(a)
-        values: Values = {
+        values: BarValues = {
             f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()
         }
         for moving in MOVING_BARS:
@@ -304,7 +304,7 @@ class ExudynBars(Loaded):
                 self.mbs.SetLoadParameter(force, "loadVector", [x, y, 0.0])
                 self.mbs.SetLoadParameter(torque, "loadVector", [0.0, 0.0, couple])
         self.solver.ComputeODE2RHS(self.mbs)
-        return np.array(self.solver.GetSystemResidual())[:SIZE]
+        return np.array(self.solver.GetSystemResidual())[:EXUDYN_SIZE]
 
 
 ExudynConstraints = partial(Exact, "exudyn-constraints", ExudynBars)

@@ -22,16 +22,15 @@ from exudyn.itemInterface import (
     ObjectRigidBody2D,
 )
 
-from fourbar.linkage import FourBar
+from fourbar.linkage import PINS, FourBar
 from fourbar_validation.engines.description import (
-    PINS,
-    about_first_pin,
-    list_parts,
+    inertia_about_first_pin,
+    list_moving_parts,
     place,
 )
 
 
-class Bodies:
+class ExudynBodies:
     """The ground and a body of each bar.
 
     The coordinates are those of its first pin and its direction.
@@ -42,9 +41,9 @@ class Bodies:
         self.ground_angle = linkage.ground_angle
         self.node: dict[int, Any] = {1: mbs.AddNode(NodePointGround())}
         self.body: dict[int, Any] = {1: mbs.AddObject(ObjectGround())}
-        for part in list_parts(linkage):
+        for part in list_moving_parts(linkage):
             self.node[part.bar] = node = mbs.AddNode(NodeRigidBody2D())
-            inertia = about_first_pin(linkage.bar(part.bar))
+            inertia = inertia_about_first_pin(linkage.bar(part.bar))
             body = ObjectRigidBody2D(
                 mass=part.mass,
                 inertia=inertia,
@@ -88,7 +87,7 @@ class Bodies:
         )
 
 
-def _add_viscous(effect: Any, bodies: Bodies) -> None:
+def _add_viscous(effect: Any, bodies: ExudynBodies) -> None:
     """Add a `CoordinateSpringDamper` between the two directions."""
     for pin, damping in effect.coefficients:
         markers = [bodies.direction(bar) for bar in PINS[pin]]
@@ -99,7 +98,7 @@ def _add_viscous(effect: Any, bodies: Bodies) -> None:
         )
 
 
-def _add_torsion(effect: Any, bodies: Bodies) -> None:
+def _add_torsion(effect: Any, bodies: ExudynBodies) -> None:
     """Add a `TorsionalSpringDamper` between axes that coincide at rest.
 
     It measures within half a turn of rest.
@@ -114,7 +113,7 @@ def _add_torsion(effect: Any, bodies: Bodies) -> None:
         bodies.mbs.AddObject(spring)
 
 
-def _add_springs(effect: Any, bodies: Bodies) -> None:
+def _add_springs(effect: Any, bodies: ExudynBodies) -> None:
     """Add a `SpringDamper` between two points."""
     for spring in effect.springs:
         ends = (spring.start, spring.end)
@@ -131,7 +130,7 @@ def _add_springs(effect: Any, bodies: Bodies) -> None:
         )
 
 
-ELEMENT_OF: dict[str, Callable[[Any, Bodies], None]] = {
+ELEMENT_OF: dict[str, Callable[[Any, ExudynBodies], None]] = {
     "viscous": _add_viscous,
     "torsion": _add_torsion,
     "springs": _add_springs,

@@ -17,23 +17,23 @@ import opensim as osim
 
 from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS
+from fourbar.quantities import Array
 from fourbar.scene import Scene
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.pins import resolve
 from fourbar_validation.engines.description import (
     ON_BARS,
-    POINTS,
-    about_first_pin,
+    PART_POINTS,
     find_unknown,
-    list_parts,
+    inertia_about_first_pin,
+    list_moving_parts,
     reduce_angle,
 )
-from fourbar_validation.engines.effects import has_term, list_acting
+from fourbar_validation.engines.effects import has_term, list_wrenches
 from fourbar_validation.engines.linear import solve_refined
-from fourbar_validation.engines.loaded import Loaded, Values
+from fourbar_validation.engines.loaded import BarValues, Loaded
 from fourbar_validation.engines.loop import Exact
 
-ZERO = (0.0, 0.0, 0.0)
+ZERO_VECTOR = (0.0, 0.0, 0.0)
 """Zero vector."""
 _PER_COORDINATE = {
     2: np.array([1.0, 0.0, 0.0]),
@@ -41,7 +41,7 @@ _PER_COORDINATE = {
     4: np.array([0.0, 1.0, 0.0]),
 }
 """Derivative of each bar's direction by the coordinates."""
-PASSES = 50
+MULTIPLIER_PASSES = 50
 """Number of passes, down to rounding. Each leaves a millionth to a tenth of the
 previous pass's multipliers.
 """
@@ -53,14 +53,14 @@ _TIME_IS_ALPHA = (1.0 / 6.0, 0.0, 0.0, 0.0)
 """Motion t^3/6 prescribed for bar 2 or 4. Its second derivative is the time, set to the
 bar's acceleration.
 """
-TURNING = {2: "O2", 4: "O4"}
+DIRECTION_JOINTS = {2: "O2", 4: "O4"}
 """Joint whose coordinate is the direction of a bar."""
 
-ENDS = ("start", "end")
+CYLINDER_ENDS = ("start", "end")
 """Names of the two ends of a cylinder; a force at a point has the first alone."""
 
 
-def find_refusal(scene: Scene) -> str:
+def find_limit_of_opensim(scene: Scene) -> str:
     """Name the declared limit that a scene meets, if any."""
     if reason := find_unknown(scene, has_term, forces=True):
         return reason
@@ -70,7 +70,7 @@ def find_refusal(scene: Scene) -> str:
                 f"bar {number} has no mass; OpenSim takes no such body at the end of a"
                 " chain, and drops its inertia"
             )
-    if about_first_pin(scene.linkage.input):
+    if inertia_about_first_pin(scene.linkage.input):
         return ""
     return "bar 2 has no inertia about O2; Simbody divides by it"
 
@@ -86,18 +86,18 @@ class _OpenSimBars(Loaded):
     )
 
     def __init__(self, scene: Scene) -> None:
-        if reason := find_refusal(scene):
+        if reason := find_limit_of_opensim(scene):
             raise LimitError(reason)
         osim.Logger.setLevelString("Off")
         osim.Logger.removeFileSink()
         linkage = scene.linkage
         self.model = model = osim.Model()
-        self.ready(scene, list_acting(scene, self))
+        self.ready(scene, list_wrenches(scene, self))
         model.setGravity(_make_vec(*self.field))
         self.body = {1: model.getGround()}
-        self.part = {part.bar: part for part in list_parts(linkage)}
+        self.part = {part.bar: part for part in list_moving_parts(linkage)}
         for bar, part in self.part.items():
-            about_z = osim.Inertia(*[part.inertia] * 3, *ZERO)
+            about_z = osim.Inertia(*[part.inertia] * 3, *ZERO_VECTOR)
             self.body[bar] = osim.Body(
                 f"bar{bar}", part.mass, _make_vec(*part.centre), about_z
             )
@@ -110,12 +110,12 @@ class _OpenSimBars(Loaded):
         if scene.drive is not None:
             self.local |= {
                 name: (end.bar, resolve(end.distance, end.angle))
-                for name, (_, end) in zip(ENDS, scene.drive.ends, strict=False)
+                for name, (_, end) in zip(CYLINDER_ENDS, scene.drive.ends, strict=False)
             }
         self.length = {bar: part.length for bar, part in self.part.items()}
         self.joint = {
-            "O2": self._make_joint("O2", 1, ZERO, 2, ZERO),
-            "O4": self._make_joint("O4", 1, self.part[4].first_pin, 4, ZERO),
+            "O2": self._make_joint("O2", 1, ZERO_VECTOR, 2, ZERO_VECTOR),
+            "O4": self._make_joint("O4", 1, self.part[4].first_pin, 4, ZERO_VECTOR),
             "B": self._make_joint(
                 "B", 4, (self.length[4], 0.0, 0.0), 3, (self.length[3], 0.0, 0.0)
             ),
@@ -127,9 +127,9 @@ class _OpenSimBars(Loaded):
             False
         )  # until a position is found: OpenSim would assemble it at angles of its own
         model.addConstraint(self.pin_a)
-        for pin in TURNING.values():
+        for pin in DIRECTION_JOINTS.values():
             self.joint[pin].updCoordinate().setPrescribedFunction(
-                osim.PolynomialFunction(make_vector(_TIME_IS_ALPHA))
+                osim.PolynomialFunction(make_simbody_vector(_TIME_IS_ALPHA))
             )
             self.joint[pin].updCoordinate().setDefaultIsPrescribed(pin == "O2")
         self.commanded = 2
@@ -193,8 +193,10 @@ class _OpenSimBars(Loaded):
         of_3_to_2, theta_4 = q[1:]
         theta_2 = reduce_angle(q[0])
         self.state.setTime(0.0)
-        self.state.setU(make_vector((0.0, 0.0, 0.0)))
-        self.state.setQ(make_vector((theta_2, theta_4, theta_2 + of_3_to_2 - theta_4)))
+        self.state.setU(make_simbody_vector((0.0, 0.0, 0.0)))
+        self.state.setQ(
+            make_simbody_vector((theta_2, theta_4, theta_2 + of_3_to_2 - theta_4))
+        )
         self.model.realizePosition(self.state)
 
     def point(self, name: str) -> Array:
@@ -241,20 +243,20 @@ class _OpenSimBars(Loaded):
 
     def positions(self) -> dict[str, Array]:
         """Locate the points of the bars."""
-        return {name: self.point(point) for name, point in POINTS.items()}
+        return {name: self.point(point) for name, point in PART_POINTS.items()}
 
-    def move(self, bar: int, speed: float, acceleration: float) -> Values:
+    def move(self, bar: int, speed: float, acceleration: float) -> BarValues:
         """Compute speeds and accelerations, pin forces and torque.
 
         Empty where a toggle leaves them 0/0.
         """
         if bar != self.commanded:
             self.commanded, q = bar, self.state.getQ().to_numpy()
-            for moving, pin in TURNING.items():
+            for moving, pin in DIRECTION_JOINTS.items():
                 self.joint[pin].updCoordinate().setIsPrescribed(
                     self.state, moving == bar
                 )
-            self.state.setQ(make_vector(q))
+            self.state.setQ(make_simbody_vector(q))
             self.model.realizePosition(self.state)
         try:
             turns, accelerations = self._set_motion(speed, acceleration)
@@ -278,7 +280,9 @@ class _OpenSimBars(Loaded):
                 if place.bar == 1
                 else self._compute_station_jacobian(name)
             )
-            for name, (sense, place) in zip(ENDS, self.force_drive.ends, strict=False)
+            for name, (sense, place) in zip(
+                CYLINDER_ENDS, self.force_drive.ends, strict=False
+            )
         )
         return np.asarray(self.line()[1] @ rate)
 
@@ -290,7 +294,7 @@ class _OpenSimBars(Loaded):
         equations = self._differentiate_constraints()
         turns = solve_refined(equations, np.eye(3)[0])
         self.state.setTime(acceleration)
-        self.state.setU(make_vector(turns * speed))
+        self.state.setU(make_simbody_vector(turns * speed))
         self.model.realizeVelocity(self.state)
         bias = osim.Vector()
         matrix = osim.Matrix()
@@ -302,8 +306,8 @@ class _OpenSimBars(Loaded):
         )
         return turns, solve_refined(equations, -np.array(bias.to_numpy())[:3])
 
-    def _motion(self) -> Values:
-        values: Values = {}
+    def _motion(self) -> BarValues:
+        values: BarValues = {}
         for bar in MOVING_BARS:
             values[f"omega_{bar}"], values[f"alpha_{bar}"] = (
                 self.velocity(bar),
@@ -332,7 +336,7 @@ class _OpenSimBars(Loaded):
         closing = np.zeros(2)
         before = (math.inf, math.inf)
         seen: set[tuple[float, float]] = set()
-        for number in range(PASSES):
+        for number in range(MULTIPLIER_PASSES):
             for bar, wrench in self.wrenches.items():
                 for function, value in zip(self.applied[bar], wrench, strict=True):
                     function.setValue(value)
@@ -392,7 +396,7 @@ class _OpenSimBars(Loaded):
 
     def _couple_of_command(self) -> float:
         return float(
-            self.joint[TURNING[self.commanded]]
+            self.joint[DIRECTION_JOINTS[self.commanded]]
             .calcReactionOnChildExpressedInGround(self.state)
             .get(0)
             .get(2)
@@ -423,7 +427,7 @@ def _make_vec(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
     return osim.Vec3(float(x), float(y), float(z))
 
 
-def make_vector(values: Iterable[float]) -> Any:
+def make_simbody_vector(values: Iterable[float]) -> Any:
     """Make a vector of Simbody."""
     numbers = [float(value) for value in values]
     made = osim.Vector(len(numbers), 0.0)
@@ -437,4 +441,4 @@ def _make_constants() -> list[Any]:
 
     They may be given another value later.
     """
-    return [osim.Constant(value) for value in ZERO]
+    return [osim.Constant(value) for value in ZERO_VECTOR]

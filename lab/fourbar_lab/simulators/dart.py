@@ -9,16 +9,16 @@ import numpy as np
 from fourbar.mjcf import size_flywheel
 from fourbar.scene import Scene
 from fourbar_lab.simulators.motion import (
-    LIGHT,
+    RECIPE_WITH_A_LIGHT_FLYWHEEL,
     Course,
     Instant,
     Readings,
     Simulator,
-    find_gravity,
+    gravity_field,
     run_through,
     start,
 )
-from fourbar_validation.engines.description import list_parts, rotate
+from fourbar_validation.engines.description import list_moving_parts, rotate
 
 
 class Dart(Simulator):
@@ -39,12 +39,12 @@ class Dart(Simulator):
         Torque and forces are those with which the last step began.
         """
         begin = start(scene)
-        inertia = size_flywheel(scene, LIGHT)
+        inertia = size_flywheel(scene, RECIPE_WITH_A_LIGHT_FLYWHEEL)
         world = dartpy.simulation.World()
         linkage = dartpy.dynamics.Skeleton("four_bar")
         bodies: dict[int, Any] = {}
         for part, angle, speed in zip(
-            list_parts(scene.linkage), begin.qpos, begin.qvel, strict=True
+            list_moving_parts(scene.linkage), begin.qpos, begin.qvel, strict=True
         ):
             joint, body = linkage.createRevoluteJointAndBodyNodePair(
                 bodies.get(part.bearer)
@@ -63,7 +63,7 @@ class Dart(Simulator):
             joint.setVelocity(0, speed)
             bodies[part.bar] = body
         world.addSkeleton(linkage)
-        world.setGravity(list(find_gravity(scene)))
+        world.setGravity(list(gravity_field(scene)))
         world.setTimeStep(course.timestep)
         length = scene.linkage.coupler.length
         end = bodies[3].getWorldTransform().multiply([length, 0.0, 0.0])

@@ -15,16 +15,16 @@ from fourbar.mjcf import size_flywheel
 from fourbar.mjcf.assembly import write_sdf
 from fourbar.scene import Scene
 from fourbar_lab.simulators.motion import (
-    LIGHT,
+    RECIPE_WITH_A_LIGHT_FLYWHEEL,
     Course,
     Instant,
     Readings,
     Simulator,
-    find_gravity,
+    gravity_field,
     run_through,
     start,
 )
-from fourbar_validation.engines.description import FIRST_PIN, rotate
+from fourbar_validation.engines.description import PIN_OF_MOVING_BAR, rotate
 
 
 class DrakeSap(Simulator):
@@ -64,14 +64,14 @@ class DrakeSap(Simulator):
         timestep = course.timestep
         written_for = self.settings[self.setting]
         begin = start(scene)
-        inertia = size_flywheel(scene, LIGHT)
+        inertia = size_flywheel(scene, RECIPE_WITH_A_LIGHT_FLYWHEEL)
         plant = MultibodyPlant(timestep)
         plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
         if written_for == "gazebo":
             plant.SetEnableLoopTopology(True)
         Parser(plant).AddModelsFromString(write_sdf(scene, written_for, begin), "sdf")
-        plant.mutable_gravity_field().set_gravity_vector(find_gravity(scene))
-        joints = [plant.GetJointByName(name) for name in FIRST_PIN.values()]
+        plant.mutable_gravity_field().set_gravity_vector(gravity_field(scene))
+        joints = [plant.GetJointByName(name) for name in PIN_OF_MOVING_BAR.values()]
         actuator = plant.AddJointActuator("drive", joints[0])
         actuator.set_default_rotor_inertia(inertia)
         actuator.set_default_gear_ratio(1.0)

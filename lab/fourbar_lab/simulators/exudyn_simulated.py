@@ -13,7 +13,7 @@ import numpy as np
 from fourbar.errors import LimitError
 from fourbar.linkage import PIN_FORCE
 from fourbar.scene import Scene
-from fourbar_lab.engines.exudyn import JOINTS, SIZE, ExudynBars
+from fourbar_lab.engines.exudyn import EXUDYN_SIZE, JOINTS, ExudynBars
 from fourbar_lab.simulators.motion import Course, Instant, Readings, Simulator, start
 
 
@@ -48,7 +48,7 @@ class ExudynIntegrators(Simulator):
         theta_2 = begin.qpos[0]
         omega_2 = begin.qvel[0]
         bars.place(begin.qpos)
-        speeds = np.linalg.solve(bars.jacobians, omega_2 * np.eye(SIZE)[-1])
+        speeds = np.linalg.solve(bars.jacobians, omega_2 * np.eye(EXUDYN_SIZE)[-1])
         initial = exu.ConfigurationType.Initial
         mbs.SetObjectParameter(
             bars.drive,

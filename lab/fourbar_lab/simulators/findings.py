@@ -62,7 +62,7 @@ def _read_outcome(done: Ended) -> str:
     return f"not run: {done.last}"
 
 
-def read(script: Path) -> Reproduction:
+def read_docstring(script: Path) -> Reproduction:
     """Read the docstring of a script."""
     sentence, _, rest = (
         ast.get_docstring(ast.parse(script.read_text(encoding="utf-8"))) or ""
@@ -77,7 +77,9 @@ def read(script: Path) -> Reproduction:
 
 def read_findings() -> list[Reproduction]:
     """Read the scripts of a checkout."""
-    return [read(path) for path in sorted(FOLDER.glob("*.py") if FOLDER else ())]
+    return [
+        read_docstring(path) for path in sorted(FOLDER.glob("*.py") if FOLDER else ())
+    ]
 
 
 def find_interpreter(finding: Reproduction) -> tuple[str, str] | None:
@@ -143,12 +145,12 @@ def _run_findings(
 @click.option(
     "--time-limit", default=600.0, show_default=True, help="Seconds for each script."
 )
-def command(scripts: tuple[Path, ...], time_limit: float) -> None:
+def findings_command(scripts: tuple[Path, ...], time_limit: float) -> None:
     """Run the scripts of docs/findings where their simulators are.
 
     They run here, or in environments of engines.toml.
     """
-    chosen = [read(script) for script in scripts] or read_findings()
+    chosen = [read_docstring(script) for script in scripts] or read_findings()
     for finding in chosen:
         if "Engine" not in finding.fields:
             raise InputError(

@@ -13,14 +13,14 @@ from fourbar_lab.simulators.motion import (
     Instant,
     Readings,
     Simulator,
-    find_gravity,
+    gravity_field,
     run_through,
     start,
     write_temp,
 )
 from fourbar_lab.simulators.mujoco_c import text
 
-FLYWHEEL = 1e5
+GENESIS_FLYWHEEL = 1e5
 """Inertia of the flywheel relative to the linkage's; beside 1e8 its solver leaves
 gravity to itself unless it is set to MuJoCo's tolerance.
 """
@@ -55,7 +55,10 @@ class GenesisRigid(Simulator):
         Torque and force are those with which the step began.
         """
         of_morph, of_solver = self.settings[self.setting]
-        common: dict[str, Any] = {"dt": course.timestep, "gravity": find_gravity(scene)}
+        common: dict[str, Any] = {
+            "dt": course.timestep,
+            "gravity": gravity_field(scene),
+        }
         world = genesis.Scene(
             sim_options=genesis.options.SimOptions(**common),
             rigid_options=genesis.options.RigidOptions(
@@ -64,7 +67,8 @@ class GenesisRigid(Simulator):
             show_viewer=False,
         )
         with write_temp(
-            text(scene, course.steps, "genesis", flywheel=FLYWHEEL), "four_bar.xml"
+            text(scene, course.steps, "genesis", flywheel=GENESIS_FLYWHEEL),
+            "four_bar.xml",
         ) as file:
             bars = world.add_entity(genesis.morphs.MJCF(file=file, **of_morph))
             world.build()

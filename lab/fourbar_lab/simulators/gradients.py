@@ -10,15 +10,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.studies.keys import command_key, list_entries, read_place, replace_numbers
 from fourbar_lab.simulators.motion import start
 from fourbar_lab.simulators.mujoco_c import text
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop, open_model
 
-STEPS = 156
+STEPS_OF_A_TURN = 156
 """Steps in a turn; a quarter of them is run through."""
 DIFFERENCE = 1e-6
 """Step to either side, SI: differences of doubles keep ten digits."""
@@ -33,12 +33,12 @@ class ClosedState(NamedTuple):
     qvel: Array
 
 
-def assemble(scene: Scene, theta_2: float, reader: str) -> ClosedState:
+def compile_and_assemble(scene: Scene, theta_2: float, reader: str) -> ClosedState:
     """Compile a scene for a simulator, and assemble it at theta_2 (rad).
 
     It has the speed there.
     """
-    written = text(scene, STEPS, reader)
+    written = text(scene, STEPS_OF_A_TURN, reader)
     loop = ClosedLoop(written)
     model, data = open_model(written)
     assembly = np.array([scene.motion.branch], dtype=np.int8)
@@ -61,11 +61,13 @@ def assemble_either_side(
     sides = []
     for step in (DIFFERENCE, -DIFFERENCE):
         if key == command_key(scene):
-            sides.append(assemble(scene, theta_2 + step, reader))
+            sides.append(compile_and_assemble(scene, theta_2 + step, reader))
         else:
             number = float(read_place(scene, list_entries(scene)[key].place)) + step
             sides.append(
-                assemble(replace_numbers(scene, {key: number}), theta_2, reader)
+                compile_and_assemble(
+                    replace_numbers(scene, {key: number}), theta_2, reader
+                )
             )
     return sides
 

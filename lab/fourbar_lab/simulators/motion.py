@@ -20,18 +20,18 @@ from fourbar.effects import Gravity
 from fourbar.errors import InputError, LimitError, NotAssembledError
 from fourbar.mjcf import RECIPE
 from fourbar.mjcf.document import Start, choose_run
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import Command, Scene, command, with_signs
-from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.compare.answer import Answer
 from fourbar_validation.engines.description import find_field, list_speeds
-from fourbar_validation.engines.free_body import move
+from fourbar_validation.engines.free_body import speeds_and_accelerations
 from fourbar_validation.engines.free_body_closure import close
 
 Floats = NDArray[np.floating[Any]]
 """Array in the precision of a simulator."""
-STEPS = 628
+DEFAULT_STEPS_OF_A_TURN = 628
 """Steps in a turn where no setting states them."""
-LIGHT = replace(RECIPE, flywheel=30.0)
+RECIPE_WITH_A_LIGHT_FLYWHEEL = replace(RECIPE, flywheel=30.0)
 """Recipe for accelerations that are differences of speeds: of a heavier flywheel's they
 keep no digits, and solvers that end at a part of all momentum leave the loop to itself
 beside it.
@@ -131,7 +131,7 @@ class Simulator:
 
     def __init__(self) -> None:
         self.setting = next(iter(self.settings))
-        self.steps = None if self.single_states else STEPS
+        self.steps = None if self.single_states else DEFAULT_STEPS_OF_A_TURN
 
     def at_setting(
         self,
@@ -337,7 +337,7 @@ def start(scene: Scene) -> Start:
     theta_2 = commanded.theta_2[usable]
     first = usable[[np.argmin(theta_2) if omega_2 >= 0.0 else np.argmax(theta_2)]]
     theta = (commanded.theta_2[first], *closed.theta[:, first])
-    omega = move(
+    omega = speeds_and_accelerations(
         scene.linkage, theta[0], np.array([omega_2]), np.zeros(1), *theta[1:]
     ).omega
     q = [float(x[0]) for x in theta]
@@ -349,7 +349,7 @@ def start(scene: Scene) -> Start:
     )
 
 
-def find_gravity(scene: Scene) -> tuple[float, float, float]:
+def gravity_field(scene: Scene) -> tuple[float, float, float]:
     """Return the field of gravity, m/s^2."""
     fields = [
         find_field(effect) for effect in scene.effects if isinstance(effect, Gravity)

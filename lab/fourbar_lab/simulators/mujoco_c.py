@@ -11,9 +11,10 @@ import mujoco
 import numpy as np
 
 from fourbar.mjcf import SIMULATORS, write_mjcf
+from fourbar.quantities import Array
 from fourbar.scene import Scene, command, with_signs
 from fourbar_lab.simulators.motion import (
-    STEPS,
+    DEFAULT_STEPS_OF_A_TURN,
     Course,
     Floats,
     Instant,
@@ -24,7 +25,6 @@ from fourbar_lab.simulators.motion import (
     run_through,
     start,
 )
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop, open_model
 from fourbar_validation.engines.mujoco.drives import remove_attributes
@@ -138,21 +138,23 @@ class MujocoFile(Simulator):
         """Run through a course."""
         model, data = open_model(text(scene, course.steps, self.settings[self.setting]))
         advance = partial(mujoco.mj_step, model, data)
-        return run_through(scene, course, advance, lambda _: _evaluated(model, data))
+        return run_through(
+            scene, course, advance, lambda _: _evaluate_mujoco(model, data)
+        )
 
     def states(self, scene: Scene) -> Readings:
         """Evaluate single states, each set by itself."""
-        written = text(scene, STEPS, self.settings[self.setting])
+        written = text(scene, DEFAULT_STEPS_OF_A_TURN, self.settings[self.setting])
         model, data = open_model(written)
         readings = Readings()
         for q, v in states_of(written, scene):
             data.qpos[:], data.qvel[:] = q, v
-            readings.read(scene, _evaluated(model, data))
+            readings.read(scene, _evaluate_mujoco(model, data))
         return readings
 
     def in_worlds(self, scene: Scene, worlds: int) -> Worlds:
         """Prepare single states of many worlds, one after the other on one core."""
-        written = text(scene, STEPS, self.settings[self.setting])
+        written = text(scene, DEFAULT_STEPS_OF_A_TURN, self.settings[self.setting])
         model, data = open_model(written)
         q, v = repeat_states(written, scene, worlds)
         shapes = ((model.nv,), (model.nu,), (2,), (model.nbody, 6))
@@ -177,7 +179,7 @@ class MujocoFile(Simulator):
         return Worlds(evaluate, evaluate, partial(read_last, scene, model))
 
 
-def _evaluated(model: Any, data: Any) -> Instant:
+def _evaluate_mujoco(model: Any, data: Any) -> Instant:
     mujoco.mj_forward(model, data)
     mujoco.mj_rnePostConstraint(model, data)
     drive = data.actuator_force[model.actuator("drive").id]

@@ -12,7 +12,7 @@ from mujoco import mjx
 from fourbar.scene import Scene
 from fourbar_lab.simulators import gradients
 from fourbar_lab.simulators.motion import (
-    STEPS,
+    DEFAULT_STEPS_OF_A_TURN,
     Course,
     Floats,
     Instant,
@@ -90,20 +90,20 @@ class MujocoMjx(Simulator):
             scene,
             course,
             further,
-            lambda now: _evaluated(model, forward(theirs, now)),
+            lambda now: _evaluate_mjx(model, forward(theirs, now)),
             self.choose_clock(),
         )
 
     def states(self, scene: Scene) -> Readings:
         """Evaluate single states, each set by itself."""
-        written = text(scene, STEPS, self.settings[self.setting])
+        written = text(scene, DEFAULT_STEPS_OF_A_TURN, self.settings[self.setting])
         model, data = open_model(written)
         theirs = mjx.put_model(model)
         state = mjx.put_data(model, data)
         readings = Readings()
         for q, v in states_of(written, scene):
             placed = state.replace(qpos=jax.numpy.array(q), qvel=jax.numpy.array(v))
-            readings.read(scene, _evaluated(model, forward(theirs, placed)))
+            readings.read(scene, _evaluate_mjx(model, forward(theirs, placed)))
         return readings
 
     def in_worlds(self, scene: Scene, worlds: int, double: bool = True) -> Worlds:
@@ -115,7 +115,7 @@ class MujocoMjx(Simulator):
         reader = "warp"
         if double:
             reader = self.settings[self.setting]
-        written = text(scene, STEPS, reader)
+        written = text(scene, DEFAULT_STEPS_OF_A_TURN, reader)
         model, data = open_model(written)
         q, v = repeat_states(written, scene, worlds)
         with jax.enable_x64(double):
@@ -142,7 +142,7 @@ class MujocoMjx(Simulator):
         begin, end = gradients.choose_quarter(scene)
         ways = [
             ("jax.jvp at a set state", end, 0),
-            ("jax.jvp through a quarter turn", begin, gradients.STEPS // 4),
+            ("jax.jvp through a quarter turn", begin, gradients.STEPS_OF_A_TURN // 4),
         ]
         ways_tried = [
             _slopes(scene, how, state, partial(_forwards, steps=steps))
@@ -165,7 +165,7 @@ class MujocoMjx(Simulator):
         ]
 
 
-def _evaluated(model: Any, state: Any) -> Instant:
+def _evaluate_mjx(model: Any, state: Any) -> Instant:
     q, v, a, drive = (
         np.array(x) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force)
     )
@@ -190,7 +190,7 @@ def _slopes(
 
     As trees these differ in what is no number of theirs.
     """
-    model, data, q, v = gradients.assemble(scene, theta_2, "mjx")
+    model, data, q, v = gradients.compile_and_assemble(scene, theta_2, "mjx")
     inputs = (mjx.put_model(model), q, v)
     by = {}
     state = (0.0,) * 4

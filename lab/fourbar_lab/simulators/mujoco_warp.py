@@ -14,7 +14,7 @@ import warp
 from fourbar.scene import Scene
 from fourbar_lab.simulators import gradients
 from fourbar_lab.simulators.motion import (
-    STEPS,
+    DEFAULT_STEPS_OF_A_TURN,
     Course,
     Floats,
     Instant,
@@ -33,7 +33,7 @@ from fourbar_lab.simulators.mujoco_c import (
 )
 from fourbar_validation.engines.mujoco.closed_loop import open_model
 
-NUMBERS = ("body_mass", "body_inertia", "body_ipos", "site_pos", "dof_armature")
+VARIED_FIELDS = ("body_mass", "body_inertia", "body_ipos", "site_pos", "dof_armature")
 """Fields of a model that change with a bar's length or mass, or with theta_2."""
 
 
@@ -71,13 +71,13 @@ class MujocoWarp(Simulator):
             scene,
             course,
             advance,
-            lambda _: _evaluated(model, theirs, state, times),
+            lambda _: _evaluate_warp(model, theirs, state, times),
             self.choose_clock(),
         )
 
     def states(self, scene: Scene) -> Readings:
         """Evaluate single states, each set by itself."""
-        written = text(scene, STEPS, "warp")
+        written = text(scene, DEFAULT_STEPS_OF_A_TURN, "warp")
         model, data = open_model(written)
         theirs = mjw.put_model(model)
         state = mjw.put_data(model, data)
@@ -86,7 +86,7 @@ class MujocoWarp(Simulator):
             state.qpos.assign(np.array([q], dtype=np.float32))
             state.qvel.assign(np.array([v], dtype=np.float32))
             readings.read(
-                scene, _evaluated(model, theirs, state, self.settings[self.setting])
+                scene, _evaluate_warp(model, theirs, state, self.settings[self.setting])
             )
         return readings
 
@@ -95,7 +95,7 @@ class MujocoWarp(Simulator):
 
         On a GPU the kernels are launched as one graph.
         """
-        written = text(scene, STEPS, "warp")
+        written = text(scene, DEFAULT_STEPS_OF_A_TURN, "warp")
         model, data = open_model(written)
         q, v = (
             array.astype(np.float32) for array in repeat_states(written, scene, worlds)
@@ -137,19 +137,19 @@ class MujocoWarp(Simulator):
         It is backwards, by the tape, then along each change.
         """
         _, theta_2 = gradients.choose_quarter(scene)
-        model, data, q, v = gradients.assemble(scene, theta_2, "warp")
+        model, data, q, v = gradients.compile_and_assemble(scene, theta_2, "warp")
         theirs = mjw.put_model(model)
         state = mjw.put_data(model, data)
         state.qpos.assign(np.array([q], dtype=np.float32))
         state.qvel.assign(np.array([v], dtype=np.float32))
-        inputs = {name: getattr(theirs, name) for name in NUMBERS} | {
+        inputs = {name: getattr(theirs, name) for name in VARIED_FIELDS} | {
             "qpos": state.qpos,
             "qvel": state.qvel,
         }
         for array in (*inputs.values(), state.qacc, state.actuator_force):
             array.requires_grad = True
         with warp.Tape() as tape:
-            now = _evaluated(model, theirs, state, 2)
+            now = _evaluate_warp(model, theirs, state, 2)
         drive = warp.full_like(state.actuator_force, 1.0)
         tape.backward(
             grads={
@@ -160,7 +160,7 @@ class MujocoWarp(Simulator):
         by = {}
         for key in gradients.list_keys(scene):
             more, less = (
-                {name: getattr(side.model, name) for name in NUMBERS}
+                {name: getattr(side.model, name) for name in VARIED_FIELDS}
                 | {"qpos": side.qpos, "qvel": side.qvel}
                 for side in gradients.assemble_either_side(scene, theta_2, key, "warp")
             )
@@ -187,7 +187,7 @@ def _forward(theirs: Any, state: Any, times: int) -> None:
     mjw.rne_postconstraint(theirs, state)
 
 
-def _evaluated(model: Any, theirs: Any, state: Any, times: int) -> Instant:
+def _evaluate_warp(model: Any, theirs: Any, state: Any, times: int) -> Instant:
     _forward(theirs, state, times)
     arrays = (state.qpos, state.qvel, state.qacc, state.actuator_force, state.cfrc_int)
     q, v, a, drive, on_bodies = (x.numpy()[-1].astype(float) for x in arrays)

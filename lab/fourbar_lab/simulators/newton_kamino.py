@@ -14,9 +14,10 @@ import warp
 from fourbar.effects import Flywheel
 from fourbar.mjcf import size_flywheel
 from fourbar.mjcf.assembly import write_usd
+from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar_lab.simulators.motion import (
-    LIGHT,
+    RECIPE_WITH_A_LIGHT_FLYWHEEL,
     Course,
     Instant,
     Readings,
@@ -25,10 +26,9 @@ from fourbar_lab.simulators.motion import (
     start,
     write_temp,
 )
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.description import rotate
 
-TOLERANCES = ("primal_tolerance", "dual_tolerance", "compl_tolerance")
+TOLERANCE_OPTIONS = ("primal_tolerance", "dual_tolerance", "compl_tolerance")
 _PARENTS = {"O2": None, "A": 0, "O4": None, "B": 2}
 """Body on which each joint's axes are fixed, in the order of the joints. None: the
 ground.
@@ -50,7 +50,7 @@ class NewtonKamino(Simulator):
         "its defaults": {},
         "PADMM to 1e-9 in 2000 iterations": {
             "max_iterations": 2000,
-            **dict.fromkeys(TOLERANCES, 1e-9),
+            **dict.fromkeys(TOLERANCE_OPTIONS, 1e-9),
         },
     }
     """Settings of the PADMM solver (200 iterations, 1e-6 by default)."""
@@ -62,7 +62,7 @@ class NewtonKamino(Simulator):
         Forces are those of a step, with the state in which it began.
         """
         begin = start(scene)
-        inertia = size_flywheel(scene, LIGHT)
+        inertia = size_flywheel(scene, RECIPE_WITH_A_LIGHT_FLYWHEEL)
         carried = replace(scene, effects=(*scene.effects, Flywheel(inertia, 2)))
         builder = newton.ModelBuilder()
         with write_temp(write_usd(carried, begin), "four_bar.usda") as file:

@@ -13,7 +13,7 @@ from fourbar_lab.simulators.motion import (
     Instant,
     Readings,
     Simulator,
-    find_gravity,
+    gravity_field,
     run_through,
     start,
     write_temp,
@@ -36,7 +36,7 @@ class NewtonMujoco(Simulator):
 
     def through(self, scene: Scene, course: Course) -> Readings:
         """Run through a course."""
-        builder = newton.ModelBuilder(gravity=find_gravity(scene))
+        builder = newton.ModelBuilder(gravity=gravity_field(scene))
         with write_temp(text(scene, course.steps, "newton"), "four_bar.xml") as file:
             builder.add_mjcf(file)
         model = builder.finalize(device=warp.get_preferred_device())

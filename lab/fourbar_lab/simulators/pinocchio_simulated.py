@@ -10,11 +10,12 @@ import pinocchio as pin
 
 from fourbar.errors import LimitError
 from fourbar.mjcf import size_flywheel
+from fourbar.quantities import Array
 from fourbar.scene import Scene, with_signs
 from fourbar.scene import command as list_positions
 from fourbar_lab.simulators.motion import (
-    LIGHT,
-    STEPS,
+    DEFAULT_STEPS_OF_A_TURN,
+    RECIPE_WITH_A_LIGHT_FLYWHEEL,
     Course,
     Instant,
     Readings,
@@ -23,12 +24,11 @@ from fourbar_lab.simulators.motion import (
     run_through,
     start,
 )
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.pinocchio import ClosedTree, PinocchioTree, make_step
 
 _SOFTNESS_STEPS = 30.0
 """Time constant of Baumgarte's stabilisation, in steps of RK4."""
-PROXIMAL = 1e-10
+DELASSUS_DIAGONAL = 1e-10
 """Added to the diagonal of the Delassus matrix, as in Pinocchio's example: one of
 its three rows depends on the rest.
 """
@@ -117,7 +117,9 @@ class _Impulses:
             self.cholesky = pin.ConstraintCholeskyDecomposition(
                 model, data, self.models, self.closure_data
             )
-        self.cholesky.compute(model, data, self.models, self.closure_data, PROXIMAL)
+        self.cholesky.compute(
+            model, data, self.models, self.closure_data, DELASSUS_DIAGONAL
+        )
         jacobian = pin.getConstraintsJacobian(
             model, data, self.models, self.closure_data
         )
@@ -189,7 +191,7 @@ class PinocchioSolvers(Simulator):
             scene,
             course,
             advance,
-            lambda state: _evaluated(tree, loop, inertia, *state),
+            lambda state: _evaluate_pinocchio(tree, loop, inertia, *state),
         )
 
     def states(self, scene: Scene) -> Readings:
@@ -203,7 +205,9 @@ class PinocchioSolvers(Simulator):
         tree = PinocchioTree(scene)
         readings = Readings()
         inertia = size_flywheel(scene)
-        loop = solver(tree, _SOFTNESS_STEPS * find_timestep(scene, STEPS))
+        loop = solver(
+            tree, _SOFTNESS_STEPS * find_timestep(scene, DEFAULT_STEPS_OF_A_TURN)
+        )
         tree.model.armature = np.array([inertia, 0.0, 0.0])
         told = with_signs(scene.linkage, list_positions(scene))
         for theta_2, sign in zip(
@@ -211,13 +215,13 @@ class PinocchioSolvers(Simulator):
         ):
             state = loop.start(theta_2, sign, scene.motion.omega_2 or 0.0)
             if state is not None:
-                readings.read(scene, _evaluated(tree, loop, inertia, *state))
+                readings.read(scene, _evaluate_pinocchio(tree, loop, inertia, *state))
         return readings
 
 
 def _run_by_impulses(scene: Scene, course: Course, loop: _Impulses) -> Readings:
     begin = start(scene)
-    inertia = size_flywheel(scene, LIGHT)
+    inertia = size_flywheel(scene, RECIPE_WITH_A_LIGHT_FLYWHEEL)
     q = np.array(begin.qpos)
     v = np.array(begin.qvel)
 
@@ -232,20 +236,23 @@ def _run_by_impulses(scene: Scene, course: Course, loop: _Impulses) -> Readings:
         return *before, (v - before[1]) / loop.h, force
 
     return run_through(
-        scene, course, advance, lambda ended: _read(loop.tree, inertia, *ended)
+        scene,
+        course,
+        advance,
+        lambda ended: _read_joint_forces(loop.tree, inertia, *ended),
     )
 
 
-def _evaluated(
+def _evaluate_pinocchio(
     tree: PinocchioTree, loop: ClosedTree, inertia: float, q: Array, v: Array
 ) -> Instant:
     tree.model.armature = np.array([inertia, 0.0, 0.0])
     a = loop.acceleration(q, v, np.zeros(3))
     tree.place(q.tolist())
-    return _read(tree, inertia, q, v, a, loop.loop_force())
+    return _read_joint_forces(tree, inertia, q, v, a, loop.loop_force())
 
 
-def _read(
+def _read_joint_forces(
     tree: PinocchioTree, inertia: float, q: Array, v: Array, a: Array, loop_force: Array
 ) -> Instant:
     """Read what Pinocchio's recursive Newton-Euler says the joints carry.

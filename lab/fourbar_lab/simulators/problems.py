@@ -9,19 +9,18 @@ import click
 import numpy as np
 
 import fourbar
-from fourbar.quantities import PIN_FORCES, UNITS
+from fourbar.quantities import PIN_FORCES, UNITS, Array
 from fourbar.scene import command as list_positions
 from fourbar.scene import with_signs
 from fourbar.solution import Solution
 from fourbar.writing import write_text
 from fourbar_lab.simulators import slider_crank
-from fourbar_validation.check.problem import SAFE, SCHEMA, collect_answers
-from fourbar_validation.compare.answer import Array
+from fourbar_validation.check.problem import PROBLEM_SCHEMA, SAFE, collect_answers
 from fourbar_validation.engines import protocol
 from fourbar_validation.places import MODELS, find_checkout
 
 PROBLEMS = MODELS / "problems"
-CONVENTIONS = (
+FOUR_BAR_CONVENTIONS = (
     "SI units, radians, world axes x and y, angles counter-clockwise from x. Pins: O2"
     " at the origin, A, B, O4; bars: 1 ground O2-O4, 2 input O2-A, 3 coupler A-B, 4"
     " output O4-B; theta_3 points from A to B, theta_4 from O4 to B. Pairs are [size,"
@@ -49,7 +48,7 @@ def collect_problem(name: str) -> dict[str, Any]:
     Each value has an error bar.
     """
     if name in slider_crank.SLIDER_CRANKS:
-        return {"schema": SCHEMA, **slider_crank.make_problem(name)}
+        return {"schema": PROBLEM_SCHEMA, **slider_crank.make_problem(name)}
     scene = fourbar.load(PROBLEMS / f"{name}.toml")
     solution = fourbar.solve(scene, "error")
     if scene.motion.free is None:
@@ -64,10 +63,10 @@ def collect_problem(name: str) -> dict[str, Any]:
         answers, errors = _answer_released(solution)
     return {
         **{
-            "schema": SCHEMA,
+            "schema": PROBLEM_SCHEMA,
             "title": scene.title,
             "source": scene.source,
-            "conventions": CONVENTIONS,
+            "conventions": FOUR_BAR_CONVENTIONS,
         },
         "mechanism": "four-bar",
         "ask": "answer" if scene.motion.free is None else "release",
@@ -156,7 +155,7 @@ def _measure_period(
     type=click.Path(path_type=Path, dir_okay=False),
     help="Pack the set into this file instead.",
 )
-def command(archive: Path | None) -> None:
+def problems_command(archive: Path | None) -> None:
     """Write the problems of models/problems and their answers as JSON."""
     checkout = find_checkout("problems")
     if archive is not None:
@@ -165,7 +164,7 @@ def command(archive: Path | None) -> None:
         return
     for name in list_problems():
         write_text(
-            (PROBLEMS / name).with_suffix(".json"), write_json(collect_problem(name))
+            (PROBLEMS / name).with_suffix(".json"), write_problem(collect_problem(name))
         )
         click.echo(f"wrote {name}.json")
 
@@ -196,7 +195,7 @@ def _write_archive(checkout: Path, archive: Path) -> None:
             packed.writestr(entry, file.read_bytes())
 
 
-def write_json(problem: dict[str, Any]) -> str:
+def write_problem(problem: dict[str, Any]) -> str:
     """Write JSON, each quantity on a line."""
     lines = []
     for key, value in problem.items():

@@ -15,12 +15,12 @@ from fourbar_lab.simulators.motion import (
     Instant,
     Readings,
     Simulator,
-    find_gravity,
+    gravity_field,
     run_through,
     start,
     write_temp,
 )
-from fourbar_validation.engines.description import list_parts, rotate
+from fourbar_validation.engines.description import list_moving_parts, rotate
 
 _STRONG = 1e9
 """N and N m that constraint and motor may exert: no limit."""
@@ -32,7 +32,7 @@ def _write_urdf(scene: Scene) -> str:
     Each link's frame lies in its mass centre.
     """
     links = ['<robot name="four_bar"><link name="ground"/>']
-    for part in list_parts(scene.linkage):
+    for part in list_moving_parts(scene.linkage):
         turned = " ".join(
             f'{axes}="{part.inertia!r}"' for axes in ("ixx", "iyy", "izz")
         )
@@ -81,7 +81,7 @@ class PyBullet(Simulator):
             bullet.setPhysicsEngineParameter(
                 fixedTimeStep=course.timestep, **self.settings[self.setting]
             )
-            bullet.setGravity(*find_gravity(scene))
+            bullet.setGravity(*gravity_field(scene))
             for joint, (angle, speed) in enumerate(
                 zip(begin.qpos, begin.qvel, strict=True)
             ):
@@ -96,7 +96,7 @@ class PyBullet(Simulator):
             bullet.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0)
             drive = {"targetVelocity": begin.qvel[0], "force": _STRONG}
             bullet.setJointMotorControl2(body, 0, bullet.VELOCITY_CONTROL, **drive)
-            _, three, four = list_parts(scene.linkage)
+            _, three, four = list_moving_parts(scene.linkage)
             frames = [
                 [part.length - part.centre[0], -part.centre[1], 0.0]
                 for part in (three, four)

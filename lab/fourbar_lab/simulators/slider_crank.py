@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-DIGITS = 50
-CONVENTIONS = (
+REFERENCE_DIGITS = 50
+SLIDER_CRANK_CONVENTIONS = (
     "SI units, radians, world axes x and y, angles counter-clockwise from x. Pins: O2"
     " at the origin, A, B; bars: 1 the ground with the guide y = offset, 2 crank O2-A,"
     " 3 rod A-B, 4 slider, whose pin and mass centre are B; theta_3 points from A to B."
@@ -24,7 +24,7 @@ CONVENTIONS = (
     " guide_force: of the guide on the slider, along y; the guide has no friction."
     " error: how far off the value may be; of a vector, its Euclidean norm."
 )
-TURN = [math.radians(15.0 * step) for step in range(25)]
+CRANK_ANGLES = [math.radians(15.0 * step) for step in range(25)]
 SLIDER_CRANKS: dict[str, dict[str, Any]] = {
     "slider_crank": {
         "title": "A slider-crank in line",
@@ -42,7 +42,12 @@ SLIDER_CRANKS: dict[str, dict[str, Any]] = {
             },
             "effects": {"gravity": [9.81, -0.5 * math.pi]},
         },
-        "command": {"theta_2": TURN, "omega_2": 20.0, "alpha_2": 0.0, "branch": 1},
+        "command": {
+            "theta_2": CRANK_ANGLES,
+            "omega_2": 20.0,
+            "alpha_2": 0.0,
+            "branch": 1,
+        },
     },
     "slider_crank_offset": {
         "title": "A slider-crank with an offset and a load on the slider",
@@ -61,10 +66,15 @@ SLIDER_CRANKS: dict[str, dict[str, Any]] = {
             "loads": [{"bar": 4, "force": [100.0, math.pi]}],
             "effects": {"gravity": [9.81, -0.5 * math.pi]},
         },
-        "command": {"theta_2": TURN, "omega_2": 20.0, "alpha_2": 50.0, "branch": 1},
+        "command": {
+            "theta_2": CRANK_ANGLES,
+            "omega_2": 20.0,
+            "alpha_2": 50.0,
+            "branch": 1,
+        },
     },
 }
-UNITS = {
+SLIDER_CRANK_UNITS = {
     "theta_3": "rad",
     "stroke": "m",
     "torque": "N m",
@@ -80,34 +90,39 @@ def make_problem(name: str) -> dict[str, Any]:
     stated = SLIDER_CRANKS[name]
     command = stated["command"]
     rates = command["omega_2"], command["alpha_2"], command["branch"]
-    rows = [solve(stated["scene"], theta, *rates) for theta in command["theta_2"]]
-    answers = {quantity: [row[quantity] for row in rows] for quantity in UNITS}
+    rows = [
+        solve_eight_equations(stated["scene"], theta, *rates)
+        for theta in command["theta_2"]
+    ]
+    answers = {
+        quantity: [row[quantity] for row in rows] for quantity in SLIDER_CRANK_UNITS
+    }
     errors = {
         quantity: [math.ulp(max(map(abs, np.atleast_1d(value)))) for value in values]
         for quantity, values in answers.items()
     }
     return {
-        "conventions": CONVENTIONS,
+        "conventions": SLIDER_CRANK_CONVENTIONS,
         "mechanism": "slider-crank",
         "ask": "answer",
         **stated,
         "answers": answers,
         "errors": errors,
-        "units": UNITS,
+        "units": SLIDER_CRANK_UNITS,
     }
 
 
-def solve(
+def solve_eight_equations(
     scene: dict[str, Any], theta_2: float, omega_2: float, alpha_2: float, branch: int
 ) -> dict[str, Any]:
     """Solve the eight equations of the three free bodies at one position."""
     from mpmath import mp, mpc, mpf
 
-    with mp.workdps(DIGITS):
+    with mp.workdps(REFERENCE_DIGITS):
         a, b, offset = (
             mpf(scene["lengths"][name]) for name in ("crank", "rod", "offset")
         )
-        g = _direct(*scene.get("effects", {}).get("gravity", (0.0, 0.0)))
+        g = _resolve_force(*scene.get("effects", {}).get("gravity", (0.0, 0.0)))
         theta = mpf(theta_2)
         omega = mpf(omega_2)
         alpha = mpf(alpha_2)
@@ -141,7 +156,7 @@ def solve(
             moments.append(mpf(bar.get("inertia", mass * length**2 / 12)) * growth)
             arms.append(arm)
         for load in scene.get("loads", ()):  # at the mass centre
-            forces[load["bar"] - 2] -= _direct(*load["force"])
+            forces[load["bar"] - 2] -= _resolve_force(*load["force"])
         A = mp.zeros(8, 8)
         y = mp.zeros(8, 1)  # F12 x y, F32 x y, F43 x y, guide, torque
         for row, terms in enumerate(
@@ -179,7 +194,7 @@ def solve(
     }
 
 
-def _direct(size: float, direction: float) -> Any:
+def _resolve_force(size: float, direction: float) -> Any:
     """Resolve a force into components.
 
     One that the direction as a double cannot tell from zero is zero.

@@ -18,13 +18,21 @@ from typing import IO, Any, NamedTuple, Protocol
 import numpy as np
 
 from fourbar.errors import LimitError
-from fourbar_validation.compare.answer import Array
+from fourbar.quantities import Array
 from fourbar_validation.compare.rows import say_error
 
-CLOSED = 1e-15
+GAP_AT_THE_END = 1e-15
 """Gap at which Newton's method ends, in parts of the rod's length."""
-STEPS = 50
-ANSWERS = ("theta_3", "stroke", "torque", "F12", "F32", "F43", "guide_force")
+NEWTON_STEPS_OF_A_POSITION = 50
+ANSWERED_QUANTITIES = (
+    "theta_3",
+    "stroke",
+    "torque",
+    "F12",
+    "F32",
+    "F43",
+    "guide_force",
+)
 
 
 class SliderBar(NamedTuple):
@@ -64,7 +72,7 @@ class _CutLoop(Protocol):
         """
 
 
-def describe(
+def describe_bodies(
     scene: dict[str, Any],
 ) -> tuple[list[SliderBar], tuple[float, float, float], Array, Array]:
     """Return the bodies, (crank, rod, offset), and what acts.
@@ -102,13 +110,15 @@ def _direct(size: float, angle: float) -> Array:
     return size * np.array([math.cos(angle), math.sin(angle)])
 
 
-def answer(make: Callable[..., _CutLoop], question: dict[str, Any]) -> dict[str, Any]:
+def answer_slider_positions(
+    make: Callable[..., _CutLoop], question: dict[str, Any]
+) -> dict[str, Any]:
     """Answer the positions of a question."""
     scene = question["scene"]
     command = question["command"]
-    tree = make(*describe(scene))
-    _, (crank, rod, _), *_ = describe(scene)
-    rows: dict[str, list[Any]] = {name: [] for name in ANSWERS}
+    tree = make(*describe_bodies(scene))
+    _, (crank, rod, _), *_ = describe_bodies(scene)
+    rows: dict[str, list[Any]] = {name: [] for name in ANSWERED_QUANTITIES}
     n = len(command["theta_2"])
     rates = [
         np.broadcast_to(command.get(name, default), n)
@@ -122,12 +132,12 @@ def answer(make: Callable[..., _CutLoop], question: dict[str, Any]) -> dict[str,
                 crank * math.cos(theta) + branch * rod,
             ]
         )
-        for _ in range(STEPS):
+        for _ in range(NEWTON_STEPS_OF_A_POSITION):
             tree.set(q, np.zeros(3))
             apart, J, _ = tree.gap()
             step = np.linalg.solve(J[:, 1:], -apart)
             q[1:] += step
-            if np.abs(step).max() <= CLOSED * rod:
+            if np.abs(step).max() <= GAP_AT_THE_END * rod:
                 break
         tree.set(q, np.zeros(3))
         _, J, _ = tree.gap()
@@ -148,14 +158,14 @@ def answer(make: Callable[..., _CutLoop], question: dict[str, Any]) -> dict[str,
             closing,
             guide[1],
         )
-        for name, value in zip(ANSWERS, values, strict=True):
+        for name, value in zip(ANSWERED_QUANTITIES, values, strict=True):
             rows[name].append(value)
     return {
         "answers": {name: np.array(values).tolist() for name, values in rows.items()}
     }
 
 
-def serve(
+def serve_slider_crank(
     hello: dict[str, Any],
     answer: Callable[[dict[str, Any]], dict[str, Any]],
     questions: IO[bytes],
@@ -189,8 +199,10 @@ if __name__ == "__main__":
         hello = {
             "engine": sys.argv[1],
             "version": module.VERSION,
-            "answers": list(ANSWERS),
+            "answers": list(ANSWERED_QUANTITIES),
             "mechanisms": ["slider-crank"],
             "effects": ["gravity", "loads"],
         }
-        serve(hello, partial(answer, loop), sys.stdin.buffer, stdout)
+        serve_slider_crank(
+            hello, partial(answer_slider_positions, loop), sys.stdin.buffer, stdout
+        )

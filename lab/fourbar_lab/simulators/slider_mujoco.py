@@ -6,10 +6,10 @@ The tree is open at B.
 import mujoco
 import numpy as np
 
+from fourbar.quantities import Array
 from fourbar_lab.simulators.slider_engines import SliderBar
-from fourbar_validation.compare.answer import Array
 
-VERSION = mujoco.__version__
+MUJOCO_VERSION = mujoco.__version__
 _NO_INERTIA = 1e-12
 """Inertia of the slider, which does not turn, kg m^2. MuJoCo holds no body without any.
 """

@@ -3,10 +3,10 @@
 import numpy as np
 import pinocchio as pin
 
+from fourbar.quantities import Array
 from fourbar_lab.simulators.slider_engines import SliderBar
-from fourbar_validation.compare.answer import Array
 
-VERSION = pin.__version__
+PINOCCHIO_VERSION = pin.__version__
 
 
 class PinocchioSlider:

@@ -31,7 +31,7 @@ from tornado.httpclient import AsyncHTTPClient, HTTPRequest
 from tornado.websocket import websocket_connect
 
 from fourbar.edit import exports, server
-from fourbar.edit.redirect import ENDING, Redirect
+from fourbar.edit.redirect import REDIRECT_ENDING, Redirect
 from fourbar.edit.server import (
     GONE,
     LARGEST_REQUEST,
@@ -403,7 +403,7 @@ def test_a_change_overtakes_a_summary_that_is_being_computed(
             )
             assert f'"{size} mm"' in about["text"] and not about["settled"]
             await asyncio.sleep(
-                server.SETTLED * 1.2
+                server.ERROR_BAR_DELAY * 1.2
             )  # each asks for a summary of its own
         released.set()
         about = await settled(line)
@@ -595,7 +595,7 @@ def test_a_second_workbench_on_one_file_leads_to_the_first(path: Path) -> None:
         assert third.stdout.readline() not in addresses
         third.send_signal(2)
         assert third.communicate(timeout=20) == ("", "")
-    assert not path.with_name(path.name + ENDING).exists()
+    assert not path.with_name(path.name + REDIRECT_ENDING).exists()
 
 
 @pytest.mark.posix

@@ -739,13 +739,13 @@ def test_a_new_scene_begins_where_there_is_no_file(tmp_path: Path) -> None:
 def test_a_slip_of_the_finger_on_the_steps_does_not_fill_the_memory(
     session: Session,
 ) -> None:
-    from fourbar.edit.session import MOST_POSITIONS
+    from fourbar.edit.session import MOST_SOLVED_ANEW
 
     path = ["motion", "theta_2", "steps"]
-    answer = session.do({"do": "set", "path": path, "value": str(MOST_POSITIONS)})
+    answer = session.do({"do": "set", "path": path, "value": str(MOST_SOLVED_ANEW)})
     assert (
         answer["refused"]
-        == f"motion.theta_2.steps: must be below {MOST_POSITIONS} in the workbench"
+        == f"motion.theta_2.steps: must be below {MOST_SOLVED_ANEW} in the workbench"
     )
     assert "refused" not in session.do({"do": "set", "path": path, "value": "100"})
 

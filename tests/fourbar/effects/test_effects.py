@@ -22,7 +22,7 @@ from fourbar.effects import (
     Table,
     Torsion,
 )
-from fourbar.effects.pin_friction import MANY, NONE, ONE, solve_sliding
+from fourbar.effects.pin_friction import MANY, NO_SOLUTION, ONE_SOLUTION, solve_sliding
 from fourbar.errors import InputError, LimitError
 from fourbar.scene import Scene
 from fourbar.scene.motion import Law, Motion, Rise, Sweep
@@ -169,15 +169,15 @@ def test_one_cone_has_one_none_or_two_solutions() -> None:
     x, and at most 1.
     """
     cases = {  # (F, C): solutions of x = |F + C x| with k = 1, and how far from jamming
-        ((1.0, 0.0), (0.5, 0.0)): (ONE, 2.0, 0.5),
-        ((1.0, 0.0), (-0.5, 0.0)): (ONE, 2.0 / 3.0, 1.0),
-        ((1.0, 0.0), (2.0, 0.0)): (NONE, math.nan, None),
+        ((1.0, 0.0), (0.5, 0.0)): (ONE_SOLUTION, 2.0, 0.5),
+        ((1.0, 0.0), (-0.5, 0.0)): (ONE_SOLUTION, 2.0 / 3.0, 1.0),
+        ((1.0, 0.0), (2.0, 0.0)): (NO_SOLUTION, math.nan, None),
         ((1.0, 0.0), (-2.0, 0.0)): (MANY, 1.0 / 3.0, 1.0),
-        ((1.0, 0.0), (0.0, 2.0)): (NONE, math.nan, None),
-        ((1.0, 0.0), (0.0, 0.6)): (ONE, 1.25, 0.64),
-        ((0.0, 0.0), (0.5, 0.3)): (ONE, 0.0, 1.0),
-        ((3.0, 4.0), (0.0, 0.0)): (ONE, 5.0, 1.0),
-        ((1.0, 0.0), (1.0 - 2.0**-20, 0.0)): (ONE, 2.0**20, 2.0**-20),
+        ((1.0, 0.0), (0.0, 2.0)): (NO_SOLUTION, math.nan, None),
+        ((1.0, 0.0), (0.0, 0.6)): (ONE_SOLUTION, 1.25, 0.64),
+        ((0.0, 0.0), (0.5, 0.3)): (ONE_SOLUTION, 0.0, 1.0),
+        ((3.0, 4.0), (0.0, 0.0)): (ONE_SOLUTION, 5.0, 1.0),
+        ((1.0, 0.0), (1.0 - 2.0**-20, 0.0)): (ONE_SOLUTION, 2.0**20, 2.0**-20),
     }
     for (F, C), (number, x, far) in cases.items():
         sliding = solve_sliding(np.array([[F]]), np.array([[[C]]]), np.array([[1.0]]))
@@ -196,16 +196,16 @@ def test_several_cones_one_of_which_is_known() -> None:
     They are so in every outcome, each position with its own arms.
     """
     for c1, c2, number in (
-        (0.5, 0.3, ONE),
-        (2.0, 0.3, NONE),
+        (0.5, 0.3, ONE_SOLUTION),
+        (2.0, 0.3, NO_SOLUTION),
         (-2.0, 0.3, MANY),
         (-2.0, -3.0, MANY),
     ):
         F = np.array([[[1.0, 0.0], [2.0, 0.0]]] * 2)
         C = np.array([[[[c1, 0.0], [0.0, 0.0]], [[0.0, 0.0], [c2, 0.0]]]] * 2)
         sliding = solve_sliding(F, C, np.array([[1.0, 1.0], [0.25, 0.125]]))
-        assert list(sliding.number) == [number, ONE]
-        if number != NONE:
+        assert list(sliding.number) == [number, ONE_SOLUTION]
+        if number != NO_SOLUTION:
             assert sliding.x[0] == pytest.approx(
                 [1.0 / (1.0 - c1), 2.0 / (1.0 - c2)], rel=1e-12
             )

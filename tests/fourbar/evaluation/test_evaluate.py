@@ -25,9 +25,9 @@ from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
-from fourbar_lab.families import FAMILIES
+from fourbar_lab.families import FAMILY_DRAWERS
 from fourbar_lab.fault_scenes import FAULT_SCENES
-from fourbar_lab.stability import run
+from fourbar_lab.stability import judge_samples
 from fourbar_lab.tally import TOO_SMALL
 from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.exact import BallArithmetic
@@ -129,13 +129,13 @@ def test_error_bars_are_of_the_size_of_the_error(
         assert np.median(width / np.maximum(error, half_a_digit)) < 5.0
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", FAMILY_DRAWERS)
 def test_error_bars_hold_with_pairs_of_doubles(
     family: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The numbers of a machine whose long doubles are no longer than doubles."""
     monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
-    tally = run(family, range(3))
+    tally = judge_samples(family, range(3))
     assert tally.too_small and max(tally.too_small.values()) <= TOO_SMALL
     assert not any(tally.too_large.values()) and not tally.warned
 
@@ -239,7 +239,7 @@ def test_what_gravity_drops_of_its_direction_shows_in_the_error_bar() -> None:
         BallArithmetic().answer(scene, command(scene)),
     )
     error = np.abs(solution.torque - exact.quantities["torque"])
-    assert (error <= printed.BARS * solution.torque_error).all()
+    assert (error <= printed.ERROR_BARS * solution.torque_error).all()
 
 
 def near_a_limit_of_bar_3() -> fourbar.Scene:

@@ -436,11 +436,11 @@ def test_the_drift_is_a_part_of_the_largest_energy_or_work() -> None:
         fourbar.Motion(0.9, 0.0, free=fourbar.Free(0.5, 5)),
         effects=(fourbar.Gravity(),),
     )
-    run = free_motion._Run(scene.linkage, scene.effects, 0.9, 0.0, 1, 2)
+    run = free_motion._IntegrationRun(scene.linkage, scene.effects, 0.9, 0.0, 1, 2)
     released = run.integrate(np.linspace(0.0, 0.5, 6))
     energy = run.start_energy + abs(float(run.y[2]))
     assert run.largest >= (1.0 - 1e-9) * energy > 0.0
     assert released.energy_drift == run.drift / run.largest < 1e-10
-    moving = free_motion._Run(scene.linkage, (), 0.9, 5.0, 1, 2)
+    moving = free_motion._IntegrationRun(scene.linkage, (), 0.9, 5.0, 1, 2)
     moving.integrate(np.linspace(0.0, 0.5, 6))
     assert moving.largest == pytest.approx(moving.start_energy, rel=1e-9)

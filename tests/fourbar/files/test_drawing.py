@@ -13,7 +13,7 @@ from fourbar.errors import InputError
 from fourbar.files import dump, loads
 from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.mjcf.plane import Plane
-from fourbar.scene.motion import COMMANDS
+from fourbar.scene.motion import COMMAND_NAMES
 
 EPS = 2.0**-52
 K = 8.0
@@ -104,7 +104,7 @@ def test_lengths_angles_and_assembly_are_those_of_the_pins() -> None:
 
 @pytest.mark.parametrize("bar", (2, 3, 4))
 def test_every_command_is_on_the_assembly_that_is_drawn(bar: int) -> None:
-    scene = loads(f'{DRAWN}[motion]\n{COMMANDS[bar][0]} = "drawn"\n')
+    scene = loads(f'{DRAWN}[motion]\n{COMMAND_NAMES[bar][0]} = "drawn"\n')
     here = fourbar.solve(scene)
     assert here.A[0] == pytest.approx([0.0, 0.1], abs=1e-15)
     assert here.B[0] == pytest.approx([0.175, 0.05], abs=1e-14)

@@ -17,8 +17,8 @@ import pytest
 import fourbar
 from fourbar.cli import status
 from fourbar.errors import BAD_INPUT, FourBarError, InputError
-from fourbar.files import load, loads, read_text
-from fourbar.files.scene_file import LARGEST_FILE
+from fourbar.files import load, loads, read_scene_text
+from fourbar.files.scene_file import LARGEST_SCENE_FILE
 
 GOOD = """title = "good"
 [lengths]
@@ -225,7 +225,10 @@ def test_a_huge_file_is_not_read(
         file.truncate(100_000_000)
     os.chmod(huge, 0)  # it would not even open
     refused(
-        ["analyze", str(huge)], ["100000000 bytes", str(LARGEST_FILE)], tmp_path, capsys
+        ["analyze", str(huge)],
+        ["100000000 bytes", str(LARGEST_SCENE_FILE)],
+        tmp_path,
+        capsys,
     )
 
 
@@ -237,7 +240,7 @@ def test_an_open_file_is_read(encode: Callable[[str], IO[Any]], tmp_path: Path) 
     assert load(encode(GOOD)) == load(tmp_path / "scene.toml")
 
 
-@pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"x" * (LARGEST_FILE + 1)])
+@pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"x" * (LARGEST_SCENE_FILE + 1)])
 def test_a_stream_that_holds_no_scene_is_refused(content: bytes) -> None:
     with pytest.raises(InputError, match="scene file = 'stream'"):
         load(io.BytesIO(content))
@@ -252,7 +255,7 @@ def test_hostile_names(
 
 def test_a_name_that_no_file_can_have() -> None:
     with pytest.raises(InputError, match="cannot be read"):
-        read_text("nul\0.toml")
+        read_scene_text("nul\0.toml")
 
 
 @pytest.mark.parametrize(
@@ -352,7 +355,7 @@ def test_bad_arguments(
      "[a.b.c]\n", "#", "\\", "a" * 99 + "\n"],
 )  # fmt: skip
 def test_large_nonsense_is_answered_soon(pattern: str) -> None:
-    text = pattern * (LARGEST_FILE // len(pattern))
+    text = pattern * (LARGEST_SCENE_FILE // len(pattern))
     started = time.process_time()
     with pytest.raises(FourBarError):
         loads(text, "nonsense")
@@ -365,7 +368,7 @@ def test_large_nonsense_is_answered_soon(pattern: str) -> None:
 )
 def test_large_files_without_a_repeated_key_are_answered_soon(pattern: str) -> None:
     text = "".join(
-        pattern.format(n=n) for n in range(LARGEST_FILE // (len(pattern) + 3))
+        pattern.format(n=n) for n in range(LARGEST_SCENE_FILE // (len(pattern) + 3))
     )
     started = time.process_time()
     with pytest.raises(FourBarError):

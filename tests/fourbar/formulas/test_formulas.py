@@ -27,8 +27,11 @@ from fourbar.formulas.arithmetic import (
     tangent,
     vector,
 )
-from fourbar.formulas.many_digits import decide_half_angles, limit_remainder
-from fourbar.formulas.many_digits import half_angle as exact_half_angle
+from fourbar.formulas.many_digits import (
+    decide_half_angles,
+    exact_half_angle,
+    limit_remainder,
+)
 from fourbar.formulas.mobility import limit_positions
 from fourbar.formulas.motion import Coefficients, Rates, State, rates
 from fourbar.formulas.path import (

@@ -14,7 +14,7 @@ from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.pin_forces import solve_between
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar_lab.contenders import make_example
-from fourbar_validation.published.thirteen import FreeBodies, solve_thirteen
+from fourbar_validation.published.thirteen import EquationTerms, solve_thirteen
 
 EPS = 2.0**-52
 SOLVED = 1e-11
@@ -28,7 +28,7 @@ PRINTED = 5e-14
 """Relative: the thesis's case recomputed in doubles elsewhere, printed to 16 digits."""
 
 
-def make_bodies(case: fourbar.Scene, command: fourbar.scene.Command) -> FreeBodies:
+def make_bodies(case: fourbar.Scene, command: fourbar.scene.Command) -> EquationTerms:
     """The right-hand sides of the thirteen equations, under gravity alone.
 
     They follow from the kinematics.
@@ -52,7 +52,7 @@ def make_bodies(case: fourbar.Scene, command: fourbar.scene.Command) -> FreeBodi
     second = {2: s.A, 3: s.B, 4: s.B}
     bars = {k: case.linkage.bar(k) for k in MOVING_BARS}
     centre = {k: getattr(s, f"G{k}") for k in MOVING_BARS}
-    return FreeBodies(
+    return EquationTerms(
         {k: first[k] - centre[k] for k in MOVING_BARS},
         {k: second[k] - centre[k] for k in MOVING_BARS},
         {k: bars[k].mass * (getattr(s, f"a_G{k}") - gravity) for k in MOVING_BARS},
@@ -164,7 +164,7 @@ def test_bars_without_mass_or_inertia(
         )
 
 
-def compare_with_thirteen(bodies: FreeBodies, s: fourbar.Solution) -> None:
+def compare_with_thirteen(bodies: EquationTerms, s: fourbar.Solution) -> None:
     """Compare pin forces and torque with the solution of the thirteen equations."""
     unknowns = solve_thirteen(bodies, s.drive_bar)
     size = SOLVED * np.max(np.abs(unknowns[:, :12])) / np.min(np.abs(s.drive_condition))

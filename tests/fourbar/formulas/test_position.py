@@ -12,7 +12,7 @@ from fourbar.formulas.arithmetic import cross, dot
 from fourbar.formulas.motion import (
     State,
     coefficients,
-    put_parallel_pairs,
+    put_parallel_speeds,
     rates,
     take_sines_of_rates,
 )
@@ -163,7 +163,7 @@ def test_bars_that_stay_parallel_turn_as_one(
     assert first != second
     assert find_parallel_pairs(bars, -branch) == (False, False)
     k = coefficients(bars, position)
-    exact = put_parallel_pairs(k, first, second)
+    exact = put_parallel_speeds(k, first, second)
     assert np.all(exact.h23 == (1.0 if first else 0.0))  # however near the change point
     assert np.all(exact.h43 == (1.0 if first else -1.0))
     for name in (

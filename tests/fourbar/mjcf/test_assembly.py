@@ -22,8 +22,8 @@ from fourbar.effects import Torsion
 from fourbar.errors import LimitError
 from fourbar.mjcf import SIMULATORS, write_mjcf_for
 from fourbar.mjcf.assembly import write_sdf, write_usd
+from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.scenes.suites import list_model_files
 from tests.support.scenes import crank_rocker
 from tests.validation.run.derived.test_derived import rows_of

@@ -21,8 +21,8 @@ from fourbar.effects.place import Place
 from fourbar.linkage import BAR_NAMES
 from fourbar.mjcf import write_mjcf_for
 from fourbar.mjcf.document import SETTLING, Drive
+from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
-from fourbar_validation.compare.answer import Array
 from tests.support.scenes import crank_rocker, thesis
 
 EXACT = 1e-6

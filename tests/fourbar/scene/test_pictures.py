@@ -13,7 +13,7 @@ import fourbar
 from fourbar.cli import status
 from fourbar.errors import InputError
 from fourbar.files import dump, load, loads, save
-from fourbar.scene.pictures import LARGEST, Picture
+from fourbar.scene.pictures import LARGEST_PICTURE, Picture
 from fourbar.show import animate
 from tests.fourbar.show.test_animate import PNG, embedded
 from tests.support.scenes import crank_rocker
@@ -128,7 +128,7 @@ def test_what_the_name_leads_to_is_looked_at_before_it_is_shown(tmp_path: Path) 
     (inner / "link.png").symlink_to(tmp_path / "secret.png")
     (inner / "up").symlink_to(tmp_path)
     (inner / "text.png").write_text("<svg onload='alert(1)'/>")
-    (inner / "big.png").write_bytes(PNG + bytes(LARGEST))
+    (inner / "big.png").write_bytes(PNG + bytes(LARGEST_PICTURE))
     (inner / "folder.png").mkdir()
     for name, word in (
         ("link.png", "out of the scene's folder"),
@@ -143,7 +143,7 @@ def test_what_the_name_leads_to_is_looked_at_before_it_is_shown(tmp_path: Path) 
         with pytest.raises(
             InputError, match=rf"^bars\.coupler\.picture[^\n]*{word}[^\n]*$"
         ):
-            animate.write(scene, tmp_path / "page.html")
+            animate.write_animation(scene, tmp_path / "page.html")
         assert not (tmp_path / "page.html").exists()
 
 

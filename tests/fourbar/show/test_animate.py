@@ -22,7 +22,7 @@ import fourbar
 from fourbar.errors import DependencyError, InputError, NotAssembledError
 from fourbar.files import loads
 from fourbar.scene.motion import Law
-from fourbar.scene.pictures import LARGEST
+from fourbar.scene.pictures import LARGEST_PICTURE
 from fourbar.show import animate
 from fourbar.show.plot import film as films
 from fourbar.show.plot.film import choose_frames
@@ -185,7 +185,7 @@ def test_the_policy_of_the_page_allows_its_own_script_and_nothing_else() -> None
     [
         ("input", b"<svg onload='alert(1)'/>", "PNG or JPEG"),
         ("input", b"", "PNG or JPEG"),
-        ("input", PNG + bytes(LARGEST), f"must not exceed {LARGEST}"),
+        ("input", PNG + bytes(LARGEST_PICTURE), f"must not exceed {LARGEST_PICTURE}"),
         ("input", None, "file not found"),
         ("wheel", PNG, "must name one of input, coupler, output"),
     ],
@@ -197,22 +197,24 @@ def test_what_is_no_picture_is_refused(
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(InputError, match=message):
-        animate.write(crank_rocker(), tmp_path / "page.html", pictures={bar: path})
+        animate.write_animation(
+            crank_rocker(), tmp_path / "page.html", pictures={bar: path}
+        )
     assert not (tmp_path / "page.html").exists()
 
 
 def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"\.html, \.gif, \.mp4"):
-        animate.write(crank_rocker(), tmp_path / "a.avi")
+        animate.write_animation(crank_rocker(), tmp_path / "a.avi")
     with pytest.raises(NotAssembledError):
-        animate.write(
+        animate.write_animation(
             thesis(fourbar.Sweep(math.radians(40), math.radians(50), 5)),
             tmp_path / "a.html",
         )
     with pytest.raises(InputError, match="seconds"):
-        animate.write(crank_rocker(), tmp_path / "a.gif", seconds=math.nan)
+        animate.write_animation(crank_rocker(), tmp_path / "a.gif", seconds=math.nan)
     with pytest.raises(InputError, match="html page only"):
-        animate.write(
+        animate.write_animation(
             crank_rocker(), tmp_path / "a.gif", pictures={"input": tmp_path / "x.png"}
         )
     assert not list(tmp_path.iterdir())
@@ -222,7 +224,7 @@ def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
 def test_a_gif_moves_the_linkage(tmp_path: Path) -> None:
     from PIL import Image
 
-    animate.write(crank_rocker(), tmp_path / "a.gif", seconds=0.2)
+    animate.write_animation(crank_rocker(), tmp_path / "a.gif", seconds=0.2)
     with Image.open(tmp_path / "a.gif") as film:
         assert film.n_frames == 5
         pictures = []
@@ -238,7 +240,7 @@ def test_a_gif_moves_the_linkage(tmp_path: Path) -> None:
     reason="neither ffmpeg nor imageio-ffmpeg",
 )
 def test_an_mp4_is_written(tmp_path: Path) -> None:
-    animate.write(thesis(), tmp_path / "a.mp4", seconds=0.2)
+    animate.write_animation(thesis(), tmp_path / "a.mp4", seconds=0.2)
     assert (tmp_path / "a.mp4").read_bytes()[4:8] == b"ftyp"
 
 
@@ -250,7 +252,7 @@ def test_without_ffmpeg_an_mp4_is_refused_in_one_line(
     with pytest.raises(
         DependencyError, match=r"^an \.mp4 film needs the program ffmpeg[^\n]*$"
     ):
-        animate.write(crank_rocker(), tmp_path / "a.mp4")
+        animate.write_animation(crank_rocker(), tmp_path / "a.mp4")
     assert not list(tmp_path.iterdir())
 
 
@@ -265,7 +267,7 @@ def test_an_ffmpeg_without_the_encoder_is_named(
     program.chmod(0o755)
     monkeypatch.setenv("PATH", f"{program.parent}:/bin:/usr/bin")
     with pytest.raises(DependencyError, match=r"cannot encode H\.264[^\n]*$"):
-        animate.write(crank_rocker(), tmp_path / "a.mp4", seconds=0.2)
+        animate.write_animation(crank_rocker(), tmp_path / "a.mp4", seconds=0.2)
     assert not list(tmp_path.glob("*.mp4"))
 
 
@@ -281,7 +283,7 @@ def test_a_film_of_a_free_motion_runs_forward_and_as_long_as_it_does(
         and shown.sweep.time[choose_frames(shown, 46)[-1]] == 1.8
     )
     monkeypatch.setattr(films, "FRAMES_PER_SECOND", 5)
-    animate.write(RELEASED, tmp_path / "a.gif")
+    animate.write_animation(RELEASED, tmp_path / "a.gif")
     with Image.open(tmp_path / "a.gif") as film:
         assert film.n_frames == 9
 

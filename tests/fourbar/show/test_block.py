@@ -16,7 +16,7 @@ from fourbar.cli import status
 from fourbar.scene.motion import Law
 from fourbar.show.block import write_block, write_motor
 from fourbar.show.summary import summarize
-from fourbar.show.tables import WIDTH
+from fourbar.show.tables import BLOCK_WIDTH
 from fourbar.show.units import suit_units
 from fourbar.solving import find_last_stage
 from tests.support.scenes import CYLINDER, crank_rocker, thesis
@@ -36,7 +36,7 @@ TURN = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, math.tau, 360), 10.
 
 def block(scene: fourbar.Scene, **options: object) -> str:
     lines = write_block(scene, fourbar.solve(scene, find_last_stage(scene)), **options)  # type: ignore[arg-type]
-    assert max(map(len, lines)) <= WIDTH, lines
+    assert max(map(len, lines)) <= BLOCK_WIDTH, lines
     return "\n".join(lines)
 
 

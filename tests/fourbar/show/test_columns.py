@@ -8,14 +8,14 @@ import pytest
 
 import fourbar
 from fourbar.errors import InputError
-from fourbar.show.columns import read_columns
+from fourbar.show.columns import choose_columns
 from tests.support.scenes import TURN
 
 MODELS = Path(__file__).parents[3] / "models"
 
 
 def columns(scene: fourbar.Scene, names: str) -> dict[str, np.ndarray]:
-    read = read_columns(scene, fourbar.solve(scene), names)
+    read = choose_columns(scene, fourbar.solve(scene), names)
     return {column.name: column.values for column in read}
 
 
@@ -43,7 +43,7 @@ def test_a_ratio_of_speeds_does_not_ask_for_a_speed() -> None:
 
 
 def test_a_ratio_of_forces_has_a_unit_where_the_two_differ() -> None:
-    torque, ratio = read_columns(TURN, fourbar.solve(TURN), "torque/F12,F12/F14")
+    torque, ratio = choose_columns(TURN, fourbar.solve(TURN), "torque/F12,F12/F14")
     assert torque.label({}) == "N m/N" and ratio.label({}) == ""
     shown = torque.shown({"N m": ("N mm", 1e3)})
     assert shown == pytest.approx(1e3 * torque.values)

@@ -8,7 +8,7 @@ import pytest
 import fourbar
 from fourbar.formulas.path import compute_state
 from fourbar.formulas.transmission import mechanical_advantage, transmission_angle
-from fourbar.quantities import DERIVED
+from fourbar.quantities import DERIVED_QUANTITIES
 from fourbar.show.derived import derive
 from fourbar.show.tables import print_positions
 from fourbar.solution import DEGREES
@@ -61,6 +61,6 @@ def test_shaking_follows_the_frame_of_a_table_and_csv() -> None:
     assert float(row["shaking_force_x"]) == -(s.F12[0, 0] + s.F14[0, 0])
     assert float(row["omega_4/omega_2"]) == s.omega_4[0] / s.omega_2[0]
     assert float(row["time"]) == 0.0
-    for quantity in DERIVED:
+    for quantity in DERIVED_QUANTITIES:
         suffix = "" if quantity.kind == "scalar" else "_x"
         assert f"{quantity.name}{suffix}" in row

@@ -33,8 +33,8 @@ from fourbar.cli import status
 from fourbar.effects import Place
 from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import Free
-from fourbar.show.tables import WIDTH
-from fourbar.studies.circuit_curve import SAMPLES, CircuitCurve
+from fourbar.show.tables import BLOCK_WIDTH
+from fourbar.studies.circuit_curve import POSITIONS_OF_A_BRANCH, CircuitCurve
 from fourbar.studies.equilibrium import Equilibria, Equilibrium, equilibrium
 from tests.support.scenes import CYLINDER, crank_rocker
 from tests.validation.run.derived.test_derived import failing, rows_of
@@ -102,7 +102,7 @@ def test_a_crank_with_mass_alone_is_a_pendulum() -> None:
     equilibria = equilibrium(crank_as_pendulum(DOWN))
     stable, unstable = one(equilibria, "stable"), one(equilibria, "unstable")
     assert len(equilibria.found) == 2 and not equilibria.indifferent
-    assert equilibria.samples == SAMPLES
+    assert equilibria.samples == POSITIONS_OF_A_BRANCH
     assert math.remainder(
         stable.place.theta_2 + math.pi / 2 + 0.3, 2 * math.pi
     ) == pytest.approx(0.0, abs=CLOSE)
@@ -243,7 +243,7 @@ def test_two_zeros_between_the_same_two_positions_are_found() -> None:
     )  # zeros at sqrt(2e-8) on both sides, a sixth of the grid's step apart
     lower, upper = equilibrium(pendulum_under_moment(excess)).found
     away = math.acos(1.0 + excess)
-    assert 2.0 * away < 2.0 * math.pi / SAMPLES
+    assert 2.0 * away < 2.0 * math.pi / POSITIONS_OF_A_BRANCH
     assert (lower.stability, upper.stability) == ("stable", "unstable")
     for rest, sign in ((lower, -1.0), (upper, 1.0)):
         expected = math.pi / 2 + 0.1 + sign * away
@@ -476,7 +476,7 @@ def test_the_other_assembly_stands_apart_in_the_print(
     assert first.startswith("0 equilibria in this sweep without friction,")
     assert second.startswith("1 equilibrium in the other assembly at angles theta_2")
     assert "138.3165" in second and "crossed" in second
-    assert max(map(len, [*first.splitlines(), *second.splitlines()])) <= WIDTH
+    assert max(map(len, [*first.splitlines(), *second.splitlines()])) <= BLOCK_WIDTH
 
 
 def test_equilibria_are_printed_in_the_units_of_the_file(
@@ -497,7 +497,7 @@ def test_equilibria_are_printed_in_the_units_of_the_file(
     slope = M * 9.81 * R / (pound * 9.80665 * inch)
     assert f"{J:.6g}" in printed and f"{slope:.6g}" in printed
     assert "torque (lbf in)" in printed
-    assert max(map(len, printed.splitlines())) <= WIDTH
+    assert max(map(len, printed.splitlines())) <= BLOCK_WIDTH
 
 
 def crossings(time: np.ndarray, angle: np.ndarray, middle: float) -> float:
@@ -626,7 +626,9 @@ def test_no_unit_of_length_changes_an_equilibrium(unit: float) -> None:
 
 
 def test_a_zero_that_falls_on_a_sample_is_found() -> None:
-    sample = 0.5 * 2 * math.pi / SAMPLES + 700 * (2 * math.pi / SAMPLES)
+    sample = 0.5 * 2 * math.pi / POSITIONS_OF_A_BRANCH + 700 * (
+        2 * math.pi / POSITIONS_OF_A_BRANCH
+    )
     linkage = replace(crank_as_pendulum().linkage, ground_angle=0.0)
     scene = replace(
         crank_as_pendulum(Torsion.at(O2=(2.0, sample, 0.0))), linkage=linkage

@@ -88,7 +88,7 @@ def test_the_same_seed_gives_the_same_samples_in_blocks_of_any_size(
 ) -> None:
     loose = Tolerance("lengths.input", 5e-5), Tolerance("lengths.coupler", 2e-5)
     at_once = spread(*loose, samples=100)
-    monkeypatch.setattr(studied, "AT_ONCE", 200)
+    monkeypatch.setattr(studied, "EVALUATED_AT_ONCE", 200)
     pieces = spread(*loose, samples=100)
     for name, in_one in at_once.spreads.items():
         for expected, piece in zip(in_one, pieces.spreads[name], strict=True):

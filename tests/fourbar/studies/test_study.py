@@ -172,7 +172,9 @@ def test_blocks_over_members_and_positions_change_no_digit(
     study = vary(case, spread(case))
     at_once = solve(study)
     for size in (3, 12):  # positions of one member, and members
-        monkeypatch.setattr(import_module("fourbar.solving"), "BLOCK", size)
+        monkeypatch.setattr(
+            import_module("fourbar.solving"), "POSITIONS_OF_A_BLOCK", size
+        )
         piece = solve(study)
         for name in at_once.evaluated():
             np.testing.assert_array_equal(

@@ -18,7 +18,7 @@ from fourbar_lab.simulators.findings import (
     FIXED,
     FOLDER,
     find_interpreter,
-    read,
+    read_docstring,
     read_findings,
 )
 from fourbar_validation.engines.environments import Entry
@@ -73,7 +73,7 @@ def test_a_script_that_breaks_down_is_not_fixed(
     (tmp_path / "one.py").write_text(
         f'"""It is so.\n\nEngine: pip (pip)\nSince: 1.0 and\n  more\n"""\n{code}\n'
     )
-    finding = read(tmp_path / "one.py")
+    finding = read_docstring(tmp_path / "one.py")
     assert finding.sentence == "It is so." and finding.fields["Since"] == "1.0 and more"
     seconds = 1.0 if "while" in code else SECONDS
     assert finding.run(Path(sys.executable), seconds) == state
@@ -88,7 +88,7 @@ def test_the_command_says_what_could_not_run(
         ' more\n"""\n'
     )
     monkeypatch.setattr(module, "FOLDER", tmp_path)
-    done = CliRunner().invoke(module.command)
+    done = CliRunner().invoke(module.findings_command)
     assert (
         "one.py: not run: nothing-such is not installed" in done.output
         and done.exit_code == 1
@@ -96,7 +96,7 @@ def test_the_command_says_what_could_not_run(
     script.write_text(
         script.read_text().replace("nothing-such (nothing_such)", "pytest (pytest)")
     )
-    done = CliRunner().invoke(module.command)
+    done = CliRunner().invoke(module.findings_command)
     assert (
         done.exit_code == 0
         and f"one.py: holds in pytest {pytest.__version__}, Python" in done.output

@@ -22,10 +22,10 @@ from fourbar_lab.cli import status as lab_status
 from fourbar_lab.simulators.problems import PROBLEMS, collect_problem, list_problems
 from fourbar_validation.check.problem import (
     LEVELS,
+    PROBLEM_SCHEMA,
     RESULT,
-    SCHEMA,
     find_levels,
-    judge,
+    judge_answers,
     read_problem,
 )
 from fourbar_validation.cli import status
@@ -95,7 +95,7 @@ def test_there_are_fifteen_and_their_files_agree() -> None:
 def test_the_files_are_those_of_today(name: str) -> None:
     old, new = read_stored(name), json.loads(json.dumps(collect_problem(name)))
     assert (
-        old["schema"] == SCHEMA
+        old["schema"] == PROBLEM_SCHEMA
         and old["answers"].keys() == new["answers"].keys() == old["errors"].keys()
     )
     for key in ("title", "source", "conventions", "mechanism", "ask", "units"):
@@ -455,7 +455,9 @@ def test_a_level_is_that_of_the_worst_position(error: float, level: str) -> None
     torque = list(read_stored("newton_128")["answers"]["torque"])
     torque[7] += error * max(map(abs, torque))
     levels = find_levels(
-        judge(read_stored("newton_128"), make_result("newton_128", torque=torque))
+        judge_answers(
+            read_stored("newton_128"), make_result("newton_128", torque=torque)
+        )
     )
     assert levels == {"motion": "A", "reactions": "A", "torque": level}
 
@@ -466,7 +468,9 @@ def test_a_level_is_that_of_the_worst_position(error: float, level: str) -> None
 def test_an_answer_that_is_none_has_no_level(torque: Any) -> None:
     assert (
         find_levels(
-            judge(read_stored("newton_128"), make_result("newton_128", torque=torque))
+            judge_answers(
+                read_stored("newton_128"), make_result("newton_128", torque=torque)
+            )
         )["torque"]
         == "-"
     )
@@ -481,7 +485,7 @@ def test_error_bars_are_allowed_where_they_are_larger() -> None:
     assert (bars > LEVELS["A"] * np.abs(torque).max()).any()
     assert (
         find_levels(
-            judge(
+            judge_answers(
                 problem,
                 make_result("near_limit", torque=(torque + 0.9 * bars).tolist()),
             )
@@ -502,9 +506,9 @@ def test_an_answer_at_its_own_motion_is_judged_there() -> None:
         **make_result("crank_rocker", **answers),
         "at": protocol.command_to_json(scene, moved),
     }
-    assert set(find_levels(judge(problem, answer_file)).values()) == {"A"}
+    assert set(find_levels(judge_answers(problem, answer_file)).values()) == {"A"}
     del answer_file["at"]
-    assert set(find_levels(judge(problem, answer_file)).values()) != {"A"}
+    assert set(find_levels(judge_answers(problem, answer_file)).values()) != {"A"}
 
 
 def test_the_command_judges_a_result_file(

@@ -24,7 +24,7 @@ from fourbar_lab import benchmark
 from fourbar_lab.simulators import gradients, motion, mujoco_c
 from fourbar_lab.simulators.motion import Course, Instant, Readings, Simulator
 from fourbar_lab.simulators.problems import PROBLEMS
-from fourbar_validation.check.problem import judge, read_problem
+from fourbar_validation.check.problem import judge_answers, read_problem
 from fourbar_validation.engine import open_engine, serve
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.environments import read_engines_of
@@ -53,7 +53,7 @@ JUDGES = {"problems.py"}
 PROBLEM = read_problem(PROBLEMS / "crank_rocker.json")
 ENTRIES = {
     name: entry
-    for name, entry in read_engines_of(benchmark.ENGINES).items()
+    for name, entry in read_engines_of(benchmark.BENCHMARKED_ENGINES).items()
     if "simulators" in entry.adapter
 }
 
@@ -70,7 +70,7 @@ def find_errors(simulator: Any, **setting: Any) -> dict[str, float]:
     answer = simulator().at_setting(**setting).answer(scene, command)
     assert answer.refusal is None, answer.refusal
     data = json.loads(json.dumps(protocol.answer_to_json(scene, command, answer)))
-    return {row.quantity: row.error for row in judge(PROBLEM, data)}
+    return {row.quantity: row.error for row in judge_answers(PROBLEM, data)}
 
 
 @pytest.fixture
@@ -129,7 +129,7 @@ def test_beyond_a_change_point_a_simulator_starts_in_the_assembly_that_is_stated
     for qpos in (
         motion.start(scene).qpos,
         *(q for q, _ in mujoco_c.states_of(write_mjcf(scene), scene)),
-        gradients.assemble(scene, 4.0, "mujoco").qpos,
+        gradients.compile_and_assemble(scene, 4.0, "mujoco").qpos,
     ):
         theta_2, of_3_to_2, theta_4 = qpos
         level = theta_2 + of_3_to_2 - scene.linkage.ground_angle
@@ -356,7 +356,7 @@ def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state() ->
         instant: Instant = mujoco_c._evaluated(state.model, state.data)
         return instant
 
-    now, by = answered(gradients.assemble(scene, theta_2, "mujoco")), {}
+    now, by = answered(gradients.compile_and_assemble(scene, theta_2, "mujoco")), {}
     for key in gradients.list_keys(scene):
         more, less = (
             answered(state).torque

@@ -45,7 +45,7 @@ def test_figures_of_the_crank_rocker(omega: float, required: float, most: int) -
     serves = [
         attempt
         for attempt in advice.attempts
-        if attempt.errors.worst <= advise.MARGIN * required
+        if attempt.errors.worst <= advise.PART_OF_THE_ERROR * required
     ]
     assert advice.best in serves
     work = [attempt.steps * attempt.step_cost for attempt in serves]
@@ -111,7 +111,7 @@ def test_the_file_alone_keeps_the_error(tmp_path: Path) -> None:
     scene, out = tmp_path / "scene.toml", tmp_path / "out.xml"
     scene.write_text(fourbar.dump(turning(positions=72)))
     process = CliRunner().invoke(
-        advise.command,
+        advise.advise_command,
         [str(scene), "--error", "1e-5", "-o", str(out)],
         standalone_mode=False,
     )
@@ -167,12 +167,12 @@ def test_what_lies_between_two_steps_is_judged_too() -> None:
 def test_out_of_reach_is_reported_with_what_would_reach_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(advise, "MOST_STEPS", 1500)
+    monkeypatch.setattr(advise, "MOST_STEPS_OF_A_RUN", 1500)
     scene = tmp_path / "scene.toml"
     scene.write_text(fourbar.dump(turning(positions=12)))
     out = tmp_path / "none.xml"
     process = CliRunner().invoke(
-        advise.command,
+        advise.advise_command,
         [str(scene), "--error", "1e-14", "-o", str(out)],
         standalone_mode=False,
     )
@@ -184,12 +184,12 @@ def test_out_of_reach_is_reported_with_what_would_reach_it(
     still = replace(turning(), motion=fourbar.Motion(1.0, 10.0))
     scene.write_text(fourbar.dump(still))
     process = CliRunner().invoke(
-        advise.command, [str(scene), "--error", "1e-3"], standalone_mode=False
+        advise.advise_command, [str(scene), "--error", "1e-3"], standalone_mode=False
     )
     assert process.return_value == 1 and "nothing to run through" in process.output
     scene.write_text(fourbar.dump(FAULT_SCENES["law"]))
     process = CliRunner().invoke(
-        advise.command, [str(scene), "--error", "1e-3"], standalone_mode=False
+        advise.advise_command, [str(scene), "--error", "1e-3"], standalone_mode=False
     )
     assert process.return_value == 1 and "motion law" in process.output
 
@@ -321,7 +321,7 @@ def test_several_scenes_have_one_table(tmp_path: Path) -> None:
         files.append(str(tmp_path / f"{name}.toml"))
         Path(files[-1]).write_text(fourbar.dump(scene))
     process = CliRunner().invoke(
-        advise.command, [*files, "--error", "1e-4"], standalone_mode=False
+        advise.advise_command, [*files, "--error", "1e-4"], standalone_mode=False
     )
     assert process.return_value == 1  # one of them cannot be run through
     lines = process.output.splitlines()
@@ -333,5 +333,5 @@ def test_several_scenes_have_one_table(tmp_path: Path) -> None:
         "-",
     ]
     with pytest.raises(fourbar.InputError, match="MJCF of one scene, not of 2"):
-        CliRunner().invoke(advise.command, [*files, "--error", "1e-4", "-o", "x.xml"], standalone_mode=False,
+        CliRunner().invoke(advise.advise_command, [*files, "--error", "1e-4", "-o", "x.xml"], standalone_mode=False,
                            catch_exceptions=False)  # fmt: skip

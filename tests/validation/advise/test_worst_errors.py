@@ -12,8 +12,8 @@ from fourbar.scene import command
 from fourbar_validation.advise import advise
 from fourbar_validation.advise.matters import judge_trial
 from fourbar_validation.advise.worst_errors import (
-    NO_ANSWER,
-    QUANTITIES,
+    ERROR_NAMES,
+    INFINITE_ERRORS,
     WorstErrors,
     compute_errors,
     find_greatest,
@@ -31,7 +31,7 @@ def answer(**off: float) -> dict[str, Any]:
     They are off by a part of their largest value.
     """
     solution = fourbar.solve(SCENE)
-    quantities = {name: np.array(getattr(solution, name)) for name in QUANTITIES}
+    quantities = {name: np.array(getattr(solution, name)) for name in ERROR_NAMES}
     for name, part in off.items():
         values = quantities[name]
         size = np.abs(values) if values.ndim == 1 else np.hypot(*values.T)
@@ -39,11 +39,11 @@ def answer(**off: float) -> dict[str, Any]:
     return quantities
 
 
-@pytest.mark.parametrize("name", QUANTITIES)
+@pytest.mark.parametrize("name", ERROR_NAMES)
 @pytest.mark.parametrize("part", (5e-6, 1e-9))
 def test_each_error_is_the_part_that_an_answer_is_off(name: str, part: float) -> None:
     errors = compute_errors(SCENE, COMMAND, answer(**{name: part}))
-    for field, error in zip(QUANTITIES, errors, strict=True):
+    for field, error in zip(ERROR_NAMES, errors, strict=True):
         assert error == pytest.approx(
             part if field == name else 0.0, rel=1e-4, abs=1e-12
         )
@@ -57,12 +57,12 @@ def test_what_is_no_number_is_no_small_error() -> None:
         assert getattr(errors, name) == errors.worst == math.inf
     assert find_greatest([0.0, math.nan]) == find_greatest([]) == math.inf
     lost = COMMAND._replace(angle=np.full(40, math.nan))
-    assert compute_errors(SCENE, lost, answer()) == NO_ANSWER
+    assert compute_errors(SCENE, lost, answer()) == INFINITE_ERRORS
 
 
 def test_a_trial_that_lost_the_motion_has_no_error_that_serves() -> None:
     trial = Trial(COMMAND, answer(), steps=40, broken="the loop came apart")
-    assert judge_trial(SCENE, trial) == NO_ANSWER
+    assert judge_trial(SCENE, trial) == INFINITE_ERRORS
     assert judge_trial(SCENE, Trial(COMMAND, answer(), steps=40)).worst < 1e-12
 
 
@@ -111,4 +111,4 @@ def test_the_greatest_deviation_of_the_speed_is_said() -> None:
     trial = SimpleNamespace(at=COMMAND._replace(speed=speed))
     found = advise._find_speed_error(Pretended(), trial)  # type: ignore[arg-type]
     assert found == pytest.approx(0.05)
-    assert isinstance(NO_ANSWER, WorstErrors)
+    assert isinstance(INFINITE_ERRORS, WorstErrors)

@@ -22,9 +22,9 @@ from fourbar.solving import solve
 from fourbar_validation.check.check import Judgement, judge_table
 from fourbar_validation.check.judge import Allowance
 from fourbar_validation.check.mistakes import list_hypotheses
-from fourbar_validation.check.theirs import LARGEST_FILE, NOT_JUDGED, read_table
+from fourbar_validation.check.theirs import LARGEST_TABLE_FILE, NOT_JUDGED, read_table
 from fourbar_validation.cli import status
-from fourbar_validation.compare.scales import TERMS, scale_of
+from fourbar_validation.compare.scales import TERMS_OF_UNIT, scale_of
 from fourbar_validation.compare.tolerance import POWER
 
 MODELS = Path(__file__).parents[3] / "models"
@@ -555,7 +555,9 @@ def test_every_quantity_is_judged_at_its_own_scale(
 def test_a_quantity_of_no_known_scale_is_not_judged_by_another() -> None:
     """Every unit that is judged has its sum of terms."""
     scene = SCENES["thesis"]
-    assert {UNITS[name] for name in EVERY_QUANTITY} == TERMS.keys() == POWER.keys()
+    assert (
+        {UNITS[name] for name in EVERY_QUANTITY} == TERMS_OF_UNIT.keys() == POWER.keys()
+    )
     for quantity in ("time", "wheel"):
         with pytest.raises(KeyError):
             scale_of(quantity, scene, solve(scene), np.ones(1))
@@ -740,7 +742,7 @@ def test_a_table_that_is_too_large_or_missing_is_one_line(
 ) -> None:
     large = tmp_path / "large.csv"
     with large.open("wb") as file:
-        file.truncate(LARGEST_FILE + 1)
+        file.truncate(LARGEST_TABLE_FILE + 1)
     for path, words in (
         (large, "must not exceed"),
         (tmp_path / "none.csv", "file not found"),

@@ -45,8 +45,8 @@ from fourbar_validation.engines.mujoco.robots import compiled as robots_compiled
 from fourbar_validation.engines.mujoco.robots.compiled import CompiledRobot
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 from fourbar_validation.engines.mujoco.theirs import (
-    ONE_STATE,
-    THROUGH_TIME,
+    FILE_AT_ONE_STATE,
+    FILE_THROUGH_TIME,
     Examined,
     examine_changed,
 )
@@ -84,7 +84,7 @@ def generated(scene: Scene) -> Examined:
 def test_a_file_is_held_to_the_assembly_that_is_stated_beyond_a_change_point() -> None:
     """Both for single states and through time: the generated file is right."""
     scene = low_parallelogram()
-    for how in (ONE_STATE, THROUGH_TIME):
+    for how in (FILE_AT_ONE_STATE, FILE_THROUGH_TIME):
         answer = answer_of(generated(scene), how)
         s = solve(scene, "force", at=answer.at)
         for name in TORQUE_AND_PINS:
@@ -127,7 +127,7 @@ def errors(scene: Scene, examined: Examined, how: str) -> dict[str, float]:
 def test_the_generated_file_differs_in_nothing_and_agrees() -> None:
     examination = examine(CRANK_ROCKER, GENERATED, {})
     assert keys(CRANK_ROCKER, examination) == set()
-    for how in (ONE_STATE, THROUGH_TIME):
+    for how in (FILE_AT_ONE_STATE, FILE_THROUGH_TIME):
         assert max(errors(CRANK_ROCKER, examination, how).values()) <= SIMULATED.factor
 
 
@@ -138,7 +138,7 @@ def test_a_tilted_file_differs_in_its_plane_alone(
     text = write_mjcf(CRANK_ROCKER, plane=Plane(axis, (1.0, -2.0, 0.5)))
     examination = examine(CRANK_ROCKER, text, {})
     assert keys(CRANK_ROCKER, examination) == {"plane"}
-    for how in (ONE_STATE, THROUGH_TIME):
+    for how in (FILE_AT_ONE_STATE, FILE_THROUGH_TIME):
         assert max(errors(CRANK_ROCKER, examination, how).values()) <= SIMULATED.factor
 
 
@@ -255,7 +255,7 @@ def test_how_softly_dry_friction_slips_is_named_and_costs() -> None:
     assert by_key.keys() == fields
     assert by_key["pins.A.solreffriction"].written == 'joint "rod" solreffriction'
     assert by_key["pins.A.solreffriction"].theirs == (0.02, 1.0)
-    assert errors(DRY, examination, ONE_STATE)["F12"] > 100.0 * SIMULATED.factor
+    assert errors(DRY, examination, FILE_AT_ONE_STATE)["F12"] > 100.0 * SIMULATED.factor
 
 
 def test_a_cause_is_named_without_what_hangs_on_it() -> None:
@@ -286,7 +286,8 @@ def test_loads_under_other_names_and_in_another_order_are_the_same_loads() -> No
     )
     assert keys(CRANK_ROCKER, examination) == set()
     assert (
-        max(errors(CRANK_ROCKER, examination, ONE_STATE).values()) <= SIMULATED.factor
+        max(errors(CRANK_ROCKER, examination, FILE_AT_ONE_STATE).values())
+        <= SIMULATED.factor
     )
 
 
@@ -299,8 +300,12 @@ def described(text: str) -> Mapping[str, ModelEntry]:
 )
 def test_what_a_difference_costs_is_seen(old: str, new: str) -> None:
     examination = examine(CRANK_ROCKER, GENERATED.replace(old, new), {})
-    assert errors(CRANK_ROCKER, examination, ONE_STATE)["F12"] > SIMULATED.factor
-    assert errors(CRANK_ROCKER, examination, THROUGH_TIME)["F12"] > SIMULATED.factor
+    assert (
+        errors(CRANK_ROCKER, examination, FILE_AT_ONE_STATE)["F12"] > SIMULATED.factor
+    )
+    assert (
+        errors(CRANK_ROCKER, examination, FILE_THROUGH_TIME)["F12"] > SIMULATED.factor
+    )
 
 
 def other_plane(
@@ -350,7 +355,7 @@ def test_bodies_and_sites_are_guessed_from_what_hangs_together_and_from_the_leng
         "guessed" in examination.notes[0]
         and "input=crank, coupler=rod, output=rocker" in examination.notes[0]
     )
-    assert errors(BARE, examination, ONE_STATE)["theta_4"] < STIFF_ENOUGH
+    assert errors(BARE, examination, FILE_AT_ONE_STATE)["theta_4"] < STIFF_ENOUGH
 
 
 COSTLY = [
@@ -392,7 +397,7 @@ def test_the_one_thing_that_is_wrong_costs_as_much_alone_in_the_generated_file(
         [price(*pair, unchanged) for pair in zip(chosen, changed, strict=True)]
     )
     assert first.key == key and first.cost is not None and second.cost is not None
-    expected = errors(BARE, spoilt, ONE_STATE)[first.quantity]
+    expected = errors(BARE, spoilt, FILE_AT_ONE_STATE)[first.quantity]
     assert (
         first.cost == pytest.approx(expected, rel=0.2)
         and second.cost < 0.01 * first.cost
@@ -436,7 +441,7 @@ def test_what_is_attached_costs_what_it_does_in_the_file_itself(key: str) -> Non
         for rows in examine_changed(SPRUNG, [(key, difference.theirs)])
     )
     priced = price(difference, changed, unchanged)
-    rows = errors(SPRUNG, spoilt, ONE_STATE)
+    rows = errors(SPRUNG, spoilt, FILE_AT_ONE_STATE)
     assert priced.cost == pytest.approx(
         max(rows[name] for name in TORQUE_AND_PINS), abs=FLOOR
     )
@@ -468,7 +473,7 @@ def test_a_load_that_is_missing_and_an_entry_that_cannot_stand_alone() -> None:
     _, missing, *others = examine_changed(CRANK_ROCKER, changes)
     assert missing is not None and others == [None] * 3
     text = re.sub('<general [^>]*name="load_2"[^>]*>', "", GENERATED)
-    expected = errors(CRANK_ROCKER, examine(CRANK_ROCKER, text, {}), ONE_STATE)
+    expected = errors(CRANK_ROCKER, examine(CRANK_ROCKER, text, {}), FILE_AT_ONE_STATE)
     errors_by_quantity = {
         row.quantity: row.error for row in rows_of(CRANK_ROCKER, missing[:1])
     }
@@ -511,7 +516,7 @@ def test_a_file_is_compiled_once_and_each_entry_is_mended_in_a_model_of_its_own(
 @pytest.mark.parametrize("axis", ["0 -1 0", "0 1 0"])
 def test_another_plane_and_a_reversed_axis_change_no_number(axis: str) -> None:
     examination = examine(BARE, other_plane(f'site1="r" site2="q" {STIFF}', axis), MINE)
-    assert max(errors(BARE, examination, ONE_STATE).values()) < STIFF_ENOUGH
+    assert max(errors(BARE, examination, FILE_AT_ONE_STATE).values()) < STIFF_ENOUGH
     assert {"plane"} <= keys(BARE, examination)
     assert ("pins.A.positive" in keys(BARE, examination)) == (axis == "0 1 0")
 
@@ -519,7 +524,7 @@ def test_another_plane_and_a_reversed_axis_change_no_number(axis: str) -> None:
 def test_the_default_softness_costs_a_percent_or_so() -> None:
     soft = examine(BARE, other_plane(), MINE)
     assert "closure.softness" in keys(BARE, soft)
-    assert 1e-3 < errors(BARE, soft, ONE_STATE)["torque"] < 1e-1
+    assert 1e-3 < errors(BARE, soft, FILE_AT_ONE_STATE)["torque"] < 1e-1
 
 
 def test_body_anchors_on_an_open_rest_state_build_another_linkage() -> None:
@@ -557,7 +562,7 @@ def test_cut_at_another_pin_it_is_the_same_linkage() -> None:
     assert not {
         key for key in keys(BARE, examination) if key.startswith(("bars.", "lengths."))
     }
-    assert max(errors(BARE, examination, ONE_STATE).values()) < STIFF_ENOUGH
+    assert max(errors(BARE, examination, FILE_AT_ONE_STATE).values()) < STIFF_ENOUGH
 
 
 def test_a_servo_and_another_equality_are_taken_off_and_reported() -> None:
@@ -569,7 +574,8 @@ def test_a_servo_and_another_equality_are_taken_off_and_reported() -> None:
     assert any("servo" in note for note in examination.notes)
     assert any("switched off" in note for note in examination.notes)
     assert (
-        max(errors(CRANK_ROCKER, examination, ONE_STATE).values()) <= SIMULATED.factor
+        max(errors(CRANK_ROCKER, examination, FILE_AT_ONE_STATE).values())
+        <= SIMULATED.factor
     )
 
 
@@ -584,7 +590,7 @@ def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for() -> None:
     for mine in (text, text.replace(driven, servo)):
         examined = examine(scene, mine, {})
         assert any("gives the cylinder's force" in note for note in examined.notes)
-        for how, most in ((ONE_STATE, 1e-9), (THROUGH_TIME, 1e-6)):
+        for how, most in ((FILE_AT_ONE_STATE, 1e-9), (FILE_THROUGH_TIME, 1e-6)):
             worst_errors = errors(scene, examined, how)
             assert (
                 "torque" not in worst_errors
@@ -597,7 +603,8 @@ def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for() -> None:
     moved = text.replace(start + "0.0", start + "0.1")
     assert (
         moved != text
-        and errors(scene, examine(scene, moved, {}), ONE_STATE)["drive_force"] > 1e-2
+        and errors(scene, examine(scene, moved, {}), FILE_AT_ONE_STATE)["drive_force"]
+        > 1e-2
     )
     assert any(
         key.startswith("tendons.") for key in keys(scene, examine(scene, moved, {}))
@@ -614,8 +621,8 @@ def test_a_loop_that_nothing_closes_is_seen_in_the_numbers() -> None:
     )
     examination = examine(BARE, text, MINE)
     assert values(examination)["closure.by"] == "nothing"
-    assert np.isnan(errors(BARE, examination, ONE_STATE)["F43"])
-    assert errors(BARE, examination, ONE_STATE)["torque"] > 0.01
+    assert np.isnan(errors(BARE, examination, FILE_AT_ONE_STATE)["F43"])
+    assert errors(BARE, examination, FILE_AT_ONE_STATE)["torque"] > 0.01
 
 
 def test_colliding_bars_are_seen() -> None:
@@ -741,7 +748,7 @@ def test_ctrl_c_does_not_wait_for_the_file() -> None:
             examined(f"{__name__}:hang", BARE, "<mujoco/>", {})
     finally:
         signal.signal(signal.SIGINT, before)
-    assert time.monotonic() - began < guard.SECONDS / 4
+    assert time.monotonic() - began < guard.ROBOT_SECONDS / 4
 
 
 @pytest.mark.slow
@@ -757,7 +764,7 @@ def test_a_file_that_breaks_the_engine_is_one_line(
     what: object, word: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        guard, "SECONDS", 4.0 if what is hang else 60.0
+        guard, "ROBOT_SECONDS", 4.0 if what is hang else 60.0
     )  # a busy machine starts a process slowly
     with (
         pytest.raises(InputError, match=word),
@@ -776,14 +783,16 @@ def test_the_command_writes_and_prints_what_it_found(tmp_path: Path) -> None:
         f"--name={role}={name}" for role, name in {**MINE, "coupler": "rod<b>|"}.items()
     ]
     arguments = [str(scene), str(path), *names, "--out", str(tmp_path / "out")]
-    process = CliRunner().invoke(mjcf.command, arguments, standalone_mode=False)
+    process = CliRunner().invoke(
+        mjcf.check_mjcf_command, arguments, standalone_mode=False
+    )
     assert process.return_value == 1, process.output
     assert "\x1b" not in process.output
     assert "closure.softness" in process.output
     report = (tmp_path / "out" / "theirs.md").read_text()
     assert "\x1b" not in report
     assert any(
-        row.verdict == FAILS and row.engine == ONE_STATE
+        row.verdict == FAILS and row.engine == FILE_AT_ONE_STATE
         for row in read_columns(tmp_path / "out" / "results.csv")
     )
 
@@ -807,7 +816,9 @@ def test_a_file_without_a_scene_is_read_as_a_robot(tmp_path: Path) -> None:
     path = tmp_path / "robot.xml"
     hinge = '<body><joint/><geom size="0.1"/></body>'
     path.write_text(f"<mujoco><worldbody>{hinge}</worldbody></mujoco>")
-    process = CliRunner().invoke(mjcf.command, [str(path)], standalone_mode=False)
+    process = CliRunner().invoke(
+        mjcf.check_mjcf_command, [str(path)], standalone_mode=False
+    )
     assert "no equality that closes a loop" in str(process.exception)
 
 
@@ -821,7 +832,9 @@ def run(tmp_path: Path, text: str, *options: str) -> tuple[int | None, list[floa
     path.write_text(text)
     out = tmp_path / f"out{len(options)}"
     arguments = [str(scene), str(path), "--out", str(out), *options]
-    process = CliRunner().invoke(mjcf.command, arguments, standalone_mode=False)
+    process = CliRunner().invoke(
+        mjcf.check_mjcf_command, arguments, standalone_mode=False
+    )
     if process.exception is not None:
         raise process.exception
     return process.return_value, sorted(

@@ -19,7 +19,7 @@ from fourbar.effects import Flywheel, Friction
 from fourbar.errors import InputError
 from fourbar.linkage import Bar, FourBar
 from fourbar.mjcf import RECIPE, write_mjcf
-from fourbar.quantities import FORCES
+from fourbar.quantities import FORCE_NAMES
 from fourbar.scene import Scene
 from fourbar.solving import solve
 from fourbar_validation.check.differences import find_differences
@@ -28,8 +28,8 @@ from fourbar_validation.compare.rows import AGREES, DEGRADED
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
 from fourbar_validation.engines.mujoco.theirs import (
-    ONE_STATE,
-    THROUGH_TIME,
+    FILE_AT_ONE_STATE,
+    FILE_THROUGH_TIME,
     Examined,
     predict_softness,
 )
@@ -132,7 +132,7 @@ def test_a_file_with_dry_friction_is_right_to_the_softness_of_its_loop() -> None
 
     It was -56 rad/s^2 in place of 0.
     """
-    for how in (ONE_STATE, THROUGH_TIME):
+    for how in (FILE_AT_ONE_STATE, FILE_THROUGH_TIME):
         assert error_of(DRY, examined_dry(), how, "torque") < SOFT_FRICTION
         for pin in ("F12", "F32", "F43", "F14"):
             assert error_of(DRY, examined_dry(), how, pin) < SOFT_LOOP
@@ -157,7 +157,7 @@ def test_a_file_that_is_as_right_as_a_soft_loop_can_be_is_called_right(
     at_one_state = {
         cost.row.quantity: cost.row.verdict
         for cost in report.costs
-        if cost.row.engine == ONE_STATE
+        if cost.row.engine == FILE_AT_ONE_STATE
     }
     assert at_one_state["torque"] == AGREES
     assert at_one_state["F43"] == DEGRADED
@@ -178,13 +178,13 @@ def test_what_the_stiffest_constraint_leaves_is_the_error_of_a_file_that_has_it(
     ours = solve(DRY, "force")
     for pin in ("F12", "F32", "F43", "F14"):
         size = float(np.hypot(*np.asarray(getattr(ours, pin)).T).max())
-        off = error_of(DRY, examined_dry(), ONE_STATE, pin)
+        off = error_of(DRY, examined_dry(), FILE_AT_ONE_STATE, pin)
         assert left[pin] / size == pytest.approx(off, rel=1e-3)
 
 
 @pytest.mark.slow
 def test_the_couple_is_the_one_that_bisection_finds() -> None:
-    answer = answer_of(examined_dry(), ONE_STATE)
+    answer = answer_of(examined_dry(), FILE_AT_ONE_STATE)
     assert answer.at.theta_2[0] == pytest.approx(math.radians(30.0))
     bisected = bisect_on_the_couple(default_friction(), math.radians(30.0), 0.0)
     assert answer.quantities["torque"][0] == pytest.approx(bisected, rel=BISECTED)
@@ -206,7 +206,7 @@ def test_friction_that_is_too_large_is_seen_at_one_state_and_through_time(
     text = re.sub('LOSS([^>]*) frictionloss="0.5"', r'\1 frictionloss="1"', text)
     assert text.count('frictionloss="1"') == 1
     examined = examine(DRY, text, {})
-    for how in (ONE_STATE, THROUGH_TIME):
+    for how in (FILE_AT_ONE_STATE, FILE_THROUGH_TIME):
         answer = answer_of(examined, how)
         ours = solve(DRY, "force", at=answer.at)
         assert ours.torque is not None and ours.omega_3 is not None
@@ -219,9 +219,9 @@ def test_friction_that_is_too_large_is_seen_at_one_state_and_through_time(
 
 def test_armature_of_the_driven_hinge_is_the_flywheel_of_the_scene() -> None:
     examined = examine(ROTOR, rotor_as_armature(), {})
-    torque = answer_of(examined, ONE_STATE).quantities["torque"]
+    torque = answer_of(examined, FILE_AT_ONE_STATE).quantities["torque"]
     assert torque[0] == pytest.approx(0.3624249, abs=2e-7)
-    for how in (ONE_STATE, THROUGH_TIME):
+    for how in (FILE_AT_ONE_STATE, FILE_THROUGH_TIME):
         assert error_of(ROTOR, examined, how, "torque") < 1e-6
     generated = examine(ROTOR, None, {})
     keys = {d.key for d in find_differences(generated.described, examined.described)}
@@ -231,7 +231,7 @@ def test_armature_of_the_driven_hinge_is_the_flywheel_of_the_scene() -> None:
 def test_armature_that_the_scene_does_not_have_is_inertia_of_the_input() -> None:
     """By virtual work it adds its own moment alone: 0.02 kg m^2 times 20 rad/s^2."""
     scene = replace(ROTOR, effects=())
-    answer = answer_of(examine(scene, rotor_as_armature(), {}), ONE_STATE)
+    answer = answer_of(examine(scene, rotor_as_armature(), {}), FILE_AT_ONE_STATE)
     ours = solve(scene, "force", at=answer.at).torque
     np.testing.assert_allclose(answer.quantities["torque"] - ours, 0.4, rtol=1e-5)
 
@@ -275,7 +275,7 @@ def test_a_stop_that_the_motion_does_not_meet_is_no_difference() -> None:
         examined = examine(BARE, text, {})
         assert examined.described["pins.O4.range"].value == "free"
         assert any("the stops of joint 'O4'" in note for note in examined.notes)
-        assert error_of(BARE, examined, ONE_STATE, "torque") < 1e-4
+        assert error_of(BARE, examined, FILE_AT_ONE_STATE, "torque") < 1e-4
 
 
 def test_a_stop_inside_the_motion_is_where_the_bars_meet_it() -> None:
@@ -288,7 +288,7 @@ def test_a_stop_inside_the_motion_is_where_the_bars_meet_it() -> None:
         examined = examine(BARE, text, {})
         stops = examined.described["pins.O4.range"].value
         assert stops == pytest.approx((middle, 3.0))
-        answer = answer_of(examined, ONE_STATE)
+        answer = answer_of(examined, FILE_AT_ONE_STATE)
         ours = solve(BARE, "force", at=answer.at)
         off = np.abs(answer.quantities["torque"] - ours.torque)
         before = np.asarray(ours.theta_4) < middle
@@ -333,7 +333,7 @@ def test_a_file_may_stand_in_its_plane_as_it_likes(scene: Scene, other: Scene) -
     keys = {d.key for d in find_differences(generated.described, examined.described)}
     assert not {k for k in keys if k.startswith(("lengths.", "bars.", "gravity."))}
     for name in ("torque", "F12", "F43"):
-        assert error_of(scene, examined, ONE_STATE, name) < WITHOUT_FLYWHEEL
+        assert error_of(scene, examined, FILE_AT_ONE_STATE, name) < WITHOUT_FLYWHEEL
 
 
 def test_a_file_that_is_turned_against_gravity_is_not_the_same() -> None:
@@ -342,7 +342,7 @@ def test_a_file_that_is_turned_against_gravity_is_not_the_same() -> None:
     generated = examine(HEAVY, None, {})
     keys = {d.key for d in find_differences(generated.described, examined.described)}
     assert "lengths.ground_angle" in keys
-    assert error_of(HEAVY, examined, ONE_STATE, "torque") > 0.1
+    assert error_of(HEAVY, examined, FILE_AT_ONE_STATE, "torque") > 0.1
 
 
 def welded(text: str) -> str:
@@ -392,7 +392,7 @@ def force_errors(report: ModelReport) -> dict[tuple[str, str], float]:
     return {
         (cost.row.engine, cost.row.quantity): cost.row.error
         for cost in report.costs
-        if cost.row.quantity in FORCES
+        if cost.row.quantity in FORCE_NAMES
     }
 
 
@@ -450,7 +450,7 @@ def test_where_no_force_gives_the_acceleration_is_said() -> None:
         f'<spatial name="cylinder" actuatorfrcrange="{-most!r} {most!r}"',
     )
     examined = examine(scene, text, {})
-    answer = answer_of(examined, ONE_STATE)
+    answer = answer_of(examined, FILE_AT_ONE_STATE)
     reached = np.isfinite(answer.quantities["drive_force"])
     assert 0 < reached.sum() < len(reached)
     assert any(
@@ -516,7 +516,7 @@ def test_how_wrong_the_default_constraint_is_as_the_pages_say(
 ) -> None:
     scene = fourbar.load(MODELS / f"{name}.toml")
     examined = examine(scene, default_constraint(scene), {})
-    assert error_of(scene, examined, ONE_STATE, "torque") == pytest.approx(
+    assert error_of(scene, examined, FILE_AT_ONE_STATE, "torque") == pytest.approx(
         off, rel=0.05
     )
 
@@ -543,7 +543,7 @@ def test_what_each_drive_reaches_as_the_guide_says(scene: Scene, motor: float) -
     for drive, reached in (("flywheel", 1e-6), ("motor", motor), ("none", motor)):
         examined = examine(scene, write_mjcf(scene, drive=drive), {})  # type: ignore[arg-type]
         worst = max(
-            error_of(scene, examined, ONE_STATE, name)
+            error_of(scene, examined, FILE_AT_ONE_STATE, name)
             for name in ("torque", "F12", "F32", "F43", "F14")
         )
         assert worst < 1.1 * reached
@@ -558,7 +558,7 @@ def test_loads_of_passive_motors_are_the_loads_of_the_scene() -> None:
     generated = examine(scene, None, {})
     keys = {d.key for d in find_differences(generated.described, examined.described)}
     assert not {key for key in keys if key.startswith(("loads.", "actuators."))}
-    assert error_of(scene, examined, ONE_STATE, "F32") < 1e-4
+    assert error_of(scene, examined, FILE_AT_ONE_STATE, "F32") < 1e-4
 
 
 FINGER = """<mujoco><compiler angle="degree" autolimits="true"/>

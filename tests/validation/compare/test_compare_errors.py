@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.quantities import Array
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES, Comparison, Demands
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, Row
-from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, Array, K
+from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, K
 from tests.support.scenes import crank_rocker
 
 POSITIONS = 40

@@ -12,9 +12,9 @@ import pytest
 import fourbar
 from fourbar.effects import Place
 from fourbar_validation.compare.pins import find_centre, state_from_pins
-from fourbar_validation.compare.scales import Sizes
-from fourbar_validation.run.judge import ask
-from fourbar_validation.run.transformed import _take_few
+from fourbar_validation.compare.scales import TermSizes
+from fourbar_validation.run.judge import ask_engines
+from fourbar_validation.run.transformed import _take_plain_positions
 from tests.support.scenes import crank_rocker
 
 LOADED = crank_rocker(
@@ -46,7 +46,7 @@ def test_a_place_that_the_formulas_misread_widens_nothing(
     """With places from G far away, a torque would be allowed to be as far off."""
     solution = fourbar.solve(LOADED)
     sizes = {
-        name: Sizes(LOADED, solution).sum_terms(name) for name in ("F12", "torque")
+        name: TermSizes(LOADED, solution).sum_terms(name) for name in ("F12", "torque")
     }
     polar = Place.polar_from_pin
 
@@ -56,17 +56,19 @@ def test_a_place_that_the_formulas_misread_widens_nothing(
 
     monkeypatch.setattr(Place, "polar_from_pin", misread)
     for name, terms in sizes.items():
-        np.testing.assert_array_equal(Sizes(LOADED, solution).sum_terms(name), terms)
+        np.testing.assert_array_equal(
+            TermSizes(LOADED, solution).sum_terms(name), terms
+        )
 
 
 def test_a_scene_that_is_stated_otherwise_has_its_places_where_they_are(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    question = ask("scene", LOADED, ())
+    question = ask_engines("scene", LOADED, ())
     wanted = question.solution.torque
     monkeypatch.setattr(
         Place, "in_one_pair", lambda place: Place(place.bar, (1.0, 0.0))
     )
-    few = _take_few(question)
+    few = _take_plain_positions(question)
     at = [int(np.argmin(abs(question.at.angle - x))) for x in few.command.angle]
     np.testing.assert_allclose(few.solution.torque, wanted[at], rtol=1e-12)

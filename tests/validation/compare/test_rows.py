@@ -38,7 +38,7 @@ from fourbar_validation.cost.laws import ErrorLaw
 from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.regression import render
 from fourbar_validation.report.html import write_html as page_of
-from fourbar_validation.report.html import write_markdown
+from fourbar_validation.report.html import write_summary_page
 from fourbar_validation.run import released as free
 from fourbar_validation.run.judge import judge, judge_for_report
 from tests.support.here import judge_here, summary_of
@@ -100,14 +100,17 @@ def test_a_quantity_that_every_row_calls_degraded_is_counted_and_named() -> None
     summary = summary_of(records)
     assert (summary.loose, summary.pairs) == (2, 5)
     stated = "2 of 5 quantities of a scene are at best"
-    for form in (write_markdown(summary), page_of(summary, dict.fromkeys(scenes, 2))):
+    for form in (
+        write_summary_page(summary),
+        page_of(summary, dict.fromkeys(scenes, 2)),
+    ):
         text = html.unescape(form)
         assert (
             stated in text
             and "torque of three (allowed 5.0e-01), F12 of one (allowed 2.0e-04)"
             in text
         )
-    assert stated not in write_markdown(summary_of(records[1:2]))
+    assert stated not in write_summary_page(summary_of(records[1:2]))
 
 
 IDENTITY = replace(ROW, engine="formulas", quantity="closure")
@@ -334,7 +337,7 @@ def test_every_form_of_a_report_says_the_same_counts() -> None:
         "All 64 comparisons on 1 of 2 scenes hold: 64 agree; not compared: 2 refuse"
     )
     assert summary.verdict == sentence == summary.counts.sentence() and summary.good
-    assert sentence in write_markdown(summary)
+    assert sentence in write_summary_page(summary)
     page = page_of(summary, {})
     assert sentence in html.unescape(page)
     assert (
@@ -368,7 +371,9 @@ def test_a_free_motion_that_every_engine_refuses_is_not_held(
 
 
 def junit(old: list[Row], new: list[Row]) -> ET.Element:
-    return ET.fromstring(render.write_junit(compare_rows((HERE, old), (HERE, new))))
+    return ET.fromstring(
+        render.write_junit_of_changes(compare_rows((HERE, old), (HERE, new)))
+    )
 
 
 def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before() -> None:
@@ -458,8 +463,8 @@ def test_two_runs_without_a_comparison_in_common_are_no_success(
     changes = compare_rows((HERE, old), (HERE, new))
     sentence = render.write_verdict(changes)
     assert sentence in html.unescape(
-        render.write_html(changes)
-    ) and sentence in render.write_markdown(changes)
+        render.write_differences_page(changes)
+    ) and sentence in render.write_pull_request_comment(changes)
 
 
 def test_of_two_rows_of_one_name_the_worse_one_counts() -> None:
@@ -501,7 +506,7 @@ def test_a_study_in_which_no_law_is_fitted_is_no_success(
     monkeypatch.setattr(
         "fourbar_validation.cost.study.CostStudy.points", lambda _: iter(())
     )
-    monkeypatch.setattr("fourbar_validation.cost.cost.write", lambda *_: [])
+    monkeypatch.setattr("fourbar_validation.cost.cost.write_cost", lambda *_: [])
     law = ErrorLaw("order", "torque", 4.0, 0.1, 4.0, 9)
     for found, code in (
         ([], FAILED),

@@ -20,11 +20,11 @@ import fourbar
 from fourbar.mjcf import Settings
 from fourbar.scene import command
 from fourbar.show.plot.style import apply_style
-from fourbar_lab.contenders import LINKAGE
+from fourbar_lab.contenders import CONTENDED_LINKAGE
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.advise.worst_errors import (
-    NO_ANSWER,
-    QUANTITIES,
+    ERROR_NAMES,
+    INFINITE_ERRORS,
     WorstErrors,
     compute_errors,
 )
@@ -45,7 +45,7 @@ def turning(omega: float = 10.0, positions: int = 36) -> fourbar.Scene:
     """
     sweep = fourbar.Sweep(0.0, 2.0 * math.pi, positions)
     return fourbar.Scene(
-        LINKAGE, fourbar.Motion(sweep, omega), effects=(fourbar.Gravity(),)
+        CONTENDED_LINKAGE, fourbar.Motion(sweep, omega), effects=(fourbar.Gravity(),)
     )
 
 
@@ -57,7 +57,7 @@ def tried(
     def error(settings: Settings) -> WorstErrors:
         trial = setup.try_out(settings, closure, drive)
         return (
-            NO_ANSWER
+            INFINITE_ERRORS
             if trial.broken
             else compute_errors(scene, trial.at, trial.quantities)
         )
@@ -238,7 +238,7 @@ def test_formulas_in_four_precisions() -> None:
                     scene, commanded, method(scene, commanded), exact
                 ).worst
             )
-            for name, method in formulas.METHODS.items()
+            for name, method in formulas.METHODS_TIMED.items()
         }
         assert wrong["formulas, double"] < 1e-13 and wrong["13x13"] < 1e-12
         assert 1e-9 < wrong["formulas, single"] < 1e-4
@@ -282,7 +282,7 @@ def test_what_is_no_number_or_not_compared_has_no_small_error() -> None:
         compute_errors(
             still,
             command(still),
-            {name: getattr(solution, name) for name in QUANTITIES},
+            {name: getattr(solution, name) for name in ERROR_NAMES},
         ).torque
         == math.inf
     )
@@ -317,7 +317,7 @@ def test_fit_floor_and_warning() -> None:
     wrong = laws.fit_laws(
         {"RK4, tc held": [point(10.0 * 2**k, 0.05 * 2.0 ** (-2 * k)) for k in range(6)]}
     )
-    assert [law.quantity for law in wrong] == list(QUANTITIES)
+    assert [law.quantity for law in wrong] == list(ERROR_NAMES)
     assert all(not law.holds and law.decided and "FAILS" in str(law) for law in wrong)
 
 
@@ -440,7 +440,7 @@ def test_a_dip_and_a_motion_lost_at_coarse_steps_are_no_jump() -> None:
         point(20.0 * 2**k, error)
         for k, error in enumerate((0.9, math.inf, 0.3, 3e-2, 1e-4, 1.2e-2, 6e-3, 3e-3))
     ]
-    assert not any(laws.find_jumps(ladder, quantity) for quantity in QUANTITIES)
+    assert not any(laws.find_jumps(ladder, quantity) for quantity in ERROR_NAMES)
 
 
 def test_the_front_holds_what_nothing_beats() -> None:
@@ -475,7 +475,9 @@ def test_a_study_is_resumed_where_it_was_interrupted(tmp_path: Path) -> None:
     assert done == ["a", "b", "c"] and [
         p.curve for row in points.values() for p in row
     ] == ["a", "b", "c"]
-    assert json.loads((tmp_path / "run.json").read_text())["study"] == study.VERSION
+    assert (
+        json.loads((tmp_path / "run.json").read_text())["study"] == study.STUDY_VERSION
+    )
     second_study = study.CostStudy(
         "s", turning(20.0), tmp_path
     )  # another scene in the same folder starts over
@@ -500,8 +502,8 @@ def test_the_command_writes_table_report_and_pictures(
     monkeypatch.setattr(
         study, "design_curves", lambda scene: [c for c in every(scene) if c.name in few]
     )
-    monkeypatch.setattr(study, "REQUIRED", (1e-3, 1e-5))
-    monkeypatch.setattr(study, "ROUNDS", 1)
+    monkeypatch.setattr(study, "ERRORS_ADVISED", (1e-3, 1e-5))
+    monkeypatch.setattr(study, "TIMINGS_OF_A_SETTING", 1)
     process = CliRunner().invoke(
         cost, [str(scene), "--out", str(tmp_path / "out")], standalone_mode=False
     )
@@ -521,11 +523,11 @@ def test_the_command_writes_table_report_and_pictures(
     assert "order of RK4 in the timestep" in detailed.output
     folder = tmp_path / "out" / "small"
     rows = (folder / "cost.csv").read_text().splitlines()
-    assert rows[0] == ",".join(study.COLUMNS) and len(rows) > 40
+    assert rows[0] == ",".join(study.COST_COLUMNS) and len(rows) > 40
     text = (folder / "cost.md").read_text()
     assert "order of RK4 in the timestep" in text and "steps a revolution on" in text
     (order,) = [line for line in text.splitlines() if "order of RK4" in line]
-    assert all(quantity in order for quantity in QUANTITIES) and "FAILS" not in order
+    assert all(quantity in order for quantity in ERROR_NAMES) and "FAILS" not in order
     stems = ("work-precision-torque", "work-precision-force", "orders", "solver")
     for stem in stems:
         picture = (folder / f"{stem}.svg").read_text()
@@ -553,7 +555,7 @@ def test_the_least_of_timings_counts_and_the_middle_one_tells_their_scatter() ->
 
 def test_the_front_is_listed_by_what_lies_between_the_steps_too() -> None:
     """A point that is right at its steps alone is not on the front."""
-    worse = replace(point(6, 0.5), at_steps=WorstErrors(*[1e-9] * len(QUANTITIES)))
+    worse = replace(point(6, 0.5), at_steps=WorstErrors(*[1e-9] * len(ERROR_NAMES)))
     assert list_front({"c": [worse, point(10, 1e-2), point(20, 1e-3)]}) == [
         ("c, 6 steps a revolution", "5e-01", "0.01", "0.01"),
         ("c, 10 steps a revolution", "1e-02", "0.02", "0.01"),
@@ -562,7 +564,7 @@ def test_the_front_is_listed_by_what_lies_between_the_steps_too() -> None:
 
 
 def test_names_in_a_picture_cover_no_other_and_are_not_cut() -> None:
-    near = {"kind": study.EXACT, "seconds_per_second": 0.3}
+    near = {"kind": study.EXACT_MOTION, "seconds_per_second": 0.3}
     curves = {
         "inverse": [
             replace(point(1, 1e-12), setting=name, **near)

@@ -34,7 +34,7 @@ from fourbar_validation.compare.compare import COMPARED_QUANTITIES, Comparison, 
 from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines import loop
-from fourbar_validation.engines.balls import closure, make_balls, wedge
+from fourbar_validation.engines.balls import compute_directions, make_balls, wedge
 from fourbar_validation.engines.effects import TERM_OF
 from fourbar_validation.engines.limits import LIGHTEST
 from fourbar_validation.engines.mujoco.inverse import MujocoInverse
@@ -734,7 +734,7 @@ def test_a_loop_that_just_closes_closes_however_the_ground_is_turned(
     folded = Scene(
         FourBar(3.0, *bars, ground_angle=ground_angle), Motion(ground_angle, 1.0)
     )  # type: ignore[misc]
-    closed = closure(make_balls(folded, ground_angle), 1)
+    closed = compute_directions(make_balls(folded, ground_angle), 1)
     assert closed is not None and abs(float(wedge(*closed[1:]).mid())) < 1e-60
     apart = replace(folded, linkage=replace(folded.linkage, ground=3.0 - 1e-15))
-    assert closure(make_balls(apart, ground_angle), 1) is None
+    assert compute_directions(make_balls(apart, ground_angle), 1) is None

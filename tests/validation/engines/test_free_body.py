@@ -418,6 +418,6 @@ def test_blocks_of_positions_make_no_difference(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     full_answer = answered(crank_rocker())
-    monkeypatch.setattr(free_body, "BLOCK", 7)
+    monkeypatch.setattr(free_body, "POSITIONS_SOLVED_AT_ONCE", 7)
     for name, values in answered(crank_rocker()).items():
         assert np.array_equal(values, full_answer[name]), name

@@ -419,7 +419,7 @@ def test_a_guest_that_integrates_is_asked_for_released_motions(
 ) -> None:
     pytest.importorskip("mujoco")
     monkeypatch.setattr(
-        "fourbar_validation.run.released.LONGEST_STEP", 1e-3
+        "fourbar_validation.run.released.LONGEST_TIMESTEP", 1e-3
     )  # MuJoCo's here
     motion = fourbar.Motion(1.0, 2.0, free=Free(0.2, 10))
     by_engine = judged(crank_rocker(motion=motion, loads=()), "Releases", "Right")
@@ -648,7 +648,7 @@ def test_parts_judged_by_another_code_are_made_again(
 def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine: Any) -> None:
     if missing := engine.missing():
         pytest.skip(missing)
-    program = guests.serve(engine.name, 120.0)
+    program = guests.serve_adapter(engine.name, 120.0)
     start = partial(guests.GuestClient, engine.name, program, guests.ask_hello(program))
     outside = replace(engine, start=start)
     loaded = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 40), 10.0))

@@ -23,24 +23,24 @@ from fourbar_validation.published.comparison import (
     list_ladder_rows,
     published,
 )
-from fourbar_validation.published.figures import ERRATA, PublishedFigure, compare
+from fourbar_validation.published.figures import ERRATA, PublishedFigure, compare_figure
 from fourbar_validation.published.program import (
+    BAR_LENGTHS,
     DATA,
-    LENGTHS,
-    STEPS,
+    ERRATA_IN_ORDER,
     THETA_1,
     THETA_2,
     ProgramErrors,
+    bound_round_off,
     climb_ladder,
     compute_right_unknowns,
     compute_thesis_program,
     make_equations,
-    make_scene,
+    make_model_scene,
     read_printed,
-    round_off,
 )
 from fourbar_validation.published.textbook import (
-    SCENES,
+    TEXTBOOK_FOLDER,
     compare_textbooks,
     compute_value,
     list_answers,
@@ -75,10 +75,10 @@ ALL = tuple(list_figures())
 def test_the_published_torque_error_by_error() -> None:
     for name, listed in (("T4", T4), ("F12x", F12X)):
         for figure, (_, x), (_, *step) in zip(
-            listed, climb_ladder(), STEPS, strict=name == "T4"
+            listed, climb_ladder(), ERRATA_IN_ORDER, strict=name == "T4"
         ):
             assert x[name] == pytest.approx(
-                figure, rel=0.0, abs=LISTED + round_off(*step)[name]
+                figure, rel=0.0, abs=LISTED + bound_round_off(*step)[name]
             )
 
 
@@ -87,7 +87,7 @@ def test_the_thesis_without_its_errors_is_ours() -> None:
     right, program, apart = (
         compute_right_unknowns(),
         climb_ladder()[0][1],
-        round_off(ProgramErrors()),
+        bound_round_off(ProgramErrors()),
     )
     assert program.keys() == right.keys()
     for name, unknown in program.items():
@@ -115,7 +115,7 @@ def test_round_off_holds_for_other_pivots_and_inputs_typed_otherwise() -> None:
             for x in (matrix[rows], sides[rows])
         )
         worst = np.maximum(worst, np.abs(np.linalg.solve(typed, right) - exact))
-    ratio = worst / list(round_off(ProgramErrors()).values())
+    ratio = worst / list(bound_round_off(ProgramErrors()).values())
     assert ratio.min() > 0.01 and ratio.max() < 1.0
 
 
@@ -153,12 +153,12 @@ def test_rows_for_the_report() -> None:
     ],
 )
 def test_verdicts(printed: str, ours: float, verdict: str) -> None:
-    assert compare(printed, ours) == verdict
+    assert compare_figure(printed, ours) == verdict
 
 
 def test_noise_is_of_the_last_digits_alone() -> None:
-    assert compare("308.8044071267012", 308.8044071267003, 1e-12) == "rounded"
-    assert compare("308.8044071267012", 308.8044071267027, 1e-12) == "differs"
+    assert compare_figure("308.8044071267012", 308.8044071267003, 1e-12) == "rounded"
+    assert compare_figure("308.8044071267012", 308.8044071267027, 1e-12) == "differs"
 
 
 def test_every_figure_is_compared() -> None:
@@ -300,7 +300,7 @@ def test_open_loops_that_the_errata_state() -> None:
     table = np.genfromtxt(
         DATA / "positions.csv", delimiter=",", skip_header=1, usecols=range(5)
     )
-    d, a, b, c = LENGTHS
+    d, a, b, c = BAR_LENGTHS
     unit = np.exp(1j * np.radians(table))
 
     def gaps(third: int, fourth: int) -> np.ndarray:
@@ -319,7 +319,7 @@ def test_open_loops_that_the_errata_state() -> None:
 
 
 def test_limits_that_the_errata_state() -> None:
-    linkage = make_scene(THETA_2).linkage
+    linkage = make_model_scene(THETA_2).linkage
     for bar, title in ((4, "limits"), (2, "dead centres")):
         angles = {
             f"{np.degrees(limit.theta_2) % 360.0:.4f}"
@@ -336,7 +336,7 @@ def test_public_test_cases_agree_to_the_last_digit() -> None:
         if figure.verdict() != "rounded"
     } == {}
     assert {answer.scene for answer in list_answers()} == {
-        path.stem for path in SCENES.glob("*.toml")
+        path.stem for path in TEXTBOOK_FOLDER.glob("*.toml")
     }
     assert len({answer.where.split(",")[0] for answer in list_answers()}) >= 3
 
@@ -380,7 +380,7 @@ def test_quantities_of_an_answer() -> None:
     ids=["code", "file"],
 )
 def test_inputs_are_those_of_the_model(scene: fourbar.Scene) -> None:
-    ours = make_scene(THETA_2)
+    ours = make_model_scene(THETA_2)
     assert ours.linkage.lengths == pytest.approx(scene.linkage.lengths, rel=TYPED)
     assert ours.linkage.ground_angle == pytest.approx(
         scene.linkage.ground_angle, rel=TYPED

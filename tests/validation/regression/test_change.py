@@ -7,7 +7,7 @@ import pytest
 
 from fourbar.errors import FAILED, HOLDS
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, Row
-from fourbar_validation.regression.change import Kind, compare_row
+from fourbar_validation.regression.change import KindOfChange, compare_row
 from fourbar_validation.regression.changes import Differences
 from fourbar_validation.regression.rules import list_weakened
 from tests.support.runs import HERE, compare_rows
@@ -25,18 +25,22 @@ def compare(old: list[Row], new: list[Row]) -> Differences:
     return compare_rows((HERE, old), (HERE, new))
 
 
-@pytest.mark.parametrize(("moves", "kind"), [(40, Kind.ROUND_OFF), (60, Kind.WORSE)])
+@pytest.mark.parametrize(
+    ("moves", "kind"), [(40, KindOfChange.ROUND_OFF), (60, KindOfChange.WORSE)]
+)
 def test_fifty_last_digits_are_round_off_and_more_are_not(
-    moves: int, kind: Kind
+    moves: int, kind: KindOfChange
 ) -> None:
     worse = changed(error=ROW.error + moves * EPS, allowed=1e-14)
     assert compare_row(KEY, changed(allowed=1e-15), worse).kind is kind
     hard = changed(error=ROW.error + 50 * moves * EPS, condition=0.01, allowed=1e-13)
-    assert compare_row(KEY, changed(allowed=1e-15), hard).kind is Kind.ROUND_OFF
+    assert compare_row(KEY, changed(allowed=1e-15), hard).kind is KindOfChange.ROUND_OFF
 
 
-@pytest.mark.parametrize(("factor", "kind"), [(1.2, Kind.SAME), (1.3, Kind.WORSE)])
-def test_a_quarter_more_is_noticed(factor: float, kind: Kind) -> None:
+@pytest.mark.parametrize(
+    ("factor", "kind"), [(1.2, KindOfChange.SAME), (1.3, KindOfChange.WORSE)]
+)
+def test_a_quarter_more_is_noticed(factor: float, kind: KindOfChange) -> None:
     old = changed(error=1e-6, allowed=1e-7)
     assert compare_row(KEY, old, replace(old, error=factor * 1e-6)).kind is kind
 
@@ -67,7 +71,7 @@ def test_of_two_rows_of_one_name_the_worse_counts_in_either_order() -> None:
     bad = changed(verdict=FAILS)
     for twice in ([ROW, bad], [bad, ROW]):
         assert compare([ROW], twice).regressed and not compare(twice, twice).regressed
-        assert compare(twice, [ROW]).kinds[Kind.VERDICT_BETTER] == 1
+        assert compare(twice, [ROW]).kinds[KindOfChange.VERDICT_BETTER] == 1
 
 
 def test_a_factor_that_grew_by_a_thousandth_is_a_weaker_rule() -> None:

@@ -36,12 +36,16 @@ from fourbar_validation.compare.tolerance import (
     ErrorBound,
 )
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.guests import STATED
-from fourbar_validation.engines.limits import LIMITS
+from fourbar_validation.engines.guests import STATED_BY_THE_ENGINE
+from fourbar_validation.engines.limits import BOUNDARIES
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression import record, render, rules
-from fourbar_validation.regression.accept import HISTORY, accept_command, compare
-from fourbar_validation.regression.change import Kind
+from fourbar_validation.regression.accept import (
+    HISTORY,
+    accept_command,
+    compare_command,
+)
+from fourbar_validation.regression.change import KindOfChange
 from fourbar_validation.regression.changes import compare_runs
 from fourbar_validation.regression.record import (
     NOTHING_KNOWN,
@@ -66,32 +70,32 @@ ROW = Row(
 )
 
 
-def kinds(old: list[Row], new: list[Row]) -> list[Kind]:
+def kinds(old: list[Row], new: list[Row]) -> list[KindOfChange]:
     return [change.kind for change in compare_rows((HERE, old), (HERE, new)).changes]
 
 
 @pytest.mark.parametrize(
     ("changed", "kind"),
     [
-        ({}, Kind.SAME),
-        ({"error": 9e-15}, Kind.ROUND_OFF),
-        ({"error": 1e-10, "allowed": 1e-9}, Kind.WORSE),
-        ({"error": math.nan, "verdict": FAILS}, Kind.VERDICT_WORSE),
-        ({"quantity": "F12"}, Kind.GONE),
+        ({}, KindOfChange.SAME),
+        ({"error": 9e-15}, KindOfChange.ROUND_OFF),
+        ({"error": 1e-10, "allowed": 1e-9}, KindOfChange.WORSE),
+        ({"error": math.nan, "verdict": FAILS}, KindOfChange.VERDICT_WORSE),
+        ({"quantity": "F12"}, KindOfChange.GONE),
     ],
 )
-def test_each_kind_of_change(changed: dict[str, object], kind: Kind) -> None:
+def test_each_kind_of_change(changed: dict[str, object], kind: KindOfChange) -> None:
     assert kind in kinds([ROW], [replace(ROW, **changed)])  # type: ignore[arg-type]
 
 
 def test_round_off_grows_with_the_condition() -> None:
     hard = replace(ROW, error=1e-9, condition=1e-6)
-    assert kinds([hard], [replace(hard, error=5e-9)]) == [Kind.ROUND_OFF]
+    assert kinds([hard], [replace(hard, error=5e-9)]) == [KindOfChange.ROUND_OFF]
     assert kinds(
         [replace(hard, condition=1.0)], [replace(hard, error=5e-9, condition=1.0)]
-    ) == [Kind.WORSE]
+    ) == [KindOfChange.WORSE]
     beyond = 60 * EPS / 1e-6
-    assert kinds([hard], [replace(hard, error=1e-9 + beyond)]) == [Kind.WORSE]
+    assert kinds([hard], [replace(hard, error=1e-9 + beyond)]) == [KindOfChange.WORSE]
 
 
 def test_better_and_new_rows_are_no_regression_but_a_new_failure_is() -> None:
@@ -100,7 +104,10 @@ def test_better_and_new_rows_are_no_regression_but_a_new_failure_is() -> None:
         (HERE, [simulated]),
         (HERE, [replace(simulated, error=1e-6), replace(ROW, quantity="F12")]),
     )
-    assert {change.kind for change in changes.changes} == {Kind.BETTER, Kind.NEW}
+    assert {change.kind for change in changes.changes} == {
+        KindOfChange.BETTER,
+        KindOfChange.NEW,
+    }
     assert not changes.regressed
     failing = replace(ROW, quantity="F12", verdict=FAILS)
     assert compare_rows((HERE, [ROW]), (HERE, [ROW, failing])).regressed
@@ -110,7 +117,7 @@ def test_other_versions_are_reported_first() -> None:
     older = About({**HERE.versions, "mujoco": "3.3.7"}, HERE.machine, HERE.settings)
     found = compare_rows((older, [ROW]), (HERE, [ROW]))
     assert [what for what, _, _ in found.surroundings] == ["mujoco"]
-    assert render.write_text(found).startswith("mujoco: 3.3.7 -> ")
+    assert render.write_differences(found).startswith("mujoco: 3.3.7 -> ")
 
 
 MODEL = [str(Path(__file__).parents[3] / "models" / "crank_rocker.toml")]
@@ -125,7 +132,7 @@ def test_command_writes_every_form_and_leaves_with_the_status(tmp_path: Path) ->
     forms = [f"--{form}={tmp_path / form}" for form in ("markdown", "html", "junit")]
     runner = CliRunner()
     process = runner.invoke(
-        compare, [str(old), str(new), *forms], standalone_mode=False
+        compare_command, [str(old), str(new), *forms], standalone_mode=False
     )
     assert process.return_value == 1
     assert "2 regressions" in process.output
@@ -133,7 +140,7 @@ def test_command_writes_every_form_and_leaves_with_the_status(tmp_path: Path) ->
     assert "<script>" not in (tmp_path / "markdown").read_text()
     suites = ET.parse(tmp_path / "junit").getroot()
     assert len(suites.findall(".//failure")) == 2
-    same = runner.invoke(compare, [str(old), str(old)], standalone_mode=False)
+    same = runner.invoke(compare_command, [str(old), str(old)], standalone_mode=False)
     assert same.return_value == 0
     assert "No regression" in same.output
 
@@ -153,7 +160,7 @@ def test_accept_keeps_the_run_next_to_the_results_or_in_a_stated_folder(
         assert json.loads((kept / "record.json").read_text())["machine"] == HERE.machine
         assert (
             runner.invoke(
-                compare, [str(kept), str(run)], standalone_mode=False
+                compare_command, [str(kept), str(run)], standalone_mode=False
             ).return_value
             == 0
         )
@@ -352,7 +359,7 @@ def test_options_of_a_run_that_would_do_nothing_are_refused_before_it(
 
 def test_what_stood_for_a_failure_and_is_gone_is_no_regression() -> None:
     alarm = replace(ROW, quantity="watch", verdict=FAILS, error=math.nan)
-    assert kinds([ROW, alarm], [ROW]) == [Kind.SAME, Kind.GONE_FAILURE]
+    assert kinds([ROW, alarm], [ROW]) == [KindOfChange.SAME, KindOfChange.GONE_FAILURE]
     assert not compare_rows((HERE, [ROW, alarm]), (HERE, [ROW])).regressed
     failed = replace(ROW, verdict=FAILS)
     assert compare_rows(
@@ -434,9 +441,9 @@ def test_two_long_runs_are_read_scene_by_scene_and_little_of_them_is_kept(
     assert (
         most == 2
         and changes.rows == 2 * scenes
-        and changes.regressed == changes.kinds[Kind.WORSE] == scenes - 1
+        and changes.regressed == changes.kinds[KindOfChange.WORSE] == scenes - 1
     )
-    assert [change.key[0][-3:] for change in changes.of(Kind.WORSE)] == [
+    assert [change.key[0][-3:] for change in changes.of(KindOfChange.WORSE)] == [
         "999",
         "998",
         "997",
@@ -444,7 +451,7 @@ def test_two_long_runs_are_read_scene_by_scene_and_little_of_them_is_kept(
         "995",
     ]
     assert len(changes.changes) == 2 * kept
-    cases = ET.fromstring(render.write_junit(changes))
+    cases = ET.fromstring(render.write_junit_of_changes(changes))
     assert (
         cases.findall(".//testcase")[-1].get("name")
         == f"{2 * (scenes - kept)} rows more: see results.parquet"
@@ -557,7 +564,11 @@ def test_the_report_says_who_is_at_fault(
     old, new = disagreeing(worse)
     changes = compare_rows((HERE, old), (HERE, new))
     assert changes.fault.sentences == [sentence]
-    for form in (render.write_text, render.write_markdown, render.write_html):
+    for form in (
+        render.write_differences,
+        render.write_pull_request_comment,
+        render.write_differences_page,
+    ):
         assert sentence in html.unescape(form(changes))
 
 
@@ -575,7 +586,7 @@ def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first() -> 
     changes_from_better = compare_rows((HERE, better), (HERE, new))
     groups = [
         line
-        for line in render.write_text(changes_from_better).splitlines()
+        for line in render.write_differences(changes_from_better).splitlines()
         if "scenes, " in line and "rows (" in line
     ]
     # one cause for all scenes, with the numbers of the worst
@@ -586,9 +597,9 @@ def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first() -> 
         f"Verdict got worse: sim, 3 of 3 scenes, 6 rows (F12 3, torque 3), {in_c}",
         "Better: two, 3 of 3 scenes, 6 rows (F12 3, torque 3)",
     ]
-    assert changes_from_better.of(Kind.VERDICT_WORSE)[0].key[:2] == ("b", "one")
+    assert changes_from_better.of(KindOfChange.VERDICT_WORSE)[0].key[:2] == ("b", "one")
     assert groups[0].partition(": ")[2] in html.unescape(
-        render.write_html(changes_from_better)
+        render.write_differences_page(changes_from_better)
     )
 
 
@@ -628,7 +639,7 @@ def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared() -> Non
         old, made([wrong, other_row], {"scene": heavier, "other": SCENE})
     )
     assert (
-        render.write_text(changes).splitlines()[0]
+        render.write_differences(changes).splitlines()[0]
         == "scene scene: bars.output.inertia 0.048 -> 0.05 kg m^2"
     )
     assert changes.status == 0 and changes.not_compared == [
@@ -640,7 +651,7 @@ def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared() -> Non
     assert compare_rows(
         made([ROW], {"scene": before}), made([wrong], {"scene": heavier})
     ).nothing
-    for form in (render.write_markdown, render.write_html):
+    for form in (render.write_pull_request_comment, render.write_differences_page):
         assert "bars.output.inertia 0.048" in form(changes)
 
 
@@ -692,14 +703,14 @@ def test_what_grew_within_its_allowance_is_shown_and_no_regression() -> None:
     shipped = replace(ROW, quantity="as shipped", error=3.4e-7, allowed=1.0)
     changes = compare_rows((HERE, [shipped]), (HERE, [replace(shipped, error=5.2e-7)]))
     assert [change.kind for change in changes.changes] == [
-        Kind.GREW
+        KindOfChange.GREW
     ] and changes.status == 0
     assert (
         "Grew within its allowance: scene / engine / exact / as shipped"
-        in render.write_text(changes)
+        in render.write_differences(changes)
     )
     assert kinds([replace(shipped, allowed=4e-7)], [replace(shipped, error=6e-7)]) == [
-        Kind.WORSE
+        KindOfChange.WORSE
     ]
 
 
@@ -724,7 +735,7 @@ def test_the_kernels_of_a_run_are_recorded_and_named_where_they_differ() -> None
     old, new = (
         replace(HERE, versions=HERE.versions | kernels) for kernels in (first, second)
     )
-    text = render.write_text(compare_rows((old, [ROW]), (new, [ROW])))
+    text = render.write_differences(compare_rows((old, [ROW]), (new, [ROW])))
     assert any(f"{name}: {first[name]} -> {second[name]}" in text for name in first)
     assert set(first) <= set(HERE.versions)
 
@@ -769,14 +780,16 @@ def test_of_an_older_record_only_the_hash_can_say_that_scenes_changed() -> None:
     changes = compare_rows(
         (old, [ROW, others[0]]), made([ROW, *others[1:]], {"scene": SCENE})
     )
-    assert render.write_text(changes).startswith(
+    assert render.write_differences(changes).startswith(
         "1 of 4 rows are compared"
-    ) and "suites: no regression in 1 of 4 rows" in render.write_text(changes)
+    ) and "suites: no regression in 1 of 4 rows" in render.write_differences(changes)
 
 
 def widen(error: float, reason: str = "fewer digits") -> Engine:
     """The engine with a tolerance that it states itself."""
-    stated = ErrorBound(STATED, f"{error:g} of the scale: {reason}", error, False)
+    stated = ErrorBound(
+        STATED_BY_THE_ENGINE, f"{error:g} of the scale: {reason}", error, False
+    )
     return Engine("engine", FreeBody, stated)
 
 
@@ -854,15 +867,15 @@ def test_each_entry_of_a_rule_can_weaken_it(
     found = compare_rows((before, [ROW]), (after, [ROW]))
     assert [weakening.what for weakening in found.weakened] == what
     assert found.status == bool(what)
-    assert render.write_text(found).startswith("Weaker rule: ") == bool(what)
+    assert render.write_differences(found).startswith("Weaker rule: ") == bool(what)
 
 
 def test_k_and_a_stated_limit_are_rules_whoever_changes_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(rules, "K", 500.0)
-    harsher = LIMITS[0]._replace(boundary=0.5)
-    monkeypatch.setattr(rules, "LIMITS", (harsher, *LIMITS[1:]))
+    harsher = BOUNDARIES[0]._replace(boundary=0.5)
+    monkeypatch.setattr(rules, "BOUNDARIES", (harsher, *BOUNDARIES[1:]))
     changed = describe_run([Engine("engine", FreeBody, EQUIVALENCE)], "suite")
     found = compare_rows((HERE, [ROW]), (changed, [ROW]))
     assert [str(weakening) for weakening in found.weakened] == [
@@ -892,7 +905,7 @@ def test_rows_alone_say_that_their_class_is_another() -> None:
     strict = replace(ROW, reason=EQUIVALENCE.explain(1.0))
     found = compare_rows((NOTHING_KNOWN, [strict]), (NOTHING_KNOWN, [LOOSE]))
     (weakening,) = found.weakened
-    assert (weakening.name, weakening.new) == ("engine", STATED)
+    assert (weakening.name, weakening.new) == ("engine", STATED_BY_THE_ENGINE)
     assert not compare_rows(
         (NOTHING_KNOWN, [LOOSE]), (NOTHING_KNOWN, [strict])
     ).weakened
@@ -905,7 +918,7 @@ def test_an_allowance_that_grew_tenfold_is_printed_and_no_regression() -> None:
     assert found.status == 0
     (line,) = found.grown
     assert line.startswith("scene / engine / torque: 1.0e-14 -> 1.0e-12")
-    assert "Allowed more: scene / engine / torque" in render.write_text(found)
+    assert "Allowed more: scene / engine / torque" in render.write_differences(found)
     assert not compare_rows((HERE, [ROW]), (HERE, [replace(hard, allowed=9e-14)])).grown
 
 
@@ -915,8 +928,12 @@ def test_every_form_keeps_the_reason_of_a_crash() -> None:
         "scene", "engine", "", "all", FAILS, "Cannot find module 'x'"
     )
     found = compare_rows((HERE, [ROW]), (HERE, [crash]))
-    forms = (render.write_text, render.write_markdown, render.write_html)
-    for form in (*forms, render.write_junit):
+    forms = (
+        render.write_differences,
+        render.write_pull_request_comment,
+        render.write_differences_page,
+    )
+    for form in (*forms, render.write_junit_of_changes):
         assert "Cannot find module" in html.unescape(form(found)), form
 
 
@@ -961,7 +978,7 @@ def test_what_is_compared_can_be_chosen(
 def test_the_run_itself_is_written_as_junit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fourbar_validation.report.junit.LISTED", 10)
+    monkeypatch.setattr("fourbar_validation.report.junit.MOST_PASSING_CASES", 10)
     judge_here(monkeypatch)
     xml, scene = (
         tmp_path / "run.xml",

@@ -36,10 +36,15 @@ from fourbar_validation.report.figures import (
     draw_scene_figure,
     find_worst_of_segments,
 )
-from fourbar_validation.report.html import ALL_OPEN, Section, write_html, write_markdown
+from fourbar_validation.report.html import (
+    ALL_OPEN,
+    Section,
+    write_html,
+    write_summary_page,
+)
 from fourbar_validation.report.record import Record
-from fourbar_validation.report.summary import OWN, Summary
-from fourbar_validation.report.svg import FLOOR
+from fourbar_validation.report.summary import OWN_CONSISTENCY, Summary
+from fourbar_validation.report.svg import LEAST_DRAWN_ERROR
 from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run.judge import judge_for_report
 from tests.support.guests import write_program
@@ -160,7 +165,7 @@ def test_a_scene_cannot_write_into_the_demo() -> None:
     )
     assert "<img src=x" not in text
     assert len(re.findall("<script", text)) == 1
-    assert "<img" not in write_markdown(summary)
+    assert "<img" not in write_summary_page(summary)
 
 
 @pytest.mark.slow
@@ -175,7 +180,7 @@ def test_nothing_is_fetched() -> None:
 
 @pytest.mark.slow
 def test_the_comment_of_a_pull_request_holds_200_scenes_that_all_fail() -> None:
-    assert len(write_markdown(summary_of(copies(200, failing=200)))) < COMMENT_LIMIT
+    assert len(write_summary_page(summary_of(copies(200, failing=200)))) < COMMENT_LIMIT
 
 
 def test_a_section_of_another_module_is_shown_and_linked() -> None:
@@ -202,7 +207,7 @@ def test_the_errors_drawn_are_the_largest_of_their_stretches() -> None:
     error[worst[3]] = np.nan
     assert worst[3] not in find_worst_of_segments(error, 0.9)
     assert len(find_worst_of_segments(np.full(40, np.nan), 0.0)) == 0
-    assert len(find_worst_of_segments(np.array([FLOOR]), 0.5)) == 1
+    assert len(find_worst_of_segments(np.array([LEAST_DRAWN_ERROR]), 0.5)) == 1
 
 
 def test_the_times_of_engines_are_those_of_the_run() -> None:
@@ -225,7 +230,7 @@ def test_the_times_of_engines_are_those_of_the_run() -> None:
         "free-body",
     }
     for engine, timing in of_one.items():
-        line = lines[OWN if engine == "formulas" else engine]
+        line = lines[OWN_CONSISTENCY if engine == "formulas" else engine]
         assert line.microseconds == pytest.approx(
             2.0 * 1e6 * timing.seconds / 37, rel=1e-12
         )
@@ -310,10 +315,10 @@ def test_many_scenes_give_a_short_report_of_the_worst(
     ]
     assert summary.orders[0][0] == "scene-000"
     assert (
-        f"the 80 of {summary.judged} scenes and engines" in write_markdown(summary)
+        f"the 80 of {summary.judged} scenes and engines" in write_summary_page(summary)
         and summary.judged > 1000
     )
-    assert write_markdown(summary).count("\n") < 160
+    assert write_summary_page(summary).count("\n") < 160
     assert (
         len(text) < 1.0e6
     )  # 20 scenes, each with 30 kB of compressed rows; the table of all of them is compressed too
@@ -324,7 +329,7 @@ def test_every_engine_of_a_report_has_a_mark_of_its_own(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """Whoever is drawn first, and in whatever process: the engine says its number."""
-    monkeypatch.setattr(svg, "NUMBERS", {})
+    monkeypatch.setattr(svg, "STYLE_NUMBERS", {})
     classes = "tests.support.hostile_class:"
     program = shlex.split(write_program(tmp_path, "plain"))
     (tmp_path / "engines.toml").write_text(
@@ -339,7 +344,7 @@ def test_every_engine_of_a_report_has_a_mark_of_its_own(
     ]
     assert len(engines) == 4
     names = [engine.name for engine in (*ENGINES, *load_further(), *engines)]
-    svg.NUMBERS.update(guests.list_numbers(engines))
+    svg.STYLE_NUMBERS.update(guests.list_numbers(engines))
     marks = {
         name: (svg.choose_style(name).symbol, svg.choose_style(name).marker)
         for name in names
@@ -349,12 +354,12 @@ def test_every_engine_of_a_report_has_a_mark_of_its_own(
         == len({marker for _, marker in marks.values()})
         == len(names)
     )
-    svg.NUMBERS.clear()
-    svg.NUMBERS.update(
+    svg.STYLE_NUMBERS.clear()
+    svg.STYLE_NUMBERS.update(
         guests.list_numbers(engines[1:])
     )  # a scene in which the first broke down
     assert svg.choose_style(names[-1]).symbol == marks[names[-1]][0]
-    assert all(svg.choose_style(name).variable in svg.LIGHT for name in names)
+    assert all(svg.choose_style(name).variable in svg.LIGHT_COLOURS for name in names)
 
 
 def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
@@ -413,7 +418,7 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
     assert "not compared: equilibria in 1 scene: too near" in " ".join(
         capsys.readouterr().out.split()
     )
-    text = write_markdown(summary)
+    text = write_summary_page(summary)
     table = text[text.index("| largest") :].splitlines()
     assert (
         table[0]

@@ -14,16 +14,16 @@ from fourbar_validation.compare.rows import (
     Row,
     write_results,
 )
-from fourbar_validation.engines.limits import LIMITS
+from fourbar_validation.engines.limits import BOUNDARIES
 from fourbar_validation.engines.registry import HARD_ENGINES, WORK, load_further
 from fourbar_validation.report.html import write_html
 from fourbar_validation.report.sections import (
-    LARGEST,
+    LARGEST_INLINE_PICTURE,
     collect_hard_cases,
     collect_sections,
 )
 from fourbar_validation.report.templating import count_or_size
-from fourbar_validation.scenes.hard_families import FAMILIES, Hard
+from fourbar_validation.scenes.hard_families import HARD_FAMILIES, Hard
 from tests.support.here import summary_of
 from tests.validation.report.test_report import demo, report
 
@@ -36,13 +36,13 @@ def test_every_scene_is_counted_in_its_family_alone() -> None:
     hard = Hard()
     rows = [judged(hard.name(index), AGREES) for index in range(len(hard))]
     table = {row[0]: row for row in collect_hard_cases(rows).rows}
-    for family in FAMILIES:
+    for family in HARD_FAMILIES:
         count = str(sum(1 for _ in family.scenes()))
         assert table[family.name][1:3] == (count, count) and table[family.name][7:] == (
             "holds",
             family.statement,
         )
-    assert set(table) == {family.name for family in FAMILIES}
+    assert set(table) == {family.name for family in HARD_FAMILIES}
 
 
 def test_a_failing_row_fails_its_family_in_the_report(tmp_path: Path) -> None:
@@ -99,8 +99,8 @@ def test_the_report_of_the_hard_suite_has_its_picture_every_statement_and_every_
         and 'href="#engine-limits"' in text
         and "<text>the picture</text>" in text
     )
-    assert all(escape(family.statement) in text for family in FAMILIES)
-    assert all(escape(limit.name) in text for limit in LIMITS)
+    assert all(escape(family.statement) in text for family in HARD_FAMILIES)
+    assert all(escape(limit.name) in text for limit in BOUNDARIES)
 
 
 def test_every_engine_says_what_its_time_goes_into() -> None:
@@ -117,7 +117,7 @@ def test_a_study_of_cost_next_to_the_report_is_part_of_it(tmp_path: Path) -> Non
     folder.mkdir(parents=True)
     (folder / "cost.csv").touch()
     (folder / "work-precision-torque.svg").write_text("<svg onload='alert(1)'/>")
-    (folder / "work-precision-force.svg").write_bytes(bytes(LARGEST + 1))
+    (folder / "work-precision-force.svg").write_bytes(bytes(LARGEST_INLINE_PICTURE + 1))
     _, text = report([demo(draw=False)], sections=collect_sections(None, tmp_path))
     assert "The study of demo" in text and 'href="cost/demo/cost.md"' in text
     data = base64.b64encode(b"<svg onload='alert(1)'/>").decode()

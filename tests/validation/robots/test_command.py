@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 import fourbar
 from fourbar.errors import InputError
-from fourbar_validation.robots.command import command
+from fourbar_validation.robots.command import robot_command
 from fourbar_validation.robots.options import read_pose
 from tests.whole.test_imports import ROOT
 
@@ -20,7 +20,7 @@ MODELS = ROOT / "models" / "robots"
 @pytest.mark.slow
 def test_a_line_for_each_closure() -> None:
     arguments = [str(MODELS / "gripper.xml")]
-    result = CliRunner().invoke(command, arguments, standalone_mode=False)
+    result = CliRunner().invoke(robot_command, arguments, standalone_mode=False)
     assert result.exception is None
     right, left = result.output.splitlines()
     assert right == (
@@ -35,7 +35,7 @@ def test_a_line_for_each_closure() -> None:
 @pytest.mark.slow
 def test_the_gap_is_that_of_the_stated_pose() -> None:
     arguments = [str(MODELS / "biped_foot.xml"), "--pose", "crank=20deg,knee=30deg"]
-    result = CliRunner().invoke(command, arguments, standalone_mode=False)
+    result = CliRunner().invoke(robot_command, arguments, standalone_mode=False)
     line, note = result.output.splitlines()
     assert line.startswith("rod: connect; ground ankle_frame; hinges rod, crank, ankle")
     # the crank turned by 20 deg carries the rod's end along: 2 . 0.31905 m sin(10 deg)
@@ -58,7 +58,7 @@ def test_a_scene_is_written_that_the_formulas_solve(tmp_path: Path) -> None:
     loop = "right_finger-right_follower"
     arguments = [str(MODELS / "gripper.xml"), "--loop", loop, "-o", str(out)]
     arguments += ["--speed", "60 rpm"]
-    result = CliRunner().invoke(command, arguments, standalone_mode=False)
+    result = CliRunner().invoke(robot_command, arguments, standalone_mode=False)
     assert result.exception is None
     assert result.output.splitlines()[-1] == f"written to {out}"
     text = out.read_text()
@@ -74,5 +74,5 @@ def test_a_speed_without_a_scene_is_refused() -> None:
     arguments = [str(MODELS / "gripper.xml"), "--speed", "1"]
     with pytest.raises(UsageError, match="--speed goes with -o"):
         CliRunner().invoke(
-            command, arguments, standalone_mode=False, catch_exceptions=False
+            robot_command, arguments, standalone_mode=False, catch_exceptions=False
         )

@@ -209,7 +209,7 @@ def test_a_million_copies_end_in_one_line(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """A robot may have <replicate>; what it becomes is bounded where it is compiled."""
-    monkeypatch.setattr(guard, "SECONDS", 5.0)
+    monkeypatch.setattr(guard, "ROBOT_SECONDS", 5.0)
     scene = ROOT / "models" / "crank_rocker.toml"
     text, path = write_mjcf(fourbar.load(scene)), tmp_path / "robot.xml"
     bodies = "<body><geom size='.1'/></body>"

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from fourbar_validation.advise.advise import command as advise
-from fourbar_validation.check.mjcf import command as check_mjcf
-from fourbar_validation.robots.command import command as loops
+from fourbar_validation.advise.advise import advise_command as advise
+from fourbar_validation.check.mjcf import check_mjcf_command as check_mjcf
+from fourbar_validation.robots.command import robot_command as loops
 
 FOOT = str(Path(__file__).parents[3] / "models" / "robots" / "biped_foot.xml")
 

@@ -10,7 +10,7 @@ import pytest
 
 import fourbar
 from fourbar.formulas.mobility import limit_positions
-from fourbar.quantities import FORCES
+from fourbar.quantities import FORCE_NAMES
 from fourbar.scene import Command, Scene, command, with_signs
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.compare.answer import Answer
@@ -194,9 +194,9 @@ def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is() -
         row = rows[quantity]
         noted = "1 positions at which dry friction reverses not judged" in row.reason
         assert (row.verdict, noted) == (
-            (AGREES, True) if quantity in FORCES else (FAILS, False)
+            (AGREES, True) if quantity in FORCE_NAMES else (FAILS, False)
         ), quantity
-        if quantity not in FORCES:
+        if quantity not in FORCE_NAMES:
             assert row.theta_2 == with_friction().motion.theta_2[AT_REST], quantity  # type: ignore[index]
 
 
@@ -310,7 +310,7 @@ def test_an_answer_that_the_formulas_withhold_is_not_compared() -> None:
         for quantity in COMPARED_QUANTITIES:
             row = rows[quantity]
             expected = (REFUSES, "the formulas state no value: 5 no_torque")
-            if quantity in FORCES:
+            if quantity in FORCE_NAMES:
                 assert (row.verdict, row.reason) == expected
             else:
                 said = EQUIVALENCE.explain(row.condition)
@@ -340,9 +340,9 @@ def test_beyond_the_range_of_doubles_what_was_before_is_judged() -> None:
         AnswersAnyway, Scene(heavy, fourbar.Motion(np.linspace(0.3, 2.0, 5), 10.0))
     )
     for quantity in COMPARED_QUANTITIES:
-        assert rows[quantity].verdict == (REFUSES if quantity in FORCES else AGREES), (
-            quantity
-        )
+        assert rows[quantity].verdict == (
+            REFUSES if quantity in FORCE_NAMES else AGREES
+        ), quantity
 
 
 class Counting(FreeBody):

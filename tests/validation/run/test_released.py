@@ -227,7 +227,7 @@ def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(
     scene = falling()
     shown: list[str] = []
     monkeypatch.setattr(
-        figures, "_draw_picture", lambda quantity, *_: shown.append(quantity) or ""
+        figures, "_draw_quantity", lambda quantity, *_: shown.append(quantity) or ""
     )
     figures.draw_scene_figure(Record("falling", scene, solution=solve(scene)))
     assert shown == ["theta_4", "F32"]

@@ -11,7 +11,7 @@ import pytest
 from fourbar_validation.compare.rows import AGREES, FAILS, Row
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.guests import STATED
+from fourbar_validation.engines.guests import STATED_BY_THE_ENGINE
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression.record import (
     Recorded,
@@ -61,7 +61,9 @@ def test_a_rule_that_is_weaker_than_before_stands_first(
     """Everything holds by the wider tolerance: the run is not green."""
     judge_here(monkeypatch)
     before = save(tmp_path / "before", [ROW])
-    stated = ErrorBound(STATED, "0.01 of the scale: fewer digits", 1e-2, False)
+    stated = ErrorBound(
+        STATED_BY_THE_ENGINE, "0.01 of the scale: fewer digits", 1e-2, False
+    )
     monkeypatch.setattr(
         "fourbar_validation.run.pool.judge_job",
         lambda job: Record(job.name, rows=[replace(ROW, allowed=1e-2)]),

@@ -10,12 +10,12 @@ import fourbar
 from fourbar.effects import Effect, Place
 from fourbar.linkage import FourBar
 from fourbar_validation.run import transformed
-from fourbar_validation.run.judge import ask
+from fourbar_validation.run.judge import ask_engines
 from fourbar_validation.run.transformed import (
     _CONVERTED,
     SCALE,
     TRANSFORMATIONS,
-    _Conversion,
+    _SceneConversion,
     check_transformed,
 )
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
@@ -61,7 +61,7 @@ SCENES = {
 
 
 def list_rows(scene: fourbar.Scene) -> dict[str, Any]:
-    question = ask("scene", scene, ())
+    question = ask_engines("scene", scene, ())
     return {row.quantity: row for row in check_transformed(question)}
 
 
@@ -76,8 +76,8 @@ def test_a_spring_whose_ends_nearly_meet_is_not_judged_there() -> None:
         scene = crank_rocker(
             motion=motion, loads=(), effects=(fourbar.Springs((spring,)),)
         )
-        question = ask("scene", scene, ())
-        few = transformed._take_few(question)
+        question = ask_engines("scene", scene, ())
+        few = transformed._take_plain_positions(question)
         rows.append(int(few.fit.sum()))
         assert not [row for row in list_rows(scene).values() if row.failed]
     assert rows == [2, 3]
@@ -119,7 +119,7 @@ def test_a_scene_has_the_same_numbers_however_it_is_stated(name: str) -> None:
 def test_what_cannot_be_stated_otherwise_is_said_with_its_reason(
     scene: fourbar.Scene, lines: list[str]
 ) -> None:
-    question = ask("scene", scene, ())
+    question = ask_engines("scene", scene, ())
     list(check_transformed(question))
     assert question.left_out == lines
 
@@ -205,7 +205,7 @@ def test_springs_that_are_wound_through_a_change_point_by_rounding_are_not_judge
     left_out = {}
     for d in (0.3 + 4 * np.spacing(0.3), 0.31):
         scene = fourbar.Scene(FourBar(d, *bars), motion, effects=(springs,))
-        question = ask("scene", scene, ())
+        question = ask_engines("scene", scene, ())
         assert bool(list(check_transformed(question))) == (d == 0.31)
         left_out[d] = [line for line in question.left_out if "wound" in line]
     assert [len(lines) for lines in left_out.values()] == [1, 0]
@@ -233,11 +233,11 @@ def test_one_number_that_differs_fails_its_row(
         return solution
 
     scene = crank_rocker(loads=LOADS, effects=EVERYTHING)
-    few = transformed._take_few(ask("scene", scene, ()))
+    few = transformed._take_plain_positions(ask_engines("scene", scene, ()))
     assert few is not None
     monkeypatch.setattr(transformed, "TRANSFORMATIONS", {name: TRANSFORMATIONS[name]})
     monkeypatch.setattr(transformed, "solve", differ)
-    (row,) = check_transformed(ask("scene", scene, ()))
+    (row,) = check_transformed(ask_engines("scene", scene, ()))
     assert row.failed and row.reason.endswith("worst in torque")
 
 
@@ -260,7 +260,7 @@ def test_a_place_of_the_coupler_is_read_from_its_other_pin() -> None:
     linkage = FourBar(
         0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22), ground_angle=0.2
     )
-    to = _Conversion(exchanged=True)
+    to = _SceneConversion(exchanged=True)
     twice = to.place(to.place(Place(3, (0.07, 0.4)), linkage), linkage)
     assert twice.from_pin == pytest.approx((0.07, 0.4))
     assert to.place(Place(2, (0.07, 0.4)), linkage) == Place(4, (0.07, 0.4))

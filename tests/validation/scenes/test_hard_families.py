@@ -20,7 +20,7 @@ from fourbar_validation.compare.compare import COMPARED_QUANTITIES
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, VERDICTS
 from fourbar_validation.compare.tolerance import EPS, FULL_ACCURACY, K, magnitude
 from fourbar_validation.engines.asking import ask_at
-from fourbar_validation.engines.limits import LIMITS
+from fourbar_validation.engines.limits import BOUNDARIES
 from fourbar_validation.engines.mujoco import shipped, simulate
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.shipped import compare_shipped
@@ -38,11 +38,11 @@ from fourbar_validation.run.judge import judge
 from fourbar_validation.run.released import make_pendulum
 from fourbar_validation.scenes import hard_families as families
 from fourbar_validation.scenes.hard_families import (
-    FAMILIES,
+    HARD_FAMILIES,
     TOGGLE,
     Family,
     Hard,
-    draw_linkage,
+    draw_lengths_of_type,
     dress,
     find_collinear_3_4,
     set_angles,
@@ -67,14 +67,14 @@ def test_the_suite_is_made_from_its_parameters_alone() -> None:
     for i in (0, len(first) // 2, len(first) - 1):
         assert fourbar.dump(first.scene(i)) == fourbar.dump(second.scene(i))
     assert {first.scene(i).source for i in range(len(first))} == {
-        family.statement for family in FAMILIES
+        family.statement for family in HARD_FAMILIES
     }
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "family",
-    [f for f in FAMILIES if f.name != "released"],
+    [f for f in HARD_FAMILIES if f.name != "released"],
     ids=lambda family: family.name,
 )
 def test_a_scene_of_each_family_holds(family: Family) -> None:
@@ -109,7 +109,7 @@ def _fewer(scene: Scene, steps: int = 12) -> Scene:
 
 
 def test_beyond_a_toggle_no_engine_finds_a_position() -> None:
-    lengths = draw_linkage(DrawnType.TRIPLE_ROCKER, 0)
+    lengths = draw_lengths_of_type(DrawnType.TRIPLE_ROCKER, 0)
     (psi, stretched), *_ = find_collinear_3_4(lengths)
     beyond = set_angles(
         dress(lengths), psi + (1.0 if stretched else -1.0) * np.array(TOGGLE)
@@ -141,7 +141,7 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
     They are those of theta_2, for every engine.
     """
     lengths, true = (
-        draw_linkage(DrawnType.TRIPLE_ROCKER, 0),
+        draw_lengths_of_type(DrawnType.TRIPLE_ROCKER, 0),
         fourbar_validation.run.question.solve,
     )
     (psi, stretched), *_ = find_collinear_3_4(lengths)
@@ -177,7 +177,7 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
 
 
 def test_an_answer_nearby_is_one_within_the_rounding_of_theta_2() -> None:
-    scene = dress(families.PLAIN)
+    scene = dress(families.ORDINARY_LENGTHS)
     command = fourbar.command(
         set_angles(scene, [0.7, 0.7 + 4.0 * 2.0**-52, 0.7 + 1e-13])
     )
@@ -193,7 +193,7 @@ def test_an_answer_nearby_has_the_sine_of_the_formulas() -> None:
 
     1e-9 rad from a limit position a sine of the formulas is met to its last digit.
     """
-    lengths = draw_linkage(DrawnType.TRIPLE_ROCKER, 0)
+    lengths = draw_lengths_of_type(DrawnType.TRIPLE_ROCKER, 0)
     (psi, stretched), *_ = find_collinear_3_4(lengths)
     near = set_angles(
         dress(lengths), psi + (-1.0 if stretched else 1.0) * np.array([0.3, 1e-3, 1e-9])
@@ -306,7 +306,7 @@ def _equivalence() -> Any:
 
 def test_near_a_toggle_a_wrong_force_fails_that_the_law_excuses() -> None:
     """1e-8 rad from a toggle K eps/s^3 allows all; roundings of the data allow 4e-5."""
-    lengths = draw_linkage(DrawnType.TRIPLE_ROCKER, 1)
+    lengths = draw_lengths_of_type(DrawnType.TRIPLE_ROCKER, 1)
     (psi, _), *_ = find_collinear_3_4(lengths)
     scene = set_angles(dress(lengths, 1), psi - 1e-8)
     assert verdict_of(Wrong, scene, None)[0] == AGREES
@@ -334,7 +334,7 @@ def test_predictions_know_what_no_law_in_sines_knows() -> None:
 
 
 def test_every_declared_limit_is_measured() -> None:
-    assert [limit.of for limit in MEASURED] == [*LIMITS]
+    assert [limit.of for limit in MEASURED] == [*BOUNDARIES]
 
 
 @pytest.mark.parametrize("limit", MEASURED, ids=lambda limit: limit.of.name)

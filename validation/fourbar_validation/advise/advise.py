@@ -26,20 +26,20 @@ from fourbar_validation.advise.matters import (
     write_sentence,
 )
 from fourbar_validation.advise.worst_errors import WorstErrors
-from fourbar_validation.compare.rows import make_plain
+from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.trial import (
     FEWEST_STEPS,
-    LONGEST,
-    ORDER,
-    SHORTEST,
+    LONGEST_TIME_CONSTANT,
+    ORDER_OF_RK4,
+    SHORTEST_TIME_CONSTANT,
     Trial,
     TrialSetup,
     describe_settings,
     guess,
     make_settings,
 )
-from fourbar_validation.report.terminal import make_table
+from fourbar_validation.report.terminal import make_words_table
 from fourbar_validation.robots.measure import (
     measure_robot,
     read_measure_options,
@@ -49,9 +49,9 @@ from fourbar_validation.robots.options import (
     pose_options,
     speed_option,
 )
-from fourbar_validation.robots.report import describe_advice, show
+from fourbar_validation.robots.report import describe_advice, show_block
 
-MARGIN = 0.7
+PART_OF_THE_ERROR = 0.7
 """Part of the required error within which the run must stay. Elsewhere the error may be
 larger.
 """
@@ -59,10 +59,10 @@ _CLOSE_ENOUGH = 1.15
 """Ratio at which the search stops. It is that of the least steps that serve to the most
 that do not.
 """
-BETWEEN = 180
+INTERVALS_READ = 180
 """Intervals of the sweep at which a run is read at least."""
 _MOST_TRIALS = 24
-MOST_STEPS = 16_000
+MOST_STEPS_OF_A_RUN = 16_000
 """Most steps of one run, a fifth of a second. An error that needs more steps counts as
 not reachable.
 """
@@ -70,13 +70,13 @@ ROBOTS = (".xml", ".mjcf")
 """Suffixes of a robot's file."""
 _LEAST_GAIN = 0.8
 """More steps that leave the error above this part of what it was have met a floor."""
-ROUNDS, TIMED_STEPS, TIMED_READINGS = 5, 200, 30
+TIMINGS_OF_A_KIND, STEPS_TIMED, READINGS_TIMED = 5, 200, 30
 """Timings of each kind of step, and what is timed at once."""
 _CHEAPER = 0.97
 """Part of the work below which a kind of step counts as cheaper. Less is the noise of
 its timing.
 """
-Kind = Callable[[Settings], Settings]
+KindOfStep = Callable[[Settings], Settings]
 """Function that changes what a step costs: solver, flywheel, integrator, pads."""
 
 
@@ -90,35 +90,35 @@ def _lighten(flywheel: float, settings: Settings) -> Settings:
     return replace(settings, tolerance=1e-8, iterations=100, flywheel=flywheel)
 
 
-def _leave_out_pads(kind: Kind, settings: Settings) -> Settings:
+def _leave_out_pads(kind: KindOfStep, settings: Settings) -> Settings:
     return replace(kind(settings), pad=None)
 
 
-def _integrate(integrator: str, settings: Settings) -> Settings:
+def _change_integrator(integrator: str, settings: Settings) -> Settings:
     """Integrate by first order, with a closure as stiff as it carries."""
     return replace(
         settings,
         integrator=integrator,
         iterations=1,
-        time_constant_steps=SHORTEST,
+        time_constant_steps=SHORTEST_TIME_CONSTANT,
     )
 
 
-FIRST_ORDER = ("Euler", "implicitfast")
-KINDS: dict[str, Kind] = {
+INTEGRATORS_OF_FIRST_ORDER = ("Euler", "implicitfast")
+KINDS_OF_STEP: dict[str, KindOfStep] = {
     **{
         f"flywheel {flywheel:g}": partial(_lighten, flywheel)
         for flywheel in (1e2, 1e3, 1e4)
     },
     "one iteration": _solve_once,
     "no pads": partial(_leave_out_pads, partial(_lighten, 1e2)),
-    **{name: partial(_integrate, name) for name in FIRST_ORDER},
+    **{name: partial(_change_integrator, name) for name in INTEGRATORS_OF_FIRST_ORDER},
 }
 """Kinds of step that are tried beside RK4 with tolerance 0, ten iterations and pads."""
 
 
 @dataclass(frozen=True, slots=True)
-class Attempt:
+class SearchRun:
     """One run of the search."""
 
     settings: Settings
@@ -143,11 +143,11 @@ class _Advice:
     """Settings that reach a required error, or the most accurate ones tried."""
 
     required: float
-    best: Attempt
+    best: SearchRun
     """Cheapest attempt that reaches the required error. It is the most accurate one if
     none does.
     """
-    attempts: tuple[Attempt, ...]
+    attempts: tuple[SearchRun, ...]
     reached: bool
 
     def cells(self) -> tuple[str, str, str]:
@@ -180,8 +180,9 @@ class _Advice:
         if self.reached:
             return f"{setting}. {errors}; required: {self.required:g}."
         return (
-            f"No setting of plain MJCF within {MOST_STEPS} steps was found to reach"
-            f" {self.required:g}. The best was {setting}. {errors}. The formulas, and"
+            f"No setting of plain MJCF within {MOST_STEPS_OF_A_RUN} steps was found"
+            f" to reach {self.required:g}."
+            f" The best was {setting}. {errors}. The formulas, and"
             " inverse dynamics of either engine with loop multipliers, reach"
             " round-off."
         )
@@ -211,25 +212,30 @@ def choose_positions(scene: Scene) -> Command:
     command = command_of(scene)
     if np.ptp(command.branch) != 0:
         return command
-    between = np.linspace(command.theta_2.min(), command.theta_2.max(), BETWEEN + 1)
+    between = np.linspace(
+        command.theta_2.min(), command.theta_2.max(), INTERVALS_READ + 1
+    )
     theta_2 = np.union1d(command.theta_2, between)
     return command._replace(
         angle=theta_2, branch=np.full(theta_2.shape, command.branch[0], dtype=np.int8)
     )
 
 
-def _time_attempt(setup: TrialSetup, attempt: Attempt) -> float:
+def _time_attempt(setup: TrialSetup, attempt: SearchRun) -> float:
     """Time the steps and readings of an attempt, CPU seconds.
 
     The time of each is the least of several rounds.
     """
     time_steps, time_readings = setup.make_clocks(attempt.settings)
-    step = min(time_steps(TIMED_STEPS) for _ in range(ROUNDS)) / TIMED_STEPS
-    reading = min(time_readings(TIMED_READINGS) for _ in range(ROUNDS)) / TIMED_READINGS
+    step = min(time_steps(STEPS_TIMED) for _ in range(TIMINGS_OF_A_KIND)) / STEPS_TIMED
+    reading = (
+        min(time_readings(READINGS_TIMED) for _ in range(TIMINGS_OF_A_KIND))
+        / READINGS_TIMED
+    )
     return attempt.steps * step + attempt.readings * reading
 
 
-def _describe_time(setup: TrialSetup, attempt: Attempt) -> str:
+def _describe_time(setup: TrialSetup, attempt: SearchRun) -> str:
     """Write the CPU time of a simulated second and of a revolution."""
     seconds = _time_attempt(setup, attempt)
     second = 1e3 * seconds / setup.simulated_seconds
@@ -248,7 +254,7 @@ class _CheapestSearch:
         self.scene = scene
         self.error = error
         self.setup = setup
-        self.attempts: list[Attempt] = []
+        self.attempts: list[SearchRun] = []
         self.reading_cost = 0.0
         """CPU time of a reading, in steps as those of `Attempt.step_cost`."""
 
@@ -261,7 +267,9 @@ class _CheapestSearch:
         first, tc = guess(self.error)
         self._bisect(tc, first)
         for factor in (0.5, 2.0, 4.0):
-            constant = min(max(tc * factor, SHORTEST), LONGEST)
+            constant = min(
+                max(tc * factor, SHORTEST_TIME_CONSTANT), LONGEST_TIME_CONSTANT
+            )
             if constant != tc:
                 self._polish(constant)
         if self._list_served():
@@ -273,7 +281,7 @@ class _CheapestSearch:
             best = _find_nearest(self.attempts)
         return _Advice(self.error, best, tuple(self.attempts), bool(served))
 
-    def _work(self, attempt: Attempt) -> float:
+    def _work(self, attempt: SearchRun) -> float:
         """Return the CPU time of a run with its readings, in steps."""
         return attempt.steps * attempt.step_cost + attempt.readings * self.reading_cost
 
@@ -285,21 +293,21 @@ class _CheapestSearch:
         start = min(self._list_served(), key=lambda attempt: attempt.steps)
         settings = start.settings
         costs = self._time_kinds(settings)
-        for name in sorted(KINDS, key=costs.__getitem__):
+        for name in sorted(KINDS_OF_STEP, key=costs.__getitem__):
             cheapest = min(map(self._work, self._list_served()))
             left = _CHEAPER * cheapest - start.readings * self.reading_cost
             part = left / (costs[name] * start.steps)
             # with fewer steps than positions each step has a reading
             both = costs[name] + self.reading_cost
             part = max(part, _CHEAPER * cheapest / (both * start.steps))
-            if name not in FIRST_ORDER:
+            if name not in INTEGRATORS_OF_FIRST_ORDER:
                 # of the same order: what serves needs no fewer steps by much
                 part = min(part, 1.0)
             n = settings.steps_per_revolution * part
             tc = settings.time_constant_steps
             if n < FEWEST_STEPS or part < 1.0 / _CLOSE_ENOUGH:
                 continue
-            kind = KINDS[name]
+            kind = KINDS_OF_STEP[name]
             cost = costs[name]
             if self._serves(self._try(n, tc, kind, cost)):
                 self._bisect(tc, n / _CLOSE_ENOUGH, serves=n, kind=kind, cost=cost)
@@ -311,15 +319,15 @@ class _CheapestSearch:
         """
         variants = {
             "": settings,
-            **{name: kind(settings) for name, kind in KINDS.items()},
+            **{name: kind(settings) for name, kind in KINDS_OF_STEP.items()},
         }
         clocks = {name: self.setup.make_clocks(s) for name, s in variants.items()}
         times: dict[str, list[float]] = {name: [] for name in variants}
         readings = []
-        for _ in range(ROUNDS):
+        for _ in range(TIMINGS_OF_A_KIND):
             for name, (time_steps, _) in clocks.items():
-                times[name].append(time_steps(TIMED_STEPS) / TIMED_STEPS)
-            readings.append(clocks[""][1](TIMED_READINGS) / TIMED_READINGS)
+                times[name].append(time_steps(STEPS_TIMED) / STEPS_TIMED)
+            readings.append(clocks[""][1](READINGS_TIMED) / READINGS_TIMED)
         base = min(times.pop(""))
         self.reading_cost = min(readings) / base
         return {name: min(values) / base for name, values in times.items()}
@@ -340,17 +348,17 @@ class _CheapestSearch:
         tc: float,
         n: float,
         serves: float | None = None,
-        kind: Kind | None = None,
+        kind: KindOfStep | None = None,
         cost: float = 1.0,
     ) -> None:
         """Narrow down the least steps per revolution at one time constant."""
         fails: float | None = None
-        last: Attempt | None = None
+        last: SearchRun | None = None
         for _ in range(_MOST_TRIALS):
             attempt = self._try(n, tc, kind, cost)
-            ratio = attempt.errors.worst / (MARGIN * self.error)
+            ratio = attempt.errors.worst / (PART_OF_THE_ERROR * self.error)
             if ratio < float("inf"):
-                step = ratio ** (1.0 / ORDER)
+                step = ratio ** (1.0 / ORDER_OF_RK4)
             else:
                 step = 2.0
             if self._serves(attempt):
@@ -366,7 +374,7 @@ class _CheapestSearch:
                 fails = n
                 last = attempt
                 ahead = n * min(max(step, _CLOSE_ENOUGH), 3.0)
-                if attempt.steps >= MOST_STEPS:
+                if attempt.steps >= MOST_STEPS_OF_A_RUN:
                     return
             if serves is not None and fails is not None:
                 if serves / fails <= _CLOSE_ENOUGH:
@@ -376,7 +384,7 @@ class _CheapestSearch:
                 return
             n = max(ahead, FEWEST_STEPS)
 
-    def _is_floored(self, before: Attempt, after: Attempt) -> bool:
+    def _is_floored(self, before: SearchRun, after: SearchRun) -> bool:
         """Tell whether more steps bought nothing."""
         worst = after.errors.worst
         return (
@@ -385,24 +393,24 @@ class _CheapestSearch:
             and after.steps > 1.3 * before.steps
         )
 
-    def _serves(self, attempt: Attempt) -> bool:
-        return attempt.errors.worst <= MARGIN * self.error
+    def _serves(self, attempt: SearchRun) -> bool:
+        return attempt.errors.worst <= PART_OF_THE_ERROR * self.error
 
-    def _list_served(self) -> list[Attempt]:
+    def _list_served(self) -> list[SearchRun]:
         return [attempt for attempt in self.attempts if self._serves(attempt)]
 
     def _try(
-        self, n: float, tc: float, kind: Kind | None = None, cost: float = 1.0
-    ) -> Attempt:
+        self, n: float, tc: float, kind: KindOfStep | None = None, cost: float = 1.0
+    ) -> SearchRun:
         settings = make_settings(n, tc)
         if kind is not None:
             settings = kind(settings)
         steps = self.setup.steps(settings)
-        if steps > MOST_STEPS:
-            fewer = settings.steps_per_revolution * MOST_STEPS / steps
+        if steps > MOST_STEPS_OF_A_RUN:
+            fewer = settings.steps_per_revolution * MOST_STEPS_OF_A_RUN / steps
             settings = replace(settings, steps_per_revolution=fewer)
         trial = self.setup.try_out(settings)
-        attempt = Attempt(
+        attempt = SearchRun(
             settings,
             max(trial.steps, 1),
             trial.readings,
@@ -428,7 +436,7 @@ def _find_speed_error(setup: TrialSetup, trial: Trial) -> float:
     return float(np.max(np.abs(np.abs(omega_2) - due)) / np.max(due))
 
 
-def _find_nearest(attempts: Sequence[Attempt]) -> Attempt:
+def _find_nearest(attempts: Sequence[SearchRun]) -> SearchRun:
     return min(attempts, key=lambda a: a.errors.worst)
 
 
@@ -445,15 +453,15 @@ def _advise_robot(
     measurement = measure_robot(files[-1], options, scene, assets)
     reached = True
     for measured in measurement.loops:
-        click.echo(make_plain(f"{measured.name}, driven by {measured.joint}"))
+        click.echo(escape_controls(f"{measured.name}, driven by {measured.joint}"))
         assert measured.advice is not None
         for block in describe_advice(measured.advice):
-            show(block)
+            show_block(block)
         for remark in measured.remarks:
-            click.echo(make_plain(f"note: {measured.name}: {remark}"))
+            click.echo(escape_controls(f"note: {measured.name}: {remark}"))
         reached &= measured.advice.reached
     for note in measurement.notes:
-        click.echo(make_plain(f"note: {note}"))
+        click.echo(escape_controls(f"note: {note}"))
     return 0 if reached else 1
 
 
@@ -480,7 +488,7 @@ def _advise_robot(
     type=click.Path(path_type=Path, dir_okay=False),
     help="Write the MJCF of one SCENE.",
 )
-def command(
+def advise_command(
     scenes: tuple[Path, ...],
     loop: str | None,
     wanted: float,
@@ -554,5 +562,5 @@ def command(
         from rich.console import Console
 
         head = ("scene", "error", "steps/turn", "tc, steps", "matters most")
-        Console().print(make_table(head, rows, show_edge=False))
+        Console().print(make_words_table(head, rows, show_edge=False))
     return 0 if reached else 1

@@ -10,19 +10,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fourbar.mjcf import Settings
-from fourbar.mjcf.document import LIGHT, compute_load_ratio, compute_mass_ratio
+from fourbar.mjcf.document import (
+    LIGHT_BAR_RATIO,
+    compute_load_ratio,
+    compute_mass_ratio,
+)
+from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
 from fourbar.solving import solve
 from fourbar_validation.advise.worst_errors import (
-    NO_ANSWER,
+    INFINITE_ERRORS,
     WorstErrors,
     compute_errors,
     mark_far_from_poles,
 )
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.mujoco.trial import (
-    LONGEST,
-    SHORTEST,
+    LONGEST_TIME_CONSTANT,
+    SHORTEST_TIME_CONSTANT,
     Trial,
     TrialSetup,
 )
@@ -35,7 +39,7 @@ _SPLINE = 7
 """Degree of the curve through what was read at the steps. Its error falls faster with
 the steps than that of RK4.
 """
-IN_LINE = 0.3
+NEAR_A_TOGGLE = 0.3
 """Least |sin(theta_4 - theta_3)| at which the timestep does not feel bars 3 and 4.
 Below it they speed up too much.
 """
@@ -77,7 +81,7 @@ def judge_trial(scene: Scene, trial: Trial) -> WorstErrors:
     There are none if MuJoCo lost the motion.
     """
     if trial.broken:
-        return NO_ANSWER
+        return INFINITE_ERRORS
     errors = [compute_errors(scene, trial.at, trial.quantities)]
     for samples, steps in trial.segments:
         errors += _compute_errors_between(scene, trial, samples, steps)
@@ -109,7 +113,7 @@ def _compute_errors_between(
     if len(theta_2) < 2 or not all(
         np.isfinite(values).all() for values in read.values()
     ):
-        yield NO_ANSWER
+        yield INFINITE_ERRORS
         return
     branch = trial.at.branch[samples][first]
     at_steps = Command(theta_2, branch, read["omega_2"], read["alpha_2"])
@@ -167,10 +171,10 @@ def measure_influences(
     scene: Scene, setup: TrialSetup, settings: Settings
 ) -> list[SettingInfluence]:
     """List every setting changed alone, the one that matters most first."""
-    before, before_at_steps = _measure(scene, setup, settings)
+    before, before_at_steps = _measure_errors(scene, setup, settings)
     influences = []
-    for name, changed, varied, why in _describe_changes(scene, settings):
-        worst, at_steps = _measure(scene, setup, varied)
+    for name, changed, varied, why in _describe_setting(scene, settings):
+        worst, at_steps = _measure_errors(scene, setup, varied)
         if before > 0.0 and math.isfinite(before):
             times = worst / before
         else:
@@ -186,7 +190,7 @@ def measure_influences(
     )
 
 
-def _measure(
+def _measure_errors(
     scene: Scene, setup: TrialSetup, settings: Settings
 ) -> tuple[float, float]:
     """Return the worst error at the steps and between them, and at the steps alone."""
@@ -207,7 +211,7 @@ def write_sentence(influences: list[SettingInfluence]) -> str:
     )
 
 
-def _describe_changes(
+def _describe_setting(
     scene: Scene, settings: Settings
 ) -> Iterator[tuple[str, str, Settings, Reason]]:
     """Say what is changed to what, and what a growth of the error would come from."""
@@ -218,7 +222,7 @@ def _describe_changes(
         settings, steps_per_revolution=steps / 2.0, steps_per_window=window
     )
     yield "the timestep", "twice as long", coarse, _explain_timestep
-    if tc / 2.0 >= SHORTEST / 2.0:
+    if tc / 2.0 >= SHORTEST_TIME_CONSTANT / 2.0:
         stiff = replace(settings, time_constant_steps=tc / 2.0)
         yield (
             "the closure's time constant",
@@ -229,7 +233,7 @@ def _describe_changes(
                 " proportion to (h/tc)^4"
             ),
         )
-    if 2.0 * tc <= LONGEST:
+    if 2.0 * tc <= LONGEST_TIME_CONSTANT:
         slow = replace(settings, time_constant_steps=2.0 * tc)
         yield (
             "the closure's time constant",
@@ -265,7 +269,7 @@ def _explain_timestep(setup: TrialSetup, times: float, growth: float) -> str:
     motion = solve(setup.scene, "position", at=setup.command)
     sines = np.abs(motion.sin_mu)
     nearest = int(np.nanargmin(sines))
-    if sines[nearest] < IN_LINE:
+    if sines[nearest] < NEAR_A_TOGGLE:
         near, angle = (
             math.degrees(x)
             for x in (math.asin(sines[nearest]), float(setup.command.theta_2[nearest]))
@@ -286,7 +290,7 @@ def _find_yielding(scene: Scene, what: str) -> str:
     """Describe what makes a soft closure yield in this scene."""
     loads = compute_load_ratio(scene)
     masses = compute_mass_ratio(scene.linkage)
-    if masses > LIGHT:
+    if masses > LIGHT_BAR_RATIO:
         return (
             f"{what} is soft at the lighter of coupler and output, whose inertia is"
             f" {masses:.1e} times smaller"

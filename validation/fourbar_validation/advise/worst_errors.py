@@ -10,11 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.quantities import OK
+from fourbar.quantities import OK, Array
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.compare import mark_turning
 from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import find_error
@@ -42,8 +41,8 @@ class WorstErrors(NamedTuple):
         return max(self)
 
 
-QUANTITIES = WorstErrors._fields
-NO_ANSWER = WorstErrors(*[math.inf] * len(QUANTITIES))
+ERROR_NAMES = WorstErrors._fields
+INFINITE_ERRORS = WorstErrors(*[math.inf] * len(ERROR_NAMES))
 
 
 def compute_errors(
@@ -57,16 +56,16 @@ def compute_errors(
     scale is that of the same positions.
     """
     if not np.isfinite(command.theta_2).all():
-        return NO_ANSWER
+        return INFINITE_ERRORS
     formulas = solve(scene, "force", at=command)
     judged = (formulas.status_code == OK) & _mark_far(scene, formulas)
     if not judged.any():
-        return NO_ANSWER
+        return INFINITE_ERRORS
     if not judged.all():
-        command = _take_rows(command, judged)
+        command = _take_positions(command, judged)
         formulas = solve(scene, "force", at=command)
     worst = {}
-    for field in QUANTITIES:
+    for field in ERROR_NAMES:
         if field == "torque":
             name = name_driving(scene)
         else:
@@ -95,7 +94,7 @@ def _mark_far(scene: Scene, formulas: Solution) -> NDArray[np.bool_]:
     return mark_turning(speed)
 
 
-def _take_rows(command: Command, rows: NDArray[np.bool_]) -> Command:
+def _take_positions(command: Command, rows: NDArray[np.bool_]) -> Command:
     """Return the command at some of its positions."""
     n = len(command.theta_2)
     speed, acceleration = (

@@ -3,4 +3,4 @@
 Each row is held against the formulas.
 """
 
-from fourbar_validation.check.check import check as check
+from fourbar_validation.check.check import check_command as check_command

@@ -21,24 +21,24 @@ from numpy.typing import NDArray
 from fourbar.effects import Gravity
 from fourbar.errors import FourBarError
 from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import FORCES, PIN_FORCES, VECTORS
+from fourbar.quantities import FORCE_NAMES, PIN_FORCES, VECTORS, Array
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.check.judge import Judge, Mistake
-from fourbar_validation.check.theirs import Array, name_quantity
+from fourbar_validation.check.theirs import name_quantity
 
-Values = dict[str, Array]
+MistakenNumbers = dict[str, Array]
 """Numbers that a mistake leads to, by quantity; others stay right."""
-PAIRS = {"F12": (1, 2), "F32": (3, 2), "F43": (4, 3), "F14": (1, 4)}
+FORCE_BETWEEN = {"F12": (1, 2), "F32": (3, 2), "F43": (4, 3), "F14": (1, 4)}
 """Bar that exerts each pin force, and bar on which it acts."""
 _CHAINS = {"B": ((2, 3), (4,)), "A": ((2,), (4, 3)), "O4": ((2, 3, 4),)}
 """Pins at which a loop is cut into a tree, the commonest first: the chains of bars that
 are left, each from the ground on.
 """
-ENOUGH = 3
+ENOUGH_POSITIONS = 3
 """Columns or positions that a hypothesis with a number in it needs."""
-SOFT = 1e-6
+SOFT_TORQUE = 1e-6
 """Part of the torque that a soft constraint still carries at rest. It is that of
 MuJoCo's inverse dynamics of a loop; 2e-8 was seen.
 """
@@ -73,9 +73,9 @@ class _BarWrenches(NamedTuple):
 
     def about_pin(self, bar: int) -> Array:
         """Compute the moment that a bar needs about its first pin, N m."""
-        return self.q[bar] + cross(self.arms[bar], self.p[bar])
+        return self.q[bar] + cross_vectors(self.arms[bar], self.p[bar])
 
-    def solve(self) -> Values:
+    def solve(self) -> MistakenNumbers:
         """Solve the three free bodies.
 
         Moments about the first pins of bars 2, 3 and 4, where T_k is the drive's couple
@@ -88,9 +88,9 @@ class _BarWrenches(NamedTuple):
         a, b, c = (self.bars[bar] for bar in MOVING_BARS)
         lever = {2: a, 3: b, 4: -c}
         moment = {bar: self.about_pin(bar) for bar in MOVING_BARS}
-        moment[2] = moment[2] + cross(a, self.p[3])
+        moment[2] = moment[2] + cross_vectors(a, self.p[3])
         one, other = (bar for bar in MOVING_BARS if bar != self.drive_bar)
-        det = cross(lever[one], lever[other])[:, None]
+        det = cross_vectors(lever[one], lever[other])[:, None]
         F43 = (
             moment[one][:, None] * lever[other] - moment[other][:, None] * lever[one]
         ) / det
@@ -101,10 +101,10 @@ class _BarWrenches(NamedTuple):
             "F32": F32,
             "F12": self.p[2] - F32,
             "F14": self.p[4] + F43,
-            "torque": moment[driven] - cross(lever[driven], F43),
+            "torque": moment[driven] - cross_vectors(lever[driven], F43),
         }
 
-    def cut(self, pin: str) -> Values:
+    def cut(self, pin: str) -> MistakenNumbers:
         """Solve the tree that a cut at a pin leaves: no force is passed there.
 
         Its torque is that of the joint by which the driven bar hangs on the ground or
@@ -141,11 +141,11 @@ class _BarWrenches(NamedTuple):
         torque = np.zeros(len(A))
         for bar in chain[place:]:
             arm = first_pins[bar] - joint
-            torque = torque + self.about_pin(bar) + cross(arm, self.p[bar])
+            torque = torque + self.about_pin(bar) + cross_vectors(arm, self.p[bar])
         return torque
 
 
-def cross(u: Array, v: Array) -> Array:
+def cross_vectors(u: Array, v: Array) -> Array:
     """Compute the z component of the cross product of vectors, (n, 2)."""
     return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
 
@@ -183,7 +183,9 @@ def find_wrenches(scene: Scene, right: Solution) -> _BarWrenches:
         arms[bar], bars[bar] = G - first[bar], second[bar] - first[bar]
         at_first, at_second = acting[bar]
         p[bar] = at_first + at_second
-        q[bar] = cross(first[bar] - G, at_first) + cross(second[bar] - G, at_second)
+        q[bar] = cross_vectors(first[bar] - G, at_first) + cross_vectors(
+            second[bar] - G, at_second
+        )
     q[scene.drive_bar] = q[scene.drive_bar] + np.asarray(right.torque)
     return _BarWrenches(arms, bars, p, q, scene.drive_bar)
 
@@ -215,10 +217,12 @@ class _Calculation:
         how = "the loop force is 0, as from mj_inverse or rnea of a loop"
         for pin, values in trees.items():
             text = f"forces and torque of the open tree, cut at {pin}: {how}"
-            yield _state(text, values, left=SOFT)
+            yield _state(text, values, left=SOFT_TORQUE)
         for pin, values in trees.items():
             text = f"torque of the open tree, cut at {pin}: {how}"
-            yield _state(text, {"torque": values["torque"]}, whole=False, left=SOFT)
+            yield _state(
+                text, {"torque": values["torque"]}, whole=False, left=SOFT_TORQUE
+            )
 
     def _frames(self) -> Iterator[Mistake]:
         ways = {
@@ -226,13 +230,13 @@ class _Calculation:
             "each force is in the frame of the bar that exerts it": 0,
         }
         for text, side in ways.items():
-            frames = {name: bars[side] for name, bars in PAIRS.items()}
+            frames = {name: bars[side] for name, bars in FORCE_BETWEEN.items()}
             yield _state(f"{text}, not in world axes", self._turned(frames))
         for bar in (1, *MOVING_BARS):
             text = f"forces are in the frame of bar {bar}, not in world axes"
-            yield _state(text, self._turned(dict.fromkeys(PAIRS, bar)))
+            yield _state(text, self._turned(dict.fromkeys(FORCE_BETWEEN, bar)))
 
-    def _turned(self, frames: dict[str, int]) -> Values:
+    def _turned(self, frames: dict[str, int]) -> MistakenNumbers:
         theta: dict[int, Array] = {
             bar: getattr(self.right, f"theta_{bar}") for bar in MOVING_BARS
         }
@@ -261,7 +265,7 @@ class _Calculation:
         with np.errstate(divide="ignore", invalid="ignore"):
             gain = np.asarray(right.alpha_2) / np.asarray(right.omega_2)
         wrenches = self.wrenches
-        moved = Values()
+        moved = MistakenNumbers()
         for bar in (3, 4):
             alpha = gain * getattr(right, f"omega_{bar}")
             more = alpha - getattr(right, f"alpha_{bar}")
@@ -292,7 +296,7 @@ class _Calculation:
         }
         for text, (part, times) in parts.items():
             wrenches = self.wrenches
-            moved = Values()
+            moved = MistakenNumbers()
             for bar in MOVING_BARS:
                 wrenches, a_G = self._accelerate(wrenches, bar, times * part[bar])
                 moved |= a_G
@@ -306,7 +310,7 @@ class _Calculation:
 
     def _accelerate(
         self, wrenches: _BarWrenches, bar: int, a: Array, alpha: Array | float = 0.0
-    ) -> tuple[_BarWrenches, Values]:
+    ) -> tuple[_BarWrenches, MistakenNumbers]:
         """Return the wrenches and a_G of a bar under an added acceleration.
 
         `a` and `alpha` are added to its acceleration.
@@ -337,7 +341,7 @@ class _Calculation:
             without = solve(replace(scene, loads=others), "force", at=self.judge.at)
             bar = load.bar
             force = find_wrenches(scene, without).p[bar] - self.wrenches.p[bar]
-            moment = cross(self.wrenches.arms[bar], force)
+            moment = cross_vectors(self.wrenches.arms[bar], force)
             name = f"load {number + 1} (bar {bar})"
             what = "its place"
             if load.arm is not None:
@@ -352,7 +356,7 @@ class _Calculation:
                 more = turn(force, theta) - force
                 r, phi = load.arm
                 arm = np.array([[r * np.cos(phi), r * np.sin(phi)]])
-                turned = self.wrenches.changed(bar, -more, -cross(arm, more))
+                turned = self.wrenches.changed(bar, -more, -cross_vectors(arm, more))
                 yield _state(
                     f"{name}: its direction turns with the bar", turned.solve()
                 )
@@ -382,7 +386,7 @@ def find_miscalculated(judge: Judge) -> Iterator[Mistake]:
 
 
 def _state(
-    text: str, values: Values, *, whole: bool = True, left: float = 0.0
+    text: str, values: MistakenNumbers, *, whole: bool = True, left: float = 0.0
 ) -> Mistake:
     def predict(quantity: str, right: Solution) -> Array | None:
         return values.get(quantity)
@@ -391,7 +395,7 @@ def _state(
 
 
 def _state_with_forces(
-    text: str, moved: Values, wrenches: _BarWrenches
+    text: str, moved: MistakenNumbers, wrenches: _BarWrenches
 ) -> Iterator[Mistake]:
     """State a mistake in accelerations.
 
@@ -407,11 +411,11 @@ def _find_impulses(judge: Judge) -> Iterator[Mistake]:
     ours = []
     theirs = []
     for key in judge.table.values:
-        if name_quantity(key) in FORCES:
+        if name_quantity(key) in FORCE_NAMES:
             mask = judge.where(key)
             ours.append(judge.ours(key)[mask].ravel())
             theirs.append(judge.table.values[key][mask].ravel())
-    if len(ours) < ENOUGH:
+    if len(ours) < ENOUGH_POSITIONS:
         return
     x = np.concatenate(ours)
     y = np.concatenate(theirs)
@@ -424,13 +428,13 @@ def _find_impulses(judge: Judge) -> Iterator[Mistake]:
             time = float(x @ y) / squares
         else:
             time = math.nan
-    if len(x) < ENOUGH:
+    if len(x) < ENOUGH_POSITIONS:
         return
     if not 0.0 < time < 1.0:
         return
 
     def predict(quantity: str, right: Solution) -> Array | None:
-        if quantity in FORCES:
+        if quantity in FORCE_NAMES:
             values = getattr(right, quantity, None)
         else:
             values = None
@@ -445,9 +449,9 @@ def _find_impulses(judge: Judge) -> Iterator[Mistake]:
 def _find_late(judge: Judge) -> Iterator[Mistake]:
     """Give each position the numbers of the one before, or of the one after."""
     n = len(judge.at.theta_2)
-    if n < ENOUGH + 1:
+    if n < ENOUGH_POSITIONS + 1:
         return
-    of_forces: Callable[[str], bool] = (*FORCES, *PIN_FORCES).__contains__
+    of_forces: Callable[[str], bool] = (*FORCE_NAMES, *PIN_FORCES).__contains__
     for text, step in _LATE.items():
         rows = np.clip(np.arange(n) - step, 0, n - 1)
         edge = 0 if step == 1 else n - 1

@@ -18,10 +18,10 @@ from fourbar_validation.check.judge import Allowance, Discrepancy, Judge
 from fourbar_validation.check.mistakes import NEARER, Explanation, explain
 from fourbar_validation.check.problem import check_problem
 from fourbar_validation.check.theirs import TheirTable, name_quantity, read_table
-from fourbar_validation.compare.rows import make_plain
+from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.compare.tolerance import EPS, magnitude
 from fourbar_validation.report.junit import JunitCase, write_document
-from fourbar_validation.report.terminal import make_table
+from fourbar_validation.report.terminal import make_words_table
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,7 @@ class Judgement:
                 if finding.quantity == quantity and finding.judged
             ]
             if allowed:
-                digits = _count_digits(max(allowed))
+                digits = _count_compared_digits(max(allowed))
                 fewest.setdefault(digits, []).append(quantity)
         if len(fewest) == 1:
             (digits,) = fewest
@@ -124,7 +124,7 @@ class Judgement:
         return explained >= {finding.quantity for finding in self.differing}
 
 
-def _count_digits(allowed: float) -> int:
+def _count_compared_digits(allowed: float) -> int:
     """Count the digits that an allowed relative error leaves to compare by."""
     return max(0, math.floor(-math.log10(max(allowed, EPS))))
 
@@ -180,7 +180,7 @@ def judge_table(
     return Judgement(findings, judge.without_answer(), explanations, tolerance)
 
 
-def write_json(judgement: Judgement, table: TheirTable) -> str:
+def write_judgement_json(judgement: Judgement, table: TheirTable) -> str:
     """Return one object in SI units: counts, and every number that differs.
 
     Each has theirs and ours, and what explains it.
@@ -214,10 +214,10 @@ def write_junit(judgement: Judgement, name: str) -> str:
 
     It is a failure if a number differs, and skipped if none could be judged.
     """
-    return write_document(judgement.sentence(), _list_cases(judgement, name))
+    return write_document(judgement.sentence(), _list_cases_of_table(judgement, name))
 
 
-def _list_cases(judgement: Judgement, name: str) -> Iterator[JunitCase]:
+def _list_cases_of_table(judgement: Judgement, name: str) -> Iterator[JunitCase]:
     by_quantity = {
         quantity: [f for f in judgement.findings if f.quantity == quantity]
         for quantity in dict.fromkeys(f.quantity for f in judgement.findings)
@@ -264,7 +264,7 @@ def _list_cases(judgement: Judgement, name: str) -> Iterator[JunitCase]:
         )
 
 
-SHOWN = 3
+MOST_SHOWN_OF_EACH = 3
 
 
 def _write_extent(explanation: Explanation) -> str:
@@ -281,7 +281,7 @@ def _write_extent(explanation: Explanation) -> str:
     return "; ".join(parts)
 
 
-@click.command()
+@click.command("check")
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.argument("theirs", type=click.Path(path_type=Path))
 @click.option(
@@ -303,7 +303,7 @@ def _write_extent(explanation: Explanation) -> str:
     type=click.Path(path_type=Path, dir_okay=False),
     help="Write it as JUnit too.",
 )
-def check(
+def check_command(
     scene: Path,
     theirs: Path,
     rtol: float | None,
@@ -352,31 +352,31 @@ def check(
     table = table.from_pin(stated.origin)
     judgement = judge_table(stated, table, tolerance)
     if json is not None:
-        write_text(json, write_json(judgement, table))
+        write_text(json, write_judgement_json(judgement, table))
     if junit is not None:
         write_text(junit, write_junit(judgement, theirs.name))
-    show(judgement, table, theirs.name)
+    show_judgement(judgement, table, theirs.name)
     return judgement.status
 
 
-def show(judgement: Judgement, table: TheirTable, name: str) -> None:
+def show_judgement(judgement: Judgement, table: TheirTable, name: str) -> None:
     """Print what differs, what explains it, and the count."""
     from rich.console import Console
     from rich.markup import escape
 
     console = Console(soft_wrap=True)
     for note in table.notes:
-        console.print(escape(make_plain(note)))
+        console.print(escape(escape_controls(note)))
     for why in dict.fromkeys(table.left_out.values()):
         headings = ", ".join(
             heading for heading, reason in table.left_out.items() if reason == why
         )
-        console.print(f"left out ({why}): {escape(make_plain(headings))}")
+        console.print(f"left out ({why}): {escape(escape_controls(headings))}")
     differing = judgement.differing
     if differing:
         title = (
-            f"{escape(make_plain(name))}: what differs, the {SHOWN} worst of each"
-            " quantity"
+            f"{escape(escape_controls(name))}: what differs,"
+            f" the {MOST_SHOWN_OF_EACH} worst of each quantity"
         )
         head = (
             "line",
@@ -398,7 +398,9 @@ def show(judgement: Judgement, table: TheirTable, name: str) -> None:
             for each in _choose_worst(differing)
         ]
         console.print(
-            make_table(head, rows, title=title, show_edge=False, padding=(0, 1, 0, 0))
+            make_words_table(
+                head, rows, title=title, show_edge=False, padding=(0, 1, 0, 0)
+            )
         )
         counted = Counter(finding.quantity for finding in differing)
         console.print(
@@ -431,7 +433,9 @@ def _choose_worst(differing: list[Discrepancy]) -> list[Discrepancy]:
     for finding in sorted(differing, key=lambda f: -f.error):
         by_quantity.setdefault(finding.quantity, []).append(finding)
     return [
-        finding for findings in by_quantity.values() for finding in findings[:SHOWN]
+        finding
+        for findings in by_quantity.values()
+        for finding in findings[:MOST_SHOWN_OF_EACH]
     ]
 
 
@@ -457,4 +461,4 @@ def _write_in_their_unit(finding: Discrepancy, table: TheirTable) -> tuple[str, 
     written = (
         ", ".join(f"{x:.{digits}g}" for x in numbers) for numbers in (theirs, ours)
     )
-    return f"{finding.quantity} [{make_plain(unit.text)}]", *written
+    return f"{finding.quantity} [{escape_controls(unit.text)}]", *written

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fourbar.quantities import FORCES
+from fourbar.quantities import FORCE_NAMES
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.engines.description import ModelEntry, Value
 
-SAME = 1e-12
+SAME_NUMBER = 1e-12
 """Relative difference of a number that is computed in another order of operations."""
 _SAME_SOFTNESS = 1e-9
 """Relative difference that is round-off. It follows from the places of both bodies in
@@ -23,9 +23,9 @@ the world, which cost digits.
 """
 _TENFOLD = 1e-9
 """Relative distance from a power of ten at which a ratio is called one."""
-ONE_SIDED = ("loads.", "tendons.", "actuators.")
+ENTRIES_THAT_MAY_LACK = ("loads.", "tendons.", "actuators.")
 """Entries that a file may lack: what is missing on one side is a difference."""
-NOTHING: dict[str, Value] = {".force": (0.0, 0.0), ".couple": 0.0}
+MISSING_LOAD: dict[str, Value] = {".force": (0.0, 0.0), ".couple": 0.0}
 """Value of a load that is missing."""
 _REMARKS = tomllib.loads(
     Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
@@ -95,17 +95,17 @@ def find_differences(
         ours = generated.get(key)
         yours_entry = theirs.get(key)
         if (ours is None or yours_entry is None) and not (
-            key.startswith(ONE_SIDED) or key.endswith(".motor")
+            key.startswith(ENTRIES_THAT_MAY_LACK) or key.endswith(".motor")
         ):
             # one of the files has no use for it, like solver parameters of no friction
             continue
         nothing = next(
-            (value for end, value in NOTHING.items() if key.endswith(end)), None
+            (value for end, value in MISSING_LOAD.items() if key.endswith(end)), None
         )
         mine, yours = (
             nothing if entry is None else entry.value for entry in (ours, yours_entry)
         )
-        if _is_same(key, mine, yours, length):
+        if _is_same_value(key, mine, yours, length):
             continue
         if yours_entry is not None:
             written = f"{yours_entry.element} {yours_entry.attribute}".strip()
@@ -145,7 +145,7 @@ def _collect_errors(rows: Sequence[Row]) -> dict[tuple[str, str], float]:
     return {
         (row.engine, row.quantity): row.error if math.isfinite(row.error) else math.inf
         for row in rows
-        if row.quantity in FORCES
+        if row.quantity in FORCE_NAMES
     }
 
 
@@ -172,7 +172,9 @@ def _is_length(key: str) -> bool:
     return key.startswith("lengths.") and not key.endswith("angle")
 
 
-def _is_same(key: str, ours: Value | None, theirs: Value | None, length: float) -> bool:
+def _is_same_value(
+    key: str, ours: Value | None, theirs: Value | None, length: float
+) -> bool:
     if (
         isinstance(ours, str)
         or isinstance(theirs, str)
@@ -188,7 +190,8 @@ def _is_same(key: str, ours: Value | None, theirs: Value | None, length: float) 
     if key.endswith("angle"):
         return bool(
             np.all(
-                np.abs(np.remainder(first - second + np.pi, math.tau) - np.pi) <= SAME
+                np.abs(np.remainder(first - second + np.pi, math.tau) - np.pi)
+                <= SAME_NUMBER
             )
         )
     placed = any(part in key for part in ("centre", "plane", ".point", ".path"))
@@ -201,7 +204,7 @@ def _is_same(key: str, ours: Value | None, theirs: Value | None, length: float) 
     if key == "closure.softness":
         same = _SAME_SOFTNESS
     else:
-        same = SAME
+        same = SAME_NUMBER
     return bool(
         np.all(
             np.abs(first - second)

@@ -16,17 +16,17 @@ from numpy.typing import NDArray
 from fourbar.effects import Gravity, Load
 from fourbar.errors import FourBarError
 from fourbar.linkage import Bar
-from fourbar.quantities import FORCES, UNITS, VECTORS
+from fourbar.quantities import FORCE_NAMES, UNITS, VECTORS, Array
 from fourbar.quantities.units import find_factor
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.check.judge import Judge, Mistake
-from fourbar_validation.check.theirs import OTHER_UNITS, Array, name_quantity
+from fourbar_validation.check.theirs import OTHER_UNITS, name_quantity
 from fourbar_validation.compare.tolerance import compute_difference, replace_zero_size
 from fourbar_validation.scenes.hard_families import replace_bars
 
-ENOUGH = 3
+ENOUGH_NUMBERS = 3
 """Numbers that a fitted one must explain: fewer are explained by chance."""
 CARRIED = 2.0
 """Factor on what is allowed. A fitted number carries the rounding of the numbers it was
@@ -40,21 +40,21 @@ _FACTORS = {
     4.0: "m L^2/3, of a slender bar about its end, where m L^2/12 is right",
 }
 """Factors of a moment of inertia, and the mistake behind each."""
-VANISHING = 1e-9
+LEAST_FACTOR = 1e-9
 """Least factor. What a smaller one multiplies was left out, which is a mistake of its
 own.
 """
-PLAIN = 1e-2
+NEAR_A_PLAIN_NUMBER = 1e-2
 """Relative distance within which a fitted number is tried as a plain one."""
-GRID = 72
+OFFSETS_TRIED = 72
 """Offsets of the crank angle that are tried before one is fitted, 5 deg apart."""
 _TRIED = 37
 """Rows by which the offsets are tried."""
 NEWTON = 12
 """Steps of the fit; it is quadratic, and starts within 5 deg."""
-STEP = 1e-6
+FIT_STEP = 1e-6
 """Step of the finite difference from which the fit finds its slope, rad."""
-MOST_ROWS = 1000
+MOST_ROWS_REORDERED = 1000
 """Rows among which another order is looked for. Every one is held against every other.
 """
 
@@ -64,7 +64,7 @@ def find_fitted(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
     yield from _find_ratios(judge, differing)
     yield from _try_exchanged(differing)
     yield from _try_order(judge)
-    if any(name_quantity(key) in FORCES for key in differing):
+    if any(name_quantity(key) in FORCE_NAMES for key in differing):
         yield from _try_factors(judge, differing)
     yield from _try_offset(judge)
 
@@ -90,7 +90,7 @@ def _find_ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
         ratio_found = _name_ratio(
             judge, key, announced.text, announced.factor, unit, near
         )
-        if ratio_found is None and np.count_nonzero(ours) >= ENOUGH and near:
+        if ratio_found is None and np.count_nonzero(ours) >= ENOUGH_NUMBERS and near:
             ratio_found = _round_ratio(judge, key, near)
         if ratio_found is not None:
             group = next((g for g in by_ratio if g[0] == ratio_found[0]), ratio_found)
@@ -112,7 +112,7 @@ def _name_ratio(
     for unit_tried in OTHER_UNITS.get(unit, ()):
         ratio = math.copysign(factor / find_factor(unit, unit_tried), near)
         if (
-            abs(near / ratio - 1.0) < PLAIN
+            abs(near / ratio - 1.0) < NEAR_A_PLAIN_NUMBER
             and abs(ratio) != 1.0
             and judge.explained(key, ratio * judge.ours(key))
         ):
@@ -177,7 +177,7 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
     Forces and torque are linear in each.
     """
     scene = judge.scene
-    keys = [key for key in differing if name_quantity(key) in FORCES]
+    keys = [key for key in differing if name_quantity(key) in FORCE_NAMES]
     keys = [
         key for key in keys if not key.startswith("|")
     ] or keys  # a magnitude is linear in none of them
@@ -187,7 +187,7 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
             for key in keys
         ]
     )
-    if np.count_nonzero(theirs) < ENOUGH:
+    if np.count_nonzero(theirs) < ENOUGH_NUMBERS:
         return
     bars = ("input", "coupler", "output")
     inertia = (
@@ -228,11 +228,16 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
                 factor = 1.0 + float(moves @ theirs) / slope
             else:
                 factor = math.nan
-            if not VANISHING < factor < math.inf or factor == 1.0:
+            if not LEAST_FACTOR < factor < math.inf or factor == 1.0:
                 continue
             if word == inertia[0]:
                 plain = next(
-                    (f for f in _FACTORS if abs(factor / f - 1.0) < PLAIN), None
+                    (
+                        f
+                        for f in _FACTORS
+                        if abs(factor / f - 1.0) < NEAR_A_PLAIN_NUMBER
+                    ),
+                    None,
                 )
             else:
                 plain = None
@@ -324,23 +329,25 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
             parts.append(np.where(np.isfinite(theirs), scaled, 0.0).reshape(m, -1))
         return np.concatenate(parts, axis=1)
 
-    if sum(np.count_nonzero(judge.where(key)) for key in keys) < ENOUGH:
+    if sum(np.count_nonzero(judge.where(key)) for key in keys) < ENOUGH_NUMBERS:
         return
-    tried = 2.0 * np.pi * np.arange(1, GRID) / GRID
+    tried = 2.0 * np.pi * np.arange(1, OFFSETS_TRIED) / OFFSETS_TRIED
     sizes = np.mean(
         np.minimum(np.abs(np.nan_to_num(residuals(tried, rows), nan=1.0)), 1.0), axis=1
     )
     offset = float(tried[np.argmin(sizes)])
     everything = np.arange(len(judge.at.theta_2))
     for _ in range(NEWTON):
-        here, more, less = residuals(offset + np.array([0.0, STEP, -STEP]), everything)
-        slope = (more - less) / (2.0 * STEP)
+        here, more, less = residuals(
+            offset + np.array([0.0, FIT_STEP, -FIT_STEP]), everything
+        )
+        slope = (more - less) / (2.0 * FIT_STEP)
         finite = np.isfinite(here) & np.isfinite(slope)
         if not finite.any() or not (size := float(slope[finite] @ slope[finite])):
             return
         step = float(slope[finite] @ here[finite]) / size
         offset -= step
-        if abs(step) < STEP**2:
+        if abs(step) < FIT_STEP**2:
             break
     offset = math.remainder(offset, 2.0 * np.pi)
     wrong = solve(
@@ -368,7 +375,7 @@ def _try_order(judge: Judge) -> Iterator[Mistake]:
     keys = [
         key for key in table.values if judge.where(key).all() and judge.size(key).all()
     ]
-    if not ENOUGH <= n <= MOST_ROWS or not keys:
+    if not ENOUGH_NUMBERS <= n <= MOST_ROWS_REORDERED or not keys:
         return
     apart = np.zeros((n, n))
     for key in keys:

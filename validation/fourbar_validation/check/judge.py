@@ -9,29 +9,27 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import InputError
 from fourbar.formulas.mobility import TURN
-from fourbar.quantities import OK
+from fourbar.quantities import OK, Array
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.scene import require_input
 from fourbar.solution import Solution
 from fourbar.solving import solve
-from fourbar_validation.check.theirs import Array, TheirTable, name_quantity
+from fourbar_validation.check.theirs import TheirTable, name_quantity
 from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import (
     EPS,
     EQUIVALENCE,
     NOTHING_TO_TELL,
+    Mask,
     compute_difference,
     divide,
     find_condition,
     magnitude,
     replace_zero_size,
 )
-
-Mask = NDArray[np.bool_]
 
 _OWN_MOTION = ("omega_2", "alpha_2")
 _AS_PRINTED = 4.0 * EPS

@@ -14,14 +14,13 @@ from fourbar.effects import Gravity, Load
 from fourbar.errors import FourBarError
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import Bar
-from fourbar.quantities import FORCES, VECTORS
+from fourbar.quantities import FORCE_NAMES, VECTORS, Array
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.check.calculated import find_miscalculated
-from fourbar_validation.check.fitted import ENOUGH, find_fitted
+from fourbar_validation.check.fitted import ENOUGH_NUMBERS, find_fitted
 from fourbar_validation.check.judge import Judge, Mistake
-from fourbar_validation.check.theirs import Array
 from fourbar_validation.scenes.hard_families import list_moving, replace_bars
 
 RPM = np.pi / 30.0
@@ -32,7 +31,7 @@ _GRAVITY_TURNED = {
     "turned by -90 deg": -np.pi / 2.0,
 }
 """Directions that gravity may be given, by their angle from the right one."""
-SHOWN = 5
+MOST_EXPLANATIONS = 5
 """Explanations that are printed."""
 NEARER = 10.0
 """Ratio of improvement above which a mistake is named. It then explains not all, but
@@ -113,7 +112,7 @@ def _scale_inertial(scene: Scene, command: Command) -> Iterator[Mistake]:
         by_mass: float, by_inertia: float
     ) -> Callable[[str, Solution], Array | None]:
         def predict(quantity: str, right: Solution) -> Array | None:
-            if quantity not in FORCES:
+            if quantity not in FORCE_NAMES:
                 return None
             extra = (by_mass - 1.0) * getattr(of_mass, quantity) + (
                 by_inertia - 1.0
@@ -215,7 +214,11 @@ def _change_loads(scene: Scene) -> Iterator[tuple[str, Scene]]:
     def reversing(i: int) -> Scene:
         return replace(
             scene,
-            loads=(*scene.loads[:i], _reverse(scene.loads[i]), *scene.loads[i + 1 :]),
+            loads=(
+                *scene.loads[:i],
+                _reverse_load(scene.loads[i]),
+                *scene.loads[i + 1 :],
+            ),
         )
 
     names = [
@@ -227,7 +230,7 @@ def _change_loads(scene: Scene) -> Iterator[tuple[str, Scene]]:
     if len(names) > 1:
         yield (
             "the loads are reversed",
-            replace(scene, loads=tuple(map(_reverse, scene.loads))),
+            replace(scene, loads=tuple(map(_reverse_load, scene.loads))),
         )
     yield from ((f"{name} is reversed", reversing(i)) for i, name in enumerate(names))
     for i, (name, load) in enumerate(zip(names, scene.loads, strict=True)):
@@ -256,7 +259,7 @@ def _change_bars(scene: Scene) -> Iterator[tuple[str, Scene]]:
             yield f"every bar: {text}", replace_bars(scene, **changed_bars)
 
 
-def _reverse(load: Load) -> Load:
+def _reverse_load(load: Load) -> Load:
     if load.force is None:
         force = None
     else:
@@ -273,7 +276,7 @@ def _measure_from_other_pin(bar: Bar) -> Bar | None:
     return None
 
 
-def _rotate(bar: Bar) -> Bar | None:
+def _rotate_bar(bar: Bar) -> Bar | None:
     r, phi = bar.mass_centre
     if bar.mass and r:
         return replace(bar, centre=(r, phi + np.pi))
@@ -293,7 +296,7 @@ _BAR_MISTAKES: tuple[tuple[str, Callable[[Bar], Bar | None]], ...] = (
         "mass centre taken at mid-bar",
         lambda bar: replace(bar, centre=(bar.length / 2.0, 0.0)) if bar.mass else None,
     ),
-    ("mass centre turned by 180 deg about the bar's first pin", _rotate),
+    ("mass centre turned by 180 deg about the bar's first pin", _rotate_bar),
     ("mass centre on the other side of the bar's line", _mirror),
     (
         "inertia about the pin used as the inertia about G",
@@ -399,7 +402,7 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
                 after = judge.judged(key, predicted)[0]
                 mask = judge.where(key)
                 enough = int((before > allowed)[mask].sum()) >= min(
-                    ENOUGH, int(mask.sum())
+                    ENOUGH_NUMBERS, int(mask.sum())
                 )
                 if enough and np.all(
                     (after <= np.maximum(before / NEARER, allowed))[mask]
@@ -417,5 +420,5 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
                 )
             )
     return sorted(explanations, key=lambda e: (-len(e.quantities), -len(e.nearer)))[
-        :SHOWN
+        :MOST_EXPLANATIONS
     ]

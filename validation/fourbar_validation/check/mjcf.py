@@ -14,7 +14,7 @@ import click
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.quantities import FORCES, PIN_FORCES, UNKNOWNS
+from fourbar.quantities import FORCE_NAMES, PIN_FORCES, UNKNOWNS, Array
 from fourbar.scene import Scene
 from fourbar.solving import solve
 from fourbar.writing import write_text
@@ -33,30 +33,29 @@ from fourbar_validation.compare.rows import (
     FAILS,
     Counts,
     Row,
-    make_plain,
+    escape_controls,
     write_results,
 )
 from fourbar_validation.compare.tolerance import (
     SIMULATED,
     TIMES_PREDICTED,
-    Array,
     ErrorBound,
     Mask,
     hold_simulated,
 )
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
-from fourbar_validation.report.templating import render, write_number
-from fourbar_validation.report.terminal import make_table
+from fourbar_validation.report.templating import render, write_error
+from fourbar_validation.report.terminal import make_words_table
 from fourbar_validation.robots.files import is_four_bar_alone, read_robot
 from fourbar_validation.robots.guard import examine_guarded
 from fourbar_validation.robots.measure import (
-    find_worst,
+    find_worst_of_loop,
     measure_robot,
     read_measure_options,
 )
 from fourbar_validation.robots.mimic import measure_mimic, show_mimic
 from fourbar_validation.robots.options import (
-    FILE,
+    ROBOT_PATH,
     loop_option,
     pose_options,
     speed_option,
@@ -76,15 +75,17 @@ _ADVICE = (
     "What to type into the file for an error E, if its settings are the cause: "
     "fourbar-validation advise SCENE FILE.xml --error E"
 )
-JUDGED = tuple(name for name in UNKNOWNS if name not in ("alpha_3", "alpha_4"))
+JUDGED_QUANTITIES = tuple(
+    name for name in UNKNOWNS if name not in ("alpha_3", "alpha_4")
+)
 """Quantities that a file is held to. A soft loop lets the bars accelerate by themselves
 for an instant; what that does to the torque and the pin forces is judged there.
 """
-HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
-_EXAMINE = "fourbar_validation.engines.mujoco.theirs:examine"
+MODEL_HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
+_EXAMINE = "fourbar_validation.engines.mujoco.theirs:examine_file"
 _CHANGED = "fourbar_validation.engines.mujoco.theirs:examine_changed"
 _MENDED = "fourbar_validation.engines.mujoco.theirs:examine_mended"
-SOFTNESS = "fourbar_validation.engines.mujoco.theirs:predict_softness"
+SOFTNESS_ENTRY = "fourbar_validation.engines.mujoco.theirs:predict_softness"
 _BY_STIFFEST = (
     "as what MuJoCo's stiffest constraint (solimp 0.9999) leaves in this file"
 )
@@ -104,7 +105,7 @@ class _CostOfModel:
         return f"{self.row.engine} {self.row.setting}"
 
     def cells(self) -> tuple[str, ...]:
-        """Return the rows under HEADINGS; a row without an error says why."""
+        """Return the rows under MODEL_HEADINGS; a row without an error says why."""
         row = self.row
         if not math.isnan(row.error):
             verdict = row.verdict
@@ -112,9 +113,9 @@ class _CostOfModel:
             verdict = f"{row.verdict}: {row.reason}"
         return (
             row.quantity,
-            write_number(row.error),
-            write_number(self.generated),
-            write_number(row.allowed),
+            write_error(row.error),
+            write_error(self.generated),
+            write_error(row.allowed),
             verdict,
         )
 
@@ -138,7 +139,7 @@ class ModelReport:
             errors = {
                 cost.row.quantity: cost.row.error
                 for cost in self.costs
-                if cost.method == method and cost.row.quantity in FORCES
+                if cost.method == method and cost.row.quantity in FORCE_NAMES
             }
             if not errors or any(math.isnan(error) for error in errors.values()):
                 continue
@@ -146,19 +147,19 @@ class ModelReport:
                 name: errors.pop(name) for name in [*errors] if name not in PIN_FORCES
             }
             parts = [
-                f"{name} is off by {write_number(error)}"
+                f"{name} is off by {write_error(error)}"
                 for name, error in driving.items()
             ]
             if errors:
                 worst = max(errors, key=lambda name: errors[name])
                 parts.append(
-                    f"the worst pin force, {worst}, by {write_number(errors[worst])}"
+                    f"the worst pin force, {worst}, by {write_error(errors[worst])}"
                 )
             yield f"{method}: {', '.join(parts)}, of its largest value."
         soft = [cost.row for cost in self.costs if cost.row.verdict == DEGRADED]
         if soft and not self.counts[FAILS]:
             softest = max(soft, key=lambda row: row.error)
-            left = write_number(softest.allowed / TIMES_PREDICTED)
+            left = write_error(softest.allowed / TIMES_PREDICTED)
             yield (
                 "The file is right as far as MuJoCo's constraints let it be: the "
                 f"stiffest (solimp 0.9999) leaves {left} of {softest.quantity} in it."
@@ -172,7 +173,7 @@ class ModelReport:
         return Counts(cost.row for cost in self.costs)
 
 
-def _read_names(pairs: tuple[str, ...]) -> dict[str, str]:
+def _read_role_names(pairs: tuple[str, ...]) -> dict[str, str]:
     """Read ROLE=NAME pairs of the command line."""
     allowed = ("input", "coupler", "output", "B3", "B4")
     names = {}
@@ -216,7 +217,7 @@ def examine_model(
         softness: dict[str, float] = {}
         rows = _list_rows(name, scene, theirs.answers, tolerance)
         if wanted is None and any(row.failed for row in rows):
-            softness = examined(SOFTNESS, scene, file, theirs.names)
+            softness = examined(SOFTNESS_ENTRY, scene, file, theirs.names)
             rows = _list_rows(name, scene, theirs.answers, tolerance, softness)
         costs = [
             _CostOfModel(row, ours.get((row.engine, row.quantity), math.nan))
@@ -224,7 +225,7 @@ def examine_model(
         ]
         differences = find_differences(generated.described, theirs.described)
         if any(row.failed for row in rows):
-            differences = _price(
+            differences = _price_differences(
                 name, scene, file, theirs, differences, rows, tolerance, examined
             )
     if parts := list_unread(file.text):
@@ -234,7 +235,7 @@ def examine_model(
     return ModelReport(order(differences), costs, [*theirs.notes, *unread])
 
 
-def _price(
+def _price_differences(
     name: str,
     scene: Scene,
     file: RobotFile,
@@ -287,7 +288,7 @@ def _list_rows(
     def predicted(quantity: str, mask: Mask) -> Array:
         return np.full(len(mask), (softness or {}).get(quantity, 0.0))
 
-    held = Demands(tolerance, JUDGED)
+    held = Demands(tolerance, JUDGED_QUANTITIES)
     if softness:
         held = held._replace(predicted=predicted, method=f", {_BY_STIFFEST}")
     rows = []
@@ -297,7 +298,7 @@ def _list_rows(
     return rows
 
 
-def show(report: ModelReport, mjcf: Path, out: Path) -> None:
+def show_model_report(report: ModelReport, mjcf: Path, out: Path) -> None:
     """Print the report and write theirs.md and results.csv."""
     from rich.console import Console
     from rich.markup import escape
@@ -308,26 +309,26 @@ def show(report: ModelReport, mjcf: Path, out: Path) -> None:
         console.print("It differs in nothing from the generated MJCF.")
     else:
         console.print(
-            f"{escape(make_plain(mjcf.name))} against the generated MJCF, the dearest"
-            " difference first"
+            f"{escape(escape_controls(mjcf.name))} against the generated MJCF,"
+            " the dearest difference first"
         )
         console.print(f"[dim]{_ABOUT_COSTS}[/]\n")
     for difference in report.differences:
         console.print(
-            f"{difference.price:>16}  {escape(make_plain(difference.line()))}"
+            f"{difference.price:>16}  {escape(escape_controls(difference.line()))}"
         )
         for text in (
             f"in the file: {difference.written}" if difference.written else "",
             difference.remark,
         ):
             if text:
-                console.print(Padding(escape(make_plain(text)), (0, 0, 0, 18)))
+                console.print(Padding(escape(escape_controls(text)), (0, 0, 0, 18)))
     for note in report.notes:
-        console.print(f"note: {escape(make_plain(note))}")
+        console.print(f"note: {escape(escape_controls(note))}")
     for method in report.methods():
         costs = [cost for cost in report.costs if cost.method == method]
-        table = make_table(
-            HEADINGS,
+        table = make_words_table(
+            MODEL_HEADINGS,
             (cost.cells() for cost in costs),
             title=f"what it costs, {escape(method)}: error",
         )
@@ -338,23 +339,25 @@ def show(report: ModelReport, mjcf: Path, out: Path) -> None:
                 shown.style = ""
         console.print(table)
     out.mkdir(parents=True, exist_ok=True)
-    write_text(out / "theirs.md", write_markdown(report, mjcf))
+    write_text(out / "theirs.md", write_model_page(report, mjcf))
     write_results([cost.row for cost in report.costs], out / "results.csv")
     for sentence in report.sentences():
         console.print(sentence)
     sentence = (
         f"{report.counts.sentence()}. It differs in {len(report.differences)} entries"
     )
-    console.print(f"[bold]{sentence}[/]; written to {escape(make_plain(str(out)))}")
+    console.print(
+        f"[bold]{sentence}[/]; written to {escape(escape_controls(str(out)))}"
+    )
 
 
-def write_markdown(report: ModelReport, mjcf: Path) -> str:
+def write_model_page(report: ModelReport, mjcf: Path) -> str:
     """Write the same as text for a page."""
     what = {
         "report": report,
         "mjcf": mjcf.name,
         "about": _ABOUT_COSTS,
-        "headings": ("method", *HEADINGS),
+        "headings": ("method", *MODEL_HEADINGS),
     }
     what |= {"differences": [difference.cells() for difference in report.differences]}
     what |= {"costs": [(cost.method, *cost.cells()) for cost in report.costs]}
@@ -362,7 +365,9 @@ def write_markdown(report: ModelReport, mjcf: Path) -> str:
 
 
 @click.command(name="check-mjcf")
-@click.argument("files", metavar="[SCENE] FILE.xml", nargs=-1, required=True, type=FILE)
+@click.argument(
+    "files", metavar="[SCENE] FILE.xml", nargs=-1, required=True, type=ROBOT_PATH
+)
 @click.option(
     "--name",
     "names",
@@ -407,7 +412,7 @@ def write_markdown(report: ModelReport, mjcf: Path) -> str:
         " and robot.csv of loops."
     ),
 )
-def command(
+def check_mjcf_command(
     files: tuple[Path, ...],
     names: tuple[str, ...],
     loop: str | None,
@@ -445,10 +450,12 @@ def command(
         options = read_measure_options(loop, wanted, robot)
         measurement = measure_robot(theirs, options, scene, assets)
         report_measurement(measurement, theirs, out)
-        worst = max(map(find_worst, measurement.loops))
+        worst = max(map(find_worst_of_loop, measurement.loops))
         return int(wanted is not None and not worst <= wanted)
-    examined = examine_model(name, scene, theirs, _read_names(names), wanted, assets)
-    show(examined, theirs, out)
+    examined = examine_model(
+        name, scene, theirs, _read_role_names(names), wanted, assets
+    )
+    show_model_report(examined, theirs, out)
     return examined.counts.status
 
 

@@ -13,16 +13,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fourbar.errors import FAILED, HOLDS, InputError
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import PIN_FORCES, Array
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar.writing import read_text
-from fourbar_validation.compare.answer import Array
-from fourbar_validation.compare.rows import make_plain, write_one_line
+from fourbar_validation.compare.rows import escape_controls, write_one_line
 from fourbar_validation.compare.tolerance import EPS, K, magnitude
 from fourbar_validation.engines import protocol
 
-SCHEMA = "fourbar-problem/3"
+PROBLEM_SCHEMA = "fourbar-problem/3"
 RESULT = "fourbar-result/1"
 LEVELS = {"A": 1e-9, "B": 1e-6, "C": 1e-3}
 """Largest error of each level, over the largest value; D is worse. Error bars of the
@@ -30,7 +29,7 @@ problem are allowed.
 """
 WORSE = "D"
 MISSING = "-"
-GROUPS = {
+QUANTITIES_OF_GROUP = {
     "reactions": (*PIN_FORCES, "guide_force"),
     "torque": ("torque", "drive_force"),
     "frequency": ("frequency",),
@@ -40,11 +39,11 @@ SAFE = 8.0
 """Factor on the error bars of the formulas, which are estimates. Against many digits an
 answer is up to 6.6 of them off.
 """
-LARGEST_FILE = 10**7
+LARGEST_PROBLEM_FILE = 10**7
 """Bytes."""
 
 
-class Judged(NamedTuple):
+class JudgedQuantity(NamedTuple):
     """One quantity of a result, where it is worst."""
 
     quantity: str
@@ -59,7 +58,7 @@ class Judged(NamedTuple):
 
 def read_problem(path: str | Path) -> dict[str, Any]:
     """Read a problem; InputError names what is wrong."""
-    problem = _read(path, SCHEMA)
+    problem = _read_document(path, PROBLEM_SCHEMA)
     for name in ("answers", "errors", "scene", "command"):
         if not isinstance(problem.get(name), dict):
             raise InputError(name, problem.get(name), "must be an object", str(path))
@@ -68,7 +67,7 @@ def read_problem(path: str | Path) -> dict[str, Any]:
 
 def read_result(path: str | Path, problem: dict[str, Any]) -> dict[str, Any]:
     """Read somebody's answers to a problem; InputError names what is wrong."""
-    answered = _read(path, RESULT)
+    answered = _read_document(path, RESULT)
     if not isinstance(answered.get("answers"), dict):
         raise InputError(
             "answers",
@@ -86,8 +85,8 @@ def read_result(path: str | Path, problem: dict[str, Any]) -> dict[str, Any]:
     return answered
 
 
-def _read(path: str | Path, schema: str) -> dict[str, Any]:
-    text = read_text(path, "JSON file", LARGEST_FILE)
+def _read_document(path: str | Path, schema: str) -> dict[str, Any]:
+    text = read_text(path, "JSON file", LARGEST_PROBLEM_FILE)
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -104,7 +103,9 @@ def _read(path: str | Path, schema: str) -> dict[str, Any]:
     return data
 
 
-def judge(problem: dict[str, Any], answered: dict[str, Any]) -> list[Judged]:
+def judge_answers(
+    problem: dict[str, Any], answered: dict[str, Any]
+) -> list[JudgedQuantity]:
     """Judge every quantity that a problem asks for.
 
     One that is missing has the level "-".
@@ -133,7 +134,7 @@ def _answer_at(
         )
     scene = protocol.scene_from_json(problem["scene"])
     scene, command = protocol.command_from_json(scene, problem["command"])
-    made = protocol.read_motion(motion, command)
+    made = protocol.read_answered_motion(motion, command)
     answers, errors = collect_answers(solve(scene, "error", at=made))
     return {name: values.tolist() for name, values in answers.items()}, {
         k: v.tolist() for k, v in errors.items()
@@ -160,8 +161,11 @@ def collect_answers(solution: Solution) -> tuple[dict[str, Array], dict[str, Arr
     return {name: getattr(solution, name) for name in bars}, bars
 
 
-def _judge_quantity(name: str, values: Any, errors: Any, theirs: Any) -> Judged:
-    group = next((group for group, names in GROUPS.items() if name in names), "motion")
+def _judge_quantity(name: str, values: Any, errors: Any, theirs: Any) -> JudgedQuantity:
+    group = next(
+        (group for group, names in QUANTITIES_OF_GROUP.items() if name in names),
+        "motion",
+    )
     ours = np.array(values, dtype=float)
     try:
         answered = np.array(theirs, dtype=float)
@@ -172,7 +176,7 @@ def _judge_quantity(name: str, values: Any, errors: Any, theirs: Any) -> Judged:
         or not np.isfinite(answered).all()
         or theirs is None
     ):
-        return Judged(name, group, MISSING, math.nan, 0)
+        return JudgedQuantity(name, group, MISSING, math.nan, 0)
     difference = np.atleast_1d(answered - ours)
     size = 1.0
     if name.startswith("theta"):
@@ -190,10 +194,10 @@ def _judge_quantity(name: str, values: Any, errors: Any, theirs: Any) -> Judged:
         WORSE,
     )
     worst = int(np.argmax(off))
-    return Judged(name, group, level, float(off[worst]), worst)
+    return JudgedQuantity(name, group, level, float(off[worst]), worst)
 
 
-def find_levels(rows: list[Judged]) -> dict[str, str]:
+def find_levels(rows: list[JudgedQuantity]) -> dict[str, str]:
     """Return the worst level of each group of quantities that a problem asks for."""
     order = (*LEVELS, WORSE, MISSING)
     groups = dict.fromkeys(row.group for row in rows)
@@ -211,13 +215,13 @@ def check_problem(problem_file: Path, result_file: Path) -> int:
     from rich.console import Console
     from rich.markup import escape
 
-    from fourbar_validation.report.terminal import make_table
+    from fourbar_validation.report.terminal import make_words_table
 
     problem = read_problem(problem_file)
     answered = read_result(result_file, problem)
-    rows = judge(problem, answered)
+    rows = judge_answers(problem, answered)
     console = Console(soft_wrap=True)
-    engine = escape(make_plain(str(answered.get("engine", "")))) or "a result"
+    engine = escape(escape_controls(str(answered.get("engine", "")))) or "a result"
     cells = [
         (
             row.quantity,
@@ -229,7 +233,7 @@ def check_problem(problem_file: Path, result_file: Path) -> int:
     ]
     title = f"{engine}: {problem['problem']}"
     console.print(
-        make_table(
+        make_words_table(
             ("quantity", "error", "position", "level"),
             cells,
             title=title,

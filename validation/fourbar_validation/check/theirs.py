@@ -25,11 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError
-from fourbar.quantities import COUPLE, LINE, UNITS, VECTORS
+from fourbar.quantities import COUPLE, LINE, UNITS, VECTORS, Array
 from fourbar.writing import read_text
 from fourbar_validation.compare.tolerance import EPS
-
-Array = NDArray[np.float64]
 
 _DECIMALS = 4
 """Decimals of a position that somebody chose, like 12.5 deg or 0.25 rad. 0.1745 rad is
@@ -106,7 +104,7 @@ _TWO_TURNS = 4.0 * math.pi
 """Angles beyond this many rad, all of them multiples of half a one, are degrees."""
 _MOST_DEGREES = 1e6
 """Beyond this no angle is meant."""
-LARGEST_FILE = 64 * 2**20
+LARGEST_TABLE_FILE = 64 * 2**20
 """Bytes; a table larger than this is not a hand-made comparison."""
 _HEADING = re.compile(
     r"\|?(?P<name>\w[\w ]*?)\|?\s*"
@@ -116,7 +114,7 @@ _HEADING = re.compile(
 """Heading of a column: a name, its unit in brackets, and a component. The name may
 stand between bars.
 """
-PLACES = frozenset(name for name in VECTORS if UNITS[name] == "m")
+DRAWN_PLACES = frozenset(name for name in VECTORS if UNITS[name] == "m")
 """Quantities that are places, in the coordinates of a scene's drawing."""
 
 
@@ -178,10 +176,10 @@ class TheirTable:
         if not any(origin):
             return self
         values = {
-            key: value - origin if key in PLACES else value
+            key: value - origin if key in DRAWN_PLACES else value
             for key, value in self.values.items()
         }
-        if not values.keys() & PLACES:
+        if not values.keys() & DRAWN_PLACES:
             return self
         x, y = origin
         note = (
@@ -205,7 +203,7 @@ def read_table(path: Path) -> TheirTable:
         raise InputError(
             "table", path.name, "needs a header and at least one row", str(path)
         )
-    columns, left_out, renamings = _read_columns(path, headings, unit_line)
+    columns, left_out, renamings = _read_headings(path, headings, unit_line)
     _drop_repeated(path, columns, left_out, headings, rows)
     names = [name for name, _ in columns.values()]
     if "theta_2" not in names:
@@ -230,7 +228,7 @@ def read_table(path: Path) -> TheirTable:
                 f"line {line}", cells, f"needs {len(headings)} cells{beside}", str(path)
             )
         for index, (name, unit) in columns.items():
-            value, half = _read_number(
+            value, half = _read_cell(
                 path, f"line {line}, {headings[index].strip()}", cells[index]
             )
             numbers[name][row], halves[name][row] = (
@@ -251,7 +249,7 @@ def read_table(path: Path) -> TheirTable:
     table = TheirTable(numbers["theta_2"], {}, {}, {}, lines, rounded, left_out, notes)
     for name in names:
         if name != "theta_2" and not np.isnan(numbers[name]).all():
-            _put(table, name, units[name], numbers[name], halves[name])
+            _enter_column(table, name, units[name], numbers[name], halves[name])
     if not table.values:
         examples = "torque, F12_x and F12_y, or F12 (its magnitude)"
         raise InputError(
@@ -328,7 +326,7 @@ def _read_degrees(
     )
 
 
-def _put(
+def _enter_column(
     table: TheirTable, name: str, unit: Unit, numbers: Array, halves: Array
 ) -> None:
     """Enter a column into the table, a component into its vector."""
@@ -365,7 +363,7 @@ def _find_rounding(halves: Array, unit: Unit) -> Array:
 
 def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
     """Read the lines that hold anything, with their numbers; at least a header."""
-    text = read_text(path, "table", LARGEST_FILE)
+    text = read_text(path, "table", LARGEST_TABLE_FILE)
     text = _remove_comments(text)
     header = next((line for line in text.splitlines() if line.strip()), "")
     delimiter = next((mark for mark in ";\t" if mark in header), ",")
@@ -439,7 +437,7 @@ def _spell(name: str) -> str:
     return re.sub(r"[\s_-]", "", plain.lower())
 
 
-def _suggest(name: str) -> str:
+def _suggest_column(name: str) -> str:
     """Say what a column may be renamed to; an empty string where nothing is like it."""
     plain = _spell(name)
     for pattern, meaning in _MAY_MEAN:
@@ -458,7 +456,7 @@ def _is_unit_line(cells: list[str]) -> bool:
     )
 
 
-def _read_columns(
+def _read_headings(
     path: Path, headings: list[str], unit_line: list[str]
 ) -> tuple[dict[int, tuple[str, Unit]], dict[str, str], dict[str, str]]:
     """Return each column's name and unit by its place in a row.
@@ -485,7 +483,7 @@ def _read_columns(
         if match is None or quantity in NOT_JUDGED or quantity not in UNITS:
             column = heading.strip() or f"column {index + 1}"
             left_out[column] = NOT_JUDGED.get(quantity, "not a known column")
-            if quantity not in NOT_JUDGED and (renaming := _suggest(name)):
+            if quantity not in NOT_JUDGED and (renaming := _suggest_column(name)):
                 left_out[column] += f": {renaming}"
                 renamings[column] = renaming
             continue
@@ -524,7 +522,7 @@ def _find_known() -> str:
     )
 
 
-def _read_number(path: Path, place: str, cell: str) -> tuple[float, float]:
+def _read_cell(path: Path, place: str, cell: str) -> tuple[float, float]:
     """Read the number in a cell and half a unit of its last printed digit.
 
     It is NaN for a blank.

@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 from xml.etree import ElementTree as ET
 
-ANY = "*"
-HINGE = (
+ANY_ATTRIBUTE = "*"
+HINGE_ATTRIBUTES = (
     "name class type pos axis ref damping frictionloss stiffness springref springdamper"
     " armature range limited"
 )
-LOOKED_AT = {
+READ_ATTRIBUTES = {
     **dict.fromkeys(
         (
             "mujoco",
@@ -20,7 +20,7 @@ LOOKED_AT = {
             "default",
             "frame",
         ),
-        ANY,
+        ANY_ATTRIBUTE,
     ),
     **dict.fromkeys(
         (
@@ -34,11 +34,11 @@ LOOKED_AT = {
             "pair",
             "exclude",
         ),
-        ANY,
+        ANY_ATTRIBUTE,
     ),
     **dict.fromkeys(
         ("visual", "asset", "camera", "light", "sensor", "keyframe", "custom", "size"),
-        ANY,
+        ANY_ATTRIBUTE,
     ),
     "option": (
         "timestep integrator solver tolerance iterations ls_iterations"
@@ -51,7 +51,7 @@ LOOKED_AT = {
     "statistic": "extent center meansize meanmass",
     "body": "name childclass pos quat axisangle euler xyaxes zaxis",
     "joint": (
-        HINGE
+        HINGE_ATTRIBUTES
         + " solreffriction solimpfriction group user joint coef joint1 joint2 polycoef"
     ),
     **dict.fromkeys(
@@ -84,10 +84,10 @@ def list_unread(text: str) -> list[str]:
     """
 
     def walk(element: ET.Element) -> Iterator[str]:
-        looked_at = LOOKED_AT.get(element.tag)
+        looked_at = READ_ATTRIBUTES.get(element.tag)
         if looked_at is None:
             yield element.tag
-        elif looked_at != ANY:
+        elif looked_at != ANY_ATTRIBUTE:
             yield from (
                 f"{element.tag} {name}"
                 for name in element.attrib

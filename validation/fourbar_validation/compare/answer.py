@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import FourBarError
+from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
-
-Array = NDArray[np.float64]
 
 
 @dataclass(slots=True, eq=False)

@@ -15,10 +15,10 @@ from typing import Any
 
 from fourbar.writing import name_file
 from fourbar_validation.compare.rows import (
-    COLUMNS,
     MADE_OF,
+    RESULT_COLUMNS,
     Row,
-    make_plain,
+    escape_controls,
     read_cell_text,
     write_rows,
 )
@@ -96,7 +96,8 @@ class Columns:
         import pyarrow as pa
 
         by_column = {
-            name: [null_nan(getattr(row, name)) for row in rows] for name in COLUMNS
+            name: [number_or_null(getattr(row, name)) for row in rows]
+            for name in RESULT_COLUMNS
         }
         self._waiting.append(pa.table(by_column, schema=self._schema))
         self._rows_waiting += len(rows)
@@ -125,7 +126,7 @@ class Columns:
             (self.out / "results.csv").unlink(missing_ok=True)
 
 
-def null_nan(value: object) -> object:
+def number_or_null(value: object) -> object:
     """Give a missing number as null.
 
     No greatest error is NaN by it, and every reader takes it for none.
@@ -153,7 +154,7 @@ def read_columns(path: Path) -> Iterator[Row]:
         yield from map(Row, *columns)
 
 
-def read_column(path: Path, column: str) -> Iterator[str]:
+def read_words(path: Path, column: str) -> Iterator[str]:
     """Read the words in a column, each once in every batch."""
     for (cells,) in _read_batches(path, [column]):
         yield from dict.fromkeys(_read_words(cells, {}))
@@ -169,7 +170,7 @@ def _read_batches(path: Path, columns: list[str]) -> Iterator[list[list[Any]]]:
         if path.suffix == ".parquet":
             batches = _read_parquet
         else:
-            batches = _read_text
+            batches = _open_csv
         for batch in batches(path, columns, files):
             yield [batch.column(name).to_pylist() for name in columns]
 
@@ -182,7 +183,7 @@ def _read_parquet(path: Path, columns: list[str], files: ExitStack) -> Any:
     )
 
 
-def _read_text(path: Path, columns: list[str], files: ExitStack) -> Any:
+def _open_csv(path: Path, columns: list[str], files: ExitStack) -> Any:
     import pyarrow as pa
     from pyarrow import csv
 
@@ -203,5 +204,5 @@ def _read_text(path: Path, columns: list[str], files: ExitStack) -> Any:
 def _read_words(cells: list[str], words: dict[str, str]) -> list[str]:
     for cell in dict.fromkeys(cells):
         if cell not in words:
-            words[cell] = sys.intern(make_plain(read_cell_text(cell)))
+            words[cell] = sys.intern(escape_controls(read_cell_text(cell)))
     return [words[cell] for cell in cells]

@@ -16,7 +16,7 @@ from fourbar.quantities import (
     CHANGE_POINT,
     COUPLE,
     DRY_FRICTION_QUANTITIES,
-    FORCES,
+    FORCE_NAMES,
     JAMMED,
     LINE,
     LINE_QUANTITIES,
@@ -26,6 +26,7 @@ from fourbar.quantities import (
     SINGULAR,
     STAGE_OF,
     STATUS_NAMES,
+    Array,
 )
 from fourbar.scene import Scene
 from fourbar.solution import Solution
@@ -38,10 +39,10 @@ from fourbar_validation.compare.rows import (
     REFUSES,
     UNDECIDED,
     Row,
-    make_plain,
+    escape_controls,
 )
 from fourbar_validation.compare.scales import (
-    Sizes,
+    TermSizes,
     make_reference,
     take_smallest_scales,
     take_strictest_condition,
@@ -51,7 +52,6 @@ from fourbar_validation.compare.tolerance import (
     IDENTITY,
     NOTHING_TO_TELL,
     TIMES_PREDICTED,
-    Array,
     ErrorBound,
     Mask,
     compute_differences,
@@ -102,7 +102,7 @@ _OF_THE_LINE = {
 """Quantities of a drive that exerts a force; each is compared if the quantity it maps
 to is compared or the engine answers it.
 """
-_OF_FORCES = (*FORCES, *DRY_FRICTION_QUANTITIES)
+_OF_FORCES = (*FORCE_NAMES, *DRY_FRICTION_QUANTITIES)
 _MOST_UNDECIDED = 0.5
 """Share of the numbers of a scene that are undecided, beyond which it does not hold."""
 _SLOW_DRIVE = 0.1
@@ -111,8 +111,8 @@ torque on bar 3 or 4, the force of a cylinder and the pin forces have poles wher
 speed of the drive vanishes.
 """
 CLOSURE = "a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}"
-NOWHERE = "no position at which it is demanded"
-NUMBERS = ("error", "allowed", "theta_2", "condition")
+NOT_DEMANDED = "no position at which it is demanded"
+ROW_NUMBERS = ("error", "allowed", "theta_2", "condition")
 """Names of the numbers of a row."""
 
 
@@ -136,7 +136,7 @@ class Demands(NamedTuple):
     """Method for which the errors are predicted, as the end of a reason."""
 
 
-class _Judged(NamedTuple):
+class _JudgedRow(NamedTuple):
     """Row of a quantity, and the numbers of positions with it and with a verdict."""
 
     row: Row
@@ -250,7 +250,7 @@ class Comparison:
         if answer.assembled.any():
             reason = f"identity: {CLOSURE}"
         else:
-            reason = NOWHERE
+            reason = NOT_DEMANDED
         gap = find_gap(linkage, theta_2, theta_3, theta_4)
         return Row.judged(
             self._who,
@@ -310,7 +310,7 @@ class Comparison:
 
     def _row(self, quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
         error, allowed, theta_2, condition = (
-            float(numbers.get(key, math.nan)) for key in NUMBERS
+            float(numbers.get(key, math.nan)) for key in ROW_NUMBERS
         )
         return Row(
             *self._who,
@@ -318,7 +318,7 @@ class Comparison:
             error,
             allowed,
             verdict,
-            make_plain(reason),
+            escape_controls(reason),
             theta_2,
             condition,
         )
@@ -341,7 +341,7 @@ class Comparison:
             self._who, "assembled", float(count) * differ, 0.0, reason, ours.theta_2
         )
 
-    def _compare(self, quantities: Sequence[str]) -> list[_Judged]:
+    def _compare(self, quantities: Sequence[str]) -> list[_JudgedRow]:
         """Compare all quantities of the answer at once, in their order.
 
         Those that neither side has are left out.
@@ -354,7 +354,7 @@ class Comparison:
             if one is not None
         ]
 
-    def _prepare(self, quantity: str) -> _Judged | _Due | None:
+    def _prepare(self, quantity: str) -> _JudgedRow | _Due | None:
         """Find where both close the loop and the formulas state a value.
 
         None if neither side has the quantity.
@@ -378,7 +378,7 @@ class Comparison:
                 missing = "no answer"
             else:
                 missing = "the formulas have no answer"
-            return _Judged(self._row(quantity, FAILS, missing))
+            return _JudgedRow(self._row(quantity, FAILS, missing))
         mask = self._closed & _mark_stated(quantity, formulas, ours)
         closed = self._count
         stated = int(np.count_nonzero(mask))
@@ -387,9 +387,9 @@ class Comparison:
             unstated = _count(formulas.status_code[self._closed & ~mask])
             if not stated:
                 reason = f"the formulas state no value: {unstated}"
-                return _Judged(self._row(quantity, REFUSES, reason), closed)
+                return _JudgedRow(self._row(quantity, REFUSES, reason), closed)
             note += f"; not judged: {unstated}"
-        if quantity in FORCES and scene.drive_bar != 2 and tolerance.in_time:
+        if quantity in FORCE_NAMES and scene.drive_bar != 2 and tolerance.in_time:
             mask = mask & _mark_moving_drive(scene, formulas)
         reversals = 0  # at a reversal the forces of either side are right
         if self._may_reverse(quantity):
@@ -399,10 +399,12 @@ class Comparison:
             note += f"; {reversals} positions at which dry friction reverses not judged"
         if not mask.any():
             nowhere = "no position at which this quantity can be compared" + note
-            return _Judged(self._row(quantity, UNDECIDED, nowhere), closed, reversals)
+            return _JudgedRow(
+                self._row(quantity, UNDECIDED, nowhere), closed, reversals
+            )
         return _Due(quantity, ours, theirs, mask, note, closed, reversals)
 
-    def _judge(self, due: Sequence[_Due]) -> Iterator[_Judged]:
+    def _judge(self, due: Sequence[_Due]) -> Iterator[_JudgedRow]:
         """Judge the errors of quantities at their positions."""
         if not due:
             return
@@ -428,7 +430,7 @@ class Comparison:
                 theta_2=self.formulas.theta_2[position],
                 condition=of_one.condition[position],
             )
-            yield _Judged(row, one.closed, one.reversals + worst.decided)
+            yield _JudgedRow(row, one.closed, one.reversals + worst.decided)
 
     def _measure(self, due: Sequence[_Due]) -> "Errors":
         """Measure the errors of quantities, and what is allowed at each position.
@@ -510,7 +512,7 @@ class Comparison:
         return np.stack(scales), np.stack(conditions)
 
     @cached_property
-    def _sizes(self) -> tuple[Sizes, Sizes | None]:
+    def _sizes(self) -> tuple[TermSizes, TermSizes | None]:
         """Sizes by the formulas and by the reference, if there is one."""
         if self.reference is None:
             reference = self._solution
@@ -519,8 +521,8 @@ class Comparison:
         if reference is None:
             theirs = None
         else:
-            theirs = Sizes(self.scene, reference)
-        return Sizes(self.scene, self.formulas), theirs
+            theirs = TermSizes(self.scene, reference)
+        return TermSizes(self.scene, self.formulas), theirs
 
 
 class Errors(NamedTuple):

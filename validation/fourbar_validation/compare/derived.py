@@ -57,7 +57,7 @@ LOCATED_ROUGHLY = ErrorBound(
     conditioned=False,
 )
 """Tolerance of the largest bending moments."""
-FOUR_DIGITS = ErrorBound(
+PRINTED_TO_FOUR_DIGITS = ErrorBound(
     "summary, printed",
     "6e-4 of the value: what is printed has four digits",
     6e-4,
@@ -71,6 +71,6 @@ DERIVED_BOUNDS = (
     CUT,
     PRINTED,
     LOCATED_ROUGHLY,
-    FOUR_DIGITS,
+    PRINTED_TO_FOUR_DIGITS,
 )
 """All of them."""

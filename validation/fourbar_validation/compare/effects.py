@@ -13,10 +13,11 @@ import numpy as np
 
 from fourbar.errors import FourBarError
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, FourBar
+from fourbar.quantities import Array
 from fourbar.solution import Solution
 from fourbar_validation.compare.pins import find_centre, find_mass
 from fourbar_validation.compare.reversals import compute_slip
-from fourbar_validation.compare.tolerance import Array, magnitude, sum_lengths
+from fourbar_validation.compare.tolerance import magnitude, sum_lengths
 
 if TYPE_CHECKING:
     from fourbar.effects import (

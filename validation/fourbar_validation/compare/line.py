@@ -6,16 +6,13 @@ It has stroke, speed and leverage.
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects import PointDrive
 from fourbar.linkage import FourBar
-from fourbar_validation.compare.answer import Array
+from fourbar.quantities import Array, ComplexArray
 
 if TYPE_CHECKING:
     from fourbar.effects import ForceDrive
-
-Complex = NDArray[np.complex128]
 
 
 class DriveLine(NamedTuple):
@@ -23,11 +20,11 @@ class DriveLine(NamedTuple):
 
     linkage: FourBar
     drive: "ForceDrive"
-    directions: dict[int, Complex]
+    directions: dict[int, ComplexArray]
     """e^{i theta} of bars 1 to 4."""
-    arms: tuple[Complex, ...]
+    arms: tuple[ComplexArray, ...]
     """Vectors from the first pins of the bars to the points where the drive acts, m."""
-    across: Complex
+    across: ComplexArray
     """Vector from one end of the drive to the other, m. For a force at a point it is
     its unit vector.
     """
@@ -38,7 +35,7 @@ class DriveLine(NamedTuple):
         return np.hypot(self.across.real, self.across.imag)
 
     @property
-    def unit(self) -> Complex:
+    def unit(self) -> ComplexArray:
         """Direction; no number where the ends coincide."""
         with np.errstate(all="ignore"):
             return self.across / self.stroke
@@ -48,7 +45,7 @@ class DriveLine(NamedTuple):
 
         Each arm swings across itself.
         """
-        rate: Complex | float = 0.0
+        rate: ComplexArray | float = 0.0
         for (sense, point), arm in zip(self.drive.ends, self.arms, strict=True):
             velocity = 1j * omega[point.bar] * arm
             if point.bar == 3:

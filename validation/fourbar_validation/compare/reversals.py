@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
-from fourbar.quantities import OK
+from fourbar.quantities import OK, Array
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
-from fourbar_validation.compare.tolerance import EPS, Array, K
+from fourbar_validation.compare.tolerance import EPS, K
 
-HALVINGS = 60
+HALVINGS_OF_AN_INTERVAL = 60
 """Halvings of the interval between two positions, down to neighbouring doubles."""
 
 
@@ -84,7 +84,9 @@ def find_reversals(
                     and command.branch[last] == command.branch[i]
                 ):
                     reversals.append(
-                        _bisect(scene, command, pin, last, i, float(slip[last]))
+                        _locate_reversal(
+                            scene, command, pin, last, i, float(slip[last])
+                        )
                     )
                 last = i
     return sorted(reversals, key=lambda reversal: reversal.position)
@@ -149,7 +151,7 @@ def _compute_speeds(solution: Solution) -> dict[int, Any]:
     return {1: 0.0, 2: solution.omega_2, 3: solution.omega_3, 4: solution.omega_4}
 
 
-def _bisect(
+def _locate_reversal(
     scene: Scene, command: Command, pin: str, i: int, j: int, slip: float
 ) -> Reversal:
     """Locate the reversal between positions i and j by bisection.
@@ -168,7 +170,7 @@ def _bisect(
 
     low = float(command.theta_2[i])
     high = float(command.theta_2[j])
-    for _ in range(HALVINGS):
+    for _ in range(HALVINGS_OF_AN_INTERVAL):
         middle = 0.5 * (low + high)
         if middle in (low, high):
             break

@@ -14,9 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from fourbar.errors import FAILED, HOLDS
+from fourbar.quantities import Array
 from fourbar.writing import write_text
 from fourbar_validation.compare.answer import EngineError
-from fourbar_validation.compare.tolerance import Array, Mask, find_used
+from fourbar_validation.compare.tolerance import Mask, find_used
 
 AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS = (
     *("agrees", "degraded as predicted"),
@@ -48,7 +49,7 @@ IDENTITIES = (
 )
 """Rows of the formulas that no engine answers: they do not count as compared."""
 
-DERIVED = (
+DERIVED_CHECKS = (
     "study",
     "sensitivity",
     "internal_forces",
@@ -61,7 +62,7 @@ DERIVED = (
 """Engines of the rows that check functions other than `solve`. With `formulas` they are
 those of fourbar itself.
 """
-LONGEST = 500
+LONGEST_REASON = 500
 """Characters of what somebody else's code gives as a reason."""
 
 
@@ -121,7 +122,7 @@ class Row:
             nan,
             nan,
             verdict,
-            make_plain(reason),
+            escape_controls(reason),
             nan,
             nan,
         )
@@ -169,7 +170,7 @@ class Row:
             worst,
             bound,
             verdict,
-            make_plain(reason),
+            escape_controls(reason),
             place,
             worst_condition,
         )
@@ -223,13 +224,13 @@ def write_one_line(text: str) -> str:
 
     The middle of a long text is left out.
     """
-    line = make_plain(" ".join(text.split()))
-    if len(line) <= LONGEST:
+    line = escape_controls(" ".join(text.split()))
+    if len(line) <= LONGEST_REASON:
         return line
-    return f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
+    return f"{line[: LONGEST_REASON // 2]} ... {line[-LONGEST_REASON // 2 :]}"
 
 
-def make_plain(text: str) -> str:
+def escape_controls(text: str) -> str:
     """Write every character that does not print as its escape.
 
     Ends of lines are kept. Characters that would steer a terminal or a reader are
@@ -264,7 +265,7 @@ def read_cell_text(cell: str) -> str:
     return cell
 
 
-COLUMNS = tuple(column.name for column in fields(Row))
+RESULT_COLUMNS = tuple(column.name for column in fields(Row))
 
 
 def sort_rows(rows: Iterable[Row]) -> list[Row]:
@@ -276,16 +277,16 @@ def sort_rows(rows: Iterable[Row]) -> list[Row]:
 
 def write_rows(rows: Iterable[Row]) -> str:
     """Write the table as text, sorted, floats as repr, a missing number left empty."""
-    return write_csv(
-        COLUMNS,
+    return write_csv_rows(
+        RESULT_COLUMNS,
         (
-            [_write_cell(getattr(row, name)) for name in COLUMNS]
+            [_write_csv_cell(getattr(row, name)) for name in RESULT_COLUMNS]
             for row in sort_rows(rows)
         ),
     )
 
 
-def write_csv(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
+def write_csv_rows(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
     """Write a table as CSV.
 
     Floats are written as repr, None as nothing, and no text that a spreadsheet would
@@ -301,7 +302,7 @@ def write_csv(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
     return text.getvalue()
 
 
-def _write_cell(value: object) -> object:
+def _write_csv_cell(value: object) -> object:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float) and math.isnan(value):

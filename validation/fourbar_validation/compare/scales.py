@@ -18,7 +18,7 @@ import numpy as np
 
 from fourbar.effects import ForceDrive
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.quantities import COUPLE, LINE, OK, UNITS
+from fourbar.quantities import COUPLE, LINE, OK, UNITS, Array
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
@@ -33,20 +33,19 @@ from fourbar_validation.compare.pins import (
 from fourbar_validation.compare.tolerance import (
     OF_THE_INPUT,
     WELL_CONDITIONED,
-    Array,
     K,
     find_condition,
     magnitude,
     sum_lengths,
 )
 
-VANISHING = 1.0 / K
+LOST_IN_CANCELLATION = 1.0 / K
 """Part of the sum of its terms below which a quantity has lost too many digits.
 Cancellation costs it more than K covers.
 """
 
 
-class Sizes:
+class TermSizes:
     """Sizes of the quantities of one solution of a scene.
 
     Each sum of terms is computed once.
@@ -81,10 +80,10 @@ class Sizes:
         if driven:
             assert formulas.drive_condition is not None
             well[driven] &= formulas.drive_condition >= WELL_CONDITIONED
-        nonzero = np.where(size < VANISHING * terms, terms, size)
+        nonzero = np.where(size < LOST_IN_CANCELLATION * terms, terms, size)
         largest = np.where(well, size, 0.0).max(axis=1, keepdims=True)
         most = np.where(well, terms, 0.0).max(axis=1, keepdims=True)
-        largest = np.where(largest < VANISHING * most, most, largest)
+        largest = np.where(largest < LOST_IN_CANCELLATION * most, most, largest)
         scales[sized] = np.where(well, largest, nonzero)
         return scales
 
@@ -101,25 +100,25 @@ class Sizes:
             key = f"{unit} {_choose_bars(quantity)}"
         if key not in self._sums:
             with np.errstate(divide="ignore", invalid="ignore"):
-                terms = TERMS[unit](quantity, self)
+                terms = TERMS_OF_UNIT[unit](quantity, self)
             self._sums[key] = np.asarray(terms, dtype=float)
         return self._sums[key]
 
 
 def scale_of(quantity: str, scene: Scene, formulas: Solution, values: Array) -> Array:
     """Compute what the error of a quantity is divided by at each position, (n,)."""
-    return Sizes(scene, formulas).scale(quantity, values)
+    return TermSizes(scene, formulas).scale(quantity, values)
 
 
 _OF_EACH_BAR = ("rad/s", "rad/s^2")
 """Units of quantities whose sums of terms differ from bar to bar."""
 
 
-def _return_one(_: str, sizes: Sizes) -> Array:
+def _return_one(_: str, sizes: TermSizes) -> Array:
     return np.ones(len(sizes.formulas))
 
 
-def _sum_lengths(_: str, sizes: Sizes) -> Array:
+def _sum_length_terms(_: str, sizes: TermSizes) -> Array:
     scene = sizes.scene
     arms = sum(_compute_arm(scene, number) for number in MOVING_BARS) + sum(
         _compute_drive_arms(scene).values()
@@ -127,7 +126,7 @@ def _sum_lengths(_: str, sizes: Sizes) -> Array:
     return np.full(len(sizes.formulas), sum_lengths(scene.linkage) + arms)
 
 
-def _sum_speeds(quantity: str, sizes: Sizes) -> Array:
+def _sum_speeds(quantity: str, sizes: TermSizes) -> Array:
     formulas = sizes.formulas
     _, a, b, c = sizes.scene.linkage.lengths
     assert formulas.omega_2 is not None
@@ -137,7 +136,7 @@ def _sum_speeds(quantity: str, sizes: Sizes) -> Array:
     return a * omega_2 / ((b if quantity == "omega_3" else c) * formulas.condition)
 
 
-def _sum_angular_accelerations(quantity: str, sizes: Sizes) -> Array:
+def _sum_angular_accelerations(quantity: str, sizes: TermSizes) -> Array:
     formulas = sizes.formulas
     _, a, b, c = sizes.scene.linkage.lengths
     w2 = formulas.omega_2
@@ -160,7 +159,7 @@ def _choose_bars(quantity: str) -> tuple[int, ...]:
     return MOVING_BARS
 
 
-def _sum_velocities(quantity: str, sizes: Sizes) -> Array:
+def _sum_velocities(quantity: str, sizes: TermSizes) -> Array:
     scene = sizes.scene
     formulas = sizes.formulas
     total = np.zeros(len(formulas))
@@ -175,7 +174,7 @@ def _sum_velocities(quantity: str, sizes: Sizes) -> Array:
     return total
 
 
-def _sum_accelerations(quantity: str, sizes: Sizes) -> Array:
+def _sum_accelerations(quantity: str, sizes: TermSizes) -> Array:
     scene = sizes.scene
     formulas = sizes.formulas
     total = np.zeros(len(formulas))
@@ -188,7 +187,7 @@ def _sum_accelerations(quantity: str, sizes: Sizes) -> Array:
     return total
 
 
-def _sum_forces(_: str, sizes: Sizes) -> Array:
+def _sum_forces(_: str, sizes: TermSizes) -> Array:
     scene = sizes.scene
     formulas = sizes.formulas
     assert formulas.drive_condition is not None
@@ -203,12 +202,12 @@ def _sum_forces(_: str, sizes: Sizes) -> Array:
     )
 
 
-def _sum_torques(_: str, sizes: Sizes) -> Array:
+def _sum_torques(_: str, sizes: TermSizes) -> Array:
     longest = max(sizes.scene.linkage.lengths[1:])
     return np.asarray(longest * sizes.sum_terms(_A_FORCE))
 
 
-def _sum_powers(_: str, sizes: Sizes) -> Array:
+def _sum_powers(_: str, sizes: TermSizes) -> Array:
     if sizes.scene.drive is not None:
         return np.asarray(sizes.sum_terms(_A_FORCE) * sizes.sum_terms(_A_VELOCITY))
     speed = getattr(sizes.formulas, f"omega_{sizes.scene.drive_bar}")
@@ -217,10 +216,10 @@ def _sum_powers(_: str, sizes: Sizes) -> Array:
 
 _A_FORCE, _A_VELOCITY = "F12", "v_B"
 """Quantities of their units to which every bar contributes."""
-TERMS: dict[str, Callable[[str, Sizes], Array]] = {
+TERMS_OF_UNIT: dict[str, Callable[[str, TermSizes], Array]] = {
     "rad": _return_one,
     "1": _return_one,
-    "m": _sum_lengths,
+    "m": _sum_length_terms,
     "rad/s": _sum_speeds,
     "m/s": _sum_velocities,
     "rad/s^2": _sum_angular_accelerations,
@@ -305,7 +304,7 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
         if {"omega_3", "omega_4"} <= known.keys():
             known |= _find_velocities(scene.linkage, theta, known)
     if scene.drive is not None:
-        known |= _find_line(scene.linkage, scene.drive, theta, known)
+        known |= _find_line_of_drive(scene.linkage, scene.drive, theta, known)
     known["sin_mu"] = np.sin(theta[4] - theta[3])
     one, second = (theta[bar] for bar in theta if bar != answer.at.bar)
     known["condition"] = np.abs(np.sin(second - one))
@@ -333,7 +332,7 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     )
 
 
-def _find_line(
+def _find_line_of_drive(
     linkage: FourBar,
     drive: ForceDrive,
     theta: dict[int, Array],
@@ -397,7 +396,7 @@ def take_strictest_condition(
 
 
 def take_smallest_scales(
-    quantities: Sequence[str], ours: Sizes, theirs: Sizes | None
+    quantities: Sequence[str], ours: TermSizes, theirs: TermSizes | None
 ) -> Array:
     """Take the smaller of two sizes of each quantity at each position, (q, n)."""
     values = [getattr(ours.formulas, quantity) for quantity in quantities]

@@ -17,14 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError
+from fourbar.formulas.mobility import TURN
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.quantities import UNITS
+from fourbar.quantities import UNITS, Array
 from fourbar.solution import Solution
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-TURN = 2.0 * math.pi
 Angle = TypeVar("Angle", float, Array)
 
 EPS = 2.0**-52
@@ -33,7 +32,7 @@ K = 50.0
 differ by sqrt(2 * 50) = 10 of them as a random walk; 50 covers the tails of some 10^5
 comparisons.
 """
-ROUNDINGS = 8.0
+RANDOM_WALK = 8.0
 """Last digits by which a chain of some fifty roundings moves a result, as a random
 walk. It is sqrt(50) = 7.
 """
@@ -43,7 +42,7 @@ the third digit.
 """
 WELL_CONDITIONED = 0.1
 """Positions whose condition is at least this set the scale of a quantity."""
-SMALL = 1e-12
+IN_PARTS_OF_EPS = 1e-12
 """Allowed errors below this are stated in parts of eps."""
 TIMES_PREDICTED = 10.0
 """Factor by which an engine may exceed the error that is predicted."""
@@ -70,7 +69,7 @@ class ErrorBound:
         """Say in a sentence what is allowed at a condition, and the error's cause."""
         if self.conditioned:
             size = f"{self.factor / EPS:.3g} eps over the condition {condition:.2g}"
-        elif self.factor < SMALL:
+        elif self.factor < IN_PARTS_OF_EPS:
             size = f"{self.factor / EPS:.3g} eps, whatever the condition"
         else:
             size = f"{self.factor:g} of the scale"
@@ -196,7 +195,7 @@ def find_condition(quantity: str, linkage: FourBar, formulas: Solution) -> Array
     return np.asarray(condition, dtype=float)
 
 
-def wrap_angle(angle: Angle) -> Angle:
+def wrap_difference(angle: Angle) -> Angle:
     """Wrap into [-pi, pi)."""
     return (angle + math.pi) % TURN - math.pi
 
@@ -224,7 +223,7 @@ def sum_lengths(linkage: FourBar) -> float:
     return math.fsum(linkage.lengths)
 
 
-def find_margin(linkage: FourBar, theta: Array, bar: int = 2) -> Array:
+def compute_closing_margin(linkage: FourBar, theta: Array, bar: int = 2) -> Array:
     """Compute by what the loop closes (> 0) or misses (< 0) at a bar's angle.
 
     It is a part of the sum of the lengths.
@@ -255,7 +254,9 @@ def find_gap(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array) -
 
 def mark_touching(linkage: FourBar, theta: Array, bar: int = 2) -> Mask:
     """Mark positions at which rounding decides whether the loop closes."""
-    return np.asarray(np.abs(find_margin(linkage, theta, bar)) < TOUCHING_MARGIN)
+    return np.asarray(
+        np.abs(compute_closing_margin(linkage, theta, bar)) < TOUCHING_MARGIN
+    )
 
 
 def magnitude(values: Array) -> Array:
@@ -285,7 +286,7 @@ def compute_differences(
                 )
                 continue
             turned = [quantities[i].startswith("theta") for i in rows]
-            difference[turned] = wrap_angle(difference[turned])
+            difference[turned] = wrap_difference(difference[turned])
             apart[rows] = np.abs(difference)
     return apart
 

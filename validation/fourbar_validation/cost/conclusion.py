@@ -8,15 +8,20 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from fourbar_validation.advise.matters import SettingInfluence, write_sentence
 from fourbar_validation.cost.laws import ErrorLaw, find_floor
-from fourbar_validation.cost.study import EXACT, FORMULAS, STEPPED, CostPoint
+from fourbar_validation.cost.study import (
+    EXACT_MOTION,
+    FORMULAS_CURVE,
+    STEPPED_MOTION,
+    CostPoint,
+)
 
 DEFAULT = "MuJoCo's defaults"
 """Label of the point that a new user gets."""
 _DEFAULT_LADDER = "Euler, MuJoCo's defaults"
-FOUR_DIGITS = 1e-4
+ERROR_OF_FOUR_DIGITS = 1e-4
 SIX_DIGITS = 1e-6
-DIGITS = {FOUR_DIGITS: "Four digits", SIX_DIGITS: "Six digits"}
-NAMES = {"torque": "driving torque", "force": "worst pin force"}
+ERROR_IN_WORDS = {ERROR_OF_FOUR_DIGITS: "Four digits", SIX_DIGITS: "Six digits"}
+QUANTITY_WORDS = {"torque": "driving torque", "force": "worst pin force"}
 Curves = Mapping[str, Sequence[CostPoint]]
 
 
@@ -27,7 +32,7 @@ def list_stepped(curves: Curves) -> list[CostPoint]:
         for name, row in curves.items()
         if "slow" not in name
         for point in row
-        if point.kind == STEPPED
+        if point.kind == STEPPED_MOTION
     ]
 
 
@@ -59,7 +64,7 @@ def _write_time(point: CostPoint) -> str:
     return f"{1e3 * second:.2g} ms ({1e3 * revolution:.2g} ms a revolution)"
 
 
-def write_short(value: float) -> str:
+def write_one_digit(value: float) -> str:
     """Format one digit and its power of ten."""
     mantissa, _, exponent = f"{value:.0e}".partition("e")
     return f"{mantissa}e{int(exponent)}"
@@ -71,25 +76,29 @@ def conclude(
     """Write the conclusion, at most ten lines."""
     return [
         "CPU time of a simulated second, with the reading of torque and pin forces:",
-        *_write_digits(curves),
+        *_write_cheapest_settings(curves),
         *_write_defaults(curves),
         write_sentence(influences),
         *_write_exact(curves),
-        _write_laws(laws),
+        _write_law_sentences(laws),
     ]
 
 
-def _write_digits(curves: Curves) -> Iterator[str]:
+def _write_cheapest_settings(curves: Curves) -> Iterator[str]:
     for error, quantity, what in (
-        (FOUR_DIGITS, "torque", "of the driving torque"),
-        (FOUR_DIGITS, "force", "of every pin force"),
+        (ERROR_OF_FOUR_DIGITS, "torque", "of the driving torque"),
+        (ERROR_OF_FOUR_DIGITS, "force", "of every pin force"),
         (SIX_DIGITS, "force", "of every pin force"),
     ):
         point = find_cheapest(curves, quantity, error)
         if point is None:
-            yield f"{DIGITS[error]} {what}: no setting that was tried reaches them."
+            yield (
+                f"{ERROR_IN_WORDS[error]} {what}:"
+                " no setting that was tried reaches them."
+            )
         else:
-            yield f"{DIGITS[error]} {what}: {_write_time(point)} by {point.name}."
+            time = _write_time(point)
+            yield f"{ERROR_IN_WORDS[error]} {what}: {time} by {point.name}."
 
 
 def _write_defaults(curves: Curves) -> Iterator[str]:
@@ -102,8 +111,8 @@ def _write_defaults(curves: Curves) -> Iterator[str]:
     errors = point.errors
     text = (
         f"MuJoCo's defaults (Euler, 2 ms): {_write_time(point)} for an error of"
-        f" {write_short(errors.torque)} in the torque, {write_short(errors.force)} in"
-        " the worst pin force"
+        f" {write_one_digit(errors.torque)} in the torque,"
+        f" {write_one_digit(errors.force)} in the worst pin force"
     )
     floors = [
         find_floor(curves.get(_DEFAULT_LADDER, ()), quantity)
@@ -112,7 +121,7 @@ def _write_defaults(curves: Curves) -> Iterator[str]:
     if None not in floors:
         least = min(floor for floor in floors if floor is not None)
         text += (
-            f"; no timestep brings them all below {write_short(least)}, "
+            f"; no timestep brings them all below {write_one_digit(least)}, "
             "because their closure is soft"
         )
     yield text + "."
@@ -123,18 +132,21 @@ def _write_exact(curves: Curves) -> Iterator[str]:
         point
         for row in curves.values()
         for point in row
-        if point.kind != STEPPED and math.isfinite(point.seconds_per_second)
+        if point.kind != STEPPED_MOTION and math.isfinite(point.seconds_per_second)
     ]
-    for kind, what in ((EXACT, "Position by position"), (FORMULAS, "The formulas")):
+    for kind, what in (
+        (EXACT_MOTION, "Position by position"),
+        (FORMULAS_CURVE, "The formulas"),
+    ):
         exact = [p for p in points if p.kind == kind and p.errors.worst < SIX_DIGITS]
         if exact:
             cheapest = min(exact, key=lambda point: point.seconds_per_second)
-            error = write_short(cheapest.errors.worst)
+            error = write_one_digit(cheapest.errors.worst)
             time = _write_time(cheapest)
             yield f"{what}: {time}, error {error}, by {cheapest.setting}."
 
 
-def _write_laws(laws: Sequence[ErrorLaw]) -> str:
+def _write_law_sentences(laws: Sequence[ErrorLaw]) -> str:
     decided = [law for law in laws if law.decided]
     failing = dict.fromkeys(law.name for law in decided if not law.holds)
     held = sum(law.holds for law in decided)

@@ -11,7 +11,7 @@ from fourbar.scene import Scene
 from fourbar.scene import command as command_of
 from fourbar.writing import write_text
 from fourbar_validation.advise.matters import MATTERS, measure_influences
-from fourbar_validation.compare.rows import write_csv
+from fourbar_validation.compare.rows import write_csv_rows
 from fourbar_validation.cost.conclusion import conclude, find_cheapest, list_stepped
 from fourbar_validation.cost.laws import (
     ErrorLaw,
@@ -21,18 +21,18 @@ from fourbar_validation.cost.laws import (
     write_laws,
 )
 from fourbar_validation.cost.series import BEST
-from fourbar_validation.cost.study import COLUMNS, CostPoint, CostStudy, list_cells
+from fourbar_validation.cost.study import COST_COLUMNS, CostPoint, CostStudy, list_cells
 from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.places import MODELS
 from fourbar_validation.report.machine import describe_setup
 from fourbar_validation.report.templating import render
-from fourbar_validation.report.terminal import make_table
+from fourbar_validation.report.terminal import make_words_table
 from fourbar_validation.scenes.suites import read_scene_files
 
 _DEFAULT_SCENES = (MODELS / "crank_rocker.toml",)
 _WANTED = (1e-3, 1e-6)
 """Errors whose price the table of several scenes has."""
-HEAD = ("setting", "error", "ms per simulated second", "ms a revolution")
+COST_HEADINGS = ("setting", "error", "ms per simulated second", "ms a revolution")
 
 
 @click.command(name="cost")
@@ -81,7 +81,7 @@ def cost(scenes: tuple[Path, ...], out: Path, verbose: bool) -> int:
         fitted += [law for law in laws if law.decided]
         title = scene.title or name
         conclusion = conclude(curves, laws, influences)
-        write(study, curves, laws, title, conclusion)
+        write_cost(study, curves, laws, title, conclusion)
         click.echo(write_subtitle(scene, title))
         click.echo("\n".join(conclusion))
         if verbose:
@@ -104,7 +104,7 @@ def cost(scenes: tuple[Path, ...], out: Path, verbose: bool) -> int:
             "laws hold",
             "matters most",
         )
-        Console().print(make_table(head, rows, show_edge=False))
+        Console().print(make_words_table(head, rows, show_edge=False))
     if not fitted:
         click.echo("Nothing was compared: no law has points enough for a fit.")
     if fitted and all(law.holds for law in fitted):
@@ -123,7 +123,7 @@ def _print_details(
     """
     from rich.console import Console
 
-    Console().print(make_table(HEAD, list_front(curves)))
+    Console().print(make_words_table(COST_HEADINGS, list_front(curves)))
     lines = [
         *write_laws(laws),
         *(f"warning: {line}" for line in list_warnings(curves)),
@@ -132,7 +132,7 @@ def _print_details(
     click.echo("\n".join(lines))
 
 
-def write(
+def write_cost(
     study: CostStudy,
     curves: Mapping[str, Sequence[CostPoint]],
     laws: Sequence[ErrorLaw],
@@ -140,23 +140,23 @@ def write(
     conclusion: Sequence[str],
 ) -> list[Path]:
     """Write cost.csv, cost.md and the pictures."""
-    from fourbar_validation.cost.pictures import draw
+    from fourbar_validation.cost.pictures import draw_pictures
 
-    pictures = draw(curves, write_subtitle(study.scene, title), study.folder)
+    pictures = draw_pictures(curves, write_subtitle(study.scene, title), study.folder)
     what = {
         "title": title,
         "conclusion": conclusion,
         "setup": describe_setup(),
         "pictures": [path.stem for path in pictures if path.suffix == ".svg"],
         "laws": write_laws(laws),
-        "head": HEAD,
+        "head": COST_HEADINGS,
         "front": list_front(curves),
         "warnings": list_warnings(curves),
         "left_out": study.left_out,
     }
     rows = (list_cells(point) for points in curves.values() for point in points)
     texts = {
-        "cost.csv": write_csv(COLUMNS, rows),
+        "cost.csv": write_csv_rows(COST_COLUMNS, rows),
         "cost.md": render("fourbar_validation.cost", "cost.md.j2", **what),
     }
     for name, text in texts.items():
@@ -187,7 +187,7 @@ def _write_price(curves: Mapping[str, Sequence[CostPoint]], error: float) -> str
 
 
 def list_front(curves: Mapping[str, Sequence[CostPoint]]) -> list[tuple[str, ...]]:
-    """List the Pareto front of everything stepped, under HEAD.
+    """List the Pareto front of everything stepped, under COST_HEADINGS.
 
     The error is the worse of torque and force.
     """

@@ -11,16 +11,15 @@ import numpy as np
 
 from fourbar.effects import Actions
 from fourbar.effects.effect import list_bodies
-from fourbar.evaluation.case import Case, compute_state
+from fourbar.evaluation.case import Case, compute_shown_state
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.longer import change_numbers
 from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.solving import solve
 from fourbar_validation.advise.worst_errors import WorstErrors, find_greatest
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import divide
 from fourbar_validation.published import thirteen
@@ -29,30 +28,34 @@ FIFTY_DIGITS = 167 + 30
 """Bits of fifty digits. They include what some sixty roundings of a well-conditioned
 position cost.
 """
-AT_MOST = 25
+POSITIONS_WITH_REFERENCE = 25
 """Positions at which errors against the reference are taken. They take a few
 milliseconds each.
 """
-Quantities = dict[str, Any]
+QuantityValues = dict[str, Any]
 
 
 def choose_few(command: Command) -> Command:
-    """Choose at most AT_MOST positions, evenly over the sweep."""
+    """Choose at most POSITIONS_WITH_REFERENCE positions, evenly over the sweep."""
     rows = np.unique(
-        np.linspace(0, len(command.theta_2) - 1, min(AT_MOST, len(command.theta_2)))
+        np.linspace(
+            0,
+            len(command.theta_2) - 1,
+            min(POSITIONS_WITH_REFERENCE, len(command.theta_2)),
+        )
         .round()
         .astype(int)
     )
     return command._replace(angle=command.theta_2[rows], branch=command.branch[rows])
 
 
-def evaluate_double(scene: Scene, command: Command) -> Quantities:
+def evaluate_double(scene: Scene, command: Command) -> QuantityValues:
     """Evaluate by `fourbar.solve`."""
     s = solve(scene, "force", at=command)
     return {name: getattr(s, name) for name in ("torque", *PIN_FORCES)}
 
 
-def evaluate_single(scene: Scene, command: Command) -> Quantities:
+def evaluate_single(scene: Scene, command: Command) -> QuantityValues:
     """Evaluate the formulas on float32 arrays."""
     case = change_numbers(Case.of(scene), _round_single)
     path = case.path._replace(u1=np.complex64(case.path.u1))
@@ -89,7 +92,7 @@ def _stack(vector: Any, n: int) -> Array:
     return np.stack([values.real, values.imag], axis=1)
 
 
-def solve_thirteen_equations(scene: Scene, command: Command) -> Quantities:
+def solve_thirteen_equations(scene: Scene, command: Command) -> QuantityValues:
     """Solve thirteen equations per position, with kinematics by the formulas."""
     if any(effect.loaded_pins for effect in scene.effects):
         raise NotImplementedError(
@@ -98,17 +101,17 @@ def solve_thirteen_equations(scene: Scene, command: Command) -> Quantities:
     x = thirteen.solve_thirteen(make_bodies(scene, command), scene.drive_bar)
     columns = {name: getattr(thirteen, name) for name in PIN_FORCES}
     return {
-        "torque": x[:, thirteen.TORQUE],
+        "torque": x[:, thirteen.TORQUE_COLUMN],
         **{name: x[:, k : k + 2] for name, k in columns.items()},
     }
 
 
-def make_bodies(scene: Scene, command: Command) -> thirteen.FreeBodies:
+def make_bodies(scene: Scene, command: Command) -> thirteen.EquationTerms:
     """Set up the free bodies with what acts on them, by our kinematics.
 
     Moments are about the mass centres.
     """
-    state = compute_state(scene, command)
+    state = compute_shown_state(scene, command)
     parts = list_bodies(scene.linkage, scene.effects)
     n = len(state.theta_2)
     placed = scene.settled()
@@ -127,12 +130,12 @@ def make_bodies(scene: Scene, command: Command) -> thirteen.FreeBodies:
         force[k] = _stack(body.m * state.acceleration(k, body.z) - R, n)
         about_G = M - cross(centre, R + 0.0j)
         moment[k] = np.broadcast_to(body.I * np.asarray(state.alpha(k)), (n,)) - about_G
-    return thirteen.FreeBodies(first, second, force, moment)
+    return thirteen.EquationTerms(first, second, force, moment)
 
 
 def evaluate_balls(
     scene: Scene, command: Command, bits: int = FIFTY_DIGITS
-) -> Quantities:
+) -> QuantityValues:
     """Evaluate balls of the independent reference, (n,) objects."""
     from flint import arb, ctx
 
@@ -153,7 +156,7 @@ def evaluate_balls(
             outputs.append(compute_outputs(scene, branch, x) or {})
     finally:
         ctx.prec = before
-    out: Quantities = {"torque": [y.get("torque") for y in outputs]}
+    out: QuantityValues = {"torque": [y.get("torque") for y in outputs]}
     return out | {
         name: [(y.get(f"{name}_x"), y.get(f"{name}_y")) for y in outputs]
         for name in PIN_FORCES
@@ -161,7 +164,10 @@ def evaluate_balls(
 
 
 def compare_with_reference(
-    scene: Scene, command: Command, quantities: Quantities, reference: Quantities
+    scene: Scene,
+    command: Command,
+    quantities: QuantityValues,
+    reference: QuantityValues,
 ) -> WorstErrors:
     """Find the worst errors on their scales against balls of many more digits."""
     formulas = solve(scene, "force", at=command)
@@ -181,7 +187,9 @@ def compare_with_reference(
                 errors.append(
                     float(
                         divide(
-                            math.hypot(*(_compute_difference(x, y) for x, y in pairs)),
+                            math.hypot(
+                                *(_compute_relative_error(x, y) for x, y in pairs)
+                            ),
                             size,
                         )
                     )
@@ -190,7 +198,7 @@ def compare_with_reference(
     return WorstErrors(**worst)
 
 
-def _compute_difference(ours: Any, exact: Any) -> float:
+def _compute_relative_error(ours: Any, exact: Any) -> float:
     from flint import arb
 
     if isinstance(ours, arb):
@@ -200,7 +208,7 @@ def _compute_difference(ours: Any, exact: Any) -> float:
     return abs(float((ball - exact).mid()))
 
 
-METHODS: dict[str, Callable[[Scene, Command], Quantities]] = {
+METHODS_TIMED: dict[str, Callable[[Scene, Command], QuantityValues]] = {
     "formulas, double": evaluate_double,
     "formulas, single": evaluate_single,
     "13x13": solve_thirteen_equations,

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fourbar_validation.advise.worst_errors import QUANTITIES
-from fourbar_validation.cost.study import STEPPED, CostPoint
+from fourbar_validation.advise.worst_errors import ERROR_NAMES
+from fourbar_validation.cost.study import STEPPED_MOTION, CostPoint
 
-TOO_LARGE = 0.1
+LARGEST_LAWFUL_ERROR = 0.1
 """A larger error is not small enough for its law: the motion itself is another."""
 FLOORED = 0.8
 """Part of an error from which on it has met its floor. Twice the steps leave that part
@@ -25,7 +25,7 @@ WITHIN = 0.35
 over two decades of a ladder the next order of the error's series moves a fitted slope
 by about a quarter.
 """
-FEWEST = 3
+FEWEST_FITTED = 3
 """Points of a fit."""
 _JUMP = 10.0
 """An error so many times larger than at either of the two coarser settings is no part
@@ -36,10 +36,10 @@ _MIXES = 1.0 / 30.0
 """Part of the least error from which on a rest flattens a slope. The rest does not
 depend on the setting.
 """
-FIRST_ORDER = 1.0
+RATIOS_OF_FIRST_ORDER = 1.0
 _FOURTH_ORDER = 4.0
 _EXPECTED_ORDER = dict.fromkeys(
-    ("Euler", "implicit", "implicitfast", "discrete"), FIRST_ORDER
+    ("Euler", "implicit", "implicitfast", "discrete"), RATIOS_OF_FIRST_ORDER
 ) | {"RK4": _FOURTH_ORDER}
 
 
@@ -66,7 +66,7 @@ class ErrorLaw:
         """Return whether a part that the setting does not change flattens the slope."""
         return (
             self.constant > _MIXES
-            and self.points >= FEWEST
+            and self.points >= FEWEST_FITTED
             and self.exponent < self.expected - WITHIN
         )
 
@@ -76,7 +76,7 @@ class ErrorLaw:
 
         It is decided too if a jump rules the law out.
         """
-        return (self.points >= FEWEST and not self.mixed) or bool(self.jumps)
+        return (self.points >= FEWEST_FITTED and not self.mixed) or bool(self.jumps)
 
     @property
     def holds(self) -> bool:
@@ -101,7 +101,8 @@ class ErrorLaw:
             )
         if not self.decided:
             return (
-                f"no fit, {self.points} points above the floor and below {TOO_LARGE:g}"
+                f"no fit, {self.points} points above the floor"
+                f" and below {LARGEST_LAWFUL_ERROR:g}"
             )
         verdict = "holds" if self.holds else "FAILS"
         return f"{verdict}, {self.exponent:.2f} (uncertain by {self.sigma:.2f})"
@@ -112,12 +113,12 @@ def write_laws(all_laws: Sequence[ErrorLaw]) -> list[str]:
     shown = []
     for name in dict.fromkeys(law.name for law in all_laws):
         laws = [law for law in all_laws if law.name == name]
-        texts = _group([(law.quantity, str(law)) for law in laws])
+        texts = _group_quantities([(law.quantity, str(law)) for law in laws])
         shown.append(f"{name}, expected {laws[0].expected:g}: {'; '.join(texts)}")
     return shown
 
 
-def _group(pairs: Sequence[tuple[str, str]]) -> list[str]:
+def _group_quantities(pairs: Sequence[tuple[str, str]]) -> list[str]:
     """Group quantities with the same text."""
     texts = dict.fromkeys(text for _, text in pairs)
     return [
@@ -143,7 +144,7 @@ def find_floor(points: Sequence[CostPoint], quantity: str) -> float | None:
 
     None if it still falls at the end of the ladder.
     """
-    errors = [_read(point, quantity) for point in _list_by_steps(points)]
+    errors = [_error_at_steps(point, quantity) for point in _list_by_steps(points)]
     if (
         len(errors) < 2
         or not math.isfinite(errors[-1])
@@ -163,7 +164,7 @@ def _find_steps_at_floor(
     ladder = _list_by_steps(points)
     first = ladder[-1]
     for point in reversed(ladder):
-        if not FLOORED * floor <= _read(point, quantity) <= floor / FLOORED:
+        if not FLOORED * floor <= _error_at_steps(point, quantity) <= floor / FLOORED:
             break
         first = point
     return first
@@ -180,14 +181,15 @@ def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
     """
     jumps = []
     for i, point in enumerate(points[1:], 1):
-        value = _read(point, quantity)
+        value = _error_at_steps(point, quantity)
         before = [
-            _read(point_before, quantity) for point_before in points[max(i - 2, 0) : i]
+            _error_at_steps(point_before, quantity)
+            for point_before in points[max(i - 2, 0) : i]
         ]
         # two sources that cancel make a dip, and its far side is no jump; a motion that
         # is lost again is one
-        if before[-1] < TOO_LARGE and not value <= _JUMP * (
-            max(before) if value < TOO_LARGE else before[-1]
+        if before[-1] < LARGEST_LAWFUL_ERROR and not value <= _JUMP * (
+            max(before) if value < LARGEST_LAWFUL_ERROR else before[-1]
         ):
             jumps.append(point)
     return jumps
@@ -212,23 +214,23 @@ def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
         name = f"order of {integrator} in the timestep"
         laws += [
             _fit_law(name, quantity, points, order, by_steps=True)
-            for quantity in QUANTITIES
+            for quantity in ERROR_NAMES
             if points
         ]
     laws += [
         _fit_law(name, quantity, points, n)
         for name, points, n in ladders
-        for quantity in QUANTITIES
+        for quantity in ERROR_NAMES
         if points
     ]
     laws += [
         _fit_sag(curves, quantity)
-        for quantity in QUANTITIES
+        for quantity in ERROR_NAMES
         if curves.get("sag tc, slow")
     ]
     return laws + [
         law
-        for quantity in QUANTITIES
+        for quantity in ERROR_NAMES
         if (law := _fit_stiff(curves, quantity)).points > 0
     ]
 
@@ -252,15 +254,19 @@ def _fit_law(
     leaps = tuple(
         _measure_leap(p, ordered, quantity) for p in find_jumps(ordered, quantity)
     )
-    used = [p for p in ordered if _ABOVE_FLOOR * least < _read(p, quantity) < TOO_LARGE]
-    if len(used) < FEWEST:
+    used = [
+        p
+        for p in ordered
+        if _ABOVE_FLOOR * least < _error_at_steps(p, quantity) < LARGEST_LAWFUL_ERROR
+    ]
+    if len(used) < FEWEST_FITTED:
         return ErrorLaw(name, quantity, math.nan, math.inf, expected, len(used), leaps)
     x = [1.0 / p.setting_value if by_steps else p.setting_value for p in used]
-    slope, sigma = fit(x, [_read(p, quantity) for p in used])
+    slope, sigma = fit(x, [_error_at_steps(p, quantity) for p in used])
     return ErrorLaw(name, quantity, slope, sigma, expected, len(used), leaps)
 
 
-def _read(point: CostPoint, quantity: str) -> float:
+def _error_at_steps(point: CostPoint, quantity: str) -> float:
     """Return the error of a quantity at the steps.
 
     Between them the laws are those of a spline.
@@ -269,8 +275,9 @@ def _read(point: CostPoint, quantity: str) -> float:
 
 
 def _measure_leap(point: CostPoint, ladder: Sequence[CostPoint], quantity: str) -> str:
-    before = _read(ladder[ladder.index(point) - 1], quantity)
-    return f"jumps from {before:.1e} to {_read(point, quantity):.1e} at {point.setting}"
+    before = _error_at_steps(ladder[ladder.index(point) - 1], quantity)
+    after = _error_at_steps(point, quantity)
+    return f"jumps from {before:.1e} to {after:.1e} at {point.setting}"
 
 
 def _fit_sag(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw:
@@ -280,11 +287,11 @@ def _fit_sag(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorL
     """
     points = curves["sag tc, slow"]
     law = _fit_law("sag at 0.1 rad/s in tc", quantity, points, 2.0)
-    least = min(_read(point, quantity) for point in points)
+    least = min(_error_at_steps(point, quantity) for point in points)
     alone = curves.get("softness alone, slow", ())
     if not alone or not 0.0 < least < math.inf:
         return law
-    return replace(law, constant=_read(alone[0], quantity) / least)
+    return replace(law, constant=_error_at_steps(alone[0], quantity) / least)
 
 
 def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw:
@@ -302,7 +309,7 @@ def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> Erro
         if (least := find_floor(points, quantity)) is not None
     }
     name = "floor of RK4 in tc/h"
-    if len(floors) < FEWEST:
+    if len(floors) < FEWEST_FITTED:
         return ErrorLaw(name, quantity, math.nan, math.inf, -_FOURTH_ORDER, len(floors))
     slope, sigma = fit(list(floors), list(floors.values()))
     return ErrorLaw(name, quantity, slope, sigma, -_FOURTH_ORDER, len(floors))
@@ -319,7 +326,7 @@ def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
             [
                 p
                 for p in points
-                if p.kind == STEPPED
+                if p.kind == STEPPED_MOTION
                 and p.setting_value == p.setting_value
                 and p.setting_value >= 2.0
             ]
@@ -334,23 +341,25 @@ def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
             continue
         leaps = [
             (q, _measure_leap(p, ladder, q))
-            for q in QUANTITIES
+            for q in ERROR_NAMES
             for p in find_jumps(ladder, q)
         ]
-        warnings += [f"{name}: {line}" for line in _group(leaps)]
+        warnings += [f"{name}: {line}" for line in _group_quantities(leaps)]
         floored = [
             (q, _describe_floor(ladder, q))
-            for q in QUANTITIES
+            for q in ERROR_NAMES
             if find_floor(ladder, q) is not None
         ]
-        warnings += [f"{name}: {line}" for line in _group(floored)]
+        warnings += [f"{name}: {line}" for line in _group_quantities(floored)]
         never = [
-            q for q in QUANTITIES if not any(_read(p, q) < TOO_LARGE for p in ladder)
+            q
+            for q in ERROR_NAMES
+            if not any(_error_at_steps(p, q) < LARGEST_LAWFUL_ERROR for p in ladder)
         ]
         if never:
             warnings.append(
                 f"{name}: no timestep of the ladder brings {', '.join(never)} below"
-                f" {TOO_LARGE:g}"
+                f" {LARGEST_LAWFUL_ERROR:g}"
             )
     return warnings
 
@@ -364,10 +373,10 @@ def _describe_floor(ladder: Sequence[CostPoint], quantity: str) -> str:
     first = _find_steps_at_floor(ladder, quantity)
     assert floor is not None and first is not None
     text = f"{floor:.1e} from {first.steps_per_revolution:.0f} steps a revolution on"
-    least = min(ladder, key=lambda point: _read(point, quantity))
-    if _read(least, quantity) < FLOORED * floor:
+    least = min(ladder, key=lambda point: _error_at_steps(point, quantity))
+    if _error_at_steps(least, quantity) < FLOORED * floor:
         text += (
-            f", but for {_read(least, quantity):.1e} at "
+            f", but for {_error_at_steps(least, quantity):.1e} at "
             f"{least.steps_per_revolution:.0f}, where two errors cancel"
         )
     return text

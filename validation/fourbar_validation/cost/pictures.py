@@ -11,34 +11,34 @@ from typing import Any, NamedTuple
 from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.style import Drawing, apply_style
 from fourbar.writing import write_text
-from fourbar_validation.advise.worst_errors import QUANTITIES
+from fourbar_validation.advise.worst_errors import ERROR_NAMES
 from fourbar_validation.cost.conclusion import (
-    DIGITS,
-    FOUR_DIGITS,
-    NAMES,
+    ERROR_IN_WORDS,
+    ERROR_OF_FOUR_DIGITS,
+    QUANTITY_WORDS,
     SIX_DIGITS,
+    Curves,
     find_cheapest,
     find_default,
     list_stepped,
-    write_short,
+    write_one_digit,
 )
-from fourbar_validation.cost.laws import TOO_LARGE, find_jumps, find_pareto
+from fourbar_validation.cost.laws import LARGEST_LAWFUL_ERROR, find_jumps, find_pareto
 from fourbar_validation.cost.series import BEST
 from fourbar_validation.cost.study import (
-    EXACT,
-    FORMULAS,
+    EXACT_MOTION,
+    FORMULAS_CURVE,
     MUJOCO_INVERSE,
     PINOCCHIO,
-    STEPPED,
+    STEPPED_MOTION,
     CostPoint,
 )
-from fourbar_validation.report.svg import LIGHT, write_alone
+from fourbar_validation.report.svg import LIGHT_COLOURS, write_alone
 
-Curves = Mapping[str, Sequence[CostPoint]]
 INK, SOFT, GRID, BAND, PAPER = (
-    LIGHT[f"--{name}"] for name in ("ink", "soft", "grid", "under", "paper")
+    LIGHT_COLOURS[f"--{name}"] for name in ("ink", "soft", "grid", "under", "paper")
 )
-_BLUE, _GREEN, _ORANGE, _PINK, _VIOLET = (LIGHT[f"--e{n}"] for n in range(1, 6))
+_BLUE, _GREEN, _ORANGE, _PINK, _VIOLET = (LIGHT_COLOURS[f"--e{n}"] for n in range(1, 6))
 
 
 class Look(NamedTuple):
@@ -56,13 +56,13 @@ class Look(NamedTuple):
 _DASHED = (0, (4, 2))
 _DOTTED = (0, (1, 1.5))
 LONG = (0, (7, 2, 1.5, 2))
-INTEGRATORS = {
+INTEGRATOR_LOOKS = {
     "Euler": Look("Euler, tc held", _ORANGE, "s", _DASHED),
     "implicitfast": Look("implicitfast, tc held", _PINK, "v", _DOTTED),
     "discrete": Look("discrete, tc held", _GREEN, "D", LONG),
     "RK4": Look("RK4, tc held", _BLUE, "o"),
 }
-METHODS = {
+METHOD_LOOKS = {
     "Euler, defaults": Look("Euler, MuJoCo's defaults", _ORANGE, "s", _DASHED),
     "RK4, defaults": Look("RK4, MuJoCo's defaults", _PINK, "D", _DOTTED),
     "Euler, stiff closure": Look("Euler, tc held", _GREEN, "v", LONG),
@@ -76,7 +76,7 @@ TIMESTEPS = {
     "tc = 100 steps": Look("RK4, pads, tc = 100 steps", _VIOLET, "P", (0, (5, 1))),
     "tc a quarter turn": Look("RK4, tc held", _BLUE, "o"),
 }
-SOFTNESS = {
+SOFTNESS_LOOKS = {
     "at the scene's speed": Look("softness d", _BLUE, "o"),
     "at 0.1 rad/s": Look("sag d, slow", _ORANGE, "s", _DASHED),
     "at 0.1 rad/s, nothing acts": Look(
@@ -88,22 +88,22 @@ SOLVERS = {
     "PGS": Look("tolerance, PGS", _ORANGE, "s", _DASHED),
     "CG": Look("tolerance, CG", _GREEN, "^", _DOTTED),
 }
-LARGEST = 10.0
+LARGEST_DRAWN_ERROR = 10.0
 """Largest error over the timestep that is drawn in its place. A larger one, and one
 without end, is drawn at the upper edge.
 """
 _LOWEST = 1e-17
 """Bottom of the picture; fifty digits lie far below and are not drawn."""
-NONE = 1e-18
+ZERO_TOLERANCE_PLACE = 1e-18
 """Place on the logarithmic axis at which a tolerance of 0 is drawn."""
-WIDTH = 5.0
+PICTURE_WIDTH = 5.0
 """Width of a picture, in: on a screen of 360 px its texts are still 9 px high."""
 TEXT = 9.5
 _NEAR_FRONT = 1.1
 """Time over that of the cheapest within which an advised setting is one of them."""
 
 
-def draw(curves: Curves, title: str, folder: Path) -> list[Path]:
+def draw_pictures(curves: Curves, title: str, folder: Path) -> list[Path]:
     """Draw all pictures of a scene as SVG and PNG; the files written."""
     with apply_style():
         made = make_pictures(curves, title)
@@ -130,7 +130,7 @@ def make_pictures(curves: Curves, title: str) -> dict[str, Any]:
     }
     made = {
         f"work-precision-{quantity}": draw_work_precision(curves, quantity, title)
-        for quantity in NAMES
+        for quantity in QUANTITY_WORDS
     }
     for name, (curve, make) in makers.items():
         if curves.get(curve):
@@ -138,7 +138,7 @@ def make_pictures(curves: Curves, title: str) -> dict[str, Any]:
     return made
 
 
-def _draw_line(
+def _draw_look(
     axes: Any, x: Sequence[float], y: Sequence[float], label: str, look: Look
 ) -> None:
     """Draw a curve in its colour, with its marker and line."""
@@ -160,7 +160,7 @@ def make_figure(height: float, statement: str, title: str) -> Any:
     """Make a figure with what it means, and what was run, above it."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(WIDTH, height), facecolor=PAPER)
+    figure = Figure(figsize=(PICTURE_WIDTH, height), facecolor=PAPER)
     figure.text(
         *(0.02, 1.0 - 0.1 / height, statement),
         fontsize=10.5,
@@ -217,7 +217,7 @@ def draw_work_precision(curves: Curves, quantity: str, title: str) -> Any:
         label="cheapest of everything stepped",
     )
     labels.keep_off(axes, *zip(*_locate(front, quantity), strict=True), width=8.0)
-    for name, look in METHODS.items():
+    for name, look in METHOD_LOOKS.items():
         label = name
         if look.curve == "recommended":
             most = _measure_distance(curves, quantity)
@@ -225,21 +225,23 @@ def draw_work_precision(curves: Curves, quantity: str, title: str) -> Any:
         row = [
             point
             for point in curves.get(look.curve, ())
-            if getattr(point.errors, quantity) < LARGEST
+            if getattr(point.errors, quantity) < LARGEST_DRAWN_ERROR
         ]
         if row:
-            _draw_line(axes, *_locate(row, quantity), label, look)
+            _draw_look(axes, *_locate(row, quantity), label, look)
             places = zip(*_locate(row, quantity), strict=True)
             labels.keep_off(axes, *places, width=1.8)
     default = find_default(curves)
-    if default is not None and getattr(default.errors, quantity) < LARGEST:
+    if default is not None and getattr(default.errors, quantity) < LARGEST_DRAWN_ERROR:
         place = _locate([default], quantity)
         axes.plot(*place, marker="*", ms=16, color=_ORANGE, mec=INK, mew=0.8, zorder=5)
-        _name(labels, axes, default, quantity, "Euler, 2 ms")
+        _name_point(labels, axes, default, quantity, "Euler, 2 ms")
     _mark_price(labels, axes, curves, quantity)
     for point in (point for row in curves.values() for point in row):
         _mark_exact(labels, axes, point, quantity)
-    axes.set_ylabel(f"error of the {NAMES[quantity]}, of its scale", labelpad=1.0)
+    axes.set_ylabel(
+        f"error of the {QUANTITY_WORDS[quantity]}, of its scale", labelpad=1.0
+    )
     set_axes(axes)
     axes.set_ylim(_LOWEST / 4.0, 3.0)
     low, high = axes.get_xlim()
@@ -269,7 +271,7 @@ def _name_time(axes: Any, front: Sequence[CostPoint]) -> None:
     axes.set_xlabel(text)
 
 
-def _name(
+def _name_point(
     labels: Labels, axes: Any, point: CostPoint, quantity: str, text: str
 ) -> None:
     """Write next to a point, where it covers nothing."""
@@ -280,11 +282,11 @@ def _name(
 
 def _mark_exact(labels: Labels, axes: Any, point: CostPoint, quantity: str) -> None:
     """Mark a method that answers each position by itself."""
-    marks = {EXACT: ("h", _GREEN), FORMULAS: ("*", INK)}
+    marks = {EXACT_MOTION: ("h", _GREEN), FORMULAS_CURVE: ("*", INK)}
     value = getattr(point.errors, quantity)
-    if point.kind == STEPPED or not math.isfinite(point.seconds_per_second):
+    if point.kind == STEPPED_MOTION or not math.isfinite(point.seconds_per_second):
         return
-    if not _LOWEST <= value < LARGEST:
+    if not _LOWEST <= value < LARGEST_DRAWN_ERROR:
         return
     marker, colour = marks[point.kind]
     axes.plot(
@@ -296,7 +298,7 @@ def _mark_exact(labels: Labels, axes: Any, point: CostPoint, quantity: str) -> N
         mew=0.6,
         zorder=4,
     )
-    _name(labels, axes, point, quantity, SHORT.get(point.setting, point.setting))
+    _name_point(labels, axes, point, quantity, SHORT.get(point.setting, point.setting))
 
 
 SHORT = {
@@ -318,7 +320,7 @@ def write_statement(curves: Curves, quantity: str) -> str:
     digits, cheapest = _find_price(curves, quantity)
     default = find_default(curves)
     if quantity == "torque":
-        name = NAMES[quantity].split()[-1]
+        name = QUANTITY_WORDS[quantity].split()[-1]
     else:
         name = "pin force"
     parts = []
@@ -330,8 +332,10 @@ def write_statement(curves: Curves, quantity: str) -> str:
     if default is not None:
         error = getattr(default.errors, quantity)
         if math.isfinite(error):
-            parts.append(f"MuJoCo's defaults have an error of {write_short(error)}")
-    return ";\n".join(parts) or f"Error of the {NAMES[quantity]} against its cost"
+            parts.append(f"MuJoCo's defaults have an error of {write_one_digit(error)}")
+    return (
+        ";\n".join(parts) or f"Error of the {QUANTITY_WORDS[quantity]} against its cost"
+    )
 
 
 def _find_price(curves: Curves, quantity: str) -> tuple[str, CostPoint | None]:
@@ -339,10 +343,10 @@ def _find_price(curves: Curves, quantity: str) -> tuple[str, CostPoint | None]:
 
     Return the words for the digits too.
     """
-    for error in (SIX_DIGITS, FOUR_DIGITS):
+    for error in (SIX_DIGITS, ERROR_OF_FOUR_DIGITS):
         point = find_cheapest(curves, quantity, error)
         if point is not None:
-            return DIGITS[error], point
+            return ERROR_IN_WORDS[error], point
     return "", None
 
 
@@ -362,7 +366,7 @@ def _mark_price(labels: Labels, axes: Any, curves: Curves, quantity: str) -> Non
         zorder=6,
     )
     text = f"{digits.lower()}, {1e3 * point.seconds_per_second:.2g} ms"
-    _name(labels, axes, point, quantity, text)
+    _name_point(labels, axes, point, quantity, text)
 
 
 def _measure_distance(curves: Curves, quantity: str) -> float:
@@ -396,13 +400,13 @@ def _draw_worst(
             (
                 point
                 for point in curves.get(look.curve, ())
-                if point.at_steps.worst < LARGEST
+                if point.at_steps.worst < LARGEST_DRAWN_ERROR
             ),
             key=abscissa,
         )
         x = [abscissa(point) for point in row]
         y = [point.at_steps.worst for point in row]
-        _draw_line(axes, x, y, label, look)
+        _draw_look(axes, x, y, label, look)
     axes.set_ylabel("worst error of torque and pin forces")
 
 
@@ -444,7 +448,7 @@ def _draw_integrator(curves: Curves, title: str) -> Any:
         curves,
         title,
         "RK4 gains four digits where the others\ngain one",
-        INTEGRATORS,
+        INTEGRATOR_LOOKS,
         lambda point: 1.0 / point.setting_value,
         "timestep, part of a revolution",
     )
@@ -459,7 +463,7 @@ def _draw_softness(curves: Curves, title: str) -> Any:
         curves,
         title,
         "The error goes as 1 - d; under loads a slow\nlinkage sags, which is far worse",
-        SOFTNESS,
+        SOFTNESS_LOOKS,
         lambda point: point.setting_value,
         "1 - d (d: impedance of solimp; MuJoCo's own 0.9)",
     )
@@ -472,14 +476,15 @@ def _draw_solver(curves: Curves, title: str) -> Any:
     figure, axes = _draw_single(
         curves,
         title,
-        f"Beside a flywheel of {write_short(BEST.flywheel)} Newton's solver needs\n"
+        f"Beside a flywheel of {write_one_digit(BEST.flywheel)} Newton's solver needs\n"
         "a tolerance of 0",
         SOLVERS,
-        lambda point: point.setting_value or NONE,
+        lambda point: point.setting_value or ZERO_TOLERANCE_PLACE,
         "tolerance of the solver",
     )
     axes.set_xticks(
-        [NONE, 1e-15, 1e-12, 1e-9, 1e-6], ["0", "1e-15", "1e-12", "1e-9", "1e-6"]
+        [ZERO_TOLERANCE_PLACE, 1e-15, 1e-12, 1e-9, 1e-6],
+        ["0", "1e-15", "1e-12", "1e-9", "1e-6"],
     )
     return figure
 
@@ -502,13 +507,15 @@ def _draw_over_timestep(axes: Any, curves: Curves, quantity: str) -> None:
 
     Its jumps are ringed.
     """
-    for label, look in INTEGRATORS.items():
+    for label, look in INTEGRATOR_LOOKS.items():
         row = sorted(curves.get(look.curve, ()), key=lambda point: point.setting_value)
         errors = {
-            point.setting_value: min(getattr(point.at_steps, quantity), LARGEST)
+            point.setting_value: min(
+                getattr(point.at_steps, quantity), LARGEST_DRAWN_ERROR
+            )
             for point in row
         }
-        _draw_line(axes, [1.0 / n for n in errors], list(errors.values()), label, look)
+        _draw_look(axes, [1.0 / n for n in errors], list(errors.values()), label, look)
         leaps = [point.setting_value for point in find_jumps(row, quantity)]
         axes.plot(
             [1.0 / n for n in leaps],
@@ -532,12 +539,12 @@ def draw_orders(curves: Curves, title: str) -> Any:
         left=0.135, right=0.98, bottom=0.065, top=0.81, wspace=0.08, hspace=0.2
     )
     flat = panels.ravel()
-    for axes, quantity in zip(flat, QUANTITIES, strict=False):
+    for axes, quantity in zip(flat, ERROR_NAMES, strict=False):
         _draw_over_timestep(axes, curves, quantity)
         set_axes(axes)
         axes.get_legend().remove()
-        axes.set_ylim(1e-12, 2.0 * LARGEST)
-        name = NAMES.get(quantity, f"pin force {quantity}")
+        axes.set_ylim(1e-12, 2.0 * LARGEST_DRAWN_ERROR)
+        name = QUANTITY_WORDS.get(quantity, f"pin force {quantity}")
         axes.set_title(name, loc="left", fontsize=TEXT, weight="bold", color=INK)
     flat[-1].set_axis_off()
     flat[-1].legend(
@@ -556,18 +563,21 @@ def state_jumps(curves: Curves) -> str:
     """Say what the picture means."""
     leaping: dict[str, None] = {}
     never: dict[str, list[str]] = {}
-    for label, look in INTEGRATORS.items():
+    for label, look in INTEGRATOR_LOOKS.items():
         row = sorted(curves.get(look.curve, ()), key=lambda point: point.setting_value)
-        for quantity in QUANTITIES:
+        for quantity in ERROR_NAMES:
             if find_jumps(row, quantity):
                 leaping[quantity] = None
             errors = [getattr(point.at_steps, quantity) for point in row]
-            if row and min(errors) >= TOO_LARGE:
+            if row and min(errors) >= LARGEST_LAWFUL_ERROR:
                 never.setdefault(label, []).append(quantity)
     if leaping:
         return f"{', '.join(leaping)} jumps where it is ringed"
     if never:
         quantities = [quantity for row in never.values() for quantity in row]
         lost = ", ".join(dict.fromkeys(quantities))
-        return f"No timestep brings {lost} below {TOO_LARGE:g}\nwith {', '.join(never)}"
+        return (
+            f"No timestep brings {lost} below {LARGEST_LAWFUL_ERROR:g}\n"
+            f"with {', '.join(never)}"
+        )
     return "No error of torque or pin force jumps\ntowards finer steps"

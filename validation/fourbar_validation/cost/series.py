@@ -12,10 +12,10 @@ from fourbar.mjcf import Settings
 from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco import drives
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
-from fourbar_validation.engines.mujoco.trial import FLYWHEEL, Build
+from fourbar_validation.engines.mujoco.trial import TRIAL_FLYWHEEL, Build
 
-STEPS = (20, 40, 80, 160, 320, 640, 1280, 2560)
-_MORE_STEPS = (*STEPS, 5120, 10240)
+STEPS_PER_TURN = (20, 40, 80, 160, 320, 640, 1280, 2560)
+_MORE_STEPS = (*STEPS_PER_TURN, 5120, 10240)
 """Steps per revolution; a first-order integrator needs more."""
 MIDDLE = 640
 """Steps per revolution where a setting other than the timestep changes."""
@@ -27,7 +27,7 @@ _SAGGING = 0.999
 """Impedance at which a slow linkage sags well above the truncation."""
 _MANY_STEPS = 10240
 """Steps per revolution at which a time constant of ten steps is too short to sag."""
-TOLERANCES = (0.0, 1e-16, 1e-14, 1e-12, 1e-10, 1e-8, 1e-6)
+SOLVER_TOLERANCES = (0.0, 1e-16, 1e-14, 1e-12, 1e-10, 1e-8, 1e-6)
 _REGULARISATIONS = (1.0, 1e-2, 1e-4, 1e-6, 1e-8)
 _PADS = (None, 1e-1, 1e-2, 1e-3, 1e-4)
 SLOW = 0.1
@@ -75,13 +75,13 @@ class Curve:
 
 BEST = Settings(
     steps_per_window=1,
-    flywheel=FLYWHEEL,
+    flywheel=TRIAL_FLYWHEEL,
     time_constant_steps=20.0,
     steps_per_revolution=MIDDLE,
 )
 
 
-def trace(
+def make_curve(
     name: str,
     label: str,
     values: Iterable[float],
@@ -99,7 +99,7 @@ def _trace_steps(
     settings: Settings,
     closure: Build | None = None,
     drive: Build | None = None,
-    steps: Iterable[int] = STEPS,
+    steps: Iterable[int] = STEPS_PER_TURN,
     held: float | None = None,
 ) -> Curve:
     """Make a curve over the timestep.
@@ -116,7 +116,7 @@ def _trace_steps(
             tc = held * n
         return replace(settings, steps_per_revolution=n, time_constant_steps=tc)
 
-    return trace(name, "{:g} steps a revolution", steps, at, closure, drive)
+    return make_curve(name, "{:g} steps a revolution", steps, at, closure, drive)
 
 
 def design_curves(scene: Scene) -> list[Curve]:
@@ -145,17 +145,17 @@ def design_curves(scene: Scene) -> list[Curve]:
                 f"RK4, pads, tc = {tc:g} steps", replace(BEST, time_constant_steps=tc)
             )
         )
-    curves.append(_trace_steps("RK4, no pads, tc = 10 steps", PLAIN))
+    curves.append(_trace_steps("RK4, no pads, tc = 10 steps", WITHOUT_PADS))
     curves += [*_vary_softness(), *_vary_sag(), *_vary_tolerance()]
     return curves + (_vary_drives() if scene.motion.alpha_2 == 0.0 else [])
 
 
-PLAIN = replace(BEST, pad=None, time_constant_steps=10.0)
+WITHOUT_PADS = replace(BEST, pad=None, time_constant_steps=10.0)
 
 
 def _choose_ladder(integrator: str) -> tuple[int, ...]:
     if integrator == "RK4":
-        return STEPS
+        return STEPS_PER_TURN
     return _MORE_STEPS
 
 
@@ -205,11 +205,11 @@ def _vary_softness() -> list[Curve]:
         )
         for factor in _REGULARISATIONS
     )
-    by_tc = trace(
+    by_tc = make_curve(
         "softness tc",
         "tc = {:g} steps",
         TIME_CONSTANTS,
-        lambda tc: replace(PLAIN, time_constant_steps=tc),
+        lambda tc: replace(WITHOUT_PADS, time_constant_steps=tc),
     )
     return [
         Curve("softness d", _list_impedances()),
@@ -225,7 +225,8 @@ def _soften(factor: float, text: str, _: float) -> ClosedLoop:
 
 def _list_impedances() -> tuple[Spot, ...]:
     return tuple(
-        Spot(f"d = {d:g}", replace(PLAIN, impedance=d), x=1.0 - d) for d in _IMPEDANCES
+        Spot(f"d = {d:g}", replace(WITHOUT_PADS, impedance=d), x=1.0 - d)
+        for d in _IMPEDANCES
     )
 
 
@@ -234,15 +235,15 @@ def _vary_sag() -> list[Curve]:
 
     The rest of the error at a short time constant is varied too.
     """
-    by_tc = trace(
+    by_tc = make_curve(
         "sag tc, slow",
         "tc = {:g} steps",
         _SAGGING_CONSTANTS,
-        lambda tc: replace(PLAIN, impedance=_SAGGING, time_constant_steps=tc),
+        lambda tc: replace(WITHOUT_PADS, impedance=_SAGGING, time_constant_steps=tc),
     )
     short = Spot(
         f"{_MANY_STEPS} steps a revolution",
-        replace(PLAIN, impedance=_SAGGING, steps_per_revolution=_MANY_STEPS),
+        replace(WITHOUT_PADS, impedance=_SAGGING, steps_per_revolution=_MANY_STEPS),
         x=_MANY_STEPS,
     )
     return [
@@ -259,10 +260,10 @@ def _vary_tolerance() -> list[Curve]:
         settings = replace(BEST, solver=solver, iterations=iterations)
         label = solver + ", tolerance {:g}"
         curves.append(
-            trace(
+            make_curve(
                 f"tolerance, {solver}",
                 label,
-                TOLERANCES,
+                SOLVER_TOLERANCES,
                 lambda x, s=settings: replace(s, tolerance=x),  # type: ignore[misc]
             )
         )
@@ -287,6 +288,6 @@ def _vary_drives() -> list[Curve]:
     ]
     for name, drive in tried:
         explicit = name.endswith("RK4")
-        settings, steps = (light, STEPS) if explicit else (fast, _MORE_STEPS)
+        settings, steps = (light, STEPS_PER_TURN) if explicit else (fast, _MORE_STEPS)
         curves.append(_trace_steps(name, settings, drive=drive, steps=steps))
     return curves

@@ -22,8 +22,8 @@ from fourbar.scene import command as command_of
 from fourbar_validation.advise.advise import advise
 from fourbar_validation.advise.matters import judge_trial
 from fourbar_validation.advise.worst_errors import (
-    NO_ANSWER,
-    QUANTITIES,
+    ERROR_NAMES,
+    INFINITE_ERRORS,
     WorstErrors,
     compute_errors,
 )
@@ -35,7 +35,7 @@ from fourbar_validation.engines.plain_loop import PlainLoop
 from fourbar_validation.report.machine import list_versions
 from fourbar_validation.run.store import Store
 
-ROUNDS = 7
+TIMINGS_OF_A_SETTING = 7
 """Timings of each setting."""
 TIMED_STEPS = 200
 """Steps per timing: some 3 ms of RK4. A round of a curve then passes within one spell
@@ -43,17 +43,17 @@ of the machine.
 """
 TIMED_READINGS = 50
 """Readings per timing."""
-REQUIRED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
+ERRORS_ADVISED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
 """Errors for which the advice is drawn."""
-ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
-VERSION = 8
+IMPEDANCES_AT_ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
+STUDY_VERSION = 8
 """Version of what is tried; parts made with another version are made again."""
-EXACT = "exact"
-STEPPED = "stepped"
-FORMULAS = "formulas"
+EXACT_MOTION = "exact"
+STEPPED_MOTION = "stepped"
+FORMULAS_CURVE = "formulas"
 PINOCCHIO = "Pinocchio, rnea and multipliers"
 MUJOCO_INVERSE = "MuJoCo, mj_inverse and multipliers"
-T = TypeVar("T")
+Clocked = TypeVar("Clocked")
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,16 +95,16 @@ class CostPoint:
         return f"{self.curve}, {self.setting}"
 
 
-COLUMNS = (
+COST_COLUMNS = (
     *("curve", "kind", "setting", "setting_value", "steps", "steps_per_revolution"),
-    *QUANTITIES,
-    *(f"{quantity}_at_steps" for quantity in QUANTITIES),
+    *ERROR_NAMES,
+    *(f"{quantity}_at_steps" for quantity in ERROR_NAMES),
     *("seconds_per_second", "seconds_per_revolution", "scatter", "broken"),
 )
 
 
 def list_cells(point: CostPoint) -> list[Any]:
-    """List the values of a point under COLUMNS."""
+    """List the values of a point under COST_COLUMNS."""
     p = point
     return [
         *(p.curve, p.kind, p.setting, p.setting_value, p.steps),
@@ -113,7 +113,7 @@ def list_cells(point: CostPoint) -> list[Any]:
     ]
 
 
-def _read_point(row: dict[str, Any]) -> CostPoint:
+def _read_cost_point(row: dict[str, Any]) -> CostPoint:
     errors = {name: WorstErrors(*row[name]) for name in ("errors", "at_steps")}
     return CostPoint(**{**row, **errors})
 
@@ -147,7 +147,7 @@ class CostStudy:
         identity = {
             "scene": dump(self.scene),
             "versions": list_versions(),
-            "study": VERSION,
+            "study": STUDY_VERSION,
         }
         with Store(self.folder, identity).held() as store:
             done = store.done()
@@ -155,7 +155,7 @@ class CostStudy:
                 if number in done:
                     points, reasons = store.read(number)
                     self.left_out += reasons
-                    yield name, [_read_point(row) for row in points]
+                    yield name, [_read_cost_point(row) for row in points]
                     continue
                 reasons = []
                 try:
@@ -231,22 +231,24 @@ class CostStudy:
                 spot.settings, spot.closure, spot.drive
             )
             steps = min(trial.steps, TIMED_STEPS) or 1
-            clocks["step", number] = partial(_divide, time_steps, steps)
-            clocks["reading", number] = partial(_divide, time_readings, TIMED_READINGS)
-        times = time_in_turns(clocks, ROUNDS)
+            clocks["step", number] = partial(_time_each, time_steps, steps)
+            clocks["reading", number] = partial(
+                _time_each, time_readings, TIMED_READINGS
+            )
+        times = time_in_turns(clocks, TIMINGS_OF_A_SETTING)
         points = []
         for number, (spot, trial) in enumerate(zip(spots, trials, strict=True)):
             step, scatter = summarise_timings(times["step", number])
             reading, _ = summarise_timings(times["reading", number])
             total = step * trial.steps + reading * readings[number]
-            at_steps = errors = NO_ANSWER
+            at_steps = errors = INFINITE_ERRORS
             if not trial.broken:
                 at_steps = compute_errors(setup.scene, trial.at, trial.quantities)
                 errors = judge_trial(setup.scene, trial)
             points.append(
                 CostPoint(
                     name,
-                    STEPPED,
+                    STEPPED_MOTION,
                     spot.label,
                     spot.x,
                     trial.steps,
@@ -265,7 +267,7 @@ class CostStudy:
         """Try what the advice gives for each required error, where it is reached."""
         setup = self.setup()
         spots = []
-        for required in REQUIRED:
+        for required in ERRORS_ADVISED:
             advice = advise(self.scene, required, setup)
             if advice.reached:
                 label = advice.best.description
@@ -310,7 +312,7 @@ class CostStudy:
         few = formulas.choose_few(self.command)
         exact = formulas.evaluate_balls(self.scene, few, 2 * formulas.FIFTY_DIGITS)
         points = []
-        for label, method in formulas.METHODS.items():
+        for label, method in formulas.METHODS_TIMED.items():
             try:
                 errors = formulas.compare_with_reference(
                     self.scene, few, method(self.scene, few), exact
@@ -323,11 +325,17 @@ class CostStudy:
             else:
                 command = self.command
             times = [
-                time_call(partial(method, self.scene, command)) for _ in range(ROUNDS)
+                time_call(partial(method, self.scene, command))
+                for _ in range(TIMINGS_OF_A_SETTING)
             ]
             points.append(
                 self._make_point(
-                    "formulas", FORMULAS, label, errors, times, len(command.theta_2)
+                    "formulas",
+                    FORMULAS_CURVE,
+                    label,
+                    errors,
+                    times,
+                    len(command.theta_2),
                 )
             )
         return points
@@ -356,9 +364,14 @@ class CostStudy:
                 self.left_out.append(f"{label}: {error}")
                 continue
             errors = compute_errors(self.scene, command, loop.answer(command))
-            times = [time_call(partial(loop.answer, command)) for _ in range(ROUNDS)]
+            times = [
+                time_call(partial(loop.answer, command))
+                for _ in range(TIMINGS_OF_A_SETTING)
+            ]
             points.append(
-                self._make_point("inverse", EXACT, label, errors, times, len(rows))
+                self._make_point(
+                    "inverse", EXACT_MOTION, label, errors, times, len(rows)
+                )
             )
         return points
 
@@ -371,7 +384,7 @@ class CostStudy:
 
         tried = [
             (f"MuJoCo at one state, d = {d:g}", MujocoOneState((d,)), (1.0 - d) / d)
-            for d in ONE_STATE
+            for d in IMPEDANCES_AT_ONE_STATE
         ]
         tried.append(("MuJoCo at one state, extrapolated", MujocoOneState(), 0.0))
         points = []
@@ -388,7 +401,7 @@ class CostStudy:
             errors = compute_errors(self.scene, command, quantities)
             points.append(
                 self._make_point(
-                    "one state", EXACT, label, errors, (), len(rows), softness
+                    "one state", EXACT_MOTION, label, errors, (), len(rows), softness
                 )
             )
         return points
@@ -415,7 +428,7 @@ def summarise_timings(times: Sequence[float]) -> tuple[float, float]:
     return least, median(times) / least - 1.0
 
 
-def _divide(clock: Callable[[int], float], count: int) -> float:
+def _time_each(clock: Callable[[int], float], count: int) -> float:
     return clock(count) / count
 
 
@@ -428,13 +441,13 @@ def time_call(action: Callable[[], object], calls: int = 1) -> float:
 
 
 def time_in_turns(
-    clocks: Mapping[Any, Callable[[], T]], rounds: int
-) -> dict[Any, list[T]]:
+    clocks: Mapping[Any, Callable[[], Clocked]], rounds: int
+) -> dict[Any, list[Clocked]]:
     """Read the clocks in turns, there and back.
 
     A slow spell hits all, and none always finds a warmer machine.
     """
-    times: dict[Any, list[T]] = {name: [] for name in clocks}
+    times: dict[Any, list[Clocked]] = {name: [] for name in clocks}
     for number in range(rounds):
         for name in list(clocks)[:: -1 if number % 2 else 1]:
             times[name].append(clocks[name]())

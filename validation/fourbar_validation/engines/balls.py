@@ -25,23 +25,22 @@ from fourbar.effects import (
     Torsion,
     Viscous,
 )
-from fourbar.linkage import MOVING_BARS
+from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.scene import Scene
 from fourbar_validation.compare.pins import find_centre, find_inertia, find_mass
-from fourbar_validation.engines.description import PINS
 
 Ball: TypeAlias = Any
-Complex: TypeAlias = Any
+ComplexBall: TypeAlias = Any
 """A vector of the plane, x + i y, of two balls."""
-Values: TypeAlias = dict[str, Ball]
+BallValues: TypeAlias = dict[str, Ball]
 
 
-def polar(r: Ball, angle: Ball) -> Complex:
+def polar_ball(r: Ball, angle: Ball) -> ComplexBall:
     """Return r e^{i angle}."""
     return acb(r * angle.cos(), r * angle.sin())
 
 
-def wedge(u: Complex, v: Complex) -> Ball:
+def wedge(u: ComplexBall, v: ComplexBall) -> Ball:
     """Return u_x v_y - u_y v_x."""
     return (u.conjugate() * v).imag
 
@@ -55,7 +54,7 @@ def square(ball: Ball) -> Ball:
     return ball * ball
 
 
-def dot(u: Complex, v: Complex) -> Ball:
+def dot_product(u: ComplexBall, v: ComplexBall) -> Ball:
     """Return u_x v_x + u_y v_y."""
     return (u.conjugate() * v).real
 
@@ -66,7 +65,7 @@ position at 1e-20) cancels.
 """
 OF_PIECE = ("table_start", "table_stop", "table_first", "table_last")
 """Angles and factors of the piece of a load's table that a position is in."""
-ENDS = ("from", "to")
+LINE_ENDS = ("from", "to")
 """Names of the points between which a linear drive acts."""
 STEP_BITS = 90
 """Sensitivities are difference quotients with a relative step of 2^-90: wrong by about
@@ -90,7 +89,7 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
         )
     )
     if scene.drive is not None:
-        for name, (_, point) in zip(ENDS, scene.drive.ends, strict=False):
+        for name, (_, point) in zip(LINE_ENDS, scene.drive.ends, strict=False):
             values |= _collect_place(scene, point, name, f"{name}_angle")
         if isinstance(scene.drive, PointDrive):
             values["direction"] = scene.drive.direction
@@ -162,22 +161,22 @@ def _place_from_pin(
     stated: Place,
     distance: Ball,
     angle: Ball,
-    w: dict[int, Complex],
-    centre: dict[int, Complex],
-) -> Complex:
+    w: dict[int, ComplexBall],
+    centre: dict[int, ComplexBall],
+) -> ComplexBall:
     """Return the vector from a bar's first pin to a place on it.
 
     Two numbers state the place.
 
     `w`: directions of the bars; `centre`: vectors from their first pins to G.
     """
-    arm = w[stated.bar] * polar(distance, angle)
+    arm = w[stated.bar] * polar_ball(distance, angle)
     if stated.from_centre is None:
         return arm
     return centre[stated.bar] + arm
 
 
-def make_balls(scene: Scene, angle: float, **motion: float) -> Values:
+def make_balls(scene: Scene, angle: float, **motion: float) -> BallValues:
     """Give the inputs as balls of no radius, and set the working precision.
 
     omega_2 or alpha_2 are replaced where they are given.
@@ -189,7 +188,9 @@ def make_balls(scene: Scene, angle: float, **motion: float) -> Values:
     }
 
 
-def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
+def compute_directions(
+    x: BallValues, branch: int
+) -> tuple[ComplexBall, ComplexBall, ComplexBall] | None:
     """Return e^{i theta_2}, e^{i theta_3}, e^{i theta_4}.
 
     None if the loop does not close.
@@ -209,8 +210,8 @@ def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
     b = x[b]
     c = x[c]
     side = 1 if bar == 4 else -1
-    w = polar(arb(1), x[f"theta_{bar}"])
-    D = polar(d, x["theta_1"]) + side * held * w
+    w = polar_ball(arb(1), x[f"theta_{bar}"])
+    D = polar_ball(d, x["theta_1"]) + side * held * w
     # |D|^2 by the angle between ground and input: where they are in line it is exact,
     # and so is a loop that just closes
     squared = (
@@ -229,7 +230,7 @@ def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
     return (-second, first, w)
 
 
-def _find_commanded(x: Values) -> int:
+def _find_commanded(x: BallValues) -> int:
     """Return the bar whose angle is among the inputs."""
     return next(bar for bar in MOVING_BARS if f"theta_{bar}" in x)
 
@@ -243,7 +244,7 @@ def _solve_linear(rows: list[list[Ball]], right: list[Ball]) -> list[Ball]:
     return [solution[k, 0] for k in range(len(right))]
 
 
-def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:
+def compute_outputs(scene: Scene, branch: int, inputs: BallValues) -> BallValues | None:
     """Compute every output at one position as balls.
 
     Vectors are name_x, name_y; None if the loop does not close.
@@ -255,13 +256,13 @@ def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:
     if x is None:
         directions = None
     else:
-        directions = closure(x, branch)
+        directions = compute_directions(x, branch)
     if x is None or directions is None:
         return None
     w = dict(zip(MOVING_BARS, directions, strict=True))
     commanded = _find_commanded(x)
     sines = {2: wedge(w[3], w[4]), 3: wedge(w[2], w[4]), 4: wedge(w[2], w[3])}
-    y: Values = {
+    y: BallValues = {
         f"theta_{bar}": w[bar].arg()
         for bar in MOVING_BARS
         if f"theta_{bar}" not in inputs
@@ -271,10 +272,10 @@ def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:
         not y["condition"] > 0
     ):  # singular; NaN where A lies on O4, about which bars 3 and 4 then turn freely
         return y
-    bars = _move(x, w, commanded)
+    bars = _move_balls(x, w, commanded)
     y |= {f"omega_{bar}": bars.omega[bar] for bar in MOVING_BARS}
     y |= {f"alpha_{bar}": bars.alpha[bar] for bar in MOVING_BARS}
-    _put(y, bars.points())
+    _put_vectors(y, bars.points())
     if scene.drive:
         line = _find_line(scene, x, bars)
     else:
@@ -294,15 +295,17 @@ def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:
         y["stroke_speed"] = speed
         if line.stroke is not None:
             y["stroke"] = line.stroke
-        _put(y, {"drive_line": line.line})
+        _put_vectors(y, {"drive_line": line.line})
     drives = {bar: (arb(0), arb(0), arb(bar == scene.drive_bar)) for bar in MOVING_BARS}
     if line is not None:
         drives = {bar: line.push(bar, bars.centre[bar]) for bar in MOVING_BARS}
     try:
-        forces, driving = _solve_thirteen(x, bars, *_sum_acting(scene, x, bars), drives)
+        forces, driving = _solve_thirteen_balls(
+            x, bars, *_sum_acting_balls(scene, x, bars), drives
+        )
     except ZeroDivisionError:
         return y
-    _put(y, forces)
+    _put_vectors(y, forces)
     y[drive], y["power"] = driving, driving * speed
     return y
 
@@ -313,37 +316,37 @@ class _BallBars(NamedTuple):
     They have directions, rates, and vectors of the plane.
     """
 
-    w: dict[int, Complex]
+    w: dict[int, ComplexBall]
     """Unit vectors along the bars."""
     omega: dict[int, Ball]
     alpha: dict[int, Ball]
-    tip: dict[int, Complex]
+    tip: dict[int, ComplexBall]
     """Vectors from the first pin to the second."""
-    first_pin: dict[int, Complex]
+    first_pin: dict[int, ComplexBall]
     """Places of the first pins, the ground's too."""
-    centre: dict[int, Complex]
+    centre: dict[int, ComplexBall]
     """Vectors from the first pin to the mass centre."""
-    v_pin: dict[int, Complex]
-    a_pin: dict[int, Complex]
+    v_pin: dict[int, ComplexBall]
+    a_pin: dict[int, ComplexBall]
     """Velocities and accelerations of the first pins."""
 
-    def turn(self, bar: int, arm: Complex) -> Complex:
+    def turn(self, bar: int, arm: ComplexBall) -> ComplexBall:
         """Return the velocity of a point of a bar against its first pin."""
         return acb(0, self.omega[bar]) * arm
 
-    def swing(self, bar: int, arm: Complex) -> Complex:
+    def swing(self, bar: int, arm: ComplexBall) -> ComplexBall:
         """Return the acceleration of a point of a bar against its first pin."""
         return acb(-self.omega[bar] * self.omega[bar], self.alpha[bar]) * arm
 
-    def acceleration(self, bar: int) -> Complex:
+    def acceleration(self, bar: int) -> ComplexBall:
         """Return the acceleration of a mass centre."""
         return self.a_pin[bar] + self.swing(bar, self.centre[bar])
 
-    def directions(self, x: Values) -> dict[int, Complex]:
+    def directions(self, x: BallValues) -> dict[int, ComplexBall]:
         """Return the unit vectors along all bars, the ground's too."""
-        return {1: polar(arb(1), x["theta_1"]), **self.w}
+        return {1: polar_ball(arb(1), x["theta_1"]), **self.w}
 
-    def points(self) -> dict[str, Complex]:
+    def points(self) -> dict[str, ComplexBall]:
         """Return places, velocities and accelerations of the points, by name.
 
         The points are those that are answered.
@@ -358,7 +361,7 @@ class _BallBars(NamedTuple):
         return points
 
 
-def _move(x: Values, w: dict[int, Complex], commanded: int) -> _BallBars:
+def _move_balls(x: BallValues, w: dict[int, ComplexBall], commanded: int) -> _BallBars:
     """Move the bars: two linear systems of the differentiated loop."""
     a = x["a"]
     b = x["b"]
@@ -367,7 +370,7 @@ def _move(x: Values, w: dict[int, Complex], commanded: int) -> _BallBars:
     side = {2: a * w[2], 3: b * w[3], 4: -c * w[4]}  # sides of the loop
     first, second = (bar for bar in MOVING_BARS if bar != commanded)
 
-    def rates(stated: Ball, total: Complex) -> dict[int, Ball]:
+    def rates(stated: Ball, total: ComplexBall) -> dict[int, Ball]:
         """Solve for the rates of the other bars.
 
         The sum of i side rate is `total`.
@@ -385,8 +388,10 @@ def _move(x: Values, w: dict[int, Complex], commanded: int) -> _BallBars:
     centripetal = sum((side[bar] * square(omega[bar]) for bar in MOVING_BARS), zero)
     alpha = rates(x[f"alpha_{commanded}"], x.get("jerk", zero) + centripetal)
     tip = {2: a * w[2], 3: b * w[3], 4: c * w[4]}
-    first_pin = {1: zero, 2: zero, 3: tip[2], 4: polar(x["d"], x["theta_1"])}
-    centre = {bar: w[bar] * polar(x[f"r{bar}"], x[f"phi{bar}"]) for bar in MOVING_BARS}
+    first_pin = {1: zero, 2: zero, 3: tip[2], 4: polar_ball(x["d"], x["theta_1"])}
+    centre = {
+        bar: w[bar] * polar_ball(x[f"r{bar}"], x[f"phi{bar}"]) for bar in MOVING_BARS
+    }
     v_A = acb(0, omega[2]) * tip[2]
     a_A = acb(-omega[2] * omega[2], alpha[2]) * tip[2]
     at_rest = {2: zero, 4: zero}
@@ -395,13 +400,13 @@ def _move(x: Values, w: dict[int, Complex], commanded: int) -> _BallBars:
     )
 
 
-def _sum_acting(
-    scene: Scene, x: Values, bars: _BallBars
-) -> tuple[dict[int, Complex], dict[int, Ball]]:
+def _sum_acting_balls(
+    scene: Scene, x: BallValues, bars: _BallBars
+) -> tuple[dict[int, ComplexBall], dict[int, Ball]]:
     """Sum what acts on each bar: a force, and a moment about the mass centre."""
     w, first_pin, centre = bars.directions(x), bars.first_pin, bars.centre
     force = {
-        bar: x[f"m{bar}"] * polar(x["g"], x["g_angle"]) if "g" in x else acb(0)
+        bar: x[f"m{bar}"] * polar_ball(x["g"], x["g_angle"]) if "g" in x else acb(0)
         for bar in MOVING_BARS
     }
     moment = {
@@ -416,9 +421,9 @@ def _sum_acting(
         if load.force is None:
             continue
         axes = w[load.bar] if load.frame == "bar" else acb(1)
-        f = axes * polar(x[f"F_{k}"], x[f"F_angle_{k}"])
+        f = axes * polar_ball(x[f"F_{k}"], x[f"F_angle_{k}"])
         if load.arm is not None:
-            arm = polar(x[f"at_{k}"], x[f"at_angle_{k}"])
+            arm = polar_ball(x[f"at_{k}"], x[f"at_angle_{k}"])
         else:
             assert load.place is not None
             stated = find_stated(scene, load.place)
@@ -433,7 +438,7 @@ def _sum_acting(
             for pin, *_ in effect.springs:
                 i, j = PINS[pin]
                 turned = (
-                    w[j] * w[i].conjugate() * polar(arb(1), -x[f"rest_{pin}"])
+                    w[j] * w[i].conjugate() * polar_ball(arb(1), -x[f"rest_{pin}"])
                 ).arg()
                 _add_twist(
                     moment, pin, -x[f"wound_{pin}"] - x[f"torsion_{pin}"] * turned
@@ -486,13 +491,13 @@ def _sum_acting(
     return force, moment
 
 
-def _solve_thirteen(
-    x: Values,
+def _solve_thirteen_balls(
+    x: BallValues,
     bars: _BallBars,
-    force: dict[int, Complex],
+    force: dict[int, ComplexBall],
     moment: dict[int, Ball],
     drives: dict[int, tuple[Ball, Ball, Ball]],
-) -> tuple[dict[str, Complex], Ball]:
+) -> tuple[dict[str, ComplexBall], Ball]:
     """Solve for the pin forces and the driving torque or force.
 
     Raises ZeroDivisionError where they are singular. Unknowns F12 F32 F23 F43 F34 F14
@@ -535,7 +540,7 @@ def _solve_thirteen(
     }, solved[12]
 
 
-def _put(y: Values, vectors: dict[str, Complex]) -> None:
+def _put_vectors(y: BallValues, vectors: dict[str, ComplexBall]) -> None:
     """Put vectors by their components."""
     for name, vector in vectors.items():
         y[f"{name}_x"], y[f"{name}_y"] = vector.real, vector.imag
@@ -552,7 +557,7 @@ def _add_twist(moment: dict[int, Ball], pin: str, couple: Ball) -> None:
             moment[bar] += value
 
 
-def _interpolate_factor(table: Table, theta_2: Ball, x: Values, k: int) -> Ball:
+def _interpolate_factor(table: Table, theta_2: Ball, x: BallValues, k: int) -> Ball:
     """Interpolate between the two points of a table that enclose an angle.
 
     The angle is taken modulo a turn. Where the inputs have them, the four numbers are
@@ -574,7 +579,7 @@ def _interpolate_factor(table: Table, theta_2: Ball, x: Values, k: int) -> Ball:
     return first + (last - first) * (angle - start) / (stop - start)
 
 
-def _turn_by_stroke(scene: Scene, x: Values) -> Values | None:
+def _turn_by_stroke(scene: Scene, x: BallValues) -> BallValues | None:
     """Add angle, speed and acceleration of the bar that a stroke turns.
 
     None if the triangle stays open.
@@ -586,16 +591,16 @@ def _turn_by_stroke(scene: Scene, x: Values) -> Values | None:
     motion = scene.motion
     assert isinstance(drive, LinearDrive) and motion.side is not None
     (_, on_ground), (bar, on_bar) = sorted(
-        zip((drive.start.bar, drive.end.bar), ENDS, strict=True)
+        zip((drive.start.bar, drive.end.bar), LINE_ENDS, strict=True)
     )
     stated = find_stated(scene, drive.start if drive.end.bar == 1 else drive.end)
-    centre = {bar: polar(x[f"r{bar}"], x[f"phi{bar}"])}
+    centre = {bar: polar_ball(x[f"r{bar}"], x[f"phi{bar}"])}
     at_zero = {bar: acb(1)}
     at = x[on_bar], x[f"{on_bar}_angle"]
     held = _place_from_pin(stated, *at, at_zero, centre)
-    fixed = polar(x[on_ground], x[f"{on_ground}_angle"] + x["theta_1"])
+    fixed = polar_ball(x[on_ground], x[f"{on_ground}_angle"] + x["theta_1"])
     if bar == 4:
-        fixed -= polar(x["d"], x["theta_1"])
+        fixed -= polar_ball(x["d"], x["theta_1"])
     s = x["stroke"]
     speed = x["stroke_speed"]
     length = abs(held)
@@ -626,22 +631,22 @@ class _BallLine(NamedTuple):
 
     stroke: Ball | None
     """None of a force at a point."""
-    line: Complex
+    line: ComplexBall
     """Unit vector from one point to the other."""
-    arms: dict[int, Complex]
+    arms: dict[int, ComplexBall]
     """Vectors from the first pin to the end, of the bars with an end."""
     sense: dict[int, int]
     """Sign of the drive's push along the line on each of these bars."""
 
-    def speed(self, foot: dict[int, Complex], omega: dict[int, Ball]) -> Ball:
+    def speed(self, foot: dict[int, ComplexBall], omega: dict[int, Ball]) -> Ball:
         """Return ds/dt from the bars' angular speeds and their pins' speeds."""
         ends = (
             sense * (foot[k] + acb(0, omega[k]) * self.arms[k])
             for k, sense in self.sense.items()
         )
-        return dot(self.line, sum(ends, acb(0)))
+        return dot_product(self.line, sum(ends, acb(0)))
 
-    def push(self, bar: int, centre: Complex) -> tuple[Ball, Ball, Ball]:
+    def push(self, bar: int, centre: ComplexBall) -> tuple[Ball, Ball, Ball]:
         """Force (x, y) and moment about the mass centre of a bar, per newton."""
         if bar not in self.sense:
             return arb(0), arb(0), arb(0)
@@ -649,7 +654,7 @@ class _BallLine(NamedTuple):
         return force.real, force.imag, wedge(self.arms[bar] - centre, force)
 
 
-def _find_line(scene: Scene, x: Values, bars_in_motion: _BallBars) -> _BallLine:
+def _find_line(scene: Scene, x: BallValues, bars_in_motion: _BallBars) -> _BallLine:
     """Find the line of a drive from the directions and first pins of all bars.
 
     The ground's are among them.
@@ -663,10 +668,10 @@ def _find_line(scene: Scene, x: Values, bars_in_motion: _BallBars) -> _BallLine:
         place.bar: _place_from_pin(
             find_stated(scene, place), x[name], x[f"{name}_angle"], w, centre
         )
-        for (_, place), name in zip(drive.ends, ENDS, strict=False)
+        for (_, place), name in zip(drive.ends, LINE_ENDS, strict=False)
     }
     if isinstance(drive, PointDrive):
-        unit = polar(arb(1), x["direction"])
+        unit = polar_ball(arb(1), x["direction"])
         if drive.frame == "bar":
             unit = unit * w[drive.place.bar]
         return _BallLine(None, unit, arms, {drive.place.bar: 1})
@@ -679,7 +684,7 @@ def _find_line(scene: Scene, x: Values, bars_in_motion: _BallBars) -> _BallLine:
 
 
 def _compute_condition(
-    line: _BallLine, x: Values, tip: Complex, sines: dict[int, Ball]
+    line: _BallLine, x: BallValues, tip: ComplexBall, sines: dict[int, Ball]
 ) -> Ball:
     """Compute |P|/L.
 

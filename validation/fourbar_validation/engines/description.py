@@ -13,9 +13,8 @@ import numpy as np
 
 from fourbar.effects import Effect, ForceDrive, Gravity
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
-from fourbar.quantities import COUPLE, LINE, UNKNOWNS
+from fourbar.quantities import COUPLE, LINE, UNKNOWNS, Array
 from fourbar.scene import Command, Scene
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.pins import (
     find_centre,
     find_inertia,
@@ -23,10 +22,9 @@ from fourbar_validation.compare.pins import (
     resolve,
 )
 
-PINS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
-FIRST_PIN = {2: "O2", 3: "A", 4: "O4"}
 FORCE_AT = {"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}
-POINTS = {
+PIN_OF_MOVING_BAR = {2: "O2", 3: "A", 4: "O4"}
+PART_POINTS = {
     "A": "first_pin3",
     "O4": "first_pin4",
     "A2": "end2",
@@ -34,15 +32,15 @@ POINTS = {
     "B4": "end4",
     **{g: g for g in ("G2", "G3", "G4")},
 }
-"""Names of points in `Part`, by the name under which a point is answered. A2 and B4 are
-the ends of bars 2 and 4.
+"""Names of points in `MovingPart`, by the name under which a point is answered. A2 and
+B4 are the ends of bars 2 and 4.
 """
 ON_BARS = {"A": "end2", "B": "end4", "G2": "G2", "G3": "G3", "G4": "G4"}
 """Points whose accelerations are answered, each as a point of a bar."""
 _TELLS = 2.0**-53
 """Least component of a direction that is not what the angle's rounding leaves of zero.
 """
-SHARED = "the description, what is commanded and the branch"
+SHARED_BY_EXACT_ENGINES = "the description, what is commanded and the branch"
 """Words of a report for what an exact engine takes from the formulas' side."""
 
 Value = float | str | tuple[float, ...]
@@ -61,7 +59,7 @@ class ModelEntry(NamedTuple):
     attribute: str = ""
 
 
-def about_first_pin(bar: Bar) -> float:
+def inertia_about_first_pin(bar: Bar) -> float:
     """Compute the moment of inertia about the first pin, kg m^2."""
     return find_inertia(bar) + find_mass(bar) * find_centre(bar)[0] ** 2
 
@@ -100,7 +98,7 @@ def find_field(gravity: Gravity) -> tuple[float, float]:
     )
 
 
-class Part(NamedTuple):
+class MovingPart(NamedTuple):
     """A moving bar in its own axes: from its first pin along its line, and across."""
 
     bar: int
@@ -123,7 +121,7 @@ class Part(NamedTuple):
         return self.points[f"G{self.bar}"]
 
 
-def list_parts(linkage: FourBar) -> list[Part]:
+def list_moving_parts(linkage: FourBar) -> list[MovingPart]:
     """Describe bars 2, 3 on 2, and 4."""
     theta_1 = linkage.ground_angle
     d = linkage.ground
@@ -142,7 +140,7 @@ def list_parts(linkage: FourBar) -> list[Part]:
         }
         points = {f"{name}{number}": place_of for name, place_of in ends.items()}
         parts_of_bars.append(
-            Part(
+            MovingPart(
                 number,
                 *first_pins[number],
                 find_mass(bar),

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fourbar.linkage import PINS
 from fourbar.scene import Scene
 from fourbar_validation.compare.pins import resolve
-from fourbar_validation.engines.description import PINS, declares, find_field
+from fourbar_validation.engines.description import declares, find_field
 from fourbar_validation.engines.loaded import Act, Loaded
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def _set_gravity(effect: "Gravity", bars: Loaded) -> None:
     bars.gravity(find_field(effect))
 
 
-def _compute_slip(bars: Loaded, pin: str) -> float:
+def _spin_at_pin(bars: Loaded, pin: str) -> float:
     """Return how much faster the first bar of a pin spins than the second, rad/s."""
     one, second = PINS[pin]
     return bars.velocity(one) - bars.velocity(second)
@@ -53,7 +54,7 @@ def _apply_twist(bars: Loaded, pin: str, couple: float) -> None:
 def _apply_viscous(effect: "Viscous", bars: Loaded) -> None:
     """Apply couples in proportion to the spin."""
     for pin, k in effect.coefficients:
-        _apply_twist(bars, pin, k * _compute_slip(bars, pin))
+        _apply_twist(bars, pin, k * _spin_at_pin(bars, pin))
 
 
 def _apply_friction(effect: "Friction", bars: Loaded) -> None:
@@ -62,7 +63,7 @@ def _apply_friction(effect: "Friction", bars: Loaded) -> None:
     MuJoCo's own frictionloss is a soft constraint.
     """
     for pin, f in effect.torques:
-        _apply_twist(bars, pin, f * float(np.sign(_compute_slip(bars, pin))))
+        _apply_twist(bars, pin, f * float(np.sign(_spin_at_pin(bars, pin))))
 
 
 def _pin_friction(effect: "PinFriction", bars: Loaded) -> None:
@@ -77,7 +78,7 @@ def _pin_friction(effect: "PinFriction", bars: Loaded) -> None:
             mu
             * r
             * bars.pin_loads.get(pin, 0.0)
-            * float(np.sign(_compute_slip(bars, pin))),
+            * float(np.sign(_spin_at_pin(bars, pin))),
         )
 
 
@@ -119,7 +120,7 @@ def _apply_flywheel(effect: "Flywheel", bars: Loaded) -> None:
     bars.couple(effect.bar, -effect.inertia * bars.alpha(effect.bar))
 
 
-def _load(load: "Load", bars: Loaded) -> None:
+def _carry_load(load: "Load", bars: Loaded) -> None:
     """Apply a force at its place, which the engine's bar carries along.
 
     A couple is applied too.
@@ -165,7 +166,7 @@ TERM_OF: dict[str, Callable[[Any, Loaded], None]] = {
     "torsion": _apply_torsion,
     "springs": _apply_springs,
     "flywheel": _apply_flywheel,
-    "load": _load,
+    "load": _carry_load,
 }
 """Function that applies an effect at a state of the bars, by the effect's key. Others
 bring their own.
@@ -177,7 +178,7 @@ def has_term(effect: "Effect") -> bool:
     return effect.key in TERM_OF or declares(effect, "act_on_engine")
 
 
-def list_acting(scene: Scene, bars: Loaded, own: Container[str] = ()) -> list[Act]:
+def list_wrenches(scene: Scene, bars: Loaded, own: Container[str] = ()) -> list[Act]:
     """List what loads and effects do at each state of the bars.
 
     Gravity is the engine's own, and is set once.

@@ -20,12 +20,12 @@ from filelock import FileLock
 
 from fourbar.errors import DependencyError, InputError
 from fourbar.writing import read_text, write_text
-from fourbar_validation.engines.guests import Guest, name_guests, serve
+from fourbar_validation.engines.guests import Guest, name_guests, serve_adapter
 from fourbar_validation.engines.processes import Program, run_to_end
-from fourbar_validation.engines.registry import FOLDERS, Engine
+from fourbar_validation.engines.registry import LAB_FOLDERS, Engine
 
-FILE = "engines.toml"
-LARGEST_FILE = 10**6
+ENGINES_FILE = "engines.toml"
+LARGEST_ENGINES_FILE = 10**6
 """Bytes."""
 _CACHE = (
     Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fourbar-engines"
@@ -73,7 +73,8 @@ def read_engines(folders: Iterable[Path]) -> dict[str, Entry]:
     """
     entries: dict[str, Entry] = {}
     for file in dict.fromkeys(
-        folder / FILE for folder in (*folders, Path(__file__).parent, *FOLDERS)
+        folder / ENGINES_FILE
+        for folder in (*folders, Path(__file__).parent, *LAB_FOLDERS)
     ):
         if file.is_file():
             entries = entries | {
@@ -86,7 +87,7 @@ def read_engines(folders: Iterable[Path]) -> dict[str, Entry]:
 
 def read_engines_of(file: Path) -> dict[str, Entry]:
     """Read the engines of one file, by name."""
-    text = read_text(file, "engines", LARGEST_FILE)
+    text = read_text(file, "engines", LARGEST_ENGINES_FILE)
     try:
         tables = tomllib.loads(text).get("engine", [])
     except tomllib.TOMLDecodeError as error:
@@ -192,13 +193,15 @@ def prepare_program(entry: Entry, seconds: float | None = None) -> Program:
     """Make an engine's environment; return the program that answers there."""
     python = make_environment(entry)
     if entry.adapter:
-        return serve(entry.adapter, seconds, python)
+        return serve_adapter(entry.adapter, seconds, python)
     program = shutil.which(
         entry.command[0],
         path=f"{Path(python).parent}{os.pathsep}{os.environ.get('PATH')}",
     )
     if program is None:
-        raise InputError("engine.command", entry.command[0], "no such program", FILE)
+        raise InputError(
+            "engine.command", entry.command[0], "no such program", ENGINES_FILE
+        )
     return Program((program, *entry.command[1:]), seconds)
 
 

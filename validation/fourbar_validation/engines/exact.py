@@ -8,17 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.formulas.many_digits import DIGITS
+from fourbar.formulas.many_digits import WORKING_DIGITS
 from fourbar.linkage import FourBar
-from fourbar.quantities import VECTORS
+from fourbar.quantities import VECTORS, Array
 from fourbar.scene import Command, Scene
-from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES
-from fourbar_validation.compare.tolerance import EPS, ROUNDINGS
-from fourbar_validation.engines.description import SHARED, find_unknown, list_speeds
+from fourbar_validation.compare.tolerance import EPS, RANDOM_WALK
+from fourbar_validation.engines.description import (
+    SHARED_BY_EXACT_ENGINES,
+    find_unknown,
+    list_speeds,
+)
 from fourbar_validation.engines.loop import make_blank
 
-NAME = "ball-arithmetic"
+BALL_ARITHMETIC = "ball-arithmetic"
 
 
 def find_refusal(scene: Scene) -> str:
@@ -29,7 +33,7 @@ def find_refusal(scene: Scene) -> str:
 class BallArithmetic:
     """Every compared quantity at each position, rounded once from 320 bits."""
 
-    name = NAME
+    name = BALL_ARITHMETIC
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Answer, or refuse by naming an effect that it does not know."""
@@ -38,7 +42,7 @@ class BallArithmetic:
         from fourbar_validation.engines.balls import compute_outputs, make_balls
 
         if reason := find_refusal(scene):
-            return Answer(NAME, "exact", refusal=reason)
+            return Answer(BALL_ARITHMETIC, "exact", refusal=reason)
         n = len(command.theta_2)
         names = [
             q
@@ -65,12 +69,12 @@ class BallArithmetic:
                 else:
                     array[i] = _to_double(values.get(name))
         return Answer(
-            NAME,
+            BALL_ARITHMETIC,
             "exact",
             at=command,
             assembled=assembled,
             quantities=out,
-            shared=SHARED,
+            shared=SHARED_BY_EXACT_ENGINES,
             own=(
                 "closure as a complex quadratic, linear speeds and accelerations,"
                 " thirteen Newton-Euler equations"
@@ -78,14 +82,14 @@ class BallArithmetic:
         )
 
 
-def compute_sines(linkage: FourBar, command: Command) -> Array:
+def compute_exact_sines(linkage: FourBar, command: Command) -> Array:
     """Compute sin(theta_4 - theta_3) of each position in many digits, (n,).
 
     NaN where the loop does not close.
     """
     from flint import arb, ctx
 
-    from fourbar_validation.engines.balls import BITS, closure, wedge
+    from fourbar_validation.engines.balls import BITS, compute_directions, wedge
 
     ctx.prec = BITS
     x = {
@@ -96,7 +100,7 @@ def compute_sines(linkage: FourBar, command: Command) -> Array:
     for i, (theta_2, branch) in enumerate(
         zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)
     ):
-        closed = closure(x | {"theta_2": arb(theta_2)}, branch)
+        closed = compute_directions(x | {"theta_2": arb(theta_2)}, branch)
         # bars 3 and 4 have no direction if A is on O4
         sines[i] = (
             math.nan
@@ -116,7 +120,7 @@ def shift_to(linkage: FourBar, theta_2: float, sin_mu: float) -> Any:
     """
     from mpmath import mp, mpf
 
-    with mp.workdps(DIGITS):
+    with mp.workdps(WORKING_DIGITS):
         d, a, b, c = map(mpf, linkage.lengths)
         theta_1 = mpf(linkage.ground_angle)
         shifts = []
@@ -129,7 +133,7 @@ def shift_to(linkage: FourBar, theta_2: float, sin_mu: float) -> Any:
                 ]
         shifts = [shift - 2 * mp.pi * mp.nint(shift / (2 * mp.pi)) for shift in shifts]
         nearest = min(shifts, key=abs, default=mp.inf)
-        if abs(nearest) <= ROUNDINGS * EPS * max(
+        if abs(nearest) <= RANDOM_WALK * EPS * max(
             1.0, abs(theta_2), abs(linkage.ground_angle)
         ):
             return nearest

@@ -14,22 +14,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.quantities import COUPLE, LINE
+from fourbar.quantities import COUPLE, LINE, Array, ComplexArray
 from fourbar.scene import Command, Scene, with_signs
-from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.line import DriveLine, place_line
 from fourbar_validation.compare.pins import find_centre, find_mass, state_from_pins
 from fourbar_validation.engines.description import (
     FORCE_AT,
-    SHARED,
-    about_first_pin,
+    SHARED_BY_EXACT_ENGINES,
     find_unknown,
+    inertia_about_first_pin,
     list_speeds,
 )
 from fourbar_validation.engines.free_body_closure import (
-    Complex,
     close,
-    cross,
+    cross_products,
     find_angle,
     measure_cylinder,
 )
@@ -45,12 +44,12 @@ from fourbar_validation.engines.free_body_effects import (
 from fourbar_validation.engines.linear import solve_refined
 
 NAME = "free-body"
-COLUMN = {"F12": 0, "F32": 2, "F23": 4, "F43": 6, "F34": 8, "F14": 10}
+FORCE_COLUMNS = {"F12": 0, "F32": 2, "F23": 4, "F43": 6, "F34": 8, "F14": 10}
 DRIVE = 12
 """The torque, or the force along a line."""
-ROWS = {2: (0, "F12", "F32"), 3: (3, "F23", "F43"), 4: (6, "F14", "F34")}
+EQUATION_ROWS = {2: (0, "F12", "F32"), 3: (3, "F23", "F43"), 4: (6, "F14", "F34")}
 """First row of a bar, the force at its first pin and that at its second."""
-BLOCK = 4096
+POSITIONS_SOLVED_AT_ONCE = 4096
 """Positions solved at once. At 1.4 kB a matrix, and some four of them at a time, they
 are 22 MB.
 """
@@ -66,7 +65,7 @@ of its terms.
 """
 _FRICTION_STARTS = 100
 """Starts from which other solutions are sought, over six decades of couples."""
-APART = 1e-6
+SAME_SOLUTIONS = 1e-6
 """Relative difference below which two solutions are one."""
 
 
@@ -109,7 +108,7 @@ class FreeBody:
                     np.max(closed.gap, initial=0.0, where=closed.assembled)
                 )
             },
-            shared=SHARED,
+            shared=SHARED_BY_EXACT_ENGINES,
             own=(
                 "assembly (Newton on the two closure equations), speeds and"
                 " accelerations (own 2x2 Jacobian), every effect from its definition,"
@@ -119,8 +118,8 @@ class FreeBody:
         if command.speed is not None:
             commanded = (theta[0], *list_speeds(command), *theta[1:])
             blocks = [
-                slice(start, start + BLOCK)
-                for start in range(0, len(command.angle), BLOCK)
+                slice(start, start + POSITIONS_SOLVED_AT_ONCE)
+                for start in range(0, len(command.angle), POSITIONS_SOLVED_AT_ONCE)
             ]
             parts = [
                 _answer_positions(scene, bar, *(array[block] for array in commanded))
@@ -153,11 +152,11 @@ def _compute_places(
         "sin_mu": np.sin(theta_4 - theta_3),
     }
     quantities |= {
-        "A": _split_components(first_pin[3]),
-        "B": _split_components(O4 + linkage.output.length * unit[4]),
+        "A": _stack_components(first_pin[3]),
+        "B": _stack_components(O4 + linkage.output.length * unit[4]),
     }
     for bar in MOVING_BARS:
-        quantities[f"G{bar}"] = _split_components(
+        quantities[f"G{bar}"] = _stack_components(
             first_pin[bar] + make_vector(find_centre(linkage.bar(bar))) * unit[bar]
         )
     return quantities
@@ -176,7 +175,7 @@ def _answer_positions(
 
     The residual of their thirteen equations is returned too.
     """
-    motion = move(
+    motion = speeds_and_accelerations(
         scene.linkage, theta_2, speed, acceleration, theta_3, theta_4, commanded
     )
     unknowns, residual, from_jamming = balance(scene, motion)
@@ -184,16 +183,17 @@ def _answer_positions(
     if (gone := find_wound(scene, motion)) is not None:
         unknowns[gone] = np.nan
     forces = {
-        name: unknowns[:, COLUMN[name] : COLUMN[name] + 2] for name in FORCE_AT.values()
+        name: unknowns[:, FORCE_COLUMNS[name] : FORCE_COLUMNS[name] + 2]
+        for name in FORCE_AT.values()
     }
     for bar in MOVING_BARS:
         forces |= {f"omega_{bar}": motion.omega[bar], f"alpha_{bar}": motion.alpha[bar]}
     a_A = motion.swing(2, motion.first_pin[3])
     if (
-        line := _place_line(scene, motion)
+        line := _place_line_of_drive(scene, motion)
     ) is None:  # the sine between the bars that are not driven
         condition = np.abs(
-            cross(
+            cross_products(
                 *(
                     motion.unit[number]
                     for number in MOVING_BARS
@@ -205,19 +205,19 @@ def _answer_positions(
         condition = line.condition
     forces["drive_condition"] = condition * from_jamming
     forces |= {
-        "a_A": _split_components(a_A),
-        "a_B": _split_components(
+        "a_A": _stack_components(a_A),
+        "a_B": _stack_components(
             motion.swing(4, scene.linkage.output.length * motion.unit[4])
         ),
     }
     for bar in MOVING_BARS:
-        forces[f"a_G{bar}"] = _split_components(
+        forces[f"a_G{bar}"] = _stack_components(
             motion.swing(bar, motion.to_centre(bar)) + (a_A if bar == 3 else 0.0)
         )
     if any(effect.dry for effect in scene.effects):
         ends = []
         for side in (1.0, -1.0):
-            begins = move(
+            begins = speeds_and_accelerations(
                 scene.linkage,
                 theta_2,
                 np.full_like(theta_2, side),
@@ -237,14 +237,14 @@ def _answer_positions(
     return forces | {drive.value: unknowns[:, DRIVE]}, residual
 
 
-def _place_line(scene: Scene, motion: BodyMotion) -> DriveLine | None:
+def _place_line_of_drive(scene: Scene, motion: BodyMotion) -> DriveLine | None:
     theta = {bar: np.angle(motion.unit[bar]) for bar in MOVING_BARS}
     if scene.drive is None:
         return None
     return place_line(scene.linkage, scene.drive, theta)
 
 
-def move(
+def speeds_and_accelerations(
     linkage: FourBar,
     theta_2: Array,
     speed: Array,
@@ -267,11 +267,11 @@ def move(
     round_ = {2: u_2, 3: u_3, 4: -u_4}  # bar 4 is gone along from B to O4
     others = [number for number in MOVING_BARS if number != bar]
     jacobian = np.stack(
-        [_split_components(round_[number]) for number in others], axis=-1
+        [_stack_components(round_[number]) for number in others], axis=-1
     )
 
-    def rates(stated: Array, centripetal: Complex) -> dict[int, Array]:
-        right = _split_components(
+    def rates(stated: Array, centripetal: ComplexArray) -> dict[int, Array]:
+        right = _stack_components(
             -length[bar] * stated * round_[bar] - 1j * centripetal
         )
         solved = solve_system(jacobian, right[..., None])[0][..., 0].T
@@ -319,7 +319,7 @@ def balance(scene: Scene, motion: BodyMotion) -> tuple[Array, float, Array | flo
 
 def _solve_unit_couples(
     scene: Scene, motion: BodyMotion
-) -> tuple[Array, Complex, Array, float]:
+) -> tuple[Array, ComplexArray, Array, float]:
     """Solve without sliding friction and per N m of it at each pin, (n, 13, 1 + p).
 
     Returns also the loads of these pins as complex numbers (n, p, 1 + p), mu r of each
@@ -338,7 +338,7 @@ def _solve_unit_couples(
     )
     if scene.drive is None:
         unknowns[:, DRIVE] *= motion.linkage.bar(scene.drive_bar).length
-    first = [COLUMN[FORCE_AT[pin]] for pin in pins]
+    first = [FORCE_COLUMNS[FORCE_AT[pin]] for pin in pins]
     loads = unknowns[:, first] + 1j * unknowns[:, [column + 1 for column in first]]
     return unknowns, loads, np.array(list(pins.values())), residual
 
@@ -352,7 +352,7 @@ def count_solutions(scene: Scene, command: Command) -> Array:
     signs = with_signs(scene.linkage, command).branch
     closed = close(scene.linkage, command.angle, signs, command.bar)
     theta = np.insert(closed.theta, command.bar - 2, command.angle, axis=0)
-    motion = move(
+    motion = speeds_and_accelerations(
         scene.linkage, theta[0], *list_speeds(command), theta[1], theta[2], command.bar
     )
     _, loads, arms, _ = _solve_unit_couples(scene, motion)
@@ -365,7 +365,7 @@ def count_solutions(scene: Scene, command: Command) -> Array:
     )
 
 
-def _count_at_position(F: Complex, C: Complex, k: Array) -> int:
+def _count_at_position(F: ComplexArray, C: ComplexArray, k: Array) -> int:
     """Count at one position.
 
     One where the couples are a contraction, else those reached from many starts.
@@ -387,7 +387,7 @@ def _count_at_position(F: Complex, C: Complex, k: Array) -> int:
     solutions: list[Array] = []
     for loads in x[settled & (x >= 0.0).all(axis=1)]:
         if all(
-            np.abs(loads - other).max() > APART * max(loads.max(), other.max())
+            np.abs(loads - other).max() > SAME_SOLUTIONS * max(loads.max(), other.max())
             for other in solutions
         ):
             solutions.append(loads)
@@ -404,7 +404,7 @@ def _add_inertia(motion: BodyMotion, wrenches: BodyWrenches) -> None:
         arm = motion.to_centre(number)
         alpha = motion.alpha[number]
         wrenches.push(number, -find_mass(bar) * motion.swing(number, arm), 0.0)
-        wrenches.couple(number, -about_first_pin(bar) * alpha)
+        wrenches.couple(number, -inertia_about_first_pin(bar) * alpha)
     wrenches.push(
         3,
         -find_mass(motion.linkage.coupler) * motion.swing(2, motion.first_pin[3]),
@@ -421,16 +421,21 @@ def _make_matrix(scene: Scene, motion: BodyMotion) -> Array:
     drive on the bars that it pushes.
     """
     matrix = np.zeros((len(motion.theta_2), 13, 13))
-    for bar, (row, first, second) in ROWS.items():
+    for bar, (row, first, second) in EQUATION_ROWS.items():
         for force in (first, second):
-            matrix[:, row, COLUMN[force]] = matrix[:, row + 1, COLUMN[force] + 1] = 1.0
+            matrix[:, row, FORCE_COLUMNS[force]] = matrix[
+                :, row + 1, FORCE_COLUMNS[force] + 1
+            ] = 1.0
         u = motion.unit[bar]
-        matrix[:, row + 2, COLUMN[second]], matrix[:, row + 2, COLUMN[second] + 1] = (
+        (
+            matrix[:, row + 2, FORCE_COLUMNS[second]],
+            matrix[:, row + 2, FORCE_COLUMNS[second] + 1],
+        ) = (
             -u.imag,
             u.real,
         )
-    if (line := _place_line(scene, motion)) is None:
-        matrix[:, ROWS[scene.drive_bar][0] + 2, DRIVE] = 1.0
+    if (line := _place_line_of_drive(scene, motion)) is None:
+        matrix[:, EQUATION_ROWS[scene.drive_bar][0] + 2, DRIVE] = 1.0
     else:
         unit = BodyWrenches(len(motion.theta_2))
         for (sense, point), arm in zip(line.drive.ends, line.arms, strict=True):
@@ -438,16 +443,16 @@ def _make_matrix(scene: Scene, motion: BodyMotion) -> Array:
         matrix[:, :, DRIVE] = -_make_right_sides(motion.linkage, unit)
     for row, (force, reaction) in ((9, ("F32", "F23")), (11, ("F43", "F34"))):
         for axis in (0, 1):
-            matrix[:, row + axis, COLUMN[force] + axis] = matrix[
-                :, row + axis, COLUMN[reaction] + axis
+            matrix[:, row + axis, FORCE_COLUMNS[force] + axis] = matrix[
+                :, row + axis, FORCE_COLUMNS[reaction] + axis
             ] = 1.0
     return matrix
 
 
 def _make_right_sides(linkage: FourBar, wrenches: BodyWrenches) -> Array:
     right = np.zeros((len(wrenches.moment[2]), 13))
-    for bar, (row, _, _) in ROWS.items():
-        right[:, row : row + 2] = -_split_components(wrenches.force[bar])
+    for bar, (row, _, _) in EQUATION_ROWS.items():
+        right[:, row : row + 2] = -_stack_components(wrenches.force[bar])
         right[:, row + 2] = -wrenches.moment[bar] / linkage.bar(bar).length
     return right
 
@@ -468,7 +473,7 @@ def solve_system(matrix: Array, right: Array) -> tuple[Array, float]:
     return x, float(np.max(remaining, initial=0.0, where=np.isfinite(remaining)))
 
 
-def continue_couples(F: Complex, C: Complex, k: Array) -> Array:
+def continue_couples(F: ComplexArray, C: ComplexArray, k: Array) -> Array:
     """Solve x_p = k_p |F_p + sum over q of C_pq x_q|, (n, p).
 
     The continuation starts from no friction; NaN where it jams.
@@ -497,7 +502,9 @@ def continue_couples(F: Complex, C: Complex, k: Array) -> Array:
     return x
 
 
-def _compute_distance_from_jamming(F: Complex, C: Complex, k: Array, x: Array) -> Array:
+def _compute_distance_from_jamming(
+    F: ComplexArray, C: ComplexArray, k: Array, x: Array
+) -> Array:
     """Compute the least singular value of the Jacobian, at most 1, (n,).
 
     The equations are those of `continue_couples`.
@@ -513,7 +520,7 @@ def _compute_distance_from_jamming(F: Complex, C: Complex, k: Array, x: Array) -
 
 
 def _compute_friction_jacobian(
-    F: Complex, C: Complex, k: Array, x: Array
+    F: ComplexArray, C: ComplexArray, k: Array, x: Array
 ) -> tuple[Array, Array]:
     """Compute the pin forces under couples, (n, p), N, and the Jacobian.
 
@@ -526,7 +533,7 @@ def _compute_friction_jacobian(
 
 
 def _solve_couples(
-    F: Complex, C: Complex, k: Array, x: Array
+    F: ComplexArray, C: ComplexArray, k: Array, x: Array
 ) -> tuple[Array, NDArray[np.bool_], Array]:
     """Solve by Newton's method from couples `x`.
 
@@ -545,5 +552,5 @@ def _solve_couples(
     return x, settled, np.linalg.det(matrix)
 
 
-def _split_components(vectors: Complex) -> Array:
+def _stack_components(vectors: ComplexArray) -> Array:
     return np.stack((vectors.real, vectors.imag), axis=-1)

@@ -13,15 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.linkage import FourBar
+from fourbar.quantities import Array, ComplexArray
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.pins import resolve
 from fourbar_validation.engines.description import place
 
-Complex = NDArray[np.complex128]
-
-STARTS = (
+STARTING_ANGLES = (
     *((30, 30), (15, 15), (45, 45), (5, 5), (5, 120)),
     *((120, 5), (60, 60), (2, 150), (150, 2), (1, 1)),
 )
@@ -29,17 +27,17 @@ STARTS = (
 where the triangle of the lengths is none to start from; they alone served 8000 of 8000
 linkages, in four times as many steps.
 """
-LONGEST_STEP = 0.5
+LONGEST_CLOSURE_STEP = 0.5
 """rad; a longer Newton step leaves the region in which the gap is nearly linear."""
-HALVINGS = 40
+MOST_HALVINGS = 40
 """A step halved this often moves nothing that a gap above the rounding could tell."""
 NEWTON_STEPS = 100
 """Newton steps. Near a toggle Newton halves its distance: fifty steps reach the last
 digit from any start.
 """
-IN_LINE = 2.0**-26
+NEARLY_IN_LINE = 2.0**-26
 """rad; so far from a line the gap is as small as rounding."""
-ROUNDING = 16.0 * 2.0**-52
+ROUNDING_OF_FOUR_BARS = 16.0 * 2.0**-52
 """Gap that the roundings of a sum of four bars can leave. It is relative to the sum of
 the lengths.
 """
@@ -73,14 +71,14 @@ def close(
     diagonal = ground + held * np.exp(1j * theta)
     e = np.abs(diagonal)
     phi = np.angle(diagonal)
-    closed = ROUNDING * sum(linkage.lengths)
+    closed = ROUNDING_OF_FOUR_BARS * sum(linkage.lengths)
     # the gap is least where bars 3 and 4 lie along the diagonal
     possible = np.maximum(e - (b + c), abs(b - c) - e) <= closed
     angles = np.full((2, len(e)), np.nan)
     gap = np.full(len(e), np.nan)
     for alpha, beta in [
         (_compute_angle_between(e, b, c), _compute_angle_between(e, c, b)),
-        *np.radians(STARTS),
+        *np.radians(STARTING_ANGLES),
     ]:
         remaining = np.flatnonzero(possible & np.isnan(gap))
         if not len(remaining):
@@ -113,11 +111,11 @@ def _compute_angle_between(e: Array, near: float, far: float) -> Array:
     angle = 2.0 * np.arctan2(
         np.sqrt(np.maximum(above, 0.0)), np.sqrt(np.maximum(below, 0.0))
     )
-    return np.clip(angle, IN_LINE, np.pi - 2.0 * IN_LINE)
+    return np.clip(angle, NEARLY_IN_LINE, np.pi - 2.0 * NEARLY_IN_LINE)
 
 
 def _solve_newton(
-    diagonal: Complex,
+    diagonal: ComplexArray,
     b: float,
     c: float,
     branch: NDArray[np.int8],
@@ -133,10 +131,10 @@ def _solve_newton(
 
     def look(
         theta: Array, indices: NDArray[np.intp]
-    ) -> tuple[Complex, Complex, Complex, Array]:
+    ) -> tuple[ComplexArray, ComplexArray, ComplexArray, Array]:
         u_3, u_4 = np.exp(1j * theta)
         gap = b * u_3 - c * u_4 - diagonal[indices]
-        inside = cross(u_3, u_4) * branch[indices] > 0.0
+        inside = cross_products(u_3, u_4) * branch[indices] > 0.0
         return u_3, u_4, gap, np.where(inside, np.abs(gap), np.inf)
 
     theta = theta.copy()
@@ -147,17 +145,22 @@ def _solve_newton(
         if not len(moving):
             break
         u_3, u_4, gap, _ = look(theta[:, moving], moving)
-        sine = cross(u_3, u_4)
+        sine = cross_products(u_3, u_4)
         # b step_3 u_3 - c step_4 u_4 = i gap
         step = np.array(
-            [cross(1j * gap, u_4) / (b * sine), cross(1j * gap, u_3) / (c * sine)]
+            [
+                cross_products(1j * gap, u_4) / (b * sine),
+                cross_products(1j * gap, u_3) / (c * sine),
+            ]
         )
         part = np.minimum(
-            1.0, LONGEST_STEP / np.maximum(np.abs(step).max(axis=0), LONGEST_STEP)
+            1.0,
+            LONGEST_CLOSURE_STEP
+            / np.maximum(np.abs(step).max(axis=0), LONGEST_CLOSURE_STEP),
         )
         pending = np.arange(len(moving))
         moved = np.zeros(len(moving), dtype=bool)
-        for _ in range(HALVINGS):
+        for _ in range(MOST_HALVINGS):
             indices = moving[pending]
             trial = theta[:, indices] + part[pending] * step[:, pending]
             trial_size = look(trial, indices)[3]
@@ -176,7 +179,7 @@ def _solve_newton(
     return np.where(arrived, theta, np.nan), np.where(arrived, size, np.nan)
 
 
-def cross(u: Any, v: Any) -> Any:
+def cross_products(u: Any, v: Any) -> Any:
     """Return u_x v_y - u_y v_x."""
     return (np.conj(u) * v).imag
 

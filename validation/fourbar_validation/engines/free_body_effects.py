@@ -11,14 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.linkage import MOVING_BARS, PINS, FourBar
+from fourbar.quantities import Array, ComplexArray
 from fourbar.scene import Command, Scene, command, with_signs
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.pins import find_centre, find_mass
-from fourbar_validation.engines.description import PINS, declares
-from fourbar_validation.engines.free_body_closure import Complex, close, cross
+from fourbar_validation.engines.description import declares
+from fourbar_validation.engines.free_body_closure import close, cross_products
 
-HALF_TURN = math.pi * (1.0 - 1e-12)
+GREATEST_WINDING = math.pi * (1.0 - 1e-12)
 """Greatest winding of a spring from rest, rad. It is half a turn less the rounding of
 an angle of several turns.
 """
@@ -29,9 +29,9 @@ class BodyMotion(NamedTuple):
 
     linkage: FourBar
     theta_2: Array
-    unit: dict[int, Complex]
+    unit: dict[int, ComplexArray]
     """Directions e^{i theta}."""
-    first_pin: dict[int, Complex]
+    first_pin: dict[int, ComplexArray]
     """Place of the first pin of each bar (O2, O2, A, O4), m."""
     omega: dict[int, Array]
     alpha: dict[int, Array]
@@ -40,11 +40,11 @@ class BodyMotion(NamedTuple):
     it stays at rest.
     """
 
-    def to_centre(self, bar: int) -> Complex:
+    def to_centre(self, bar: int) -> ComplexArray:
         """Return the vector from a moving bar's first pin to its mass centre, m."""
         return self.unit[bar] * make_vector(find_centre(self.linkage.bar(bar)))
 
-    def swing(self, bar: int, arm: Complex) -> Complex:
+    def swing(self, bar: int, arm: ComplexArray) -> ComplexArray:
         """Return the acceleration of the end of an arm about its bar's first pin.
 
         The unit is m/s^2.
@@ -82,7 +82,7 @@ class BodyWrenches:
     """
 
     def __init__(self, n: int) -> None:
-        self.force: dict[int, Complex] = {
+        self.force: dict[int, ComplexArray] = {
             bar: np.zeros(n, dtype=complex) for bar in MOVING_BARS
         }
         self.moment: dict[int, Array] = {bar: np.zeros(n) for bar in MOVING_BARS}
@@ -94,7 +94,7 @@ class BodyWrenches:
         """
         if bar in self.force:
             self.force[bar] = self.force[bar] + force
-            self.moment[bar] = self.moment[bar] + cross(arm, force)
+            self.moment[bar] = self.moment[bar] + cross_products(arm, force)
 
     def couple(self, bar: int, couple: Any) -> None:
         """Add a couple; on the ground it does nothing."""
@@ -133,19 +133,25 @@ def _apply_gravity(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> N
         )
 
 
-def _apply_viscous(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
+def _add_viscous_couple(
+    effect: Any, motion: BodyMotion, wrenches: BodyWrenches
+) -> None:
     """Couple -k (omega_j - omega_i)."""
     for pin, k in effect.coefficients:
         wrenches.twist_at(pin, -k * motion.slip(pin))
 
 
-def _apply_friction(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
+def _add_friction_couple(
+    effect: Any, motion: BodyMotion, wrenches: BodyWrenches
+) -> None:
     """Couple -f sign(omega_j - omega_i), none at rest."""
     for pin, f in effect.torques:
         wrenches.twist_at(pin, -f * motion.sense(pin))
 
 
-def _apply_torsion(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
+def _add_torsion_couple(
+    effect: Any, motion: BodyMotion, wrenches: BodyWrenches
+) -> None:
     """Apply the couple -(preload + k (theta_j - theta_i - rest)).
 
     The angle is within half a turn.
@@ -158,7 +164,7 @@ def _apply_torsion(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> N
         wrenches.twist_at(pin, -(preload + k * angle))
 
 
-def _apply_springs(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
+def _add_spring_pulls(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Apply the pull preload + k (distance - length) along the points' line.
 
     The line has no direction where they coincide.
@@ -192,21 +198,23 @@ def _apply_springs(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> N
         wrenches.push(spring.end.bar, -pull, arms[1])
 
 
-def _apply_flywheel(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
+def _add_flywheel_couple(
+    effect: Any, motion: BodyMotion, wrenches: BodyWrenches
+) -> None:
     """Couple -J alpha (d'Alembert)."""
     wrenches.couple(effect.bar, -effect.inertia * motion.alpha[effect.bar])
 
 
 WRENCH_OF: dict[str, Callable[[Any, BodyMotion, BodyWrenches], None]] = {
     "gravity": _apply_gravity,
-    "viscous": _apply_viscous,
-    "friction": _apply_friction,
+    "viscous": _add_viscous_couple,
+    "friction": _add_friction_couple,
     "pin_friction": lambda *_: (
         None
     ),  # it depends on the pin forces, and is solved with them
-    "torsion": _apply_torsion,
-    "springs": _apply_springs,
-    "flywheel": _apply_flywheel,
+    "torsion": _add_torsion_couple,
+    "springs": _add_spring_pulls,
+    "flywheel": _add_flywheel_couple,
 }
 """Function that applies an effect, by the effect's name in a scene file. Others bring
 their own.
@@ -242,7 +250,7 @@ def sum_acting(scene: Scene, motion: BodyMotion) -> BodyWrenches:
 def apply_load(load: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Apply a force where it acts, from the bar's first pin, and a couple."""
     factor = (
-        1.0 if load.table is None else _interpolate_factor(load.table, motion.theta_2)
+        1.0 if load.table is None else _interpolate_table(load.table, motion.theta_2)
     )
     if load.force is not None:
         force: Any = make_vector(load.force)
@@ -264,7 +272,7 @@ def find_arm(load: Any, motion: BodyMotion) -> Any:
     return motion.unit[load.bar] * make_vector(load.place.from_pin)
 
 
-def _interpolate_factor(table: Any, theta_2: Array) -> Array:
+def _interpolate_table(table: Any, theta_2: Array) -> Array:
     """Interpolate between the points.
 
     The angle is taken within half a turn of the middle of the table.
@@ -312,7 +320,7 @@ def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
             np.abs(
                 away[places] - 2.0 * np.pi * np.floor(away[first] / (2.0 * np.pi) + 0.5)
             )
-            > HALF_TURN
+            > GREATEST_WINDING
         )
     return gone
 

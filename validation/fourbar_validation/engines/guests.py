@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from fourbar.errors import InputError
-from fourbar.quantities import ANGLES, DRY_FRICTION_QUANTITIES
+from fourbar.quantities import ANGLES, DRY_FRICTION_QUANTITIES, Array
 from fourbar.scene import Command, Scene
-from fourbar_validation.compare.answer import Answer, Array, EngineError, ReleasedAnswer
+from fourbar_validation.compare.answer import Answer, EngineError, ReleasedAnswer
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES
 from fourbar_validation.compare.rows import FORMULAS, write_one_line
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound, hold_simulated
@@ -29,7 +29,7 @@ from fourbar_validation.engines.processes import Ask, Program, Running
 from fourbar_validation.engines.registry import SIMULATED_TO_ERROR, Engine
 from fourbar_validation.places import CHECKOUT, PACKAGE
 
-CLASS = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*", re.ASCII)
+CLASS_OF_THE_USER = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*", re.ASCII)
 """A class of the user's, which our host serves: "module:Class". Anything else is a
 command line.
 """
@@ -39,11 +39,11 @@ QUESTIONS = 4
 """Most questions to a guest about one scene, hello included. Each may take as long as
 the guest's time limit.
 """
-QUANTITIES = (*COMPARED_QUANTITIES, *DRY_FRICTION_QUANTITIES)
+ANSWERABLE_QUANTITIES = (*COMPARED_QUANTITIES, *DRY_FRICTION_QUANTITIES)
 """Names of what an engine can answer."""
-STATED = "as the engine states"
+STATED_BY_THE_ENGINE = "as the engine states"
 """Class of the tolerance that a guest states itself."""
-COMMANDS = tuple(names[0] for names in protocol.KINDS_OF_COMMAND)
+COMMANDED_NAMES = tuple(names[0] for names in protocol.KINDS_OF_COMMAND)
 HELLO = {"ask": "hello", "protocol": protocol.PROTOCOL}
 
 
@@ -127,7 +127,7 @@ def name_guests(
             trouble = str(error)
         except EngineError as error:
             trouble = str(error)
-            if CLASS.fullmatch(entry) and trouble.startswith(
+            if CLASS_OF_THE_USER.fullmatch(entry) and trouble.startswith(
                 f"exit status {NOT_FOUND}: "
             ):
                 raise InputError("--guest", entry, trouble.partition(": ")[2]) from None
@@ -186,8 +186,8 @@ def _make_program(entry: str, seconds: float | None = None) -> Program:
 
     Raises InputError if there is none.
     """
-    if CLASS.fullmatch(entry):
-        return serve(entry, seconds)
+    if CLASS_OF_THE_USER.fullmatch(entry):
+        return serve_adapter(entry, seconds)
     try:
         command = shlex.split(entry)
     except ValueError as error:
@@ -201,7 +201,7 @@ def _make_program(entry: str, seconds: float | None = None) -> Program:
     return Program((os.path.abspath(program), *command[1:]), seconds)
 
 
-def serve(
+def serve_adapter(
     entry: str, seconds: float | None = None, python: str = sys.executable
 ) -> Program:
     """Make the program that serves one of our adapters, or a class of the user's."""
@@ -222,7 +222,7 @@ def _name_program(entry: str, program: Program) -> str:
 
     It is its class, or the first argument that is a file, else the program.
     """
-    if CLASS.fullmatch(entry):
+    if CLASS_OF_THE_USER.fullmatch(entry):
         return entry.partition(":")[2]
     first, *arguments = program.command
     return (
@@ -283,19 +283,19 @@ def _read_hello(data: dict[str, Any]) -> Hello:
             data.get("engine"),
             "must be a name of printable characters in one line",
         )
-    answers = texts("answers", (), QUANTITIES)
+    answers = texts("answers", (), ANSWERABLE_QUANTITIES)
     if not answers:
         raise InputError(
             "answers",
             data.get("answers"),
-            f"must name quantities among {', '.join(QUANTITIES)}",
+            f"must name quantities among {', '.join(ANSWERABLE_QUANTITIES)}",
         )
     if "four-bar" not in texts("mechanisms", ("four-bar",)):
         raise InputError("mechanisms", data["mechanisms"], 'must hold "four-bar"')
     return Hello(
         name,
-        tuple(quantity for quantity in QUANTITIES if quantity in answers),
-        texts("commands", ("theta_2",), COMMANDS),
+        tuple(quantity for quantity in ANSWERABLE_QUANTITIES if quantity in answers),
+        texts("commands", ("theta_2",), COMMANDED_NAMES),
         texts("effects", ()),
         _read_tolerance(data.get("tolerance", EQUIVALENCE.name)),
         text("version"),
@@ -324,7 +324,7 @@ def _read_tolerance(stated: Any) -> ErrorBound:
         )
         raise InputError("tolerance", stated, allowed)
     reason = f"{error:g} of the scale: {write_one_line(reason)}"
-    return ErrorBound(STATED, reason, error, conditioned=False)
+    return ErrorBound(STATED_BY_THE_ENGINE, reason, error, conditioned=False)
 
 
 def _find_needs(scene: Scene) -> list[str]:
@@ -362,7 +362,7 @@ class GuestClient:
         else:
             self._setting = {}
         if trouble:
-            self.commands = COMMANDS
+            self.commands = COMMANDED_NAMES
         else:
             self.commands = hello.commands
         self.step: float | None = None

@@ -73,7 +73,7 @@ LIGHTEST = Boundary(
     "mjMINVAL: the compiler raises ValueError for a moving body below it",
     "mujoco-inverse and mujoco-simulated",
 )
-PROXIMAL = Boundary(
+PROXIMAL_BOUNDARY = Boundary(
     "mu of the proximal iteration, least",
     0.0,
     "",
@@ -81,14 +81,14 @@ PROXIMAL = Boundary(
     " every number is NaN",
     "pinocchio-forward",
 )
-LIMITS = (
+BOUNDARIES = (
     NEAREST_TOGGLE,
     FASTEST,
     SLOWEST,
     HEAVIEST,
     NEAREST_CENTRE,
     LIGHTEST,
-    PROXIMAL,
+    PROXIMAL_BOUNDARY,
 )
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fourbar_validation.compare.answer import Array
+from fourbar.quantities import Array
 
 
 def solve_refined(matrix: Array, right: Array) -> Array:

@@ -11,8 +11,8 @@ import numpy as np
 
 from fourbar.effects import PointDrive
 from fourbar.linkage import MOVING_BARS
+from fourbar.quantities import Array
 from fourbar.scene import Scene
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.pins import resolve
 from fourbar_validation.engines.description import (
     FORCE_AT,
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
     from fourbar.effects import ForceDrive
     from fourbar.effects.place import Place
 
-PASSES = 1000
+FRICTION_PASSES = 1000
 """Passes over pin loads and the friction they make. Each lessens the error where the
 friction is far from a jam.
 """
-STAGES, STEPS = 16, 30
+STAGES_NEAR_A_JAM, STEPS_OF_A_STAGE = 16, 30
 """Stages and Newton's steps of each in which friction grows near a jam."""
 NUDGE = 1e-6
 """Change of each load for the slopes of a pass, in parts of the greatest load."""
@@ -41,12 +41,12 @@ torque too.
 """
 _DIVERGED = 1e100
 """Load, N, that only passes running away from each other reach."""
-Pair = tuple[float, float]
+Components = tuple[float, float]
 """A vector of the plane: plain numbers. An array of two costs more than its arithmetic.
 """
 Act = Callable[[], None]
 """Function that applies what acts on the bars at their present motion."""
-Values = dict[str, Array | Sequence[float] | float]
+BarValues = dict[str, Array | Sequence[float] | float]
 
 
 class Assembled(Protocol):
@@ -64,7 +64,7 @@ class Assembled(Protocol):
     def jacobian(self) -> Array:
         """Return the derivative of the gap, (2, 3), m."""
 
-    def positions(self) -> Mapping[str, Array | Pair]:
+    def positions(self) -> Mapping[str, Array | Components]:
         """Locate O4, A, B and "B4", the end of bar 4; (2,), m.
 
         If pin A is open, "A2" is that of bar 2.
@@ -94,7 +94,7 @@ class EngineBars(Assembled, Protocol):
         The end on the bar is at angle 0 of the bar; the other is on the ground.
         """
 
-    def move(self, bar: int, speed: float, acceleration: float) -> Values:
+    def move(self, bar: int, speed: float, acceleration: float) -> BarValues:
         """Return motion and forces where the bars are placed, by name.
 
         Empty where a toggle leaves them 0/0.
@@ -166,24 +166,24 @@ class Loaded(EngineBars, Protocol):
         (cosine, _), (sine, _) = self.rotation(bar).tolist()
         return math.atan2(sine, cosine)
 
-    def rotate(self, bar: int, x: float, y: float) -> Pair:
+    def rotate(self, bar: int, x: float, y: float) -> Components:
         """Rotate (x, y) along and across a bar's line into world axes."""
         if bar == 1:
             return rotate(self.ground_angle, x, y)
         return rotate_by(self.rotation(bar).tolist(), x, y)
 
-    def locate(self, name: str) -> Pair:
+    def locate(self, name: str) -> Components:
         """Locate a point that `description.parts` names, m."""
         x, y = self.point(name).tolist()
         return x, y
 
-    def first_pin(self, bar: int) -> Pair:
+    def first_pin(self, bar: int) -> Components:
         """Locate the first pin of a bar (O2, O2, A, O4 of bars 1, 2, 3, 4), m."""
         if bar == 1:
             return (0.0, 0.0)
         return self.locate(f"first_pin{bar}")
 
-    def end(self, point: "Place") -> Pair:
+    def end(self, point: "Place") -> Components:
         """Locate an end of a spring or a place of the drive, m."""
         x, y = self.first_pin(point.bar)
         along, across = self.rotate(point.bar, *resolve(point.distance, point.angle))
@@ -201,7 +201,7 @@ class Loaded(EngineBars, Protocol):
         )
         return complex(*on), complex(*ground)
 
-    def line(self) -> tuple[list[tuple[float, int, Pair]], Array]:
+    def line(self) -> tuple[list[tuple[float, int, Components]], Array]:
         """Place the drive: sense, bar and point of each end, m; and its direction."""
         assert self.force_drive is not None
         ends = [
@@ -264,7 +264,7 @@ class Loaded(EngineBars, Protocol):
         self.pin_loads = {}
         before = math.inf
         forces = balanced()
-        for _ in range(PASSES if self.loaded else 0):
+        for _ in range(FRICTION_PASSES if self.loaded else 0):
             loads = {pin: math.hypot(*forces[FORCE_AT[pin]]) for pin in self.loaded}
             most = max(loads.values())
             change = max(
@@ -298,9 +298,9 @@ class Loaded(EngineBars, Protocol):
 
         unit = np.eye(len(self.loaded))
         forces, loads = passed(np.zeros(len(unit)))
-        for share in np.arange(1, STAGES + 1) / STAGES:
+        for share in np.arange(1, STAGES_NEAR_A_JAM + 1) / STAGES_NEAR_A_JAM:
             before = math.inf
-            for _ in range(STEPS):
+            for _ in range(STEPS_OF_A_STAGE):
                 forces, settled_loads = passed(share * loads)
                 most = float(settled_loads.max())
                 change = float(np.abs(settled_loads - loads).max())

@@ -21,26 +21,27 @@ from fourbar.quantities import (
     STAGE_OF,
     STAGES,
     VECTORS,
+    Array,
 )
 from fourbar.scene import Command, Scene
-from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.engines.description import (
-    SHARED,
+    SHARED_BY_EXACT_ENGINES,
     list_speeds,
     list_unknowns,
     name_driving,
     reduce_angle,
 )
 from fourbar_validation.engines.free_body_closure import (
-    LONGEST_STEP,
+    LONGEST_CLOSURE_STEP,
     NEWTON_STEPS,
-    STARTS,
+    STARTING_ANGLES,
     find_angle,
 )
-from fourbar_validation.engines.loaded import Assembled, EngineBars, Values
+from fourbar_validation.engines.loaded import Assembled, BarValues, EngineBars
 
-_START_ANGLES = np.radians(STARTS).tolist()
+_START_ANGLES = np.radians(STARTING_ANGLES).tolist()
 _SHORTEST_STEP = 2.0**-40
 """A step halved this often moves nothing that a gap above the rounding could tell."""
 NOT_ANSWERED = frozenset(
@@ -61,11 +62,11 @@ NOT_ANSWERED = frozenset(
 """Quantities that no exact engine answers. They are commanded, follow from others that
 are answered, or exist in the formulas alone.
 """
-ROUNDING = 16.0 * 2.0**-52
+ROUNDING_OF_THREE_BARS = 16.0 * 2.0**-52
 """Gap that the roundings of a chain of three bars can leave. It is relative to the sum
 of the lengths.
 """
-Angles = tuple[float, float, float]
+JointAngles = tuple[float, float, float]
 """Turns of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4, rad."""
 _CLOSING = {2: (3, 4), 3: (2, 4), 4: (3, 2)}
 """The two bars that close the loop, by the commanded bar. In this order the sine
@@ -92,9 +93,9 @@ class Assembler:
         self.along = along[bar]
         self.near, self.far = (abs(along[other]) for other in _CLOSING[bar])
         lengths = abs(self.ground), abs(self.along), self.near, self.far
-        self.closed = ROUNDING * sum(lengths)
+        self.closed = ROUNDING_OF_THREE_BARS * sum(lengths)
 
-    def find(self, theta: float, branch: int) -> Angles | None:
+    def find(self, theta: float, branch: int) -> JointAngles | None:
         """Assemble on the branch and place the tree there.
 
         None if the loop does not close.
@@ -146,8 +147,8 @@ def _compute_triangle_angle(e: float, near: float, far: float) -> float:
 
 
 def _turn_others(
-    q: Angles, bar: int, theta_3: float, one: float, other: float
-) -> Angles:
+    q: JointAngles, bar: int, theta_3: float, one: float, other: float
+) -> JointAngles:
     """Turn the two bars that close the loop, the commanded one held.
 
     `theta_3`: direction of bar 3, held where it is commanded.
@@ -160,8 +161,8 @@ def _turn_others(
 
 
 def _close_gap(
-    tree: Assembled, q: Angles, branch: int, closed: float, bar: int = 2
-) -> Angles | None:
+    tree: Assembled, q: JointAngles, branch: int, closed: float, bar: int = 2
+) -> JointAngles | None:
     """Close the gap with a bar held, never leaving the branch.
 
     The determinant of the gap's derivative by the angles of the others, for bar 2 -b c
@@ -172,7 +173,7 @@ def _close_gap(
     """
     theta_3 = q[0] + q[1]
 
-    def look(q: Angles) -> tuple[float, float, float, float, float, float, float]:
+    def look(q: JointAngles) -> tuple[float, float, float, float, float, float, float]:
         tree.place(q)
         x, y = tree.gap()
         (e, a, b), (f, c, d) = tree.jacobian().tolist()
@@ -193,7 +194,10 @@ def _close_gap(
         x, y, a, b, c, d, det = state
         first, second = (b * y - d * x) / det, (c * x - a * y) / det
         size = math.hypot(x, y)
-        part = min(1.0, LONGEST_STEP / max(abs(first), abs(second), LONGEST_STEP))
+        part = min(
+            1.0,
+            LONGEST_CLOSURE_STEP / max(abs(first), abs(second), LONGEST_CLOSURE_STEP),
+        )
         while True:
             trial = _turn_others(q, bar, theta_3, part * first, part * second)
             trial_state = look(trial)
@@ -246,10 +250,10 @@ class Exact:
         names = list_unknowns(scene, names)
         names += [f"{name_driving(scene)}_inertia"] if bars.alone and moves else []
 
-        def read(q: Angles, speed: float, acceleration: float) -> Values:
+        def read(q: JointAngles, speed: float, acceleration: float) -> BarValues:
             theta_3 = bars.angle(3)
             theta_4 = bars.angle(4)
-            values: Values = dict(bars.positions())
+            values: BarValues = dict(bars.positions())
             values["theta_3"] = theta_3
             values["theta_4"] = theta_4
             values["sin_mu"] = math.sin(theta_4 - theta_3)
@@ -268,14 +272,14 @@ class Exact:
             self.name, "exact", asked, assembled, out, evidence={"closure_gap": gap}
         )
         answer.shared, answer.own, answer.seconds = (
-            SHARED,
+            SHARED_BY_EXACT_ENGINES,
             bars.own,
             time.perf_counter() - start,
         )
         return answer
 
 
-Read = Callable[[Angles, float, float], dict[str, Any]]
+Read = Callable[[JointAngles, float, float], dict[str, Any]]
 """Function from the bars' angles to values by name. It has speed and acceleration of
 the commanded bar.
 """

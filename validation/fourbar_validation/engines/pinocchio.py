@@ -14,16 +14,17 @@ import pinocchio as pin
 from fourbar.effects import Gravity
 from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS
+from fourbar.quantities import Array
 from fourbar.scene import Scene, command, with_signs
-from fourbar_validation.compare.answer import Array, ReleasedAnswer
+from fourbar_validation.compare.answer import ReleasedAnswer
 from fourbar_validation.engines.description import (
-    FIRST_PIN,
+    PIN_OF_MOVING_BAR,
     find_unknown,
-    list_parts,
+    list_moving_parts,
     rotate_by,
 )
-from fourbar_validation.engines.effects import has_term, list_acting
-from fourbar_validation.engines.loaded import Pair
+from fourbar_validation.engines.effects import has_term, list_wrenches
+from fourbar_validation.engines.loaded import Components
 from fourbar_validation.engines.loop import Assembler, Exact
 from fourbar_validation.engines.tree import Tree, solve_closed
 
@@ -40,12 +41,12 @@ class PinocchioTree(Tree):
             raise LimitError(reason)
         self.model = model = pin.Model()
         self.joint, self.frame = {1: 0}, dict[str, int]()
-        for part in list_parts(scene.linkage):
+        for part in list_moving_parts(scene.linkage):
             joint = model.addJoint(
                 self.joint[part.bearer],
                 pin.JointModelRZ(),
                 _place_at(*part.first_pin),
-                FIRST_PIN[part.bar],
+                PIN_OF_MOVING_BAR[part.bar],
             )
             self.joint[part.bar] = joint
             # nothing is appended, no frame either: below 2.2e-16 kg the sum of two
@@ -80,7 +81,7 @@ class PinocchioTree(Tree):
             for bar, joint in self.joint.items()
         }
         self._fields: dict[tuple[float, float], Any] = {}
-        self.ready(scene, list_acting(scene, self))
+        self.ready(scene, list_wrenches(scene, self))
         self._weigh(self.field)
 
     def _weigh(self, field: tuple[float, float]) -> None:
@@ -149,7 +150,7 @@ class PinocchioTree(Tree):
             pin.rnea(self.model, self.data, self.q, self.v, self.a, self.external)
         )
 
-    def carried(self) -> dict[int, Pair]:
+    def carried(self) -> dict[int, Components]:
         """Read what each joint transmits, which the last pass left in its own axes."""
         return {
             bar: rotate_by(self.turned_to[bar].tolist(), *force.tolist())
@@ -164,12 +165,12 @@ def _place_at(x: float, y: float) -> Any:
     return pin.SE3(_UPRIGHT, np.array([x, y, 0.0]))
 
 
-NAME = "pinocchio-forward"
-TIME_CONSTANT_STEPS = 10.0
+RELEASED_NAME = "pinocchio-forward"
+BAUMGARTE_TIMESTEPS = 10.0
 """Time constant of Baumgarte's stabilisation of a free motion, in timesteps: with 30
 the loop is lost at a change point from h = 5 ms on.
 """
-PROXIMAL = (1e-14, 1e-8, 10)
+PROXIMAL_SETTINGS = (1e-14, 1e-8, 10)
 """Accuracy, mu, iterations. With the default mu = 0 every acceleration is NaN: of the
 three rows of the closure only two are independent in the plane.
 """
@@ -209,7 +210,7 @@ class ClosedTree:
         pin.initConstraintDynamics(
             tree.model, self.data, self.models, self.closure_data
         )
-        self.proximal = pin.ProximalSettings(*PROXIMAL)
+        self.proximal = pin.ProximalSettings(*PROXIMAL_SETTINGS)
 
     def start(
         self, theta_2: float, branch: int, omega_2: float
@@ -253,7 +254,7 @@ def make_step(f: Acceleration, q: Array, v: Array, h: float) -> tuple[Array, Arr
 class PinocchioReleased:
     """Free motion of the closed loop with a fixed step, s."""
 
-    name = NAME
+    name = RELEASED_NAME
     version = pin.__version__
 
     def __init__(self, step: float = 2e-3) -> None:
@@ -266,18 +267,20 @@ class PinocchioReleased:
             not isinstance(effect, Gravity) for effect in scene.effects
         ):
             return ReleasedAnswer.refused(
-                NAME, setting, "in forward dynamics only gravity has a model here"
+                RELEASED_NAME,
+                setting,
+                "in forward dynamics only gravity has a model here",
             )
         tree = PinocchioTree(scene)
         none = np.zeros(3)
         start = with_signs(scene.linkage, command(scene))
-        loop = ClosedTree(tree, TIME_CONSTANT_STEPS * self.step)
+        loop = ClosedTree(tree, BAUMGARTE_TIMESTEPS * self.step)
         state = loop.start(
             float(start.theta_2[0]), int(start.branch[0]), scene.motion.omega_2 or 0.0
         )
         if state is None:
             return ReleasedAnswer.refused(
-                NAME, setting, "the loop does not close at the start"
+                RELEASED_NAME, setting, "the loop does not close at the start"
             )
         q, v = state
         rows = []
@@ -295,4 +298,4 @@ class PinocchioReleased:
                 (q[0], v[0], energy, data.kinetic_energy + abs(data.potential_energy))
             )
         theta_2, omega, energy, terms = np.array(rows).T
-        return ReleasedAnswer(NAME, setting, theta_2, omega, energy, terms)
+        return ReleasedAnswer(RELEASED_NAME, setting, theta_2, omega, energy, terms)

@@ -4,11 +4,11 @@ import numpy as np
 import pinocchio as pin
 
 from fourbar.effects import Gravity
+from fourbar.quantities import Array
 from fourbar.scene import Scene
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.pinocchio import WORLD, PinocchioTree
 from fourbar_validation.engines.plain_loop import PlainLoop
-from fourbar_validation.engines.tree import AT_REST
+from fourbar_validation.engines.tree import NO_RATES
 
 
 class PinocchioLoop(PlainLoop):
@@ -24,7 +24,7 @@ class PinocchioLoop(PlainLoop):
             not isinstance(effect, Gravity) for effect in scene.effects
         )
         tree.act()
-        self.model.gravity = pin.Motion(np.array([*tree.field, 0.0]), AT_REST)
+        self.model.gravity = pin.Motion(np.array([*tree.field, 0.0]), NO_RATES)
 
     def look(self, q: Array) -> tuple[float, float, Array]:
         """Return the gap, m, and its derivative, (2, 3)."""
@@ -45,7 +45,7 @@ class PinocchioLoop(PlainLoop):
         model = self.model
         data = self.data
         one, two = self.ends
-        pin.forwardKinematics(model, data, q, v, AT_REST)
+        pin.forwardKinematics(model, data, q, v, NO_RATES)
         x, y, _ = (
             pin.getFrameClassicalAcceleration(model, data, one, WORLD).linear
             - pin.getFrameClassicalAcceleration(model, data, two, WORLD).linear

@@ -19,15 +19,14 @@ from typing import Any
 import numpy as np
 
 from fourbar.errors import LimitError
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import Command, Scene, with_signs
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.engines.description import list_speeds
 from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.tree import put_back, solve_closed, solve_multipliers
 
-MOST_STEPS = 20
+MOST_CLOSURE_STEPS = 20
 """Newton's steps of one position; from its neighbour two or three are enough."""
 _SQUARES_AWAY = 1e-7
 """A step (rad) after which Newton's method, which squares it, is at round-off."""
@@ -84,7 +83,7 @@ class PlainLoop:
         Return the derivative of the gap there.
         """
         converged = False
-        for _ in range(MOST_STEPS):
+        for _ in range(MOST_CLOSURE_STEPS):
             x, y, jacobian = self.look(q)
             if converged:
                 return jacobian

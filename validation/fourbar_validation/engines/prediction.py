@@ -26,15 +26,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.quantities import PIN_FORCES, STAGE_OF, VECTORS
+from fourbar.quantities import PIN_FORCES, STAGE_OF, VECTORS, Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.pins import find_centre, find_mass
 from fourbar_validation.compare.tolerance import (
     EPS,
     OF_THE_INPUT,
-    ROUNDINGS,
+    RANDOM_WALK,
     TOUCHING_MARGIN,
-    Array,
     Mask,
     mark_touching,
     sum_lengths,
@@ -42,9 +41,9 @@ from fourbar_validation.compare.tolerance import (
 from fourbar_validation.engines.description import list_speeds
 
 if TYPE_CHECKING:
-    from fourbar_validation.engines.balls import Ball, Values
+    from fourbar_validation.engines.balls import Ball, BallValues
 
-FIRST_ORDER = 0.1
+LARGEST_FIRST_ORDER = 0.1
 """Limit of first-order prediction. Angles uncertain by this part of the sine that
 everything divides by leave speeds, forces and the torque undetermined; the torque's own
 first order can cancel.
@@ -141,7 +140,7 @@ def _predict_error(
             if touching[i]:
                 errors[i] = bound
             continue
-        lost = ROUNDINGS * EPS * moved.data["theta_4"] >= FIRST_ORDER * float(
+        lost = RANDOM_WALK * EPS * moved.data["theta_4"] >= LARGEST_FIRST_ORDER * float(
             moved.data["condition"]
         )
         if lost and STAGE_OF.get(quantity) != "position":
@@ -220,7 +219,7 @@ class Sensitivities(NamedTuple):
         parts = []
         name = "sin_mu" if name == "condition" else name
         for axis in ("_x", "_y") if name in VECTORS else ("",):
-            part = ROUNDINGS * self.data.get(
+            part = RANDOM_WALK * self.data.get(
                 name + axis, math.inf
             ) + reach * self.loop.get(name + axis, 0.0)
             parts.append(
@@ -246,7 +245,7 @@ def _compute_sensitivity(
         return None
     step = arb(2) ** -STEP_BITS
 
-    def move(**changed: "Ball") -> "Values | None":
+    def move(**changed: "Ball") -> "BallValues | None":
         return compute_outputs(scene, branch, exact | changed)
 
     data = {
@@ -303,7 +302,7 @@ def _weigh_inputs(stored: dict[str, float]) -> dict[str, float]:
 
 def compute_reference(
     scene: Scene, branch: int, angle: float
-) -> "tuple[Values, dict[str, float]] | None":
+) -> "tuple[BallValues, dict[str, float]] | None":
     """Compute values at one position as balls, and sum |x_i dy/dx_i| of each.
 
     None if the loop does not close.
@@ -320,7 +319,7 @@ def compute_reference(
         for name in OF_PIECE
     }
 
-    def move(**changed: "Ball") -> "Values | None":
+    def move(**changed: "Ball") -> "BallValues | None":
         return compute_outputs(scene, branch, exact | changed)
 
     base = move()
@@ -334,9 +333,9 @@ def compute_reference(
 
 def _add_responses(
     total: dict[str, float],
-    base: "Values",
-    move: "Callable[..., Values | None]",
-    inputs: "Values",
+    base: "BallValues",
+    move: "Callable[..., BallValues | None]",
+    inputs: "BallValues",
     weights: dict[str, float],
 ) -> None:
     """Add how far each output moves as each input moves by its weight.
@@ -356,7 +355,7 @@ def _add_responses(
 
 
 def _add_response(
-    total: dict[str, float], base: "Values", moved: "Values | None"
+    total: dict[str, float], base: "BallValues", moved: "BallValues | None"
 ) -> None:
     """Add how far each output moves, in parts of 2^-STEP_BITS.
 

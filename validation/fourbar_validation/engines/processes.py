@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from fourbar_validation.compare.answer import EngineError
-from fourbar_validation.compare.rows import make_plain, write_one_line
+from fourbar_validation.compare.rows import escape_controls, write_one_line
 
 WORKER_MEMORY = 8 * 2**30
 """Bytes of data of one process, a guest too; a scene takes a hundredth."""
@@ -118,7 +118,7 @@ def find_reason(errors: str) -> str:
     return lines[-1].strip() if lines else ""
 
 
-KEPT = 20_000
+OUTPUT_KEPT = 20_000
 """Bytes that are kept of one answer's output. Half are from its beginning, half from
 its end.
 """
@@ -181,7 +181,7 @@ def _take_printed() -> str:
                 descriptor, "w", 1, "utf-8", "backslashreplace", closefd=False
             )
             setattr(sys, name, stream)
-    return make_plain(text.decode(errors="backslashreplace"))
+    return escape_controls(text.decode(errors="backslashreplace"))
 
 
 def _take_written(file: IO[bytes]) -> bytes:
@@ -191,28 +191,28 @@ def _take_written(file: IO[bytes]) -> bytes:
     """
     size = file.seek(0, os.SEEK_END)
     file.seek(0)
-    text = file.read(min(size, KEPT // 2))
-    skipped = max(size - KEPT, 0)
+    text = file.read(min(size, OUTPUT_KEPT // 2))
+    skipped = max(size - OUTPUT_KEPT, 0)
     file.seek(skipped, os.SEEK_CUR)
     text += f"\n... {skipped} bytes left out ...\n".encode() * bool(
         skipped
-    ) + file.read(KEPT // 2)
+    ) + file.read(OUTPUT_KEPT // 2)
     file.truncate(0)
     file.seek(0)
     return text
 
 
-SECONDS, SECONDS_PER_POSITION = 60.0, 0.03
+ANSWER_SECONDS, SECONDS_PER_POSITION = 60.0, 0.03
 """Time for a question and for each of its positions if no limit is stated, s. It is ten
 times what a position takes with all engines.
 """
-LONGEST_LINE, _BYTES_PER_POSITION = 10**6, 10**4
+LONGEST_ANSWER, _BYTES_PER_POSITION = 10**6, 10**4
 """Bytes of an answer: ten times as many as all quantities take."""
 MOST_ERRORS = 10**8
 """Bytes that a program may write to its standard error for one answer."""
 _KILLED = (-9, 137)
 """Exit status of a program that was killed: its own, or its shell's."""
-ENDING = 5.0
+ENDING_SECONDS = 5.0
 """Seconds for a program that is told to end; then it is killed."""
 _Message = dict[str, Any]
 """A question or an answer, as an object of JSON."""
@@ -237,7 +237,7 @@ class Program:
     def limit(self, positions: int) -> float:
         """Return the seconds within which a question is answered."""
         if self.seconds is None:
-            return SECONDS + SECONDS_PER_POSITION * positions
+            return ANSWER_SECONDS + SECONDS_PER_POSITION * positions
         return self.seconds
 
 
@@ -299,7 +299,7 @@ class Running:
             + b"\n"
         )
         seconds = self.program.limit(positions)
-        most = LONGEST_LINE + _BYTES_PER_POSITION * positions
+        most = LONGEST_ANSWER + _BYTES_PER_POSITION * positions
         answered = threading.Event()
         watch = threading.Thread(
             target=self._watch, args=(process, seconds, answered), daemon=True
@@ -323,7 +323,7 @@ class Running:
 
     def _read(self, reply: bytes) -> _Message:
         """Read a line; EngineError where it is not the answer that was asked for."""
-        said = write_one_line(reply[:KEPT].decode(errors="backslashreplace"))
+        said = write_one_line(reply[:OUTPUT_KEPT].decode(errors="backslashreplace"))
         try:
             data = json.loads(
                 reply, object_pairs_hook=_make_object, parse_constant=_refuse_constant
@@ -434,7 +434,7 @@ def _stop(process: "subprocess.Popen[bytes]") -> None:
     """End a program and what it started in its session."""
     _signal(process, "SIGTERM")
     with suppress(subprocess.TimeoutExpired):
-        process.wait(ENDING)
+        process.wait(ENDING_SECONDS)
     _signal(process, "SIGKILL")
     process.wait()
 

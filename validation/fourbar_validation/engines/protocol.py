@@ -17,14 +17,14 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.files.fields import Reader, Written
 from fourbar.files.scene_file import read_scene
-from fourbar.files.scene_text import describe
-from fourbar.formulas.many_digits import DIGITS
+from fourbar.files.scene_text import list_scene_tables
+from fourbar.formulas.many_digits import WORKING_DIGITS
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
-from fourbar.quantities import VECTORS
+from fourbar.quantities import VECTORS, Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene import command as command_of
-from fourbar.scene.motion import COMMANDS, STROKE_COMMAND, Free, Motion
-from fourbar_validation.compare.answer import Answer, Array, EngineError, ReleasedAnswer
+from fourbar.scene.motion import COMMAND_NAMES, STROKE_COMMAND, Free, Motion
+from fourbar_validation.compare.answer import Answer, EngineError, ReleasedAnswer
 from fourbar_validation.compare.pins import find_mass, state_from_pins
 from fourbar_validation.compare.rows import write_one_line
 
@@ -34,8 +34,8 @@ _FURTHEST = 0.1
 """rad, and part of the greatest speed and acceleration: a motion that ends further from
 the command than this answers another question.
 """
-TABLES = ("lengths", "bars", "drive", "loads", "effects")
-KINDS_OF_COMMAND = (*COMMANDS.values(), STROKE_COMMAND)
+DESCRIBED_TABLES = ("lengths", "bars", "drive", "loads", "effects")
+KINDS_OF_COMMAND = (*COMMAND_NAMES.values(), STROKE_COMMAND)
 _OF_RELEASED = ("theta_2", "omega_2", "energy", "terms")
 
 
@@ -67,7 +67,7 @@ def scene_to_json(scene: Scene) -> dict[str, Any]:
         for number, bar in zip(MOVING_BARS, scene.linkage.moving, strict=True)
     }
     plain = replace(scene, linkage=replace(scene.linkage, **bars))
-    tables: dict[str, Any] = _take_numbers(describe(state_from_pins(plain)))
+    tables: dict[str, Any] = _take_numbers(list_scene_tables(state_from_pins(plain)))
     return {name: table for name, table in tables.items() if table}
 
 
@@ -88,7 +88,7 @@ def scene_from_json(data: Any) -> Scene:
     """
     read = _Numbers("scene")
     try:
-        return read_scene(read, read.table("", data, TABLES), ".")
+        return read_scene(read, read.table("", data, DESCRIBED_TABLES), ".")
     except InputError as error:
         raise (error if error.file else error.in_file("scene")) from None
 
@@ -99,17 +99,17 @@ def command_to_json(scene: Scene, command: Command) -> dict[str, Any]:
     The place is an angle or a stroke.
     """
     if command.stroke is None:
-        names = COMMANDS[command.bar]
+        names = COMMAND_NAMES[command.bar]
         values = (command.angle, command.speed, command.acceleration)
     else:
         names = STROKE_COMMAND
         values = (command.stroke, command.stroke_speed, scene.motion.acceleration)
     place, speed, acceleration = names
-    data = {place: _write_numbers(values[0])}
+    data = {place: _write_json_numbers(values[0])}
     if values[1] is not None:
         data |= {
-            speed: _write_numbers(values[1]),
-            acceleration: _write_numbers(values[2]),
+            speed: _write_json_numbers(values[1]),
+            acceleration: _write_json_numbers(values[2]),
         }
     if command.stroke is not None:
         data["side"] = scene.motion.side
@@ -120,15 +120,15 @@ def command_to_json(scene: Scene, command: Command) -> dict[str, Any]:
     if command.remainder is not None:
         from mpmath import mp, mpf
 
-        with mp.workdps(DIGITS):
+        with mp.workdps(WORKING_DIGITS):
             digits = str(
-                mp.nstr(mpf(command.remainder), DIGITS + 5)
+                mp.nstr(mpf(command.remainder), WORKING_DIGITS + 5)
             )  # they read back as they were
         data["remainder"] = [digits] * len(command.angle)
     return data
 
 
-def _write_numbers(value: Any) -> Any:
+def _write_json_numbers(value: Any) -> Any:
     if np.ndim(value) == 0:
         return float(value)
     return np.asarray(value, dtype=float).tolist()
@@ -274,7 +274,7 @@ def _read_digits(value: Any, n: int) -> Any:
     ):
         raise InputError("command.remainder", value, wanted)
     try:
-        with mp.workdps(DIGITS):
+        with mp.workdps(WORKING_DIGITS):
             number = mpf(value[0])
     except ValueError:
         raise InputError("command.remainder", value[0], wanted) from None
@@ -350,7 +350,7 @@ def answer_from_json(engine: str, command: Command, data: Any) -> Answer:
     where it broke down.
     """
     data = _read_reply(data)
-    setting = _read_text("setting", data.get("setting", "exact"))
+    setting = _require_text("setting", data.get("setting", "exact"))
     if "refusal" in data:
         return Answer(engine, setting, refusal=_read_reason(data["refusal"]))
     n = len(command.angle)
@@ -367,20 +367,20 @@ def answer_from_json(engine: str, command: Command, data: Any) -> Answer:
     return Answer(
         engine,
         setting,
-        read_motion(data.get("at"), command),
+        read_answered_motion(data.get("at"), command),
         _read_assembled(data.get("assembled"), quantities, n),
         quantities,
         predicted={
             name: _read_values("predicted", name, values, n, ())
             for name, values in predicted
         },
-        alarms=[_read_text("alarms", alarm) for alarm in alarms],
+        alarms=[_require_text("alarms", alarm) for alarm in alarms],
         evidence={
             name: float(_read_values("evidence", name, [value], 1, ())[0])
             for name, value in evidence
         },
-        shared=_read_text("shared", data.get("shared", "")) or "not stated",
-        own=_read_text("own", data.get("own", "")) or "not stated",
+        shared=_require_text("shared", data.get("shared", "")) or "not stated",
+        own=_require_text("own", data.get("own", "")) or "not stated",
         seconds=_read_seconds("seconds", data.get("seconds", 0.0)),
     )
 
@@ -394,19 +394,19 @@ def _read_reply(data: Any) -> dict[str, Any]:
         raise InputError("answer", data, "must be an object")
     if "error" in data:
         raise EngineError(
-            _read_text("error", data["error"])
+            _require_text("error", data["error"])
             or "the engine reported an error without text"
         )
     return data
 
 
 def _read_reason(value: Any) -> str:
-    if not (reason := _read_text("refusal", value)):
+    if not (reason := _require_text("refusal", value)):
         raise InputError("refusal", value, "must say why")
     return reason
 
 
-def _read_text(name: str, value: Any) -> str:
+def _require_text(name: str, value: Any) -> str:
     if not isinstance(value, str):
         raise InputError(name, value, "must be a text")
     return write_one_line(value)
@@ -468,7 +468,7 @@ def _read_assembled(value: Any, quantities: dict[str, Array], n: int) -> Any:
     return np.array(value, dtype=bool)
 
 
-def read_motion(data: Any, command: Command) -> Command:
+def read_answered_motion(data: Any, command: Command) -> Command:
     """Read the motion that an engine made; left out: the command."""
     if data is None:
         return command
@@ -477,7 +477,7 @@ def read_motion(data: Any, command: Command) -> Command:
     if names not in (
         KINDS_OF_COMMAND[:-1]
         if command.stroke is not None
-        else (COMMANDS[command.bar],)
+        else (COMMAND_NAMES[command.bar],)
     ):
         raise InputError(
             "at",
@@ -485,7 +485,9 @@ def read_motion(data: Any, command: Command) -> Command:
             f"must have {command.commanded}, or for a stroke an angle of its bar",
         )
     bar = next(
-        bar for bar, commanded_names in COMMANDS.items() if commanded_names == names
+        bar
+        for bar, commanded_names in COMMAND_NAMES.items()
+        if commanded_names == names
     )
     if "branch" in data:
         branch = _read_branch(data["branch"], n)
@@ -548,7 +550,7 @@ def require_near(made: Command, command: Command) -> None:
     allowances = (_FURTHEST, _FURTHEST + faster - 1.0, _FURTHEST + faster**2 - 1.0)
     names = ("angle", "speed", "acceleration")
     for key, name, size, most in zip(
-        COMMANDS[command.bar], names, sizes, allowances, strict=True
+        COMMAND_NAMES[command.bar], names, sizes, allowances, strict=True
     ):
         value = getattr(made, name)
         commanded = getattr(command, name)
@@ -631,7 +633,7 @@ def released_to_json(released: ReleasedAnswer) -> dict[str, Any]:
 def released_from_json(engine: str, n: int, data: Any) -> ReleasedAnswer:
     """Read and check a released motion at n times, as `answer_from_json` does."""
     data = _read_reply(data)
-    setting = _read_text("setting", data.get("setting", "exact"))
+    setting = _require_text("setting", data.get("setting", "exact"))
     if "refusal" in data:
         return ReleasedAnswer.refused(engine, setting, _read_reason(data["refusal"]))
     answers = dict(_read_object("answers", data))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fourbar.errors import say_install
-from fourbar.quantities import DRY_FRICTION_QUANTITIES, STAGE_OF, UNKNOWNS
+from fourbar.quantities import DRY_FRICTION_QUANTITIES, STAGE_OF, UNKNOWNS, Array
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Adapter, Answer
@@ -31,7 +31,6 @@ from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
     FULL_ACCURACY,
     SIMULATED,
-    Array,
     ErrorBound,
     Mask,
 )
@@ -212,30 +211,30 @@ class Later:
         return getattr(import_module(module), name)(*arguments)
 
 
-_HERE = "fourbar_validation.engines"
-SIMULATED_TO_ERROR = Later(f"{_HERE}.mujoco.trial:SimulatedToError")
+_ENGINES_PACKAGE = "fourbar_validation.engines"
+SIMULATED_TO_ERROR = Later(f"{_ENGINES_PACKAGE}.mujoco.trial:SimulatedToError")
 """Simulation with settings for a wanted error."""
 ENGINES = (
     Engine(
         "pinocchio-inverse",
-        Later(f"{_HERE}.pinocchio:PinocchioInverse"),
+        Later(f"{_ENGINES_PACKAGE}.pinocchio:PinocchioInverse"),
         EQUIVALENCE,
         predictor=predict_in_world_axes,
         library="pinocchio",
     ),
     Engine(
         "mujoco-inverse",
-        Later(f"{_HERE}.mujoco.inverse:MujocoInverse"),
+        Later(f"{_ENGINES_PACKAGE}.mujoco.inverse:MujocoInverse"),
         EQUIVALENCE,
         predictor=predict_about_mass_centre,
         library="mujoco",
     ),
     Engine(
         "mujoco-simulated",
-        Later(f"{_HERE}.mujoco.simulate:MujocoSimulated"),
+        Later(f"{_ENGINES_PACKAGE}.mujoco.simulate:MujocoSimulated"),
         SIMULATED,
         UNKNOWNS,
-        order=Later(f"{_HERE}.mujoco.simulate:observe_order"),
+        order=Later(f"{_ENGINES_PACKAGE}.mujoco.simulate:observe_order"),
         through_time=True,
         generated=True,
         residuals=True,
@@ -278,7 +277,7 @@ def hold_fully(engine: Engine) -> Engine:
 
 
 HARD_ENGINES = tuple(hold_fully(engine) for engine in (BALLS, *ENGINES))
-LAB, GROUP = "fourbar-lab", "fourbar.engines"
+LAB_DISTRIBUTION, GROUP = "fourbar-lab", "fourbar.engines"
 """Distribution and group of its entry points. No other distribution adds an engine to
 the judge's process.
 """
@@ -288,13 +287,13 @@ the judge's process.
 def load_further() -> tuple[Engine, ...]:
     """Load the engines that the lab registers; none if it is not installed."""
     try:
-        registered: Iterable[EntryPoint] = distribution(LAB).entry_points.select(
-            group=GROUP
-        )
+        registered: Iterable[EntryPoint] = distribution(
+            LAB_DISTRIBUTION
+        ).entry_points.select(group=GROUP)
     except (
         PackageNotFoundError
     ):  # the environment of one engine has the lab of a checkout on its path alone
-        if CHECKOUT is None or find_spec(LAB.replace("-", "_")) is None:
+        if CHECKOUT is None or find_spec(LAB_DISTRIBUTION.replace("-", "_")) is None:
             return ()
         project = tomllib.loads(
             (CHECKOUT / "lab" / "pyproject.toml").read_text(encoding="utf-8")
@@ -306,9 +305,9 @@ def load_further() -> tuple[Engine, ...]:
     return tuple(entry.load() for entry in sorted(registered))
 
 
-FOLDERS = tuple(
+LAB_FOLDERS = tuple(
     Path(folder)
-    for spec in [find_spec(LAB.replace("-", "_"))]
+    for spec in [find_spec(LAB_DISTRIBUTION.replace("-", "_"))]
     if spec is not None
     for folder in spec.submodule_search_locations or ()
 )

@@ -18,7 +18,12 @@ from fourbar_validation.engines.environments import (
 from fourbar_validation.engines.guests import Guest, read_guests
 from fourbar_validation.engines.registry import BALLS, ENGINES, Engine, load_further
 
-HARNESS, LAB, FILE, GUEST = "harness", "lab", "engines.toml", "--guest"
+HARNESS_ENGINES, LAB_ENGINES, ENGINES_TOML, GUEST = (
+    "harness",
+    "lab",
+    "engines.toml",
+    "--guest",
+)
 """Sources of engines."""
 
 
@@ -48,7 +53,7 @@ def fill_table(
     balls : offer ball arithmetic too, which is for hard positions.
     """
     ours = [BALLS] * balls + list(ENGINES)
-    by_source = {HARNESS: ours, LAB: list(load_further())}
+    by_source = {HARNESS_ENGINES: ours, LAB_ENGINES: list(load_further())}
     table: dict[str, _Listed] = {}
     for source, engines in by_source.items():
         for engine in engines:
@@ -56,7 +61,9 @@ def fill_table(
     for guest in read_guests(guests, list(table), seconds):
         table[guest.name] = _Listed(GUEST, partial(_ready, guest))
     for name, entry in read_engines(folders).items():
-        table.setdefault(name, _Listed(FILE, partial(_start, entry, seconds)))
+        table.setdefault(
+            name, _Listed(ENGINES_TOML, partial(_start_environment, entry, seconds))
+        )
     return table
 
 
@@ -64,7 +71,9 @@ def _ready(engine: Engine, _: Collection[str]) -> Engine:
     return engine
 
 
-def _start(entry: Entry, seconds: float | None, taken: Collection[str]) -> Engine:
+def _start_environment(
+    entry: Entry, seconds: float | None, taken: Collection[str]
+) -> Engine:
     """Make the environment of an engine of engines.toml and read its hello."""
     ours = {engine.name: engine for engine in (*ENGINES, *load_further())}
     return start_engine(entry, taken, seconds, like=ours.get(entry.adapter))
@@ -80,7 +89,7 @@ def choose_engines(
     """
     table = fill_table() if table is None else table
     if names is None:
-        wanted = {name for name, one in table.items() if one.source != FILE}
+        wanted = {name for name, one in table.items() if one.source != ENGINES_TOML}
     else:
         guests = {name for name, one in table.items() if one.source == GUEST}
         wanted = {*_read_names(names, table), *guests}
@@ -88,7 +97,7 @@ def choose_engines(
     for name in [name for name in table if name in wanted]:
         taken = {*table, *(engine.name for engine in chosen)} - {name}
         engine = table[name].open(taken)
-        optional = names is None and table[name].source == LAB
+        optional = names is None and table[name].source == LAB_ENGINES
         if optional and engine.missing():
             continue
         if isinstance(engine, Guest):

@@ -20,23 +20,23 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from fourbar.linkage import MOVING_BARS
+from fourbar.quantities import Array
 from fourbar.scene import Scene
-from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import ON_BARS, POINTS
+from fourbar_validation.engines.description import ON_BARS, PART_POINTS
 from fourbar_validation.engines.loaded import (
     Act,
+    BarValues,
+    Components,
     Loaded,
-    Pair,
-    Values,
     make_no_wrenches,
 )
 
 if TYPE_CHECKING:
     from fourbar.effects.place import Place
-_OPEN_AT_B = [(name, point) for name, point in POINTS.items() if name != "A2"]
+_OPEN_AT_B = [(name, point) for name, point in PART_POINTS.items() if name != "A2"]
 """Names of points where bars 2 and 3 share pin A, and of the points of the bars."""
 _ACCELERATIONS = [f"a_{name}" for name in ON_BARS]
-AT_REST = np.zeros(3)
+NO_RATES = np.zeros(3)
 """Speeds or accelerations of the coordinates, where they are zero."""
 _BORNE = {2: (2,), 3: (3, 2), 4: (4,)}
 """Bars whose first pins carry what acts on a bar of the open tree."""
@@ -96,7 +96,7 @@ class Tree(Loaded, Protocol):
         Gravity and what acts are taken off.
         """
 
-    def carried(self) -> dict[int, Pair]:
+    def carried(self) -> dict[int, Components]:
         """Return the force on each moving bar at its first pin, N.
 
         It is at the motion and wrenches last asked for.
@@ -113,7 +113,7 @@ class Tree(Loaded, Protocol):
         """Return the difference of the two points' Jacobians."""
         return self.point_jacobian("end3") - self.point_jacobian("end4")
 
-    def positions(self) -> dict[str, Pair]:
+    def positions(self) -> dict[str, Components]:
         """Locate the points of the bars."""
         return {name: self.locate(point) for name, point in _OPEN_AT_B}
 
@@ -131,9 +131,9 @@ class Tree(Loaded, Protocol):
         self.a = a
         self.set_motion(v, a)
 
-    def drift(self, v: Array) -> Pair:
+    def drift(self, v: Array) -> Components:
         """Return the acceleration of the gap at speeds v where a = 0, m/s^2."""
-        self.moving(v, AT_REST)
+        self.moving(v, NO_RATES)
         (x, y), (x_4, y_4) = self.accelerations(("end3", "end4"))
         return x - x_4, y - y_4
 
@@ -164,7 +164,7 @@ class Tree(Loaded, Protocol):
             (-y, x), self.turns[point.bar]
         )
 
-    def forces(self, loop_force: Array, drive: float) -> dict[str, Pair]:
+    def forces(self, loop_force: Array, drive: float) -> dict[str, Components]:
         """Return F12, F32, F14 at the motion and wrenches last set.
 
         The open tree carries what acts. The force of the loop on bar 3, its opposite on
@@ -179,7 +179,7 @@ class Tree(Loaded, Protocol):
         x, y = loop_force.tolist()
         return put_back(on, x, y)
 
-    def move(self, bar: int, speed: float, acceleration: float) -> Values:
+    def move(self, bar: int, speed: float, acceleration: float) -> BarValues:
         """Return velocities, accelerations and forces where the tree is placed.
 
         Empty where they are 0/0.
@@ -191,7 +191,7 @@ class Tree(Loaded, Protocol):
         except np.linalg.LinAlgError:
             return {}
         self.moving(v, a)
-        values: Values = dict(
+        values: BarValues = dict(
             zip(_ACCELERATIONS, self.accelerations(ON_BARS.values()), strict=True)
         )
         values |= zip(_OMEGAS, (self.rows @ v).tolist(), strict=True)
@@ -221,7 +221,7 @@ class Tree(Loaded, Protocol):
         return values
 
 
-def carry(on: dict[int, Pair], bar: int, x: float, y: float) -> None:
+def carry(on: dict[int, Components], bar: int, x: float, y: float) -> None:
     """Let the pins of an open tree carry one more force on a bar, N.
 
     The ground takes none.
@@ -231,7 +231,7 @@ def carry(on: dict[int, Pair], bar: int, x: float, y: float) -> None:
         on[bearer] = f_x - x, f_y - y
 
 
-def put_back(on: dict[int, Pair], x: float, y: float) -> dict[str, Pair]:
+def put_back(on: dict[int, Components], x: float, y: float) -> dict[str, Components]:
     """Return F12, F32, F14, N.
 
     They are what the pins of an open tree carry, with the force (x, y) of bar 4 on bar

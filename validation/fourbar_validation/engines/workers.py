@@ -18,7 +18,7 @@ from fourbar_validation.engines.processes import bound_memory, keep_output
 if TYPE_CHECKING:
     from pebble import ProcessPool
 
-SECONDS = 60.0
+SCENE_SECONDS = 60.0
 """A scene takes 0.05 to 3 s; what takes longer than this hangs."""
 _IN_FLIGHT = 4
 """Chunks submitted per worker. It is always busy then, and the memory stays bounded."""
@@ -31,9 +31,9 @@ milliseconds.
 """
 Chunk = tuple[int, Sequence[Any]]
 """Number and items."""
-Attempt = Callable[[Any], Any]
+TaskFunction = Callable[[Any], Any]
 """Do one item by itself: its result, or the exception that it ended with."""
-_Instead = Callable[[Any, BaseException, Attempt], Any]
+_Instead = Callable[[Any, BaseException, TaskFunction], Any]
 """Make the result of an item that failed: item, exception, how to try another one."""
 
 
@@ -117,7 +117,7 @@ def _lost_workers() -> NoWorkersError:
     )
 
 
-def fail(_: object, error: BaseException, __: Attempt) -> NoReturn:
+def fail(_: object, error: BaseException, __: TaskFunction) -> NoReturn:
     """Raise what an item failed with."""
     raise error
 

@@ -12,15 +12,23 @@ import click
 
 from fourbar.errors import FAILED, HOLDS, DependencyError, say_install
 from fourbar.writing import write_text
-from fourbar_validation.places import PROGRAM
-from fourbar_validation.published.figures import ERRATA, VERDICTS, PublishedFigure
-from fourbar_validation.published.program import STEPS, climb_ladder, read_printed
+from fourbar_validation.places import HARNESS_PROGRAM
+from fourbar_validation.published.figures import (
+    ERRATA,
+    FIGURE_VERDICTS,
+    PublishedFigure,
+)
+from fourbar_validation.published.program import (
+    ERRATA_IN_ORDER,
+    climb_ladder,
+    read_printed,
+)
 from fourbar_validation.published.textbook import compare_maple, compare_textbooks
 from fourbar_validation.published.thesis import list_thesis_figures
 from fourbar_validation.report.templating import render
-from fourbar_validation.report.terminal import make_table
+from fourbar_validation.report.terminal import make_words_table
 
-WIDTH = 78
+PAGE_WIDTH = 78
 
 
 def list_figures() -> Iterator[PublishedFigure]:
@@ -49,7 +57,7 @@ def explain_difference(figure: PublishedFigure) -> str:
     """Explain in a phrase why a figure differs."""
     if not figure.errata or not set(figure.errata) <= set(ERRATA):
         return "no erratum explains this"
-    steps = tuple(name for name, _, _ in STEPS if name in ERRATA)
+    steps = tuple(name for name, _, _ in ERRATA_IN_ORDER if name in ERRATA)
     if len(figure.errata) > 3 and set(figure.errata) <= set(steps):
         text = "#" + " #".join(figure.errata) + ", the steps of the table above"
     else:
@@ -62,7 +70,7 @@ def explain_difference(figure: PublishedFigure) -> str:
     return f"{text}: does not give this"
 
 
-def check(show_all: bool) -> int:
+def compare_figures(show_all: bool) -> int:
     """Compare the figures of the sources with ours.
 
     Return 1 on a difference that no erratum explains.
@@ -97,14 +105,17 @@ def check(show_all: bool) -> int:
             )
         if verdict == "differs":
             click.echo(
-                click.wrap_text(explain_difference(figure), WIDTH, "    ", "    ")
+                click.wrap_text(explain_difference(figure), PAGE_WIDTH, "    ", "    ")
             )
-    total = Table(*("table", *VERDICTS), title="Printed figures against ours")
+    total = Table(*("table", *FIGURE_VERDICTS), title="Printed figures against ours")
     for table in dict.fromkeys(key[0] for key in counts):
-        total.add_row(table, *(str(counts[table, verdict]) for verdict in VERDICTS))
+        total.add_row(
+            table, *(str(counts[table, verdict]) for verdict in FIGURE_VERDICTS)
+        )
     total.add_section()
     sums = [
-        sum(n for (_, v), n in counts.items() if v == verdict) for verdict in VERDICTS
+        sum(n for (_, v), n in counts.items() if v == verdict)
+        for verdict in FIGURE_VERDICTS
     ]
     total.add_row(f"{sum(sums)} figures", *map(str, sums))
     console.print(total)
@@ -114,7 +125,7 @@ def check(show_all: bool) -> int:
         f" equals it. {sums[2]} figures differ: the errata named reproduce {reproduced}"
         f" of them digit for digit, and {misprints} are misprints."
     )
-    click.echo(click.wrap_text(summary, WIDTH) + "\n")
+    click.echo(click.wrap_text(summary, PAGE_WIDTH) + "\n")
     console.print("The errata met above (all: errata.toml of published/):")
     for name, erratum in ERRATA.items():
         if met[name]:
@@ -123,7 +134,7 @@ def check(show_all: bool) -> int:
                 f" {erratum.right}. "
             )
             text += f"Why: {erratum.derivation}. Effect: {erratum.effect}."
-            click.echo(click.wrap_text(text, WIDTH, "", "    "))
+            click.echo(click.wrap_text(text, PAGE_WIDTH, "", "    "))
     if unexplained:
         console.print(f"No erratum explains {len(unexplained)} of the differences.")
     if not sum(sums):
@@ -133,7 +144,7 @@ def check(show_all: bool) -> int:
     return HOLDS
 
 
-HEAD = (
+ERRATA_HEADINGS = (
     "error of its program, added to those above",
     "right",
     "T4 [N cm]",
@@ -202,8 +213,12 @@ def published(show_all: bool, out: Path | None) -> int:
         ) from None
     rows = list_ladder_rows()
     Console().print(
-        make_table(
-            HEAD, rows, 2, title="The published torque, error by error", show_lines=True
+        make_words_table(
+            ERRATA_HEADINGS,
+            rows,
+            2,
+            title="The published torque, error by error",
+            show_lines=True,
         )
     )
     if out is not None:
@@ -212,9 +227,9 @@ def published(show_all: bool, out: Path | None) -> int:
             render(
                 "fourbar_validation.published",
                 "ladder.md.j2",
-                head=HEAD,
+                head=ERRATA_HEADINGS,
                 rows=rows,
-                program=PROGRAM,
+                program=HARNESS_PROGRAM,
             ),
         )
-    return check(show_all)
+    return compare_figures(show_all)

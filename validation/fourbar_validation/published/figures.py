@@ -5,7 +5,7 @@ from decimal import ROUND_DOWN, ROUND_HALF_EVEN, Decimal
 from pathlib import Path
 from typing import NamedTuple
 
-VERDICTS = ("rounded", "truncated", "differs")
+FIGURE_VERDICTS = ("rounded", "truncated", "differs")
 
 
 class _Erratum(NamedTuple):
@@ -24,10 +24,10 @@ class _Erratum(NamedTuple):
     """True if it may be a slip of the transcription that was read."""
 
 
-LISTED = tomllib.loads(
+LISTED_ERRATA = tomllib.loads(
     (Path(__file__).parent / "errata.toml").read_text(encoding="utf-8")
 )["erratum"]
-ERRATA = {entry["id"]: _Erratum(**entry) for entry in LISTED}
+ERRATA = {entry["id"]: _Erratum(**entry) for entry in LISTED_ERRATA}
 """The errata of the sources, as data: `errata.toml` says what each field is."""
 
 
@@ -52,17 +52,17 @@ class PublishedFigure(NamedTuple):
 
         It is rounded, truncated or differs.
         """
-        return compare(self.printed, self.ours, self.noise)
+        return compare_figure(self.printed, self.ours, self.noise)
 
     def reproduced(self) -> bool:
         """Tell whether the errata give the published digits, rounded or truncated."""
         return (
             self.made is not None
-            and compare(self.printed, self.made, self.noise) != "differs"
+            and compare_figure(self.printed, self.made, self.noise) != "differs"
         )
 
 
-def compare(printed: str, value: float, noise: float = 0.0) -> str:
+def compare_figure(printed: str, value: float, noise: float = 0.0) -> str:
     """Compare `value` to the published number of decimals.
 
     It is rounded, truncated, or it differs.

@@ -17,12 +17,12 @@ import numpy as np
 
 import fourbar
 from fourbar.linkage import MOVING_BARS
-from fourbar.solution import Array
+from fourbar.quantities import Array
 from fourbar_validation.compare.tolerance import EPS
-from fourbar_validation.published.thirteen import FreeBodies, assemble
+from fourbar_validation.published.thirteen import EquationTerms, assemble_equations
 
 DATA = Path(__file__).parent / "data"
-UNKNOWNS = (
+PRINTED_UNKNOWNS = (
     "F12x",
     "F12y",
     "F32x",
@@ -37,13 +37,13 @@ UNKNOWNS = (
     "F34y",
     "T4",
 )
-LENGTHS = (20.0, 48.0, 55.0, 20.0)
+BAR_LENGTHS = (20.0, 48.0, 55.0, 20.0)
 """Bars 1 to 4, cm."""
 MASSES = {2: 57.0, 3: 0.544, 4: 0.2}
 """kg."""
 INERTIA_2 = 57.0 * 153.0**2 / 12.0
 """kg cm^2; bar 2 is 153 cm long in all."""
-WIDTH = 2.54
+BAR_WIDTH = 2.54
 """cm."""
 OMEGA_2 = 0.2244
 """rad/s."""
@@ -51,9 +51,9 @@ THETA_1, THETA_2 = math.radians(225.0), math.radians(135.0)
 """Angles of sections 4.12 and 5.7 in the thesis's convention, rad."""
 CENTRE = {2: 76.5, 3: 27.5, 4: 10.0}
 """Distance from the bar's first pin to G, cm."""
-LOAD, LOAD_ARM, LOAD_ANGLE = 10.0, 5.0, math.radians(265.0)
+FORCE_ON_BAR_2, LOAD_ARM, LOAD_ANGLE = 10.0, 5.0, math.radians(265.0)
 """Force along x on bar 2, N, and where it acts from G2, cm and rad."""
-COUPLE = -15.0
+COUPLE_ON_A_BAR = -15.0
 """Couple on each of bars 2, 3, 4, N cm."""
 TO_N = 0.01
 """1 kg cm/s^2 in N, and 1 kg cm^2/s^2 in N cm."""
@@ -93,9 +93,9 @@ def to_ours(theta: float) -> float:
     return math.remainder(theta + math.pi, 2.0 * math.pi)
 
 
-def make_scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
-    """Make the model mechanism for our formulas, SI, uniform bars of `WIDTH`."""
-    d, a, b, c = (0.01 * length for length in LENGTHS)
+def make_model_scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
+    """Make the model mechanism for our formulas, SI, uniform bars of `BAR_WIDTH`."""
+    d, a, b, c = (0.01 * length for length in BAR_LENGTHS)
     centre = {bar: (0.01 * distance, 0.0) for bar, distance in CENTRE.items()}
     linkage = fourbar.FourBar(
         d,
@@ -104,8 +104,8 @@ def make_scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
         fourbar.Bar(c, MASSES[4], 1e-4 * compute_inertia(4), centre[4]),
         ground_angle=to_ours(THETA_1),
     )
-    loads = [fourbar.Load(2, (LOAD, 0.0), arm=(0.01 * LOAD_ARM, LOAD_ANGLE))]
-    loads += [fourbar.Load(bar, moment=0.01 * COUPLE) for bar in (2, 3, 4)]
+    loads = [fourbar.Load(2, (FORCE_ON_BAR_2, 0.0), arm=(0.01 * LOAD_ARM, LOAD_ANGLE))]
+    loads += [fourbar.Load(bar, moment=0.01 * COUPLE_ON_A_BAR) for bar in (2, 3, 4)]
     return fourbar.Scene(
         linkage, fourbar.Motion(theta_2, OMEGA_2, branch=branch), 4, tuple(loads)
     )
@@ -113,12 +113,12 @@ def make_scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
 
 def compute_motion(theta_2: Array, branch: int = 1) -> fourbar.Solution:
     """Compute position to accelerations of the model mechanism by our formulas, SI."""
-    return fourbar.solve(make_scene(theta_2, branch), "acceleration")
+    return fourbar.solve(make_model_scene(theta_2, branch), "acceleration")
 
 
 def compute_right_unknowns() -> dict[str, float]:
     """Compute the 13 unknowns by our formulas at theta_2 = 135 deg, N and N cm."""
-    s = fourbar.solve(make_scene(THETA_2))
+    s = fourbar.solve(make_model_scene(THETA_2))
     assert s.F32 is not None and s.F43 is not None and s.torque is not None
     pins: dict[str, Any] = {
         "F12": s.F12,
@@ -144,8 +144,8 @@ def compute_inertia(bar: int, about_long_axis: bool = False) -> float:
     if about_long_axis:
         across = 0.0
     else:
-        across = LENGTHS[bar - 1] ** 2
-    return MASSES[bar] * (across + WIDTH**2) / 12.0
+        across = BAR_LENGTHS[bar - 1] ** 2
+    return MASSES[bar] * (across + BAR_WIDTH**2) / 12.0
 
 
 class Kinematics:
@@ -170,11 +170,11 @@ class Kinematics:
         """
         self.arms = {  # from G; R14 points along B to O4, the thesis's theta_4
             "R12": split_components(-CENTRE[2], THETA_2),
-            "R32": split_components(LENGTHS[1] - CENTRE[2], THETA_2),
+            "R32": split_components(BAR_LENGTHS[1] - CENTRE[2], THETA_2),
             "R23": split_components(-CENTRE[3], self.theta_3),
-            "R43": split_components(LENGTHS[2] - CENTRE[3], self.theta_3),
+            "R43": split_components(BAR_LENGTHS[2] - CENTRE[3], self.theta_3),
             "R14": split_components(CENTRE[4], self.theta_4),
-            "R34": split_components(CENTRE[4] - LENGTHS[3], self.theta_4),
+            "R34": split_components(CENTRE[4] - BAR_LENGTHS[3], self.theta_4),
         }
 
 
@@ -209,12 +209,12 @@ def make_equations(
         per_inertia = TO_N
     force = {bar: per_mass * MASSES[bar] * k.a_G[bar] for bar in MOVING_BARS}
     moment = {
-        bar: np.array([per_inertia * about_G[bar] * k.alpha[bar] - COUPLE])
+        bar: np.array([per_inertia * about_G[bar] * k.alpha[bar] - COUPLE_ON_A_BAR])
         for bar in MOVING_BARS
     }
-    force[2][0] -= LOAD
+    force[2][0] -= FORCE_ON_BAR_2
     moment[2] += (
-        split_components(LOAD_ARM, LOAD_ANGLE)[1] * LOAD
+        split_components(LOAD_ARM, LOAD_ANGLE)[1] * FORCE_ON_BAR_2
     )  # minus the moment of the load, -y F
     first, second = (
         {
@@ -223,7 +223,7 @@ def make_equations(
         }
         for names in (("R12", "R23", "R14"), ("R32", "R43", "R34"))
     )
-    matrix, right = assemble(FreeBodies(first, second, force, moment), 4)
+    matrix, right = assemble_equations(EquationTerms(first, second, force, moment), 4)
     return matrix[0], right[0]
 
 
@@ -232,10 +232,10 @@ def compute_thesis_program(
 ) -> dict[str, float]:
     """Compute the 13 unknowns of section 5.7 at theta_2 = 135 deg, N and N cm."""
     unknowns = np.linalg.solve(*make_equations(errors, inertias))
-    return dict(zip(UNKNOWNS, map(float, unknowns), strict=True))
+    return dict(zip(PRINTED_UNKNOWNS, map(float, unknowns), strict=True))
 
 
-def round_off(
+def bound_round_off(
     errors: ProgramErrors, inertias: tuple[float, float] | None = None
 ) -> dict[str, float]:
     """Bound how far an elimination of these equations may be off, N and N cm.
@@ -250,7 +250,13 @@ def round_off(
     moved = np.abs(np.linalg.inv(matrix)) @ (
         np.abs(matrix) @ np.abs(unknowns) + np.abs(right)
     )
-    return dict(zip(UNKNOWNS, map(float, len(UNKNOWNS) * EPS * moved), strict=True))
+    return dict(
+        zip(
+            PRINTED_UNKNOWNS,
+            map(float, len(PRINTED_UNKNOWNS) * EPS * moved),
+            strict=True,
+        )
+    )
 
 
 _PRINTED_INERTIAS = (0.2924725333, 0.1075266667)
@@ -258,7 +264,7 @@ _TYPED_INERTIAS = (0.292472, 0.107526)
 """I_G3, I_G4 of the manual's table and of section 5.7, kg cm^2. They are solved back
 from the printed unknowns.
 """
-STEPS: tuple[tuple[str, ProgramErrors, tuple[float, float] | None], ...] = (
+ERRATA_IN_ORDER: tuple[tuple[str, ProgramErrors, tuple[float, float] | None], ...] = (
     ("", ProgramErrors(), None),
     ("3", ProgramErrors(True), None),
     ("1", ProgramErrors(True, True), None),
@@ -275,5 +281,5 @@ def climb_ladder() -> list[tuple[str, dict[str, float]]]:
     """Compute the unknowns after each further erratum, from right to published."""
     return [
         (erratum, compute_thesis_program(errors, inertias))
-        for erratum, errors, inertias in STEPS
+        for erratum, errors, inertias in ERRATA_IN_ORDER
     ]

@@ -17,10 +17,10 @@ import fourbar
 from fourbar_validation.places import MODELS
 from fourbar_validation.published.figures import PublishedFigure
 
-SCENES = MODELS / "textbook"
-ANSWERS = Path(__file__).parent / "textbook.toml"
+TEXTBOOK_FOLDER = MODELS / "textbook"
+PRINTED_ANSWERS = Path(__file__).parent / "textbook.toml"
 _SHEET = Path(__file__).parent / "data" / "maple.json"
-AXES = {"_x": 0, "_y": 1}
+COMPONENT_AXES = {"_x": 0, "_y": 1}
 
 
 class _TextbookAnswer(NamedTuple):
@@ -38,14 +38,18 @@ def list_answers() -> list[_TextbookAnswer]:
     """List all of them."""
     return [
         _TextbookAnswer(**entry)
-        for entry in tomllib.loads(ANSWERS.read_text(encoding="utf-8"))["answer"]
+        for entry in tomllib.loads(PRINTED_ANSWERS.read_text(encoding="utf-8"))[
+            "answer"
+        ]
     ]
 
 
 def compare_textbooks() -> Iterator[PublishedFigure]:
     """Compare each answer with ours."""
     for answer in list_answers():
-        ours = compute_value(_solve(answer.scene), answer.quantity, answer.position)
+        ours = compute_value(
+            _solve_book_scene(answer.scene), answer.quantity, answer.position
+        )
         yield PublishedFigure(
             "public test cases",
             f"{answer.scene} {answer.quantity}",
@@ -64,8 +68,8 @@ def compute_value(solution: fourbar.Solution, quantity: str, position: int) -> f
     if quantity.startswith("-"):
         return -compute_value(solution, quantity[1:], position)
     name, axis = (
-        (quantity[:-2], AXES[quantity[-2:]])
-        if quantity[-2:] in AXES
+        (quantity[:-2], COMPONENT_AXES[quantity[-2:]])
+        if quantity[-2:] in COMPONENT_AXES
         else (quantity, None)
     )
     values: Any
@@ -80,8 +84,8 @@ def compute_value(solution: fourbar.Solution, quantity: str, position: int) -> f
 
 
 @cache
-def _solve(scene: str) -> fourbar.Solution:
-    return fourbar.solve(fourbar.load(SCENES / f"{scene}.toml"))
+def _solve_book_scene(scene: str) -> fourbar.Solution:
+    return fourbar.solve(fourbar.load(TEXTBOOK_FOLDER / f"{scene}.toml"))
 
 
 def compare_maple() -> Iterator[PublishedFigure]:

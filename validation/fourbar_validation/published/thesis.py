@@ -16,28 +16,28 @@ import numpy as np
 from fourbar.formulas.mobility import limit_positions
 from fourbar_validation.published.figures import PublishedFigure
 from fourbar_validation.published.program import (
+    BAR_LENGTHS,
     CENTRE,
-    COUPLE,
+    COUPLE_ON_A_BAR,
     DATA,
+    ERRATA_IN_ORDER,
+    FORCE_ON_BAR_2,
     INERTIA_2,
-    LENGTHS,
-    LOAD,
     LOAD_ANGLE,
     LOAD_ARM,
     MASSES,
     OMEGA_2,
-    STEPS,
     THETA_1,
     THETA_2,
     TO_N,
     Kinematics,
+    bound_round_off,
     climb_ladder,
     compute_inertia,
     compute_motion,
     compute_right_unknowns,
-    make_scene,
+    make_model_scene,
     read_printed,
-    round_off,
     split_components,
     to_degrees,
     to_ours,
@@ -47,7 +47,7 @@ _ANGLE_NOISE = 4e-15
 """Four steps of a double near 360 deg, rad. The program carries such angles, where a
 step is 5.7e-14 deg = 1e-15 rad.
 """
-d, a, b, c = LENGTHS
+d, a, b, c = BAR_LENGTHS
 
 
 def list_thesis_figures() -> Iterator[PublishedFigure]:
@@ -57,9 +57,9 @@ def list_thesis_figures() -> Iterator[PublishedFigure]:
     yield from _list_half_angle_constants()
     yield from _list_limits()
     yield from _list_simulation_window()
-    yield from list_kinematics(k)
+    yield from list_section_4_12(k)
     yield from _list_constants(k)
-    yield from list_unknowns()
+    yield from list_section_5_7()
 
 
 def list_positions() -> Iterator[PublishedFigure]:
@@ -167,7 +167,7 @@ def _list_limits() -> Iterator[PublishedFigure]:
 
     The limit positions are those that do exist.
     """
-    linkage = make_scene(THETA_2).linkage
+    linkage = make_model_scene(THETA_2).linkage
     output, dead_centre = (limit_positions(linkage, bar) for bar in (4, 2))
     cosines = {
         1: ((a + b) ** 2 + d**2 - c**2) / (2.0 * (a + b) * d),
@@ -206,7 +206,7 @@ def _list_limits() -> Iterator[PublishedFigure]:
             )
 
 
-def cut(value: float, decimals: int) -> float:
+def truncate(value: float, decimals: int) -> float:
     """Cut off further decimals."""
     return math.trunc(value * 10.0**decimals) / 10.0**decimals
 
@@ -216,7 +216,9 @@ def _compute_cut_arm(k: Kinematics, decimals: int) -> float:
 
     It is erratum 12.
     """
-    return -CENTRE[3] * math.sin(math.radians(cut(to_degrees(k.theta_3), decimals)))
+    return -CENTRE[3] * math.sin(
+        math.radians(truncate(to_degrees(k.theta_3), decimals))
+    )
 
 
 def _compute_our_kinematics(k: Kinematics) -> dict[str, float]:
@@ -272,7 +274,7 @@ def _list_slips(k: Kinematics) -> dict[str, tuple[tuple[str, ...], float]]:
     }
 
 
-def list_kinematics(k: Kinematics) -> Iterator[PublishedFigure]:
+def list_section_4_12(k: Kinematics) -> Iterator[PublishedFigure]:
     """List section 4.12, and the manual's table of the program's 17 digits."""
     ours = _compute_our_kinematics(k)
     slips = _list_slips(k)
@@ -322,11 +324,11 @@ def _list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
     ours: dict[str, float] = {
         "R_ext_i": load[0],
         "R_ext_j": load[1],
-        "moment_of_force_N_cm": -load[1] * LOAD,
+        "moment_of_force_N_cm": -load[1] * FORCE_ON_BAR_2,
     }
     slips: dict[str, tuple[tuple[str, ...], float]] = {}
     for bar, a_G in k.a_G.items():
-        force = LOAD if bar == 2 else 0.0
+        force = FORCE_ON_BAR_2 if bar == 2 else 0.0
         slip = k.slip if bar == 3 else 0.0
         ours[f"k{bar}x"], ours[f"k{bar}y"] = (
             TO_N * MASSES[bar] * a_G[0] - force,
@@ -337,11 +339,13 @@ def _list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
             MASSES[bar] * (a_G[0] + slip) - force,
         )
         slips[f"k{bar}y"] = (("1",), MASSES[bar] * a_G[1])
-    ours["k2_5"] = -COUPLE + load[1] * LOAD
+    ours["k2_5"] = -COUPLE_ON_A_BAR + load[1] * FORCE_ON_BAR_2
     for bar, alpha, sign in ((3, k.alpha[3], -1.0), (4, k.alpha[4], 1.0)):
-        ours[f"k{bar}_5"] = TO_N * compute_inertia(bar) * alpha - COUPLE
+        ours[f"k{bar}_5"] = TO_N * compute_inertia(bar) * alpha - COUPLE_ON_A_BAR
         # the sign of I alpha is wrong for bar 3 alone, erratum 7
-        made = sign * compute_inertia(bar, about_long_axis=True) * alpha - COUPLE
+        made = (
+            sign * compute_inertia(bar, about_long_axis=True) * alpha - COUPLE_ON_A_BAR
+        )
         slips[f"k{bar}_5"] = (("3", "2", "7") if bar == 3 else ("3", "2"), made)
     for bar, pins in ((2, ("R12", "R32")), (3, ("R23", "R43")), (4, ("R14", "R34"))):
         for pair, pin in enumerate(pins):
@@ -355,9 +359,9 @@ def _list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
         **slips,
         "k3_2_in_eq_5_6": (("12b",), None),
         "k4_1": (("12b",), None),
-        "k2x": (("1", "12c"), MASSES[2] * cut(k.a_G[2][0], 6) - LOAD),
-        "k2y": (("1", "12c"), MASSES[2] * cut(k.a_G[2][1], 6)),
-        "k4x": (("1", "12c"), MASSES[4] * cut(k.a_G[4][0], 10)),
+        "k2x": (("1", "12c"), MASSES[2] * truncate(k.a_G[2][0], 6) - FORCE_ON_BAR_2),
+        "k2y": (("1", "12c"), MASSES[2] * truncate(k.a_G[2][1], 6)),
+        "k4x": (("1", "12c"), MASSES[4] * truncate(k.a_G[4][0], 10)),
     }
     for name, text in source["published"]["section_5_7_hand_constants"].items():
         errata, changed = by_hand.get(name, ((), None))
@@ -381,16 +385,18 @@ def _list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
     yield PublishedFigure("5.7 matrix", "T4 in row 9", matrix["row9_bar4"][4], 1.0)
 
 
-def list_unknowns() -> Iterator[PublishedFigure]:
+def list_section_5_7() -> Iterator[PublishedFigure]:
     """List the 13 unknowns, of the program (the manual's table) and of section 5.7."""
     right = compute_right_unknowns()
     steps = climb_ladder()
-    names = tuple(name for name, _, _ in STEPS if name in "12345" and name)
+    names = tuple(name for name, _, _ in ERRATA_IN_ORDER if name in "12345" and name)
     for key, label, step, last in (
         ("manual_program_dynamic", "manual, unknowns", -2, ()),
         ("section_5_7_hand_solution", "5.7 unknowns", -1, ("5b",)),
     ):
-        noise = round_off(*STEPS[step][1:])  # printed with up to 17 digits
+        noise = bound_round_off(
+            *ERRATA_IN_ORDER[step][1:]
+        )  # printed with up to 17 digits
         for name, text in read_printed()["published"][key].items():
             yield PublishedFigure(
                 label,

@@ -8,14 +8,14 @@ F34 (x, y each), T, as in the thesis (section 5.7).
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from fourbar.quantities import Array
+
 Vectors = dict[int, Array]
 """Vectors of each bar 2, 3, 4, an array (n, 2)."""
 
 
-class FreeBodies(NamedTuple):
+class EquationTerms(NamedTuple):
     """Terms of the thirteen equations."""
 
     to_first: Vectors
@@ -34,10 +34,10 @@ F23 = 4
 F43 = 6
 F14 = 8
 F34 = 10
-TORQUE = 12
+TORQUE_COLUMN = 12
 
 
-def assemble(bodies: FreeBodies, drive_bar: int) -> tuple[Array, Array]:
+def assemble_equations(bodies: EquationTerms, drive_bar: int) -> tuple[Array, Array]:
     """Assemble the matrices (n, 13, 13) and right-hand sides (n, 13)."""
     n = len(bodies.inertia_moment[2])
     matrix = np.zeros((n, 13, 13))
@@ -57,7 +57,7 @@ def assemble(bodies: FreeBodies, drive_bar: int) -> tuple[Array, Array]:
                 arm[:, 0],
             )
         if bar == drive_bar:
-            matrix[:, row + 2, TORQUE] = 1.0
+            matrix[:, row + 2, TORQUE_COLUMN] = 1.0
         right[:, row : row + 2] = bodies.inertia_force[bar]
         right[:, row + 2] = bodies.inertia_moment[bar]
     for row, (force, reaction) in enumerate(
@@ -67,7 +67,7 @@ def assemble(bodies: FreeBodies, drive_bar: int) -> tuple[Array, Array]:
     return matrix, right
 
 
-def solve_thirteen(bodies: FreeBodies, drive_bar: int) -> Array:
+def solve_thirteen(bodies: EquationTerms, drive_bar: int) -> Array:
     """Solve for the thirteen unknowns of each position, (n, 13)."""
-    matrix, right = assemble(bodies, drive_bar)
+    matrix, right = assemble_equations(bodies, drive_bar)
     return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])

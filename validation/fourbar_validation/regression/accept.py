@@ -19,14 +19,14 @@ import click
 
 from fourbar.errors import HOLDS, InputError
 from fourbar.writing import write_bytes, write_text
-from fourbar_validation.compare.columns import CSV_ROWS, null_nan
+from fourbar_validation.compare.columns import CSV_ROWS, number_or_null
 from fourbar_validation.compare.rows import FAILS, MADE_OF, Counts, Row, sort_rows
 from fourbar_validation.regression import render
 from fourbar_validation.regression.changes import Differences, compare_runs
 from fourbar_validation.regression.record import (
-    ABOUT,
+    ABOUT_FILE,
     ACCEPTED,
-    TABLES,
+    RECORD_FILES,
     About,
     Recorded,
     accept,
@@ -38,7 +38,7 @@ from fourbar_validation.regression.scenes import find_renamed
 
 HISTORY = "history.parquet"
 TIME = "time"
-Command = Callable[..., Any]
+CommandFunction = Callable[..., Any]
 
 
 def append(
@@ -52,7 +52,7 @@ def append(
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    table = _write_table(about, rows, times)
+    table = _write_record_table(about, rows, times)
     if file.exists():
         try:
             old = pq.read_table(
@@ -71,7 +71,7 @@ def append(
     write_bytes(file, sink.getvalue().to_pybytes())
 
 
-def _write_table(
+def _write_record_table(
     about: About, rows: list[Row], times: Mapping[tuple[str, str], float]
 ) -> Any:
     """Write a run as columns; a text that recurs is kept once."""
@@ -79,7 +79,7 @@ def _write_table(
 
     nothing: dict[str, Any] = dict.fromkeys((*MADE_OF, "times_formulas"))
     lines = [
-        nothing | {name: null_nan(getattr(row, name)) for name in MADE_OF}
+        nothing | {name: number_or_null(getattr(row, name)) for name in MADE_OF}
         for row in sort_rows(rows)
     ]
     for (scene, engine), ratio in sorted(times.items()):
@@ -125,26 +125,26 @@ def _write_table(
 
 
 FORMS: dict[str, Callable[[Differences], str]] = {
-    "markdown": render.write_markdown,
-    "html": render.write_html,
-    "junit": render.write_junit,
+    "markdown": render.write_pull_request_comment,
+    "html": render.write_differences_page,
+    "junit": render.write_junit_of_changes,
 }
 """Forms in which the differences can be written, besides the text that is printed."""
 _FORM_NAMES = {"markdown": "Markdown", "html": "HTML", "junit": "JUnit"}
 """Names of these forms in help texts."""
-NAMED = 50
+MOST_NAMES_LISTED = 50
 """Names of a column that a message lists."""
 _CHOICES = {"only": "scene", "engines": "engine", "quantity": "quantity"}
 """Option, and the column that it chooses by."""
 
 
-def add_output_options(junit: str = "") -> Callable[[Command], Command]:
+def add_output_options(junit: str = "") -> Callable[[CommandFunction], CommandFunction]:
     """Make a decorator that adds --markdown, --html and --junit.
 
     `junit`: end of the help of --junit.
     """
 
-    def add(command: Command) -> Command:
+    def add(command: CommandFunction) -> CommandFunction:
         for form in reversed(FORMS):
             path = click.Path(path_type=Path, dir_okay=False)
             end = junit if form == "junit" else ""
@@ -155,7 +155,7 @@ def add_output_options(junit: str = "") -> Callable[[Command], Command]:
     return add
 
 
-def _add_choosing_options(command: Command) -> Command:
+def _add_choosing_options(command: CommandFunction) -> CommandFunction:
     """Add the options --only, --engines and --quantity."""
     for option, column in reversed(_CHOICES.items()):
         text = f"These alone, comma-separated: names of column {column}."
@@ -194,13 +194,13 @@ def report_differences(
     differences.baseline = before.describe()
     unproven = [str(run.table) for run in (before, after) if not run.verified]
     differences.notes += [
-        f"{table}: not verified, its {ABOUT} states no SHA-256 or is missing"
+        f"{table}: not verified, its {ABOUT_FILE} states no SHA-256 or is missing"
         for table in unproven
     ]
     for form, path in forms.items():
         if path is not None:
             write_text(path, FORMS[form](differences))
-    click.echo(render.write_text(differences), nl=False)
+    click.echo(render.write_differences(differences), nl=False)
     if differences.strange:
         raise InputError(
             "OLD",
@@ -232,7 +232,7 @@ def _is_chosen(
         offered = set[str]()
         for word in words(_CHOICES[option]):
             missing.discard(word)
-            if len(offered) < NAMED:
+            if len(offered) < MOST_NAMES_LISTED:
                 offered.add(word)
         for name in sorted(missing) or ([] if names else [text]):
             raise InputError(
@@ -250,12 +250,12 @@ def _is_chosen(
     )
 
 
-@click.command()
+@click.command("compare")
 @click.argument("old")
 @click.argument("new", type=click.Path(path_type=Path))
 @_add_choosing_options
 @add_output_options()
-def compare(
+def compare_command(
     old: str,
     new: Path,
     only: str | None,
@@ -284,7 +284,7 @@ def compare(
 
 def _require_as_strict(run: Recorded, target: Path) -> None:
     """Refuse a run whose rules are weaker than those of the accepted one."""
-    if not (target / ABOUT).is_file():
+    if not (target / ABOUT_FILE).is_file():
         return
     accepted = open_run(target, "--to")
     weakened = list_weakened(accepted.about.rules, run.about.rules)
@@ -339,7 +339,7 @@ def accept_command(
         raise InputError(
             "--to", str(target), "must be another folder than that of the results"
         )
-    for name in (*TABLES, ABOUT, HISTORY):
+    for name in (*RECORD_FILES, ABOUT_FILE, HISTORY):
         if (target / name).is_dir():
             raise InputError(
                 "--to", str(target / name), "must name a file, not a folder"
@@ -358,7 +358,7 @@ def accept_command(
         raise InputError(
             run.key,
             str(run.table),
-            f"needs a {ABOUT} with its rows and SHA-256; `run` writes one",
+            f"needs a {ABOUT_FILE} with its rows and SHA-256; `run` writes one",
         )
     if not allow_weaker:
         _require_as_strict(run, target)

@@ -7,7 +7,7 @@ from enum import Enum
 from fourbar_validation.compare.rows import FAILS, VERDICTS, Row
 from fourbar_validation.compare.tolerance import EPS, K
 
-ROUND_OFF = K
+FREE_ROUND_OFFS = K
 """Errors of an exact comparison move freely by this many eps/condition: another
 compiler, another order of summation. A move beyond it is a change of the numbers
 themselves.
@@ -16,7 +16,7 @@ _NOTICEABLE = 1.25
 """An error that is not round-off has changed where it grew or shrank by this factor."""
 
 
-class Kind(Enum):
+class KindOfChange(Enum):
     """Change of a row; the value is the heading in the report."""
 
     VERDICT_WORSE = "verdict got worse"
@@ -36,11 +36,22 @@ class Kind(Enum):
     SAME = "same"
 
 
-WHOLE = ("all", "watch")
+WHOLE_ENGINE = ("all", "watch")
 """Rows of what went wrong with an engine as a whole. Once it is mended they are gone.
 """
-REGRESSIONS = frozenset((Kind.VERDICT_WORSE, Kind.WORSE, Kind.GONE, Kind.NEW_FAILURE))
-OTHER_QUESTION = (Kind.OTHER_SCENE, Kind.OTHER_POSITIONS, Kind.OTHER_SETTING)
+REGRESSIONS = frozenset(
+    (
+        KindOfChange.VERDICT_WORSE,
+        KindOfChange.WORSE,
+        KindOfChange.GONE,
+        KindOfChange.NEW_FAILURE,
+    )
+)
+OTHER_QUESTION = (
+    KindOfChange.OTHER_SCENE,
+    KindOfChange.OTHER_POSITIONS,
+    KindOfChange.OTHER_SETTING,
+)
 """Rows that are not compared: each run answers a question of its own."""
 Key = tuple[str, str, str, str]
 
@@ -49,7 +60,7 @@ Key = tuple[str, str, str, str]
 class Change:
     """One row in the old and the new run."""
 
-    kind: Kind
+    kind: KindOfChange
     key: Key
     old: Row | None
     new: Row | None
@@ -80,7 +91,7 @@ def compare_row(
     new: Row | None,
     *,
     asked: bool = True,
-    differs: Kind | None = None,
+    differs: KindOfChange | None = None,
 ) -> Change:
     """Compare a row of both runs, or take that of one of them.
 
@@ -90,50 +101,50 @@ def compare_row(
     round_off = math.nan
     if old is None:
         if new is not None and new.verdict == FAILS:
-            kind = Kind.NEW_FAILURE
+            kind = KindOfChange.NEW_FAILURE
         else:
-            kind = Kind.NEW
+            kind = KindOfChange.NEW
     elif new is None and not asked:
-        kind = Kind.NOT_RUN
+        kind = KindOfChange.NOT_RUN
     elif new is None:
-        if old.verdict == FAILS and old.quantity in WHOLE:
-            kind = Kind.GONE_FAILURE
+        if old.verdict == FAILS and old.quantity in WHOLE_ENGINE:
+            kind = KindOfChange.GONE_FAILURE
         else:
-            kind = Kind.GONE
+            kind = KindOfChange.GONE
     else:
         round_off = (
-            ROUND_OFF
+            FREE_ROUND_OFFS
             * EPS
             / min((c for c in (old.condition, new.condition) if c > 0.0), default=1.0)
         )
         kind = _choose_kind(old, new, round_off)
         if differs is not None:
             if new.verdict == FAILS and old.verdict != FAILS:
-                kind = Kind.NEW_FAILURE
+                kind = KindOfChange.NEW_FAILURE
             else:
                 kind = differs
     return Change(kind, key, old, new, round_off)
 
 
-def _choose_kind(old: Row, new: Row, round_off: float) -> Kind:
+def _choose_kind(old: Row, new: Row, round_off: float) -> KindOfChange:
     if old.verdict != new.verdict:
         worse = VERDICTS.index(new.verdict) > VERDICTS.index(old.verdict)
         if worse:
-            return Kind.VERDICT_WORSE
-        return Kind.VERDICT_BETTER
+            return KindOfChange.VERDICT_WORSE
+        return KindOfChange.VERDICT_BETTER
     if (
         not new.compared
         or old.error == new.error
         or (math.isnan(old.error) and math.isnan(new.error))
     ):
-        return Kind.SAME
+        return KindOfChange.SAME
     if abs(new.error - old.error) <= round_off:
-        return Kind.ROUND_OFF
+        return KindOfChange.ROUND_OFF
     if new.error > _NOTICEABLE * old.error or math.isnan(new.error):
         within = (
             new.passed and new.error <= _NOTICEABLE * old.allowed
         )  # an allowance that was widened holds nothing
-        return Kind.GREW if within else Kind.WORSE
+        return KindOfChange.GREW if within else KindOfChange.WORSE
     if old.error > _NOTICEABLE * new.error:
-        return Kind.BETTER
-    return Kind.SAME
+        return KindOfChange.BETTER
+    return KindOfChange.SAME

@@ -17,7 +17,7 @@ from fourbar_validation.regression.change import (
     REGRESSIONS,
     Change,
     Key,
-    Kind,
+    KindOfChange,
     compare_row,
 )
 from fourbar_validation.regression.fault import Fault
@@ -34,24 +34,24 @@ from fourbar_validation.regression.scenes import (
     list_scene_changes,
 )
 
-KEPT = 10_000
+ROWS_LISTED = 10_000
 """Rows of one kind that are listed, the worst of them; all are counted."""
-NAMED = 50
+MOST_ENGINES_LISTED = 50
 """Scenes and engines listed by name that were not run or not compared. The others are
 counted.
 """
-ONE_SIDED = (
-    *(Kind.NOT_RUN, Kind.GONE, Kind.GONE_FAILURE),
-    *(Kind.NEW, Kind.NEW_FAILURE),
+KINDS_OF_ONE_RUN = (
+    *(KindOfChange.NOT_RUN, KindOfChange.GONE, KindOfChange.GONE_FAILURE),
+    *(KindOfChange.NEW, KindOfChange.NEW_FAILURE),
 )
 """Kinds of rows that only one run has."""
-T = TypeVar("T")
-_ByScene = Iterable[tuple[str, Sequence[T]]]
+PerScene = TypeVar("PerScene")
+_ByScene = Iterable[tuple[str, Sequence[PerScene]]]
 """Items of one scene after the other, in ascending order of the scenes' names."""
 
 
 class Named:
-    """Rows by a name; of more than NAMED names the others are one."""
+    """Rows by a name; of more than MOST_ENGINES_LISTED names the others are one."""
 
     def __init__(self) -> None:
         self._rows: Counter[str] = Counter()
@@ -62,7 +62,7 @@ class Named:
 
     def add(self, name: str) -> None:
         """Add one more row of a name."""
-        if name in self._rows or len(self._rows) < NAMED:
+        if name in self._rows or len(self._rows) < MOST_ENGINES_LISTED:
             self._rows[name] += 1
         else:
             self._others += name != self._last
@@ -92,13 +92,13 @@ class Differences:
     """The old run in words: where it lies, of which date and commit."""
     notes: list[str] = field(default_factory=list)
     """Scenes of another name, and what an older record cannot say."""
-    kept: int = KEPT
-    kinds: Counter[Kind] = field(default_factory=Counter)
+    kept: int = ROWS_LISTED
+    kinds: Counter[KindOfChange] = field(default_factory=Counter)
     """Rows by what happened to them."""
     counts: Counts = field(default_factory=Counts)
     """The rows of the new run by verdict."""
     fault: Fault = field(default_factory=Fault)
-    _changes: dict[Kind, list[Change]] = field(default_factory=dict)
+    _changes: dict[KindOfChange, list[Change]] = field(default_factory=dict)
     _compared: Counts = field(default_factory=Counts)
     """The rows of the new run that have their counterpart in the old one."""
     _scenes_not_run: Named = field(default_factory=Named)
@@ -119,9 +119,9 @@ class Differences:
         self.fault.add(changes)
         scene_was_run = any(change.new is not None for change in changes)
         for change in changes:
-            if change.kind is Kind.NOT_RUN and scene_was_run:
+            if change.kind is KindOfChange.NOT_RUN and scene_was_run:
                 self._engines_not_run.add(change.key[1])
-            elif change.kind is Kind.NOT_RUN:
+            elif change.kind is KindOfChange.NOT_RUN:
                 self._scenes_not_run.add(f"scene {change.key[0]}")
             elif (
                 change.kind in OTHER_QUESTION
@@ -151,7 +151,7 @@ class Differences:
             growth = f"{old.allowed:.1e} -> {new.allowed:.1e}"
             self._grown.add(f"{new.scene} / {new.engine} / {new.quantity}: {growth}")
 
-    def of(self, kind: Kind) -> list[Change]:
+    def of(self, kind: KindOfChange) -> list[Change]:
         """List the changes of one kind, the worst first; at most `kept` of them."""
         return nlargest(
             self.kept, self._changes.get(kind, ()), key=lambda one: one.severity
@@ -161,7 +161,7 @@ class Differences:
     def changes(self) -> list[Change]:
         """Return the changes that are kept, by scene, engine, setting and quantity."""
         return sorted(
-            (change for kind in Kind for change in self.of(kind)),
+            (change for kind in KindOfChange for change in self.of(kind)),
             key=lambda change: change.key,
         )
 
@@ -216,7 +216,7 @@ class Differences:
     @property
     def shared(self) -> int:
         """Return how many rows stand in both runs, whatever question they answer."""
-        return self.rows - sum(self.kinds[kind] for kind in ONE_SIDED)
+        return self.rows - sum(self.kinds[kind] for kind in KINDS_OF_ONE_RUN)
 
     @property
     def strange(self) -> bool:
@@ -233,11 +233,11 @@ class Differences:
 
 
 def _say_why_not_compared(change: Change, old: Row, new: Row) -> str:
-    if change.kind is Kind.OTHER_SETTING:
+    if change.kind is KindOfChange.OTHER_SETTING:
         return f"{change.key[0]} / {change.key[1]}: {old.setting} -> {new.setting}"
+    other_scene = change.kind is KindOfChange.OTHER_SCENE
     return (
-        f"scene {change.key[0]}"
-        f" {'changed' if change.kind is Kind.OTHER_SCENE else 'has other positions'}"
+        f"scene {change.key[0]} {'changed' if other_scene else 'has other positions'}"
     )
 
 
@@ -245,7 +245,7 @@ def compare_runs(
     old: tuple[About, _ByScene[Row]],
     new: tuple[About, _ByScene[Row]],
     engines: set[str],
-    kept: int = KEPT,
+    kept: int = ROWS_LISTED,
 ) -> Differences:
     """Compare two runs by their scenes, in ascending order.
 
@@ -287,7 +287,9 @@ def compare_runs(
     return differences
 
 
-def _rename_scenes(scenes: _ByScene[T], names: Mapping[str, str]) -> _ByScene[T]:
+def _rename_scenes(
+    scenes: _ByScene[PerScene], names: Mapping[str, str]
+) -> _ByScene[PerScene]:
     """Return the old run's scenes under the new run's names.
 
     Nothing is held in memory if none differs.
@@ -301,8 +303,8 @@ def _rename_scenes(scenes: _ByScene[T], names: Mapping[str, str]) -> _ByScene[T]
 
 
 def _merge_scenes(
-    old: _ByScene[T], new: _ByScene[T]
-) -> Iterator[tuple[str, Sequence[T], Sequence[T]]]:
+    old: _ByScene[PerScene], new: _ByScene[PerScene]
+) -> Iterator[tuple[str, Sequence[PerScene], Sequence[PerScene]]]:
     """Yield each scene that either run has, with what both have of it.
 
     Raises InputError if the scenes are not in order.
@@ -318,8 +320,8 @@ def _merge_scenes(
 
 
 def _require_order(
-    run: str, scenes: _ByScene[T]
-) -> Iterator[tuple[str, str, Sequence[T]]]:
+    run: str, scenes: _ByScene[PerScene]
+) -> Iterator[tuple[str, str, Sequence[PerScene]]]:
     last = None
     for scene, rows in scenes:
         if last is not None and scene <= last:
@@ -353,14 +355,14 @@ def _compare_scene(
     changes = []
     for key in sorted((before.keys() | after.keys()) - set(renamed.values())):
         if key in renamed:
-            differs = Kind.OTHER_SETTING
+            differs = KindOfChange.OTHER_SETTING
         else:
             differs = None
         if change is not None:
             if change.positions_alone:
-                differs = Kind.OTHER_POSITIONS
+                differs = KindOfChange.OTHER_POSITIONS
             else:
-                differs = Kind.OTHER_SCENE
+                differs = KindOfChange.OTHER_SCENE
         new = after.get(renamed.get(key, key))
         changes.append(
             compare_row(

@@ -8,12 +8,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from fourbar_validation.compare.rows import FORMULAS, Row
-from fourbar_validation.regression.change import Change, Kind
-from fourbar_validation.report.words import NUMBER
+from fourbar_validation.regression.change import Change, KindOfChange
+from fourbar_validation.report.words import NUMBER_IN_A_REASON
 
-EXACT = "exact"
+EXACT_SETTING = "exact"
 """Setting of an engine that is held to round-off, and sees what is wrong by more."""
-MOST_CAUSES = 200
+MOST_CAUSES_APART = 200
 """Causes with a line of their own; the others are one."""
 
 
@@ -22,7 +22,7 @@ class Group:
     """Rows of one engine to which the same happened, for one cause."""
 
     engine: str
-    kind: Kind
+    kind: KindOfChange
     cause: str
     """What came of it, and the reason without its numbers."""
     rows: int = 0
@@ -68,7 +68,7 @@ class Fault:
     """Scene by scene; what is kept does not grow with their number."""
 
     def __init__(self) -> None:
-        self._groups: dict[tuple[str, Kind, str], Group] = {}
+        self._groups: dict[tuple[str, KindOfChange, str], Group] = {}
         self._scenes: Counter[str] = Counter()
         self._who: Counter[tuple[str, frozenset[str]]] = Counter()
 
@@ -76,15 +76,19 @@ class Fault:
         """Add the rows of one scene."""
         changes = list(changes)
         self._scenes.update(
-            {change.key[1] for change in changes if change.kind is not Kind.NOT_RUN}
+            {
+                change.key[1]
+                for change in changes
+                if change.kind is not KindOfChange.NOT_RUN
+            }
         )
-        groups: dict[tuple[str, Kind, str], list[Change]] = {}
+        groups: dict[tuple[str, KindOfChange, str], list[Change]] = {}
         for change in changes:
             groups.setdefault(
                 (change.key[1], change.kind, _find_cause(change)), []
             ).append(change)
         for key, some in groups.items():
-            if key not in self._groups and len(self._groups) >= MOST_CAUSES:
+            if key not in self._groups and len(self._groups) >= MOST_CAUSES_APART:
                 key = (*key[:2], "other causes")  # noqa: PLW2901
             self._groups.setdefault(key, Group(*key)).add(some)
         worse = {change.key[1] for change in changes if change.regression}
@@ -94,9 +98,9 @@ class Fault:
                 for change in changes
                 if _is_compared_exactly(change.old) or _is_compared_exactly(change.new)
             }
-            self._who[write_sentence(worse, exact), frozenset(worse)] += 1
+            self._who[write_fault_sentence(worse, exact), frozenset(worse)] += 1
 
-    def groups(self, kinds: Iterable[Kind]) -> list[Group]:
+    def groups(self, kinds: Iterable[KindOfChange]) -> list[Group]:
         """Return the groups of some kinds, the worst first.
 
         Each has the number of its engine's scenes.
@@ -105,7 +109,7 @@ class Fault:
         groups = [group for group in self._groups.values() if group.kind in wanted]
         for group in groups:
             group.of_scenes = self._scenes[group.engine]
-        order = list(Kind)
+        order = list(KindOfChange)
         return sorted(
             groups,
             key=lambda g: (
@@ -144,7 +148,7 @@ def _rank_severity(group: Group) -> tuple[bool, float]:
 def _is_compared_exactly(row: Row | None) -> bool:
     return (
         row is not None
-        and row.setting == EXACT
+        and row.setting == EXACT_SETTING
         and row.compared
         and row.engine != FORMULAS
     )
@@ -152,13 +156,18 @@ def _is_compared_exactly(row: Row | None) -> bool:
 
 def _find_cause(change: Change) -> str:
     """Take the reason without its numbers: one cause has one text in all scenes."""
-    return NUMBER.sub("#", _write_cause(change))
+    return NUMBER_IN_A_REASON.sub("#", _write_cause(change))
 
 
 def _write_cause(change: Change) -> str:
     """Say how the verdict changed, and why."""
     if (
-        change.kind in (Kind.VERDICT_WORSE, Kind.VERDICT_BETTER, Kind.NEW_FAILURE)
+        change.kind
+        in (
+            KindOfChange.VERDICT_WORSE,
+            KindOfChange.VERDICT_BETTER,
+            KindOfChange.NEW_FAILURE,
+        )
         and change.new is not None
     ):
         if change.old is not None:
@@ -169,7 +178,7 @@ def _write_cause(change: Change) -> str:
     return ""
 
 
-def write_sentence(worse: set[str], exact: set[str]) -> str:
+def write_fault_sentence(worse: set[str], exact: set[str]) -> str:
     """Say which engine is at fault in a scene.
 
     The rows of `worse` regressed; `exact`: engines held to round-off.

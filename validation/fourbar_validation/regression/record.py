@@ -18,8 +18,8 @@ from typing import Any, TypeVar
 
 from fourbar.errors import InputError
 from fourbar.writing import name_file, write_text
-from fourbar_validation.compare.columns import count_rows, read_column, read_columns
-from fourbar_validation.compare.rows import Row, make_plain, read_cell_text
+from fourbar_validation.compare.columns import count_rows, read_columns, read_words
+from fourbar_validation.compare.rows import Row, escape_controls, read_cell_text
 from fourbar_validation.compare.tolerance import SIMULATED, K
 from fourbar_validation.engines.guests import Guest
 from fourbar_validation.engines.registry import Engine
@@ -29,13 +29,13 @@ from fourbar_validation.report.machine import find_kernels, list_versions, name_
 
 SHIPPED = Path(__file__).parent
 """Folder of the accepted state of this project's models."""
-T = TypeVar("T")
+AnyRow = TypeVar("AnyRow")
 ACCEPTED = "accepted"
 TABLE = "results.csv"
-COLUMNS = "results.parquet"
-ABOUT = "record.json"
-TIMINGS = "timings.csv"
-TABLES = (TABLE, COLUMNS, TIMINGS)
+COLUMNS_FILE = "results.parquet"
+ABOUT_FILE = "record.json"
+TIMINGS_FILE = "timings.csv"
+RECORD_FILES = (TABLE, COLUMNS_FILE, TIMINGS_FILE)
 UNFINISHED = "run.json"
 """File that a run keeps in its folder until it is finished."""
 
@@ -133,14 +133,14 @@ def write_about(record: About, folder: Path) -> None:
 
     It has rows and SHA-256 of each table, and of itself.
     """
-    present = [path for name in TABLES if (path := folder / name).is_file()]
+    present = [path for name in RECORD_FILES if (path := folder / name).is_file()]
     tables = {
         path.name: {"rows": count_rows(path), "sha256": _hash_file(path)}
         for path in present
     }
     kept = asdict(record) | {"tables": tables}
     write_text(
-        folder / ABOUT,
+        folder / ABOUT_FILE,
         json.dumps(kept | {"sha256": _hash_own(kept)}, indent=1, sort_keys=True) + "\n",
     )
 
@@ -154,20 +154,22 @@ def _hash_own(kept: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()
 
 
-def _require_whole(
+def _require_undamaged(
     tables: Mapping[str, Mapping[str, Any]], folder: Path, read: str, key: str
 ) -> None:
     """Raise an InputError that names the first damaged table of a folder.
 
     Such a table is not what its record says.
     """
-    present = {name for name in TABLES if (folder / name).is_file()}
+    present = {name for name in RECORD_FILES if (folder / name).is_file()}
     for name in sorted({*tables, *present, read}):
         path = folder / name
         if name not in tables:
-            why = f"is not of this run: its {ABOUT} does not name it"
+            why = f"is not of this run: its {ABOUT_FILE} does not name it"
         elif name not in present:
-            why = f"is missing: {ABOUT} says that it has {tables[name]['rows']} rows"
+            why = (
+                f"is missing: {ABOUT_FILE} says that it has {tables[name]['rows']} rows"
+            )
         elif _hash_file(path) == tables[name]["sha256"]:
             continue
         else:
@@ -177,7 +179,7 @@ def _require_whole(
                 rows = "no rows that can be read"
             why = (
                 f"is damaged: {rows} of {tables[name]['rows']}, and not the SHA-256"
-                f" that {ABOUT} states"
+                f" that {ABOUT_FILE} states"
             )
         raise InputError(key, str(path), why)
 
@@ -227,14 +229,14 @@ class Recorded:
 
     def words(self, column: str) -> Iterator[str]:
         """Read what stands in a column of text, some of it more than once."""
-        yield from self._read(read_column(self.table, column))
+        yield from self._read(read_words(self.table, column))
 
     def times(self) -> Iterator[tuple[str, list[tuple[str, float]]]]:
         """Return each engine's time over that of the formulas, scene by scene.
 
         It is empty if they were not kept.
         """
-        table = self.table.parent / TIMINGS
+        table = self.table.parent / TIMINGS_FILE
         if not table.is_file():
             return
         try:
@@ -243,10 +245,10 @@ class Recorded:
                     csv.DictReader(file), key=lambda row: row["scene"]
                 ):
                     yield (
-                        make_plain(read_cell_text(scene)),
+                        escape_controls(read_cell_text(scene)),
                         [
                             (
-                                make_plain(read_cell_text(row["engine"])),
+                                escape_controls(read_cell_text(row["engine"])),
                                 float(row["times_formulas"]),
                             )
                             for row in some
@@ -257,7 +259,7 @@ class Recorded:
                 self.key, str(table), "is not a table of times written by `run`"
             ) from None
 
-    def _read(self, entries: Iterator[T]) -> Iterator[T]:
+    def _read(self, entries: Iterator[AnyRow]) -> Iterator[AnyRow]:
         try:
             yield from entries
         except (
@@ -280,14 +282,14 @@ def open_run(path: Path, key: str = "RESULTS") -> Recorded:
     that of an unfinished run.
     """
     table = path / TABLE if path.is_dir() else path
-    long = path / COLUMNS
+    long = path / COLUMNS_FILE
     if not table.is_file() and long.is_file():  # too many rows for a text
         table = long
     if not table.is_file():
         raise InputError(
             key,
             str(path),
-            f"must be a folder with {TABLE} or {COLUMNS}, or such a file",
+            f"must be a folder with {TABLE} or {COLUMNS_FILE}, or such a file",
         )
     if (table.parent / UNFINISHED).is_file():
         raise InputError(
@@ -295,7 +297,7 @@ def open_run(path: Path, key: str = "RESULTS") -> Recorded:
             str(table),
             "must be of a run that was finished: run it again, and it is resumed",
         )
-    record = table.parent / ABOUT
+    record = table.parent / ABOUT_FILE
     if record.is_file():
         run = _open_described(record, table, key)
     else:
@@ -323,28 +325,32 @@ def _open_described(record: Path, table: Path, key: str) -> Recorded:
         return Recorded(about, table, key=key)
     if stated != _hash_own(kept):
         raise InputError(key, str(record), "is damaged: it is not what `run` wrote")
-    _require_whole(tables, table.parent, table.name, key)
+    _require_undamaged(tables, table.parent, table.name, key)
     return Recorded(about, table, True, key)
 
 
 def _make_record(kept: dict[str, Any]) -> About:
     """Make the record of what a file says of a run; its words are somebody's text."""
-    versions, settings = (_make_plain(kept[name]) for name in ("versions", "settings"))
+    versions, settings = (
+        _escape_entries(kept[name]) for name in ("versions", "settings")
+    )
     scenes = {
-        make_plain(name): _make_plain(entries)
+        escape_controls(name): _escape_entries(entries)
         for name, entries in kept.get("scenes", {}).items()
     }
-    date, commit = (make_plain(kept.get(name, "")) for name in ("date", "commit"))
+    date, commit = (escape_controls(kept.get(name, "")) for name in ("date", "commit"))
     rules = {
-        make_plain(name): _make_plain(entries)
+        escape_controls(name): _escape_entries(entries)
         for name, entries in kept.get("rules", {}).items()
     }
-    machine = make_plain(kept["machine"])
+    machine = escape_controls(kept["machine"])
     return About(versions, machine, settings, scenes, date, commit, rules)
 
 
-def _make_plain(entries: dict[str, str]) -> dict[str, str]:
-    return {make_plain(key): make_plain(value) for key, value in entries.items()}
+def _escape_entries(entries: dict[str, str]) -> dict[str, str]:
+    return {
+        escape_controls(key): escape_controls(value) for key, value in entries.items()
+    }
 
 
 def find_baseline(name_or_path: str) -> Path:
@@ -360,8 +366,8 @@ def find_baseline(name_or_path: str) -> Path:
 def accept(run: Recorded, target: Path) -> None:
     """Keep a run, with its times, as the accepted state in a folder."""
     target.mkdir(parents=True, exist_ok=True)
-    kept = {run.table.name, TIMINGS}
-    for name in TABLES:
+    kept = {run.table.name, TIMINGS_FILE}
+    for name in RECORD_FILES:
         if name in kept and (table := run.table.with_name(name)).is_file():
             _copy(table, target / name)
         else:

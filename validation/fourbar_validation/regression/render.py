@@ -2,23 +2,29 @@
 
 from collections.abc import Callable, Iterator, Sequence
 
-from fourbar_validation.regression.change import OTHER_QUESTION, Change, Kind
+from fourbar_validation.regression.change import OTHER_QUESTION, Change, KindOfChange
 from fourbar_validation.regression.changes import Differences
 from fourbar_validation.regression.fault import Group
 from fourbar_validation.report.junit import JunitCase, count_beyond, write_document
-from fourbar_validation.report.templating import render, write_number
+from fourbar_validation.report.templating import render, write_error
 
-SHOWN = tuple(
+KINDS_SHOWN = tuple(
     kind
-    for kind in Kind
-    if kind not in (Kind.SAME, Kind.ROUND_OFF, Kind.NOT_RUN, *OTHER_QUESTION)
+    for kind in KindOfChange
+    if kind
+    not in (
+        KindOfChange.SAME,
+        KindOfChange.ROUND_OFF,
+        KindOfChange.NOT_RUN,
+        *OTHER_QUESTION,
+    )
 )
 """Kinds shown by engine and cause. Rows that were not run, or answer another question,
 are named together.
 """
-AT_MOST = 50
+MOST_GROUPS_LISTED = 50
 """Engines and causes listed in text and Markdown."""
-HEADINGS = (
+CHANGE_HEADINGS = (
     "scene",
     "engine",
     "quantity",
@@ -28,9 +34,9 @@ HEADINGS = (
     "old verdict",
     "new verdict",
 )
-LISTED = 1000
+MOST_ROWS_ON_THE_PAGE = 1000
 """Rows of one kind on the page."""
-ROWS = 5
+MOST_ROWS_IN_TEXT = 5
 """Rows of one kind listed there, the worst of them."""
 
 
@@ -39,7 +45,9 @@ def write_verdict(diff: Differences) -> str:
 
     What else moved, and the counts of the new run, follow.
     """
-    counts = [f"{diff.kinds[kind]} {kind.value}" for kind in Kind if diff.kinds[kind]]
+    counts = [
+        f"{diff.kinds[kind]} {kind.value}" for kind in KindOfChange if diff.kinds[kind]
+    ]
     many = diff.regressed
     if diff.weakened:
         rules = len(diff.weakened)
@@ -65,12 +73,12 @@ def write_verdict(diff: Differences) -> str:
     return f"{head}{moved}. New run: {diff.counts.sentence()}"
 
 
-def _write_line(change: Change) -> str:
+def _write_change_line(change: Change) -> str:
     """Write one change in one line of text."""
     name = " / ".join(part for part in change.key if part)
     if change.old is None:
         assert change.new is not None
-        error = write_number(change.new.error)
+        error = write_error(change.new.error)
         if not change.new.passed:
             why = f": {change.new.reason}"
         else:
@@ -78,19 +86,19 @@ def _write_line(change: Change) -> str:
         return f"{name}: {change.new.verdict}, error {error}{why}"
     if change.new is None:
         return (
-            f"{name}: was {change.old.verdict}, error {write_number(change.old.error)}"
+            f"{name}: was {change.old.verdict}, error {write_error(change.old.error)}"
         )
     old = change.old
     new = change.new
-    words = f"{name}: error {write_number(old.error)} -> {write_number(new.error)}"
+    words = f"{name}: error {write_error(old.error)} -> {write_error(new.error)}"
     if old.verdict != new.verdict:
         words += f", {old.verdict} -> {new.verdict} ({new.reason})"
     elif new.failed:
         words += f", {new.verdict} ({new.reason})"
-    return words + f"; round-off moves it by {write_number(change.round_off)}"
+    return words + f"; round-off moves it by {write_error(change.round_off)}"
 
 
-def write_text(diff: Differences) -> str:
+def write_differences(diff: Differences) -> str:
     """Write for a terminal: what is another question first.
 
     What the runs were made with follows, then the rows.
@@ -104,7 +112,7 @@ def write_text(diff: Differences) -> str:
     lines += [f"Disagreement: {sentence}" for sentence in diff.fault.sentences]
     groups, more = _group_rows(diff)
     lines += [f"{_capitalise(group.kind.value)}: {group}" for group in groups] + more
-    for kind in SHOWN:
+    for kind in KINDS_SHOWN:
         lines += [
             f"{_capitalise(kind.value)}: {line}" for line in _list_worst(diff, kind)
         ]
@@ -121,17 +129,19 @@ def _group_rows(diff: Differences) -> tuple[list[Group], list[str]]:
 
     Say how many more there are.
     """
-    groups = diff.fault.groups(SHOWN)
-    more = len(groups) - AT_MOST
-    return groups[:AT_MOST], [f"and {more} more engines and causes"] if more > 0 else []
+    groups = diff.fault.groups(KINDS_SHOWN)
+    more = len(groups) - MOST_GROUPS_LISTED
+    return groups[:MOST_GROUPS_LISTED], [
+        f"and {more} more engines and causes"
+    ] if more > 0 else []
 
 
-def _list_worst(diff: Differences, kind: Kind) -> list[str]:
+def _list_worst(diff: Differences, kind: KindOfChange) -> list[str]:
     """List the worst rows of a kind; say how many more there are."""
-    more = diff.kinds[kind] - ROWS
-    return [_write_line(change) for change in diff.of(kind)[:ROWS]] + (
-        [f"and {more} more"] if more > 0 else []
-    )
+    more = diff.kinds[kind] - MOST_ROWS_IN_TEXT
+    return [
+        _write_change_line(change) for change in diff.of(kind)[:MOST_ROWS_IN_TEXT]
+    ] + ([f"and {more} more"] if more > 0 else [])
 
 
 def _list_other_questions(diff: Differences) -> list[tuple[str, list[str]]]:
@@ -147,35 +157,35 @@ def _list_other_questions(diff: Differences) -> list[tuple[str, list[str]]]:
     return [(heading, texts) for heading, texts in parts.items() if texts]
 
 
-def write_markdown(diff: Differences) -> str:
+def write_pull_request_comment(diff: Differences) -> str:
     """Write for a comment on a pull request."""
     groups, more = _group_rows(diff)
     return (
-        _render(
+        _render_differences(
             "changes.md.j2", diff, groups, lambda kind: _list_worst(diff, kind), more
         ).rstrip("\n")
         + "\n"
     )
 
 
-def write_html(diff: Differences) -> str:
+def write_differences_page(diff: Differences) -> str:
     """Write a page of its own."""
-    return _render(
+    return _render_differences(
         "changes.html.j2",
         diff,
-        diff.fault.groups(SHOWN),
-        lambda kind: _write_cells(diff.of(kind)),
+        diff.fault.groups(KINDS_SHOWN),
+        lambda kind: _write_change_cells(diff.of(kind)),
         (),
     )
 
 
-def _write_cells(changes: Sequence[Change]) -> list[tuple[str, ...]]:
-    """Write the changes as the cells under HEADINGS."""
+def _write_change_cells(changes: Sequence[Change]) -> list[tuple[str, ...]]:
+    """Write the changes as the cells under CHANGE_HEADINGS."""
     cells: list[tuple[str, ...]] = []
-    for change in changes[:LISTED]:
+    for change in changes[:MOST_ROWS_ON_THE_PAGE]:
         scene, engine, setting, quantity = change.key
         old, new = (
-            (write_number(row.error), row.verdict) if row else ("", "")
+            (write_error(row.error), row.verdict) if row else ("", "")
             for row in (change.old, change.new)
         )
         if change.new and not change.new.passed:
@@ -189,7 +199,7 @@ def _write_cells(changes: Sequence[Change]) -> list[tuple[str, ...]]:
                 quantity,
                 old[0],
                 new[0],
-                write_number(change.round_off),
+                write_error(change.round_off),
                 old[1],
                 new[1] + why,
             )
@@ -197,47 +207,47 @@ def _write_cells(changes: Sequence[Change]) -> list[tuple[str, ...]]:
     return cells
 
 
-def _render(
+def _render_differences(
     name: str,
     diff: Differences,
     groups: list[Group],
-    rows: Callable[[Kind], Sequence[object]],
+    rows: Callable[[KindOfChange], Sequence[object]],
     more: Sequence[str],
 ) -> str:
     kinds = [
         (kind, [group for group in groups if group.kind is kind], rows(kind))
-        for kind in SHOWN
+        for kind in KINDS_SHOWN
         if diff.kinds[kind]
     ]
     what = {
         "verdict": write_verdict(diff),
         "questions": _list_other_questions(diff),
         "more": more,
-        "headings": HEADINGS,
+        "headings": CHANGE_HEADINGS,
     }
     return render(
         "fourbar_validation.regression", name, found=diff, kinds=kinds, **what
     )
 
 
-def write_junit(diff: Differences) -> str:
+def write_junit_of_changes(diff: Differences) -> str:
     """Write for the test page of a continuous-integration system: one case per row.
 
     A regression is a failure, and so is a row that fails as it did before; what was not
     compared is skipped.
     """
-    return write_document(write_verdict(diff), _list_cases(diff))
+    return write_document(write_verdict(diff), _list_cases_of_changes(diff))
 
 
-def _list_cases(diff: Differences) -> Iterator[JunitCase]:
+def _list_cases_of_changes(diff: Differences) -> Iterator[JunitCase]:
     for change in diff.changes:
         scene, engine, setting, quantity = change.key
         name = (scene, f"{scene}.{engine} {setting}", quantity)
         kind = change.kind.value
         if change.regression or (change.new is not None and change.new.failed):
-            yield JunitCase(*name, "failure", kind, _write_line(change))
+            yield JunitCase(*name, "failure", kind, _write_change_line(change))
         elif change.new is None:
-            yield JunitCase(*name, "skipped", kind, _write_line(change))
+            yield JunitCase(*name, "skipped", kind, _write_change_line(change))
         elif not change.new.compared:
             yield JunitCase(
                 *name, "skipped", kind, f"{change.new.verdict}: {change.new.reason}"

@@ -18,18 +18,18 @@ from fourbar_validation.compare.tolerance import (
     ErrorBound,
     K,
 )
-from fourbar_validation.engines.guests import STATED
-from fourbar_validation.engines.limits import LIMITS
+from fourbar_validation.engines.guests import STATED_BY_THE_ENGINE
+from fourbar_validation.engines.limits import BOUNDARIES
 from fourbar_validation.engines.registry import Engine
 
 Rules = dict[str, dict[str, str]]
 """What stands under each name, as entries of text."""
-FACTOR = "factor"
-CLASS = "class"
+FACTOR_CHANGED = "factor"
+CLASS_CHANGED = "class"
 _REASON = "reason"
 _CONDITIONED = "over the condition"
 _PREDICTED = "prediction"
-ANSWERS = "answers"
+ANSWERS_CHECK = "answers"
 _BOUNDARY = "boundary"
 _IN_TIME = "through time"
 _YES = "yes"
@@ -41,7 +41,7 @@ NOTABLE = 10.0
 kernels of a processor, and K eps/condition with it: 139 of 2093 allowances grew so.
 """
 CLASSES = {
-    STATED,
+    STATED_BY_THE_ENGINE,
     *(bound.cause for bound in (IDENTITY, EQUIVALENCE, SIMULATED, FULL_ACCURACY)),
     *(bound.name for bound in DERIVED_BOUNDS),
 }
@@ -50,16 +50,19 @@ CLASSES = {
 
 def list_rules(engines: Iterable[Engine]) -> Rules:
     """List the rules of a run: of identities, derived results, engines and limits."""
-    rules: Rules = {"identities": _describe(IDENTITY), "K": {FACTOR: repr(K)}}
+    rules: Rules = {
+        "identities": _describe_bound(IDENTITY),
+        "K": {FACTOR_CHANGED: repr(K)},
+    }
     for bound in DERIVED_BOUNDS:
-        rules[f"derived results: {bound.name}"] = _describe(bound)
+        rules[f"derived results: {bound.name}"] = _describe_bound(bound)
     for engine in engines:
         predicted = engine.predictor is not None or engine.residuals
-        rules[engine.name] = _describe(engine.tolerance) | {
+        rules[engine.name] = _describe_bound(engine.tolerance) | {
             _PREDICTED: _YES if predicted else NO,
-            ANSWERS: ", ".join(sorted(engine.answers)),
+            ANSWERS_CHECK: ", ".join(sorted(engine.answers)),
         }
-    for limit in LIMITS:
+    for limit in BOUNDARIES:
         rules[f"limit of {limit.engine}: {limit.name}"] = {
             _BOUNDARY: repr(limit.boundary),
             _REASON: limit.reason,
@@ -67,10 +70,10 @@ def list_rules(engines: Iterable[Engine]) -> Rules:
     return rules
 
 
-def _describe(bound: ErrorBound) -> dict[str, str]:
+def _describe_bound(bound: ErrorBound) -> dict[str, str]:
     return {
-        CLASS: bound.name,
-        FACTOR: repr(bound.factor),
+        CLASS_CHANGED: bound.name,
+        FACTOR_CHANGED: repr(bound.factor),
         _CONDITIONED: _YES if bound.conditioned else NO,
         _IN_TIME: _YES if bound.in_time else NO,
         _REASON: bound.reason,
@@ -104,18 +107,24 @@ def list_weakened(old: Mapping[str, Mapping[str, str]], new: Rules) -> list[Weak
         for what in before.keys() & after.keys():
             if before[what] != after[what] and _is_weaker(what, before, after):
                 weakened.append(Weakening(name, what, before[what], after[what]))
-    return sorted(weakened, key=lambda one: (one.name, one.what != FACTOR, one.what))
+    return sorted(
+        weakened, key=lambda one: (one.name, one.what != FACTOR_CHANGED, one.what)
+    )
 
 
 def _is_weaker(what: str, old: Mapping[str, str], new: Mapping[str, str]) -> bool:
     """Return whether an entry that differs makes its rule weaker."""
-    if what == FACTOR:
+    if what == FACTOR_CHANGED:
         return _number(new[what]) > _LOOSER * _number(old[what])
-    if what in (CLASS, _REASON) and FACTOR in old and FACTOR in new:
-        return not _number(new[FACTOR]) * _LOOSER < _number(old[FACTOR])
+    if (
+        what in (CLASS_CHANGED, _REASON)
+        and FACTOR_CHANGED in old
+        and FACTOR_CHANGED in new
+    ):
+        return not _number(new[FACTOR_CHANGED]) * _LOOSER < _number(old[FACTOR_CHANGED])
     if what in (_CONDITIONED, _PREDICTED, _IN_TIME):
         return new[what] == _YES
-    if what == ANSWERS:
+    if what == ANSWERS_CHECK:
         return bool(set(old[what].split(", ")) - set(new[what].split(", ")))
     return True
 
@@ -148,7 +157,7 @@ def find_weakened_row(old: Row, new: Row) -> Weakening | None:
     after = find_class(new)
     if not before or not after or before == after:
         return None
-    return Weakening(new.engine, CLASS, before, after)
+    return Weakening(new.engine, CLASS_CHANGED, before, after)
 
 
 def has_grown(old: Row, new: Row) -> bool:

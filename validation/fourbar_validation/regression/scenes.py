@@ -13,7 +13,7 @@ from fourbar.files import dump
 from fourbar.scene import Scene
 from fourbar_validation.scenes.suites import Suite
 
-Description = Mapping[str, str]
+SceneEntries = Mapping[str, str]
 
 _MOST_DESCRIBED = 2000
 """Scenes that a record describes, one or two kB each. Random linkages follow from their
@@ -21,7 +21,7 @@ seed.
 """
 _NO_QUESTION = ("title", "source", "pictures")
 """Entries of a scene file that change no number."""
-WHERE = ("motion.theta_2", "motion.free.steps", "motion.law.steps")
+POSITION_KEYS = ("motion.theta_2", "motion.free.steps", "motion.law.steps")
 """Entries that say at which positions the same question is put."""
 
 
@@ -48,20 +48,20 @@ def describe_changes(scene: Scene) -> dict[str, str]:
     except FourBarError:  # a scene that no file can state
         return {"scene": repr(scene)}
     return dict(
-        _flatten(
+        _flatten_entries(
             "",
             {key: value for key, value in entries.items() if key not in _NO_QUESTION},
         )
     )
 
 
-def _flatten(prefix: str, value: Any) -> Iterable[tuple[str, str]]:
+def _flatten_entries(prefix: str, value: Any) -> Iterable[tuple[str, str]]:
     if isinstance(value, dict):
         for key, entry in value.items():
-            yield from _flatten(f"{prefix}.{key}" if prefix else key, entry)
+            yield from _flatten_entries(f"{prefix}.{key}" if prefix else key, entry)
     elif isinstance(value, list) and any(isinstance(entry, dict) for entry in value):
         for number, entry in enumerate(value, 1):
-            yield from _flatten(f"{prefix}.{number}", entry)
+            yield from _flatten_entries(f"{prefix}.{number}", entry)
     else:
         yield (
             prefix,
@@ -80,16 +80,16 @@ class SceneChange:
     @property
     def positions_alone(self) -> bool:
         """Return whether the question is the same, at other positions."""
-        return all(key.startswith(WHERE) for key, _, _ in self.entries)
+        return all(key.startswith(POSITION_KEYS) for key, _, _ in self.entries)
 
     def __str__(self) -> str:
         parts = "; ".join(
-            f"{key} {_shorten(old, new)}" for key, old, new in self.entries
+            f"{key} {_write_unit_once(old, new)}" for key, old, new in self.entries
         )
         return f"scene {self.scene}: {parts}"
 
 
-def _shorten(old: str, new: str) -> str:
+def _write_unit_once(old: str, new: str) -> str:
     """Write a unit that both have once: "0.048 -> 0.05 kg m^2"."""
     number, _, unit = old.partition(" ")
     _, _, new_unit = new.partition(" ")
@@ -99,7 +99,7 @@ def _shorten(old: str, new: str) -> str:
 
 
 def find_renamed(
-    old: Mapping[str, Description], new: Mapping[str, Description]
+    old: Mapping[str, SceneEntries], new: Mapping[str, SceneEntries]
 ) -> dict[str, str]:
     """Find the scenes that state the same under another name.
 
@@ -116,7 +116,7 @@ def find_renamed(
 
 
 def list_scene_changes(
-    old: Mapping[str, Description], new: Mapping[str, Description]
+    old: Mapping[str, SceneEntries], new: Mapping[str, SceneEntries]
 ) -> list[SceneChange]:
     """List the scenes of both runs that ask something else now."""
     changes = []

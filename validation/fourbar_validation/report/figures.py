@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.quantities import ANGLES, COUPLE, FORCES, LINE, OK, PIN_FORCES
+from fourbar.quantities import ANGLES, COUPLE, FORCE_NAMES, LINE, OK, PIN_FORCES, Array
 from fourbar.scene import Command, Scene
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.linkage import draw_linkage
@@ -22,7 +22,6 @@ from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
     SIMULATED,
-    Array,
     find_condition,
     find_error,
     magnitude,
@@ -32,8 +31,8 @@ from fourbar_validation.report.summary import compute_shares
 from fourbar_validation.report.svg import (
     ALLOWED,
     BAND,
-    FLOOR,
     INK,
+    LEAST_DRAWN_ERROR,
     PAPER,
     choose_style,
     set_frame,
@@ -43,7 +42,7 @@ from fourbar_validation.report.svg import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MARKS = 10
+MARKS_OF_A_CURVE = 10
 """Marks of one engine on a curve. Every engine has its own positions, so no mark hides
 another.
 """
@@ -77,13 +76,13 @@ def draw_scene_figure(record: Record) -> str | None:
         or not np.any(solution.status_code == OK)
     ):
         return None
-    linkage = _draw_linkage(record.name, record.scene, solution)
+    linkage = _draw_best_position(record.name, record.scene, solution)
     if np.count_nonzero(solution.status_code == OK) < 2:
         return linkage
     return linkage + _draw_answers(record, solution)
 
 
-def _draw_linkage(name: str, scene: Scene, solution: Solution) -> str:
+def _draw_best_position(name: str, scene: Scene, solution: Solution) -> str:
     """Draw the linkage as `fourbar plot` does, at its best conditioned position."""
     from matplotlib.figure import Figure
 
@@ -128,7 +127,7 @@ def _draw_answers(record: Record, solution: Solution) -> str:
     if record.scene is not None and record.scene.motion.free is not None:
         shown = _MOTION_AND_FORCE
     return "".join(
-        _draw_picture(quantity, record, solution, answers) for quantity in shown
+        _draw_quantity(quantity, record, solution, answers) for quantity in shown
     )
 
 
@@ -148,7 +147,7 @@ def _choose_force(record: Record, solution: Solution) -> str:
     )
 
 
-def _draw_picture(
+def _draw_quantity(
     quantity: str, record: Record, solution: Solution, answers: list[Answer]
 ) -> str:
     from matplotlib.figure import Figure
@@ -170,7 +169,7 @@ def _draw_picture(
     for below, group in zip(axes[1:], groups, strict=True):
         _draw_errors(below, quantity, record, solution, group)
         below.set_ylabel(
-            "error / scale" if quantity in FORCES else "error (rad)", fontsize=8.5
+            "error / scale" if quantity in FORCE_NAMES else "error (rad)", fontsize=8.5
         )
     axes[-1].set_xlabel("time (s)" if solution.time is not None else "θ₂ (°)")
     figure.align_ylabels(axes)
@@ -205,9 +204,11 @@ def _draw_values(
     axes.plot(base, line, color=BAND, lw=5, solid_capstyle="butt")
     for turn, answer in enumerate(answers):
         theirs = _take_plain(quantity, answer.quantities[quantity])
-        phase = (turn + 0.5) / (len(answers) * MARKS)
+        phase = (turn + 0.5) / (len(answers) * MARKS_OF_A_CURVE)
         places = np.unique(
-            ((np.arange(MARKS) / MARKS + phase) * len(theirs)).astype(int)
+            (
+                (np.arange(MARKS_OF_A_CURVE) / MARKS_OF_A_CURVE + phase) * len(theirs)
+            ).astype(int)
         )
         axes.plot(
             _choose_base(solution, answer.at)[places],
@@ -264,7 +265,7 @@ def _draw_errors(
         if not len(places):
             continue
         x = _choose_base(solution, answer.at)[places]
-        heights = np.maximum(error[places], FLOOR)
+        heights = np.maximum(error[places], LEAST_DRAWN_ERROR)
         axes.plot(x, heights, **_mark(answer, 3.2) | {"mew": 0.8})
         worst = int(np.argmax(heights))
         axes.plot(

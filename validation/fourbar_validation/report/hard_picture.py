@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.quantities import OK
+from fourbar.quantities import OK, Array
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar.solving import solve
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.tolerance import (
     EPS,
     TIMES_PREDICTED,
@@ -29,9 +28,9 @@ from fourbar_validation.engines.registry import HARD_ENGINES, Engine
 from fourbar_validation.report.svg import choose_style, write_svg
 from fourbar_validation.scenes.hard_families import (
     CHANGE_POINTS,
-    CRANK,
-    ROCKER,
-    draw_linkage,
+    TYPES_WITH_A_CRANK,
+    TYPES_WITH_A_ROCKER,
+    draw_lengths_of_type,
     dress,
     find_collinear_2_3,
     find_collinear_3_4,
@@ -40,11 +39,11 @@ from fourbar_validation.scenes.hard_families import (
 
 _DISTANCES = np.logspace(-1, -12, 23)
 """rad from the singular position."""
-INK = "#777777"
+GREY = "#777777"
 """Grey that reads on white and on black."""
-FLOOR = 1e-17
+DRAWN_AS_ZERO = 1e-17
 """Differences of exactly zero are drawn here."""
-SHOWN = ("torque", "F32")
+QUANTITIES_DRAWN = ("torque", "F32")
 _SIMULATED_FROM = 3e-3
 """rad; nearer than this the simulation refuses."""
 
@@ -60,8 +59,8 @@ class Approach:
 
 def list_approaches() -> list[Approach]:
     """List a toggle, a pole of T4 and a change point."""
-    rocker = draw_linkage(ROCKER, 1)
-    crank = draw_linkage(CRANK, 0)
+    rocker = draw_lengths_of_type(TYPES_WITH_A_ROCKER, 1)
+    crank = draw_lengths_of_type(TYPES_WITH_A_CRANK, 0)
     (limit, stretched), *_ = find_collinear_3_4(rocker)
     (pole, branch), *_ = find_collinear_2_3(crank)
     lengths, (_, half_turn) = CHANGE_POINTS["parallelogram"]
@@ -115,7 +114,7 @@ def list_errors(
     values = getattr(ours, quantity)
     error = find_error(quantity, values, answer.quantities[quantity], magnitude(values))
     keep = (ours.status_code == OK) & np.isfinite(error)
-    return answer.at.theta_2[keep], np.maximum(error[keep], FLOOR)
+    return answer.at.theta_2[keep], np.maximum(error[keep], DRAWN_AS_ZERO)
 
 
 def draw_picture() -> str:
@@ -127,13 +126,15 @@ def draw_picture() -> str:
 
     columns = list_approaches()
     figure = Figure(figsize=(10.5, 6.4), layout="constrained", facecolor="none")
-    axes = figure.subplots(len(SHOWN), len(columns), squeeze=False, sharex="col")
+    axes = figure.subplots(
+        len(QUANTITIES_DRAWN), len(columns), squeeze=False, sharex="col"
+    )
     for column, approach in enumerate(columns):
-        for row, quantity in enumerate(SHOWN):
-            _draw(axes[row][column], approach, quantity)
+        for row, quantity in enumerate(QUANTITIES_DRAWN):
+            _draw_approach(axes[row][column], approach, quantity)
         axes[0][column].set_title(approach.title, fontsize=9)
         axes[-1][column].set_xlabel("distance in theta_2 [rad]")
-    for row, quantity in enumerate(SHOWN):
+    for row, quantity in enumerate(QUANTITIES_DRAWN):
         axes[row][0].set_ylabel(f"error of {quantity}, of its own size")
     handles, labels = axes[0][0].get_legend_handles_labels()
     figure.legend(
@@ -142,10 +143,10 @@ def draw_picture() -> str:
     return write_svg(figure, "where it gets hard")
 
 
-def _draw(axes: Any, approach: Approach, quantity: str) -> None:
+def _draw_approach(axes: Any, approach: Approach, quantity: str) -> None:
     solution = solve(approach.scene, "force")
     size = magnitude(getattr(solution, quantity))
-    singular = _find_singular(approach)
+    singular = _find_singular_angle(approach)
     predicted = divide(
         predict_in_world_axes(approach.scene, command_of(approach.scene), quantity),
         size,
@@ -155,7 +156,7 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
     axes.loglog(
         approach.distances,
         law,
-        color=INK,
+        color=GREY,
         linestyle=(0, (1, 1)),
         linewidth=1,
         label="law K eps/condition",
@@ -164,7 +165,7 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
         approach.distances[shown],
         predicted[shown],
         TIMES_PREDICTED * predicted[shown],
-        color=INK,
+        color=GREY,
         alpha=0.25,
         linewidth=0,
         label="computed: predicted to ten times that",
@@ -179,11 +180,11 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
                 **choose_style(engine.name).line,
             )
     axes.set_xlim(approach.distances[0] * 2, approach.distances[-1] / 2)
-    axes.set_ylim(FLOOR, 1e3)
-    axes.grid(visible=True, color=INK, alpha=0.2)
+    axes.set_ylim(DRAWN_AS_ZERO, 1e3)
+    axes.grid(visible=True, color=GREY, alpha=0.2)
 
 
-def _find_singular(approach: Approach) -> float:
+def _find_singular_angle(approach: Approach) -> float:
     """Return theta_2 of the singular position.
 
     The positions lie at the distances from it.

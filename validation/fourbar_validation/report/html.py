@@ -17,10 +17,10 @@ from fourbar_validation.compare.rows import (
     sort_rows,
     write_rows,
 )
-from fourbar_validation.report.overview import GROUPS, OWN_ENGINES
+from fourbar_validation.report.overview import OVERVIEW_GROUPS, OWN_ENGINES
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import (
-    OWN,
+    OWN_CONSISTENCY,
     STATEMENT,
     Summary,
     compute_shares,
@@ -28,7 +28,7 @@ from fourbar_validation.report.summary import (
 from fourbar_validation.report.templating import (
     count_or_size,
     render,
-    write_number,
+    write_error,
     write_share,
 )
 
@@ -36,7 +36,7 @@ ALL_OPEN = 8
 """Most scenes that are all shown open. The bodies of more are packed, and unpacked when
 they are opened.
 """
-ORDER = (*UNKNOWNS, "torque_inertia", LINE.value, f"{LINE.value}_inertia")
+QUANTITY_ORDER = (*UNKNOWNS, "torque_inertia", LINE.value, f"{LINE.value}_inertia")
 """Quantities in the order of the computation; others follow by name."""
 
 
@@ -155,7 +155,7 @@ def write_html(
     from markupsafe import Markup
 
     views = [
-        _make_view(scene, first_lines.get(scene.name, 2), pictures or {})
+        _make_scene_view(scene, first_lines.get(scene.name, 2), pictures or {})
         for scene in summary.shown
     ]
     csv = write_rows(cell.row for view in views for cell in view.cells)
@@ -171,9 +171,9 @@ def write_html(
         views=views,
         engines=[name for name in engines if name not in OWN_ENGINES],
         own_engines=[name for name in OWN_ENGINES if name in engines],
-        own=OWN,
+        own=OWN_CONSISTENCY,
         failing=failing,
-        groups=GROUPS,
+        groups=OVERVIEW_GROUPS,
         causes=summary.overview.causes,
         places={
             view.scene.name: (number, view) for number, view in enumerate(views, 1)
@@ -195,7 +195,7 @@ def write_html(
         orders=[
             (
                 scene,
-                *map(write_number, (e["error_at_4h"], e["error_at_2h"])),
+                *map(write_error, (e["error_at_4h"], e["error_at_2h"])),
                 f"{e['observed_order']:.1f}",
             )
             for scene, e in summary.orders
@@ -213,20 +213,20 @@ def _take_answers(scene: Record | None) -> str:
     return answers or linkage + end
 
 
-def write_markdown(summary: Summary) -> str:
+def write_summary_page(summary: Summary) -> str:
     """Write the report as Markdown, short enough for a comment on a pull request."""
     return render(
         "fourbar_validation.report",
         "report.md.j2",
         s=summary,
-        groups=GROUPS,
+        groups=OVERVIEW_GROUPS,
         causes=summary.overview.causes,
-        own=OWN,
+        own=OWN_CONSISTENCY,
         statement=STATEMENT,
     )
 
 
-def _make_view(
+def _make_scene_view(
     scene: Record, first_line: int, pictures: Mapping[str, str]
 ) -> _SceneView:
     rows = sort_rows(scene.rows)
@@ -247,8 +247,8 @@ def _make_view(
         if cell.row.quantity != "undecided" or cell.row.failed
     }
     names = {cell.row.quantity for cell in cells}
-    quantities = [name for name in ORDER if name in names] + sorted(
-        names.difference(ORDER)
+    quantities = [name for name in QUANTITY_ORDER if name in names] + sorted(
+        names.difference(QUANTITY_ORDER)
     )
     engines = _list_engines(cell.row for cell in cells)
     return _SceneView(
@@ -260,5 +260,5 @@ def _list_engines(rows: Any) -> list[str]:
     """List the engines by name: independent ones first, the formulas last."""
     return sorted(
         {row.engine for row in rows},
-        key=lambda name: (name in OWN_ENGINES, name == OWN, name),
+        key=lambda name: (name in OWN_ENGINES, name == OWN_CONSISTENCY, name),
     )

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from fourbar_validation.compare.rows import Row
 
-LISTED = 10_000
+MOST_PASSING_CASES = 10_000
 """Comparisons with a case of their own, besides as many that fail. The others are
 counted.
 """
@@ -33,7 +33,7 @@ def list_cases(rows: Iterable[Row]) -> Iterator[JunitCase]:
     listed = failures = others = 0
     for row in rows:
         name = (row.scene, f"{row.scene}.{row.engine} {row.setting}", row.quantity)
-        if row.failed and failures < LISTED:
+        if row.failed and failures < MOST_PASSING_CASES:
             failures += 1
             yield JunitCase(
                 *name,
@@ -41,7 +41,7 @@ def list_cases(rows: Iterable[Row]) -> Iterator[JunitCase]:
                 row.verdict,
                 f"error {row.error!r}, allowed {row.allowed!r}: {row.reason}",
             )
-        elif not row.failed and listed < LISTED:
+        elif not row.failed and listed < MOST_PASSING_CASES:
             listed += 1
             yield (
                 JunitCase(*name, "passed")

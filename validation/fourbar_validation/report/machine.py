@@ -12,9 +12,9 @@ from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
 from typing import Any
 
-from fourbar_validation.places import FORMULAS, PACKAGE
+from fourbar_validation.places import FORMULAS_FOLDER, PACKAGE
 
-PACKAGES = {
+REPORTED_DISTRIBUTIONS = {
     "fourbar": "fourbar",
     "numpy": "numpy",
     "mujoco": "mujoco",
@@ -22,7 +22,9 @@ PACKAGES = {
     "scipy": "scipy",
 }
 """Name in the report and name of the distribution."""
-DISTRIBUTIONS = PACKAGES | {name: name for name in ("drake", "exudyn", "opensim")}
+DISTRIBUTIONS = REPORTED_DISTRIBUTIONS | {
+    name: name for name in ("drake", "exudyn", "opensim")
+}
 """Distribution of each package, including those that need not be installed."""
 CODE = (".py", ".toml")
 """Endings of the files that numbers come from. Templates and accepted states change
@@ -44,7 +46,7 @@ def list_versions() -> dict[str, str]:
         try:
             versions[name] = version(package)
         except PackageNotFoundError:
-            if name in PACKAGES:
+            if name in REPORTED_DISTRIBUTIONS:
                 versions[name] = "not installed"
     return versions
 
@@ -130,7 +132,7 @@ def name_code(*further: Path) -> dict[str, str]:
         if digest and name != "fourbar"
     }
     return {
-        "code": hash_modules(FORMULAS, PACKAGE, *further),
+        "code": hash_modules(FORMULAS_FOLDER, PACKAGE, *further),
         **list_versions(),
         **build_hashes,
     }

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from fourbar.quantities import LINE, PIN_FORCES, UNITS
 from fourbar_validation.compare.rows import (
-    DERIVED,
+    DERIVED_CHECKS,
     FORMULAS,
     HOLDING_VERDICTS,
     REFUSES,
@@ -20,20 +20,20 @@ from fourbar_validation.compare.rows import (
 )
 from fourbar_validation.compare.tolerance import find_used
 from fourbar_validation.report.record import Record
-from fourbar_validation.report.words import NUMBER, AlikeTexts
+from fourbar_validation.report.words import NUMBER_IN_A_REASON, AlikeTexts
 
-OWN_ENGINES = (FORMULAS, *DERIVED)
+OWN_ENGINES = (FORMULAS, *DERIVED_CHECKS)
 """Engines whose rows check fourbar against itself. They are identities, and functions
 other than `solve`.
 """
-TORQUE = "torque"
-PINS = "pin forces"
-MOTION = "motion"
-GROUPS = (TORQUE, PINS, MOTION)
+TORQUE_GROUP = "torque"
+PIN_FORCE_GROUP = "pin forces"
+MOTION_GROUP = "motion"
+OVERVIEW_GROUPS = (TORQUE_GROUP, PIN_FORCE_GROUP, MOTION_GROUP)
 """Columns of the table."""
 DRIVES = ("torque", LINE.value)
 """Names of what drives: a couple, or the force of a cylinder."""
-NAMES = {
+ENGINE_NAMES = {
     "free-body": "free bodies",
     "pinocchio-inverse": "Pinocchio {}",
     "pinocchio-forward": "Pinocchio {}, released",
@@ -48,14 +48,14 @@ NAMES = {
 """Names of engines as people write them, with the place of the version."""
 _MOST_KINDS = 500
 """Causes that are told apart; further ones are one."""
-OTHERS = "other causes"
-NO_ANSWER = "no answer: "
+OTHER_CAUSES = "other causes"
+NO_ANSWER_PREFIX = "no answer: "
 """Beginning of the cause of an engine that broke down."""
-SMALL = 1e-5
+ERROR_OF_MISSING_DIGITS = 1e-5
 """Largest relative error of an engine that lacks digits, not an equation. It is over a
 quantity's scale.
 """
-LIMIT, _NO_VALUE, NO_DIGITS, _DOES_NOT_APPLY = (
+AT_A_LIMIT, _NO_VALUE, NO_DIGITS, _DOES_NOT_APPLY = (
     "at declared limits of an engine",
     "where the formulas state no value",
     "with no digit left to decide by",
@@ -103,7 +103,7 @@ class OverviewLine:
     engine: str
     name: str
     columns: dict[str, _OverviewCell] = field(
-        default_factory=lambda: {group: _OverviewCell() for group in GROUPS}
+        default_factory=lambda: {group: _OverviewCell() for group in OVERVIEW_GROUPS}
     )
     compared: int = 0
     failed: int = 0
@@ -135,7 +135,7 @@ class Cause:
 
 
 @dataclass(slots=True)
-class _Kind:
+class _SimilarScenes:
     """Scenes of an engine that the same mistakes would explain."""
 
     scenes: int
@@ -156,11 +156,11 @@ def _find_group(row: Row) -> str | None:
     """Find the column of an engine's row; None for what is no error of a quantity."""
     name = row.quantity
     if name in DRIVES or name.removesuffix("_inertia") in DRIVES:
-        return TORQUE
+        return TORQUE_GROUP
     if name in PIN_FORCES:
-        return PINS
+        return PIN_FORCE_GROUP
     if name in UNITS or name in ("energy", "frequency", "closure"):
-        return MOTION
+        return MOTION_GROUP
     return None
 
 
@@ -180,7 +180,7 @@ class Overview:
         self.baseline = ""
         """That run in words."""
         self._lines: dict[str, OverviewLine] = {}
-        self._kinds: dict[tuple[str, tuple[str, ...]], _Kind] = {}
+        self._kinds: dict[tuple[str, tuple[str, ...]], _SimilarScenes] = {}
 
     def add(self, scene: Record) -> None:
         """Add one more scene."""
@@ -201,7 +201,7 @@ class Overview:
 
     def _add_row(self, row: Row) -> None:
         if row.verdict == REFUSES:
-            self.not_compared[LIMIT if row.quantity == "all" else _NO_VALUE] += 1
+            self.not_compared[AT_A_LIMIT if row.quantity == "all" else _NO_VALUE] += 1
         elif row.verdict == UNDECIDED:
             self.not_compared[NO_DIGITS] += 1
         if row.engine in OWN_ENGINES:
@@ -248,8 +248,8 @@ class Overview:
             worst = (whole or rows)[used.index(max(used))]
             key = (engine, tuple(_name_causes(scene, engine, rows)))
             if key not in self._kinds and len(self._kinds) >= _MOST_KINDS:
-                key = (engine, (OTHERS,))
-            kind = self._kinds.setdefault(key, _Kind(0, worst, -1.0))
+                key = (engine, (OTHER_CAUSES,))
+            kind = self._kinds.setdefault(key, _SimilarScenes(0, worst, -1.0))
             kind.scenes += 1
             if max(used) > kind.used:
                 kind.worst, kind.used = worst, max(used)
@@ -276,7 +276,7 @@ class Overview:
                 kind = max((left[texts] for texts in explained), key=lambda k: k.used)
                 words = text
                 if kind.worst.quantity == "all":
-                    words = f"{NO_ANSWER}{_take_reason(kind.worst)}"
+                    words = f"{NO_ANSWER_PREFIX}{_take_reason(kind.worst)}"
                 of_engine.append(Cause(engine, words, counts[text], kind.worst))
                 left = {t: kind for t, kind in left.items() if t not in explained}
             causes += sorted(of_engine, key=lambda cause: -cause.scenes)
@@ -292,12 +292,12 @@ class Overview:
         """Return the engines that were compared, with their names and versions."""
         for line in self._lines.values():
             version = versions.get(line.engine, "")
-            pattern = NAMES.get(line.engine)
+            pattern = ENGINE_NAMES.get(line.engine)
             if pattern is None:
                 line.name = f"{line.engine} {version}".strip()
             else:
                 line.name = pattern.format(version).replace(" ,", ",").strip()
-        order = list(NAMES)
+        order = list(ENGINE_NAMES)
         lines = [line for line in self._lines.values() if line.answered]
         return sorted(
             lines,
@@ -360,7 +360,7 @@ def _list_reasons(scene: Record) -> Iterable[tuple[str, str]]:
     refused = {row.engine for row in scene.rows}
     for line in scene.left_out:
         engine, _, reason = line.partition(": ")
-        if engine in NAMES and engine not in refused:
+        if engine in ENGINE_NAMES and engine not in refused:
             yield engine, reason
 
 
@@ -376,7 +376,9 @@ def _name_causes(scene: Record, engine: str, rows: Sequence[Row]) -> list[str]:
     """
     whole = [row for row in rows if row.quantity == "all"]
     if whole:
-        return [f"{NO_ANSWER}{NUMBER.sub('#', _take_reason(whole[0]))}"]
+        return [
+            f"{NO_ANSWER_PREFIX}{NUMBER_IN_A_REASON.sub('#', _take_reason(whole[0]))}"
+        ]
     if known := scene.causes.get(engine):
         return [f"{text}, all else agrees" for text in known]
     if engine in OWN_ENGINES:
@@ -388,14 +390,14 @@ def _name_causes(scene: Record, engine: str, rows: Sequence[Row]) -> list[str]:
     missing = sorted({row.quantity for row in rows if math.isnan(row.error)})
     if missing and len(missing) == len({row.quantity for row in rows}):
         return [f"no number for {', '.join(missing[:4])}"]
-    differ = [group for group in GROUPS if group in groups]
-    differ += sorted(groups - set(GROUPS))
-    agree = [group for group in GROUPS if group not in groups]
-    words = _join(differ[:3], "differ")
+    differ = [group for group in OVERVIEW_GROUPS if group in groups]
+    differ += sorted(groups - set(OVERVIEW_GROUPS))
+    agree = [group for group in OVERVIEW_GROUPS if group not in groups]
+    words = _join_groups(differ[:3], "differ")
     if agree:
-        words += f", {_join(agree, 'agree')}"
+        words += f", {_join_groups(agree, 'agree')}"
     worst = max(row.error for row in rows)
-    if worst < SMALL:
+    if worst < ERROR_OF_MISSING_DIGITS:
         digits = math.floor(-math.log10(worst))
         return [
             f"{words}: from digit {digits} on, as where numbers are single "
@@ -404,7 +406,7 @@ def _name_causes(scene: Record, engine: str, rows: Sequence[Row]) -> list[str]:
     return [f"{words}; no known mistake explains it"]
 
 
-def _join(groups: Sequence[str], verb: str) -> str:
+def _join_groups(groups: Sequence[str], verb: str) -> str:
     """Write groups of quantities with their verb."""
     plural = len(groups) > 1 or groups[0].endswith("s")
     return f"{' and '.join(groups)} {verb if plural else verb + 's'}"

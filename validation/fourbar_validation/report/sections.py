@@ -11,15 +11,15 @@ from pathlib import Path
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import VERDICTS, Counts, Row
 from fourbar_validation.report.html import Section, SectionFigure
-from fourbar_validation.scenes.hard_families import FAMILIES
+from fourbar_validation.scenes.hard_families import HARD_FAMILIES
 
-HARD, _COST = "hard", "cost"
+HARD_FOLDER, _COST = "hard", "cost"
 """Folders of the hard cases and of the study, in OUT."""
 _ALT = (
     "Error of each engine over the distance to a toggle, a pole of T4 and a change"
     " point"
 )
-CAPTION = (
+HARD_CAPTION = (
     "Error against the formulas, relative to the value itself, towards a singular"
     " position. Dotted: the law K eps/condition. Band: what rounding was computed to do"
     " there, up to ten times that; above it a row fails."
@@ -40,9 +40,9 @@ _PICTURES = {
     ),
 }
 """Pictures of the study, and what they show."""
-LARGEST = 2_000_000
+LARGEST_INLINE_PICTURE = 2_000_000
 """Bytes of a picture that is taken into the page."""
-MOST = 3
+MOST_STUDIES = 3
 """Scenes whose study is shown."""
 
 
@@ -52,20 +52,22 @@ def collect_sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
     The former are of this run or in OUT/hard, the latter in OUT/cost. Those of this run
     have their picture, and the limits of the engines with them.
     """
-    results = out / HARD / "results.csv"
+    results = out / HARD_FOLDER / "results.csv"
     sections = []
     if hard is not None:
         from fourbar_validation.report.hard_picture import draw_picture
 
-        sections += [collect_hard_cases(hard, draw_picture()), _list_limits()]
-    elif results.is_file() and (out / HARD / "report.html").is_file():
+        sections += [collect_hard_cases(hard, draw_picture()), _list_declared_limits()]
+    elif results.is_file() and (out / HARD_FOLDER / "report.html").is_file():
         section = collect_hard_cases(read_columns(results))
-        links = [(f"{HARD}/report.html",) * 2]
+        links = [(f"{HARD_FOLDER}/report.html",) * 2]
         sections.append(
-            replace(section, text=f"From the run in {HARD}/: {_MUST}", links=links)
+            replace(
+                section, text=f"From the run in {HARD_FOLDER}/: {_MUST}", links=links
+            )
         )
     folders = sorted(path.parent for path in (out / _COST).glob("*/cost.csv"))
-    return [*sections, *(_read_study(folder) for folder in folders[:MOST])]
+    return [*sections, *(_read_study(folder) for folder in folders[:MOST_STUDIES])]
 
 
 def collect_hard_cases(rows: Iterable[Row], picture: str | None = None) -> Section:
@@ -73,8 +75,8 @@ def collect_hard_cases(rows: Iterable[Row], picture: str | None = None) -> Secti
 
     `picture` is the inline SVG of `fourbar_validation.report.hard_picture`.
     """
-    counts = {family.name: Counts() for family in FAMILIES}
-    scenes: dict[str, set[str]] = {family.name: set() for family in FAMILIES}
+    counts = {family.name: Counts() for family in HARD_FAMILIES}
+    scenes: dict[str, set[str]] = {family.name: set() for family in HARD_FAMILIES}
     for row in rows:
         family = find_family(row.scene)
         if family is not None:
@@ -88,16 +90,16 @@ def collect_hard_cases(rows: Iterable[Row], picture: str | None = None) -> Secti
             counts[family.name].word,
             family.statement,
         )
-        for family in FAMILIES
+        for family in HARD_FAMILIES
         if scenes[family.name]
     ]
     headings = ("family", "scenes", *VERDICTS, "verdict", "what must happen")
     if picture:
-        figures = [SectionFigure(_ALT, CAPTION, svg=picture)]
+        figures = [SectionFigure(_ALT, HARD_CAPTION, svg=picture)]
     else:
         figures = []
     return Section(
-        HARD,
+        HARD_FOLDER,
         "Hard cases",
         _MUST.capitalize(),
         headings,
@@ -108,9 +110,9 @@ def collect_hard_cases(rows: Iterable[Row], picture: str | None = None) -> Secti
     )
 
 
-def _list_limits() -> Section:
+def _list_declared_limits() -> Section:
     """List the limits that engines declare, with the reason of each."""
-    from fourbar_validation.engines.limits import LIMITS
+    from fourbar_validation.engines.limits import BOUNDARIES
 
     rows = [
         (
@@ -119,7 +121,7 @@ def _list_limits() -> Section:
             f"{limit.boundary:g} {limit.unit}".rstrip(),
             limit.reason,
         )
-        for limit in LIMITS
+        for limit in BOUNDARIES
     ]
     text = "Where an engine refuses to answer, declared as data before it is asked."
     return Section(
@@ -135,7 +137,7 @@ def find_family(scene: str) -> str | None:
     """Find the family whose name a scene's begins with; of several the longest."""
     names = [
         family.name
-        for family in FAMILIES
+        for family in HARD_FAMILIES
         if scene.startswith(family.name.replace(" ", "-") + "-")
     ]
     return max(names, key=len, default=None)
@@ -145,7 +147,7 @@ def _read_study(folder: Path) -> Section:
     figures = []
     for name, alt in _PICTURES.items():
         picture = folder / name
-        if picture.is_file() and picture.stat().st_size <= LARGEST:
+        if picture.is_file() and picture.stat().st_size <= LARGEST_INLINE_PICTURE:
             data = base64.b64encode(picture.read_bytes()).decode("ascii")
             figures.append(
                 SectionFigure(alt, f"{alt}.", image=f"data:image/svg+xml;base64,{data}")

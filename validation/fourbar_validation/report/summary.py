@@ -33,7 +33,7 @@ from fourbar_validation.engines.registry import WORK
 from fourbar_validation.report.machine import list_versions, name_machine
 from fourbar_validation.report.overview import OWN_ENGINES, Overview, OverviewLine
 from fourbar_validation.report.record import Record
-from fourbar_validation.report.words import NUMBER
+from fourbar_validation.report.words import NUMBER_IN_A_REASON
 
 T = TypeVar("T")
 _ALLOWANCE = attrgetter("allowed")
@@ -92,7 +92,7 @@ class _EngineLine:
             self.used = used
 
 
-OWN = "our own consistency"
+OWN_CONSISTENCY = "our own consistency"
 SCENES_SHOWN = 200
 SKETCHED = 60
 """Scenes with small pictures."""
@@ -169,7 +169,7 @@ class Summary:
         self.failures += bad[: _FAILURES_KEPT - len(self.failures)]
         for row, used in zip(scene.rows, compute_shares(scene.rows), strict=True):
             if row.engine in OWN_ENGINES:
-                name = OWN
+                name = OWN_CONSISTENCY
             else:
                 name = row.engine
             self._engines.setdefault(name, _EngineLine(name)).add(row, used)
@@ -179,10 +179,10 @@ class Summary:
             _LOOSEST_SHOWN, [*self._loosest, *loose], _ALLOWANCE
         )
         for engine, reason in sorted(_list_left_out(scene)):
-            kind = (engine, NUMBER.sub("#", reason))
+            kind = (engine, NUMBER_IN_A_REASON.sub("#", reason))
             self._refusals[kind] += 1
             self._first_reason.setdefault(kind, reason)
-        worst = _find_worst(scene.rows)
+        worst = _find_worst_row(scene.rows)
         self.judged += len(worst)
         self._worst = _keep_largest(
             _WORST_SHOWN, [*self._worst, *worst], lambda w: w.used
@@ -329,7 +329,7 @@ class Summary:
                 line.version = ""
             else:
                 line.version = version
-            if line.name == OWN:
+            if line.name == OWN_CONSISTENCY:
                 engine = FORMULAS
             else:
                 engine = line.name
@@ -339,7 +339,8 @@ class Summary:
                 )
                 line.work = WORK.get(engine, "")
         return sorted(
-            self._engines.values(), key=lambda line: (line.name == OWN, line.name)
+            self._engines.values(),
+            key=lambda line: (line.name == OWN_CONSISTENCY, line.name),
         )
 
     @property
@@ -457,7 +458,7 @@ def _count_compared(rows: Sequence[Row]) -> tuple[int, list[Row]]:
     return len(by_quantity), [min(rows_of_one, key=_ALLOWANCE) for rows_of_one in loose]
 
 
-def _find_worst(rows: Sequence[Row]) -> list[Worst]:
+def _find_worst_row(rows: Sequence[Row]) -> list[Worst]:
     groups: dict[tuple[str, str], list[tuple[float, Row]]] = {}
     for share, row in zip(compute_shares(rows), rows, strict=True):
         if row.compared:

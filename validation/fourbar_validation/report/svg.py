@@ -14,19 +14,23 @@ from typing import Any, NamedTuple
 
 from fourbar_validation.compare.tolerance import EPS
 
-PAGE = Path(__file__).parent / "templates" / "page.css"
-LIGHT: dict[str, str] = dict(
-    re.findall(r"(--[\w-]+): light-dark\((#\w+),", PAGE.read_text(encoding="utf-8"))
+PAGE_STYLES = Path(__file__).parent / "templates" / "page.css"
+LIGHT_COLOURS: dict[str, str] = dict(
+    re.findall(
+        r"(--[\w-]+): light-dark\((#\w+),", PAGE_STYLES.read_text(encoding="utf-8")
+    )
 )
 """Colours of a light page by the names of their custom properties."""
 _DARK: dict[str, str] = dict(
     re.findall(
-        r"(--[\w-]+): light-dark\(#\w+, (#\w+)\)", PAGE.read_text(encoding="utf-8")
+        r"(--[\w-]+): light-dark\(#\w+, (#\w+)\)",
+        PAGE_STYLES.read_text(encoding="utf-8"),
     )
 )
 """Colours of a dark page."""
 INK, SOFT, GRID, BAND, ALLOWED, PAPER = (
-    LIGHT[f"--{name}"] for name in ("ink", "soft", "grid", "under", "allowed", "paper")
+    LIGHT_COLOURS[f"--{name}"]
+    for name in ("ink", "soft", "grid", "under", "allowed", "paper")
 )
 _BLACK = "#000000"
 """Colour of matplotlib's own; in a page it is the ink."""
@@ -45,7 +49,7 @@ class Style(NamedTuple):
     @property
     def colour(self) -> str:
         """Return the colour with which matplotlib draws."""
-        return LIGHT[self.variable]
+        return LIGHT_COLOURS[self.variable]
 
     @property
     def line(self) -> dict[str, Any]:
@@ -68,31 +72,33 @@ _STYLES = {
     "opensim-constraints": Style("--e7", ">", "▷"),
     "drake-inverse": Style("--e8", "h", "⬡"),
 }
-_MARKS = (("P", "✚"), ("X", "✖"), ("*", "★"), ("p", "⬟"))
-OTHERS = tuple(Style(f"--e{9 + n % 3}", *_MARKS[n % 4]) for n in range(12))
+_MARK_SHAPES = (("P", "✚"), ("X", "✖"), ("*", "★"), ("p", "⬟"))
+OTHER_STYLES = tuple(Style(f"--e{9 + n % 3}", *_MARK_SHAPES[n % 4]) for n in range(12))
 """Styles of engines that are not named above, one after the other."""
-NUMBERS: dict[str, int] = {}
+STYLE_NUMBERS: dict[str, int] = {}
 """Number of each engine's style among them. It is as a run numbers its engines,
 otherwise in the order of drawing.
 """
-FLOOR = EPS / 16.0
+LEAST_DRAWN_ERROR = EPS / 16.0
 """Errors below this, zero among them, are drawn here."""
 LONG_NUMBER = re.compile(r"(\d+\.\d)\d+")
 COORDINATES = re.compile(r' (?:d|x|y|transform|points)="[^"]*"')
-STYLE = re.compile(r' style="([^"]*)"')
+STYLE_ATTRIBUTE = re.compile(r' style="([^"]*)"')
 _BETWEEN_TAGS = re.compile(r">\s+<")
-METADATA = re.compile(r"<metadata>.*?</metadata>", re.DOTALL)
+METADATA_ELEMENT = re.compile(r"<metadata>.*?</metadata>", re.DOTALL)
 _GROUP_NAME = re.compile(r'<g id="[^"]*"')
 
 
 def choose_style(engine: str) -> Style:
     """Choose the style of an engine.
 
-    One that is not named in `_STYLES` has the next of `OTHERS`.
+    One that is not named in `_STYLES` has the next of `OTHER_STYLES`.
     """
     return (
         _STYLES.get(engine)
-        or OTHERS[NUMBERS.setdefault(engine, len(NUMBERS)) % len(OTHERS)]
+        or OTHER_STYLES[
+            STYLE_NUMBERS.setdefault(engine, len(STYLE_NUMBERS)) % len(OTHER_STYLES)
+        ]
     )
 
 
@@ -121,7 +127,7 @@ def write_alone(figure: Any, salt: str) -> str:
     svg = _shrink_svg(_draw_svg(figure, salt, transparent=False))
     light, dark = (
         "".join(f"{name}:{value};" for name, value in colours.items())
-        for colours in (LIGHT, _DARK)
+        for colours in (LIGHT_COLOURS, _DARK)
     )
     rules = f"svg{{{light}}}@media(prefers-color-scheme:dark){{svg{{{dark}}}}}"
     return svg.replace("<style>", f"<style>{rules}", 1)
@@ -152,10 +158,10 @@ def _draw_svg(figure: Any, salt: str, *, transparent: bool = True) -> str:
 
 def _shrink_svg(svg: str) -> str:
     """Make the SVG smaller, and take the colours of the page around it."""
-    svg = METADATA.sub("", svg)
+    svg = METADATA_ELEMENT.sub("", svg)
     svg = COORDINATES.sub(lambda match: LONG_NUMBER.sub(r"\1", match.group()), svg)
     svg = _GROUP_NAME.sub("<g", _BETWEEN_TAGS.sub("><", svg))
-    for variable, colour in (("--ink", _BLACK), *LIGHT.items()):
+    for variable, colour in (("--ink", _BLACK), *LIGHT_COLOURS.items()):
         svg = svg.replace(colour, f"var({variable})")
     return _name_styles(svg)
 
@@ -173,7 +179,7 @@ def _name_styles(svg: str) -> str:
         classes[style] = "m" + hashlib.sha256(style.encode()).hexdigest()[:8]
         return f' class="{classes[style]}"'
 
-    svg = STYLE.sub(name, svg)
+    svg = STYLE_ATTRIBUTE.sub(name, svg)
     rules = "".join(f".{short}{{{style}}}" for style, short in classes.items())
     # the rule that matplotlib writes for every element would otherwise hold for the
     # whole page

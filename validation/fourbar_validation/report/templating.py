@@ -4,10 +4,10 @@ import base64
 import gzip
 import math
 
-from fourbar_validation.compare.rows import make_plain
+from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.report.svg import choose_style
 
-PLAIN = (1e-2, 1e6)
+WITHOUT_A_POWER = (1e-2, 1e6)
 """Numbers between these are written without a power of ten. The larger ones are if they
 are whole.
 """
@@ -23,7 +23,7 @@ def render(package: str, name: str, /, **what: object) -> str:
 
     page = name.endswith(
         ".html.j2"
-    )  # in Markdown `write_cell` escapes what would break out
+    )  # in Markdown `escape_cell` escapes what would break out
     environment = Environment(
         loader=ChoiceLoader(
             [PackageLoader(package), PackageLoader("fourbar_validation.report")]
@@ -35,13 +35,13 @@ def render(package: str, name: str, /, **what: object) -> str:
         keep_trailing_newline=not page,
     )
     environment.filters |= {
-        "number": write_number,
+        "number": write_error,
         "plain": count_or_size,
         "degrees": lambda radians: (
             "-" if math.isnan(radians) else f"{math.degrees(radians):.3f}"
         ),
         "share": write_share,
-        "cell": write_cell,
+        "cell": escape_cell,
         "packed": (
             lambda text: base64.b64encode(
                 gzip.compress(text.encode("utf-8"), mtime=0)
@@ -53,9 +53,9 @@ def render(package: str, name: str, /, **what: object) -> str:
     return environment.get_template(name).render(**what)
 
 
-def write_cell(text: object) -> str:
+def escape_cell(text: object) -> str:
     """Write text that can neither end a table cell of Markdown nor start markup."""
-    shown = " ".join(make_plain(str(text)).split())
+    shown = " ".join(escape_controls(str(text)).split())
     for mark in "\\|`*_[]<>#":
         shown = shown.replace(mark, f"\\{mark}")
     return shown.replace("\\<", "&lt;").replace("\\>", "&gt;")
@@ -74,7 +74,7 @@ def write_share(value: float) -> str:
     return f"{value:.1e}"
 
 
-def write_number(value: float) -> str:
+def write_error(value: float) -> str:
     """Write an error: three significant digits and a power of ten.
 
     A dash stands for no number.
@@ -91,8 +91,8 @@ def count_or_size(value: float) -> str:
     """
     if math.isnan(value):
         return "-"
-    if value == 0.0 or (float(value).is_integer() and abs(value) < PLAIN[1]):
+    if value == 0.0 or (float(value).is_integer() and abs(value) < WITHOUT_A_POWER[1]):
         return f"{value:.0f}"
-    if PLAIN[0] <= abs(value) < 1000.0:
+    if WITHOUT_A_POWER[0] <= abs(value) < 1000.0:
         return f"{value:.3g}"
     return f"{value:.2e}"

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from fourbar.errors import clean_line
 from fourbar_validation.compare.rows import FAILS
-from fourbar_validation.report.overview import GROUPS
+from fourbar_validation.report.overview import OVERVIEW_GROUPS
 from fourbar_validation.report.summary import Summary
-from fourbar_validation.report.templating import write_number
+from fourbar_validation.report.templating import write_error
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -19,7 +19,7 @@ _NARROWEST = 80
 """Least columns of the table. A narrower terminal breaks its lines, where rich would
 cut its numbers.
 """
-MOST_CAUSES = 18
+MOST_CAUSES_PRINTED = 18
 """Causes of failures that are printed, one line each; the report has all."""
 _MOST_NOTES = 10
 """Lines beneath the table."""
@@ -40,11 +40,11 @@ def print_table(summary: Summary, out: Path, *, verbose: bool = False) -> None:
     console.print(f"[bold {colour}]{escape(clean_line(summary.headline))}[/]")
     wide.print(_make_overview(summary))
     causes = summary.overview.causes
-    for cause in causes[:MOST_CAUSES]:
+    for cause in causes[:MOST_CAUSES_PRINTED]:
         console.print(f"[bold red]wrong:[/] {escape(clean_line(str(cause)))}")
-    if len(causes) > MOST_CAUSES:
+    if len(causes) > MOST_CAUSES_PRINTED:
         console.print(
-            f"and {len(causes) - MOST_CAUSES} more causes; the report has them"
+            f"and {len(causes) - MOST_CAUSES_PRINTED} more causes; the report has them"
         )
     for note in summary.overview.notes[:_MOST_NOTES]:
         console.print(escape(clean_line(note)))
@@ -65,8 +65,8 @@ def _print_rows(summary: Summary, console: Any, wide: Any) -> None:
     for row in summary.failures:
         console.print(
             f"[bold red]fails[/] {escape(clean_line(row.scene))} {escape(row.engine)} "
-            f"{escape(row.quantity)}: error {write_number(row.error)}, allowed "
-            f"{write_number(row.allowed)}: {escape(clean_line(row.reason))}"
+            f"{escape(row.quantity)}: error {write_error(row.error)}, allowed "
+            f"{write_error(row.allowed)}: {escape(clean_line(row.reason))}"
         )
     more = summary.counts[FAILS] - len(summary.failures)
     if more > 0:
@@ -87,12 +87,12 @@ def _make_overview(summary: Summary) -> "Table":
         box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True, padding=(0, 1)
     )
     shown.add_column("error of allowed", overflow="fold", ratio=1)
-    for heading in (*GROUPS, "compared"):
+    for heading in (*OVERVIEW_GROUPS, "compared"):
         shown.add_column(heading, justify="right", no_wrap=True)
     for line in summary.lines:
         name = escape(clean_line(line.name))
         cells = []
-        for group in GROUPS:
+        for group in OVERVIEW_GROUPS:
             cell = line.columns[group]
             cells.append(f"[bold red]{cell}[/]" if cell.failed else str(cell))
         if line.failed:
@@ -118,8 +118,8 @@ def _make_worst_table(summary: Summary) -> "Table":
         shown.add_row(f"[bold]{escape(clean_line(scene))}[/]")
         for w in group:
             numbers = (
-                write_short(w.row.error),
-                write_short(w.row.allowed),
+                write_two_digits(w.row.error),
+                write_two_digits(w.row.allowed),
                 f"{w.used:.2g}",
                 (
                     "-"
@@ -146,7 +146,7 @@ def _make_bare_table(
     return shown
 
 
-def make_table(
+def make_words_table(
     headings: Sequence[str],
     rows: Iterable[Sequence[str]],
     words: int = 1,
@@ -168,7 +168,7 @@ def make_table(
     return shown
 
 
-def write_short(value: float) -> str:
+def write_two_digits(value: float) -> str:
     """Write two digits: the table fits 80 columns, and results.csv has them all."""
     if math.isnan(value):
         return "-"

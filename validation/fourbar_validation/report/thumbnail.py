@@ -8,20 +8,19 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.quantities import COUPLE, LINE, OK
+from fourbar.quantities import COUPLE, LINE, OK, Array
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.tolerance import Array
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.svg import choose_style
 
-HEIGHT, LINKAGE, _CURVE, EDGE = 76.0, 96.0, 150.0, 6.0
+THUMBNAIL_HEIGHT, LINKAGE_WIDTH, _CURVE, EDGE = 76.0, 96.0, 150.0, 6.0
 """Sizes in pixels: height, widths of both pictures, and their margin."""
-MOST_POINTS = 120
+POINTS_OF_A_CURVE = 120
 """Points of a curve."""
-Place = Callable[[Array], tuple[Array, Array]]
+PlacePoints = Callable[[Array], tuple[Array, Array]]
 """Function that places values in the picture."""
-MARKS = 7
+MARKS_OF_AN_ENGINE = 7
 """Marks of one engine on it."""
 
 
@@ -31,15 +30,15 @@ def draw_thumbnail(record: Record) -> str | None:
     scene = record.scene
     if scene is None or solution is None or not np.any(solution.status_code == OK):
         return None
-    width = LINKAGE + _CURVE
+    width = LINKAGE_WIDTH + _CURVE
     return (
-        f'<svg viewBox="0 0 {width:g} {HEIGHT:g}" width="{width:g}" '
-        f'height="{HEIGHT:g}" aria-hidden="true">'
-        f"{_draw_linkage(record, solution)}{_draw_curve(record, solution)}</svg>"
+        f'<svg viewBox="0 0 {width:g} {THUMBNAIL_HEIGHT:g}" width="{width:g}" '
+        f'height="{THUMBNAIL_HEIGHT:g}" aria-hidden="true">'
+        f"{_draw_four_bars(record, solution)}{_draw_curve(record, solution)}</svg>"
     )
 
 
-def _draw_linkage(record: Record, solution: Solution) -> str:
+def _draw_four_bars(record: Record, solution: Solution) -> str:
     """Draw the four bars at the best conditioned position."""
     assert record.scene is not None
     good = solution.status_code == OK
@@ -50,9 +49,9 @@ def _draw_linkage(record: Record, solution: Solution) -> str:
     pins = np.array([(0.0, 0.0), solution.A[best], solution.B[best], O4])
     low = pins.min(axis=0)
     high = pins.max(axis=0)
-    room = np.array([LINKAGE, HEIGHT]) - 2.0 * EDGE - 4.0
+    room = np.array([LINKAGE_WIDTH, THUMBNAIL_HEIGHT]) - 2.0 * EDGE - 4.0
     scale = float(np.min(room / np.maximum(high - low, 1e-300)))
-    middle = 0.5 * np.array([LINKAGE, HEIGHT])
+    middle = 0.5 * np.array([LINKAGE_WIDTH, THUMBNAIL_HEIGHT])
     places = (pins - 0.5 * (low + high)) * [scale, -scale] + middle
     bars = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
     ground = " ".join(f"{x:.1f},{y:.1f}" for x, y in places[[0, 3]])
@@ -82,11 +81,17 @@ def _draw_curve(record: Record, solution: Solution) -> str:
     span = max(float(high - low), 1e-300)
 
     def place(values: Array) -> tuple[Array, Array]:
-        x = LINKAGE + EDGE + (_CURVE - 2.0 * EDGE) * np.linspace(0.0, 1.0, len(values))
+        x = (
+            LINKAGE_WIDTH
+            + EDGE
+            + (_CURVE - 2.0 * EDGE) * np.linspace(0.0, 1.0, len(values))
+        )
         height = np.clip((values - low) / span, -0.1, 1.1)
-        return x, HEIGHT - 2.0 * EDGE - (HEIGHT - 4.0 * EDGE) * height
+        return x, THUMBNAIL_HEIGHT - 2.0 * EDGE - (
+            THUMBNAIL_HEIGHT - 4.0 * EDGE
+        ) * height
 
-    kept = np.linspace(0, len(ours) - 1, min(len(ours), MOST_POINTS)).astype(int)
+    kept = np.linspace(0, len(ours) - 1, min(len(ours), POINTS_OF_A_CURVE)).astype(int)
     x, y = place(np.where(good, ours, np.nan))
     drawn = "".join(_write_path(x[kept], y[kept]))
     marks = ""
@@ -110,7 +115,7 @@ def _write_path(x: Array, y: Array) -> list[str]:
 
 
 def _draw_marks(
-    answer: Answer, name: str, phase: float, place: Place, good: NDArray[np.bool_]
+    answer: Answer, name: str, phase: float, place: PlacePoints, good: NDArray[np.bool_]
 ) -> str:
     """Draw some answers of an engine.
 
@@ -121,7 +126,9 @@ def _draw_marks(
     x, y = place(values)
     if len(values) == len(good):  # a simulation makes positions of its own
         y = np.where(good, y, np.nan)
-    rows = ((np.arange(MARKS) + phase) / MARKS * len(values)).astype(int)
+    rows = (
+        (np.arange(MARKS_OF_AN_ENGINE) + phase) / MARKS_OF_AN_ENGINE * len(values)
+    ).astype(int)
     colour = choose_style(answer.engine).variable
     return "".join(
         f'<circle class="mark" cx="{x[i]:.1f}" cy="{y[i]:.1f}" r="2.2" '

@@ -3,7 +3,7 @@
 import re
 from collections import Counter
 
-NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+NUMBER_IN_A_REASON = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 """Pattern of a number in a reason. Reasons that differ in numbers alone count as one.
 """
 
@@ -21,7 +21,7 @@ class AlikeTexts:
 
     def add(self, text: str) -> None:
         """Take in a text."""
-        words = NUMBER.sub("#", text)
+        words = NUMBER_IN_A_REASON.sub("#", text)
         self._counts[words] += 1
         if self._first.setdefault(words, text) != text:
             self._differing.add(words)

@@ -10,7 +10,7 @@ import click
 
 from fourbar.files import dump
 from fourbar.writing import require_file, write_text
-from fourbar_validation.compare.rows import make_plain
+from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.engines.mujoco.robots.loop import (
     LoopScene,
     RobotClosure,
@@ -20,7 +20,7 @@ from fourbar_validation.engines.mujoco.robots.loop import (
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.guard import examine_guarded
 from fourbar_validation.robots.options import (
-    FILE,
+    ROBOT_PATH,
     loop_option,
     pose_options,
     read_pose,
@@ -28,7 +28,7 @@ from fourbar_validation.robots.options import (
     speed_option,
 )
 
-ROUND_OFF = 1e-12
+PRINTED_AS_ZERO = 1e-12
 """m or deg; less is printed as 0."""
 SCENE = "fourbar_validation.engines.mujoco.robots.scene:read_loop_scene"
 _LIST = "fourbar_validation.engines.mujoco.robots.closures:list_closures"
@@ -47,19 +47,19 @@ def _write_closure(closure: RobotClosure) -> str:
         parts.append(closure.loop.describe_lengths())
     if closure.misaligned is not None:
         angle = math.degrees(closure.misaligned)
-        parts.append(f"axes {angle if angle > ROUND_OFF else 0.0:.2g} deg apart")
+        parts.append(f"axes {angle if angle > PRINTED_AS_ZERO else 0.0:.2g} deg apart")
     if closure.gap is not None:
-        if closure.gap > ROUND_OFF:
+        if closure.gap > PRINTED_AS_ZERO:
             gap = closure.gap
         else:
             gap = 0.0
         parts.append(f"gap {write_length(gap) if gap else 0} mm")
-    parts.append(f"solref {_join(closure.solref)}")
-    parts.append(f"solimp {_join(closure.solimp)}")
-    return make_plain("; ".join(parts))
+    parts.append(f"solref {_join_numbers(closure.solref)}")
+    parts.append(f"solimp {_join_numbers(closure.solimp)}")
+    return escape_controls("; ".join(parts))
 
 
-def _join(numbers: tuple[float, ...]) -> str:
+def _join_numbers(numbers: tuple[float, ...]) -> str:
     return " ".join(f"{number:.6g}" for number in numbers)
 
 
@@ -72,9 +72,9 @@ def _show_report(report: RobotReport) -> None:
     for closure in report.closures:
         remarks = () if closure.loop is None else closure.loop.remarks
         for remark in remarks:
-            click.echo(make_plain(f"note: {closure.name}: {remark}"))
+            click.echo(escape_controls(f"note: {closure.name}: {remark}"))
     for note in report.notes:
-        click.echo(make_plain(f"note: {note}"))
+        click.echo(escape_controls(f"note: {note}"))
 
 
 def _write_scene(made: LoopScene) -> str:
@@ -83,23 +83,23 @@ def _write_scene(made: LoopScene) -> str:
     Its comments say where it is from and what it leaves out.
     """
     lines = [*made.parts, *made.remarks, *made.notes]
-    comments = "".join(f"# {make_plain(line)}\n" for line in lines)
+    comments = "".join(f"# {escape_controls(line)}\n" for line in lines)
     return f"{comments}\n{dump(made.scene)}"
 
 
 @click.command()
-@click.argument("robot", metavar="ROBOT.xml", type=FILE)
+@click.argument("robot", metavar="ROBOT.xml", type=ROBOT_PATH)
 @pose_options
 @loop_option
 @speed_option
 @click.option(
     "-o",
     "--out",
-    type=FILE,
+    type=ROBOT_PATH,
     metavar="SCENE.toml",
     help="Write the loop as a scene: what it carries, its range, and what acts on it.",
 )
-def command(
+def robot_command(
     robot: Path,
     pose: tuple[str, ...],
     key: str | None,
@@ -131,5 +131,5 @@ def command(
         return
     write_text(out, _write_scene(made))
     for line in [*made.parts, *made.remarks, *made.notes]:
-        click.echo(make_plain(line))
-    click.echo(make_plain(f"written to {out}"))
+        click.echo(escape_controls(line))
+    click.echo(escape_controls(f"written to {out}"))

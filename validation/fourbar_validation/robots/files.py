@@ -37,9 +37,9 @@ _REACHING_OUT = (
 """Elements that load plugins or models, or make deformable bodies."""
 _FOR_THE_EYE = ("texture", "skin", "layer")
 """Elements that are dropped; so is every attribute `texture`."""
-FOLDERS = ("assetdir", "meshdir", "texturedir")
+FOLDER_ATTRIBUTES = ("assetdir", "meshdir", "texturedir")
 """Attributes of <compiler> that name folders of assets; the later ones go first."""
-OUTSIDE = ("file", "directory", "content_type")
+FILE_ATTRIBUTES = ("file", "directory", "content_type")
 """Attributes that name files."""
 _COUNTS = (
     "iterations",
@@ -206,7 +206,7 @@ class _RobotReading:
         folder = ""
         strip = False
         for compiler in root.iter("compiler"):
-            for name in FOLDERS[:2]:
+            for name in FOLDER_ATTRIBUTES[:2]:
                 folder = compiler.attrib.pop(name, folder)
             compiler.attrib.pop("texturedir", None)
             strip = compiler.attrib.pop("strippath", str(strip)).lower() == "true"
@@ -267,7 +267,7 @@ class _RobotReading:
                         f"must be a whole number up to {_MOST_ITERATIONS}: MuJoCo "
                         "might never come back",
                     )
-            if name.startswith(OUTSIDE) and element.tag != "mesh":
+            if name.startswith(FILE_ATTRIBUTES) and element.tag != "mesh":
                 raise self._refuse(
                     f"<{element.tag} {name}=...>", "is not allowed: it names a file"
                 )

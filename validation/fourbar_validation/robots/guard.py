@@ -12,7 +12,7 @@ from fourbar.errors import FourBarError, InputError
 from fourbar.show.tables import show_running
 from fourbar_validation.engines.processes import WORKER_MEMORY, bound_memory
 
-SECONDS = 120.0
+ROBOT_SECONDS = 120.0
 """A four-bar takes less than one, a humanoid a few."""
 
 
@@ -24,9 +24,9 @@ def examine_guarded(
 
     The process may crash, hang or run out of memory. An adapter is "module:function";
     its arguments and its result are pickled. `seconds`: limit of each call; None:
-    SECONDS.
+    ROBOT_SECONDS.
     """
-    seconds = SECONDS if seconds is None else seconds
+    seconds = ROBOT_SECONDS if seconds is None else seconds
     from multiprocessing import get_context
 
     from pebble import ProcessExpired, ProcessPool
@@ -41,7 +41,9 @@ def examine_guarded(
 
         def examined(*arguments: object) -> Any:
             try:
-                return pool.schedule(_examine, args=arguments, timeout=seconds).result()
+                return pool.schedule(
+                    _examine_robot, args=arguments, timeout=seconds
+                ).result()
             except FourBarError as error:
                 if not isinstance(error, InputError) or error.key != "MJCF":
                     raise
@@ -69,5 +71,5 @@ def _confine() -> None:
     bound_memory()
 
 
-def _examine(adapter: str, *arguments: object) -> Any:
+def _examine_robot(adapter: str, *arguments: object) -> Any:
     return resolve_name(adapter)(*arguments)

@@ -13,13 +13,12 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.linkage import require
-from fourbar.quantities import OK, UNITS
+from fourbar.quantities import OK, UNITS, Array
 from fourbar.scene import Command, Scene
 from fourbar.solving import solve
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.reversals import mark_reversing
 from fourbar_validation.engines.mujoco.robots.answers import (
-    QUANTITIES,
+    FORCE_QUANTITIES,
     InsideAnswer,
     LoopMeasurement,
     MeasureOptions,
@@ -31,10 +30,10 @@ from fourbar_validation.robots.guard import examine_guarded
 from fourbar_validation.robots.options import read_pose, read_speed
 
 _MEASURE = "fourbar_validation.engines.mujoco.robots.measure:measure_loops"
-LIMIT = 600.0
+MEASURE_SECONDS = 600.0
 """s; a busy machine takes several times the two minutes of an idle one."""
 STATES = "single states"
-THROUGH_TIME = "through time"
+MEASURED_THROUGH_TIME = "through time"
 _SLIP = 1e-9
 """Part of the speeds below which a pin with dry friction is at rest. It may then rub
 either way.
@@ -80,19 +79,19 @@ def measure_robot(
 ) -> RobotMeasurement:
     """Measure the loops of a robot's file in a guarded process."""
     file = read_robot(path, assets)
-    with examine_guarded(path, LIMIT) as examined:
+    with examine_guarded(path, MEASURE_SECONDS) as examined:
         measurement: RobotMeasurement = examined(_MEASURE, file, options, scene)
     return measurement
 
 
-def list_errors(loop: LoopMeasurement) -> list[_InsideError]:
+def list_errors_by_method(loop: LoopMeasurement) -> list[_InsideError]:
     """List the worst errors of torque and pin forces, by method.
 
     They are against the formulas.
     """
     errors = list(_compare(STATES, loop, loop.states))
     if loop.through_time is not None:
-        errors += _compare(THROUGH_TIME, loop, loop.through_time)
+        errors += _compare(MEASURED_THROUGH_TIME, loop, loop.through_time)
     return errors
 
 
@@ -125,11 +124,11 @@ def _compare(
     formulas = solve(loop.scene, "force", at=commanded)
     judged = formulas.status_code == OK
     reversing = mark_reversing(loop.scene, formulas, _SLIP)
-    for name in QUANTITIES:
+    for name in FORCE_QUANTITIES:
         ours = np.asarray(getattr(formulas, name))
         theirs = np.array([row.soft.values()[name] for row in rows])
         if theirs.ndim == 2:
-            theirs = _turn(theirs, -loop.turned)
+            theirs = _turn_vectors(theirs, -loop.turned)
         sizes = measure_sizes(theirs - ours)
         sizes = np.where(judged & np.isfinite(sizes), sizes, math.inf)
         sizes = np.where(judged & reversing, 0.0, sizes)
@@ -142,16 +141,16 @@ def _compare(
         yield _InsideError(method, name, error, largest, rows[worst].joint)
 
 
-def _turn(vectors: Array, angle: float) -> Array:
+def _turn_vectors(vectors: Array, angle: float) -> Array:
     """Turn vectors (n, 2) counter-clockwise."""
     cos = math.cos(angle)
     sin = math.sin(angle)
     return np.asarray(vectors @ np.array([[cos, sin], [-sin, cos]]))
 
 
-def find_worst(loop: LoopMeasurement) -> float:
+def find_worst_of_loop(loop: LoopMeasurement) -> float:
     """Return the worst error of torque and pin forces, over the largest of each."""
-    return max(error.part for error in list_errors(loop))
+    return max(error.part for error in list_errors_by_method(loop))
 
 
 def _read_torque(text: str | None) -> float | None:

@@ -11,31 +11,30 @@ import click
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.quantities import CHANGE_POINT, OK
+from fourbar.quantities import CHANGE_POINT, OK, Array
 from fourbar.scene import Command, Scene, command
 from fourbar.solving import solve
-from fourbar_validation.compare.answer import Array
-from fourbar_validation.compare.rows import make_plain
+from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.engines.mujoco.robots.mimic import JointEquality
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.guard import examine_guarded
 
 READ = "fourbar_validation.engines.mujoco.robots.mimic:read_joint_equality"
-DEGREES = (1, 2, 3, 4)
+POLYNOMIAL_DEGREES = (1, 2, 3, 4)
 """Degrees of the polynomials of MuJoCo's polycoef; URDF's mimic has degree 1."""
-SAMPLES = 1001
+POSITIONS_FITTED = 1001
 """Positions over the motion of the scene. A largest error between two of them is missed
 by some 1e-6 of it.
 """
-FEWEST = 6
+FEWEST_POSITIONS = 6
 """Least positions of the scene from which a polynomial of degree 4 is fitted. It is
 fitted by least squares with an error to tell.
 """
-HEADINGS = ("degree", "fit", "angle, deg", "ratio", "polycoef")
+FIT_HEADINGS = ("degree", "fit", "angle, deg", "ratio", "polycoef")
 _FITS = ("least squares", "smallest largest error")
 """Names of the fits of `MimicReport.squares` and `MimicReport.fitted`."""
 ROW = "{:6}  {:22}  {:>10}  {:>8}  {}"
-"""Format of a row under HEADINGS."""
+"""Format of a row under FIT_HEADINGS."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,9 +65,9 @@ class _MimicReport:
     centred: float
     """Largest error of the angle with the constant that makes it smallest, rad."""
     squares: tuple[_MimicError, ...]
-    """Polynomials of DEGREES by least squares over the positions of the scene."""
+    """Polynomials of POLYNOMIAL_DEGREES by least squares over the scene's positions."""
     fitted: tuple[_MimicError, ...]
-    """Polynomials of DEGREES with the smallest largest error of the angle."""
+    """Polynomials of POLYNOMIAL_DEGREES whose largest error of the angle is least."""
 
 
 def measure_mimic(
@@ -94,15 +93,16 @@ def measure_mimic(
     positions = np.unique(command(scene).theta_2)
     low = float(positions[0])
     high = float(positions[-1])
-    if len(positions) < FEWEST:
+    if len(positions) < FEWEST_POSITIONS:
         raise InputError(
             "motion.theta_2",
             low if low == high else f"{len(positions)} positions",
-            f"must be a range of at least {FEWEST} positions: a ratio is of a motion",
+            f"must be a range of at least {FEWEST_POSITIONS} positions:"
+            " a ratio is of a motion",
         )
     branch = int(command(scene).branch[0])
     zero = _find_zero(equality, 0.5 * (low + high))
-    theta_2 = np.union1d(np.linspace(low, high, SAMPLES), positions)
+    theta_2 = np.union1d(np.linspace(low, high, POSITIONS_FITTED), positions)
     through_zero = np.union1d(theta_2, zero)
     theta_4, ratio = _follow(scene, through_zero, branch)
     origin = theta_4[np.searchsorted(through_zero, zero)]
@@ -111,19 +111,21 @@ def measure_mimic(
     turned = equality.side * equality.sense * (theta_4 - origin)[inside]
     ratio = equality.sense * ratio[inside]
     x = equality.side * (theta_2 - zero)
-    own = _measure(equality.coefficients, x, turned, ratio)
+    own = _measure_polynomial(equality.coefficients, x, turned, ratio)
     left = np.polynomial.polynomial.polyval(x, own.coefficients) - turned
     stated = np.searchsorted(theta_2, positions)
-    squares = (fit_squares(x[stated], turned[stated], degree) for degree in DEGREES)
-    fitted = (fit_minimax(x, turned, degree) for degree in DEGREES)
+    squares = (
+        fit_squares(x[stated], turned[stated], degree) for degree in POLYNOMIAL_DEGREES
+    )
+    fitted = (fit_minimax(x, turned, degree) for degree in POLYNOMIAL_DEGREES)
     return _MimicReport(
         equality,
         (low, high),
         own,
         float(np.abs(left - left[stated].mean()).max()),
         float(np.ptp(left)) / 2.0,
-        tuple(_measure(one, x, turned, ratio) for one in squares),
-        tuple(_measure(one, x, turned, ratio) for one in fitted),
+        tuple(_measure_polynomial(one, x, turned, ratio) for one in squares),
+        tuple(_measure_polynomial(one, x, turned, ratio) for one in fitted),
     )
 
 
@@ -159,7 +161,7 @@ def _follow(scene: Scene, theta_2: Array, branch: int) -> tuple[Array, Array]:
     return np.unwrap(solution.theta_4), np.asarray(solution.omega_4)
 
 
-def _measure(
+def _measure_polynomial(
     coefficients: tuple[float, ...], x: Array, turned: Array, ratio: Array
 ) -> _MimicError:
     """Measure the largest errors of a polynomial."""
@@ -209,24 +211,28 @@ def show_mimic(report: _MimicReport) -> None:
     equality = report.equality
     own = report.file
     low, high = (f"{math.degrees(angle):.6g}" for angle in report.swing)
-    _say(
+    _print_sentence(
         f"{equality.follower} follows {equality.leader} by polycoef"
-        f" {_write(equality.coefficients)}; theta_2 is {_write_theta_2(equality)}, from"
-        f" {low} to {high} deg"
+        f" {_write_coefficients(equality.coefficients)};"
+        f" theta_2 is {_write_theta_2(equality)}, from {low} to {high} deg"
     )
-    _say(
+    _print_sentence(
         f"largest error of the angle: {_deg(own.angle)} deg through the zero of the "
         f"file; {_deg(report.shifted)} deg with the constant of least squares, "
         f"{_deg(report.centred)} deg with the best one; "
         f"of the ratio omega_4/omega_2: {own.ratio:.4g}"
     )
-    _say(ROW.format(*HEADINGS))
-    for degree, *errors in zip(DEGREES, report.squares, report.fitted, strict=True):
+    _print_sentence(ROW.format(*FIT_HEADINGS))
+    for degree, *errors in zip(
+        POLYNOMIAL_DEGREES, report.squares, report.fitted, strict=True
+    ):
         for fit, error in zip(_FITS, errors, strict=True):
-            missing = max(DEGREES) - degree
-            polycoef = _write((*error.coefficients, *[0.0] * missing))
+            missing = max(POLYNOMIAL_DEGREES) - degree
+            polycoef = _write_coefficients((*error.coefficients, *[0.0] * missing))
             ratio = f"{error.ratio:.4g}"
-            _say(ROW.format(str(degree), fit, _deg(error.angle), ratio, polycoef))
+            _print_sentence(
+                ROW.format(str(degree), fit, _deg(error.angle), ratio, polycoef)
+            )
 
 
 def _write_theta_2(equality: JointEquality) -> str:
@@ -243,9 +249,9 @@ def _deg(angle: float) -> str:
     return f"{math.degrees(angle):.5g}"
 
 
-def _write(coefficients: tuple[float, ...]) -> str:
+def _write_coefficients(coefficients: tuple[float, ...]) -> str:
     return " ".join(f"{number:.7g}" for number in coefficients)
 
 
-def _say(text: str) -> None:
-    click.echo(make_plain(text))
+def _print_sentence(text: str) -> None:
+    click.echo(escape_controls(text))

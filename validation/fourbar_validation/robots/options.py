@@ -10,10 +10,10 @@ from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
 
-FILE = click.Path(path_type=Path)
-Command = Callable[..., Any]
+ROBOT_PATH = click.Path(path_type=Path)
+RobotCommand = Callable[..., Any]
 
-_OPTIONS = (
+_POSE_OPTIONS = (
     click.option(
         "--pose",
         metavar="JOINT=ANGLE,...",
@@ -43,19 +43,19 @@ _OPTIONS = (
     ),
     click.option(
         "--assets",
-        type=FILE,
+        type=ROBOT_PATH,
         metavar="DIR",
         help="Folder in which includes and meshes are looked for too.",
     ),
 )
 
 
-def pose_options(command: Command) -> Command:
+def pose_options(command: RobotCommand) -> RobotCommand:
     """Add --pose, --key, --hold, --drive and --assets to a command.
 
     The parameters are `pose`, `key`, `hold`, `drive`, `assets`.
     """
-    for option in reversed(_OPTIONS):
+    for option in reversed(_POSE_OPTIONS):
         command = option(command)
     return command
 
@@ -91,12 +91,12 @@ def read_pose(
     InputError : an entry of --pose that is no JOINT=ANGLE.
     """
     joints = {}
-    for entry in _split(pose):
+    for entry in _split_at_commas(pose):
         joint, equals, position = entry.partition("=")
         if not equals or not joint or not position:
             raise InputError("--pose", entry, "must be like JOINT=20deg")
         joints[joint.strip()] = position.strip()
-    return PoseOptions(joints, key, tuple(_split(hold)), drive)
+    return PoseOptions(joints, key, tuple(_split_at_commas(hold)), drive)
 
 
 def read_speed(text: str | None) -> float | None:
@@ -109,7 +109,7 @@ def read_speed(text: str | None) -> float | None:
         return require("--speed", text, "rad/s")
 
 
-def _split(values: tuple[str, ...]) -> list[str]:
+def _split_at_commas(values: tuple[str, ...]) -> list[str]:
     """Split values at commas; the same option may be given several times."""
     return [
         part.strip() for value in values for part in value.split(",") if part.strip()

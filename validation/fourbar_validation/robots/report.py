@@ -12,26 +12,26 @@ import click
 
 from fourbar.quantities import PIN_FORCES
 from fourbar.writing import write_text
-from fourbar_validation.compare.rows import make_plain, write_csv
+from fourbar_validation.compare.rows import escape_controls, write_csv_rows
 from fourbar_validation.engines.mujoco.robots.answers import (
     LoopMeasurement,
     RobotMeasurement,
     SettingsAdvice,
     TriedSettings,
 )
-from fourbar_validation.report.templating import write_cell
-from fourbar_validation.report.terminal import make_table
+from fourbar_validation.report.templating import escape_cell
+from fourbar_validation.report.terminal import make_words_table
 from fourbar_validation.robots.measure import (
+    MEASURED_THROUGH_TIME,
     STATES,
-    THROUGH_TIME,
     find_left_out,
-    find_worst,
-    list_errors,
+    find_worst_of_loop,
+    list_errors_by_method,
 )
 
-ERRORS = ("method", "quantity", "error", "of its largest", "at")
+ERROR_HEADINGS = ("method", "quantity", "error", "of its largest", "at")
 _SETTINGS = ("changed alone", "single states", "through time", "cost")
-ROUND_OFF = 1e-8
+SCENE_ROUND_OFF = 1e-8
 """Difference of two exact answers that the digits of the scene make. It is over the
 largest torque and pin forces.
 """
@@ -60,13 +60,13 @@ class Typed:
     text: str
 
 
-Block = str | TextTable | Typed
+ReportBlock = str | TextTable | Typed
 """A sentence, a table, or an element to paste."""
 
 
-def describe_measurement(measurement: RobotMeasurement) -> Iterator[Block]:
+def describe_measurement(measurement: RobotMeasurement) -> Iterator[ReportBlock]:
     """Describe the loops of a robot, the worst first."""
-    for loop in sorted(measurement.loops, key=find_worst, reverse=True):
+    for loop in sorted(measurement.loops, key=find_worst_of_loop, reverse=True):
         yield from _describe_loop(loop)
         if loop.advice is not None:
             yield from describe_advice(loop.advice)
@@ -74,7 +74,7 @@ def describe_measurement(measurement: RobotMeasurement) -> Iterator[Block]:
         yield f"note: {note}"
 
 
-def _describe_loop(loop: LoopMeasurement) -> Iterator[Block]:
+def _describe_loop(loop: LoopMeasurement) -> Iterator[ReportBlock]:
     joints = [math.degrees(row.joint) for row in loop.states.rows]
     speed = loop.states.rows[0].omega_2
     yield (
@@ -91,15 +91,17 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[Block]:
         names = ", ".join(loop.switched_off)
         yield f"switched off, because it ties its bars to joints that are held: {names}"
     left_out = find_left_out(loop)
-    if left_out > ROUND_OFF:
+    if left_out > SCENE_ROUND_OFF:
         size = f"{left_out:.1e}"
     else:
-        size = f"less than {ROUND_OFF:g}"
+        size = f"less than {SCENE_ROUND_OFF:g}"
     yield (
         f"with rigid pins the robot differs from the formulas by {size} of the largest:"
         " what the scene leaves out; the rest is MuJoCo's soft constraint"
     )
-    yield TextTable(ERRORS, [error.cells() for error in list_errors(loop)])
+    yield TextTable(
+        ERROR_HEADINGS, [error.cells() for error in list_errors_by_method(loop)]
+    )
     if loop.through_time is None:
         yield f"not simulated: {loop.refusal}"
     elif loop.through_time.lost:
@@ -125,7 +127,7 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[Block]:
         yield f"note: {loop.name}: {remark}"
 
 
-def _describe_torn(loop: LoopMeasurement) -> Iterator[Block]:
+def _describe_torn(loop: LoopMeasurement) -> Iterator[ReportBlock]:
     """Describe the state of the largest gap under a motor's torque."""
     if not loop.torn:
         return
@@ -142,7 +144,7 @@ def _describe_torn(loop: LoopMeasurement) -> Iterator[Block]:
     )
 
 
-def describe_advice(advice: SettingsAdvice) -> Iterator[Block]:
+def describe_advice(advice: SettingsAdvice) -> Iterator[ReportBlock]:
     """Describe what to type, what it reaches, and what each setting does alone."""
     before = advice.before
     best = advice.best
@@ -177,46 +179,46 @@ def _write_tried(tried: TriedSettings) -> tuple[str, ...]:
     )
 
 
-def show(block: Block) -> None:
+def show_block(block: ReportBlock) -> None:
     """Print a sentence, a table or an element."""
     if isinstance(block, TextTable):
         from rich.console import Console
 
-        table = make_table(block.headings, block.rows, show_edge=False)
+        table = make_words_table(block.headings, block.rows, show_edge=False)
         Console().print(table)
     else:
-        click.echo(make_plain(block.text if isinstance(block, Typed) else block))
+        click.echo(escape_controls(block.text if isinstance(block, Typed) else block))
 
 
-def write_markdown(title: str, blocks: Sequence[Block]) -> str:
+def write_markdown(title: str, blocks: Sequence[ReportBlock]) -> str:
     """Write sentences, tables and elements as a page of Markdown."""
-    parts = [f"# {write_cell(title)}"]
+    parts = [f"# {escape_cell(title)}"]
     for block in blocks:
         if isinstance(block, TextTable):
             rule = ("---",) * len(block.headings)
             rows = (block.headings, rule, *block.rows)
             written = (
-                " | ".join(cell if row is rule else write_cell(cell) for cell in row)
+                " | ".join(cell if row is rule else escape_cell(cell) for cell in row)
                 for row in rows
             )
             parts.append("\n".join(f"| {row} |" for row in written))
         elif isinstance(block, Typed):
-            parts.append(f"```xml\n{make_plain(block.text)}\n```")
+            parts.append(f"```xml\n{escape_controls(block.text)}\n```")
         else:
-            parts.append(write_cell(block))
+            parts.append(escape_cell(block))
     return "\n\n".join(parts) + "\n"
 
 
 def write_states(measurement: RobotMeasurement) -> str:
     """Write every state that MuJoCo was asked at as CSV, under STATES_FILE."""
-    return write_csv(STATES_FILE, _list_states(measurement))
+    return write_csv_rows(STATES_FILE, _list_states(measurement))
 
 
 def _list_states(measurement: RobotMeasurement) -> Iterator[tuple[str | float, ...]]:
     for loop in measurement.loops:
         for method, answer in (
             (STATES, loop.states),
-            (THROUGH_TIME, loop.through_time),
+            (MEASURED_THROUGH_TIME, loop.through_time),
         ):
             for row in () if answer is None else answer.rows:
                 numbers = [math.degrees(row.joint), row.omega_2, row.alpha_2]
@@ -224,16 +226,16 @@ def _list_states(measurement: RobotMeasurement) -> Iterator[tuple[str | float, .
                 for pins in (row.soft, row.rigid):
                     numbers += [math.hypot(*pins.forces[name]) for name in PIN_FORCES]
                 numbers.append(1e3 * row.gap)
-                yield make_plain(loop.name), method, *map(float, numbers)
+                yield escape_controls(loop.name), method, *map(float, numbers)
 
 
 def report_measurement(measurement: RobotMeasurement, robot: Path, out: Path) -> None:
     """Print a measurement, and write robot.md and robot.csv into a folder."""
     blocks = list(describe_measurement(measurement))
     for block in blocks:
-        show(block)
+        show_block(block)
     out.mkdir(parents=True, exist_ok=True)
     title = f"The loops of {robot.name} in MuJoCo"
     write_text(out / "robot.md", write_markdown(title, blocks))
     write_text(out / "robot.csv", write_states(measurement))
-    click.echo(make_plain(f"written to {out}"))
+    click.echo(escape_controls(f"written to {out}"))

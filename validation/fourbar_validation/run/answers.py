@@ -11,8 +11,8 @@ from functools import partial
 from typing import NamedTuple
 
 from fourbar.errors import LimitError
-from fourbar.mjcf.document import LIGHT
-from fourbar.quantities import COUPLE, FORCES
+from fourbar.mjcf.document import LIGHT_BAR_RATIO
+from fourbar.quantities import COUPLE, FORCE_NAMES
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Adapter, Answer
 from fourbar_validation.compare.compare import Comparison, Predicted
@@ -29,10 +29,12 @@ from fourbar_validation.run.question import Question
 def compare_answers(question: Question) -> Iterator[Row]:
     """Compare every engine's answer with the formulas."""
     for engine in question.engines:
-        yield from question.attempt(partial(_answer, question, engine), engine.name)
+        yield from question.attempt(
+            partial(_answer_of_engine, question, engine), engine.name
+        )
 
 
-def _answer(question: Question, engine: Engine) -> Iterator[Row]:
+def _answer_of_engine(question: Question, engine: Engine) -> Iterator[Row]:
     answer = question.answer(engine)
     if answer.refusal is not None:
         question.leave_out(answer.engine, answer.refusal)
@@ -41,7 +43,7 @@ def _answer(question: Question, engine: Engine) -> Iterator[Row]:
         question.causes[engine.name] = find_causes(question, answer, engine.tolerance)
     yield from rows
     if question.order and engine.order and answer.refusal is None:
-        answer.evidence |= _observe_order(question, engine)
+        answer.evidence |= _observe_order_of_engine(question, engine)
 
 
 def compare_answer(question: Question, engine: Engine, answer: Answer) -> list[Row]:
@@ -59,7 +61,7 @@ def compare_answer(question: Question, engine: Engine, answer: Answer) -> list[R
         name, scene, answer, formulas, held, question.reference, question.scales
     )
     rows = comparison.rows()
-    if (ratio := answer.evidence.get("mass_ratio", 1.0)) > LIGHT:
+    if (ratio := answer.evidence.get("mass_ratio", 1.0)) > LIGHT_BAR_RATIO:
         why = f"; of coupler and output one is {ratio:.1e} times lighter"
         rows = [
             replace(row, reason=row.reason + why) if row.failed else row for row in rows
@@ -72,16 +74,16 @@ def compare_answer(question: Question, engine: Engine, answer: Answer) -> list[R
     return rows
 
 
-def _observe_order(question: Question, engine: Engine) -> dict[str, float]:
+def _observe_order_of_engine(question: Question, engine: Engine) -> dict[str, float]:
     """Measure the worst error of torque and pin forces at 4h and 2h.
 
     The order in h that they show is returned too.
     """
 
     def error(answer: Answer) -> float:
-        rows = compare_answer(question, replace(engine, answers=FORCES), answer)
+        rows = compare_answer(question, replace(engine, answers=FORCE_NAMES), answer)
         return max(
-            (row.error for row in rows if row.quantity in FORCES), default=math.nan
+            (row.error for row in rows if row.quantity in FORCE_NAMES), default=math.nan
         )  # a refusal has none
 
     assert engine.order is not None
@@ -141,7 +143,7 @@ class Statements(NamedTuple):
     transmission: transmission.StatedTransmission
     over: transmission.StatedOver | None
     """None where the motion has no speed."""
-    places: list[limit_positions.Place]
+    places: list[limit_positions.LimitPlace]
     """Places where an engine is asked."""
 
     @classmethod

@@ -3,18 +3,18 @@
 import numpy as np
 
 from fourbar.errors import FourBarError
-from fourbar.quantities import OK, UNITS
+from fourbar.quantities import OK, UNITS, Array
 from fourbar_validation.check.judge import Judge
 from fourbar_validation.check.mistakes import explain
-from fourbar_validation.check.theirs import NOT_JUDGED, Array, TheirTable, Unit
+from fourbar_validation.check.theirs import NOT_JUDGED, TheirTable, Unit
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.tolerance import ErrorBound, magnitude
 from fourbar_validation.run.question import Question
 
-MOST_POSITIONS = 400
+MOST_POSITIONS_SEARCHED = 400
 """Positions, in a row, by which a mistake is looked for."""
-ROUND_OFF = 1e-9
+SAME_NUMBERS = 1e-9
 """Part of a quantity's largest value within which a mistake must give an exact engine's
 numbers: it was made in another order of summation than the hypothesis."""
 
@@ -29,7 +29,7 @@ def find_causes(question: Question, answer: Answer, tolerance: ErrorBound) -> li
     if at is None or at.commanded != "theta_2" or answer.assembled is None:
         return []
     try:
-        table = make_table(answer, tolerance)
+        table = make_answer_table(answer, tolerance)
         commanded = at.part(slice(0, len(table.theta_2)))
         judge = Judge(state_from_pins(question.scene), table, at=commanded)
     except FourBarError:
@@ -50,20 +50,20 @@ def find_causes(question: Question, answer: Answer, tolerance: ErrorBound) -> li
     return causes
 
 
-def make_table(answer: Answer, tolerance: ErrorBound) -> TheirTable:
+def make_answer_table(answer: Answer, tolerance: ErrorBound) -> TheirTable:
     """Make a table of an engine's numbers, as if they had been read from a file.
 
     Each is taken to be rounded to what the engine is held to, so that a mistake need
     not explain more of it.
     """
     assert answer.at is not None and answer.assembled is not None
-    rows = slice(MOST_POSITIONS)
+    rows = slice(MOST_POSITIONS_SEARCHED)
     theta_2 = np.asarray(answer.at.angle[rows], dtype=float)
     blank = ~answer.assembled[rows]
     if not tolerance.conditioned:
         slack = tolerance.factor
     else:
-        slack = ROUND_OFF
+        slack = SAME_NUMBERS
     values: dict[str, Array] = {}
     rounding: dict[str, Array] = {}
     for name, numbers in answer.quantities.items():
@@ -81,7 +81,7 @@ def make_table(answer: Answer, tolerance: ErrorBound) -> TheirTable:
         else:
             scale = largest
         values[name] = kept
-        rounding[name] = np.full(len(theta_2), max(slack, ROUND_OFF) * scale)
+        rounding[name] = np.full(len(theta_2), max(slack, SAME_NUMBERS) * scale)
     units = {name: Unit(UNITS[name], 1.0) for name in values}
     lines = list(range(1, len(theta_2) + 1))
     exact = np.zeros(len(theta_2))

@@ -9,10 +9,10 @@ from fourbar.errors import HOLDS
 from fourbar.writing import write_text
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.regression.accept import add_output_options, report_differences
-from fourbar_validation.regression.record import COLUMNS
+from fourbar_validation.regression.record import COLUMNS_FILE
 from fourbar_validation.report.junit import list_cases, write_document
 from fourbar_validation.run.parts import judge_part
-from fourbar_validation.run.plan import SAMPLE, WORKERS, RunPart
+from fourbar_validation.run.plan import SCENES_SAMPLED, WORKERS, RunPart
 from fourbar_validation.run.progress import ShownProgress
 from fourbar_validation.run.request import ALL_TYPES, Request, make_plan
 from fourbar_validation.run.run import run
@@ -96,7 +96,7 @@ from fourbar_validation.run.run import run
 @click.option(
     "--sample-derived",
     type=click.IntRange(min=0),
-    default=SAMPLE,
+    default=SCENES_SAMPLED,
     show_default=True,
     metavar="N",
     help=(
@@ -123,7 +123,7 @@ from fourbar_validation.run.run import run
     help="Draw nothing and measure no observed order; no verdict changes.",
 )
 @add_output_options("; without --against the comparisons of the run")
-def command(**stated: Any) -> int:
+def run_command(**stated: Any) -> int:
     """Judge scenes and write a report.
 
     Without SCENES the run judges those of models/ and models/capabilities/. It writes
@@ -165,7 +165,7 @@ def command(**stated: Any) -> int:
         write_text(
             request.junit,
             write_document(
-                summary.verdict, list_cases(read_columns(request.out / COLUMNS))
+                summary.verdict, list_cases(read_columns(request.out / COLUMNS_FILE))
             ),
         )
     return plan.conclude(summary.counts, worse=worse)

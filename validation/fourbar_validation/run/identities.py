@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fourbar.effects import Actions
 from fourbar.effects.effect import list_bodies
-from fourbar.evaluation.case import compute_state
+from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import (
@@ -28,33 +28,33 @@ from fourbar.quantities import (
     OVERFLOW,
     SEVERAL,
     SINGULAR,
+    Array,
 )
 from fourbar.scene import Scene
 from fourbar.solution import Solution
-from fourbar_validation.compare.compare import CLOSURE, NOWHERE
+from fourbar_validation.compare.compare import CLOSURE, NOT_DEMANDED
 from fourbar_validation.compare.rows import FAILS, FORMULAS, Row
 from fourbar_validation.compare.tolerance import (
     EPS,
     IDENTITY,
     NOTHING_TO_TELL,
-    Array,
     Mask,
+    compute_closing_margin,
     count_half_turns,
     divide,
     find_condition,
     find_gap,
     find_lever,
-    find_margin,
     find_worst,
     magnitude,
     mark_touching,
 )
-from fourbar_validation.engines.exact import compute_sines
+from fourbar_validation.engines.exact import compute_exact_sines
 from fourbar_validation.engines.free_body import count_solutions
 from fourbar_validation.engines.registry import find_missing
 from fourbar_validation.run.question import Question, select_positions, spread_evenly
 
-STAGES = ("omega_3", "alpha_3", COUPLE.value, LINE.value)
+OPTIONAL_QUANTITIES = ("omega_3", "alpha_3", COUPLE.value, LINE.value)
 """One quantity of each stage that a position may lack."""
 _LARGE = 1e75
 """Size of numbers beyond which they, or their squares, may overflow. A product of four
@@ -66,11 +66,11 @@ _IN_ONE_LINE = 32.0 * 2.0**-53
 """|sin(theta_4 - theta_3)| at which bars 3 and 4 may count as collinear. Their
 directions are rounded by that.
 """
-SAMPLE = 5
+POSITIONS_OF_FRICTION = 5
 """Positions of a scene that are tried for solutions of friction. Some have several,
 some one; each may take a search.
 """
-NEAR = 1e-6
+TOO_NEAR_A_TOGGLE = 1e-6
 """|sin(theta_4 - theta_3)| below which doubles have no word in it."""
 
 
@@ -81,7 +81,7 @@ def check_identities(question: Question) -> Iterator[Row]:
     linkage = question.scene.linkage
     closing = solution.assembled & (solution.status_code != OVERFLOW)
     gap = find_gap(linkage, solution.theta_2, solution.theta_3, solution.theta_4)
-    yield _make_row(question, "closure", CLOSURE, gap, closing)
+    yield _make_equation_row(question, "closure", CLOSURE, gap, closing)
     if (
         question.scene.motion.angle is None
         and question.scene.motion.law is None
@@ -104,18 +104,20 @@ def _check_sweep(question: Question) -> Row:
     start = float(command.theta_2[0])
     stop = float(command.theta_2[-1])
     if (start, stop) == (0.0, 2.0 * np.pi):
-        missed = np.maximum(-find_margin(linkage, command.theta_2), 0.0)
+        missed = np.maximum(-compute_closing_margin(linkage, command.theta_2), 0.0)
     else:
         left_out = min(np.radians(1.0), 0.5 * (stop - start))
         missed = np.abs(
-            find_margin(linkage, np.array([start - left_out, stop + left_out]))
+            compute_closing_margin(
+                linkage, np.array([start - left_out, stop + left_out])
+            )
         )
     allowed = IDENTITY.factor * count_half_turns(linkage.ground_angle, command.theta_2)
     reason = "one degree short of where the loop just closes, or a whole turn"
     return question.row("sweep", np.array([missed.max()]), allowed, reason)
 
 
-def _make_row(
+def _make_equation_row(
     question: Question, quantity: str, equation: str, error: Array, judged: Mask
 ) -> Row:
     """Make the row of an equation from its error where it is worst.
@@ -128,7 +130,7 @@ def _make_row(
     if judged.any():
         reason = f"identity: {equation}"
     else:
-        reason = NOWHERE
+        reason = NOT_DEMANDED
     return question.row(
         quantity, error, IDENTITY.factor / condition, reason, judged, condition
     )
@@ -221,10 +223,10 @@ def _check_sums(question: Question) -> Iterator[Row]:
     yield _check_power(question, drive, judged)
     forces = divide(magnitude(balance.force), force_size)
     moments = divide(np.abs(balance.moment), moment_size)
-    yield _make_row(
+    yield _make_equation_row(
         question, "force_sum", "F12 + F14 + loads = sum of m a_G", forces, judged
     )
-    yield _make_row(
+    yield _make_equation_row(
         question, "moment_sum", "moments about O2, with the torque", moments, judged
     )
 
@@ -237,7 +239,7 @@ def _sum_actions(question: Question) -> tuple[Actions, Array]:
     scene = question.scene
     command = question.at
     solution = question.solution
-    state = compute_state(scene, command)
+    state = compute_shown_state(scene, command)
     speeds = {
         f"omega_{bar}": getattr(solution, f"omega_{bar}")
         for bar in MOVING_BARS
@@ -270,7 +272,7 @@ def _check_power(question: Question, drive: str, judged: Mask) -> Row:
     works = getattr(solution, drive) * getattr(
         solution, f"omega_{solution.drive_bar}", solution.stroke_speed
     )
-    return _make_row(
+    return _make_equation_row(
         question,
         "power",
         "of the drive",
@@ -314,7 +316,7 @@ def _solve_exactly(question: Question) -> tuple[_OfSome | None, _OfSome | None]:
         (
             None
             if unknown
-            else lambda indices: compute_sines(
+            else lambda indices: compute_exact_sines(
                 scene.linkage, select_positions(command, indices)
             )
         ),
@@ -345,7 +347,7 @@ def compare_status(
     formulas = question.solution
     differ = np.zeros(len(formulas), dtype=bool)
     large = _mark_large(scene, reference)
-    for quantity in STAGES:
+    for quantity in OPTIONAL_QUANTITIES:
         ours = getattr(formulas, quantity)
         theirs = getattr(reference, quantity)
         if ours is None or theirs is None:
@@ -370,12 +372,12 @@ def compare_status(
         in_line = reference.drive_condition < _IN_ONE_LINE
         differ |= (formulas.status_code == OVERFLOW) & moves & in_line
         differ |= np.isin(formulas.status_code, (NO_TORQUE, NO_LEVER)) & (
-            reference.drive_condition > NEAR
+            reference.drive_condition > TOO_NEAR_A_TOGGLE
         )
     close = (
         mark_touching(scene.linkage, formulas.theta_2)
-        | (reference.condition < NEAR)
-        | (formulas.condition < NEAR)
+        | (reference.condition < TOO_NEAR_A_TOGGLE)
+        | (formulas.condition < TOO_NEAR_A_TOGGLE)
     )
     if sines is not None and len(
         near := np.flatnonzero(close)
@@ -388,11 +390,11 @@ def compare_status(
             in_line, sine > _IN_ONE_LINE, sine < 1.0 / 16.0 * _IN_ONE_LINE
         )
     if solutions is not None and len(
-        many := np.flatnonzero(formulas.status_code == SEVERAL)[:SAMPLE]
+        many := np.flatnonzero(formulas.status_code == SEVERAL)[:POSITIONS_OF_FRICTION]
     ):
         differ[many] |= solutions(many) < 2
     if solutions is not None and len(ok := np.flatnonzero(formulas.status_code == OK)):
-        some = spread_evenly(ok, SAMPLE)
+        some = spread_evenly(ok, POSITIONS_OF_FRICTION)
         differ[some] |= solutions(some) > 1
     index = find_worst(differ.astype(float))
     wrong = np.count_nonzero(differ)
@@ -421,7 +423,7 @@ def _mark_large(scene: Scene, reference: Solution) -> Mask:
         max(scene.linkage.lengths) > _LARGE
         or min(scene.linkage.lengths) < 1.0 / _LARGE,
     )
-    for name in ("omega_2", "alpha_2", *STAGES, "F12", "F43"):
+    for name in ("omega_2", "alpha_2", *OPTIONAL_QUANTITIES, "F12", "F43"):
         values = getattr(reference, name)
         if values is not None:
             large |= magnitude(values) > _LARGE

@@ -17,7 +17,7 @@ from fourbar_validation.compare.rows import FORMULAS, Row
 from fourbar_validation.engines.guests import list_numbers
 from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.report.record import Record
-from fourbar_validation.report.svg import NUMBERS
+from fourbar_validation.report.svg import STYLE_NUMBERS
 from fourbar_validation.report.thumbnail import draw_thumbnail
 from fourbar_validation.run.answers import (
     check_mjcf,
@@ -140,7 +140,7 @@ def judge_for_report(
                 row, reason=f"{row.reason}; what it printed: {OUTPUT}"
             )
     figure = thumbnail = None
-    NUMBERS.update(list_numbers(engines))
+    STYLE_NUMBERS.update(list_numbers(engines))
     if draw:
         from fourbar_validation.report.figures import draw_scene_figure
 
@@ -164,7 +164,7 @@ def judge(
     simulations and changes no row. `derived`: make the derived checks of `CHECKS`
     too, those of functions other than `solve`, which takes a second.
     """
-    question = ask(name, scene, engines)
+    question = ask_engines(name, scene, engines)
     free = scene.motion.free is not None
     question.order = order
     begin = time.perf_counter()
@@ -198,7 +198,7 @@ def judge(
     return question.record(rows, seconds)
 
 
-def ask(name: str, scene: Scene, engines: Sequence[Engine]) -> Question:
+def ask_engines(name: str, scene: Scene, engines: Sequence[Engine]) -> Question:
     """Ask the engines that a scene needs, each position once.
 
     List what is left out.

@@ -81,7 +81,7 @@ class _Gathered:
         return self._stores[chunk].read(chunk)
 
 
-def collect(
+def collect_parts(
     plan: Plan,
     folders: Sequence[Path],
     parts: int,
@@ -121,7 +121,7 @@ def collect(
     help="Folder for tables and report.",
 )
 @click.option("--verbose", is_flag=True, help="Print the worst row of each scene too.")
-def command(folders: tuple[Path, ...], out: Path, verbose: bool) -> int:
+def collect_command(folders: tuple[Path, ...], out: Path, verbose: bool) -> int:
     """Put together the parts of a run.
 
     It writes tables and report from the folders in which `run --part` judged the parts.
@@ -132,6 +132,6 @@ def command(folders: tuple[Path, ...], out: Path, verbose: bool) -> int:
     parts, request, files = read_request(folders[0])
     plan = make_plan(request, files)
     with ShownProgress(len(plan.suite)) as progress:
-        summary = collect(plan, folders, parts, out, progress)
+        summary = collect_parts(plan, folders, parts, out, progress)
     print_table(summary, out, verbose=verbose)
     return plan.conclude(summary.counts)

@@ -22,11 +22,11 @@ from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.suites import Files, Suite
 
 WORKERS = 2
-SAMPLE = 30
+SCENES_SAMPLED = 30
 """Scenes in which everything else that is shipped is judged. In a scene that takes as
 long as judging thirty scenes: a tenth more for 10 000 random ones.
 """
-CHUNK = {True: 1, False: 20}
+SCENES_OF_A_TASK = {True: 1, False: 20}
 """Scenes per task. It is one if something is simulated or drawn (a second each), else
 twenty (a second together).
 """
@@ -51,7 +51,7 @@ class RunOptions:
     """Earlier run that `--against` names. The failure that the verdict names is looked
     up there, and its rules must not be stricter.
     """
-    sample: int = SAMPLE
+    sample: int = SCENES_SAMPLED
     """Scenes, evenly chosen, in which functions other than `solve` are checked."""
 
 
@@ -94,7 +94,7 @@ class RunPart(NamedTuple):
         return chunk % self.of == self.number - 1
 
 
-WHOLE = RunPart()
+WHOLE_RUN = RunPart()
 """The only part of a run that one machine judges."""
 
 
@@ -131,7 +131,7 @@ class Plan:
         """Return the scenes of each task."""
         count = len(self.suite)
         simulated = any(engine.through_time for engine in self.engines)
-        least = CHUNK[self.draw_at_once or simulated]
+        least = SCENES_OF_A_TASK[self.draw_at_once or simulated]
         size = max(least, math.ceil(count / _MOST_PARTS))
         return [
             range(start, min(start + size, count)) for start in range(0, count, size)

@@ -6,7 +6,7 @@ One that breaks down is judged again engine by engine.
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from fourbar_validation.compare.rows import make_breakdown, make_plain
+from fourbar_validation.compare.rows import escape_controls, make_breakdown
 from fourbar_validation.engines import workers as worker_processes
 from fourbar_validation.engines.guests import QUESTIONS, Guest
 from fourbar_validation.engines.processes import SECONDS_PER_POSITION
@@ -34,7 +34,7 @@ class Job:
     @property
     def name(self) -> str:
         """Return the scene's name."""
-        return make_plain(self.suite.name(self.scene))
+        return escape_controls(self.suite.name(self.scene))
 
 
 def make_jobs(
@@ -84,7 +84,7 @@ def judge_job(job: Job) -> Record:
 
 
 def _judge_by_engine(
-    job: Job, _: BaseException, attempt: worker_processes.Attempt
+    job: Job, _: BaseException, attempt: worker_processes.TaskFunction
 ) -> Record:
     """Judge a scene that broke down one engine at a time.
 
@@ -114,7 +114,7 @@ def find_time_limit(suite: Suite, engines: Iterable[Engine]) -> float:
 
     Guests have limits of their own besides.
     """
-    limit = worker_processes.SECONDS + SECONDS_PER_POSITION * (
+    limit = worker_processes.SCENE_SECONDS + SECONDS_PER_POSITION * (
         suite.positions if isinstance(suite, Files) else 0
     )
     return limit + QUESTIONS * sum(

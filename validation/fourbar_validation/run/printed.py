@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects import Springs, Torsion
-from fourbar.evaluation.case import BLOCK
+from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
-from fourbar.quantities import FORCES, OK, PIN_FORCES
+from fourbar.quantities import FORCE_NAMES, OK, PIN_FORCES, Array
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Rise
 from fourbar.solution import Solution
@@ -20,7 +20,7 @@ from fourbar.solving import solve
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.rows import FAILS, FORMULAS, UNDECIDED, Row
 from fourbar_validation.compare.scales import (
-    Sizes,
+    TermSizes,
     make_reference,
     take_smallest_scales,
     take_strictest_condition,
@@ -30,7 +30,6 @@ from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
     IDENTITY,
     NOTHING_TO_TELL,
-    Array,
     K,
     count_half_turns,
     divide,
@@ -43,7 +42,7 @@ from fourbar_validation.compare.tolerance import (
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.description import list_speeds
 from fourbar_validation.engines.exact import BallArithmetic, find_refusal
-from fourbar_validation.engines.free_body import move
+from fourbar_validation.engines.free_body import speeds_and_accelerations
 from fourbar_validation.engines.free_body_effects import sum_acting
 from fourbar_validation.engines.prediction import predict_from_data
 from fourbar_validation.engines.registry import find_missing
@@ -53,11 +52,11 @@ from fourbar_validation.run.question import (
     spread_evenly,
 )
 
-SAMPLE = 5
+POSITIONS_OF_ERROR_BARS = 5
 """Positions of a scene at which the error bars are held to the true error. Those
 nearest to a rest are added.
 """
-BARS = 10.0
+ERROR_BARS = 10.0
 """Error bars: 2 in 100 million normal errors exceed ten of them."""
 _BALLS_EXACT_TO = 2.0**-256
 """Part of a size that 320-bit balls may leave of an exact zero, whose error bar is 0. A
@@ -104,11 +103,11 @@ def compare_points(
         4: reference.theta_4,
     }
     speed = {
-        bar: zero if bar == 1 else _find_known(reference, f"omega_{bar}", n)
+        bar: zero if bar == 1 else _find_true_value(reference, f"omega_{bar}", n)
         for bar in theta
     }
     growth = {
-        bar: zero if bar == 1 else _find_known(reference, f"alpha_{bar}", n)
+        bar: zero if bar == 1 else _find_true_value(reference, f"alpha_{bar}", n)
         for bar in theta
     }
 
@@ -121,7 +120,7 @@ def compare_points(
         4: [link.ground * np.exp(1j * theta[1]), 0.0 * zero, 0.0 * zero],
     }
     error = np.zeros(n)
-    sizes = Sizes(scene, reference)
+    sizes = TermSizes(scene, reference)
     usable = (solution.status_code == OK) & (reference.condition >= least)
     usable &= find_condition("F12", link, reference) * NOTHING_TO_TELL > EPS
     for point in state_from_pins(scene).points:
@@ -150,7 +149,7 @@ def compare_points(
     )
 
 
-def _find_known(reference: Solution, quantity: str, n: int) -> Array:
+def _find_true_value(reference: Solution, quantity: str, n: int) -> Array:
     values: Array | None = getattr(reference, quantity)
     return np.zeros(n) if values is None else values
 
@@ -168,17 +167,17 @@ def check_blocks(question: Question) -> Iterator[Row]:
     n = len(command.angle)
     ok = np.flatnonzero(solution.status_code == OK)
     long = np.concatenate(
-        (np.resize(ok if len(ok) else np.arange(n), BLOCK), np.arange(n))
+        (np.resize(ok if len(ok) else np.arange(n), POSITIONS_OF_A_BLOCK), np.arange(n))
     )
-    ends = np.unique([0, BLOCK - 1, BLOCK, len(long) - 1])
+    ends = np.unique([0, POSITIONS_OF_A_BLOCK - 1, POSITIONS_OF_A_BLOCK, len(long) - 1])
     repeated = select_positions(command, long)
     if (
         sum(len(effect.loaded_pins) for effect in scene.effects) > 1
     ):  # each may take a search
-        repeated.angle[1 : BLOCK - 1] = np.nan
+        repeated.angle[1 : POSITIONS_OF_A_BLOCK - 1] = np.nan
     expected = {
         name: values
-        for name in ("sin_mu", "B", "alpha_3", *FORCES)
+        for name in ("sin_mu", "B", "alpha_3", *FORCE_NAMES)
         if (values := getattr(solution, name)) is not None
     }
     # every other quantity of thousands of positions would cost as much again
@@ -191,7 +190,7 @@ def check_blocks(question: Question) -> Iterator[Row]:
         float
     )
     with np.errstate(all="ignore"):  # beyond the range of doubles there is no size
-        scales = Sizes(scene, solution).scales([*expected], [*expected.values()])
+        scales = TermSizes(scene, solution).scales([*expected], [*expected.values()])
     for (quantity, ours), scale in zip(expected.items(), scales, strict=True):
         one = found[quantity][ends]
         due = ours[long[ends]]
@@ -245,16 +244,18 @@ def check_error_bars(question: Question) -> Iterator[Row]:
         usable[np.argmin(pull[usable])]
         for pull in _compute_pulls(scene, command, solution)
     ]
-    indices = np.union1d(spread_evenly(usable, SAMPLE), nearest).astype(int)
+    indices = np.union1d(
+        spread_evenly(usable, POSITIONS_OF_ERROR_BARS), nearest
+    ).astype(int)
     sampled = select_positions(command, indices)
     exact = ask_at(BallArithmetic(), scene, sampled)
     ours = solve(scene, "error", at=sampled)
     reference = make_reference(scene, exact)
-    sizes = Sizes(scene, ours)
+    sizes = TermSizes(scene, ours)
     if reference is None:
         of_balls = None
     else:
-        of_balls = Sizes(scene, reference)
+        of_balls = TermSizes(scene, reference)
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
         width = getattr(ours, bar)
         true = np.max(
@@ -284,7 +285,7 @@ def check_error_bars(question: Question) -> Iterator[Row]:
                 axis=0,
             )
             wide = np.where(beyond, divide(width, expected), wide)
-        allowed = BARS * width + _BALLS_EXACT_TO * size
+        allowed = ERROR_BARS * width + _BALLS_EXACT_TO * size
         share = np.where(tells, np.maximum(divide(true, allowed), wide), 0.0)
         share[tells & ~np.isfinite(width)] = np.inf
         index = find_worst(share)
@@ -305,7 +306,7 @@ def _compute_pulls(
     They follow from free bodies, N and N m together.
     """
     assert solution.theta_3 is not None and solution.theta_4 is not None
-    motion = move(
+    motion = speeds_and_accelerations(
         scene.linkage,
         command.theta_2,
         *list_speeds(command),

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -21,9 +22,14 @@ from fourbar_validation.compare.reversals import (
     find_reversals,
     mark_reversing,
 )
-from fourbar_validation.compare.rows import FORMULAS, Row, make_breakdown, make_plain
+from fourbar_validation.compare.rows import (
+    FORMULAS,
+    Row,
+    escape_controls,
+    make_breakdown,
+)
 from fourbar_validation.compare.scales import make_reference
-from fourbar_validation.compare.tolerance import Array, Mask
+from fourbar_validation.compare.tolerance import Mask
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.processes import keep_printed
@@ -190,8 +196,8 @@ class Question:
         return Record(
             self.name,
             self.scene,
-            make_plain(self.scene.title),
-            make_plain(self.scene.source),
+            escape_controls(self.scene.title),
+            escape_controls(self.scene.source),
             rows,
             timings,
             self.left_out,

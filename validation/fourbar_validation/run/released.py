@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from fourbar.effects import Friction, Gravity, Load
 from fourbar.linkage import MOVING_BARS, PINS
-from fourbar.quantities import UNKNOWNS
+from fourbar.quantities import UNKNOWNS, Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.solution import Solution
-from fourbar_validation.compare.answer import Array, ReleasedAnswer
+from fourbar_validation.compare.answer import ReleasedAnswer
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.pins import find_centre, find_inertia, find_mass
 from fourbar_validation.compare.rows import (
@@ -68,14 +68,14 @@ FORWARD = {
 """Engines that integrate by themselves. Each has a function that starts it with a step,
 the longest step (s), and its library.
 """
-LONGEST_STEP = 2e-3
+LONGEST_TIMESTEP = 2e-3
 """s, of a guest."""
-FULL = {"theta_2": 1e-9, "omega_2": 1e-8, "energy": 1e-10}
+RELEASED_ERRORS = {"theta_2": 1e-9, "omega_2": 1e-8, "energy": 1e-10}
 """Errors (rad, of the greatest speed, of the greatest energies) at which a free motion
 agrees: the formulas hold theta_2 to 1e-9 rad over 5 s; a motion of 100 s may amplify
 that by its duration, so 5 s is the unit.
 """
-UNIT = 5.0
+DURATION_OF_FULL_ACCURACY = 5.0
 
 
 class _Pendulum(NamedTuple):
@@ -199,7 +199,7 @@ def check_released(question: Question) -> Iterator[Row]:
     for engine in question.engines:
         if isinstance(engine, Guest) and engine.releases:
             yield from question.attempt(
-                partial(rows, engine.at_step, LONGEST_STEP), engine.name
+                partial(rows, engine.at_step, LONGEST_TIMESTEP), engine.name
             )
     for adapter, (start, longest, library) in FORWARD.items():
         if reason := find_missing(library):
@@ -418,7 +418,9 @@ def _make_rows(
             else:
                 expected = math.nan
         index = find_worst(error)
-        full = FULL[name] * max(1.0, free.duration / UNIT)
+        full = RELEASED_ERRORS[name] * max(
+            1.0, free.duration / DURATION_OF_FULL_ACCURACY
+        )
         allowed = max(full, TIMES_PREDICTED * expected)
         if error[index] <= full:
             verdict = AGREES

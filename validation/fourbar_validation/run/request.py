@@ -15,7 +15,13 @@ from fourbar_validation.engines.registry import Engine, hold_fully
 from fourbar_validation.engines.table import choose_engines, fill_table
 from fourbar_validation.regression.accept import FORMS
 from fourbar_validation.regression.record import find_baseline, open_run
-from fourbar_validation.run.plan import SAMPLE, WORKERS, Plan, RunOptions, RunPart
+from fourbar_validation.run.plan import (
+    SCENES_SAMPLED,
+    WORKERS,
+    Plan,
+    RunOptions,
+    RunPart,
+)
 from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.random import UNEVEN_TYPE, DrawnType
 from fourbar_validation.scenes.suites import (
@@ -34,7 +40,7 @@ _EXCLUDED = (
     ("suite", "random", "has its own scenes; leave out scene files and --random"),
 )
 """Option, what it cannot be combined with, and why."""
-HARD = "hard"
+HARD_SUITE = "hard"
 """Name of the suite of hard cases."""
 _OF_RANDOM = ("seed", "type")
 """Options that say which random linkages are drawn."""
@@ -42,7 +48,7 @@ _OF_A_REPORT = ("against", *FORMS)
 """Options of the verdict, which a part has none of."""
 _REQUEST = "request.json"
 """File beside a part that says what was asked for, so that parts can be collected."""
-KEPT = (
+OPTIONS_OF_A_PART = (
     *("scenes", "engines", "error", "suite", "random", "seed", "type"),
     *("guest", "time_limit", "sample_derived", "no_pictures"),
 )
@@ -68,7 +74,7 @@ class Request:
     against: str | None = None
     guest: tuple[str, ...] = ()
     time_limit: float | None = None
-    sample_derived: int = SAMPLE
+    sample_derived: int = SCENES_SAMPLED
     part: str | None = None
     verbose: bool = False
     no_pictures: bool = False
@@ -154,7 +160,7 @@ def keep_request(request: Request, part: RunPart, suite: Suite, out: Path) -> No
 
     Another machine need not have the files.
     """
-    asked = {name: getattr(request, name) for name in KEPT}
+    asked = {name: getattr(request, name) for name in OPTIONS_OF_A_PART}
     kept: dict[str, Any] = {"parts": part.of, "asked": asked}
     if isinstance(suite, Files):
         kept["files"] = asdict(suite) | {"not_drawn": sorted(suite.not_drawn)}
@@ -191,7 +197,7 @@ def forget_request(folder: Path) -> None:
 
 def _select_scenes(request: Request) -> Suite:
     """Select the scenes."""
-    if request.suite == HARD:
+    if request.suite == HARD_SUITE:
         return Hard()
     if request.suite is not None:
         return read_suite(Path(request.suite))
@@ -205,7 +211,7 @@ def _select_scenes(request: Request) -> Suite:
 
 def select_engines(request: Request) -> tuple[Engine, ...]:
     """Select the engines that are to answer, and say what each is held to."""
-    hard = request.suite == HARD
+    hard = request.suite == HARD_SUITE
     folders = [path.parent for path in request.scenes]
     table = fill_table(folders, request.guest, request.time_limit, balls=hard)
     engines = choose_engines(request.engines, table)

@@ -13,13 +13,19 @@ from fourbar.errors import FourBarError
 from fourbar.mjcf import write_mjcf
 from fourbar.writing import name_file, write_text
 from fourbar_validation.compare.columns import Columns, read_columns
-from fourbar_validation.compare.rows import FAILS, FORMULAS, Row, make_plain, write_csv
+from fourbar_validation.compare.rows import (
+    FAILS,
+    FORMULAS,
+    Row,
+    escape_controls,
+    write_csv_rows,
+)
 from fourbar_validation.engines.guests import list_numbers
 from fourbar_validation.engines.mujoco.picture import render_pictures
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression.record import (
-    ABOUT,
-    COLUMNS,
+    ABOUT_FILE,
+    COLUMNS_FILE,
     TABLE,
     Recorded,
     describe_run,
@@ -28,11 +34,11 @@ from fourbar_validation.regression.record import (
 )
 from fourbar_validation.regression.rules import list_weakened
 from fourbar_validation.regression.scenes import describe_scenes
-from fourbar_validation.report.html import write_html, write_markdown
+from fourbar_validation.report.html import write_html, write_summary_page
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.sections import collect_sections
 from fourbar_validation.report.summary import Summary
-from fourbar_validation.report.svg import NUMBERS
+from fourbar_validation.report.svg import STYLE_NUMBERS
 from fourbar_validation.run import pool
 from fourbar_validation.run.judge import OUTPUT
 from fourbar_validation.run.plan import (
@@ -40,7 +46,7 @@ from fourbar_validation.run.plan import (
     DEFAULTS,
     DRAWING,
     UNHEARD,
-    WHOLE,
+    WHOLE_RUN,
     Plan,
     Progress,
     RunOptions,
@@ -50,8 +56,23 @@ from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.suites import Suite
 
-TIMINGS = ("scene", "engine", "setting", "positions", "seconds", "times_formulas")
-_OUTCOME = (TABLE, COLUMNS, ABOUT, "timings.csv", "report.md", "report.html", OUTPUT)
+TIMING_COLUMNS = (
+    "scene",
+    "engine",
+    "setting",
+    "positions",
+    "seconds",
+    "times_formulas",
+)
+_OUTCOME = (
+    TABLE,
+    COLUMNS_FILE,
+    ABOUT_FILE,
+    "timings.csv",
+    "report.md",
+    "report.html",
+    OUTPUT,
+)
 """Files that a run ends with. A run first removes those of an earlier run, so that none
 passes for its own if it ends early.
 """
@@ -74,7 +95,7 @@ def run(
     """
     plan = Plan(suite, engines, options, missing)
     with open_store(plan, out) as store:
-        plan.judge(store, WHOLE, progress)
+        plan.judge(store, WHOLE_RUN, progress)
         summary = write_outcome(plan, store.read, out, progress)
         store.finish()
         forget_request(out)
@@ -101,7 +122,7 @@ def write_outcome(
     engines = plan.engines
     options = plan.options
     summary = plan.summarise()
-    first_lines = _collect(plan, read, out, summary, progress)
+    first_lines = _collect_tasks(plan, read, out, summary, progress)
     if options.drawn:
         pictured = {record.name for record in summary.pictured}
     else:
@@ -109,7 +130,7 @@ def write_outcome(
     shown = [
         index
         for index in range(len(suite))
-        if make_plain(suite.name(index)) in pictured
+        if escape_controls(suite.name(index)) in pictured
     ]
     if shown and not plan.draw_at_once:
         jobs = ((index, [_redraw(suite, index, summary, engines)]) for index in shown)
@@ -122,7 +143,7 @@ def write_outcome(
     summary.date = about.date
     summary.commit = about.commit
     if len(suite) == 1:
-        summary.asked = make_plain(suite.name(0))
+        summary.asked = escape_controls(suite.name(0))
     else:
         summary.asked = ""
     if options.against is not None:
@@ -132,13 +153,13 @@ def write_outcome(
         weakened = list_weakened(before.about.rules, about.rules)
         overview.weaker = [f"{rule}" for rule in weakened]
         overview.baseline = before.describe()
-    write_text(out / "report.md", write_markdown(summary))
+    write_text(out / "report.md", write_summary_page(summary))
     generated = any(engine.generated for engine in engines)
     models, why_not = _picture_models(suite, shown) if generated else ({}, "")
     sections = collect_sections(
-        read_columns(out / COLUMNS) if isinstance(suite, Hard) else None, out
+        read_columns(out / COLUMNS_FILE) if isinstance(suite, Hard) else None, out
     )
-    NUMBERS.update(list_numbers(engines))
+    STYLE_NUMBERS.update(list_numbers(engines))
     page = write_html(
         summary,
         first_lines,
@@ -173,7 +194,7 @@ def find_since(failure: Row | None, before: Recorded) -> str:
     return f"It is not in {before.describe()}."
 
 
-def _collect(
+def _collect_tasks(
     plan: Plan,
     read: Callable[[int], list[Any]],
     out: Path,
@@ -189,18 +210,18 @@ def _collect(
         _draft_file(out / OUTPUT) as output,
         _draft_file(out / "timings.csv") as times,
     ):
-        times.write(write_csv(TIMINGS, []))
+        times.write(write_csv_rows(TIMING_COLUMNS, []))
         for number, scenes in enumerate(plan.chunks):
             records = [Record.restore(kept) for kept in read(number)]
             for scene, record in zip(scenes, records, strict=True):
-                name = make_plain(plan.suite.name(scene))
+                name = escape_controls(plan.suite.name(scene))
                 record.rows = record.rows or [
                     Row.unmeasured(
                         name, FORMULAS, "", "all", FAILS, "nothing was judged"
                     )
                 ]
                 summary.add(record)
-                times.write(write_csv((), _list_timings(record)))
+                times.write(write_csv_rows((), _list_timings(record)))
                 output.writelines(
                     f"{record.name}: {engine}\n{text}\n\n"
                     for engine, text in record.output.items()
@@ -218,7 +239,7 @@ def _redraw(
     Its answers were not kept. An engine that broke down, or hung, in the scene is not
     started in it again.
     """
-    name = make_plain(suite.name(scene))
+    name = escape_controls(suite.name(scene))
     rows = next(record.rows for record in summary.pictured if record.name == name)
     broken = {row.engine for row in rows if row.failed and row.quantity == "all"}
     (job,) = pool.make_jobs(

@@ -31,7 +31,7 @@ from fourbar.effects import (
     Viscous,
 )
 from fourbar.linkage import MOVING_BARS, Bar, FourBar, copy_with
-from fourbar.quantities import OK, PIN_FORCES, STAGE_OF, UNITS
+from fourbar.quantities import OK, PIN_FORCES, STAGE_OF, UNITS, Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
@@ -44,11 +44,10 @@ from fourbar_validation.compare.pins import (
     state_from_pins,
 )
 from fourbar_validation.compare.rows import Row
-from fourbar_validation.compare.scales import Sizes
+from fourbar_validation.compare.scales import TermSizes
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
     WELL_CONDITIONED,
-    Array,
     Mask,
     compute_differences,
     count_half_turns,
@@ -62,22 +61,22 @@ from fourbar_validation.compare.tolerance import (
 from fourbar_validation.engines.loop import make_blank
 from fourbar_validation.run.question import NotAskedError, Question, spread_evenly
 
-SAMPLE = 5
+POSITIONS_STATED_OTHERWISE = 5
 """Positions of a scene that are stated otherwise."""
 TURNED = 0.7
 """Angle by which a scene is turned, rad."""
 SCALE = 2.0**7
 """Factor of every length."""
-PART, APART = 0.3, 0.4
+PART, MASSES_APART = 0.3, 0.4
 """Part of a bar's mass that is split off, and the distance of both parts. The distance
 is in radii of gyration of the bar.
 """
 _AT_A_REVERSAL = 1e-3
 """Part of its speeds below which a pin with dry friction may reverse."""
-FORCES = (*PIN_FORCES, "torque", "drive_force")
+SCALED_FORCES = (*PIN_FORCES, "torque", "drive_force")
 _TRANSFORMED_QUANTITIES = (
     *(f"{name}_{bar}" for name in ("theta", "omega", "alpha") for bar in MOVING_BARS),
-    *FORCES,
+    *SCALED_FORCES,
     "power",
 )
 """Quantities that are compared, as far as the scene has them."""
@@ -134,7 +133,9 @@ class _Few:
     def forces(self) -> slice:
         """Return which of the quantities are forces and torques."""
         of_forces = [
-            self.quantities.index(name) for name in FORCES if name in self.quantities
+            self.quantities.index(name)
+            for name in SCALED_FORCES
+            if name in self.quantities
         ]
         return slice(of_forces[0], of_forces[-1] + 1)
 
@@ -146,7 +147,7 @@ class _Few:
     @cached_property
     def sizes(self) -> _QuantitySizes:
         """Return the sizes of all quantities."""
-        sizes = Sizes(self.scene, self.solution)
+        sizes = TermSizes(self.scene, self.solution)
         linkage = self.scene.linkage
         conditions = [
             find_condition(name, linkage, self.solution) for name in self.quantities
@@ -167,11 +168,13 @@ class _Few:
 
         Some entries of the command are changed.
         """
-        return _solve(scene, self.command._replace(**changed), self.quantities)
+        return _solve_from_first(
+            scene, self.command._replace(**changed), self.quantities
+        )
 
     def solve_forces(self, scene: Scene) -> Solution:
         """Solve another scene at the same positions for forces and torques alone."""
-        return _solve(scene, self.command, self.quantities[self.forces])
+        return _solve_from_first(scene, self.command, self.quantities[self.forces])
 
     def solve_alike(self, scene: Scene, sense: int, **changed: Any) -> Solution:
         """Solve another scene whose loop lies on the same side, or on the other.
@@ -183,7 +186,9 @@ class _Few:
         the same in both scenes, the name of the assembly need not be.
         """
         signed = self.command._replace(branch=sense * self._signs, **changed)
-        return _solve(scene, with_signs(scene.linkage, signed), self.quantities)
+        return _solve_from_first(
+            scene, with_signs(scene.linkage, signed), self.quantities
+        )
 
     def compare(self, convert: Callable[[str], Array]) -> Array:
         """Compare all quantities with those of another scene, converted; (q, n)."""
@@ -219,7 +224,7 @@ class _Few:
 def check_transformed(question: Question) -> Iterator[Row]:
     """Hold a scene to what it is when it is stated otherwise."""
     try:
-        few = _take_few(question)
+        few = _take_plain_positions(question)
     except NotAskedError as reason:
         question.leave_out("scenes stated otherwise", reason)
         return
@@ -230,7 +235,7 @@ def check_transformed(question: Question) -> Iterator[Row]:
             question.leave_out(name, reason)
 
 
-def _take_few(question: Question) -> _Few:
+def _take_plain_positions(question: Question) -> _Few:
     """Take a scene at a few positions, with plain numbers of its bars and places.
 
     Raises NotAskedError where it cannot be stated otherwise.
@@ -263,11 +268,11 @@ def _take_few(question: Question) -> _Few:
     if not len(indices):
         raise NotAskedError("no position is well-conditioned")
     begin = int(np.argmax(solution.assembled))
-    chosen = spread_evenly(indices, SAMPLE)
+    chosen = spread_evenly(indices, POSITIONS_STATED_OTHERWISE)
     positions = np.concatenate([[begin], chosen[chosen != begin]])
     command = at.part(positions)._replace(remainder=None)
     link = scene.linkage
-    two, three, four = (_make_plain(link.bar(bar)) for bar in MOVING_BARS)
+    two, three, four = (_make_bar_of_numbers(link.bar(bar)) for bar in MOVING_BARS)
     few = Scene(
         FourBar(link.ground, two, three, four, link.ground_angle),
         Motion(),
@@ -276,7 +281,7 @@ def _take_few(question: Question) -> _Few:
         placed.effects,
         drive=placed.drive,
     )
-    return _Few(few, command, _solve(few, command), question, fit[positions])
+    return _Few(few, command, _solve_from_first(few, command), question, fit[positions])
 
 
 def _mark_long_springs(scene: Scene, solution: Solution) -> Mask:
@@ -299,7 +304,7 @@ def _mark_long_springs(scene: Scene, solution: Solution) -> Mask:
     return long
 
 
-def _solve(
+def _solve_from_first(
     scene: Scene, command: Command, names: Sequence[str] | None = None
 ) -> Solution:
     """Solve a scene whose motion begins at the first position.
@@ -319,13 +324,13 @@ def _solve(
     return solve(begun, at=command, out=make_blank(len(command.angle), evaluated))
 
 
-def _make_plain(bar: Bar) -> Bar:
+def _make_bar_of_numbers(bar: Bar) -> Bar:
     """Return a bar whose mass, inertia and centre are numbers."""
     return Bar(bar.length, find_mass(bar), find_inertia(bar), find_centre(bar))
 
 
 @dataclass(frozen=True)
-class _Conversion:
+class _SceneConversion:
     """Conversion of each number of a scene."""
 
     length: float = 1.0
@@ -373,7 +378,7 @@ def _from_other_end(length: float, pair: tuple[float, float]) -> tuple[float, fl
     return cmath.polar(length - cmath.rect(*pair))
 
 
-def _convert_load(load: Load, to: _Conversion, linkage: FourBar) -> Load:
+def _convert_load(load: Load, to: _SceneConversion, linkage: FourBar) -> Load:
     force = None
     if to.exchanged:
         bar = _OTHER_BAR[load.bar]
@@ -399,27 +404,31 @@ def _convert_load(load: Load, to: _Conversion, linkage: FourBar) -> Load:
     return Load(bar, force, **places, moment=moment, frame=load.frame)
 
 
-def _convert_gravity(effect: Gravity, to: _Conversion, linkage: FourBar) -> Gravity:
+def _convert_gravity(
+    effect: Gravity, to: _SceneConversion, linkage: FourBar
+) -> Gravity:
     return Gravity(to.length * effect.magnitude, to.direction(effect.angle))
 
 
-def _convert_couples(effect: Any, to: _Conversion, linkage: FourBar) -> Any:
+def _convert_couples(effect: Any, to: _SceneConversion, linkage: FourBar) -> Any:
     """Convert damping and dry friction, whose couples have no sense of their own."""
     square = to.length * to.length
     return type(effect).at(
-        **{_name(pin, to): square * number for pin, number in effect.rows}
+        **{_name_pin(pin, to): square * number for pin, number in effect.rows}
     )
 
 
 def _convert_pin_friction(
-    effect: PinFriction, to: _Conversion, linkage: FourBar
+    effect: PinFriction, to: _SceneConversion, linkage: FourBar
 ) -> PinFriction:
     return PinFriction(
-        tuple((_name(pin, to), mu, to.length * r) for pin, mu, r in effect.pins)
+        tuple((_name_pin(pin, to), mu, to.length * r) for pin, mu, r in effect.pins)
     )
 
 
-def _convert_springs(effect: Springs, to: _Conversion, linkage: FourBar) -> Springs:
+def _convert_springs(
+    effect: Springs, to: _SceneConversion, linkage: FourBar
+) -> Springs:
     return Springs(
         tuple(
             replace(
@@ -439,7 +448,9 @@ def _scale_stroke(stroke: float | None, factor: float) -> float | None:
     return None if stroke is None else factor * stroke
 
 
-def _convert_torsion(effect: Torsion, to: _Conversion, linkage: FourBar) -> Torsion:
+def _convert_torsion(
+    effect: Torsion, to: _SceneConversion, linkage: FourBar
+) -> Torsion:
     """Convert springs at pins.
 
     Read from the other end two bars at A or B change their order.
@@ -454,7 +465,7 @@ def _convert_torsion(effect: Torsion, to: _Conversion, linkage: FourBar) -> Tors
             line = -math.pi
         rows.append(
             (
-                _name(pin, to),
+                _name_pin(pin, to),
                 square * stiffness,
                 sense * rest + line,
                 square * sense * preload,
@@ -463,7 +474,9 @@ def _convert_torsion(effect: Torsion, to: _Conversion, linkage: FourBar) -> Tors
     return Torsion(tuple(rows))
 
 
-def _convert_flywheel(effect: Flywheel, to: _Conversion, linkage: FourBar) -> Flywheel:
+def _convert_flywheel(
+    effect: Flywheel, to: _SceneConversion, linkage: FourBar
+) -> Flywheel:
     if to.exchanged:
         bar = _OTHER_BAR[effect.bar]
     else:
@@ -471,11 +484,11 @@ def _convert_flywheel(effect: Flywheel, to: _Conversion, linkage: FourBar) -> Fl
     return Flywheel(to.length * to.length * effect.inertia, bar)
 
 
-def _name(pin: str, to: _Conversion) -> str:
+def _name_pin(pin: str, to: _SceneConversion) -> str:
     return OTHER_PIN[pin] if to.exchanged else pin
 
 
-_CONVERTED: dict[type[Effect], Callable[[Any, _Conversion, FourBar], Any]] = {
+_CONVERTED: dict[type[Effect], Callable[[Any, _SceneConversion, FourBar], Any]] = {
     Load: _convert_load,
     Gravity: _convert_gravity,
     Viscous: _convert_couples,
@@ -490,7 +503,7 @@ _NOT_IN_PARTS = (Friction, PinFriction)
 """Effects that are not the sum of what each adds."""
 
 
-def _convert_drive(drive: Any, to: _Conversion, linkage: FourBar) -> Any:
+def _convert_drive(drive: Any, to: _SceneConversion, linkage: FourBar) -> Any:
     if isinstance(drive, LinearDrive):
         ends = (to.place(end, linkage) for end in (drive.start, drive.end))
         return LinearDrive(*ends)
@@ -502,7 +515,7 @@ def _convert_drive(drive: Any, to: _Conversion, linkage: FourBar) -> Any:
     return PointDrive(to.place(drive.place, linkage), direction, drive.frame)
 
 
-def _convert(scene: Scene, to: _Conversion) -> Scene:
+def _convert(scene: Scene, to: _SceneConversion) -> Scene:
     """State a scene otherwise."""
     link = scene.linkage
     bars = [
@@ -534,7 +547,7 @@ def _measure_mirrored(few: _Few) -> Array:
     """Mirror at the x-axis: the sine changes its sign."""
     command = few.command
     other = few.solve_alike(
-        _convert(few.scene, _Conversion(sense=-1.0)),
+        _convert(few.scene, _SceneConversion(sense=-1.0)),
         -1,
         angle=-command.angle,
         speed=-np.asarray(command.speed),
@@ -555,7 +568,7 @@ def _measure_mirrored(few: _Few) -> Array:
 def _measure_turned(few: _Few) -> Array:
     """Turn about O2."""
     other = few.solve(
-        _convert(few.scene, _Conversion(turn=TURNED)),
+        _convert(few.scene, _SceneConversion(turn=TURNED)),
         angle=few.command.angle + TURNED,
     )
 
@@ -576,7 +589,7 @@ def _measure_scaled(few: _Few) -> Array:
 
     Return what differs at all.
     """
-    other = few.solve(_convert(few.scene, _Conversion(length=SCALE)))
+    other = few.solve(_convert(few.scene, _SceneConversion(length=SCALE)))
     power = {"N": SCALE, "N m": SCALE**2, "W": SCALE**2}
     errors = []
     for name, ours in zip(few.quantities, few.numbers, strict=True):
@@ -595,7 +608,7 @@ def _measure_exchanged(few: _Few) -> Array:
     bar = _OTHER_BAR[command.bar]
     reversed_ = bar == 3
     other = few.solve_alike(
-        _convert(few.scene, _Conversion(exchanged=True)),
+        _convert(few.scene, _SceneConversion(exchanged=True)),
         -1 if reversed_ else 1,
         angle=command.angle + math.pi if reversed_ else command.angle,
         bar=bar,
@@ -655,7 +668,7 @@ def _take_part(linkage: FourBar, part: float) -> FourBar:
         assert bar.inertia is not None and bar.centre is not None
         mass = part * bar.mass
         if bar.mass:
-            apart = APART * math.sqrt(bar.inertia / bar.mass)
+            apart = MASSES_APART * math.sqrt(bar.inertia / bar.mass)
         else:
             apart = 0.0
         # the inertia of both parts about the common centre, less what their distance

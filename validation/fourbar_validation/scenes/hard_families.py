@@ -27,7 +27,7 @@ from fourbar_validation.scenes.random import (
 
 Lengths = tuple[float, float, float, float]
 """(ground, input, coupler, output), m."""
-BARS = Ranges(
+HEAVY_BARS = Ranges(
     mass=draw_uniform(0.2, 2.0),
     inertia=draw_uniform(0.05, 0.2),
     centre=draw_uniform(0.2, 0.8),
@@ -35,20 +35,20 @@ BARS = Ranges(
 )
 Scenes = Iterator[tuple[str, Scene]]
 _ROCKERS = (DrawnType.DOUBLE_ROCKER, DrawnType.TRIPLE_ROCKER)
-CRANK = DrawnType.CRANK_ROCKER
-ROCKER = DrawnType.TRIPLE_ROCKER
+TYPES_WITH_A_CRANK = DrawnType.CRANK_ROCKER
+TYPES_WITH_A_ROCKER = DrawnType.TRIPLE_ROCKER
 REGULAR = (0.5, 0.4, 0.3)
 """rad from the singular position: positions that set the scale of each quantity."""
 TOGGLE = tuple(10.0**-k for k in range(1, 13))
-NEAR = (1e-1, 3e-2, 1e-2, 3e-3)
+NEAR_DISTANCES = (1e-1, 3e-2, 1e-2, 3e-3)
 """rad; as far as a simulation in time follows."""
 _POLE = tuple(10.0**-k for k in range(1, 10))
-PLAIN = (0.3, 0.1, 0.25, 0.22)
+ORDINARY_LENGTHS = (0.3, 0.1, 0.25, 0.22)
 """Lengths of an ordinary crank-rocker, m."""
 CHANGE = tuple(10.0**-k for k in range(1, 9))
 
 
-def draw_linkage(kind: DrawnType, seed: int) -> Lengths:
+def draw_lengths_of_type(kind: DrawnType, seed: int) -> Lengths:
     """Draw random lengths of a type, from its seed alone."""
     return draw_lengths(
         np.random.default_rng([seed, list(DrawnType).index(kind)]), kind
@@ -62,7 +62,7 @@ def dress(lengths: Lengths, seed: int = 0) -> Scene:
     """
     rng = np.random.default_rng([seed, 4])
     d, *moving = lengths
-    bars = draw_bars(rng, moving, BARS)
+    bars = draw_bars(rng, moving, HEAVY_BARS)
     weight = 9.81 * sum(bar.mass for bar in bars)
     loads = (
         Load(
@@ -132,7 +132,7 @@ def find_collinear_2_3(lengths: Lengths) -> list[tuple[float, int]]:
     for along in (a + b, a - b):
         for psi in _compute_corners(d, along, c):
             u = complex(math.cos(psi), math.sin(psi))
-            places.append((psi, _find_side(d - a * u, (along - a) * u)))
+            places.append((psi, _find_sense(d - a * u, (along - a) * u)))
     return places
 
 
@@ -146,11 +146,11 @@ def _find_parallel_2_4(lengths: Lengths) -> list[tuple[float, int]]:
     for joined, side in ((a - c, 1.0), (a + c, -1.0)):
         for psi in _compute_corners(d, joined, b):
             u = complex(math.cos(psi), math.sin(psi))
-            places.append((psi, _find_side(d - joined * u, side * c * u)))
+            places.append((psi, _find_sense(d - joined * u, side * c * u)))
     return places
 
 
-def _find_side(one: complex, second: complex) -> int:
+def _find_sense(one: complex, second: complex) -> int:
     """Return the sign of the rotation from one direction to another."""
     if (one.conjugate() * second).imag > 0.0:
         return 1
@@ -161,7 +161,7 @@ def toggle(*, distances: tuple[float, ...] = TOGGLE, seeds: range = range(2)) ->
     """Approach bars 3, 4 in line from inside, and the same distances beyond it."""
     for kind in _ROCKERS:
         for seed in seeds:
-            lengths = draw_linkage(kind, seed)
+            lengths = draw_lengths_of_type(kind, seed)
             for psi, stretched in find_collinear_3_4(lengths):
                 inward = -1.0 if stretched else 1.0
                 inside = psi + inward * np.array([*REGULAR, *distances])
@@ -190,7 +190,7 @@ def _approach_poles(
         [*(-x for x in (*REGULAR, *distances)), *distances[::-1], *REGULAR[::-1]]
     )
     for seed in seeds:
-        lengths = draw_linkage(CRANK, seed)
+        lengths = draw_lengths_of_type(TYPES_WITH_A_CRANK, seed)
         if bar == 3:
             poles = _find_parallel_2_4(lengths)
         else:
@@ -208,7 +208,7 @@ def _driven_output(*, steps: int = 180, seeds: range = range(2)) -> Scenes:
     The turn leads across both positions where omega_4 = 0.
     """
     for seed in seeds:
-        scene = dress(draw_linkage(CRANK, seed), seed)
+        scene = dress(draw_lengths_of_type(TYPES_WITH_A_CRANK, seed), seed)
         for branch, name in BRANCH_NAMES.items():
             motion = Motion(Sweep(0.05, 0.05 + 2 * math.pi, steps), 3.0, 0.0, branch)
             yield f"{seed} {name}", replace(scene, motion=motion, drive_bar=4)
@@ -294,7 +294,7 @@ def _shorten_crank(*, exponents: range = range(-6, 0)) -> Scenes:
 
 def _vary_mass_ratio(*, exponents: tuple[int, ...] = (-6, -3, 3, 6)) -> Scenes:
     """Make one bar heavier or lighter than the others by up to 1e6."""
-    base = sweep_turn(dress(PLAIN))
+    base = sweep_turn(dress(ORDINARY_LENGTHS))
     for name, bar in list_moving(base):
         for k in exponents:
             heavy = replace(
@@ -308,7 +308,7 @@ def _remove_inertia() -> Scenes:
 
     Some have loads only on massless bars.
     """
-    base = sweep_turn(dress(PLAIN))
+    base = sweep_turn(dress(ORDINARY_LENGTHS))
     for name, bar in list_moving(base):
         yield (
             f"{name} point mass",
@@ -325,7 +325,7 @@ def _remove_inertia() -> Scenes:
 
 def _move_centres_out(*, times: tuple[float, ...] = (3.0, 100.0, 1e4)) -> Scenes:
     """Put mass centres far outside the bar."""
-    base = sweep_turn(dress(PLAIN))
+    base = sweep_turn(dress(ORDINARY_LENGTHS))
     for name, bar in list_moving(base):
         for k in times:
             yield (
@@ -339,12 +339,15 @@ def _move_centres_out(*, times: tuple[float, ...] = (3.0, 100.0, 1e4)) -> Scenes
 def _scale_sizes(*, exponents: range = range(-6, 7, 2)) -> Scenes:
     """Scale the same shape from micrometres to a thousand kilometres."""
     for k in exponents:
-        yield f"1e{k:+d} m", sweep_turn(dress(tuple(x * 10.0**k for x in PLAIN)))  # type: ignore[arg-type]
+        ground, input_, coupler, output = ORDINARY_LENGTHS
+        size = 10.0**k
+        lengths = (ground * size, input_ * size, coupler * size, output * size)
+        yield f"1e{k:+d} m", sweep_turn(dress(lengths))
 
 
 def _scale_speeds(*, exponents: tuple[int, ...] = (-6, -3, 0, 3, 6)) -> Scenes:
     """Vary omega_2 from 1e-6 to 1e6 rad/s, in both senses."""
-    base = sweep_turn(dress(PLAIN))
+    base = sweep_turn(dress(ORDINARY_LENGTHS))
     for k in exponents:
         for sign, name in ((1.0, "+"), (-1.0, "-")):
             yield (
@@ -355,7 +358,7 @@ def _scale_speeds(*, exponents: tuple[int, ...] = (-6, -3, 0, 3, 6)) -> Scenes:
 
 def scale_loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:
     """Load from 1e-9 to 1e9 of the weights."""
-    base = sweep_turn(dress(PLAIN))
+    base = sweep_turn(dress(ORDINARY_LENGTHS))
     for k in exponents:
         scaled = []
         for load in base.loads:
@@ -372,7 +375,7 @@ def _sweep_out_and_back(
 ) -> Scenes:
     """Sweep out of the range in which the linkage assembles, and back."""
     for seed in seeds:
-        lengths = draw_linkage(ROCKER, seed)
+        lengths = draw_lengths_of_type(TYPES_WITH_A_ROCKER, seed)
         (psi, stretched), *_ = find_collinear_3_4(lengths)
         outward = 1.0 if stretched else -1.0
         out = np.linspace(psi - outward * 0.6, psi + outward * beyond, steps)
@@ -425,11 +428,11 @@ class Family:
 _STATEMENTS = tomllib.loads(
     Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
 )
-FAMILIES = tuple(
+HARD_FAMILIES = tuple(
     Family(name, _STATEMENTS[name], scenes)
     for name, scenes in {
         "toggle": toggle,
-        "toggle-near": lambda: toggle(distances=NEAR),
+        "toggle-near": lambda: toggle(distances=NEAR_DISTANCES),
         "pole-T3": lambda: _approach_poles(bar=3),
         "pole-T4": lambda: _approach_poles(bar=4),
         "driven-output": _driven_output,
@@ -469,14 +472,14 @@ class Hard:
 
     def fingerprint(self) -> str:
         """Name the families and count their scenes."""
-        return f"hard {' '.join(family.name for family in FAMILIES)} {len(self)}"
+        return f"hard {' '.join(family.name for family in HARD_FAMILIES)} {len(self)}"
 
 
 @cache
 def _make_scenes() -> list[tuple[str, Scene]]:
     """Make the scenes, by name."""
     scenes = []
-    for family in FAMILIES:
+    for family in HARD_FAMILIES:
         for label, scene in family.scenes():
             titled = replace(
                 scene, title=f"{family.name}: {label}", source=family.statement

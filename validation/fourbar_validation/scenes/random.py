@@ -103,9 +103,9 @@ class Ranges:
     """True if the mass is per metre."""
 
 
-Angles = Callable[[np.random.Generator, FourBar], Any]
+DrawAngle = Callable[[np.random.Generator, FourBar], Any]
 """Commanded theta_2, rad, of a linkage whose bars are drawn."""
-DrawnLinkage = tuple[Sequence[float], Angles]
+DrawnLinkage = tuple[Sequence[float], DrawAngle]
 """Lengths (ground, input, coupler, output), m, and the angles commanded."""
 
 
@@ -125,7 +125,7 @@ class RandomFamily:
         )
 
 
-def command_angle(psi: float) -> Angles:
+def command_angle(psi: float) -> DrawAngle:
     """Command the angle theta_2 - theta_1, rad."""
     return lambda _, linkage: linkage.ground_angle + psi
 
@@ -265,7 +265,7 @@ class DrawnType(Enum):
     TRIPLE_ROCKER = "triple-rocker"
 
 
-SHORTEST = {
+SHORTEST_BAR = {
     DrawnType.DRAG_LINK: 0,
     DrawnType.CRANK_ROCKER: 1,
     DrawnType.DOUBLE_ROCKER: 2,
@@ -276,7 +276,7 @@ is a Grashof one.
 """
 UNEVEN_TYPE = "uneven"
 """Name that stands for the family `_UNEVEN_FAMILY` in place of types."""
-POSITIONS = 37
+POSITIONS_OF_A_SWEEP = 37
 _CLEARANCE = 0.02
 """Distance of a random linkage from the equality of change points. It is this part of
 its longest bar, from s + l = p + q.
@@ -302,7 +302,7 @@ def draw_lengths(
                 return tuple(float(x) for x in rng.permutation(lengths))  # type: ignore[return-value]
         elif surplus > _CLEARANCE:
             others = list(rng.permutation(lengths[1:]))
-            others.insert(SHORTEST[kind], shortest)
+            others.insert(SHORTEST_BAR[kind], shortest)
             return tuple(float(x) for x in others)  # type: ignore[return-value]
 
 
@@ -324,7 +324,7 @@ def draw_uneven_lengths(
 
 
 _TEN_DECADES = draw_decades(-5.0, 5.0)
-UNEVEN = Ranges(
+UNEVEN_RANGES = Ranges(
     pushed=PUSHED,
     mass=draw_chance(0.9, _TEN_DECADES),
     inertia=draw_product(draw_uniform(0.02, 0.4), draw_chance(0.5, _TEN_DECADES, 1.0)),
@@ -354,7 +354,7 @@ def _draw_uneven_place(rng: np.random.Generator) -> DrawnLinkage:
     return [size * x for x in lengths], draw_angles
 
 
-_UNEVEN_FAMILY = RandomFamily(_draw_uneven_place, UNEVEN)
+_UNEVEN_FAMILY = RandomFamily(_draw_uneven_place, UNEVEN_RANGES)
 """Linkages with ratios of 1e-5 to 1e5, and with every kind of effect. The ratios are
 those of lengths, masses, arms and loads.
 """
@@ -374,13 +374,15 @@ MACHINES = Ranges(
 
 
 def _draw_machine_place(kind: DrawnType, rng: np.random.Generator) -> DrawnLinkage:
-    """Draw a linkage of a type, with POSITIONS angles over its range.
+    """Draw a linkage of a type, with POSITIONS_OF_A_SWEEP angles over its range.
 
     It can move over that range.
     """
     size = 10.0 ** rng.uniform(-1.5, 1.0)
     lengths = [size * x for x in draw_lengths(rng, kind)]
-    return lengths, lambda _, linkage: Sweep(*choose_range(linkage), POSITIONS - 1)
+    return lengths, lambda _, linkage: Sweep(
+        *choose_range(linkage), POSITIONS_OF_A_SWEEP - 1
+    )
 
 
 _MACHINE_FAMILIES = {

@@ -14,16 +14,16 @@ from typing import Protocol
 
 from fourbar import writing
 from fourbar.errors import InputError, state_messages_in
-from fourbar.files import loads, read_text
+from fourbar.files import loads, read_scene_text
 from fourbar.scene import Scene
 from fourbar.scene.motion import Free, Law, Rise, Sweep, require_steps
 from fourbar.scene.scene import default_places
 from fourbar.show.units import units_of_text
-from fourbar_validation.compare.rows import make_plain
+from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.places import MODELS
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 
-MOST_POSITIONS = 100_000
+MOST_POSITIONS_OF_A_SCENE = 100_000
 """Most positions of a scene in a run. Every engine solves each of them: 3 ms each, with
 all engines.
 """
@@ -148,7 +148,7 @@ def read_scene_files(paths: Iterable[Path]) -> Files:
                 str(file),
                 f"must have a name of its own: another file is {name!r} too",
             )
-        text = read_text(file)
+        text = read_scene_text(file)
         with state_messages_in(units_of_text(text)):
             scene = loads(text, str(file))
         most = max(most, _count_positions(scene, file))
@@ -159,7 +159,7 @@ def read_scene_files(paths: Iterable[Path]) -> Files:
 
 
 def _write_printed(name: str) -> str:
-    return make_plain(name).replace("\n", "\\n")
+    return escape_controls(name).replace("\n", "\\n")
 
 
 def _count_positions(scene: Scene, file: Path) -> int:
@@ -167,7 +167,7 @@ def _count_positions(scene: Scene, file: Path) -> int:
 
     Raises InputError beyond the most.
     """
-    require_steps(scene.motion, MOST_POSITIONS, "in a run", str(file))
+    require_steps(scene.motion, MOST_POSITIONS_OF_A_SCENE, "in a run", str(file))
     for stated in (scene.motion.angle, scene.motion.law, scene.motion.free):
         if isinstance(stated, (Sweep, Law, Rise, Free)):
             if isinstance(stated, Free):

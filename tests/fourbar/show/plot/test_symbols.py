@@ -23,7 +23,7 @@ from fourbar.show.plot import symbols
 from fourbar.show.plot.figures import draw_figure
 from fourbar.show.plot.film import _make_stage
 from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.linkage import draw_mechanism, scale_of
+from fourbar.show.plot.linkage import choose_drawing_scale, draw_mechanism
 from fourbar.show.plot.style import apply_style
 from fourbar.show.plot.symbols import list_acting
 from fourbar.show.plot.view import make_view
@@ -67,7 +67,7 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything: Scene) -> Non
     for index in (5, 30):
         place = symbols.place_of(everything.linkage, solution, index, 1.0)
         drawn = {
-            s.name: symbols.draw(axes, s, place, 0.01)
+            s.name: symbols.draw_symbol(axes, s, place, 0.01)
             for s in list_acting(everything)
             if s.kind in ("force", "spring")
         }
@@ -115,7 +115,7 @@ def test_nothing_at_a_pin_hides_a_bar_and_what_lies_off_a_bar_is_joined_to_it(
     shown = make_view(
         replace(everything, linkage=short, points=(fourbar.Point("P", 3, (0.15, 0.7)),))
     )
-    factor, *_ = scale_of(shown)
+    factor, *_ = choose_drawing_scale(shown)
     axes = Figure().subplots()
     draw_mechanism(axes, shown, shown.here, 0, Labels())
     bars = [line for line in axes.lines if line.get_linewidth() == 4.5]

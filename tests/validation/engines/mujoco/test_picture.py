@@ -13,9 +13,9 @@ import fourbar
 from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.model import compute_frame
 from fourbar_validation.engines.mujoco.picture import (
-    HEIGHT,
-    MOST,
-    WIDTH,
+    MOST_SCENES_DRAWN,
+    PIXELS_HIGH,
+    PIXELS_WIDE,
     render_pictures,
 )
 from tests.support.scenes import crank_rocker, thesis
@@ -35,7 +35,7 @@ def test_the_bars_are_seen_where_the_formulas_put_them() -> None:
     from matplotlib.image import imread
 
     image = imread(io.BytesIO(base64.b64decode(drawn["thesis"])))[..., :3]
-    assert image.shape == (HEIGHT, WIDTH, 3)
+    assert image.shape == (PIXELS_HIGH, PIXELS_WIDE, 3)
     seen = compute_frame(scene.linkage)
     s = fourbar.solve(scene)
     O4 = scene.linkage.ground * np.exp(1j * scene.linkage.ground_angle)
@@ -46,8 +46,8 @@ def test_the_bars_are_seen_where_the_formulas_put_them() -> None:
     }
     for number, (start, end) in ends.items():
         middle = start + 0.4 * (end - start)  # at 0.5 lies the site of a load
-        x = WIDTH / 2 + (middle[0] - seen.x) / seen.half_height * HEIGHT / 2
-        y = HEIGHT / 2 - (middle[1] - seen.y) / seen.half_height * HEIGHT / 2
+        x = PIXELS_WIDE / 2 + (middle[0] - seen.x) / seen.half_height * PIXELS_HIGH / 2
+        y = PIXELS_HIGH / 2 - (middle[1] - seen.y) / seen.half_height * PIXELS_HIGH / 2
         around = image[
             round(y) - 2 : round(y) + 3, round(x) - 2 : round(x) + 3
         ].reshape(-1, 3)
@@ -68,7 +68,7 @@ def test_no_position_leaves_the_frame(scene: fourbar.Scene) -> None:
             offset = np.abs(points[s.assembled] - (seen.x, seen.y)).max(axis=0)
             assert (
                 offset[1] < seen.half_height
-                and offset[0] < seen.half_height * WIDTH / HEIGHT
+                and offset[0] < seen.half_height * PIXELS_WIDE / PIXELS_HIGH
             )
 
 
@@ -80,5 +80,7 @@ def test_without_opengl_there_is_a_reason(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_many_scenes_are_left_out_with_a_reason() -> None:
-    drawn, why_not = render_pictures(dict.fromkeys(map(str, range(MOST + 1)), ""))
-    assert drawn == {} and str(MOST) in why_not
+    drawn, why_not = render_pictures(
+        dict.fromkeys(map(str, range(MOST_SCENES_DRAWN + 1)), "")
+    )
+    assert drawn == {} and str(MOST_SCENES_DRAWN) in why_not

@@ -12,8 +12,8 @@ import pytest
 import fourbar
 from fourbar.mjcf import Settings, size_flywheel
 from fourbar.scene import command
-from fourbar_validation.advise.worst_errors import QUANTITIES, compute_errors
-from fourbar_validation.cost.series import BEST, PLAIN
+from fourbar_validation.advise.worst_errors import ERROR_NAMES, compute_errors
+from fourbar_validation.cost.series import BEST, WITHOUT_PADS
 from fourbar_validation.engines.mujoco import drives
 from fourbar_validation.engines.mujoco.trial import Build, TrialSetup
 from fourbar_validation.scenes.suites import MODELS
@@ -71,9 +71,9 @@ CASES = {
     "defaults, implicit": defaults("implicit"),
     "defaults, implicitfast": defaults("implicitfast"),
     "defaults, discrete": defaults("discrete"),
-    "no pads": Case(PLAIN, LoopSettings(160, "RK4", 10.0)),
+    "no pads": Case(WITHOUT_PADS, LoopSettings(160, "RK4", 10.0)),
     "no pads, d = 0.99": Case(
-        replace(PLAIN, impedance=0.99), LoopSettings(160, "RK4", 10.0, 0.99)
+        replace(WITHOUT_PADS, impedance=0.99), LoopSettings(160, "RK4", 10.0, 0.99)
     ),
     "regularisation edited": Case(
         replace(BEST, pad=None),
@@ -154,7 +154,7 @@ def compare(drive: str, case: Case) -> None:
         case.again, steps_per_revolution=steps, wheel=wheel, carrier=carrier
     )
     right = measure(scene, again)
-    for quantity in QUANTITIES:
+    for quantity in ERROR_NAMES:
         assert getattr(plotted, quantity) == pytest.approx(right[quantity], rel=AGREES)
 
 

@@ -18,7 +18,7 @@ from fourbar.scene import Scene, command
 from fourbar.studies import derivatives
 from fourbar.studies.keys import read_numbers
 from fourbar_lab.fault_scenes import FAULT_SCENES
-from fourbar_validation.compare.rows import DERIVED as DERIVED_ROWS
+from fourbar_validation.compare.rows import DERIVED_CHECKS as DERIVED_ROWS
 from fourbar_validation.compare.rows import FAILS, REFUSES, Row
 from fourbar_validation.run import judge
 from fourbar_validation.run.derived import files

@@ -19,8 +19,9 @@ import numpy as np
 
 from fourbar.errors import LimitError
 from fourbar.formulas import mobility
+from fourbar.formulas.mobility import TURN
 from fourbar.linkage import MOVING_BARS, FourBar, uniform
-from fourbar.quantities import FORCES, UNKNOWNS
+from fourbar.quantities import FORCE_NAMES, UNKNOWNS, Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.answer import Adapter, Answer
@@ -30,22 +31,20 @@ from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
     NOTHING_TO_TELL,
     TOUCHING_MARGIN,
-    TURN,
-    Array,
     Mask,
+    compute_closing_margin,
     count_half_turns,
     find_lever,
-    find_margin,
     find_roundoff,
     find_used,
-    wrap_angle,
+    wrap_difference,
 )
 
-Place = tuple[float, int]
+LimitPlace = tuple[float, int]
 """theta_2 (rad) and branch."""
-Seen = Mapping[Place, Mapping[str, float]]
+Seen = Mapping[LimitPlace, Mapping[str, float]]
 """Values that an engine finds at some places."""
-_OF_BARS = [name for name in UNKNOWNS if name not in FORCES]
+_OF_BARS = [name for name in UNKNOWNS if name not in FORCE_NAMES]
 
 
 class Finding(NamedTuple):
@@ -74,7 +73,7 @@ def make_worst_row(
     return Row.judged(who, quantity, error, allowed, worst.what, theta_2, condition)
 
 
-def look(engine: Adapter, linkage: FourBar, places: Iterable[Place]) -> Seen:
+def look(engine: Adapter, linkage: FourBar, places: Iterable[LimitPlace]) -> Seen:
     """Ask an engine at some places where bar 2 turns at 1 rad/s.
 
     The bars are uniform: masses play no part. `assembled` is 1.0 where it finds that
@@ -122,7 +121,9 @@ def _compare_angles(
         return Finding(
             0.0 if len(stated) == len(answered) else math.inf, 0.0, 0.0, what
         )
-    apart = np.abs(wrap_angle(np.subtract.outer(np.array(stated), np.array(answered))))
+    apart = np.abs(
+        wrap_difference(np.subtract.outer(np.array(stated), np.array(answered)))
+    )
     error = float(max(apart.min(axis=0).max(), apart.min(axis=1).max()))
     return Finding(
         error,
@@ -188,7 +189,7 @@ def _compute_step_beyond(linkage: FourBar, theta_2: float) -> float:
     return float(little / slope) + 4.0 * EPS * (abs(theta_2) + TURN)
 
 
-class _Trial(NamedTuple):
+class _LimitTrial(NamedTuple):
     """Scene and command that an engine is tried with for one bar.
 
     It holds too what the formulas state of them.
@@ -207,14 +208,14 @@ class _Trial(NamedTuple):
     """Findings from comparing the statements with each other."""
 
     @property
-    def places(self) -> list[Place]:
+    def places(self) -> list[LimitPlace]:
         """Places of the command."""
         theta_2 = self.command.theta_2.tolist()
         branch = self.command.branch.tolist()
         return list(zip(theta_2, branch, strict=True))
 
 
-def _try_bar(linkage: FourBar, bar: int) -> _Trial:
+def _try_bar(linkage: FourBar, bar: int) -> _LimitTrial:
     second, third = (linkage.bar(k) for k in MOVING_BARS if k != bar)
     first = FourBar(
         linkage.ground, linkage.bar(bar), second, third, linkage.ground_angle
@@ -269,15 +270,17 @@ def _try_bar(linkage: FourBar, bar: int) -> _Trial:
             float(full != all(within)), 0.0, along[0], f"whether bar {bar} turns fully"
         ),
     )
-    decidable = np.abs(find_margin(first, angles + shift)) > TOUCHING_MARGIN
+    decidable = np.abs(compute_closing_margin(first, angles + shift)) > TOUCHING_MARGIN
     command = Command(angles + shift, np.ones(len(angles), np.int8), None, 0.0)
-    return _Trial(Scene(first), command, angles, inside, decidable, findings)
+    return _LimitTrial(Scene(first), command, angles, inside, decidable, findings)
 
 
 def _compute_inwards(linkage: FourBar, theta_2: float) -> float:
     """Compute the angle of bar 2 from its limit to where the loop closes, rad."""
     step = _compute_step_beyond(linkage, theta_2)
-    ahead, behind = find_margin(linkage, np.array([theta_2 + step, theta_2 - step]))
+    ahead, behind = compute_closing_margin(
+        linkage, np.array([theta_2 + step, theta_2 - step])
+    )
     return step if ahead > behind else -step
 
 
@@ -290,7 +293,7 @@ def _list_limits(
     """
     limits = mobility.limit_positions(linkage, bar)
     angles = np.array([limit.theta_2 for limit in limits])
-    touching = np.abs(find_margin(linkage, angles)) <= TOUCHING_MARGIN
+    touching = np.abs(compute_closing_margin(linkage, angles)) <= TOUCHING_MARGIN
     return list(zip(limits, touching.tolist(), strict=True))
 
 
@@ -307,7 +310,7 @@ class _Passage(NamedTuple):
     after: int
 
     @property
-    def places(self) -> list[Place]:
+    def places(self) -> list[LimitPlace]:
         """Places before the change point and beyond it.
 
         Beyond it they have the stated sign and the other one.
@@ -339,7 +342,7 @@ class StatedLimits(NamedTuple):
     """
 
     linkage: FourBar
-    trials: dict[int, _Trial]
+    trials: dict[int, _LimitTrial]
     """Trials by moving bar."""
     inside: list[tuple[mobility.LimitPosition, float]]
     """Limits of bar 2, and the small angle that it turns from each. At the limit
@@ -406,7 +409,7 @@ def compare_ranges(
     yield stated.change_points
 
 
-def choose_places(stated: StatedLimits) -> list[Place]:
+def choose_places(stated: StatedLimits) -> list[LimitPlace]:
     """Return the places where an engine is evaluated to check these statements."""
     places = stated.trials[2].places
     places += [
@@ -467,8 +470,10 @@ def _check_input(stated: StatedLimits, seen: Seen) -> Iterator[Finding]:
         )
         middle = {}
         for name, angle in (("theta_3", limit.theta_3), ("theta_4", limit.theta_4)):
-            middle[name] = open_[name] + 0.5 * wrap_angle(crossed[name] - open_[name])
-            error = abs(wrap_angle(middle[name] - angle))
+            middle[name] = open_[name] + 0.5 * wrap_difference(
+                crossed[name] - open_[name]
+            )
+            error = abs(wrap_difference(middle[name] - angle))
             yield Finding(error, allowed, limit.theta_2, f"{name} at a limit of bar 2")
         aligned = math.cos(middle["theta_4"] - middle["theta_3"]) < 0.0
         yield Finding(
@@ -515,7 +520,7 @@ def _check_dead_centres(
             continue
         moved = _compute_moved(linkage, bar, limit)
         for angle, of_formula in ((theta_3, limit.theta_3), (theta_4, limit.theta_4)):
-            error = abs(wrap_angle(angle - of_formula))
+            error = abs(wrap_difference(angle - of_formula))
             yield Finding(
                 error,
                 find_roundoff(linkage) / digits + moved * speed,

@@ -11,27 +11,31 @@ from typing import NamedTuple
 import numpy as np
 
 from fourbar.formulas import mobility, transmission
+from fourbar.formulas.mobility import TURN
 from fourbar.formulas.path import compute_state as state_of
 from fourbar.formulas.path import drive_sine, find_singular
 from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Predicted
-from fourbar_validation.compare.statements.limit_positions import Finding, Place, Seen
+from fourbar_validation.compare.statements.limit_positions import (
+    Finding,
+    LimitPlace,
+    Seen,
+)
 from fourbar_validation.compare.tolerance import (
     EPS,
     EQUIVALENCE,
     NOTHING_TO_TELL,
     TIMES_PREDICTED,
-    TURN,
-    Array,
     Mask,
     count_half_turns,
     find_lever,
     find_roundoff,
     find_used,
     find_worst,
-    wrap_angle,
+    wrap_difference,
 )
 
 _RADII = (0.2, 0.3)
@@ -116,7 +120,7 @@ class StatedOver(NamedTuple):
         )
 
 
-def choose_places(stated: StatedTransmission) -> list[Place]:
+def choose_places(stated: StatedTransmission) -> list[LimitPlace]:
     """Return the places where an engine is evaluated.
 
     They are the extremes that are no limits, and both strokes of bar 4.
@@ -206,7 +210,7 @@ def _list_claims(over: StatedOver, answer: Answer) -> Iterator[_Claim]:
         **{bar: answer.quantities[f"theta_{bar}"] for bar in (3, 4)},
     }
     first, second = (theta[bar] for bar in MOVING_BARS if bar != drive)
-    angle = np.abs(wrap_angle(theta[4] - theta[3]))
+    angle = np.abs(wrap_difference(theta[4] - theta[3]))
     sine = np.abs(np.sin(angle))
     # a row of its own compares whether both say that the loop closes
     closed = answer.assembled & over.closed
@@ -315,7 +319,7 @@ def _compare_extremes(stated: StatedTransmission, seen: Seen) -> Iterator[Findin
     for value, theta_2, collinear in stated.ends:
         if value == collinear:
             error = min(
-                (abs(wrap_angle(theta_2 - point)) for point in stated.collinear),
+                (abs(wrap_difference(theta_2 - point)) for point in stated.collinear),
                 default=math.inf,
             )
             yield Finding(
@@ -326,7 +330,9 @@ def _compare_extremes(stated: StatedTransmission, seen: Seen) -> Iterator[Findin
             )
             continue
         angle = abs(
-            wrap_angle(seen[(theta_2, 1)]["theta_4"] - seen[(theta_2, 1)]["theta_3"])
+            wrap_difference(
+                seen[(theta_2, 1)]["theta_4"] - seen[(theta_2, 1)]["theta_3"]
+            )
         )
         digits = find_lever(linkage) * math.sin(angle)
         if not digits * NOTHING_TO_TELL <= EPS:

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from fourbar.mjcf.model import CYLINDER
-from fourbar_validation.compare.answer import Array
+from fourbar.quantities import Array
 from fourbar_validation.engines.loaded import Assembled
 from fourbar_validation.engines.tree import solve_closed
 
@@ -29,7 +29,7 @@ _COLUMN_OF = {
     for bar, joints in _TURNED_BY.items()
 }
 """Derivative of each bar's rotation by the joint angles."""
-ENDS = (f"{CYLINDER}_start", f"{CYLINDER}_end")
+CYLINDER_SITES = (f"{CYLINDER}_start", f"{CYLINDER}_end")
 """Sites of the cylinder."""
 WARNINGS = (
     mujoco.mjtWarning.mjWARN_BADQPOS,
@@ -223,7 +223,7 @@ class ClosedLoop(Assembled):
         """
         if drive_bar is not None:
             return _COLUMN_OF[drive_bar]
-        start, end = ENDS
+        start, end = CYLINDER_SITES
         return np.asarray(
             self.line()
             / self.stroke()
@@ -236,7 +236,7 @@ class ClosedLoop(Assembled):
 
     def line(self) -> Array:
         """Return the vector from the cylinder's one site to the other, (2,), m."""
-        start, end = (self.data.site_xpos[self.site[end]] for end in ENDS)
+        start, end = (self.data.site_xpos[self.site[end]] for end in CYLINDER_SITES)
         return np.asarray((end - start)[:2])
 
     def stroke(self) -> float:
@@ -250,7 +250,7 @@ class ClosedLoop(Assembled):
         """
         if drive_bar is not None:
             return 0.0
-        start, end = ENDS
+        start, end = CYLINDER_SITES
         line = self.line()
         stroke = self.stroke()
         v = self.data.qvel
@@ -279,7 +279,7 @@ class ClosedLoop(Assembled):
         self.place((0.0, 0.0, 0.0))
         ground = self.model.body("ground").id
         ends = sorted(
-            (self.site[end] for end in ENDS),
+            (self.site[end] for end in CYLINDER_SITES),
             key=lambda site: self.model.site_bodyid[site] == ground,
         )
         if bar == 4:

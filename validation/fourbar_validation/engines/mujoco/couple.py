@@ -15,7 +15,7 @@ from fourbar_validation.engines.mujoco.closed_loop import solve_couple
 
 _REFINEMENTS = 3
 """Secant steps after the first: each gains the digits that the one before has."""
-LEAST = 1e-6
+LEAST_ACCELERATION = 1e-6
 """Acceleration of the driven joint that is not told from none. It is over that of the
 open tree's joints.
 """
@@ -53,7 +53,7 @@ def find_couple(
     # without a couple it may already accelerate as wanted, to the rounding of the
     # others
     others = float(np.abs(data.qacc_smooth).max()) or 1.0
-    sought = max(abs(wanted - free), LEAST * others)
+    sought = max(abs(wanted - free), LEAST_ACCELERATION * others)
     trial = float(model.dof_M0.sum()) * sought
     couple = solve_couple(acceleration, wanted, 0.0, trial, _REFINEMENTS)
     if couple is None or abs(acceleration(couple) - wanted) <= _MISSED * sought:

@@ -14,17 +14,17 @@ import mujoco
 import numpy as np
 
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS
-from fourbar_validation.compare.answer import Array
+from fourbar.quantities import Array
 from fourbar_validation.engines.description import ModelEntry, Value
 from fourbar_validation.engines.mujoco.topology import Topology
 
 Described = dict[str, ModelEntry]
-NONE = "none"
-FREE = "free"
+NONE_IN_WORDS = "none"
+UNLIMITED_RANGE = "free"
 """Range of a pin that no stop ends."""
 _GROUND_PINS = ("O2", "O4")
 
-PIN = {
+PIN_PROPERTIES = {
     "damping": ("dof_damping", "damping", "damper"),
     "friction": ("dof_frictionloss", "frictionloss", "frictionloss"),
     "stiffness": ("jnt_stiffness", "stiffness", "spring"),
@@ -33,7 +33,7 @@ PIN = {
 """Property of a pin as field of MjModel and attribute of its joint. The flag switches
 it off.
 """
-FRICTION = {"dof_solref": "solreffriction", "dof_solimp": "solimpfriction"}
+FRICTION_COMPLIANCE = {"dof_solref": "solreffriction", "dof_solimp": "solimpfriction"}
 """Fields of MjModel and attributes by which dry friction yields. They are compared if
 there is any.
 """
@@ -44,7 +44,7 @@ _TENDON = {
     "solref_fri": "solreffriction",
     "solimp_fri": "solimpfriction",
 }
-OPTIONS = (
+COMPARED_OPTIONS = (
     *(
         "timestep",
         "integrator",
@@ -56,8 +56,8 @@ OPTIONS = (
     ),
     *("density", "viscosity", "wind"),
 )
-KINDS = {"integrator": mujoco.mjtIntegrator, "solver": mujoco.mjtSolver}
-WORDS = {
+ENUMERATIONS = {"integrator": mujoco.mjtIntegrator, "solver": mujoco.mjtSolver}
+MJCF_WORDS = {
     "EULER": "Euler",
     "IMPLICIT": "implicit",
     "IMPLICITFAST": "implicitfast",
@@ -98,14 +98,14 @@ def describe_model(topology: Topology, flywheel: float = 0.0) -> Described:
         | _describe_loads(topology)
         | _describe_tendons(topology)
     )
-    for name in OPTIONS:
+    for name in COMPARED_OPTIONS:
         setting = getattr(model.opt, name)
-        if name in KINDS:
-            kind = KINDS[name](setting).name.partition("_")[2]
+        if name in ENUMERATIONS:
+            kind = ENUMERATIONS[name](setting).name.partition("_")[2]
         else:
             kind = ""
         described[f"option.{name}"] = ModelEntry(
-            WORDS.get(kind, kind) or _read_numbers(setting), "option", name
+            MJCF_WORDS.get(kind, kind) or _read_field(setting), "option", name
         )
     touching = model.npair or (
         model.geom_contype.any() and model.geom_conaffinity.any()
@@ -128,7 +128,7 @@ def _is_on(model: mujoco.MjModel, *flags: str) -> bool:
     return not any(model.opt.disableflags & bit for bit in bits)
 
 
-def _read_numbers(entry: object) -> Value:
+def _read_field(entry: object) -> Value:
     return (
         float(entry)  # type: ignore[arg-type]
         if np.ndim(entry) == 0  # type: ignore[arg-type]
@@ -209,13 +209,13 @@ def _describe_pin(topology: Topology, pin: str) -> Described:
     key = f"pins.{pin}"
     joint = topology.hinge.get(pin)
     if joint is None:
-        return {f"{key}.{name}": ModelEntry(0.0) for name in PIN} | {
-            f"{key}.range": ModelEntry(FREE)
+        return {f"{key}.{name}": ModelEntry(0.0) for name in PIN_PROPERTIES} | {
+            f"{key}.range": ModelEntry(UNLIMITED_RANGE)
         }
     dof = int(model.jnt_dofadr[joint])
     element = _name_element("joint", model.joint(joint).name, joint)
     described = {}
-    for name, (field, attribute, flag) in PIN.items():
+    for name, (field, attribute, flag) in PIN_PROPERTIES.items():
         if name == "armature" and pin in _GROUND_PINS:
             continue  # it is inertia of the bar there
         size = float(getattr(model, field)[joint if field.startswith("jnt") else dof])
@@ -224,9 +224,9 @@ def _describe_pin(topology: Topology, pin: str) -> Described:
         )
         described[f"{key}.{name}"] = ModelEntry(size * acts, element, attribute)
     if described[f"{key}.friction"].value:
-        for field, attribute in FRICTION.items():
+        for field, attribute in FRICTION_COMPLIANCE.items():
             described[f"{key}.{attribute}"] = ModelEntry(
-                _read_numbers(getattr(model, field)[dof]), element, attribute
+                _read_field(getattr(model, field)[dof]), element, attribute
             )
     if described[f"{key}.stiffness"].value:
         address = model.jnt_qposadr[joint]
@@ -238,7 +238,7 @@ def _describe_pin(topology: Topology, pin: str) -> Described:
         )
     stops = topology.stops(pin)
     described[f"{key}.range"] = ModelEntry(
-        FREE if stops is None else stops, element, "range"
+        UNLIMITED_RANGE if stops is None else stops, element, "range"
     )
     if topology.sense[pin] > 0:
         sense = "counter-clockwise"
@@ -262,7 +262,7 @@ def _describe_closure(topology: Topology) -> Described:
     )
     others = [i for i in range(model.neq) if i != number and model.eq_active0[i]]
     names = [model.equality(i).name or f"(unnamed {i})" for i in others]
-    described["other equalities"] = ModelEntry(", ".join(names) or NONE)
+    described["other equalities"] = ModelEntry(", ".join(names) or NONE_IN_WORDS)
     if number is None:
         return described
     element = _name_element(
@@ -271,10 +271,10 @@ def _describe_closure(topology: Topology) -> Described:
     impedance = float(np.clip(model.eq_solimp[number, 0], _SOFTEST, STIFFEST))
     softness = (1.0 - impedance) / impedance * _sum_inverse_weights(topology, number)
     described["closure.solref"] = ModelEntry(
-        _read_numbers(model.eq_solref[number]), element, "solref"
+        _read_field(model.eq_solref[number]), element, "solref"
     )
     described["closure.solimp"] = ModelEntry(
-        _read_numbers(model.eq_solimp[number]), element, "solimp"
+        _read_field(model.eq_solimp[number]), element, "solimp"
     )
     return described | {"closure.softness": ModelEntry(softness, element, "solimp")}
 
@@ -311,11 +311,11 @@ def _describe_loads(topology: Topology) -> Described:
         if kind == mujoco.mjtTrn.mjTRN_JOINT:
             pin = next(pin for pin, joint in topology.hinge.items() if joint == number)
             described[f"pins.{pin}.motor"] = ModelEntry(
-                _read_numbers(topology.sense[pin] * gear[0] * bias), element
+                _read_field(topology.sense[pin] * gear[0] * bias), element
             )
         elif kind == mujoco.mjtTrn.mjTRN_TENDON:
             described[f"{_name_tendon(topology, number)}.tension"] = ModelEntry(
-                _read_numbers(gear[0] * bias), element
+                _read_field(gear[0] * bias), element
             )
         elif (
             kind == mujoco.mjtTrn.mjTRN_SITE
@@ -458,7 +458,7 @@ def _describe_tendons(topology: Topology) -> Described:
         described[f"{key}.path"] = ModelEntry(numbers, element)
         for attribute, written in _TENDON.items():
             described[f"{key}.{written}"] = ModelEntry(
-                _read_numbers(getattr(model, f"tendon_{attribute}")[i]),
+                _read_field(getattr(model, f"tendon_{attribute}")[i]),
                 element,
                 written,
             )
@@ -543,9 +543,9 @@ def _set_attribute(root: ET.Element, entry: ModelEntry, key: str, value: Value) 
         stated = float(element.attrib[entry.attribute])
         described = np.atleast_1d(entry.value)[0]
         value = stated + float(np.atleast_1d(value)[0]) - float(described)
-    element.set(entry.attribute, _write_value(value))
+    element.set(entry.attribute, _write_setting(value))
     flags = {"range": "limit"} | {
-        attribute: flag for _, attribute, flag in PIN.values()
+        attribute: flag for _, attribute, flag in PIN_PROPERTIES.values()
     }
     if (flag := flags.get(entry.attribute)) and (
         switches := root.find("option/flag")
@@ -553,7 +553,7 @@ def _set_attribute(root: ET.Element, entry: ModelEntry, key: str, value: Value) 
         switches.attrib.pop(flag, None)
 
 
-def _write_value(value: Value) -> str:
+def _write_setting(value: Value) -> str:
     if isinstance(value, str):
         return value
     if isinstance(value, tuple):
@@ -580,14 +580,14 @@ def _set_length(
         )
         length, angle = (value, angle) if bar == "ground" else (length, value)
         place = (length * math.cos(angle), length * math.sin(angle), 0.0)
-        _find(root, 'body "output"').set("pos", _write_value(place))
+        _find(root, 'body "output"').set("pos", _write_setting(place))
     else:
         element = {
             "input": 'body "coupler"',
             "coupler": 'site "B3"',
             "output": 'site "B4"',
         }[bar]
-        _find(root, element).set("pos", _write_value((value, 0.0, 0.0)))
+        _find(root, element).set("pos", _write_setting((value, 0.0, 0.0)))
 
 
 def _set_inertial(
@@ -604,7 +604,7 @@ def _set_inertial(
     if name == "mass":
         inertial.set("mass", repr(value))
     elif name == "inertia":
-        inertial.set("diaginertia", _write_value((value, value, value)))
+        inertial.set("diaginertia", _write_setting((value, value, value)))
     else:
         polar = {
             part: float(generated[f"bars.{bar}.{part}"].value)  # type: ignore[arg-type]
@@ -613,7 +613,9 @@ def _set_inertial(
         distance, angle = (polar | {name: value}).values()
         inertial.set(
             "pos",
-            _write_value((distance * math.cos(angle), distance * math.sin(angle), 0.0)),
+            _write_setting(
+                (distance * math.cos(angle), distance * math.sin(angle), 0.0)
+            ),
         )
 
 
@@ -650,7 +652,7 @@ def _set_load(
             body,
             "site",
             name=f"changed_{number}",
-            pos=_write_value((float(x), float(y), 0.0)),
+            pos=_write_setting((float(x), float(y), 0.0)),
         )
         gear = sign * np.array((fx, fy, 0.0, 0.0, 0.0, parts["couple"][0]))
         if axes == "world axes":
@@ -667,7 +669,7 @@ def _set_load(
             gainprm="0",
             biastype="affine",
             biasprm="1 0 0",
-            gear=_write_value(tuple(gear.tolist())),
+            gear=_write_setting(tuple(gear.tolist())),
         )
 
 
@@ -691,8 +693,8 @@ def mend_entry(topology: Topology, key: str, value: Value | None) -> bool:
         joint = topology.hinge[pin]
         for i in topology.list_actuators(joint):
             model.actuator_gainprm[i] = model.actuator_biasprm[i] = 0.0
-    elif subject == "option" and rest in KINDS:
-        setattr(model.opt, rest, _find_kind(rest, str(value)))
+    elif subject == "option" and rest in ENUMERATIONS:
+        setattr(model.opt, rest, _number_of_word(rest, str(value)))
     elif subject == "option":
         was = getattr(model.opt, rest)
         setattr(model.opt, rest, np.asarray(value).astype(np.asarray(was).dtype))
@@ -700,8 +702,10 @@ def mend_entry(topology: Topology, key: str, value: Value | None) -> bool:
         model.eq_solref[topology.closure] = value
     elif key in ("closure.solimp", "closure.softness"):
         model.eq_solimp[topology.closure, :2] = STIFFEST
-    elif subject == "pins" and what in FRICTION.values():
-        (field,) = (one for one, attribute in FRICTION.items() if attribute == what)
+    elif subject == "pins" and what in FRICTION_COMPLIANCE.values():
+        (field,) = (
+            one for one, attribute in FRICTION_COMPLIANCE.items() if attribute == what
+        )
         dof = model.jnt_dofadr[topology.hinge[pin]]
         getattr(model, field)[dof] = value
     else:
@@ -709,10 +713,10 @@ def mend_entry(topology: Topology, key: str, value: Value | None) -> bool:
     return True
 
 
-def _find_kind(name: str, word: str) -> int:
+def _number_of_word(name: str, word: str) -> int:
     """Find the number of an integrator or a solver that MJCF calls by a word."""
     return next(
         int(kind)
-        for member, kind in KINDS[name].__members__.items()
+        for member, kind in ENUMERATIONS[name].__members__.items()
         if member.partition("_")[2] == word.upper()
     )

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from xml.etree import ElementTree as ET
 
-from fourbar.mjcf.model import join as numbers
+from fourbar.mjcf.model import write_exactly as numbers
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 
 WHEEL = 1e8

@@ -20,26 +20,26 @@ from fourbar.effects import PointDrive
 from fourbar.errors import InputError
 from fourbar.mjcf import RECIPE, Settings, write_mjcf
 from fourbar.mjcf.model import unwind
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene import command as command_of
-from fourbar_validation.compare.answer import Answer, Array, ReleasedAnswer
+from fourbar_validation.compare.answer import Answer, ReleasedAnswer
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.limits import NO_PUSH
-from fourbar_validation.engines.loaded import Values
-from fourbar_validation.engines.loop import Angles, Assembler, read_each
+from fourbar_validation.engines.loaded import BarValues
+from fourbar_validation.engines.loop import Assembler, JointAngles, read_each
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.runner import Stepper
 
-RELEASED, ONE_STATE = "mujoco-forward", "mujoco-one-state"
+RELEASED, ONE_STATE_NAME = "mujoco-forward", "mujoco-one-state"
 """Names of the engines."""
-TIME_CONSTANT_STEPS = 2.0
+CLOSURE_TIMESTEPS = 2.0
 """Time constant of the loop's closure, in timesteps. Through change points the closure
 takes energy out: 1e-6 of it in ten seconds at 1 ms with 2, three hundred times as much
 with 10.
 """
-FRICTION = (
+FRICTION_ROWS = (
     mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF,
     mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON,
 )
@@ -67,7 +67,7 @@ class MujocoForward:
             RECIPE,
             flywheel=0.0,
             timestep=timestep,
-            time_constant_steps=TIME_CONSTANT_STEPS,
+            time_constant_steps=CLOSURE_TIMESTEPS,
             pad=None,
         )
         bare = replace(scene, motion=scene.motion.replace(free=None, acceleration=0.0))
@@ -84,7 +84,7 @@ class MujocoForward:
         loop.set_state(q_0, scene.motion.omega_2 or 0.0)
         rows = []
         stepper = Stepper(loop.model, loop.data, timestep)
-        work = _Work(loop.model, loop.data, timestep)
+        work = _WorkOnBars(loop.model, loop.data, timestep)
 
         for t in times:
             stepper.to(float(t), lambda _: work.add())
@@ -102,7 +102,7 @@ class MujocoForward:
         return ReleasedAnswer(RELEASED, setting, theta_2, omega, energy, terms)
 
 
-class _Work:
+class _WorkOnBars:
     """Work of loads, damping and dry friction on the bars, J.
 
     It follows from MuJoCo's own powers at the ends of each step.
@@ -134,7 +134,7 @@ class _Work:
 
     def _compute_power(self) -> float:
         d = self.data
-        rubbing = np.isin(d.efc_type, FRICTION)
+        rubbing = np.isin(d.efc_type, FRICTION_ROWS)
         power = float(d.qvel @ (d.qfrc_actuator + d.qfrc_damper))
         return power + float(d.efc_force[rubbing] @ d.efc_vel[rubbing])
 
@@ -151,7 +151,7 @@ class MujocoOneState:
     """
 
     impedances: tuple[float, ...] = _RUNGS
-    name: str = ONE_STATE
+    name: str = ONE_STATE_NAME
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Answer, or refuse a bar that MuJoCo cannot hold."""
@@ -166,11 +166,11 @@ class MujocoOneState:
         try:
             rungs = [_compute_at_impedance(scene, command, d) for d in self.impedances]
         except InputError as error:
-            return Answer(ONE_STATE, setting, refusal=str(error))
+            return Answer(ONE_STATE_NAME, setting, refusal=str(error))
         values = extrapolate(self.impedances, [rung for rung, _ in rungs])
         assembled = rungs[0][1]
         return Answer(
-            ONE_STATE,
+            ONE_STATE_NAME,
             setting,
             command,
             assembled,
@@ -211,7 +211,7 @@ def _compute_at_impedance(
     loop = ClosedLoop(write_mjcf(scene, settings, keyframe=False))
     drive = name_driving(scene)
 
-    def read(q: Angles, omega_2: float, alpha_2: float) -> Values:
+    def read(q: JointAngles, omega_2: float, alpha_2: float) -> BarValues:
         loop.set_state(unwind(scene, q), omega_2)
         torque = loop.solve_drive(scene.drive_bar, alpha_2, (0.0, 1.0), refinements=1)
         return {drive: math.nan if torque is None else torque, **loop.forces()}

@@ -13,21 +13,25 @@ import numpy as np
 
 from fourbar.errors import LimitError
 from fourbar.linkage import uniform
+from fourbar.quantities import Array
 from fourbar.scene import Scene
-from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import FIRST_PIN, find_unknown, list_parts
-from fourbar_validation.engines.effects import has_term, list_acting
+from fourbar_validation.engines.description import (
+    PIN_OF_MOVING_BAR,
+    find_unknown,
+    list_moving_parts,
+)
+from fourbar_validation.engines.effects import has_term, list_wrenches
 from fourbar_validation.engines.limits import LIGHTEST
-from fourbar_validation.engines.loaded import Pair
+from fourbar_validation.engines.loaded import Components
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.tree import Tree
 
 
-def find_refusal(scene: Scene) -> str:
+def find_limit_met(scene: Scene) -> str:
     """Name the declared limit that a scene meets, if any."""
     if reason := find_unknown(scene, has_term, forces=True):
         return reason
-    for part in list_parts(scene.linkage):
+    for part in list_moving_parts(scene.linkage):
         if min(part.mass, part.inertia) < LIGHTEST.boundary:
             return (
                 f"bar {part.bar} has mass {part.mass:g} kg and inertia {part.inertia:g}"
@@ -43,20 +47,20 @@ def _compile_bars() -> mujoco.MjModel:
 
     Constraints are off; what is fixed lies at 0. Only numbers differ from tree to tree,
     and to compile takes a hundred times as long as to write them. What the compiler
-    takes from nobody, `find_refusal` refuses.
+    takes from nobody, `find_limit_met` refuses.
     """
     spec = mujoco.MjSpec()
     spec.option.disableflags |= (
         mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT
     )
     bodies: dict[int, Any] = {1: spec.worldbody}
-    for part in list_parts(uniform(1.0, 1.0, 1.0, 1.0)):
+    for part in list_moving_parts(uniform(1.0, 1.0, 1.0, 1.0)):
         body = bodies[part.bar] = bodies[part.bearer].add_body(name=f"bar{part.bar}")
         body.explicitinertial = True
         body.mass = part.mass
         body.inertia = [part.inertia] * 3
         body.add_joint(
-            name=FIRST_PIN[part.bar],
+            name=PIN_OF_MOVING_BAR[part.bar],
             type=mujoco.mjtJoint.mjJNT_HINGE,
             axis=[0.0, 0.0, 1.0],
         )
@@ -68,7 +72,11 @@ def _compile_bars() -> mujoco.MjModel:
     model.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     model.site_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     model.body_simple[:] = model.dof_simplenum[:] = 0
-    assert [int(model.joint(pin).dofadr[0]) for pin in FIRST_PIN.values()] == [0, 1, 2]
+    assert [int(model.joint(pin).dofadr[0]) for pin in PIN_OF_MOVING_BAR.values()] == [
+        0,
+        1,
+        2,
+    ]
     return model
 
 
@@ -86,7 +94,7 @@ class MujocoTree(Tree):
             memory = model, mujoco.MjData(model)
         self.model, self.data = model, data = memory
         mujoco.mj_resetData(model, data)
-        self.body = {bar: model.body(f"bar{bar}").id for bar in FIRST_PIN}
+        self.body = {bar: model.body(f"bar{bar}").id for bar in PIN_OF_MOVING_BAR}
         self.site = {model.site(number).name: number for number in range(model.nsite)}
         self._describe(scene)
         # the engine's own memory, read and written in place: to look it up again takes
@@ -112,7 +120,7 @@ class MujocoTree(Tree):
         self._jac = np.zeros((3, 3))
         self._jacobians, self._rates = np.zeros((2, model.nsite, 3, 3))
         self._force, self._couple = np.zeros(3), np.zeros(3)
-        self.ready(scene, list_acting(scene, self))
+        self.ready(scene, list_wrenches(scene, self))
 
     def _describe(self, scene: Scene) -> None:
         """Write places, masses and inertias.
@@ -121,7 +129,7 @@ class MujocoTree(Tree):
         alone.
         """
         model = self.model
-        for part in list_parts(scene.linkage):
+        for part in list_moving_parts(scene.linkage):
             body = self.body[part.bar]
             model.body_pos[body, :2] = part.first_pin
             model.body_ipos[body, :2] = part.centre
@@ -202,7 +210,7 @@ class MujocoTree(Tree):
                 )
         return np.asarray(self.qfrc_inverse - applied)
 
-    def carried(self) -> dict[int, Pair]:
+    def carried(self) -> dict[int, Components]:
         """Return cfrc_int, the force of the parent on each body."""
         for bar, (x, y, _) in self.wrenches.items():
             # the couples about the mass centres, at which these forces act, ask nothing
@@ -227,7 +235,7 @@ class MujocoInverse(Exact):
         self.memory: tuple[mujoco.MjModel, mujoco.MjData] | None = None
 
     def _make_tree(self, scene: Scene) -> MujocoTree:
-        if reason := find_refusal(scene):
+        if reason := find_limit_met(scene):
             raise LimitError(reason)
         tree = MujocoTree(scene, self.memory)
         self.memory = tree.model, tree.data

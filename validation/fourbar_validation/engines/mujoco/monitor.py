@@ -25,8 +25,7 @@ import mujoco
 import numpy as np
 
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
-from fourbar.quantities import COUPLE, LINE, PIN_FORCES
-from fourbar_validation.compare.answer import Array
+from fourbar.quantities import COUPLE, LINE, PIN_FORCES, Array
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from fourbar_validation.engines.tree import put_back, solve_multipliers
 
@@ -39,7 +38,7 @@ class _ResidualLimit:
     reason: str
 
 
-LIMITS = {
+RESIDUAL_LIMITS = {
     "acceleration_gap": _ResidualLimit(
         1e-3,
         "of the greatest a_B: healthy runs have 1e-7..1e-4, a step that errs by 98 %"
@@ -84,13 +83,13 @@ def list_alarms(evidence: dict[str, float], size: float) -> list[str]:
     seen = {**evidence, "closure_gap": evidence["closure_gap_m"] / size}
     return [
         f"{name} = {seen[name]:.1e} > {limit.value:g}: {limit.reason}"
-        for name, limit in {**_OF_THE_DATA, **LIMITS}.items()
+        for name, limit in {**_OF_THE_DATA, **RESIDUAL_LIMITS}.items()
         if name in seen and not seen[name] <= limit.value
     ]
 
 
 @dataclass(slots=True)
-class _Motion:
+class _MonitoredMotion:
     """The bars at one position, velocity and acceleration."""
 
     gap: Array
@@ -124,8 +123,8 @@ class ResidualMonitor:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EQUALITY
         if self.bars.drive is not None:
             model.actuator_biastype[self.bars.drive] = mujoco.mjtBias.mjBIAS_NONE
-        self.worst = dict.fromkeys(LIMITS, 0.0)
-        self._most = dict.fromkeys(LIMITS, 0.0)
+        self.worst = dict.fromkeys(RESIDUAL_LIMITS, 0.0)
+        self._most = dict.fromkeys(RESIDUAL_LIMITS, 0.0)
 
     def look(
         self, loop: ClosedLoop, torque: float, loop_force: Array
@@ -197,7 +196,7 @@ class ResidualMonitor:
             for name, worst in self.worst.items()
         }
 
-    def _motion(self, q: Array, v: Array, a: Array) -> _Motion:
+    def _motion(self, q: Array, v: Array, a: Array) -> _MonitoredMotion:
         bars, d = self.bars, self.bars.data
         d.qpos[:], d.qvel[:], d.qacc[:] = q, v, a
         mujoco.mj_inverse(bars.model, d)
@@ -219,7 +218,9 @@ class ResidualMonitor:
         answer |= self._compute_pins(multipliers[:2], float(multipliers[2]))
         jerk = jacobian @ a + (rate_3 - rate_4) @ v
         a_B = bars.jacobian_at("B4") @ a + rate_4 @ v
-        return _Motion(gap, jacobian @ v, jerk, a_B, jacobian, drive, needed, answer)
+        return _MonitoredMotion(
+            gap, jacobian @ v, jerk, a_B, jacobian, drive, needed, answer
+        )
 
     def _compute_pins(self, loop_force: Array, drive: float) -> dict[str, Array]:
         """Compute F12, F32, F14.
@@ -237,7 +238,9 @@ class ResidualMonitor:
         pins = put_back({bar: on[BAR_NAMES[bar]].tolist() for bar in MOVING_BARS}, x, y)
         return {name: np.array(force) for name, force in pins.items()}
 
-    def _close(self, q: Array, v: Array, a: Array, seen: _Motion) -> _Motion:
+    def _close(
+        self, q: Array, v: Array, a: Array, seen: _MonitoredMotion
+    ) -> _MonitoredMotion:
         """Close the loop at the same theta_2, omega_2, alpha_2.
 
         It is closed in position, velocity and acceleration.

@@ -13,11 +13,11 @@ import os
 import subprocess
 import sys
 
-WIDTH = 480
-HEIGHT = 360
-SECONDS = 120.0
+PIXELS_WIDE = 480
+PIXELS_HIGH = 360
+PICTURE_SECONDS = 120.0
 """A picture takes half of one; a driver that takes this long for a handful hangs."""
-MOST = 8
+MOST_SCENES_DRAWN = 8
 """Scenes that are drawn: more cost the reader of a long run minutes."""
 _BACKENDS = ("egl", "osmesa") if sys.platform == "linux" else ("glfw",)
 """Values of MUJOCO_GL that are tried where the environment does not name one."""
@@ -30,8 +30,8 @@ def render_pictures(texts: dict[str, str]) -> tuple[dict[str, str], str]:
     """
     if not texts:
         return {}, ""
-    if len(texts) > MOST:
-        return {}, f"they are drawn for at most {MOST} scenes"
+    if len(texts) > MOST_SCENES_DRAWN:
+        return {}, f"they are drawn for at most {MOST_SCENES_DRAWN} scenes"
     named = os.environ.get("MUJOCO_GL")
     for backend in (named,) if named else _BACKENDS:
         environment = {**os.environ, "MUJOCO_GL": backend}
@@ -40,7 +40,7 @@ def render_pictures(texts: dict[str, str]) -> tuple[dict[str, str], str]:
                 [sys.executable, "-m", __name__],
                 input=json.dumps(texts).encode(),
                 capture_output=True,
-                timeout=SECONDS,
+                timeout=PICTURE_SECONDS,
                 env=environment,
                 check=True,
             )
@@ -51,7 +51,7 @@ def render_pictures(texts: dict[str, str]) -> tuple[dict[str, str], str]:
     return {}, "MuJoCo cannot render off screen here (it needs libegl1 or libosmesa6)"
 
 
-def draw(texts: dict[str, str]) -> dict[str, str]:
+def draw_here(texts: dict[str, str]) -> dict[str, str]:
     """Draw in this process."""
     import matplotlib.image
     import mujoco
@@ -61,7 +61,7 @@ def draw(texts: dict[str, str]) -> dict[str, str]:
     drawn = {}
     for name, text in texts.items():
         model, data = open_model(text)
-        with mujoco.Renderer(model, HEIGHT, WIDTH) as renderer:
+        with mujoco.Renderer(model, PIXELS_HIGH, PIXELS_WIDE) as renderer:
             renderer.update_scene(data, camera="plane")
             png = io.BytesIO()
             matplotlib.image.imsave(png, renderer.render(), format="png")
@@ -70,7 +70,7 @@ def draw(texts: dict[str, str]) -> dict[str, str]:
 
 
 if __name__ == "__main__":
-    json.dump(draw(json.load(sys.stdin)), sys.stdout)
+    json.dump(draw_here(json.load(sys.stdin)), sys.stdout)
     sys.stdout.flush()
     # some drivers crash while Python takes them down, after the pictures are drawn
     os._exit(0)

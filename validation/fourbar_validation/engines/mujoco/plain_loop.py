@@ -3,8 +3,8 @@
 import mujoco
 import numpy as np
 
+from fourbar.quantities import Array
 from fourbar.scene import Scene
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.mujoco.inverse import MujocoTree
 from fourbar_validation.engines.plain_loop import PlainLoop
 

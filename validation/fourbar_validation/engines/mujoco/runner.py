@@ -30,9 +30,9 @@ from fourbar.errors import LimitError
 from fourbar.mjcf import RECIPE, Settings, choose_run, write_mjcf
 from fourbar.mjcf.document import FULL_TURN
 from fourbar.mjcf.model import unwind
+from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Law, Motion, Rise
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.effects import look_up
 from fourbar_validation.engines.free_body_closure import find_angle
 from fourbar_validation.engines.limits import compute_least_sine
@@ -44,7 +44,7 @@ from fourbar_validation.engines.mujoco.closed_loop import (
 )
 from fourbar_validation.engines.tree import solve_closed
 
-LOOKED_AT = 2000
+INSTANTS_OF_A_LAW = 2000
 """Instants at which a law is searched for its greatest speed and acceleration. Between
 them it hardly differs.
 """
@@ -114,7 +114,7 @@ class LawSegment:
         self.omega = float(law.at(np.array([self.began]))[1][0])
         self.knots = list(law.time)
         self.at_knots = law.at(np.array(law.time))[2].tolist()
-        angles, speeds, _ = law.at(np.linspace(self.began, ends, LOOKED_AT))
+        angles, speeds, _ = law.at(np.linspace(self.began, ends, INSTANTS_OF_A_LAW))
         self.fastest = self.turning = float(np.abs(speeds).max())
         self.width = float(np.ptp(angles))
 
@@ -160,7 +160,7 @@ def find_extremes(law: Law | Rise) -> tuple[float, float]:
 
     Flywheel and closure are laid out for them.
     """
-    _, omega, alpha = law.at(np.linspace(law.time[0], law.time[-1], LOOKED_AT))
+    _, omega, alpha = law.at(np.linspace(law.time[0], law.time[-1], INSTANTS_OF_A_LAW))
     return float(np.abs(omega).max()), float(np.abs(alpha).max())
 
 
@@ -453,7 +453,7 @@ def take_full_size(scene: Scene) -> Scene:
     """
     loads = []
     for load in scene.loads:
-        peak = _find_peak(load)
+        peak = _find_peak_of_load(load)
         if load.force is None:
             force = None
         else:
@@ -462,7 +462,7 @@ def take_full_size(scene: Scene) -> Scene:
     return replace(scene, loads=tuple(loads))
 
 
-def _find_peak(load: Load) -> float:
+def _find_peak_of_load(load: Load) -> float:
     if load.table is None:
         return 1.0
     return max(map(abs, load.table.factor)) or 1.0
@@ -476,7 +476,7 @@ def evaluate_loads(scene: Scene) -> dict[str, ActuatorForce]:
 
     def force_of(load: Load) -> ActuatorForce:
         table = load.table
-        peak = _find_peak(load)
+        peak = _find_peak_of_load(load)
         assert table is not None
         first = table.theta_2[0]
         last = table.theta_2[-1]

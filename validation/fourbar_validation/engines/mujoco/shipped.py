@@ -13,7 +13,7 @@ from fourbar.mjcf import write_mjcf
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar_validation.compare.rows import FAILS, UNDECIDED, Row
-from fourbar_validation.compare.tolerance import EPS, SIMULATED, K, wrap_angle
+from fourbar_validation.compare.tolerance import EPS, SIMULATED, K, wrap_difference
 from fourbar_validation.engines.limits import (
     FASTEST,
     NEAREST_TOGGLE,
@@ -21,17 +21,17 @@ from fourbar_validation.engines.limits import (
 )
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 
-NAME = "mujoco-simulated"
+SIMULATED_NAME = "mujoco-simulated"
 QUANTITY = "as shipped"
-OPEN = 1e4 * K * EPS
+LARGEST_GAP = 1e4 * K * EPS
 """Gap in parts of the lengths, and gap speed in parts of the speeds: one rounding near
 a limit position, where |sin mu| is 1e-4 and less MuJoCo is not run.
 """
-STEPS = 200
+SERVO_STEPS = 200
 """Timesteps after which the servo has brought the input to its speed, to e^-100. Its
 time constant is two steps.
 """
-SPEED = 100.0 * SIMULATED.factor
+SPEED_ERROR = 100.0 * SIMULATED.factor
 """Allowed error of the speed, from loads and the closure in as many steps. It is ten
 times what was measured.
 """
@@ -60,7 +60,10 @@ def compare_shipped(name: str, scene: Scene, command: Command) -> Row | None:
     def closed(what: str) -> None:
         mujoco.mj_forward(loop.model, d)
         errors.append(
-            (math.hypot(*loop.gap()) / (OPEN * size), f"{what}: the loop is open")
+            (
+                math.hypot(*loop.gap()) / (LARGEST_GAP * size),
+                f"{what}: the loop is open",
+            )
         )
         here = _find_commanded(command, float(d.qpos[O2]), omega)
         # of an assembly the sign changes at a change point
@@ -90,7 +93,7 @@ def compare_shipped(name: str, scene: Scene, command: Command) -> Row | None:
     slip = float(np.hypot(*(loop.jacobian() @ d.qvel[:3])))
     errors.append(
         (
-            slip / (OPEN * size * float(np.abs(d.qvel).max())),
+            slip / (LARGEST_GAP * size * float(np.abs(d.qvel).max())),
             "keyframe: the bars' speeds open the loop",
         )
     )
@@ -99,13 +102,13 @@ def compare_shipped(name: str, scene: Scene, command: Command) -> Row | None:
         mujoco.mj_resetData(loop.model, d)
         moving = omega
     else:  # a motor: on from the keyframe
-        moving = omega + scene.motion.alpha_2 * STEPS * loop.model.opt.timestep
+        moving = omega + scene.motion.alpha_2 * SERVO_STEPS * loop.model.opt.timestep
     if (
         beyond := _find_not_driven(
-            scene, omega, float(d.qpos[O2]), STEPS * loop.model.opt.timestep
+            scene, omega, float(d.qpos[O2]), SERVO_STEPS * loop.model.opt.timestep
         )
     ) is not None:
-        error, reason = _find_worst(errors)
+        error, reason = _find_worst_departure(errors)
         verdict, reason = (
             (FAILS, reason)
             if error > 1.0
@@ -113,7 +116,7 @@ def compare_shipped(name: str, scene: Scene, command: Command) -> Row | None:
         )
         return Row(
             name,
-            NAME,
+            SIMULATED_NAME,
             "shipped",
             QUANTITY,
             error,
@@ -123,24 +126,31 @@ def compare_shipped(name: str, scene: Scene, command: Command) -> Row | None:
             float(d.qpos[O2]),
             1.0,
         )
-    mujoco.mj_step(loop.model, d, STEPS)
-    lost = d.time < 0.5 * STEPS * loop.model.opt.timestep
+    mujoco.mj_step(loop.model, d, SERVO_STEPS)
+    lost = d.time < 0.5 * SERVO_STEPS * loop.model.opt.timestep
     if lost:
         speed = math.inf
     else:
-        speed = abs(float(d.qvel[O2]) - moving) / (SPEED * max(abs(omega), abs(moving)))
+        speed = abs(float(d.qvel[O2]) - moving) / (
+            SPEED_ERROR * max(abs(omega), abs(moving))
+        )
     errors.append(
         (
             speed,
             (
-                f"after {STEPS} steps the input turns at {d.qvel[O2]:.6g} of"
+                f"after {SERVO_STEPS} steps the input turns at {d.qvel[O2]:.6g} of"
                 f" {moving:.6g} rad/s"
             ),
         )
     )
-    error, reason = _find_worst(errors)
+    error, reason = _find_worst_departure(errors)
     return Row.judged(
-        (name, NAME, "shipped"), QUANTITY, error, 1.0, reason, float(d.qpos[O2])
+        (name, SIMULATED_NAME, "shipped"),
+        QUANTITY,
+        error,
+        1.0,
+        reason,
+        float(d.qpos[O2]),
     )
 
 
@@ -150,14 +160,14 @@ def _find_commanded(command: Command, theta_2: float, omega_2: float) -> Command
     It is the nearest; of several turns the first in the direction of motion, where the
     file begins.
     """
-    apart = np.abs(wrap_angle(command.theta_2 - theta_2))
+    apart = np.abs(wrap_difference(command.theta_2 - theta_2))
     rounding = K * EPS * np.maximum(1.0, np.abs(command.theta_2))
     nearest = np.flatnonzero(apart <= apart.min() + rounding)
     in_time = math.copysign(1.0, omega_2) * command.theta_2[nearest]
     return command.part(nearest[[np.argmin(in_time)]])
 
 
-def _find_worst(errors: list[tuple[float, str]]) -> tuple[float, str]:
+def _find_worst_departure(errors: list[tuple[float, str]]) -> tuple[float, str]:
     return max(errors, key=lambda each: math.inf if math.isnan(each[0]) else each[0])
 
 

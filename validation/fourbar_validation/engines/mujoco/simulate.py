@@ -17,7 +17,7 @@ from fourbar.mjcf import RECIPE, Settings, write_mjcf
 from fourbar.mjcf.document import compute_mass_ratio
 from fourbar.mjcf.model import CYLINDER, unwind
 from fourbar.scene import Command, Scene
-from fourbar.scene.motion import COMMANDS, Motion
+from fourbar.scene.motion import COMMAND_NAMES, Motion
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.engines.asking import ask_at
@@ -32,7 +32,7 @@ from fourbar_validation.engines.limits import (
     compute_least_sine,
     find_exceeded,
 )
-from fourbar_validation.engines.loaded import Values
+from fourbar_validation.engines.loaded import BarValues
 from fourbar_validation.engines.loop import MADE, Assembler, make_blank
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor, list_alarms
@@ -56,15 +56,15 @@ from fourbar_validation.engines.mujoco.runner import (
     take_full_size,
 )
 
-SHARED = (
+SHARED_WITH_SIMULATION = (
     "lengths, masses, inertias, centres, loads and effects as MJCF text; tables of"
     " loads; what is commanded or the motion law, and the branch"
 )
-OWN = (
+COMPUTED_BY_MUJOCO = (
     "assembly, velocities at the start, the motion through time, accelerations, drive"
     " torque, pin forces"
 )
-FINE = np.radians(2.0)
+LONGEST_STEP_OF_A_CHECK = np.radians(2.0)
 """Greatest step between positions at which the loop is tried for closure, rad."""
 COLLINEAR = 1e-9
 """Part of the sum of the lengths, and of half a turn, that counts as none. The time
@@ -129,8 +129,8 @@ class MujocoSimulated:
         ) as error:  # anything else is a failure, not a declared limit
             answer = Answer(self.name, self.settings.integrator, refusal=str(error))
         answer.shared, answer.own, answer.seconds = (
-            SHARED,
-            OWN,
+            SHARED_WITH_SIMULATION,
+            COMPUTED_BY_MUJOCO,
             time.perf_counter() - began,
         )
         return answer
@@ -272,7 +272,9 @@ class _Simulation:
         self.out["theta_2"] = clip_angles(self.scene, self.out["theta_2"])
         # the command stands for the motion where nothing moved
         commanded = zip(
-            COMMANDS[bar], (self.command.angle, *list_speeds(self.command)), strict=True
+            COMMAND_NAMES[bar],
+            (self.command.angle, *list_speeds(self.command)),
+            strict=True,
         )
         motion_made = [
             np.where(np.isnan(self.out[name]), x, self.out[name])
@@ -336,7 +338,7 @@ class _Simulation:
         """Tell whether the loop closes everywhere between two positions."""
         start = float(self.command.angle[one])
         stop = float(self.command.angle[second])
-        pieces = int(np.ceil(abs(stop - start) / FINE))
+        pieces = int(np.ceil(abs(stop - start) / LONGEST_STEP_OF_A_CHECK))
         branch = int(self.command.branch[one])
         return all(
             position.find(float(theta_2), branch) is not None
@@ -396,7 +398,7 @@ class _Simulation:
             else:
                 drive = f"the couple on bar {self.scene.drive_bar}"
             raise LimitError(f"{drive} does not move the input: a pole of its size")
-        values: Values = {name_driving(self.scene): torque, **pins}
+        values: BarValues = {name_driving(self.scene): torque, **pins}
         if self.scene.drive is not None:
             tendon = loop.model.tendon(CYLINDER).id
             values |= {

@@ -24,17 +24,17 @@ from fourbar.effects import Flywheel, Gravity
 from fourbar.errors import FourBarError, InputError, LimitError
 from fourbar.linkage import PINS
 from fourbar.mjcf import choose_run, write_mjcf
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene import command as command_of
-from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.description import Value, list_unknowns, name_driving
 from fourbar_validation.engines.loaded import Assembled
 from fourbar_validation.engines.loop import (
     MADE,
-    Angles,
     Assembler,
+    JointAngles,
     make_blank,
     read_each,
     split_answer,
@@ -45,8 +45,8 @@ from fourbar_validation.engines.mujoco.closed_loop import (
 )
 from fourbar_validation.engines.mujoco.couple import find_couple
 from fourbar_validation.engines.mujoco.describe import (
-    FREE,
     STIFFEST,
+    UNLIMITED_RANGE,
     Described,
     describe_model,
     mend_entry,
@@ -73,11 +73,11 @@ from fourbar_validation.engines.mujoco.runner import (
 from fourbar_validation.engines.mujoco.topology import Topology, find_topology
 from fourbar_validation.engines.tree import solve_closed
 
-ONE_STATE = "mjcf-one-state"
-THROUGH_TIME = "mjcf-simulated"
-POSITIONS = 37
+FILE_AT_ONE_STATE = "mjcf-one-state"
+FILE_THROUGH_TIME = "mjcf-simulated"
+POSITIONS_OF_A_FILE = 37
 """Positions taken of a sweep: a file is judged as a whole, not position by position."""
-MOST_STEPS = 400_000
+MOST_STEPS_THROUGH_TIME = 400_000
 """A revolution at 628 steps per turn is a thousandth of this; more would be minutes."""
 PRICING = 60.0
 """Seconds in which differences are tried one by one; each takes two evaluations."""
@@ -94,8 +94,10 @@ _SAME_GRAVITY = 1e-9
 GENERATED = Path("generated.xml")
 """Name of the file that is generated from a scene."""
 _NO_BIAS = mujoco.mjtBias.mjBIAS_NONE
-SHARED = "theta_2, omega_2, alpha_2 and the branch; the rest is the file's"
-OWN = (
+SHARED_WITH_THE_FILE = (
+    "theta_2, omega_2, alpha_2 and the branch; the rest is the file's"
+)
+COMPUTED_FROM_THE_FILE = (
     "assembly, speeds, accelerations, drive torque and pin forces, by MuJoCo from the"
     " file as compiled"
 )
@@ -163,20 +165,24 @@ def orient(topology: Topology, scene: Scene) -> Topology:
     return nearest if fits else topology
 
 
-def examine(scene: Scene, file: RobotFile | None, names: Mapping[str, str]) -> Examined:
+def examine_file(
+    scene: Scene, file: RobotFile | None, names: Mapping[str, str]
+) -> Examined:
     """Describe an MJCF, and evaluate it at single states and through time.
 
     None: the one generated from the scene.
     """
     with collect_warnings() as warnings:
-        examined = _examine(
+        examined = _examine_motion(
             scene, file or RobotFile(GENERATED, write_mjcf(scene)), names
         )
     examined.notes += [f"MuJoCo warns: {warning}" for warning in warnings]
     return examined
 
 
-def _examine(scene: Scene, file: RobotFile, names: Mapping[str, str]) -> Examined:
+def _examine_motion(
+    scene: Scene, file: RobotFile, names: Mapping[str, str]
+) -> Examined:
     robot = compile_robot(file)
     list_unknown_parts(robot, set(range(robot.model.nbody)))
     topology, guessed = find_topology(robot.model, names, scene.linkage.lengths)
@@ -188,7 +194,7 @@ def _examine(scene: Scene, file: RobotFile, names: Mapping[str, str]) -> Examine
             raise InputError(
                 "MJCF", None, f"{key} is beyond the range of doubles: {value}"
             )
-    answers = _list_answers(loop, scene)
+    answers = _answer_both_ways(loop, scene)
     notes = [*robot.notes, *guessed, *loop.notes]
     notes += _free_unmet_stops(described, loop)
     return Examined(described, answers, notes, topology.names)
@@ -204,7 +210,7 @@ def _free_unmet_stops(described: Described, loop: "_UserLoop") -> Iterator[str]:
         if stops is None or joint in loop.stopped:
             continue
         key = f"pins.{pin}.range"
-        described[key] = described[key]._replace(value=FREE)
+        described[key] = described[key]._replace(value=UNLIMITED_RANGE)
         low, high = (f"{math.degrees(stop):.4g}" for stop in stops)
         yield (
             f"the stops of joint {loop.model.joint(joint).name!r}, at {low} and {high}"
@@ -231,7 +237,7 @@ def examine_changed(
             try:
                 with collect_warnings():
                     topology = _compile_topology(replace(file, text=changed), {}, scene)
-                    answers = _list_answers(_UserLoop(topology, scene), scene)
+                    answers = _answer_both_ways(_UserLoop(topology, scene), scene)
             except (
                 FourBarError
             ):  # with this entry it is no four-bar, or does not compile
@@ -259,7 +265,7 @@ def examine_mended(
             topology = seen.copied()
             if mend_entry(topology, key, value):
                 with collect_warnings():
-                    answers = _list_answers(_UserLoop(topology, scene), scene)
+                    answers = _answer_both_ways(_UserLoop(topology, scene), scene)
         answered.append(answers)
     return answered
 
@@ -284,7 +290,7 @@ def predict_softness(
         topology.model.eq_solimp[topology.closure, :2] = impedance
         loop = _UserLoop(topology, scene)
         with collect_warnings():
-            command = _choose_positions(command_of(scene))
+            command = _choose_some_positions(command_of(scene))
             answers.append(_answer_one_state(loop, command).quantities)
     stiff, softer = answers
     return {
@@ -293,21 +299,27 @@ def predict_softness(
     }
 
 
-def _list_answers(loop: "_UserLoop", scene: Scene) -> list[Answer]:
-    command = _choose_positions(command_of(scene))
-    answers = [_answer(ONE_STATE, scene, lambda: _answer_one_state(loop, command))]
+def _answer_both_ways(loop: "_UserLoop", scene: Scene) -> list[Answer]:
+    command = _choose_some_positions(command_of(scene))
+    answers = [
+        _answer_or_refuse(
+            FILE_AT_ONE_STATE, scene, lambda: _answer_one_state(loop, command)
+        )
+    ]
     if (
         command.omega_2 is not None
         and np.any(command.omega_2)
         and np.ptp(command.theta_2) > 0.0
     ):
         answers.append(
-            _answer(THROUGH_TIME, scene, lambda: answer_through_time(loop, command))
+            _answer_or_refuse(
+                FILE_THROUGH_TIME, scene, lambda: answer_through_time(loop, command)
+            )
         )
     return answers
 
 
-def _choose_positions(command: Command) -> Command:
+def _choose_some_positions(command: Command) -> Command:
     """Choose at most so many of the positions, spread evenly."""
     n = len(command.theta_2)
     if command.omega_2 is None:
@@ -321,13 +333,15 @@ def _choose_positions(command: Command) -> Command:
             "omega_2 or alpha_2 differs from position to position: that is no one"
             " motion through time"
         )
-    keep = np.unique(np.linspace(0, n - 1, min(n, POSITIONS)).round().astype(int))
+    keep = np.unique(
+        np.linspace(0, n - 1, min(n, POSITIONS_OF_A_FILE)).round().astype(int)
+    )
     omega_2 = float(np.max(command.omega_2))
     alpha_2 = float(np.max(command.alpha_2))
     return Command(command.theta_2[keep], command.branch[keep], omega_2, alpha_2)
 
 
-def _answer(name: str, scene: Scene, ask: Callable[[], Answer]) -> Answer:
+def _answer_or_refuse(name: str, scene: Scene, ask: Callable[[], Answer]) -> Answer:
     start = time.perf_counter()
     try:
         answer = ask()
@@ -335,7 +349,11 @@ def _answer(name: str, scene: Scene, ask: Callable[[], Answer]) -> Answer:
         answer = Answer(name, "-", refusal=str(error))
     except ArithmeticError as error:  # its numbers are far from those of any linkage
         raise InputError("MJCF", None, str(error)) from None
-    answer.shared, answer.own, answer.seconds = SHARED, OWN, time.perf_counter() - start
+    answer.shared, answer.own, answer.seconds = (
+        SHARED_WITH_THE_FILE,
+        COMPUTED_FROM_THE_FILE,
+        time.perf_counter() - start,
+    )
     return answer
 
 
@@ -656,7 +674,9 @@ def _answer_one_state(loop: _UserLoop, command: Command) -> Answer:
     """Answer every position by itself."""
     contacts = 0
 
-    def read(_: Angles, omega_2: float, alpha_2: float) -> dict[str, Array | float]:
+    def read(
+        _: JointAngles, omega_2: float, alpha_2: float
+    ) -> dict[str, Array | float]:
         nonlocal contacts
         try:
             v = loop.speeds(omega_2)
@@ -685,16 +705,18 @@ def _answer_one_state(loop: _UserLoop, command: Command) -> Answer:
             f" {places} deg"
         )
     evidence = {"closure_gap_m": gap, "contacts": float(contacts)}
-    return Answer(ONE_STATE, "as compiled", command, assembled, out, evidence=evidence)
+    return Answer(
+        FILE_AT_ONE_STATE, "as compiled", command, assembled, out, evidence=evidence
+    )
 
 
 def _require_steps(seconds: float, timestep: float) -> None:
-    """Raise LimitError if a motion takes no step, or more than MOST_STEPS."""
+    """Raise LimitError if a motion takes no step or over MOST_STEPS_THROUGH_TIME."""
     steps = seconds / timestep
-    if not 1.0 <= steps <= MOST_STEPS:
+    if not 1.0 <= steps <= MOST_STEPS_THROUGH_TIME:
         raise LimitError(
             f"its timestep of {timestep:g} s makes {steps:.3g} steps of the motion;"
-            f" must be 1 to {MOST_STEPS}"
+            f" must be 1 to {MOST_STEPS_THROUGH_TIME}"
         )
 
 
@@ -765,7 +787,7 @@ def answer_through_time(loop: _UserLoop, command: Command) -> Answer:
     integrator = mujoco.mjtIntegrator(model.opt.integrator).name
     setting = f"{integrator.removeprefix('mjINT_')} {timestep:g} s"
     return Answer(
-        THROUGH_TIME,
+        FILE_THROUGH_TIME,
         setting,
         motion,
         np.ones(finite.sum(), dtype=bool),

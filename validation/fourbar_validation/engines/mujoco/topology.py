@@ -16,22 +16,22 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, ENDS, MOVING_BARS, PINS
 from fourbar.mjcf import Plane
-from fourbar_validation.compare.answer import Array
+from fourbar.quantities import Array
 
 _PIN_OF = {frozenset(bars): pin for pin, bars in PINS.items()}
 _PLANES = {2: ("x-y", (0, 1)), 1: ("x-z", (0, 2)), 0: ("y-z", (1, 2))}
 """World axis of the hinges: the plane, and the world axes for x and y there."""
-STRAIGHT = 1e-9
+UPRIGHT_HINGE = 1e-9
 """A hinge tilted by more than this (sine) leaves the plane."""
-ROLES = tuple(BAR_NAMES[bar] for bar in MOVING_BARS)
+ROLE_NAMES = tuple(BAR_NAMES[bar] for bar in MOVING_BARS)
 _SITES = ("B3", "B4")
-ALIKE = 1e-9
+GUESSED_ALIKE = 1e-9
 """Two guesses whose lengths fit equally well to this are distinguished by the drive."""
 _MOST_BODIES = 8
 """Bodies on hinges among which three are looked for."""
 
 
-def _find_body(model: mujoco.MjModel, name: str) -> int | None:
+def _find_named_body(model: mujoco.MjModel, name: str) -> int | None:
     """Find the body of a name, by what it is welded to; None where there is none."""
     number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
     if number >= 0:
@@ -39,7 +39,7 @@ def _find_body(model: mujoco.MjModel, name: str) -> int | None:
     return None
 
 
-def list_bodies(model: mujoco.MjModel) -> str:
+def list_body_names(model: mujoco.MjModel) -> str:
     """List the bodies of a file by name, for a message."""
     return ", ".join(
         model.body(i).name or f"(unnamed {i})" for i in range(1, model.nbody)
@@ -54,12 +54,12 @@ def _find_stated_body(
     Raises InputError if there is none.
     """
     name = names.get(role, role)
-    body = _find_body(model, name)
+    body = _find_named_body(model, name)
     if body is None:
         raise InputError(
             "--name",
             f"{role}={name}",
-            f"no such body; the file has: {list_bodies(model)}",
+            f"no such body; the file has: {list_body_names(model)}",
         )
     return body
 
@@ -181,7 +181,7 @@ class Topology:
         across = int(np.argmax(np.abs(axis)))
         self.plane, axes = _PLANES[across]
         self.axes = np.eye(3)[list(axes)]
-        if np.abs(axis[list(axes)]).max() > STRAIGHT:
+        if np.abs(axis[list(axes)]).max() > UPRIGHT_HINGE:
             # as `fourbar mjcf --axis` turns it
             tilted = Plane(tuple(axis.tolist()))
             self.plane = "normal to " + " ".join(f"{part:.6g}" for part in axis)
@@ -194,7 +194,7 @@ class Topology:
         bars = [self.bar(body), self.bar(model.body_parentid[body])]
         kind = mujoco.mjtJoint(model.jnt_type[joint])
         if kind != mujoco.mjtJoint.mjJNT_HINGE or None in bars:
-            advice = self._advise(ROLES, "name the bodies by --name")
+            advice = self._advise(ROLE_NAMES, "name the bodies by --name")
             raise InputError(
                 "MJCF",
                 name,
@@ -209,7 +209,7 @@ class Topology:
             )
         axis = self.data.xaxis[joint]
         along = float(axis @ self.normal)
-        if float(np.linalg.norm(np.cross(axis, self.normal))) > STRAIGHT:
+        if float(np.linalg.norm(np.cross(axis, self.normal))) > UPRIGHT_HINGE:
             raise InputError(
                 "MJCF",
                 name,
@@ -441,14 +441,14 @@ def find_topology(
 
     Raises InputError in one line: why no three bodies fit.
     """
-    roles = {role: names.get(role, role) for role in (*ROLES, *_SITES)}
+    roles = {role: names.get(role, role) for role in (*ROLE_NAMES, *_SITES)}
     bodies = [
         (
             _find_stated_body(model, names, role)
             if role in names
-            else _find_body(model, role)
+            else _find_named_body(model, role)
         )
-        for role in ROLES
+        for role in ROLE_NAMES
     ]
     if None not in bodies and (
         _find_site(model, roles["B3"])
@@ -460,7 +460,9 @@ def find_topology(
         {int(model.body_weldid[model.jnt_bodyid[joint]]) for joint in range(model.njnt)}
     )
     free = [body for body in candidates if body not in bodies]
-    missing = [role for role, body in zip(ROLES, bodies, strict=True) if body is None]
+    missing = [
+        role for role, body in zip(ROLE_NAMES, bodies, strict=True) if body is None
+    ]
     guesses: list[tuple[float, bool, Topology, dict[str, str]]] = []
     refused: list[str] = []
     for chosen in permutations(free[:_MOST_BODIES], len(missing)):
@@ -499,10 +501,10 @@ def find_topology(
         if unstated:
             kind = "BODY" if missing else "SITE"
             advice = f"; say which is which: --name {unstated[0]}={kind}, and so on"
-        raise InputError("MJCF", list_bodies(model), nowhere + advice)
+        raise InputError("MJCF", list_body_names(model), nowhere + advice)
     best = min(misfit[0] for misfit in guesses)
     _, _, topology, guessed = min(
-        (misfit for misfit in guesses if misfit[0] <= best + ALIKE),
+        (misfit for misfit in guesses if misfit[0] <= best + GUESSED_ALIKE),
         key=lambda misfit: misfit[1],
     )
     pairs = ", ".join(f"{role}={name}" for role, name in guessed.items())
@@ -543,7 +545,7 @@ def _list_sites(
             for i in range(model.nsite)
             if model.site(i).name
             and int(model.body_weldid[model.site_bodyid[i]])
-            == _find_body(model, roles[role])
+            == _find_named_body(model, roles[role])
         ]
         for role in ("coupler", "output")
     }

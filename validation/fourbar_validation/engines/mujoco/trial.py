@@ -3,8 +3,8 @@
 One scene is run through in time with any of them. From the laws that the study of cost
 measured:
 
-    error = STIFF (h/tc)^4, whatever the timestep    -> tc, the closure's time constant
-    error ~ h^ORDER until a floor                    -> h, the timestep
+    error = STIFFNESS_CONSTANT (h/tc)^4, whatever h   -> tc, the closure's time constant
+    error ~ h^ORDER_OF_RK4 until a floor              -> h, the timestep
 
 The scene is assembled once by the engine itself; each trial compiles the generated MJCF
 anew, with the drive to be tried, and reports its own motion, torque and pin forces.
@@ -24,9 +24,9 @@ import numpy as np
 
 from fourbar.errors import LimitError
 from fourbar.mjcf import Settings, write_mjcf
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import Command, Scene, with_signs
-from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES, mark_turning
 from fourbar_validation.compare.tolerance import divide, magnitude
 from fourbar_validation.engines.description import name_driving
@@ -47,23 +47,23 @@ from fourbar_validation.engines.mujoco.runner import (
 )
 from fourbar_validation.engines.mujoco.simulate import MujocoSimulated
 
-STIFF = 4e-2
+STIFFNESS_CONSTANT = 4e-2
 """Value of error (tc/h)^4 of RK4, with tc in steps. Measured: 1.3e-2 to 6e-2 on
 crank-rocker, drag link and double rocker.
 """
-SHORTEST = 3.0
+SHORTEST_TIME_CONSTANT = 3.0
 """Steps of the time constant: below 2 the closure follows no integrator."""
-LONGEST = 400.0
+LONGEST_TIME_CONSTANT = 400.0
 """Time constant beyond which nothing is gained above 1e-12. The loop is then no longer
 held together over a revolution.
 """
-ORDER = 4.0
+ORDER_OF_RK4 = 4.0
 """Order of RK4, for the first guess of the next number of steps; it decides nothing."""
 _FIRST_STEPS, _FIRST_ERROR = 60.0, 1e-5
 """Steps per revolution from which the search begins, by the order, for other errors."""
 FEWEST_STEPS = 6.0
 """A revolution cannot be followed by less."""
-FLYWHEEL = 1e5
+TRIAL_FLYWHEEL = 1e5
 """Flywheel, lighter than the recipe's. The torque, armature times acceleration, is
 rounded in proportion to it.
 """
@@ -78,9 +78,11 @@ def guess(error: float) -> tuple[float, float]:
 
     The laws give them; the time constant is in steps.
     """
-    tc = (STIFF / (error / 2.0)) ** (1.0 / ORDER)
-    steps = _FIRST_STEPS * (_FIRST_ERROR / error) ** (1.0 / ORDER)
-    return max(steps, FEWEST_STEPS), min(max(tc, SHORTEST), LONGEST)
+    tc = (STIFFNESS_CONSTANT / (error / 2.0)) ** (1.0 / ORDER_OF_RK4)
+    steps = _FIRST_STEPS * (_FIRST_ERROR / error) ** (1.0 / ORDER_OF_RK4)
+    return max(steps, FEWEST_STEPS), min(
+        max(tc, SHORTEST_TIME_CONSTANT), LONGEST_TIME_CONSTANT
+    )
 
 
 def make_settings(steps_per_revolution: float, time_constant_steps: float) -> Settings:
@@ -92,7 +94,7 @@ def make_settings(steps_per_revolution: float, time_constant_steps: float) -> Se
         steps_per_revolution=steps_per_revolution,
         steps_per_window=1,
         time_constant_steps=time_constant_steps,
-        flywheel=FLYWHEEL,
+        flywheel=TRIAL_FLYWHEEL,
     )
 
 
@@ -400,9 +402,9 @@ def _keep_text(text: str, _: float) -> ClosedLoop:
     return ClosedLoop(text)
 
 
-ROUNDS = 6
+MOST_SIMULATIONS = 6
 """Simulations of a scene at most; the laws are seldom wrong by more than one."""
-MARGIN = 0.5
+PREDICTED_PART = 0.5
 """The engine's own prediction must stay within this part of the wanted error."""
 _LEAST_GROWTH, _MOST_GROWTH = 1.15, 3.0
 """Factor on the steps from one round to the next."""
@@ -423,18 +425,18 @@ class SimulatedToError:
         steps, tc = guess(self.error)
         spent = 0.0
         runs = 0
-        for _ in range(ROUNDS):
+        for _ in range(MOST_SIMULATIONS):
             answer = MujocoSimulated(make_settings(steps, tc)).answer(scene, command)
             if answer.refusal is not None:
                 return answer
             spent = spent + answer.evidence["steps"]
             runs = runs + 1
             expected = compute_expected_error(scene, answer)
-            if expected <= MARGIN * self.error and not answer.alarms:
+            if expected <= PREDICTED_PART * self.error and not answer.alarms:
                 break
-            ratio = expected / (MARGIN * self.error)
+            ratio = expected / (PREDICTED_PART * self.error)
             if np.isfinite(ratio):
-                growth = ratio ** (1.0 / ORDER)
+                growth = ratio ** (1.0 / ORDER_OF_RK4)
             else:
                 growth = _MOST_GROWTH
             growth = min(max(growth, _LEAST_GROWTH), _MOST_GROWTH)
@@ -443,7 +445,7 @@ class SimulatedToError:
                 answer.setting.rpartition(" ")[2].removesuffix("/rev")
             )  # of "RK4 628/rev"
             steps = max(steps, steps_made) * growth
-            tc = min(tc * growth, LONGEST)
+            tc = min(tc * growth, LONGEST_TIME_CONSTANT)
         answer.evidence |= {"wanted_error": self.error, "expected_error": expected}
         answer.evidence |= {"steps_with_the_search": spent, "runs": float(runs)}
         return answer

@@ -12,9 +12,10 @@ import numpy as np
 
 import fourbar
 from fourbar.linkage import ENDS, MOVING_BARS, PIN_FORCE, PINS
+from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
-from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.derived import CUT
 from fourbar_validation.compare.line import place_line
 from fourbar_validation.compare.pins import (
@@ -25,7 +26,7 @@ from fourbar_validation.compare.pins import (
 )
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import divide
-from fourbar_validation.engines.free_body import move
+from fourbar_validation.engines.free_body import speeds_and_accelerations
 from fourbar_validation.engines.free_body_effects import (
     BodyMotion,
     BodyWrenches,
@@ -38,7 +39,7 @@ from fourbar_validation.engines.free_body_effects import (
 from fourbar_validation.run.derived.variants import ask_free_bodies, make_row, take_few
 from fourbar_validation.run.question import Question
 
-WHERE = (0.0, 0.137, 0.479, 0.863)
+CUT_POSITIONS = (0.0, 0.137, 0.479, 0.863)
 """Cuts, in parts of the bar's length from its first pin. The first is just beyond that
 pin, and none is at another foot.
 """
@@ -57,7 +58,7 @@ def internal_forces(question: Question) -> list[Row]:
     rows = []
     for bar in MOVING_BARS:
         length = scene.linkage.bar(bar).length
-        cuts = np.array([part * length for part in WHERE])
+        cuts = np.array([part * length for part in CUT_POSITIONS])
         stated = state_from_pins(scene)
         pieces = [free_piece(stated, motion, answer, bar, cut) for cut in cuts]
         forces = fourbar.internal_forces(scene, solution, bar, cuts)
@@ -92,7 +93,9 @@ def move_bars(scene: Scene, command: Command, answer: Answer) -> BodyMotion:
     omega, alpha = (
         answer.quantities[f"{name}_{command.bar}"] for name in ("omega", "alpha")
     )
-    return move(scene.linkage, theta[0], omega, alpha, theta[1], theta[2], command.bar)
+    return speeds_and_accelerations(
+        scene.linkage, theta[0], omega, alpha, theta[1], theta[2], command.bar
+    )
 
 
 @dataclass

@@ -20,10 +20,10 @@ import numpy as np
 import fourbar
 from fourbar.formulas.mobility import change_points, find_intervals, turns_fully
 from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.studies.equilibrium import Equilibrium
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.derived import REST
 from fourbar_validation.compare.pins import (
     find_centre,
@@ -34,17 +34,17 @@ from fourbar_validation.compare.pins import (
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import (
     EPS,
-    ROUNDINGS,
+    RANDOM_WALK,
     WELL_CONDITIONED,
     K,
 )
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.prediction import FIRST_ORDER
+from fourbar_validation.engines.prediction import LARGEST_FIRST_ORDER
 from fourbar_validation.engines.registry import find_missing
 from fourbar_validation.run.derived.variants import make_row
 from fourbar_validation.run.question import NotAskedError, Question
 
-SAMPLES = 720
+POSITIONS_OF_A_TURN = 720
 """Positions of a turn of the input. Between two of them the torque changes its sign at
 an odd number of equilibria.
 """
@@ -52,7 +52,7 @@ _OFF_GRID = 0.381966
 """Part of a sample's step by which the samples are moved. No equilibrium of a round
 angle falls on one.
 """
-ANGLES = ("theta", "rest", "phi", "angle")
+PARTS_OF_ANGLE_NAMES = ("theta", "rest", "phi", "angle")
 """Parts of the names of inputs that are angles: they are rounded as 1 rad at least."""
 _AT_LIMIT = EPS**-0.5
 """Most roundings by which a rounding of theta_2 moves theta_4. It is at a limit of
@@ -90,7 +90,10 @@ def equilibria(question: Question) -> Iterator[Row]:
             torque[signs != branch] = np.nan
     if not any(np.any(torque[np.isfinite(torque)]) for torque in torques.values()):
         raise NotAskedError("no position is held by a torque")
-    judged = [(equilibrium, _judge(scene, equilibrium)) for equilibrium in answer.found]
+    judged = [
+        (equilibrium, _judge_equilibrium(scene, equilibrium))
+        for equilibrium in answer.found
+    ]
     missed = 0
     for branch, torque in torques.items():
         places = [
@@ -100,8 +103,8 @@ def equilibria(question: Question) -> Iterator[Row]:
         ]
         missed += _count_missed(scene, branch, theta_2, torque, places)
     reason = (
-        f"{len(answer.found)} equilibria; {SAMPLES} positions of a turn held by free"
-        " bodies"
+        f"{len(answer.found)} equilibria; {POSITIONS_OF_A_TURN} positions of a turn"
+        " held by free bodies"
     )
     yield Row.judged(
         (question.name, "equilibria", "exact"), "missed", missed, 0.0, reason
@@ -168,7 +171,9 @@ def _list_samples(question: Question) -> Array:
             high = first + 2.0 * turn
         low = max(low, float(swept.min()))
         high = min(high, float(swept.max()), float(swept.min()) + turn)
-    return np.arange(low + _OFF_GRID * turn / SAMPLES, high, turn / SAMPLES)
+    return np.arange(
+        low + _OFF_GRID * turn / POSITIONS_OF_A_TURN, high, turn / POSITIONS_OF_A_TURN
+    )
 
 
 def _hold(scene: Scene, angle: Array, branch: int) -> Array:
@@ -224,7 +229,7 @@ def _count_missed(
     differing = ~open_steps & ((torque[:-1] * torque[1:] < 0.0) != (counted % 2 == 1))
 
     def is_certain(index: int) -> bool:
-        held = _derive(scene, 2, float(theta_2[index]), branch)
+        held = _derive_torque(scene, 2, float(theta_2[index]), branch)
         return (
             held is not None
             and held[0].value * torque[index] > 0.0
@@ -237,7 +242,9 @@ def _count_missed(
     )
 
 
-def _judge(scene: Scene, equilibrium: Equilibrium) -> tuple[float, dict[str, float]]:
+def _judge_equilibrium(
+    scene: Scene, equilibrium: Equilibrium
+) -> tuple[float, dict[str, float]]:
     """Compare torque, slope, inertia and frequency.
 
     It gives too by how much the equilibrium may be off, rad. No errors where nothing is
@@ -247,15 +254,19 @@ def _judge(scene: Scene, equilibrium: Equilibrium) -> tuple[float, dict[str, flo
     bar = int(equilibrium.angle[-1])
     theta = {2: place.theta_2, 3: place.theta_3, 4: place.theta_4}
     one, further = (theta[k] for k in MOVING_BARS if k != bar)
-    held = _derive(scene, bar, theta[bar], 1 if np.sin(further - one) > 0.0 else -1)
+    held = _derive_torque(
+        scene, bar, theta[bar], 1 if np.sin(further - one) > 0.0 else -1
+    )
     if held is None or equilibrium.stability == "undecided":
         return math.inf, {}
     torque, slope, inertia = held
     errors = {
-        "torque": _divide(torque.value, torque.size),
-        "slope": _divide(slope.value + equilibrium.slope, slope.size),
+        "torque": _difference_over_size(torque.value, torque.size),
+        "slope": _difference_over_size(slope.value + equilibrium.slope, slope.size),
     }
-    errors["inertia"] = _divide(inertia.value - equilibrium.inertia, inertia.size)
+    errors["inertia"] = _difference_over_size(
+        inertia.value - equilibrium.inertia, inertia.size
+    )
     part = [
         K * EPS * x.size / abs(x.value) if x.value else math.inf
         for x in (slope, inertia)
@@ -264,13 +275,13 @@ def _judge(scene: Scene, equilibrium: Equilibrium) -> tuple[float, dict[str, flo
         off = K * EPS * torque.size / abs(slope.value)
     else:
         off = math.inf
-    if part[0] < FIRST_ORDER:
+    if part[0] < LARGEST_FIRST_ORDER:
         stable = slope.value > 0.0
         if (equilibrium.stability == "stable") != stable or (
             equilibrium.frequency is not None and not stable
         ):
             errors["frequency"] = math.inf
-        elif stable and part[1] < FIRST_ORDER:
+        elif stable and part[1] < LARGEST_FIRST_ORDER:
             frequency = math.sqrt(slope.value / inertia.value) / (2.0 * math.pi)
             if equilibrium.frequency is None:
                 apart = math.inf
@@ -282,7 +293,7 @@ def _judge(scene: Scene, equilibrium: Equilibrium) -> tuple[float, dict[str, flo
     return off, errors
 
 
-def _divide(apart: float, size: float) -> float:
+def _difference_over_size(apart: float, size: float) -> float:
     if size:
         return abs(apart) / size
     if apart == 0.0:
@@ -290,7 +301,7 @@ def _divide(apart: float, size: float) -> float:
     return math.inf
 
 
-def _derive(
+def _derive_torque(
     scene: Scene, bar: int, angle: float, branch: int
 ) -> tuple[Derived, Derived, Derived] | None:
     """Derive the torque on a bar held at rest, its slope, and the bar's inertia.
@@ -354,7 +365,9 @@ def _derive(
     numbers, outputs, rate = base
     sizes = np.zeros(len(numbers))
     for name, value in x.items():
-        weight = max(abs(float(value)), float(any(part in name for part in ANGLES)))
+        weight = max(
+            abs(float(value)), float(any(part in name for part in PARTS_OF_ANGLE_NAMES))
+        )
         if name == commanded:
             weight = max(
                 weight,
@@ -373,9 +386,9 @@ def _derive(
                 abs(float(((after - before) / step).mid()))
                 for after, before in zip(moved[0], numbers, strict=True)
             ]
-    if not np.isfinite(sizes).all() or ROUNDINGS * EPS * sizes[
+    if not np.isfinite(sizes).all() or RANDOM_WALK * EPS * sizes[
         3:
-    ].max() >= FIRST_ORDER * float(outputs["condition"]):
+    ].max() >= LARGEST_FIRST_ORDER * float(outputs["condition"]):
         return None
     sizes[2] = max(sizes[2], _sum_inertias(scene))
     torque, slope, inertia = (

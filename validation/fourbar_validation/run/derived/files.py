@@ -15,7 +15,8 @@ import numpy as np
 
 from fourbar.effects import Effect, Friction, Gravity, Viscous
 from fourbar.errors import InputError, LimitError
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
+from fourbar.files.scene_text import BAR_NUMBERS
+from fourbar.linkage import Bar, FourBar
 from fourbar.mjcf.assembly import write_sdf as sdf_text
 from fourbar.mjcf.assembly import write_usd as usd_text
 from fourbar.scene import Scene
@@ -31,8 +32,7 @@ from fourbar_validation.run.derived.variants import (
 )
 from fourbar_validation.run.question import Question
 
-NUMBER = r"[-+.\deE]+"
-BARS = {BAR_NAMES[number]: number for number in MOVING_BARS}
+NUMBER_IN_A_FILE = r"[-+.\deE]+"
 
 
 class _FileBody(NamedTuple):
@@ -100,7 +100,7 @@ def _judge_file(
                 )
             )
             answer.quantities |= {
-                f"theta_{BARS[bar]}": np.array([turns[bar]])
+                f"theta_{BAR_NUMBERS[bar]}": np.array([turns[bar]])
                 for bar in ("coupler", "output")
             }
             rows += hold_to(question, engine, opened, solve(opened), answer)
@@ -182,7 +182,7 @@ def _read_usd(text: str) -> Contents:
     def numbers(block: str, key: str) -> list[float]:
         match = re.search(rf"{re.escape(key)} = (.*)", block)
         if match:
-            return [float(number) for number in re.findall(NUMBER, match[1])]
+            return [float(number) for number in re.findall(NUMBER_IN_A_FILE, match[1])]
         return [math.nan] * 4
 
     def turn(block: str, key: str) -> float:
@@ -196,7 +196,7 @@ def _read_usd(text: str) -> Contents:
         )
     )
     bodies = {"ground": _FileBody(0j, 0.0, math.nan, math.nan, 0j)}
-    for bar in BARS:
+    for bar in BAR_NUMBERS:
         block = blocks[bar]
         place, centre = (
             complex(*numbers(block, f"{key}")[:2])
@@ -251,6 +251,6 @@ def _read_noted(text: str) -> dict[str, float]:
     """Read the angles that the file states in words."""
     return {
         bar: float(match[1])
-        for bar, number in BARS.items()
-        if (match := re.search(f"theta_{number} = ({NUMBER})", text))
+        for bar, number in BAR_NUMBERS.items()
+        if (match := re.search(f"theta_{number} = ({NUMBER_IN_A_FILE})", text))
     }

@@ -14,12 +14,11 @@ import numpy as np
 import fourbar
 from fourbar.effects import Load
 from fourbar.effects.load import Table
-from fourbar.quantities import FORCES, LINE, UNKNOWNS
+from fourbar.quantities import FORCE_NAMES, LINE, UNKNOWNS, Array
 from fourbar.scene import Scene
 from fourbar.scene.numbers import Point
 from fourbar.studies.keys import command_key
 from fourbar.studies.spread import Spread
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.derived import DIFFERENCES, SPREAD
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import divide, magnitude
@@ -32,7 +31,7 @@ from fourbar_validation.run.derived.variants import (
     is_near_change_point,
     keep_worst,
     make_row,
-    split_parts,
+    split_unknowns,
     stays_beside,
     take_few,
     take_member,
@@ -43,7 +42,7 @@ _MEMBERS = 5
 """Members of the study, as many as positions. It is a square study, whose axes only its
 numbers tell apart.
 """
-APART = 1e-2
+MEMBERS_APART = 1e-2
 """Difference of its numbers from member to member, relative, for angles in rad."""
 _APART_NEAR_CHANGE_POINT = 1e-5
 """The same near a change point, where larger differences make linkages of their own."""
@@ -101,7 +100,7 @@ def study(question: Question) -> list[Row]:
     scene = furnish(_take_few_by_lengths(question), question)
     places = np.asarray(scene.motion.angle)
     key = command_key(scene)
-    apart = APART
+    apart = MEMBERS_APART
     if is_near_change_point(scene.linkage):
         apart = _APART_NEAR_CHANGE_POINT
     stated = SceneFile(scene).find_stated(fourbar.sensitivity(scene).keys)
@@ -144,11 +143,11 @@ def study(question: Question) -> list[Row]:
     return keep_worst(rows)
 
 
-STEP = 1e-4
+RELATIVE_STEP = 1e-4
 """Relative step of each number, for an angle in rad. Truncation at fourth order and
 rounding are then about equal.
 """
-SMALL = 1e-8
+FIRST_ORDER_STEP = 1e-8
 """Step of the first order that tolerances are held to. Rounding adds 1e-7, and what
 bends a curve nothing.
 """
@@ -157,9 +156,9 @@ _CONVERGED = 1e-5
 absolute terms: it leaves out some hundred times the square of that. Elsewhere a linkage
 that does not assemble is too near for differences.
 """
-SAMPLES, DRAWN = 1024, 20_000
+SPREAD_SAMPLES, DRAWN = 1024, 20_000
 """Samples of the tolerances, and of the first-order sum for percentiles."""
-_NEARLY_STRAIGHT, STRAIGHT = 0.1, 1e-4
+_NEARLY_STRAIGHT, NEARLY_LINEAR = 0.1, 1e-4
 """Relative differences of cubature and first order. Below the first, three points are
 enough for a deviation; below the second, percentiles are those of the first order: what
 bends a curve by q skews it by q and widens it by q^2.
@@ -168,7 +167,7 @@ _SLIGHT = 1e-3
 """Part of the greatest worst case of a quantity that is not judged. Differences and
 rounding are there as large as their result.
 """
-MOST = 3
+MOST_TOLERANCES = 3
 """Tolerances of a scene that are judged together: three points each."""
 _GIVEN = 1e-4
 """Tolerance that the run gives the lengths, in parts of the shortest bar."""
@@ -195,7 +194,7 @@ def sensitivity(question: Question) -> list[Row]:
     nominal = ask_free_bodies(scene)
 
     def along(part: float) -> dict[str, Array]:
-        changes = {key: part * STEP * step for key, step in directions.items()}
+        changes = {key: part * RELATIVE_STEP * step for key, step in directions.items()}
         return ask_beside(file.move(changes), scene, nominal).quantities
 
     near, far = [(along(part), along(-part)) for part in (1.0, 2.0)]
@@ -206,8 +205,8 @@ def sensitivity(question: Question) -> list[Row]:
         first, second = (
             _subtract(name, up[name], down[name]) for up, down in (near, far)
         )
-        slope = (8.0 * first - second) / (12.0 * STEP)
-        coarse = first / (2.0 * STEP)
+        slope = (8.0 * first - second) / (12.0 * RELATIVE_STEP)
+        coarse = first / (2.0 * RELATIVE_STEP)
         terms = np.array(
             [step * derivatives.of(name, key) for key, step in directions.items()]
         )
@@ -215,7 +214,7 @@ def sensitivity(question: Question) -> list[Row]:
             magnitude(term) for term in terms
         )
         comparable = np.array([status == "ok" for status in derivatives.status]) | (
-            name not in FORCES
+            name not in FORCE_NAMES
         )
         # a derivative that is no number is compared, and fails
         bent = divide(magnitude(slope - coarse), size) > _CONVERGED
@@ -250,9 +249,11 @@ def tolerances(question: Question) -> list[Row]:
     defaults = (
         fourbar.Tolerance(f"lengths.{name}", width, name == "output") for name in names
     )
-    scene = replace(scene, tolerances=(scene.tolerances or tuple(defaults))[:MOST])
+    scene = replace(
+        scene, tolerances=(scene.tolerances or tuple(defaults))[:MOST_TOLERANCES]
+    )
     _require_beside(scene)
-    spread = fourbar.tolerances(scene, SAMPLES)
+    spread = fourbar.tolerances(scene, SPREAD_SAMPLES)
     expected = _compute_expected(scene)
     errors: dict[str, Array] = {}
     for name in (*UNKNOWNS, LINE.value):
@@ -278,7 +279,7 @@ def tolerances(question: Question) -> list[Row]:
     ]
 
 
-def _find_reach(tolerance: fourbar.Tolerance) -> float:
+def _find_worst_deviation(tolerance: fourbar.Tolerance) -> float:
     """Return how far the worst case of a tolerance reaches."""
     return tolerance.width * (3.0 if tolerance.sigma else 1.0)
 
@@ -298,7 +299,7 @@ def _require_beside(scene: Scene) -> None:
     ]
     for signs in product((1.0, -1.0), repeat=len(of_lengths)):
         changes = {
-            tolerance.key: sign * _find_reach(tolerance)
+            tolerance.key: sign * _find_worst_deviation(tolerance)
             for tolerance, sign in zip(of_lengths, signs, strict=True)
         }
         if not stays_beside(file.move(changes), scene):
@@ -330,12 +331,12 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
     """
     bare = replace(scene, tolerances=())
     answer = ask_free_bodies(bare)
-    nominal = split_parts(answer)
+    nominal = split_unknowns(answer)
     file = SceneFile(bare)
     numbers = file.find_stated(tolerance.key for tolerance in scene.tolerances)
 
     def changed(changes: dict[str, float]) -> dict[str, Array]:
-        parts = split_parts(ask_beside(file.move(changes), bare, answer))
+        parts = split_unknowns(ask_beside(file.move(changes), bare, answer))
         return {
             part: _subtract(part, values, nominal[part])
             for part, values in parts.items()
@@ -359,7 +360,7 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
         weights.append(math.prod(w for _, w in node))
     slopes = []
     for tolerance in scene.tolerances:
-        h = SMALL * max(abs(numbers[tolerance.key].number), tolerance.width)
+        h = FIRST_ORDER_STEP * max(abs(numbers[tolerance.key].number), tolerance.width)
         up, down = (changed({tolerance.key: change}) for change in (h, -h))
         slopes.append({part: (up[part] - down[part]) / (2.0 * h) for part in nominal})
     rng = np.random.default_rng(0)
@@ -373,7 +374,9 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
     variances = np.array(
         [[1.0 if tolerance.sigma else 1.0 / 3.0] for tolerance in scene.tolerances]
     )
-    reaches = np.array([[_find_reach(tolerance)] for tolerance in scene.tolerances])
+    reaches = np.array(
+        [[_find_worst_deviation(tolerance)] for tolerance in scene.tolerances]
+    )
     expected = {}
     for part in nominal:
         values, slope = (
@@ -385,7 +388,7 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
         bent = divide(np.abs(deviation - first_order), deviation)
         bent = np.maximum(bent, divide(np.abs(mean), deviation) ** 2)
         percentiles = np.full((2, len(mean)), np.nan)
-        straight = bent <= STRAIGHT
+        straight = bent <= NEARLY_LINEAR
         if straight.any():
             percentiles[:, straight] = np.percentile(
                 samples @ (slope * widths)[:, straight], (1.0, 99.0), axis=0
@@ -400,7 +403,7 @@ def _compute_off(spread: Spread, expected: Expected, slight: float) -> Array:
     bent = expected.bent
     every = bent >= 0.0
     near = bent <= _NEARLY_STRAIGHT
-    straight = bent <= STRAIGHT
+    straight = bent <= NEARLY_LINEAR
     pairs = [
         (spread.worst, expected.worst, expected.worst, 1.0, every),
         (spread.first_order, expected.first_order, expected.first_order, 1.0, every),

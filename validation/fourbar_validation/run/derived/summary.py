@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
-from fourbar.quantities import OK
+from fourbar.quantities import OK, Array
 from fourbar.scene import Scene, command_at
 from fourbar.scene.motion import FromLimit
 from fourbar.show.block import write_block, write_motor
@@ -26,33 +26,33 @@ from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.derived import (
     CUT,
-    FOUR_DIGITS,
     LOCATED_ROUGHLY,
     PRINTED,
+    PRINTED_TO_FOUR_DIGITS,
 )
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.scales import make_reference
-from fourbar_validation.compare.tolerance import (
-    Array,
-    divide,
-    magnitude,
-    wrap_angle,
-)
+from fourbar_validation.compare.tolerance import divide, magnitude, wrap_difference
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.run.derived.cuts import WHERE, Piece, free_piece, move_bars
+from fourbar_validation.run.derived.cuts import (
+    CUT_POSITIONS,
+    Piece,
+    free_piece,
+    move_bars,
+)
 from fourbar_validation.run.derived.variants import ask_free_bodies, make_row
 from fourbar_validation.run.question import NotAskedError, Question
 
-ROWS = ("ranges", "peaks", "means", "pins", "frame_force", "bending", "bore")
+ROW_NAMES = ("ranges", "peaks", "means", "pins", "frame_force", "bending", "bore")
 """Names of the rows."""
 _CUT_BESIDE = 1e-10
 """Part of the length by which a bar is cut on either side of a place. A couple that
 acts there makes a jump.
 """
-FINE = 1440
+PEAK_INTERVALS = 1440
 """Intervals of the motion at whose ends nothing may exceed a peak or a range."""
-BETWEEN = 1e-3
+EXCESS_BETWEEN_POSITIONS = 1e-3
 """Part by which a largest value without a place may exceed that of many positions. Its
 own position lies between two of them.
 """
@@ -70,7 +70,7 @@ parts of the largest.
 """
 _PRESSURE = 1e6
 """Pressure of the cylinder whose bore is judged, Pa."""
-TOLERANCES = {"bore": FOUR_DIGITS, "bending": LOCATED_ROUGHLY}
+ROW_TOLERANCES = {"bore": PRINTED_TO_FOUR_DIGITS, "bending": LOCATED_ROUGHLY}
 
 
 @dataclass
@@ -101,7 +101,7 @@ class _SummaryJudge:
     def fine(self) -> Answer:
         """Return their answer at many positions."""
         places = self.solution.at.places
-        return self.ask(np.linspace(places[0], places[-1], FINE + 1))
+        return self.ask(np.linspace(places[0], places[-1], PEAK_INTERVALS + 1))
 
     @cached_property
     def motor(self) -> dict[str, Any]:
@@ -118,7 +118,7 @@ class _SummaryJudge:
             return False
         for bar in MOVING_BARS:
             theta = self.own.quantities[f"theta_{bar}"]
-            if abs(wrap_angle(theta[-1] - theta[0])) > _REPEATS:
+            if abs(wrap_difference(theta[-1] - theta[0])) > _REPEATS:
                 return False
             for name in (f"omega_{bar}", f"alpha_{bar}"):
                 rate = self.own.quantities[name]
@@ -170,20 +170,20 @@ def summary(question: Question) -> list[Row]:
 
     Shaking force, bending and bore are judged too.
     """
-    judged = _SummaryJudge(question, _summarize(question))
+    judged = _SummaryJudge(question, _summarize_scene(question))
     _judge_ranges(judged)
     _judge_drive(judged)
     _judge_pins(judged)
     _judge_bending(judged)
     _judge_growth(judged)
     rows = []
-    for name in ROWS:
+    for name in ROW_NAMES:
         errors = judged.errors.get(name, [])
         if not errors:
             continue
-        tolerance = TOLERANCES.get(name, PRINTED)
+        tolerance = ROW_TOLERANCES.get(name, PRINTED)
         error = np.array(errors)
-        reason = f"{len(errors)} numbers, {FINE + 1} positions"
+        reason = f"{len(errors)} numbers, {PEAK_INTERVALS + 1} positions"
         nowhere = np.full(len(errors), math.nan)
         rows.append(
             make_row(question, "summary", name, error, tolerance, nowhere, reason)
@@ -191,7 +191,7 @@ def summary(question: Question) -> list[Row]:
     return rows
 
 
-def _summarize(question: Question) -> Facts:
+def _summarize_scene(question: Question) -> Facts:
     """Summarize the scene.
 
     Raises NotAskedError if its motion has nothing between its positions, or poles.
@@ -220,7 +220,7 @@ def _judge_ranges(judged: _SummaryJudge) -> None:
         fine -= 2.0 * math.pi * round((fine.min() - low.value) / (2.0 * math.pi))
         # both ends of one range: one that is a whole turn too wide has another end
         near = np.array([fine.min(), fine.max()])
-        reached = near + wrap_angle(there - near)
+        reached = near + wrap_difference(there - near)
         judged.add("ranges", np.abs(reached - [low.value, high.value]))
         judged.add_excess("ranges", fine.max() - high.value, low.value - fine.min())
     least = judged.facts.transmission
@@ -273,7 +273,9 @@ def _judge_drive(judged: _SummaryJudge) -> None:
         most = float(np.abs(fine).max())
         if key.removeprefix("peak_") not in facts.between.growing and most != 0.0:
             judged.add_excess("peaks", (most - entry[key]) / most)
-            judged.add_excess("peaks", entry[key] / most - 1.0 - BETWEEN)
+            judged.add_excess(
+                "peaks", entry[key] / most - 1.0 - EXCESS_BETWEEN_POSITIONS
+            )
     _judge_energy(judged, entry, power)
     _judge_bore(judged, fine_values)
 
@@ -350,7 +352,7 @@ def _judge_pins(judged: _SummaryJudge) -> None:
         judged.add_value("pins", of_pin["peak"], load.peak.value)
         judged.add_value("pins", of_pin["rms"], mean)
         apart = there.quantities["theta_2"] - of_pin["theta_2"]
-        judged.add("pins", np.abs(wrap_angle(apart)))
+        judged.add("pins", np.abs(wrap_difference(apart)))
     if judged.scene.drive is None:
         on_frame = -(judged.own.quantities["F12"] + judged.own.quantities["F14"])
         size = magnitude(judged.own.quantities["F12"]).max()
@@ -379,7 +381,7 @@ def _judge_bending(judged: _SummaryJudge) -> None:
             largest.x * (1.0 + off) + off * length
             for off in (-_CUT_BESIDE, _CUT_BESIDE)
         ]
-        anywhere = [*beside, *(part * length for part in WHERE)]
+        anywhere = [*beside, *(part * length for part in CUT_POSITIONS)]
         at_peak, others = (
             [free_piece(stated, moved, answer, bar, cut) for cut in cuts]
             for moved, answer, cuts in (

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from fourbar.files import dump, loads
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.quantities import LINE, OK, SCALARS, UNKNOWNS
+from fourbar.quantities import LINE, OK, SCALARS, UNKNOWNS, Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene import command as command_of
 from fourbar.solution import Solution
-from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES, Comparison, Demands
 from fourbar_validation.compare.reversals import mark_reversing
 from fourbar_validation.compare.rows import VERDICTS, Row
@@ -45,7 +45,7 @@ from fourbar_validation.run.question import (
     spread_evenly,
 )
 
-SAMPLE = 5
+POSITIONS_OF_VARIANTS = 5
 """Positions at which whatever takes more than one call is judged."""
 _FROM_A_CORNER = 0.02
 """Distance from a point of a load's table without differences, rad. The table's slope
@@ -55,9 +55,9 @@ _NOT_AT_REST = 1e-3
 """Part of the speeds over sin^2 mu below which a dry pin may reverse. Small changes of
 a number reverse it then.
 """
-NEAR_A_CHANGE_POINT = 1e-3
+MISS_OF_A_CHANGE_POINT = 1e-3
 """Part of the sum of the lengths by which a linkage near a change point misses it."""
-A_PERTURBATION = 5e-4
+PERTURBATION_TRIED = 5e-4
 """Part of the squared sum of the lengths. Changed linkages keep to the nominal assembly
 if they miss its change point by less than twice as much. See `_measure_misses`.
 """
@@ -102,7 +102,7 @@ def take_few(question: Question) -> Scene:
     indices = np.flatnonzero(fit)
     if not len(indices):
         raise NotAskedError("no position that is well-conditioned and moves")
-    places = command.places[spread_evenly(indices, SAMPLE, inside=True)]
+    places = command.places[spread_evenly(indices, POSITIONS_OF_VARIANTS, inside=True)]
     return at_places(replace(scene, title="", source="", pictures=()), places)
 
 
@@ -131,7 +131,7 @@ class SceneFile:
         self.scene = scene
         self._document = tomllib.loads(dump(scene))
         self._lines = {
-            key: _write_line(key, value) for key, value in self._document.items()
+            key: _write_toml_line(key, value) for key, value in self._document.items()
         }
 
     def find_stated(self, keys: Iterable[str]) -> dict[str, _FileNumber]:
@@ -142,7 +142,7 @@ class SceneFile:
         stated = {}
         for index, key in enumerate(keys):
             with suppress(KeyError):
-                table, last = _place(self._document, key)
+                table, last = _find_entry(self._document, key)
                 number, _, unit = str(
                     table[last][0] if isinstance(table[last], list) else table[last]
                 ).partition(" ")
@@ -175,7 +175,7 @@ class SceneFile:
             for top in {key.partition(".")[0] for key in changes}
         }
         for key, change in changes.items():
-            table, last = _place(tables, key)
+            table, last = _find_entry(tables, key)
             old = table[last]
             if isinstance(old, list):
                 moved = [_change_entry(entry, change) for entry in old]
@@ -183,12 +183,12 @@ class SceneFile:
                 moved = None
             table[last] = _change_entry(old, change) if moved is None else moved
         lines = self._lines | {
-            key: _write_line(key, value) for key, value in tables.items()
+            key: _write_toml_line(key, value) for key, value in tables.items()
         }
         return loads("\n".join(lines.values()))
 
 
-def _place(document: Any, key: str) -> tuple[Any, Any]:
+def _find_entry(document: Any, key: str) -> tuple[Any, Any]:
     """Find the table that holds a number, and its name or index there.
 
     Raises KeyError if the file leaves it out.
@@ -208,13 +208,15 @@ def _change_entry(quantity: str | float, change: float) -> str | float:
     return float(number) + change
 
 
-def _write_line(key: str, value: Any) -> str:
+def _write_toml_line(key: str, value: Any) -> str:
     return f"{json.dumps(key)} = {_write_toml(value)}"
 
 
 def _write_toml(value: Any) -> str:
     if isinstance(value, dict):
-        return "{" + ", ".join(_write_line(*entry) for entry in value.items()) + "}"
+        return (
+            "{" + ", ".join(_write_toml_line(*entry) for entry in value.items()) + "}"
+        )
     if isinstance(value, list):
         return "[" + ",\n".join(map(_write_toml, value)) + "]"
     return json.dumps(value)
@@ -233,7 +235,7 @@ def is_near_change_point(linkage: FourBar) -> bool:
     d, a, b, c = linkage.lengths
     differences = d + a - b - c, d + b - a - c, d + c - a - b
     least = min(abs(difference) for difference in differences)
-    return least <= NEAR_A_CHANGE_POINT * sum_lengths(linkage)
+    return least <= MISS_OF_A_CHANGE_POINT * sum_lengths(linkage)
 
 
 def _measure_misses(linkage: FourBar, bar: int) -> Array:
@@ -257,7 +259,7 @@ def stays_beside(member: Scene, scene: Scene) -> bool:
     bar = scene.motion.bar
     nominal = _measure_misses(scene.linkage, bar)
     changed = _measure_misses(member.linkage, bar)
-    return bool(np.all(changed[nominal <= A_PERTURBATION] <= A_PERTURBATION))
+    return bool(np.all(changed[nominal <= PERTURBATION_TRIED] <= PERTURBATION_TRIED))
 
 
 def ask_beside(member: Scene, scene: Scene, nominal: Answer) -> Answer:
@@ -367,7 +369,7 @@ def take_member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
     return Solution(**taken)
 
 
-def split_parts(answer: Answer) -> dict[str, Array]:
+def split_unknowns(answer: Answer) -> dict[str, Array]:
     """Split the unknowns of a position.
 
     Vectors become components, pin forces also their magnitudes.

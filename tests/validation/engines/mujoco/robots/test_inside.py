@@ -15,7 +15,10 @@ from fourbar.scene import Command
 from fourbar.scene.motion import Sweep
 from fourbar.solving import solve
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.mujoco.robots.answers import QUANTITIES, measure_sizes
+from fourbar_validation.engines.mujoco.robots.answers import (
+    FORCE_QUANTITIES,
+    measure_sizes,
+)
 from fourbar_validation.engines.mujoco.robots.closures import find_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.inside import HEAVY, LoopInside
@@ -25,7 +28,7 @@ from fourbar_validation.engines.mujoco.robots.loop import (
     RobotFile,
 )
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
-from fourbar_validation.engines.mujoco.robots.scene import make_scene
+from fourbar_validation.engines.mujoco.robots.scene import make_loop_scene
 from fourbar_validation.robots.files import read_robot
 from tests.support.robots import ADAPTIVE, EXCAVATOR, FINGER, LIFTED
 
@@ -63,7 +66,7 @@ def open_loop(name: str) -> tuple[LoopInside, LoopScene]:
         for closure in find_closures(posed, options)
         if closure.loop is not None and closing in (None, closure.name)
     )
-    return LoopInside(posed.model, loop), make_scene(compiled, posed, loop, 2.0)
+    return LoopInside(posed.model, loop), make_loop_scene(compiled, posed, loop, 2.0)
 
 
 def spread_over_range(inside: LoopInside, made: LoopScene, count: int) -> np.ndarray:
@@ -145,7 +148,7 @@ def test_rigid_pins_in_the_robot_are_the_formulas_of_its_scene(name: str) -> Non
     command = Command(angles - _turn_back(inside, made), branch, 2.0, 3.0)
     formulas = solve(made.scene, "force", at=command)
     free_bodies = FreeBody().answer(made.scene, command).quantities
-    for quantity in QUANTITIES:
+    for quantity in FORCE_QUANTITIES:
         rigid = np.array([row.rigid.values()[quantity] for row in rows])
         for right in (getattr(formulas, quantity), free_bodies[quantity]):
             size = measure_sizes(right).max()
@@ -169,7 +172,7 @@ def test_the_start_of_a_simulation_is_not_judged() -> None:
     assert min(row.theta_2 for row in through.rows) >= start + 0.1 - 1e-3
     errors, scales = through.errors(), through.scales()
     single = inside.answer_states(angles[5:], 1.0, 0.0)
-    for quantity in QUANTITIES:
+    for quantity in FORCE_QUANTITIES:
         settled = errors[quantity].max() / scales[quantity]
         assert settled < 0.02
         assert single.errors()[quantity].max() / scales[quantity] > 10.0 * settled
@@ -196,7 +199,7 @@ def test_what_holds_the_other_joints_hardly_matters(name: str) -> None:
         inside.answer_through_time(angles, 2.0, 0.0, heavy)
         for heavy in (HEAVY, 0.1 * HEAVY)
     ]
-    for quantity in QUANTITIES:
+    for quantity in FORCE_QUANTITIES:
         one, other = (
             np.array([row.soft.values()[quantity] for row in answer.rows])
             for answer in answers

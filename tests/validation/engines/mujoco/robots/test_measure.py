@@ -17,7 +17,7 @@ from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
 from fourbar_validation.robots.files import read_robot
-from fourbar_validation.robots.measure import find_left_out, find_worst
+from fourbar_validation.robots.measure import find_left_out, find_worst_of_loop
 from tests.support.robots import FINGER
 from tests.support.scenes import mirrored
 
@@ -28,7 +28,9 @@ ROBOTS = Path(__file__).parents[5] / "models" / "robots"
 def test_both_fingers_of_a_gripper_are_measured_and_are_alike() -> None:
     file = read_robot(ROBOTS / "gripper.xml")
     right, left = measure_loops(file, MeasureOptions(PoseOptions()), None).loops
-    assert find_worst(right) == pytest.approx(find_worst(left), rel=1e-3)
+    assert find_worst_of_loop(right) == pytest.approx(
+        find_worst_of_loop(left), rel=1e-3
+    )
 
 
 @pytest.mark.slow
@@ -50,7 +52,9 @@ def test_a_scene_with_axes_of_its_own_gives_the_same_errors() -> None:
         motion=scene.motion.replace(angle=np.asarray(made_angles(made)) + 0.3),
     )
     (other,) = measure_loops(file, options, turned).loops
-    assert find_worst(other) == pytest.approx(find_worst(made), rel=1e-6)
+    assert find_worst_of_loop(other) == pytest.approx(
+        find_worst_of_loop(made), rel=1e-6
+    )
 
 
 ROCKER = fourbar.load(ROBOTS.parent / "crank_rocker.toml")
@@ -83,7 +87,9 @@ def test_a_scene_may_see_the_loop_from_behind() -> None:
     (behind,) = measure_loops(file, options, mirrored(bare)).loops
     assert find_left_out(front) < 1e-9
     assert find_left_out(behind) < 1e-9
-    assert find_worst(behind) == pytest.approx(find_worst(front), rel=1e-3)
+    assert find_worst_of_loop(behind) == pytest.approx(
+        find_worst_of_loop(front), rel=1e-3
+    )
 
 
 @pytest.mark.slow

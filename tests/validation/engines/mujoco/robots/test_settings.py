@@ -67,7 +67,7 @@ def test_an_error_that_nothing_reaches_is_not_reached(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(
-        "fourbar_validation.engines.mujoco.robots.settings.SECONDS", 3.0
+        "fourbar_validation.engines.mujoco.robots.settings.SEARCH_SECONDS", 3.0
     )
     file = read_robot(FOOT)
     advice = search(file).advise(1e-12, file)

@@ -6,12 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import Scene
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
 
-QUANTITIES = ("torque", *PIN_FORCES)
+FORCE_QUANTITIES = ("torque", *PIN_FORCES)
 
 
 class LoopMotion(NamedTuple):
@@ -86,7 +85,7 @@ class InsideAnswer:
         They are sizes at each state, N m and N.
         """
         sizes = {}
-        for name in QUANTITIES:
+        for name in FORCE_QUANTITIES:
             soft, rigid = (
                 np.array([getattr(row, which).values()[name] for row in self.rows])
                 for which in ("soft", "rigid")
@@ -103,7 +102,7 @@ class InsideAnswer:
             name: float(
                 measure_sizes([row.rigid.values()[name] for row in self.rows]).max()
             )
-            for name in QUANTITIES
+            for name in FORCE_QUANTITIES
         }
 
 
@@ -136,7 +135,7 @@ class RobotSettings:
     def list_changes(self, other: "RobotSettings") -> dict[str, str]:
         """List the attributes in which this differs from another, as MJCF has them."""
         return {
-            name: _write(getattr(self, name))
+            name: _write_attribute(getattr(self, name))
             for name in self.__slots__
             if getattr(self, name) != getattr(other, name)
         }
@@ -243,7 +242,7 @@ class RobotMeasurement:
     notes: tuple[str, ...]
 
 
-def _write(value: object) -> str:
+def _write_attribute(value: object) -> str:
     """Write a value as MJCF does."""
     if isinstance(value, tuple):
         return " ".join(f"{number:.6g}" for number in value)

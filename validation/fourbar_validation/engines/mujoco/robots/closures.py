@@ -14,8 +14,8 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.linkage import ENDS
-from fourbar_validation.compare.answer import Array
+from fourbar.linkage import ENDS, PINS
+from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     climb,
     find_common,
@@ -28,7 +28,6 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
 )
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.loop import (
-    PAIRS,
     PoseOptions,
     RobotClosure,
     RobotFile,
@@ -37,9 +36,9 @@ from fourbar_validation.engines.mujoco.robots.loop import (
 )
 from fourbar_validation.engines.mujoco.robots.pose import (
     BALL,
-    FREE,
-    HINGE,
-    OPEN,
+    FREE_JOINT,
+    HINGE_JOINT,
+    LARGEST_RESIDUAL,
     SLIDE,
     PosedRobot,
     find_joint,
@@ -50,15 +49,15 @@ _PARALLEL = math.radians(0.5)
 """Largest angle between the axes of a planar linkage, rad. Beyond it forces across the
 plane reach a hundredth.
 """
-COINCIDE = 1e-6
+COINCIDENT_PINS = 1e-6
 """Two pins are one where they are nearer than this part of the longest bar."""
-LEVEL = 1e-6
+LEVEL_PLANE = 1e-6
 """Part of gravity below which a plane is level."""
-KINDS = {
+EQUALITY_KINDS = {
     int(getattr(mujoco.mjtEq, f"mjEQ_{name.upper()}")): name
     for name in ("connect", "weld", "joint", "tendon")
 }
-NUMBERS = {
+HINGES_IN_WORDS = {
     1: "one hinge",
     2: "two hinges",
     3: "three hinges",
@@ -135,7 +134,7 @@ def describe_equality(model: mujoco.MjModel, number: int) -> str:
     """
     if model.equality(number).name:
         return str(model.equality(number).name)
-    kind = KINDS.get(int(model.eq_type[number]))
+    kind = EQUALITY_KINDS.get(int(model.eq_type[number]))
     first = int(model.eq_obj1id[number])
     second = int(model.eq_obj2id[number])
     if kind in ("connect", "weld"):
@@ -250,7 +249,7 @@ class _Finder:
         """Describe one equality."""
         model = self.model
         name = self._name(number)
-        kind = KINDS.get(int(model.eq_type[number]), "flex")
+        kind = EQUALITY_KINDS.get(int(model.eq_type[number]), "flex")
         solref = tuple(model.eq_solref[number].tolist())
         solimp = tuple(model.eq_solimp[number].tolist())
         if kind == "joint":
@@ -339,12 +338,12 @@ class _Finder:
 
     def _find_other_joint(self, chain: _Chain) -> str:
         words = {
-            FREE: "floats freely",
+            FREE_JOINT: "floats freely",
             BALL: "is a ball joint: the loop is spatial",
             SLIDE: "is a slide: the loop is a slider-crank or of its kin",
         }
         for joint, kind in zip(chain.joints, chain.kinds, strict=True):
-            if kind != HINGE:
+            if kind != HINGE_JOINT:
                 name = name_joint(self.model, joint)
                 return f"{name} {words[kind]}"
         return ""
@@ -354,7 +353,7 @@ class _Finder:
         hinges = [
             joint
             for joint, kind in zip(chain.joints, chain.kinds, strict=True)
-            if kind == HINGE
+            if kind == HINGE_JOINT
         ]
         largest: tuple[float, str] | None = None
         for one, other in combinations(hinges, 2):
@@ -383,7 +382,7 @@ class _Finder:
         """
         freedoms = hinges - 3
         names = [name_joint(self.model, j) for j in chain.joints]
-        count = NUMBERS.get(hinges, f"{hinges} hinges")
+        count = HINGES_IN_WORDS.get(hinges, f"{hinges} hinges")
         if freedoms <= 0:
             if is_pin:
                 closer = ""
@@ -440,7 +439,9 @@ class _Finder:
         bars = {bar for bar in chain.bars if bar is not None} - {chain.ground}
         names = []
         for other in range(self.model.neq):
-            if other == number or KINDS.get(int(self.model.eq_type[other])) not in (
+            if other == number or EQUALITY_KINDS.get(
+                int(self.model.eq_type[other])
+            ) not in (
                 "connect",
                 "weld",
             ):
@@ -516,7 +517,7 @@ class _Finder:
         if driven != pins[0]:
             groups = [groups[0], *reversed(groups[1:])]
             pins = list(reversed(pins))
-        by_pin = dict(zip(PAIRS, pins, strict=True))
+        by_pin = dict(zip(PINS, pins, strict=True))
         hinges = {pin: joint for pin, joint in by_pin.items() if joint is not None}
         bodies = dict(zip((1, 2, 3, 4), groups, strict=True))
         layout = _Layout(self, self.posed, bodies, hinges, number)
@@ -610,7 +611,7 @@ class _Finder:
         pushed: dict[int, str] = {}
         bars = {self.root[int(self.model.jnt_bodyid[j])]: j for j in at_ground}
         for other in range(self.model.neq):
-            kind = KINDS.get(int(self.model.eq_type[other]))
+            kind = EQUALITY_KINDS.get(int(self.model.eq_type[other]))
             if other == number or kind not in ("connect", "weld"):
                 continue
             ends = (end.body for end in _find_ends(self.posed, other))
@@ -641,7 +642,7 @@ class _Finder:
         others: list[int | str] = []
         pins = set(layout.hinges.values())
         for other in range(model.neq):
-            kind = KINDS.get(int(model.eq_type[other]))
+            kind = EQUALITY_KINDS.get(int(model.eq_type[other]))
             if other == number or not model.eq_active0[other]:
                 continue
             if kind == "joint":
@@ -661,7 +662,7 @@ class _Finder:
                 others.append(other)
                 continue
             pin = next(
-                (p for p, pair in PAIRS.items() if set(pair) == set(numbers)), None
+                (p for p, pair in PINS.items() if set(pair) == set(numbers)), None
             )
             if pin is not None and self._is_pin(other) and layout.is_at(pin, ends):
                 if pin == cut:
@@ -716,7 +717,7 @@ class _Layout:
     def _side(self, pin: str, joint: int) -> float:
         """Return +1 if the second bar of a pin hangs on its joint, -1 if the first."""
         root = self.finder.root[int(self.model.jnt_bodyid[joint])]
-        first, second = PAIRS[pin]
+        first, second = PINS[pin]
         if root in self.bodies[second]:
             return 1.0
         assert root in self.bodies[first]
@@ -734,7 +735,7 @@ class _Layout:
         for pin, joint in self.hinges.items():
             turned = self.data.xaxis[joint] @ self.normal * self._side(pin, joint)
             self.senses[pin] = math.copysign(1.0, float(turned))
-            for bar in PAIRS[pin]:
+            for bar in PINS[pin]:
                 self.places[bar, pin] = self.data.xanchor[joint].copy()
         if cut is not None:
             for end in self.ends:
@@ -750,13 +751,13 @@ class _Layout:
         self.lengths = tuple(math.hypot(x, y) for x, y in lines)
         self.angles = tuple(math.atan2(y, x) for x, y in lines)
         for length, (one, other) in zip(self.lengths, ENDS.values(), strict=True):
-            if length <= COINCIDE * max(self.lengths):
+            if length <= COINCIDENT_PINS * max(self.lengths):
                 return f"pins {one} and {other} are in one place: a bar has no length"
         return ""
 
     def _find_bar_of(self, body: int, cut: str) -> int:
         root = self.finder.root[body]
-        return next(bar for bar in PAIRS[cut] if root in self.bodies[bar])
+        return next(bar for bar in PINS[cut] if root in self.bodies[bar])
 
     def _choose_along(self) -> Array:
         """Return x of the plane in world axes.
@@ -766,7 +767,7 @@ class _Layout:
         gravity = self.model.opt.gravity
         in_plane = gravity - (gravity @ self.normal) * self.normal
         size = float(np.linalg.norm(in_plane))
-        if size > LEVEL * float(np.linalg.norm(gravity)) and size > 0.0:
+        if size > LEVEL_PLANE * float(np.linalg.norm(gravity)) and size > 0.0:
             return np.asarray(np.cross(-in_plane / size, self.normal))
         line = self.places[1, "O4"] - self.places[1, "O2"]
         line = line - (line @ self.normal) * self.normal
@@ -783,11 +784,11 @@ class _Layout:
 
     def is_at(self, pin: str, ends: tuple[_ClosureEnd, _ClosureEnd]) -> bool:
         """Tell whether both ends of another equality lie on the axis of a pin."""
-        bar = PAIRS[pin][0]
+        bar = PINS[pin][0]
         for end in ends:
             apart = end.place - self.places[bar, pin]
             in_plane = apart - (apart @ self.normal) * self.normal
-            near = max(COINCIDE * max(self.lengths), OPEN)
+            near = max(COINCIDENT_PINS * max(self.lengths), LARGEST_RESIDUAL)
             if float(np.linalg.norm(in_plane)) > near:
                 return False
         return True

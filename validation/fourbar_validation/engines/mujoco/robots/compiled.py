@@ -15,7 +15,7 @@ _MOST_KEYFRAMES = 100_000
 """A robot has a few; MuJoCo reserves as many as a file asks for, minutes long."""
 _STAND_IN = 0.01
 """m, radius of the sphere that stands where a mesh is missing and a mass unknown."""
-LIGHT = 1e-3
+MASS_OF_THE_SPHERE = 1e-3
 """kg, mass of that sphere: MuJoCo moves no body without one."""
 _FROM_GEOMS, _AS_STATED = 1, 0
 """Values of the compiler's `inertiafromgeom`: all bodies, and none; 2 is in between."""
@@ -121,7 +121,7 @@ def _take_out_meshes(spec: mujoco.MjSpec, file: RobotFile) -> tuple[set[str], se
         if body.name in unknown and body.joints:
             size = [_STAND_IN, 0.0, 0.0]
             kind = mujoco.mjtGeom.mjGEOM_SPHERE
-            body.add_geom(type=kind, size=size, mass=LIGHT)
+            body.add_geom(type=kind, size=size, mass=MASS_OF_THE_SPHERE)
     if left_out:  # they may name the geoms, and move nothing
         for element in [*spec.sensors, *spec.pairs]:
             spec.delete(element)

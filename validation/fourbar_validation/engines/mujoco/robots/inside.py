@@ -31,8 +31,9 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import LimitError
-from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.mujoco.closed_loop import load_force
+from fourbar.linkage import PINS
+from fourbar.quantities import Array
+from fourbar_validation.engines.mujoco.closed_loop import WARNINGS, load_force
 from fourbar_validation.engines.mujoco.couple import find_couple
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     climb,
@@ -47,13 +48,13 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     PinsAndTorque,
     TornState,
 )
-from fourbar_validation.engines.mujoco.robots.loop import PAIRS, RobotLoop
+from fourbar_validation.engines.mujoco.robots.loop import RobotLoop
 from fourbar_validation.engines.mujoco.runner import Stepper
 
-CLOSED = 1e-12
+RESIDUAL_OF_A_CLOSED_STATE = 1e-12
 """m or rad; residual of the closure at which a state is closed."""
 _CLOSING_STEPS = 50
-OPEN = 1e-6
+RESIDUAL_OF_AN_OPEN_LOOP = 1e-6
 """Residual above which the loop does not close at a position, m or rad."""
 _STRIDE = math.radians(2.0)
 """Largest turn of the driven hinge from one closed state to the next. The assembly is
@@ -68,24 +69,19 @@ HEAVY = 1e4
 the robot. It lets the joints move by about its inverse; beyond 1e5 MuJoCo's solver
 loses the light bars beside it: at 1e6 the gap was three times too large.
 """
-LIMIT = int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
-SETTLED = 5.0
+LIMITS_OFF = int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+SETTLING_TIME = 5.0
 """Time constants after which the loop has yielded but for 1 %. They are at most half of
 the motion.
 """
 _REACHED = 1.0 - 1e-6
 """Part of its couple at which dry friction acts in full."""
-MOST_STEPS = 60_000
+MOST_TIMESTEPS = 60_000
 """Steps of one run; at 0.1 ms a step of a humanoid these are six seconds."""
 _FORCE_OF_PIN = {"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}
 """Names of the pin forces. F_ij is the force of bar i on bar j."""
 _FORCE_ON = {"F12": 2, "F32": 2, "F43": 3, "F14": 4}
 """The bar that each force acts on."""
-WARNINGS = (
-    mujoco.mjtWarning.mjWARN_BADQPOS,
-    mujoco.mjtWarning.mjWARN_BADQVEL,
-    mujoco.mjtWarning.mjWARN_BADQACC,
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,14 +169,19 @@ class LoopInside:
         size = math.inf
         for _ in range(_CLOSING_STEPS):
             residual, jacobian = self._evaluate_closure(qpos)
-            if np.abs(residual).max() <= CLOSED or np.abs(residual).max() >= size:
+            if (
+                np.abs(residual).max() <= RESIDUAL_OF_A_CLOSED_STATE
+                or np.abs(residual).max() >= size
+            ):
                 break
             size = float(np.abs(residual).max())
             step = np.linalg.lstsq(jacobian[:, self.passive], -residual, rcond=1e-9)[0]
             for dof, part in zip(self.passive, step, strict=True):
                 joint = int(self.model.dof_jntid[dof])
                 qpos[self.model.jnt_qposadr[joint]] += part
-        return bool(np.abs(residual).max() <= max(OPEN, self._skew()))
+        return bool(
+            np.abs(residual).max() <= max(RESIDUAL_OF_AN_OPEN_LOOP, self._skew())
+        )
 
     def measure_transmission(self, qpos: Array) -> float:
         """Return how well the hinges that are not driven close the gap in a pose, m.
@@ -438,7 +439,7 @@ class LoopInside:
     def _find_bar(self, body: int, pin: str) -> int:
         """Return which of the two bars of a pin a body belongs to."""
         for above in climb(self.model, body):
-            for bar in PAIRS[pin]:
+            for bar in PINS[pin]:
                 if above in self.loop.bodies[bar] and bar != 1:
                     return bar
         return 1
@@ -489,10 +490,10 @@ class LoopInside:
         instants = [
             _find_instant(angles[0], angle, omega_2, alpha_2) for angle in angles
         ]
-        if not 1.0 <= instants[-1] / timestep <= MOST_STEPS:
+        if not 1.0 <= instants[-1] / timestep <= MOST_TIMESTEPS:
             raise LimitError(
                 f"its timestep of {timestep:g} s makes {instants[-1] / timestep:.3g}"
-                f" steps of the motion; must be 1 to {MOST_STEPS}: --speed states"
+                f" steps of the motion; must be 1 to {MOST_TIMESTEPS}: --speed states"
                 " another speed"
             )
         spent = 0.0
@@ -531,7 +532,7 @@ class LoopInside:
         model, data = copy(self.model), mujoco.MjData(self.model)
         model.dof_armature[self.held] += HEAVY * float(model.dof_M0.max())
         model.opt.disableflags &= ~(
-            LIMIT & ~self.flags
+            LIMITS_OFF & ~self.flags
         )  # the motor may meet the stops of the file
         steps = max(round(seconds / model.opt.timestep), 1)
         for angle in theta_2:
@@ -577,7 +578,7 @@ def settling_time(constant: float, seconds: float) -> float:
     constant : time constant of its closure, s.
     seconds : duration of the motion, s.
     """
-    return min(SETTLED * constant, 0.5 * seconds)
+    return min(SETTLING_TIME * constant, 0.5 * seconds)
 
 
 def reflect(model: mujoco.MjModel, loop: RobotLoop) -> Array:

@@ -9,15 +9,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from fourbar.linkage import BAR_NAMES
+from fourbar.quantities import Array
 from fourbar.scene import Scene
-from fourbar_validation.compare.answer import Array
 
 FLAT = 2e-3
 """rad; where the outputs of both assemblies are nearer the pose does not tell which it
 is: a loop that is closed to 1e-12 m leaves about half as much open where its bars are
 in line.
 """
-PAIRS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
+PINS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
 """The two bars that meet at each pin."""
 
 

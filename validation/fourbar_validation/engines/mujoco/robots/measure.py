@@ -34,14 +34,14 @@ from fourbar_validation.engines.mujoco.robots.onto_scene import (
     miss_lengths,
 )
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
-from fourbar_validation.engines.mujoco.robots.scene import make_scene
+from fourbar_validation.engines.mujoco.robots.scene import make_loop_scene
 from fourbar_validation.engines.mujoco.robots.settings import (
     SettingsSearch,
     read_settings,
 )
 from fourbar_validation.engines.mujoco.theirs import collect_warnings
 
-POSITIONS = 37
+POSITIONS_OF_A_LOOP = 37
 """Positions at which a loop is looked at."""
 _TORN_POSITIONS = 5
 """Positions from which a motor's torque acts."""
@@ -87,7 +87,7 @@ def measure_loops(
                 loop, robot = one, posed
             else:
                 loop, robot = close_onto(scene, posed, one, options.pose)
-            made = make_scene(compiled, robot, loop, options.speed, loop.name)
+            made = make_loop_scene(compiled, robot, loop, options.speed, loop.name)
             stated = made.scene if scene is None else scene
             if scene is None:
                 remarks = made.remarks
@@ -114,7 +114,7 @@ def _measure_loop(
         scene = replace(scene, motion=scene.motion.replace(speed=options.speed))
     inside = LoopInside(model, loop)
     turned = find_turn(scene, loop)
-    motion = _choose_motion(scene, turned).thin_out(POSITIONS)
+    motion = _choose_motion(scene, turned).thin_out(POSITIONS_OF_A_LOOP)
     states = inside.answer_states(*motion)
     if not states.rows:
         raise LimitError(
@@ -130,7 +130,7 @@ def _measure_loop(
             raise LimitError("nothing moves: a sweep at a speed is needed")
         through = inside.answer_through_time(*closing)
         lighter = inside.answer_through_time(*closing, HEAVY * _LIGHTER)
-        influence = _compare(through, lighter)
+        influence = _compare_at_same_angles(through, lighter)
     except LimitError as error:
         refusal = str(error)
     torn: tuple[TornState, ...] = ()
@@ -169,7 +169,7 @@ def _choose_motion(scene: Scene, turned: float) -> LoopMotion:
     return LoopMotion(tuple(angles.tolist()), speed, acceleration)
 
 
-def _compare(one: InsideAnswer, other: InsideAnswer) -> float:
+def _compare_at_same_angles(one: InsideAnswer, other: InsideAnswer) -> float:
     """Return by how much the errors of two runs differ at the same angles.
 
     It is over the largest of each quantity. Each is the error at its own state: the

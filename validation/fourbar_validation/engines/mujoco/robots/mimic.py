@@ -11,12 +11,12 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import InputError
+from fourbar.quantities import Array
 from fourbar.scene import Scene
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import name_joint
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
-from fourbar_validation.engines.mujoco.robots.pose import HINGE, find_joint
+from fourbar_validation.engines.mujoco.robots.pose import HINGE_JOINT, find_joint
 from fourbar_validation.engines.mujoco.robots.scene import is_seen_from_behind
 
 _SAME_LENGTH = 1e-3
@@ -66,7 +66,7 @@ def read_joint_equality(file: RobotFile, name: str, scene: Scene) -> JointEquali
         ties = model.eq_type[number] == mujoco.mjtEq.mjEQ_JOINT
         leader = int(model.eq_obj2id[number])
         if ties and int(model.eq_obj1id[number]) == joint and leader >= 0:
-            return _describe(model, number, joint, leader, scene)
+            return _describe_follower(model, number, joint, leader, scene)
     raise InputError(
         "--mimic",
         name,
@@ -74,11 +74,11 @@ def read_joint_equality(file: RobotFile, name: str, scene: Scene) -> JointEquali
     )
 
 
-def _describe(
+def _describe_follower(
     model: mujoco.MjModel, number: int, follower: int, leader: int, scene: Scene
 ) -> JointEquality:
     for joint in (follower, leader):
-        if int(model.jnt_type[joint]) != HINGE:
+        if int(model.jnt_type[joint]) != HINGE_JOINT:
             raise InputError(
                 "--mimic", name_joint(model, joint), "is no hinge: both must be hinges"
             )
@@ -114,14 +114,14 @@ def _measure_input(
     normal = data.xaxis[leader]
     line = data.xanchor[follower] - data.xanchor[leader]
     line = line - (line @ normal) * normal
-    if not _is_same(float(np.linalg.norm(line)), ground):
+    if not _is_same_number(float(np.linalg.norm(line)), ground):
         return None, 1.0
     x = line / np.linalg.norm(line)
     y = np.cross(normal, x)
-    input_angle = _find_line(model, data, leader, input_length, (x, y))
+    input_angle = _find_angle_of_bar(model, data, leader, input_length, (x, y))
     if input_angle is None:
         return None, 1.0
-    output_angle = _find_line(model, data, follower, output_length, (x, y))
+    output_angle = _find_angle_of_bar(model, data, follower, output_length, (x, y))
     behind = output_angle is not None and is_seen_from_behind(
         scene, 0.0, input_angle, output_angle
     )
@@ -129,7 +129,7 @@ def _measure_input(
     return linkage.ground_angle + side * input_angle, side
 
 
-def _find_line(
+def _find_angle_of_bar(
     model: mujoco.MjModel,
     data: mujoco.MjData,
     joint: int,
@@ -147,7 +147,7 @@ def _find_line(
         for place in places:
             apart = place - data.xanchor[joint]
             across, up = (float(apart @ axis) for axis in axes)
-            if _is_same(math.hypot(across, up), length):
+            if _is_same_number(math.hypot(across, up), length):
                 directions.append(math.atan2(up, across))
         if directions:
             first, *others = directions
@@ -163,7 +163,7 @@ def _list_places(
 ) -> Iterator[list[Array]]:
     """Yield the hinges of the bodies on a body, its sites, and the ends of its rods."""
     on_body = model.body_parentid[model.jnt_bodyid] == body
-    hinges = np.flatnonzero(on_body & (model.jnt_type == HINGE))
+    hinges = np.flatnonzero(on_body & (model.jnt_type == HINGE_JOINT))
     yield [data.xanchor[number] for number in hinges]
     sites = np.flatnonzero(model.site_bodyid == body)
     yield [data.site_xpos[number] for number in sites]
@@ -178,5 +178,5 @@ def _list_places(
     yield ends
 
 
-def _is_same(one: float, other: float) -> bool:
+def _is_same_number(one: float, other: float) -> bool:
     return math.isclose(one, other, rel_tol=_SAME_LENGTH)

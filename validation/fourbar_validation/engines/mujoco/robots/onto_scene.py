@@ -13,8 +13,8 @@ import numpy as np
 
 from fourbar.effects import Gravity
 from fourbar.errors import InputError
+from fourbar.quantities import Array
 from fourbar.scene import Scene, command
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import is_enabled, name_joint
 from fourbar_validation.engines.mujoco.robots.closures import (
     choose_loop,

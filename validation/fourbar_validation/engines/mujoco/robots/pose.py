@@ -13,7 +13,7 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.linkage import require
-from fourbar_validation.compare.answer import Array
+from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     find_tied_bodies,
     list_joints_between,
@@ -21,23 +21,23 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
 )
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
 
-FREE, BALL, SLIDE, HINGE = (
+FREE_JOINT, BALL, SLIDE, HINGE_JOINT = (
     int(getattr(mujoco.mjtJoint, f"mjJNT_{name}"))
     for name in ("FREE", "BALL", "SLIDE", "HINGE")
 )
-UNITS = {HINGE: "rad", SLIDE: "m"}
-CLOSED = 1e-9
+JOINT_UNITS = {HINGE_JOINT: "rad", SLIDE: "m"}
+CLOSED_IN_THE_FILE = 1e-9
 """m or rad; a smaller residual of the equalities is closed as far as a file can say."""
-OPEN = 1e-5
+LARGEST_RESIDUAL = 1e-5
 """m or rad; a residual above this after closing is a loop that does not close."""
-MOST_STEPS = 100
-LONGEST_STEP = 0.3
+MOST_NEWTON_STEPS = 100
+LONGEST_NEWTON_STEP = 0.3
 """rad or m; longer steps leave the region where the loops are nearly linear."""
 _DAMPING = 1e-4
 """Weight of a step against the residuals. It keeps what no equality decides where it
 is.
 """
-OUTSIDE = 1e-6
+OUTSIDE_A_RANGE = 1e-6
 """rad or m; a joint is outside its range beyond the rounding of a file."""
 
 
@@ -65,10 +65,10 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
     fixed = {find_joint(model, name, "--hold") for name in options.held}
     for name, text in options.joints.items():
         joint = find_joint(model, name, "--pose")
-        unit = UNITS.get(int(model.jnt_type[joint]))
+        unit = JOINT_UNITS.get(int(model.jnt_type[joint]))
         if unit is None:
             raise InputError("--pose", f"{name}={text}", "must be a hinge or a slide")
-        stated[model.jnt_qposadr[joint]] = _read_position(name, text, unit)
+        stated[model.jnt_qposadr[joint]] = _read_joint_position(name, text, unit)
         fixed.add(joint)
     closing = _Closing(model, fixed)
     tied = {*closing.joints, *fixed}
@@ -79,24 +79,26 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
     else:
         notes = []
     before = closing.size(stated)
-    if before <= CLOSED and not set(outside) - fixed:
-        return PosedRobot(model, _evaluate(model, stated), stated, tuple(notes))
+    if before <= CLOSED_IN_THE_FILE and not set(outside) - fixed:
+        return PosedRobot(
+            model, _evaluate_kinematics(model, stated), stated, tuple(notes)
+        )
     closed = closing.close(stated)
     after = closing.size(closed)
     moved = [
         name_joint(model, joint)
         for joint in closing.joints
         if abs(closed[model.jnt_qposadr[joint]] - stated[model.jnt_qposadr[joint]])
-        > OUTSIDE
+        > OUTSIDE_A_RANGE
     ]
-    if moved and after <= OPEN:
+    if moved and after <= LARGEST_RESIDUAL:
         notes.append(
             f"the loops are closed again by least squares: {_list_some(moved)} moved"
         )
-    elif after > OPEN:
+    elif after > LARGEST_RESIDUAL:
         left = f"what is left is {1e3 * after:.3g} mm or mrad"
         notes.append(_say_open(model, options, stated, left))
-    return PosedRobot(model, _evaluate(model, closed), stated, tuple(notes))
+    return PosedRobot(model, _evaluate_kinematics(model, closed), stated, tuple(notes))
 
 
 def _say_open(
@@ -109,7 +111,7 @@ def _say_open(
     """
     held = {find_joint(model, name, "--hold") for name in options.held}
     free = _Closing(model, held)
-    closes = free.size(free.close(stated)) <= OPEN
+    closes = free.size(free.close(stated)) <= LARGEST_RESIDUAL
     ranges = any(model.jnt_limited[joint] for joint in free.joints)
     if options.joints and closes and not ranges:
         return (
@@ -126,7 +128,9 @@ def _say_open(
 
 def move_to(posed: PosedRobot, qpos: Array) -> PosedRobot:
     """Return a robot whose loops are closed in another pose."""
-    return PosedRobot(posed.model, _evaluate(posed.model, qpos), qpos, posed.notes)
+    return PosedRobot(
+        posed.model, _evaluate_kinematics(posed.model, qpos), qpos, posed.notes
+    )
 
 
 def find_joint(model: mujoco.MjModel, name: str, option: str) -> int:
@@ -146,10 +150,10 @@ def _find_outside(model: mujoco.MjModel, qpos: Array) -> list[int]:
     low, high = _list_bounds(model)
     outside = []
     for joint in range(model.njnt):
-        if int(model.jnt_type[joint]) in UNITS:
+        if int(model.jnt_type[joint]) in JOINT_UNITS:
             value = qpos[model.jnt_qposadr[joint]]
             dof = model.jnt_dofadr[joint]
-            if not low[dof] - OUTSIDE <= value <= high[dof] + OUTSIDE:
+            if not low[dof] - OUTSIDE_A_RANGE <= value <= high[dof] + OUTSIDE_A_RANGE:
                 outside.append(joint)
     return outside
 
@@ -169,7 +173,7 @@ def _choose_start(model: mujoco.MjModel, options: PoseOptions) -> tuple[Array, s
     return model.key_qpos[number].copy(), f"in keyframe {options.key}"
 
 
-def _read_position(name: str, text: str, unit: str) -> float:
+def _read_joint_position(name: str, text: str, unit: str) -> float:
     try:
         float(text)
     except ValueError:
@@ -190,13 +194,13 @@ def _list_bounds(model: mujoco.MjModel) -> tuple[Array, Array]:
     low = np.full(model.nv, -np.inf)
     high = np.full(model.nv, np.inf)
     for joint in range(model.njnt):
-        if model.jnt_limited[joint] and int(model.jnt_type[joint]) in UNITS:
+        if model.jnt_limited[joint] and int(model.jnt_type[joint]) in JOINT_UNITS:
             dof = model.jnt_dofadr[joint]
             low[dof], high[dof] = model.jnt_range[joint]
     return low, high
 
 
-def _evaluate(model: mujoco.MjModel, qpos: Array) -> mujoco.MjData:
+def _evaluate_kinematics(model: mujoco.MjModel, qpos: Array) -> mujoco.MjData:
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     mujoco.mj_normalizeQuat(model, data.qpos)
@@ -223,7 +227,7 @@ class _Closing:
         self.joints = [
             joint
             for joint in _list_tied_joints(model)
-            if joint not in fixed and int(model.jnt_type[joint]) != FREE
+            if joint not in fixed and int(model.jnt_type[joint]) != FREE_JOINT
         ]
         self.dofs = [dof for joint in self.joints for dof in self._list_dofs(joint)]
 
@@ -268,9 +272,9 @@ class _Closing:
         if not self.dofs:
             return qpos
         damping = _DAMPING * np.eye(len(self.dofs))
-        for _ in range(MOST_STEPS):
+        for _ in range(MOST_NEWTON_STEPS):
             residuals, jacobian = self._move_to(qpos)
-            if np.abs(residuals).max(initial=0.0) <= 1e-3 * CLOSED:
+            if np.abs(residuals).max(initial=0.0) <= 1e-3 * CLOSED_IN_THE_FILE:
                 break
             matrix = np.vstack([jacobian[:, self.dofs], damping])
             wanted = np.concatenate([-residuals, np.zeros(len(self.dofs))])
@@ -284,7 +288,7 @@ class _Closing:
         """Return the pose with every joint that may move inside its range."""
         qpos = start.copy()
         for joint in self.joints:
-            if int(self.model.jnt_type[joint]) in UNITS:
+            if int(self.model.jnt_type[joint]) in JOINT_UNITS:
                 address = self.model.jnt_qposadr[joint]
                 dof = int(self.model.jnt_dofadr[joint])
                 qpos[address] = np.clip(qpos[address], self.low[dof], self.high[dof])
@@ -292,11 +296,11 @@ class _Closing:
 
     def _list_room(self, qpos: Array) -> tuple[Array, Array]:
         """Return how far each unknown may step down and up."""
-        low = np.full(len(self.dofs), -LONGEST_STEP)
-        high = np.full(len(self.dofs), LONGEST_STEP)
+        low = np.full(len(self.dofs), -LONGEST_NEWTON_STEP)
+        high = np.full(len(self.dofs), LONGEST_NEWTON_STEP)
         place = {dof: number for number, dof in enumerate(self.dofs)}
         for joint in self.joints:
-            if int(self.model.jnt_type[joint]) in UNITS:
+            if int(self.model.jnt_type[joint]) in JOINT_UNITS:
                 dof = int(self.model.jnt_dofadr[joint])
                 value = qpos[self.model.jnt_qposadr[joint]]
                 number = place[dof]

@@ -17,15 +17,15 @@ from numpy.typing import NDArray
 from fourbar.effects import Effect, Flywheel, Friction, Gravity, Load, Torsion, Viscous
 from fourbar.errors import InputError
 from fourbar.formulas.mobility import (
-    MARGIN,
+    ANGLE_FROM_LIMITS,
     find_intervals,
     turns_fully,
 )
-from fourbar.linkage import BAR_NAMES, ENDS, MOVING_BARS, Bar, FourBar
+from fourbar.linkage import BAR_NAMES, ENDS, MOVING_BARS, PINS, Bar, FourBar
+from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene.motion import CROSSED, OPEN, Motion, Sweep
 from fourbar.solving import solve
-from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.free_body_closure import close
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     climb,
@@ -46,31 +46,30 @@ from fourbar_validation.engines.mujoco.robots.compiled import (
 from fourbar_validation.engines.mujoco.robots.inside import reflect
 from fourbar_validation.engines.mujoco.robots.loop import (
     FLAT,
-    PAIRS,
     LoopScene,
     PoseOptions,
     RobotFile,
     RobotLoop,
 )
 from fourbar_validation.engines.mujoco.robots.pose import (
-    OUTSIDE,
+    OUTSIDE_A_RANGE,
     PosedRobot,
     pose_robot,
 )
 
 NAMES = {OPEN: "open", CROSSED: "crossed"}
 """Names of the assemblies, by the branch of a motion."""
-DIGITS = 12
+DIGITS_OF_A_MODEL = 12
 """Significant digits of a number of the scene. Those beyond are round-off of the
 compiler.
 """
-STEPS = 120
+SWEEP_INTERVALS = 120
 """Intervals of the sweep."""
-SAMPLES = 720
+RANGE_INTERVALS = 720
 """Intervals in which the ranges of the other hinges are looked for."""
-SPEED = 1.0
+DEFAULT_SPEED = 1.0
 """rad/s, where none is stated."""
-NOTHING = 1e-9
+ROUND_OFF_OF_LOADS = 1e-9
 """Part of what acts below which a number is round-off."""
 _ACROSS = 1e-6
 """Part of gravity below which none acts across the plane."""
@@ -105,12 +104,12 @@ def read_loop_scene(
         (name,) = names
     loop = choose_loop(closures, name)
     title = f"{name} of {file.path.name}"
-    made = make_scene(compiled, posed, loop, speed, title, str(file.path.name))
+    made = make_loop_scene(compiled, posed, loop, speed, title, str(file.path.name))
     notes = (*compiled.notes, *posed.notes)
     return replace(made, notes=notes)
 
 
-def make_scene(
+def make_loop_scene(
     compiled: CompiledRobot,
     posed: PosedRobot,
     loop: RobotLoop,
@@ -120,10 +119,12 @@ def make_scene(
 ) -> LoopScene:
     """Make a scene from a loop in its pose; errors as of `read_loop_scene`."""
     made = _SceneOfLoop(compiled, posed, loop)
-    scene = made.describe(SPEED if speed is None else speed, title, source)
+    scene = made.describe(DEFAULT_SPEED if speed is None else speed, title, source)
     remarks = [*loop.remarks, *made.remarks]
     if speed is None:
-        remarks.append(f"a speed of {SPEED:g} rad/s is taken; --speed states another")
+        remarks.append(
+            f"a speed of {DEFAULT_SPEED:g} rad/s is taken; --speed states another"
+        )
     return LoopScene(scene, loop, made.write_parts(), tuple(remarks), ())
 
 
@@ -184,12 +185,12 @@ def write_pose(model: mujoco.MjModel, loop: RobotLoop, qpos: Array) -> str:
 
 def round_off(number: float) -> float:
     """Round to the digits that a compiled model has."""
-    return float(f"{number:.{DIGITS}g}")
+    return float(f"{number:.{DIGITS_OF_A_MODEL}g}")
 
 
 def _round_angle(angle: float) -> float:
     """Round an angle to the digits that a compiled model has, rad; -0.0 becomes 0.0."""
-    return round(angle, DIGITS) + 0.0
+    return round(angle, DIGITS_OF_A_MODEL) + 0.0
 
 
 def miss_output(scene: Scene, theta_1: float, theta_2: float, theta_4: float) -> float:
@@ -260,7 +261,7 @@ class _SceneOfLoop:
         loop = self.loop
         closing = loop.name if loop.cut else ""
         hinges = {pin: name_joint(model, joint) for pin, joint in loop.hinges.items()}
-        pins = (f"{pin} {hinges.get(pin, closing)}" for pin in PAIRS)
+        pins = (f"{pin} {hinges.get(pin, closing)}" for pin in PINS)
         bars = []
         for bar, name in BAR_NAMES.items():
             bodies = [name_body(model, body) for body in loop.bodies[bar]]
@@ -295,7 +296,7 @@ class _SceneOfLoop:
         path = self._find_sweep(linkage)
         whole = math.tau * math.ceil((-math.pi - path.start) / math.tau)
         start, stop = (_round_angle(end + whole) for end in (path.start, path.stop))
-        theta_2 = Sweep(start, stop, STEPS) if stop > start else start
+        theta_2 = Sweep(start, stop, SWEEP_INTERVALS) if stop > start else start
         branch = self._find_branch(linkage, self.loop.angles[1] + whole)
         motion = Motion(theta_2, speed, branch=branch)
         effects = tuple(self._list_effects(armature, path.betas))
@@ -327,7 +328,7 @@ class _SceneOfLoop:
         pin = self._locate(bar, first)
         line = self._in_plane(self._locate(bar, second) - pin)
         arm = self._in_plane(place - pin)
-        if abs(arm) <= NOTHING * abs(line):
+        if abs(arm) <= ROUND_OFF_OF_LOADS * abs(line):
             return 0.0, 0.0
         turned = arm / line
         return abs(arm), math.atan2(turned.imag, turned.real)
@@ -377,12 +378,10 @@ class _SceneOfLoop:
         """List the effects, the pins in their order."""
         model = self.model
         pull = self._in_plane(self.gravity)
-        if abs(pull) > NOTHING * float(np.linalg.norm(self.gravity)):
+        if abs(pull) > ROUND_OFF_OF_LOADS * float(np.linalg.norm(self.gravity)):
             angle = math.atan2(pull.imag, pull.real)
             yield Gravity(round_off(abs(pull)), _round_angle(angle))
-        hinges = {
-            pin: self.loop.hinges[pin] for pin in PAIRS if pin in self.loop.hinges
-        }
+        hinges = {pin: self.loop.hinges[pin] for pin in PINS if pin in self.loop.hinges}
         damping = {pin: _reflect_damping(model, joint) for pin, joint in hinges.items()}
         rows = tuple((pin, round_off(k)) for pin, k in damping.items() if k)
         if rows:
@@ -451,7 +450,7 @@ class _SceneOfLoop:
             from_pin = (round_off(place[0]), _round_angle(place[1]))
             yield Load(bar, (size, angle), from_pin=from_pin)
 
-    def _find_sweep(self, linkage: FourBar) -> "_Path":
+    def _find_sweep(self, linkage: FourBar) -> "_MotionOverRange":
         """Follow the loop over the range of the driven hinge.
 
         It ends where the loop does not assemble or another hinge stops it.
@@ -465,7 +464,7 @@ class _SceneOfLoop:
             low = theta_2
             high = theta_2 + math.tau
         low, high = max(low, high - math.tau), min(high, low + math.tau)
-        reach = np.linspace(low, high, SAMPLES + 1)
+        reach = np.linspace(low, high, RANGE_INTERVALS + 1)
         angles = np.union1d(reach, [theta_2])
         in_pose = int(np.searchsorted(angles, theta_2))
         betas = self._follow(linkage, angles, in_pose)
@@ -473,7 +472,9 @@ class _SceneOfLoop:
         stops = []
         for pin in self.loop.hinges.keys() - {"O2"}:
             least, most = self._find_range(pin, float(betas[pin][in_pose]))
-            inside = (betas[pin] >= least - OUTSIDE) & (betas[pin] <= most + OUTSIDE)
+            inside = (betas[pin] >= least - OUTSIDE_A_RANGE) & (
+                betas[pin] <= most + OUTSIDE_A_RANGE
+            )
             if not inside[free].all():
                 stops.append(name_joint(self.model, self.loop.hinges[pin]))
             free &= inside
@@ -487,7 +488,7 @@ class _SceneOfLoop:
                 "MJCF", self.loop.name, "no position is within the ranges of its hinges"
             )
         rows = _find_run(free, in_pose)
-        return _Path(
+        return _MotionOverRange(
             float(angles[rows[0]]),
             float(angles[rows[-1]]),
             {pin: (beta[in_pose], beta[rows[0]]) for pin, beta in betas.items()},
@@ -523,7 +524,7 @@ class _SceneOfLoop:
             3: solution.theta_3,
             4: solution.theta_4,
         }
-        return {pin: thetas[j] - thetas[i] for pin, (i, j) in PAIRS.items()}
+        return {pin: thetas[j] - thetas[i] for pin, (i, j) in PINS.items()}
 
     def _find_branch(self, linkage: FourBar, theta_2: float) -> int:
         """Return the branch whose output stands as in the pose.
@@ -639,7 +640,7 @@ class _SceneOfLoop:
 
 
 @dataclass(frozen=True, slots=True)
-class _Path:
+class _MotionOverRange:
     """Motion of a loop over its range."""
 
     start: float
@@ -672,5 +673,5 @@ def _find_assembling(linkage: FourBar, theta_2: float) -> tuple[float, float]:
         ranges.append((first + turns, last + turns))
     outside = [max(ends[0] - theta_2, theta_2 - ends[1]) for ends in ranges]
     first, last = ranges[int(np.argmin(outside))]
-    margin = min(MARGIN, 0.25 * (last - first))
+    margin = min(ANGLE_FROM_LIMITS, 0.25 * (last - first))
     return first + margin, last - margin

@@ -28,21 +28,21 @@ from fourbar_validation.engines.mujoco.robots.answers import (
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile, RobotLoop
 
-SECONDS = 75.0
+SEARCH_SECONDS = 75.0
 """Processor time in which combinations are tried, s. With the rest the command stays
 within two minutes.
 """
-POSITIONS = 9
+POSITIONS_OF_A_TRIAL = 9
 """Positions of a trial."""
-STIFF = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+STIFFEST_IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 """The stiffest impedance: MuJoCo clamps it there."""
 _FASTER = (0.5, 0.2, 0.1, 0.05)
 """Factors on the closure's time constant."""
-FEWEST = 2.0
+FEWEST_TIMESTEPS = 2.0
 """Timesteps of the time constant, below which MuJoCo keeps it."""
 _FINER = (0.5, 0.2, 0.1)
 """Factors on the timestep."""
-INTEGRATORS = ("Euler", "implicit", "implicitfast", "RK4")
+INTEGRATORS_TRIED = ("Euler", "implicit", "implicitfast", "RK4")
 _EVALUATIONS = {"RK4": 4.0}
 """Evaluations of a step, for the order in which combinations are tried. The others have
 one.
@@ -62,14 +62,14 @@ def read_settings(model: mujoco.MjModel, loop: RobotLoop) -> RobotSettings:
         tuple(model.eq_solref[loop.equality].tolist()),
         tuple(model.eq_solimp[loop.equality].tolist()),
         float(option.timestep),
-        _name(mujoco.mjtIntegrator, option.integrator, INTEGRATORS),
-        _name(mujoco.mjtSolver, option.solver, ("Newton", "CG", "PGS")),
+        _name_value(mujoco.mjtIntegrator, option.integrator, INTEGRATORS_TRIED),
+        _name_value(mujoco.mjtSolver, option.solver, ("Newton", "CG", "PGS")),
         int(option.iterations),
         float(option.tolerance),
     )
 
 
-def _name(kinds: type, value: int, words: Sequence[str]) -> str:
+def _name_value(kinds: type, value: int, words: Sequence[str]) -> str:
     """Return the word of MJCF for a value of an enumeration."""
     name = kinds(value).name.partition("_")[2]
     return next(word for word in words if word.upper() == name)
@@ -111,10 +111,10 @@ class SettingsSearch:
     ) -> None:
         self.model = model
         self.loop = loop
-        self.motion = motion.thin_out(POSITIONS)
+        self.motion = motion.thin_out(POSITIONS_OF_A_TRIAL)
         self.own = read_settings(model, loop)
         self.tried: dict[RobotSettings, TriedSettings] = {}
-        self.end = time.process_time() + SECONDS * share
+        self.end = time.process_time() + SEARCH_SECONDS * share
 
     def advise(self, wanted: float, file: RobotFile) -> SettingsAdvice:
         """Find the cheapest combination within an error."""
@@ -134,9 +134,9 @@ class SettingsSearch:
         motion = self.motion
         states = through = gap = seconds = math.inf
         try:
-            states = _find_worst(inside.answer_states(*motion))
+            states = _find_worst_force_error(inside.answer_states(*motion))
             answer = inside.answer_through_time(*motion)
-            through = _find_worst(answer)
+            through = _find_worst_force_error(answer)
             seconds = answer.seconds_per_step
             gap = max((row.gap for row in answer.rows), default=math.inf)
         except LimitError:
@@ -174,15 +174,18 @@ class SettingsSearch:
             ratio = own.solref[1]
         else:
             ratio = 1.0
-        shortest = FEWEST * own.timestep
+        shortest = FEWEST_TIMESTEPS * own.timestep
         constants = {max(factor * constant, shortest) for factor in _FASTER}
         faster = sorted((one for one in constants if one < constant), reverse=True)
         return {
-            "solimp": [own.solimp, *([STIFF] if own.solimp != STIFF else [])],
+            "solimp": [
+                own.solimp,
+                *([STIFFEST_IMPEDANCE] if own.solimp != STIFFEST_IMPEDANCE else []),
+            ],
             "solref": [own.solref, *((one, ratio) for one in faster)],
             "integrator": [
                 own.integrator,
-                *(name for name in INTEGRATORS if name != own.integrator),
+                *(name for name in INTEGRATORS_TRIED if name != own.integrator),
             ],
             "timestep": [own.timestep, *(factor * own.timestep for factor in _FINER)],
         }
@@ -226,7 +229,7 @@ class SettingsSearch:
         return evaluations, len(changes), -settings.solref[0]
 
 
-def _find_worst(answer: InsideAnswer) -> float:
+def _find_worst_force_error(answer: InsideAnswer) -> float:
     """Return the worst error of torque and pin forces over the largest of each.
 
     It is infinite without an answer.
