@@ -9,7 +9,7 @@ import numpy as np
 from fourbar.quantities import Array
 from fourbar_lab.simulators.slider_engines import SliderBar
 
-MUJOCO_VERSION = mujoco.__version__
+VERSION = mujoco.__version__
 _NO_INERTIA = 1e-12
 """Inertia of the slider, which does not turn, kg m^2. MuJoCo holds no body without any.
 """

@@ -6,7 +6,7 @@ import pinocchio as pin
 from fourbar.quantities import Array
 from fourbar_lab.simulators.slider_engines import SliderBar
 
-PINOCCHIO_VERSION = pin.__version__
+VERSION = pin.__version__
 
 
 class PinocchioSlider:

@@ -353,7 +353,7 @@ def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state() ->
 
     def answered(state: gradients.ClosedState) -> Instant:
         state.data.qpos[:], state.data.qvel[:] = state.qpos, state.qvel
-        instant: Instant = mujoco_c._evaluated(state.model, state.data)
+        instant: Instant = mujoco_c._evaluate_mujoco(state.model, state.data)
         return instant
 
     now, by = answered(gradients.compile_and_assemble(scene, theta_2, "mujoco")), {}
