@@ -80,8 +80,8 @@ def solve(
         omega_2.
     at : other positions, velocities and accelerations than the scene's own, of a bar of
         its own.
-    out : arrays to write into, by name, (n,) or (n, 2), of a study (m, n) or (m, n, 2),
-        which share no memory; only the quantities named are evaluated, with the stages
+    out : arrays to write into, by name, (n,) or (n, 2), of a study (m, n) or (m, n, 2).
+        No two share memory. Only the quantities named are evaluated, with the stages
         they need, and the others are None in the result.
     side : in which sense pins at rest are about to turn where dry friction acts: +1 as
         the commanded angle grows, -1 as it falls, 0 neither.
@@ -114,7 +114,10 @@ def solve(
         else:
             case = _make_case(scene, commanded, request, side)
             alone = _solve_alone(case, commanded, request)
-            results = alone or _solve_blocks(case, commanded, request)
+            if alone is not None:
+                results = alone
+            else:
+                results = _solve_blocks(case, commanded, request)
     return make_solution(
         scene, commanded, results, solved=scene, change_points=change_points
     )

@@ -237,7 +237,8 @@ class Case(NamedTuple):
         else:
             position = path.position(q, half, branch)
             k = _NO_MOTION
-            position, sine = path.in_order(position), position.sin_mu
+            sine = position.sin_mu  # before the bars are put in order
+            position = path.in_order(position)
             speed = acceleration = 0.0
         return State(
             self.lengths,
@@ -316,13 +317,10 @@ class Case(NamedTuple):
         half = self.path.half_angle(q)
         close: Any = remainder is not None
         if remainder is None:
-            for factor, constant in (
-                (half.outer, lengths.E1),
-                (half.inner, lengths.E2),
-            ):
-                if is_any(
-                    constant < 0.0
-                ):  # otherwise both terms are positive and nothing cancels
+            factors = ((half.outer, lengths.E1), (half.inner, lengths.E2))
+            for factor, constant in factors:
+                # where it is not negative both terms are positive, nothing cancels
+                if is_any(constant < 0.0):
                     close = close | _find_undecided(
                         factor, constant, 4.0 * lengths.a * lengths.d
                     )
@@ -354,7 +352,7 @@ class Case(NamedTuple):
             of_input, of_others = inertia(a, self.bodies, position, k)
             others = others + of_others * acceleration
             inertial = others + of_input * acceleration
-        if self.path.bar != 2:  # bar 2 has inertia of its own
+        if self.path.bar != 2:  # half_slope has bar 2 in it then
             others = (
                 others - (about_first_pin(self.bodies[0]) * (k.h2 * k.dh2)) * square
             )
@@ -372,16 +370,20 @@ class Case(NamedTuple):
         For the parameters see `Actions`.
         """
         actions = Actions(state, self.bodies, side).add(self.terms)
-        driven = (self.drive_bar,) if self.drive is None else self.drive.apart
-        sines = {bar: self.path.drive_sine(state.position, bar) for bar in driven}
+        if self.drive is None:
+            may_be_left_out: tuple[int, ...] = (self.drive_bar,)
+        else:
+            may_be_left_out = self.drive.apart
+        sines = {
+            bar: self.path.drive_sine(state.position, bar) for bar in may_be_left_out
+        }
         inertia = self._compute_inertia(state, acceleration, sines.get(4))
         unit = None if self.drive is None else self.drive.per_newton(actions)
         gain = state.k[self.drive_bar - 2] if unit is None else unit.work()[0]
         bodies = _FreeBodies(state, inertia, sines, unit, gain)
         friction = SolvedFriction(bodies.solve_pin_forces(actions))
-        for term in (
-            self.terms
-        ):  # a scene holds one effect of a kind, and one kind depends on the forces
+        # a scene holds one effect of a kind, and one kind depends on the forces
+        for term in self.terms:
             if term.loaded_pins:
                 friction = term.solve_friction(
                     actions, friction.pins, bodies.solve_pin_forces
@@ -494,11 +496,11 @@ class _FreeBodies(NamedTuple):
         position = self.state.position
         moment = 0.0
         if left_out == 4:
+            # of the coupler about B
             moment = -(actions.about_B() + inertia.about_B)
         elif left_out == 2 and is_any(lengths.d < lengths.a):
-            moment = (
-                actions.work()[1] - inertia.of_others
-            ) / self.state.k.h2  # virtual work of bars 3 and 4
+            # of F32 about O2, by the virtual work of bars 3 and 4
+            moment = (actions.work()[1] - inertia.of_others) / self.state.k.h2
         wrenches = actions.wrenches(inertia.wrenches)
         pins = pin_forces(
             lengths,

@@ -259,9 +259,10 @@ class LoopPath(NamedTuple):
                 else (-2.0 * position.half.sk, 0.0)
             )
             sine = select(first, with_first, select(second, with_second, sine))
-        return (
-            -sine if self.bar + drive_bar == 7 else sine
-        )  # the two bars have changed places
+        # read in order for a command of bar 3 or 4, bars 3 and 4 have changed places
+        if {self.bar, drive_bar} == {3, 4}:
+            return -sine
+        return sine
 
 
 def prepare_path(lengths: Loop, theta_1: Number, bar: int = 2) -> LoopPath:

@@ -211,23 +211,20 @@ def pin_forces(
             position.u4,
             sine,
         )
-        F32 = (
-            dot(position.u2, F32) + along - 1j * (M2 / a)
-        ) * position.u2  # the moment on bar 2 gives the component across it
+        # the moment on bar 2 gives the component across it
+        F32 = (dot(position.u2, F32) + along - 1j * (M2 / a)) * position.u2
     else:
         k = 1.0 / (c * sine)
         F43 = (of_3 * k * (1.0 / b)) * position.diagonal - ((M3 + M4) * k) * position.u3
         F32 = R3 + F43 + mass_at_A * position.u2
         short = d < a
-        if is_any(
-            short
-        ):  # the bars turn together; the sum loses the small component across bar 2
+        # the bars turn together; the sum loses the small component across bar 2
+        if is_any(short):
             F32 = (
                 F32
                 + select(short, moment_of_F32 / a - cross(position.u2, F32), 0.0)
                 * 1j
                 * position.u2
             )
-    return PinForces(
-        -1.0 * (R2 + F32), F32, F43, F43 - R4
-    )  # NumPy negates complex numbers slowly
+    # NumPy negates complex numbers slowly
+    return PinForces(-1.0 * (R2 + F32), F32, F43, F43 - R4)

@@ -632,8 +632,8 @@ def command_at(scene: Scene, places: Array) -> Command:
 def with_signs(linkage: FourBar, commanded: Command) -> Command:
     """Return a command whose branch is the sign of the bar's sine at each position.
 
-    Engines are told this one. It follows from the lengths and the angle alone. Of a
-    command with signs this returns the one with assemblies.
+    Engines are told this one. It follows from the lengths and the angle alone. The
+    function is its own inverse: of signs it makes assemblies.
     """
     path = prepare_path(
         Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle, commanded.bar
