@@ -17,7 +17,15 @@ from numpy.typing import NDArray
 
 from fourbar.formulas.mobility import TURN, find_intervals
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
-from fourbar.quantities import COUPLE, LINE, OK, PIN_FORCES, STATUS_NAMES, Array
+from fourbar.quantities import (
+    CHANGE_POINT,
+    COUPLE,
+    LINE,
+    OK,
+    PIN_FORCES,
+    STATUS_NAMES,
+    Array,
+)
 from fourbar.scene import Scene, command_at
 from fourbar.scene.motion import Motion
 from fourbar.show.duty import (
@@ -413,7 +421,9 @@ def _find_peaks(
 
 def _find_change_points(solution: Solution) -> list[int]:
     """List the steps within which the linkage passes a change point."""
-    sine = np.nan_to_num(solution.sin_mu)
+    # on a change point itself the sine is rounding
+    between = solution.status_code != CHANGE_POINT
+    sine = np.where(between, np.nan_to_num(solution.sin_mu), 0.0)
     steps: list[int] = np.flatnonzero(sine[:-1] * sine[1:] < 0.0).tolist()
     return steps
 

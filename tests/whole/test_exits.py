@@ -399,6 +399,7 @@ PROCESSES = [
     ("validation", f"advise {NO_FILE} --error 1e-3", BAD_INPUT),
     ("fourbar_lab", "advice --count 0", BAD_INPUT),
     ("fourbar_lab", "effects --engines nobody", BAD_INPUT),
+    ("fourbar_lab", "worlds --worlds 0", BAD_INPUT),
 ]
 
 

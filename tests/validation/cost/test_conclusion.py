@@ -20,7 +20,7 @@ def test_statement_and_conclusion_have_one_criterion() -> None:
     assert (
         pictures.write_statement(curves, "torque")
         == "Four digits of torque cost 0.06 ms a simulated second;\n"
-        "the defaults pay 0.6 ms for an error of 4e-3"
+        "MuJoCo's defaults have an error of 4e-3"
     )
     lines = conclusion.conclude(curves, [], [])
     assert len(lines) <= 11

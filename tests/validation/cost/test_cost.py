@@ -513,7 +513,9 @@ def test_the_command_writes_table_report_and_pictures(
     assert "matters most here. " in process.output and ", because " in process.output
     for what in ("the driving torque", "every pin force"):
         assert re.search(rf"Four digits of {what}: \S+ ms \(", process.output)
-    assert "The formulas: " in process.output and "Pinocchio" in process.output
+    # which of the exact loops is cheapest is for the machine
+    for what in ("Position by position: ", "The formulas: "):
+        assert what in process.output
     detailed = CliRunner().invoke(
         cost,
         [str(scene), "--out", str(tmp_path / "out"), "--verbose"],
@@ -578,7 +580,7 @@ def test_names_in_a_picture_cover_no_other_and_are_not_cut() -> None:
     with apply_style():
         figure = pictures.draw_work_precision(curves, "torque", "title")
     boxes = [text.get_window_extent() for text in figure.axes[0].texts]
-    assert len(boxes) == 3 and not any(
+    assert len(boxes) == 4 and not any(
         box.overlaps(next_box) for box, next_box in combinations(boxes, 2)
     )
     assert all(figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1 for box in boxes)

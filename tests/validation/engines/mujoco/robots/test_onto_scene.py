@@ -17,9 +17,11 @@ from fourbar_validation.engines.mujoco.robots.answers import (
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
-from fourbar_validation.engines.mujoco.theirs import THROUGH_TIME as SIMULATED_ALONE
+from fourbar_validation.engines.mujoco.theirs import (
+    FILE_THROUGH_TIME,
+)
 from fourbar_validation.robots.measure import (
-    THROUGH_TIME,
+    MEASURED_THROUGH_TIME,
     find_left_out,
     find_worst,
     list_errors,
@@ -110,10 +112,10 @@ def test_a_four_bar_alone_is_simulated_as_it_is_in_a_robot() -> None:
     inside = {
         error.quantity: error.part
         for error in list_errors(loop)
-        if error.method == THROUGH_TIME
+        if error.method == MEASURED_THROUGH_TIME
     }
     examined = examine_text(scene, TEXT, {})
-    answer = answer_of(examined, SIMULATED_ALONE)
+    answer = answer_of(examined, FILE_THROUGH_TIME)
     formulas = solve(scene, "force", at=answer.at)
     for name in ("torque", "F12", "F32", "F43", "F14"):
         ours = np.asarray(getattr(formulas, name))
