@@ -23,10 +23,10 @@ from fourbar_validation.engines.mujoco.theirs import (
 from fourbar_validation.robots.measure import (
     MEASURED_THROUGH_TIME,
     find_left_out,
-    find_worst,
-    list_errors,
+    find_worst_of_loop,
+    list_errors_by_method,
 )
-from fourbar_validation.robots.report import ROUND_OFF
+from fourbar_validation.robots.report import SCENE_ROUND_OFF
 from tests.support.robots import answer_of, examine_text
 
 TEXT = """
@@ -67,8 +67,8 @@ def test_a_flat_rest_pose_is_closed_onto_the_assembly_of_the_scene(branch: str) 
     scene = make_scene(branch)
     measured = measure_loops(FILE, MeasureOptions(PoseOptions()), scene)
     (loop,) = measured.loops
-    assert find_left_out(loop) < ROUND_OFF
-    assert find_worst(loop) < 0.06
+    assert find_left_out(loop) < SCENE_ROUND_OFF
+    assert find_worst_of_loop(loop) < 0.06
     (remark,) = [text for text in loop.remarks if "in line" in text]
     assert f"onto the {branch} one of the scene" in remark
 
@@ -111,7 +111,7 @@ def test_a_four_bar_alone_is_simulated_as_it_is_in_a_robot() -> None:
     (loop,) = measure_loops(FILE, MeasureOptions(PoseOptions()), scene).loops
     inside = {
         error.quantity: error.part
-        for error in list_errors(loop)
+        for error in list_errors_by_method(loop)
         if error.method == MEASURED_THROUGH_TIME
     }
     examined = examine_text(scene, TEXT, {})
