@@ -122,7 +122,11 @@ class Reader:
 
     def bar(self, key: str, value: object, least: int = 2) -> int:
         """Read the number of a bar; 1, the ground, where `least` is 1."""
-        if value not in range(least, 5) or not isinstance(value, int):
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int)
+            or value not in range(least, 5)
+        ):
             numbers = [f"{bar} ({BAR_NAMES[bar]})" for bar in range(least, 5)]
             allowed = f"must be {', '.join(numbers[:-1])} or {numbers[-1]}"
             raise self.refuse(key, value, allowed)

@@ -98,6 +98,7 @@ MISTAKES = [
     ("negative damping", '"0.01 N', '"-0.01 N', ["effects.viscous.O2", "-0.01 N m s/rad", ">= 0"]),
     ("negative spring", "viscous =", SPRINGS.format("-0.1 m", 4), ["effects.springs[1].length", "-0.1", ">= 0"]),
     ("spring on one bar", "viscous =", SPRINGS.format("0.1 m", 1), ["effects.springs[1].to.bar", "another bar"]),
+    ("spring on a truth", "viscous =", SPRINGS.format("0.1 m", "true"), ["springs[1].to.bar", "True", "1 (ground)"]),
     ("spring that softens", "viscous =", SPRINGS.format("0.1 m", 4).replace("1 N/m", "-5 N/cm"), ["-5 N/cm", ">= 0"]),
     ("gas and coil", "viscous =", SPRINGS.format('1 m", gas = "', 3), ["springs[1].stiffness", "from, to, gas"]),
     ("gas without a stroke", "viscous =", GAS.format(""), ["effects.springs[0].gas.stroke", "missing", "1 m"]),
