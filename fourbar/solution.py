@@ -417,7 +417,8 @@ def _list_scalars(solution: Solution, units: Conversion = SI) -> list[_ScalarCol
             named = ""
         for part, column in _split_columns(name, values).items():
             columns.append(_ScalarColumn(f"{part}{named}", unit, column))
-    if solution.time is None and (time := compute_times(solution)) is not None:
+    time = compute_times(solution.scene, solution.at)
+    if time is not None:
         columns.append(_ScalarColumn("time [s]" if units else "time", "s", time))
     return columns
 
@@ -453,18 +454,24 @@ def has_size(name: str) -> bool:
     return name in PIN_FORCES or name == "shaking_force"
 
 
-def compute_times(solution: Solution) -> Array | None:
+def compute_times(scene: Scene | None, at: Command) -> Array | None:
     """Compute when each position of a steady sweep is passed, s; None for any other.
 
-    A sweep is steady if what it commands moves at one speed.
+    A sweep is steady if what it commands moves at one speed. A motion over time states
+    its times itself.
+
+    `scene`: None for a study, whose positions have no time.
     """
-    at, places = solution.at, solution.at.places
-    speed = at.speed
-    acceleration = at.acceleration
-    if at.stroke is not None and solution.scene is not None:
+    places = at.places
+    if scene is None or at.time is not None or len(places) < 2:
+        return None
+    if at.stroke is None:
+        speed = at.speed
+        acceleration = at.acceleration
+    else:
         speed = at.stroke_speed
-        acceleration = solution.scene.motion.acceleration
-    if speed is None or solution.theta_2.ndim > 1 or len(places) < 2:
+        acceleration = scene.motion.acceleration
+    if speed is None:
         return None
     if np.ptp(speed) != 0.0 or np.any(acceleration) or not np.all(speed):
         return None

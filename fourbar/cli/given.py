@@ -54,9 +54,13 @@ at_option = click.option(
 
 
 def units_option(default: str = "those of the file") -> Callable[..., Any]:
-    """Make --units of a command whose default, which the help states, is not SI."""
-    told = f'Units: SI, imperial or a list like "mm N.mm deg" (default: {default}).'
-    return click.option("--units", callback=_read_units, metavar="UNITS", help=told)
+    """Make --units; the help states its default."""
+    help_text = (
+        f'Units: SI, imperial or a list like "mm N.mm deg" (default: {default}).'
+    )
+    return click.option(
+        "--units", callback=_read_units, metavar="UNITS", help=help_text
+    )
 
 
 def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:
@@ -75,9 +79,9 @@ def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:
         return out
 
     if required:
-        told = "Write to FILE."
+        help_text = "Write to FILE."
     else:
-        told = "Write to FILE instead of printing."
+        help_text = "Write to FILE instead of printing."
     return click.option(
         "-o",
         "--out",
@@ -85,7 +89,7 @@ def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:
         required=required,
         callback=require_ending,
         metavar="FILE",
-        help=told,
+        help=help_text,
     )
 
 

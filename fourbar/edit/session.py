@@ -624,6 +624,20 @@ def _export(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     return {"note": f"wrote {file}"}
 
 
+def _begin_page(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
+    """List what a page needs once: what it offers, in the units of the scene."""
+    offers = dict(list_offers())
+    for name in ("fields", "commands"):
+        offers[name] = _suit_entry(offers[name], session.now.plain)
+    offers["units"] = OFFERED_UNITS
+    return {
+        "offers": offers,
+        "file": session.path.name,
+        "fresh": session.fresh,
+        "refer": True,
+    }
+
+
 _ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] = {
     "set": lambda session, asked: session.change(
         lambda of: of.set(asked["path"], str(asked["value"])),
@@ -651,16 +665,6 @@ _ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] 
             session.now.scene, float(asked["position"]), session.units
         )
     },
-    "hello": lambda session, asked: {
-        "offers": list_offers()
-        | {
-            name: _suit_entry(list_offers()[name], session.now.plain)
-            for name in ("fields", "commands")
-        }
-        | {"units": OFFERED_UNITS},
-        "file": session.path.name,
-        "fresh": session.fresh,
-        "refer": True,
-    },
+    "hello": _begin_page,
 }
 """Requests that a page can make."""

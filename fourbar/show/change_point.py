@@ -17,7 +17,7 @@ ANGLE_STEP = 2e-4
 parabola through three of them meets a limit within the third power, and rounding, which
 grows beside a change point as 1/ANGLE_STEP, is 1e-11 of them.
 """
-PARABOLA_STEPS, _FAR = (1.0, 2.0, 3.0), (2.0, 4.0, 6.0)
+NEAR_STEPS, FAR_STEPS = (1.0, 2.0, 3.0), (2.0, 4.0, 6.0)
 """Multiples of the step at which each of two parabolas meets the forces of a side."""
 SAME_LIMIT = 1e-6
 """Part of the forces within which four extrapolations are one limit: as is shown."""
@@ -47,7 +47,7 @@ def find_limits(scene: Scene, solution: Solution) -> Solution | None:
     if solution.F12 is None or solution.status_code[0] != CHANGE_POINT:
         return None
     multiples = np.array(
-        [[sign * m for m in (*PARABOLA_STEPS, *_FAR)] for sign in (-1.0, 1.0)]
+        [[sign * m for m in (*NEAR_STEPS, *FAR_STEPS)] for sign in (-1.0, 1.0)]
     )
     places = _list_places(scene, solution, np.sort(multiples.ravel()))
     beside = solve(scene, "force", at=places)

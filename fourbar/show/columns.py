@@ -104,7 +104,7 @@ def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
     """Return the SI unit of a number of each position and its values."""
     if name == "time":
         if solution.time is None:
-            values = compute_times(solution)
+            values = compute_times(solution.scene, solution.at)
         else:
             values = solution.time
         if values is None:

@@ -201,7 +201,8 @@ def list_columns(
         shown[f"digits\nof {drive.symbol[0]}"] = _count_torque_digits(
             drive.values, drive.error
         )
-    if solution.time is None and (time := compute_times(solution)) is not None:
+    time = compute_times(solution.scene, solution.at)
+    if time is not None:
         add("time", "s", time)
     for name, quantity in DERIVED_NAMES.items():
         for part, values in _list_columns_of(solution, name).items():

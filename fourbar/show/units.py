@@ -117,7 +117,8 @@ def _explain_unit(name: str, unit: str) -> str:
 def suit_units(length: str) -> Conversion:
     """Return the units that suit a length as it was typed.
 
-    They are imperial for inches and feet, otherwise `COMMON`.
+    They are imperial for inches and feet, otherwise `COMMON`: a result has the prefix
+    that suits its size, where a message repeats the unit that was typed.
     """
     from fourbar.quantities.units import IMPERIAL, find_unit
 

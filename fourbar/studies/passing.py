@@ -92,8 +92,8 @@ def _find_places(scene: Scene, name: str, value: float) -> list[float]:
 
 def _find_place_of_sweep(scene: Scene, time: float) -> float:
     """Find what a steady sweep commands at a time."""
-    sweep = solve(scene, "position")
-    times = compute_times(sweep)
+    sweep = command(scene)
+    times = compute_times(scene, sweep)
     if times is None:
         raise InputError(
             "at",
@@ -103,10 +103,11 @@ def _find_place_of_sweep(scene: Scene, time: float) -> float:
     last = float(times.max())
     if not 0.0 <= time <= last:
         raise NotAssembledError(
-            f"{_say_position('time', time)}: the sweep goes from 0 to {last:.6g} s"
+            f"{_say_position('time', time)}: the sweep goes from 0 to"
+            f" {_write_position('time', last)}"
         )
     order = np.argsort(times)
-    return float(np.interp(time, times[order], sweep.at.places[order]))
+    return float(np.interp(time, times[order], sweep.places[order]))
 
 
 def _require_assembled(scene: Scene, name: str, value: float) -> None:

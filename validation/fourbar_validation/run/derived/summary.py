@@ -60,7 +60,7 @@ _LEAST_CONDITION = 1e-2
 """Condition below which a motion counts as one with poles. Beside a pole peaks are
 those of the positions.
 """
-_NOTHING = 1e-13
+BALANCED_SHARE = 1e-13
 """Part of the largest pin force, at the longest bar of a torque, below which a load is
 its rounding: a balanced linkage needs no torque.
 """
@@ -251,7 +251,7 @@ def _judge_drive(judged: _SummaryJudge) -> None:
     assert facts.peak is not None and facts.duty is not None
     values, speed = _find_work(judged, judged.own)
     lever = 1.0 if facts.linear else max(judged.scene.linkage.lengths)
-    if np.abs(values).max() <= _NOTHING * _find_largest_load(judged) * lever:
+    if np.abs(values).max() <= BALANCED_SHARE * _find_largest_load(judged) * lever:
         return
     power = values * speed
     name = name_driving(judged.scene)
@@ -338,7 +338,7 @@ def _judge_pins(judged: _SummaryJudge) -> None:
     for pin, name in PIN_FORCE.items():
         load = facts.pins[pin]
         own = magnitude(judged.own.quantities[name])
-        if own.max() <= _NOTHING * _find_largest_load(judged):
+        if own.max() <= BALANCED_SHARE * _find_largest_load(judged):
             continue
         mean = math.sqrt(np.square(own[judged.counted]).mean())
         judged.add_value("pins", load.rms, mean)
