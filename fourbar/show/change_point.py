@@ -9,6 +9,7 @@ from fourbar.errors import InputError
 from fourbar.evaluation.free_motion import release_at
 from fourbar.quantities import CHANGE_POINT, PIN_FORCES, Array
 from fourbar.scene import Command, Scene, command_at
+from fourbar.scene.scene import compute_bar_motion
 from fourbar.solution import Solution
 from fourbar.solving import solve
 
@@ -25,12 +26,6 @@ ZERO_LIMIT = 1e-9
 """Part of the forces below which a limit is zero."""
 
 
-_HALF = 1e-6
-"""Part of a stroke over which the turn of its bar is measured: the third power of it is
-lost, and the rounding over it is 1e-10.
-"""
-
-
 class NoSideError(Exception):
     """A change point of which a side cannot be asked; says why."""
 
@@ -42,18 +37,18 @@ def find_limits(scene: Scene, solution: Solution) -> Solution | None:
     None elsewhere, and without forces.
 
     Raises NoSideError where a side cannot be asked: where a law or a release begins or
-    ends, or stands still, and where a cylinder has no lever.
+    ends, or stands still, and where a cylinder is at an end of its range.
     """
     if solution.F12 is None or solution.status_code[0] != CHANGE_POINT:
         return None
     multiples = np.array(
         [[sign * m for m in (*NEAR_STEPS, *FAR_STEPS)] for sign in (-1.0, 1.0)]
     )
-    places = _list_places(scene, solution, np.sort(multiples.ravel()))
+    rising, order = np.unique(multiples, return_inverse=True)
+    places = _list_places(scene, solution, rising)
     beside = solve(scene, "force", at=places)
-    order = np.argsort(np.argsort(multiples.ravel(), kind="stable"))
     forces = {
-        name: np.reshape(getattr(beside, name)[order], (2, 2, 3, 2))
+        name: np.reshape(getattr(beside, name)[order.ravel()], (2, 2, 3, 2))
         for name in PIN_FORCES
     }
     size = max(np.abs(values[:, 1, -1]).max() for values in forces.values())
@@ -71,9 +66,10 @@ def _list_places(scene: Scene, solution: Solution, multiples: Array) -> Command:
     at, motion = solution.at, scene.motion
     here = float(at.places[0])
     if motion.law is None and motion.free is None:
-        step = ANGLE_STEP if at.stroke is None else _find_step_of_stroke(scene, here)
+        # a stroke changes by as much as turns its bar by the step; an angle has turn 1
+        _, turn, *_ = compute_bar_motion(scene, here, 1.0, 0.0)
         try:
-            return command_at(scene, here + step * multiples)
+            return command_at(scene, here + ANGLE_STEP / abs(turn) * multiples)
         except InputError as error:
             raise NoSideError("the cylinder is at an end of its range") from error
     moving = "the law" if motion.free is None else "the release"
@@ -94,17 +90,6 @@ def _list_places(scene: Scene, solution: Solution, multiples: Array) -> Command:
     if not motion.law.time[0] <= times[0] < times[-1] <= motion.law.time[-1]:
         raise one_side
     return command_at(scene, times)
-
-
-def _find_step_of_stroke(scene: Scene, stroke: float) -> float:
-    """Return the change of the stroke that turns its bar by `ANGLE_STEP`, m."""
-    low, high = stroke * (1.0 - _HALF), stroke * (1.0 + _HALF)
-    try:
-        angles = command_at(scene, np.array([low, high])).angle
-    except InputError as error:
-        raise NoSideError("the cylinder is at an end of its range") from error
-    turned = abs(float(angles[1] - angles[0]))
-    return ANGLE_STEP * (high - low) / turned
 
 
 def _extrapolate_force(values: Array, size: float) -> Array:
