@@ -13,13 +13,7 @@ from numpy.typing import NDArray
 from fourbar.errors import DependencyError, InputError, expect, say_install
 from fourbar.quantities import NOT_ASSEMBLED, PIN_FORCES, Array
 from fourbar.scene import Command, Scene, command
-from fourbar.solution import (
-    Solution,
-    find_unit_of_quantity,
-    find_values,
-    is_scalar,
-    split_parts,
-)
+from fourbar.solution import find_values, split_parts
 from fourbar.solving import solve
 from fourbar.studies.derivatives import Sensitivity, sensitivity
 from fourbar.studies.keys import (
@@ -266,12 +260,13 @@ def tolerances(
         )
         parts = replace(study, at=Command(*pieces))
         width = columns.stop - columns.start
-        solution = solve(parts)
+        # the solution of a study knows of no drawing, in whose coordinates places are
+        solution = replace(solve(parts), scene=scene)
         code = solution.status_code[:, -width:]
         without[columns] = np.count_nonzero(code, axis=0)
         gone |= ((code == NOT_ASSEMBLED) & nominal_closes[columns]).any(axis=1)
         for name in names:
-            number = _find_in_drawing(scene, solution, name)[:, -width:]
+            number = find_values(solution, name)[:, -width:]
             if name.startswith(
                 "theta_"
             ):  # each member counts its turns from its own first position
@@ -292,17 +287,6 @@ def tolerances(
         int(gone.sum()),
         invalid,
     )
-
-
-def _find_in_drawing(scene: Scene, solution: Solution, name: str) -> Array:
-    """Return a quantity of the members, places in the coordinates of the drawing.
-
-    The solution of a study knows of no drawing.
-    """
-    values: Array = find_values(solution, name)
-    if find_unit_of_quantity(name) == "m" and not is_scalar(name) and any(scene.origin):
-        return values + scene.origin
-    return values
 
 
 def _make_members(scene: Scene, samples: int, seed: int | np.random.Generator) -> Study:
