@@ -13,6 +13,7 @@ All three vanish at change points alone.
 """
 
 import math
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -148,10 +149,7 @@ class CircuitCurve:
         if self.assembly:
             self.branches = (int(commanded.branch[0]),)
         self.low, self.high = (end - self.theta_1 for end in self.circuit.theta_2)
-        self.signs = with_signs(linkage, commanded).branch
-        """Sign of sin mu at each position of the command."""
-        self.places = commanded.theta_2 - self.theta_1
-        """psi at each position of the command."""
+        self.commanded = commanded
         stated = isinstance(scene.motion.angle, Sweep) or scene.motion.law is not None
         self.sweep = (
             (float(commanded.theta_2.min()), float(commanded.theta_2.max()))
@@ -174,8 +172,8 @@ class CircuitCurve:
             return np.ones(psi.shape, dtype=bool)
         middle = 0.5 * (self.sweep[0] + self.sweep[1]) - self.theta_1
         half = 0.5 * (self.sweep[1] - self.sweep[0])
-        away = psi - middle - TURN * np.rint((psi - middle) / TURN)
-        return np.asarray(np.abs(away) <= half + radius + AT_END_OF_SWEEP)
+        apart = np.abs(_turn_apart(psi, middle))
+        return np.asarray(apart <= half + radius + AT_END_OF_SWEEP)
 
     def reached(self, points: Array) -> NDArray[np.bool_]:
         """Mark the points that the sweep passes, all of them without a sweep.
@@ -187,36 +185,37 @@ class CircuitCurve:
             return np.ones(len(points), dtype=bool)
         sines = np.sin(points[:, 1])
         passed = np.zeros(len(points), dtype=bool)
-        for low, high, sign in self._list_runs():
+        for low, high, sign in self._runs:
             middle = 0.5 * (low + high)
             half = 0.5 * (high - low)
-            apart = np.abs(
-                np.remainder(points[:, 0] - middle + math.pi, TURN) - math.pi
-            )
+            apart = np.abs(_turn_apart(points[:, 0], middle))
             here = (apart <= half + AT_END_OF_SWEEP) & (
                 sign * sines >= -AT_END_OF_SWEEP
             )
             passed |= here
         return passed
 
-    def _list_runs(self) -> list[tuple[float, float, int]]:
-        """List the ranges of psi that the sweep passes with one sign of sin mu.
+    @cached_property
+    def _runs(self) -> list[tuple[float, float, int]]:
+        """Ranges of psi that the sweep passes with one sign of sin mu.
 
         The sign changes at a limit or a change point between two positions.
         """
+        places = self.commanded.theta_2 - self.theta_1
+        signs = with_signs(self.scene.linkage, self.commanded).branch
         between = np.array([self.low, self.high, *(psi for psi, _ in self.singular)])
-        changes = np.flatnonzero(np.diff(self.signs)) + 1
-        bounds = [0, *changes.tolist(), len(self.signs)]
+        changes = np.flatnonzero(np.diff(signs)) + 1
+        bounds = [0, *changes.tolist(), len(signs)]
         runs = list[tuple[float, float, int]]()
         for first, stop in pairwise(bounds):
-            psi = self.places[first:stop].tolist()
+            psi = places[first:stop].tolist()
             inner = [first] if first > 0 else []
-            if stop < len(self.signs):
+            if stop < len(signs):
                 inner.append(stop - 1)
-            for place in self.places[inner].tolist():
-                away = np.remainder(between - place + math.pi, TURN) - math.pi
+            for place in places[inner].tolist():
+                away = _turn_apart(between, place)
                 psi.append(place + float(away[np.argmin(np.abs(away))]))
-            runs.append((min(psi), max(psi), int(self.signs[first])))
+            runs.append((min(psi), max(psi), int(signs[first])))
         return runs
 
     def point(self, tau: Array, branch: int) -> Array:
@@ -366,6 +365,12 @@ class CircuitCurve:
             theta_4,
             0 if abs(sine) < AT_END_OF_SWEEP else int(math.copysign(1.0, sine)),
         )
+
+
+def _turn_apart(psi: Array, middle: float) -> Array:
+    """Return how far psi lies from a middle, within half a turn."""
+    away = psi - middle
+    return np.asarray(away - TURN * np.rint(away / TURN))
 
 
 def closure(lengths: Loop, psi: Number, mu: Number) -> Number:
