@@ -5,6 +5,7 @@ The duty in its JSON belongs to it.
 
 import math
 from collections.abc import Iterator
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,19 +19,24 @@ from fourbar.formulas.mobility import (
     name_assembly,
     turns_fully,
 )
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, PIN_FORCE
+from fourbar.linkage import BAR_NAMES, PIN_FORCE
 from fourbar.quantities import LINE, PIN_FORCES
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.duty import DUTY_UNITS, bearing_load, describe_drive
 from fourbar.show.gas import list_gas_notes
 from fourbar.show.position import PositionSheet
-from fourbar.show.summary import Facts, find_duty, locate_between, summarize
+from fourbar.show.summary import (
+    Facts,
+    find_drive_rounding,
+    find_duty,
+    locate_between,
+    summarize,
+)
 from fourbar.show.tables import BLOCK_WIDTH, wrap_line
 from fourbar.show.units import (
     COMMON,
     POSITION_DIGITS,
-    SHOWN_AS_ZERO,
     SHOWN_DIGITS,
     choose_unit,
     drop_rounding,
@@ -468,13 +474,18 @@ class _SceneBlock:
 
     def _without_rounding(self, value: float) -> float:
         """Return zero for a torque or force of the drive within its rounding."""
+        if self.facts.drive is not None and abs(value) <= self._rounding:
+            return 0.0
+        return value
+
+    @cached_property
+    def _rounding(self) -> float:
+        """Rounding of the drive's torque or force, or its error bar if that is more."""
+        rounding = find_drive_rounding(self.facts.solution)
         drive = self.facts.drive
-        if drive is None:
-            return value
-        error = self._find_round_off()
-        if drive.error is not None:
-            error = max(error, np.nanmax(drive.error, initial=0.0))
-        return 0.0 if abs(value) <= error else value
+        if drive is None or drive.error is None:
+            return rounding
+        return max(rounding, float(np.nanmax(drive.error, initial=0.0)))
 
     def _is_balanced(self) -> bool:
         """Tell whether the drive has nothing to do: its peak is rounding alone."""
@@ -482,27 +493,6 @@ class _SceneBlock:
         if peak is None or not peak.value:
             return False
         return not self._without_rounding(peak.value)
-
-    def _find_round_off(self) -> float:
-        """Return the rounding of the torques (forces) that the drive sums.
-
-        They are inertial ones, and usual pin forces at the longest bar. At a change
-        point an error bar is less, and where springs balance weights, as far as their
-        numbers are rounded.
-        """
-        solution = self.facts.solution
-        bars = self.facts.scene.linkage.moving
-        inertial = 0.0
-        for number, bar in zip(MOVING_BARS, bars, strict=True):
-            a_G = getattr(solution, f"a_G{number}")
-            inertial += bar.mass * float(np.nanmax(np.hypot(*a_G.T), initial=0.0))
-        usual = 0.0
-        for name in PIN_FORCES:
-            sizes = np.hypot(*getattr(solution, name).T)
-            if np.isfinite(sizes).any():
-                usual = max(usual, float(np.nanmedian(sizes)))
-        lever = 1.0 if self.facts.linear else self.longest
-        return SHOWN_AS_ZERO * max(inertial, usual) * lever
 
     def _write_power(self) -> list[str]:
         """Write power and energy of the drive, and what a motor must have."""

@@ -36,7 +36,7 @@ from fourbar.show.duty import (
     motor_duty,
     read_drive_demand,
 )
-from fourbar.show.units import SHOWN_AS_ZERO
+from fourbar.show.units import SHOWN_AS_ZERO, drop_rounding
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar.studies.internal_forces import Bending, internal_forces
@@ -150,16 +150,42 @@ def list_sizes(solution: Solution) -> dict[str, Array]:
     works = {name: np.abs(getattr(solution, key)) for name, key in keys.items()}
     # what a balanced linkage leaves of a load is rounding, and has no peak
     largest = np.max([*forces.values()], axis=0)
-    for size in forces.values():
-        size[size <= SHOWN_AS_ZERO * largest] = 0.0
-    lever = 1.0
-    if solution.drive is None and solution.scene is not None:
-        lever = max(solution.scene.linkage.lengths)
-    with np.errstate(invalid="ignore"):
-        idle = works[drive.keys.value] <= SHOWN_AS_ZERO * largest * lever
+    forces = {name: drop_rounding(size, largest) for name, size in forces.items()}
+    lever = _find_lever(solution)
+    idle = works[drive.keys.value] <= SHOWN_AS_ZERO * largest * lever
     for name in (drive.keys.value, "power"):
         works[name] = np.where(idle, 0.0, works[name])
     return {**works, **forces}
+
+
+def find_drive_rounding(solution: Solution) -> float:
+    """Return the rounding of the torques (forces) that the drive sums, N m or N.
+
+    They are inertial ones, and usual pin forces at the longest bar. At a change
+    point an error bar is less, and where springs balance weights, as far as their
+    numbers are rounded.
+    """
+    assert solution.scene is not None
+    inertial = 0.0
+    for number, bar in zip(MOVING_BARS, solution.scene.linkage.moving, strict=True):
+        a_G = getattr(solution, f"a_G{number}")
+        inertial += bar.mass * float(np.nanmax(np.hypot(*a_G.T), initial=0.0))
+    usual = 0.0
+    for name in PIN_FORCES:
+        sizes = np.hypot(*getattr(solution, name).T)
+        if np.isfinite(sizes).any():
+            usual = max(usual, float(np.nanmedian(sizes)))
+    return SHOWN_AS_ZERO * max(inertial, usual) * _find_lever(solution)
+
+
+def _find_lever(solution: Solution) -> float:
+    """Return the arm at which pin forces load the drive: the longest bar, m.
+
+    It is 1 for a drive that exerts a force itself.
+    """
+    if solution.drive is None and solution.scene is not None:
+        return max(solution.scene.linkage.lengths)
+    return 1.0
 
 
 def locate_between(scene: Scene, solution: Solution) -> Between:
