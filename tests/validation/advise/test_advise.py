@@ -312,6 +312,17 @@ def test_the_time_of_the_settings_is_told() -> None:
     assert time_steps(50 * best.steps) + time_readings(100) > revolution / 1e3
 
 
+def test_the_time_of_an_attempt_is_that_of_its_steps_and_readings() -> None:
+    setup = TrialSetup(turning(10.0, 36), fourbar.command(turning(10.0, 36)))
+    attempt = advise.advise(turning(10.0, 36), 1e-2, setup).best
+    clocks = (lambda count: 2e-6 * count), (lambda count: 3e-5 * count)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(setup, "make_clocks", lambda settings: clocks)
+        seconds = advise._time_attempt(setup, attempt)
+    expected = 2e-6 * attempt.steps + 3e-5 * attempt.readings
+    assert seconds == pytest.approx(expected, rel=1e-12)
+
+
 def test_several_scenes_have_one_table(tmp_path: Path) -> None:
     files = []
     for name, scene in (

@@ -422,24 +422,34 @@ class _UserLoop(Assembled):
             return self.flywheel
         return HEAVY * float(self.model.dof_M0.max())
 
-    def find_settling_time(self, seconds: float) -> float:
-        """Return the time after which a motion of some seconds is judged, s.
+    def leave_out_settling(
+        self, times: Mapping[int, float], seconds: float
+    ) -> list[int]:
+        """List the positions that are judged in a motion of some seconds.
 
         The loop starts exactly closed, and takes some time constants to yield as far as
-        it does. What keeps the speed is noted.
+        it does. What is left out, and what keeps the speed, is noted.
+
+        `times`: of the positions after the start, s.
         """
         settled = 0.0
         if self.topology.closure is not None:
             constant = find_time_constant(self.model, self.topology.closure)
             settled = settling_time(constant, seconds)
+        judged = [index for index, instant in times.items() if instant >= settled]
         if not self.flywheel:
             self.notes.append(
                 f"through time {self.find_carrier():.3g} kg m^2 on pin O2, which are"
                 " not the file's, and at each position the torque solved for keep the"
-                f" speed; the first {settled:.3g} s, in which the loop yields, are not"
-                " judged"
+                " speed"
             )
-        return settled
+        if len(judged) < len(times):
+            left_out = len(times) - len(judged)
+            self.notes.append(
+                f"through time the first {settled:.3g} s ({left_out} of {len(times)}"
+                " positions after the start) are not judged: the loop yields in them"
+            )
+        return judged
 
     def find_crank_couple(self, values: Mapping[str, Array | float]) -> float:
         """Return the couple on bar 2 with the power of the drive, N m.
@@ -751,9 +761,8 @@ def answer_through_time(loop: _UserLoop, command: Command) -> Answer:
     couple = loop.find_crank_couple(
         loop.ask(data.qpos.copy(), data.qvel.copy(), command.alpha_2)
     )
-    settled = loop.find_settling_time(run.time(run.stop))
     times = {index: run.time(float(command.theta_2[index])) for index in segment[1:]}
-    segment = [index for index, instant in times.items() if instant >= settled]
+    segment = loop.leave_out_settling(times, run.time(run.stop))
     out = make_blank(len(segment), [*list_unknowns(loop.scene), *MADE])
     seen = {"closure_gap_m": 0.0, "speed_error": 0.0}
     alarms: list[str] = []

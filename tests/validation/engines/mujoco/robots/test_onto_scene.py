@@ -8,6 +8,7 @@ import pytest
 
 import fourbar
 from fourbar.errors import InputError
+from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import CROSSED, OPEN
 from fourbar.solving import solve
 from fourbar_validation.engines.mujoco.robots.answers import (
@@ -50,7 +51,11 @@ OPEN_POSE = {"j_crank": "60deg", "j_rod": "-30deg", "j_rocker": "95deg"}
 """Whole degrees near the open assembly; 6 mm are left."""
 
 
-def make_scene(branch: str) -> fourbar.Scene:
+NEAR_G = fourbar.Gravity(9.80665)
+"""The gravity of a scene differs from the robot's 9.81 in its size alone."""
+
+
+def make_scene(branch: str, gravity: fourbar.Gravity | None = None) -> fourbar.Scene:
     linkage = fourbar.FourBar(
         0.5,
         fourbar.Bar(0.15, 0.3, 0.3 * 0.15**2 / 12.0, (0.075, 0.0)),
@@ -59,7 +64,8 @@ def make_scene(branch: str) -> fourbar.Scene:
     )
     sign = {"open": OPEN, "crossed": CROSSED}[branch]
     motion = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 36), 4.0, branch=sign)
-    return fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    effects = (fourbar.Gravity() if gravity is None else gravity,)
+    return fourbar.Scene(linkage, motion, effects=effects)
 
 
 @pytest.mark.parametrize("branch", ["open", "crossed"])
@@ -71,6 +77,23 @@ def test_a_flat_rest_pose_is_closed_onto_the_assembly_of_the_scene(branch: str) 
     assert find_worst_of_loop(loop) < 0.06
     (remark,) = [text for text in loop.remarks if "in line" in text]
     assert f"onto the {branch} one of the scene" in remark
+
+
+@pytest.mark.parametrize("branch", ["open", "crossed"])
+@pytest.mark.parametrize("axis", ["0 -1 0", "0 1 0"])
+def test_gravity_tells_the_side_by_its_direction_alone(branch: str, axis: str) -> None:
+    """The hinges turn the other way: the plane is seen from the other side."""
+    file = RobotFile(Path("loop.xml"), TEXT.replace("0 -1 0", axis))
+    scene = make_scene(branch, NEAR_G)
+    (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), scene).loops
+    difference = 1.0 - 9.80665 / 9.81
+    assert find_left_out(loop) < 2.0 * difference
+
+
+def test_a_pose_of_the_other_assembly_is_refused_for_another_size_of_gravity() -> None:
+    options = MeasureOptions(PoseOptions(OPEN_POSE))
+    with pytest.raises(InputError, match="to the open assembly"):
+        measure_loops(FILE, options, make_scene("crossed", NEAR_G))
 
 
 def test_a_pose_of_the_other_assembly_is_refused_with_one_that_closes() -> None:
@@ -125,3 +148,18 @@ def test_a_four_bar_alone_is_simulated_as_it_is_in_a_robot() -> None:
         assert alone == pytest.approx(inside[name], rel=0.2), name
     (note,) = [note for note in examined.notes if "keep the speed" in note]
     assert "1.44e+03 kg m^2 on pin O2, which are not the file's" in note
+    (note,) = [note for note in examined.notes if "not judged" in note]
+    judged = len(answer.quantities["torque"])
+    positions = len(fourbar.command(scene).theta_2) - 1
+    assert f"({positions - judged} of {positions} positions after the start)" in note
+
+
+def test_what_is_not_judged_is_said_of_a_file_with_its_own_flywheel_too() -> None:
+    scene = make_scene("open")
+    examined = examine_text(scene, write_mjcf(scene), {})
+    assert not [note for note in examined.notes if "are not the file's" in note]
+    judged = len(answer_of(examined, FILE_THROUGH_TIME).quantities["torque"])
+    positions = len(fourbar.command(scene).theta_2) - 1
+    assert judged < positions
+    (note,) = [note for note in examined.notes if "are not judged" in note]
+    assert f"({positions - judged} of {positions} positions" in note

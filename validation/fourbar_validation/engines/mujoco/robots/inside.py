@@ -581,11 +581,11 @@ def settling_time(constant: float, seconds: float) -> float:
     return min(SETTLING_TIME * constant, 0.5 * seconds)
 
 
-def reflect(model: mujoco.MjModel, loop: RobotLoop) -> Array:
+def reflect(model: mujoco.MjModel, loop: RobotLoop) -> Array | None:
     """Return the pose of the other assembly at the same angle of bar 2, (nq,).
 
     Bars 3 and 4 are reflected in the line from A to O4, and the gap of the engine is
-    closed from there.
+    closed from there. None where it does not close.
     """
     ground, crank = loop.lengths[:2]
     theta_1, theta_2, theta_3, theta_4 = loop.angles
@@ -600,7 +600,8 @@ def reflect(model: mujoco.MjModel, loop: RobotLoop) -> Array:
         if pin in loop.hinges:
             address = model.jnt_qposadr[loop.hinges[pin]]
             qpos[address] += loop.senses[pin] * math.remainder(turn, math.tau)
-    LoopInside(model, loop).close_gap(qpos)
+    if not LoopInside(model, loop).close_gap(qpos):
+        return None
     return qpos
 
 

@@ -36,9 +36,9 @@ from fourbar_validation.engines.mujoco.robots.scene import (
 
 ALIKE = 1e-6
 """Difference of logarithms of lengths below which two ways round fit a scene alike."""
-_SAME_GRAVITY = 1e-6
-"""Part of gravity by which its direction may differ in the axes of a scene: angles of a
-pose have six digits.
+_SAME_DIRECTION = 1e-6
+"""Difference of two unit vectors up to which gravity has the direction of a scene's:
+angles of a pose have six digits.
 """
 
 
@@ -79,27 +79,33 @@ def _close_flat(
 ) -> tuple[RobotLoop, PosedRobot]:
     """Close a loop whose pose does not tell its assembly onto that of a scene."""
 
-    def look(at: PosedRobot) -> RobotLoop:
-        looked = choose_loop(find_closures(at, pose), loop.name)
-        return looked.seen_from_behind() if behind else looked
+    def sample_loop(at: PosedRobot) -> RobotLoop:
+        sampled = choose_loop(find_closures(at, pose), loop.name)
+        return sampled.seen_from_behind() if behind else sampled
 
-    loop = look(posed)
+    loop = sample_loop(posed)
     if _measure_sine(loop) <= FLAT:
         posed = move_to(posed, _leave_flat(scene, posed, loop))
-        loop = look(posed)
+        loop = sample_loop(posed)
     theta_1, theta_2, _, theta_4 = loop.angles
     missed = miss_output(scene, theta_1, theta_2, theta_4)
-    qpos = reflect(posed.model, loop)
-    other_pose = move_to(posed, qpos)
-    other = look(other_pose)
-    theta_1, theta_2, _, theta_4 = other.angles
-    if miss_output(scene, theta_1, theta_2, theta_4) < missed:
-        posed, loop = other_pose, other
-    name = NAMES[scene.motion.branch]
+    reflected = reflect(posed.model, loop)
+    if reflected is not None:
+        other_pose = move_to(posed, reflected)
+        other = sample_loop(other_pose)
+        theta_1, theta_2, _, theta_4 = other.angles
+        missed_by_other = miss_output(scene, theta_1, theta_2, theta_4)
+        if missed_by_other < missed:
+            posed, loop, missed = other_pose, other, missed_by_other
     text = (
         "the bars of pin B are in line in the pose before closing, which does not tell"
-        f" the assembly: the loop is closed onto the {name} one of the scene"
+        " the assembly: "
     )
+    if missed <= FLAT:
+        name = NAMES[scene.motion.branch]
+        text += f"the loop is closed onto the {name} one of the scene"
+    else:
+        text += "no pose that was tried closes onto that of the scene"
     return replace(loop, remarks=(*loop.remarks, text)), posed
 
 
@@ -131,18 +137,24 @@ def _require_assembly(scene: Scene, posed: PosedRobot, loop: RobotLoop) -> None:
         return
     wanted = NAMES[scene.motion.branch]
     other = NAMES[-scene.motion.branch]
-    pose = write_pose(posed.model, loop, reflect(posed.model, loop))
+    reflected = reflect(posed.model, loop)
+    if reflected is None:
+        advice = "state a pose of that one"
+    else:
+        advice = f"give --pose {write_pose(posed.model, loop, reflected)}"
     raise InputError(
         "--pose",
         None,
         f"the pose of {loop.name} closes to the {other} assembly and the scene names"
-        f" the {wanted} one (seen so that gravity points as in the scene): give"
-        f" --pose {pose}",
+        f" the {wanted} one (seen so that gravity points as in the scene): {advice}",
     )
 
 
 def _fits_gravity(scene: Scene, posed: PosedRobot, loop: RobotLoop) -> bool:
-    """Tell whether gravity has the direction that it has in a scene."""
+    """Tell whether gravity has the direction that it has in a scene.
+
+    Its size is for the comparison; where one of them has none, no side fits.
+    """
     model = posed.model
     effects = [effect for effect in scene.effects if isinstance(effect, Gravity)]
     wanted = sum((effect.vector for effect in effects), start=np.zeros(2))
@@ -154,9 +166,13 @@ def _fits_gravity(scene: Scene, posed: PosedRobot, loop: RobotLoop) -> bool:
     cos = math.cos(angle)
     sin = math.sin(angle)
     x, y = float(gravity @ along), float(gravity @ across)
-    there = np.array([cos * x - sin * y, sin * x + cos * y])
-    allowed = _SAME_GRAVITY * float(np.linalg.norm(gravity))
-    return bool(np.linalg.norm(there - wanted) <= allowed)
+    of_robot = np.array([cos * x - sin * y, sin * x + cos * y])
+    size = float(np.linalg.norm(of_robot))
+    wanted_size = float(np.linalg.norm(wanted))
+    if size == 0.0 or wanted_size == 0.0:
+        return False
+    difference = of_robot / size - np.asarray(wanted) / wanted_size
+    return bool(np.linalg.norm(difference) <= _SAME_DIRECTION)
 
 
 def miss_lengths(scene: Scene, loop: RobotLoop) -> tuple[float, float]:

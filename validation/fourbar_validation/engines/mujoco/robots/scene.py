@@ -545,12 +545,15 @@ class _SceneOfLoop:
             return OPEN
         branch = OPEN if apart[0] < apart[1] else CROSSED
         if self.loop.is_flat:
-            pose = write_pose(self.model, self.loop, reflect(self.model, self.loop))
-            self._remark(
+            text = (
                 "the bars of pin B are in line in the pose before closing, which does"
-                f" not tell the assembly: it closed to the {NAMES[branch]} one;"
-                f" --pose {pose} closes to the other"
+                f" not tell the assembly: it closed to the {NAMES[branch]} one"
             )
+            reflected = reflect(self.model, self.loop)
+            if reflected is not None:
+                pose = write_pose(self.model, self.loop, reflected)
+                text += f"; --pose {pose} closes to the other"
+            self._remark(text)
         return branch
 
     def _remark(self, text: str) -> None:
