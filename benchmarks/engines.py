@@ -6,7 +6,7 @@ They are over commits and versions of the engines.
 import math
 
 import fourbar
-from fourbar.scene import command
+from fourbar.scene import command, with_signs
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.places import MODELS
 from fourbar_validation.run.judge import judge
@@ -68,7 +68,8 @@ class Answer:
         if solver.missing():
             raise NotImplementedError(solver.missing())
         self.scene = fourbar.load(SCENES[model])
-        self.command, self.adapter = command(self.scene), solver.start()
+        self.command = with_signs(self.scene.linkage, command(self.scene))
+        self.adapter = solver.start()
         self.adapter.answer(self.scene, self.command)
 
     def time_answer(self, engine, model):

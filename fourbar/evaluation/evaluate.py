@@ -333,7 +333,7 @@ def _compute_unresolved(
     Near a limit, or beside a spring's free length, their own rounding shows in a
     double's digits. Where a double is as far off by coincidence, its distance to the
     long double is no bound. What rounding does follows from the slope:
-        dF = (dF/dq) max(|q|, 1) LONG_EPS ROUNDINGS_IN_FULL,
+        dF = (dF/dq) max(|q|, 1) _LONG_EPS ROUNDINGS_IN_FULL,
     dF/dq by a step that is short against the distance to the limit, which is some s^2
     (s the sine of the command). NaN where no double lies a step away.
     """

@@ -355,7 +355,7 @@ def _write_toml_value(key: str, value: object) -> str:
             + " }"
         )
     if isinstance(value, list):
-        # one line each where there are many, so that no line holds more than MOST_DOTS
+        # one line each where there are many: no line has more than MOST_DOTS_OF_A_LINE
         between = ", " if len(value) <= 3 else ",\n  "
         return (
             "[" + between.join(_write_toml_value(key, entry) for entry in value) + "]"

@@ -184,8 +184,9 @@ def pin_forces(
     d, a, b, c, _, _ = lengths
     R2, R3, R4, M2, M3, M4, C = w
     of_3 = M3 - C
+    # bar 2: separate, because a sum of both loses digits
     along = mass_at_A.real
-    across = mass_at_A.imag  # bar 2; separate, because a sum of both loses digits
+    across = mass_at_A.imag
     if drive_bar == 4:
         F32 = solve_between(-M2 / a, moment_of_F32 / b, position.u2, position.u3, sine)
         F43 = solve_between(

@@ -635,11 +635,20 @@ def with_signs(linkage: FourBar, commanded: Command) -> Command:
     Engines are told this one. It follows from the lengths and the angle alone. The
     function is its own inverse: of signs it makes assemblies.
     """
-    path = prepare_path(
-        Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle, commanded.bar
-    )
-    branch = path.sign(commanded.angle, commanded.branch)
-    return commanded._replace(branch=np.asarray(branch).astype(np.int8))
+    signs = find_signs(linkage, commanded.angle, commanded.branch, commanded.bar)
+    return commanded._replace(branch=signs)
+
+
+def find_signs(
+    linkage: FourBar, angle: Array, branch: NDArray[np.int8] | int, bar: int = 2
+) -> NDArray[np.int8]:
+    """Return the sign of a bar's sine at each of its angles, (n,).
+
+    `branch`: of the assembly, one for all or (n,). Given signs, it returns assemblies.
+    """
+    path = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle, bar)
+    assemblies = np.broadcast_to(np.asarray(branch, dtype=np.int8), np.shape(angle))
+    return np.asarray(path.sign(angle, assemblies)).astype(np.int8)
 
 
 def command(scene: Scene) -> Command:

@@ -24,7 +24,7 @@ from fourbar.formulas.mobility import (
 from fourbar.formulas.transmission import transmission_extremes
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar
 from fourbar.quantities import COUPLE, LINE, NOT_ASSEMBLED, PIN_FORCES, SINGULAR
-from fourbar.scene import Command, with_signs
+from fourbar.scene import find_signs
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.duty import read_drive_demand
 from fourbar.show.gas import list_gas_notes
@@ -395,8 +395,7 @@ def _name_assemblies(rest: Equilibria) -> Equilibria:
 
     def name(place: RestPosition) -> RestPosition:
         theta_2 = np.array([place.theta_2])
-        sign = np.array([place.branch], np.int8)
-        assembly = with_signs(linkage, Command(theta_2, sign, None, 0.0)).branch[0]
+        assembly = find_signs(linkage, theta_2, place.branch)[0]
         return place._replace(branch=int(assembly))
 
     def name_both(ends: Ends) -> Ends:

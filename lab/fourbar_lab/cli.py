@@ -16,7 +16,7 @@ LAB_COMMANDS = {
     "stability": "fourbar_lab.stability:stability",
     "bench": "fourbar_lab.bench:bench",
     "effects": "fourbar_lab.effects:effects",
-    "worlds": "fourbar_lab.worlds:command",
+    "worlds": "fourbar_lab.worlds:worlds_command",
     "advice": "fourbar_lab.advice:advice_command",
     "fuzz": "fourbar_lab.fuzz:fuzz",
     "fuzz-files": "fourbar_lab.fuzz_files:fuzz_files",

@@ -23,6 +23,7 @@ from fourbar.scene.motion import Motion, Sweep
 from fourbar.solving import solve
 from fourbar.writing import write_text
 from fourbar_validation.cost.study import time_call, time_in_turns
+from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.report.machine import describe_setup
 from fourbar_validation.report.templating import render
@@ -147,7 +148,7 @@ def _prepare_answers(name: str, effect: str) -> Callable[[int], Any]:
 
     def work(amount: int) -> None:
         scene = make_effect_scene(effect, amount)
-        adapter.answer(scene, command(scene))
+        ask_at(adapter, scene, command(scene))
 
     return work
 

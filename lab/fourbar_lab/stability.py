@@ -15,7 +15,7 @@ import numpy as np
 from fourbar.errors import FAILED, HOLDS
 from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.quantities import OK, PIN_FORCES, UNITS
-from fourbar.scene import Command, Scene, command, with_signs
+from fourbar.scene import Scene, command, find_signs, with_signs
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -29,6 +29,7 @@ from fourbar_lab.tally import (
     list_components,
 )
 from fourbar_validation.compare.tolerance import find_used
+from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.prediction import compute_reference
 from fourbar_validation.engines.workers import apply_each
 from fourbar_validation.report.terminal import make_words_table
@@ -61,10 +62,7 @@ def judge_sample(scene: Scene, tally: Tally, sample: str) -> None:
     """Compare one position with the reference."""
     tally.samples += 1
     angle = float(np.asarray(scene.motion.angle))
-    if scene.drive is None:
-        drive = "torque"
-    else:
-        drive = "drive_force"
+    drive = name_driving(scene)
     internal = (
         scene.drive is not None
         and scene.drive.has_stroke
@@ -165,9 +163,8 @@ def _feed_back(scene: Scene, bar: int) -> Scene | None:
     if solution.status_code[0] != OK or abs(sine) <= NO_DIGIT_LEFT:
         return None
     numbers = {f"theta_{bar}": theta, f"omega_{bar}": omega, f"alpha_{bar}": alpha}
-    signs = np.array([1 if sine > 0.0 else -1], dtype=np.int8)
-    position = Command(np.array([theta]), signs, None, 0.0, bar=bar)
-    branch = int(with_signs(scene.linkage, position).branch[0])
+    sign = 1 if sine > 0.0 else -1
+    branch = int(find_signs(scene.linkage, np.array([theta]), sign, bar)[0])
     return replace(scene, motion=Motion(branch=branch, **numbers))  # type: ignore[arg-type]
 
 

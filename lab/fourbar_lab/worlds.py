@@ -3,6 +3,7 @@
 MJX and MuJoCo Warp evaluate them on a GPU, MuJoCo and the formulas on one core.
 """
 
+import math
 import time
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -46,7 +47,7 @@ class Contender(NamedTuple):
     """Precision that `in_worlds` is asked for. None: it has one alone."""
 
 
-FORMULAS = "formulas, NumPy, one core"
+FORMULAS_ON_ONE_CORE = "formulas, NumPy, one core"
 CONTENDERS = {
     "MuJoCo, one core": Contender("mujoco_c:MujocoFile", False),
     "MJX-JAX, double precision": Contender("mujoco_mjx:MujocoMjx", True, double=True),
@@ -59,7 +60,8 @@ _ABOUT = (
     " is the median of up to 20 calls on assembled states that lie on the device; in"
     " brackets that of calls where states come from NumPy and results return there."
     " The formulas assemble the positions too. Errors are relative to the largest"
-    " value. The first call includes compilation."
+    " value. The first call is that of the most positions. It includes compilation,"
+    " the assembly of the states, and a whole evaluation."
 )
 
 
@@ -74,11 +76,11 @@ class WorldsCost(NamedTuple):
     """Seconds of a call that sets states from NumPy and copies the results back."""
     first: float
     """Seconds until the first call has returned, compilation included."""
-    torque: float = 0.0
-    """Largest error of the torque, relative to its largest value; that of the formulas
-    is 0, as they are the reference.
+    torque: float = math.nan
+    """Largest error of the torque, relative to its largest value. The formulas are the
+    reference, and have none.
     """
-    force: float = 0.0
+    force: float = math.nan
     """Largest error of a pin force, likewise."""
 
 
@@ -111,10 +113,10 @@ def _measure_formulas(worlds: int) -> WorldsCost:
     call()
     first = time.perf_counter() - began
     seconds = _time_call(call)
-    return WorldsCost(FORMULAS, worlds, seconds, seconds, first)
+    return WorldsCost(FORMULAS_ON_ONE_CORE, worlds, seconds, seconds, first)
 
 
-def measure(name: str, worlds: int) -> WorldsCost:
+def measure_worlds(name: str, worlds: int) -> WorldsCost:
     """Time a contender, and judge the last worlds, one for each position."""
     contender = CONTENDERS[name]
     problem, scene, command = _read_question()
@@ -173,19 +175,22 @@ def _list_devices() -> list[str]:
     return devices
 
 
-def list_rows(costs: Iterable[WorldsCost]) -> tuple[list[str], list[list[str]]]:
+def list_worlds_rows(costs: Iterable[WorldsCost]) -> tuple[list[str], list[list[str]]]:
     """List the columns of the table, and a row of each contender."""
     by_name: dict[str, dict[int, WorldsCost]] = {}
     for cost in costs:
         by_name.setdefault(cost.contender, {})[cost.worlds] = cost
-    formulas = by_name[FORMULAS]
+    formulas = by_name[FORMULAS_ON_ONE_CORE]
     rows = []
     for name, row in by_name.items():
         cells = [_write_time(row.get(worlds), formulas[worlds]) for worlds in formulas]
-        # NaN stays NaN
-        torque = np.max([cost.torque for cost in row.values()])
-        force = np.max([cost.force for cost in row.values()])
-        cells += [_write_error(float(torque)), _write_error(float(force))]
+        if name == FORMULAS_ON_ONE_CORE:
+            cells += ["reference", "reference"]
+        else:
+            # NaN stays NaN
+            torque = np.max([cost.torque for cost in row.values()])
+            force = np.max([cost.force for cost in row.values()])
+            cells += [f"{torque:.1e}", f"{force:.1e}"]
         cells.append(f"{max(cost.first for cost in row.values()):.2g}")
         rows.append([name, *cells])
     numbers = [f"{worlds:,}".replace(",", " ") for worlds in formulas]
@@ -196,14 +201,10 @@ def _write_time(cost: WorldsCost | None, formulas: WorldsCost) -> str:
     """Write the time of a position: of the formulas in ns, else divided by theirs."""
     if cost is None:
         return "failed"
-    if cost.contender == FORMULAS:
+    if cost.contender == FORMULAS_ON_ONE_CORE:
         return f"{1e9 * cost.seconds / cost.worlds:.0f} ns"
     ratio = cost.seconds / formulas.seconds
     return f"{ratio:.2g} ({cost.exchanged / formulas.seconds:.2g})"
-
-
-def _write_error(error: float) -> str:
-    return "reference" if error == 0.0 else f"{error:.1e}"
 
 
 def _read_worlds(text: str, positions: int) -> list[int]:
@@ -217,7 +218,7 @@ def _read_worlds(text: str, positions: int) -> list[int]:
     return numbers
 
 
-@click.command()
+@click.command(name="worlds")
 @click.option(
     "--worlds", metavar="NUMBERS", default=_WORLDS, show_default=True, help="Worlds."
 )
@@ -230,7 +231,7 @@ def _read_worlds(text: str, positions: int) -> list[int]:
     type=click.Path(path_type=Path, dir_okay=False),
     help="Write the table as Markdown too.",
 )
-def command(worlds: str, any_device: bool, out: Path | None) -> int:
+def worlds_command(worlds: str, any_device: bool, out: Path | None) -> int:
     """Time torque and pin forces of many positions at once, on a GPU.
 
     MuJoCo and the formulas stand beside it, on one core. What is not run is named with
@@ -247,8 +248,8 @@ def command(worlds: str, any_device: bool, out: Path | None) -> int:
     not_run = [f"{name}: {reason}" for name, reason in obstacles.items() if reason]
     costs: list[WorldsCost] = []
     for number in numbers:
-        actions = {FORMULAS: partial(_measure_formulas, number)} | {
-            name: partial(measure, name, number)
+        actions = {FORMULAS_ON_ONE_CORE: partial(_measure_formulas, number)} | {
+            name: partial(measure_worlds, name, number)
             for name, reason in obstacles.items()
             if not reason
         }
@@ -260,7 +261,7 @@ def command(worlds: str, any_device: bool, out: Path | None) -> int:
                 not_run.append(f"{what}: failed: {write_one_line(str(error))}")
                 continue
             click.echo(f"{what}: {1e9 * costs[-1].seconds / number:.0f} ns a position")
-    columns, rows = list_rows(costs)
+    columns, rows = list_worlds_rows(costs)
     Console().print(make_words_table(columns, rows, caption=_ABOUT))
     for line in not_run:
         click.echo(line)

@@ -43,7 +43,10 @@ class _NotFoundError(Exception):
 
 
 def open_engine(entry: str) -> tuple[_Factory, dict[str, Any]]:
-    """Return what makes an engine, and its hello; NotFoundError where there is none."""
+    """Return what makes an engine, and its hello.
+
+    Raises _NotFoundError where there is none.
+    """
     if ":" in entry:
         return _open_class(entry)
     engines = {engine.name: engine for engine in (*ENGINES, *load_further(), BALLS)}

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fourbar.quantities import Array
-from fourbar.scene import Command, Scene, with_signs
+from fourbar.scene import Scene, find_signs
 from fourbar.studies.keys import command_key, list_entries, read_place, replace_numbers
 from fourbar_lab.simulators.motion import start
 from fourbar_lab.simulators.mujoco_c import text
@@ -41,9 +41,8 @@ def compile_and_assemble(scene: Scene, theta_2: float, reader: str) -> ClosedSta
     written = text(scene, STEPS_OF_A_TURN, reader)
     loop = ClosedLoop(written)
     model, data = open_model(written)
-    assembly = np.array([scene.motion.branch], dtype=np.int8)
-    told = with_signs(scene.linkage, Command(np.array([theta_2]), assembly, None, 0.0))
-    q = Assembler(loop).find(theta_2, int(told.branch[0]))
+    signs = find_signs(scene.linkage, np.array([theta_2]), scene.motion.branch)
+    q = Assembler(loop).find(theta_2, int(signs[0]))
     assert q is not None
     loop.set_state(q, scene.motion.omega_2 or 0.0)
     return ClosedState(model, data, loop.data.qpos.copy(), loop.data.qvel.copy())

@@ -21,7 +21,7 @@ from fourbar.errors import InputError, LimitError, NotAssembledError
 from fourbar.mjcf import RECIPE
 from fourbar.mjcf.document import Start, choose_run
 from fourbar.quantities import PIN_FORCES, Array
-from fourbar.scene import Command, Scene, command, with_signs
+from fourbar.scene import Command, Scene, command, find_signs, with_signs
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.engines.description import find_field, list_speeds
 from fourbar_validation.engines.free_body import speeds_and_accelerations
@@ -282,9 +282,8 @@ def lay_out(scene: Scene, command: Command, steps: int) -> tuple[Scene, Course]:
 
 def _closes(scene: Scene, theta_2: Array) -> bool:
     """Tell whether the linkage closes at all these angles, and far from a toggle."""
-    assembly = np.full(len(theta_2), scene.motion.branch, dtype=np.int8)
-    told = with_signs(scene.linkage, Command(theta_2, assembly, None, 0.0))
-    closed = close(scene.linkage, theta_2, told.branch)
+    signs = find_signs(scene.linkage, theta_2, scene.motion.branch)
+    closed = close(scene.linkage, theta_2, signs)
     return bool(
         closed.assembled.all()
         and np.abs(np.sin(closed.theta[1] - closed.theta[0])).min() > _FROM_TOGGLE

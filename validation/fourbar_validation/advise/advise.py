@@ -256,7 +256,7 @@ class _CheapestSearch:
         self.setup = setup
         self.attempts: list[SearchRun] = []
         self.reading_cost = 0.0
-        """CPU time of a reading, in steps as those of `Attempt.step_cost`."""
+        """CPU time of a reading, in steps as those of `SearchRun.step_cost`."""
 
     def advice(self) -> _Advice:
         """Find the cheapest that serves.

@@ -74,7 +74,7 @@ _MAY_MEAN = (
     (r".*(?:acceleration|beschleunigung).*", "alpha_2, alpha_3 or alpha_4"),
     (r".*(?:angle|winkel|theta|phi).*", "theta_2, theta_3 or theta_4"),
 )
-"""Patterns of names, spelled as in OTHER_NAMES, and what they may mean."""
+"""Patterns of names, spelled as in _OTHER_NAMES, and what they may mean."""
 OTHER_UNITS = {
     "rad": ("rad", "deg"),
     "rad/s": ("rad/s", "deg/s", "rpm", "rev/s"),
@@ -144,7 +144,7 @@ class TheirTable:
     """The line of the file that each row stands in."""
     theta_2_rounding: Array
     """Half a unit of the last digit of theta_2, rad, (n,). It is stated if the column
-    is printed with DECIMALS, else 0.
+    is printed with _DECIMALS, else 0.
     """
     left_out: dict[str, str]
     """Headings of columns that are not judged, and why."""

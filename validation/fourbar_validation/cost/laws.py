@@ -36,10 +36,10 @@ _MIXES = 1.0 / 30.0
 """Part of the least error from which on a rest flattens a slope. The rest does not
 depend on the setting.
 """
-RATIOS_OF_FIRST_ORDER = 1.0
+_FIRST_ORDER = 1.0
 _FOURTH_ORDER = 4.0
 _EXPECTED_ORDER = dict.fromkeys(
-    ("Euler", "implicit", "implicitfast", "discrete"), RATIOS_OF_FIRST_ORDER
+    ("Euler", "implicit", "implicitfast", "discrete"), _FIRST_ORDER
 ) | {"RK4": _FOURTH_ORDER}
 
 

@@ -33,11 +33,16 @@ from fourbar_validation.cost.study import (
     STEPPED_MOTION,
     CostPoint,
 )
-from fourbar_validation.report.svg import LIGHT_COLOURS, write_alone
-
-INK, SOFT, GRID, BAND, PAPER = (
-    LIGHT_COLOURS[f"--{name}"] for name in ("ink", "soft", "grid", "under", "paper")
+from fourbar_validation.report.svg import (
+    BAND,
+    GRID,
+    INK,
+    LIGHT_COLOURS,
+    PAPER,
+    SOFT,
+    write_alone,
 )
+
 _BLUE, _GREEN, _ORANGE, _PINK, _VIOLET = (LIGHT_COLOURS[f"--e{n}"] for n in range(1, 6))
 
 

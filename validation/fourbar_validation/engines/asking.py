@@ -1,7 +1,8 @@
 """Ask an engine: it is told the sign at each position, and no result of the formulas.
 
 A command of a scene names an assembly; an engine is asked for the sign of the bar's
-sine. The two differ beyond a change point. Whoever asks an engine asks it here.
+sine. The two differ beyond a change point. Whoever asks about a command of a scene asks
+here; limits and equilibria are asked for by their signs.
 """
 
 from dataclasses import replace

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fourbar.linkage import MOVING_BARS, PINS, FourBar
 from fourbar.quantities import Array, ComplexArray
-from fourbar.scene import Command, Scene, command, with_signs
+from fourbar.scene import Scene, command, find_signs
 from fourbar_validation.compare.pins import find_centre, find_mass
 from fourbar_validation.engines.description import declares
 from fourbar_validation.engines.free_body_closure import close, cross_products
@@ -302,9 +302,7 @@ def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
     ends = np.concatenate((begins.theta_2, motion.theta_2))
     steps = math.ceil(float(np.ptp(ends)) / FOLLOWED) + 1
     path = np.unique(np.concatenate((ends, np.linspace(ends.min(), ends.max(), steps))))
-    assembly = np.full(len(path), scene.motion.branch, dtype=np.int8)
-    told = with_signs(link, Command(path, assembly, None, 0.0))
-    closed = close(link, path, told.branch)
+    closed = close(link, path, find_signs(link, path, scene.motion.branch))
     path = path[closed.assembled]
     if not (on_path := np.isin(begins.theta_2, path)).any():
         return gone

@@ -167,9 +167,9 @@ def _close_gap(
 
     The determinant of the gap's derivative by the angles of the others, for bar 2 -b c
     sin(theta_4 - theta_3), has the branch's sign. A step is halved until the gap falls
-    and the sign is kept; the last one is taken where nothing smaller than `closed` (m)
-    falls any further: an answer that stops a step earlier has other last digits, which
-    near a change point decide whether forces can be told.
+    and the sign is kept. The last step is the one after which a gap below `closed` (m)
+    falls no further. An answer that stops a step earlier has other last digits, and
+    near a change point these decide whether forces can be told.
     """
     theta_3 = q[0] + q[1]
 

@@ -21,7 +21,7 @@ from fourbar.files.scene_text import list_scene_tables
 from fourbar.formulas.many_digits import WORKING_DIGITS
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.quantities import VECTORS, Array
-from fourbar.scene import Command, Scene, with_signs
+from fourbar.scene import Command, Scene, find_signs, with_signs
 from fourbar.scene import command as command_of
 from fourbar.scene.motion import COMMAND_NAMES, STROKE_COMMAND, Free, Motion
 from fourbar_validation.compare.answer import Answer, EngineError, ReleasedAnswer
@@ -614,11 +614,11 @@ def release_from_json(scene: Scene, command: Any, times: Any) -> Scene:
         for name in ("theta_2", "omega_2")
     )
     sign = _read_branch(command.get("branch", 1), 1)
-    assembly = with_signs(scene.linkage, Command(np.array([theta]), sign, None, 0.0))
+    assembly = find_signs(scene.linkage, np.array([theta]), sign)
     free = Free(float(instants[-1]), len(instants) - 1)
     return replace(
         scene,
-        motion=Motion(theta, omega, 0.0, int(assembly.branch[0]), free),
+        motion=Motion(theta, omega, 0.0, int(assembly[0]), free),
     )
 
 

@@ -28,7 +28,7 @@ POSITION_KEYS = ("motion.theta_2", "motion.free.steps", "motion.law.steps")
 def describe_scenes(suite: Suite) -> dict[str, dict[str, str]]:
     """Describe each scene of a suite by its name.
 
-    None of a suite of more than MOST_DESCRIBED is described.
+    None of a suite of more than _MOST_DESCRIBED is described.
     """
     if len(suite) > _MOST_DESCRIBED:
         return {}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.quantities import ANGLES, COUPLE, FORCE_NAMES, LINE, OK, PIN_FORCES, Array
+from fourbar.quantities import ANGLES, FORCE_NAMES, LINE, OK, PIN_FORCES, Array
 from fourbar.scene import Command, Scene
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.linkage import draw_linkage
@@ -26,6 +26,7 @@ from fourbar_validation.compare.tolerance import (
     find_error,
     magnitude,
 )
+from fourbar_validation.engines.description import name_driving
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import compute_shares
 from fourbar_validation.report.svg import (
@@ -117,10 +118,8 @@ def _draw_answers(record: Record, solution: Solution) -> str:
         for answer in record.answers
         if answer.refusal is None and answer.quantities
     ]
-    if solution.drive is None:
-        drive = COUPLE.value
-    else:
-        drive = LINE.value
+    assert record.scene is not None
+    drive = name_driving(record.scene)
     shown = ANGLES
     if solution.F32 is not None:
         shown = (drive, _choose_force(record, solution))

@@ -129,7 +129,7 @@ class Summary:
         """Name of the scene that was asked for; empty if there are several."""
         self.versions, self.machine = list_versions(), name_machine()
         self.failures: list[Row] = []
-        """Failures, at most FAILURES_KEPT of them."""
+        """Failures, at most _FAILURES_KEPT of them."""
         self.pairs = self.loose = 0
         """Quantities of a scene that were compared. Those that no row judges tighter
         than degraded are counted too.
@@ -155,7 +155,7 @@ class Summary:
         self._worst: list[Worst] = []
         self._times: dict[str, list[tuple[float, float]]] = {}
         """Microseconds per position, and the ratio to the formulas. They are of at most
-        TIMED scenes of each engine.
+        _TIMED scenes of each engine.
         """
         self._orders: list[tuple[str, dict[str, float]]] = []
         self._failing: list[Record] = []
@@ -347,7 +347,7 @@ class Summary:
     def worst(self) -> list[Worst]:
         """Return the worst by scene and engine.
 
-        Of more than WORST_SHOWN they are those that used most, in that order.
+        Of more than _WORST_SHOWN they are those that used most, in that order.
         """
         if self.judged > _WORST_SHOWN:
             return nlargest(_WORST_SHOWN, self._worst, key=lambda w: w.used)
@@ -371,7 +371,7 @@ class Summary:
     def orders(self) -> list[tuple[str, dict[str, float]]]:
         """Return (scene, errors at 4h and 2h and observed order) of simulations.
 
-        They are at most ORDERS_SHOWN, lowest first.
+        They are at most _ORDERS_SHOWN, lowest first.
         """
         few = len(self._orders) <= _ORDERS_SHOWN
         if few:

@@ -8,9 +8,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.quantities import COUPLE, LINE, OK, Array
+from fourbar.quantities import OK, Array
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
+from fourbar_validation.engines.description import name_driving
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.svg import choose_style
 
@@ -64,11 +65,8 @@ def _draw_four_bars(record: Record, solution: Solution) -> str:
 
 def _draw_curve(record: Record, solution: Solution) -> str:
     """Draw the formulas' torque as a band, and each engine's as marks on it."""
-    if solution.drive is None:
-        name = COUPLE.value
-    else:
-        name = LINE.value
     assert record.scene is not None
+    name = name_driving(record.scene)
     released = record.scene.motion.free is not None  # no torque acts
     if released:
         ours = None

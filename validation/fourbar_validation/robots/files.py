@@ -71,7 +71,7 @@ def read_robot(path: Path, assets: Path | None = None) -> RobotFile:
 
 
 def is_four_bar_alone(file: RobotFile) -> bool:
-    """Tell whether a file has no more joints than HINGES."""
+    """Tell whether a file has no more joints than _HINGES."""
     joints = [
         element
         for world in ET.fromstring(file.text).iter("worldbody")

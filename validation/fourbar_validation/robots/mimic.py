@@ -32,7 +32,7 @@ fitted by least squares with an error to tell.
 """
 FIT_HEADINGS = ("degree", "fit", "angle, deg", "ratio", "polycoef")
 _FITS = ("least squares", "smallest largest error")
-"""Names of the fits of `MimicReport.squares` and `MimicReport.fitted`."""
+"""Names of the fits of `_MimicReport.squares` and `_MimicReport.fitted`."""
 ROW = "{:6}  {:22}  {:>10}  {:>8}  {}"
 """Format of a row under FIT_HEADINGS."""
 

@@ -49,6 +49,7 @@ from fourbar_validation.compare.tolerance import (
     magnitude,
     mark_touching,
 )
+from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.exact import compute_exact_sines
 from fourbar_validation.engines.free_body import count_solutions
 from fourbar_validation.engines.registry import find_missing
@@ -181,10 +182,7 @@ def _check_sums(question: Question) -> Iterator[Row]:
     )
     assert solution.F32 is not None and solution.F43 is not None
     actions, O4 = _sum_actions(question)
-    if solution.drive is None:
-        drive = COUPLE.value
-    else:
-        drive = LINE.value
+    drive = name_driving(question.scene)
     balance = _Balance()
     if solution.torque is not None:
         balance.couple(solution.torque)

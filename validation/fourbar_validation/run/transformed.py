@@ -317,8 +317,8 @@ def _solve_from_first(
     # only the motion is new, and it is checked
     begun = copy_with(scene, motion=Motion(**begin))
     if names is None or len(command.angle) == 1:
-        # one position is solved in Python's own numbers, into arrays it is not, and
-        # "scaled" demands the same digits
+        # a single position is solved in Python's own numbers, but not where arrays to
+        # write into are given; "scaled" demands the same digits
         return solve(begun, "force", at=command)
     evaluated = [name for name in names if name in STAGE_OF]
     return solve(begun, at=command, out=make_blank(len(command.angle), evaluated))

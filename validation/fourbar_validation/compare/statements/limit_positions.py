@@ -22,7 +22,7 @@ from fourbar.formulas import mobility
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import MOVING_BARS, FourBar, uniform
 from fourbar.quantities import FORCE_NAMES, UNKNOWNS, Array
-from fourbar.scene import Command, Scene, with_signs
+from fourbar.scene import Command, Scene, find_signs
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.answer import Adapter, Answer
 from fourbar_validation.compare.rows import Row
@@ -177,7 +177,7 @@ def _compare_change_points(linkage: FourBar) -> Finding:
 def _compute_step_beyond(linkage: FourBar, theta_2: float) -> float:
     """Compute the angle by which bar 2 turns beyond a limit, rad.
 
-    The loop then closes, or misses, by BEYOND more.
+    The loop then closes, or misses, by _BEYOND more.
     """
     d, a, *_ = linkage.lengths
     psi = theta_2 - linkage.ground_angle
@@ -328,10 +328,8 @@ def _list_passages(linkage: FourBar) -> Iterator[_Passage]:
     for change_point in mobility.change_points(linkage):
         for turn, assembly in itertools.product((0, 1), (1, -1)):
             point = change_point + TURN * turn
-            assemblies = np.full(2, assembly, dtype=np.int8)
             around = np.array([point - _PAST, point + _PAST])
-            command = Command(around, assemblies, None, 0.0)
-            before, after = with_signs(linkage, command).branch.tolist()
+            before, after = find_signs(linkage, around, assembly).tolist()
             yield _Passage(point, assembly, before, after)
 
 
@@ -411,7 +409,7 @@ def compare_ranges(
 
 def choose_places(stated: StatedLimits) -> list[LimitPlace]:
     """Return the places where an engine is evaluated to check these statements."""
-    places = stated.trials[2].places
+    places = [*stated.trials[2].places]
     places += [
         (limit.theta_2 + step, branch)
         for limit, step in stated.inside

@@ -93,7 +93,7 @@ class StatedOver(NamedTuple):
     """Transmission angle, rad."""
     extremes: transmission.TransmissionExtremes
     advantage: Array
-    """Mechanical advantage of forces at RADII."""
+    """Mechanical advantage of forces at _RADII."""
     to_singular: Finding
     """Distance to a singular position. It is held against the limits and dead centres
     that are stated.

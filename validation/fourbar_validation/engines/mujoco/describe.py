@@ -16,6 +16,7 @@ import numpy as np
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS
 from fourbar.quantities import Array
 from fourbar_validation.engines.description import ModelEntry, Value
+from fourbar_validation.engines.mujoco.robots.ancestry import is_enabled
 from fourbar_validation.engines.mujoco.topology import Topology
 
 Described = dict[str, ModelEntry]
@@ -85,7 +86,7 @@ def describe_model(topology: Topology, flywheel: float = 0.0) -> Described:
     described["lengths.ground_angle"] = ModelEntry(topology.ground_angle)
     for bar in MOVING_BARS:
         described |= _describe_bar(topology, bar, flywheel)
-    gravity = model.opt.gravity * _is_on(model, "gravity")
+    gravity = model.opt.gravity * is_enabled(model, "gravity")
     for axis, size in zip("xy", topology.in_plane(gravity), strict=True):
         described[f"gravity.{axis}"] = ModelEntry(float(size), "option", "gravity")
     described["gravity.across"] = ModelEntry(
@@ -111,21 +112,9 @@ def describe_model(topology: Topology, flywheel: float = 0.0) -> Described:
         model.geom_contype.any() and model.geom_conaffinity.any()
     )
     described["contacts"] = ModelEntry(
-        "possible" if touching and _is_on(model, "contact") else "off"
+        "possible" if touching and is_enabled(model, "contact") else "off"
     )
     return described
-
-
-def _is_on(model: mujoco.MjModel, *flags: str) -> bool:
-    """Return whether no flag switches a feature off.
-
-    A flag that this MuJoCo does not have switches nothing.
-    """
-    bits = (
-        int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0))
-        for flag in flags
-    )
-    return not any(model.opt.disableflags & bit for bit in bits)
 
 
 def _read_field(entry: object) -> Value:
@@ -219,7 +208,7 @@ def _describe_pin(topology: Topology, pin: str) -> Described:
         if name == "armature" and pin in _GROUND_PINS:
             continue  # it is inertia of the bar there
         size = float(getattr(model, field)[joint if field.startswith("jnt") else dof])
-        acts = not flag or _is_on(
+        acts = not flag or is_enabled(
             model, flag, *(("passive",) if flag in ("spring", "damper") else ())
         )
         described[f"{key}.{name}"] = ModelEntry(size * acts, element, attribute)

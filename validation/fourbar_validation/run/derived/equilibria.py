@@ -21,7 +21,7 @@ import fourbar
 from fourbar.formulas.mobility import change_points, find_intervals, turns_fully
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import Array
-from fourbar.scene import Command, Scene, with_signs
+from fourbar.scene import Command, Scene, find_signs
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.studies.equilibrium import Equilibrium
 from fourbar_validation.compare.derived import REST
@@ -84,8 +84,7 @@ def equilibria(question: Question) -> Iterator[Row]:
         branches = (int(question.solution.branch[0]),)
     torques = {branch: _hold(scene, theta_2, branch) for branch in branches}
     if turns_fully(scene.linkage) and len(change_points(scene.linkage)) == 2:
-        assembly = np.full(theta_2.shape, question.at.branch[0], dtype=np.int8)
-        signs = with_signs(scene.linkage, Command(theta_2, assembly, None, 0.0)).branch
+        signs = find_signs(scene.linkage, theta_2, int(question.at.branch[0]))
         for branch, torque in torques.items():  # one assembly is a circuit of its own
             torque[signs != branch] = np.nan
     if not any(np.any(torque[np.isfinite(torque)]) for torque in torques.values()):

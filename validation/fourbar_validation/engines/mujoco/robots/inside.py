@@ -33,6 +33,7 @@ import numpy as np
 from fourbar.errors import LimitError
 from fourbar.linkage import PINS
 from fourbar.quantities import Array
+from fourbar_validation.engines.description import FORCE_AT
 from fourbar_validation.engines.mujoco.closed_loop import WARNINGS, load_force
 from fourbar_validation.engines.mujoco.couple import find_couple
 from fourbar_validation.engines.mujoco.robots.ancestry import (
@@ -78,8 +79,6 @@ _REACHED = 1.0 - 1e-6
 """Part of its couple at which dry friction acts in full."""
 MOST_TIMESTEPS = 60_000
 """Steps of one run; at 0.1 ms a step of a humanoid these are six seconds."""
-_FORCE_OF_PIN = {"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}
-"""Names of the pin forces. F_ij is the force of bar i on bar j."""
 _FORCE_ON = {"F12": 2, "F32": 2, "F43": 3, "F14": 4}
 """The bar that each force acts on."""
 
@@ -384,7 +383,7 @@ class LoopInside:
             ]
         )
         forces = {}
-        for pin, name in _FORCE_OF_PIN.items():
+        for pin, name in FORCE_AT.items():
             joint = self.loop.hinges.get(pin)
             if joint is None:
                 force, bar = self._read_closure(data, pin)

@@ -17,8 +17,6 @@ FLAT = 2e-3
 is: a loop that is closed to 1e-12 m leaves about half as much open where its bars are
 in line.
 """
-PINS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
-"""The two bars that meet at each pin."""
 
 
 @dataclass(frozen=True, slots=True)

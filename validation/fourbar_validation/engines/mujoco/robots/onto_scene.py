@@ -15,6 +15,7 @@ from fourbar.effects import Gravity
 from fourbar.errors import InputError
 from fourbar.quantities import Array
 from fourbar.scene import Scene, command
+from fourbar.scene.motion import BRANCH_NAMES
 from fourbar_validation.engines.mujoco.robots.ancestry import is_enabled, name_joint
 from fourbar_validation.engines.mujoco.robots.closures import (
     choose_loop,
@@ -28,7 +29,6 @@ from fourbar_validation.engines.mujoco.robots.loop import (
 )
 from fourbar_validation.engines.mujoco.robots.pose import PosedRobot, move_to
 from fourbar_validation.engines.mujoco.robots.scene import (
-    NAMES,
     is_seen_from_behind,
     miss_output,
     write_pose,
@@ -102,7 +102,7 @@ def _close_flat(
         " the assembly: "
     )
     if missed <= FLAT:
-        name = NAMES[scene.motion.branch]
+        name = BRANCH_NAMES[scene.motion.branch]
         text += f"the loop is closed onto the {name} one of the scene"
     else:
         text += "no pose that was tried closes onto that of the scene"
@@ -135,8 +135,8 @@ def _require_assembly(scene: Scene, posed: PosedRobot, loop: RobotLoop) -> None:
     behind = loop.seen_from_behind()
     if _fits_gravity(scene, posed, loop) or not _fits_gravity(scene, posed, behind):
         return
-    wanted = NAMES[scene.motion.branch]
-    other = NAMES[-scene.motion.branch]
+    wanted = BRANCH_NAMES[scene.motion.branch]
+    other = BRANCH_NAMES[-scene.motion.branch]
     reflected = reflect(posed.model, loop)
     if reflected is None:
         advice = "state a pose of that one"

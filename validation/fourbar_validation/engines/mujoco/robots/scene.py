@@ -23,8 +23,8 @@ from fourbar.formulas.mobility import (
 )
 from fourbar.linkage import BAR_NAMES, ENDS, MOVING_BARS, PINS, Bar, FourBar
 from fourbar.quantities import Array
-from fourbar.scene import Command, Scene, with_signs
-from fourbar.scene.motion import CROSSED, OPEN, Motion, Sweep
+from fourbar.scene import Scene, find_signs
+from fourbar.scene.motion import BRANCH_NAMES, CROSSED, OPEN, Motion, Sweep
 from fourbar.solving import solve
 from fourbar_validation.engines.free_body_closure import close
 from fourbar_validation.engines.mujoco.robots.ancestry import (
@@ -57,8 +57,6 @@ from fourbar_validation.engines.mujoco.robots.pose import (
     pose_robot,
 )
 
-NAMES = {OPEN: "open", CROSSED: "crossed"}
-"""Names of the assemblies, by the branch of a motion."""
 DIGITS_OF_A_MODEL = 12
 """Significant digits of a number of the scene. Those beyond are round-off of the
 compiler.
@@ -200,8 +198,7 @@ def miss_output(scene: Scene, theta_1: float, theta_2: float, theta_4: float) ->
     """
     linkage = scene.linkage
     angle = np.array([theta_2 - theta_1 + linkage.ground_angle])
-    sign = np.array([scene.motion.branch], dtype=np.int8)
-    branch = with_signs(linkage, Command(angle, sign, None, 0.0)).branch
+    branch = find_signs(linkage, angle, scene.motion.branch)
     output = float(close(linkage, angle, branch).theta[1, 0])
     away = output - linkage.ground_angle - (theta_4 - theta_1)
     if math.isfinite(away):
@@ -547,7 +544,7 @@ class _SceneOfLoop:
         if self.loop.is_flat:
             text = (
                 "the bars of pin B are in line in the pose before closing, which does"
-                f" not tell the assembly: it closed to the {NAMES[branch]} one"
+                f" not tell the assembly: it closed to the {BRANCH_NAMES[branch]} one"
             )
             reflected = reflect(self.model, self.loop)
             if reflected is not None:
