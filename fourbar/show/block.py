@@ -23,6 +23,7 @@ from fourbar.linkage import BAR_NAMES, PIN_FORCE
 from fourbar.quantities import LINE, PIN_FORCES
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
+from fourbar.show.change_point import has_growing_forces
 from fourbar.show.duty import DUTY_UNITS, bearing_load, describe_drive
 from fourbar.show.gas import list_gas_notes
 from fourbar.show.position import PositionSheet
@@ -748,7 +749,11 @@ class _SceneBlock:
                 head + ", ".join(names) for head, names in parts if names
             )
             lines.append(f"growing without bound between these positions: {grow}")
-        if facts.solution.change_points and facts.pins:
+        if (
+            facts.solution.change_points
+            and facts.pins
+            and has_growing_forces(facts.scene, facts.solution)
+        ):
             lines.append(
                 "at a change point pin forces grow without bound: the peaks are those "
                 "of these instants"

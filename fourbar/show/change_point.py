@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.errors import InputError
 from fourbar.evaluation.free_motion import release_at
@@ -20,6 +21,10 @@ grows beside a change point as 1/ANGLE_STEP, is 1e-11 of them.
 """
 NEAR_STEPS, FAR_STEPS = (1.0, 2.0, 3.0), (2.0, 4.0, 6.0)
 """Multiples of the step at which each of two parabolas meets the forces of a side."""
+MULTIPLES = np.ravel(
+    [[sign * m for m in (*NEAR_STEPS, *FAR_STEPS)] for sign in (-1.0, 1.0)]
+)
+"""Those of both sides, by side, parabola and place."""
 SAME_LIMIT = 1e-6
 """Part of the forces within which four extrapolations are one limit: as is shown."""
 ZERO_LIMIT = 1e-9
@@ -41,21 +46,39 @@ def find_limits(scene: Scene, solution: Solution) -> Solution | None:
     """
     if solution.F12 is None or solution.status_code[0] != CHANGE_POINT:
         return None
-    multiples = np.array(
-        [[sign * m for m in (*NEAR_STEPS, *FAR_STEPS)] for sign in (-1.0, 1.0)]
-    )
-    rising, order = np.unique(multiples, return_inverse=True)
-    places = _list_places(scene, solution, rising)
-    beside = solve(scene, "force", at=places)
-    forces = {
-        name: np.reshape(getattr(beside, name)[order.ravel()], (2, 2, 3, 2))
-        for name in PIN_FORCES
-    }
-    size = max(np.abs(values[:, 1, -1]).max() for values in forces.values())
+    rising, order = np.unique(MULTIPLES, return_inverse=True)
+    beside = solve(scene, "force", at=_list_places(scene, solution, rising))
     limits: dict[str, Any] = {
-        name: _extrapolate_force(values, size)[None] for name, values in forces.items()
+        name: limit[None] for name, limit in _extrapolate_forces(beside, order).items()
     }
     return replace(solution, **limits)
+
+
+def has_growing_forces(scene: Scene, solution: Solution) -> bool:
+    """Return True if a release meets a change point where pin forces have no limit.
+
+    They grow without bound there. A change point at which the motion begins or ends has
+    one side alone, and is not asked.
+
+    `solution`: of the release, over time.
+    """
+    assert solution.time is not None
+    instants = np.array([0.0, *(solution.change_points or ())])
+    speed = np.asarray(release_at(scene, instants).command.speed, dtype=float)
+    # a motion that comes to rest before it meets the last of them has fewer instants
+    instants = instants[: len(speed)]
+    moving = speed != 0.0
+    steps = ANGLE_STEP / np.abs(speed[moving])
+    times = instants[moving, None] + steps[:, None] * MULTIPLES
+    of_motion = (times >= 0.0) & (times <= solution.time[-1])
+    times = times[of_motion.all(axis=1)]
+    rising, rows = np.unique([0.0, *times.ravel()], return_inverse=True)
+    beside = solve(scene, "force", at=release_at(scene, rising).command)
+    for rows_of_one in rows[1:].reshape(times.shape):
+        limits = _extrapolate_forces(beside, rows_of_one)
+        if any(np.isnan(limit).any() for limit in limits.values()):
+            return True
+    return False
 
 
 def _list_places(scene: Scene, solution: Solution, multiples: Array) -> Command:
@@ -90,6 +113,22 @@ def _list_places(scene: Scene, solution: Solution, multiples: Array) -> Command:
     if not motion.law.time[0] <= times[0] < times[-1] <= motion.law.time[-1]:
         raise one_side
     return command_at(scene, times)
+
+
+def _extrapolate_forces(beside: Solution, rows: NDArray[np.intp]) -> dict[str, Array]:
+    """Extrapolate the pin forces to a change point, each (2,); NaN without a limit.
+
+    Parameters
+    ----------
+    beside : positions on both sides of it.
+    rows : those at the `MULTIPLES` of the step.
+    """
+    forces = {
+        name: np.reshape(getattr(beside, name)[rows], (2, 2, 3, 2))
+        for name in PIN_FORCES
+    }
+    size = max(np.abs(values[:, 1, -1]).max() for values in forces.values())
+    return {name: _extrapolate_force(values, size) for name, values in forces.items()}
 
 
 def _extrapolate_force(values: Array, size: float) -> Array:

@@ -54,6 +54,7 @@ moment = "5 kN m"
 [effects]
 gravity = ["9.81 m/s^2", "-90 deg"]
 """
+GRAVITY = fourbar.Gravity()
 PRINTED = math.radians(1e-4)
 """Angles of equilibria are printed with four decimals of a degree."""
 
@@ -371,7 +372,9 @@ def test_the_peak_of_a_release_over_change_points_is_said_to_grow() -> None:
     pytest.importorskip("scipy")
     linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
     motion = fourbar.Motion(0.5, 25.0, free=fourbar.Free(0.4, 50))
-    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    scene = fourbar.Scene(
+        linkage, motion, loads=(fourbar.Load(2, moment=0.05),), effects=(GRAVITY,)
+    )
     solution = fourbar.solve(scene)
     assert solution.change_points is not None and len(solution.change_points) > 2
     text = " ".join(" ".join(write_block(scene, solution)).split())
@@ -379,6 +382,19 @@ def test_the_peak_of_a_release_over_change_points_is_said_to_grow() -> None:
     for time in solution.change_points:
         angle = np.interp(time, solution.time, solution.theta_2)
         assert abs(math.sin(angle)) < 1e-3
+
+
+@pytest.mark.parametrize("steps", [50, 100, 1000])
+def test_the_peak_of_a_release_with_limits_is_not_said_to_grow(steps: int) -> None:
+    """Of equal halves each arm carries its own: no pin force grows, however near."""
+    pytest.importorskip("scipy")
+    motion = fourbar.Motion(0.5, 6.0, free=fourbar.Free(2.0, steps))
+    scene = fourbar.Scene(
+        fourbar.uniform(0.3, 0.1, 0.3, 0.1), motion, effects=(GRAVITY,)
+    )
+    solution = fourbar.solve(scene)
+    assert solution.change_points
+    assert "without bound" not in "\n".join(write_block(scene, solution))
 
 
 def test_a_kite_on_its_change_point_shows_zeros_and_not_their_rounding() -> None:
