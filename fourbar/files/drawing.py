@@ -18,6 +18,7 @@ from fourbar.quantities.units import half_unit_of_text
 from fourbar.scene import Scene, command_at
 from fourbar.scene.drawing import DrawnPins
 from fourbar.scene.motion import BRANCH_NAMES, COMMAND_NAMES, STROKE_COMMAND, Motion
+from fourbar.scene.scene import require_cylinder
 from fourbar.solving import solve
 
 DRAWN_WORD = "drawn"
@@ -172,15 +173,16 @@ def state_motion(
 ) -> Any:
     """Replace the word "drawn" of a motion by the drawn angle, stroke or side.
 
-    A side that is left out of a commanded stroke is the drawn one.
+    A side that is left out of a commanded stroke is the drawn one. InputError for the
+    stroke or side of a scene without a cylinder.
     """
     if not isinstance(motion, dict):
         return motion
     stated = dict(motion)
     if any(name in stated for name in STROKE_COMMAND):
         stated.setdefault("side", DRAWN_WORD)
-    if stated.get("side") == DRAWN_WORD and line is not None:
-        stated["side"] = _find_side_of_cylinder(drawing, line)
+    if stated.get("side") == DRAWN_WORD:
+        stated["side"] = _find_side_of_cylinder(drawing, require_cylinder(line))
     for name in (*BAR_OF_ANGLE, STROKE_COMMAND[0]):
         place = stated.get(name)
         drawn = find_drawn(drawing, line, name)
@@ -217,16 +219,11 @@ def _draw_ends(drawing: DrawnPins, line: LinearDrive) -> tuple[complex, complex]
     )
 
 
-def _find_side_of_cylinder(drawing: DrawnPins, line: LinearDrive) -> str | None:
-    """Find the side of a cylinder's end on its bar.
-
-    It is None if the cylinder does not join the ground to a bar.
-    """
+def _find_side_of_cylinder(drawing: DrawnPins, line: LinearDrive) -> str:
+    """Find the side of a cylinder's end on its bar."""
     bars = line.start.bar, line.end.bar
     ends = dict(zip(bars, _draw_ends(drawing, line), strict=True))
-    (bar,) = ends.keys() - {1} or (None,)
-    if 1 not in ends or bar is None:
-        return None
+    (bar,) = ends.keys() - {1}
     pivot = complex(*drawing.place("O2" if bar == 2 else "O4"))
     across = ((ends[1] - pivot).conjugate() * (ends[bar] - pivot)).imag
     return "left" if across >= 0.0 else "right"

@@ -48,7 +48,7 @@ from fourbar.scene.numbers import Point, Tolerance
 from fourbar.scene.pictures import Picture
 
 if TYPE_CHECKING:
-    from fourbar.effects import ForceDrive, Load, Place
+    from fourbar.effects import ForceDrive, LinearDrive, Load, Place
 
 
 _A_DRIVE = "a drive is a couple on a bar or a force: state drive_bar or drive"
@@ -474,10 +474,10 @@ class _Triangle(NamedTuple):
         return theta, sign * rate, sign * growth, condition
 
 
-def _find_triangle(linkage: FourBar, drive: "ForceDrive | None") -> _Triangle:
-    """Return the triangle of a cylinder between the ground and bar 2 or 4.
+def require_cylinder(drive: "ForceDrive | None") -> "LinearDrive":
+    """Return a drive that a stroke can command.
 
-    Raises InputError for any other drive.
+    Raises InputError for any but a cylinder between the ground and bar 2 or 4.
     """
     from fourbar.effects.linear_drive import LinearDrive
 
@@ -492,6 +492,12 @@ def _find_triangle(linkage: FourBar, drive: "ForceDrive | None") -> _Triangle:
             drives,
             "is of a cylinder ([drive]) between the ground and bar 2 or 4",
         )
+    return drive
+
+
+def _find_triangle(linkage: FourBar, drive: "ForceDrive | None") -> _Triangle:
+    """Return the triangle of a cylinder, as `require_cylinder` has it."""
+    drive = require_cylinder(drive)
     moving, fixed = (
         (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
     )

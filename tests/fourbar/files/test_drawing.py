@@ -180,6 +180,26 @@ def test_a_side_that_is_left_out_is_the_drawn_one() -> None:
     assert loads(text).motion.side == loads(DRAWN + CYLINDER).motion.side
 
 
+@pytest.mark.parametrize(
+    "drive",
+    [
+        "",
+        "[drive]\nbar = 2\n",
+        """\
+[drive]
+from = { bar = 2, from_pin = { drawn = ["0 mm", "50 mm"] } }
+to = { bar = 4, from_pin = { drawn = ["200 mm", "50 mm"] } }
+""",
+    ],
+)
+@pytest.mark.parametrize("side", ["", 'side = "drawn"\n'])
+def test_a_drawn_stroke_without_its_cylinder_is_refused(drive: str, side: str) -> None:
+    """The drive is wrong, and not a side that the file need not state."""
+    with pytest.raises(InputError, match=r"is of a cylinder \(\[drive\]\)") as raised:
+        loads(DRAWN + drive + '[motion]\nstroke = "drawn"\n' + side)
+    assert raised.value.key == "motion.stroke"
+
+
 def test_a_scene_that_was_changed_since_is_written_by_its_lengths() -> None:
     scene = loads(DRAWN)
     crossed = fourbar.Scene(
