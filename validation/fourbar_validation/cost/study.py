@@ -37,7 +37,7 @@ from fourbar_validation.run.store import Store
 
 TIMINGS_OF_A_SETTING = 7
 """Timings of each setting."""
-TIMED_STEPS = 200
+MOST_STEPS_TIMED = 200
 """Steps per timing: some 3 ms of RK4. A round of a curve then passes within one spell
 of the machine.
 """
@@ -230,7 +230,7 @@ class CostStudy:
             time_steps, time_readings = setup.make_clocks(
                 spot.settings, spot.closure, spot.drive
             )
-            steps = min(trial.steps, TIMED_STEPS) or 1
+            steps = min(trial.steps, MOST_STEPS_TIMED) or 1
             clocks["step", number] = partial(_time_each, time_steps, steps)
             clocks["reading", number] = partial(
                 _time_each, time_readings, TIMED_READINGS

@@ -57,9 +57,9 @@ def list_thesis_figures() -> Iterator[PublishedFigure]:
     yield from _list_half_angle_constants()
     yield from _list_limits()
     yield from _list_simulation_window()
-    yield from list_section_4_12(k)
+    yield from list_printed_kinematics(k)
     yield from _list_constants(k)
-    yield from list_section_5_7()
+    yield from list_printed_unknowns()
 
 
 def list_positions() -> Iterator[PublishedFigure]:
@@ -274,7 +274,7 @@ def _list_slips(k: Kinematics) -> dict[str, tuple[tuple[str, ...], float]]:
     }
 
 
-def list_section_4_12(k: Kinematics) -> Iterator[PublishedFigure]:
+def list_printed_kinematics(k: Kinematics) -> Iterator[PublishedFigure]:
     """List section 4.12, and the manual's table of the program's 17 digits."""
     ours = _compute_our_kinematics(k)
     slips = _list_slips(k)
@@ -385,7 +385,7 @@ def _list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
     yield PublishedFigure("5.7 matrix", "T4 in row 9", matrix["row9_bar4"][4], 1.0)
 
 
-def list_section_5_7() -> Iterator[PublishedFigure]:
+def list_printed_unknowns() -> Iterator[PublishedFigure]:
     """List the 13 unknowns, of the program (the manual's table) and of section 5.7."""
     right = compute_right_unknowns()
     steps = climb_ladder()
