@@ -355,6 +355,21 @@ def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array,
     return [pin for pin, *_ in steps], places[first], places[last]
 
 
+class _Search(NamedTuple):
+    """Search for the largest value of a magnitude around one position."""
+
+    name: str
+    top: int
+    """Index of the position of largest value."""
+    start: int
+    """Index of the first position of the steps that are searched."""
+    stop: int
+    inward: bool = False
+    """True if it goes away from the top, as far as values exist: a maximum on the way
+    would hide the pole of a change point.
+    """
+
+
 def _find_peaks(
     scene: Scene,
     solution: Solution,
@@ -368,8 +383,7 @@ def _find_peaks(
     looks like one between them after few rounds, so that more follow then.
     """
     places = solution.at.places
-    peaks = list[tuple[str, int, int, int]]()
-    towards_pole = list[tuple[str, int, int, int]]()
+    searches = list[_Search]()
     passed = _find_dead_points(scene, solution) + _find_change_points(solution)
     present = sizes(solution)
     for name, size in present.items():
@@ -388,34 +402,31 @@ def _find_peaks(
         for i in tops[np.argsort(-here[tops], kind="stable")][:most]:
             start = i - (before[i] >= 0.0)
             stop = i + (after[i] >= 0.0)
-            peaks.append((name, i, start, stop))
+            searches.append(_Search(name, i, start, stop))
         for step in passed:
             rises = bool(padded[step + 1] < padded[step + 2])
-            peaks.append((name, step + rises, step, step + 1))
+            searches.append(_Search(name, step + rises, step, step + 1))
         for i, j in pairwise(
             range(len(places))
         ):  # towards a gap a magnitude may grow without a local maximum
             if padded[i + 1] * padded[j + 1] < 0.0:
-                beside = (name, i if padded[j + 1] < 0.0 else j, i, j)
-                peaks.append(beside)
-                # a maximum on the way would hide the pole of a change point
+                beside = _Search(name, i if padded[j + 1] < 0.0 else j, i, j)
+                searches.append(beside)
                 if solution.assembled[i] and solution.assembled[j]:
-                    towards_pole.append(beside)
-    inward = np.repeat([False, True], [len(peaks), len(towards_pole)])
-    peaks += towards_pole
-    rows = np.arange(len(peaks))
-    names = [name for name, *_ in peaks]
-    top, start, stop = (
-        np.array([peak[k] for peak in peaks], dtype=int) for k in (1, 2, 3)
-    )
+                    searches.append(beside._replace(inward=True))
+    if not searches:
+        return np.zeros(0), set()
+    names, *columns = zip(*searches, strict=True)
+    top, start, stop, inward = map(np.array, columns)
     opens = inward | ~(solution.assembled[start] & solution.assembled[stop])
     begins = solution.assembled[start] & ~(inward & (top == stop))
     low = places[start]
     high = places[stop]
     peak_places = places[top]
-    reached = [np.array([present[name][i] for name, i, *_ in peaks])]
-    growing = np.zeros(0, dtype=bool)
-    for count in range(LOCATING_ROUNDS if len(peaks) else 0):
+    reached = [np.array([present[one.name][one.top] for one in searches])]
+    growing = np.zeros(len(searches), dtype=bool)
+    rows = np.arange(len(searches))
+    for count in range(LOCATING_ROUNDS):
         if count >= rounds and not growing.any():
             break
         cut_range = _cut_range(low, high)
