@@ -13,10 +13,8 @@ from fourbar.linkage import ANY_NUMBER, POSITIVE, require
 from fourbar.scene import Scene
 from fourbar.solution import Conversion
 
-_SCENE_TEXT = "fourbar.scene_text"
-"""Key of the scene file's text in the context of a command. Standard input is read
-once.
-"""
+_FILE_UNITS = "fourbar.file_units"
+"""Key of the units that suit the scene file in the context of a command."""
 MOST_PRINTED = 1_000_000
 """Positions that `analyze` prints: about a gigabyte of text."""
 FILE_PATH = click.Path(path_type=Path)
@@ -121,16 +119,17 @@ def open_scene(path: Path) -> Iterator[Scene]:
     looked at before anything is solved, which may take minutes. Mistakes that show only
     then name the file too.
     """
-    from fourbar.files import loads, read_scene_text
+    from fourbar.files import parse_tables, read_scene_text, read_tables
     from fourbar.scene.motion import require_steps
-    from fourbar.show.units import units_of_text
+    from fourbar.show.units import units_of_scene
     from fourbar.writing import require_file
 
     context = click.get_current_context()
-    text = read_scene_text(path)
-    context.meta[_SCENE_TEXT] = text
-    with state_messages_in(units_of_text(text)):
-        scene = loads(text, str(path))
+    tables = parse_tables(read_scene_text(path), str(path))
+    units = units_of_scene(tables)
+    context.meta[_FILE_UNITS] = units
+    with state_messages_in(units):
+        scene = read_tables(tables, str(path))
         out = context.params.get("out")
         if out is not None:
             require_file(out, path)
@@ -169,9 +168,8 @@ def read_lengths(texts: tuple[str, ...]) -> list[float]:
 
 def suit_file_units() -> Conversion:
     """Return the units that suit the file of `open_scene`."""
-    from fourbar.show.units import units_of_text
-
-    return units_of_text(click.get_current_context().meta[_SCENE_TEXT])
+    units: Conversion = click.get_current_context().meta[_FILE_UNITS]
+    return units
 
 
 def is_bare(text: str) -> bool:

@@ -23,7 +23,7 @@ from tornado.iostream import IOStream
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
-from fourbar.edit.exports import HarnessRun, evaluate_scene, pack_frame
+from fourbar.edit.exports import HarnessRun, pack_frame
 from fourbar.edit.redirect import Redirect
 from fourbar.edit.session import SceneState, Session
 from fourbar.errors import FourBarError, InputError
@@ -190,7 +190,7 @@ class Workbench:
         def evaluate() -> dict[str, Any] | None:
             if not is_present():
                 return None
-            return evaluate_scene(state.scene, units, settled=True, pressure=pressure)
+            return state.evaluate(units, settled=True, pressure=pressure)
 
         def describe(data: dict[str, Any]) -> dict[str, Any] | None:
             if is_present():

@@ -18,7 +18,7 @@ from fourbar.edit.document import SceneDocument, list_offers, name_entry
 from fourbar.edit.dragging import Dragged, drag, parse_place, put_place, write_rounded
 from fourbar.edit.exports import Exports, evaluate_scene
 from fourbar.errors import FourBarError, InputError, state_messages_in
-from fourbar.files import loads, read_scene_text
+from fourbar.files import parse_tables, read_scene_text, read_tables
 from fourbar.files.drawing import DRAWN_WORD
 from fourbar.files.fields import Reader
 from fourbar.files.scene_file import LARGEST_SCENE_FILE
@@ -27,7 +27,7 @@ from fourbar.linkage import PINS, POSITIVE
 from fourbar.quantities.units import UnitError, find_unit, to_si
 from fourbar.scene import Scene
 from fourbar.scene.motion import COMMAND_NAMES, SIDES, STROKE_COMMAND, require_steps
-from fourbar.show.units import find_length, units, units_of_scene, units_of_text
+from fourbar.show.units import find_length, units, units_of_scene
 from fourbar.solution import Conversion, Solution, find_unit_in
 from fourbar.solving import solve
 from fourbar.studies.keys import list_entries, read_place
@@ -71,6 +71,22 @@ class SceneState(NamedTuple):
     text: str
     scene: Scene
     plain: dict[str, Any]
+
+    @property
+    def units(self) -> Conversion:
+        """Units of the file, in which messages state numbers too."""
+        return units_of_scene(self.plain)
+
+    def evaluate(
+        self,
+        units: Conversion,
+        *,
+        settled: bool = False,
+        pressure: float | None = None,
+    ) -> dict[str, Any]:
+        """Evaluate the scene for the page, as `evaluate_scene` does."""
+        with state_messages_in(self.units):
+            return evaluate_scene(self.scene, units, settled=settled, pressure=pressure)
 
 
 class Session:
@@ -179,7 +195,7 @@ class Session:
         """Units of results: as chosen, or those of the file."""
         if self.unit_names != _AS_THE_FILE:
             return _cached_units(self.unit_names)
-        return units_of_scene(self.now.plain)
+        return self.now.units
 
     @property
     def pressure(self) -> float | None:
@@ -212,18 +228,19 @@ class Session:
             raise InputError(
                 "scene file", len(text), f"must not exceed {LARGEST_SCENE_FILE} bytes"
             )
-        with state_messages_in(units_of_text(text)):
-            scene = loads(text, str(self.path))
-        require_steps(
-            scene.motion, MOST_SOLVED_ANEW, "in the workbench", str(self.path)
-        )
-        return SceneState(text, scene, tomllib.loads(text))
+        plain = parse_tables(text, str(self.path))
+        with state_messages_in(units_of_scene(plain)):
+            scene = read_tables(plain, str(self.path))
+            require_steps(
+                scene.motion, MOST_SOLVED_ANEW, "in the workbench", str(self.path)
+            )
+        return SceneState(text, scene, plain)
 
     # ---- what a page asks for ----
 
     def answer(self) -> dict[str, Any]:
         """Describe the present state, without error bars and summary."""
-        return self.describe(evaluate_scene(self.now.scene, self.units))
+        return self.describe(self.now.evaluate(self.units))
 
     def describe(
         self, data: dict[str, Any], *, settled: bool = False
@@ -255,7 +272,7 @@ class Session:
         kept = self.read(self.kept[self.reference])
         return {
             "compared": self.reference,
-            "data": evaluate_scene(kept.scene, self.units),
+            "data": kept.evaluate(self.units),
         }
 
     def do(self, asked: dict[str, Any]) -> dict[str, Any]:
@@ -270,7 +287,8 @@ class Session:
                 raise InputError(
                     "do", asked.get("do"), "must be one of " + ", ".join(_ACTIONS)
                 )
-            note = action(self, asked) or {}
+            with state_messages_in(self.now.units):
+                note = action(self, asked) or {}
             return self.answer() | note
         except (
             Exception
@@ -477,7 +495,7 @@ def _command_other(session: Session, asked: dict[str, Any]) -> None:
     inset = 1e-3 * (
         values[last] - values[first]
     )  # so that rounding leads to no position beyond
-    shown_units = units_of_scene(session.now.plain)
+    shown_units = session.now.units
     ground = find_unit(find_length(session.now.plain), "m")
     unit, si = (ground, "m") if place == "stroke" else ("deg", "rad")
     factor = to_si(f"1 {si}", unit)

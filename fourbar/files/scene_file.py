@@ -148,7 +148,15 @@ def loads(text: str, name: str = "scene") -> Scene:
 
     `name`: stands for the file in errors; pictures lie in its folder.
     """
-    shown = name if name.isprintable() else repr(name)
+    return read_tables(parse_tables(text, name), name)
+
+
+def parse_tables(text: str, name: str = "scene") -> dict[str, Any]:
+    """Parse the TOML text of a scene; InputError where it is none.
+
+    `name`: as `loads` has it.
+    """
+    shown = _write_name(name)
     for number, line in enumerate(text.split("\n"), 1):
         if line.count(".") > MOST_DOTS_OF_A_LINE:
             raise InputError(
@@ -158,15 +166,28 @@ def loads(text: str, name: str = "scene") -> Scene:
                 shown,
             )
     try:
-        document = tomllib.loads(text)
+        return tomllib.loads(text)
     except RecursionError:
         raise InputError("TOML", "...", "is nested too deeply", shown) from None
     except ValueError as error:  # TOMLDecodeError, and numbers that Python refuses
         raise _explain_unreadable(text, str(error), shown) from None
+
+
+def read_tables(document: dict[str, Any], name: str = "scene") -> Scene:
+    """Read the scene of the tables of a file.
+
+    `name`: as `loads` has it.
+    """
+    shown = _write_name(name)
     try:
         return read_scene(Reader(shown), document, str(Path(name).parent))
     except InputError as error:
         raise (error if error.file else error.in_file(shown)) from None
+
+
+def _write_name(name: str) -> str:
+    """Write the name of a file for an error."""
+    return name if name.isprintable() else repr(name)
 
 
 _UNQUOTED = re.compile(r"[=,\[{]\s*([+-]?\.?[0-9][0-9.]*\s*[A-Za-z°µ][^\",#\]}]*)")

@@ -4,7 +4,6 @@ They are a list like "mm N N.mm deg", those of a scene file, or SI with prefixes
 """
 
 import math
-import tomllib
 from collections.abc import Mapping
 from functools import cache
 from typing import Any
@@ -135,30 +134,24 @@ def units_of_length(length: str) -> Conversion:
     return _suit_texts(length, ())
 
 
-def units_of_text(text: str) -> Conversion:
-    """Return the units that suit the text of a scene file.
-
-    They are `COMMON` if the text is no scene: the reader says what is wrong with it.
-    """
-    try:
-        return units_of_scene(tomllib.loads(text))
-    except (ValueError, RecursionError, LookupError, TypeError, AttributeError):
-        return COMMON
-
-
 def units_of_scene(document: Mapping[str, Any]) -> Conversion:
     """Return the units that suit the tables of a scene file.
 
     They are imperial where the lengths are in inches or feet; otherwise lengths have
     the unit of lengths.ground, and speeds and accelerations of bars those that the
-    motion is stated in.
+    motion is stated in. They are `COMMON` if the tables are no scene: the reader says
+    what is wrong with them.
     """
-    motion = document.get("motion", {})
-    rates = (
-        (str(motion.get(f"omega_{bar}", "")), str(motion.get(f"alpha_{bar}", "")))
-        for bar in MOVING_BARS
-    )
-    return _suit_texts(str(find_length(document)), tuple(rates))
+    try:
+        length = str(find_length(document))
+        motion = document.get("motion", {})
+        rates = tuple(
+            (str(motion.get(f"omega_{bar}", "")), str(motion.get(f"alpha_{bar}", "")))
+            for bar in MOVING_BARS
+        )
+    except (LookupError, TypeError, AttributeError):
+        return COMMON
+    return _suit_texts(length, rates)
 
 
 @cache

@@ -7,9 +7,11 @@ import cmath
 import json
 import math
 import os
+import re
 import struct
 import time
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +31,7 @@ from fourbar.edit.exports import evaluate_scene, pack_frame
 from fourbar.edit.session import LARGEST_STATE, MOST_CHARACTERS, MOST_KEPT, Session
 
 ROOT = Path(__file__).parents[3]
+STROKE_INPUT = ROOT / "models" / "capabilities" / "stroke_input.toml"
 CRANK_ROCKER = ROOT / "models" / "crank_rocker.toml"
 FILES = sorted((ROOT / "models").rglob("*.toml"))
 PIXEL = 1e-3
@@ -411,6 +414,26 @@ def test_what_cannot_be_commanded_is_one_line(session: Session) -> None:
         "does not move"
         in session.do({"do": "command", "command": "theta_4"})["refused"]
     )
+
+
+def test_a_stroke_out_of_range_is_refused_in_the_units_of_the_file(
+    tmp_path: Path,
+) -> None:
+    """The range shows on solving, when the file has been read."""
+    path = tmp_path / "scene.toml"
+    path.write_bytes(STROKE_INPUT.read_bytes())
+    session = Session(path, tmp_path / "exports")
+    units = session.now.units
+    assert units["m"][0] == "mm"
+    asked = {"do": "set", "path": ["motion", "stroke"], "value": "7000 mm"}
+    refused = session.do(asked)["refused"]
+    assert re.fullmatch(
+        r"motion\.stroke: this cylinder can have \S+ to \S+ mm", refused
+    ), refused
+    far = session.now.scene.motion.replace(angle=7.0)
+    state = session.now._replace(scene=replace(session.now.scene, motion=far))
+    with pytest.raises(fourbar.InputError, match=r"stroke = 7000 mm: .* mm$"):
+        state.evaluate(units, settled=True)
 
 
 PINS_DRAWN = [[0.0, 0.0], [3.0, 4.0], [14.0, 9.0], [12.0, -5.0]]

@@ -14,11 +14,11 @@ from typing import Protocol
 
 from fourbar import writing
 from fourbar.errors import InputError, state_messages_in
-from fourbar.files import loads, read_scene_text
+from fourbar.files import parse_tables, read_scene_text, read_tables
 from fourbar.scene import Scene
 from fourbar.scene.motion import Free, Law, Rise, Sweep, require_steps
 from fourbar.scene.scene import default_places
-from fourbar.show.units import units_of_text
+from fourbar.show.units import units_of_scene
 from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.places import MODELS
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
@@ -74,8 +74,7 @@ class Files:
     def scene(self, index: int) -> Scene:
         """Read a scene."""
         name, text = self.texts[index]
-        with state_messages_in(units_of_text(text)):
-            return loads(text, name)
+        return _read_in_its_units(text, name)
 
     def fingerprint(self) -> str:
         """Hash the texts."""
@@ -149,13 +148,19 @@ def read_scene_files(paths: Iterable[Path]) -> Files:
                 f"must have a name of its own: another file is {name!r} too",
             )
         text = read_scene_text(file)
-        with state_messages_in(units_of_text(text)):
-            scene = loads(text, str(file))
+        scene = _read_in_its_units(text, str(file))
         most = max(most, _count_positions(scene, file))
         texts[name] = text
     if not texts:
         raise InputError("SCENE", [], "no scene file to run")
     return Files(tuple(sorted(texts.items())), most)
+
+
+def _read_in_its_units(text: str, name: str) -> Scene:
+    """Read the scene of a text; errors state numbers in its units."""
+    tables = parse_tables(text, name)
+    with state_messages_in(units_of_scene(tables)):
+        return read_tables(tables, name)
 
 
 def _write_printed(name: str) -> str:
