@@ -345,8 +345,13 @@ def _hash_text(data: bytes) -> str:
 
 
 _SUITED = {
-    **{"m": "m", "N": "N", "N m": "N m", "kg": "kg"},
-    **{"N/m": "N", "kg m^2": "kg", "kg/m^3": "kg"},
+    "m": "m",
+    "N": "N",
+    "N m": "N m",
+    "kg": "kg",
+    "N/m": "N",
+    "kg m^2": "kg",
+    "kg/m^3": "kg",
 }
 """SI units whose quantities a new entry states in the scene's own units.
 
@@ -355,15 +360,14 @@ no density in kg/mm^3.
 """
 
 
-def _suit_entry(value: Any, plain: dict[str, Any]) -> Any:
-    """Write the quantities of a new entry in the units of the scene, of two digits."""
+def _suit_entry(value: Any, own: Conversion) -> Any:
+    """Write the quantities of a new entry in the scene's own units, of two digits."""
     if isinstance(value, dict):
-        return {key: _suit_entry(inner, plain) for key, inner in value.items()}
+        return {key: _suit_entry(inner, own) for key, inner in value.items()}
     if isinstance(value, list):
-        return [_suit_entry(inner, plain) for inner in value]
+        return [_suit_entry(inner, own) for inner in value]
     if not isinstance(value, str):
         return value
-    own = units_of_scene(plain)
     names = {si: find_unit_in(si, own)[0] for si in ("m", "N", "N m", "kg")}
     for si, base in _SUITED.items():
         unit = re.sub(r"N m|kg|N|m", lambda part: names[part[0]], si)
@@ -382,7 +386,8 @@ def _add_element(session: Session, asked: dict[str, Any]) -> None:
     part = list_offers()["parts"][int(asked["part"])]
     name = str(asked.get("name", ""))
     path = [name if step == "" else step for step in part["at"]]
-    value = _suit_entry(part["value"], session.now.plain)
+    own = units_of_scene(session.now.plain)
+    value = _suit_entry(part["value"], own)
     if path[0] == "tolerances":
         entries = list_entries(session.now.scene)
         if name in entries:  # a thousandth of the number, until the designer says more
@@ -390,7 +395,7 @@ def _add_element(session: Session, asked: dict[str, Any]) -> None:
                 abs(float(read_place(session.now.scene, entries[name].place) or 1.0))
                 / 1000.0
             )
-            value = _suit_entry(f"{size:.1g} {entries[name].unit}", session.now.plain)
+            value = _suit_entry(f"{size:.1g} {entries[name].unit}", own)
     session.change(lambda document: document.put(path, value))
 
 
@@ -645,8 +650,9 @@ def _export(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
 def _begin_page(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     """List what a page needs once: what it offers, in the units of the scene."""
     offers = dict(list_offers())
+    own = units_of_scene(session.now.plain)
     for name in ("fields", "commands"):
-        offers[name] = _suit_entry(offers[name], session.now.plain)
+        offers[name] = _suit_entry(offers[name], own)
     offers["units"] = OFFERED_UNITS
     return {
         "offers": offers,
