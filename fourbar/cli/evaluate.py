@@ -389,12 +389,9 @@ def _list_chosen(columns: "list[Column]", units: Conversion) -> dict[str, Array]
 
 
 def _assembles_nowhere(path: Path, scene: Scene) -> NotAssembledError:
-    from fourbar.studies.passing import say_range
+    from fourbar.studies.passing import say_nowhere
 
-    return NotAssembledError(
-        f"{path}: motion.{scene.motion.commanded}: the linkage assembles at none of the"
-        f" positions requested; {say_range(scene)}"
-    )
+    return NotAssembledError(f"{path}: {say_nowhere(scene)}")
 
 
 def _read_pressure(scene: Scene, pressure: str | None) -> float | None:

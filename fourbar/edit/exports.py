@@ -30,6 +30,7 @@ from fourbar.show.studies import write_type
 from fourbar.show.units import COMMON
 from fourbar.solution import Conversion, write_csv
 from fourbar.solving import find_last_stage, solve
+from fourbar.studies.passing import say_nowhere
 from fourbar.writing import write_text
 
 _ENDINGS = {
@@ -67,9 +68,7 @@ def evaluate_scene(
         stage = None
     solution = solve(scene, stage)
     if not solution.assembled.any():
-        raise NotAssembledError(
-            "motion.theta_2: the linkage assembles at none of the positions requested"
-        )
+        raise NotAssembledError(say_nowhere(scene))
     data = collect_live_data(scene, units, stage=stage, midway=True) | {
         "tolerances": None,
         "pictures": {},

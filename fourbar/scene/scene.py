@@ -607,6 +607,15 @@ def command_stroke(
     )
 
 
+def find_stroke_range(scene: Scene) -> tuple[float, float]:
+    """Find the least and the most stroke of a cylinder, both collinear with its bar, m.
+
+    The linkage need not assemble at all between them.
+    """
+    triangle = _find_triangle(scene.linkage, scene.settled_drive())
+    return abs(triangle.length - triangle.reach), triangle.length + triangle.reach
+
+
 def command_at(scene: Scene, places: Array) -> Command:
     """Command what the scene's motion commands at other places.
 
@@ -614,9 +623,7 @@ def command_at(scene: Scene, places: Array) -> Command:
     """
     motion, bar = scene.motion, scene.motion.bar
     if motion.stroke is not None:
-        triangle = _find_triangle(scene.linkage, scene.settled_drive())
-        least = abs(triangle.length - triangle.reach)
-        most = triangle.length + triangle.reach
+        least, most = find_stroke_range(scene)
         inside = (places >= least) & (places <= most)
         if not inside.all():
             stroke = float(places[np.argmin(inside)])

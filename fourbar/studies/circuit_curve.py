@@ -37,6 +37,7 @@ from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, with_signs
 from fourbar.scene.motion import Sweep
 from fourbar.solving import solve
+from fourbar.studies.passing import say_nowhere
 from fourbar.studies.sloped import Sloped
 
 POSITIONS_OF_A_BRANCH = 3600
@@ -137,10 +138,7 @@ class CircuitCurve:
         """
         number = find_circuit(linkage, commanded.theta_2, commanded.branch)
         if (number < 0).all():
-            raise NotAssembledError(
-                f"motion.{scene.motion.commanded}: the linkage assembles at none of the"
-                " positions requested"
-            )
+            raise NotAssembledError(say_nowhere(scene))
         self.circuit = circuits(linkage)[number[number >= 0][0]]
         self.full = turns_fully(linkage)
         self.assembly = self.full and len(change_points(linkage)) == 2

@@ -436,6 +436,17 @@ def test_a_stroke_out_of_range_is_refused_in_the_units_of_the_file(
         state.evaluate(units, settled=True)
 
 
+def test_a_state_that_assembles_nowhere_names_what_it_commands(
+    session: Session,
+) -> None:
+    """The output of this linkage rocks, and does not come to 0 deg."""
+    scene = replace(session.now.scene, motion=fourbar.Motion(theta_4=0.0))
+    with pytest.raises(
+        fourbar.NotAssembledError, match=r"^motion\.theta_4: .*; theta_4 goes from"
+    ):
+        evaluate_scene(scene, {})
+
+
 PINS_DRAWN = [[0.0, 0.0], [3.0, 4.0], [14.0, 9.0], [12.0, -5.0]]
 
 

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.errors import InputError, NotAssembledError
-from fourbar.studies.passing import find_positions
+from fourbar.errors import InputError, NotAssembledError, state_messages_in
+from fourbar.files import loads
+from fourbar.show.units import units
+from fourbar.studies.passing import find_positions, say_nowhere, say_range
 from tests.support.scenes import crank_rocker, thesis
 
 MODELS = Path(__file__).parents[3] / "models"
@@ -150,3 +152,48 @@ def test_the_range_of_a_refusal_is_that_of_the_motion_and_not_the_other_one() ->
     ends = re.findall(r"(-?[\d.]+) deg", str(caught.value))[-2:]
     least, most = map(float, ends)
     assert least <= theta_4.min() and theta_4.max() <= most
+
+
+ROCKER_WITH_RAM = """\
+[lengths]
+ground = "7 in"
+input = "2 in"
+coupler = "4 in"
+output = "4.5 in"
+[motion]
+stroke = "3.5 in"
+side = "right"
+[drive]
+from = { bar = 1, from_pin = ["3 in", "-60 deg"] }
+to = { bar = 2, from_pin = ["1 in", "0 deg"] }
+"""
+
+
+def test_strokes_that_assemble_are_named_where_none_requested_does() -> None:
+    """The input's limits by cosines, and the cylinder from them by cosines.
+
+    From the line of the cylinder's ground pin bar 2 turns clockwise to the one limit
+    and anticlockwise, by the rest of a turn, to the other.
+    """
+    limit = math.acos((7.0**2 + 2.0**2 - 8.5**2) / 28.0)
+    from_line = math.radians(60.0)
+    first, last = (
+        math.sqrt(3.0**2 + 1.0 - 6.0 * math.cos(limit + away))
+        for away in (-from_line, from_line)
+    )
+    scene = loads(ROCKER_WITH_RAM)
+    assert not fourbar.solve(scene).assembled.any()
+    said = (
+        "motion.stroke: the linkage assembles at none of the positions requested;"
+        f" stroke goes from 2 to {first:.6g} in and from {last:.6g} to 4 in"
+    )
+    with state_messages_in(units("imperial")):
+        assert say_nowhere(scene) == said
+        with pytest.raises(NotAssembledError) as raised:
+            fourbar.equilibrium(scene)
+        assert str(raised.value) == said
+    other = replace(scene, motion=scene.motion.replace(side="left"))
+    assert say_range(other) == "stroke goes from 0.0508 to 0.1016 m"
+    narrow = ROCKER_WITH_RAM.replace('"7 in"', '"10.3 in"').replace("-60 deg", "90 deg")
+    none = loads(narrow.replace('"right"', '"left"'))
+    assert say_range(none) == "no stroke with motion.side = left does"
