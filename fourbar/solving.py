@@ -162,7 +162,7 @@ class Results:
             else:
                 shape_of_one = (*shape, 2)
             self.arrays[name] = given[name] if name in given else np.empty(shape_of_one)
-        self.reverses = False
+        self.reverses: bool = False
         """True if sin(theta_4 - theta_3) may have another sign than the branch."""
 
     def store(self, case: Case, evaluated: Evaluated, part: StudyPart) -> None:
