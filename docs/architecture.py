@@ -168,7 +168,10 @@ def spread(ends: list[tuple[float, Route]]) -> dict[Route, float]:
 
 
 def draw_way(
-    way: Route, x: dict[str, float], y: dict[str, float], ports: tuple[float, float]
+    way: Route,
+    x: dict[str, float],
+    y: dict[str, float],
+    ports: tuple[float, float],
 ) -> str:
     """Draw an arrow: upright where it passes a floor, and curved between floors."""
     u, v = x[way[0]] + ports[0], y[way[0]] + HEIGHT / 2

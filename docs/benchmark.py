@@ -316,7 +316,9 @@ def draw_problem(name: str) -> str:
         drawn = io.StringIO()
         with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
             figure.savefig(
-                drawn, format="svg", metadata={"Date": None, "Creator": None}
+                drawn,
+                format="svg",
+                metadata={"Date": None, "Creator": None},
             )
     svg = add_dark_form(drawn.getvalue().encode()).decode()
     return COORDINATES.sub(lambda part: LONG_NUMBER.sub(r"\1", part.group()), svg)
@@ -333,7 +335,9 @@ def draw_slider_crank(axes: Any, problem: dict[str, Any], labels: Labels) -> Non
         "B": (stroke, level),
     }
     assert math.isclose(
-        pins["A"][1] + lengths["rod"] * math.sin(theta_3), level, abs_tol=1e-12
+        pins["A"][1] + lengths["rod"] * math.sin(theta_3),
+        level,
+        abs_tol=1e-12,
     )
     draw_support(axes, pins["O2"], 0.5 * size, labels)
     guide = [(-crank, level), (1.3 * (crank + lengths["rod"]), level)]
@@ -357,7 +361,12 @@ def draw_slider_crank(axes: Any, problem: dict[str, Any], labels: Labels) -> Non
         labels.keep_off(axes, *ends, width=4.5)
     for pin, point in pins.items():
         axes.plot(
-            *[[value] for value in point], "o", ms=6.0, mew=1.2, zorder=6, **RING_MARK
+            *[[value] for value in point],
+            "o",
+            ms=6.0,
+            mew=1.2,
+            zorder=6,
+            **RING_MARK,
         )
         labels.add(
             Label(

@@ -61,7 +61,8 @@ def setup(app):
     def written(display):
         def write(page, node):
             formula = convert(
-                node.astext().replace("{aligned}", "{align*}"), display=display
+                node.astext().replace("{aligned}", "{align*}"),
+                display=display,
             )
             page.body.append(
                 re.sub(

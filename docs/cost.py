@@ -122,7 +122,9 @@ def draw_effects() -> Any:
     axes = figure.add_axes((0.24, 0.1, 0.7, 0.62))
     names = sorted(effects, key=effects.__getitem__)
     bars = axes.barh(
-        names, [effects[name] for name in names], color=LIGHT_COLOURS["--e1"]
+        names,
+        [effects[name] for name in names],
+        color=LIGHT_COLOURS["--e1"],
     )
     axes.bar_label(bars, fmt="%.0f %%", fontsize=TEXT, color=INK, padding=3)
     axes.set_facecolor(figure.get_facecolor())
@@ -220,7 +222,9 @@ def draw_small_effects() -> Any:
     figure, axes = make_small("What effects add to a step, %")
     names = sorted(effects, key=effects.__getitem__)
     bars = axes.barh(
-        names, [effects[name] for name in names], color=LIGHT_COLOURS["--e1"]
+        names,
+        [effects[name] for name in names],
+        color=LIGHT_COLOURS["--e1"],
     )
     axes.bar_label(bars, fmt="%.0f", fontsize=7.5, color=INK, padding=2)
     axes.margins(x=0.12)
@@ -265,7 +269,8 @@ def main(study: Path) -> None:
     with apply_style():
         for name, draw in drawings.items():
             (TARGET / f"{name}.svg").write_text(
-                write_alone(draw(), name), encoding="utf-8"
+                write_alone(draw(), name),
+                encoding="utf-8",
             )
 
 

@@ -29,7 +29,11 @@ def line(kind: str, *points: complex) -> str:
 
 
 def arc(
-    centre: complex, radius: float, start: float, stop: float, kind: str = "arc"
+    centre: complex,
+    radius: float,
+    start: float,
+    stop: float,
+    kind: str = "arc",
 ) -> str:
     """Draw an arc from one angle to another, rad."""
     steps = [start + (stop - start) * i / 40 for i in range(41)]

@@ -48,7 +48,10 @@ def name_unit(unit: str, otherwise: str | None = None) -> str:
 
 
 def write_in_units(
-    unit: str, *values: float, digits: int = 6, between: str = ", "
+    unit: str,
+    *values: float,
+    digits: int = 6,
+    between: str = ", ",
 ) -> str:
     """Write numbers of an SI unit in the unit of messages, which follows them.
 
@@ -305,7 +308,9 @@ def clean_line(text: str) -> str:
 
 
 def _report_interruption(
-    kind: type[BaseException], error: BaseException, trace: TracebackType | None
+    kind: type[BaseException],
+    error: BaseException,
+    trace: TracebackType | None,
 ) -> None:
     """Print one line for an interruption while the libraries are imported.
 

@@ -115,7 +115,10 @@ def convert_to_unit(key: str, value: object, unit: str) -> object:
 
 
 def require_numbers(
-    key: str, value: object, allowed: str = "must be finite numbers", unit: str = "1"
+    key: str,
+    value: object,
+    allowed: str = "must be finite numbers",
+    unit: str = "1",
 ) -> NDArray[np.float64]:
     """Return the value as finite floats, shape () or (n,).
 

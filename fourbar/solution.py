@@ -280,7 +280,8 @@ def split_parts(name: str, values: Array) -> dict[str, Array]:
 
 
 def list_parts(
-    values: Mapping[str, Array | None], scalars: tuple[str, ...]
+    values: Mapping[str, Array | None],
+    scalars: tuple[str, ...],
 ) -> dict[str, Array]:
     """List the given scalars and the magnitudes of the pin forces that have values."""
     parts: dict[str, Array] = {}
@@ -351,7 +352,9 @@ def write_csv(
     }
     text = io.StringIO()
     writer = csv.writer(
-        text, lineterminator="\n", delimiter=";" if decimal == "," else ","
+        text,
+        lineterminator="\n",
+        delimiter=";" if decimal == "," else ",",
     )
     writer.writerow([*first, *columns])
     for index, row in enumerate(zip(*columns.values(), strict=True)):

@@ -119,7 +119,11 @@ def solve(
             else:
                 results = _solve_blocks(case, commanded, request)
     return make_solution(
-        scene, commanded, results, solved=scene, change_points=change_points
+        scene,
+        commanded,
+        results,
+        solved=scene,
+        change_points=change_points,
     )
 
 
@@ -193,7 +197,10 @@ def _may_reverse(case: Case) -> bool:
 
 
 def _make_case(
-    scene: Scene, commanded: Command, request: _Requested, side: int
+    scene: Scene,
+    commanded: Command,
+    request: _Requested,
+    side: int,
 ) -> Case:
     """Make the case of one linkage.
 
@@ -251,7 +258,9 @@ def _solve_blocks(case: Case, commanded: Command, request: _Requested) -> Result
 
 
 def _solve_released(
-    scene: Scene, independent: Independent, request: _Requested
+    scene: Scene,
+    independent: Independent,
+    request: _Requested,
 ) -> Results:
     """Solve a released motion, as the commands of bars 2 and 4 that it is made of."""
     results = Results(request)
@@ -409,7 +418,9 @@ def _list_stages(points: tuple[str, ...]) -> dict[str, str]:
 
 @cache
 def _list_wanted(
-    last_stage: int, absent: tuple[str, ...], points: tuple[str, ...]
+    last_stage: int,
+    absent: tuple[str, ...],
+    points: tuple[str, ...],
 ) -> KeysView[str]:
     """List the quantities of the stages up to the last one evaluated."""
     before = STAGES[: last_stage + 1]

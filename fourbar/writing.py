@@ -165,7 +165,9 @@ def write_bytes(path: str | Path, data: bytes, *, private: bool = False) -> None
 
     with name_file(target):
         handle, temporary = tempfile.mkstemp(
-            prefix=f".{target.name[:100]}.", suffix=_TEMPORARY, dir=target.parent
+            prefix=f".{target.name[:100]}.",
+            suffix=_TEMPORARY,
+            dir=target.parent,
         )
         try:
             with os.fdopen(handle, "wb") as file:

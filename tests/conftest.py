@@ -83,7 +83,11 @@ def browse(chromium, tmp_path: Path):
     """
 
     def open_page(
-        text: str, width: int = 1100, *, dark: bool = False, still: bool = False
+        text: str,
+        width: int = 1100,
+        *,
+        dark: bool = False,
+        still: bool = False,
     ):
         path = tmp_path / "page.html"
         path.write_text(text, encoding="utf-8")

@@ -37,18 +37,28 @@ def torque(step: float, **settings: float) -> float:
         file = Path(folder) / "loop.urdf"
         file.write_text(f'<robot name="loop">{URDF}</robot>')
         body = bullet.loadURDF(
-            str(file), useFixedBase=True, flags=bullet.URDF_USE_INERTIA_FROM_FILE
+            str(file),
+            useFixedBase=True,
+            flags=bullet.URDF_USE_INERTIA_FROM_FILE,
         )
     bullet.setPhysicsEngineParameter(fixedTimeStep=step, **settings)
     bullet.setGravity(0, -9.81, 0)
     for joint, (angle, speed) in enumerate(((1.5, 1.0), (-1.5, -1.0), (1.5, 1.0))):
         bullet.changeDynamics(
-            body, joint, linearDamping=0, angularDamping=0, jointDamping=0
+            body,
+            joint,
+            linearDamping=0,
+            angularDamping=0,
+            jointDamping=0,
         )
         bullet.resetJointState(body, joint, angle, speed)
         bullet.setJointMotorControl2(body, joint, bullet.VELOCITY_CONTROL, force=0)
     bullet.setJointMotorControl2(
-        body, 0, bullet.VELOCITY_CONTROL, targetVelocity=1.0, force=1e9
+        body,
+        0,
+        bullet.VELOCITY_CONTROL,
+        targetVelocity=1.0,
+        force=1e9,
     )
     end = [0.5, 0, 0]  # from the mass centre
     bullet.changeConstraint(

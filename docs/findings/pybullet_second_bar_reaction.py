@@ -39,13 +39,19 @@ def reaction(q: tuple[float, float], v: tuple[float, float]) -> tuple[float, flo
         file = Path(folder) / "two.urdf"
         file.write_text(URDF)
         body = bullet.loadURDF(
-            str(file), useFixedBase=True, flags=bullet.URDF_USE_INERTIA_FROM_FILE
+            str(file),
+            useFixedBase=True,
+            flags=bullet.URDF_USE_INERTIA_FROM_FILE,
         )
     bullet.setPhysicsEngineParameter(fixedTimeStep=STEP)
     bullet.setGravity(0, 0, 0)
     for joint in range(2):
         bullet.changeDynamics(
-            body, joint, linearDamping=0, angularDamping=0, jointDamping=0
+            body,
+            joint,
+            linearDamping=0,
+            angularDamping=0,
+            jointDamping=0,
         )
         bullet.resetJointState(body, joint, q[joint], v[joint])
         bullet.setJointMotorControl2(body, joint, bullet.VELOCITY_CONTROL, force=0)

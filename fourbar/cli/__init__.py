@@ -35,7 +35,9 @@ class SectionedGroup(click.Group):
     """A group whose help lists its commands in sections, each description whole."""
 
     def format_commands(
-        self, ctx: click.Context, formatter: click.HelpFormatter
+        self,
+        ctx: click.Context,
+        formatter: click.HelpFormatter,
     ) -> None:
         """Write the sections."""
         for title, commands in SECTIONS.items():
@@ -55,7 +57,9 @@ class SectionedGroup(click.Group):
 )
 @click.version_option(__version__, "-V", "--version", prog_name="fourbar")
 @click.option(
-    "--traceback", is_flag=True, help="Show where an internal error happened."
+    "--traceback",
+    is_flag=True,
+    help="Show where an internal error happened.",
 )
 @click.pass_context
 def group(context: click.Context, traceback: bool) -> None:

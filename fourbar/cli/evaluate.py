@@ -29,7 +29,10 @@ if TYPE_CHECKING:
 @given.json_option
 @given.text_option(*given.TABLE_ENDINGS)
 def classify_command(
-    lengths: tuple[str, ...], everything: bool, as_json: bool, out: Path | None
+    lengths: tuple[str, ...],
+    everything: bool,
+    as_json: bool,
+    out: Path | None,
 ) -> None:
     """Classify a linkage by its lengths: which bars turn, and how far.
 
@@ -64,7 +67,11 @@ def classify_command(
 @click.command()
 @click.argument("file", type=given.FILE_PATH, required=False)
 @click.option(
-    "-o", "--out", type=given.FILE_PATH, metavar="FILE", help="Name of the new file."
+    "-o",
+    "--out",
+    type=given.FILE_PATH,
+    metavar="FILE",
+    help="Name of the new file.",
 )
 @click.option(
     "--lengths",
@@ -205,10 +212,16 @@ def _choose_output(table: bool, as_json: bool, as_csv: bool, out: Path | None) -
 )
 @click.option("--all", "every", flag_value=1, help="Print every position of the table.")
 @click.option(
-    "--json", "as_json", is_flag=True, help="Print one JSON object in SI units."
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Print one JSON object in SI units.",
 )
 @click.option(
-    "--csv", "decimal", flag_value=".", help="Print one line per position in SI units."
+    "--csv",
+    "decimal",
+    flag_value=".",
+    help="Print one line per position in SI units.",
 )
 @click.option(
     "--csv-comma",
@@ -291,7 +304,9 @@ def analyze(  # noqa: PLR0913 - one for each option
 
 
 def _choose_units(
-    form: str, units: Conversion | None, degrees: bool | None
+    form: str,
+    units: Conversion | None,
+    degrees: bool | None,
 ) -> Conversion:
     """Choose the units of the output.
 

@@ -39,7 +39,11 @@ def _plane_options(command: Callable[..., None]) -> Callable[..., None]:
         ("--axis", "0 0 1", "Direction of the pins' axes in the world."),
     ):
         placed = click.option(
-            name, default=default, show_default=True, metavar='"X Y Z"', help=text
+            name,
+            default=default,
+            show_default=True,
+            metavar='"X Y Z"',
+            help=text,
         )(placed)
     return placed
 
@@ -48,7 +52,9 @@ def _scene_or_lengths(command: Callable[..., None]) -> Callable[..., None]:
     """Add SCENE, --lengths and --omega, one of the first two to be given."""
     for add in (
         click.option(
-            "--omega", metavar="W", help="Speed of the input with --lengths, rad/s."
+            "--omega",
+            metavar="W",
+            help="Speed of the input with --lengths, rad/s.",
         ),
         click.option(
             "--lengths",
@@ -64,7 +70,10 @@ def _scene_or_lengths(command: Callable[..., None]) -> Callable[..., None]:
 
 @contextmanager
 def _open_or_make_scene(
-    scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None, out: Path
+    scene: Path | None,
+    lengths: tuple[str, ...] | None,
+    omega: str | None,
+    out: Path,
 ) -> Iterator[Scene]:
     """Open the scene, or make one of the lengths; its defaults are told at the end."""
     if (scene is None) == (lengths is None):
@@ -127,7 +136,9 @@ _without_loads_option = click.option(
     help="Draw one branch or both.",
 )
 @click.option(
-    "--dimensions", is_flag=True, help="Write the lengths of the bars at them."
+    "--dimensions",
+    is_flag=True,
+    help="Write the lengths of the bars at them.",
 )
 @given.units_option()
 def plot(
@@ -189,7 +200,9 @@ def _find_place(scene: Scene, text: str) -> float:
     help="Duration of a film (default: 6, or that of the motion).",
 )
 @click.option(
-    "--vectors", is_flag=True, help="Draw velocity and acceleration at the points."
+    "--vectors",
+    is_flag=True,
+    help="Draw velocity and acceleration at the points.",
 )
 @given.units_option()
 def animate(
@@ -325,10 +338,15 @@ def usd_command(
     help="Folder of exports and reports (default: SCENE_exports).",
 )
 @click.option(
-    "--no-browser", is_flag=True, help="Print the address and open no browser."
+    "--no-browser",
+    is_flag=True,
+    help="Print the address and open no browser.",
 )
 def edit_command(
-    scene: Path | None, port: int, exports: Path | None, no_browser: bool
+    scene: Path | None,
+    port: int,
+    exports: Path | None,
+    no_browser: bool,
 ) -> None:
     """Edit a scene, or a new one, in the browser; torque and forces follow each change.
 

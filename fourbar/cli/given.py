@@ -30,7 +30,9 @@ _KEYS_OF_A_SCENE = (
 
 
 def _read_units(
-    context: click.Context, parameter: click.Parameter, text: str | None
+    context: click.Context,
+    parameter: click.Parameter,
+    text: str | None,
 ) -> Conversion | None:
     from fourbar.show.units import units
 
@@ -39,7 +41,12 @@ def _read_units(
 
 scene_argument = click.argument("scene", type=FILE_PATH)
 out_option = click.option(
-    "-o", "--out", type=FILE_PATH, required=True, metavar="FILE", help="Write to FILE."
+    "-o",
+    "--out",
+    type=FILE_PATH,
+    required=True,
+    metavar="FILE",
+    help="Write to FILE.",
 )
 TABLE_ENDINGS = (".txt", ".json")
 at_option = click.option(
@@ -57,7 +64,10 @@ def units_option(default: str = "those of the file") -> Callable[..., Any]:
         f'Units: SI, imperial or a list like "mm N.mm deg" (default: {default}).'
     )
     return click.option(
-        "--units", callback=_read_units, metavar="UNITS", help=help_text
+        "--units",
+        callback=_read_units,
+        metavar="UNITS",
+        help=help_text,
     )
 
 
@@ -68,7 +78,9 @@ def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:
     """
 
     def require_ending(
-        context: click.Context, parameter: click.Parameter, out: Path | None
+        context: click.Context,
+        parameter: click.Parameter,
+        out: Path | None,
     ) -> Path | None:
         if out is not None and out.suffix and out.suffix.lower() not in endings:
             raise InputError(

@@ -149,7 +149,10 @@ class Dragged(NamedTuple):
 
 
 def drag(
-    document: SceneDocument, scene: Scene, plain: dict[str, Any], dragged: Dragged
+    document: SceneDocument,
+    scene: Scene,
+    plain: dict[str, Any],
+    dragged: Dragged,
 ) -> None:
     """Change the numbers of the file for a drag that began in `scene`.
 
@@ -219,7 +222,9 @@ def drag(
 
 
 def _drag_pin(
-    document: SceneDocument, dragged: Dragged, pins: dict[str, complex]
+    document: SceneDocument,
+    dragged: Dragged,
+    pins: dict[str, complex],
 ) -> None:
     if dragged.what not in DRAGGED_PINS:
         raise InputError(
@@ -252,7 +257,9 @@ def _drag_pin(
 
 
 def _drag_drawn_pin(
-    document: SceneDocument, dragged: Dragged, drawing: DrawnPins
+    document: SceneDocument,
+    dragged: Dragged,
+    drawing: DrawnPins,
 ) -> None:
     """Move a pin of the drawing.
 
@@ -291,7 +298,11 @@ def parse_place(stated: Any, drawing: DrawnPins | None = None, bar: int = 1) -> 
 
 
 def put_place(
-    document: SceneDocument, path: KeyPath, place: complex, grain: float, by: str = ""
+    document: SceneDocument,
+    path: KeyPath,
+    place: complex,
+    grain: float,
+    by: str = "",
 ) -> None:
     """State a place as the file does, in its units.
 
@@ -340,7 +351,11 @@ def _write_dragged_angle(old: object, angle: float, grain: float) -> str:
 
 
 def _write_like(
-    old: object, value: float, grain: float, si: str, otherwise: str
+    old: object,
+    value: float,
+    grain: float,
+    si: str,
+    otherwise: str,
 ) -> str:
     """Write a number of an SI unit in the unit of its older text.
 

@@ -129,7 +129,8 @@ class Workbench:
             self.waiting.pop()
         if len(self.waiting) >= MOST_WAITING:
             self.tell(
-                {"for": asked.get("id"), "refused": "too many requests wait"}, to=line
+                {"for": asked.get("id"), "refused": "too many requests wait"},
+                to=line,
             )
             return
         self.waiting.append((line, asked))
@@ -231,7 +232,11 @@ class Workbench:
                     self.tell({"tolerances": spreads})
 
     async def serve(
-        self, port: int, redirect: Redirect | None = None, *, browse: bool = False
+        self,
+        port: int,
+        redirect: Redirect | None = None,
+        *,
+        browse: bool = False,
     ) -> None:
         """Serve until all pages have gone, or until Ctrl-C.
 

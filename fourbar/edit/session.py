@@ -243,7 +243,10 @@ class Session:
         return self.describe(self.now.evaluate(self.units))
 
     def describe(
-        self, data: dict[str, Any], *, settled: bool = False
+        self,
+        data: dict[str, Any],
+        *,
+        settled: bool = False,
     ) -> dict[str, Any]:
         """Describe the present state.
 

@@ -80,7 +80,11 @@ class Actions:
         return self
 
     def force(
-        self, bar: int, force: Number, point: Number = 0.0j, beyond: Number = None
+        self,
+        bar: int,
+        force: Number,
+        point: Number = 0.0j,
+        beyond: Number = None,
     ) -> None:
         """Add a force (complex, N, world axes) on a bar; on the ground it does nothing.
 
@@ -397,7 +401,10 @@ class Effect:
         """Add its forces and couples on the bars; its places are settled."""
 
     def solve_friction(
-        self, actions: Actions, pins: PinForces, eliminate: Callable[..., PinForces]
+        self,
+        actions: Actions,
+        pins: PinForces,
+        eliminate: Callable[..., PinForces],
     ) -> SolvedFriction:
         """Solve for what depends on the pin forces, and add it to the actions.
 
@@ -419,7 +426,9 @@ class Effect:
         return self
 
     def status(
-        self, state: State, branch: NDArray[np.int8] | None
+        self,
+        state: State,
+        branch: NDArray[np.int8] | None,
     ) -> NDArray[np.uint8] | None:
         """Return status codes, (n,): other than `OK` where the effect has no value.
 

@@ -38,7 +38,9 @@ class LinearDrive(ForceDrive):
 
     def __post_init__(self) -> None:
         for name, point in zip(
-            ("start", "end"), require_ends("drive", self.start, self.end), strict=True
+            ("start", "end"),
+            require_ends("drive", self.start, self.end),
+            strict=True,
         ):
             object.__setattr__(self, name, point)
 

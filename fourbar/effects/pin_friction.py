@@ -87,7 +87,9 @@ class PinFriction(PinRows):
         return self.loaded_pins
 
     def per_unit(
-        self, actions: Actions, eliminate: Callable[..., PinForces]
+        self,
+        actions: Actions,
+        eliminate: Callable[..., PinForces],
     ) -> dict[str, PinForces]:
         """Compute the pin forces that a couple of 1 N m at each pin causes.
 
@@ -101,7 +103,10 @@ class PinFriction(PinRows):
         return forces
 
     def solve_friction(
-        self, actions: Actions, pins: PinForces, eliminate: Callable[..., PinForces]
+        self,
+        actions: Actions,
+        pins: PinForces,
+        eliminate: Callable[..., PinForces],
     ) -> SolvedFriction:
         """Add the couples that fulfil x_p = mu_p r_p |F_p(x)|.
 
@@ -164,7 +169,10 @@ class PinFriction(PinRows):
         )
 
     def _refine(
-        self, couples: dict[str, Any], pins: PinForces, per_unit: dict[str, PinForces]
+        self,
+        couples: dict[str, Any],
+        pins: PinForces,
+        per_unit: dict[str, PinForces],
     ) -> dict[str, Any]:
         """Take Newton's steps from couples in doubles.
 
@@ -250,7 +258,10 @@ def solve_sliding(F: Array, C: Array, k: Array) -> _Sliding:
                 axis=1,
             )
             _, first, same = np.unique(
-                numbers, axis=0, return_index=True, return_inverse=True
+                numbers,
+                axis=0,
+                return_index=True,
+                return_inverse=True,
             )
             first = some[first]
             x[some], count[some] = (
@@ -329,7 +340,8 @@ def _iterate(F: Array, C: Array, k: Array, x: Array) -> Array:
             done[:, None], x, new
         )  # solved problems keep their digits while others go on
         done |= np.abs(new - x).max(axis=1, initial=0.0) <= ROUNDING_OF_X * new.max(
-            axis=1, initial=0.0
+            axis=1,
+            initial=0.0,
         )
         x = new
         if done.all():

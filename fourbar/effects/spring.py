@@ -195,7 +195,9 @@ class Springs(Effect):
             actions.pull(spring.start, spring.end, by_distance * across)
 
     def status(
-        self, state: State, branch: NDArray[np.int8] | None
+        self,
+        state: State,
+        branch: NDArray[np.int8] | None,
     ) -> NDArray[np.uint8] | None:
         """Return NO_DIRECTION where the two points of a spring with slack coincide."""
         codes = None

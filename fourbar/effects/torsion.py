@@ -72,7 +72,9 @@ class Torsion(PinRows):
         away = [
             followed - rest
             for followed, (_, _, rest, _) in zip(
-                self._follow_angles(start, branch), self.springs, strict=True
+                self._follow_angles(start, branch),
+                self.springs,
+                strict=True,
             )
         ]
         # a constructor checks what a user gives, one number at a time
@@ -82,14 +84,19 @@ class Torsion(PinRows):
         return counted
 
     def status(
-        self, state: State, branch: NDArray[np.int8] | None
+        self,
+        state: State,
+        branch: NDArray[np.int8] | None,
     ) -> NDArray[np.uint8] | None:
         """Return WOUND at half a turn from rest and beyond."""
         if self.turns is None or branch is None:
             return None
         wound = np.zeros(np.shape(state.theta_2), dtype=bool)
         for followed, turns, (_, _, rest, _) in zip(
-            self._follow_angles(state, branch), self.turns, self.springs, strict=True
+            self._follow_angles(state, branch),
+            self.turns,
+            self.springs,
+            strict=True,
         ):
             wound |= np.abs(followed - rest - turns) > HALF_TURN
         return np.where(wound, WOUND, OK).astype(np.uint8)
@@ -192,7 +199,11 @@ def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
 
 
 def _find_middle(
-    beside: Number, opposite: Number, half: Number, outer: Number, inner: Number
+    beside: Number,
+    opposite: Number,
+    half: Number,
+    outer: Number,
+    inner: Number,
 ) -> Number:
     """Find what the angle of a bar from the diagonal never leaves by half a turn, rad.
 

@@ -49,7 +49,10 @@ _NO_MOTION = Coefficients(*[np.nan] * 8)
 
 
 def _find_undecided(
-    factor: Any, constant: Any, size: Any, part: float = NEEDS_DIGITS
+    factor: Any,
+    constant: Any,
+    size: Any,
+    part: float = NEEDS_DIGITS,
 ) -> Any:
     """Mark where doubles cannot decide the sign of a factor of Heron's formula.
 
@@ -232,7 +235,11 @@ class Case(NamedTuple):
         path = self.path
         if moving:
             position, k, sine = path.close(
-                q, half, branch, condition=condition, margin=margin
+                q,
+                half,
+                branch,
+                condition=condition,
+                margin=margin,
             )
         else:
             position = path.position(q, half, branch)
@@ -255,7 +262,10 @@ class Case(NamedTuple):
         )
 
     def at(
-        self, commanded: Command, *, moving: bool = True
+        self,
+        commanded: Command,
+        *,
+        moving: bool = True,
     ) -> tuple[State, NDArray[np.intp]]:
         """Compute the positions of a command, and their motion.
 
@@ -310,7 +320,9 @@ class Case(NamedTuple):
         )
 
     def half_angle(
-        self, q: Array, remainder: Any
+        self,
+        q: Array,
+        remainder: Any,
     ) -> tuple[HalfAngle, NDArray[np.intp]]:
         """Compute the half angles, and the indices of those in many digits."""
         lengths = self.path.lengths
@@ -335,7 +347,10 @@ class Case(NamedTuple):
         return half, index
 
     def _compute_inertia(
-        self, state: State, acceleration: Any, sine: Any
+        self,
+        state: State,
+        acceleration: Any,
+        sine: Any,
     ) -> "_Inertia":
         """Compute d'Alembert's forces and moments, and their generalized force.
 
@@ -394,7 +409,10 @@ class Case(NamedTuple):
         )
 
     def drive_interval(
-        self, state: State, acceleration: Any, drive: Any
+        self,
+        state: State,
+        acceleration: Any,
+        drive: Any,
     ) -> tuple[Any, Any, Any]:
         """Compute the least and greatest torque or force of the drive.
 
@@ -456,7 +474,10 @@ class _FreeBodies(NamedTuple):
     """h of the driven bar, or ds/dq of the drive that exerts a force, m."""
 
     def solve_pin_forces(
-        self, actions: Actions, *, with_inertia: bool = True
+        self,
+        actions: Actions,
+        *,
+        with_inertia: bool = True,
     ) -> PinForces:
         """Solve for the pin forces under some actions and the drive that balances them.
 
@@ -489,7 +510,10 @@ class _FreeBodies(NamedTuple):
         )
 
     def _solve_from_two_moments(
-        self, left_out: int, actions: Actions, inertia: _Inertia
+        self,
+        left_out: int,
+        actions: Actions,
+        inertia: _Inertia,
     ) -> PinForces:
         """Solve from the moments of the two bars other than the one left out."""
         lengths = self.state.lengths

@@ -81,7 +81,10 @@ class Evaluated(NamedTuple):
 
 
 def evaluate(
-    case: Case, command: Command, last_stage: int, wanted: Set[str]
+    case: Case,
+    command: Command,
+    last_stage: int,
+    wanted: Set[str],
 ) -> Evaluated:
     """Evaluate the named quantities at the positions of a command.
 
@@ -134,7 +137,11 @@ def evaluate_released(
 
 
 def _compute_codes(
-    path: LoopPath, sine: Any, half: HalfAngle, command: Command, unit: float = 1.0
+    path: LoopPath,
+    sine: Any,
+    half: HalfAngle,
+    command: Command,
+    unit: float = 1.0,
 ) -> Any:
     """Compute the status of each position from the sine of the transmission angle.
 
@@ -324,7 +331,10 @@ def _compute_error_bars(
 
 
 def _compute_unresolved(
-    case: Case, command: Command, state: State, dynamics: Dynamics
+    case: Case,
+    command: Command,
+    state: State,
+    dynamics: Dynamics,
 ) -> tuple[Any, Any]:
     """Compute what long doubles do not resolve of the pin forces and of the drive.
 
@@ -354,7 +364,9 @@ def _compute_unresolved(
     except InputError:  # a load's table ends here
         return np.nan, np.nan
     pairs = zip(
-        (*dynamics.pins, dynamics.drive), (*there.pins, there.drive), strict=True
+        (*dynamics.pins, dynamics.drive),
+        (*there.pins, there.drive),
+        strict=True,
     )
     with np.errstate(all="ignore"):
         share = np.divide(
@@ -399,7 +411,9 @@ def withhold_infinite(case: Case, evaluated: Evaluated) -> None:
 
 
 def _withhold(
-    values: dict[str, Any], code: NDArray[np.uint8], in_line: NDArray[np.bool_]
+    values: dict[str, Any],
+    code: NDArray[np.uint8],
+    in_line: NDArray[np.bool_],
 ) -> None:
     """Set the status of each position at which a promised quantity is not finite.
 

@@ -325,7 +325,11 @@ class _IntegrationRun:
         self.rows: list[tuple[float, ...]] = []
 
     def _require_directions(
-        self, q: float, position: Position, k: Coefficients, rate: float
+        self,
+        q: float,
+        position: Position,
+        k: Coefficients,
+        rate: float,
     ) -> None:
         """Raise a LimitError if a force has no direction at the start.
 
@@ -350,7 +354,11 @@ class _IntegrationRun:
         return self.reading.evaluate(float(self.y[0]))
 
     def _compute_generalised_force(
-        self, q: float, position: Position, k: Coefficients, rate: float
+        self,
+        q: float,
+        position: Position,
+        k: Coefficients,
+        rate: float,
     ) -> float:
         """Compute Q under everything that acts.
 
@@ -360,7 +368,11 @@ class _IntegrationRun:
         return float(Actions(state, self.bodies).add(self.terms).work()[0])
 
     def _make_state(
-        self, q: float, position: Position, k: Coefficients, rate: float
+        self,
+        q: float,
+        position: Position,
+        k: Coefficients,
+        rate: float,
     ) -> State:
         """Make the state at an angle and a speed of the bar that is read."""
         return State(
@@ -532,7 +544,10 @@ class _IntegrationRun:
         return True
 
     def _note_change_points(
-        self, start: float, stop: float, dense: Callable[[float], Array]
+        self,
+        start: float,
+        stop: float,
+        dense: Callable[[float], Array],
     ) -> None:
         """Note the times within a step at which all bars are collinear.
 

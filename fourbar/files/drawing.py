@@ -34,7 +34,10 @@ _NUMBERS_OF_BARS = {name: bar for bar, name in BAR_NAMES.items()}
 
 
 def from_pins(
-    O2: tuple[Any, Any], A: tuple[Any, Any], B: tuple[Any, Any], O4: tuple[Any, Any]
+    O2: tuple[Any, Any],
+    A: tuple[Any, Any],
+    B: tuple[Any, Any],
+    O4: tuple[Any, Any],
 ) -> Scene:
     """Make the scene of a linkage from the places of its pins, at the drawn position.
 
@@ -84,7 +87,9 @@ def read_point(read: Reader, key: str, value: object) -> tuple[float, float]:
 
 
 def state_lengths(
-    read: Reader, top: dict[str, Any], drawing: DrawnPins
+    read: Reader,
+    top: dict[str, Any],
+    drawing: DrawnPins,
 ) -> dict[str, Any]:
     """State a drawing by lengths, and each place of it in its bar's frame."""
     met = meet_lengths(drawing, top["pins"])
@@ -120,7 +125,11 @@ def meet_lengths(drawing: DrawnPins, pins: dict[str, Any]) -> tuple[float, ...]:
 
 
 def _state_places(
-    read: Reader, key: str, value: Any, drawing: DrawnPins, bar: int | None = None
+    read: Reader,
+    key: str,
+    value: Any,
+    drawing: DrawnPins,
+    bar: int | None = None,
 ) -> Any:
     """State each `{ drawn = [x, y] }` of an entry in the frame of its bar."""
     if isinstance(value, list):
@@ -152,7 +161,11 @@ def _state_places(
 
 
 def _state_place(
-    read: Reader, key: str, value: dict[str, Any], drawing: DrawnPins, bar: int | None
+    read: Reader,
+    key: str,
+    value: dict[str, Any],
+    drawing: DrawnPins,
+    bar: int | None,
 ) -> dict[str, str]:
     """State a place of the drawing by its coordinates in the frame of its bar."""
     if bar is None:
@@ -169,7 +182,10 @@ def _state_place(
 
 
 def state_motion(
-    read: Reader, motion: Any, drawing: DrawnPins, line: LinearDrive | None
+    read: Reader,
+    motion: Any,
+    drawing: DrawnPins,
+    line: LinearDrive | None,
 ) -> Any:
     """Replace the word "drawn" of a motion by the drawn angle, stroke or side.
 

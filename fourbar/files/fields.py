@@ -197,7 +197,10 @@ class Reader:
         return self.quantity(key, value, *by[:2])
 
     def numbers(
-        self, key: str, given: Mapping[str, object], numbers: Mapping[str, Declared]
+        self,
+        key: str,
+        given: Mapping[str, object],
+        numbers: Mapping[str, Declared],
     ) -> dict[str, Any]:
         """Read each of some numbers, by name."""
         return {
@@ -288,7 +291,10 @@ def write_numbers(description: Any) -> dict[str, Any]:
 
 
 def write_pair(
-    first: float, second: float, unit: str, of_second: str = "rad"
+    first: float,
+    second: float,
+    unit: str,
+    of_second: str = "rad",
 ) -> list[str]:
     """Write a pair, mostly [magnitude, angle], likewise."""
     return [write_quantity(first, unit), write_quantity(second, of_second)]

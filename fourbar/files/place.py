@@ -23,7 +23,11 @@ AT_OF_A_LOAD = {
 
 
 def read_table_with_place(
-    read: Reader, key: str, value: object, allowed: Iterable[str], instead: str = ""
+    read: Reader,
+    key: str,
+    value: object,
+    allowed: Iterable[str],
+    instead: str = "",
 ) -> dict[str, Any]:
     """Read a table in which a place is stated.
 

@@ -264,12 +264,15 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
         scene = choose_assembly(scene, drawing)
     scene = replace(scene, coordinates=tuple(read.coordinates.items()))
     return replace(
-        scene, tolerances=_read_tolerances(read, scene, top.get("tolerances", {}))
+        scene,
+        tolerances=_read_tolerances(read, scene, top.get("tolerances", {})),
     )
 
 
 def _read_drive(
-    read: Reader, value: object, bars: Mapping[str, int]
+    read: Reader,
+    value: object,
+    bars: Mapping[str, int],
 ) -> tuple[int | None, ForceDrive | None]:
     """Read the bar on which a couple acts, or a force along a line or at a place."""
     allowed = ("bar", "from", "to", *PLACES_OF_ENDS, "direction", "frame")
@@ -308,7 +311,9 @@ def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
 
 
 def _read_pictures(
-    read: Reader, bars: dict[str, Any], folder: str
+    read: Reader,
+    bars: dict[str, Any],
+    folder: str,
 ) -> tuple[Picture, ...]:
     """Read the names of the bars' pictures.
 
@@ -347,7 +352,8 @@ def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
 
 
 def _meet_stated_equalities(
-    length: dict[str, float], stated: dict[str, Any]
+    length: dict[str, float],
+    stated: dict[str, Any],
 ) -> dict[str, float]:
     """Return the lengths with the equalities that their last decimals miss."""
     names = tuple(BAR_NAMES.values())
@@ -419,7 +425,10 @@ def _read_motion(read: Reader, value: object) -> Motion:
     if speed in entry:
         arguments[speed] = read.quantity(f"motion.{speed}", entry[speed], f"{unit}/s")
     arguments[acceleration] = read.quantity(
-        f"motion.{acceleration}", entry.get(acceleration), f"{unit}/s^2", default=0.0
+        f"motion.{acceleration}",
+        entry.get(acceleration),
+        f"{unit}/s^2",
+        default=0.0,
     )
     if "free" in entry:
         released = read.table("motion.free", entry["free"], ("duration", "steps"))
@@ -469,7 +478,10 @@ def _read_rise(read: Reader, key: str, value: object) -> Rise:
 
 
 def _read_places(
-    read: Reader, key: str, value: object, unit: str
+    read: Reader,
+    key: str,
+    value: object,
+    unit: str,
 ) -> float | Array | Sweep | FromLimit:
     """Read angles or strokes: one, a list of them, or a sweep.
 
@@ -539,7 +551,10 @@ def _read_load(read: Reader, key: str, value: object, bars: Mapping[str, int]) -
 
 
 def _read_effect(
-    read: Reader, key: str, value: object, bar_of_point: Mapping[str, int]
+    read: Reader,
+    key: str,
+    value: object,
+    bar_of_point: Mapping[str, int],
 ) -> Effect:
     """Read an effect from the value under its key."""
     kind: Any = list_kinds()[key]
@@ -574,7 +589,10 @@ def _read_effect(
 
 
 def _read_springs(
-    read: Reader, key: str, value: object, bars: Mapping[str, int]
+    read: Reader,
+    key: str,
+    value: object,
+    bars: Mapping[str, int],
 ) -> Springs:
     """Read springs and gas springs."""
     if not isinstance(value, list) or not 1 <= len(value) <= _MOST_SPRINGS:
@@ -609,7 +627,10 @@ def _read_springs(
 
 
 def _read_ends(
-    read: Reader, key: str, row: dict[str, Any], bars: Mapping[str, int]
+    read: Reader,
+    key: str,
+    row: dict[str, Any],
+    bars: Mapping[str, int],
 ) -> tuple[Place, Place]:
     """Read the entries `from` and `to` of a line between two bars.
 
@@ -626,7 +647,9 @@ def _read_ends(
 
 
 def _read_tolerances(
-    read: Reader, scene: Scene, value: object
+    read: Reader,
+    scene: Scene,
+    value: object,
 ) -> tuple[Tolerance, ...]:
     """Read ``"lengths.input" = "0.05 mm"`` or ``["0.02 mm", "sigma"]``.
 

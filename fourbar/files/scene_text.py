@@ -116,7 +116,9 @@ def _add_strokes(effects: dict[str, Any], scene: Scene) -> None:
 
 
 def _write_lengths(
-    scene: Scene, lengths: dict[str, Any], motion: dict[str, Any]
+    scene: Scene,
+    lengths: dict[str, Any],
+    motion: dict[str, Any],
 ) -> list[tuple[str, dict[str, Any]]]:
     """Write the pins of a scene that still is as it was drawn, otherwise its lengths.
 
@@ -137,7 +139,8 @@ def _write_lengths(
 
 
 def _restore_coordinates(
-    tables: dict[str, Any], coordinates: tuple[tuple[str, tuple[float, float]], ...]
+    tables: dict[str, Any],
+    coordinates: tuple[tuple[str, tuple[float, float]], ...],
 ) -> None:
     """Write places by x and y again that were read so and are the same still."""
     for key, (x, y) in coordinates:
@@ -294,7 +297,9 @@ def _write_effect(effect: Effect) -> Any:
             texts = {
                 name: write_declared(x, declared)
                 for (name, declared), x in zip(
-                    effect.numbers.items(), values, strict=True
+                    effect.numbers.items(),
+                    values,
+                    strict=True,
                 )
             }
             rows[pin] = texts.get("", texts)
@@ -475,7 +480,10 @@ _IMPERIAL_EXAMPLES = {
 
 
 def _fill_in(
-    lines: str, lengths: tuple[float, float, float], branch: str, unit: str
+    lines: str,
+    lengths: tuple[float, float, float],
+    branch: str,
+    unit: str,
 ) -> str:
     """Fill in the template of a new scene file; each bar weighs 1 kg/m or 0.05 lb/in.
 
@@ -490,5 +498,8 @@ def _fill_in(
     moving = zip(("input", "coupler", "output"), masses, strict=True)
     text = files("fourbar.files").joinpath("new.toml").read_text(encoding="utf-8")
     return Template(text).substitute(
-        linkage=lines, branch=branch, **dict(moving), **examples
+        linkage=lines,
+        branch=branch,
+        **dict(moving),
+        **examples,
     )

@@ -116,7 +116,11 @@ class Pair(NDArrayOperatorsMixin):
         return Pair(self.high[index], self.low[index])
 
     def __array_ufunc__(
-        self, function: Any, method: str, *inputs: Any, **options: Any
+        self,
+        function: Any,
+        method: str,
+        *inputs: Any,
+        **options: Any,
     ) -> Any:
         if method != "__call__" or options or function not in LONGER_FUNCTIONS:
             return NotImplemented
@@ -125,7 +129,11 @@ class Pair(NDArrayOperatorsMixin):
         )
 
     def __array_function__(
-        self, function: Any, types: Any, args: Sequence[Any], options: Any
+        self,
+        function: Any,
+        types: Any,
+        args: Sequence[Any],
+        options: Any,
     ) -> Any:
         if function is np.where:
             return _choose(*args)

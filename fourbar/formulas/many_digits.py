@@ -122,7 +122,11 @@ def decide_half_angles(
 
 
 def limit_remainder(
-    linkage: FourBar, limit: float, theta_2: float, offset: float, bar: int = 2
+    linkage: FourBar,
+    limit: float,
+    theta_2: float,
+    offset: float,
+    bar: int = 2,
 ) -> Any:
     """Compute (limit position + offset) - theta_2 in many digits.
 

@@ -224,7 +224,9 @@ def turns_fully(linkage: FourBar, bar: int = 2) -> bool:
 
 
 def choose_range(
-    linkage: FourBar, bar: int = 2, holding: float | None = None
+    linkage: FourBar,
+    bar: int = 2,
+    holding: float | None = None,
 ) -> tuple[float, float]:
     """Choose the range of a commanded bar's angle for a scene that names none, rad.
 
@@ -341,7 +343,9 @@ def circuits(linkage: FourBar) -> tuple[Circuit, ...]:
 
 
 def find_circuit(
-    linkage: FourBar, theta_2: Array, branch: int | NDArray[np.int8]
+    linkage: FourBar,
+    theta_2: Array,
+    branch: int | NDArray[np.int8],
 ) -> NDArray[np.int8]:
     """Find the circuit (index into `circuits`) of each position, (n,).
 

@@ -88,7 +88,10 @@ class LoopPath(NamedTuple):
         """
         psi = q - self.theta_1
         return half_angle(
-            self.lengths, psi, opposite=self.bar == 4, passing=self.passing
+            self.lengths,
+            psi,
+            opposite=self.bar == 4,
+            passing=self.passing,
         )
 
     def sign(self, q: Number, branch: Number) -> Number:
@@ -195,7 +198,9 @@ class LoopPath(NamedTuple):
         return *self.motion(position, branch), position.sin_mu
 
     def motion(
-        self, position: Position, branch: Number
+        self,
+        position: Position,
+        branch: Number,
     ) -> tuple[Position, Coefficients]:
         """Compute positions and kinematic coefficients by q, the bars in usual order.
 

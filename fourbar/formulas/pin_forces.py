@@ -79,7 +79,10 @@ def about_first_pin(body: Body) -> Number:
 
 
 def inertia_wrenches(
-    a: Number, bodies: MovingBodies, position: Position, moving: Rates
+    a: Number,
+    bodies: MovingBodies,
+    position: Position,
+    moving: Rates,
 ) -> tuple[Wrenches, Number]:
     """Compute d'Alembert's force -m a_G and moment on each bar.
 
@@ -108,7 +111,11 @@ def inertia_wrenches(
 
 
 def coupler_about_B(
-    lengths: Loop, three: Body, position: Position, moving: Rates, sine: Number
+    lengths: Loop,
+    three: Body,
+    position: Position,
+    moving: Rates,
+    sine: Number,
 ) -> Number:
     """Compute d'Alembert's moment of the coupler about B, small where G lies near B.
 
@@ -128,7 +135,11 @@ def coupler_about_B(
 
 
 def solve_between(
-    M_u: Number, M_v: Number, u: Number, v: Number, sine: Number
+    M_u: Number,
+    M_v: Number,
+    u: Number,
+    v: Number,
+    sine: Number,
 ) -> Number:
     """Solve u x F = M_u and v x F = M_v for F.
 

@@ -43,7 +43,11 @@ class PointCoefficients(NamedTuple):
 
 
 def point_coefficients(
-    linkage: FourBar, theta_2: Array, branch: Number, bar: int, z: complex
+    linkage: FourBar,
+    theta_2: Array,
+    branch: Number,
+    bar: int,
+    z: complex,
 ) -> PointCoefficients:
     """Compute d r_P/d theta_2 and d^2 r_P/d theta_2^2 of a point of bar 2, 3 or 4.
 
@@ -81,7 +85,9 @@ class Centre(NamedTuple):
 
 
 def instant_centres(
-    linkage: FourBar, theta_2: Array, branch: Number
+    linkage: FourBar,
+    theta_2: Array,
+    branch: Number,
 ) -> dict[tuple[int, int], Centre]:
     """Locate the six instant centres I_ij, keyed by (i, j) with i < j.
 
@@ -105,7 +111,13 @@ def instant_centres(
 
 
 def locate_centres(
-    O4: Number, A: Number, B: Number, u1: Number, u2: Number, u3: Number, u4: Number
+    O4: Number,
+    A: Number,
+    B: Number,
+    u1: Number,
+    u2: Number,
+    u3: Number,
+    u4: Number,
 ) -> dict[tuple[int, int], Centre]:
     """Locate the six instant centres, complex.
 
@@ -186,7 +198,10 @@ def coupler_curve(
 
 
 def list_circuit(
-    linkage: FourBar, circuit: int, branch: int, steps: int
+    linkage: FourBar,
+    circuit: int,
+    branch: int,
+    steps: int,
 ) -> tuple[Array, NDArray[np.int64], int]:
     """List the positions of a circuit, (steps,).
 

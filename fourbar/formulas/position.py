@@ -113,7 +113,8 @@ class Position(NamedTuple):
 
 
 def reorder_lengths(
-    bar: int, lengths: tuple[Number, Number, Number, Number]
+    bar: int,
+    lengths: tuple[Number, Number, Number, Number],
 ) -> tuple[Any, Any, Any, Any]:
     """Return the four lengths as the loop is read from bar 2, 3 or 4.
 
@@ -173,7 +174,9 @@ def _replace(length: Number, other: Number, mask: Number) -> Number:
 
 
 def _vanish(
-    difference: Number, lengths: tuple[Number, ...], diagonal: Number | None = None
+    difference: Number,
+    lengths: tuple[Number, ...],
+    diagonal: Number | None = None,
 ) -> Number:
     """Return a difference of lengths, or zero if it is within their rounding.
 
@@ -266,7 +269,11 @@ def signed_root(half: HalfAngle, branch: Number) -> Number:
 
 
 def compute_factors(
-    lengths: Loop, ss: Number, kk: Number, sk: Number, side: Number = 1.0
+    lengths: Loop,
+    ss: Number,
+    kk: Number,
+    sk: Number,
+    side: Number = 1.0,
 ) -> HalfAngle:
     """Compute the factors of Heron's formula from sin^2 h, cos^2 h and sin h cos h."""
     four_ad = 4.0 * lengths.a * lengths.d

@@ -18,7 +18,10 @@ from fourbar.formulas.position import Position
 
 
 def inertia(
-    a: Number, bodies: MovingBodies, position: Position, k: Coefficients
+    a: Number,
+    bodies: MovingBodies,
+    position: Position,
+    k: Coefficients,
 ) -> tuple[Number, Number]:
     """Compute the equivalent inertia J = sum of m |dG/dq|^2 + I h_k^2, kg m^2.
 
@@ -37,7 +40,10 @@ def inertia(
 
 
 def half_slope(
-    a: Number, bodies: MovingBodies, position: Position, k: Coefficients
+    a: Number,
+    bodies: MovingBodies,
+    position: Position,
+    k: Coefficients,
 ) -> Number:
     """Compute J'/2 = sum of m G'.G'' + I h_k h_k', kg m^2/rad.
 

@@ -116,7 +116,9 @@ def speed_ratio(state: State) -> Array:
 
 
 def mechanical_advantage(
-    state: State, radius_in: float = 1.0, radius_out: float = 1.0
+    state: State,
+    radius_in: float = 1.0,
+    radius_out: float = 1.0,
 ) -> Array:
     """Compute F_out/F_in = (omega_2/omega_4)(r_in/r_out), (n,).
 

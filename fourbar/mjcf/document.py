@@ -238,7 +238,11 @@ def _size_control(scene: Scene) -> float:
 
 
 def _write_comments(
-    scene: Scene, drive: Drive, reader: str, *, exerts: bool
+    scene: Scene,
+    drive: Drive,
+    reader: str,
+    *,
+    exerts: bool,
 ) -> list[str]:
     """Say how the file starts and where its numbers stand, a line each."""
     notes = NOTES["mjcf"]
@@ -513,7 +517,9 @@ def find_start(scene: Scene) -> Start:
     alpha = scene.motion.alpha_2
     speed = scene.motion.omega_2 or 0.0
     solution = solve(
-        scene, "velocity", at=Command(commanded.theta_2, commanded.branch, speed, alpha)
+        scene,
+        "velocity",
+        at=Command(commanded.theta_2, commanded.branch, speed, alpha),
     )
     usable = np.flatnonzero(solution.status_code == OK)
     if not len(usable):
@@ -595,7 +601,12 @@ def write_mjcf_for(
         )
     settings = SIMULATORS[simulator]
     return write_mjcf(
-        scene, settings, simulator, drive=drive, plane=plane, origin=scene.origin
+        scene,
+        settings,
+        simulator,
+        drive=drive,
+        plane=plane,
+        origin=scene.origin,
     )
 
 
@@ -606,7 +617,11 @@ OMEGA = 1.0
 
 
 def make_scene(
-    ground: float, input: float, coupler: float, output: float, omega: float = OMEGA
+    ground: float,
+    input: float,
+    coupler: float,
+    output: float,
+    omega: float = OMEGA,
 ) -> Scene:
     """Make a scene of uniform slender bars of 1 kg/m; lengths in m.
 

@@ -140,7 +140,11 @@ def add_appearance(root: ET.Element, linkage: FourBar) -> None:
         "height": "192",
     }
     ET.SubElement(
-        ET.SubElement(root, "asset"), "texture", type="skybox", builtin="flat", **sky
+        ET.SubElement(root, "asset"),
+        "texture",
+        type="skybox",
+        builtin="flat",
+        **sky,
     )
 
 
@@ -376,7 +380,11 @@ class Model:
         ET.SubElement(ground, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
         self._add_capsule(ground, 1, self.linkage.ground, -2.0 * self.radius)
         ET.SubElement(
-            ground, "site", name="O2", pos="0 0 0", size=write_six_digits(self.radius)
+            ground,
+            "site",
+            name="O2",
+            pos="0 0 0",
+            size=write_six_digits(self.radius),
         )
         self._add_site(ground, "O4", *self.O4)
         crank = self._add_bar(ground, 2, (0.0, 0.0), armature=flywheel)
@@ -384,7 +392,11 @@ class Model:
         self._add_bar(ground, 4, self.O4)
 
     def _add_bar(
-        self, parent: ET.Element, number: int, at: tuple[float, float], **drive: float
+        self,
+        parent: ET.Element,
+        number: int,
+        at: tuple[float, float],
+        **drive: float,
     ) -> ET.Element:
         """Add a bar that turns about its first pin.
 
@@ -393,7 +405,10 @@ class Model:
         bar = self.linkage.bar(number)
         pin = FIRST_PIN[number]
         body = ET.SubElement(
-            parent, "body", name=BAR_NAMES[number], pos=write_exactly(*at, 0.0)
+            parent,
+            "body",
+            name=BAR_NAMES[number],
+            pos=write_exactly(*at, 0.0),
         )
         if self.rest is not None:
             angle = self.rest[number - 2]
@@ -444,7 +459,11 @@ class Model:
         )
 
     def _add_capsule(
-        self, body: ET.Element, number: int, length: float, z: float
+        self,
+        body: ET.Element,
+        number: int,
+        length: float,
+        z: float,
     ) -> None:
         """Add a bar's shape: for the eye only, without mass and without contact."""
         if number == 1:
@@ -540,7 +559,12 @@ class Model:
             self._add_site(body, f"load_{index}", z.real, z.imag)
 
     def add_actuators(
-        self, root: ET.Element, drive: dict[str, str], *, cylinder: bool, passive: bool
+        self,
+        root: ET.Element,
+        drive: dict[str, str],
+        *,
+        cylinder: bool,
+        passive: bool,
     ) -> None:
         """Add actuators: the drive, if it has attributes; loads; and some springs.
 
@@ -576,7 +600,10 @@ class Model:
                 continue
             tension = write_exactly(-spring.slack, 0.0 - spring.stiffness, 0.0)
             ET.SubElement(
-                actuators, "general", {**_UNCONTROLLED, **placed}, biasprm=tension
+                actuators,
+                "general",
+                {**_UNCONTROLLED, **placed},
+                biasprm=tension,
             )
         for index, load in enumerate(self.loads, 1):
             fx = fy = 0.0
@@ -596,7 +623,10 @@ class Model:
                 ET.SubElement(actuators, "dcmotor", {**_make_passive(1.0), **placed})
                 continue
             ET.SubElement(
-                actuators, "general", {**_UNCONTROLLED, **placed}, biasprm="1 0 0"
+                actuators,
+                "general",
+                {**_UNCONTROLLED, **placed},
+                biasprm="1 0 0",
             )
 
 

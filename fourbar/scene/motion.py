@@ -402,7 +402,8 @@ def _make_number_property(name: str, place: int) -> Any:
         return otherwise
 
     return property(
-        read, doc=f"The {field} if {name} is commanded, otherwise {otherwise}."
+        read,
+        doc=f"The {field} if {name} is commanded, otherwise {otherwise}.",
     )
 
 
@@ -623,7 +624,10 @@ def _require_strokes(stroke: Any) -> Any:
 
 
 def _require_command(
-    names: tuple[str, str, str], angle: Any, speed: Any, acceleration: Any
+    names: tuple[str, str, str],
+    angle: Any,
+    speed: Any,
+    acceleration: Any,
 ) -> tuple[Any, Any, float]:
     """Return angle, speed and acceleration of the command of these names, checked."""
     (theta, unit), (omega, per_second), (alpha, growth) = (

@@ -100,7 +100,9 @@ class Scene:
     drive: "ForceDrive | None" = None
     drawing: DrawnPins | None = None
     coordinates: tuple[tuple[str, tuple[float, float]], ...] = field(
-        default=(), repr=False, compare=False
+        default=(),
+        repr=False,
+        compare=False,
     )
 
     def __post_init__(self) -> None:
@@ -440,7 +442,11 @@ class _Triangle(NamedTuple):
     """theta of the bar where both ends are in one direction from the pivot, rad."""
 
     def turn_bar(
-        self, stroke: Any, speed: Any, acceleration: Any, side: str | None
+        self,
+        stroke: Any,
+        speed: Any,
+        acceleration: Any,
+        side: str | None,
     ) -> tuple[Any, Any, Any, Any]:
         """Compute angle, speed and acceleration of the bar, and the condition.
 
@@ -549,7 +555,10 @@ def default_places(scene: Scene, holding: float | None = None) -> Array:
 
 
 def compute_bar_motion(
-    scene: Scene, place: Any, speed: Any, acceleration: Any
+    scene: Scene,
+    place: Any,
+    speed: Any,
+    acceleration: Any,
 ) -> tuple[Any, Any, Any, Any]:
     """Compute angle, speed and acceleration of the commanded bar, and the condition.
 
@@ -565,7 +574,10 @@ def compute_bar_motion(
 
 
 def command_stroke(
-    scene: Scene, stroke: Array, speed: Any, acceleration: Any
+    scene: Scene,
+    stroke: Array,
+    speed: Any,
+    acceleration: Any,
 ) -> Command:
     """Command the bar that a cylinder turns, from strokes and their rates.
 
@@ -653,7 +665,10 @@ def with_signs(linkage: FourBar, commanded: Command) -> Command:
 
 
 def find_signs(
-    linkage: FourBar, angle: Array, branch: NDArray[np.int8] | int, bar: int = 2
+    linkage: FourBar,
+    angle: Array,
+    branch: NDArray[np.int8] | int,
+    bar: int = 2,
 ) -> NDArray[np.int8]:
     """Return the sign of a bar's sine at each of its angles, (n,).
 

@@ -189,7 +189,9 @@ def _write_symbol(symbol: Symbol, theta_2: list[float]) -> dict[str, Any]:
 
 
 def _collect_sweep(
-    scene: Scene, signs: tuple[int, ...], stage: str | None
+    scene: Scene,
+    signs: tuple[int, ...],
+    stage: str | None,
 ) -> dict[str, Any]:
     """Collect both branches over theta_2, or over another commanded quantity."""
     motion = scene.motion
@@ -227,7 +229,10 @@ def _collect_sweep(
 
 
 def _over(
-    name: str, commanded: str, values: Array, speed: float | None = None
+    name: str,
+    commanded: str,
+    values: Array,
+    speed: float | None = None,
 ) -> dict[str, Any]:
     """Say what curves and slider run over: "time" or what is commanded.
 
@@ -335,7 +340,8 @@ def _collect_columns(solution: Solution) -> dict[str, Any]:
 
 
 def _encode_pictures(
-    scene: Scene, pictures: Mapping[str, str | Path]
+    scene: Scene,
+    pictures: Mapping[str, str | Path],
 ) -> dict[int, str]:
     """Encode the pictures of the bars as data URIs.
 

@@ -158,7 +158,9 @@ class _SceneBlock:
         return [*_align(rows), "no mass, load or effect: nothing loads pins and drive"]
 
     def _write_position(
-        self, head: list[str], pressure: float | None
+        self,
+        head: list[str],
+        pressure: float | None,
     ) -> Iterator[list[str]]:
         """Write the paragraphs of one position: motion, forces, ratios."""
         facts = self.facts
@@ -246,7 +248,9 @@ class _SceneBlock:
         lengths = ", ".join(
             f"{name} {write_digits(factor * length)}"
             for name, length in zip(
-                BAR_NAMES.values(), self.facts.scene.linkage.lengths, strict=True
+                BAR_NAMES.values(),
+                self.facts.scene.linkage.lengths,
+                strict=True,
             )
         )
         return f"{lengths} {unit}"
@@ -868,7 +872,9 @@ def explain_static(scene: Scene) -> str:
 
 
 def write_motor(
-    scene: Scene, solution: Solution, units: Conversion
+    scene: Scene,
+    solution: Solution,
+    units: Conversion,
 ) -> dict[str, Any] | None:
     """Write the duty and the loads of the pins as the JSON has them.
 

@@ -216,7 +216,10 @@ def is_once_round(solution: Solution) -> Any:
         period = period[:, 0]
     turns = np.abs(angle[..., -1] - angle[..., 0]) / (2.0 * np.pi * period)
     once_round = (turns > 0.5) & np.isclose(
-        turns, np.round(turns), rtol=1e-12, atol=0.0
+        turns,
+        np.round(turns),
+        rtol=1e-12,
+        atol=0.0,
     )
     for rate in (solution.at.speed, solution.at.acceleration):
         if rate is not None and np.shape(rate)[-1:] == angle.shape[-1:]:
@@ -241,7 +244,8 @@ def _require_quantity(solution: Solution, name: str) -> Array:
 
 
 def _integrate_power(
-    solution: Solution, power: Array
+    solution: Solution,
+    power: Array,
 ) -> tuple[float | None, float | None]:
     """Integrate the positive and the negative part of the power, each over time."""
     stroke = solution.at.stroke
@@ -257,7 +261,10 @@ def _integrate_power(
         speed = np.broadcast_to(np.asarray(speed), power.shape)[..., :-1]
         spans = np.abs(
             np.divide(
-                steps, speed, out=np.full(speed.shape, np.nan), where=speed != 0.0
+                steps,
+                speed,
+                out=np.full(speed.shape, np.nan),
+                where=speed != 0.0,
             )
         )
     parts = [
@@ -390,7 +397,9 @@ def compute_energies(scene: Scene, motion: Solution) -> _Energies:
             ).antiderivative()(motion.time)
     kinetic = np.zeros(len(motion))
     for number, body in zip(
-        MOVING_BARS, list_bodies(scene.linkage, scene.effects), strict=True
+        MOVING_BARS,
+        list_bodies(scene.linkage, scene.effects),
+        strict=True,
     ):
         v = state.velocity(number, body.z)
         kinetic = (

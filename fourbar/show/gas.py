@@ -99,7 +99,11 @@ def _list_stretches(
 
 
 def _locate_crossings(
-    scene: Scene, solution: Solution, spring: Spring, end: float, rows: NDArray[np.intp]
+    scene: Scene,
+    solution: Solution,
+    spring: Spring,
+    end: float,
+    rows: NDArray[np.intp],
 ) -> Array:
     """Find where a spring reaches one of its ends in the steps that begin at rows.
 

@@ -51,7 +51,10 @@ def _list_facts(scene: Scene, units: Conversion) -> list[tuple[str, str]]:
     facts = [("type", classify(scene.linkage).name)]
     masses = (0.0, *(bar.mass for bar in scene.linkage.moving))
     for name, length, mass in zip(
-        BAR_NAMES.values(), scene.linkage.lengths, masses, strict=True
+        BAR_NAMES.values(),
+        scene.linkage.lengths,
+        masses,
+        strict=True,
     ):
         facts.append(
             (

@@ -105,7 +105,11 @@ class PositionSheet:
                 label = name if not start else f"  {start[0]}"
                 rows.append(
                     self._write_vector(
-                        label, vector[0], unit, largest[start], sized=bool(start)
+                        label,
+                        vector[0],
+                        unit,
+                        largest[start],
+                        sized=bool(start),
                     )
                 )
         return rows
@@ -243,7 +247,11 @@ class PositionSheet:
         return _write_row(label, [*cells, *([] if sized else [""]), name])
 
     def _write_number(
-        self, label: str, values: Array, unit: str, after: str = ""
+        self,
+        label: str,
+        values: Array,
+        unit: str,
+        after: str = "",
     ) -> str:
         factor = 1.0
         name = ""

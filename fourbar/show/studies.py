@@ -47,7 +47,10 @@ Ends = tuple[RestPosition, RestPosition]
 
 
 def write_type(
-    linkage: FourBar, units: Conversion | None = COMMON, *, everything: bool = False
+    linkage: FourBar,
+    units: Conversion | None = COMMON,
+    *,
+    everything: bool = False,
 ) -> Iterator[str]:
     """Write the type of a linkage and the condition that decides it.
 
@@ -104,12 +107,17 @@ def write_type_json(linkage: FourBar) -> str:
         }
     lengths = dict(zip(BAR_NAMES.values(), linkage.lengths, strict=True))
     return write_object(
-        "fourbar-classify/1", lengths=lengths, **mobility._asdict(), **more
+        "fourbar-classify/1",
+        lengths=lengths,
+        **mobility._asdict(),
+        **more,
     )
 
 
 def _write_mobility(
-    linkage: FourBar, write: Callable[[float], str], everything: bool
+    linkage: FourBar,
+    write: Callable[[float], str],
+    everything: bool,
 ) -> Iterator[str]:
     """Write what swings and turns, and between which limits.
 
@@ -164,7 +172,9 @@ def _write_mobility(
 
 
 def _explain_turning(
-    linkage: FourBar, bar: int, write: Callable[[float], str]
+    linkage: FourBar,
+    bar: int,
+    write: Callable[[float], str],
 ) -> Iterator[str]:
     """Say why a bar has no limits.
 
@@ -311,7 +321,9 @@ def write_sensitivity_json(derivatives: Sensitivity) -> str:
         keys={
             key: {"value": number, "unit": entry.unit}
             for (key, entry), number in zip(
-                derivatives.keys.items(), derivatives.numbers.tolist(), strict=True
+                derivatives.keys.items(),
+                derivatives.numbers.tolist(),
+                strict=True,
             )
         },
         by={
@@ -348,7 +360,10 @@ def write_equilibria(title: str, rest: Equilibria, units: Conversion = COMMON) -
 
 
 def _write_resting(
-    title: str, lines: list[str], found: list[Equilibrium], units: Conversion
+    title: str,
+    lines: list[str],
+    found: list[Equilibrium],
+    units: Conversion,
 ) -> str:
     """Write the table of some equilibria with its title and lines."""
     if not found:

@@ -271,7 +271,8 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, _BarBending]:
 
 
 def _list_stresses(
-    scene: Scene, bending: dict[int, _BarBending]
+    scene: Scene,
+    bending: dict[int, _BarBending],
 ) -> dict[int, float | None]:
     """List the largest bending stresses.
 
@@ -313,7 +314,10 @@ def _cut_range(low: Array, high: Array) -> Array:
 
 
 def _merge(
-    scene: Scene, solution: Solution, places: Array, stage: str = "force"
+    scene: Scene,
+    solution: Solution,
+    places: Array,
+    stage: str = "force",
 ) -> Solution:
     """Solve at the positions of a solution and at others among them.
 
@@ -439,7 +443,8 @@ def _find_peaks(
         )
         inwards = np.abs(np.arange(CUTS + 1) - np.where(begins, 0, CUTS)[:, None])
         best = np.argmax(
-            np.where(opens[:, None] & (values >= 0.0), inwards, values), axis=1
+            np.where(opens[:, None] & (values >= 0.0), inwards, values),
+            axis=1,
         )
         peak_places, low, high = (
             cut_range[rows, np.clip(best + step, 0, CUTS)] for step in (0, -1, 1)
@@ -481,7 +486,9 @@ def _find_dead_points(scene: Scene, solution: Solution) -> list[int]:
 
 
 def _find_growing(
-    reached: list[Array], values: Array, best: NDArray[np.intp]
+    reached: list[Array],
+    values: Array,
+    best: NDArray[np.intp],
 ) -> NDArray[np.bool_]:
     """Mark the searches for a maximum that end beside a pole.
 
@@ -708,7 +715,8 @@ def _find_extreme(values: Array, places: Array, sign: int, smooth: bool) -> Peak
 
 
 def _list_assembled_stretches(
-    scene: Scene, fine: Solution
+    scene: Scene,
+    fine: Solution,
 ) -> list[tuple[float | None, float | None]]:
     """List where the linkage assembles within a sweep.
 
@@ -743,7 +751,8 @@ def _list_assembled_stretches(
 
 
 def _solve_finely(
-    scene: Scene, places: Array
+    scene: Scene,
+    places: Array,
 ) -> tuple[Solution, list[tuple[float | None, float | None]]]:
     """Solve many positions of a sweep in its sense; list the stretches.
 
@@ -866,7 +875,8 @@ def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]
     here = float(positions.angle[first])
     intervals = find_intervals(scene.linkage, positions.bar)
     low, high = min(
-        intervals, key=lambda ends: (here - ends[0]) % TURN - (ends[1] - ends[0])
+        intervals,
+        key=lambda ends: (here - ends[0]) % TURN - (ends[1] - ends[0]),
     )
     width = high - low
     low = here - ((here - low) % TURN if width < TURN else 0.5 * TURN)
@@ -897,7 +907,8 @@ def _find_largest_error_bar(solution: Solution, drive: Driving | None) -> float 
     if solution.force_error is None:
         return None
     loads = np.max(
-        [np.hypot(*getattr(solution, name).T) for name in PIN_FORCE.values()], axis=0
+        [np.hypot(*getattr(solution, name).T) for name in PIN_FORCE.values()],
+        axis=0,
     )
     pairs = [(solution.force_error, loads)]
     if drive is not None and drive.error is not None and drive.values is not None:

@@ -90,11 +90,16 @@ def make_plain_table(
     from rich.text import Text
 
     shown = Table(
-        box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, gap, 0, 0)
+        box=box.SIMPLE_HEAD,
+        show_edge=False,
+        pad_edge=False,
+        padding=(0, gap, 0, 0),
     )
     for head in heads:
         shown.add_column(
-            Text(head), justify="left" if head in left else "right", no_wrap=True
+            Text(head),
+            justify="left" if head in left else "right",
+            no_wrap=True,
         )
     for row in rows:
         shown.add_row(*map(Text, row))
@@ -168,7 +173,8 @@ def write_with_unit(number: float, unit: str, units: Conversion) -> str:
 
 
 def list_columns(
-    solution: Solution, units: Conversion = DEGREES
+    solution: Solution,
+    units: Conversion = DEGREES,
 ) -> dict[str, list[str]]:
     """List the columns of the table, most wanted first: heading with unit -> cells.
 

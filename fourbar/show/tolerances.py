@@ -109,7 +109,10 @@ def write_spreads(spreads: Tolerances, units: Conversion = DEGREES) -> str:
         f"\n{BAND_PERCENTILES[1]:g} %",
     )
     table = make_plain_table(
-        (*heads, "\nleast", "\ngreatest", "worst\n+-"), rows, left=("",), gap=0
+        (*heads, "\nleast", "\ngreatest", "worst\n+-"),
+        rows,
+        left=("",),
+        gap=0,
     )
     wrapped = [part for line in lines for part in wrap_line(line)]
     return write_table(spreads.scene.title, wrapped, table)
@@ -187,7 +190,9 @@ def _name_largest(spreads: Tolerances, spread: Spread, worst: int) -> str:
 
 
 def collect_tolerances(
-    scene: Scene, places: list[float], progress: Callable[[float], None] | None = None
+    scene: Scene,
+    places: list[float],
+    progress: Callable[[float], None] | None = None,
 ) -> dict[str, Any]:
     """Collect what a page shows of tolerances at places of its axis.
 

@@ -61,7 +61,9 @@ class RestPosition(NamedTuple):
 
 
 def _compute_generalised_force(
-    scene: Scene, terms: tuple[Any, ...], state: State
+    scene: Scene,
+    terms: tuple[Any, ...],
+    state: State,
 ) -> Any:
     """Compute Q of loads and effects.
 
@@ -82,7 +84,11 @@ class _Sizes(Actions):
         self.fastest = np.max(np.abs([state.k.h2, state.k.h3, state.k.h4]), axis=0)
 
     def force(
-        self, bar: int, force: Any, point: Any = 0.0j, beyond: Any = None
+        self,
+        bar: int,
+        force: Any,
+        point: Any = 0.0j,
+        beyond: Any = None,
     ) -> None:
         super().force(bar, force, point, beyond)
         if bar == 3:
@@ -240,7 +246,8 @@ class CircuitCurve:
             return psi - self.low, np.zeros(len(points), dtype=np.intp)
         if self.full:
             return psi - self.low, np.array(
-                [self.rows.index(branch) for branch in sign], dtype=np.intp
+                [self.rows.index(branch) for branch in sign],
+                dtype=np.intp,
             )
         part = np.clip(
             (0.5 * (self.low + self.high) - psi) / (0.5 * (self.high - self.low)),

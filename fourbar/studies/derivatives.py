@@ -177,7 +177,9 @@ class Sensitivity:
         value = self.value(quantity)
         rows = []
         for (key, entry), number in zip(
-            self.keys.items(), self.numbers.tolist(), strict=True
+            self.keys.items(),
+            self.numbers.tolist(),
+            strict=True,
         ):
             change = (
                 _DEGREE if entry.unit == "rad" else _HUNDREDTH * abs(number)
@@ -195,7 +197,8 @@ class Sensitivity:
                     )
                 )
         return sorted(
-            (row for row in rows if row.change != 0.0), key=lambda row: -abs(row.change)
+            (row for row in rows if row.change != 0.0),
+            key=lambda row: -abs(row.change),
         )
 
     def _list_rows(self) -> list[tuple[str, str, str]]:
@@ -427,7 +430,12 @@ def _compute_derivatives(
     case, branch = Case.of(scene, stated.bar), stated.branch[index].astype(float)
     case = case._replace(path=_SlopedPath(*case.path))
     state = case.assemble(
-        q, case.path.half_angle(q), branch, speed, acceleration, moving=moving
+        q,
+        case.path.half_angle(q),
+        branch,
+        speed,
+        acceleration,
+        moving=moving,
     )
     quantities = {**list_kinematics(case, state, names), **commanded}
     if condition is not None:

@@ -329,7 +329,8 @@ def _find_zeros(curve: CircuitCurve, points: Array) -> _Zeros:
     idle_beside[grid.second] |= grid.idle[grid.first]
     alone = grid.idle & ~idle_beside
     paired = np.bincount(
-        np.concatenate([grid.first, grid.second]), minlength=len(points)
+        np.concatenate([grid.first, grid.second]),
+        minlength=len(points),
     )
     ending = alone & (paired == 1)  # the sweep: nothing beyond shows a sign
     at_end = _Zeros(points[ending], grid.size[ending])
@@ -438,7 +439,9 @@ def _moves(curve: CircuitCurve, points: Array) -> NDArray[np.int8]:
 
 
 def _list_ranges(
-    curve: CircuitCurve, holds: Callable[[Array], NDArray[np.bool_]], points_held: Array
+    curve: CircuitCurve,
+    holds: Callable[[Array], NDArray[np.bool_]],
+    points_held: Array,
 ) -> list[_CircuitRange]:
     """List the ranges within the sweep in which something holds, row by row.
 
@@ -491,7 +494,10 @@ def _list_ranges(
             there, tau[stops], np.remainder(following - tau[stops], TURN), 1.0
         )
         for low, high, count in zip(
-            begin, end, (stops - starts) % len(tau) + 1, strict=True
+            begin,
+            end,
+            (stops - starts) % len(tau) + 1,
+            strict=True,
         ):
             one, stop = (
                 curve.place(point)
@@ -524,7 +530,10 @@ def _is_reached(curve: CircuitCurve, part: _CircuitRange) -> bool:
 
 
 def _find_edge(
-    held: Callable[[Array], NDArray[np.bool_]], tau: Array, gap: Array, sense: float
+    held: Callable[[Array], NDArray[np.bool_]],
+    tau: Array,
+    gap: Array,
+    sense: float,
 ) -> Array:
     """Find where a range ends between a place that is held and a free one.
 
@@ -535,7 +544,9 @@ def _find_edge(
 
 
 def bisect(
-    holds: Callable[[Array], NDArray[np.bool_]], low: Array, high: Array
+    holds: Callable[[Array], NDArray[np.bool_]],
+    low: Array,
+    high: Array,
 ) -> tuple[Array, Array]:
     """Narrow each interval to the two neighbours between which something ends.
 

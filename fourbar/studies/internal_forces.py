@@ -63,7 +63,10 @@ class InternalForces(NamedTuple):
 
 
 def internal_forces(
-    scene: Scene, solution: Solution, bar: int, stations: Array | None = None
+    scene: Scene,
+    solution: Solution,
+    bar: int,
+    stations: Array | None = None,
 ) -> InternalForces:
     """Compute the internal forces of a moving bar.
 
@@ -125,7 +128,10 @@ class _Beam(NamedTuple):
         N, V, M = (np.zeros(x.shape) for _ in range(3))
         end = x + (-SAME_FOOT if before else SAME_FOOT) * self.length
         for foot, force, couple in zip(
-            self.foot.T, self.force.T, self.couple.T, strict=True
+            self.foot.T,
+            self.force.T,
+            self.couple.T,
+            strict=True,
         ):
             acts = foot[:, None] < end
             N -= np.where(acts, force.real[:, None], 0.0)
@@ -203,7 +209,11 @@ class _Recorder(Actions):
         """Point in the bar's axes where a pure couple acts."""
 
     def force(
-        self, bar: int, force: Any, point: Any = 0.0j, beyond: Any = None
+        self,
+        bar: int,
+        force: Any,
+        point: Any = 0.0j,
+        beyond: Any = None,
     ) -> None:
         """Record a force on the bar, world axes."""
         if bar == self.bar:
@@ -312,7 +322,9 @@ def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
 
 
 def _sum_by_foot(
-    items: list[tuple[Any, Any, Any]], zero: Array, same: float
+    items: list[tuple[Any, Any, Any]],
+    zero: Array,
+    same: float,
 ) -> tuple[Array, ComplexArray, Array]:
     """Sum what acts at the same foot at every position.
 

@@ -66,7 +66,9 @@ class SceneNumber(NamedTuple):
 
 
 def _list_entries(
-    description: Any, key: str, place: NumberPath
+    description: Any,
+    key: str,
+    place: NumberPath,
 ) -> dict[str, SceneNumber]:
     """List the entries of the numbers that a description states.
 
@@ -180,7 +182,9 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
     }
     if scene.motion.law is None:
         for field, name in zip(
-            ("speed", "acceleration"), scene.motion.names[1:], strict=True
+            ("speed", "acceleration"),
+            scene.motion.names[1:],
+            strict=True,
         ):
             entries[f"motion.{name}"] = SceneNumber(
                 ("motion", field), scene.motion.numbers[name].unit

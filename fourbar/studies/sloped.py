@@ -95,7 +95,11 @@ class Sloped(NDArrayOperatorsMixin):
         raise LimitError("a number with slopes has no truth value")
 
     def __array_ufunc__(
-        self, function: Any, method: str, *inputs: Any, **options: Any
+        self,
+        function: Any,
+        method: str,
+        *inputs: Any,
+        **options: Any,
     ) -> Any:
         if method != "__call__" or options:
             raise _refuse(f"{function.__name__} with options")
@@ -134,7 +138,11 @@ class Sloped(NDArrayOperatorsMixin):
         return Sloped(size, (along * self.slopes).real)
 
     def __array_function__(
-        self, function: Any, types: Any, args: Sequence[Any], options: Any
+        self,
+        function: Any,
+        types: Any,
+        args: Sequence[Any],
+        options: Any,
     ) -> Any:
         if function not in SLOPED_FUNCTIONS or options:
             raise _refuse(function.__name__)

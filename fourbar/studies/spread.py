@@ -320,7 +320,10 @@ def _make_members(scene: Scene, samples: int, seed: int | np.random.Generator) -
 
 
 def _list_blocks(
-    study: Study, scene: Scene, samples: int, closes: NDArray[np.bool_]
+    study: Study,
+    scene: Scene,
+    samples: int,
+    closes: NDArray[np.bool_],
 ) -> Iterator[tuple[slice, NDArray[np.intp]]]:
     """List blocks of positions with their indices.
 
@@ -376,7 +379,9 @@ def _fill(spread: Spread, columns: slice, sampled: Array) -> None:
             sampled - np.nan_to_num(spread.nominal[columns])
         ).std(axis=0)
         spread.low[columns], spread.high[columns] = np.percentile(
-            sampled, BAND_PERCENTILES, axis=0
+            sampled,
+            BAND_PERCENTILES,
+            axis=0,
         )
         spread.least[columns], spread.greatest[columns] = (
             sampled.min(axis=0),
@@ -384,7 +389,9 @@ def _fill(spread: Spread, columns: slice, sampled: Array) -> None:
         )
         return
     for column, values in zip(
-        range(columns.start, columns.stop), sampled.T, strict=True
+        range(columns.start, columns.stop),
+        sampled.T,
+        strict=True,
     ):
         finite = values[np.isfinite(values)]
         if finite.size > 1:

@@ -274,7 +274,10 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
 
 
 def _list_commands(
-    scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int
+    scene: Scene,
+    numbers: Mapping[str, Array],
+    angles: Array,
+    m: int,
 ) -> Command:
     """Return the command of each member, (m, n).
 
@@ -288,7 +291,9 @@ def _list_commands(
     speed, acceleration = (
         numbers[f"motion.{name}"][:, None] if f"motion.{name}" in numbers else number
         for name, number in zip(
-            scene.motion.names[1:], (motion.speed, motion.acceleration), strict=True
+            scene.motion.names[1:],
+            (motion.speed, motion.acceleration),
+            strict=True,
         )
     )
     if scene.motion.law is not None:
@@ -301,7 +306,12 @@ def _list_commands(
         if scene.motion.law is not None:
             time = np.broadcast_to(motion.time, angle.shape)
         return Command(
-            angle, branch, speed, acceleration, time=time, bar=scene.motion.bar
+            angle,
+            branch,
+            speed,
+            acceleration,
+            time=time,
+            bar=scene.motion.bar,
         )
     varied = replace_numbers(
         scene, {key: array[:, None] for key, array in numbers.items()}

@@ -89,7 +89,9 @@ def _change_kind(kind: tuple[str, bool], settings: Settings) -> Settings:
 
 
 def try_all_settings(
-    setup: TrialSetup, error: float, costs: Mapping[tuple[str, bool], float]
+    setup: TrialSetup,
+    error: float,
+    costs: Mapping[tuple[str, bool], float],
 ) -> float | None:
     """Try every integrator, with and without pads, over time constants and steps.
 
@@ -114,7 +116,11 @@ def try_all_settings(
 
 
 def _find_least_steps(
-    setup: TrialSetup, kind: tuple[str, bool], tc: float, most: float, error: float
+    setup: TrialSetup,
+    kind: tuple[str, bool],
+    tc: float,
+    most: float,
+    error: float,
 ) -> int | None:
     """Find the least steps of the ladder, fewer than `most`, that serve."""
     n = FEWEST_STEPS
@@ -131,7 +137,11 @@ def _find_least_steps(
 
 
 def _serves(
-    setup: TrialSetup, kind: tuple[str, bool], tc: float, steps: float, error: float
+    setup: TrialSetup,
+    kind: tuple[str, bool],
+    tc: float,
+    steps: float,
+    error: float,
 ) -> bool:
     per_run = setup.steps(make_settings(1000.0, tc)) / 1000.0
     trial = setup.try_out(_change_kind(kind, make_settings(steps / per_run, tc)))
@@ -208,7 +218,9 @@ def _make_denser(scene: Scene, times: int) -> Scene:
 
 
 def measure_case(
-    seed: int, index: int, costs: dict[tuple[str, bool], float]
+    seed: int,
+    index: int,
+    costs: dict[tuple[str, bool], float],
 ) -> AdviceCase:
     """Ask for advice, judge it at denser positions, and search exhaustively."""
     scene, required = draw_advised_scene(seed, index)

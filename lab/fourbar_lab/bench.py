@@ -266,7 +266,10 @@ def _make_floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
 
 @click.command()
 @click.option(
-    "--positions", default=1_000_000, show_default=True, type=click.IntRange(1000)
+    "--positions",
+    default=1_000_000,
+    show_default=True,
+    type=click.IntRange(1000),
 )
 @click.option("--rounds", default=5, show_default=True, type=click.IntRange(1))
 @click.option(
@@ -294,7 +297,9 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> in
         arguments += ["--picture", picture] if picture is not None else []
         line = [sys.executable, "-m", "fourbar_lab", "bench", *map(str, arguments)]
         status = subprocess.run(
-            line, env=os.environ | dict.fromkeys(ONE_THREAD, "1"), check=False
+            line,
+            env=os.environ | dict.fromkeys(ONE_THREAD, "1"),
+            check=False,
         ).returncode
         return status if status >= 0 else BROKEN  # below 0: a signal ended it
     measurement = measure_speed(positions, rounds, largest)

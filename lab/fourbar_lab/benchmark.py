@@ -200,7 +200,11 @@ class Benchmark:
             )
 
     def _ask_engine(
-        self, entry: Entry, hello: dict[str, Any], setting: str, running: Running
+        self,
+        entry: Entry,
+        hello: dict[str, Any],
+        setting: str,
+        running: Running,
     ) -> None:
         """Ask an engine in one setting every problem."""
         way = "" if entry.setting else setting
@@ -305,7 +309,10 @@ class Benchmark:
         return {**result, "file": file.relative_to(self.out)}
 
     def _judge(
-        self, problem: dict[str, Any], result: dict[str, Any], cell: _MatrixCell
+        self,
+        problem: dict[str, Any],
+        result: dict[str, Any],
+        cell: _MatrixCell,
     ) -> None:
         """Judge one result; of several timesteps the finest that is answered stands."""
         if "answers" not in result:
@@ -550,7 +557,8 @@ def _ask_question(running: Running, question: dict[str, Any]) -> dict[str, Any]:
 
 
 def compare_slopes(
-    problem: dict[str, Any], slopes: Iterable[Any]
+    problem: dict[str, Any],
+    slopes: Iterable[Any],
 ) -> list[tuple[str, dict[str, str]]]:
     """Compare derivatives of the torque with those of the formulas.
 
@@ -568,7 +576,9 @@ def compare_slopes(
                     float(way[key]) for key in scene.motion.names
                 )
                 motion = scene.motion.replace(
-                    angle=angle, speed=speed, acceleration=acceleration
+                    angle=angle,
+                    speed=speed,
+                    acceleration=acceleration,
                 )
                 ours = sensitivity(replace(scene, motion=motion))
                 pairs = {"torque": (way["torque"], ours.value("torque"))}
@@ -621,7 +631,11 @@ def _find_order(runs: list[BenchmarkRun]) -> float | None:
     help="A file like engines.toml, whose engines alone are asked.",
 )
 @click.option(
-    "--problem", "problems", multiple=True, metavar="NAME", help="These alone (repeat)."
+    "--problem",
+    "problems",
+    multiple=True,
+    metavar="NAME",
+    help="These alone (repeat).",
 )
 @click.option(
     "-o",
@@ -631,10 +645,16 @@ def _find_order(runs: list[BenchmarkRun]) -> float | None:
     show_default=True,
 )
 @click.option(
-    "--time-limit", default=600.0, show_default=True, help="Seconds for each question."
+    "--time-limit",
+    default=600.0,
+    show_default=True,
+    help="Seconds for each question.",
 )
 def benchmark_command(
-    engines: Path | None, problems: tuple[str, ...], out: Path, time_limit: float
+    engines: Path | None,
+    problems: tuple[str, ...],
+    out: Path,
+    time_limit: float,
 ) -> None:
     """Ask every engine every problem of models/problems.
 

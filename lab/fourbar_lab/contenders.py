@@ -69,7 +69,8 @@ class _Peers(NamedTuple):
 
 
 def make_example(
-    linkage: FourBar = CONTENDED_LINKAGE, theta_2: float | None = 0.0
+    linkage: FourBar = CONTENDED_LINKAGE,
+    theta_2: float | None = 0.0,
 ) -> Scene:
     """Build the scene that is timed.
 
@@ -96,7 +97,9 @@ def allocate(names: Iterable[str], command: Command) -> dict[str, Array]:
 
 
 def time_interleaved(
-    actions: Mapping[str, Callable[[], object]], rounds: int, calls: int = 1
+    actions: Mapping[str, Callable[[], object]],
+    rounds: int,
+    calls: int = 1,
 ) -> dict[str, float]:
     """Time a call of each action in turn, in CPU seconds.
 
@@ -137,7 +140,9 @@ def _make_solve_loop() -> TimedLoop:
             row = next(rows)
             into[name] = out[row : next(rows) + 1].T if name in VECTORS else out[row]
         solve(
-            scene, at=command_positions(len(theta_2))._replace(angle=theta_2), out=into
+            scene,
+            at=command_positions(len(theta_2))._replace(angle=theta_2),
+            out=into,
         )
 
     return call
@@ -161,7 +166,11 @@ def _compile_loop() -> TimedLoop | str:
             "-lm",
         ]
         made = subprocess.run(
-            line, capture_output=True, encoding="utf-8", errors="replace", check=False
+            line,
+            capture_output=True,
+            encoding="utf-8",
+            errors="replace",
+            check=False,
         )
         if made.returncode != 0:
             return (
@@ -214,7 +223,8 @@ def time_linkages(largest: int, rounds: int) -> Times:
     def looped(lengths: Any) -> None:
         for length in lengths.tolist():
             linkage = replace(
-                scene.linkage, coupler=replace(scene.linkage.coupler, length=length)
+                scene.linkage,
+                coupler=replace(scene.linkage.coupler, length=length),
             )
             solve(replace(scene, linkage=linkage))
 

@@ -38,7 +38,10 @@ EFFECTS: dict[str, kinds.Effect | None] = {
     "friction": kinds.Friction.at(O2=0.01, A=0.01, O4=0.01),
     "friction at pin B": kinds.Friction.at(B=0.01),
     "pin_friction": kinds.PinFriction.at(
-        O2=(0.1, 0.01), A=(0.1, 0.01), B=(0.1, 0.01), O4=(0.1, 0.01)
+        O2=(0.1, 0.01),
+        A=(0.1, 0.01),
+        B=(0.1, 0.01),
+        O4=(0.1, 0.01),
     ),
     "torsion": kinds.Torsion.at(O4=(2.0, 1.9, 0.1)),
     "springs": kinds.Springs(
@@ -225,7 +228,8 @@ def list_cost_rows(costs: Iterable[EffectCost]) -> tuple[list[str], list[list[st
 
 
 def list_pairs(
-    engines: tuple[str, ...], effects: tuple[str, ...]
+    engines: tuple[str, ...],
+    effects: tuple[str, ...],
 ) -> list[tuple[str, str]]:
     """Pair each engine with each effect that it has.
 
@@ -282,7 +286,9 @@ def effects(engines: str, only: str | None, out: Path | None) -> int:
     costs = [
         measure_effect(*pair)
         for pair in track(
-            list_pairs(wanted, chosen), description="timing", transient=True
+            list_pairs(wanted, chosen),
+            description="timing",
+            transient=True,
         )
     ]
     columns, rows = list_cost_rows(costs)

@@ -327,7 +327,10 @@ def tables(rng: np.random.Generator) -> Scene:
     )
     motion = scene.motion.replace(angle=angle + math.tau * turns)
     return replace(
-        scene, linkage=replace(linkage, ground_angle=0.0), loads=(load,), motion=motion
+        scene,
+        linkage=replace(linkage, ground_angle=0.0),
+        loads=(load,),
+        motion=motion,
     )
 
 
@@ -375,7 +378,10 @@ def strokes(rng: np.random.Generator) -> Scene:
 
 
 def _put_cylinder(
-    scene: Scene, rng: np.random.Generator, one: int, other: int
+    scene: Scene,
+    rng: np.random.Generator,
+    one: int,
+    other: int,
 ) -> Scene:
     start, end = (_draw_place(bar, rng, 0.05) for bar in (one, other))
     return replace(scene, drive_bar=None, drive=LinearDrive(start, end))  # type: ignore[arg-type]

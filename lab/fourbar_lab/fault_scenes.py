@@ -58,15 +58,24 @@ POINTS_OF_BARS = (
     Point("R", 2, (0.03, 0.2)),
 )
 CRANK_ROCKER = Scene(
-    CRANK_ROCKER_LINKAGE, MOTION_OF_A_TURN, 2, LOADS, (_WEIGHT,), points=POINTS_OF_BARS
+    CRANK_ROCKER_LINKAGE,
+    MOTION_OF_A_TURN,
+    2,
+    LOADS,
+    (_WEIGHT,),
+    points=POINTS_OF_BARS,
 )
 FAULT_SCENES: dict[str, Scene] = {
     "crank-rocker": CRANK_ROCKER,
     "coupler driven": replace(
-        CRANK_ROCKER, motion=MOTION_OF_A_TURN.replace(branch=CROSSED), drive_bar=3
+        CRANK_ROCKER,
+        motion=MOTION_OF_A_TURN.replace(branch=CROSSED),
+        drive_bar=3,
     ),
     "output driven": replace(
-        CRANK_ROCKER, motion=Motion(Sweep(0.5, 1.5, 12), -10.0, 5.0), drive_bar=4
+        CRANK_ROCKER,
+        motion=Motion(Sweep(0.5, 1.5, 12), -10.0, 5.0),
+        drive_bar=4,
     ),
     "cylinder": replace(
         CRANK_ROCKER,
@@ -122,10 +131,15 @@ FAULT_SCENES: dict[str, Scene] = {
     ),
     "slender bars": Scene(_SLENDER, MOTION_OF_A_TURN),
     "drag link": Scene(
-        uniform(0.08, 0.24, 0.2, 0.26), MOTION_OF_A_TURN, 4, effects=(Gravity(),)
+        uniform(0.08, 0.24, 0.2, 0.26),
+        MOTION_OF_A_TURN,
+        4,
+        effects=(Gravity(),),
     ),
     "limited": Scene(
-        ROCKER_CRANK_LINKAGE, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(_WEIGHT,)
+        ROCKER_CRANK_LINKAGE,
+        Motion(Sweep(0.3, 1.4, 22), 3.0),
+        effects=(_WEIGHT,),
     ),
     "parallelogram": Scene(
         FourBar(0.3, Bar(0.1, 0.2), Bar(0.3, 0.5), Bar(0.1, 0.4)),
@@ -149,7 +163,9 @@ FAULT_SCENES: dict[str, Scene] = {
         effects=(_WEIGHT,),
     ),
     "a hair from a limit": Scene(
-        ROCKER_CRANK_LINKAGE, Motion(FromLimit(1, 1e-9), 1.0), effects=(_WEIGHT,)
+        ROCKER_CRANK_LINKAGE,
+        Motion(FromLimit(1, 1e-9), 1.0),
+        effects=(_WEIGHT,),
     ),
     "positions": Scene(CRANK_ROCKER_LINKAGE, Motion(Sweep(0.0, 6.0, 12))),
     "damped": replace(
@@ -186,7 +202,8 @@ FAULT_SCENES: dict[str, Scene] = {
         ),
     ),
     "flywheel": replace(
-        CRANK_ROCKER, effects=(Flywheel(0.003, 2), Torsion.at(A=(0.5, 0.2, 0.1)))
+        CRANK_ROCKER,
+        effects=(Flywheel(0.003, 2), Torsion.at(A=(0.5, 0.2, 0.1))),
     ),
     "wound": Scene(
         CRANK_ROCKER_LINKAGE,
@@ -194,10 +211,13 @@ FAULT_SCENES: dict[str, Scene] = {
         effects=(Torsion.at(O2=(0.5, 1.0, 0.1)),),
     ),
     "sliding pins": replace(
-        CRANK_ROCKER, effects=(_WEIGHT, PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03)))
+        CRANK_ROCKER,
+        effects=(_WEIGHT, PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03))),
     ),
     "one sliding pin": replace(
-        CRANK_ROCKER, effects=(_WEIGHT, PinFriction.at(B=(0.3, 0.03))), drive_bar=4
+        CRANK_ROCKER,
+        effects=(_WEIGHT, PinFriction.at(B=(0.3, 0.03))),
+        drive_bar=4,
     ),
     "at rest": Scene(
         CRANK_ROCKER_LINKAGE,
@@ -249,7 +269,9 @@ FAULT_SCENES: dict[str, Scene] = {
         Motion(law=Law((0.0, 0.3, 0.7, 1.0, 1.4), (0.3, 1.0, 2.2, 3.0, 3.3), 16)),
     ),
     "released": Scene(
-        CRANK_ROCKER_LINKAGE, Motion(1.0, 3.0, free=Free(0.5, 50)), effects=(_WEIGHT,)
+        CRANK_ROCKER_LINKAGE,
+        Motion(1.0, 3.0, free=Free(0.5, 50)),
+        effects=(_WEIGHT,),
     ),
     "released, damped": Scene(
         CRANK_ROCKER_LINKAGE,
@@ -337,10 +359,15 @@ FAULT_SCENES: dict[str, Scene] = {
         effects=(_WEIGHT,),
     ),
     "derived": Scene(
-        _SLENDER, MOTION_OF_A_TURN, effects=(_WEIGHT,), points=POINTS_OF_BARS
+        _SLENDER,
+        MOTION_OF_A_TURN,
+        effects=(_WEIGHT,),
+        points=POINTS_OF_BARS,
     ),
     "derived, limited": Scene(
-        ROCKER_CRANK_LINKAGE, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(_WEIGHT,)
+        ROCKER_CRANK_LINKAGE,
+        Motion(Sweep(0.3, 1.4, 22), 3.0),
+        effects=(_WEIGHT,),
     ),
     "derived, loaded": Scene(_SLENDER, MOTION_OF_A_TURN, 2, LOADS, (_WEIGHT,)),
     "simulated": Scene(

@@ -123,7 +123,9 @@ def _try_every_fault(workers: int) -> Iterator[tuple[str, str | None]]:
         for start in range(0, len(entries), FAULTS_OF_A_PROCESS)
     ]
     for chunk, outcomes in zip(
-        chunks, apply_each(try_in_turn, chunks, workers), strict=True
+        chunks,
+        apply_each(try_in_turn, chunks, workers),
+        strict=True,
     ):
         for number, outcome in zip(chunk, outcomes, strict=True):
             why = explain_survival(entries[number], outcome)

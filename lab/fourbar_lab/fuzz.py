@@ -171,7 +171,9 @@ def _draw_fuzzed_lengths(rng: np.random.Generator, hard: bool) -> Any:
 
 
 def _draw_fuzzed_angles(
-    rng: np.random.Generator, hard: bool, lengths: tuple[float, ...]
+    rng: np.random.Generator,
+    hard: bool,
+    lengths: tuple[float, ...],
 ) -> Any:
     """Draw theta_2 - theta_1, anywhere or at a special place.
 
@@ -255,7 +257,9 @@ def _list_simpler(lines: list[str], number: int) -> Iterator[list[str]]:
 
 
 def keep_counterexample(
-    scene: Scene, name: str, folder: Path = COUNTEREXAMPLES
+    scene: Scene,
+    name: str,
+    folder: Path = COUNTEREXAMPLES,
 ) -> Path:
     """Write a counter-example where the tests find it."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -337,7 +341,11 @@ def _check_engines(question: Question) -> list[str]:
             engine.name == "pinocchio-inverse" and answer.refusal is None
         ):  # the quicker of two exact engines
             rows += check_statements(
-                "", scene, engine.start(), answer, predicted=held.predicted
+                "",
+                scene,
+                engine.start(),
+                answer,
+                predicted=held.predicted,
             )
     # half of the scenes are drawn where doubles have few digits: that they are
     # undecided is no fault
@@ -357,7 +365,10 @@ def _find_lost(_: int, error: BaseException, __: object) -> list[str]:
 
 
 def examine_scenes(
-    count: int, seed: int, out: Path, workers: int
+    count: int,
+    seed: int,
+    out: Path,
+    workers: int,
 ) -> Iterator[dict[str, list[str]]]:
     """Examine the scenes chunk by chunk, what is wrong by number.
 
@@ -399,7 +410,11 @@ def examine_scenes(
 )
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0))
 @click.option(
-    "--workers", default=2, show_default=True, type=click.IntRange(1), help="Processes."
+    "--workers",
+    default=2,
+    show_default=True,
+    type=click.IntRange(1),
+    help="Processes.",
 )
 @click.option(
     "-o",

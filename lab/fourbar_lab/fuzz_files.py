@@ -82,7 +82,9 @@ that other formats would run.
 
 
 def _mutate_files(
-    seed: int, indices: Sequence[int], originals: Sequence[str]
+    seed: int,
+    indices: Sequence[int],
+    originals: Sequence[str],
 ) -> Iterator[tuple[int, str]]:
     """Mutate scene files; each depends on (seed, index) alone."""
     for index in indices:
@@ -171,7 +173,9 @@ def fuzz_files(count: int, seed: int) -> int:
     originals = [file.read_text(encoding="utf-8") for file in list_model_files()]
     failed = 0
     for index, text in track(
-        _mutate_files(seed, range(count), originals), total=count, description="mutants"
+        _mutate_files(seed, range(count), originals),
+        total=count,
+        description="mutants",
     ):
         if what := try_out(text):
             failed += 1

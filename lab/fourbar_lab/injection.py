@@ -79,7 +79,10 @@ class _FaultFinder(importlib.abc.MetaPathFinder):
         """Modules that are not loaded yet."""
 
     def find_spec(
-        self, fullname: str, path: Any, target: Any = None
+        self,
+        fullname: str,
+        path: Any,
+        target: Any = None,
     ) -> importlib.machinery.ModuleSpec | None:
         """Find a module with the fault, or None."""
         if fullname not in self.texts:
@@ -122,7 +125,10 @@ def _list_failing(names: list[str]) -> dict[str, list[str]]:
             offered = ENGINES
         engines = [engine for engine in offered if simulated or not engine.through_time]
         rows = judge(
-            name, FAULT_SCENES[name], engines, derived=name.startswith("derived")
+            name,
+            FAULT_SCENES[name],
+            engines,
+            derived=name.startswith("derived"),
         ).rows
         failing[name] = [
             f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.failed

@@ -260,7 +260,9 @@ def is_changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
 
 
 def is_caught(
-    scene: Scene, command: Command, answers: list[tuple[Engine, Answer]]
+    scene: Scene,
+    command: Command,
+    answers: list[tuple[Engine, Answer]],
 ) -> bool:
     """Check a scene: whether any comparison or identity fails."""
     question = Question("", scene, command)
@@ -363,7 +365,9 @@ def mutants_command(module: str | None, most: int) -> int:
             chosen = [
                 chosen[i]
                 for i in np.random.default_rng(0).choice(
-                    len(chosen), most, replace=False
+                    len(chosen),
+                    most,
+                    replace=False,
                 )
             ]
         verdicts = [

@@ -185,7 +185,10 @@ def _read_commanded(solution: Solution, bar: int) -> tuple[float, float, float, 
 
 
 def _judge_task(
-    seed: int, bar: int, derivatives: bool, task: tuple[str, range]
+    seed: int,
+    bar: int,
+    derivatives: bool,
+    task: tuple[str, range],
 ) -> Tally:
     return judge_samples(*task, seed, bar, derivatives=derivatives)
 
@@ -243,7 +246,9 @@ def stability(
     results = apply_each(partial(_judge_task, seed, bar, derivatives), tasks, jobs)
     tallies = {family: Tally() for family in chosen}
     for (family, _), tally in track(
-        zip(tasks, results, strict=True), "samples", total=len(tasks)
+        zip(tasks, results, strict=True),
+        "samples",
+        total=len(tasks),
     ):
         tallies[family].add(tally)
     rows = []

@@ -106,7 +106,10 @@ def list_components(name: str) -> list[tuple[str, Any]]:
 
 
 def error_over_allowed(
-    name: str, ours: float, value: Any, sensitivity: float
+    name: str,
+    ours: float,
+    value: Any,
+    sensitivity: float,
 ) -> tuple[float, float]:
     """Compute an error over what is allowed, and the error.
 

@@ -105,7 +105,8 @@ def _measure_formulas(worlds: int) -> WorldsCost:
     """Time the formulas at as many positions, into arrays that exist."""
     _, scene, command = _read_question()
     repeated = command._replace(
-        angle=np.resize(command.angle, worlds), branch=np.resize(command.branch, worlds)
+        angle=np.resize(command.angle, worlds),
+        branch=np.resize(command.branch, worlds),
     )
     into = allocate(UNKNOWNS, repeated)
     call = partial(solve, scene, at=repeated, out=into)
@@ -142,7 +143,8 @@ def load_simulator(adapter: str) -> Any:
 
 
 def _judge_forces(
-    problem: dict[str, Any], result: dict[str, Any]
+    problem: dict[str, Any],
+    result: dict[str, Any],
 ) -> tuple[float, float]:
     """Return the errors of the torque and of the worst pin force."""
     errors = {row.quantity: row.error for row in judge_answers(problem, result)}
@@ -220,10 +222,16 @@ def _read_worlds(text: str, positions: int) -> list[int]:
 
 @click.command(name="worlds")
 @click.option(
-    "--worlds", metavar="NUMBERS", default=_WORLDS, show_default=True, help="Worlds."
+    "--worlds",
+    metavar="NUMBERS",
+    default=_WORLDS,
+    show_default=True,
+    help="Worlds.",
 )
 @click.option(
-    "--any-device", is_flag=True, help="Run MJX and MuJoCo Warp without a GPU too."
+    "--any-device",
+    is_flag=True,
+    help="Run MJX and MuJoCo Warp without a GPU too.",
 )
 @click.option(
     "-o",

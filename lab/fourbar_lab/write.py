@@ -42,12 +42,17 @@ def _is_same_model(one: str, other: str) -> bool:
     if NUMBER_IN_AN_MJCF.split(one) != NUMBER_IN_AN_MJCF.split(other):
         return False
     numbers = zip(
-        NUMBER_IN_AN_MJCF.findall(one), NUMBER_IN_AN_MJCF.findall(other), strict=True
+        NUMBER_IN_AN_MJCF.findall(one),
+        NUMBER_IN_AN_MJCF.findall(other),
+        strict=True,
     )
     return all(
         a == b
         or math.isclose(
-            float(a), float(b), rel_tol=STATE_ROUND_OFF, abs_tol=STATE_ROUND_OFF
+            float(a),
+            float(b),
+            rel_tol=STATE_ROUND_OFF,
+            abs_tol=STATE_ROUND_OFF,
         )
         for a, b in numbers
     )

@@ -60,7 +60,8 @@ def test_the_section_modulus_is_that_of_the_second_moment_of_area() -> None:
     ],
 )
 def test_a_material_that_states_no_mass_is_refused(
-    stated: dict[str, object], key: str
+    stated: dict[str, object],
+    key: str,
 ) -> None:
     with pytest.raises(InputError) as error:
         Bar(0.4, **stated)  # type: ignore[arg-type]

@@ -144,7 +144,10 @@ def scenes(draw: st.DrawFn) -> Scene:
         per_pin.map(lambda pins: Viscous.at(**pins)),
         per_pin.map(lambda pins: Friction.at(**pins)),
         st.dictionaries(
-            st.sampled_from(list(PINS)), st.tuples(sizes, sizes), min_size=1, max_size=2
+            st.sampled_from(list(PINS)),
+            st.tuples(sizes, sizes),
+            min_size=1,
+            max_size=2,
         ).map(lambda pins: PinFriction.at(**pins)),
         st.dictionaries(
             st.sampled_from(list(PINS)),
@@ -174,7 +177,8 @@ def scenes(draw: st.DrawFn) -> Scene:
 @EXAMPLES
 @given(scenes(), st.sampled_from(STAGES))
 def test_where_the_status_is_ok_every_requested_quantity_is_a_number(
-    scene: Scene, stage: str
+    scene: Scene,
+    stage: str,
 ) -> None:
     solution = solved(scene, stage)
     assert without_value(solution) == {}
@@ -197,7 +201,9 @@ CRANK_ROCKER = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
     ("linkage", "branch", "drive_bar"), [(PARALLELOGRAM, 1, 3), (KITE, -1, 4)]
 )
 def test_a_bar_that_does_not_turn_takes_no_torque(
-    linkage: fourbar.FourBar, branch: int, drive_bar: int
+    linkage: fourbar.FourBar,
+    branch: int,
+    drive_bar: int,
 ) -> None:
     """T3 of a parallelogram and T4 of a folded kite are tested.
 
@@ -291,7 +297,8 @@ def test_where_it_depends_on_the_position_only_those_positions_are_lost() -> Non
 @pytest.mark.parametrize("omega", [1.4e154, -1e200, 1.7e308])
 def test_a_speed_whose_square_is_no_number_is_refused_in_one_line(omega: float) -> None:
     with pytest.raises(
-        InputError, match=r"motion\.omega_2 = .*: must be below 1\.34078e\+154 rad/s"
+        InputError,
+        match=r"motion\.omega_2 = .*: must be below 1\.34078e\+154 rad/s",
     ) as caught:
         Motion(0.3, omega)
     assert "\n" not in str(caught.value)
@@ -375,7 +382,10 @@ bar = {drive_bar}
     ],
 )
 def test_analyze_says_it_in_every_form(
-    changes: dict[str, Any], words: str, tmp_path: Path, capfd: Any
+    changes: dict[str, Any],
+    words: str,
+    tmp_path: Path,
+    capfd: Any,
 ) -> None:
     file = tmp_path / "scene.toml"
     file.write_text(
@@ -404,7 +414,8 @@ def test_analyze_says_it_in_every_form(
 
 
 def test_analyze_refuses_a_speed_without_a_square_in_one_line(
-    tmp_path: Path, capfd: Any
+    tmp_path: Path,
+    capfd: Any,
 ) -> None:
     file = tmp_path / "scene.toml"
     file.write_text(SCENE.format(mass="1 kg", omega="1e200 rad/s", drive_bar=2))
@@ -420,7 +431,8 @@ def test_analyze_refuses_a_speed_without_a_square_in_one_line(
 @pytest.mark.slow
 @pytest.mark.parametrize("figure", ["overview", "torque", "forces", "hodograph"])
 def test_figures_without_a_single_force_are_drawn_without_a_word(
-    figure: str, tmp_path: Path
+    figure: str,
+    tmp_path: Path,
 ) -> None:
     scene = Scene(PARALLELOGRAM, Motion(np.linspace(0.3, 2.0, 5), 1.0), 3)
     with warnings.catch_warnings():
@@ -431,7 +443,8 @@ def test_figures_without_a_single_force_are_drawn_without_a_word(
 def test_free_bodies_without_forces_are_refused_with_the_reason(tmp_path: Path) -> None:
     scene = Scene(PARALLELOGRAM, Motion(np.array([0.3]), 1.0), 3)
     with pytest.raises(
-        InputError, match=r"freebody.*no value at theta_2 = 17\.1887 deg: no_torque"
+        InputError,
+        match=r"freebody.*no value at theta_2 = 17\.1887 deg: no_torque",
     ):
         draw(scene, tmp_path / "figure.svg", "freebody")
     assert list(tmp_path.iterdir()) == []

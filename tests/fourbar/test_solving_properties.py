@@ -82,7 +82,9 @@ def scenes(draw: st.DrawFn, effects: bool = True) -> Scene:
     if effects and draw(st.booleans()):
         terms.append(
             Viscous.at(
-                O2=draw(between(0, 1)), B=draw(between(0, 1)), O4=draw(between(0, 1))
+                O2=draw(between(0, 1)),
+                B=draw(between(0, 1)),
+                O4=draw(between(0, 1)),
             )
         )
     omega = draw(st.sampled_from([-1.0, 1.0])) * draw(between(0.5, 20.0))
@@ -321,7 +323,10 @@ def test_mirror_symmetry(scene: Scene) -> None:
 @EXAMPLES
 @given(scenes(), st.integers(-20, 20), st.integers(-20, 20), st.integers(-20, 20))
 def test_length_mass_and_time_scale(
-    scene: Scene, length: int, mass: int, time: int
+    scene: Scene,
+    length: int,
+    mass: int,
+    time: int,
 ) -> None:
     """By powers of two, which round nothing.
 
@@ -393,7 +398,8 @@ def test_time_reversal(scene: Scene) -> None:
     The same forces, without what depends on the sense of motion.
     """
     still = replace(
-        scene, effects=tuple(e for e in scene.effects if isinstance(e, Gravity))
+        scene,
+        effects=tuple(e for e in scene.effects if isinstance(e, Gravity)),
     )
     back = replace(still, motion=still.motion.replace(speed=-still.motion.omega_2))
     ours, of_back = fourbar.solve(still), fourbar.solve(back)
@@ -469,7 +475,9 @@ def test_relabelled_from_the_other_end(scene: Scene) -> None:
         if load.from_centre is not None:
             r, phi = load.from_centre
             return replace(
-                load, force=(size, direction), from_centre=(r, phi + math.pi)
+                load,
+                force=(size, direction),
+                from_centre=(r, phi + math.pi),
             )
         if load.from_pin is not None:
             x, y = place_from_B(*load.from_pin)

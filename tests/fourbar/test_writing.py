@@ -23,7 +23,8 @@ def mode(path: Path) -> int:
 
 @pytest.mark.parametrize("before", [0o600, 0o640, 0o664, 0o755], ids=oct)
 def test_an_existing_file_keeps_its_mode_and_a_new_one_is_an_ordinary_file(
-    tmp_path: Path, before: int
+    tmp_path: Path,
+    before: int,
 ) -> None:
     path = tmp_path / "a"
     write_bytes(path, b"new")

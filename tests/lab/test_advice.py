@@ -50,7 +50,9 @@ def hopeless(scene: fourbar.Scene) -> object:
 
 @pytest.mark.slow
 def test_a_count_that_cannot_decide_says_which_one_can(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     case = advice.AdviceCase(0, 1e-3, True, 5e-4, 20.0, 19.0)
     monkeypatch.setattr(

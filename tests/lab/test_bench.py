@@ -108,7 +108,9 @@ def test_what_is_missing_is_named_with_its_reason(
 @pytest.mark.parametrize("name", bench.SPEED_LIMITS)
 @pytest.mark.parametrize("spoiled", [math.nan, "beyond", None])
 def test_what_is_beyond_its_limit_fails_with_the_reason(
-    name: str, spoiled: float | str | None, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    spoiled: float | str | None,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     rows = {what: limit.bound for what, limit in bench.SPEED_LIMITS.items()} | {
         "all, 1000 positions": 100.0

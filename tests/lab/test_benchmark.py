@@ -163,7 +163,9 @@ def test_a_row_names_its_version_before_its_way() -> None:
     ],
 )
 def test_entries_that_cannot_be_read_are_named_in_one_line(
-    text: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    text: str | None,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     if text is not None:
         (tmp_path / "engines.toml").write_text(text)

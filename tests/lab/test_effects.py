@@ -51,7 +51,9 @@ def test_a_workload_with_twice_the_work_costs_twice_as_much(
 
 
 def test_the_table_has_a_row_for_each_effect_and_flag(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(
         effects,
@@ -77,7 +79,8 @@ def test_the_table_has_a_row_for_each_effect_and_flag(
 
 
 def test_an_engine_that_is_missing_is_named(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(registry, "find_missing", lambda _: "mujoco is not installed")
     assert status(["effects", "--engines", "formulas,mujoco-inverse"]) == BROKEN

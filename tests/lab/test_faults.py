@@ -96,7 +96,8 @@ FIRST_OF_FOLDERS = {
     ],
 )
 def test_a_fault_of_what_judges_falls_in_the_tests_of_its_folder(
-    number: int, monkeypatch: pytest.MonkeyPatch
+    number: int,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """How soon they fail is for `python -m fourbar_lab faults`.
 

@@ -33,7 +33,9 @@ SEED = 0
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "path", sorted(COUNTEREXAMPLES.glob("*.toml")), ids=lambda path: path.stem
+    "path",
+    sorted(COUNTEREXAMPLES.glob("*.toml")),
+    ids=lambda path: path.stem,
 )
 def test_a_kept_counterexample_holds(path: Path) -> None:
     assert examine.list_findings(loads(path.read_text(encoding="utf-8"))) == []
@@ -77,12 +79,14 @@ def small_error(true: object) -> object:
 
 
 def test_an_error_of_a_billionth_is_found_and_shrunk(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
     solving = import_module("fourbar.evaluation.case")
     monkeypatch.setattr(solving, "pin_forces", small_error(solving.pin_forces))
     scene = replace(
-        crank_rocker(), motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0)
+        crank_rocker(),
+        motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0),
     )
     assert examine.list_findings(scene)
     small = shrink_scene(
@@ -95,7 +99,8 @@ def test_an_error_of_a_billionth_is_found_and_shrunk(
 
 def test_a_limit_off_by_a_billionth_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = replace(
-        crank_rocker(), motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0)
+        crank_rocker(),
+        motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0),
     )
     assert examine.list_findings(scene) == []
     true = fourbar.formulas.mobility.limit_positions
@@ -112,7 +117,9 @@ def test_a_limit_off_by_a_billionth_is_found(monkeypatch: pytest.MonkeyPatch) ->
 
 @pytest.mark.parametrize(("times", "found"), [(9.0, False), (11.0, True)])
 def test_a_force_that_vanishes_is_held_to_its_prediction(
-    monkeypatch: pytest.MonkeyPatch, times: float, found: bool
+    monkeypatch: pytest.MonkeyPatch,
+    times: float,
+    found: bool,
 ) -> None:
     """Relative to 0 no error has a size.
 
@@ -163,7 +170,8 @@ def test_a_position_that_does_not_close_is_a_finding(
 
 @pytest.mark.slow
 def test_an_interrupted_run_goes_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("fourbar_lab.fuzz.SCENES_OF_A_CHUNK", 4)
     first = examine_scenes(12, 1, tmp_path, 1)
@@ -178,7 +186,8 @@ def test_an_interrupted_run_goes_on(
 
 @pytest.mark.slow
 def test_a_scene_that_kills_its_worker_costs_itself_alone(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(examine, "examine_scene", dies_in_scene_2)
     (finding,) = examine_scenes(4, 1, tmp_path, 1)

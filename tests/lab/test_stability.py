@@ -97,7 +97,8 @@ def tallies() -> dict[str, Tally]:
 @pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILY_DRAWERS)
 def test_every_output_is_within_what_the_inputs_last_digits_do(
-    family: str, tallies: dict[str, Tally]
+    family: str,
+    tallies: dict[str, Tally],
 ) -> None:
     tally = tallies[family]
     assert tally.samples == SAMPLES
@@ -110,7 +111,8 @@ def test_every_output_is_within_what_the_inputs_last_digits_do(
 @pytest.mark.parametrize("bar", [3, 4])
 @pytest.mark.parametrize("family", FAMILY_DRAWERS)
 def test_fed_back_as_a_command_of_another_bar_every_output_returns_within_it_too(
-    family: str, bar: int
+    family: str,
+    bar: int,
 ) -> None:
     tally = judge_samples(family, range(FED_BACK), bar=bar)
     assert tally.samples > FED_BACK / 2 and not tally.not_assembled and not tally.warned

@@ -118,7 +118,9 @@ def test_times_are_divided_by_those_of_the_formulas() -> None:
 
 
 def test_without_a_gpu_nothing_is_claimed_of_one(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(worlds, "load_simulator", lambda _: MujocoFile)
     out = tmp_path / "worlds.md"
@@ -139,7 +141,9 @@ class Elsewhere(MujocoFile):
 
 @pytest.mark.parametrize("on_gpu", [True, False])
 def test_with_a_gpu_or_on_any_device_all_are_run(
-    on_gpu: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    on_gpu: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(Elsewhere, "on_gpu", on_gpu)
     monkeypatch.setattr(worlds, "load_simulator", lambda _: Elsewhere)
@@ -154,7 +158,8 @@ def test_with_a_gpu_or_on_any_device_all_are_run(
 
 
 def test_what_is_not_installed_is_named(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     def refuse(adapter: str) -> type[MujocoFile]:
         if "warp" in adapter:
@@ -167,7 +172,8 @@ def test_what_is_not_installed_is_named(
 
 
 def test_a_call_that_fails_costs_its_own_row(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     def fail(*_: Any) -> None:
         raise MemoryError("out of memory")

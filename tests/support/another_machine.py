@@ -84,7 +84,12 @@ def machine(core: str | None = None) -> str:
     line = [sys.executable, "-c", f"from {__name__} import here; print(here())"]
     changed = os.environ | ({} if core is None else environment(core))
     return subprocess.run(
-        line, cwd=ROOT, env=changed, capture_output=True, text=True, check=True
+        line,
+        cwd=ROOT,
+        env=changed,
+        capture_output=True,
+        text=True,
+        check=True,
     ).stdout.strip()
 
 

@@ -5,7 +5,10 @@ from fourbar_validation.cost.study import STEPPED_MOTION, CostPoint
 
 
 def point(
-    steps: float, worst: float, curve: str = "c", kind: str = STEPPED_MOTION
+    steps: float,
+    worst: float,
+    curve: str = "c",
+    kind: str = STEPPED_MOTION,
 ) -> CostPoint:
     """Return a point with one error of all quantities.
 

@@ -168,7 +168,11 @@ class Equations:
             self.couple[k] += x * fy - y * fx
 
     def start(
-        self, linkage: FourBar, theta_2: float, omega_2: float, branch: int
+        self,
+        linkage: FourBar,
+        theta_2: float,
+        omega_2: float,
+        branch: int,
     ) -> tuple[list[Ball], list[Ball]]:
         """Angles and speeds; not at a limit position."""
         x = dict(zip(("d", "a", "b", "c"), self.lengths, strict=True))

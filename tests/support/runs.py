@@ -23,7 +23,10 @@ HEAD = "scene,engine,setting,positions,seconds,times_formulas\n"
 
 
 def save_run(
-    folder: Path, rows: list[Row], times: str = "", about: About = HERE
+    folder: Path,
+    rows: list[Row],
+    times: str = "",
+    about: About = HERE,
 ) -> Path:
     """Write the folder of a run with these rows.
 

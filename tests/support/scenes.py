@@ -85,12 +85,17 @@ def thesis(theta_2: object = None) -> fourbar.Scene:
     loads += [fourbar.Load(bar, moment=-0.15) for bar in (2, 3, 4)]
     angles = np.radians([135.0]) if theta_2 is None else theta_2
     return fourbar.Scene(
-        linkage, fourbar.Motion(angles, 0.2244), 4, tuple(loads), title="thesis"
+        linkage,
+        fourbar.Motion(angles, 0.2244),
+        4,
+        tuple(loads),
+        title="thesis",
     )  # type: ignore[arg-type]
 
 
 def change_place(
-    load: fourbar.Load, change: Callable[[float, float], tuple[float, float]]
+    load: fourbar.Load,
+    change: Callable[[float, float], tuple[float, float]],
 ) -> dict[str, tuple[float, float]]:
     """Return the place of a load changed, in the form in which it is stated."""
     forms = ("from_pin", "from_centre", "arm")

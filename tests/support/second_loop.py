@@ -102,12 +102,16 @@ class Loop:
         raise AssertionError("the circles do not meet")
 
     def rates(
-        self, angles: Array, omega_2: float, alpha_2: float
+        self,
+        angles: Array,
+        omega_2: float,
+        alpha_2: float,
     ) -> tuple[Array, Array]:
         """Differentiate the closure a e^(i t2) + b e^(i t3) - c e^(i t4) = const. twice."""
         arms = np.array([self.a, self.b, -self.c]) * np.exp(1j * angles)
         matrix = np.array(
-            [(1j * arms[1:]).real, (1j * arms[1:]).imag], dtype=np.float64
+            [(1j * arms[1:]).real, (1j * arms[1:]).imag],
+            dtype=np.float64,
         )
 
         def others(right: complex) -> Array:
@@ -137,7 +141,10 @@ class Loop:
         return sums
 
     def load_vectors(
-        self, load: fourbar.Load, number: int, angles: Array
+        self,
+        load: fourbar.Load,
+        number: int,
+        angles: Array,
     ) -> tuple[complex, complex]:
         """Return a load's force in world axes and its arm from the bar's first pin."""
         turned = complex(np.exp(1j * angles[number]))
@@ -192,7 +199,10 @@ class Loop:
         ]
 
     def right_forces(
-        self, theta_2: float, omega_2: float, alpha_2: float
+        self,
+        theta_2: float,
+        omega_2: float,
+        alpha_2: float,
     ) -> dict[str, Array]:
         """Solve Newton's and Euler's laws of the three bars for F12, F32, F43, F14 and the drive."""
         angles = np.array([theta_2, *self.assemble(theta_2)])
@@ -364,7 +374,9 @@ class Simulation:
         self.probe = mujoco.MjData(self.probed)
 
     def compile(
-        self, wheel: float, carrier: Servo | TurningWheel | None = None
+        self,
+        wheel: float,
+        carrier: Servo | TurningWheel | None = None,
     ) -> mujoco.MjModel:
         """Compile the loop with a flywheel on the crank, or with what else keeps its speed."""
         text = self.loop.write(self.settings, self.timestep, wheel, carrier, self.omega)
@@ -521,7 +533,9 @@ class Simulation:
 
 
 def measure(
-    scene: fourbar.Scene, settings: LoopSettings, settle: bool = False
+    scene: fourbar.Scene,
+    settings: LoopSettings,
+    settle: bool = False,
 ) -> dict[str, float]:
     """Return the worst error of the drive and of each pin's force over its largest value in the sweep."""
     simulation = Simulation(scene, settings)

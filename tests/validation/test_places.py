@@ -20,7 +20,8 @@ from fourbar_validation.places import CHECKOUT, find_program
     ],
 )
 def test_the_command_follows_from_the_file_that_was_started(
-    started: str, program: str
+    started: str,
+    program: str,
 ) -> None:
     assert find_program(started) == program
 
@@ -38,7 +39,8 @@ def test_the_command_follows_from_the_file_that_was_started(
     ],
 )
 def test_help_names_the_command_that_was_typed(
-    command: list[str], program: str
+    command: list[str],
+    program: str,
 ) -> None:
     done = subprocess.run(
         [*command, "-h"],

@@ -131,7 +131,10 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
 
     def solved(*arguments: Any) -> object:
         return fourbar.solve(
-            arguments[0], arguments[1], at=arguments[2], side=arguments[3]
+            arguments[0],
+            arguments[1],
+            at=arguments[2],
+            side=arguments[3],
         )
 
     only_linkage = (
@@ -390,7 +393,8 @@ def spoilt(value: Any, wrong: object) -> Iterator[Any]:
 
 @pytest.mark.slow
 def test_whatever_an_argument_is_the_answer_is_a_value_or_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     table = calls() | calls_by_name()
@@ -456,7 +460,10 @@ def test_the_public_formulas_agree_with_a_solution() -> None:
         + coefficients.second * solution.omega_2**2
     )
     assert np.allclose(
-        np.column_stack([np.real(a), np.imag(a)]), solution.a_G3, rtol=1e-12, atol=1e-12
+        np.column_stack([np.real(a), np.imag(a)]),
+        solution.a_G3,
+        rtol=1e-12,
+        atol=1e-12,
     )
     curve = fourbar.coupler_curve(linkage, z.real, z.imag)
     gap = np.hypot(
@@ -494,7 +501,8 @@ def test_classify_as_json_is_what_the_formulas_say(
 
 def test_a_scene_draws_itself(tmp_path: Path) -> None:
     pytest.importorskip(
-        "matplotlib", reason="drawing needs matplotlib: pip install matplotlib"
+        "matplotlib",
+        reason="drawing needs matplotlib: pip install matplotlib",
     )
     drawing = crank_rocker().plot("torque")  # type: ignore[attr-defined]
     assert drawing._repr_svg_().rstrip().endswith("</svg>")
@@ -536,7 +544,8 @@ def test_scenes_compare_by_value(tmp_path: Path) -> None:
 
 
 def test_loads_without_a_speed_are_pointed_to_the_static_torque(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     save(crank_rocker(motion=fourbar.Motion(1.0)), tmp_path / "still.toml")
     assert status(["analyze", str(tmp_path / "still.toml")]) == 0

@@ -67,7 +67,10 @@ def compute_row(text: str, steps: float, folder: Path) -> WorstErrors:
         steps = 2.0 * math.pi / float(SCENE.motion.omega_2) / DEFAULT_TIMESTEP  # type: ignore[arg-type]
     integrator = text.partition(",")[0]
     settings = replace(
-        BEST, pad=None, integrator=integrator, steps_per_revolution=steps
+        BEST,
+        pad=None,
+        integrator=integrator,
+        steps_per_revolution=steps,
     )
     setup = study.CostStudy("page", SCENE, folder).setup(settled=True)
     trial = setup.try_out(settings, drives.restore_defaults)
@@ -77,7 +80,8 @@ def compute_row(text: str, steps: float, folder: Path) -> WorstErrors:
 
 @pytest.mark.parametrize("row", ROWS, ids=[row[0] for row in ROWS])
 def test_the_errors_of_the_table_are_computed_again(
-    row: list[str], tmp_path: Path
+    row: list[str],
+    tmp_path: Path,
 ) -> None:
     text, steps, torque, force, _ = row
     errors = compute_row(text, float(steps), tmp_path)
@@ -104,7 +108,8 @@ def read_words(svg: str) -> set[str]:
 
 @pytest.mark.slow
 def test_the_pictures_are_those_that_few_points_draw(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(study, "TIMINGS_OF_A_SETTING", 2)
     monkeypatch.setattr(study, "ERRORS_ADVISED", (1e-2, 1e-4))

@@ -79,7 +79,8 @@ def test_the_examples_of_continuous_integration_use_commands_and_options_that_ex
 
 @pytest.mark.slow
 def test_the_run_of_a_pull_request_is_held_against_what_comes_along(
-    checkout: Path, monkeypatch: pytest.MonkeyPatch
+    checkout: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The accepted state of the project is cut down.
 
@@ -141,7 +142,10 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ],
 )
 def test_every_command_prints_what_is_shown(
-    name: str, count: int, checkout: Path, capsys: pytest.CaptureFixture[str]
+    name: str,
+    count: int,
+    checkout: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     sessions = re.findall(
         r"^\$ (.*)\n((?:(?!\$ ).*\n)*)",
@@ -181,21 +185,25 @@ def test_the_programs_print_what_is_shown(name: str, count: int) -> None:
 
 
 def test_the_table_of_the_exercise_is_right(
-    checkout: Path, capsys: pytest.CaptureFixture[str]
+    checkout: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     (table,) = blocks("csv", read("docs/tutorial.md"))
     (checkout / "theirs.csv").write_text(table, encoding="utf-8")
     assert harness(["check", "models/crank_rocker.toml", "theirs.csv"]) == HOLDS
     assert "4 of 4 numbers agree" in capsys.readouterr().out
     (checkout / "theirs.csv").write_text(
-        table.replace("0.4467", "0.4476"), encoding="utf-8"
+        table.replace("0.4467", "0.4476"),
+        encoding="utf-8",
     )
     assert harness(["check", "models/crank_rocker.toml", "theirs.csv"]) == FAILED
 
 
 @pytest.mark.slow
 def test_the_engine_of_the_guide_agrees(
-    checkout: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    checkout: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     (program,) = blocks("python", read("docs/guide-simulator.md"))
     (checkout / "closure.py").write_text(program, encoding="utf-8")
@@ -312,7 +320,8 @@ def test_every_effect_whose_cost_is_counted_can_be_chosen_from_a_list() -> None:
     ("program", "commands"), [("fourbar-validation", COMMANDS), ("fourbar_lab", LABS)]
 )
 def test_every_command_of_harness_and_lab_is_listed(
-    program: str, commands: dict[str, str]
+    program: str,
+    commands: dict[str, str],
 ) -> None:
     table = read("docs/checks.md").partition(f"`{program}` |")[2].partition("\n\n")[0]
     first = "".join(line.split("|")[1] for line in table.splitlines()[2:] if line)
@@ -368,7 +377,9 @@ def test_pages_keep_to_their_length() -> None:
 
 
 @pytest.mark.parametrize(
-    "page", [page for page in PAGES if page.parent == DOCS], ids=lambda page: page.stem
+    "page",
+    [page for page in PAGES if page.parent == DOCS],
+    ids=lambda page: page.stem,
 )
 def test_a_page_begins_with_what_its_reader_can_do(page: Path) -> None:
     title, first = page.read_text(encoding="utf-8").split("\n\n")[:2]
@@ -455,7 +466,9 @@ def test_the_figure_of_the_theory_is_the_one_that_is_drawn() -> None:
     ],
 )
 def test_the_pictures_are_those_that_are_drawn(
-    name: str, options: tuple[str, ...], tmp_path: Path
+    name: str,
+    options: tuple[str, ...],
+    tmp_path: Path,
 ) -> None:
     """Compare what is written in the pictures.
 
@@ -476,7 +489,9 @@ def test_the_pictures_are_those_that_are_drawn(
 
 
 @pytest.mark.parametrize(
-    "path", sorted(DOCS.rglob("*.svg")), ids=lambda path: path.name
+    "path",
+    sorted(DOCS.rglob("*.svg")),
+    ids=lambda path: path.name,
 )
 def test_every_figure_has_a_form_for_dark_pages(path: Path) -> None:
     assert "prefers-color-scheme" in path.read_text(encoding="utf-8")
@@ -536,7 +551,8 @@ def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
     assert fourbar.time_ratio(wiper) == pytest.approx(1.0, rel=1e-8)
     gear = fourbar.solve(load(GALLERY / "landing_gear.toml")).points["foot"]
     assert gear[0] == pytest.approx(
-        [-0.250962, -0.162331], abs=2e-5
+        [-0.250962, -0.162331],
+        abs=2e-5,
     )  # retracted: D of the source
     assert gear[-1] == pytest.approx([0.654038, -1.067331], abs=3e-4)  # plumb under O4
     pump_cranks = (
@@ -545,10 +561,14 @@ def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
         * 60.0
     )
     assert (pump_cranks.min(), pump_cranks.max()) == pytest.approx(
-        (240.0, 375.0), rel=1e-3
+        (240.0, 375.0),
+        rel=1e-3,
     )
     curve = fourbar.coupler_curve(
-        load(GALLERY / "hoecken.toml").linkage, 0.5, 0.0, steps=720
+        load(GALLERY / "hoecken.toml").linkage,
+        0.5,
+        0.0,
+        steps=720,
     )
     straight = curve.y < 0.4015
     assert (
@@ -582,7 +602,8 @@ def test_the_wiper_of_the_page_needs_less_torque_by_other_means(
     )
     assert after < 0.95 * before
     assert fourbar.swing(better.linkage) == pytest.approx(
-        fourbar.swing(scene.linkage), abs=1e-6
+        fourbar.swing(scene.linkage),
+        abs=1e-6,
     )
     worst = fourbar.transmission_extremes(better.linkage).worst
     assert math.degrees(worst) > 40.0 - 1e-3

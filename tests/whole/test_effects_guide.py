@@ -78,7 +78,9 @@ def test_one_file_is_all_that_the_example_needs(latch: Any) -> None:
 
 @pytest.mark.parametrize("method", ["act_on_engine", "act_on_free_bodies", "act"])
 def test_the_test_of_the_page_fails_for_a_mistake_in_one_derivation(
-    latch: Any, method: str, monkeypatch: pytest.MonkeyPatch
+    latch: Any,
+    method: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     right = getattr(latch, method)
 
@@ -120,7 +122,10 @@ def test_the_example_is_read_written_and_agreed_on(latch: Any) -> None:
     [("act_on_engine", ON_TREES), ("act_on_free_bodies", {"free-body"})],
 )
 def test_engines_without_a_model_refuse_the_example(
-    latch: Any, method: str, engines: set[str], monkeypatch: pytest.MonkeyPatch
+    latch: Any,
+    method: str,
+    engines: set[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.delattr(latch, method)
     assert failing(guide_scene(), EXACT) == []
@@ -141,7 +146,8 @@ def test_mjcf_has_no_counterpart_of_the_example_and_refuses_it(latch: Any) -> No
 
 
 def test_without_its_size_nothing_is_judged_by_another_scale(
-    latch: Any, monkeypatch: pytest.MonkeyPatch
+    latch: Any,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.delattr(latch, "size")
     rows = judge("scene", guide_scene(), EXACT).rows
@@ -150,7 +156,8 @@ def test_without_its_size_nothing_is_judged_by_another_scale(
 
 
 def test_without_its_file_a_scene_neither_reads_nor_writes_the_example(
-    latch: Any, monkeypatch: pytest.MonkeyPatch
+    latch: Any,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     scene = guide_scene()
     monkeypatch.setattr(effects, "list_further", dict)
@@ -174,7 +181,9 @@ def test_the_drive_makes_up_for_what_the_example_takes(latch: Any) -> None:
     assert 2 <= np.count_nonzero(couple) < 20 and couple.min() < 0.0 < couple.max()
     power = -couple * motion["omega_4"]
     assert (with_it - without) * 10.0 == pytest.approx(
-        power, abs=1e-12 * np.abs(with_it).max(), rel=0
+        power,
+        abs=1e-12 * np.abs(with_it).max(),
+        rel=0,
     )
 
 

@@ -45,7 +45,10 @@ READING = [
 @pytest.mark.parametrize("what", ["pipe", "device", "directory"])
 @pytest.mark.parametrize("line", READING, ids=lambda line: " ".join(line[:2]))
 def test_what_may_never_end_is_not_waited_for(
-    line: list[str], what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    line: list[str],
+    what: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     endless = {
         "pipe": tmp_path / "pipe",
@@ -91,7 +94,9 @@ gravity = ["9.81 m/s^2", "-90 deg"]
 
 @pytest.mark.slow
 def test_a_free_motion_without_end_is_given_up_with_its_reason(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     (tmp_path / "released.toml").write_text(RELEASED)
     monkeypatch.setattr(free_motion, "MOST_INTEGRATION_STEPS", 500)
@@ -118,7 +123,9 @@ def test_a_long_free_motion_stops_at_ctrl_c(tmp_path: Path) -> None:
     begin = "from fourbar.cli import main; print(flush=True); main()"
     command = [sys.executable, "-c", begin, "analyze", str(tmp_path / "released.toml")]
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
     ) as running:
         assert running.stdout is not None and running.stdout.readline()
         time.sleep(1.0)
@@ -141,7 +148,8 @@ def test_a_long_free_motion_stops_at_ctrl_c(tmp_path: Path) -> None:
 
 
 def test_a_free_motion_too_long_for_the_engines_is_refused_before_a_run(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     (tmp_path / "released.toml").write_text(RELEASED)
     assert (

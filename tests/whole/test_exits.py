@@ -155,7 +155,8 @@ def test_every_end_has_its_status(
 
 @pytest.mark.parametrize("module", ["fourbar", "validation"])
 def test_an_interruption_while_the_libraries_are_imported_is_one_line(
-    module: str, tmp_path: Path
+    module: str,
+    tmp_path: Path,
 ) -> None:
     (tmp_path / "numpy.py").write_text("raise KeyboardInterrupt")
     paths = os.pathsep.join((str(tmp_path), str(ROOT), str(ROOT / "validation")))
@@ -184,7 +185,8 @@ def test_a_program_without_output_streams_runs(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_full_disk_names_the_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def full(_: int) -> None:
         raise OSError(28, "No space left on device")
@@ -262,7 +264,9 @@ STATUSES: list[tuple[Callable[[list[str]], int], str, int]] = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("command", "line", "status"), STATUSES, ids=[line for _, line, _ in STATUSES]
+    ("command", "line", "status"),
+    STATUSES,
+    ids=[line for _, line, _ in STATUSES],
 )
 def test_every_command_ends_with_its_status(
     command: Callable[[list[str]], int],
@@ -289,7 +293,8 @@ def test_a_figure_that_no_erratum_explains_is_status_1(
 
 
 def test_no_figure_at_all_is_status_1(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(
         "fourbar_validation.published.comparison.list_figures", lambda: iter([])
@@ -317,7 +322,8 @@ def test_a_torque_off_in_its_twelfth_digit_is_status_1(
 
 
 def test_samples_that_compare_nothing_are_status_1(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     def open_loop(scene: fourbar.Scene, tally: Tally, *_: str) -> None:
         tally.samples += 1
@@ -347,7 +353,9 @@ def test_a_ratio_that_is_not_reached_is_status_1(
     ("ended", "status"), [(0, HOLDS), (1, FAILED), (3, BROKEN), (-11, BROKEN)]
 )
 def test_bench_passes_on_how_its_own_process_ended(
-    ended: int, status: int, monkeypatch: pytest.MonkeyPatch
+    ended: int,
+    status: int,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     for name in ONE_THREAD:
         monkeypatch.delenv(name, raising=False)
@@ -409,7 +417,10 @@ PROCESSES = [
     ids=[f"{p} {w.split()[0]}" for p, w, _ in PROCESSES],
 )
 def test_each_command_in_a_process_of_its_own(
-    program: str, line: str, status: int, tmp_path: Path
+    program: str,
+    line: str,
+    status: int,
+    tmp_path: Path,
 ) -> None:
     ended, complained = alone(program, line.split(), tmp_path)
     assert (ended, bool(complained.strip())) == (
@@ -429,7 +440,8 @@ def test_every_command_is_in_the_table_of_processes() -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(
-    not Path("/dev/full").exists(), reason="only Linux has a device that is always full"
+    not Path("/dev/full").exists(),
+    reason="only Linux has a device that is always full",
 )
 def test_what_was_printed_without_being_written_out_is_not_lost_in_silence() -> None:
     code = "import click, sys; from fourbar.errors import run; "
@@ -455,7 +467,8 @@ def test_what_was_printed_without_being_written_out_is_not_lost_in_silence() -> 
 
 
 def test_published_says_at_once_that_scipy_is_missing(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setitem(sys.modules, "scipy.integrate", None)
     assert fourbar_validation.cli.status(["published"]) == BROKEN
@@ -464,7 +477,9 @@ def test_published_says_at_once_that_scipy_is_missing(
 
 
 def test_a_module_that_the_harness_lacks_is_in_the_extra_of_the_harness(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
 ) -> None:
     monkeypatch.setitem(sys.modules, "filelock", None)
     assert (

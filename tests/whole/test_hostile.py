@@ -85,7 +85,9 @@ class Named:
 
 @pytest.mark.slow
 def test_reports_hold_hostile_text_as_text(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     judge_here(monkeypatch)
     out = tmp_path / "deep" / "out"
@@ -134,7 +136,9 @@ def test_sdf_and_usd_hold_a_hostile_title_as_a_text(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_differences_hold_hostile_names_as_text(
-    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    kind: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     name = HOSTILE[kind]
     # a table written by somebody else, whose names nothing has looked at
@@ -174,7 +178,9 @@ def test_differences_hold_hostile_names_as_text(
     ],
 )
 def test_what_is_no_table_of_results_is_one_line(
-    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    text: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     good = ",".join(RESULT_COLUMNS) + "\n"
     for rows, record in (
@@ -196,7 +202,8 @@ def test_what_is_no_table_of_results_is_one_line(
     "name", ["../out", "/tmp/out", "a/b", "..", ".", "", "a\x00b", "a\x1b[0m"]
 )
 def test_a_baseline_has_a_name_and_no_path(
-    name: str, capsys: pytest.CaptureFixture[str]
+    name: str,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert status(["accept", "results", "--as", name]) == BAD_INPUT
     printed = capsys.readouterr().err
@@ -209,7 +216,9 @@ FILE_NAMES = ("\x1b[31mred.toml", "a\nb.toml", "<b>.toml", "[red]x.toml")
 
 @pytest.mark.parametrize("name", FILE_NAMES)
 def test_a_hostile_name_of_a_bad_file_is_shown_and_not_sent(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     (tmp_path / name).write_text('title = "no lengths"')
     assert (
@@ -223,7 +232,9 @@ def test_a_hostile_name_of_a_bad_file_is_shown_and_not_sent(
 
 @pytest.mark.slow
 def test_a_suite_file_of_hostile_names_runs_and_they_are_shown_and_not_sent(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     judge_here(monkeypatch)
     names = ("\x1b[31m<b>[red]x.toml", "a\nb.toml")
@@ -265,10 +276,15 @@ LISTS = [
 
 
 @pytest.mark.parametrize(
-    ("what", "name", "text"), LISTS, ids=[case[0] for case in LISTS]
+    ("what", "name", "text"),
+    LISTS,
+    ids=[case[0] for case in LISTS],
 )
 def test_a_suite_file_lists_scenes_from_its_own_folder(
-    what: str, name: str, text: str, tmp_path: Path
+    what: str,
+    name: str,
+    text: str,
+    tmp_path: Path,
 ) -> None:
     suite = read_suite(listed(tmp_path, text, name))
     assert [suite.name(i) for i in range(len(suite))] == ["a", "b"]
@@ -288,10 +304,15 @@ BAD_LISTS = [
 
 
 @pytest.mark.parametrize(
-    ("what", "text", "words"), BAD_LISTS, ids=[case[0] for case in BAD_LISTS]
+    ("what", "text", "words"),
+    BAD_LISTS,
+    ids=[case[0] for case in BAD_LISTS],
 )
 def test_a_bad_suite_file_is_one_line(
-    what: str, text: str | bytes, words: str, tmp_path: Path
+    what: str,
+    text: str | bytes,
+    words: str,
+    tmp_path: Path,
 ) -> None:
     with pytest.raises(InputError) as caught:
         read_suite(listed(tmp_path, text))
@@ -356,7 +377,8 @@ def test_a_system_that_sets_no_limit_of_memory_goes_on_without(
 @pytest.mark.slow
 @pytest.mark.linux
 def test_running_out_of_memory_costs_its_own_row(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
     monkeypatch.setattr(

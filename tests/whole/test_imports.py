@@ -112,14 +112,19 @@ def test_solving_loads_numpy_alone() -> None:
         " print(*sorted({name.partition('.')[0] for name in sys.modules}))"
     )
     out = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
     ).stdout.split()
     assert "numpy" in out
     assert not set(HEAVY) & set(out)
 
 
 @pytest.mark.parametrize(
-    "path", sorted((ROOT / "fourbar").rglob("*.py")), ids=lambda path: path.stem
+    "path",
+    sorted((ROOT / "fourbar").rglob("*.py")),
+    ids=lambda path: path.stem,
 )
 def test_the_product_knows_neither_harness_nor_engines(path: Path) -> None:
     roots = {name.partition(".")[0] for name in imported(path)}

@@ -80,7 +80,10 @@ EXACT = choose_engines("free-body")
 
 
 def judge_all(
-    suite: Suite, out: Path, engines: tuple[Engine, ...] = EXACT, workers: int = 2
+    suite: Suite,
+    out: Path,
+    engines: tuple[Engine, ...] = EXACT,
+    workers: int = 2,
 ) -> Summary:
     heard = Heard()
     summary = run(
@@ -99,7 +102,8 @@ def judge_all(
     300
 )  # its hangs alone take half a minute, and every new worker imports the harness again
 def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(
         fourbar_validation.run.plan, "SCENES_OF_A_TASK", {True: 2, False: 2}
@@ -126,7 +130,10 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(
 @pytest.mark.posix
 @pytest.mark.parametrize(("kills", "blamed"), [(1, False), (KILLS_OF_BLAME, True)])
 def test_a_worker_killed_once_is_not_held_against_the_engine(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kills: int, blamed: bool
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    kills: int,
+    blamed: bool,
 ) -> None:
     """One that kills its worker each time is: in the scene, and by itself."""
     (tmp_path / "lives").mkdir()
@@ -144,7 +151,8 @@ def test_a_worker_killed_once_is_not_held_against_the_engine(
 
 @pytest.mark.slow
 def test_workers_that_die_with_nothing_to_do_end_the_run_which_can_be_resumed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     (tmp_path / "lives").mkdir()
     (tmp_path / "lives" / "0").touch()
@@ -168,7 +176,11 @@ def test_a_worker_killed_with_the_lock_of_the_pipe_ends_the_run_within_seconds()
     """
     begin = time.monotonic()
     results = workers.apply_over_processes(
-        die_with_the_pipe, [(0, [None])], 1, seconds=None, instead=workers.fail
+        die_with_the_pipe,
+        [(0, [None])],
+        1,
+        seconds=None,
+        instead=workers.fail,
     )
     with pytest.raises(workers.NoWorkersError, match="what is finished is kept"):
         list(results)
@@ -177,7 +189,9 @@ def test_a_worker_killed_with_the_lock_of_the_pipe_ends_the_run_within_seconds()
 
 @pytest.mark.slow
 def test_the_bytes_do_not_depend_on_the_workers(
-    tmp_path: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    undisturbed: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """None, in order, or two."""
     monkeypatch.setattr(
@@ -376,7 +390,8 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.timeout(120 + 20 * KILLS)
 def test_whatever_ended_it_a_rerun_goes_on_and_ends_with_the_same_bytes(
-    tmp_path: Path, undisturbed: Path
+    tmp_path: Path,
+    undisturbed: Path,
 ) -> None:
     """Interrupted, killed at random moments and met with a full disk.
 
@@ -438,7 +453,8 @@ def workers_of(process: subprocess.Popen[bytes]) -> list[int]:
 @pytest.mark.linux
 @pytest.mark.timeout(400 + 20 * KILLS)
 def test_a_worker_killed_at_random_moments_changes_no_byte(
-    tmp_path: Path, undisturbed: Path
+    tmp_path: Path,
+    undisturbed: Path,
 ) -> None:
     rng = np.random.default_rng(SEED + 1)
     kills = runs = 0
@@ -488,7 +504,8 @@ def guest(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @pytest.fixture(scope="module")
 def undisturbed_with_guest(
-    guest: str, tmp_path_factory: pytest.TempPathFactory
+    guest: str,
+    tmp_path_factory: pytest.TempPathFactory,
 ) -> bytes:
     """The results of a run with that program that nothing disturbed."""
     out = tmp_path_factory.mktemp("undisturbed")
@@ -562,7 +579,9 @@ def test_a_read_only_folder_is_reported(tmp_path: Path) -> None:
     ],
 )
 def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(
-    motion: str, key: str, tmp_path: Path
+    motion: str,
+    key: str,
+    tmp_path: Path,
 ) -> None:
     lengths = (
         '[lengths]\nground = "4 m"\ninput = "1 m"\ncoupler = "3 m"\noutput = "3 m"\n'
@@ -606,13 +625,16 @@ class Blunders:
         if scene.title == "b":
             raise RuntimeError("no licence")
         return Answer(
-            "blunders", "exact", refusal=None if scene.title == "c" else "declined"
+            "blunders",
+            "exact",
+            refusal=None if scene.title == "c" else "declined",
         )
 
 
 @pytest.mark.slow
 def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Drawn at the end, without the engine that broke down.
 

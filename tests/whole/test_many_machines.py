@@ -49,7 +49,10 @@ def assert_same_bytes(out: Path, alone: Path) -> None:
 
 
 def run_shell(
-    script: str, folder: Path, options: Sequence[str] = (), **variables: str
+    script: str,
+    folder: Path,
+    options: Sequence[str] = (),
+    **variables: str,
 ) -> None:
     """Run a script as a machine does that has the programs of this environment."""
     path = f"{PROGRAM.parent}{os.pathsep}{os.environ['PATH']}"
@@ -152,7 +155,8 @@ def has_address(scheduler: Path) -> bool:
     reason="not run: distributed is not installed: pip install distributed",
 )
 def test_a_dask_worker_that_dies_and_one_that_joins_change_no_byte(
-    alone: Path, tmp_path: Path
+    alone: Path,
+    tmp_path: Path,
 ) -> None:
     assert len((CI / "dask_run.py").read_text().splitlines()) <= 40
     scheduler = tmp_path / "scheduler.json"

@@ -52,7 +52,10 @@ omega_2 = "1 rad/s"
 
 
 def without(
-    library: str, folder: Path, *arguments: str, **settings: str
+    library: str,
+    folder: Path,
+    *arguments: str,
+    **settings: str,
 ) -> subprocess.CompletedProcess[str]:
     """`python -m validation run` where a library cannot be imported."""
     (folder / "sitecustomize.py").write_text(BLOCKER)
@@ -90,7 +93,8 @@ def without(
 @pytest.mark.slow
 @pytest.mark.parametrize("library", ENGINES)
 def test_the_others_run_and_the_missing_named_with_the_reason(
-    library: str, tmp_path: Path
+    library: str,
+    tmp_path: Path,
 ) -> None:
     done = without(library, tmp_path)
     reason = f'{library} is not installed: pip install ".[validation]" in the checkout'

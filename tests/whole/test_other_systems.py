@@ -59,7 +59,9 @@ def folder(tmp_path: Path) -> Path:
     ],
 )
 def test_commands_need_neither_fork_nor_utf_8(
-    module: str, line: str, folder: Path
+    module: str,
+    line: str,
+    folder: Path,
 ) -> None:
     if "mjcf" in line:
         pytest.importorskip("mujoco")
@@ -91,7 +93,8 @@ def test_commands_need_neither_fork_nor_utf_8(
 
 
 def test_line_ends_of_windows_are_read(
-    folder: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     scene, table = folder / "scène.toml", folder / "table.csv"
     assert status(["analyze", str(scene), "--csv", "-o", str(table)]) == HOLDS

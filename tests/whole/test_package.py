@@ -85,7 +85,9 @@ def test_the_source_archive_has_the_package_that_lies_elsewhere() -> None:
 
 @pytest.mark.parametrize("line", ["write", "problems"])
 def test_what_needs_a_checkout_says_so_in_one_line(
-    line: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    line: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr("fourbar_validation.places.CHECKOUT", None)
     assert lab([line]) == BAD_INPUT
@@ -94,7 +96,8 @@ def test_what_needs_a_checkout_says_so_in_one_line(
 
 
 def test_the_harness_lists_a_command_whose_library_is_missing(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     def without_flint(_: str) -> None:
         raise ModuleNotFoundError("No module named 'flint'", name="flint")
@@ -233,7 +236,10 @@ def lowest(requirements: list[str]) -> list[str]:
 
 
 def installed_works(
-    python: str, package: Path, folder: Path, constraints: list[str]
+    python: str,
+    package: Path,
+    folder: Path,
+    constraints: list[str],
 ) -> None:
     """Install afresh, outside the tree.
 
@@ -332,7 +338,9 @@ def test_wheel_and_archive_install_on_every_python(tmp_path: Path) -> None:
         if (
             python
             and subprocess.run(
-                [python, "--version"], capture_output=True, check=False
+                [python, "--version"],
+                capture_output=True,
+                check=False,
             ).returncode
             == 0
         ):

@@ -25,7 +25,9 @@ Steps = Callable[..., str]
 
 @pytest.fixture
 def ask(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> Steps:
     """Run one command line of `fourbar` in an empty folder.
 
@@ -85,7 +87,10 @@ CROSSED = {
 
 @pytest.mark.parametrize(("branch", "right"), [("open", OPEN), ("crossed", CROSSED)])
 def test_everything_about_one_position_of_a_homework_linkage(
-    branch: str, right: dict[str, tuple[float, ...]], ask: Steps, tmp_path: Path
+    branch: str,
+    right: dict[str, tuple[float, ...]],
+    ask: Steps,
+    tmp_path: Path,
 ) -> None:
     """A file, an edit of its branch, a command."""
     stated = HOMEWORK.replace("[points]", f'branch = "{branch}"\n[points]')
@@ -99,7 +104,8 @@ def test_everything_about_one_position_of_a_homework_linkage(
 
 
 def test_another_position_is_asked_for_on_the_command_line(
-    ask: Steps, tmp_path: Path
+    ask: Steps,
+    tmp_path: Path,
 ) -> None:
     (tmp_path / "homework.toml").write_text(HOMEWORK.replace('"45 deg"', '"10 deg"'))
     text = ask("analyze", "homework.toml", "--at", "45 deg")
@@ -135,13 +141,15 @@ def test_the_output_angle_is_known(ask: Steps, tmp_path: Path) -> None:
 
 
 def test_pliers_have_their_advantage_without_a_speed(
-    ask: Steps, tmp_path: Path
+    ask: Steps,
+    tmp_path: Path,
 ) -> None:
     (tmp_path / "pliers.toml").write_text(PLIERS)
     text = ask("analyze", "pliers.toml")
     assert row_of(text, "omega_4/omega_2")[0] == pytest.approx(0.1332544, rel=PRINTED)
     assert row_of(text, "mechanical advantage")[0] == pytest.approx(
-        1.0 / 0.1332544, rel=PRINTED
+        1.0 / 0.1332544,
+        rel=PRINTED,
     )
     assert row_of(text, "F_jaw/F_handle")[0] == pytest.approx(31.969, rel=PRINTED)
 
@@ -158,7 +166,8 @@ def test_pliers_have_their_force_ratio_over_a_sweep(ask: Steps, tmp_path: Path) 
 
 
 def test_four_pins_and_the_speed_of_the_output_as_they_are_drawn(
-    ask: Steps, tmp_path: Path
+    ask: Steps,
+    tmp_path: Path,
 ) -> None:
     """A command, an edit of two lines, a command."""
     ask("new", "pins.toml", "--pins", "0,0 0,100 175,50 250,50", "--unit", "mm")
@@ -168,10 +177,12 @@ def test_four_pins_and_the_speed_of_the_output_as_they_are_drawn(
     (tmp_path / "pins.toml").write_text(text.replace('omega_2 = "60 rpm"', stated))
     text = ask("analyze", "pins.toml")
     assert row_of(text, "bar 2")[1:] == pytest.approx(
-        [-0.4285714, -4.338192], rel=PRINTED
+        [-0.4285714, -4.338192],
+        rel=PRINTED,
     )
     assert row_of(text, "bar 3")[1:] == pytest.approx(
-        [-0.8571429, -0.104956], rel=PRINTED
+        [-0.8571429, -0.104956],
+        rel=PRINTED,
     )
 
 
@@ -247,7 +258,8 @@ gravity = ["9.81 m/s^2", "-90 deg"]
 
 
 def test_a_platform_that_hangs_on_two_arms_as_it_is_drawn(
-    ask: Steps, tmp_path: Path
+    ask: Steps,
+    tmp_path: Path,
 ) -> None:
     """Arms of 200 mm, whose drawn ends are rounded to a thousandth of a millimetre."""
     (tmp_path / "platform.toml").write_text(HANGING)
@@ -280,7 +292,8 @@ gravity = ["9.81 m/s^2", "-90 deg"]
 
 
 def test_a_given_couple_moves_two_parallel_links_from_rest(
-    ask: Steps, tmp_path: Path
+    ask: Steps,
+    tmp_path: Path,
 ) -> None:
     """alpha = 14.8148 - 6.54 cos 30 deg; the upper link carries 2.139 kN."""
     (tmp_path / "links.toml").write_text(COUPLE)

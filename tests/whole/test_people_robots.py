@@ -103,7 +103,9 @@ MIMIC = """\
 
 @pytest.fixture
 def ask(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> Steps:
     """Run one command line in an empty folder.
 

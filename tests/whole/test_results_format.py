@@ -201,13 +201,17 @@ def test_the_parquet_file_holds_the_rows_of_the_table(results: Path) -> None:
     assert len(kept) == len(table)
     for one, other in zip(kept, table, strict=True):
         for ours, theirs in zip(
-            dataclasses.astuple(one), dataclasses.astuple(other), strict=True
+            dataclasses.astuple(one),
+            dataclasses.astuple(other),
+            strict=True,
         ):
             assert ours == theirs or (math.isnan(ours) and math.isnan(theirs))
 
 
 def test_the_pandas_snippet_runs(
-    results: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    results: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     pytest.importorskip("pandas", reason="pandas is optional")
     monkeypatch.chdir(results)

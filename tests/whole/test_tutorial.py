@@ -28,7 +28,8 @@ def test_a_page_does_and_prints_what_it_says(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     pytest.importorskip(
-        "pandas", reason="the tutorial makes a table of pandas: pip install pandas"
+        "pandas",
+        reason="the tutorial makes a table of pandas: pip install pandas",
     )
     monkeypatch.chdir(tmp_path)
     (tmp_path / "models").symlink_to(ROOT / "models")

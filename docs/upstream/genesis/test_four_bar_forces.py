@@ -62,7 +62,7 @@ def test_four_bar_forces(backend, n_envs, show_viewer, tmp_path):
     scene = gs.Scene(
         sim_options=gs.options.SimOptions(dt=1e-5, gravity=GRAVITY),
         rigid_options=gs.options.RigidOptions(
-            dt=1e-5, gravity=GRAVITY, enable_mujoco_compatibility=True
+            dt=1e-5, gravity=GRAVITY, enable_mujoco_compatibility=True,
         ),
         show_viewer=show_viewer,
     )
@@ -91,5 +91,5 @@ def test_four_bar_forces(backend, n_envs, show_viewer, tmp_path):
         closing = solver.constraint_solver.efc_force.to_numpy()[:2].reshape(2, -1)
         np.testing.assert_allclose(-ARMATURE * alpha, torque, atol=1e-3)
         np.testing.assert_allclose(
-            closing.T, np.broadcast_to(force, closing.T.shape), atol=8e-3
+            closing.T, np.broadcast_to(force, closing.T.shape), atol=8e-3,
         )

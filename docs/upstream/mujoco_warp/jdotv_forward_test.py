@@ -29,7 +29,7 @@ class JdotvForwardTest(parameterized.TestCase):
         connect_2d.xml has none.
         """
         mjm, mjd, m, d = test_data.fixture(
-            xml, keyframe=0, overrides={"opt.jacobian": jacobian}
+            xml, keyframe=0, overrides={"opt.jacobian": jacobian},
         )
         mjd.qvel[:] = np.tile([0.0, 0.0, 0.0, 10.0, -20.0, 30.0], mjm.nv // 6)
         mujoco.mj_forward(mjm, mjd)
@@ -39,7 +39,7 @@ class JdotvForwardTest(parameterized.TestCase):
 
         aref = d.efc.aref.numpy()[0, : mjd.nefc]
         np.testing.assert_allclose(
-            aref, mjd.efc_aref, atol=1e-4 * np.abs(mjd.efc_aref).max()
+            aref, mjd.efc_aref, atol=1e-4 * np.abs(mjd.efc_aref).max(),
         )  # single precision
 
 

@@ -118,7 +118,7 @@ def build_model(device, theta_2):
     for length, angle, armature in bars:
         bar = builder.add_link(xform=wp.transform_identity())
         builder.add_shape_box(
-            bar, hx=length / 2.0, hy=HALF_THICKNESS, hz=HALF_THICKNESS, cfg=cfg
+            bar, hx=length / 2.0, hy=HALF_THICKNESS, hz=HALF_THICKNESS, cfg=cfg,
         )
         turned = wp.quat_from_axis_angle(wp.vec3(0.0, 0.0, 1.0), float(angle))
         joint = builder.add_joint_revolute(
@@ -236,7 +236,7 @@ for device in get_test_devices():
             test_fourbar_forces,
             devices=[device],
             solver_fn=lambda model, use_cpu=use_cpu: newton.solvers.SolverMuJoCo(
-                model, use_mujoco_cpu=use_cpu, iterations=100, ls_iterations=50
+                model, use_mujoco_cpu=use_cpu, iterations=100, ls_iterations=50,
             ),
         )
 

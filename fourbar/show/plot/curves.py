@@ -91,7 +91,13 @@ def draw_axes(axes: "Axes", view: View) -> Array:
         else:
             stop = 0.5 * (over[after - 1] + over[after])
         axes.axvspan(
-            start, stop, fc="#f1f1f1", ec=FAINT, hatch="////", lw=0.0, zorder=0
+            start,
+            stop,
+            fc="#f1f1f1",
+            ec=FAINT,
+            hatch="////",
+            lw=0.0,
+            zorder=0,
         )
     if closed.size:
         note(view, "Hatched: the linkage does not assemble.")
@@ -143,7 +149,11 @@ def break_at_poles(values: Array, poles: _Indices) -> Array:
 
 
 def plot_between_poles(
-    axes: "Axes", over: Array, values: Array, poles: _Indices, **look: Any
+    axes: "Axes",
+    over: Array,
+    values: Array,
+    poles: _Indices,
+    **look: Any,
 ) -> None:
     """Plot a curve that no line takes across a pole."""
     axes.plot(break_at_poles(over, poles), break_at_poles(values, poles), **look)
@@ -235,7 +245,12 @@ def draw_angles(axes: "Axes", view: View) -> None:
 
 
 def _draw_rates(
-    axes: "Axes", view: View, letter: str, unit: str, title: str, what: str
+    axes: "Axes",
+    view: View,
+    letter: str,
+    unit: str,
+    title: str,
+    what: str,
 ) -> None:
     """Draw the rates of the commanded bar and of the other two bars.
 
@@ -297,7 +312,11 @@ draw_accelerations = partial(
 
 
 def _draw_point_sizes(
-    axes: "Axes", view: View, letter: str, unit: str, title: str
+    axes: "Axes",
+    view: View,
+    letter: str,
+    unit: str,
+    title: str,
 ) -> None:
     """Draw the sizes at A, B, the mass centres and the scene's own points."""
     over = draw_axes(axes, view)
@@ -317,7 +336,9 @@ def _draw_point_sizes(
         **{f"G{bar}": BAR_COLOURS[bar] for bar in MOVING_BARS},
     }
     for (name, values), dashes in zip(
-        curves.items(), cycle(("-", "--", "-.", ":")), strict=False
+        curves.items(),
+        cycle(("-", "--", "-.", ":")),
+        strict=False,
     ):
         colour = looks.get(name, FORCE_COLOURS["F43"])
         width = 2.0 if name in view.sweep.points else 1.2
@@ -336,15 +357,26 @@ def _draw_point_sizes(
 
 
 draw_speeds = partial(
-    _draw_point_sizes, letter="v", unit="m/s", title="Speeds of points"
+    _draw_point_sizes,
+    letter="v",
+    unit="m/s",
+    title="Speeds of points",
 )
 draw_point_accelerations = partial(
-    _draw_point_sizes, letter="a", unit="m/s^2", title="Accelerations of points"
+    _draw_point_sizes,
+    letter="a",
+    unit="m/s^2",
+    title="Accelerations of points",
 )
 
 
 def _draw_drive(
-    axes: "Axes", view: View, name: str, letter: str, unit: str, what: str
+    axes: "Axes",
+    view: View,
+    name: str,
+    letter: str,
+    unit: str,
+    what: str,
 ) -> None:
     """Draw a quantity of the drive, with its poles."""
     over = draw_axes(axes, view)
@@ -482,13 +514,23 @@ def draw_energy(axes: "Axes", view: View) -> None:
     )
     factor, unit = choose_unit(most, "J", view.units)
     axes.plot(
-        over, factor * energies.kinetic, color=INK, lw=2.2, label="kinetic energy"
+        over,
+        factor * energies.kinetic,
+        color=INK,
+        lw=2.2,
+        label="kinetic energy",
     )
     for (name, values), (colour, dashes) in zip(
-        energies.work.items(), cycle(_WORKS), strict=False
+        energies.work.items(),
+        cycle(_WORKS),
+        strict=False,
     ):
         axes.plot(
-            over, factor * values, color=colour, ls=dashes, label=name.replace("_", " ")
+            over,
+            factor * values,
+            color=colour,
+            ls=dashes,
+            label=name.replace("_", " "),
         )
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     axes.set(ylabel=f"energy ({unit})", title="Kinetic energy, and the work done")
@@ -730,6 +772,7 @@ def _find_free_direction(directions: Array) -> float:
     """Find the multiple of 22.5 deg that lies furthest from the curve."""
     candidates = np.radians(np.arange(16) * 22.5)
     away = np.abs(np.angle(np.exp(1j * (directions - candidates[:, None])))).min(
-        axis=1, initial=math.pi
+        axis=1,
+        initial=math.pi,
     )
     return float(np.degrees(candidates[int(np.argmax(away))]))

@@ -44,7 +44,8 @@ _Painter = Callable[["SubFigure", View, Labels], None]
 def _draw_overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
     if not shown.moves:
         panels = figure.subplot_mosaic(
-            [["linkage", "angles"], ["linkage", "mu"]], width_ratios=[1.15, 1.0]
+            [["linkage", "angles"], ["linkage", "mu"]],
+            width_ratios=[1.15, 1.0],
         )
         linkage.draw_linkage(panels["linkage"], shown, labels)
         curves.draw_angles(panels["angles"], shown)
@@ -86,7 +87,8 @@ def _draw_kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
 def _draw_points(figure: "SubFigure", shown: View, labels: Labels) -> None:
     """Draw paths, speeds and accelerations of points."""
     panels = figure.subplot_mosaic(
-        [["linkage", "speeds"], ["linkage", "accelerations"]], width_ratios=[1.15, 1.0]
+        [["linkage", "speeds"], ["linkage", "accelerations"]],
+        width_ratios=[1.15, 1.0],
     )
     linkage.draw_linkage(panels["linkage"], shown, labels, moving=True)
     curves.draw_speeds(panels["speeds"], shown)
@@ -102,7 +104,9 @@ def _draw_rows(*painters: Callable[[Any, View], None]) -> _Painter:
 
     def paint(figure: "SubFigure", shown: View, labels: Labels) -> None:
         for axes, painter in zip(
-            figure.subplots(len(painters), 1), painters, strict=True
+            figure.subplots(len(painters), 1),
+            painters,
+            strict=True,
         ):
             painter(axes, shown)
 
@@ -165,7 +169,9 @@ TAKERS = {
 
 
 def _choose_painter(
-    scene: Scene, figure: str, branches: str
+    scene: Scene,
+    figure: str,
+    branches: str,
 ) -> tuple[_Painter, tuple[float, float]]:
     """Choose the painter and the size of a figure that the scene can show."""
     for key, value, allowed in (
@@ -261,7 +267,10 @@ def _look_between(shown: View) -> None:
 
 
 def draw(
-    scene: Scene, path: str | Path, figure: str = "overview", **options: Any
+    scene: Scene,
+    path: str | Path,
+    figure: str = "overview",
+    **options: Any,
 ) -> None:
     """Draw a figure of a scene, as `draw_figure` does, into a file.
 
@@ -272,7 +281,9 @@ def draw(
 
 
 def _compose(
-    painter: _Painter, size: tuple[float, float], views: list[View]
+    painter: _Painter,
+    size: tuple[float, float],
+    views: list[View],
 ) -> "Figure":
     """Compose the figure itself, laid out and labelled."""
     from matplotlib.figure import Figure

@@ -100,7 +100,9 @@ def write_film(
         if kind == "mp4":
             # yuv420p needs even pixel numbers and is what browsers and slides play
             writer = FFMpegWriter(
-                fps=FRAMES_PER_SECOND, codec="h264", extra_args=["-pix_fmt", "yuv420p"]
+                fps=FRAMES_PER_SECOND,
+                codec="h264",
+                extra_args=["-pix_fmt", "yuv420p"],
             )
         with tempfile.TemporaryDirectory() as folder:
             draft = Path(folder) / f"film.{kind}"
@@ -112,10 +114,16 @@ def write_film(
                         else lambda done, count: progress(done / count)
                     )
                     film = FuncAnimation(
-                        figure, move, frames=order, cache_frame_data=False
+                        figure,
+                        move,
+                        frames=order,
+                        cache_frame_data=False,
                     )
                     film.save(
-                        str(draft), writer=writer, dpi=FILM_DPI, progress_callback=told
+                        str(draft),
+                        writer=writer,
+                        dpi=FILM_DPI,
+                        progress_callback=told,
                     )
             except (subprocess.CalledProcessError, BrokenPipeError):
                 raise DependencyError(

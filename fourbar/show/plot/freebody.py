@@ -133,7 +133,11 @@ class _ActionRecorder(Actions):
         self.turns: dict[int, list[Couple]] = {bar: [] for bar in BAR_NAMES}
 
     def force(
-        self, bar: int, force: Number, point: Number = 0.0j, beyond: Number = None
+        self,
+        bar: int,
+        force: Number,
+        point: Number = 0.0j,
+        beyond: Number = None,
     ) -> None:
         """Add a force on a bar, at a point of its frame.
 
@@ -219,7 +223,8 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
         ],
     )
     biggest = max(
-        (abs(arrow.force) for *_, arrows, _ in freed for arrow in arrows), default=0.0
+        (abs(arrow.force) for *_, arrows, _ in freed for arrow in arrows),
+        default=0.0,
     )
     longest = max(view.scene.linkage.bar(bar).length for bar in MOVING_BARS)
     if biggest > 0.0:
@@ -233,7 +238,10 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
     )
     note(view, f"At {view.at}.")
     for axes, text, (_, bar, arrows, couples) in zip(
-        panels, below, freed, strict=False
+        panels,
+        below,
+        freed,
+        strict=False,
     ):
         _draw_one(axes, view, bar, arrows, scale, biggest, labels, span)
         _write_couples(text, view, couples)
@@ -261,13 +269,19 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
         factor, unit = choose_unit(float(x[-1]), "m", view.units)
         place = view.axis.words(float(worst.solution.at.places[worst.row]))
         for axes, (name, si) in zip(
-            column, {"N": "N", "V": "N", "M": "N m"}.items(), strict=True
+            column,
+            {"N": "N", "V": "N", "M": "N m"}.items(),
+            strict=True,
         ):
             curve = getattr(forces, name)[worst.row]
             scale, shown = choose_unit(largest_magnitude(curve), si, view.units)
             axes.plot(factor * x, scale * curve, color=BAR_COLOURS[bar])
             axes.fill_between(
-                factor * x, scale * curve, color=BAR_COLOURS[bar], alpha=0.15, lw=0.0
+                factor * x,
+                scale * curve,
+                color=BAR_COLOURS[bar],
+                alpha=0.15,
+                lw=0.0,
             )
             axes.axhline(0.0, color=INK, lw=0.6)
             axes.set_ylabel(f"${name}$ ({shown})")
@@ -341,7 +355,12 @@ def _draw_one(
             "ls": "--" if arrow.dashed else "-",
         }
         axes.annotate(
-            "", xy=tip, xytext=foot, arrowprops=look, zorder=5, annotation_clip=False
+            "",
+            xy=tip,
+            xytext=foot,
+            arrowprops=look,
+            zorder=5,
+            annotation_clip=False,
         )
         labels.keep_off(axes, foot, tip)
         labels.add(
@@ -386,7 +405,11 @@ def _write_couples(axes: "Axes", view: View, couples: list[Couple]) -> None:
         "color": INK if lines else MUTED,
     }
     axes.text(
-        0.0, 1.0, "\n".join(lines) or "no couples", transform=axes.transAxes, **look
+        0.0,
+        1.0,
+        "\n".join(lines) or "no couples",
+        transform=axes.transAxes,
+        **look,
     )
 
 

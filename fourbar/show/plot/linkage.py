@@ -80,7 +80,11 @@ def locate_pins(view: View, factor: float = 1.0) -> dict[str, DrawnPoint]:
 
 
 def draw_mechanism(
-    axes: "Axes", view: View, solution: Solution, index: int, labels: Labels
+    axes: "Axes",
+    view: View,
+    solution: Solution,
+    index: int,
+    labels: Labels,
 ) -> list[Any]:
     """Draw bars, pins, mass centres, points and what acts at a position.
 
@@ -116,7 +120,12 @@ def draw_mechanism(
         )
     for name, point in pins.items():
         drawn += axes.plot(
-            *[[v] for v in point], "o", ms=6.0, mew=1.2, zorder=6, **RING_MARK
+            *[[v] for v in point],
+            "o",
+            ms=6.0,
+            mew=1.2,
+            zorder=6,
+            **RING_MARK,
         )
         labels.add(Label(axes, pin_name(name), point, middle, INK, 9.0, 2.5))
     for name, path in solution.points.items():
@@ -186,7 +195,10 @@ def _list_off_bars(view: View, place: Pose) -> Iterator[tuple[int, complex]]:
 
 
 def draw_plate(
-    axes: "Axes", bar: int, corners: tuple[complex, complex, complex], labels: Labels
+    axes: "Axes",
+    bar: int,
+    corners: tuple[complex, complex, complex],
+    labels: Labels,
 ) -> list[Any]:
     """Join a point to its bar, from pin to point to pin, as a plate.
 
@@ -206,14 +218,22 @@ def draw_plate(
     return [
         axes.add_patch(
             Polygon(
-                shape, closed=False, fc=shade, ec=colour, lw=0.8, ls=":", zorder=1.5
+                shape,
+                closed=False,
+                fc=shade,
+                ec=colour,
+                lw=0.8,
+                ls=":",
+                zorder=1.5,
             )
         )
     ]
 
 
 def draw_mass_centre(
-    axes: "Axes", point: DrawnPoint, ms: float = 7.0
+    axes: "Axes",
+    point: DrawnPoint,
+    ms: float = 7.0,
 ) -> "list[Line2D]":
     """Draw the quartered circle that marks a mass centre."""
     from matplotlib.path import Path
@@ -222,7 +242,13 @@ def draw_mass_centre(
     marks = axes.plot([x], [y], "o", ms=ms, mfc="white", mec=INK, mew=0.8, zorder=7)
     for quarter in ((0, 90), (180, 270)):
         marks += axes.plot(
-            [x], [y], marker=Path.wedge(*quarter), ms=ms, mfc=INK, mec="none", zorder=7
+            [x],
+            [y],
+            marker=Path.wedge(*quarter),
+            ms=ms,
+            mfc=INK,
+            mec="none",
+            zorder=7,
         )
     return marks
 
@@ -315,7 +341,11 @@ _COUPLER_CURVES: tuple[tuple[str, Any], ...] = (
 
 
 def draw_linkage(
-    axes: "Axes", view: View, labels: Labels, *, moving: bool = False
+    axes: "Axes",
+    view: View,
+    labels: Labels,
+    *,
+    moving: bool = False,
 ) -> None:
     """Draw the linkage at the drawn position, over the paths of its points.
 
@@ -364,7 +394,11 @@ def draw_paths(axes: "Axes", view: View, labels: Labels) -> None:
     O2 = pins["O2"]
     O4 = pins["O4"]
     axes.plot(
-        *zip(O2, O4, strict=True), color=MUTED, lw=1.0, ls=(0, (8, 3, 2, 3)), zorder=1
+        *zip(O2, O4, strict=True),
+        color=MUTED,
+        lw=1.0,
+        ls=(0, (8, 3, 2, 3)),
+        zorder=1,
     )
     labels.keep_off(axes, O2, O4)
     for pin in (O2, O4):
@@ -455,10 +489,19 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     for name in names:
         x, y = (float(x) for x in factor * view.here.points[name][0])
         axes.plot(
-            *zip(pins["A"], (x, y), pins["B"], strict=True), lw=0.8, ls=":", **faint
+            *zip(pins["A"], (x, y), pins["B"], strict=True),
+            lw=0.8,
+            ls=":",
+            **faint,
         )
         axes.plot(
-            [x], [y], "D", ms=4.5, mew=1.2, zorder=8, **{**RING_MARK, "mec": POINT}
+            [x],
+            [y],
+            "D",
+            ms=4.5,
+            mew=1.2,
+            zorder=8,
+            **{**RING_MARK, "mec": POINT},
         )
         labels.keep_off(axes, pins["A"], (x, y), pins["B"])
         labels.add(Label(axes, name, (x, y), pins["A"], POINT, 8.5, 2.5))
@@ -488,7 +531,8 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
 
 
 def _list_coupler_points(
-    sweep: Solution, names: list[str]
+    sweep: Solution,
+    names: list[str],
 ) -> Iterator[tuple[str, Array]]:
     """List the points of the coupler whose paths are drawn, each with its name."""
     along = sweep.B - sweep.A

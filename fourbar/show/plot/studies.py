@@ -56,7 +56,9 @@ _MOST_PANELS = 6
 
 
 def draw_tolerances(
-    spreads: Tolerances, path: str | Path, units: Conversion = SI
+    spreads: Tolerances,
+    path: str | Path,
+    units: Conversion = SI,
 ) -> None:
     """Draw the deviations from the nominal with their bands into a file.
 
@@ -86,7 +88,8 @@ def draw_tolerances(
         _draw_shares(panels[len(parts)], spreads, parts[0], units)
         title = shorten_text(spreads.scene.title, 80) or "Four-bar linkage"
         figure.suptitle(
-            f"{title}: what the tolerances do ({spreads.samples} samples)", **TITLE
+            f"{title}: what the tolerances do ({spreads.samples} samples)",
+            **TITLE,
         )
         caption = (
             f"Deviation from the nominal. Filled: {BAND_PERCENTILES[0]:g} to"
@@ -128,7 +131,12 @@ def _draw_band(axes: "Axes", spreads: Tolerances, part: str, units: Conversion) 
     factor, unit = choose_unit(most, find_part_unit(part), units)
     colour = FORCE_COLOURS.get(part.strip("|"), INK)
     axes.fill_between(
-        over, factor * away[0], factor * away[1], color=colour, alpha=0.35, lw=0.0
+        over,
+        factor * away[0],
+        factor * away[1],
+        color=colour,
+        alpha=0.35,
+        lw=0.0,
     )
     for line in away[2:]:
         axes.plot(over, factor * line, color=colour, lw=0.7)
@@ -141,7 +149,10 @@ def _draw_band(axes: "Axes", spreads: Tolerances, part: str, units: Conversion) 
 
 
 def _draw_shares(
-    axes: "Axes", spreads: Tolerances, part: str, units: Conversion
+    axes: "Axes",
+    spreads: Tolerances,
+    part: str,
+    units: Conversion,
 ) -> None:
     from matplotlib.transforms import offset_copy
 
@@ -162,7 +173,10 @@ def _draw_shares(
         title=f"{part}: from which dimension",
     )
     below = offset_copy(
-        axes.transAxes, axes.get_figure(root=True), y=-_BELOW, units="points"
+        axes.transAxes,
+        axes.get_figure(root=True),
+        y=-_BELOW,
+        units="points",
     )  # of the axis and its name
     axes.legend(
         loc="upper left",
@@ -192,10 +206,14 @@ def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
             color=FORCE_COLOURS.get(name, INK),
         )
         axes.set_yticks(
-            range(len(keys)), keys if axes is panels[0] else [""] * len(keys), size=6.8
+            range(len(keys)),
+            keys if axes is panels[0] else [""] * len(keys),
+            size=6.8,
         )
         axes.set(
-            ylim=(-0.6, len(keys) - 0.4), title=shorten_text(name, 12), xlabel=unit
+            ylim=(-0.6, len(keys) - 0.4),
+            title=shorten_text(name, 12),
+            xlabel=unit,
         )
         axes.grid(False, axis="y")
         axes.locator_params(axis="x", nbins=3)

@@ -355,18 +355,30 @@ def split_complex(z: complex) -> DrawnPoint:
 
 
 def _draw_line(
-    axes: "Axes", drawn: _DrawnSymbol, points: Any, colour: str, width: float
+    axes: "Axes",
+    drawn: _DrawnSymbol,
+    points: Any,
+    colour: str,
+    width: float,
 ) -> None:
     x = np.real(points)
     y = np.imag(points)
     drawn.artists += axes.plot(
-        x, y, color=colour, lw=width, zorder=3.5
+        x,
+        y,
+        color=colour,
+        lw=width,
+        zorder=3.5,
     )  # over supports, under the bars
     drawn.lines.append([(float(a), float(b)) for a, b in zip(x, y, strict=True)])
 
 
 def _draw_arrow(
-    axes: "Axes", tail: complex, tip: complex, colour: str, drawn: _DrawnSymbol
+    axes: "Axes",
+    tail: complex,
+    tip: complex,
+    colour: str,
+    drawn: _DrawnSymbol,
 ) -> None:
     from matplotlib.patches import FancyArrowPatch
 
@@ -384,7 +396,11 @@ def _draw_arrow(
 
 
 def _draw_force(
-    axes: "Axes", symbol: Symbol, place: Pose, size: float, drawn: _DrawnSymbol
+    axes: "Axes",
+    symbol: Symbol,
+    place: Pose,
+    size: float,
+    drawn: _DrawnSymbol,
 ) -> None:
     tail = place.tail(symbol)
     sign = symbol.sign(place.theta_2)
@@ -469,7 +485,11 @@ def _draw_gravity(axes: "Axes", symbol: Symbol, drawn: _DrawnSymbol) -> None:
 
 
 def draw_vectors(
-    axes: "Axes", view: View, solution: Solution, factor: float, size: float
+    axes: "Axes",
+    view: View,
+    solution: Solution,
+    factor: float,
+    size: float,
 ) -> Callable[[int], None]:
     """Draw the arrows of a solution's first position.
 

@@ -135,7 +135,9 @@ def where_in_words(solution: Solution) -> str:
 
 
 def collect_point_vectors(
-    scene: Scene, solution: Solution, letter: str
+    scene: Scene,
+    solution: Solution,
+    letter: str,
 ) -> dict[str, Array]:
     """Collect velocities ("v") or accelerations ("a") of points.
 

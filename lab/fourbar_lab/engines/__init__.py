@@ -37,5 +37,7 @@ OPENSIM = _exact(
     library="opensim",
 )
 DRAKE = _exact(
-    "drake-inverse", Later("fourbar_lab.engines.drake:DrakeInverse"), library="pydrake"
+    "drake-inverse",
+    Later("fourbar_lab.engines.drake:DrakeInverse"),
+    library="pydrake",
 )

@@ -141,7 +141,9 @@ class _DrakeTree(Tree):
         return np.asarray(self.point_jacobian(name) @ self.a + bias[:2, 0])
 
     def needed(
-        self, field: tuple[float, float], wrenches: dict[int, list[float]]
+        self,
+        field: tuple[float, float],
+        wrenches: dict[int, list[float]],
     ) -> Array:
         """Compute the inverse dynamics with gravity as a force element.
 

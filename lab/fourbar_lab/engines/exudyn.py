@@ -156,7 +156,9 @@ class ExudynBars(Loaded):
         theta_2 = reduce_angle(q[0])
         coordinates = np.zeros(EXUDYN_SIZE)
         for bar, angle in zip(
-            MOVING_BARS, (theta_2, theta_2 + of_3_to_2, theta_4), strict=True
+            MOVING_BARS,
+            (theta_2, theta_2 + of_3_to_2, theta_4),
+            strict=True,
         ):
             coordinates[self.turn[bar]] = angle
         self.state.SetODE2Coordinates(coordinates)

@@ -65,7 +65,8 @@ class ExudynBodies:
         """Mark the direction of a bar as a coordinate; of the ground a zero."""
         return self.mbs.AddMarker(
             MarkerNodeCoordinate(
-                nodeNumber=self.node[bar], coordinate=0 if bar == 1 else 2
+                nodeNumber=self.node[bar],
+                coordinate=0 if bar == 1 else 2,
             )
         )
 
@@ -93,7 +94,8 @@ def _add_viscous(effect: Any, bodies: ExudynBodies) -> None:
         markers = [bodies.direction(bar) for bar in PINS[pin]]
         bodies.mbs.AddObject(
             ObjectConnectorCoordinateSpringDamper(
-                markerNumbers=markers, damping=damping
+                markerNumbers=markers,
+                damping=damping,
             )
         )
 
@@ -108,7 +110,9 @@ def _add_torsion(effect: Any, bodies: ExudynBodies) -> None:
         line = bodies.ground_angle if first == 1 else 0.0
         markers = [bodies.axes(first, line + rest), bodies.axes(second)]
         spring = ObjectConnectorTorsionalSpringDamper(
-            markerNumbers=markers, stiffness=stiffness, torque=preload
+            markerNumbers=markers,
+            stiffness=stiffness,
+            torque=preload,
         )
         bodies.mbs.AddObject(spring)
 

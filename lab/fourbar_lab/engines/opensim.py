@@ -153,7 +153,12 @@ class _OpenSimBars(Loaded):
         )
 
     def _make_joint(
-        self, name: str, parent: int, on_parent: Any, child: int, on_child: Any
+        self,
+        name: str,
+        parent: int,
+        on_parent: Any,
+        child: int,
+        on_child: Any,
     ) -> Any:
         joint = osim.PinJoint(
             name,
@@ -281,7 +286,9 @@ class _OpenSimBars(Loaded):
                 else self._compute_station_jacobian(name)
             )
             for name, (sense, place) in zip(
-                CYLINDER_ENDS, self.force_drive.ends, strict=False
+                CYLINDER_ENDS,
+                self.force_drive.ends,
+                strict=False,
             )
         )
         return np.asarray(self.line()[1] @ rate)

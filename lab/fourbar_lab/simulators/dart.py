@@ -44,7 +44,10 @@ class Dart(Simulator):
         linkage = dartpy.dynamics.Skeleton("four_bar")
         bodies: dict[int, Any] = {}
         for part, angle, speed in zip(
-            list_moving_parts(scene.linkage), begin.qpos, begin.qvel, strict=True
+            list_moving_parts(scene.linkage),
+            begin.qpos,
+            begin.qvel,
+            strict=True,
         ):
             joint, body = linkage.createRevoluteJointAndBodyNodePair(
                 bodies.get(part.bearer)

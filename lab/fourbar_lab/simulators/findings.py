@@ -115,7 +115,8 @@ def _list_interpreters(name: str) -> Iterator[str]:
 
 
 def _run_findings(
-    findings: list[Reproduction], seconds: float
+    findings: list[Reproduction],
+    seconds: float,
 ) -> list[tuple[Reproduction, str]]:
     """Run each finding where its engine is: what came of it, in words."""
     outcomes = []
@@ -140,10 +141,15 @@ def _run_findings(
 
 @click.command()
 @click.argument(
-    "scripts", nargs=-1, type=click.Path(exists=True, dir_okay=False, path_type=Path)
+    "scripts",
+    nargs=-1,
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
 )
 @click.option(
-    "--time-limit", default=600.0, show_default=True, help="Seconds for each script."
+    "--time-limit",
+    default=600.0,
+    show_default=True,
+    help="Seconds for each script.",
 )
 def findings_command(scripts: tuple[Path, ...], time_limit: float) -> None:
     """Run the scripts of docs/findings where their simulators are.

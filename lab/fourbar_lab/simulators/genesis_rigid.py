@@ -62,7 +62,10 @@ class GenesisRigid(Simulator):
         world = genesis.Scene(
             sim_options=genesis.options.SimOptions(**common),
             rigid_options=genesis.options.RigidOptions(
-                **common, enable_collision=False, enable_joint_limit=False, **of_solver
+                **common,
+                enable_collision=False,
+                enable_joint_limit=False,
+                **of_solver,
             ),
             show_viewer=False,
         )

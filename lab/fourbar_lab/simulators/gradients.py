@@ -54,7 +54,10 @@ def list_keys(scene: Scene) -> tuple[str, ...]:
 
 
 def assemble_either_side(
-    scene: Scene, theta_2: float, key: str, reader: str
+    scene: Scene,
+    theta_2: float,
+    key: str,
+    reader: str,
 ) -> list[ClosedState]:
     """Assemble the scene with a number a little greater, and a little less."""
     sides = []
@@ -85,7 +88,10 @@ def choose_quarter(scene: Scene) -> tuple[float, float]:
 
 
 def collect_answer(
-    scene: Scene, how: str, state: tuple[Any, Any, Any, Any], by: dict[str, Any]
+    scene: Scene,
+    how: str,
+    state: tuple[Any, Any, Any, Any],
+    by: dict[str, Any],
 ) -> dict[str, Any]:
     """Collect theta_2, omega_2, alpha_2 and torque of a state, and derivatives.
 

@@ -376,7 +376,9 @@ def compute_gap(scene: Scene, theta: tuple[float, float, float]) -> float:
     a, b, c = (
         bar.length * np.exp(1j * angle)
         for bar, angle in zip(
-            (linkage.input, linkage.coupler, linkage.output), theta, strict=True
+            (linkage.input, linkage.coupler, linkage.output),
+            theta,
+            strict=True,
         )
     )
     return float(abs(a + b - c - linkage.ground * np.exp(1j * linkage.ground_angle)))

@@ -44,7 +44,9 @@ def text(scene: Scene, steps: int, simulator: str | None, **settings: Any) -> st
     """
     reader = simulator or "warp"  # without pads
     changed = replace(
-        SIMULATORS[reader], timestep=find_timestep(scene, steps), **settings
+        SIMULATORS[reader],
+        timestep=find_timestep(scene, steps),
+        **settings,
     )
     written = write_mjcf(scene, changed, reader, start=start(scene))
     if simulator is not None:
@@ -53,7 +55,13 @@ def text(scene: Scene, steps: int, simulator: str | None, **settings: Any) -> st
 
 
 def reading(
-    model: Any, q: Any, v: Any, a: Any, drive: float, closing: Any, borne: Any
+    model: Any,
+    q: Any,
+    v: Any,
+    a: Any,
+    drive: float,
+    closing: Any,
+    borne: Any,
 ) -> Instant:
     """Read as the comment in the file says; q, v, a in the joints' coordinates.
 

@@ -184,7 +184,10 @@ def _evaluate_mjx(model: Any, state: Any) -> Instant:
 
 
 def _slopes(
-    scene: Scene, how: str, theta_2: float, differentiate: Callable[..., Any]
+    scene: Scene,
+    how: str,
+    theta_2: float,
+    differentiate: Callable[..., Any],
 ) -> dict[str, Any]:
     """Differentiate along the changes of model and state.
 
@@ -205,7 +208,11 @@ def _slopes(
 
 
 def _torque(
-    part: Any, inputs: Any, moves: Any, data: Any, steps: Any
+    part: Any,
+    inputs: Any,
+    moves: Any,
+    data: Any,
+    steps: Any,
 ) -> tuple[Any, Any]:
     """Evaluate the torque where so much of the moves is added.
 

@@ -211,7 +211,9 @@ class PinocchioSolvers(Simulator):
         tree.model.armature = np.array([inertia, 0.0, 0.0])
         told = with_signs(scene.linkage, list_positions(scene))
         for theta_2, sign in zip(
-            told.theta_2.tolist(), told.branch.tolist(), strict=True
+            told.theta_2.tolist(),
+            told.branch.tolist(),
+            strict=True,
         ):
             state = loop.start(theta_2, sign, scene.motion.omega_2 or 0.0)
             if state is not None:
@@ -244,7 +246,11 @@ def _run_by_impulses(scene: Scene, course: Course, loop: _Impulses) -> Readings:
 
 
 def _evaluate_pinocchio(
-    tree: PinocchioTree, loop: ClosedTree, inertia: float, q: Array, v: Array
+    tree: PinocchioTree,
+    loop: ClosedTree,
+    inertia: float,
+    q: Array,
+    v: Array,
 ) -> Instant:
     tree.model.armature = np.array([inertia, 0.0, 0.0])
     a = loop.acceleration(q, v, np.zeros(3))
@@ -253,7 +259,12 @@ def _evaluate_pinocchio(
 
 
 def _read_joint_forces(
-    tree: PinocchioTree, inertia: float, q: Array, v: Array, a: Array, loop_force: Array
+    tree: PinocchioTree,
+    inertia: float,
+    q: Array,
+    v: Array,
+    a: Array,
+    loop_force: Array,
 ) -> Instant:
     """Read what Pinocchio's recursive Newton-Euler says the joints carry.
 

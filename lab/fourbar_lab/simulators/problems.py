@@ -124,7 +124,10 @@ def _answer_released(solution: Solution) -> tuple[dict[str, Any], dict[str, Any]
 
 
 def _measure_period(
-    time: Array, theta: Array, omega: Array, alpha: Array
+    time: Array,
+    theta: Array,
+    omega: Array,
+    alpha: Array,
 ) -> float | None:
     """Measure the time between upward passages through mid-swing, s.
 

@@ -76,21 +76,32 @@ class PyBullet(Simulator):
             with write_temp(_write_urdf(scene), "four_bar.urdf") as file:
                 flags = bullet.URDF_USE_INERTIA_FROM_FILE
                 body = bullet.loadURDF(
-                    file, useFixedBase=True, flags=flags, physicsClientId=client
+                    file,
+                    useFixedBase=True,
+                    flags=flags,
+                    physicsClientId=client,
                 )
             bullet.setPhysicsEngineParameter(
-                fixedTimeStep=course.timestep, **self.settings[self.setting]
+                fixedTimeStep=course.timestep,
+                **self.settings[self.setting],
             )
             bullet.setGravity(*gravity_field(scene))
             for joint, (angle, speed) in enumerate(
                 zip(begin.qpos, begin.qvel, strict=True)
             ):
                 bullet.changeDynamics(
-                    body, joint, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0
+                    body,
+                    joint,
+                    linearDamping=0.0,
+                    angularDamping=0.0,
+                    jointDamping=0.0,
                 )
                 bullet.resetJointState(body, joint, angle, speed)
                 bullet.setJointMotorControl2(
-                    body, joint, bullet.VELOCITY_CONTROL, force=0.0
+                    body,
+                    joint,
+                    bullet.VELOCITY_CONTROL,
+                    force=0.0,
                 )
                 bullet.enableJointForceTorqueSensor(body, joint, True)
             bullet.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0)

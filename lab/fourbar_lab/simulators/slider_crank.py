@@ -113,7 +113,11 @@ def make_problem(name: str) -> dict[str, Any]:
 
 
 def solve_eight_equations(
-    scene: dict[str, Any], theta_2: float, omega_2: float, alpha_2: float, branch: int
+    scene: dict[str, Any],
+    theta_2: float,
+    omega_2: float,
+    alpha_2: float,
+    branch: int,
 ) -> dict[str, Any]:
     """Solve the eight equations of the three free bodies at one position."""
     from mpmath import mp, mpc, mpf

@@ -111,7 +111,8 @@ def _direct(size: float, angle: float) -> Array:
 
 
 def answer_slider_positions(
-    make: Callable[..., _CutLoop], question: dict[str, Any]
+    make: Callable[..., _CutLoop],
+    question: dict[str, Any],
 ) -> dict[str, Any]:
     """Answer the positions of a question."""
     scene = question["scene"]

@@ -94,7 +94,10 @@ class MujocoSlider:
         slider.
         """
         for body, force, site in zip(
-            self.bodies[1:], (closing, self.push - closing), self.sites, strict=True
+            self.bodies[1:],
+            (closing, self.push - closing),
+            self.sites,
+            strict=True,
         ):
             arm = self.data.site_xpos[site] - self.data.xipos[body]
             pull = np.array([*force, 0.0])

@@ -156,7 +156,9 @@ def test_a_free_motion_has_time_and_no_drive(tmp_path: Path, run: Fourbar) -> No
 
 @pytest.mark.parametrize("ending", ["csv", "json", "txt"])
 def test_a_file_holds_what_would_be_printed_and_its_name_asks_for_the_form(
-    ending: str, tmp_path: Path, run: Fourbar
+    ending: str,
+    tmp_path: Path,
+    run: Fourbar,
 ) -> None:
     scene, named, asked = (
         tmp_path / "scene.toml",
@@ -188,7 +190,11 @@ def test_a_file_holds_what_would_be_printed_and_its_name_asks_for_the_form(
     ],
 )
 def test_text_is_not_written_under_a_name_whose_readers_refuse_it(
-    command: str, name: str, written: str, tmp_path: Path, run: Fourbar
+    command: str,
+    name: str,
+    written: str,
+    tmp_path: Path,
+    run: Fourbar,
 ) -> None:
     code, _, err = run(command, MODELS / "crank_rocker.toml", "-o", tmp_path / name)
     assert (
@@ -202,7 +208,10 @@ def test_text_is_not_written_under_a_name_whose_readers_refuse_it(
 
 @pytest.mark.parametrize(("command", "ending"), [("sdf", "sdf"), ("usd", "usda")])
 def test_four_lengths_are_written_for_every_simulator(
-    command: str, ending: str, tmp_path: Path, run: Fourbar
+    command: str,
+    ending: str,
+    tmp_path: Path,
+    run: Fourbar,
 ) -> None:
     lengths = ("300 mm", "10 cm", 0.25, 0.22)
     target = tmp_path / f"bars.{ending}"
@@ -212,14 +221,19 @@ def test_four_lengths_are_written_for_every_simulator(
     assert (code, err) == (0, "") and "1 kg/m" in out
     writer = import_module("fourbar.mjcf.assembly")
     made = import_module("fourbar.mjcf").make_scene(
-        0.3, 0.1, 0.25, 0.22, omega=2.0 * math.pi
+        0.3,
+        0.1,
+        0.25,
+        0.22,
+        omega=2.0 * math.pi,
     )
     written = getattr(writer, f"write_{command}")(made)
     assert target.read_text(encoding="utf-8") == written
 
 
 def test_what_rests_at_every_angle_is_no_range_of_one(
-    tmp_path: Path, run: Fourbar
+    tmp_path: Path,
+    run: Fourbar,
 ) -> None:
     bar = fourbar.Bar(0.1, 1.0, centre=(0.0, 0.0))
     linkage = fourbar.FourBar(0.3, bar, fourbar.Bar(0.25), fourbar.Bar(0.22))
@@ -253,7 +267,9 @@ def test_csv_has_the_same_numbers(run: Fourbar) -> None:
     "name", ["=cmd|'calc'!A0", "+1", "-A1", "@SUM(A1)", "P,=1+1", "P\n=1+1"]
 )
 def test_a_heading_of_csv_is_a_word_and_no_formula(
-    name: str, tmp_path: Path, run: Fourbar
+    name: str,
+    tmp_path: Path,
+    run: Fourbar,
 ) -> None:
     """A spreadsheet calculates a cell that begins with =.
 
@@ -285,7 +301,10 @@ def test_degrees_are_of_angles_alone_and_named(run: Fourbar) -> None:
     for key in CONTRACT[1:]:
         if key in ("theta_2", "theta_3", "theta_4"):
             assert np.allclose(
-                turned[key], np.degrees(plain[key]), rtol=1e-15, atol=0.0
+                turned[key],
+                np.degrees(plain[key]),
+                rtol=1e-15,
+                atol=0.0,
             )  # type: ignore[arg-type]
         else:
             assert turned[key] == plain[key], key
@@ -382,14 +401,17 @@ def test_every_thins_the_table_and_keeps_its_last_position(run: Fourbar) -> None
     ],
 )
 def test_what_contradicts_itself_or_lacks_a_unit_is_refused(
-    arguments: tuple[object, ...], words: str, run: Fourbar
+    arguments: tuple[object, ...],
+    words: str,
+    run: Fourbar,
 ) -> None:
     code, out, err = run(*arguments)
     assert (code, out) == (2, "") and words in err and err.count("\n") == 1
 
 
 def test_no_command_is_a_question_for_help(
-    run: Fourbar, capsys: pytest.CaptureFixture[str]
+    run: Fourbar,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     code, out, err = run()
     assert (code, err) == (HOLDS, "") and out == run("-h")[1] and "analyze" in out
@@ -442,7 +464,10 @@ def test_the_digits_of_the_torque() -> None:
         if "digits" in name
     )
     for cell, torque, error in zip(
-        column, solution.torque, solution.torque_error, strict=True
+        column,
+        solution.torque,
+        solution.torque_error,
+        strict=True,
     ):
         digits = int(cell)
         assert error <= abs(torque) * 10.0**-digits or digits == 0
@@ -502,7 +527,8 @@ def test_what_is_printed_can_be_written(tmp_path: Path, run: Fourbar) -> None:
 
 
 def test_a_length_that_is_written_to_a_file_has_a_unit(
-    tmp_path: Path, run: Fourbar
+    tmp_path: Path,
+    run: Fourbar,
 ) -> None:
     code, _, err = run("new", tmp_path / "a.toml", "--lengths", 300, 100, 250, 220)
     assert (
@@ -540,7 +566,8 @@ def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:
         if line.startswith("  output: input, coupler stretched") and "open" in line
     )
     assert [float(cell) for cell in row[4:7]] == pytest.approx(
-        [stretched, stretched, 180.0 - angle(a + b, d, c)], abs=6e-5
+        [stretched, stretched, 180.0 - angle(a + b, d, c)],
+        abs=6e-5,
     )
     row = next(
         line.split()
@@ -548,7 +575,8 @@ def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:
         if line.startswith("  output: input, coupler folded") and "open" in line
     )
     assert [float(cell) for cell in row[4:6]] == pytest.approx(
-        [folded, folded - 180.0], abs=6e-5
+        [folded, folded - 180.0],
+        abs=6e-5,
     )
     least, greatest = angle(d - a, b, c), angle(d + a, b, c)
     swung = angle(b - a, d, c) - angle(b + a, d, c)
@@ -608,7 +636,8 @@ def test_mjcf_of_a_scene_and_of_bare_lengths(tmp_path: Path, run: Fourbar) -> No
         == HOLDS
     )
     assert (tmp_path / "c.xml").read_text() == write_mjcf_for(
-        load(MODELS / "thesis.toml"), drive="motor"
+        load(MODELS / "thesis.toml"),
+        drive="motor",
     )
 
 
@@ -627,7 +656,9 @@ def test_the_command_that_new_names_can_be_copied(tmp_path: Path, run: Fourbar) 
     ],
 )
 def test_new_writes_lengths_with_marks_of_inches_as_a_file_that_is_read(
-    texts: tuple[str, ...], tmp_path: Path, run: Fourbar
+    texts: tuple[str, ...],
+    tmp_path: Path,
+    run: Fourbar,
 ) -> None:
     path = tmp_path / "inches.toml"
     assert run("new", path, "--lengths", *texts)[0] == HOLDS
@@ -642,7 +673,10 @@ def test_new_writes_lengths_with_marks_of_inches_as_a_file_that_is_read(
     ("units", "unit"), [((), "lbf in"), (("--units", "SI"), "N m")]
 )
 def test_plot_and_animate_show_the_units_of_the_scene(
-    units: tuple[str, ...], unit: str, tmp_path: Path, run: Fourbar
+    units: tuple[str, ...],
+    unit: str,
+    tmp_path: Path,
+    run: Fourbar,
 ) -> None:
     path, picture = tmp_path / "inches.toml", tmp_path / "a.svg"
     run("new", path, "--lengths", "12 in", "4 in", "10 in", "9 in")
@@ -655,7 +689,9 @@ def test_plot_and_animate_show_the_units_of_the_scene(
 
 @pytest.mark.parametrize("form", ["sdf", "usd"])
 def test_sdf_and_usd_name_the_loads_that_they_leave_out(
-    form: str, tmp_path: Path, run: Fourbar
+    form: str,
+    tmp_path: Path,
+    run: Fourbar,
 ) -> None:
     code, _, err = run(form, MODELS / "crank_rocker.toml", "-o", tmp_path / "a")
     assert (
@@ -673,7 +709,8 @@ def test_sdf_and_usd_name_the_loads_that_they_leave_out(
 
 @pytest.mark.slow
 def test_plot_and_animate_write_what_their_ending_says(
-    tmp_path: Path, run: Fourbar
+    tmp_path: Path,
+    run: Fourbar,
 ) -> None:
     file = MODELS / "crank_rocker.toml"
     drawn = tmp_path / "a.svg"
@@ -724,7 +761,9 @@ def test_what_goes_wrong_is_one_line_and_a_status(
 
 
 def test_a_full_disk_leaves_the_old_file(
-    run: Fourbar, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    run: Fourbar,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
     def full(_: int) -> None:
         raise OSError(28, "No space left on device")
@@ -843,7 +882,8 @@ def test_a_reader_that_leaves_early_is_no_error(arguments: tuple[str, ...]) -> N
 
 @pytest.mark.slow
 @pytest.mark.skipif(
-    not Path("/dev/full").exists(), reason="only Linux has a device that is always full"
+    not Path("/dev/full").exists(),
+    reason="only Linux has a device that is always full",
 )
 def test_standard_output_that_is_full() -> None:
     with Path("/dev/full").open("w") as full:
@@ -915,7 +955,10 @@ BY_STROKE = BY_STROKE.replace('omega_2 = "60 rpm"', 'stroke_speed = "1 in/s"') +
     ],
 )
 def test_a_message_has_the_units_of_the_scene(
-    text: str, words: str, tmp_path: Path, run: Fourbar
+    text: str,
+    words: str,
+    tmp_path: Path,
+    run: Fourbar,
 ) -> None:
     """The limit of bar 2 by cosines: (49 + 4 - 72.25)/28 is that of 133.4 deg."""
     (tmp_path / "scene.toml").write_text(text)
@@ -938,7 +981,8 @@ def test_a_message_has_the_units_of_the_lengths_that_were_typed(run: Fourbar) ->
 
 
 def test_an_output_angle_out_of_range_is_refused_with_the_range(
-    tmp_path: Path, run: Fourbar
+    tmp_path: Path,
+    run: Fourbar,
 ) -> None:
     (tmp_path / "scene.toml").write_text(INCHES)
     scene = tmp_path / "scene.toml"
@@ -951,7 +995,8 @@ def test_an_output_angle_out_of_range_is_refused_with_the_range(
 
 
 def test_points_in_the_table_have_the_coordinates_of_the_drawing(
-    run: Fourbar, tmp_path: Path
+    run: Fourbar,
+    tmp_path: Path,
 ) -> None:
     """O2 is not the origin of the drawing; `--at` and CSV have its coordinates too."""
     file = tmp_path / "drawn.toml"

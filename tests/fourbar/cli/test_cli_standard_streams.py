@@ -17,7 +17,9 @@ SCENE = ROOT / "models" / "crank_rocker.toml"
 
 
 def call_fourbar(
-    folder: Path, *arguments: str, scene: bytes = SCENE.read_bytes()
+    folder: Path,
+    *arguments: str,
+    scene: bytes = SCENE.read_bytes(),
 ) -> subprocess.CompletedProcess[bytes]:
     """Run the command line in a folder, with a scene on a pipe.
 
@@ -25,7 +27,11 @@ def call_fourbar(
     """
     line = [sys.executable, "-m", "fourbar", *arguments]
     return subprocess.run(
-        line, input=scene, capture_output=True, check=False, cwd=folder
+        line,
+        input=scene,
+        capture_output=True,
+        check=False,
+        cwd=folder,
     )
 
 
@@ -71,7 +77,9 @@ def test_a_mistake_on_standard_input_is_one_line(tmp_path: Path) -> None:
     ids=lambda value: value[0] if isinstance(value, tuple) else "",
 )
 def test_a_file_is_written_to_standard_output(
-    arguments: tuple[str, ...], start: bytes, tmp_path: Path
+    arguments: tuple[str, ...],
+    start: bytes,
+    tmp_path: Path,
 ) -> None:
     written = call_fourbar(tmp_path, *arguments)
     assert written.returncode == 0, written.stderr

@@ -22,10 +22,12 @@ from pathlib import Path
 import pytest
 
 pytest.importorskip(
-    "tornado", reason="the workbench is served by tornado: pip install tornado"
+    "tornado",
+    reason="the workbench is served by tornado: pip install tornado",
 )
 pytest.importorskip(
-    "tomlkit", reason="the workbench edits scene files by tomlkit: pip install tomlkit"
+    "tomlkit",
+    reason="the workbench edits scene files by tomlkit: pip install tomlkit",
 )
 from tornado.httpclient import AsyncHTTPClient, HTTPRequest
 from tornado.websocket import websocket_connect
@@ -109,7 +111,8 @@ def port_of(address: str) -> str:
 
 async def status(address: str, **options) -> int:
     answer = await AsyncHTTPClient(force_instance=True).fetch(
-        HTTPRequest(address, **options), raise_error=False
+        HTTPRequest(address, **options),
+        raise_error=False,
     )
     return answer.code
 
@@ -119,7 +122,8 @@ async def page(address: str):
     line = address.replace("http:", "ws:") + "live"
     OPEN.append(
         await websocket_connect(
-            HTTPRequest(line, headers={"Origin": origin}), max_message_size=HUGE
+            HTTPRequest(line, headers={"Origin": origin}),
+            max_message_size=HUGE,
         )
     )
     return OPEN[-1]
@@ -330,7 +334,8 @@ def test_it_ends_when_the_last_page_has_gone_and_not_before(bench) -> None:
 
 
 def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
-    bench, monkeypatch
+    bench,
+    monkeypatch,
 ) -> None:
     program = (
         "import sys, time, pathlib; print('agrees', flush=True); out ="
@@ -376,7 +381,8 @@ def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
 
 @pytest.mark.slow
 def test_a_change_overtakes_a_summary_that_is_being_computed(
-    bench, monkeypatch
+    bench,
+    monkeypatch,
 ) -> None:
     evaluate, asked_for, released, summaries = (
         server.evaluate_scene,
@@ -474,10 +480,13 @@ def processor_time(process: subprocess.Popen) -> float:
 @pytest.mark.slow
 @pytest.mark.linux
 @pytest.mark.parametrize(
-    "files", [256, 40], ids=["within its limit of files", "beyond its limit of files"]
+    "files",
+    [256, 40],
+    ids=["within its limit of files", "beyond its limit of files"],
 )
 def test_half_open_connections_neither_stop_the_server_nor_stay(
-    path: Path, files: int
+    path: Path,
+    files: int,
 ) -> None:
     import resource
 
@@ -496,7 +505,10 @@ server.edit(Path(sys.argv[1]), Path(sys.argv[1] + "_exports"), browse=False)
         command = [sys.executable, "-c", program, str(path)]
         process = stack.enter_context(
             subprocess.Popen(
-                command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+                command,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
             )
         )
         stack.callback(process.kill)
@@ -600,7 +612,8 @@ def test_a_second_workbench_on_one_file_leads_to_the_first(path: Path) -> None:
 
 @pytest.mark.posix
 def test_a_file_that_another_one_locks_and_gives_no_address_for_is_named(
-    tmp_path: Path, monkeypatch
+    tmp_path: Path,
+    monkeypatch,
 ) -> None:
     from fourbar.edit import redirect
 

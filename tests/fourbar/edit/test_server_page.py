@@ -17,13 +17,16 @@ import pytest
 import fourbar
 
 pytest.importorskip(
-    "selenium", reason="pages are driven by selenium: pip install selenium"
+    "selenium",
+    reason="pages are driven by selenium: pip install selenium",
 )
 pytest.importorskip(
-    "tornado", reason="the workbench is served by tornado: pip install tornado"
+    "tornado",
+    reason="the workbench is served by tornado: pip install tornado",
 )
 pytest.importorskip(
-    "tomlkit", reason="the workbench edits scene files by tomlkit: pip install tomlkit"
+    "tomlkit",
+    reason="the workbench edits scene files by tomlkit: pip install tomlkit",
 )
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
@@ -151,7 +154,9 @@ def opened(chromium):
 
 @pytest.mark.slow
 def test_the_table_of_limits_keeps_its_columns_in_a_narrow_window(
-    chromium, opened, tmp_path: Path
+    chromium,
+    opened,
+    tmp_path: Path,
 ) -> None:
     (tmp_path / "a.toml").write_text(
         fourbar.dump(fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22)))
@@ -183,7 +188,9 @@ def test_the_table_of_limits_keeps_its_columns_in_a_narrow_window(
 
 @pytest.mark.slow
 def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(
-    chromium, opened, tmp_path: Path
+    chromium,
+    opened,
+    tmp_path: Path,
 ) -> None:
     path, driver = tmp_path / "mine.toml", chromium
     open_scene(driver, opened(path))
@@ -263,7 +270,9 @@ SHOWN_FIELDS = (
 
 @pytest.mark.slow
 def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(
-    chromium, opened, tmp_path: Path
+    chromium,
+    opened,
+    tmp_path: Path,
 ) -> None:
     path, driver = tmp_path / "mine.toml", chromium
     driver.get(opened(path))
@@ -288,14 +297,16 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(
         assert vector == pytest.approx(pin, abs=PIXELS * scale)
     lengths = driver.execute_script("return data.lengths")
     assert [length / 0.0254 for length in lengths] == pytest.approx(
-        [abs(bar) for bar in bars], abs=PIXELS * scale
+        [abs(bar) for bar in bars],
+        abs=PIXELS * scale,
     )
     shown = driver.execute_script(
         "const p = at(row); return [p.A, p.B]"
     )  # the position shown is the one drawn
     for place, pin in zip(shown, ("A", "B"), strict=True):
         assert complex(*place) / 0.0254 == pytest.approx(
-            pins[pin], abs=2 * PIXELS * scale
+            pins[pin],
+            abs=2 * PIXELS * scale,
         )
     assert "lbf" in driver.find_element("id", "forces").text  # results follow the file
     assert not driver.find_elements("id", "field:lengths/input")  # the pins state them
@@ -330,14 +341,17 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(
         math.hypot(0.25, 0.75),
     ]
     assert driver.execute_script("return data.lengths") == pytest.approx(
-        expected, abs=2e-6
+        expected,
+        abs=2e-6,
     )
     assert not driver.get_log("browser")
 
 
 @pytest.mark.slow
 def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(
-    chromium, opened, tmp_path: Path
+    chromium,
+    opened,
+    tmp_path: Path,
 ) -> None:
     path, driver = tmp_path / "mine.toml", chromium
     driver.get(opened(path))
@@ -380,7 +394,8 @@ def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(
         driver.execute_script("return data.over.values[17]"),
     )
     assert force == pytest.approx(
-        solution.drive_force[np.abs(solution.stroke - stroke).argmin()], rel=PRINTED
+        solution.drive_force[np.abs(solution.stroke - stroke).argmin()],
+        rel=PRINTED,
     )
     command = [
         sys.executable,
@@ -401,7 +416,9 @@ def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(
 
 @pytest.mark.slow
 def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(
-    chromium, opened, tmp_path: Path
+    chromium,
+    opened,
+    tmp_path: Path,
 ) -> None:
     path, driver = tmp_path / "mine.toml", chromium
     driver.get(opened(path))
@@ -479,7 +496,9 @@ def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(
 
 @pytest.mark.slow
 def test_each_label_is_what_a_screen_reader_says_and_each_choice_a_list(
-    chromium, opened, tmp_path: Path
+    chromium,
+    opened,
+    tmp_path: Path,
 ) -> None:
     path, driver = tmp_path / "bucket.toml", chromium
     path.write_text((MODELS / "gallery" / "excavator_bucket.toml").read_text())
@@ -530,7 +549,10 @@ def test_each_label_is_what_a_screen_reader_says_and_each_choice_a_list(
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [1440, 390])
 def test_it_opens_in_the_middle_with_a_linkage_that_fills_half_and_labels_apart(
-    chromium, opened, tmp_path: Path, width: int
+    chromium,
+    opened,
+    tmp_path: Path,
+    width: int,
 ) -> None:
     driver = chromium
     resize(driver, width)
@@ -568,7 +590,9 @@ def test_it_opens_in_the_middle_with_a_linkage_that_fills_half_and_labels_apart(
 
 @pytest.mark.slow
 def test_undo_takes_a_refused_entry_back_and_leaves_the_last_good_state(
-    chromium, opened, tmp_path: Path
+    chromium,
+    opened,
+    tmp_path: Path,
 ) -> None:
     driver = chromium
     open_scene(driver, opened(tmp_path / "mine.toml"))
@@ -605,7 +629,9 @@ def test_undo_takes_a_refused_entry_back_and_leaves_the_last_good_state(
 
 @pytest.mark.slow
 def test_a_page_finds_its_server_again_and_a_new_one_goes_on_from_the_state(
-    chromium, opened, tmp_path: Path
+    chromium,
+    opened,
+    tmp_path: Path,
 ) -> None:
     path, driver = tmp_path / "mine.toml", chromium
     server = opened(path)
@@ -631,7 +657,9 @@ def test_a_page_finds_its_server_again_and_a_new_one_goes_on_from_the_state(
 
 @pytest.mark.slow
 def test_a_refused_entry_stays_with_its_message_when_tab_follows_at_once(
-    chromium, opened, tmp_path: Path
+    chromium,
+    opened,
+    tmp_path: Path,
 ) -> None:
     driver = chromium
     open_scene(driver, opened(tmp_path / "mine.toml"))
@@ -654,7 +682,9 @@ def test_a_refused_entry_stays_with_its_message_when_tab_follows_at_once(
 
 @pytest.mark.slow
 def test_a_strip_beside_the_drawing_tells_the_largest_numbers_and_a_change_of_type(
-    chromium, opened, tmp_path: Path
+    chromium,
+    opened,
+    tmp_path: Path,
 ) -> None:
     driver = chromium
     open_scene(driver, opened(tmp_path / "mine.toml"))
@@ -687,7 +717,9 @@ def test_a_strip_beside_the_drawing_tells_the_largest_numbers_and_a_change_of_ty
 
 @pytest.mark.slow
 def test_choosing_another_commanded_angle_keeps_the_position(
-    chromium, opened, tmp_path: Path
+    chromium,
+    opened,
+    tmp_path: Path,
 ) -> None:
     driver = chromium
     open_scene(driver, opened(tmp_path / "mine.toml"))
@@ -703,7 +735,10 @@ def test_choosing_another_commanded_angle_keeps_the_position(
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [1440, 400])
 def test_no_number_of_the_scene_is_cut_off_in_its_field(
-    chromium, opened, tmp_path: Path, width: int
+    chromium,
+    opened,
+    tmp_path: Path,
+    width: int,
 ) -> None:
     """The pump-jack states a ground of 98.595131725659 in, which no half line holds."""
     path, driver = tmp_path / "pump.toml", chromium
@@ -724,7 +759,9 @@ def test_no_number_of_the_scene_is_cut_off_in_its_field(
 
 @pytest.mark.slow
 def test_a_change_beyond_ten_times_is_no_percentage(
-    chromium, opened, tmp_path: Path
+    chromium,
+    opened,
+    tmp_path: Path,
 ) -> None:
     driver = chromium
     open_scene(driver, opened(tmp_path / "mine.toml"))

@@ -23,7 +23,8 @@ from fourbar.files.scene_text import write_new_scene
 from fourbar.quantities.units import find_unit
 
 pytest.importorskip(
-    "tomlkit", reason="the workbench edits scene files by tomlkit: pip install tomlkit"
+    "tomlkit",
+    reason="the workbench edits scene files by tomlkit: pip install tomlkit",
 )
 from fourbar.edit.document import SceneDocument, list_offers
 from fourbar.edit.dragging import write_rounded
@@ -233,7 +234,8 @@ def at_50(session: Session) -> fourbar.Solution:
     scene = session.now.scene
     command = fourbar.command(scene)
     at_50_deg = command._replace(
-        angle=np.array([math.radians(50.0)]), branch=command.branch[:1]
+        angle=np.array([math.radians(50.0)]),
+        branch=command.branch[:1],
     )
     return fourbar.solve(scene, at=at_50_deg)
 
@@ -259,11 +261,13 @@ def test_what_is_dragged_stands_where_it_was_dragged_to(session: Session) -> Non
         else:
             linkage = session.now.scene.linkage
             assert linkage.ground * np.exp(1j * linkage.ground_angle) == pytest.approx(
-                to, abs=2 * PIXEL
+                to,
+                abs=2 * PIXEL,
             )
     dragged(session, ["points", "P", "from_pin"], 0.11 + 0.2j)
     assert complex(*at_50(session).points["P"][0]) == pytest.approx(
-        0.11 + 0.2j, abs=2 * PIXEL
+        0.11 + 0.2j,
+        abs=2 * PIXEL,
     )
     assert session.now.plain["points"]["P"]["from_pin"][0].endswith(" in")
     dragged(session, ["bars", "output", "centre"], 0.3 + 0.1j)
@@ -274,7 +278,8 @@ def test_what_is_dragged_stands_where_it_was_dragged_to(session: Session) -> Non
     start = session.now.scene.effects[-1].springs[0].start
     turned = session.now.scene.linkage.ground_angle
     assert np.exp(1j * turned) * start.vector() == pytest.approx(
-        0.1 - 0.05j, abs=2 * PIXEL
+        0.1 - 0.05j,
+        abs=2 * PIXEL,
     )
     dragged(session, ["loads", 1, "from_centre"], 0.12 + 0.12j)
     load, s = session.now.scene.loads[1], at_50(session)
@@ -299,7 +304,9 @@ def test_what_is_dragged_stands_where_it_was_dragged_to(session: Session) -> Non
 @pytest.mark.parametrize("frame", ["world", "bar"])
 @pytest.mark.parametrize("size", ["5 N", "-5 N"])
 def test_the_arrow_of_a_load_goes_where_it_is_dragged_in_either_frame_and_a_negative_force_stays(
-    session: Session, frame: str, size: str
+    session: Session,
+    frame: str,
+    size: str,
 ) -> None:
     load = (
         f'[[loads]]\nbar = 3\nforce = ["{size}", "10 deg"]\n'
@@ -354,7 +361,8 @@ def test_a_place_by_coordinates_is_dragged_and_stays_so_until_it_is_restated(
     turned = np.exp(1j * session.now.scene.linkage.ground_angle)
     start = session.now.scene.drive.start
     assert turned * start.distance * np.exp(1j * start.angle) == pytest.approx(
-        0.02 + 0.05j, abs=2 * PIXEL
+        0.02 + 0.05j,
+        abs=2 * PIXEL,
     )
     for by, kind in (("polar", list), ("xy", dict)):
         assert "refused" not in session.do({"do": "restate", "path": path, "by": by})
@@ -375,7 +383,8 @@ BUCKET = ROOT / "models" / "gallery" / "excavator_bucket.toml"
 
 @pytest.mark.parametrize("command", ["theta_3", "theta_4", "stroke"])
 def test_another_command_goes_over_the_same_motion(
-    tmp_path: Path, command: str
+    tmp_path: Path,
+    command: str,
 ) -> None:
     path = tmp_path / "bucket.toml"
     path.write_text(BUCKET.read_text())
@@ -388,7 +397,8 @@ def test_another_command_goes_over_the_same_motion(
     assert after.assembled.all() and np.isfinite(after.drive_force).all()
     values, places = getattr(before, command), getattr(after, command)
     assert sorted(places[[0, -1]]) == pytest.approx(
-        sorted(values[[0, -1]]), abs=3e-3 * np.ptp(values)
+        sorted(values[[0, -1]]),
+        abs=3e-3 * np.ptp(values),
     )
     order = np.argsort(values)
     for name in ("theta_2", "theta_3", "theta_4"):  # the same poses
@@ -442,7 +452,8 @@ def test_a_state_that_assembles_nowhere_names_what_it_commands(
     """The output of this linkage rocks, and does not come to 0 deg."""
     scene = replace(session.now.scene, motion=fourbar.Motion(theta_4=0.0))
     with pytest.raises(
-        fourbar.NotAssembledError, match=r"^motion\.theta_4: .*; theta_4 goes from"
+        fourbar.NotAssembledError,
+        match=r"^motion\.theta_4: .*; theta_4 goes from",
     ):
         evaluate_scene(scene, {})
 
@@ -452,7 +463,8 @@ PINS_DRAWN = [[0.0, 0.0], [3.0, 4.0], [14.0, 9.0], [12.0, -5.0]]
 
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(
-    tmp_path: Path, mirrored: bool
+    tmp_path: Path,
+    mirrored: bool,
 ) -> None:
     session = Session(tmp_path / "new.toml", tmp_path / "exports")
     assert session.do({"do": "hello"})["fresh"]
@@ -468,7 +480,8 @@ def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(
     A, B, O4 = (0.0254 * complex(*pin) for pin in pins[1:])
     command = fourbar.command(scene)
     as_drawn = command._replace(
-        angle=np.array([np.angle(A)]), branch=command.branch[:1]
+        angle=np.array([np.angle(A)]),
+        branch=command.branch[:1],
     )
     s = fourbar.solve(scene, "position", at=as_drawn)
     assert [complex(*s.A[0]), complex(*s.B[0])] == pytest.approx([A, B], abs=1e-6)
@@ -489,7 +502,8 @@ def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(
         session.now.plain["bars"]["coupler"]["mass"] == "3 lb"
     )  # what was typed stays
     assert session.now.scene.linkage.coupler.length == pytest.approx(
-        0.0254 * math.hypot(11, 8), abs=0.0254 * 0.01
+        0.0254 * math.hypot(11, 8),
+        abs=0.0254 * 0.01,
     )
     for nonsense in (
         [[0, 0]] * 4,
@@ -516,7 +530,9 @@ def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(
     ],
 )
 def test_results_have_the_units_of_the_file_until_others_are_chosen(
-    session: Session, length: str, force: str
+    session: Session,
+    length: str,
+    force: str,
 ) -> None:
     text = session.now.text.replace('ground = "300 mm"', f"ground = '''{length}'''")
     told = session.do({"do": "text", "text": text})
@@ -557,7 +573,8 @@ def unpacked(data: bytes) -> dict:
 def settled(session: Session) -> dict:
     now = session.now
     return session.describe(
-        evaluate_scene(now.scene, session.units, settled=True), settled=True
+        evaluate_scene(now.scene, session.units, settled=True),
+        settled=True,
     )
 
 
@@ -703,7 +720,8 @@ def test_a_damaged_state_file_is_one_line(session: Session, name: str) -> None:
 
 @pytest.mark.slow
 def test_the_history_of_a_large_scene_stays_within_what_the_next_start_reads(
-    session: Session, monkeypatch: pytest.MonkeyPatch
+    session: Session,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Both limits and the scene are a tenth as large.
 

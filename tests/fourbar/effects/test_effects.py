@@ -41,12 +41,18 @@ LAST_DIGITS = 64 * 2.0**-52
 
 
 def alone(
-    *effects: object, omega_2: float = 0.0, theta_2: object = None, **changes: object
+    *effects: object,
+    omega_2: float = 0.0,
+    theta_2: object = None,
+    **changes: object,
 ) -> Scene:
     """Massless in effect: static, so that only the effects act."""
     angles = np.linspace(0.2, 6.0, 9) if theta_2 is None else theta_2
     return crank_rocker(
-        motion=Motion(angles, omega_2), loads=(), effects=effects, **changes
+        motion=Motion(angles, omega_2),
+        loads=(),
+        effects=effects,
+        **changes,
     )  # type: ignore[arg-type]
 
 
@@ -78,7 +84,9 @@ def test_a_spring_is_the_slope_of_its_energy() -> None:
     torque = solve(scene).torque
     assert torque is not None and np.abs(torque).max() > 1.0
     assert torque == pytest.approx(
-        potential_torque(scene, energy), abs=SECOND_ORDER * 10, rel=0
+        potential_torque(scene, energy),
+        abs=SECOND_ORDER * 10,
+        rel=0,
     )
 
 
@@ -99,7 +107,9 @@ def test_the_work_that_compresses_a_gas_spring_is_that_of_its_two_forces() -> No
     torque = solve(scene).torque
     assert torque is not None and np.abs(torque).max() > 1.0
     assert torque == pytest.approx(
-        potential_torque(scene, energy), abs=SECOND_ORDER * 10, rel=0
+        potential_torque(scene, energy),
+        abs=SECOND_ORDER * 10,
+        rel=0,
     )
     assert Spring.gas(*ends, extended, stroke, first) == Spring(
         *ends, 0.0, extended, -first
@@ -140,7 +150,9 @@ def test_torsion_springs_are_the_slope_of_their_energy() -> None:
         return total
 
     assert solve(scene).torque == pytest.approx(
-        potential_torque(scene, energy), abs=SECOND_ORDER * 10, rel=0
+        potential_torque(scene, energy),
+        abs=SECOND_ORDER * 10,
+        rel=0,
     )
 
 
@@ -149,7 +161,8 @@ def test_a_flywheel_is_inertia_of_the_bar(bar: int, name: str) -> None:
     scene = crank_rocker(effects=(Gravity(), Flywheel(0.02, bar)), drive_bar=bar)
     plain = scene.linkage.bar(bar)
     heavier = replace(
-        scene.linkage, **{name: replace(plain, inertia=plain.moment_of_inertia + 0.02)}
+        scene.linkage,
+        **{name: replace(plain, inertia=plain.moment_of_inertia + 0.02)},
     )
     with_wheel, with_bar = (
         solve(scene),
@@ -207,14 +220,17 @@ def test_several_cones_one_of_which_is_known() -> None:
         assert list(sliding.number) == [number, ONE_SOLUTION]
         if number != NO_SOLUTION:
             assert sliding.x[0] == pytest.approx(
-                [1.0 / (1.0 - c1), 2.0 / (1.0 - c2)], rel=1e-12
+                [1.0 / (1.0 - c1), 2.0 / (1.0 - c2)],
+                rel=1e-12,
             )
             # both slopes are 1 - k c where F + C x keeps the sense of F
             assert sliding.from_jamming[0] == pytest.approx(
-                min(1.0, 1.0 - c1, 1.0 - c2), rel=1e-12
+                min(1.0, 1.0 - c1, 1.0 - c2),
+                rel=1e-12,
             )
         assert sliding.x[1] == pytest.approx(
-            [0.25 / (1.0 - 0.25 * c1), 0.25 / (1.0 - 0.125 * c2)], rel=1e-12
+            [0.25 / (1.0 - 0.25 * c1), 0.25 / (1.0 - 0.125 * c2)],
+            rel=1e-12,
         )
 
 
@@ -253,7 +269,8 @@ def test_at_rest_the_interval_is_that_of_beginning_to_move(friction: object) -> 
     assert ((rest.torque_low < rest.torque) & (rest.torque < rest.torque_high)).all()
     for side, beginning in zip((1, -1), slow, strict=True):
         assert solve(scene, "force", side=side).torque == pytest.approx(
-            beginning, rel=1e-13
+            beginning,
+            rel=1e-13,
         )
 
 
@@ -288,7 +305,8 @@ def test_a_load_over_theta_2_is_the_load_times_its_factor() -> None:
         solve(replace(alone(theta_2=angle), loads=(replace(load, table=table),))),
     )
     twice = replace(
-        alone(theta_2=angle), loads=(replace(load, force=(6.0, 0.7), moment=0.4),)
+        alone(theta_2=angle),
+        loads=(replace(load, force=(6.0, 0.7), moment=0.4),),
     )
     assert tabled[1].torque == pytest.approx(solve(twice).torque, rel=1e-14)
 
@@ -333,7 +351,9 @@ CAM = {"rise": (1.0, 0.5), "dwell": 0.2, "fall": 0.4, "rest": 0.1}
     [("cycloidal", 2.0, 2.0 * math.pi), ("345", 1.875, 10.0 / math.sqrt(3.0))],
 )
 def test_a_standard_law_has_the_factors_of_the_books(
-    kind: str, speed: float, acceleration: float
+    kind: str,
+    speed: float,
+    acceleration: float,
 ) -> None:
     """C_v = 2, C_a = 2 pi of the cycloidal law.
 
@@ -401,7 +421,8 @@ def test_each_position_of_a_law_is_that_motion_alone() -> None:
             float(along_law.alpha_2[i]),
         )
         assert solve(crank_rocker(motion=here)).torque[0] == pytest.approx(
-            along_law.torque[i], rel=1e-13
+            along_law.torque[i],
+            rel=1e-13,
         )  # type: ignore[index]
 
 
@@ -448,7 +469,8 @@ def test_a_sweep_without_theta_2_still_runs_over_the_range() -> None:
 def test_a_table_says_in_degrees_what_it_covers_and_what_lies_outside() -> None:
     table = fourbar.effects.Table(("0 deg", "90 deg"), (0.0, 1.0))
     with pytest.raises(
-        InputError, match="covers 0 to 90 deg; the position at 120 deg lies outside"
+        InputError,
+        match="covers 0 to 90 deg; the position at 120 deg lies outside",
     ):
         table.at(np.radians([45.0, 120.0]))
 

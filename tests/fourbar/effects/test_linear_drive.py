@@ -55,7 +55,9 @@ def driven(start_bar: int, end_bar: int, **changes: Any) -> fourbar.Scene:
 @pytest.mark.parametrize("lengths", [WIDE, SHORT, KITE])
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
 def test_forces_are_those_of_thirteen_equations_in_balls_within_their_error_bars(
-    start_bar: int, end_bar: int, lengths: tuple[float, ...]
+    start_bar: int,
+    end_bar: int,
+    lengths: tuple[float, ...],
 ) -> None:
     d, *moving = lengths
     scene = driven(start_bar, end_bar)
@@ -66,7 +68,8 @@ def test_forces_are_those_of_thirteen_equations_in_balls_within_their_error_bars
     scene = replace(scene, linkage=fourbar.FourBar(d, *bars, 0.2))
     for branch in (1, -1):
         scene = replace(
-            scene, motion=fourbar.Motion(np.linspace(0.25, 6.2, 7), 10.0, 5.0, branch)
+            scene,
+            motion=fourbar.Motion(np.linspace(0.25, 6.2, 7), 10.0, 5.0, branch),
         )
         s = fourbar.solve(scene, "error")
         ok = s.status_code == 0
@@ -83,7 +86,9 @@ def test_forces_are_those_of_thirteen_equations_in_balls_within_their_error_bars
 
 
 def compare_with_balls(
-    scene: fourbar.Scene, s: fourbar.Solution, ok: np.ndarray
+    scene: fourbar.Scene,
+    s: fourbar.Solution,
+    ok: np.ndarray,
 ) -> dict[str, np.ndarray]:
     """Compare forces with those in balls by their error bars.
 
@@ -102,7 +107,8 @@ def compare_with_balls(
 
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
 def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
-    start_bar: int, end_bar: int
+    start_bar: int,
+    end_bar: int,
 ) -> None:
     """At rest nothing grows without end there but for a line without lever.
 
@@ -111,7 +117,10 @@ def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
     link = fourbar.uniform(0.2, 0.48, 0.55, 0.2)
     near = fourbar.Motion(fourbar.FromLimit(1, 1e-10), 0.0)
     scene = fourbar.Scene(
-        link, near, effects=(fourbar.Gravity(),), drive=ends(start_bar, end_bar)
+        link,
+        near,
+        effects=(fourbar.Gravity(),),
+        drive=ends(start_bar, end_bar),
     )
     s = fourbar.solve(scene, "error")
     assert s.status == ["ok"] and s.condition[0] < 1e-4
@@ -164,17 +173,23 @@ def test_from_the_ground_to_a_bar_it_is_the_torque_over_its_lever(bar: int) -> N
     # the ground's end lies where it was stated, against the ground's line
     start = 0.17 * np.array([math.cos(0.2 - 1.1), math.sin(0.2 - 1.1)])
     np.testing.assert_allclose(
-        start + s.stroke[:, None] * s.drive_line, foot + arm, atol=1e-15
+        start + s.stroke[:, None] * s.drive_line,
+        foot + arm,
+        atol=1e-15,
     )
 
 
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
 def test_its_power_is_that_of_the_torque_and_its_line_has_no_sense(
-    start_bar: int, end_bar: int
+    start_bar: int,
+    end_bar: int,
 ) -> None:
     s, torque = fourbar.solve(driven(start_bar, end_bar)), fourbar.solve(crank_rocker())
     np.testing.assert_allclose(
-        s.power, torque.power, rtol=0, atol=ROUND_OFF * np.abs(torque.power).max()
+        s.power,
+        torque.power,
+        rtol=0,
+        atol=ROUND_OFF * np.abs(torque.power).max(),
     )
     back = fourbar.solve(
         crank_rocker(
@@ -192,7 +207,10 @@ def test_its_power_is_that_of_the_torque_and_its_line_has_no_sense(
         "F43",
     ):
         np.testing.assert_allclose(
-            getattr(back, name), getattr(s, name), rtol=1e-12, atol=1e-12
+            getattr(back, name),
+            getattr(s, name),
+            rtol=1e-12,
+            atol=1e-12,
         )
     np.testing.assert_array_equal(back.drive_line, -s.drive_line)
     assert (
@@ -205,7 +223,8 @@ def test_its_power_is_that_of_the_torque_and_its_line_has_no_sense(
 
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
 def test_the_condition_is_the_slope_of_the_stroke_over_what_its_ends_could_move(
-    start_bar: int, end_bar: int
+    start_bar: int,
+    end_bar: int,
 ) -> None:
     """In [0, 1] for linkages of every type.
 
@@ -300,11 +319,13 @@ def test_where_it_has_no_lever_or_no_direction_there_are_no_forces() -> None:
     ],
 )
 def test_ends_that_keep_their_distance_are_refused_in_one_line(
-    start: Any, end: Any
+    start: Any,
+    end: Any,
 ) -> None:
     drive = fourbar.LinearDrive(Place(start[0], start[1:]), Place(end[0], end[1:]))
     with pytest.raises(
-        fourbar.InputError, match=r"^drive\.to = .*keeps its distance from `from`"
+        fourbar.InputError,
+        match=r"^drive\.to = .*keeps its distance from `from`",
     ):
         fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), drive=drive)
 
@@ -343,7 +364,8 @@ FROM, TO = (
     ],
 )
 def test_a_file_with_a_wrong_drive_is_refused_in_one_line(
-    drive: str, says: str
+    drive: str,
+    says: str,
 ) -> None:
     with pytest.raises(fourbar.InputError, match=says) as caught:
         loads(TEXT + drive, "scene.toml")
@@ -362,23 +384,28 @@ def test_it_reads_back_as_it_was_written_and_is_carried_by_studies() -> None:
         fourbar.solve(again)
     )
     with pytest.raises(
-        fourbar.InputError, match="a drive is a couple on a bar or a force"
+        fourbar.InputError,
+        match="a drive is a couple on a bar or a force",
     ):
         replace(scene, drive_bar=3)
     with pytest.raises(fourbar.InputError, match="out = 'torque'"):
         fourbar.solve(scene, out={"torque": np.empty(1)})
     with pytest.raises(
-        fourbar.InputError, match=r"drive\.from\.bar = .*same for every member"
+        fourbar.InputError,
+        match=r"drive\.from\.bar = .*same for every member",
     ):
         fourbar.vary(scene, {"drive.from.bar": [2]})
 
 
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
 def test_derivatives_by_its_ends_are_those_of_differences(
-    start_bar: int, end_bar: int
+    start_bar: int,
+    end_bar: int,
 ) -> None:
     scene = driven(
-        start_bar, end_bar, motion=fourbar.Motion(np.array([0.4, 2.0, 4.5]), 10.0, 5.0)
+        start_bar,
+        end_bar,
+        motion=fourbar.Motion(np.array([0.4, 2.0, 4.5]), 10.0, 5.0),
     )
     slopes = fourbar.sensitivity(scene)
     for key in (
@@ -407,7 +434,8 @@ def test_derivatives_by_its_ends_are_those_of_differences(
 
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
 def test_the_frame_bears_what_changes_the_momentum_of_the_bars(
-    start_bar: int, end_bar: int
+    start_bar: int,
+    end_bar: int,
 ) -> None:
     scene = driven(start_bar, end_bar, loads=(), effects=())
     s = fourbar.solve(scene)
@@ -445,7 +473,8 @@ def test_the_frame_bears_what_changes_the_momentum_of_the_bars(
 
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
 def test_friction_that_depends_on_pin_forces_takes_its_power_from_the_drive(
-    start_bar: int, end_bar: int
+    start_bar: int,
+    end_bar: int,
 ) -> None:
     """P = power without friction + sum of mu r |F| |slip|.
 
@@ -482,7 +511,9 @@ def test_friction_that_depends_on_pin_forces_takes_its_power_from_the_drive(
     lost = sum(
         mu * r * np.hypot(*getattr(s, f).T) * np.abs(slip[p])
         for (p, (mu, r)), f in zip(
-            pins.items(), ("F12", "F32", "F43", "F14"), strict=True
+            pins.items(),
+            ("F12", "F32", "F43", "F14"),
+            strict=True,
         )
     )
     np.testing.assert_allclose(
@@ -500,7 +531,9 @@ def test_friction_that_depends_on_pin_forces_takes_its_power_from_the_drive(
     )
     wide = 0.05 / np.abs(bare.stroke_speed / 10.0)
     np.testing.assert_allclose(
-        rest.drive_force_high - rest.drive_force_low, 2.0 * wide, rtol=1e-9
+        rest.drive_force_high - rest.drive_force_low,
+        2.0 * wide,
+        rtol=1e-9,
     )
 
 
@@ -513,7 +546,10 @@ def test_files_of_simulators_refuse_it_by_name() -> None:
 
 def test_a_released_linkage_has_a_stroke_and_no_force() -> None:
     scene = driven(
-        1, 4, loads=(), motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.05, 50))
+        1,
+        4,
+        loads=(),
+        motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.05, 50)),
     )
     s = fourbar.solve(scene, "error")
     assert (

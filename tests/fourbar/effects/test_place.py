@@ -73,7 +73,9 @@ def find_place(scene: Scene, load: Load, s: fourbar.Solution) -> np.ndarray:
 @pytest.mark.parametrize("bar", [3, 4])
 @pytest.mark.parametrize("form", PLACES)
 def test_a_force_does_the_work_of_its_place_and_its_direction(
-    form: str, bar: int, frame: str
+    form: str,
+    bar: int,
+    frame: str,
 ) -> None:
     """T2 dtheta_2 = -F . dr of a massless linkage at rest.
 
@@ -262,7 +264,9 @@ def test_every_form_reads_back_as_it_was_written() -> None:
     ],
 )
 def test_a_place_that_is_stated_wrongly_is_refused_with_what_to_write(
-    old: str, new: str, words: str
+    old: str,
+    new: str,
+    words: str,
 ) -> None:
     with pytest.raises(InputError) as refused:
         loads(EVERY_FORM.replace(old, new, 1))

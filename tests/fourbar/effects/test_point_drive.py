@@ -54,14 +54,16 @@ def test_pliers_multiply_the_force_of_the_hand() -> None:
 
 def driven(bar: int, frame: str, **changes: Any) -> Scene:
     return crank_rocker(
-        drive=PointDrive(Place(bar, (0.15, 0.3)), DIRECTION, frame), **changes
+        drive=PointDrive(Place(bar, (0.15, 0.3)), DIRECTION, frame),
+        **changes,
     )
 
 
 @pytest.mark.parametrize("frame", ["world", "bar"])
 @pytest.mark.parametrize("bar", [2, 3, 4])
 def test_the_power_of_the_force_is_that_of_a_couple_on_the_input(
-    bar: int, frame: str
+    bar: int,
+    frame: str,
 ) -> None:
     """F (e . v_P) = T2 omega_2.
 
@@ -87,7 +89,8 @@ def test_the_power_of_the_force_is_that_of_a_couple_on_the_input(
 @pytest.mark.parametrize("frame", ["world", "bar"])
 @pytest.mark.parametrize("bar", [2, 3, 4])
 def test_the_pin_forces_are_those_of_a_load_of_this_size_and_no_couple(
-    bar: int, frame: str
+    bar: int,
+    frame: str,
 ) -> None:
     """The couple on the input is zero under a load of the drive's force.
 
@@ -96,7 +99,10 @@ def test_the_pin_forces_are_those_of_a_load_of_this_size_and_no_couple(
     scene = driven(bar, frame, motion=fourbar.Motion(0.7, 10.0, 5.0))
     s = fourbar.solve(scene)
     push = fourbar.Load(
-        bar, (float(s.drive_force[0]), DIRECTION), from_pin=(0.15, 0.3), frame=frame
+        bar,
+        (float(s.drive_force[0]), DIRECTION),
+        from_pin=(0.15, 0.3),
+        frame=frame,
     )
     loaded = replace(scene, drive=None, drive_bar=2, loads=(*scene.loads, push))
     other = fourbar.solve(loaded)
@@ -116,10 +122,14 @@ def test_free_bodies_find_the_same_force(bar: int, frame: str) -> None:
     theirs = answer.quantities["drive_force"]
     condition = s.drive_condition
     np.testing.assert_allclose(
-        condition * theirs / s.drive_force, condition, atol=ROUND_OFF
+        condition * theirs / s.drive_force,
+        condition,
+        atol=ROUND_OFF,
     )
     np.testing.assert_allclose(
-        answer.quantities["drive_condition"], condition, rtol=1e-9
+        answer.quantities["drive_condition"],
+        condition,
+        rtol=1e-9,
     )
 
 
@@ -162,7 +172,9 @@ def test_a_study_and_a_file_carry_it() -> None:
     ],
 )
 def test_a_drive_that_is_stated_wrongly_is_refused_in_one_line(
-    old: str, new: str, words: str
+    old: str,
+    new: str,
+    words: str,
 ) -> None:
     with pytest.raises(InputError) as refused:
         loads(HELD.replace(old, new, 1))

@@ -42,7 +42,8 @@ def linkage(name: str) -> fourbar.FourBar:
 @pytest.mark.parametrize("pin", ["A", "B"])
 @pytest.mark.parametrize("name", ["crank-rocker", "drag link"])
 def test_a_spring_with_both_ends_in_one_pin_has_no_direction(
-    name: str, pin: str
+    name: str,
+    pin: str,
 ) -> None:
     link = linkage(name)
     ends = {
@@ -107,7 +108,9 @@ def continuous(scene: Scene, pin: str) -> np.ndarray:
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize("name", LINKAGES)
 def test_a_torsion_spring_is_wound_where_the_continuous_angle_says_so(
-    name: str, branch: int, pin: str
+    name: str,
+    branch: int,
+    pin: str,
 ) -> None:
     """Followed position by position, and evaluated at each fiftieth.
 
@@ -166,7 +169,9 @@ def test_the_pins_that_turn_do_wind_their_springs() -> None:
 def test_every_engine_stops_where_the_spring_is_wound() -> None:
     spring = Torsion.at(O2=(0.2, 0.5, 0.0))
     scene = Scene(
-        linkage("crank-rocker"), Motion(Sweep(0.1, 6.2, 12), 10.0), effects=(spring,)
+        linkage("crank-rocker"),
+        Motion(Sweep(0.1, 6.2, 12), 10.0),
+        effects=(spring,),
     )
     record = judge("scene", scene)
     assert [row for row in record.rows if row.failed] == []
@@ -178,7 +183,9 @@ def test_every_engine_stops_where_the_spring_is_wound() -> None:
         record.solution is not None and record.solution.status.count("wound") == 6
     )  # of theta_2 beyond 0.5 + pi
     at_half = Scene(
-        scene.linkage, Motion([0.5, 1.0, 0.5 + math.pi, 4.0], 10.0), effects=(spring,)
+        scene.linkage,
+        Motion([0.5, 1.0, 0.5 + math.pi, 4.0], 10.0),
+        effects=(spring,),
     )
     record = judge("scene", at_half)
     assert record.solution is not None and record.solution.status == [
@@ -214,7 +221,8 @@ def test_a_free_motion_that_winds_a_spring_is_an_error() -> None:
     free = Motion(0.1, 12.0, free=Free(1.0, 100))
     weak = Torsion.at(O2=(1e-4, 0.0, 0.0))
     with pytest.raises(
-        LimitError, match=r"effects\.torsion: at 0\.\d+ s .* half a turn"
+        LimitError,
+        match=r"effects\.torsion: at 0\.\d+ s .* half a turn",
     ):
         solve(Scene(linkage("crank-rocker"), free, effects=(weak,)))
     held = Torsion.at(O2=(2.0, 0.0, 0.0))
@@ -240,7 +248,9 @@ CHANGE_POINTS = {
 @pytest.mark.parametrize("branch", (1, -1))
 @pytest.mark.parametrize("name", CHANGE_POINTS)
 def test_turns_are_counted_through_change_points(
-    name: str, branch: int, bar: int
+    name: str,
+    branch: int,
+    bar: int,
 ) -> None:
     """A spring winds as its pin turns, from one position to the next, on an assembly."""
     link = replace(fourbar.uniform(*CHANGE_POINTS[name]), ground_angle=0.4)
@@ -296,7 +306,9 @@ def test_turns_are_counted_alike_whichever_bar_is_commanded(pin: str, bar: int) 
 @pytest.mark.parametrize("branch", (1, -1))
 @pytest.mark.parametrize("theta_1", (0.0, 2.5))
 def test_turns_are_counted_where_the_output_is_a_crank(
-    pin: str, branch: int, theta_1: float
+    pin: str,
+    branch: int,
+    theta_1: float,
 ) -> None:
     """Angles that are continuous along two turns say where a pin is wound.
 

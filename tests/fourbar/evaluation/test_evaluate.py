@@ -102,7 +102,9 @@ SCENES |= {
 @pytest.mark.parametrize("kind", ["long doubles", "pairs of doubles"])
 @pytest.mark.parametrize("name", SCENES)
 def test_error_bars_are_of_the_size_of_the_error(
-    name: str, kind: str, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    kind: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     scene = SCENES[name]
     if kind == "pairs of doubles":
@@ -131,7 +133,8 @@ def test_error_bars_are_of_the_size_of_the_error(
 
 @pytest.mark.parametrize("family", FAMILY_DRAWERS)
 def test_error_bars_hold_with_pairs_of_doubles(
-    family: str, monkeypatch: pytest.MonkeyPatch
+    family: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The numbers of a machine whose long doubles are no longer than doubles."""
     monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
@@ -252,7 +255,9 @@ def near_a_limit_of_bar_3() -> fourbar.Scene:
     )
     motion = fourbar.Motion(theta_3=-0.9625944120558366, omega_3=3.0)
     return fourbar.Scene(
-        fourbar.uniform(*lengths), motion, effects=(fourbar.Gravity(),)
+        fourbar.uniform(*lengths),
+        motion,
+        effects=(fourbar.Gravity(),),
     )
 
 
@@ -278,7 +283,8 @@ def beside_a_free_length() -> fourbar.Scene:
 )
 @pytest.mark.parametrize("make", (near_a_limit_of_bar_3, beside_a_free_length))
 def test_an_error_bar_holds_what_long_doubles_do_not_resolve(
-    make: Callable[[], fourbar.Scene], monkeypatch: pytest.MonkeyPatch
+    make: Callable[[], fourbar.Scene],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Double and long double agree here and are both wrong.
 

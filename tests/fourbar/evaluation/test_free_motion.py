@@ -214,7 +214,9 @@ def test_a_release_is_computed_once_and_solved_as_any_command() -> None:
     again = solve(SWING, "force", at=released.command)
     for name in solution.evaluated():
         np.testing.assert_array_equal(
-            getattr(again, name), getattr(solution, name), err_msg=name
+            getattr(again, name),
+            getattr(solution, name),
+            err_msg=name,
         )
     np.testing.assert_array_equal(released.time, solution.time)
     np.testing.assert_array_equal(released.theta_2, solution.theta_2)
@@ -302,7 +304,8 @@ def test_pin_forces_pass_a_limit_position_smoothly(
 
 @pytest.mark.parametrize(("pin", "bar"), [("O2", 2), ("O4", 4)])
 def test_friction_that_holds_at_the_ground_loads_the_pins_as_a_drive_there(
-    pin: str, bar: int
+    pin: str,
+    bar: int,
 ) -> None:
     """The ground's couple on a bar is that of a drive on it.
 
@@ -318,13 +321,19 @@ def test_friction_that_holds_at_the_ground_loads_the_pins_as_a_drive_there(
     )
     driven = solve(
         fourbar.Scene(
-            HANGING, fourbar.Motion(0.3, 0.0), bar, effects=(fourbar.Gravity(),)
+            HANGING,
+            fourbar.Motion(0.3, 0.0),
+            bar,
+            effects=(fourbar.Gravity(),),
         )
     )
     assert s.alpha_2 is not None and not s.alpha_2.any()
     for force in PINS:
         assert np.allclose(
-            getattr(s, force), getattr(driven, force), rtol=0.0, atol=1e-12
+            getattr(s, force),
+            getattr(driven, force),
+            rtol=0.0,
+            atol=1e-12,
         )
 
 
@@ -332,14 +341,19 @@ def test_what_begins_to_move_against_friction_does_so_at_once() -> None:
     motion = fourbar.Motion(0.3, 0.0, free=fourbar.Free(1e-4, 2))
     s = solve(
         fourbar.Scene(
-            HANGING, motion, effects=(fourbar.Gravity(), fourbar.Friction.at(O4=0.02))
+            HANGING,
+            motion,
+            effects=(fourbar.Gravity(), fourbar.Friction.at(O4=0.02)),
         )
     )
     assert s.alpha_2 is not None and s.alpha_2[0] != 0.0
     assert np.allclose(s.alpha_2, s.alpha_2[1], rtol=1e-5)
     for force in PINS:
         assert np.allclose(
-            getattr(s, force), getattr(s, force)[1], rtol=1e-4, atol=1e-5
+            getattr(s, force),
+            getattr(s, force)[1],
+            rtol=1e-4,
+            atol=1e-5,
         )
 
 
@@ -375,7 +389,9 @@ def test_a_spring_between_places_that_are_one_is_refused_where_it_is_released(
 @pytest.mark.parametrize("bar", (3, 4))
 def test_a_release_at_an_angle_of_another_bar_is_the_same_motion(bar: int) -> None:
     scene = fourbar.Scene(
-        HANGING, fourbar.Motion(0.5, 2.0), effects=(fourbar.Gravity(),)
+        HANGING,
+        fourbar.Motion(0.5, 2.0),
+        effects=(fourbar.Gravity(),),
     )
     free = fourbar.Free(0.2, 8)
     start = solve(scene, "velocity")
@@ -395,7 +411,11 @@ def test_change_points_of_several_turns_are_noted_when_they_are_passed() -> None
     All bars are in line at each half turn of the input.
     """
     linkage = fourbar.FourBar(
-        0.3, fourbar.Bar(0.1), fourbar.Bar(0.3), fourbar.Bar(0.1), ground_angle=0.2
+        0.3,
+        fourbar.Bar(0.1),
+        fourbar.Bar(0.3),
+        fourbar.Bar(0.1),
+        ground_angle=0.2,
     )
     for speed in (10.0, -10.0):
         scene = fourbar.Scene(
@@ -421,7 +441,8 @@ def test_a_released_spring_is_followed_up_to_half_a_turn_and_no_further() -> Non
     assert len(fourbar.release(still).time) == 5
     fast = replace(still, motion=fourbar.Motion(0.5, 40.0, free=fourbar.Free(0.2, 40)))
     with pytest.raises(
-        LimitError, match=r"effects\.torsion: at 0.*more than half a turn"
+        LimitError,
+        match=r"effects\.torsion: at 0.*more than half a turn",
     ):
         fourbar.release(fast)
 

@@ -60,7 +60,8 @@ def four_lengths(rng: np.random.Generator, grashof: bool) -> list[float]:
 
 
 def with_extreme(
-    place: int, grashof: bool
+    place: int,
+    grashof: bool,
 ) -> Callable[[np.random.Generator], list[float]]:
     """Linkages by the place of the shortest bar (Grashof) or of the longest.
 
@@ -132,7 +133,9 @@ def motion(kind: str, number: int) -> Released:
             )
         )
     linkage = fourbar.FourBar(
-        lengths[0], *bars, ground_angle=float(rng.uniform(-3.0, 3.0))
+        lengths[0],
+        *bars,
+        ground_angle=float(rng.uniform(-3.0, 3.0)),
     )
     weight = 9.81 * sum(bar.mass * bar.length for bar in bars)
     terms: list[Any] = [fourbar.Gravity()]
@@ -146,7 +149,8 @@ def motion(kind: str, number: int) -> Released:
     if rng.random() < 0.6:
         terms.append(
             fourbar.Load(
-                int(rng.integers(2, 5)), moment=float(rng.uniform(-0.3, 0.3)) * weight
+                int(rng.integers(2, 5)),
+                moment=float(rng.uniform(-0.3, 0.3)) * weight,
             )
         )
     forces = []

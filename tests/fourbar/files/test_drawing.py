@@ -314,7 +314,8 @@ def test_a_parallelogram_drawn_on_a_grid_is_one() -> None:
         scene = loads(write_pins(pins))
         tried += 1
         recognised += scene.linkage.ground == pytest.approx(
-            scene.linkage.coupler.length, rel=1e-14
+            scene.linkage.coupler.length,
+            rel=1e-14,
         )
         assert loads(dump(scene)).linkage == scene.linkage
     assert tried > 150
@@ -359,7 +360,8 @@ def test_sdf_and_usd_stand_where_the_drawing_has_them() -> None:
 
 def test_a_study_of_a_drawing_names_the_lengths_that_follow() -> None:
     with pytest.raises(
-        InputError, match=r"varied by the lengths that follow: lengths\."
+        InputError,
+        match=r"varied by the lengths that follow: lengths\.",
     ):
         fourbar.vary(loads(DRAWN), {"pins.A.0": [0.0, 0.1]})
 

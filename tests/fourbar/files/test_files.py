@@ -83,7 +83,9 @@ def test_the_thesis_scenes_reach_the_figures(name: str, torque: float) -> None:
         }
         for key, force in forces.items():
             assert getattr(solution, key)[0] == pytest.approx(
-                force, rel=0.0, abs=PRINTED
+                force,
+                rel=0.0,
+                abs=PRINTED,
             ), key
 
 
@@ -123,7 +125,9 @@ def test_the_thesis_scenes_reach_the_figures(name: str, torque: float) -> None:
     ],
 )
 def test_units_are_converted_exactly_and_rounded_once(
-    text: str, unit: str, value: Fraction
+    text: str,
+    unit: str,
+    value: Fraction,
 ) -> None:
     assert to_si(text, unit) == float(value)
 
@@ -186,7 +190,8 @@ def test_defaults_are_those_of_the_contract() -> None:
     assert (scene.loads, scene.effects, scene.title, scene.source) == ((), (), "", "")
     bar = loads(LENGTHS + '[bars.coupler]\nmass = "6 kg"\n').linkage.coupler
     assert bar.moment_of_inertia == pytest.approx(
-        6.0 * 0.25**2 / 12.0, rel=1e-15
+        6.0 * 0.25**2 / 12.0,
+        rel=1e-15,
     ) and bar.mass_centre == (0.125, 0.0)
 
 
@@ -241,7 +246,9 @@ springs = [{ from = { bar = 1 }, to = { bar = 4, from_pin = ["20 cm", "0 deg"] }
 
 
 def numbers(
-    least: float = -1e300, most: float = 1e300, **more: bool
+    least: float = -1e300,
+    most: float = 1e300,
+    **more: bool,
 ) -> st.SearchStrategy[float]:
     return st.floats(least, most, allow_nan=False, allow_infinity=False, **more)
 
@@ -263,7 +270,9 @@ LOAD = st.builds(
     frame=st.sampled_from(("world", "bar")),
 )
 PER_PIN = st.dictionaries(
-    st.sampled_from(("O2", "A", "B", "O4")), numbers(0.0), min_size=1
+    st.sampled_from(("O2", "A", "B", "O4")),
+    numbers(0.0),
+    min_size=1,
 )
 THETA_2 = (
     st.none()
@@ -337,7 +346,8 @@ def test_a_place_by_coordinates_is_the_polar_one_and_is_written_back_as_it_was_r
     assert facts(again) == facts(by_coordinates) and dump(again) == text
     if key.startswith("bars"):  # another centre is written as what it is
         bars = replace(
-            again.linkage, coupler=replace(again.linkage.coupler, centre=(0.1, 0.2))
+            again.linkage,
+            coupler=replace(again.linkage.coupler, centre=(0.1, 0.2)),
         )
         assert "{ x =" not in dump(replace(again, linkage=bars))
     for wrong, words in (
@@ -359,7 +369,8 @@ def test_every_letter_of_a_title_reads_back() -> None:
 
 
 def test_save_is_whole_or_not_at_all(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     scene = load(MODELS[0])
     target = tmp_path / "scene.toml"
@@ -401,7 +412,8 @@ def test_what_a_bar_leaves_out_follows_its_length(length: float) -> None:
     assert coupler.moment_of_inertia == pytest.approx(0.5 * length**2 / 12.0, rel=1e-15)
     assert coupler.mass_centre == (0.5 * length, 0.0)
     assert output.moment_of_inertia == 3.0 and output.mass_centre == pytest.approx(
-        (0.07, 0.0), rel=1e-15
+        (0.07, 0.0),
+        rel=1e-15,
     )
 
 
@@ -439,7 +451,9 @@ def test_tolerances_read_back_in_their_order(keys: list[str]) -> None:
     ],
 )
 def test_no_tolerance_is_written_that_reading_refuses(
-    key: str, width: float, why: str
+    key: str,
+    width: float,
+    why: str,
 ) -> None:
     scene = crank_rocker(tolerances=(fourbar.Tolerance(key, width),))
     with pytest.raises(InputError, match=why) as refused:
@@ -472,7 +486,8 @@ def test_a_stroke_is_less_than_the_spring_is_long() -> None:
     with pytest.raises(InputError, match=r"stroke = 0\.3 m: must be less than the"):
         fourbar.Spring(*ends, 10.0, 0.3, stroke=0.3)
     with pytest.raises(
-        InputError, match=r"stroke = -0\.1: must be a finite number > 0"
+        InputError,
+        match=r"stroke = -0\.1: must be a finite number > 0",
     ):
         fourbar.Spring(*ends, 10.0, 0.3, stroke=-0.1)
 
@@ -487,7 +502,9 @@ def test_a_stroke_is_less_than_the_spring_is_long() -> None:
     ],
 )
 def test_the_comments_of_a_new_file_have_its_units_and_can_be_used(
-    length: str, units: set[str], gravity: float
+    length: str,
+    units: set[str],
+    gravity: float,
 ) -> None:
     text = write_new_scene([length] * 4)
     used = re.sub(r"^# (?=\w+ = |\[)", "", text, flags=re.MULTILINE)

@@ -60,7 +60,8 @@ things too.
 
 
 def test_the_file_that_the_mistakes_are_made_in_is_good(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     (tmp_path / "good.toml").write_text(GOOD)
     assert status(["analyze", str(tmp_path / "good.toml")]) == 0
@@ -201,7 +202,9 @@ def refused(
 
 @pytest.mark.parametrize("command", ["analyze", "mjcf", "plot", "animate"])
 def test_every_command_refuses_a_bad_file(
-    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    command: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     refused(
         [command, str(tmp_path / "missing.toml")],
@@ -219,7 +222,8 @@ def test_a_directory(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
 
 
 def test_a_huge_file_is_not_read(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     huge = tmp_path / "huge.toml"
     with huge.open("wb") as file:
@@ -249,7 +253,9 @@ def test_a_stream_that_holds_no_scene_is_refused(content: bytes) -> None:
 
 @pytest.mark.parametrize("name", ["a\nb\x1b[31m.toml", "n" * 300])
 def test_hostile_names(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     refused(["analyze", str(tmp_path / name)], [], tmp_path, capsys)
 
@@ -264,7 +270,9 @@ def test_a_name_that_no_file_can_have() -> None:
     [b"\xff\xfe\x00", GOOD.encode() + b"\n# \xe9\n", b"\x89PNG\r\n\x1a\n" + bytes(100)],
 )
 def test_what_is_not_text(
-    data: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    data: bytes,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     (tmp_path / "scene.toml").write_bytes(data)
     refused(["analyze", str(tmp_path / "scene.toml")], ["UTF-8"], tmp_path, capsys)
@@ -280,7 +288,8 @@ def rocker(theta_2: str) -> str:
 
 
 def test_no_position_assembles(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     (tmp_path / "scene.toml").write_text(rocker('"180 deg"'))
     refused(
@@ -292,7 +301,8 @@ def test_no_position_assembles(
 
 
 def test_some_positions_do_not_assemble(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     (tmp_path / "scene.toml").write_text(
         rocker('{ from = "0 deg", to = "90 deg", steps = 9 }')

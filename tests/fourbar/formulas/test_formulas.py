@@ -178,7 +178,9 @@ def test_a_difference_of_two_sums_is_zero_where_it_is_zero_and_nowhere_else() ->
 
 
 def is_rounding(
-    difference: Fraction, lengths: tuple[Fraction, ...], diagonal: Fraction | None
+    difference: Fraction,
+    lengths: tuple[Fraction, ...],
+    diagonal: Fraction | None,
 ) -> bool:
     """Decide exactly whether a difference of lengths is no more than their rounding."""
     size = abs(difference)
@@ -190,7 +192,9 @@ def is_rounding(
 
 
 def is_nearly_at_the_bound(
-    difference: Fraction, lengths: tuple[Fraction, ...], diagonal: Fraction
+    difference: Fraction,
+    lengths: tuple[Fraction, ...],
+    diagonal: Fraction,
 ) -> bool:
     """Decide whether the squares in doubles may compare otherwise than exact ones."""
     bounds = [Fraction(ROUNDED_SUM) * sum(lengths)]
@@ -410,7 +414,14 @@ where all sines are above 0.1.
 
 
 def everything(
-    d: Any, a: Any, b: Any, c: Any, theta_1: Any, q: Any, branch: Any, bar: int = 2
+    d: Any,
+    a: Any,
+    b: Any,
+    c: Any,
+    theta_1: Any,
+    q: Any,
+    branch: Any,
+    bar: int = 2,
 ) -> dict[str, Any]:
     """All that the formulas give, on the path in the angle of a bar."""
     lengths = loop(d, a, b, c)
@@ -470,7 +481,9 @@ def plainly(number: type, *arguments: Any) -> dict[str, Any]:
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize("theta_1", [0.0, 0.4])
 def test_numbers_arrays_and_many_linkages_at_once_are_the_same_formulas(
-    theta_1: float, branch: int, bar: int
+    theta_1: float,
+    branch: int,
+    bar: int,
 ) -> None:
     q = theta_1 + ANGLES
     shape = (len(LINKAGES), len(ANGLES))
@@ -528,7 +541,8 @@ def test_numbers_arrays_and_many_linkages_at_once_are_the_same_formulas(
             )
     regular = (
         np.min(
-            [np.abs(at_once[name]) for name in ("sin_mu", "sine_A", "sine_24")], axis=0
+            [np.abs(at_once[name]) for name in ("sin_mu", "sine_A", "sine_24")],
+            axis=0,
         )
         > 0.1
     )
@@ -567,13 +581,17 @@ def test_the_half_angle_in_many_digits_is_rounded_once() -> None:
             bars, theta_2 = drawn.bars, float(drawn.theta_2[0])
             expected = five(bars, mp.mpf(theta_2) - mp.mpf(bars.ground_angle))
             for ours, exact in zip(
-                exact_half_angle(bars, theta_2)[:5], expected, strict=True
+                exact_half_angle(bars, theta_2)[:5],
+                expected,
+                strict=True,
             ):
                 assert abs(ours - exact) <= U * abs(exact)
             offset = mp.mpf("1e-25") * theta_2
             expected = five(bars, mp.mpf(theta_2) + offset - mp.mpf(bars.ground_angle))
             for ours, exact in zip(
-                exact_half_angle(bars, theta_2, offset)[:5], expected, strict=True
+                exact_half_angle(bars, theta_2, offset)[:5],
+                expected,
+                strict=True,
             ):
                 assert abs(ours - exact) <= U * abs(exact)
 
@@ -654,7 +672,9 @@ def exact_limit(bars: FourBar, stretched: bool) -> mp.mpf:
     ],
 )
 def test_an_offset_from_a_limit_in_many_digits(
-    bars: FourBar, stretched: bool, size: float
+    bars: FourBar,
+    stretched: bool,
+    size: float,
 ) -> None:
     first = next(
         limit.theta_2 for limit in limit_positions(bars) if limit.stretched == stretched
@@ -713,7 +733,10 @@ def test_positions_decided_in_many_digits_replace_their_own_alone() -> None:
         decided = decide_half_angles(bars, 1.0, half, np.array([1, 4]), theta_2, offset)
         assert decided.side == half.side == 1.0
         for name, before, after in zip(
-            half._fields[:5], half[:5], decided[:5], strict=True
+            half._fields[:5],
+            half[:5],
+            decided[:5],
+            strict=True,
         ):
             exact = [
                 float(getattr(exact_half_angle(bars, float(angle), offset), name))
@@ -727,7 +750,8 @@ def test_positions_decided_in_many_digits_replace_their_own_alone() -> None:
 @pytest.mark.parametrize("bar", [3, 4])
 @pytest.mark.parametrize("branch", [1, -1])
 def test_the_sine_of_the_drive_by_the_triangle_is_that_of_the_directions(
-    bar: int, branch: int
+    bar: int,
+    branch: int,
 ) -> None:
     """On linkages whose directions differ by much, and on a short ground.
 
@@ -753,7 +777,8 @@ def test_the_sine_of_the_drive_by_the_triangle_is_that_of_the_directions(
     short = loop(2.0**-14, 1.5, 0.75, 1.25)
     position = close_loop(short, 1.0, direction(0.7), half_angle(short, 0.7), branch)
     assert drive_sine_of_triangle(short, position, bar) == pytest.approx(
-        exact, rel=16.0 * U
+        exact,
+        rel=16.0 * U,
     )
 
 

@@ -39,7 +39,9 @@ five digits of nineteen.
 
 
 def intersect_circles(
-    linkage: fourbar.FourBar, bar: int, q: np.ndarray
+    linkage: fourbar.FourBar,
+    bar: int,
+    q: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The two places of the free pin at each angle of a bar, complex (n, 2).
 
@@ -63,7 +65,8 @@ def intersect_circles(
     square = r * r / e2 - along * along
     across = np.sqrt(np.where(square < 0, np.nan, square))
     meet = np.stack(
-        [first + apart * (along + sign * 1j * across) for sign in (1, -1)], axis=1
+        [first + apart * (along + sign * 1j * across) for sign in (1, -1)],
+        axis=1,
     )
     if bar == 2:
         others = meet - first[:, None], meet - second[:, None]  # bars 3 and 4 to B
@@ -99,7 +102,9 @@ def list_angles(linkage: fourbar.FourBar, bar: int) -> np.ndarray:
 @pytest.mark.parametrize("bar", [2, 3, 4])
 @pytest.mark.parametrize("lengths", LINKAGES.values(), ids=LINKAGES)
 def test_an_assembly_goes_on_smoothly_through_change_points(
-    lengths: tuple[float, float, float, float], bar: int, theta_1: float
+    lengths: tuple[float, float, float, float],
+    bar: int,
+    theta_1: float,
 ) -> None:
     bars = uniform(*lengths)
     linkage = fourbar.FourBar(
@@ -112,7 +117,8 @@ def test_an_assembly_goes_on_smoothly_through_change_points(
         q = list_angles(linkage, bar)
         q = 2 * q[0] - q if backwards else q
         motion = fourbar.Motion(
-            **{f"theta_{bar}": q, f"omega_{bar}": 1.0}, branch=branch
+            **{f"theta_{bar}": q, f"omega_{bar}": 1.0},
+            branch=branch,
         )
         ours = fourbar.solve(fourbar.Scene(linkage, motion), "velocity")
         places, angles = intersect_circles(linkage, bar, q)

@@ -60,7 +60,8 @@ def exact(pair: Pair) -> list[Any]:
     ],
 )
 def test_a_function_keeps_the_digits_of_a_pair(
-    function: Callable[..., Pair], reference: Callable[..., Any]
+    function: Callable[..., Pair],
+    reference: Callable[..., Any],
 ) -> None:
     with mp.workdps(60):
         x, y = draw(1), draw(2)

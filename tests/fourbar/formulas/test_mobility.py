@@ -66,7 +66,8 @@ def random_linkages(seed: int, count: int) -> list[FourBar]:
         if 2.0 * lengths.max() < lengths.sum():
             linkages.append(
                 linkage(
-                    *lengths.tolist(), theta_1=float(rng.uniform(-math.pi, math.pi))
+                    *lengths.tolist(),
+                    theta_1=float(rng.uniform(-math.pi, math.pi)),
                 )
             )
     return linkages
@@ -83,7 +84,10 @@ def closes(bars: FourBar, theta_2: np.ndarray) -> np.ndarray:
 
 
 def angle(
-    bars: FourBar, theta_2: np.ndarray, branch: int | np.ndarray, bar: int
+    bars: FourBar,
+    theta_2: np.ndarray,
+    branch: int | np.ndarray,
+    bar: int,
 ) -> np.ndarray:
     return np.angle(compute_state(bars, theta_2, branch).direction(bar))
 
@@ -104,27 +108,33 @@ THESIS = linkage(0.20, 0.48, 0.55, 0.20, math.radians(45.0))
 def test_thesis_limits_of_the_input() -> None:
     limits = limit_positions(THESIS)
     assert np.degrees([limit.theta_2 for limit in limits]) == pytest.approx(
-        [84.61804062253105, 365.38195937746895], abs=PRINTED_8
+        [84.61804062253105, 365.38195937746895],
+        abs=PRINTED_8,
     )
     # theta_4 of chapter 2 (from B to O4) is ours + 180 deg
     assert (math.degrees(limits[0].theta_4) + 180.0) % 360.0 == pytest.approx(
-        105.98752759110246, abs=PRINTED_8
+        105.98752759110246,
+        abs=PRINTED_8,
     )
     assert (math.degrees(limits[1].theta_4) + 180.0) % 360.0 == pytest.approx(
-        344.01247240889757, abs=PRINTED_8
+        344.01247240889757,
+        abs=PRINTED_8,
     )
     assert np.degrees(choose_range(THESIS)) == pytest.approx(
-        [85.61804062253105, 364.38195937746895], abs=PRINTED_8
+        [85.61804062253105, 364.38195937746895],
+        abs=PRINTED_8,
     )
     assert math.degrees(swing(THESIS, 2)) == pytest.approx(
-        280.7639187549379, abs=PRINTED_8
+        280.7639187549379,
+        abs=PRINTED_8,
     )
 
 
 def test_thesis_limits_of_the_output() -> None:
     limits = limit_positions(THESIS, 4)
     assert np.degrees([limit.theta_2 for limit in limits]) == pytest.approx(
-        [145.07865810778765, 304.92134189221235], abs=PRINTED_8
+        [145.07865810778765, 304.92134189221235],
+        abs=PRINTED_8,
     )
     assert sorted(
         (math.degrees(limit.theta_4) + 180.0) % 360.0 for limit in limits
@@ -214,7 +224,8 @@ def test_ranges_and_circuits_agree_with_a_scan(bars: FourBar) -> None:
     starts = np.concatenate([place[joined], GRID + place[joined], place[meets]])
     ends = np.concatenate([ahead[joined], GRID + ahead[joined], GRID + place[meets]])
     graph = coo_array(
-        (np.ones(starts.size), (starts, ends)), shape=(2 * GRID, 2 * GRID)
+        (np.ones(starts.size), (starts, ends)),
+        shape=(2 * GRID, 2 * GRID),
     )
     component = connected_components(graph, directed=False)[1][np.tile(closed, 2)]
     number = find_circuit(
@@ -397,7 +408,8 @@ def test_time_ratio_is_the_time_of_both_strokes() -> None:
     )  # omega_4 > 0
     ratio = max(ahead, n - ahead) / min(ahead, n - ahead)
     assert time_ratio(bars) == pytest.approx(
-        ratio, rel=8.0 / n
+        ratio,
+        rel=8.0 / n,
     )  # both ends counted to one step
     assert time_ratio(uniform(1, 3, 2.5, 3.2)) is None
     assert time_ratio(THESIS) is None
@@ -442,7 +454,8 @@ def test_what_touches_is_up_to_the_rounding_of_the_lengths_and_no_further() -> N
     ],
 )
 def test_the_shortest_bar_of_a_grashof_linkage_turns(
-    lengths: tuple[float, ...], turning: set[int]
+    lengths: tuple[float, ...],
+    turning: set[int],
 ) -> None:
     """Grashof: the shortest bar turns against all others.
 
@@ -469,7 +482,8 @@ def test_a_range_narrower_than_two_margins_is_halved() -> None:
     (start, stop), (low, high) = find_intervals(bars)[0], choose_range(bars)
     assert 0.0 < stop - start < math.radians(4.0)
     assert (low - start, stop - high) == pytest.approx(
-        2 * [(stop - start) / 4.0], rel=1e-12
+        2 * [(stop - start) / 4.0],
+        rel=1e-12,
     )
 
 

@@ -22,7 +22,8 @@ CLOSURE = 8 * EPS
 
 
 def linkage(
-    theta_1: float = 0.4, lengths: tuple[float, ...] = LENGTHS
+    theta_1: float = 0.4,
+    lengths: tuple[float, ...] = LENGTHS,
 ) -> fourbar.FourBar:
     ground, *moving = lengths
     return fourbar.FourBar(ground, *map(fourbar.Bar, moving), ground_angle=theta_1)
@@ -61,7 +62,8 @@ def test_positions_that_cannot_close_are_nan_and_say_so() -> None:
 )
 @pytest.mark.parametrize("offset", [1e-6, 1e-12, 1e-20, 1e-40])
 def test_beyond_a_limit_nothing_assembles_however_near(
-    lengths: tuple[float, ...], offset: float
+    lengths: tuple[float, ...],
+    offset: float,
 ) -> None:
     link = linkage(0.2, lengths)
     # the first limit ends the range in which the linkage closes, the second begins it
@@ -88,7 +90,9 @@ BY_DIFFERENCES = 1e-5
 @pytest.mark.parametrize("theta_1", [0.0, 0.4])
 @pytest.mark.parametrize("point", [(0.05, -0.02), (0.07, 0.0), (0.0, 1.0)])
 def test_points_move_as_their_positions_do(
-    point: tuple[float, float], theta_1: float, alpha: float
+    point: tuple[float, float],
+    theta_1: float,
+    alpha: float,
 ) -> None:
     """Points of all bars as complex numbers.
 
@@ -126,10 +130,12 @@ def test_points_move_as_their_positions_do(
         )
         ahead, back = (at(t).point(bar, z) for t in (STEP, -STEP))
         assert moving.velocity(bar, z) == pytest.approx(
-            (ahead - back) / (2 * STEP), abs=BY_DIFFERENCES
+            (ahead - back) / (2 * STEP),
+            abs=BY_DIFFERENCES,
         )
         assert moving.point_coefficient(bar, z) * omega == pytest.approx(
-            moving.velocity(bar, z), abs=CLOSURE * omega
+            moving.velocity(bar, z),
+            abs=CLOSURE * omega,
         )
         bend = (ahead - 2.0 * place + back) / STEP**2
         assert moving.acceleration(bar, z) == pytest.approx(bend, abs=BY_DIFFERENCES)
@@ -177,7 +183,10 @@ def test_within_the_rounding_of_a_change_point_no_direction_is_left(
 @pytest.mark.parametrize("half_turn", [0, 1])
 @pytest.mark.parametrize("theta_1", [0.0, 0.4])
 def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
-    lengths: tuple[float, ...], branch: int, half_turn: int, theta_1: float
+    lengths: tuple[float, ...],
+    branch: int,
+    half_turn: int,
+    theta_1: float,
 ) -> None:
     """A parallelogram's coupler lies as its ground and bar 4 as bar 2.
 
@@ -195,20 +204,24 @@ def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
     )
     for k, bar in enumerate((3, 4)):
         assert moving.direction(bar) == pytest.approx(
-            np.broadcast_to(directions[k], 3), abs=EPS
+            np.broadcast_to(directions[k], 3),
+            abs=EPS,
         )
         assert np.array_equal(moving.omega(bar), np.full(3, speeds[k]))
         assert np.array_equal(moving.alpha(bar), np.full(3, growths[k]))
     # between the bars: the angle of input and ground
     assert np.abs(moving.position.sin_mu) == pytest.approx(
-        np.abs(np.sin(theta_2 - theta_1)), rel=8 * EPS, abs=2 * EPS
+        np.abs(np.sin(theta_2 - theta_1)),
+        rel=8 * EPS,
+        abs=2 * EPS,
     )
 
 
 @pytest.mark.parametrize("theta_1", [0.0, 0.4, -2.5])
 @pytest.mark.parametrize("branch", [1, -1])
 def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(
-    branch: int, theta_1: float
+    branch: int,
+    theta_1: float,
 ) -> None:
     """As theta_2 falls to theta_1 bars 3 and 4 come to lie on the ground's line.
 
@@ -231,7 +244,8 @@ def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(
         )
         for bar in (3, 4):
             assert on.direction(bar) == pytest.approx(
-                near.direction(bar), abs=2.0 * step
+                near.direction(bar),
+                abs=2.0 * step,
             )
         assert find_singular(on.position).tolist() == [True, False]
         assert on.omega(3) == pytest.approx(near.omega(3), abs=8.0 * step)
@@ -288,7 +302,9 @@ def test_short_ground_and_input_leave_no_digit_of_mu() -> None:
     "lengths", [(0.3, 0.1, 0.25, 0.22), (0.3, 0.25, 0.1, 0.22), (0.3, 0.3, 0.2, 0.2)]
 )
 def test_angles_alone_are_those_of_the_whole_position(
-    lengths: tuple[float, float, float, float], branch: int, theta_1: float
+    lengths: tuple[float, float, float, float],
+    branch: int,
+    theta_1: float,
 ) -> None:
     """The same angles, statuses and gaps, a limit and A on O4 among them.
 

@@ -127,7 +127,9 @@ def test_the_model_mechanism_of_the_thesis(inertias: tuple[float, float]) -> Non
     assert s.torque[0] == pytest.approx(torque, rel=PRINTED)
     for name, force in zip(("F12", "F32", "F43", "F14"), forces, strict=True):
         assert getattr(s, name)[0] == pytest.approx(
-            force, rel=0, abs=PRINTED * math.hypot(*force)
+            force,
+            rel=0,
+            abs=PRINTED * math.hypot(*force),
         )
 
 
@@ -143,7 +145,9 @@ def test_the_model_mechanism_of_the_thesis(inertias: tuple[float, float]) -> Non
     ],
 )
 def test_bars_without_mass_or_inertia(
-    bodies: tuple[tuple[float, float], ...], alpha: float, drive_bar: int
+    bodies: tuple[tuple[float, float], ...],
+    alpha: float,
+    drive_bar: int,
 ) -> None:
     """Mass and inertia of 0 and of 1, where a term may be left out.
 
@@ -176,11 +180,14 @@ def compare_with_thirteen(bodies: EquationTerms, s: fourbar.Solution) -> None:
 
 
 @pytest.mark.parametrize(
-    "pins", [("O2",), ("A",), ("B",), ("O4",), ("O2", "A", "B", "O4")], ids="-".join
+    "pins",
+    [("O2",), ("A",), ("B",), ("O4",), ("O2", "A", "B", "O4")],
+    ids="-".join,
 )
 @pytest.mark.parametrize("drive_bar", [2, 3, 4])
 def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
-    pins: tuple[str, ...], drive_bar: int
+    pins: tuple[str, ...],
+    drive_bar: int,
 ) -> None:
     """With the couples mu r |F| of the forces the equations give these again.
 
@@ -240,7 +247,8 @@ def test_dry_friction_at_rest_holds_as_much_as_its_work(drive_bar: int) -> None:
     """
     couples = {"O2": 0.04, "A": 0.02, "B": 0.03, "O4": 0.01}
     case = replace(
-        scene(drive_bar), motion=fourbar.Motion(np.linspace(0.1, 6.0, 7), 0.0)
+        scene(drive_bar),
+        motion=fourbar.Motion(np.linspace(0.1, 6.0, 7), 0.0),
     )
     loads_and_gravity = replace(case, effects=case.effects[:1])
     s = fourbar.solve(

@@ -303,7 +303,8 @@ def test_a_curve_with_one_change_point_takes_two_turns() -> None:
     curve = coupler_curve(FourBar(2.0, Bar(1.0), Bar(4.0), Bar(3.0)), 1.0, 1.0)
     assert turns_fully(FourBar(2.0, Bar(1.0), Bar(4.0), Bar(3.0)))
     assert curve.theta_2[-1] - curve.theta_2[0] == pytest.approx(
-        4 * math.pi, rel=4 * EPS
+        4 * math.pi,
+        rel=4 * EPS,
     )
     assert set(curve.branch.tolist()) == {1, -1}
 

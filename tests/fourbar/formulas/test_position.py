@@ -84,7 +84,9 @@ def differences(lengths: tuple[float, ...], psi: float, branch: int) -> list[mpf
 
 @pytest.mark.parametrize(("lengths", "psi", "branch"), SHORT)
 def test_coefficients_keep_their_digits_where_the_diagonal_is_short(
-    lengths: tuple[float, ...], psi: float, branch: int
+    lengths: tuple[float, ...],
+    psi: float,
+    branch: int,
 ) -> None:
     k = compute_state(uniform(*lengths), psi, find_assembly(psi, branch)).k
     h3, h4, dh3, dh4 = differences(lengths, psi, branch)
@@ -103,7 +105,10 @@ def test_coefficients_keep_their_digits_where_the_diagonal_is_short(
 @pytest.mark.parametrize("theta_1", [0.0, 0.4])
 @pytest.mark.parametrize(("lengths", "psi", "branch"), SHORT)
 def test_small_sines_of_coupler_and_output_keep_their_digits(
-    lengths: tuple[float, ...], psi: float, branch: int, theta_1: float
+    lengths: tuple[float, ...],
+    psi: float,
+    branch: int,
+    theta_1: float,
 ) -> None:
     bars, half = loop(*lengths), half_angle(loop(*lengths), psi)
     u1 = complex(np.exp(1j * theta_1))
@@ -119,7 +124,10 @@ def test_small_sines_of_coupler_and_output_keep_their_digits(
         )
         exact = (B - A) / b, (B - d) / c
     for ours, theirs, before in zip(
-        (corrected.u3, corrected.u4), exact, (plain.u3, plain.u4), strict=True
+        (corrected.u3, corrected.u4),
+        exact,
+        (plain.u3, plain.u4),
+        strict=True,
     ):
         apart = abs(mp.mpc(ours) - theirs * mp.mpc(u1))
         assert apart < FEW_ROUNDINGS / abs(psi) and abs(
@@ -154,7 +162,8 @@ def test_moment_of_the_coupler_about_B_is_that_of_its_inertia_at_the_mass_centre
     ("lengths", "branch"), [((3.0, 1.0, 3.0, 1.0), 1), ((3.0, 1.0, 1.0, 3.0), -1)]
 )
 def test_bars_that_stay_parallel_turn_as_one(
-    lengths: tuple[float, ...], branch: int
+    lengths: tuple[float, ...],
+    branch: int,
 ) -> None:
     bars, theta_2 = loop(*lengths), np.array([1e-12, 0.7, -0.7, 2.0])
     half = half_angle(bars, theta_2)
@@ -203,7 +212,10 @@ def test_grounds_at_several_angles_are_those_of_each() -> None:
         alone = one.position(theta_2, one.half_angle(theta_2), 1)
         assert np.allclose(positions.u2[row], alone.u2, rtol=0.0, atol=FEW_ROUNDINGS)
         assert np.allclose(
-            positions.u2[row], np.exp(1j * theta_2), rtol=0.0, atol=FEW_ROUNDINGS
+            positions.u2[row],
+            np.exp(1j * theta_2),
+            rtol=0.0,
+            atol=FEW_ROUNDINGS,
         )
 
 
@@ -226,13 +238,17 @@ def test_a_point_moves_by_either_angle_alike() -> None:
         z = 0.07 + 0.03j
         chain = by_4.point_coefficient(bar, z) * by_2.k.h4
         assert np.allclose(
-            by_2.point_coefficient(bar, z), chain, rtol=0.0, atol=64 * FEW_ROUNDINGS
+            by_2.point_coefficient(bar, z),
+            chain,
+            rtol=0.0,
+            atol=64 * FEW_ROUNDINGS,
         )
 
 
 @pytest.mark.parametrize(("ground", "taken"), [(0.01, True), (1.1, False)])
 def test_a_short_ground_takes_the_moment_of_the_force_at_A_from_virtual_work(
-    ground: float, taken: bool
+    ground: float,
+    taken: bool,
 ) -> None:
     s = compute_state(uniform(ground, 1.0, 1.2, 1.1), np.array([0.4, 1.0, 4.0]), 1)
     wrenches = Wrenches(1.0 + 2.0j, -0.5j, 0.3 + 0.1j, 0.7, -0.4, 0.2)
@@ -244,7 +260,9 @@ def test_a_short_ground_takes_the_moment_of_the_force_at_A_from_virtual_work(
     ]
     along = [dot(s.position.u2, F32) for F32 in forces]
     assert np.allclose(
-        *along, rtol=0.0, atol=64 * FEW_ROUNDINGS * np.max(np.abs(forces))
+        *along,
+        rtol=0.0,
+        atol=64 * FEW_ROUNDINGS * np.max(np.abs(forces)),
     )
     for F32, moment in zip(forces, (0.3, -0.5), strict=True):
         assert (

@@ -127,7 +127,10 @@ def test_they_keep_their_digits_at_a_stated_distance_from_a_limit(
             assembled = []
             for side in (offset, -offset):
                 motion = fourbar.Motion(
-                    fourbar.FromLimit(number, side), 1.3, 0.7, branch=branch
+                    fourbar.FromLimit(number, side),
+                    1.3,
+                    0.7,
+                    branch=branch,
                 )
                 scene = fourbar.Scene(linkage, motion, drive, terms[:3], terms[3:5])
                 s, exact = (
@@ -157,7 +160,9 @@ def test_where_the_loop_closes_is_known_at_the_last_digits_of_a_limit() -> None:
             with mp.workdps(50):
                 d, a, b, c = (mp.mpf(length) for length in linkage.lengths)
                 for angle, assembled in zip(
-                    angles.tolist(), ours.tolist(), strict=True
+                    angles.tolist(),
+                    ours.tolist(),
+                    strict=True,
                 ):
                     e = abs(
                         d - a * mp.expj(mp.mpf(angle) - mp.mpf(linkage.ground_angle))
@@ -323,7 +328,8 @@ def test_equivalent_inertia_is_that_of_the_kinetic_energy(
         J_of(linkage, state_of(linkage, theta_2 + s, 1)) for s in (step, -step)
     )
     assert slope[ok] == pytest.approx(
-        ((ahead - back) / (2 * step))[ok], abs=1e-6 * float(np.max(J[ok]))
+        ((ahead - back) / (2 * step))[ok],
+        abs=1e-6 * float(np.max(J[ok])),
     )
     # q = theta_4: the chain rule, on the path that reads the loop from bar 4
     rate, bend = state.k.h4, state.k.dh4
@@ -352,7 +358,9 @@ def test_equivalent_inertia_is_that_of_the_kinetic_energy(
             <= READ_BACKWARDS / rate[same] ** 2
         )
         assert slope_of(linkage, by_theta_4)[same] == pytest.approx(
-            expected, rel=1e-10, abs=1e-10 * size
+            expected,
+            rel=1e-10,
+            abs=1e-10 * size,
         )
         ok = ok & ~same
     assert not ok.any()
@@ -382,7 +390,8 @@ def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(
         scene = fourbar.Scene(linkage, fourbar.Motion(0.0, 1.0), drive, *terms)
         s = solve(scene, "force", at=command)
         assert solve_thirteen_equations(scene, command)["torque"] == pytest.approx(
-            s.torque, rel=1e-11
+            s.torque,
+            rel=1e-11,
         )
         for i in range(5):  # one by one
             alone = solve(scene, "force", at=some_of(command, np.arange(5) == i)).torque
@@ -489,12 +498,16 @@ def test_a_parallelogram_moves_its_coupler_without_turning_it() -> None:
     motion = fourbar.Motion(np.linspace(0.2, 2.9, 13), 3.0, 5.0)
     s = solve(
         fourbar.Scene(
-            fourbar.FourBar(0.3, *bars), motion, effects=(fourbar.Gravity(),)
+            fourbar.FourBar(0.3, *bars),
+            motion,
+            effects=(fourbar.Gravity(),),
         ),
         "force",
     )
     J = (m2 + m4) * a**2 / 3.0 + m3 * a**2
     weight = 9.81 * (0.5 * m2 + m3 + 0.5 * m4) * a
     assert s.torque == pytest.approx(
-        J * 5.0 + weight * np.cos(s.theta_2), rel=0.0, abs=16 * EPS * (weight + J * 5.0)
+        J * 5.0 + weight * np.cos(s.theta_2),
+        rel=0.0,
+        abs=16 * EPS * (weight + J * 5.0),
     )

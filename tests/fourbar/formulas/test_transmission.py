@@ -100,7 +100,8 @@ def test_extremes_are_those_of_a_scan() -> None:
             assert 0.0 <= theta - bars.ground_angle <= math.pi * (1.0 + EPS) + 2.0 * EPS
             e = abs(a * np.exp(1j * theta) - d * np.exp(1j * bars.ground_angle))
             assert e**2 == pytest.approx(
-                b * b + c * c - 2 * b * c * math.cos(end), abs=64 * EPS
+                b * b + c * c - 2 * b * c * math.cos(end),
+                abs=64 * EPS,
             )
     assert kinds == {(True, True), (True, False), (False, True), (False, False)}
 
@@ -130,7 +131,8 @@ def test_speed_ratio_follows_from_the_centres_of_rotation() -> None:
         lever_in = a * math.sin(drawn.theta_2[0] - theta_3)
         lever_out = c * math.sin(theta_4 - theta_3)
         assert speed_ratio(moving)[0] * lever_out == pytest.approx(
-            lever_in, abs=256 * EPS * (a + c) / drawn.sine**2
+            lever_in,
+            abs=256 * EPS * (a + c) / drawn.sine**2,
         )
 
 
@@ -144,7 +146,8 @@ def test_power_in_is_power_out() -> None:
         # at equal distances, which is what is taken where none are given, it is the
         # ratio of torques
         assert mechanical_advantage(moving) == pytest.approx(
-            mechanical_advantage(moving, 0.7, 0.7), rel=4 * EPS
+            mechanical_advantage(moving, 0.7, 0.7),
+            rel=4 * EPS,
         )
 
 
@@ -229,14 +232,17 @@ def test_what_ends_the_input_is_near_for_every_drive_and_branch() -> None:
                 distance_to_singular(rocker, theta_2, drive, branch) <= from_its_ends
             ).all()
         assert distance_to_singular(
-            parallelogram, np.full(9, 0.6), branch=branch
+            parallelogram,
+            np.full(9, 0.6),
+            branch=branch,
         ) == pytest.approx(0.1, abs=8 * EPS)
 
 
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize("drive", [3, 4])
 def test_a_dead_centre_is_where_the_driven_bar_reverses(
-    drive: int, branch: int
+    drive: int,
+    branch: int,
 ) -> None:
     crank = FourBar(3.0, Bar(1.0), Bar(2.5), Bar(2.2), 0.5)
     theta_2 = np.linspace(0.0, 2.0 * math.pi, 1201)
@@ -253,7 +259,8 @@ def test_a_dead_centre_is_where_the_driven_bar_reverses(
         - np.array([[-2.0 * math.pi], [0.0], [2.0 * math.pi]])[:, None]
     )
     assert distance_to_singular(crank, theta_2, drive, branch) == pytest.approx(
-        nearest.min(axis=(0, 2)), abs=step
+        nearest.min(axis=(0, 2)),
+        abs=step,
     )
 
 

@@ -45,7 +45,12 @@ def ours(scene: Scene, q: Array, v: Array, a: Array) -> Any:
 
 
 def errors(
-    scene: Scene, q: Array, v: Array, a: Array, torque: float, force: Array
+    scene: Scene,
+    q: Array,
+    v: Array,
+    a: Array,
+    torque: float,
+    force: Array,
 ) -> tuple[float, float]:
     """Of T2 and of the pin force at B, by their greatest value in a turn."""
     expected, turn = (
@@ -379,7 +384,8 @@ def test_drake_loads_the_sdf_and_moves_as_released() -> None:
         "the force at A as the comment says"
     )
     assert abs(missed[1]) < 1e-2 and missed[1] / missed[0] == pytest.approx(
-        0.5, rel=FIRST_ORDER
+        0.5,
+        rel=FIRST_ORDER,
     )
 
 
@@ -398,7 +404,8 @@ def test_drake_loads_the_sdf_and_moves_as_released() -> None:
     ],
 )
 def test_a_file_holds_the_linkage_its_pins_and_what_acts(
-    engine: str, effects: tuple[Any, ...]
+    engine: str,
+    effects: tuple[Any, ...],
 ) -> None:
     """As a run judges it, which reads the text and asks free bodies."""
     rows = rows_of(crank_rocker(effects=effects), engine)
@@ -448,7 +455,9 @@ LOADED, AT_B = (
     ],
 )
 def test_what_a_file_cannot_hold_is_refused(
-    write: Any, scene: Scene, words: str
+    write: Any,
+    scene: Scene,
+    words: str,
 ) -> None:
     with pytest.raises(LimitError, match=words):
         write(scene)
@@ -496,7 +505,9 @@ def test_newton_loads_the_usd_and_reads_as_the_comment_says() -> None:
     pytest.importorskip("newton_usd_schemas")
     wheel = fourbar.Flywheel(100.0, 2)
     scene = crank_rocker(
-        effects=(fourbar.Gravity(), wheel), loads=(), motion=fourbar.Motion(1.0, 3.0)
+        effects=(fourbar.Gravity(), wheel),
+        loads=(),
+        motion=fourbar.Motion(1.0, 3.0),
     )
     text = write_usd(scene)
     with tempfile.TemporaryDirectory() as folder:

@@ -57,13 +57,15 @@ def random_scene(rng: np.random.Generator, kind: DrawnType) -> fourbar.Scene:
         else min(SHORT_OF_LIMIT, 0.25 * (stop - start))
     )
     motion = scene.motion.replace(
-        angle=fourbar.Sweep(start + short, stop - short, 90), acceleration=0.0
+        angle=fourbar.Sweep(start + short, stop - short, 90),
+        acceleration=0.0,
     )
     return replace(scene, motion=motion, drive=None, drive_bar=2, loads=())
 
 
 def at_keyframe(
-    scene: fourbar.Scene, text: str = ""
+    scene: fourbar.Scene,
+    text: str = "",
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:
     model = mujoco.MjModel.from_xml_string(text or write_mjcf(scene))
     data = mujoco.MjData(model)
@@ -145,7 +147,9 @@ def opened(scene: fourbar.Scene) -> tuple[mujoco.MjModel, mujoco.MjData]:
     ids=["parallelogram", "kite a = b", "kite a = d", "a + d = b + c"],
 )
 def test_the_file_opens_in_the_assembly_beyond_change_points(
-    lengths: tuple[float, ...], points: tuple[float, ...], branch: int
+    lengths: tuple[float, ...],
+    points: tuple[float, ...],
+    branch: int,
 ) -> None:
     """Pin B lies left of the diagonal from A to O4 in the open assembly's first half.
 
@@ -241,7 +245,8 @@ def test_a_released_linkage_falls_by_itself(scale: float) -> None:
     for time, theta_2 in zip(expected.time[1:], expected.theta_2[1:], strict=True):
         mujoco.mj_step(model, data, round((time - data.time) / model.opt.timestep))
         assert data.qpos[0] + data.qvel[0] * (time - data.time) == pytest.approx(
-            theta_2, abs=RELEASE
+            theta_2,
+            abs=RELEASE,
         )
 
 
@@ -288,7 +293,8 @@ def test_shapes_add_no_mass_and_change_no_bit() -> None:
 
 @pytest.mark.parametrize(("mass", "inertia"), [(0.0, None), (1e-16, 1.0), (1.0, 1e-16)])
 def test_massless_bar_is_refused_in_one_line(
-    mass: float, inertia: float | None
+    mass: float,
+    inertia: float | None,
 ) -> None:
     linkage = fourbar.FourBar(
         0.3,
@@ -328,7 +334,8 @@ def test_without_keyframe_no_position_is_written() -> None:
 @pytest.mark.parametrize("pin", ("O2", "O4"))
 @pytest.mark.parametrize("theta_1", (0.0, 0.7, -2.0))
 def test_a_spring_at_a_ground_pin_rests_at_an_angle_from_the_ground(
-    pin: str, theta_1: float
+    pin: str,
+    theta_1: float,
 ) -> None:
     """Hinges count from the world's axis, a scene's rest from the ground bar.
 

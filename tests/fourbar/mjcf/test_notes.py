@@ -116,7 +116,9 @@ class Opened:
         )
 
     def errors(
-        self, answers: dict[str, Any], scene: Scene | None = None
+        self,
+        answers: dict[str, Any],
+        scene: Scene | None = None,
     ) -> dict[str, float]:
         """Compare with the formulas at the state that was last forwarded.
 
@@ -124,7 +126,10 @@ class Opened:
         """
         d, scene = self.data, scene or self.driven
         round_ = replace(
-            scene, drive=None, drive_bar=2, motion=scene.motion.replace(free=None)
+            scene,
+            drive=None,
+            drive_bar=2,
+            motion=scene.motion.replace(free=None),
         )  # without poles
         command = Command(
             *(np.array([x]) for x in (d.qpos[0], 1, d.qvel[0], d.qacc[0]))
@@ -174,7 +179,9 @@ def opens_assembled(file: Opened) -> None:
     file.forward()
     gap = math.dist(d.site("B3").xpos, d.site("B4").xpos)
     s = fourbar.solve(
-        file.scene, "position", at=Command(d.qpos[:1].copy(), np.array([1]), None, 0.0)
+        file.scene,
+        "position",
+        at=Command(d.qpos[:1].copy(), np.array([1]), None, 0.0),
     )
     assert gap < 1e-9 and m.joint("O2").qpos0[0] == d.qpos[0] == pytest.approx(0.4)
     for angle, theta in (
@@ -199,7 +206,8 @@ def is_accelerated(file: Opened) -> None:
     assert d.qvel[0] == 10.0
     file.step(100)
     assert d.qvel[0] ** 2 == pytest.approx(
-        100.0 + 2.0 * file.scene.motion.alpha_2 * (d.qpos[0] - 0.4), rel=1e-6
+        100.0 + 2.0 * file.scene.motion.alpha_2 * (d.qpos[0] - 0.4),
+        rel=1e-6,
     )
 
 
@@ -256,7 +264,8 @@ def cylinder_force(file: Opened) -> float:
     command = Command(*(np.array([x]) for x in (d.qpos[0], 1, d.qvel[0], d.qacc[0])))
     solution = fourbar.solve(file.scene, "force", at=command)
     assert d.ten_length[file.model.tendon("cylinder").id] == pytest.approx(
-        solution.stroke[0], rel=1e-9
+        solution.stroke[0],
+        rel=1e-9,
     )
     return float(solution.drive_force[0])
 
@@ -484,7 +493,8 @@ def test_every_sentence_holds(name: str) -> None:
 
 
 def test_a_linkage_with_limits_says_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(
         tmp_path

@@ -36,7 +36,10 @@ SAME: list[tuple[Callable[..., Any], tuple[Any, ...], tuple[Any, ...]]] = [
     (fourbar.Point, ("P", 3, ("5 cm", "180 deg")), ("P", 3, (0.05, np.pi))),
     (
         lambda bar, force, at, moment: fourbar.Load(
-            bar, force, from_pin=at, moment=moment
+            bar,
+            force,
+            from_pin=at,
+            moment=moment,
         ),
         (4, ("2 kN", "180 deg"), ("5 cm", 0), "3 N cm"),
         (4, (2000.0, np.pi), (0.05, 0.0), 0.03),
@@ -73,7 +76,9 @@ SAME: list[tuple[Callable[..., Any], tuple[Any, ...], tuple[Any, ...]]] = [
 
 @pytest.mark.parametrize(("make", "texts", "numbers"), SAME)
 def test_a_text_with_a_unit_is_its_number(
-    make: Callable[..., Any], texts: Any, numbers: Any
+    make: Callable[..., Any],
+    texts: Any,
+    numbers: Any,
 ) -> None:
     assert make(*texts) == make(*numbers)
 
@@ -250,7 +255,9 @@ def test_the_tables_name_every_unit_and_prefix() -> None:
     ],
 )
 def test_units_are_read_as_people_write_them(
-    text: str, unit: str, value: float
+    text: str,
+    unit: str,
+    value: float,
 ) -> None:
     assert to_si(text, unit) == value
 

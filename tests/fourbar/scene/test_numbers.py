@@ -51,7 +51,10 @@ def test_pins_and_mass_centres_are_points() -> None:
             (s.acceleration, "a_"),
         ):
             np.testing.assert_allclose(
-                vectors[point], getattr(s, start + name), rtol=1e-13, atol=1e-13
+                vectors[point],
+                getattr(s, start + name),
+                rtol=1e-13,
+                atol=1e-13,
             )
 
 
@@ -74,12 +77,16 @@ def test_velocity_and_acceleration_are_derivatives() -> None:
             * omega_2
         )
         np.testing.assert_allclose(
-            here.acceleration[point.name], slope, atol=100.0 * OF_A_DIFFERENCE
+            here.acceleration[point.name],
+            slope,
+            atol=100.0 * OF_A_DIFFERENCE,
         )
     for name in ("A", "B", "G2", "G3", "G4"):
         slope = (getattr(after, name) - getattr(before, name)) / (2 * h) * omega_2
         np.testing.assert_allclose(
-            getattr(here, f"v_{name}"), slope, atol=OF_A_DIFFERENCE
+            getattr(here, f"v_{name}"),
+            slope,
+            atol=OF_A_DIFFERENCE,
         )
     np.testing.assert_allclose(
         here.points["on_ground"],

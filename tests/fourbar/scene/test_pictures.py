@@ -30,7 +30,9 @@ def scene_file(folder: Path, name: str, bar: str = "coupler") -> Path:
 
 @pytest.mark.parametrize("name", ("bar.png", "parts/bar.png"))
 def test_the_picture_of_a_scene_file_is_shown_and_saved(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    name: str,
 ) -> None:
     (tmp_path / "parts").mkdir()
     (tmp_path / name).write_bytes(PNG)
@@ -61,7 +63,8 @@ def test_a_scene_saved_elsewhere_names_the_same_file_or_says_why_not(
     elsewhere = tmp_path / "other"
     elsewhere.mkdir()
     with pytest.raises(
-        InputError, match=r"^bars\.output\.picture.*copy it there first[^\n]*$"
+        InputError,
+        match=r"^bars\.output\.picture.*copy it there first[^\n]*$",
     ):
         save(scene, elsewhere / "scene.toml")
     assert not list(elsewhere.iterdir())
@@ -103,7 +106,9 @@ def test_one_given_with_the_command_takes_its_place(tmp_path: Path) -> None:
     ),
 )
 def test_a_name_that_leads_elsewhere_is_refused_when_the_file_is_read(
-    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    name: str,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     (tmp_path / "secret.png").write_bytes(PNG)
     inner = tmp_path / "inner"
@@ -141,7 +146,8 @@ def test_what_the_name_leads_to_is_looked_at_before_it_is_shown(tmp_path: Path) 
         scene = load(scene_file(inner, name))
         fourbar.solve(scene)  # nobody has to see it to compute
         with pytest.raises(
-            InputError, match=rf"^bars\.coupler\.picture[^\n]*{word}[^\n]*$"
+            InputError,
+            match=rf"^bars\.coupler\.picture[^\n]*{word}[^\n]*$",
         ):
             animate.write_animation(scene, tmp_path / "page.html")
         assert not (tmp_path / "page.html").exists()

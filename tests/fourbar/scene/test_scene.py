@@ -82,7 +82,8 @@ def of_bar(solution: Solution, bar: int) -> Command:
 @pytest.mark.parametrize("bar", [3, 4])
 @pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
 def test_what_comes_out_fed_back_as_a_command_returns_itself(
-    path: Path, bar: int
+    path: Path,
+    bar: int,
 ) -> None:
     scene = fourbar.load(path)
     compared = 0
@@ -160,7 +161,8 @@ def test_limits_of_a_bar_are_where_its_own_sine_is_zero(bar: int) -> None:
     with pytest.raises(InputError, match=rf"motion.theta_{bar}.limit = 9"):
         solve(Scene(rocker, Motion(**{f"theta_{bar}": FromLimit(9)})))
     with pytest.raises(
-        InputError, match="the output of this linkage has no limit positions"
+        InputError,
+        match="the output of this linkage has no limit positions",
     ):
         solve(Scene(uniform(0.1, 0.3, 0.25, 0.28), Motion(theta_4=FromLimit(1))))
 
@@ -196,7 +198,9 @@ def test_at_a_limit_of_theta_2_a_command_of_theta_4_has_motion_and_forces() -> N
             for name in ("theta_2", "alpha_2", "F12", "F32", "F43", "F14", "torque"):
                 before, at_limit, after = getattr(s, name)
                 assert at_limit == pytest.approx(
-                    0.5 * (before + after), rel=1e-9, abs=1e-9
+                    0.5 * (before + after),
+                    rel=1e-9,
+                    abs=1e-9,
                 )
             assert (s.torque_error < 1e-11 * np.abs(s.torque)).all()
             answer = FreeBody().answer(
@@ -223,7 +227,8 @@ def test_a_periodic_law_passes_its_points_whenever_it_begins() -> None:
     assert (omega[0], alpha[0]) == pytest.approx((omega[-1], alpha[-1]), rel=1e-13)
     early = Law(tuple(t - 10.0 for t in times), angles, 8, "periodic")
     assert np.array(law.at(law.times())) == pytest.approx(
-        np.array(early.at(early.times())), rel=1e-13
+        np.array(early.at(early.times())),
+        rel=1e-13,
     )
 
 
@@ -240,7 +245,10 @@ def test_a_sweep_a_law_and_what_is_left_out_follow_the_commanded_bar(bar: int) -
     assert np.abs(np.diff(swept.theta_2)).max() < 1.0  # continuous
     table = tuple(np.linspace(angle[30], angle[200], 5).tolist())
     law = Law(
-        (0.0, 1.0, 2.0, 3.0, 4.0), steps=8, ends="rest", **{f"theta_{bar}": table}
+        (0.0, 1.0, 2.0, 3.0, 4.0),
+        steps=8,
+        ends="rest",
+        **{f"theta_{bar}": table},
     )
     assert law.bar == bar and law.angle == table
     moved = solve(replace(LOADED, motion=Motion(law=law)))
@@ -254,7 +262,8 @@ def test_a_sweep_a_law_and_what_is_left_out_follow_the_commanded_bar(bar: int) -
         and abs(moved.omega_2[0]) < 1e-12
     )
     with pytest.raises(
-        InputError, match=f"gives theta_{bar}, omega_{bar} and alpha_{bar}"
+        InputError,
+        match=f"gives theta_{bar}, omega_{bar} and alpha_{bar}",
     ):
         Motion(law=law, theta_2=1.0)
     with pytest.raises(InputError, match="is the command of one bar"):
@@ -287,7 +296,9 @@ def test_a_study_sensitivities_and_tolerances_take_the_keys_of_the_commanded_bar
             low, high = getattr(solved, name)
             slope = (high - low) / (2 * h)
             assert slopes.of(name, key) == pytest.approx(
-                slope, rel=DIFFERENCE, abs=DIFFERENCE * np.abs(slope).max()
+                slope,
+                rel=DIFFERENCE,
+                abs=DIFFERENCE * np.abs(slope).max(),
             )
     assert np.array_equal(slopes.of("theta_4", "motion.theta_4"), [1.0, 1.0])
     assert not slopes.of("theta_4", "lengths.input").any()
@@ -296,7 +307,8 @@ def test_a_study_sensitivities_and_tolerances_take_the_keys_of_the_commanded_bar
     toleranced = replace(scene, tolerances=(fourbar.Tolerance("motion.omega_4", 0.01),))
     spread = fourbar.tolerances(toleranced, 64).spreads["omega_2"]
     assert spread.worst == pytest.approx(
-        np.abs(slopes.value("omega_2")) * 0.005, rel=1e-9
+        np.abs(slopes.value("omega_2")) * 0.005,
+        rel=1e-9,
     )
 
 
@@ -363,7 +375,11 @@ output = "22 cm"
 
 
 STROKE = Motion(
-    stroke=0.3, stroke_speed=0.1, stroke_acceleration=0.2, side="left", branch=-1
+    stroke=0.3,
+    stroke_speed=0.1,
+    stroke_acceleration=0.2,
+    side="left",
+    branch=-1,
 )
 
 
@@ -395,7 +411,9 @@ STROKE = Motion(
     ids=str,
 )
 def test_a_motion_is_replaced_by_what_it_commands(
-    motion: Motion, changes: dict[str, Any], same: Motion
+    motion: Motion,
+    changes: dict[str, Any],
+    same: Motion,
 ) -> None:
     assert motion.replace() == motion != same == motion.replace(**changes)
     with pytest.raises(
@@ -460,7 +478,8 @@ def test_two_commands_of_motion_are_one_line(lines: str, said: str) -> None:
 )
 def test_a_file_of_it_reads_back_bit_for_bit(angle: object) -> None:
     scene = replace(
-        LOADED, motion=Motion(theta_4=angle, omega_4=2.0, alpha_4=-0.1, branch=-1)
+        LOADED,
+        motion=Motion(theta_4=angle, omega_4=2.0, alpha_4=-0.1, branch=-1),
     )  # type: ignore[arg-type]
     text = fourbar.dump(scene)
     again = fourbar.files.loads(text)
@@ -475,14 +494,18 @@ def test_a_file_of_it_reads_back_bit_for_bit(angle: object) -> None:
 
 def test_what_takes_theta_2_alone_refuses_in_one_line() -> None:
     scene = replace(
-        LOADED, motion=Motion(theta_4=Sweep(3.8, 4.2, 7), omega_4=1.0), loads=()
+        LOADED,
+        motion=Motion(theta_4=Sweep(3.8, 4.2, 7), omega_4=1.0),
+        loads=(),
     )
     with pytest.raises(
-        LimitError, match=r"^motion.theta_4: .* takes a command of theta_2 alone$"
+        LimitError,
+        match=r"^motion.theta_4: .* takes a command of theta_2 alone$",
     ):
         write_mjcf(scene)
     with pytest.raises(
-        InputError, match=r"theta_4'?: is commanded, and theta_2 is not"
+        InputError,
+        match=r"theta_4'?: is commanded, and theta_2 is not",
     ):
         _ = fourbar.command(scene).theta_2
 

@@ -44,12 +44,19 @@ third derivatives of 1e4.
 
 
 def scene(
-    bar: int, stroke: Any, side: str = "left", *, turned: bool = False, **motion: Any
+    bar: int,
+    stroke: Any,
+    side: str = "left",
+    *,
+    turned: bool = False,
+    **motion: Any,
 ) -> fourbar.Scene:
     ends = (ENDS[bar], GROUND) if turned else (GROUND, ENDS[bar])
     commanded = fourbar.Motion(stroke=stroke, side=side, **motion)
     return crank_rocker(
-        motion=commanded, drive=LinearDrive(*ends), effects=(fourbar.Gravity(),)
+        motion=commanded,
+        drive=LinearDrive(*ends),
+        effects=(fourbar.Gravity(),),
     )
 
 
@@ -59,10 +66,18 @@ def scene(
     ("bar", "strokes"), [(2, Sweep(0.25, 0.35, 6)), (4, Sweep(0.45, 0.52, 6))]
 )
 def test_its_bar_moves_as_the_triangle_in_balls_does(
-    bar: int, strokes: Sweep, side: str, turned: bool
+    bar: int,
+    strokes: Sweep,
+    side: str,
+    turned: bool,
 ) -> None:
     by_stroke = scene(
-        bar, strokes, side, turned=turned, stroke_speed=0.2, stroke_acceleration=0.1
+        bar,
+        strokes,
+        side,
+        turned=turned,
+        stroke_speed=0.2,
+        stroke_acceleration=0.1,
     )
     s, exact = fourbar.solve(by_stroke), answer_in_balls(by_stroke)
     ok = s.status_code == 0
@@ -83,7 +98,10 @@ def test_its_bar_moves_as_the_triangle_in_balls_does(
     ):
         largest = np.abs(exact[name][ok]).max()
         np.testing.assert_allclose(
-            getattr(s, name)[ok], exact[name][ok], rtol=0.0, atol=ROUND_OFF * largest
+            getattr(s, name)[ok],
+            exact[name][ok],
+            rtol=0.0,
+            atol=ROUND_OFF * largest,
         )
 
 
@@ -99,7 +117,8 @@ def test_the_sides_are_left_and_right_of_the_line_from_pin_to_ground_end() -> No
     ("bar", "strokes"), [(2, [0.181, 0.4, 0.4199999]), (4, [0.4, 0.45, 0.5])]
 )
 def test_error_bars_hold_what_the_angle_of_a_stroke_loses(
-    bar: int, strokes: list[float]
+    bar: int,
+    strokes: list[float],
 ) -> None:
     """The ground turned with all that is on it.
 
@@ -145,7 +164,11 @@ def test_where_the_line_passes_the_pin_the_stroke_is_at_its_end_and_singular() -
 
 def test_it_reads_back_as_it_was_written() -> None:
     by_stroke = scene(
-        4, Sweep(0.4, 0.5, 5), "right", stroke_speed=0.2, stroke_acceleration=-0.1
+        4,
+        Sweep(0.4, 0.5, 5),
+        "right",
+        stroke_speed=0.2,
+        stroke_acceleration=-0.1,
     )
     again = loads(dump(by_stroke))
     assert again == by_stroke and again.motion.bar == 4
@@ -161,11 +184,13 @@ def test_it_reads_back_as_it_was_written() -> None:
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(
-    motion: dict[str, Any], says: str
+    motion: dict[str, Any],
+    says: str,
 ) -> None:
     with pytest.raises(InputError, match=says) as caught:
         refused = crank_rocker(
-            motion=fourbar.Motion(**motion), drive=LinearDrive(GROUND, ENDS[2])
+            motion=fourbar.Motion(**motion),
+            drive=LinearDrive(GROUND, ENDS[2]),
         )
         fourbar.solve(refused)
     assert "\n" not in str(caught.value)
@@ -182,10 +207,14 @@ def test_who_does_not_take_it_says_so() -> None:
 
 @pytest.mark.parametrize(("bar", "strokes"), [(2, (0.25, 0.35)), (4, (0.45, 0.52))])
 def test_a_study_of_strokes_is_as_its_members_one_by_one(
-    bar: int, strokes: tuple[float, float]
+    bar: int,
+    strokes: tuple[float, float],
 ) -> None:
     by_stroke = scene(
-        bar, Sweep(*strokes, 6), stroke_speed=0.2, stroke_acceleration=0.1
+        bar,
+        Sweep(*strokes, 6),
+        stroke_speed=0.2,
+        stroke_acceleration=0.1,
     )
     values = {
         "lengths.input": [0.1, 0.11],
@@ -210,7 +239,10 @@ def test_a_study_of_strokes_is_as_its_members_one_by_one(
         ):
             theirs = getattr(one, name)
             np.testing.assert_allclose(
-                getattr(study, name)[k], theirs, rtol=ROUND_OFF, atol=1e-12
+                getattr(study, name)[k],
+                theirs,
+                rtol=ROUND_OFF,
+                atol=1e-12,
             )
 
 
@@ -260,14 +292,18 @@ def test_sensitivities_at_a_stroke_are_its_differences(bar: int, stroke: float) 
             slope = (ahead - back)[0] / (2.0 * h)
             size = np.abs(getattr(slopes.solution, name)).max() / h
             np.testing.assert_allclose(
-                slopes.of(name, key)[0], slope, rtol=DIFFERENCES, atol=1e-11 * size
+                slopes.of(name, key)[0],
+                slope,
+                rtol=DIFFERENCES,
+                atol=1e-11 * size,
             )
 
 
 def test_tolerances_at_a_stroke_spread_as_first_order_says() -> None:
     drawn = fourbar.Tolerance("drive.to.from_pin.0", 1e-5, sigma=True)
     by_stroke = replace(
-        scene(2, Sweep(0.25, 0.35, 5), stroke_speed=0.2), tolerances=(drawn,)
+        scene(2, Sweep(0.25, 0.35, 5), stroke_speed=0.2),
+        tolerances=(drawn,),
     )
     spread, slopes = fourbar.tolerances(by_stroke, 256), fourbar.sensitivity(by_stroke)
     for name in ("theta_2", "theta_4", "drive_force"):

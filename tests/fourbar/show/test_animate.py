@@ -97,7 +97,8 @@ def test_a_single_position_is_one_of_the_rows_and_the_first_shown() -> None:
 
 
 RELEASED = crank_rocker(
-    motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(1.8, 90)), drive_bar=2
+    motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(1.8, 90)),
+    drive_bar=2,
 )
 
 
@@ -120,7 +121,8 @@ def test_a_free_motion_is_embedded_instant_by_instant() -> None:
     [(0.2, 0.1), (1.4e-3, 1e-4), (30.0, 1.0), (6e3, 100.0), (6.1e3, 1e3)],
 )
 def test_what_is_too_quick_to_see_is_slowed_down_by_a_power_of_ten(
-    duration: float, rate: float
+    duration: float,
+    rate: float,
 ) -> None:
     law = Law((0.0, 0.5 * duration, duration), (0.0, 1.0, 2.0), ends="rest")
     data = embedded(animate.write_page(crank_rocker(motion=fourbar.Motion(law=law))))
@@ -191,14 +193,19 @@ def test_the_policy_of_the_page_allows_its_own_script_and_nothing_else() -> None
     ],
 )
 def test_what_is_no_picture_is_refused(
-    tmp_path: Path, bar: str, content: bytes | None, message: str
+    tmp_path: Path,
+    bar: str,
+    content: bytes | None,
+    message: str,
 ) -> None:
     path = tmp_path / "picture.png"
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(InputError, match=message):
         animate.write_animation(
-            crank_rocker(), tmp_path / "page.html", pictures={bar: path}
+            crank_rocker(),
+            tmp_path / "page.html",
+            pictures={bar: path},
         )
     assert not (tmp_path / "page.html").exists()
 
@@ -215,7 +222,9 @@ def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
         animate.write_animation(crank_rocker(), tmp_path / "a.gif", seconds=math.nan)
     with pytest.raises(InputError, match="html page only"):
         animate.write_animation(
-            crank_rocker(), tmp_path / "a.gif", pictures={"input": tmp_path / "x.png"}
+            crank_rocker(),
+            tmp_path / "a.gif",
+            pictures={"input": tmp_path / "x.png"},
         )
     assert not list(tmp_path.iterdir())
 
@@ -245,12 +254,14 @@ def test_an_mp4_is_written(tmp_path: Path) -> None:
 
 
 def test_without_ffmpeg_an_mp4_is_refused_in_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(
-        DependencyError, match=r"^an \.mp4 film needs the program ffmpeg[^\n]*$"
+        DependencyError,
+        match=r"^an \.mp4 film needs the program ffmpeg[^\n]*$",
     ):
         animate.write_animation(crank_rocker(), tmp_path / "a.mp4")
     assert not list(tmp_path.iterdir())
@@ -259,7 +270,8 @@ def test_without_ffmpeg_an_mp4_is_refused_in_one_line(
 @pytest.mark.slow
 @pytest.mark.posix
 def test_an_ffmpeg_without_the_encoder_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     program = tmp_path / "bin" / "ffmpeg"
     program.parent.mkdir()
@@ -273,7 +285,8 @@ def test_an_ffmpeg_without_the_encoder_is_named(
 
 @pytest.mark.slow
 def test_a_film_of_a_free_motion_runs_forward_and_as_long_as_it_does(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     from PIL import Image
 

@@ -59,7 +59,8 @@ def test_ranges_are_those_of_the_triangles_whatever_the_steps(steps: int) -> Non
     assert low.value == pytest.approx(math.pi - opposite(A + B, D, C), abs=LOCATED)
     assert high.value == pytest.approx(math.pi - opposite(B - A, D, C), abs=LOCATED)
     assert low.place == pytest.approx(
-        opposite(C, D, A + B), abs=1e-4
+        opposite(C, D, A + B),
+        abs=1e-4,
     )  # where it is flat, a place is less sharp
     assert high.place == pytest.approx(math.pi + opposite(C, D, B - A), abs=1e-4)
     assert facts.transmission.value == pytest.approx(opposite(D - A, B, C), abs=LOCATED)
@@ -74,7 +75,8 @@ def test_where_the_assembly_ends_is_the_limit_of_the_commanded_bar() -> None:
     )
     bounds = [end for stretch in facts.stretches for end in stretch if end is not None]
     assert sorted(bounds) == pytest.approx(
-        sorted(limit.theta_2 % math.tau for limit in limits), abs=1e-12
+        sorted(limit.theta_2 % math.tau for limit in limits),
+        abs=1e-12,
     )
     assert (
         f"assembles up to theta_2 = {ends[0]} deg, and from theta_2 = {ends[1]} deg"
@@ -90,7 +92,8 @@ def test_where_the_assembly_ends_is_the_limit_of_the_commanded_bar() -> None:
 def test_peaks_and_means_are_those_of_much_finer_steps() -> None:
     fine = fourbar.solve(
         replace(
-            TURN, motion=TURN.motion.replace(angle=fourbar.Sweep(0.0, math.tau, 36000))
+            TURN,
+            motion=TURN.motion.replace(angle=fourbar.Sweep(0.0, math.tau, 36000)),
         )
     )
     text = block(TURN)
@@ -100,7 +103,8 @@ def test_peaks_and_means_are_those_of_much_finer_steps() -> None:
         r"torque   peak (\S+) mN m at theta_2 = (\S+) deg, RMS (\S+) mN m", text
     )
     assert row is not None and [float(x) for x in row.groups()] == pytest.approx(
-        [torque, place, 1e3 * np.sqrt(np.mean(fine.torque[:-1] ** 2))], rel=6e-4
+        [torque, place, 1e3 * np.sqrt(np.mean(fine.torque[:-1] ** 2))],
+        rel=6e-4,
     )
     pins = text[text.index("pins") : text.index("bending")]
     cells = {
@@ -116,16 +120,19 @@ def test_peaks_and_means_are_those_of_much_finer_steps() -> None:
         )
         mean = np.sqrt(np.mean(size[:-1] ** 2))
         assert [peak, angle, rms] == pytest.approx(
-            [size.max(), math.degrees(fine.theta_2[size.argmax()]), mean], rel=1e-3
+            [size.max(), math.degrees(fine.theta_2[size.argmax()]), mean],
+            rel=1e-3,
         )
     supplied, back = (
         float(x) for x in re.findall(r"(\S+) J (?:per turn given|taken back)", text)
     )
     energy = np.trapezoid(np.maximum(fine.power, 0.0), fine.theta_2) / 10.0
     assert supplied == pytest.approx(
-        energy, rel=6e-4
+        energy,
+        rel=6e-4,
     ) and back - supplied == pytest.approx(
-        -np.trapezoid(fine.power, fine.theta_2) / 10.0, abs=2e-3
+        -np.trapezoid(fine.power, fine.theta_2) / 10.0,
+        abs=2e-3,
     )
     assert (
         "of these positions" not in text
@@ -203,7 +210,8 @@ def test_the_largest_bending_moment_of_each_bar_is_located_between_the_positions
             and not bending.grows
         )
         assert bending.peak.place == pytest.approx(
-            s.theta_2[worst], abs=math.radians(0.02)
+            s.theta_2[worst],
+            abs=math.radians(0.02),
         )
         assert bending.x == pytest.approx(x[worst], abs=1e-5)
     rows = {
@@ -259,7 +267,8 @@ def test_friction_at_rest_gives_the_range_that_it_holds() -> None:
     )
     assert row is not None
     assert [float(x) for x in row.groups()] == pytest.approx(
-        [1e3 * s.torque_low[0], 1e3 * s.torque_high[0]], rel=6e-4
+        [1e3 * s.torque_low[0], 1e3 * s.torque_high[0]],
+        rel=6e-4,
     )
     assert s.torque_high[0] - s.torque_low[0] == pytest.approx(1.0)
 
@@ -270,7 +279,9 @@ def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore() -> None:
     They are from the pivot of the input.
     """
     motion = fourbar.Motion(
-        stroke=fourbar.Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left"
+        stroke=fourbar.Sweep(0.17, 0.33, 40),
+        stroke_speed=0.2,
+        side="left",
     )
     scene = crank_rocker(motion=motion, drive=CYLINDER)
     text, s = plain(block(scene, pressure=210e5)), fourbar.solve(scene)
@@ -289,7 +300,8 @@ def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore() -> None:
     )
     right = replace(scene, motion=motion.replace(side="right"))
     assert summarize(right, fourbar.solve(right)).stroke_limits == pytest.approx(
-        (0.16, 0.34), abs=1e-6
+        (0.16, 0.34),
+        abs=1e-6,
     )
 
 
@@ -302,7 +314,8 @@ def test_the_command_line_states_the_bore(capsys: pytest.CaptureFixture[str]) ->
 
 
 def test_units_follow_the_file(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     for length, shown in (("12 in", "lbf in"), ("1.5ft", "lbf in"), ("300 mm", "mN m")):
         assert ("in" in dict(suit_units(length)).get("m", ("",))) == (shown == "lbf in")
@@ -328,7 +341,8 @@ def test_units_follow_the_file(
 
 
 def test_a_new_scene_has_weight_and_sixty_turns_a_minute(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert (
         status(
@@ -381,7 +395,8 @@ def test_a_reversal_of_a_motion_law_is_named_by_its_angle() -> None:
     angle = 0.3 + 0.85 * (1.0 - np.cos(math.pi * time))
     law = Law(tuple(time), tuple(angle), steps=30, ends="rest")
     scene = crank_rocker(
-        motion=fourbar.Motion(law=law), effects=(fourbar.Friction.at(O2=0.05),)
+        motion=fourbar.Motion(law=law),
+        effects=(fourbar.Friction.at(O2=0.05),),
     )
     facts = summarize(scene, fourbar.solve(scene))
     ((place, pin),) = facts.between.reversals

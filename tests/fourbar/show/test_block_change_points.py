@@ -156,7 +156,9 @@ def test_a_given_couple_lifts_a_bar_on_two_links(tmp_path: Path) -> None:
     ],
 )
 def test_headings_name_the_assembly(
-    lengths: tuple[float, ...], motion: dict[str, float], head: str
+    lengths: tuple[float, ...],
+    motion: dict[str, float],
+    head: str,
 ) -> None:
     scene = fourbar.Scene(fourbar.uniform(*lengths), fourbar.Motion(**motion))
     lines = write_block(scene, fourbar.solve(scene))
@@ -188,7 +190,9 @@ def test_a_scene_without_a_range_covers_both_turns_of_a_single_change_point() ->
     """The drive then gives as much energy as it takes back: only weights act."""
     linkage = fourbar.uniform(0.4, 0.2, 0.3, 0.3)
     scene = fourbar.Scene(
-        linkage, fourbar.Motion(omega_2=6.0), effects=(fourbar.Gravity(),)
+        linkage,
+        fourbar.Motion(omega_2=6.0),
+        effects=(fourbar.Gravity(),),
     )
     solution = fourbar.solve(scene)
     assert len(solution) == 721
@@ -298,7 +302,8 @@ def test_equilibria_are_those_of_the_assembly() -> None:
     The antiparallelogram elsewhere too.
     """
     scene = fourbar.Scene(
-        fourbar.uniform(0.3, 0.1, 0.3, 0.1), effects=(fourbar.Gravity(),)
+        fourbar.uniform(0.3, 0.1, 0.3, 0.1),
+        effects=(fourbar.Gravity(),),
     )
     found = fourbar.equilibrium(scene).found
     angles = sorted(math.degrees(rest.place.theta_2) % 360.0 for rest in found)
@@ -373,7 +378,10 @@ def test_the_peak_of_a_release_over_change_points_is_said_to_grow() -> None:
     linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
     motion = fourbar.Motion(0.5, 25.0, free=fourbar.Free(0.4, 50))
     scene = fourbar.Scene(
-        linkage, motion, loads=(fourbar.Load(2, moment=0.05),), effects=(GRAVITY,)
+        linkage,
+        motion,
+        loads=(fourbar.Load(2, moment=0.05),),
+        effects=(GRAVITY,),
     )
     solution = fourbar.solve(scene)
     assert solution.change_points is not None and len(solution.change_points) > 2
@@ -390,7 +398,9 @@ def test_the_peak_of_a_release_with_limits_is_not_said_to_grow(steps: int) -> No
     pytest.importorskip("scipy")
     motion = fourbar.Motion(0.5, 6.0, free=fourbar.Free(2.0, steps))
     scene = fourbar.Scene(
-        fourbar.uniform(0.3, 0.1, 0.3, 0.1), motion, effects=(GRAVITY,)
+        fourbar.uniform(0.3, 0.1, 0.3, 0.1),
+        motion,
+        effects=(GRAVITY,),
     )
     solution = fourbar.solve(scene)
     assert solution.change_points

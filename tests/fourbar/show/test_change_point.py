@@ -23,7 +23,8 @@ PARALLELOGRAM = fourbar.FourBar(
 
 @pytest.mark.parametrize(("theta_2", "sense"), ((0.0, 1.0), (np.pi, -1.0)))
 def test_pin_forces_that_are_bounded_on_a_change_point_have_their_limit(
-    theta_2: float, sense: float
+    theta_2: float,
+    sense: float,
 ) -> None:
     """Weights along the line of all bars ask for no moment there.
 
@@ -111,7 +112,9 @@ def test_a_release_has_the_limits_of_its_own_motion(direction: float) -> None:
     shaking = numbers(rows[5])[:2]
     assert shaking == pytest.approx(weight - lost, rel=SIX_DIGITS, abs=1e-6)
     assert numbers(rows[1])[:2] == pytest.approx(
-        [-0.5 * x for x in shaking], rel=SIX_DIGITS, abs=1e-6
+        [-0.5 * x for x in shaking],
+        rel=SIX_DIGITS,
+        abs=1e-6,
     )
 
 

@@ -60,7 +60,8 @@ def test_a_ratio_of_forces_has_a_unit_where_the_two_differ() -> None:
     ],
 )
 def test_an_unknown_column_is_refused_with_those_there_are(
-    name: str, says: str
+    name: str,
+    says: str,
 ) -> None:
     with pytest.raises(InputError, match=says):
         columns(TURN, name)
@@ -75,7 +76,8 @@ def test_a_column_that_needs_a_speed_says_so() -> None:
 
 def test_a_steady_command_of_another_bar_or_a_stroke_has_a_time() -> None:
     rocker = replace(
-        TURN, motion=fourbar.Motion(theta_4=fourbar.Sweep(2.0, 1.7, 3), omega_4=-2.0)
+        TURN,
+        motion=fourbar.Motion(theta_4=fourbar.Sweep(2.0, 1.7, 3), omega_4=-2.0),
     )
     assert columns(rocker, "time")["time"] == pytest.approx([0.0, 0.05, 0.1, 0.15])
     growing = fourbar.Motion(fourbar.Sweep(0.0, 1.0, 3), 1.0, 0.5)

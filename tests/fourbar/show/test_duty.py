@@ -156,10 +156,14 @@ def test_a_study_has_what_each_of_its_members_has() -> None:
             )
         )
         assert moment[member] == pytest.approx(
-            shaking_moment(alone), rel=1e-12, abs=1e-12
+            shaking_moment(alone),
+            rel=1e-12,
+            abs=1e-12,
         )
         assert force[member] == pytest.approx(
-            shaking_force(alone), rel=1e-12, abs=1e-12
+            shaking_force(alone),
+            rel=1e-12,
+            abs=1e-12,
         )
         for of_study, one in (
             (duty, motor_duty(alone)),
@@ -190,7 +194,9 @@ def test_a_study_of_a_motion_law_keeps_its_time() -> None:
     law = Law((0.0, 0.5, 1.0, 1.5, 2.0), (0.0, 0.0, 2.0, 2.0, 0.0), 20, "rest")
     linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
     scene = fourbar.Scene(
-        linkage, fourbar.Motion(law=law), effects=(fourbar.Gravity(),)
+        linkage,
+        fourbar.Motion(law=law),
+        effects=(fourbar.Gravity(),),
     )
     study = fourbar.solve(fourbar.vary(scene, {"bars.input.mass": [0.1, 0.1]}))
     alone, duty = fourbar.solve(scene), motor_duty(study)

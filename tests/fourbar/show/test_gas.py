@@ -112,7 +112,9 @@ MOTIONS = {
 
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_ends_are_found_whatever_is_commanded(
-    motion: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    motion: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     file = Path(write(tmp_path, "400 mm", "150 mm"))
     text = file.read_text(encoding="utf-8").replace(SWEEP, MOTIONS[motion])
@@ -133,7 +135,8 @@ def test_ends_are_found_whatever_is_commanded(
 
 
 def test_between_the_positions_of_a_list_nothing_is_located(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     file = Path(write(tmp_path, "400 mm", "150 mm"))
     listed = 'theta_2 = ["10 deg", "80 deg", "12 deg", "50 deg"]\n'

@@ -25,7 +25,8 @@ HOSTILE = "<script>alert(1)</script>&"
 @pytest.mark.slow
 def test_a_scene_shows_itself() -> None:
     pytest.importorskip(
-        "matplotlib", reason="drawing needs matplotlib: pip install matplotlib"
+        "matplotlib",
+        reason="drawing needs matplotlib: pip install matplotlib",
     )
     shown = thesis()._repr_html_()
     picture = b64decode(
@@ -96,7 +97,10 @@ def test_showing_needs_numpy_alone() -> None:
         " print(*{n.partition('.')[0] for n in sys.modules})"
     )
     loaded = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
     ).stdout.split()
     assert not {"pandas", "matplotlib", "pint", "rich", "click", "scipy"} & set(loaded)
 
@@ -132,14 +136,16 @@ def test_a_new_scene_is_a_scene_and_its_comments_are_entries(tmp_path: Path) -> 
     ],
 )
 def test_a_new_scene_of_bad_lengths_is_refused(
-    lengths: tuple[str, ...], words: str
+    lengths: tuple[str, ...],
+    words: str,
 ) -> None:
     with pytest.raises(InputError, match=words):
         write_new_scene(lengths)
 
 
 def test_a_new_scene_never_replaces_a_file(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     file = tmp_path / "mine.toml"
     assert (
@@ -235,7 +241,8 @@ def test_sensitivities_and_tolerances_as_pandas_and_by_one_set_of_names() -> Non
     ]
     slope = (np.hypot(*sides[0].T) - np.hypot(*sides[1].T)) / (2.0 * step)
     assert slopes.of("|F12|", "lengths.input") == pytest.approx(
-        slope, abs=1e-6 * np.abs(slope).max()
+        slope,
+        abs=1e-6 * np.abs(slope).max(),
     )
     wide = spread.to_pandas()
     of_F43 = wide[wide["quantity"] == "|F43|"]

@@ -22,7 +22,8 @@ from tests.fourbar.show.test_animate import HOSTILE, PNG, RELEASED, embedded
 from tests.support.scenes import CYLINDER, crank_rocker, thesis
 
 pytest.importorskip(
-    "selenium", reason="pages are driven by selenium: pip install selenium"
+    "selenium",
+    reason="pages are driven by selenium: pip install selenium",
 )
 
 PRINTED = 6e-5
@@ -71,7 +72,8 @@ def test_numbers_are_shown_in_the_units_of_the_page(browse) -> None:
     s = fourbar.solve(scene)
     expected = [s.torque[0] * 1e3, s.F43[0, 0] * 1e-3, s.omega_4[0] * 30.0 / math.pi]
     assert shown(driver, "torque", "F43_x", "omega_4") == pytest.approx(
-        expected, rel=PRINTED
+        expected,
+        rel=PRINTED,
     )
     text = driver.find_element("tag name", "body").text
     assert "N mm" in text and "kN" in text and "rpm" in text and "rad/s²" in text
@@ -103,7 +105,8 @@ def test_each_step_shows_the_numbers_of_its_position(turning) -> None:
     for row in (0, 1, 2, 3):
         angles = np.degrees([s.theta_2[row], s.theta_3[row], s.theta_4[row]])
         assert shown(driver, "theta_2", "theta_3", "theta_4") == pytest.approx(
-            angles, abs=PRINTED_DEG
+            angles,
+            abs=PRINTED_DEG,
         )
         rest = [
             s.omega_3[row],
@@ -133,7 +136,8 @@ def test_play_moves_the_linkage_and_pause_leaves_true_numbers(turning) -> None:
     row = state_of(driver, "row")
     assert np.hypot(*(pins(driver)["A"] - start)) > 10
     assert shown(driver, "torque", "omega_4") == pytest.approx(
-        [s.torque[row], s.omega_4[row]], rel=PRINTED
+        [s.torque[row], s.omega_4[row]],
+        rel=PRINTED,
     )
     drawn = pins(driver)
     scale = np.hypot(*drawn["O4"]) / 0.3
@@ -184,7 +188,9 @@ def test_a_free_motion_plays_once_in_its_own_time(browse) -> None:
     assert state_of(driver, "branch") == 1
     rows = clockwork(driver, 20)  # 0.95 s: the first frame starts the clock
     np.testing.assert_allclose(
-        s.time[rows], 0.05 * np.arange(20), atol=0.011
+        s.time[rows],
+        0.05 * np.arange(20),
+        atol=0.011,
     )  # half a row
     assert clockwork(driver, 41)[-1] == 90 and not state_of(driver, "playing")
     driver.execute_script("go(37)")
@@ -194,18 +200,23 @@ def test_a_free_motion_plays_once_in_its_own_time(browse) -> None:
         == "0.740 seconds"
     )
     assert shown(driver, "omega_2", "alpha_4") == pytest.approx(
-        [s.omega_2[37], s.alpha_4[37]], rel=PRINTED
+        [s.omega_2[37], s.alpha_4[37]],
+        rel=PRINTED,
     )
     kinetic = embedded(animate.write_page(RELEASED))["branches"]["1"]["energy"][37]
     assert shown(driver, "energy") == pytest.approx([kinetic], rel=PRINTED)
     drawn = pins(driver)
     np.testing.assert_allclose(
-        drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[37], atol=PIXEL
+        drawn["B"],
+        np.hypot(*drawn["O4"]) / 0.3 * s.B[37],
+        atol=PIXEL,
     )
 
 
 STROKES = fourbar.Motion(
-    stroke=fourbar.Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left"
+    stroke=fourbar.Sweep(0.17, 0.33, 40),
+    stroke_speed=0.2,
+    side="left",
 )
 OUTPUT = fourbar.Motion(theta_4=fourbar.Sweep(1.75, 2.95, 40), omega_4=4.0)
 """Its ends do not assemble."""
@@ -231,7 +242,12 @@ OUTPUT = fourbar.Motion(theta_4=fourbar.Sweep(1.75, 2.95, 40), omega_4=4.0)
     ],
 )
 def test_another_command_is_the_axis_and_the_linkage_follows(
-    browse, motion, name, place, over, pace
+    browse,
+    motion,
+    name,
+    place,
+    over,
+    pace,
 ) -> None:
     scene = crank_rocker(motion=motion, drive=CYLINDER)
     driver, s = browse(animate.write_page(scene)), fourbar.solve(scene)
@@ -244,17 +260,22 @@ def test_another_command_is_the_axis_and_the_linkage_follows(
     assert not driver.find_element("id", "branch").is_displayed()
     names = ("theta_2", "theta_3", "theta_4")
     assert shown(driver, *names) == pytest.approx(
-        [math.degrees(getattr(s, n)[20]) for n in names], abs=PRINTED_DEG
+        [math.degrees(getattr(s, n)[20]) for n in names],
+        abs=PRINTED_DEG,
     )
     assert shown(driver, "drive_force", "condition") == pytest.approx(
-        [s.drive_force[20], s.condition[20]], rel=PRINTED
+        [s.drive_force[20], s.condition[20]],
+        rel=PRINTED,
     )
     assert shown(driver, "stroke") == pytest.approx(
-        [1000.0 * s.stroke[20]], rel=PRINTED
+        [1000.0 * s.stroke[20]],
+        rel=PRINTED,
     )
     drawn = pins(driver)
     np.testing.assert_allclose(
-        drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[20], atol=PIXEL
+        drawn["B"],
+        np.hypot(*drawn["O4"]) / 0.3 * s.B[20],
+        atol=PIXEL,
     )
     assert state_of(driver, "plotted.over") == pytest.approx(
         getattr(s.at, "stroke" if name == "stroke" else "angle")
@@ -272,13 +293,16 @@ def test_another_command_is_the_axis_and_the_linkage_follows(
 
 @pytest.mark.parametrize("width", [360, 400, 480, 1280])
 def test_the_numbers_of_an_axis_stand_clear_of_each_other_and_a_stroke_stays_in_its_column(
-    browse, width: int
+    browse,
+    width: int,
 ) -> None:
     drive = fourbar.LinearDrive(
         Place(1, (1.45, math.radians(-160.0))), Place(2, (0.29, 0.17))
     )
     motion = fourbar.Motion(
-        stroke=fourbar.Sweep(1.2, 1.7, 40), stroke_speed=0.2, side="left"
+        stroke=fourbar.Sweep(1.2, 1.7, 40),
+        stroke_speed=0.2,
+        side="left",
     )
     scene = fourbar.Scene(fourbar.uniform(0.9, 0.3, 0.75, 0.66), motion, drive=drive)
     driver = browse(animate.write_page(scene), width)
@@ -327,15 +351,20 @@ def test_the_page_replays_the_positions_speeds_and_accelerations_of_fourbar(
         )
         for k, vectors in enumerate((s.v_G3, s.a_G3)):
             np.testing.assert_allclose(
-                [moved[i][k] for i in here], vectors[here], rtol=1e-9, atol=1e-9
+                [moved[i][k] for i in here],
+                vectors[here],
+                rtol=1e-9,
+                atol=1e-9,
             )
 
 
 def test_what_is_downloaded_is_the_scene_on_the_branch_shown(
-    browse, tmp_path: Path
+    browse,
+    tmp_path: Path,
 ) -> None:
     scene = crank_rocker(
-        title="a\\nb", motion=fourbar.Motion(np.array([0.1, 0.2, 0.3, 0.4]), 10.0, 5.0)
+        title="a\\nb",
+        motion=fourbar.Motion(np.array([0.1, 0.2, 0.3, 0.4]), 10.0, 5.0),
     )
     driver = browse(animate.write_page(scene))
     assert (
@@ -372,7 +401,8 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> No
     spring = fourbar.Spring(Place(1, (0.1, -0.5)), Place(4, (0.08, 0.0)), 20.0, 0.1)
     load = fourbar.Load(3, (2.0, 0.5), from_centre=(0.03, 1.0), frame="bar")
     scene = crank_rocker(
-        loads=(load,), effects=(fourbar.Springs((spring,)), fourbar.Gravity())
+        loads=(load,),
+        effects=(fourbar.Springs((spring,)), fourbar.Gravity()),
     )
     driver = browse(animate.write_page(scene))
     driver.execute_script("go(20)")
@@ -394,7 +424,8 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> No
     )
     towards = np.subtract(arrow[1], arrow[0])
     assert math.atan2(towards[1], towards[0]) == pytest.approx(
-        s.theta_3[20] + 0.5, abs=0.01
+        s.theta_3[20] + 0.5,
+        abs=0.01,
     )
     assert acting.keys() >= {"act act-drive", "act act-gravity"}
     names = (
@@ -424,17 +455,21 @@ def test_the_branch_switches_the_picture_and_the_numbers(turning) -> None:
     driver.execute_script("chooseBranch(-1)")
     s = fourbar.solve(replace(scene, motion=scene.motion.replace(branch=-1)))
     assert shown(driver, "torque", "F32_y") == pytest.approx(
-        [s.torque[0], s.F32[0, 1]], rel=PRINTED
+        [s.torque[0], s.F32[0, 1]],
+        rel=PRINTED,
     )
     drawn = pins(driver)
     np.testing.assert_allclose(
-        drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[0], atol=PIXEL
+        drawn["B"],
+        np.hypot(*drawn["O4"]) / 0.3 * s.B[0],
+        atol=PIXEL,
     )
 
 
 @pytest.mark.parametrize("scaling", ("sweep", "position"))
 def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(
-    turning, scaling: str
+    turning,
+    scaling: str,
 ) -> None:
     driver, s = turning
     choose = """const e = document.getElementById("arrow-scale"); e.value = arguments[0];
@@ -452,7 +487,9 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(
     for name in ("F12", "F32", "F43", "F14"):
         drawn = np.array(driver.execute_script(script, name))
         np.testing.assert_allclose(
-            drawn, getattr(s, name)[50] * bar / newtons, atol=PIXEL
+            drawn,
+            getattr(s, name)[50] * bar / newtons,
+            atol=PIXEL,
         )
 
 
@@ -461,7 +498,9 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(
     [(360, "position"), (1100, "position"), (360, "sweep"), (1100, "sweep")],
 )
 def test_no_arrow_and_no_name_of_one_leaves_the_picture(
-    browse, width: int, scaling: str
+    browse,
+    width: int,
+    scaling: str,
 ) -> None:
     driver = browse(
         animate.write_page(thesis() if scaling == "position" else crank_rocker()), width
@@ -534,10 +573,14 @@ def test_every_control_has_a_name(turning) -> None:
 
 @pytest.mark.parametrize("dark", (False, True))
 @pytest.mark.parametrize(
-    "scene", (crank_rocker(), thesis()), ids=("crank-rocker", "thesis")
+    "scene",
+    (crank_rocker(), thesis()),
+    ids=("crank-rocker", "thesis"),
 )
 def test_at_360_pixels_nothing_sticks_out_and_all_text_is_readable(
-    browse, scene: fourbar.Scene, dark: bool
+    browse,
+    scene: fourbar.Scene,
+    dark: bool,
 ) -> None:
     driver = browse(animate.write_page(scene), 360, dark=dark)
     assert state_of(driver, "document.documentElement.scrollWidth") <= 360
@@ -694,7 +737,8 @@ def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse) -> No
         )
     shares = study.spreads["torque"].shares[:, 20]
     assert [rows[tolerance.key][0] for tolerance in loose] == pytest.approx(
-        100 * shares / shares.sum(), abs=0.51
+        100 * shares / shares.sum(),
+        abs=0.51,
     )
     assert state_of(driver, "document.documentElement.scrollWidth") <= 360
     box = driver.find_element("css selector", "#bands .band").rect
@@ -730,7 +774,11 @@ def test_a_scene_without_bands_says_why_or_shows_nothing(browse) -> None:
     ],
 )
 def test_the_bars_of_the_sheet_have_the_units_of_its_heads(
-    browse, names: str, head: str, mass: float, inertia: float
+    browse,
+    names: str,
+    head: str,
+    mass: float,
+    inertia: float,
 ) -> None:
     """`mass`, `inertia`: the units of the heads in kg and kg m^2."""
     scene = crank_rocker()
@@ -792,7 +840,9 @@ def test_a_printed_page_is_one_sheet_with_lengths_bars_and_the_chart_s_name(
         along, off = (number(part) for part in row[3].text.split(", "))
         centre = 1e3 * bar.to_centre
         assert (along, off) == pytest.approx(
-            (centre.real, centre.imag), rel=PRINTED, abs=PRINTED
+            (centre.real, centre.imag),
+            rel=PRINTED,
+            abs=PRINTED,
         )
     background = "return getComputedStyle(document.body).backgroundColor"
     assert driver.execute_script(background) == "rgb(255, 255, 255)"

@@ -18,7 +18,8 @@ from tests.support.texts import PLIERS
 
 SIX_DIGITS = 6e-6
 ONE = crank_rocker(
-    motion=fourbar.Motion(1.0, 10.0, 3.0), points=(fourbar.Point("P", 3, (0.1, 0.7)),)
+    motion=fourbar.Motion(1.0, 10.0, 3.0),
+    points=(fourbar.Point("P", 3, (0.1, 0.7)),),
 )
 
 
@@ -47,7 +48,8 @@ def test_bars_points_and_forces_are_those_of_the_solution() -> None:
         vector = getattr(s, name)[0]
         assert line.startswith(name)
         assert numbers(line) == pytest.approx(
-            [*vector, np.hypot(*vector)], rel=SIX_DIGITS
+            [*vector, np.hypot(*vector)],
+            rel=SIX_DIGITS,
         )
 
 

@@ -57,7 +57,8 @@ FINE = fourbar.Sweep(0.0, math.tau, 36000)
 
 def swept(scene: fourbar.Scene, steps: int) -> fourbar.Scene:
     return replace(
-        scene, motion=scene.motion.replace(angle=fourbar.Sweep(0.0, math.tau, steps))
+        scene,
+        motion=scene.motion.replace(angle=fourbar.Sweep(0.0, math.tau, steps)),
     )
 
 
@@ -156,7 +157,8 @@ def test_a_motion_law_is_looked_at_between_its_instants_and_a_list_of_angles_is_
 ):
     law = Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), steps=20, ends="rest")
     scene = crank_rocker(
-        motion=fourbar.Motion(law=law), effects=(fourbar.Friction.at(O2=0.05),)
+        motion=fourbar.Motion(law=law),
+        effects=(fourbar.Friction.at(O2=0.05),),
     )
     between = locate_between(scene, fourbar.solve(scene))
     fine = list_sizes(
@@ -166,7 +168,8 @@ def test_a_motion_law_is_looked_at_between_its_instants_and_a_list_of_angles_is_
     )
     assert [pin for _, pin in between.reversals] == ["O2"]
     assert np.max(list_sizes(between.solution)["power"]) == pytest.approx(
-        fine["power"].max(), rel=PEAK
+        fine["power"].max(),
+        rel=PEAK,
     )
     assert np.all(np.diff(between.solution.time) > 0.0)
     listed = crank_rocker(motion=fourbar.Motion(np.linspace(0.0, 6.0, 9), 10.0))
@@ -178,10 +181,14 @@ def test_a_motion_law_is_looked_at_between_its_instants_and_a_list_of_angles_is_
 def test_the_largest_force_of_a_stroke_is_that_of_fine_steps() -> None:
     def of(steps: int) -> fourbar.Scene:
         motion = fourbar.Motion(
-            stroke=fourbar.Sweep(0.33, 0.17, steps), stroke_speed=-0.2, side="left"
+            stroke=fourbar.Sweep(0.33, 0.17, steps),
+            stroke_speed=-0.2,
+            side="left",
         )
         return crank_rocker(
-            motion=motion, drive=CYLINDER, effects=(fourbar.Friction((("O4", 0.01),)),)
+            motion=motion,
+            drive=CYLINDER,
+            effects=(fourbar.Friction((("O4", 0.01),)),),
         )
 
     between = locate_between(of(20), fourbar.solve(of(20)))
@@ -192,7 +199,8 @@ def test_the_largest_force_of_a_stroke_is_that_of_fine_steps() -> None:
     fine = fourbar.solve(of(20000))
     for name, size in list_sizes(fine).items():
         assert list_sizes(between.solution)[name].max() == pytest.approx(
-            size.max(), rel=PEAK
+            size.max(),
+            rel=PEAK,
         ), name
     slips = np.flatnonzero(np.diff(np.sign(fine.omega_4)))
     assert [pin for _, pin in between.reversals] == ["O4"]

@@ -94,7 +94,8 @@ def test_speed_and_power_beside_a_pole_of_the_force_are_located() -> None:
 @pytest.mark.parametrize("steps", (36, 360))
 @pytest.mark.parametrize("start", (5.0, 6.3))
 def test_pin_forces_at_a_change_point_grow_and_the_torque_has_its_largest_value(
-    start: float, steps: int
+    start: float,
+    steps: int,
 ) -> None:
     """Bars of 0.1, 0.3 and 0.1 kg.
 
@@ -197,7 +198,8 @@ def test_a_pole_between_two_positions_that_rise_past_it_is_found(speed: float) -
 
 @pytest.mark.parametrize(("last", "grows"), [(0.0, False), (-2.0, True)])
 def test_a_pole_just_beyond_the_last_position_is_none_between(
-    last: float, grows: bool
+    last: float,
+    grows: bool,
 ) -> None:
     """A toggle clamp whose bars 2 and 3 would be in line at -6e-5 deg.
 

@@ -75,7 +75,8 @@ def test_every_number_is_in_the_unit_that_is_named(
                 and "condition" in header
             )
             assert float(rows[90][column]) * POUND == pytest.approx(
-                solution.F12[90, 1], rel=1e-14
+                solution.F12[90, 1],
+                rel=1e-14,
             )  # type: ignore[index]
     for name, (values, unit) in printed.items():
         if UNITS[name] != unit or unit in ("rad/s^2", "1"):
@@ -156,13 +157,15 @@ def test_the_table_names_its_units(capsys: pytest.CaptureFixture[str]) -> None:
     ]
     torque = [float(line.split()[1]) for line in lines[heading + 3 :]]
     assert torque == pytest.approx(
-        list(1000.0 * fourbar.solve(fourbar.load(MODEL)).torque), rel=1e-4
+        list(1000.0 * fourbar.solve(fourbar.load(MODEL)).torque),
+        rel=1e-4,
     )
 
 
 @pytest.mark.parametrize("text", ["furlong", "mm in", "N.mm J", "m^2"])
 def test_what_is_no_list_of_units_is_refused(
-    text: str, capsys: pytest.CaptureFixture[str]
+    text: str,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     with pytest.raises(InputError):
         units(text)
@@ -183,7 +186,8 @@ def test_units_are_read_as_people_write_them() -> None:
 @pytest.mark.slow
 def test_plots_and_notebooks_say_theirs() -> None:
     pytest.importorskip(
-        "matplotlib", reason="drawing needs matplotlib: pip install matplotlib"
+        "matplotlib",
+        reason="drawing needs matplotlib: pip install matplotlib",
     )
     from fourbar.show.plot.figures import draw_figure
 
@@ -195,7 +199,8 @@ def test_plots_and_notebooks_say_theirs() -> None:
             torque = fourbar.solve(scene).torque
             curve = max((np.asarray(line.get_ydata()) for line in axes.lines), key=len)
             assert np.nanmax(curve) == pytest.approx(
-                np.max(torque) / (POUND * INCH), rel=0.01
+                np.max(torque) / (POUND * INCH),
+                rel=0.01,
             )
     assert " in" in notebook.in_units(scene, "imperial")._repr_html_()
     table = notebook.in_units(fourbar.solve(scene), "imperial")._repr_html_()

@@ -80,11 +80,17 @@ def test_derivatives_are_those_of_a_50_digit_reference(drive: int) -> None:
 
 @pytest.mark.parametrize(("effects", "drive"), [(DRIVEN, 4), (RUBBING, 2)])
 def test_effects_that_the_reference_lacks_by_differences(
-    effects: tuple[Any, ...], drive: int
+    effects: tuple[Any, ...],
+    drive: int,
 ) -> None:
     case, points = scene(effects, drive), (fourbar.Point("P", 3, (0.1, 0.4)),)
     case = Scene(
-        case.linkage, case.motion, drive, (*LOADS, TABLED), effects, points=points
+        case.linkage,
+        case.motion,
+        drive,
+        (*LOADS, TABLED),
+        effects,
+        points=points,
     )
     slopes = sensitivity(case)
     assert slopes.status == ["ok"] * len(ANGLES) and {"P", "v_P", "a_P"} <= set(
@@ -193,7 +199,9 @@ KITE = (0.3, 0.1, 0.1, 0.3)
     [(PARALLELOGRAM, "theta_2"), (PARALLELOGRAM, "theta_4"), (KITE, "theta_2")],
 )
 def test_derivatives_are_the_differences_of_a_study_at_change_points(
-    lengths: tuple[float, ...], branch: int, command: str
+    lengths: tuple[float, ...],
+    branch: int,
+    command: str,
 ) -> None:
     angles = np.array([0.7, 2.4, 4.0, 5.5])
     motion = Motion(**{command: angles}, branch=branch)
@@ -201,7 +209,10 @@ def test_derivatives_are_the_differences_of_a_study_at_change_points(
     of = sensitivity(nominal).of
     for key in ("lengths.ground", "lengths.input", "lengths.coupler"):
         np.testing.assert_allclose(
-            of("theta_3", key), differ_by_a_study(nominal, key), rtol=1e-6, atol=1e-6
+            of("theta_3", key),
+            differ_by_a_study(nominal, key),
+            rtol=1e-6,
+            atol=1e-6,
         )
 
 
@@ -226,7 +237,8 @@ def test_an_unknown_name_is_refused() -> None:
 
 @pytest.mark.slow
 def test_the_command_ranks_the_numbers_and_writes_them_all(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
 ) -> None:
     models, out = Path(__file__).parents[3] / "models", tmp_path / "s.json"
     assert status(["analyze", str(models / "crank_rocker.toml"), "--sensitivity"]) == 0
@@ -269,7 +281,8 @@ def test_the_command_ranks_the_numbers_and_writes_them_all(
     [(0.0, np.pi), (-0.4, np.pi - 0.4), (0.3, np.pi), (0.0, -np.pi)],
 )
 def test_half_a_turn_from_the_ground_the_first_derivative_is_the_ratio_of_the_speeds(
-    ground_angle: float, theta_2: float
+    ground_angle: float,
+    theta_2: float,
 ) -> None:
     """There the tangent of the half angle is 1e16, of whose slope no digit is left."""
     link = replace(LINK, ground_angle=ground_angle)
@@ -277,7 +290,9 @@ def test_half_a_turn_from_the_ground_the_first_derivative_is_the_ratio_of_the_sp
     solution = slopes.solution
     assert solution.omega_3 is not None and solution.alpha_3 is not None
     np.testing.assert_allclose(
-        slopes.of("theta_3", "motion.theta_2"), solution.omega_3 / 10.0, rtol=1e-13
+        slopes.of("theta_3", "motion.theta_2"),
+        solution.omega_3 / 10.0,
+        rtol=1e-13,
     )
     turned = (
         slopes.of("omega_3", "motion.theta_2") * 10.0
@@ -288,7 +303,9 @@ def test_half_a_turn_from_the_ground_the_first_derivative_is_the_ratio_of_the_sp
         "theta_3", "lengths.ground_angle"
     )
     np.testing.assert_allclose(
-        with_ground, 1.0, rtol=1e-13
+        with_ground,
+        1.0,
+        rtol=1e-13,
     )  # a linkage turned as a whole
 
 

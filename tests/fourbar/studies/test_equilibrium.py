@@ -55,7 +55,10 @@ def crank_as_pendulum(
     """
     linkage = FourBar(0.3, Bar(0.1, M, INERTIA, (R, 0.3)), Bar(0.25), Bar(0.22), 0.2)
     return Scene(
-        linkage, Motion(**{"theta_2": 0.7, **motion}), loads=loads, effects=effects
+        linkage,
+        Motion(**{"theta_2": 0.7, **motion}),
+        loads=loads,
+        effects=effects,
     )  # type: ignore[arg-type]
 
 
@@ -89,7 +92,8 @@ def test_gazebos_four_bar_hangs_at_the_frequency_of_its_pendulum() -> None:
     weight = 9.8 * (2 * bars.input.mass * 0.25 + bars.coupler.mass * 0.5)
     J = swinging + bars.coupler.mass * 0.5**2
     assert hanging.frequency == pytest.approx(
-        math.sqrt(weight / J) / (2 * math.pi), rel=CLOSE
+        math.sqrt(weight / J) / (2 * math.pi),
+        rel=CLOSE,
     )
     assert f"{hanging.frequency:.10f}" == "0.7594391930"
     released = (
@@ -111,13 +115,16 @@ def test_a_crank_with_mass_alone_is_a_pendulum() -> None:
     ) == pytest.approx(0.0, abs=CLOSE)
     J = INERTIA + M * R * R
     assert (stable.slope, stable.inertia) == pytest.approx(
-        (-M * 9.81 * R, J), rel=CLOSE
+        (-M * 9.81 * R, J),
+        rel=CLOSE,
     )
     assert stable.frequency == pytest.approx(
-        math.sqrt(M * 9.81 * R / J) / (2 * math.pi), rel=CLOSE
+        math.sqrt(M * 9.81 * R / J) / (2 * math.pi),
+        rel=CLOSE,
     )
     assert unstable.frequency is None and unstable.slope == pytest.approx(
-        M * 9.81 * R, rel=CLOSE
+        M * 9.81 * R,
+        rel=CLOSE,
     )
 
 
@@ -129,7 +136,9 @@ def test_at_a_limit_of_the_input_the_output_is_the_angle() -> None:
             limit.theta_2 + off for off in (0.01, -0.01)
         ]  # on one side the linkage assembles
         scene = Scene(
-            linkage, Motion(np.array(beside)), effects=(Gravity(9.81, limit.theta_4),)
+            linkage,
+            Motion(np.array(beside)),
+            effects=(Gravity(9.81, limit.theta_4),),
         )
         (hanging,) = [
             rest
@@ -139,14 +148,16 @@ def test_at_a_limit_of_the_input_the_output_is_the_angle() -> None:
         assert hanging.stability == "stable"
         assert hanging.angle == "theta_4" and hanging.place.branch == 0
         assert hanging.place.theta_4 == pytest.approx(
-            limit.theta_4, abs=1e-10
+            limit.theta_4,
+            abs=1e-10,
         )  # theta_2 as a double: root of 2^-53
         assert math.remainder(
             hanging.place.theta_2 - limit.theta_2, 2 * math.pi
         ) == pytest.approx(0.0, abs=CLOSE)
         J = INERTIA + M * R * R
         assert (hanging.slope, hanging.inertia) == pytest.approx(
-            (-M * 9.81 * R, J), rel=1e-9
+            (-M * 9.81 * R, J),
+            rel=1e-9,
         )
 
 
@@ -373,7 +384,8 @@ def test_what_has_no_answer_says_so() -> None:
     (ends,) = equilibrium(balanced).indifferent
     assert ends[1].theta_2 - ends[0].theta_2 == pytest.approx(2 * math.pi)
     touching = crank_as_pendulum(
-        Gravity(8.0, 0.0), loads=(Load(2, moment=0.5),)
+        Gravity(8.0, 0.0),
+        loads=(Load(2, moment=0.5),),
     )  # 0.5 - 0.5 sin theta_2
     touching = replace(
         touching,
@@ -386,7 +398,8 @@ def test_what_has_no_answer_says_so() -> None:
     ) == pytest.approx(0.0, abs=1e-5)
     spring = Springs((Spring(Place(1, (0.3, 1.0)), Place(2, (0.1, 0.0)), 100.0),))
     massless = replace(
-        crank_as_pendulum(spring), linkage=FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22))
+        crank_as_pendulum(spring),
+        linkage=FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22)),
     )
     rest = one(equilibrium(massless), "stable")
     assert (rest.inertia, rest.frequency) == (
@@ -411,7 +424,8 @@ def test_the_half_turn_of_a_torsion_spring_is_no_equilibrium() -> None:
     assert rest.stability == "stable"
     assert rest.place.theta_2 == pytest.approx(0.5 + 0.2, abs=1e-9)
     assert rest.frequency == pytest.approx(
-        math.sqrt(2.0 / (INERTIA + M * R * R)) / (2 * math.pi), rel=1e-9
+        math.sqrt(2.0 / (INERTIA + M * R * R)) / (2 * math.pi),
+        rel=1e-9,
     )
 
 
@@ -422,7 +436,8 @@ def test_a_sweep_bounds_the_search() -> None:
         equilibria.positions
     ) == 31
     assert equilibria.found[0].place.theta_2 == pytest.approx(
-        -math.pi / 2 - 0.3, abs=CLOSE
+        -math.pi / 2 - 0.3,
+        abs=CLOSE,
     )
 
 
@@ -468,7 +483,8 @@ def test_a_sweep_of_another_bar_reaches_both_sides_of_a_limit_and_no_more() -> N
 
 
 def test_the_other_assembly_stands_apart_in_the_print(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     fourbar.save(springy_table(theta_2=SWEPT), tmp_path / "table.toml")
     assert status(["equilibrium", str(tmp_path / "table.toml")]) == 0
@@ -480,7 +496,8 @@ def test_the_other_assembly_stands_apart_in_the_print(
 
 
 def test_equilibria_are_printed_in_the_units_of_the_file(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     scene = crank_as_pendulum(DOWN)
     fourbar.save(scene, tmp_path / "metres.toml")
@@ -521,14 +538,18 @@ def test_released_motions_swing_at_the_frequency() -> None:
     scene = replace(
         scene,
         motion=Motion(
-            rest.place.theta_2 + off, 0.0, branch=rest.place.branch, free=free
+            rest.place.theta_2 + off,
+            0.0,
+            branch=rest.place.branch,
+            free=free,
         ),
     )
     ours = fourbar.solve(scene, "position")
     assert ours.time is not None
     # the amplitude changes the frequency by a part of its square
     assert crossings(ours.time, ours.theta_2, rest.place.theta_2) == pytest.approx(
-        rest.frequency, rel=10 * off**2
+        rest.frequency,
+        rel=10 * off**2,
     )
     model = mujoco.MjModel.from_xml_string(write_mjcf(scene))
     data = mujoco.MjData(model)
@@ -540,7 +561,8 @@ def test_released_motions_swing_at_the_frequency() -> None:
         seen.append((data.time, data.qpos[0]))
     time, angle = np.array(seen).T
     assert crossings(time, angle, float(rest.place.theta_2)) == pytest.approx(
-        rest.frequency, rel=1e-4
+        rest.frequency,
+        rel=1e-4,
     )
 
 
@@ -554,7 +576,9 @@ def test_released_ones_begin_to_move_as_stated() -> None:
         motion = Motion(float(equilibria.positions.theta_2[i]), 0.0, free=Free(1e-2, 1))
         released = fourbar.solve(
             replace(
-                scene, motion=motion, effects=(*scene.effects, Friction.at(O2=0.2))
+                scene,
+                motion=motion,
+                effects=(*scene.effects, Friction.at(O2=0.2)),
             ),
             "position",
         )
@@ -566,7 +590,8 @@ def test_released_ones_begin_to_move_as_stated() -> None:
 
 @pytest.mark.slow
 def test_the_command_prints_what_python_finds(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     file = MODELS / "problems" / "gz_physics_987.toml"
     assert status(["equilibrium", str(file)]) == 0
@@ -631,7 +656,8 @@ def test_a_zero_that_falls_on_a_sample_is_found() -> None:
     )
     linkage = replace(crank_as_pendulum().linkage, ground_angle=0.0)
     scene = replace(
-        crank_as_pendulum(Torsion.at(O2=(2.0, sample, 0.0))), linkage=linkage
+        crank_as_pendulum(Torsion.at(O2=(2.0, sample, 0.0))),
+        linkage=linkage,
     )
     (rest,) = equilibrium(scene).found
     assert rest.place.theta_2 == pytest.approx(sample, abs=1e-9)
@@ -652,11 +678,14 @@ def test_another_command_has_the_equilibria_of_the_positions_that_it_passes(
     side: dict[str, Any] = {"side": "left"} if name == "stroke" else {"branch": -1}
     motion = Motion(**{name: Sweep(*swept, 90)}, **side)
     commanded = crank_rocker(
-        motion=motion, effects=(fourbar.Gravity(),), drive=CYLINDER
+        motion=motion,
+        effects=(fourbar.Gravity(),),
+        drive=CYLINDER,
     )
     theta_2 = fourbar.solve(commanded).theta_2
     same = replace(
-        commanded, motion=Motion(Sweep(float(theta_2.min()), float(theta_2.max()), 90))
+        commanded,
+        motion=Motion(Sweep(float(theta_2.min()), float(theta_2.max()), 90)),
     )
     equilibria, by_input = equilibrium(commanded), equilibrium(same)
     assert len(by_input.found) == len(equilibria.found) > 0

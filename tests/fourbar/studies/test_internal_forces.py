@@ -33,7 +33,10 @@ def test_a_force_across_the_coupler_bends_it_as_a_beam_on_two_supports() -> None
     Sagging to the right of the bar, which is clockwise before it.
     """
     load = fourbar.Load(
-        3, (8.0, math.radians(-90.0)), from_centre=(0.05, math.pi), frame="bar"
+        3,
+        (8.0, math.radians(-90.0)),
+        from_centre=(0.05, math.pi),
+        frame="bar",
     )  # 75 mm from A
     internal = solved(
         fourbar.Scene(BARE, AT, loads=(load,)), 3, [0.0, 0.03, 0.08, 0.1, 0.25]
@@ -56,7 +59,8 @@ def test_a_couple_on_the_output_jumps_where_it_acts() -> None:
         0, 0
     ] == pytest.approx(internal.V[0, 2])
     assert max(abs(before), abs(after)) == pytest.approx(
-        abs(internal.largest.moment[0]), rel=1e-4
+        abs(internal.largest.moment[0]),
+        rel=1e-4,
     )
 
 
@@ -179,7 +183,9 @@ def test_feet_that_differ_by_rounding_are_one() -> None:
     load = fourbar.Load(3, (3.0, 0.7), moment=20.0)
     sweep = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 200), 10.0)
     scene = replace(
-        crank_rocker(motion=sweep, effects=()), linkage=linkage, loads=(load,)
+        crank_rocker(motion=sweep, effects=()),
+        linkage=linkage,
+        loads=(load,),
     )
     s = fourbar.solve(scene)
     largest = fourbar.internal_forces(scene, s, 3).largest

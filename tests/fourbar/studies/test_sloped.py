@@ -60,7 +60,8 @@ def check_against_differences(function: Any, x: float) -> None:
 @pytest.mark.parametrize("function", ufuncs(1), ids=lambda f: f.__name__)
 @pytest.mark.parametrize("x", POINTS)
 def test_a_function_of_one_number_has_its_slope_or_is_refused(
-    function: Any, x: float
+    function: Any,
+    x: float,
 ) -> None:
     check_against_differences(function, x)
 
@@ -70,7 +71,9 @@ def test_a_function_of_one_number_has_its_slope_or_is_refused(
 @pytest.mark.parametrize("x", POINTS)
 @pytest.mark.parametrize("constant", [0.7, -1.1])
 def test_a_function_of_two_numbers_has_its_slopes_or_is_refused(
-    function: Any, x: float, constant: float
+    function: Any,
+    x: float,
+    constant: float,
 ) -> None:
     def of_first(x: Any) -> Any:
         return function(x, constant)
@@ -142,7 +145,8 @@ def test_an_effect_that_copies_a_sign_keeps_its_derivatives(speed: float) -> Non
     other, same = torques("absolute", speed)
     assert torque == pytest.approx(same, rel=1e-14)
     assert by_speed == pytest.approx(
-        fourbar.sensitivity(other).of("torque", "motion.omega_2"), rel=1e-12
+        fourbar.sensitivity(other).of("torque", "motion.omega_2"),
+        rel=1e-12,
     )
     refused, _ = torques("maximum", speed)
     with pytest.raises(LimitError, match=r"cannot follow numpy\.maximum"):

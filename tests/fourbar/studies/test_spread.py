@@ -34,7 +34,10 @@ by 1/sqrt(2 N) = 0.016.
 
 
 def spread(
-    *stated: Tolerance, samples: int = 2048, seed: Any = 0, **motion: Any
+    *stated: Tolerance,
+    samples: int = 2048,
+    seed: Any = 0,
+    **motion: Any,
 ) -> Any:
     linkage = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
     case = Scene(
@@ -53,11 +56,15 @@ def test_a_number_that_the_torque_is_proportional_to() -> None:
     torque = study.spreads["torque"]
     size = np.abs(torque.nominal)
     np.testing.assert_allclose(
-        np.fmax(np.abs(torque.least), np.abs(torque.greatest)), 1.0609 * size, rtol=1e-4
+        np.fmax(np.abs(torque.least), np.abs(torque.greatest)),
+        1.0609 * size,
+        rtol=1e-4,
     )
     np.testing.assert_allclose(torque.worst, 2 * 0.03 * size, rtol=1e-12)
     np.testing.assert_allclose(
-        torque.first_order, 2 * 0.03 / math.sqrt(3) * size, rtol=1e-12
+        torque.first_order,
+        2 * 0.03 / math.sqrt(3) * size,
+        rtol=1e-12,
     )
     np.testing.assert_allclose(torque.deviation, torque.first_order, rtol=QUASI)
     np.testing.assert_allclose(study.spreads["theta_4"].deviation, 0.0, atol=1e-14)
@@ -74,7 +81,9 @@ def test_samples_and_first_order_agree_where_it_is_straight_and_shares_are_those
         np.testing.assert_allclose(of_both.deviation, of_both.first_order, rtol=QUASI)
         for share, one in zip(of_both.shares, alone, strict=True):
             np.testing.assert_allclose(
-                np.sqrt(share), one.spreads[name].deviation, rtol=QUASI
+                np.sqrt(share),
+                one.spreads[name].deviation,
+                rtol=QUASI,
             )
         assert (
             (of_both.least <= of_both.low).all()
@@ -93,7 +102,11 @@ def test_the_same_seed_gives_the_same_samples_in_blocks_of_any_size(
     for name, in_one in at_once.spreads.items():
         for expected, piece in zip(in_one, pieces.spreads[name], strict=True):
             np.testing.assert_allclose(
-                expected, piece, rtol=1e-12, atol=1e-12, err_msg=name
+                expected,
+                piece,
+                rtol=1e-12,
+                atol=1e-12,
+                err_msg=name,
             )
 
 
@@ -189,7 +202,8 @@ def test_what_the_study_refuses() -> None:
 
 @pytest.mark.slow
 def test_the_command_prints_draws_and_writes(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     scene, plot = tmp_path / "s.toml", tmp_path / "t.png"
     text = MODEL.replace("steps = 360", "steps = 12")
@@ -260,7 +274,8 @@ theta_2 = "drawn"
 
 
 def test_samples_of_a_drawing_have_its_coordinates_and_units(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """The nominal place is as drawn, and the samples lie about it."""
     (tmp_path / "drawn.toml").write_text(DRAWN)

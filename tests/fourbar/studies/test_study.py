@@ -140,7 +140,9 @@ def alone(study: Study, values: dict[str, Any], member: int) -> Scene:
     ],
 )
 def test_a_member_is_its_linkage_alone(
-    effects: tuple[Any, ...], drive: int, stage: str | None
+    effects: tuple[Any, ...],
+    drive: int,
+    stage: str | None,
 ) -> None:
     case = scene(effects, drive)
     values = spread(case)
@@ -157,11 +159,16 @@ def test_a_member_is_its_linkage_alone(
             )
             if name.endswith("_error"):
                 np.testing.assert_allclose(
-                    array[member], getattr(single, name), rtol=BARS, err_msg=name
+                    array[member],
+                    getattr(single, name),
+                    rtol=BARS,
+                    err_msg=name,
                 )
             else:
                 np.testing.assert_array_equal(
-                    array[member], getattr(single, name), err_msg=name
+                    array[member],
+                    getattr(single, name),
+                    err_msg=name,
                 )
 
 
@@ -178,7 +185,9 @@ def test_blocks_over_members_and_positions_change_no_digit(
         piece = solve(study)
         for name in at_once.evaluated():
             np.testing.assert_array_equal(
-                getattr(piece, name), getattr(at_once, name), err_msg=name
+                getattr(piece, name),
+                getattr(at_once, name),
+                err_msg=name,
             )
 
 
@@ -359,7 +368,8 @@ def test_what_cannot_vary_is_refused_in_one_line(name: str) -> None:
     ],
 )
 def test_a_motion_of_one_linkage_is_refused_in_one_line(
-    motion: Motion, words: str
+    motion: Motion,
+    words: str,
 ) -> None:
     with pytest.raises(InputError, match=words):
         vary(Scene(LINK, motion), {"bars.coupler.mass": [1.0, 2.0]})

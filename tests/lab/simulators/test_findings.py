@@ -31,7 +31,8 @@ SECONDS = 100.0
 @pytest.mark.nightly
 @pytest.mark.parametrize("finding", ALL, ids=lambda finding: finding.script.stem)
 def test_each_finding_holds_or_says_since_when_not(
-    finding: module.Reproduction, monkeypatch: pytest.MonkeyPatch
+    finding: module.Reproduction,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(
         module, "read_engines", lambda folders: {}
@@ -68,7 +69,9 @@ def test_each_finding_is_a_report_and_stands_in_the_list() -> None:
     ],
 )
 def test_a_script_that_breaks_down_is_not_fixed(
-    code: str, state: str, tmp_path: Path
+    code: str,
+    state: str,
+    tmp_path: Path,
 ) -> None:
     (tmp_path / "one.py").write_text(
         f'"""It is so.\n\nEngine: pip (pip)\nSince: 1.0 and\n  more\n"""\n{code}\n'
@@ -80,7 +83,8 @@ def test_a_script_that_breaks_down_is_not_fixed(
 
 
 def test_the_command_says_what_could_not_run(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
     script = tmp_path / "one.py"
     script.write_text(
@@ -127,7 +131,8 @@ def test_a_simulator_is_sought_in_the_environments_of_engines(
 
 @pytest.mark.parametrize("arguments", [[__file__], ["no_such.py"]])
 def test_bad_input_is_one_line(
-    arguments: list[str], capsys: pytest.CaptureFixture[str]
+    arguments: list[str],
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert status(["findings", *arguments]) == 2
     assert capsys.readouterr().err.count("\n") == 1

@@ -107,7 +107,9 @@ def test_the_files_are_those_of_today(name: str) -> None:
         for problem in (old, new)
     ]
     assert np.allclose(
-        *(np.array(texts, dtype=float) for texts in numbers), rtol=K * EPS, atol=1e-9
+        *(np.array(texts, dtype=float) for texts in numbers),
+        rtol=K * EPS,
+        atol=1e-9,
     )
     for quantity, values in old["answers"].items():
         bar = np.asarray(old["errors"][quantity])
@@ -321,7 +323,9 @@ def test_a02_passes_every_angle_when_energy_says() -> None:
 
 
 def solve_pin_forces(
-    problem: Any, theta: Any, omega: Any
+    problem: Any,
+    theta: Any,
+    omega: Any,
 ) -> dict[str, list[list[float]]]:
     """Return the pin forces of a released parallelogram.
 
@@ -430,7 +434,9 @@ def test_the_proposed_problem_rests_and_swings_as_its_page_says() -> None:
         )
         frequency = mp.sqrt(stiffness / inertia) / (2 * mp.pi)
     assert abs(rest.place.theta_2 - float(angle)) < 1e-12 and math.isclose(
-        rest.frequency, frequency, rel_tol=1e-9
+        rest.frequency,
+        frequency,
+        rel_tol=1e-9,
     )
     assert abs(float(angle) - 2.23433101898) < 5e-11
     for text in (f"{float(angle):.12f}", f"{float(frequency):.6f}", f"{float(root.real):.9f} ± {float(root.imag):.9f}i",
@@ -498,7 +504,8 @@ def test_an_answer_at_its_own_motion_is_judged_there() -> None:
     problem = read_stored("crank_rocker")
     scene, command = read_question("crank_rocker")
     moved = command._replace(
-        angle=command.angle + 1e-3, speed=np.full(len(command.angle), 10.01)
+        angle=command.angle + 1e-3,
+        speed=np.full(len(command.angle), 10.01),
     )
     theirs = fourbar.solve(scene, at=moved)
     answers = {name: getattr(theirs, name).tolist() for name in problem["answers"]}
@@ -512,7 +519,8 @@ def test_an_answer_at_its_own_motion_is_judged_there() -> None:
 
 
 def test_the_command_judges_a_result_file(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     file, problem = tmp_path / "mine.json", str(PROBLEMS / "newton_128.json")
     file.write_text(json.dumps(make_result("newton_128")))

@@ -104,7 +104,8 @@ def test_a_simulator_starts_from_its_own_assembly_without_the_formulas() -> None
     for branch in (1, -1):
         scene = fourbar.load(PROBLEMS / "crank_rocker.toml")
         scene = replace(
-            scene, motion=scene.motion.replace(branch=branch, speed=-10.0 * branch)
+            scene,
+            motion=scene.motion.replace(branch=branch, speed=-10.0 * branch),
         )
         begin = motion.start(scene)
         assert write_mjcf(scene, start=begin).count(
@@ -304,7 +305,8 @@ def test_the_host_serves_a_simulator_its_settings_and_derivatives(
 @pytest.mark.usefixtures("sealed")
 def test_mujoco_answers_at_states_and_through_a_turn() -> None:
     module = pytest.importorskip(
-        "fourbar_lab.simulators.mujoco_c", exc_type=ImportError
+        "fourbar_lab.simulators.mujoco_c",
+        exc_type=ImportError,
     )
     at_states, through = (
         find_errors(module.MujocoFile),
@@ -320,7 +322,8 @@ def test_mujoco_answers_at_states_and_through_a_turn() -> None:
 @pytest.mark.usefixtures("sealed")
 def test_each_solver_of_pinocchio_carries_the_loop() -> None:
     module = pytest.importorskip(
-        "fourbar_lab.simulators.pinocchio_simulated", exc_type=ImportError
+        "fourbar_lab.simulators.pinocchio_simulated",
+        exc_type=ImportError,
     )
     for setting in module.PinocchioSolvers.settings:
         accurate = setting in ("constraintDynamics", "lcaba")
@@ -346,7 +349,8 @@ def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state() ->
     A differentiable simulator is given these changes.
     """
     mujoco_c = pytest.importorskip(
-        "fourbar_lab.simulators.mujoco_c", exc_type=ImportError
+        "fourbar_lab.simulators.mujoco_c",
+        exc_type=ImportError,
     )
     scene = fourbar.load(PROBLEMS / "crank_rocker.toml")
     _, theta_2 = gradients.choose_quarter(scene)
@@ -387,13 +391,16 @@ def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state() ->
 @pytest.mark.nightly
 def test_exudyn_refuses_what_it_has_no_element_for() -> None:
     module = pytest.importorskip(
-        "fourbar_lab.simulators.exudyn_simulated", exc_type=ImportError
+        "fourbar_lab.simulators.exudyn_simulated",
+        exc_type=ImportError,
     )
     (scene, command), (_, setting) = ask_position(), module.ExudynIntegrators.settings
     assert (
         max(
             find_errors(
-                module.ExudynIntegrators, name=setting, steps_per_turn=314
+                module.ExudynIntegrators,
+                name=setting,
+                steps_per_turn=314,
             ).values()
         )
         < IN_EXUDYN
@@ -425,7 +432,9 @@ def test_each_simulator_that_is_installed_carries_the_loop(name: str) -> None:
     assert find_spec(module) is not None
     simulator = getattr(pytest.importorskip(module, exc_type=ImportError), cls)
     errors = find_errors(
-        simulator, name=entry.setting or None, steps_per_turn=entry.steps[1]
+        simulator,
+        name=entry.setting or None,
+        steps_per_turn=entry.steps[1],
     )
     assert errors["torque"] < (
         simulator.tolerance[0] if "tolerance" in vars(simulator) else COARSE

@@ -165,7 +165,8 @@ def test_what_lies_between_two_steps_is_judged_too() -> None:
 
 
 def test_out_of_reach_is_reported_with_what_would_reach_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(advise, "MOST_STEPS_OF_A_RUN", 1500)
     scene = tmp_path / "scene.toml"
@@ -184,12 +185,16 @@ def test_out_of_reach_is_reported_with_what_would_reach_it(
     still = replace(turning(), motion=fourbar.Motion(1.0, 10.0))
     scene.write_text(fourbar.dump(still))
     process = CliRunner().invoke(
-        advise.advise_command, [str(scene), "--error", "1e-3"], standalone_mode=False
+        advise.advise_command,
+        [str(scene), "--error", "1e-3"],
+        standalone_mode=False,
     )
     assert process.return_value == 1 and "nothing to run through" in process.output
     scene.write_text(fourbar.dump(FAULT_SCENES["law"]))
     process = CliRunner().invoke(
-        advise.advise_command, [str(scene), "--error", "1e-3"], standalone_mode=False
+        advise.advise_command,
+        [str(scene), "--error", "1e-3"],
+        standalone_mode=False,
     )
     assert process.return_value == 1 and "motion law" in process.output
 
@@ -266,7 +271,9 @@ def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason() -> No
     )
     motion = fourbar.Motion(fourbar.Sweep(0.8, 1.8, 12), 0.5)
     hood = fourbar.Scene(
-        fourbar.FourBar(0.11, *bars), motion, effects=(fourbar.Gravity(),)
+        fourbar.FourBar(0.11, *bars),
+        motion,
+        effects=(fourbar.Gravity(),),
     )
     for scene, setting, why in ((hood, "the stiffness by pads", "lighter of coupler and output"),
                                 (turning(10.0, 36), "the timestep", "the steps themselves")):  # fmt: skip
@@ -332,7 +339,9 @@ def test_several_scenes_have_one_table(tmp_path: Path) -> None:
         files.append(str(tmp_path / f"{name}.toml"))
         Path(files[-1]).write_text(fourbar.dump(scene))
     process = CliRunner().invoke(
-        advise.advise_command, [*files, "--error", "1e-4"], standalone_mode=False
+        advise.advise_command,
+        [*files, "--error", "1e-4"],
+        standalone_mode=False,
     )
     assert process.return_value == 1  # one of them cannot be run through
     lines = process.output.splitlines()

@@ -45,7 +45,9 @@ def test_each_error_is_the_part_that_an_answer_is_off(name: str, part: float) ->
     errors = compute_errors(SCENE, COMMAND, answer(**{name: part}))
     for field, error in zip(ERROR_NAMES, errors, strict=True):
         assert error == pytest.approx(
-            part if field == name else 0.0, rel=1e-4, abs=1e-12
+            part if field == name else 0.0,
+            rel=1e-4,
+            abs=1e-12,
         )
     assert errors.worst == pytest.approx(part, rel=1e-4)
     assert errors.force == pytest.approx(0.0 if name == "torque" else part, abs=1e-12)

@@ -39,7 +39,8 @@ SCENES["accelerating"] = replace(
 )
 MOMENT, FORCE = SCENES["crank_rocker"].loads
 SCENES["load_in_the_world"] = replace(
-    SCENES["crank_rocker"], loads=(MOMENT, replace(FORCE, frame="world"))
+    SCENES["crank_rocker"],
+    loads=(MOMENT, replace(FORCE, frame="world")),
 )
 FORCES = ("torque", "F12", "F32", "F43", "F14")
 ALL = ("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4", *FORCES)
@@ -103,7 +104,9 @@ def judged(scene: Scene, path: Path) -> Judgement:
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("digits", [None, 5])
 def test_the_right_numbers_agree_also_when_rounded(
-    name: str, digits: int | None, tmp_path: Path
+    name: str,
+    digits: int | None,
+    tmp_path: Path,
 ) -> None:
     path = write(tmp_path / "theirs.csv", right(SCENES[name]), digits=digits)
     assert judged(SCENES[name], path).differing == []
@@ -111,7 +114,8 @@ def test_the_right_numbers_agree_also_when_rounded(
 
 @pytest.mark.parametrize("name", SCENES)
 def test_a_torque_off_by_one_in_the_last_of_six_digits_is_found(
-    name: str, tmp_path: Path
+    name: str,
+    tmp_path: Path,
 ) -> None:
     numbers = right(SCENES[name])
     numbers["torque"] = numbers["torque"] * (1.0 + 3e-5)
@@ -121,7 +125,8 @@ def test_a_torque_off_by_one_in_the_last_of_six_digits_is_found(
 
 @pytest.mark.parametrize("name", SCENES)
 def test_a_theta_2_rounded_as_the_rest_is_allowed_for_and_excuses_no_more(
-    name: str, tmp_path: Path
+    name: str,
+    tmp_path: Path,
 ) -> None:
     numbers = right(SCENES[name])
     rounded = numbers | {
@@ -147,7 +152,8 @@ def test_whole_degrees_are_positions_that_somebody_chose(tmp_path: Path) -> None
         "theta_2 [deg],torque\n10,1.0\n20.5003,1.0\n"
     )  # zeros left off: the column has four decimals
     assert read_table(path).theta_2_rounding == pytest.approx(
-        np.radians(0.00005), rel=1e-9
+        np.radians(0.00005),
+        rel=1e-9,
     )
 
 
@@ -240,7 +246,8 @@ def solved_with(
     names = names or ("input", "coupler", "output")
     return solved(
         lambda scene: bars(
-            scene, **{name: change(getattr(scene.linkage, name)) for name in names}
+            scene,
+            **{name: change(getattr(scene.linkage, name)) for name in names},
         )
     )
 
@@ -278,7 +285,9 @@ def half_a_turn(bar: fourbar.Bar) -> tuple[float, float]:
 
 def reversed_load(load: fourbar.Load) -> fourbar.Load:
     return replace(
-        load, force=load.force and (-load.force[0], load.force[1]), moment=-load.moment
+        load,
+        force=load.force and (-load.force[0], load.force[1]),
+        moment=-load.moment,
     )
 
 
@@ -429,7 +438,8 @@ def test_every_hypothesis_has_a_case_and_no_two_have_one_text() -> None:
 
 @pytest.mark.parametrize("digits", [4, 5])
 def test_a_ratio_fitted_to_rounded_numbers_and_one_to_SI_are_named(
-    digits: int, tmp_path: Path
+    digits: int,
+    tmp_path: Path,
 ) -> None:
     scene = SCENES["crank_rocker"]
     numbers = right(scene)
@@ -523,7 +533,9 @@ EVERY_QUANTITY = [
 )
 @pytest.mark.parametrize("name", SCENES)
 def test_every_quantity_is_judged_at_its_own_scale(
-    name: str, quantity: str, tmp_path: Path
+    name: str,
+    quantity: str,
+    tmp_path: Path,
 ) -> None:
     """Off by 1e-9 of its largest value it differs, whatever its unit.
 
@@ -592,7 +604,9 @@ def test_one_component_is_judged_by_itself(letter: str, tmp_path: Path) -> None:
     ("torque", "code"), [("0.0", HOLDS), ("0.04", FAILED), ("5.0", FAILED)]
 )
 def test_what_is_zero_by_all_its_terms_is_judged_in_its_own_unit(
-    torque: str, code: int, tmp_path: Path
+    torque: str,
+    code: int,
+    tmp_path: Path,
 ) -> None:
     """Bars without mass or load take no torque.
 
@@ -651,7 +665,8 @@ def test_a_number_at_the_end_of_the_range_differs_without_a_warning(
 
 
 def test_the_thesis_itself_differs_and_its_unit_slip_is_hinted(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     forces = ("F12", "F32", "F43", "F14")
     path = tmp_path / "thesis.csv"
@@ -713,7 +728,9 @@ BAD_TABLES = [
 
 
 @pytest.mark.parametrize(
-    ("what", "text", "words"), BAD_TABLES, ids=[case[0] for case in BAD_TABLES]
+    ("what", "text", "words"),
+    BAD_TABLES,
+    ids=[case[0] for case in BAD_TABLES],
 )
 def test_a_bad_table_is_one_line(
     what: str,
@@ -738,7 +755,8 @@ def test_a_bad_table_is_one_line(
 
 
 def test_a_table_that_is_too_large_or_missing_is_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     large = tmp_path / "large.csv"
     with large.open("wb") as file:
@@ -831,7 +849,8 @@ def test_blank_cells_state_nothing_and_the_rest_of_their_row_is_judged(
     ]  # fmt: skip
     (wrong,) = judgement.differing
     assert wrong.theirs == (2 * second,) and wrong.ours == pytest.approx(
-        (second,), rel=1e-12
+        (second,),
+        rel=1e-12,
     )
 
 
@@ -862,7 +881,8 @@ def test_magnitudes_and_a_whole_imperial_table(tmp_path: Path) -> None:
 
 
 def test_a_stated_tolerance_decides_and_the_exact_count_stands_next_to_it(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     numbers = right(SCENES["thesis"])
     off = numbers | {"torque": numbers["torque"] * (1.0 + 1e-4)}
@@ -1082,7 +1102,8 @@ def test_an_ordinary_table_is_read(form: str, tmp_path: Path) -> None:
 
 
 def test_degrees_under_a_bare_theta_2_are_recognised_and_said(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     bare = lines("theta_2,torque\n", "{theta:.0f},{torque:.9e}\n")
     path = write_torques(tmp_path / "theirs.csv", bare)
@@ -1111,7 +1132,9 @@ def test_a_bare_omega_suggests_the_commanded_one(tmp_path: Path) -> None:
     ],
 )
 def test_a_column_of_an_unknown_name_says_what_it_may_be(
-    heading: str, words: str, tmp_path: Path
+    heading: str,
+    words: str,
+    tmp_path: Path,
 ) -> None:
     form = lines(f"theta_2 [deg],torque,{heading}\n", "{theta:.0f},{torque:.9e},1\n")
     path = write_torques(tmp_path / "theirs.csv", form)

@@ -183,7 +183,9 @@ def test_what_is_welded_to_a_bar_is_part_of_it() -> None:
         for part in ("mass", "centre.distance", "centre.angle", "inertia")
     ]
     assert described == pytest.approx(
-        [0.4, 0.1, 0.0, 2e-3 + 0.2 * 0.1**2 / 2.0], rel=1e-12, abs=1e-14
+        [0.4, 0.1, 0.0, 2e-3 + 0.2 * 0.1**2 / 2.0],
+        rel=1e-12,
+        abs=1e-14,
     )
 
 
@@ -214,10 +216,16 @@ EDITS = [
 
 
 @pytest.mark.parametrize(
-    ("what", "old", "new", "key", "word"), EDITS, ids=[edit[0] for edit in EDITS]
+    ("what", "old", "new", "key", "word"),
+    EDITS,
+    ids=[edit[0] for edit in EDITS],
 )
 def test_a_planted_difference_is_named(
-    what: str, old: str, new: str, key: str, word: str
+    what: str,
+    old: str,
+    new: str,
+    key: str,
+    word: str,
 ) -> None:
     assert old in GENERATED
     text = GENERATED.replace(old, new) if new else re.sub(old + "[^>]*>", "", GENERATED)
@@ -232,7 +240,8 @@ def test_a_planted_difference_is_named(
 
 
 DRY = replace(
-    CRANK_ROCKER, effects=(*CRANK_ROCKER.effects, Friction((("A", 0.05), ("O4", 0.05))))
+    CRANK_ROCKER,
+    effects=(*CRANK_ROCKER.effects, Friction((("A", 0.05), ("O4", 0.05)))),
 )
 
 
@@ -309,7 +318,9 @@ def test_what_a_difference_costs_is_seen(old: str, new: str) -> None:
 
 
 def other_plane(
-    closure: str = 'site1="r" site2="q"', axis: str = "0 -1 0", option: str = ""
+    closure: str = 'site1="r" site2="q"',
+    axis: str = "0 -1 0",
+    option: str = "",
 ) -> str:
     """The crank-rocker by another hand.
 
@@ -375,10 +386,14 @@ COSTLY = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("key", "old", "new"), COSTLY, ids=[case[0] for case in COSTLY]
+    ("key", "old", "new"),
+    COSTLY,
+    ids=[case[0] for case in COSTLY],
 )
 def test_the_one_thing_that_is_wrong_costs_as_much_alone_in_the_generated_file(
-    key: str, old: str, new: str
+    key: str,
+    old: str,
+    new: str,
 ) -> None:
     """Another tree in another plane, made wrong in one entry.
 
@@ -443,7 +458,8 @@ def test_what_is_attached_costs_what_it_does_in_the_file_itself(key: str) -> Non
     priced = price(difference, changed, unchanged)
     rows = errors(SPRUNG, spoilt, FILE_AT_ONE_STATE)
     assert priced.cost == pytest.approx(
-        max(rows[name] for name in TORQUE_AND_PINS), abs=FLOOR
+        max(rows[name] for name in TORQUE_AND_PINS),
+        abs=FLOOR,
     )
 
 
@@ -661,7 +677,9 @@ OVERDONE = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("what", "old", "new", "words"), OVERDONE, ids=[case[0] for case in OVERDONE]
+    ("what", "old", "new", "words"),
+    OVERDONE,
+    ids=[case[0] for case in OVERDONE],
 )
 def test_a_file_that_overdoes_it_is_one_line_with_its_name(
     what: str,
@@ -710,10 +728,15 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(
-    ("what", "text", "names", "word"), REFUSED, ids=[case[0] for case in REFUSED]
+    ("what", "text", "names", "word"),
+    REFUSED,
+    ids=[case[0] for case in REFUSED],
 )
 def test_a_file_that_is_no_four_bar_is_one_line(
-    what: str, text: str, names: dict[str, str], word: str
+    what: str,
+    text: str,
+    names: dict[str, str],
+    word: str,
 ) -> None:
     with pytest.raises(InputError) as caught:
         examine(BARE, text, names)
@@ -761,7 +784,9 @@ def test_ctrl_c_does_not_wait_for_the_file() -> None:
     ],
 )
 def test_a_file_that_breaks_the_engine_is_one_line(
-    what: object, word: str, monkeypatch: pytest.MonkeyPatch
+    what: object,
+    word: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(
         guard, "ROBOT_SECONDS", 4.0 if what is hang else 60.0
@@ -784,7 +809,9 @@ def test_the_command_writes_and_prints_what_it_found(tmp_path: Path) -> None:
     ]
     arguments = [str(scene), str(path), *names, "--out", str(tmp_path / "out")]
     process = CliRunner().invoke(
-        mjcf.check_mjcf_command, arguments, standalone_mode=False
+        mjcf.check_mjcf_command,
+        arguments,
+        standalone_mode=False,
     )
     assert process.return_value == 1, process.output
     assert "\x1b" not in process.output
@@ -806,7 +833,8 @@ def test_a_role_that_no_body_has_is_refused(tmp_path: Path) -> None:
     "options", [["--pose", "A=20deg"], ["--torque", "1"], ["--hold", "A"]]
 )
 def test_a_name_beside_an_option_of_a_robot_is_refused(
-    options: list[str], tmp_path: Path
+    options: list[str],
+    tmp_path: Path,
 ) -> None:
     with pytest.raises(UsageError, match="--name is for the MJCF of a four-bar alone"):
         run(tmp_path, GENERATED, "--name", "input=input", *options)
@@ -817,7 +845,9 @@ def test_a_file_without_a_scene_is_read_as_a_robot(tmp_path: Path) -> None:
     hinge = '<body><joint/><geom size="0.1"/></body>'
     path.write_text(f"<mujoco><worldbody>{hinge}</worldbody></mujoco>")
     process = CliRunner().invoke(
-        mjcf.check_mjcf_command, [str(path)], standalone_mode=False
+        mjcf.check_mjcf_command,
+        [str(path)],
+        standalone_mode=False,
     )
     assert "no equality that closes a loop" in str(process.exception)
 
@@ -833,7 +863,9 @@ def run(tmp_path: Path, text: str, *options: str) -> tuple[int | None, list[floa
     out = tmp_path / f"out{len(options)}"
     arguments = [str(scene), str(path), "--out", str(out), *options]
     process = CliRunner().invoke(
-        mjcf.check_mjcf_command, arguments, standalone_mode=False
+        mjcf.check_mjcf_command,
+        arguments,
+        standalone_mode=False,
     )
     if process.exception is not None:
         raise process.exception

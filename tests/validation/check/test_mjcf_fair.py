@@ -377,7 +377,9 @@ def report_of(spoil: Callable[[str], str], folder: Path) -> ModelReport:
     [(welded, "closure.by"), (colliding, "contacts"), (stopped, "pins.O4.range")],
 )
 def test_the_cause_that_explains_the_error_stands_first(
-    spoil: Callable[[str], str], key: str, tmp_path: Path
+    spoil: Callable[[str], str],
+    key: str,
+    tmp_path: Path,
 ) -> None:
     report = report_of(spoil, tmp_path)
     assert report.differences[0].key == key
@@ -408,7 +410,9 @@ def set_attribute(text: str, name: str, value: str) -> str:
     [("closure.solimp", "0.9 0.95 0.001 0.5 2"), ("option.timestep", "0.003")],
 )
 def test_a_setting_costs_what_typing_it_into_the_file_gains(
-    key: str, was: str, tmp_path: Path
+    key: str,
+    was: str,
+    tmp_path: Path,
 ) -> None:
     """In the stiff file that is generated, a timestep would matter less.
 
@@ -512,12 +516,14 @@ def default_constraint(scene: Scene) -> str:
     [("crank_rocker", 0.037), ("drag_link", 0.10), ("gallery/landing_gear", 0.88)],
 )
 def test_how_wrong_the_default_constraint_is_as_the_pages_say(
-    name: str, off: float
+    name: str,
+    off: float,
 ) -> None:
     scene = fourbar.load(MODELS / f"{name}.toml")
     examined = examine(scene, default_constraint(scene), {})
     assert error_of(scene, examined, FILE_AT_ONE_STATE, "torque") == pytest.approx(
-        off, rel=0.05
+        off,
+        rel=0.05,
     )
 
 

@@ -50,7 +50,9 @@ def make_errors(*error: float, condition: float = 1.0, **changes: object) -> Err
     ],
 )
 def test_an_error_beyond_the_allowed_one_is_held_to_its_prediction(
-    predicted: float | None, verdict: str, allowed: float
+    predicted: float | None,
+    verdict: str,
+    allowed: float,
 ) -> None:
     expected = None if predicted is None else np.array([0.0, predicted, 0.0])
     worst = judge_errors(make_errors(1e-15, 1e-12, 0.0), expected)
@@ -134,7 +136,8 @@ def test_an_error_within_the_rounding_of_theta_2_is_taken_again() -> None:
     assert right["torque"].error == 0.0
     solution = fourbar.solve(
         crank_rocker(
-            motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0), loads=()
+            motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0),
+            loads=(),
         ),
         "force",
     )

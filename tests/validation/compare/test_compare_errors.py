@@ -141,7 +141,8 @@ def test_angles_that_do_not_close_the_loop_fail_beside_their_own_row() -> None:
 
 @pytest.mark.parametrize(("times", "verdict"), [(9.0, DEGRADED), (11.0, FAILS)])
 def test_ten_times_its_prediction_an_error_is_degraded_and_no_more(
-    times: float, verdict: str
+    times: float,
+    verdict: str,
 ) -> None:
     most = np.abs(FORMULAS.torque).max()  # type: ignore[type-var]
     expected = np.full(POSITIONS, 1e-10 * most)

@@ -38,7 +38,8 @@ def driven(one: int, other: int, **changes: Any) -> Scene:
 
 @pytest.mark.parametrize(("one", "other"), PAIRS)
 def test_every_pair_of_bars_agrees_with_thirteen_equations(
-    one: int, other: int
+    one: int,
+    other: int,
 ) -> None:
     for effects in (
         (fourbar.Gravity(), fourbar.Viscous.at(B=0.02)),
@@ -71,7 +72,9 @@ def test_every_pair_of_bars_agrees_with_thirteen_equations(
 @pytest.mark.parametrize("engine", EXACT, ids=lambda engine: engine.name)
 @pytest.mark.parametrize(("one", "other"), PAIRS)
 def test_every_pair_of_bars_agrees_with_the_multipliers_of_an_engine(
-    engine: Engine, one: int, other: int
+    engine: Engine,
+    one: int,
+    other: int,
 ) -> None:
     if missing := engine.missing():
         pytest.skip(missing)
@@ -101,7 +104,8 @@ def test_every_pair_of_bars_agrees_with_the_multipliers_of_an_engine(
 @pytest.mark.parametrize("engine", [*FREE_BODY, *EXACT], ids=lambda engine: engine.name)
 @pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6])
 def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(
-    engine: Engine, gap: float
+    engine: Engine,
+    gap: float,
 ) -> None:
     if missing := engine.missing():
         pytest.skip(missing)
@@ -114,7 +118,8 @@ def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(
         Place(1, (abs(on_bar + gap), np.angle(on_bar + gap))), Place(4, (0.2, 0.4))
     )
     scene = crank_rocker(
-        motion=fourbar.Motion(1.0 + gap * np.linspace(-1.0, 1.0, 7), 10.0), drive=drive
+        motion=fourbar.Motion(1.0 + gap * np.linspace(-1.0, 1.0, 7), 10.0),
+        drive=drive,
     )
     assert fourbar.solve(scene, "position").stroke == pytest.approx(gap, rel=0.5)
     rows = {
@@ -141,7 +146,9 @@ def test_positions_alone_have_a_stroke_that_is_judged() -> None:
 
 def test_statics_and_friction_at_rest_agree_too() -> None:
     scene = driven(
-        1, 3, effects=(fourbar.Gravity(), fourbar.Friction.at(A=0.05, O4=0.02))
+        1,
+        3,
+        effects=(fourbar.Gravity(), fourbar.Friction.at(A=0.05, O4=0.02)),
     )
     rows = judge(
         "",
@@ -155,7 +162,10 @@ def test_statics_and_friction_at_rest_agree_too() -> None:
 
 
 def _reversed(
-    self: LinearDrive, actions: Any, force: Any, act: Any = LinearDrive.act
+    self: LinearDrive,
+    actions: Any,
+    force: Any,
+    act: Any = LinearDrive.act,
 ) -> None:
     act(self, actions, -force)
 
@@ -191,7 +201,8 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_in_the_drive_is_caught(
-    monkeypatch: pytest.MonkeyPatch, fault: str
+    monkeypatch: pytest.MonkeyPatch,
+    fault: str,
 ) -> None:
     monkeypatch.setattr(LinearDrive, *FAULTS[fault])
     rows = judge("", driven(2, 4), FREE_BODY).rows

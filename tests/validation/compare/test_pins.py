@@ -29,7 +29,9 @@ LOADED = crank_rocker(
 def test_places_are_sums_of_vectors_along_and_across_the_bar() -> None:
     stated = state_from_pins(LOADED)
     for load, from_centre in zip(
-        stated.loads, ((0.05, 1.0), (0.04, -2.0)), strict=True
+        stated.loads,
+        ((0.05, 1.0), (0.04, -2.0)),
+        strict=True,
     ):
         r, phi = find_centre(LOADED.linkage.bar(load.bar))
         x = r * math.cos(phi) + from_centre[0] * math.cos(from_centre[1])

@@ -29,7 +29,10 @@ ROUNDING = 1e-13
 def scene(pin: str, drive: int = 2, start: float = 0.1) -> Scene:
     sweep = Sweep(start, start + 2 * math.pi, 36)
     return Scene(
-        LINKAGE, Motion(sweep, 10.0), drive, effects=(Friction.at(**{pin: FRICTION}),)
+        LINKAGE,
+        Motion(sweep, 10.0),
+        drive,
+        effects=(Friction.at(**{pin: FRICTION}),),
     )
 
 
@@ -55,7 +58,8 @@ def test_they_are_where_geometry_puts_them(pin: str, places: list[float]) -> Non
     posed = scene(pin)
     reversals = find_reversals(posed, command(posed), solve(posed))
     assert [reversal.theta_2 for reversal in reversals] == pytest.approx(
-        places, abs=ROUNDING
+        places,
+        abs=ROUNDING,
     )
     assert {reversal.pin for reversal in reversals} <= {pin}
 
@@ -69,7 +73,8 @@ def test_the_jump_is_that_of_statics() -> None:
     for reversal in find_reversals(posed, command(posed), solve(posed)):
         sine = abs(float(reversal.before.sin_mu[0]))
         assert reversal.jump("F43") == pytest.approx(
-            2 * FRICTION / (C * sine), rel=1e-9
+            2 * FRICTION / (C * sine),
+            rel=1e-9,
         )
         assert reversal.jump("torque") < 1e-9  # its power f |slip| is continuous
         assert "O4" in str(reversal) and "jumps from" in str(reversal)

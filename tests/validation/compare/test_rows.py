@@ -68,7 +68,11 @@ def rows(**counts: int) -> list[Row]:
 
 def test_a_quantity_that_every_row_calls_degraded_is_counted_and_named() -> None:
     def row(
-        scene: str, engine: str, quantity: str, verdict: str, allowed: float
+        scene: str,
+        engine: str,
+        quantity: str,
+        verdict: str,
+        allowed: float,
     ) -> Row:
         return replace(
             ROW,
@@ -157,7 +161,9 @@ IDENTITY = replace(ROW, engine="formulas", quantity="closure")
     ],
 )
 def test_all_hold_counts_what_was_compared_alone(
-    rows: list[Row], sentence: str, status: int
+    rows: list[Row],
+    sentence: str,
+    status: int,
 ) -> None:
     counts = Counts(rows)
     assert (counts.sentence(), counts.status) == (sentence, status)
@@ -226,7 +232,9 @@ class SilentWithoutEffects(Echo):
     ],
 )
 def test_what_is_wrong_with_the_inertia_alone_is_a_row(
-    adapter: type, verdict: str, reason: str
+    adapter: type,
+    verdict: str,
+    reason: str,
 ) -> None:
     engine = Engine("echo", adapter, EQUIVALENCE)
     inertial_rows = [
@@ -294,7 +302,9 @@ omega_2 = "1 rad/s"
 
 @pytest.mark.slow
 def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     judge_here(monkeypatch)
     (tmp_path / "scene.toml").write_text(ONE_POSITION)
@@ -473,7 +483,8 @@ def test_of_two_rows_of_one_name_the_worse_one_counts() -> None:
 
 
 def test_numbers_without_a_digit_do_not_agree(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     # 1e-13 rad from a limit of theta_2 the condition of the accelerations is about
     # 1e-13
@@ -501,7 +512,9 @@ def test_numbers_without_a_digit_do_not_agree(
 
 @pytest.mark.slow
 def test_a_study_in_which_no_law_is_fitted_is_no_success(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(
         "fourbar_validation.cost.study.CostStudy.points", lambda _: iter(())

@@ -63,7 +63,9 @@ def test_a_size_of_nothing_demands_nothing_but_zero() -> None:
     ],
 )
 def test_what_is_no_number_uses_more_than_is_allowed(
-    error: float, allowed: float, share: float
+    error: float,
+    allowed: float,
+    share: float,
 ) -> None:
     assert find_used(error, allowed) == share
 
@@ -81,7 +83,9 @@ def test_of_a_stroke_the_angle_of_its_bar_is_conditioned_by_the_lever() -> None:
     r, arm = 0.25, 0.09
     drive = LinearDrive(Place(1, (r, 2.5)), Place(2, (arm, 0.3)))
     motion = fourbar.Motion(
-        stroke=np.array([0.2, 0.3, 0.339]), side="left", stroke_speed=0.1
+        stroke=np.array([0.2, 0.3, 0.339]),
+        side="left",
+        stroke_speed=0.1,
     )
     s = fourbar.solve(crank_rocker(motion=motion, drive=drive))
     share = (
@@ -98,7 +102,8 @@ def test_of_a_stroke_the_angle_of_its_bar_is_conditioned_by_the_lever() -> None:
     ):
         assert find_condition(name, linkage, s) == pytest.approx(wanted)
     at_angles = crank_rocker(
-        motion=fourbar.Motion(theta_2=s.theta_2, omega_2=1.0), drive=drive
+        motion=fourbar.Motion(theta_2=s.theta_2, omega_2=1.0),
+        drive=drive,
     )
     assert (find_condition("theta_2", linkage, fourbar.solve(at_angles)) == 1.0).all()
 

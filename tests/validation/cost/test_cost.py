@@ -45,12 +45,16 @@ def turning(omega: float = 10.0, positions: int = 36) -> fourbar.Scene:
     """
     sweep = fourbar.Sweep(0.0, 2.0 * math.pi, positions)
     return fourbar.Scene(
-        CONTENDED_LINKAGE, fourbar.Motion(sweep, omega), effects=(fourbar.Gravity(),)
+        CONTENDED_LINKAGE,
+        fourbar.Motion(sweep, omega),
+        effects=(fourbar.Gravity(),),
     )
 
 
 def tried(
-    scene: fourbar.Scene, closure: Build | None = None, drive: Build | None = None
+    scene: fourbar.Scene,
+    closure: Build | None = None,
+    drive: Build | None = None,
 ) -> Callable[[Settings], WorstErrors]:
     setup = TrialSetup(scene, command(scene))
 
@@ -75,7 +79,9 @@ def tried(
     ],
 )
 def test_each_integrator_shows_its_order(
-    integrator: str, order: float, steps: tuple[int, ...]
+    integrator: str,
+    order: float,
+    steps: tuple[int, ...],
 ) -> None:
     error = tried(turning())
     points = [
@@ -126,7 +132,8 @@ def test_the_defaults_stay_at_their_floor_at_every_timestep(tmp_path: Path) -> N
     ]
     ladder = made._try_curve(
         replace(
-            curve, spots=tuple(spot for spot in curve.spots if spot.x in (320, 2560))
+            curve,
+            spots=tuple(spot for spot in curve.spots if spot.x in (320, 2560)),
         )
     )
     coarse, fine = (p.at_steps for p in ladder)
@@ -181,7 +188,9 @@ def test_only_tolerance_0_is_tight_with_a_heavy_flywheel() -> None:
     ],
 )
 def test_every_drive_exerts_the_torque_of_the_formulas(
-    build: Build, settings: Settings, allowed: float
+    build: Build,
+    settings: Settings,
+    allowed: float,
 ) -> None:
     assert tried(turning(), drive=build)(settings).worst <= allowed
 
@@ -247,7 +256,8 @@ def test_formulas_in_four_precisions() -> None:
 
 def test_single_precision_slides_too() -> None:
     scene = replace(
-        crank_rocker(), effects=(fourbar.PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03)),)
+        crank_rocker(),
+        effects=(fourbar.PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03)),),
     )
     assert (
         compute_errors(
@@ -256,7 +266,8 @@ def test_single_precision_slides_too() -> None:
         < 1e-4
     )
     with pytest.raises(
-        NotImplementedError, match="pin forces"
+        NotImplementedError,
+        match="pin forces",
     ):  # thirteen equations that are not linear
         formulas.solve_thirteen_equations(scene, command(scene))
 
@@ -487,7 +498,8 @@ def test_a_study_is_resumed_where_it_was_interrupted(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_command_writes_table_report_and_pictures(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     scene = tmp_path / "small.toml"
     scene.write_text(fourbar.dump(turning(positions=12)))
@@ -505,7 +517,9 @@ def test_the_command_writes_table_report_and_pictures(
     monkeypatch.setattr(study, "ERRORS_ADVISED", (1e-3, 1e-5))
     monkeypatch.setattr(study, "TIMINGS_OF_A_SETTING", 1)
     process = CliRunner().invoke(
-        cost, [str(scene), "--out", str(tmp_path / "out")], standalone_mode=False
+        cost,
+        [str(scene), "--out", str(tmp_path / "out")],
+        standalone_mode=False,
     )
     assert process.exception is None and process.return_value == 0, process.output
     printed = process.output.splitlines()
@@ -543,7 +557,9 @@ def test_a_scene_that_cannot_be_run_through_is_refused_before_anything_is_measur
     scene, out = tmp_path / "law.toml", tmp_path / "out"
     scene.write_text(fourbar.dump(FAULT_SCENES["law"]))
     process = CliRunner().invoke(
-        cost, [str(scene), "--out", str(out)], standalone_mode=False
+        cost,
+        [str(scene), "--out", str(out)],
+        standalone_mode=False,
     )
     assert isinstance(
         process.exception, fourbar.errors.LimitError

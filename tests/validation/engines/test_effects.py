@@ -42,7 +42,10 @@ ACTING: dict[str, Effect] = {
     "viscous": Viscous.at(O2=0.02, A=0.03, B=0.04, O4=0.05),
     "friction": Friction.at(O2=0.02, A=0.03, B=0.04, O4=0.05),
     "pin_friction": PinFriction.at(
-        O2=(0.2, 0.01), A=(0.3, 0.01), B=(0.1, 0.02), O4=(0.2, 0.01)
+        O2=(0.2, 0.01),
+        A=(0.3, 0.01),
+        B=(0.1, 0.02),
+        O4=(0.2, 0.01),
     ),
     "torsion": Torsion.at(O4=(2.0, 1.9, 0.1), B=(1.0, 0.8, -0.2)),
     "springs": Springs(
@@ -57,7 +60,12 @@ ACTING: dict[str, Effect] = {
     "flywheel": Flywheel(0.02, 2),
     "load": Load(4, (3.0, 0.7), from_centre=(0.05, 1.0), moment=0.2, frame="bar"),
     "load over theta_2": Load(
-        3, (4.0, 0.7), arm=(0.05, 1.0), moment=0.2, frame="world", table=TABLE
+        3,
+        (4.0, 0.7),
+        arm=(0.05, 1.0),
+        moment=0.2,
+        frame="world",
+        table=TABLE,
     ),
 }
 EXACT = [engine for engine in ENGINES if not engine.through_time]
@@ -88,7 +96,8 @@ def scene(*names: str) -> Scene:
 
 
 def outcome(
-    posed: Scene, engines: list[Any]
+    posed: Scene,
+    engines: list[Any],
 ) -> tuple[list[tuple[str, str, str]], set[str]]:
     """What fails, and who refuses."""
     rows = judge("scene", posed, engines).rows
@@ -113,7 +122,9 @@ def test_every_effect_of_the_registry_is_here() -> None:
 
 
 @pytest.mark.parametrize(
-    "names", [(name,) for name in ACTING] + list_pairs(ACTING), ids="+".join
+    "names",
+    [(name,) for name in ACTING] + list_pairs(ACTING),
+    ids="+".join,
 )
 def test_exact_engines_agree(names: tuple[str, ...]) -> None:
     assert outcome(scene(*names), EXACT) == ([], set())
@@ -215,7 +226,8 @@ def moved(effect: Effect) -> Effect:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ACTING)
 def test_an_effect_that_acts_elsewhere_in_the_formulas_fails_the_run(
-    name: str, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The formulas have it at another pin, on another bar or in another direction.
 
@@ -255,14 +267,20 @@ class FaultyTree:
 
 @pytest.mark.parametrize("name", [name for name in ACTING if name != "pin_friction"])
 @pytest.mark.parametrize(
-    "factor", [-1.0, 2.0, 0.0], ids=["wrong sign", "applied twice", "missing"]
+    "factor",
+    [-1.0, 2.0, 0.0],
+    ids=["wrong sign", "applied twice", "missing"],
 )
 def test_a_fault_in_the_wrench_on_the_free_bodies_fails_the_run(
-    name: str, factor: float, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    factor: float,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def faulty(right: Callable[..., None]) -> Callable[..., None]:
         def act(
-            effect: Any, motion: Any, wrenches: free_body_effects.BodyWrenches
+            effect: Any,
+            motion: Any,
+            wrenches: free_body_effects.BodyWrenches,
         ) -> None:
             alone = free_body_effects.BodyWrenches(len(motion.theta_2))
             right(effect, motion, alone)
@@ -298,10 +316,14 @@ def test_what_the_formulas_make_of_a_spring_does_not_reach_the_engines(
 
 @pytest.mark.parametrize("name", ACTING)
 @pytest.mark.parametrize(
-    "factor", [-1.0, 2.0, 0.0], ids=["wrong sign", "applied twice", "missing"]
+    "factor",
+    [-1.0, 2.0, 0.0],
+    ids=["wrong sign", "applied twice", "missing"],
 )
 def test_a_fault_in_the_engine_term_fails_the_run(
-    name: str, factor: float, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    factor: float,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     key = ACTING[name].key
     right = TERM_OF[key]

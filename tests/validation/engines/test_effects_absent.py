@@ -115,7 +115,11 @@ def test_the_bare_model_has_the_closed_loop_and_nothing_else() -> None:
     ],
 )
 def test_each_effect_adds_what_it_needs_and_no_more(
-    name: str, enabled: set[str], more_rows: int, tendons: int, actuators: int
+    name: str,
+    enabled: set[str],
+    more_rows: int,
+    tendons: int,
+    actuators: int,
 ) -> None:
     model = compiled(name)
     assert (model.nv, model.neq, model.nu, model.nsensor) == (3, 1, actuators, 0)
@@ -185,7 +189,8 @@ def moved(*motion: Any) -> Record:
     ],
 )
 def test_what_does_not_move_through_time_is_not_simulated(
-    motion: tuple[Any, float], reason: str
+    motion: tuple[Any, float],
+    reason: str,
 ) -> None:
     record = moved(*motion)
     assert f"mujoco-simulated: {reason}" in record.left_out

@@ -83,7 +83,8 @@ def present(*names: str) -> list[Any]:
         pytest.param(
             name,
             marks=pytest.mark.skipif(
-                bool(lib) and find_spec(lib) is None, reason=str(ENGINE[name].missing())
+                bool(lib) and find_spec(lib) is None,
+                reason=str(ENGINE[name].missing()),
             ),
         )
         for name, lib in libraries.items()
@@ -125,7 +126,8 @@ def failures(name: str, case: Scene, every: int = 1) -> list[tuple[str, str]]:
     """Quantities on which an engine and the formulas disagree, or its refusal."""
     commanded = command(case)
     commanded = commanded._replace(
-        angle=commanded.theta_2[::every], branch=commanded.branch[::every]
+        angle=commanded.theta_2[::every],
+        branch=commanded.branch[::every],
     )
     answer = answered(name, case, commanded)
     if answer.refusal is not None:
@@ -356,7 +358,8 @@ def test_the_floor_of_mujoco_is_where_it_is_stated_to_be() -> None:
         (LIGHTEST.boundary, 0.9 * LIGHTEST.boundary),
     ):
         below = replace(
-            case, linkage=replace(case.linkage, output=Bar(c, mass, inertia))
+            case,
+            linkage=replace(case.linkage, output=Bar(c, mass, inertia)),
         )
         assert MujocoInverse().answer(below, command(below)).refusal is not None
         with pytest.raises(ValueError, match="mass and inertia"):
@@ -365,7 +368,8 @@ def test_the_floor_of_mujoco_is_where_it_is_stated_to_be() -> None:
 
 @pytest.mark.parametrize("name", present("opensim-constraints"))
 def test_simbody_loses_a_constraint_where_the_limit_says(
-    name: str, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Bars 3 and 4 nearly in one line.
 
@@ -375,7 +379,10 @@ def test_simbody_loses_a_constraint_where_the_limit_says(
 
     linkage = with_bar(2, mass=0.2).linkage
     linkage = replace(
-        linkage, input=Bar(0.25, 0.2), coupler=Bar(0.22, 0.5), output=Bar(0.3, 0.4)
+        linkage,
+        input=Bar(0.25, 0.2),
+        coupler=Bar(0.22, 0.5),
+        output=Bar(0.3, 0.4),
     )
     d, a, b, c = linkage.lengths
     limit = math.acos((d * d + a * a - (b + c) ** 2) / (2.0 * d * a))
@@ -567,7 +574,9 @@ def commanded(what: str, branch: int) -> Scene:
     "what", ["theta_3", "theta_4", "stroke of bar 2", "stroke of bar 4"]
 )
 def test_an_engine_closes_its_own_loop_from_whatever_is_commanded(
-    name: str, what: str, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    what: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     for branch in (1, -1):
         case = commanded(what, branch)
@@ -608,7 +617,9 @@ def twice(row: Callable[..., Any]) -> Callable[..., Any]:
 @further
 @pytest.mark.parametrize("key", sorted(TERM_OF.keys() - {"gravity"}))
 def test_a_fault_in_a_row_shows_but_where_an_engine_has_its_own(
-    name: str, key: str, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    key: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Also in what depends on the load of a pin."""
     monkeypatch.setitem(TERM_OF, key, twice(TERM_OF[key]))
@@ -618,7 +629,8 @@ def test_a_fault_in_a_row_shows_but_where_an_engine_has_its_own(
 
 @pytest.mark.parametrize("name", present("exudyn-constraints"))
 def test_a_fault_in_an_element_of_exudyn_shows(
-    name: str, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     from fourbar_lab.engines.exudyn_elements import ELEMENT_OF
 
@@ -633,7 +645,8 @@ def test_a_fault_in_an_element_of_exudyn_shows(
 @each_engine
 @pytest.mark.parametrize("index", [63, 97])
 def test_a_steady_input_keeps_its_digits_beside_bars_that_are_fast(
-    name: str, index: int
+    name: str,
+    index: int,
 ) -> None:
     """The acceleration of A is judged by what bar 2 does alone.
 
@@ -653,7 +666,9 @@ def test_a_thousand_turns_take_no_position(name: str) -> None:
     )
     assert far.assembled is not None and far.assembled.all()
     np.testing.assert_allclose(
-        far.quantities["torque"], near.quantities["torque"], rtol=1e-9
+        far.quantities["torque"],
+        near.quantities["torque"],
+        rtol=1e-9,
     )
 
 
@@ -670,7 +685,9 @@ def test_a_position_before_leaves_nothing_behind(name: str) -> None:
     ).quantities
     for quantity in ("omega_3", "alpha_4", "F12", "F43", "torque"):
         np.testing.assert_array_equal(
-            quantities[quantity][1:], alone[quantity], err_msg=quantity
+            quantities[quantity][1:],
+            alone[quantity],
+            err_msg=quantity,
         )
         assert np.isfinite(alone[quantity]).all(), quantity
 
@@ -704,7 +721,10 @@ def test_a_scene_before_leaves_nothing_behind() -> None:
     ],
 )
 def test_near_a_jam_an_engine_finds_the_one_solution_that_there_is(
-    drive: int, mu: float, r: float, theta_2: float
+    drive: int,
+    mu: float,
+    r: float,
+    theta_2: float,
 ) -> None:
     link, motion = uniform(0.3, 0.1, 0.25, 0.22), Motion(np.array([theta_2]), 3.0, 2.0)
     for arms, jams in ((r, False), (50.0, True)):

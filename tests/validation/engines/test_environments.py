@@ -74,7 +74,8 @@ def write_wheel(folder: Path, version: str, factor: str) -> str:
 
 @pytest.mark.slow
 def test_two_versions_are_judged_side_by_side(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     made = make_environment
@@ -109,11 +110,13 @@ def test_two_versions_are_judged_side_by_side(
 
 
 def test_an_environment_that_cannot_be_made_is_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     with pytest.raises(
-        DependencyError, match=r"^none: its environment cannot be made: .*no-such-thing"
+        DependencyError,
+        match=r"^none: its environment cannot be made: .*no-such-thing",
     ):
         make_environment(
             Entry("none", adapter="a:B", requires=("no-such-thing==1",)), tmp_path
@@ -144,7 +147,8 @@ def test_an_engine_is_asked_for_its_steps_an_error_or_a_setting() -> None:
     pytest.importorskip("mujoco")
     entry = Entry("mine", adapter="mujoco-simulated", steps=(48, 96))
     scene = crank_rocker(
-        motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0), loads=()
+        motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0),
+        loads=(),
     )
     simulated, free_body = (
         next(engine for engine in ENGINES if engine.name == name)
@@ -194,7 +198,9 @@ def test_an_engine_is_asked_for_its_steps_an_error_or_a_setting() -> None:
     ],
 )
 def test_what_is_no_entry_is_named_with_its_file(
-    text: str, words: str, tmp_path: Path
+    text: str,
+    words: str,
+    tmp_path: Path,
 ) -> None:
     (tmp_path / "engines.toml").write_text(text)
     with pytest.raises(InputError) as error:
@@ -206,6 +212,7 @@ def test_what_is_no_entry_is_named_with_its_file(
 
 def test_a_name_that_is_nobody_s_is_refused_with_those_that_are_known() -> None:
     with pytest.raises(
-        InputError, match=r"must be among pinocchio-inverse, .*mujoco 3\.3\.7"
+        InputError,
+        match=r"must be among pinocchio-inverse, .*mujoco 3\.3\.7",
     ):
         choose_engines("nobody")

@@ -109,7 +109,10 @@ def test_it_imports_the_description_and_nothing_of_the_formulas() -> None:
 
 
 def gap(
-    lengths: tuple[float, ...], theta_2: Any, theta_3: Any, theta_4: Any
+    lengths: tuple[float, ...],
+    theta_2: Any,
+    theta_3: Any,
+    theta_4: Any,
 ) -> list[Any]:
     """Both closure equations, theta_1 = 0, m."""
     d, a, b, c = lengths
@@ -217,7 +220,10 @@ def test_over_a_turn_what_stores_energy_gives_it_back(drive: int) -> None:
     motion = fourbar.Motion(np.arange(512) * (2.0 * math.pi / 512), 10.0)
     got = answered(
         crank_rocker(
-            motion=motion, loads=(), effects=(Gravity(), SPRING, TORSION), drive_bar=2
+            motion=motion,
+            loads=(),
+            effects=(Gravity(), SPRING, TORSION),
+            drive_bar=2,
         )
     )
     if drive == 4:
@@ -231,7 +237,9 @@ def test_over_a_turn_what_stores_energy_gives_it_back(drive: int) -> None:
         )
         power = four["torque"] * four["omega_4"]
         assert power == pytest.approx(
-            got["torque"] * 10.0, abs=1e-10 * np.abs(power).max(), rel=0
+            got["torque"] * 10.0,
+            abs=1e-10 * np.abs(power).max(),
+            rel=0,
         )
     assert abs(got["torque"].sum()) < 512 * 1e-14 * np.abs(got["torque"]).max()
     assert np.abs(got["torque"]).max() > 0.1
@@ -274,7 +282,9 @@ def test_what_brakes_takes_the_power_that_the_drive_gives_more(effect: Any) -> N
     more = 10.0 * (with_["torque"] - without["torque"])
     assert (loss > 0.0).all()
     assert more == pytest.approx(
-        loss, abs=1e-12 * 10.0 * np.abs(with_["torque"]).max(), rel=0
+        loss,
+        abs=1e-12 * 10.0 * np.abs(with_["torque"]).max(),
+        rel=0,
     )
 
 
@@ -282,7 +292,8 @@ def test_dry_friction_does_nothing_at_rest() -> None:
     dry = (Friction.at(A=1.0), PinFriction.at(B=(0.2, 0.1)))
     still = crank_rocker(motion=fourbar.Motion([0.3, 2.0], 0.0), effects=dry)
     assert answered(still)["torque"] == pytest.approx(
-        answered(replace(still, effects=()))["torque"], rel=1e-14
+        answered(replace(still, effects=()))["torque"],
+        rel=1e-14,
     )
 
 

@@ -262,7 +262,8 @@ FINE: dict[str, tuple[str, str]] = {
     ],
 )
 def test_the_reason_of_a_dead_program_is_the_line_that_says_why(
-    errors: str, line: str
+    errors: str,
+    line: str,
 ) -> None:
     assert processes.find_reason(errors) == line
 
@@ -284,7 +285,8 @@ def test_a_torque_that_is_a_thousandth_off_fails_alone(tmp_path: Path) -> None:
 @pytest.mark.linux
 @pytest.mark.timeout(300)
 def test_whatever_a_program_does_costs_its_own_rows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(processes, "WORKER_MEMORY", 2 * 10**8)
     monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
@@ -315,7 +317,8 @@ def test_whatever_a_program_does_costs_its_own_rows(
 @pytest.mark.linux
 @pytest.mark.timeout(120)
 def test_a_program_that_is_silent_ends_at_its_limit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """With what it started, and is not asked again for that scene."""
     monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
@@ -392,7 +395,9 @@ def test_a_guest_is_asked_for_what_its_hello_names(tmp_path: Path) -> None:
         motion=fourbar.Motion(theta_3=fourbar.Sweep(0.4, 0.8, 8), omega_3=3.0)
     )
     stroke = fourbar.Motion(
-        stroke=fourbar.Sweep(0.25, 0.35, 8), stroke_speed=0.2, side="left"
+        stroke=fourbar.Sweep(0.25, 0.35, 8),
+        stroke_speed=0.2,
+        side="left",
     )
     drive = fourbar.LinearDrive(Place(1, (0.3, 2.2)), Place(2, (0.12, 0.4)))
     for scene in (four, crank_rocker(motion=stroke, drive=drive)):
@@ -506,7 +511,8 @@ def command_line(out: Path, *options: str) -> "subprocess.CompletedProcess[str]"
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_run_with_guests_ends_with_their_rows_and_none_of_their_processes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
     for name in ("scene", "second"):
@@ -594,7 +600,8 @@ def answer(scene, at):
 
 @pytest.mark.slow
 def test_parts_judged_by_another_code_are_made_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Runs that are interrupted once the first part is there.
 
@@ -643,7 +650,9 @@ def test_parts_judged_by_another_code_are_made_again(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "engine", [*ENGINES, *load_further()], ids=lambda engine: engine.name
+    "engine",
+    [*ENGINES, *load_further()],
+    ids=lambda engine: engine.name,
 )
 def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine: Any) -> None:
     if missing := engine.missing():
@@ -653,7 +662,9 @@ def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine: Any) ->
     outside = replace(engine, start=start)
     loaded = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 40), 10.0))
     stroke = fourbar.Motion(
-        stroke=fourbar.Sweep(0.25, 0.35, 8), stroke_speed=0.2, side="left"
+        stroke=fourbar.Sweep(0.25, 0.35, 8),
+        stroke_speed=0.2,
+        side="left",
     )
     drive = fourbar.LinearDrive(Place(1, (0.3, 2.2)), Place(2, (0.12, 0.4)))
     theta_4 = fourbar.Motion(theta_4=fourbar.Sweep(1.8, 2.5, 8), omega_4=3.0)

@@ -62,7 +62,8 @@ ENGINE = Engine("spoiled", FreeBody, FULL_ACCURACY, predictor=predict_from_data)
 
 @pytest.mark.parametrize("quantity", ("A", "G2", "v_A", "omega_2", "B", "G4"))
 def test_a_place_that_is_wrong_by_a_half_fails_where_the_loop_just_closes(
-    quantity: str, question: Question
+    quantity: str,
+    question: Question,
 ) -> None:
     solution = question.solution
     numbers = {name: np.array(getattr(solution, name)) for name in COMPARED_QUANTITIES}
@@ -89,7 +90,9 @@ def test_what_the_input_decides_is_predicted_to_its_last_digits() -> None:
 @pytest.mark.parametrize("stretched", (True, False))
 @pytest.mark.parametrize(("b", "c"), ((0.1, 0.22), (0.4, 0.07), (0.3, 1e-3)))
 def test_the_bound_of_the_angles_is_that_of_the_triangle(
-    b: float, c: float, stretched: bool
+    b: float,
+    c: float,
+    stretched: bool,
 ) -> None:
     """Close a triangle that misses its line by the margin.
 

@@ -128,7 +128,8 @@ def test_nothing_travels_that_the_formulas_computed():
     What the file leaves out is left out.
     """
     scene = replace(
-        crank_rocker(), effects=(fourbar.Gravity(), fourbar.Viscous((("O2", 0.01),)))
+        crank_rocker(),
+        effects=(fourbar.Gravity(), fourbar.Viscous((("O2", 0.01),))),
     )
     data = protocol.scene_to_json(scene)
     text = dump(scene)
@@ -214,7 +215,9 @@ def test_an_answer_comes_back_with_all_that_it_says():
     commanded = list_positions(scene)
     n = len(commanded.angle)
     moved = commanded._replace(
-        angle=commanded.angle + 1e-3, speed=np.full(n, 10.01), acceleration=5.0
+        angle=commanded.angle + 1e-3,
+        speed=np.full(n, 10.01),
+        acceleration=5.0,
     )
     torque, force = np.linspace(0.0, 1.0, n), np.ones((n, 2))
     torque[3] = np.nan
@@ -388,7 +391,9 @@ def test_an_engine_through_time_may_be_faster_by_what_the_acceleration_gives() -
         fourbar.load(MODELS / "capabilities" / "stroke_input.toml")
     )
     faster = command._replace(
-        stroke=None, speed=1.2 * command.speed, acceleration=1.2 * command.acceleration
+        stroke=None,
+        speed=1.2 * command.speed,
+        acceleration=1.2 * command.acceleration,
     )
     protocol.require_near(faster, command)
     steady = command._replace(acceleration=0.0 * command.acceleration)

@@ -75,7 +75,8 @@ def ask(engine: Path, *questions: dict[str, Any]) -> list[dict[str, Any]]:
 
 @pytest.mark.parametrize("file", NAMED, ids=lambda file: file.stem)
 def test_the_page_s_engine_answers_what_the_formulas_do(
-    engine: Path, file: Path
+    engine: Path,
+    file: Path,
 ) -> None:
     scene = fourbar.load(file)
     gravity = tuple(effect for effect in scene.effects if isinstance(effect, Gravity))
@@ -87,7 +88,12 @@ def test_the_page_s_engine_answers_what_the_formulas_do(
     if motion.speed is None:
         motion = motion.replace(speed=1.0)
     scene = replace(
-        scene, motion=motion, loads=(), effects=gravity, drive=None, drive_bar=2
+        scene,
+        motion=motion,
+        loads=(),
+        effects=gravity,
+        drive=None,
+        drive_bar=2,
     )
     commanded = list_positions(scene)
     # an engine is told the sign of the command's own sine at each position
@@ -184,7 +190,8 @@ def test_what_an_engine_writes_is_what_the_schema_says(engine: Path) -> None:
     ],
 )
 def test_what_is_refused_is_none_by_the_schema_either(
-    part: str, wrong: list[Any]
+    part: str,
+    wrong: list[Any],
 ) -> None:
     refused = [
         data

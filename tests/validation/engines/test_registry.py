@@ -48,7 +48,8 @@ NAMES = ["exudyn-constraints", "opensim-constraints", "drake-inverse"]
 
 
 def test_the_lab_alone_adds_engines(
-    only: Path, monkeypatch: pytest.MonkeyPatch
+    only: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert [
         engine.name for engine in load()

@@ -75,10 +75,15 @@ ALL = tuple(list_figures())
 def test_the_published_torque_error_by_error() -> None:
     for name, listed in (("T4", T4), ("F12x", F12X)):
         for figure, (_, x), (_, *step) in zip(
-            listed, climb_ladder(), ERRATA_IN_ORDER, strict=name == "T4"
+            listed,
+            climb_ladder(),
+            ERRATA_IN_ORDER,
+            strict=name == "T4",
         ):
             assert x[name] == pytest.approx(
-                figure, rel=0.0, abs=LISTED + bound_round_off(*step)[name]
+                figure,
+                rel=0.0,
+                abs=LISTED + bound_round_off(*step)[name],
             )
 
 
@@ -298,7 +303,10 @@ def test_torques_that_the_errata_state() -> None:
 def test_open_loops_that_the_errata_state() -> None:
     """Closure of the angles as printed, in the thesis's polygon, cm."""
     table = np.genfromtxt(
-        DATA / "positions.csv", delimiter=",", skip_header=1, usecols=range(5)
+        DATA / "positions.csv",
+        delimiter=",",
+        skip_header=1,
+        usecols=range(5),
     )
     d, a, b, c = BAR_LENGTHS
     unit = np.exp(1j * np.radians(table))
@@ -370,7 +378,8 @@ def test_quantities_of_an_answer() -> None:
     assert compute_value(s, "-F14_y", 0) == -s.F14[0, 1]
     assert compute_value(s, "omega_3 - omega_2", 0) == s.omega_3[0] - s.omega_2[0]
     assert compute_value(s, "v_A_x", 0) == pytest.approx(
-        -0.2244 * 0.48 * np.sin(THETA_2), rel=TYPED
+        -0.2244 * 0.48 * np.sin(THETA_2),
+        rel=TYPED,
     )
 
 
@@ -383,13 +392,15 @@ def test_inputs_are_those_of_the_model(scene: fourbar.Scene) -> None:
     ours = make_model_scene(THETA_2)
     assert ours.linkage.lengths == pytest.approx(scene.linkage.lengths, rel=TYPED)
     assert ours.linkage.ground_angle == pytest.approx(
-        scene.linkage.ground_angle, rel=TYPED
+        scene.linkage.ground_angle,
+        rel=TYPED,
     )
     for number in (2, 3, 4):
         mine, theirs = ours.linkage.bar(number), scene.linkage.bar(number)
         assert mine.mass == theirs.mass
         assert mine.moment_of_inertia == pytest.approx(
-            theirs.moment_of_inertia, rel=TYPED
+            theirs.moment_of_inertia,
+            rel=TYPED,
         )
         assert mine.mass_centre == pytest.approx(theirs.mass_centre, rel=TYPED)
     assert (ours.drive_bar, ours.motion.omega_2) == (

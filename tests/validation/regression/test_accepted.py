@@ -83,5 +83,6 @@ def test_a_row_states_the_condition_that_its_allowance_comes_from(turns: int) ->
         ):  # held to what is computed for the position: no law in the condition
             continue
         assert row.condition == pytest.approx(
-            min(1.0, K * EPS / row.allowed), rel=1e-9
+            min(1.0, K * EPS / row.allowed),
+            rel=1e-9,
         ), row

@@ -29,7 +29,8 @@ def compare(old: list[Row], new: list[Row]) -> Differences:
     ("moves", "kind"), [(40, KindOfChange.ROUND_OFF), (60, KindOfChange.WORSE)]
 )
 def test_fifty_last_digits_are_round_off_and_more_are_not(
-    moves: int, kind: KindOfChange
+    moves: int,
+    kind: KindOfChange,
 ) -> None:
     worse = changed(error=ROW.error + moves * EPS, allowed=1e-14)
     assert compare_row(KEY, changed(allowed=1e-15), worse).kind is kind
@@ -62,7 +63,9 @@ def test_a_quarter_more_is_noticed(factor: float, kind: KindOfChange) -> None:
     ],
 )
 def test_a_comparison_ends_with_1_for_a_regression_and_for_nothing(
-    old: list[Row], new: list[Row], status: int
+    old: list[Row],
+    new: list[Row],
+    status: int,
 ) -> None:
     assert compare(old, new).status == status
 

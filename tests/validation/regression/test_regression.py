@@ -132,7 +132,9 @@ def test_command_writes_every_form_and_leaves_with_the_status(tmp_path: Path) ->
     forms = [f"--{form}={tmp_path / form}" for form in ("markdown", "html", "junit")]
     runner = CliRunner()
     process = runner.invoke(
-        compare_command, [str(old), str(new), *forms], standalone_mode=False
+        compare_command,
+        [str(old), str(new), *forms],
+        standalone_mode=False,
     )
     assert process.return_value == 1
     assert "2 regressions" in process.output
@@ -160,7 +162,9 @@ def test_accept_keeps_the_run_next_to_the_results_or_in_a_stated_folder(
         assert json.loads((kept / "record.json").read_text())["machine"] == HERE.machine
         assert (
             runner.invoke(
-                compare_command, [str(kept), str(run)], standalone_mode=False
+                compare_command,
+                [str(kept), str(run)],
+                standalone_mode=False,
             ).return_value
             == 0
         )
@@ -212,7 +216,8 @@ def damaged(folder: Path) -> Iterator[tuple[Path, str]]:
 
 
 def test_a_damaged_run_is_named_and_nothing_is_written(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     rows = [replace(ROW, engine=f"engine {k}") for k in range(4)]
     good, run = (
@@ -244,7 +249,8 @@ def test_a_damaged_run_is_named_and_nothing_is_written(
 
 @pytest.mark.slow
 def test_a_damaged_table_is_one_line_and_nothing_is_written(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     run, kept = save_run(tmp_path / "run", [ROW]), tmp_path / "kept"
     assert status(["accept", str(run), "--to", str(kept)]) == 0
@@ -287,7 +293,8 @@ def test_a_damaged_table_is_one_line_and_nothing_is_written(
 
 
 def test_what_has_no_record_of_its_rows_is_compared_with_a_note_and_not_accepted(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     good, bare = (save_run(tmp_path / name, [ROW]) for name in ("good", "bare"))
     (bare / "record.json").unlink()
@@ -349,7 +356,10 @@ def test_what_is_empty_unfinished_or_fails_is_not_accepted(tmp_path: Path) -> No
     ],
 )
 def test_options_of_a_run_that_would_do_nothing_are_refused_before_it(
-    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    arguments: list[str],
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert status(["run", *arguments, "--out", str(tmp_path / "out")]) == 2
     message = capsys.readouterr().err.strip()
@@ -394,7 +404,8 @@ def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(
 
 
 def test_two_long_runs_are_read_scene_by_scene_and_little_of_them_is_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """One row group after the other, both in step.
 
@@ -471,7 +482,8 @@ def test_two_long_runs_are_read_scene_by_scene_and_little_of_them_is_kept(
 
 
 def test_a_part_of_a_long_run_compares_with_its_part_and_a_table_out_of_order_with_nothing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     rows = [replace(ROW, scene=f"scene {k:03d}") for k in range(80)]
     all_rows, some = (
@@ -523,7 +535,9 @@ def disagreeing(worse: set[tuple[str, str]]) -> tuple[list[Row], list[Row]]:
     return old, [
         (
             replace(
-                row, **fails, reason=f"{ord(row.scene)}e-6 where 1e-9 was predicted"
+                row,
+                **fails,
+                reason=f"{ord(row.scene)}e-6 where 1e-9 was predicted",
             )  # type: ignore[arg-type]
             if (row.engine, row.quantity) in worse
             else row
@@ -559,7 +573,8 @@ def disagreeing(worse: set[tuple[str, str]]) -> tuple[list[Row], list[Row]]:
     ],
 )
 def test_the_report_says_who_is_at_fault(
-    worse: set[tuple[str, str]], sentence: str
+    worse: set[tuple[str, str]],
+    sentence: str,
 ) -> None:
     old, new = disagreeing(worse)
     changes = compare_rows((HERE, old), (HERE, new))
@@ -625,10 +640,13 @@ def made(
 def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared() -> None:
     output = replace(SCENE.linkage.output, inertia=0.05)
     heavier = replace(
-        SCENE, linkage=replace(SCENE.linkage, output=output), title="another title"
+        SCENE,
+        linkage=replace(SCENE.linkage, output=output),
+        title="another title",
     )
     before = replace(
-        SCENE, linkage=replace(SCENE.linkage, output=replace(output, inertia=0.048))
+        SCENE,
+        linkage=replace(SCENE.linkage, output=replace(output, inertia=0.048)),
     )
     other_row, wrong = (
         replace(ROW, scene="other"),
@@ -656,12 +674,14 @@ def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared() -> Non
 
 
 def test_a_renamed_scene_is_found_by_what_it_states(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     heavier = replace(
         SCENE,
         linkage=replace(
-            SCENE.linkage, output=replace(SCENE.linkage.output, inertia=0.05)
+            SCENE.linkage,
+            output=replace(SCENE.linkage.output, inertia=0.05),
         ),
     )
     names = (
@@ -726,7 +746,10 @@ def test_the_kernels_of_a_run_are_recorded_and_named_where_they_differ() -> None
         pytest.skip("this CPU can pass for no other")
     printed = [
         subprocess.check_output(
-            [sys.executable, "-c", code], cwd=ROOT, env=os.environ | more, text=True
+            [sys.executable, "-c", code],
+            cwd=ROOT,
+            env=os.environ | more,
+            text=True,
         )
         for more in ({}, environment(possible[0]))
     ]
@@ -742,7 +765,8 @@ def test_the_kernels_of_a_run_are_recorded_and_named_where_they_differ() -> None
 
 def test_more_positions_and_other_settings_are_named_so() -> None:
     finer = replace(
-        SCENE, motion=SCENE.motion.replace(angle=fourbar.Sweep(0.0, 2.0 * math.pi, 720))
+        SCENE,
+        motion=SCENE.motion.replace(angle=fourbar.Sweep(0.0, 2.0 * math.pi, 720)),
     )
     worse = replace(ROW, error=1e-9, allowed=1e-8)
     changes = compare_rows(
@@ -794,12 +818,15 @@ def widen(error: float, reason: str = "fewer digits") -> Engine:
 
 
 LOOSE = replace(
-    ROW, allowed=1e-2, reason="as the engine states: 0.01 of the scale: fewer digits"
+    ROW,
+    allowed=1e-2,
+    reason="as the engine states: 0.01 of the scale: fewer digits",
 )
 
 
 def test_a_wider_tolerance_is_a_regression_over_two_nights(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """The first night widens it and is not accepted.
 
@@ -828,7 +855,8 @@ def test_a_wider_tolerance_is_a_regression_over_two_nights(
 
 
 def test_a_run_of_another_suite_is_never_called_no_regression(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """Two of eight rows stand in both: the verdict says so before anything else."""
     both = [ROW, replace(ROW, quantity="F12")]
@@ -861,7 +889,9 @@ def test_a_run_of_another_suite_is_never_called_no_regression(
     ids=["reason", "stricter", "prediction", "fewer answers", "class"],
 )
 def test_each_entry_of_a_rule_can_weaken_it(
-    old: Engine, new: Engine, what: list[str]
+    old: Engine,
+    new: Engine,
+    what: list[str],
 ) -> None:
     before, after = (describe_run([engine], "suite") for engine in (old, new))
     found = compare_rows((before, [ROW]), (after, [ROW]))
@@ -886,7 +916,8 @@ def test_k_and_a_stated_limit_are_rules_whoever_changes_them(
 
 @pytest.mark.parametrize("bound", DERIVED_BOUNDS, ids=lambda bound: bound.name)
 def test_the_bound_of_a_derived_result_is_a_rule(
-    bound: ErrorBound, monkeypatch: pytest.MonkeyPatch
+    bound: ErrorBound,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """What bounds a row of a derived check is one of them: its reason begins with the name."""
     before = describe_run([Engine("engine", FreeBody, EQUIVALENCE)], "suite")
@@ -957,7 +988,8 @@ def test_what_was_not_wanted_is_not_run_and_what_was_wanted_is_gone() -> None:
 
 
 def test_what_is_compared_can_be_chosen(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     bad = replace(ROW, quantity="F12")
     old = save_run(tmp_path / "old", [ROW, bad])
@@ -976,7 +1008,8 @@ def test_what_is_compared_can_be_chosen(
 
 @pytest.mark.slow
 def test_the_run_itself_is_written_as_junit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("fourbar_validation.report.junit.MOST_PASSING_CASES", 10)
     judge_here(monkeypatch)
@@ -1043,7 +1076,9 @@ def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(tmp_path: Path) -
 
 @pytest.mark.slow
 def test_a_name_that_does_not_print_or_is_a_formula_is_one_name_everywhere(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """Escapes change the order of names.
 
@@ -1100,7 +1135,9 @@ def test_a_name_that_does_not_print_or_is_a_formula_is_one_name_everywhere(
     "name", ["lock", "run.json", "results.csv", "timings.csv", "report.html"]
 )
 def test_a_folder_where_a_file_of_a_run_belongs_is_one_line_before_it(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     (tmp_path / "out" / name).mkdir(parents=True)
     assert (
@@ -1129,7 +1166,8 @@ def test_a_folder_where_a_file_of_a_run_belongs_is_one_line_before_it(
     "name", ["results.csv", "results.parquet", "timings.csv", "record.json", HISTORY]
 )
 def test_accept_onto_a_folder_of_that_name_writes_nothing(
-    name: str, tmp_path: Path
+    name: str,
+    tmp_path: Path,
 ) -> None:
     run, kept = save_run(tmp_path / "run", [ROW]), tmp_path / "kept"
     (kept / name).mkdir(parents=True)
@@ -1147,7 +1185,8 @@ def test_folders_among_the_parts_of_a_run_are_swept_away(tmp_path: Path) -> None
     (tmp_path / "parts").write_text("a file")
     with (
         pytest.raises(
-            InputError, match="must be a folder, in which a run keeps its parts"
+            InputError,
+            match="must be a folder, in which a run keeps its parts",
         ),
         Store(tmp_path, {}).held(),
     ):
@@ -1155,7 +1194,8 @@ def test_folders_among_the_parts_of_a_run_are_swept_away(tmp_path: Path) -> None
 
 
 def test_a_full_disk_names_the_file_that_does_not_fit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     run = save_run(tmp_path / "run", [ROW])
 

@@ -17,7 +17,8 @@ from tests.validation.report.test_report import copies, report
 from tests.whole.test_imports import ROOT
 
 pytest.importorskip(
-    "selenium", reason="pages are driven by selenium: pip install selenium"
+    "selenium",
+    reason="pages are driven by selenium: pip install selenium",
 )
 
 CONTRAST = 4.5

@@ -78,7 +78,8 @@ def test_a_missing_answer_uses_all_that_is_allowed() -> None:
     ],
 )
 def test_a_run_is_good_where_something_holds_and_nothing_fails(
-    rows: tuple[Row, ...], good: bool
+    rows: tuple[Row, ...],
+    good: bool,
 ) -> None:
     summary = Summary()
     summary.add(record(*rows))

@@ -158,10 +158,15 @@ def test_the_verdict_stands_first_and_a_failure_is_named_before_anything_else() 
 @pytest.mark.slow
 def test_a_scene_cannot_write_into_the_demo() -> None:
     hostile = replace(
-        demo(), title=HOSTILE, source=HOSTILE, name=HOSTILE, left_out=[HOSTILE]
+        demo(),
+        title=HOSTILE,
+        source=HOSTILE,
+        name=HOSTILE,
+        left_out=[HOSTILE],
     )
     summary, text = report(
-        [hostile], sections=[Section("more", HOSTILE, HOSTILE, [HOSTILE], [[HOSTILE]])]
+        [hostile],
+        sections=[Section("more", HOSTILE, HOSTILE, [HOSTILE], [[HOSTILE]])],
     )
     assert "<img src=x" not in text
     assert len(re.findall("<script", text)) == 1
@@ -171,7 +176,9 @@ def test_a_scene_cannot_write_into_the_demo() -> None:
 @pytest.mark.slow
 def test_nothing_is_fetched() -> None:
     _, text = report(
-        copies(2), pictures={"scene-000": "iVBORw0KGgo="}, no_pictures="none"
+        copies(2),
+        pictures={"scene-000": "iVBORw0KGgo="},
+        no_pictures="none",
     )
     text = re.sub(r'xmlns(:xlink)?="[^"]*"', "", text)
     assert not re.search(r'(?:src|href)="(?!#|data:)', text)
@@ -232,10 +239,12 @@ def test_the_times_of_engines_are_those_of_the_run() -> None:
     for engine, timing in of_one.items():
         line = lines[OWN_CONSISTENCY if engine == "formulas" else engine]
         assert line.microseconds == pytest.approx(
-            2.0 * 1e6 * timing.seconds / 37, rel=1e-12
+            2.0 * 1e6 * timing.seconds / 37,
+            rel=1e-12,
         )
         assert line.times_formulas == pytest.approx(
-            timing.seconds / of_one["formulas"].seconds, rel=1e-12
+            timing.seconds / of_one["formulas"].seconds,
+            rel=1e-12,
         )
         assert WORK[engine] in unescape(report(scenes)[1]) and line.work == WORK[engine]
     refused = replace(demo().rows[0], engine="free-body", verdict=REFUSES)
@@ -260,7 +269,9 @@ def test_the_times_of_engines_are_those_of_the_run() -> None:
     ids=["positions", "one position", "released", "sweep"],
 )
 def test_every_kind_of_scene_is_drawn(
-    motion: fourbar.Motion, pictures: int, monkeypatch: pytest.MonkeyPatch
+    motion: fourbar.Motion,
+    pictures: int,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     judge_solve_alone(monkeypatch)
     engines = tuple(w for w in ENGINES if w.name == "free-body")
@@ -326,7 +337,8 @@ def test_many_scenes_give_a_short_report_of_the_worst(
 
 @pytest.mark.slow
 def test_every_engine_of_a_report_has_a_mark_of_its_own(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
     """Whoever is drawn first, and in whatever process: the engine says its number."""
     monkeypatch.setattr(svg, "STYLE_NUMBERS", {})
@@ -363,7 +375,8 @@ def test_every_engine_of_a_report_has_a_mark_of_its_own(
 
 
 def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """Beside the error what is allowed to it; a share of undecided numbers is no error.
 
@@ -435,7 +448,10 @@ def test_the_picture_shows_the_pin_force_that_fails() -> None:
     largest = max(sizes, key=sizes.__getitem__)
     other = min(sizes, key=sizes.__getitem__)
     answer = Answer(
-        "free-body", "exact", command(scene), quantities={"torque": solution.torque}
+        "free-body",
+        "exact",
+        command(scene),
+        quantities={"torque": solution.torque},
     )
     for name in PIN_FORCES:
         answer.quantities[name] = getattr(solution, name)
@@ -463,7 +479,8 @@ OF_MINE = Row(
 
 
 def test_failures_are_one_line_an_engine_and_cause(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """A mistake that explains more scenes is named first.
 

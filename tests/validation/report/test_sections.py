@@ -80,7 +80,8 @@ def test_a_failing_row_fails_its_family_in_the_report(tmp_path: Path) -> None:
 
 
 def test_the_report_of_the_hard_suite_has_its_picture_every_statement_and_every_limit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     picture = "<svg><text>the picture</text></svg>"
     monkeypatch.setattr(

@@ -36,7 +36,10 @@ def test_no_mark_stands_where_nothing_is_judged() -> None:
     whole = fourbar.solve(plain, "force")
     assert (whole.status_code == OK).all()
     answer = Answer(
-        "free-body", "exact", command(plain), quantities={"torque": whole.torque}
+        "free-body",
+        "exact",
+        command(plain),
+        quantities={"torque": whole.torque},
     )
     everywhere = count_marks(Record("all", plain, solution=whole, answers=[answer]))
     assert of_the_kite == everywhere - 1

@@ -74,5 +74,8 @@ def test_a_speed_without_a_scene_is_refused() -> None:
     arguments = [str(MODELS / "gripper.xml"), "--speed", "1"]
     with pytest.raises(UsageError, match="--speed goes with -o"):
         CliRunner().invoke(
-            robot_command, arguments, standalone_mode=False, catch_exceptions=False
+            robot_command,
+            arguments,
+            standalone_mode=False,
+            catch_exceptions=False,
         )

@@ -62,7 +62,8 @@ def test_includes_and_meshes_of_its_folder_are_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("where", ["beside", "assets"])
 def test_meshes_beside_it_and_of_the_option_are_read(
-    tmp_path: Path, where: str
+    tmp_path: Path,
+    where: str,
 ) -> None:
     path = make(tmp_path / "robot", meshdir="../meshes" if where == "beside" else "")
     elsewhere = tmp_path / ("meshes" if where == "beside" else "far/away")
@@ -137,7 +138,9 @@ def test_no_file_outside_is_opened(tmp_path: Path) -> None:
     ],
 )
 def test_what_a_file_may_not_hold_is_one_line(
-    tmp_path: Path, text: str | bytes, words: str
+    tmp_path: Path,
+    text: str | bytes,
+    words: str,
 ) -> None:
     path = tmp_path / "robot.xml"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
@@ -156,14 +159,16 @@ def assert_refused(path: Path, words: str) -> None:
     ["extension", "plugin", "attach", "model", "composite", "flexcomp", "flex"],
 )
 def test_what_reaches_beyond_the_file_is_refused_wherever_it_stands(
-    tmp_path: Path, tag: str
+    tmp_path: Path,
+    tag: str,
 ) -> None:
     path = make(tmp_path, inertial=INERTIAL + f"<body><{tag} name='x'/></body>")
     assert_refused(path, f"'<{tag}>': is not read here")
 
 
 def test_a_text_has_a_limit_alone_and_with_its_includes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     path = make(tmp_path, inertial=INERTIAL)
     sizes = [len(p.read_bytes()) for p in (path, tmp_path / "options.xml")]
@@ -176,7 +181,8 @@ def test_a_text_has_a_limit_alone_and_with_its_includes(
 
 
 def test_meshes_have_a_limit_together(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     path = make(tmp_path, meshdir="", inertial=INERTIAL)
     for name in ("part.obj", "other.obj"):
@@ -191,7 +197,8 @@ def test_meshes_have_a_limit_together(
 
 
 def test_includes_have_a_limit_in_number(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     path = make(tmp_path, inertial=INERTIAL)
     include = '<include file="options.xml"/>'

@@ -56,7 +56,10 @@ PAD = """<body pos="0 0.04 0"><joint name="pad"/><geom size="0.004"/></body>"""
 
 
 def write_upright(
-    folder: Path, polycoef: str = "0 1 0 0 0", sense: int = 1, pad: str = PAD
+    folder: Path,
+    polycoef: str = "0 1 0 0 0",
+    sense: int = 1,
+    pad: str = PAD,
 ) -> Path:
     path = folder / "upright.xml"
     path.write_text(UPRIGHT.format(polycoef=polycoef, sense=sense, pad=pad))
@@ -66,7 +69,10 @@ def write_upright(
 @pytest.mark.slow
 @pytest.mark.parametrize(("sense", "pad"), [(1, PAD), (1, ""), (-1, PAD), (-1, "")])
 def test_theta_2_is_counted_from_where_the_file_has_the_bar(
-    sense: int, pad: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    sense: int,
+    pad: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     report = measure_mimic(
         write_upright(tmp_path, sense=sense, pad=pad), "rocker_j", GRIPPER
@@ -159,7 +165,8 @@ def test_what_the_file_loses_through_its_own_zero(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_each_error_stands_with_its_name(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     show_mimic(measure_mimic(write(tmp_path), "s", KNEE))
     printed = capsys.readouterr().out
@@ -188,7 +195,9 @@ def test_the_printed_polynomial_does_in_mujoco_what_was_said(tmp_path: Path) -> 
     [(np.square, 1, 0.5), (np.abs, 2, 0.125), (lambda x: x**3, 2, 0.25)],
 )
 def test_the_smallest_largest_error_is_that_of_the_textbooks(
-    function: object, degree: int, smallest: float
+    function: object,
+    degree: int,
+    smallest: float,
 ) -> None:
     """Chebyshev's theorem.
 

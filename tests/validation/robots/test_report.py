@@ -76,7 +76,8 @@ def test_a_page_holds_sentences_tables_and_elements() -> None:
 
 @pytest.mark.slow
 def test_the_report_is_printed_and_written(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     report_measurement(measured(), Path("finger.xml"), tmp_path / "new")
     printed = capsys.readouterr().out

@@ -24,7 +24,8 @@ from tests.support.guests import PLAIN
 from tests.support.scenes import crank_rocker
 
 SCENE = crank_rocker(
-    motion=fourbar.Motion(fourbar.Sweep(0.1, 6.0, 30), 10.0, 5.0), loads=()
+    motion=fourbar.Motion(fourbar.Sweep(0.1, 6.0, 30), 10.0, 5.0),
+    loads=(),
 )
 SOLVER = PLAIN.partition("\nNAMES =")[0]
 TORQUE = '"torque": moments[0] - cross(r2, F32)'
@@ -272,7 +273,8 @@ def test_a_mistake_is_named_wherever_the_drive_acts(bar: int) -> None:
 
 @pytest.mark.parametrize(("pin", "bar"), [("A", 3), ("O4", 4), ("O4", 3)])
 def test_the_joint_of_a_driven_bar_carries_the_bars_behind_it(
-    pin: str, bar: int
+    pin: str,
+    bar: int,
 ) -> None:
     """The work of the weights in a tree is that of its torque.
 
@@ -347,7 +349,11 @@ class Misplaced:
         return Answer(self.name, "exact", at, assembled, numbers)
 
     def change(
-        self, scene: Scene, right: fourbar.Solution, i: int, load: fourbar.Load
+        self,
+        scene: Scene,
+        right: fourbar.Solution,
+        i: int,
+        load: fourbar.Load,
     ) -> fourbar.Load:
         raise NotImplementedError
 
@@ -356,7 +362,11 @@ class FromThePin(Misplaced):
     """Arms are measured from the bar's first pin."""
 
     def change(
-        self, scene: Scene, right: fourbar.Solution, i: int, load: fourbar.Load
+        self,
+        scene: Scene,
+        right: fourbar.Solution,
+        i: int,
+        load: fourbar.Load,
     ) -> fourbar.Load:
         first = {2: 0j, 3: complex(*right.A[i])}.get(load.bar)
         if first is None:
@@ -372,7 +382,11 @@ class FromG(Misplaced):
     """Places that are told from the bar's first pin are taken from G."""
 
     def change(
-        self, scene: Scene, right: fourbar.Solution, i: int, load: fourbar.Load
+        self,
+        scene: Scene,
+        right: fourbar.Solution,
+        i: int,
+        load: fourbar.Load,
     ) -> fourbar.Load:
         return replace(load, from_pin=None, from_centre=load.from_pin)
 
@@ -381,7 +395,11 @@ class Turning(Misplaced):
     """Forces of fixed direction turn with their bars."""
 
     def change(
-        self, scene: Scene, right: fourbar.Solution, i: int, load: fourbar.Load
+        self,
+        scene: Scene,
+        right: fourbar.Solution,
+        i: int,
+        load: fourbar.Load,
     ) -> fourbar.Load:
         size, direction = load.force
         theta = float(getattr(right, f"theta_{load.bar}")[i])
@@ -402,7 +420,9 @@ class Turning(Misplaced):
     ],
 )
 def test_a_load_that_acts_elsewhere_is_named(
-    guest: type, place: str, words: str
+    guest: type,
+    place: str,
+    words: str,
 ) -> None:
     motion = fourbar.Motion(fourbar.Sweep(0.1, 6.0, 8), 10.0)
     load = fourbar.Load(4, (3.0, 0.7), **{place: (0.05, 1.0)})

@@ -31,7 +31,12 @@ POSITIONS = np.array([0.14, 1.75, 4.03, 4.73])
 
 
 def bars(
-    d: float, a: float, b: float, c: float, theta_1: float = 0.0, r: float | None = None
+    d: float,
+    a: float,
+    b: float,
+    c: float,
+    theta_1: float = 0.0,
+    r: float | None = None,
 ) -> FourBar:
     far = None if r is None else (r, 0.35)
     return FourBar(d, Bar(a, 0.01), Bar(b, 1.0, centre=far), Bar(c, 0.5), theta_1)
@@ -39,7 +44,9 @@ def bars(
 
 SCENES = {
     "short input": Scene(
-        bars(0.5, 0.002, 0.48, 0.12), Motion(POSITIONS, 10.0), effects=(Gravity(),)
+        bars(0.5, 0.002, 0.48, 0.12),
+        Motion(POSITIONS, 10.0),
+        effects=(Gravity(),),
     ),
     "centre 100 m away": Scene(
         bars(0.2, 0.08, 0.18, 0.15, r=100.0), Motion(np.array([0.63, 0.94, 1.26]), 10.0)
@@ -93,7 +100,8 @@ def test_a_free_motion_near_a_limit_raises_no_alarm(
     monkeypatch.setattr(released, "FORWARD", {})
     scene = FAULT_SCENES["double rocker released"]
     often = replace(
-        scene, motion=scene.motion.replace(free=Free(1.0, 1000))
+        scene,
+        motion=scene.motion.replace(free=Free(1.0, 1000)),
     )  # nearer to its limits
     rows = judge("released", often, BY_ITSELF).rows
     assert not [row for row in rows if row.failed] and DEGRADED in {
@@ -194,7 +202,11 @@ class AboutCentres:
 
     @staticmethod
     def _solve(
-        scene: Scene, theta: float, omega: float, alpha: float, branch: int
+        scene: Scene,
+        theta: float,
+        omega: float,
+        alpha: float,
+        branch: int,
     ) -> dict[str, object]:
         d, a, b, c = scene.linkage.lengths
         O4 = d * np.exp(1j * scene.linkage.ground_angle)

@@ -47,7 +47,8 @@ def assert_same(out: Path, whole: Path) -> None:
 
 
 def test_parts_are_collected_into_the_bytes_of_a_whole_run(
-    parts: list[str], tmp_path: Path
+    parts: list[str],
+    tmp_path: Path,
 ) -> None:
     out = tmp_path / "all"
     assert status(["collect", *reversed(parts), "-o", str(out)]) == HOLDS
@@ -82,7 +83,9 @@ def refusal(line: list[str], capsys: pytest.CaptureFixture[str]) -> str:
 
 
 def test_what_is_missing_is_named_by_its_part(
-    parts: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    parts: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     out = ["-o", str(tmp_path / "all")]
     said = refusal(["collect", parts[0], parts[2], *out], capsys)
@@ -95,7 +98,9 @@ def test_what_is_missing_is_named_by_its_part(
 
 
 def test_parts_of_another_run_are_refused(
-    parts: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    parts: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     out, other = ["-o", str(tmp_path / "all")], str(tmp_path / "other")
     asked = [*OPTIONS, "--seed", "1", "--part", "2/3", "-o", other]
@@ -110,7 +115,9 @@ def test_parts_of_another_run_are_refused(
 
 
 def test_what_is_no_folder_of_a_part_is_refused(
-    parts: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    parts: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     line = ["collect", str(tmp_path), "-o", str(tmp_path / "all")]
     assert "must be a folder that `run --part` wrote" in refusal(line, capsys)
@@ -168,7 +175,8 @@ def test_a_part_is_k_of_n(text: str) -> None:
 
 
 def test_a_part_has_no_verdict_to_compare(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     line = ["run", *OPTIONS, "--part", "1/3", "--against", "accepted"]
     said = refusal([*line, "-o", str(tmp_path / "out")], capsys)

@@ -43,7 +43,10 @@ states itself; an engine that loses more than this has become worse.
 
 
 def find_spread_by_energy(
-    scene: Scene, solution: fourbar.Solution, instant: int, engine: str
+    scene: Scene,
+    solution: fourbar.Solution,
+    instant: int,
+    engine: str,
 ) -> float:
     """Find how far theta_2 goes apart, rad.
 
@@ -69,7 +72,9 @@ def find_spread_by_energy(
         speed = solution.omega_2[instant] * np.sqrt(1.0 + change / kinetic)
         rest = fourbar.Free(1.0 - times[instant], len(times) - 1 - instant)
         motion = fourbar.Motion(
-            float(solution.theta_2[instant]), float(speed), free=rest
+            float(solution.theta_2[instant]),
+            float(speed),
+            free=rest,
         )
         other = solve(replace(scene, motion=motion))
         apart = np.abs(other.theta_2 - solution.theta_2[instant:])
@@ -114,7 +119,10 @@ def test_a_linkage_that_friction_holds_beyond_a_change_point_is_judged_as_it_sta
     """The couples of dry friction that hold it are those of its own assembly."""
     friction = fourbar.effects.Friction.at(O2=5.0, A=5.0, B=5.0, O4=5.0)
     motion = fourbar.Motion(
-        np.radians(250.0), 0.0, branch=branch, free=fourbar.Free(0.1, 2)
+        np.radians(250.0),
+        0.0,
+        branch=branch,
+        free=fourbar.Free(0.1, 2),
     )
     scene = Scene(
         fourbar.uniform(0.3, 0.1, 0.3, 0.1),
@@ -163,7 +171,8 @@ def test_an_engine_that_stops_before_fails(monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.slow
 @pytest.mark.parametrize("index", [20, 60])
 def test_an_engine_that_is_nan_before_the_limit_or_behind_it_fails(
-    monkeypatch: pytest.MonkeyPatch, index: int
+    monkeypatch: pytest.MonkeyPatch,
+    index: int,
 ) -> None:
     def strike(answer: Any) -> Any:
         answer.theta_2[index] = np.nan

@@ -46,7 +46,10 @@ def save(folder: Path, rows: list[Row]) -> Recorded:
     ],
 )
 def test_a_failure_is_looked_up_in_an_earlier_run(
-    tmp_path: Path, before: list[Row], failure: Row, words: str
+    tmp_path: Path,
+    before: list[Row],
+    failure: Row,
+    words: str,
 ) -> None:
     earlier = save(tmp_path / "before", before)
     since = find_since(failure, earlier)
@@ -56,7 +59,8 @@ def test_a_failure_is_looked_up_in_an_earlier_run(
 
 
 def test_a_rule_that_is_weaker_than_before_stands_first(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Everything holds by the wider tolerance: the run is not green."""
     judge_here(monkeypatch)
@@ -79,7 +83,8 @@ def test_a_rule_that_is_weaker_than_before_stands_first(
 
 
 def test_the_verdict_says_since_when_of_the_failure_that_it_names(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The cause of most scenes is named.
 

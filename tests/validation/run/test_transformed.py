@@ -53,7 +53,9 @@ SCENES = {
     ),
     "bar 3 commanded": crank_rocker(
         motion=fourbar.Motion(
-            theta_3=fourbar.Sweep(0.4, 0.7, 12), omega_3=-2.0, branch=-1
+            theta_3=fourbar.Sweep(0.4, 0.7, 12),
+            omega_3=-2.0,
+            branch=-1,
         ),
         loads=LOADS,
     ),
@@ -74,7 +76,9 @@ def test_a_spring_whose_ends_nearly_meet_is_not_judged_there() -> None:
     for angles in (np.array([meet, 2.0, 2.5]), np.array([3.0, 2.0, 2.5])):
         motion = fourbar.Motion(angles, 10.0)
         scene = crank_rocker(
-            motion=motion, loads=(), effects=(fourbar.Springs((spring,)),)
+            motion=motion,
+            loads=(),
+            effects=(fourbar.Springs((spring,)),),
         )
         question = ask_engines("scene", scene, ())
         few = transformed._take_plain_positions(question)
@@ -117,7 +121,8 @@ def test_a_scene_has_the_same_numbers_however_it_is_stated(name: str) -> None:
     ids=("arm", "friction", "positions"),
 )
 def test_what_cannot_be_stated_otherwise_is_said_with_its_reason(
-    scene: fourbar.Scene, lines: list[str]
+    scene: fourbar.Scene,
+    lines: list[str],
 ) -> None:
     question = ask_engines("scene", scene, ())
     list(check_transformed(question))
@@ -137,7 +142,8 @@ CHANGE_POINTS = {
 @pytest.mark.parametrize("command", [2, 3, 4])
 @pytest.mark.parametrize("lengths", CHANGE_POINTS.values(), ids=CHANGE_POINTS)
 def test_an_assembly_through_change_points_is_the_same_however_it_is_stated(
-    lengths: tuple[float, ...], command: int
+    lengths: tuple[float, ...],
+    command: int,
 ) -> None:
     ground, *others = lengths
     bars = [fourbar.Bar(length, 0.8, centre=(0.3 * length, 0.2)) for length in others]
@@ -178,7 +184,8 @@ IN_LINE = (
 @pytest.mark.parametrize("gap", (0, 1, 2, 3, 5, 8, 13, 21, 31, 33, 64, 1000))
 @pytest.mark.parametrize("command", (2, 3, 4))
 def test_lengths_that_miss_a_change_point_by_roundings_are_the_same(
-    command: int, gap: int
+    command: int,
+    gap: int,
 ) -> None:
     """Rounding decides in each statement whether there is a change point."""
     judged = 0
@@ -219,7 +226,8 @@ def test_random_scenes_have_the_same_numbers(index: int) -> None:
 
 @pytest.mark.parametrize("name", TRANSFORMATIONS)
 def test_one_number_that_differs_fails_its_row(
-    name: str, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     solve = transformed.solve
     calls = []
@@ -258,7 +266,11 @@ def test_a_field_that_forgets_the_ground_fails_where_it_is_turned(
 
 def test_a_place_of_the_coupler_is_read_from_its_other_pin() -> None:
     linkage = FourBar(
-        0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22), ground_angle=0.2
+        0.3,
+        fourbar.Bar(0.1),
+        fourbar.Bar(0.25),
+        fourbar.Bar(0.22),
+        ground_angle=0.2,
     )
     to = _SceneConversion(exchanged=True)
     twice = to.place(to.place(Place(3, (0.07, 0.4)), linkage), linkage)

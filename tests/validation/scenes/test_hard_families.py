@@ -104,7 +104,8 @@ def _fewer(scene: Scene, steps: int = 12) -> Scene:
     sweep = scene.motion.theta_2
     assert isinstance(sweep, fourbar.Sweep)
     return replace(
-        scene, motion=scene.motion.replace(angle=replace(sweep, steps=steps))
+        scene,
+        motion=scene.motion.replace(angle=replace(sweep, steps=steps)),
     )
 
 
@@ -202,7 +203,9 @@ def test_an_answer_nearby_has_the_sine_of_the_formulas() -> None:
     nearby = make_nearby(HARD_ENGINES[0], near, command, formulas)
     assert nearby is not None
     np.testing.assert_allclose(
-        nearby(np.ones(3, dtype=bool))["sin_mu"], formulas.sin_mu, rtol=1e-15
+        nearby(np.ones(3, dtype=bool))["sin_mu"],
+        formulas.sin_mu,
+        rtol=1e-15,
     )
 
 
@@ -244,7 +247,8 @@ def test_the_balls_know_a_coupler_that_does_not_turn() -> None:
 
 @pytest.mark.parametrize("name", AT_CHANGE_POINTS)
 def test_the_file_opens_in_the_assembly_that_is_stated_beyond_a_change_point_too(
-    name: str, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     scene = AT_CHANGE_POINTS[name]
     row = compare_shipped(name, scene, fourbar.command(scene))
@@ -286,7 +290,9 @@ class AlmostRight(Spoiled):
 
 
 def verdict_of(
-    adapter: type, scene: Scene, predictor: Predictor | None
+    adapter: type,
+    scene: Scene,
+    predictor: Predictor | None,
 ) -> tuple[str, float]:
     tolerance = FULL_ACCURACY if predictor else _equivalence()
     engine = Engine("spoiled", adapter, tolerance, predictor=predictor)
@@ -339,7 +345,9 @@ def test_every_declared_limit_is_measured() -> None:
 
 @pytest.mark.parametrize("limit", MEASURED, ids=lambda limit: limit.of.name)
 def test_a_limit_is_where_it_was(
-    limit: Measured, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
+    limit: Measured,
+    tmp_path: Any,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A failure after an engine's upgrade means another limit.
 
@@ -413,7 +421,9 @@ def test_a_crank_that_does_not_turn_as_commanded_is_seen() -> None:
 
 @pytest.mark.parametrize("what", ["qvel", "qacc"])
 def test_a_reset_and_what_caused_it_are_seen(
-    what: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Any
+    what: str,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Any,
 ) -> None:
     """A state or an acceleration that MuJoCo takes for bad.
 
@@ -520,7 +530,8 @@ def test_a_golden_file_of_others_swept_through_its_change_point() -> None:
     ],
 )
 def test_the_file_as_shipped_is_driven_within_the_declared_limits_of_mujoco(
-    name: str, why: str | None
+    name: str,
+    why: str | None,
 ) -> None:
     suite = Hard()
     scene = next(

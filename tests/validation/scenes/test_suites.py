@@ -95,7 +95,9 @@ SUITE = read_default_suite()
 
 
 @pytest.mark.parametrize(
-    "index", range(len(SUITE)), ids=[SUITE.name(i) for i in range(len(SUITE))]
+    "index",
+    range(len(SUITE)),
+    ids=[SUITE.name(i) for i in range(len(SUITE))],
 )
 def test_every_scene_of_it_holds(index: int) -> None:
     rows = judge(SUITE.name(index), SUITE.scene(index), [FREE_BODY], order=False).rows
@@ -108,7 +110,9 @@ def test_every_scene_of_it_holds(index: int) -> None:
     [(6, 30, 6), (60, 30, 30), (1000, 30, 30), (6, 0, 0)],
 )
 def test_of_a_sample_what_else_is_shipped_is_judged(
-    count: int, sample: int, shipped: int
+    count: int,
+    sample: int,
+    shipped: int,
 ) -> None:
     suite = Random(count, 0, tuple(DrawnType))
     jobs = pool.make_jobs(suite, range(count), (), True, sample)

@@ -217,7 +217,8 @@ def choose_positions(scene: Scene) -> Command:
     )
     theta_2 = np.union1d(command.theta_2, between)
     return command._replace(
-        angle=theta_2, branch=np.full(theta_2.shape, command.branch[0], dtype=np.int8)
+        angle=theta_2,
+        branch=np.full(theta_2.shape, command.branch[0], dtype=np.int8),
     )
 
 
@@ -400,7 +401,11 @@ class _CheapestSearch:
         return [attempt for attempt in self.attempts if self._serves(attempt)]
 
     def _try(
-        self, n: float, tc: float, kind: KindOfStep | None = None, cost: float = 1.0
+        self,
+        n: float,
+        tc: float,
+        kind: KindOfStep | None = None,
+        cost: float = 1.0,
     ) -> SearchRun:
         settings = make_settings(n, tc)
         if kind is not None:
@@ -441,7 +446,9 @@ def _find_nearest(attempts: Sequence[SearchRun]) -> SearchRun:
 
 
 def _advise_robot(
-    files: tuple[Path, ...], options: MeasureOptions, assets: Path | None
+    files: tuple[Path, ...],
+    options: MeasureOptions,
+    assets: Path | None,
 ) -> int:
     """Print what to type into a robot's file for an error; return the exit status."""
     from fourbar.files import load

@@ -89,7 +89,10 @@ def judge_trial(scene: Scene, trial: Trial) -> WorstErrors:
 
 
 def _compute_errors_between(
-    scene: Scene, trial: Trial, samples: slice, steps: int
+    scene: Scene,
+    trial: Trial,
+    samples: slice,
+    steps: int,
 ) -> Iterator[WorstErrors]:
     """Compute errors between the steps of a segment, by a spline.
 
@@ -168,7 +171,9 @@ def _compute_stretch(
 
 
 def measure_influences(
-    scene: Scene, setup: TrialSetup, settings: Settings
+    scene: Scene,
+    setup: TrialSetup,
+    settings: Settings,
 ) -> list[SettingInfluence]:
     """List every setting changed alone, the one that matters most first."""
     before, before_at_steps = _measure_errors(scene, setup, settings)
@@ -186,12 +191,15 @@ def measure_influences(
         reason = why(setup, times, growth)
         influences.append(SettingInfluence(name, changed, worst, times, reason))
     return sorted(
-        influences, key=lambda one: -one.times if one.times == one.times else math.inf
+        influences,
+        key=lambda one: -one.times if one.times == one.times else math.inf,
     )
 
 
 def _measure_errors(
-    scene: Scene, setup: TrialSetup, settings: Settings
+    scene: Scene,
+    setup: TrialSetup,
+    settings: Settings,
 ) -> tuple[float, float]:
     """Return the worst error at the steps and between them, and at the steps alone."""
     trial = setup.try_out(settings)
@@ -212,14 +220,17 @@ def write_sentence(influences: list[SettingInfluence]) -> str:
 
 
 def _describe_setting(
-    scene: Scene, settings: Settings
+    scene: Scene,
+    settings: Settings,
 ) -> Iterator[tuple[str, str, Settings, Reason]]:
     """Say what is changed to what, and what a growth of the error would come from."""
     steps = settings.steps_per_revolution
     tc = settings.time_constant_steps
     window = max(settings.steps_per_window // 2, 1)
     coarse = replace(
-        settings, steps_per_revolution=steps / 2.0, steps_per_window=window
+        settings,
+        steps_per_revolution=steps / 2.0,
+        steps_per_window=window,
     )
     yield "the timestep", "twice as long", coarse, _explain_timestep
     if tc / 2.0 >= SHORTEST_TIME_CONSTANT / 2.0:

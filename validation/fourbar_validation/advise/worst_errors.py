@@ -46,7 +46,9 @@ INFINITE_ERRORS = WorstErrors(*[math.inf] * len(ERROR_NAMES))
 
 
 def compute_errors(
-    scene: Scene, command: Command, quantities: dict[str, Array]
+    scene: Scene,
+    command: Command,
+    quantities: dict[str, Array],
 ) -> WorstErrors:
     """Compute the errors of an answer at the motion that its engine really made.
 

@@ -64,11 +64,15 @@ class _BarWrenches(NamedTuple):
     """Bar on which the ground's couple acts."""
 
     def changed(
-        self, bar: int, p: Array | float = 0.0, q: Array | float = 0.0
+        self,
+        bar: int,
+        p: Array | float = 0.0,
+        q: Array | float = 0.0,
     ) -> "_BarWrenches":
         """Return the wrenches with more force and moment needed by one bar."""
         return self._replace(
-            p={**self.p, bar: self.p[bar] + p}, q={**self.q, bar: self.q[bar] + q}
+            p={**self.p, bar: self.p[bar] + p},
+            q={**self.q, bar: self.q[bar] + q},
         )
 
     def about_pin(self, bar: int) -> Array:
@@ -221,7 +225,10 @@ class _Calculation:
         for pin, values in trees.items():
             text = f"torque of the open tree, cut at {pin}: {how}"
             yield _state(
-                text, {"torque": values["torque"]}, whole=False, left=SOFT_TORQUE
+                text,
+                {"torque": values["torque"]},
+                whole=False,
+                left=SOFT_TORQUE,
             )
 
     def _frames(self) -> Iterator[Mistake]:
@@ -309,7 +316,11 @@ class _Calculation:
             yield from _state_with_forces(text, moved, wrenches)
 
     def _accelerate(
-        self, wrenches: _BarWrenches, bar: int, a: Array, alpha: Array | float = 0.0
+        self,
+        wrenches: _BarWrenches,
+        bar: int,
+        a: Array,
+        alpha: Array | float = 0.0,
     ) -> tuple[_BarWrenches, MistakenNumbers]:
         """Return the wrenches and a_G of a bar under an added acceleration.
 
@@ -386,7 +397,11 @@ def find_miscalculated(judge: Judge) -> Iterator[Mistake]:
 
 
 def _state(
-    text: str, values: MistakenNumbers, *, whole: bool = True, left: float = 0.0
+    text: str,
+    values: MistakenNumbers,
+    *,
+    whole: bool = True,
+    left: float = 0.0,
 ) -> Mistake:
     def predict(quantity: str, right: Solution) -> Array | None:
         return values.get(quantity)
@@ -395,7 +410,9 @@ def _state(
 
 
 def _state_with_forces(
-    text: str, moved: MistakenNumbers, wrenches: _BarWrenches
+    text: str,
+    moved: MistakenNumbers,
+    wrenches: _BarWrenches,
 ) -> Iterator[Mistake]:
     """State a mistake in accelerations.
 
@@ -493,7 +510,9 @@ def _find_other_branch(judge: Judge) -> Iterator[Mistake]:
         return
     try:
         other = solve(
-            judge.scene, judge.stage, at=judge.at._replace(branch=-judge.at.branch)
+            judge.scene,
+            judge.stage,
+            at=judge.at._replace(branch=-judge.at.branch),
         )
     except FourBarError:
         return

@@ -154,7 +154,9 @@ def _require_information(judge: Judge) -> None:
 
 
 def judge_table(
-    scene: Scene, table: TheirTable, tolerance: Allowance | None = None
+    scene: Scene,
+    table: TheirTable,
+    tolerance: Allowance | None = None,
 ) -> Judgement:
     """Judge every number of a table.
 
@@ -285,7 +287,10 @@ def _write_extent(explanation: Explanation) -> str:
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.argument("theirs", type=click.Path(path_type=Path))
 @click.option(
-    "--rtol", type=float, metavar="R", help="Allow this part of each number too."
+    "--rtol",
+    type=float,
+    metavar="R",
+    help="Allow this part of each number too.",
 )
 @click.option(
     "--atol",
@@ -399,7 +404,11 @@ def show_judgement(judgement: Judgement, table: TheirTable, name: str) -> None:
         ]
         console.print(
             make_words_table(
-                head, rows, title=title, show_edge=False, padding=(0, 1, 0, 0)
+                head,
+                rows,
+                title=title,
+                show_edge=False,
+                padding=(0, 1, 0, 0),
             )
         )
         counted = Counter(finding.quantity for finding in differing)

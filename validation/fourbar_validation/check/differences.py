@@ -82,7 +82,8 @@ class Difference:
 
 
 def find_differences(
-    generated: Mapping[str, ModelEntry], theirs: Mapping[str, ModelEntry]
+    generated: Mapping[str, ModelEntry],
+    theirs: Mapping[str, ModelEntry],
 ) -> list[Difference]:
     """Find what differs, in the order of their description."""
     length = max(
@@ -118,7 +119,9 @@ def find_differences(
 
 
 def price(
-    difference: Difference, rows: Sequence[Row], unchanged: Sequence[Row]
+    difference: Difference,
+    rows: Sequence[Row],
+    unchanged: Sequence[Row],
 ) -> Difference:
     """Put the cost on a difference: what it adds to the worst error of a force.
 
@@ -173,7 +176,10 @@ def _is_length(key: str) -> bool:
 
 
 def _is_same_value(
-    key: str, ours: Value | None, theirs: Value | None, length: float
+    key: str,
+    ours: Value | None,
+    theirs: Value | None,
+    length: float,
 ) -> bool:
     if (
         isinstance(ours, str)

@@ -107,7 +107,12 @@ def _find_ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
 
 
 def _name_ratio(
-    judge: Judge, key: str, announced: str, factor: float, unit: str, near: float
+    judge: Judge,
+    key: str,
+    announced: str,
+    factor: float,
+    unit: str,
+    near: float,
 ) -> tuple[str, float] | None:
     for unit_tried in OTHER_UNITS.get(unit, ()):
         ratio = math.copysign(factor / find_factor(unit, unit_tried), near)
@@ -261,10 +266,14 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
 
 
 def _scale_bars(
-    scene: Scene, which: Sequence[str], change: Callable[[Bar, float], Bar], f: float
+    scene: Scene,
+    which: Sequence[str],
+    change: Callable[[Bar, float], Bar],
+    f: float,
 ) -> Scene:
     return replace_bars(
-        scene, **{bar: change(getattr(scene.linkage, bar), f) for bar in which}
+        scene,
+        **{bar: change(getattr(scene.linkage, bar), f) for bar in which},
     )
 
 
@@ -333,7 +342,8 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
         return
     tried = 2.0 * np.pi * np.arange(1, OFFSETS_TRIED) / OFFSETS_TRIED
     sizes = np.mean(
-        np.minimum(np.abs(np.nan_to_num(residuals(tried, rows), nan=1.0)), 1.0), axis=1
+        np.minimum(np.abs(np.nan_to_num(residuals(tried, rows), nan=1.0)), 1.0),
+        axis=1,
     )
     offset = float(tried[np.argmin(sizes)])
     everything = np.arange(len(judge.at.theta_2))

@@ -213,7 +213,11 @@ class Judge:
         )
 
     def explained(
-        self, key: str, predicted: Array, times: float = 1.0, left: float = 0.0
+        self,
+        key: str,
+        predicted: Array,
+        times: float = 1.0,
+        left: float = 0.0,
     ) -> bool:
         """Return whether all numbers of a key are as `predicted`.
 
@@ -295,7 +299,10 @@ def make_command(scene: Scene, table: TheirTable) -> Command:
         )
     theta_2 = table.theta_2
     if base.theta_2.shape == theta_2.shape and np.allclose(
-        base.theta_2, theta_2, rtol=_AS_PRINTED, atol=0.0
+        base.theta_2,
+        theta_2,
+        rtol=_AS_PRINTED,
+        atol=0.0,
     ):
         return base
     if scene.motion.law is not None:

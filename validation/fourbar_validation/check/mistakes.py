@@ -109,7 +109,8 @@ def _scale_inertial(scene: Scene, command: Command) -> Iterator[Mistake]:
     )
 
     def scaled(
-        by_mass: float, by_inertia: float
+        by_mass: float,
+        by_inertia: float,
     ) -> Callable[[str, Solution], Array | None]:
         def predict(quantity: str, right: Solution) -> Array | None:
             if quantity not in FORCE_NAMES:
@@ -143,7 +144,8 @@ def _scale_inertial(scene: Scene, command: Command) -> Iterator[Mistake]:
 
 
 def _list_other_problems(
-    scene: Scene, command: Command
+    scene: Scene,
+    command: Command,
 ) -> Iterator[tuple[str, Scene, Command]]:
     """List scenes and commands that mistakes amount to.
 
@@ -302,7 +304,8 @@ _BAR_MISTAKES: tuple[tuple[str, Callable[[Bar], Bar | None]], ...] = (
         "inertia about the pin used as the inertia about G",
         lambda bar: (
             replace(
-                bar, inertia=bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2
+                bar,
+                inertia=bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2,
             )
             if bar.mass
             else None
@@ -389,7 +392,9 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
         for key in table.values:
             predicted = mistake.prediction(key, judge.right)
             if predicted is None or np.array_equal(
-                predicted, judge.ours(key), equal_nan=True
+                predicted,
+                judge.ours(key),
+                equal_nan=True,
             ):
                 continue
             if judge.explained(key, predicted, mistake.times, mistake.left):

@@ -366,7 +366,11 @@ def write_model_page(report: ModelReport, mjcf: Path) -> str:
 
 @click.command(name="check-mjcf")
 @click.argument(
-    "files", metavar="[SCENE] FILE.xml", nargs=-1, required=True, type=ROBOT_PATH
+    "files",
+    metavar="[SCENE] FILE.xml",
+    nargs=-1,
+    required=True,
+    type=ROBOT_PATH,
 )
 @click.option(
     "--name",
@@ -460,7 +464,10 @@ def check_mjcf_command(
 
 
 def _is_robot(
-    mjcf: Path, names: tuple[str, ...], assets: Path | None, robot: Mapping[str, Any]
+    mjcf: Path,
+    names: tuple[str, ...],
+    assets: Path | None,
+    robot: Mapping[str, Any],
 ) -> bool:
     """Tell whether a file is to be measured as a robot.
 

@@ -104,7 +104,8 @@ def _read_document(path: str | Path, schema: str) -> dict[str, Any]:
 
 
 def judge_answers(
-    problem: dict[str, Any], answered: dict[str, Any]
+    problem: dict[str, Any],
+    answered: dict[str, Any],
 ) -> list[JudgedQuantity]:
     """Judge every quantity that a problem asks for.
 
@@ -123,7 +124,8 @@ def judge_answers(
 
 
 def _answer_at(
-    problem: dict[str, Any], motion: Any
+    problem: dict[str, Any],
+    motion: Any,
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Evaluate the reference at the motion that an engine really made."""
     if problem["mechanism"] != "four-bar" or problem["ask"] != "answer":

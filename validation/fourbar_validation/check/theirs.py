@@ -327,7 +327,11 @@ def _read_degrees(
 
 
 def _enter_column(
-    table: TheirTable, name: str, unit: Unit, numbers: Array, halves: Array
+    table: TheirTable,
+    name: str,
+    unit: Unit,
+    numbers: Array,
+    halves: Array,
 ) -> None:
     """Enter a column into the table, a component into its vector."""
     halves = np.where(np.isnan(numbers), 0.0, halves)
@@ -457,7 +461,9 @@ def _is_unit_line(cells: list[str]) -> bool:
 
 
 def _read_headings(
-    path: Path, headings: list[str], unit_line: list[str]
+    path: Path,
+    headings: list[str],
+    unit_line: list[str],
 ) -> tuple[dict[int, tuple[str, Unit]], dict[str, str], dict[str, str]]:
     """Return each column's name and unit by its place in a row.
 

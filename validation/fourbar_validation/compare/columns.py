@@ -179,7 +179,8 @@ def _read_parquet(path: Path, columns: list[str], files: ExitStack) -> Any:
     import pyarrow.parquet as pq
 
     return files.enter_context(pq.ParquetFile(path)).iter_batches(
-        BATCH_ROWS, columns=columns
+        BATCH_ROWS,
+        columns=columns,
     )
 
 

@@ -287,7 +287,10 @@ class Comparison:
         """
         tolerance = self.demands.tolerance
         return mark_reversing(
-            self.scene, self.formulas, tolerance.factor, in_time=tolerance.in_time
+            self.scene,
+            self.formulas,
+            tolerance.factor,
+            in_time=tolerance.in_time,
         )
 
     def _may_reverse(self, quantity: str) -> bool:
@@ -507,7 +510,8 @@ class Comparison:
                 )
                 self.scales[name] = size, condition
         scales, conditions = zip(
-            *(self.scales[name] for name in quantities), strict=True
+            *(self.scales[name] for name in quantities),
+            strict=True,
         )
         return np.stack(scales), np.stack(conditions)
 
@@ -605,7 +609,9 @@ def _find_worst_used(errors: Errors) -> NDArray[np.intp]:
 
 
 def judge_errors(
-    errors: Errors, predicted: Array | None, method: str = ""
+    errors: Errors,
+    predicted: Array | None,
+    method: str = "",
 ) -> _WorstPosition:
     """Judge errors by the allowed error.
 

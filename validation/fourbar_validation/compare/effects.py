@@ -73,7 +73,9 @@ def _find_friction(friction: "Friction", linkage: FourBar, _: Solution) -> float
 
 
 def _find_pin_friction(
-    friction: "PinFriction", linkage: FourBar, formulas: Solution
+    friction: "PinFriction",
+    linkage: FourBar,
+    formulas: Solution,
 ) -> Any:
     def load(pin: str) -> Array:
         return np.nan_to_num(magnitude(getattr(formulas, PIN_FORCE[pin])))

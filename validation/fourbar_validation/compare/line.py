@@ -107,7 +107,9 @@ class DriveLine(NamedTuple):
 
 
 def place_line(
-    linkage: FourBar, drive: "ForceDrive", theta: dict[int, Array]
+    linkage: FourBar,
+    drive: "ForceDrive",
+    theta: dict[int, Array],
 ) -> DriveLine:
     """Place the ends at angles of bars 2, 3, 4, each (n,)."""
     directions = {bar: np.exp(1j * angle) for bar, angle in theta.items()}

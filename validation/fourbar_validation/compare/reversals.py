@@ -58,7 +58,9 @@ class Reversal:
 
 
 def find_reversals(
-    scene: Scene, command: Command, solution: Solution
+    scene: Scene,
+    command: Command,
+    solution: Solution,
 ) -> list[Reversal]:
     """Find every reversal between two positions of a sweep, in their order.
 
@@ -93,7 +95,11 @@ def find_reversals(
 
 
 def mark_reversing(
-    scene: Scene, solution: Solution, slip: float, *, in_time: bool = False
+    scene: Scene,
+    solution: Solution,
+    slip: float,
+    *,
+    in_time: bool = False,
 ) -> NDArray[np.bool_]:
     """Mark where a dry pin of a moving linkage slips little, (n,).
 
@@ -107,7 +113,8 @@ def mark_reversing(
         mask |= _mark_resting(solution, pin, slip)
         if in_time:
             speeds = np.max(
-                [np.abs(_compute_speeds(solution)[bar]) for bar in MOVING_BARS], axis=0
+                [np.abs(_compute_speeds(solution)[bar]) for bar in MOVING_BARS],
+                axis=0,
             )
             speeds = np.nan_to_num(speeds)
             mask |= speeds <= slip * speeds.max()
@@ -152,7 +159,12 @@ def _compute_speeds(solution: Solution) -> dict[int, Any]:
 
 
 def _locate_reversal(
-    scene: Scene, command: Command, pin: str, i: int, j: int, slip: float
+    scene: Scene,
+    command: Command,
+    pin: str,
+    i: int,
+    j: int,
+    slip: float,
 ) -> Reversal:
     """Locate the reversal between positions i and j by bisection.
 

@@ -190,7 +190,10 @@ class Row:
 
 
 def make_breakdown(
-    scene: str, engine: str, error: BaseException, part: str = ""
+    scene: str,
+    engine: str,
+    error: BaseException,
+    part: str = "",
 ) -> Row:
     """Make the row of an engine that broke down.
 
@@ -271,7 +274,8 @@ RESULT_COLUMNS = tuple(column.name for column in fields(Row))
 def sort_rows(rows: Iterable[Row]) -> list[Row]:
     """Sort rows by scene, engine, setting and quantity."""
     return sorted(
-        rows, key=lambda row: (row.scene, row.engine, row.setting, row.quantity)
+        rows,
+        key=lambda row: (row.scene, row.engine, row.setting, row.quantity),
     )
 
 

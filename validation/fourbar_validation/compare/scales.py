@@ -356,7 +356,9 @@ def _find_line_of_drive(
 
 
 def _find_velocities(
-    linkage: FourBar, theta: dict[int, Array], known: dict[str, Any]
+    linkage: FourBar,
+    theta: dict[int, Array],
+    known: dict[str, Any],
 ) -> dict[str, Array]:
     """Find the speeds of A, B and the mass centres, m/s.
 
@@ -383,7 +385,10 @@ def _find_velocities(
 
 
 def take_strictest_condition(
-    quantity: str, linkage: FourBar, formulas: Solution, reference: Solution | None
+    quantity: str,
+    linkage: FourBar,
+    formulas: Solution,
+    reference: Solution | None,
 ) -> Array:
     """Take the better of two conditions of a quantity at each position, (n,).
 
@@ -396,7 +401,9 @@ def take_strictest_condition(
 
 
 def take_smallest_scales(
-    quantities: Sequence[str], ours: TermSizes, theirs: TermSizes | None
+    quantities: Sequence[str],
+    ours: TermSizes,
+    theirs: TermSizes | None,
 ) -> Array:
     """Take the smaller of two sizes of each quantity at each position, (q, n)."""
     values = [getattr(ours.formulas, quantity) for quantity in quantities]

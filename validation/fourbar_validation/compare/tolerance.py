@@ -143,7 +143,9 @@ def hold_simulated(error: float, why: str) -> ErrorBound:
             "--error", error, "must be a relative error, above 0 and below 1"
         )
     return replace(
-        SIMULATED, factor=error, reason=f"{error:g} of the scale, as wanted: {why}"
+        SIMULATED,
+        factor=error,
+        reason=f"{error:g} of the scale, as wanted: {why}",
     )
 
 
@@ -267,7 +269,9 @@ def magnitude(values: Array) -> Array:
 
 
 def compute_differences(
-    quantities: Sequence[str], ours: Sequence[Array], theirs: Sequence[Array]
+    quantities: Sequence[str],
+    ours: Sequence[Array],
+    theirs: Sequence[Array],
 ) -> Array:
     """Compute the differences of several quantities, (q, n).
 

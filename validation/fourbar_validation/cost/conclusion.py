@@ -71,7 +71,9 @@ def write_one_digit(value: float) -> str:
 
 
 def conclude(
-    curves: Curves, laws: Sequence[ErrorLaw], influences: list[SettingInfluence]
+    curves: Curves,
+    laws: Sequence[ErrorLaw],
+    influences: list[SettingInfluence],
 ) -> list[str]:
     """Write the conclusion, at most ten lines."""
     return [

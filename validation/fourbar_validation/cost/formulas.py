@@ -134,7 +134,9 @@ def make_bodies(scene: Scene, command: Command) -> thirteen.EquationTerms:
 
 
 def evaluate_balls(
-    scene: Scene, command: Command, bits: int = FIFTY_DIGITS
+    scene: Scene,
+    command: Command,
+    bits: int = FIFTY_DIGITS,
 ) -> QuantityValues:
     """Evaluate balls of the independent reference, (n,) objects."""
     from flint import arb, ctx
@@ -147,7 +149,9 @@ def evaluate_balls(
     try:
         outputs = []
         for theta_2, branch in zip(
-            command.theta_2.tolist(), command.branch.tolist(), strict=True
+            command.theta_2.tolist(),
+            command.branch.tolist(),
+            strict=True,
         ):
             x = {
                 name: arb(value)
@@ -176,7 +180,10 @@ def compare_with_reference(
         sizes = scale_of(name, scene, formulas, getattr(formulas, name))
         errors = []
         for ours, exact, size in zip(
-            quantities[name], reference[name], sizes.tolist(), strict=True
+            quantities[name],
+            reference[name],
+            sizes.tolist(),
+            strict=True,
         ):
             pairs = (
                 ((ours, exact),)

@@ -155,7 +155,8 @@ def find_floor(points: Sequence[CostPoint], quantity: str) -> float | None:
 
 
 def _find_steps_at_floor(
-    points: Sequence[CostPoint], quantity: str
+    points: Sequence[CostPoint],
+    quantity: str,
 ) -> CostPoint | None:
     """Find the first point of a ladder from which its error stays near its last."""
     floor = find_floor(points, quantity)
@@ -390,7 +391,8 @@ def find_pareto(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
     """
     front: list[CostPoint] = []
     for point in sorted(
-        points, key=lambda p: (p.seconds_per_second, getattr(p.errors, quantity))
+        points,
+        key=lambda p: (p.seconds_per_second, getattr(p.errors, quantity)),
     ):
         error = getattr(point.errors, quantity)
         if math.isfinite(error) and (

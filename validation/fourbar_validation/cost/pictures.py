@@ -144,7 +144,11 @@ def make_pictures(curves: Curves, title: str) -> dict[str, Any]:
 
 
 def _draw_look(
-    axes: Any, x: Sequence[float], y: Sequence[float], label: str, look: Look
+    axes: Any,
+    x: Sequence[float],
+    y: Sequence[float],
+    label: str,
+    look: Look,
 ) -> None:
     """Draw a curve in its colour, with its marker and line."""
     axes.plot(
@@ -175,7 +179,10 @@ def make_figure(height: float, statement: str, title: str) -> Any:
         wrap=True,
     )
     figure.text(
-        *(0.02, 1.0 - 0.52 / height, title), fontsize=TEXT, color=SOFT, va="top"
+        *(0.02, 1.0 - 0.52 / height, title),
+        fontsize=TEXT,
+        color=SOFT,
+        va="top",
     )
     return figure
 
@@ -245,7 +252,8 @@ def draw_work_precision(curves: Curves, quantity: str, title: str) -> Any:
     for point in (point for row in curves.values() for point in row):
         _mark_exact(labels, axes, point, quantity)
     axes.set_ylabel(
-        f"error of the {QUANTITY_WORDS[quantity]}, of its scale", labelpad=1.0
+        f"error of the {QUANTITY_WORDS[quantity]}, of its scale",
+        labelpad=1.0,
     )
     set_axes(axes)
     axes.set_ylim(_LOWEST / 4.0, 3.0)
@@ -257,7 +265,8 @@ def draw_work_precision(curves: Curves, quantity: str, title: str) -> Any:
 
 
 def _locate(
-    points: Sequence[CostPoint], quantity: str
+    points: Sequence[CostPoint],
+    quantity: str,
 ) -> tuple[list[float], list[float]]:
     """Return ms of a simulated second, and errors.
 
@@ -277,7 +286,11 @@ def _name_time(axes: Any, front: Sequence[CostPoint]) -> None:
 
 
 def _name_point(
-    labels: Labels, axes: Any, point: CostPoint, quantity: str, text: str
+    labels: Labels,
+    axes: Any,
+    point: CostPoint,
+    quantity: str,
+    text: str,
 ) -> None:
     """Write next to a point, where it covers nothing."""
     (x,), (y,) = _locate([point], quantity)
@@ -541,7 +554,12 @@ def draw_orders(curves: Curves, title: str) -> Any:
     figure = make_figure(height, state_jumps(curves), title)
     panels = figure.subplots(3, 2, sharex=True, sharey=True)
     figure.subplots_adjust(
-        left=0.135, right=0.98, bottom=0.065, top=0.81, wspace=0.08, hspace=0.2
+        left=0.135,
+        right=0.98,
+        bottom=0.065,
+        top=0.81,
+        wspace=0.08,
+        hspace=0.2,
     )
     flat = panels.ravel()
     for axes, quantity in zip(flat, ERROR_NAMES, strict=False):

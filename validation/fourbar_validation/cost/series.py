@@ -183,7 +183,9 @@ def _vary_default_closure(integrator: str, speed: float) -> Curve:
             )
         )
     return replace(
-        curve, spots=tuple(sorted(spots, key=lambda spot: spot.x)), settled=True
+        curve,
+        spots=tuple(sorted(spots, key=lambda spot: spot.x)),
+        settled=True,
     )
 
 

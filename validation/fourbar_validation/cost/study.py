@@ -168,7 +168,10 @@ class CostStudy:
                 yield name, points
 
     def setup(
-        self, slow: bool = False, bare: bool = False, settled: bool = False
+        self,
+        slow: bool = False,
+        bare: bool = False,
+        settled: bool = False,
     ) -> TrialSetup:
         """Assemble the scene for trials.
 
@@ -355,7 +358,8 @@ class CostStudy:
         points = []
         rows = sorted(row for segment in self.setup().segments for row in segment)
         command = self.command._replace(
-            angle=self.command.theta_2[rows], branch=self.command.branch[rows]
+            angle=self.command.theta_2[rows],
+            branch=self.command.branch[rows],
         )
         for label, make in loops.items():
             try:
@@ -395,7 +399,8 @@ class CostStudy:
             assert answer.assembled is not None
             rows = np.flatnonzero(answer.assembled)
             command = self.command._replace(
-                angle=self.command.theta_2[rows], branch=self.command.branch[rows]
+                angle=self.command.theta_2[rows],
+                branch=self.command.branch[rows],
             )
             quantities = {name: x[rows] for name, x in answer.quantities.items()}
             errors = compute_errors(self.scene, command, quantities)
@@ -441,7 +446,8 @@ def time_call(action: Callable[[], object], calls: int = 1) -> float:
 
 
 def time_in_turns(
-    clocks: Mapping[Any, Callable[[], Clocked]], rounds: int
+    clocks: Mapping[Any, Callable[[], Clocked]],
+    rounds: int,
 ) -> dict[Any, list[Clocked]]:
     """Read the clocks in turns, there and back.
 

@@ -40,5 +40,9 @@ def remove_angles(command: Command) -> Command:
     unknown = np.full_like(command.angle, np.nan)
     speed = None if command.speed is None else unknown
     return command._replace(
-        angle=unknown, speed=speed, acceleration=unknown, condition=None, lost=None
+        angle=unknown,
+        speed=speed,
+        acceleration=unknown,
+        condition=None,
+        lost=None,
     )

@@ -85,7 +85,9 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
     values = {"d": d, "a": a, "b": b, "c": c, "theta_1": link.ground_angle}
     values |= dict(
         zip(
-            motion.names, (angle, motion.speed or 0.0, motion.acceleration), strict=True
+            motion.names,
+            (angle, motion.speed or 0.0, motion.acceleration),
+            strict=True,
         )
     )
     if scene.drive is not None:
@@ -145,7 +147,10 @@ def find_stated(scene: Scene, place: Place) -> Place:
 
 
 def _collect_place(
-    scene: Scene, place: Place, distance: str, angle: str
+    scene: Scene,
+    place: Place,
+    distance: str,
+    angle: str,
 ) -> dict[str, float]:
     """Collect the two numbers that state a place, under two names."""
     stated = find_stated(scene, place)
@@ -189,7 +194,8 @@ def make_balls(scene: Scene, angle: float, **motion: float) -> BallValues:
 
 
 def compute_directions(
-    x: BallValues, branch: int
+    x: BallValues,
+    branch: int,
 ) -> tuple[ComplexBall, ComplexBall, ComplexBall] | None:
     """Return e^{i theta_2}, e^{i theta_3}, e^{i theta_4}.
 
@@ -401,7 +407,9 @@ def _move_balls(x: BallValues, w: dict[int, ComplexBall], commanded: int) -> _Ba
 
 
 def _sum_acting_balls(
-    scene: Scene, x: BallValues, bars: _BallBars
+    scene: Scene,
+    x: BallValues,
+    bars: _BallBars,
 ) -> tuple[dict[int, ComplexBall], dict[int, Ball]]:
     """Sum what acts on each bar: a force, and a moment about the mass centre."""
     w, first_pin, centre = bars.directions(x), bars.first_pin, bars.centre
@@ -684,7 +692,10 @@ def _find_line(scene: Scene, x: BallValues, bars_in_motion: _BallBars) -> _BallL
 
 
 def _compute_condition(
-    line: _BallLine, x: BallValues, tip: ComplexBall, sines: dict[int, Ball]
+    line: _BallLine,
+    x: BallValues,
+    tip: ComplexBall,
+    sines: dict[int, Ball],
 ) -> Ball:
     """Compute |P|/L.
 

@@ -82,7 +82,9 @@ def rotate(angle: float, x: float, y: float) -> tuple[float, float]:
 
 
 def rotate_by(
-    rotation: Sequence[Sequence[float]], x: float, y: float
+    rotation: Sequence[Sequence[float]],
+    x: float,
+    y: float,
 ) -> tuple[float, float]:
     """Rotate a vector by a matrix of two rows."""
     (a, b), (c, d) = rotation
@@ -198,7 +200,10 @@ def declares(effect: Effect, method: str) -> bool:
 
 
 def find_unknown(
-    scene: Scene, knows: Callable[[Any], bool], *, forces: bool = False
+    scene: Scene,
+    knows: Callable[[Any], bool],
+    *,
+    forces: bool = False,
 ) -> str:
     """Give the reason to refuse a scene with an unknown effect.
 

@@ -126,7 +126,8 @@ class FreeBody:
                 for block in blocks
             ]
             answer.evidence["residual"] = max(
-                (residual for _, residual in parts), default=0.0
+                (residual for _, residual in parts),
+                default=0.0,
             )
             for name in parts[0][0] if parts else ():
                 answer.quantities[name] = np.concatenate(
@@ -136,7 +137,10 @@ class FreeBody:
 
 
 def _compute_places(
-    linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array
+    linkage: FourBar,
+    theta_2: Array,
+    theta_3: Array,
+    theta_4: Array,
 ) -> dict[str, Array]:
     """Compute the angles of bars 3 and 4, their sine, and the points.
 
@@ -267,7 +271,8 @@ def speeds_and_accelerations(
     round_ = {2: u_2, 3: u_3, 4: -u_4}  # bar 4 is gone along from B to O4
     others = [number for number in MOVING_BARS if number != bar]
     jacobian = np.stack(
-        [_stack_components(round_[number]) for number in others], axis=-1
+        [_stack_components(round_[number]) for number in others],
+        axis=-1,
     )
 
     def rates(stated: Array, centripetal: ComplexArray) -> dict[int, Array]:
@@ -318,7 +323,8 @@ def balance(scene: Scene, motion: BodyMotion) -> tuple[Array, float, Array | flo
 
 
 def _solve_unit_couples(
-    scene: Scene, motion: BodyMotion
+    scene: Scene,
+    motion: BodyMotion,
 ) -> tuple[Array, ComplexArray, Array, float]:
     """Solve without sliding friction and per N m of it at each pin, (n, 13, 1 + p).
 
@@ -503,7 +509,10 @@ def continue_couples(F: ComplexArray, C: ComplexArray, k: Array) -> Array:
 
 
 def _compute_distance_from_jamming(
-    F: ComplexArray, C: ComplexArray, k: Array, x: Array
+    F: ComplexArray,
+    C: ComplexArray,
+    k: Array,
+    x: Array,
 ) -> Array:
     """Compute the least singular value of the Jacobian, at most 1, (n,).
 
@@ -520,7 +529,10 @@ def _compute_distance_from_jamming(
 
 
 def _compute_friction_jacobian(
-    F: ComplexArray, C: ComplexArray, k: Array, x: Array
+    F: ComplexArray,
+    C: ComplexArray,
+    k: Array,
+    x: Array,
 ) -> tuple[Array, Array]:
     """Compute the pin forces under couples, (n, p), N, and the Jacobian.
 
@@ -533,7 +545,10 @@ def _compute_friction_jacobian(
 
 
 def _solve_couples(
-    F: ComplexArray, C: ComplexArray, k: Array, x: Array
+    F: ComplexArray,
+    C: ComplexArray,
+    k: Array,
+    x: Array,
 ) -> tuple[Array, NDArray[np.bool_], Array]:
     """Solve by Newton's method from couples `x`.
 

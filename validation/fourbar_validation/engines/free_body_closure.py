@@ -56,7 +56,10 @@ class Closed(NamedTuple):
 
 
 def close(
-    linkage: FourBar, theta: Array, branch: NDArray[np.int8], bar: int = 2
+    linkage: FourBar,
+    theta: Array,
+    branch: NDArray[np.int8],
+    bar: int = 2,
 ) -> Closed:
     """Close the loop by Newton's method.
 
@@ -130,7 +133,8 @@ def _solve_newton(
     """
 
     def look(
-        theta: Array, indices: NDArray[np.intp]
+        theta: Array,
+        indices: NDArray[np.intp],
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray, Array]:
         u_3, u_4 = np.exp(1j * theta)
         gap = b * u_3 - c * u_4 - diagonal[indices]
@@ -196,7 +200,8 @@ def measure_cylinder(scene: Scene) -> tuple[complex, complex]:
     drive = scene.drive
     assert drive is not None and drive.has_stroke
     on_ground, on_bar = sorted(
-        (place for _, place in drive.ends), key=lambda place: place.bar
+        (place for _, place in drive.ends),
+        key=lambda place: place.bar,
     )
     d = scene.linkage.ground
     theta_1 = scene.linkage.ground_angle
@@ -211,7 +216,10 @@ def measure_cylinder(scene: Scene) -> tuple[complex, complex]:
 
 
 def find_angle(
-    command: Command, motion: Motion, arm: complex, ground: complex
+    command: Command,
+    motion: Motion,
+    arm: complex,
+    ground: complex,
 ) -> Command:
     """Find the bar's angle where its cylinder has the stroke, and its rates.
 

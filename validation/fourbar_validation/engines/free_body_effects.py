@@ -134,7 +134,9 @@ def _apply_gravity(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> N
 
 
 def _add_viscous_couple(
-    effect: Any, motion: BodyMotion, wrenches: BodyWrenches
+    effect: Any,
+    motion: BodyMotion,
+    wrenches: BodyWrenches,
 ) -> None:
     """Couple -k (omega_j - omega_i)."""
     for pin, k in effect.coefficients:
@@ -142,7 +144,9 @@ def _add_viscous_couple(
 
 
 def _add_friction_couple(
-    effect: Any, motion: BodyMotion, wrenches: BodyWrenches
+    effect: Any,
+    motion: BodyMotion,
+    wrenches: BodyWrenches,
 ) -> None:
     """Couple -f sign(omega_j - omega_i), none at rest."""
     for pin, f in effect.torques:
@@ -150,7 +154,9 @@ def _add_friction_couple(
 
 
 def _add_torsion_couple(
-    effect: Any, motion: BodyMotion, wrenches: BodyWrenches
+    effect: Any,
+    motion: BodyMotion,
+    wrenches: BodyWrenches,
 ) -> None:
     """Apply the couple -(preload + k (theta_j - theta_i - rest)).
 
@@ -199,7 +205,9 @@ def _add_spring_pulls(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -
 
 
 def _add_flywheel_couple(
-    effect: Any, motion: BodyMotion, wrenches: BodyWrenches
+    effect: Any,
+    motion: BodyMotion,
+    wrenches: BodyWrenches,
 ) -> None:
     """Couple -J alpha (d'Alembert)."""
     wrenches.couple(effect.bar, -effect.inertia * motion.alpha[effect.bar])

@@ -98,7 +98,9 @@ class Guest(Engine):
 
 
 def read_guests(
-    entries: Sequence[str], known: Iterable[str], seconds: float | None = None
+    entries: Sequence[str],
+    known: Iterable[str],
+    seconds: float | None = None,
 ) -> tuple[Guest, ...]:
     """Start each guest of the command line and read its hello.
 
@@ -110,7 +112,8 @@ def read_guests(
 
 
 def name_guests(
-    entries: Sequence[tuple[str, str, Program]], known: Iterable[str]
+    entries: Sequence[tuple[str, str, Program]],
+    known: Iterable[str],
 ) -> tuple[Guest, ...]:
     """Read the hello of programs, and name them apart.
 
@@ -202,7 +205,9 @@ def _make_program(entry: str, seconds: float | None = None) -> Program:
 
 
 def serve_adapter(
-    entry: str, seconds: float | None = None, python: str = sys.executable
+    entry: str,
+    seconds: float | None = None,
+    python: str = sys.executable,
 ) -> Program:
     """Make the program that serves one of our adapters, or a class of the user's."""
     if CHECKOUT is None:
@@ -255,7 +260,9 @@ def _read_hello(data: dict[str, Any]) -> Hello:
     """Check the hello of an engine; InputError names what is wrong."""
 
     def texts(
-        name: str, default: tuple[str, ...], allowed: Sequence[str] | None = None
+        name: str,
+        default: tuple[str, ...],
+        allowed: Sequence[str] | None = None,
     ) -> tuple[str, ...]:
         values = data.get(name, list(default))
         if not isinstance(values, list) or not all(

@@ -110,7 +110,9 @@ def find_exceeded(scene: Scene, speed: float) -> str | None:
 
 
 def compute_least_sine(
-    linkage: FourBar, theta_2: NDArray[np.float64], assembled: NDArray[np.bool_]
+    linkage: FourBar,
+    theta_2: NDArray[np.float64],
+    assembled: NDArray[np.bool_],
 ) -> float:
     """Compute the least |sin(theta_4 - theta_3)| between assembled neighbours.
 

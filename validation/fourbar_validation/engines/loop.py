@@ -147,7 +147,11 @@ def _compute_triangle_angle(e: float, near: float, far: float) -> float:
 
 
 def _turn_others(
-    q: JointAngles, bar: int, theta_3: float, one: float, other: float
+    q: JointAngles,
+    bar: int,
+    theta_3: float,
+    one: float,
+    other: float,
 ) -> JointAngles:
     """Turn the two bars that close the loop, the commanded one held.
 
@@ -161,7 +165,11 @@ def _turn_others(
 
 
 def _close_gap(
-    tree: Assembled, q: JointAngles, branch: int, closed: float, bar: int = 2
+    tree: Assembled,
+    q: JointAngles,
+    branch: int,
+    closed: float,
+    bar: int = 2,
 ) -> JointAngles | None:
     """Close the gap with a bar held, never leaving the branch.
 
@@ -269,7 +277,12 @@ class Exact:
         for name in ANGLES:
             out[name][assembled] = np.unwrap(out[name][assembled])
         answer = Answer(
-            self.name, "exact", asked, assembled, out, evidence={"closure_gap": gap}
+            self.name,
+            "exact",
+            asked,
+            assembled,
+            out,
+            evidence={"closure_gap": gap},
         )
         answer.shared, answer.own, answer.seconds = (
             SHARED_BY_EXACT_ENGINES,
@@ -286,7 +299,10 @@ the commanded bar.
 
 
 def read_each(
-    bars: Assembled, command: Command, names: Iterable[str], read: Read
+    bars: Assembled,
+    command: Command,
+    names: Iterable[str],
+    read: Read,
 ) -> tuple[dict[str, Array], NDArray[np.bool_], float]:
     """Read each position that assembles, NaN elsewhere.
 
@@ -319,14 +335,16 @@ MADE = ("theta_2", "omega_2", "alpha_2")
 
 
 def make_blank(
-    n: int, names: Iterable[str] = (*MADE, "torque", *PIN_FORCES)
+    n: int,
+    names: Iterable[str] = (*MADE, "torque", *PIN_FORCES),
 ) -> dict[str, Array]:
     """Return NaN for each of n positions, (n,) or (n, 2)."""
     return {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}
 
 
 def split_answer(
-    out: dict[str, Array], branch: NDArray[np.int8]
+    out: dict[str, Array],
+    branch: NDArray[np.int8],
 ) -> tuple[Command, dict[str, Array]]:
     """Split what was read into a command and the other quantities.
 

@@ -133,7 +133,9 @@ class PinocchioTree(Tree):
         ]
 
     def needed(
-        self, field: tuple[float, float], wrenches: dict[int, list[float]]
+        self,
+        field: tuple[float, float],
+        wrenches: dict[int, list[float]],
     ) -> Array:
         """Compute recursive Newton-Euler.
 
@@ -213,7 +215,10 @@ class ClosedTree:
         self.proximal = pin.ProximalSettings(*PROXIMAL_SETTINGS)
 
     def start(
-        self, theta_2: float, branch: int, omega_2: float
+        self,
+        theta_2: float,
+        branch: int,
+        omega_2: float,
     ) -> tuple[Array, Array] | None:
         """Assemble at the speeds that keep the loop closed.
 

@@ -51,14 +51,20 @@ first order can cancel.
 
 
 def predict_from_data(
-    scene: Scene, command: Command, quantity: str, mask: Mask | None = None
+    scene: Scene,
+    command: Command,
+    quantity: str,
+    mask: Mask | None = None,
 ) -> Array:
     """Predict for a derivation that works in angles and lengths themselves."""
     return _predict_error(scene, command, quantity, 0.0, mask)
 
 
 def predict_in_world_axes(
-    scene: Scene, command: Command, quantity: str, mask: Mask | None = None
+    scene: Scene,
+    command: Command,
+    quantity: str,
+    mask: Mask | None = None,
 ) -> Array:
     """Predict for an engine that differences points in world axes.
 
@@ -68,7 +74,10 @@ def predict_in_world_axes(
 
 
 def predict_about_mass_centre(
-    scene: Scene, command: Command, quantity: str, mask: Mask | None = None
+    scene: Scene,
+    command: Command,
+    quantity: str,
+    mask: Mask | None = None,
 ) -> Array:
     """Predict for an engine that moves a tree about the common mass centre.
 
@@ -89,7 +98,10 @@ def predict_about_mass_centre(
 
 
 def predict_for_any_method(
-    scene: Scene, command: Command, quantity: str, mask: Mask | None = None
+    scene: Scene,
+    command: Command,
+    quantity: str,
+    mask: Mask | None = None,
 ) -> Array:
     """Predict for an engine whose method nobody states: the worst of those above.
 
@@ -232,7 +244,11 @@ class Sensitivities(NamedTuple):
 
 @lru_cache(maxsize=8192)
 def _compute_sensitivity(
-    scene: Scene, theta_2: float, branch: int, omega_2: float, alpha_2: float
+    scene: Scene,
+    theta_2: float,
+    branch: int,
+    omega_2: float,
+    alpha_2: float,
 ) -> Sensitivities | None:
     """Compute the sensitivities at one position; None where the loop does not close."""
     from flint import acb, arb
@@ -301,7 +317,9 @@ def _weigh_inputs(stored: dict[str, float]) -> dict[str, float]:
 
 
 def compute_reference(
-    scene: Scene, branch: int, angle: float
+    scene: Scene,
+    branch: int,
+    angle: float,
 ) -> "tuple[BallValues, dict[str, float]] | None":
     """Compute values at one position as balls, and sum |x_i dy/dx_i| of each.
 
@@ -355,7 +373,9 @@ def _add_responses(
 
 
 def _add_response(
-    total: dict[str, float], base: "BallValues", moved: "BallValues | None"
+    total: dict[str, float],
+    base: "BallValues",
+    moved: "BallValues | None",
 ) -> None:
     """Add how far each output moves, in parts of 2^-STEP_BITS.
 

@@ -178,7 +178,12 @@ def _take_printed() -> str:
         if getattr(getattr(sys, name), "closed", True):
             # line by line, in the order of what libraries print
             stream = open(  # noqa: SIM115
-                descriptor, "w", 1, "utf-8", "backslashreplace", closefd=False
+                descriptor,
+                "w",
+                1,
+                "utf-8",
+                "backslashreplace",
+                closefd=False,
             )
             setattr(sys, name, stream)
     return escape_controls(text.decode(errors="backslashreplace"))
@@ -302,7 +307,9 @@ class Running:
         most = LONGEST_ANSWER + _BYTES_PER_POSITION * positions
         answered = threading.Event()
         watch = threading.Thread(
-            target=self._watch, args=(process, seconds, answered), daemon=True
+            target=self._watch,
+            args=(process, seconds, answered),
+            daemon=True,
         )
         watch.start()
         try:
@@ -326,7 +333,9 @@ class Running:
         said = write_one_line(reply[:OUTPUT_KEPT].decode(errors="backslashreplace"))
         try:
             data = json.loads(
-                reply, object_pairs_hook=_make_object, parse_constant=_refuse_constant
+                reply,
+                object_pairs_hook=_make_object,
+                parse_constant=_refuse_constant,
             )
         except (ValueError, RecursionError) as error:
             raise EngineError(
@@ -391,7 +400,10 @@ class Running:
         return text
 
     def _find_end(
-        self, process: "subprocess.Popen[bytes]", reply: bytes, most: int
+        self,
+        process: "subprocess.Popen[bytes]",
+        reply: bytes,
+        most: int,
     ) -> EngineError:
         """Say in one line how a program ended, or that it did not end its line."""
         if self._stopped:

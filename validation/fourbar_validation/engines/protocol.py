@@ -429,7 +429,11 @@ def _read_object(name: str, data: dict[str, Any]) -> list[tuple[str, Any]]:
 
 
 def _read_values(
-    table: str, name: str, value: Any, n: int, vectors: Iterable[str] = VECTORS
+    table: str,
+    name: str,
+    value: Any,
+    n: int,
+    vectors: Iterable[str] = VECTORS,
 ) -> Array:
     """Read n numbers, or n pairs of them; null becomes NaN."""
     pairs = name in vectors
@@ -503,7 +507,11 @@ def read_answered_motion(data: Any, command: Command) -> Command:
         else:
             acceleration = 0.0
     made = Command(
-        _read_list(names[0], data[names[0]], n), branch, speed, acceleration, bar=bar
+        _read_list(names[0], data[names[0]], n),
+        branch,
+        speed,
+        acceleration,
+        bar=bar,
     )
     if (
         command.stroke is not None
@@ -550,7 +558,11 @@ def require_near(made: Command, command: Command) -> None:
     allowances = (_FURTHEST, _FURTHEST + faster - 1.0, _FURTHEST + faster**2 - 1.0)
     names = ("angle", "speed", "acceleration")
     for key, name, size, most in zip(
-        COMMAND_NAMES[command.bar], names, sizes, allowances, strict=True
+        COMMAND_NAMES[command.bar],
+        names,
+        sizes,
+        allowances,
+        strict=True,
     ):
         value = getattr(made, name)
         commanded = getattr(command, name)

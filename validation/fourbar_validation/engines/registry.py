@@ -252,7 +252,11 @@ ENGINES = (
 
 
 BALLS = Engine(
-    "ball-arithmetic", BallArithmetic, FULL_ACCURACY, nearby=True, library="flint"
+    "ball-arithmetic",
+    BallArithmetic,
+    FULL_ACCURACY,
+    nearby=True,
+    library="flint",
 )
 
 
@@ -272,7 +276,9 @@ def hold_fully(engine: Engine) -> Engine:
     else:
         unstated = predict_for_any_method
     return replace(
-        engine, tolerance=FULL_ACCURACY, predictor=engine.predictor or unstated
+        engine,
+        tolerance=FULL_ACCURACY,
+        predictor=engine.predictor or unstated,
     )
 
 
@@ -351,7 +357,10 @@ def make_demands(
 
 
 def make_prediction(
-    engine: Engine, scene: Scene, command: Command, answer: Answer
+    engine: Engine,
+    scene: Scene,
+    command: Command,
+    answer: Answer,
 ) -> Predicted | None:
     """Give what computes the errors to be expected, should any be asked for.
 
@@ -376,7 +385,10 @@ def make_prediction(
 
 
 def make_nearby(
-    engine: Engine, scene: Scene, command: Command, formulas: Solution
+    engine: Engine,
+    scene: Scene,
+    command: Command,
+    formulas: Solution,
 ) -> Nearby | None:
     """Give what answers within the rounding of the stated theta_2.
 

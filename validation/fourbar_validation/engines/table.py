@@ -72,7 +72,9 @@ def _ready(engine: Engine, _: Collection[str]) -> Engine:
 
 
 def _start_environment(
-    entry: Entry, seconds: float | None, taken: Collection[str]
+    entry: Entry,
+    seconds: float | None,
+    taken: Collection[str],
 ) -> Engine:
     """Make the environment of an engine of engines.toml and read its hello."""
     ours = {engine.name: engine for engine in (*ENGINES, *load_further())}
@@ -80,7 +82,8 @@ def _start_environment(
 
 
 def choose_engines(
-    names: str | None, table: dict[str, _Listed] | None = None
+    names: str | None,
+    table: dict[str, _Listed] | None = None,
 ) -> tuple[Engine, ...]:
     """Choose the engines named in a comma-separated list, and every guest.
 

@@ -89,7 +89,9 @@ class Tree(Loaded, Protocol):
         """Return those of points at the motion last set, [x, y] of each, m/s^2."""
 
     def needed(
-        self, field: tuple[float, float], wrenches: dict[int, list[float]]
+        self,
+        field: tuple[float, float],
+        wrenches: dict[int, list[float]],
     ) -> Array:
         """Return the generalized forces of the motion last set, (3,), N m.
 
@@ -248,7 +250,11 @@ _BAR_2 = np.array([1.0, 0.0, 0.0])
 
 
 def solve_closed(
-    jacobian: Array, rate: float, turn: Array = _BAR_2, x: float = 0.0, y: float = 0.0
+    jacobian: Array,
+    rate: float,
+    turn: Array = _BAR_2,
+    x: float = 0.0,
+    y: float = 0.0,
 ) -> Array:
     """Solve J rates + (x, y) = 0, turn . rates = rate.
 

@@ -66,7 +66,9 @@ class Tasks:
         """Hand in an item; NoWorkersError where the pool is broken."""
         try:
             task: Future[Any] = self.pool.schedule(
-                self.function, args=(item,), timeout=self.seconds
+                self.function,
+                args=(item,),
+                timeout=self.seconds,
             )
         except RuntimeError:
             raise _lost_workers() from None
@@ -95,7 +97,10 @@ class Tasks:
         return task.result() if error is None else error
 
     def outcomes(
-        self, items: Sequence[Any], tasks: "Sequence[Future[Any]]", instead: _Instead
+        self,
+        items: Sequence[Any],
+        tasks: "Sequence[Future[Any]]",
+        instead: _Instead,
     ) -> list[Any]:
         """Return the results of items in order.
 
@@ -123,12 +128,18 @@ def fail(_: object, error: BaseException, __: TaskFunction) -> NoReturn:
 
 
 def apply_each(
-    function: Callable[[Any], Any], items: Iterable[Any], workers: int
+    function: Callable[[Any], Any],
+    items: Iterable[Any],
+    workers: int,
 ) -> Iterator[Any]:
     """Apply the function to each item, however long it takes; results in order."""
     chunks = enumerate([item] for item in items)
     for _, results in apply_over_processes(
-        function, chunks, workers, seconds=None, instead=fail
+        function,
+        chunks,
+        workers,
+        seconds=None,
+        instead=fail,
     ):
         yield from results
 
@@ -156,7 +167,9 @@ def apply_over_processes(
         tasks = Tasks(pool, function, seconds)
 
         def finish(
-            number: int, items: Sequence[Any], waiting: Sequence[Future[Any]]
+            number: int,
+            items: Sequence[Any],
+            waiting: Sequence[Future[Any]],
         ) -> tuple[int, list[Any]]:
             return number, tasks.outcomes(items, waiting, instead)
 

@@ -179,7 +179,8 @@ class Kinematics:
 
 
 def make_equations(
-    errors: ProgramErrors, inertias: tuple[float, float] | None = None
+    errors: ProgramErrors,
+    inertias: tuple[float, float] | None = None,
 ) -> tuple[Array, Array]:
     """Make matrix and right side of section 5.7 at theta_2 = 135 deg, N and N cm.
 
@@ -228,7 +229,8 @@ def make_equations(
 
 
 def compute_thesis_program(
-    errors: ProgramErrors, inertias: tuple[float, float] | None = None
+    errors: ProgramErrors,
+    inertias: tuple[float, float] | None = None,
 ) -> dict[str, float]:
     """Compute the 13 unknowns of section 5.7 at theta_2 = 135 deg, N and N cm."""
     unknowns = np.linalg.solve(*make_equations(errors, inertias))
@@ -236,7 +238,8 @@ def compute_thesis_program(
 
 
 def bound_round_off(
-    errors: ProgramErrors, inertias: tuple[float, float] | None = None
+    errors: ProgramErrors,
+    inertias: tuple[float, float] | None = None,
 ) -> dict[str, float]:
     """Bound how far an elimination of these equations may be off, N and N cm.
 

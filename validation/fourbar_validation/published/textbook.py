@@ -76,7 +76,8 @@ def compute_value(solution: fourbar.Solution, quantity: str, position: int) -> f
     if name == "v_A":
         assert solution.omega_2 is not None
         values = solution.omega_2[:, None] * np.stack(
-            [-solution.A[:, 1], solution.A[:, 0]], axis=1
+            [-solution.A[:, 1], solution.A[:, 0]],
+            axis=1,
         )
     else:
         values = getattr(solution, name)

@@ -61,7 +61,8 @@ def assemble_equations(bodies: EquationTerms, drive_bar: int) -> tuple[Array, Ar
         right[:, row : row + 2] = bodies.inertia_force[bar]
         right[:, row + 2] = bodies.inertia_moment[bar]
     for row, (force, reaction) in enumerate(
-        ((F32, F23), (F32 + 1, F23 + 1), (F43, F34), (F43 + 1, F34 + 1)), start=9
+        ((F32, F23), (F32 + 1, F23 + 1), (F43, F34), (F43 + 1, F34 + 1)),
+        start=9,
     ):
         matrix[:, row, force] = matrix[:, row, reaction] = 1.0
     return matrix, right

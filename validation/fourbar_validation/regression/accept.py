@@ -42,7 +42,10 @@ CommandFunction = Callable[..., Any]
 
 
 def append(
-    file: Path, about: About, rows: list[Row], times: Mapping[tuple[str, str], float]
+    file: Path,
+    about: About,
+    rows: list[Row],
+    times: Mapping[tuple[str, str], float],
 ) -> None:
     """Append a run to the table, which is made if there is none.
 
@@ -56,7 +59,8 @@ def append(
     if file.exists():
         try:
             old = pq.read_table(
-                pa.BufferReader(file.read_bytes()), page_checksum_verification=True
+                pa.BufferReader(file.read_bytes()),
+                page_checksum_verification=True,
             )
             if table["run"][0].as_py() in set(old["run"].to_pylist()):
                 return
@@ -72,7 +76,9 @@ def append(
 
 
 def _write_record_table(
-    about: About, rows: list[Row], times: Mapping[tuple[str, str], float]
+    about: About,
+    rows: list[Row],
+    times: Mapping[tuple[str, str], float],
 ) -> Any:
     """Write a run as columns; a text that recurs is kept once."""
     import pyarrow as pa
@@ -186,7 +192,10 @@ def report_differences(
     )
     engines = set(after.words("engine"))
     scenes = track(
-        after.scenes(keep), "comparing", console=Console(stderr=True), transient=True
+        after.scenes(keep),
+        "comparing",
+        console=Console(stderr=True),
+        transient=True,
     )
     differences = compare_runs(
         (before.about, before.scenes(keep)), (after.about, scenes), engines
@@ -320,7 +329,10 @@ def _require_as_strict(run: Recorded, target: Path) -> None:
     help="Accept a run that is held to weaker rules than the accepted one.",
 )
 def accept_command(
-    results: Path, to: Path | None, even_failing: bool, allow_weaker: bool
+    results: Path,
+    to: Path | None,
+    even_failing: bool,
+    allow_weaker: bool,
 ) -> None:
     """Record a run as the accepted state.
 

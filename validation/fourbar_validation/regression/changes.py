@@ -137,7 +137,9 @@ class Differences:
             same_kind.append(change)
             if len(same_kind) > 2 * self.kept:
                 self._changes[change.kind] = nlargest(
-                    self.kept, same_kind, key=lambda one: one.severity
+                    self.kept,
+                    same_kind,
+                    key=lambda one: one.severity,
                 )
 
     def _hold_rules(self, old: Row, new: Row) -> None:
@@ -154,7 +156,9 @@ class Differences:
     def of(self, kind: KindOfChange) -> list[Change]:
         """List the changes of one kind, the worst first; at most `kept` of them."""
         return nlargest(
-            self.kept, self._changes.get(kind, ()), key=lambda one: one.severity
+            self.kept,
+            self._changes.get(kind, ()),
+            key=lambda one: one.severity,
         )
 
     @property
@@ -288,7 +292,8 @@ def compare_runs(
 
 
 def _rename_scenes(
-    scenes: _ByScene[PerScene], names: Mapping[str, str]
+    scenes: _ByScene[PerScene],
+    names: Mapping[str, str],
 ) -> _ByScene[PerScene]:
     """Return the old run's scenes under the new run's names.
 
@@ -303,7 +308,8 @@ def _rename_scenes(
 
 
 def _merge_scenes(
-    old: _ByScene[PerScene], new: _ByScene[PerScene]
+    old: _ByScene[PerScene],
+    new: _ByScene[PerScene],
 ) -> Iterator[tuple[str, Sequence[PerScene], Sequence[PerScene]]]:
     """Yield each scene that either run has, with what both have of it.
 
@@ -320,7 +326,8 @@ def _merge_scenes(
 
 
 def _require_order(
-    run: str, scenes: _ByScene[PerScene]
+    run: str,
+    scenes: _ByScene[PerScene],
 ) -> Iterator[tuple[str, str, Sequence[PerScene]]]:
     last = None
     for scene, rows in scenes:
@@ -336,7 +343,8 @@ def _require_order(
 
 def _index_rows(scene: str, rows: Iterable[Row]) -> dict[Key, Row]:
     worst_last = sorted(
-        rows, key=lambda row: VERDICTS.index(row.verdict)
+        rows,
+        key=lambda row: VERDICTS.index(row.verdict),
     )  # the worse of two rows of one name counts
     return {(scene, row.engine, row.setting, row.quantity): row for row in worst_last}
 
@@ -366,14 +374,19 @@ def _compare_scene(
         new = after.get(renamed.get(key, key))
         changes.append(
             compare_row(
-                key, before.get(key), new, asked=key[1] in engines, differs=differs
+                key,
+                before.get(key),
+                new,
+                asked=key[1] in engines,
+                differs=differs,
             )
         )
     return changes
 
 
 def _pair_settings(
-    before: Mapping[Key, Row], after: Mapping[Key, Row]
+    before: Mapping[Key, Row],
+    after: Mapping[Key, Row],
 ) -> dict[Key, Key]:
     """Pair the rows that each run has with a single setting of its own.
 
@@ -396,7 +409,8 @@ def _pair_settings(
 
 
 def _list_surroundings(
-    old: About, new: About
+    old: About,
+    new: About,
 ) -> tuple[list[tuple[str, str, str]], list[str]]:
     """List what the runs were made with if it differs.
 
@@ -429,7 +443,8 @@ def _list_surroundings(
 
 
 def _take_both(
-    old: Mapping[str, str], new: Mapping[str, str]
+    old: Mapping[str, str],
+    new: Mapping[str, str],
 ) -> list[tuple[str, str, str]]:
     unstated = "not recorded"
     return [

@@ -155,7 +155,10 @@ def _hash_own(kept: Mapping[str, Any]) -> str:
 
 
 def _require_undamaged(
-    tables: Mapping[str, Mapping[str, Any]], folder: Path, read: str, key: str
+    tables: Mapping[str, Mapping[str, Any]],
+    folder: Path,
+    read: str,
+    key: str,
 ) -> None:
     """Raise an InputError that names the first damaged table of a folder.
 
@@ -219,11 +222,13 @@ class Recorded:
         yield from self._read(read_columns(self.table))
 
     def scenes(
-        self, keep: Callable[[Row], bool] = lambda _: True
+        self,
+        keep: Callable[[Row], bool] = lambda _: True,
     ) -> Iterator[tuple[str, list[Row]]]:
         """Read the rows that are wanted, scene by scene."""
         for scene, some in groupby(
-            filter(keep, self.rows()), key=lambda row: row.scene
+            filter(keep, self.rows()),
+            key=lambda row: row.scene,
         ):
             yield scene, list(some)
 
@@ -242,7 +247,8 @@ class Recorded:
         try:
             with table.open(newline="", encoding="utf-8") as file:
                 for scene, some in groupby(
-                    csv.DictReader(file), key=lambda row: row["scene"]
+                    csv.DictReader(file),
+                    key=lambda row: row["scene"],
                 ):
                     yield (
                         escape_controls(read_cell_text(scene)),

@@ -226,7 +226,11 @@ def _render_differences(
         "headings": CHANGE_HEADINGS,
     }
     return render(
-        "fourbar_validation.regression", name, found=diff, kinds=kinds, **what
+        "fourbar_validation.regression",
+        name,
+        found=diff,
+        kinds=kinds,
+        **what,
     )
 
 

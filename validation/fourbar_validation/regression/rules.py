@@ -108,7 +108,8 @@ def list_weakened(old: Mapping[str, Mapping[str, str]], new: Rules) -> list[Weak
             if before[what] != after[what] and _is_weaker(what, before, after):
                 weakened.append(Weakening(name, what, before[what], after[what]))
     return sorted(
-        weakened, key=lambda one: (one.name, one.what != FACTOR_CHANGED, one.what)
+        weakened,
+        key=lambda one: (one.name, one.what != FACTOR_CHANGED, one.what),
     )
 
 

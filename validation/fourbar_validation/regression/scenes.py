@@ -99,7 +99,8 @@ def _write_unit_once(old: str, new: str) -> str:
 
 
 def find_renamed(
-    old: Mapping[str, SceneEntries], new: Mapping[str, SceneEntries]
+    old: Mapping[str, SceneEntries],
+    new: Mapping[str, SceneEntries],
 ) -> dict[str, str]:
     """Find the scenes that state the same under another name.
 
@@ -116,7 +117,8 @@ def find_renamed(
 
 
 def list_scene_changes(
-    old: Mapping[str, SceneEntries], new: Mapping[str, SceneEntries]
+    old: Mapping[str, SceneEntries],
+    new: Mapping[str, SceneEntries],
 ) -> list[SceneChange]:
     """List the scenes of both runs that ask something else now."""
     changes = []

@@ -147,7 +147,10 @@ def _choose_force(record: Record, solution: Solution) -> str:
 
 
 def _draw_quantity(
-    quantity: str, record: Record, solution: Solution, answers: list[Answer]
+    quantity: str,
+    record: Record,
+    solution: Solution,
+    answers: list[Answer],
 ) -> str:
     from matplotlib.figure import Figure
 
@@ -168,7 +171,8 @@ def _draw_quantity(
     for below, group in zip(axes[1:], groups, strict=True):
         _draw_errors(below, quantity, record, solution, group)
         below.set_ylabel(
-            "error / scale" if quantity in FORCE_NAMES else "error (rad)", fontsize=8.5
+            "error / scale" if quantity in FORCE_NAMES else "error (rad)",
+            fontsize=8.5,
         )
     axes[-1].set_xlabel("time (s)" if solution.time is not None else "θ₂ (°)")
     figure.align_ylabels(axes)
@@ -297,7 +301,8 @@ def _draw_errors(
 
 
 def find_worst_of_segments(
-    error: Array, phase: float
+    error: Array,
+    phase: float,
 ) -> np.ndarray[Any, np.dtype[np.intp]]:
     """Find the index of the largest error in each of STRETCHES stretches.
 

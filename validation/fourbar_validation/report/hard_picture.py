@@ -87,7 +87,9 @@ def list_approaches() -> list[Approach]:
 
 
 def list_errors(
-    scene: Scene, quantity: str, engine: Engine
+    scene: Scene,
+    quantity: str,
+    engine: Engine,
 ) -> tuple[Array, Array] | None:
     """Return (theta_2, error relative to the value itself) of one engine.
 
@@ -127,7 +129,10 @@ def draw_picture() -> str:
     columns = list_approaches()
     figure = Figure(figsize=(10.5, 6.4), layout="constrained", facecolor="none")
     axes = figure.subplots(
-        len(QUANTITIES_DRAWN), len(columns), squeeze=False, sharex="col"
+        len(QUANTITIES_DRAWN),
+        len(columns),
+        squeeze=False,
+        sharex="col",
     )
     for column, approach in enumerate(columns):
         for row, quantity in enumerate(QUANTITIES_DRAWN):
@@ -138,7 +143,12 @@ def draw_picture() -> str:
         axes[row][0].set_ylabel(f"error of {quantity}, of its own size")
     handles, labels = axes[0][0].get_legend_handles_labels()
     figure.legend(
-        handles, labels, loc="outside upper center", ncols=4, frameon=False, fontsize=8
+        handles,
+        labels,
+        loc="outside upper center",
+        ncols=4,
+        frameon=False,
+        fontsize=8,
     )
     return write_svg(figure, "where it gets hard")
 

@@ -227,7 +227,9 @@ def write_summary_page(summary: Summary) -> str:
 
 
 def _make_scene_view(
-    scene: Record, first_line: int, pictures: Mapping[str, str]
+    scene: Record,
+    first_line: int,
+    pictures: Mapping[str, str],
 ) -> _SceneView:
     rows = sort_rows(scene.rows)
     cells = [
@@ -237,7 +239,8 @@ def _make_scene_view(
         )
     ]
     ranked = sorted(
-        reversed(cells), key=lambda cell: (cell.row.compared, cell.used)
+        reversed(cells),
+        key=lambda cell: (cell.row.compared, cell.used),
     )  # the last cell of a place stays
     by_place = {(cell.row.quantity, cell.row.engine): cell for cell in ranked}
     # a share of undecided numbers is no error, unless it fails

@@ -63,7 +63,9 @@ def collect_sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
         links = [(f"{HARD_FOLDER}/report.html",) * 2]
         sections.append(
             replace(
-                section, text=f"From the run in {HARD_FOLDER}/: {_MUST}", links=links
+                section,
+                text=f"From the run in {HARD_FOLDER}/: {_MUST}",
+                links=links,
             )
         )
     folders = sorted(path.parent for path in (out / _COST).glob("*/cost.csv"))

@@ -352,7 +352,8 @@ class Summary:
         if self.judged > _WORST_SHOWN:
             return nlargest(_WORST_SHOWN, self._worst, key=lambda w: w.used)
         return sorted(
-            self._worst, key=lambda w: (w.row.scene, w.row.engine, w.row.setting)
+            self._worst,
+            key=lambda w: (w.row.scene, w.row.engine, w.row.setting),
         )
 
     @property
@@ -415,7 +416,9 @@ class Summary:
 
     def _find_most_used(self, most: int) -> list[Record]:
         holding = nlargest(
-            most - len(self._failing), self._holding, key=lambda entry: entry[0]
+            most - len(self._failing),
+            self._holding,
+            key=lambda entry: entry[0],
         )
         return [*self._failing, *(scene for _, scene in holding)]
 

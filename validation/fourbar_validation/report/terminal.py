@@ -53,7 +53,8 @@ def print_table(summary: Summary, out: Path, *, verbose: bool = False) -> None:
     if verbose:
         _print_rows(summary, console, wide)
     console.print(
-        f"Report: {escape(clean_line(str(out / 'report.html')))}", soft_wrap=True
+        f"Report: {escape(clean_line(str(out / 'report.html')))}",
+        soft_wrap=True,
     )
 
 
@@ -84,7 +85,10 @@ def _make_overview(summary: Summary) -> "Table":
     from rich.table import Table
 
     shown = Table(
-        box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True, padding=(0, 1)
+        box=SIMPLE_HEAD,
+        pad_edge=False,
+        collapse_padding=True,
+        padding=(0, 1),
     )
     shown.add_column("error of allowed", overflow="fold", ratio=1)
     for heading in (*OVERVIEW_GROUPS, "compared"):
@@ -133,7 +137,9 @@ def _make_worst_table(summary: Summary) -> "Table":
 
 
 def _make_bare_table(
-    words: Sequence[str], numbers: Sequence[str], title: str | None = None
+    words: Sequence[str],
+    numbers: Sequence[str],
+    title: str | None = None,
 ) -> "Table":
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
@@ -141,7 +147,9 @@ def _make_bare_table(
     shown = Table(title=title, box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
     for heading in (*words, *numbers):
         shown.add_column(
-            heading, justify="left" if heading in words else "right", no_wrap=True
+            heading,
+            justify="left" if heading in words else "right",
+            no_wrap=True,
         )
     return shown
 
@@ -161,7 +169,9 @@ def make_words_table(
     shown = Table(**(settings | options))
     for index, heading in enumerate(headings):
         shown.add_column(
-            heading, justify="left" if index < words else "right", overflow="fold"
+            heading,
+            justify="left" if index < words else "right",
+            overflow="fold",
         )
     for row in rows:
         shown.add_row(*(escape(clean_line(cell)) for cell in row))

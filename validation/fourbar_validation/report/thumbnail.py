@@ -113,7 +113,11 @@ def _write_path(x: Array, y: Array) -> list[str]:
 
 
 def _draw_marks(
-    answer: Answer, name: str, phase: float, place: PlacePoints, good: NDArray[np.bool_]
+    answer: Answer,
+    name: str,
+    phase: float,
+    place: PlacePoints,
+    good: NDArray[np.bool_],
 ) -> str:
     """Draw some answers of an engine.
 

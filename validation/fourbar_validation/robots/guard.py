@@ -18,7 +18,8 @@ ROBOT_SECONDS = 120.0
 
 @contextmanager
 def examine_guarded(
-    mjcf: Path, seconds: float | None = None
+    mjcf: Path,
+    seconds: float | None = None,
 ) -> Iterator[Callable[..., Any]]:
     """Examine a file, by an adapter and its arguments, in another process.
 
@@ -35,14 +36,18 @@ def examine_guarded(
     with (
         waiting,
         ProcessPool(
-            max_workers=1, context=get_context("spawn"), initializer=_confine
+            max_workers=1,
+            context=get_context("spawn"),
+            initializer=_confine,
         ) as pool,
     ):
 
         def examined(*arguments: object) -> Any:
             try:
                 return pool.schedule(
-                    _examine_robot, args=arguments, timeout=seconds
+                    _examine_robot,
+                    args=arguments,
+                    timeout=seconds,
                 ).result()
             except FourBarError as error:
                 if not isinstance(error, InputError) or error.key != "MJCF":

@@ -75,7 +75,10 @@ class _InsideError:
 
 
 def measure_robot(
-    path: Path, options: MeasureOptions, scene: Scene | None, assets: Path | None
+    path: Path,
+    options: MeasureOptions,
+    scene: Scene | None,
+    assets: Path | None,
 ) -> RobotMeasurement:
     """Measure the loops of a robot's file in a guarded process."""
     file = read_robot(path, assets)
@@ -106,7 +109,9 @@ def find_left_out(loop: LoopMeasurement) -> float:
 
 
 def _compare(
-    method: str, loop: LoopMeasurement, answer: InsideAnswer
+    method: str,
+    loop: LoopMeasurement,
+    answer: InsideAnswer,
 ) -> Iterator[_InsideError]:
     """Compare an answer with the formulas at its own theta_2, omega_2 and alpha_2.
 
@@ -164,7 +169,9 @@ def _read_torque(text: str | None) -> float | None:
 
 
 def read_measure_options(
-    loop: str | None, wanted: float | None, robot: Mapping[str, Any]
+    loop: str | None,
+    wanted: float | None,
+    robot: Mapping[str, Any],
 ) -> MeasureOptions:
     """Read --loop, --error, and the values of the other options of a robot.
 

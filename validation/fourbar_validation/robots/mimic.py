@@ -71,7 +71,10 @@ class _MimicReport:
 
 
 def measure_mimic(
-    path: Path, joint: str, scene: Scene, assets: Path | None = None
+    path: Path,
+    joint: str,
+    scene: Scene,
+    assets: Path | None = None,
 ) -> _MimicReport:
     """Hold the polynomial of a joint against the loop of a scene over its motion.
 
@@ -162,7 +165,10 @@ def _follow(scene: Scene, theta_2: Array, branch: int) -> tuple[Array, Array]:
 
 
 def _measure_polynomial(
-    coefficients: tuple[float, ...], x: Array, turned: Array, ratio: Array
+    coefficients: tuple[float, ...],
+    x: Array,
+    turned: Array,
+    ratio: Array,
 ) -> _MimicError:
     """Measure the largest errors of a polynomial."""
     polynomial = np.polynomial.Polynomial(coefficients)
@@ -224,7 +230,10 @@ def show_mimic(report: _MimicReport) -> None:
     )
     _print_sentence(ROW.format(*FIT_HEADINGS))
     for degree, *errors in zip(
-        POLYNOMIAL_DEGREES, report.squares, report.fitted, strict=True
+        POLYNOMIAL_DEGREES,
+        report.squares,
+        report.fitted,
+        strict=True,
     ):
         for fit, error in zip(_FITS, errors, strict=True):
             missing = max(POLYNOMIAL_DEGREES) - degree

@@ -82,7 +82,10 @@ torque_option = click.option(
 
 
 def read_pose(
-    pose: tuple[str, ...], key: str | None, hold: tuple[str, ...], drive: str | None
+    pose: tuple[str, ...],
+    key: str | None,
+    hold: tuple[str, ...],
+    drive: str | None,
 ) -> PoseOptions:
     """Read the values of `pose_options`.
 

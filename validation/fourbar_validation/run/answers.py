@@ -83,7 +83,8 @@ def _observe_order_of_engine(question: Question, engine: Engine) -> dict[str, fl
     def error(answer: Answer) -> float:
         rows = compare_answer(question, replace(engine, answers=FORCE_NAMES), answer)
         return max(
-            (row.error for row in rows if row.quantity in FORCE_NAMES), default=math.nan
+            (row.error for row in rows if row.quantity in FORCE_NAMES),
+            default=math.nan,
         )  # a refusal has none
 
     assert engine.order is not None

@@ -119,7 +119,11 @@ def _check_sweep(question: Question) -> Row:
 
 
 def _make_equation_row(
-    question: Question, quantity: str, equation: str, error: Array, judged: Mask
+    question: Question,
+    quantity: str,
+    equation: str,
+    error: Array,
+    judged: Mask,
 ) -> Row:
     """Make the row of an equation from its error where it is worst.
 
@@ -410,7 +414,11 @@ def compare_status(
             f"{wrong} positions differ, the first is {formulas.status[index]}; {reason}"
         )
     return question.row(
-        "status", float(wrong) * differ, 0.0, reason, theta_2=formulas.theta_2
+        "status",
+        float(wrong) * differ,
+        0.0,
+        reason,
+        theta_2=formulas.theta_2,
     )
 
 

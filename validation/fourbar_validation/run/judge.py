@@ -137,7 +137,8 @@ def judge_for_report(
     for i, row in enumerate(record.rows):
         if row.failed and row.engine in record.output:
             record.rows[i] = replace(
-                row, reason=f"{row.reason}; what it printed: {OUTPUT}"
+                row,
+                reason=f"{row.reason}; what it printed: {OUTPUT}",
             )
     figure = thumbnail = None
     STYLE_NUMBERS.update(list_numbers(engines))

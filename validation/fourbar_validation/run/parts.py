@@ -27,7 +27,10 @@ _MOST_NAMED = 5
 
 
 def judge_part(
-    plan: Plan, part: RunPart, request: Request, progress: Progress = UNHEARD
+    plan: Plan,
+    part: RunPart,
+    request: Request,
+    progress: Progress = UNHEARD,
 ) -> None:
     """Judge a part of a run into the parts of its folder.
 

@@ -84,7 +84,9 @@ def judge_job(job: Job) -> Record:
 
 
 def _judge_by_engine(
-    job: Job, _: BaseException, attempt: worker_processes.TaskFunction
+    job: Job,
+    _: BaseException,
+    attempt: worker_processes.TaskFunction,
 ) -> Record:
     """Judge a scene that broke down one engine at a time.
 
@@ -123,12 +125,18 @@ def find_time_limit(suite: Suite, engines: Iterable[Engine]) -> float:
 
 
 def judge_chunks(
-    chunks: Iterable[tuple[int, list[Job]]], limit: float, workers: int
+    chunks: Iterable[tuple[int, list[Job]]],
+    limit: float,
+    workers: int,
 ) -> Iterator[tuple[int, list[Record]]]:
     """Judge numbered chunks of jobs, each as it is done.
 
     A job that takes longer than `limit` (s) hangs.
     """
     return worker_processes.apply_over_processes(
-        judge_job, chunks, workers, seconds=limit, instead=_judge_by_engine
+        judge_job,
+        chunks,
+        workers,
+        seconds=limit,
+        instead=_judge_by_engine,
     )

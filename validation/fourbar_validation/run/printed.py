@@ -145,7 +145,12 @@ def compare_points(
     allowed = EQUIVALENCE.factor * count_half_turns(link.ground_angle, solution.theta_2)
     what = f"the {len(scene.points)} points of the scene"
     return question.row(
-        "points", error, allowed, what, usable, theta_2=solution.theta_2
+        "points",
+        error,
+        allowed,
+        what,
+        usable,
+        theta_2=solution.theta_2,
     )
 
 
@@ -299,7 +304,9 @@ def check_error_bars(question: Question) -> Iterator[Row]:
 
 
 def _compute_pulls(
-    scene: Scene, command: Command, solution: Solution
+    scene: Scene,
+    command: Command,
+    solution: Solution,
 ) -> Iterator[Array]:
     """Compute what springs, torsion springs and loads over a table do, (n,).
 
@@ -369,11 +376,17 @@ def check_residual(question: Question) -> Iterator[Row]:
     )
     reason = "couples of mu r |F|, relative to the largest"
     row = question.row(
-        "friction_residual", error, K * EPS, reason, theta_2=solution.theta_2
+        "friction_residual",
+        error,
+        K * EPS,
+        reason,
+        theta_2=solution.theta_2,
     )
     if np.count_nonzero(sliding) >= _ROUNDED_SOMEWHERE and not residual[sliding].any():
         row = replace(
-            row, verdict=FAILS, reason="not even rounding is left at any position"
+            row,
+            verdict=FAILS,
+            reason="not even rounding is left at any position",
         )
     yield row
 
@@ -495,7 +508,12 @@ def _restate_law(kind: str, u: Array) -> tuple[Array, Array, Array]:
 
 
 def _interpolate_hermite(
-    s: Array, angle: Array, speed: Array, first: Array, last: Array, h: Array
+    s: Array,
+    angle: Array,
+    speed: Array,
+    first: Array,
+    last: Array,
+    h: Array,
 ) -> tuple[Array, Array, Array]:
     """Compute angle, speed and acceleration a time s into a piece.
 

@@ -56,6 +56,7 @@ class ShownProgress(Progress):
         """Move the bar of the stage; how many scenes are drawn is not told before."""
         if stage not in self.tasks:
             self.tasks[stage] = self.bars.add_task(
-                stage, total=None if stage == DRAWING else self.scenes
+                stage,
+                total=None if stage == DRAWING else self.scenes,
             )
         self.bars.advance(self.tasks[stage], scenes)

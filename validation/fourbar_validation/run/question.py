@@ -83,7 +83,9 @@ class Question:
         if self.scene.motion.free is not None:
             return solve(self.scene)
         return solve(
-            self.scene, "position" if self.at.speed is None else "force", at=self.at
+            self.scene,
+            "position" if self.at.speed is None else "force",
+            at=self.at,
         )
 
     @cached_property
@@ -209,7 +211,10 @@ class Question:
         )
 
     def attempt(
-        self, check: Callable[[], Iterable[Row]], engine: str, part: str = ""
+        self,
+        check: Callable[[], Iterable[Row]],
+        engine: str,
+        part: str = "",
     ) -> Iterator[Row]:
         """Yield the rows of a check.
 
@@ -224,7 +229,10 @@ class Question:
 
 
 def spread_evenly(
-    indices: NDArray[np.intp], count: int, *, inside: bool = False
+    indices: NDArray[np.intp],
+    count: int,
+    *,
+    inside: bool = False,
 ) -> NDArray[np.intp]:
     """Choose some of many positions evenly, with both ends or between them."""
     last = len(indices) - 1

@@ -264,7 +264,8 @@ def _compare_forces(question: Question) -> Iterator[Row]:
 
 
 def _keep_worst_forces(
-    engine: Engine, driven: list[tuple[Question, Solution]]
+    engine: Engine,
+    driven: list[tuple[Question, Solution]],
 ) -> list[Row]:
     """Compare what one engine answers to each part of the motion.
 
@@ -278,7 +279,9 @@ def _keep_worst_forces(
 
 
 def _compare_forces_by(
-    engine: Engine, driven: Question, solution: Solution
+    engine: Engine,
+    driven: Question,
+    solution: Solution,
 ) -> list[Row]:
     """Compare what one engine answers to the motion as a prescribed one."""
     answer = driven.answer(engine)
@@ -314,7 +317,8 @@ def _compare_forces_by(
 
 
 def _prescribe(
-    scene: Scene, command: Command
+    scene: Scene,
+    command: Command,
 ) -> Iterator[tuple[Scene, NDArray[np.intp]]]:
     """Prescribe the instants at which the linkage moves.
 

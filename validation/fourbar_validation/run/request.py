@@ -238,7 +238,9 @@ def _read_linkage_types(text: str) -> tuple[DrawnType, ...]:
 
 
 def _find_askable(
-    engines: tuple[Engine, ...], *, by_name: bool
+    engines: tuple[Engine, ...],
+    *,
+    by_name: bool,
 ) -> tuple[tuple[Engine, ...], list[tuple[str, str]]]:
     """Find those that can answer here, and the others with the reason.
 

@@ -112,7 +112,10 @@ def open_store(plan: Plan, out: Path) -> Iterator[Store]:
 
 
 def write_outcome(
-    plan: Plan, read: Callable[[int], list[Any]], out: Path, progress: Progress
+    plan: Plan,
+    read: Callable[[int], list[Any]],
+    out: Path,
+    progress: Progress,
 ) -> Summary:
     """Write tables and report of what was judged.
 
@@ -232,7 +235,10 @@ def _collect_tasks(
 
 
 def _redraw(
-    suite: Suite, scene: int, summary: Summary, engines: Sequence[Engine]
+    suite: Suite,
+    scene: int,
+    summary: Summary,
+    engines: Sequence[Engine],
 ) -> pool.Job:
     """Make the job of judging a scene once more, now with its pictures.
 
@@ -243,7 +249,10 @@ def _redraw(
     rows = next(record.rows for record in summary.pictured if record.name == name)
     broken = {row.engine for row in rows if row.failed and row.quantity == "all"}
     (job,) = pool.make_jobs(
-        suite, [scene], [one for one in engines if one.name not in broken], draw=True
+        suite,
+        [scene],
+        [one for one in engines if one.name not in broken],
+        draw=True,
     )
     return job
 

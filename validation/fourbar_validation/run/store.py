@@ -33,7 +33,10 @@ class Store:
     """
 
     def __init__(
-        self, folder: Path, identity: dict[str, Any], outcome: Sequence[str] = ()
+        self,
+        folder: Path,
+        identity: dict[str, Any],
+        outcome: Sequence[str] = (),
     ) -> None:
         self.folder, self.parts, self._written = (
             folder,

@@ -305,7 +305,9 @@ def _mark_long_springs(scene: Scene, solution: Solution) -> Mask:
 
 
 def _solve_from_first(
-    scene: Scene, command: Command, names: Sequence[str] | None = None
+    scene: Scene,
+    command: Command,
+    names: Sequence[str] | None = None,
 ) -> Solution:
     """Solve a scene whose motion begins at the first position.
 
@@ -405,7 +407,9 @@ def _convert_load(load: Load, to: _SceneConversion, linkage: FourBar) -> Load:
 
 
 def _convert_gravity(
-    effect: Gravity, to: _SceneConversion, linkage: FourBar
+    effect: Gravity,
+    to: _SceneConversion,
+    linkage: FourBar,
 ) -> Gravity:
     return Gravity(to.length * effect.magnitude, to.direction(effect.angle))
 
@@ -419,7 +423,9 @@ def _convert_couples(effect: Any, to: _SceneConversion, linkage: FourBar) -> Any
 
 
 def _convert_pin_friction(
-    effect: PinFriction, to: _SceneConversion, linkage: FourBar
+    effect: PinFriction,
+    to: _SceneConversion,
+    linkage: FourBar,
 ) -> PinFriction:
     return PinFriction(
         tuple((_name_pin(pin, to), mu, to.length * r) for pin, mu, r in effect.pins)
@@ -427,7 +433,9 @@ def _convert_pin_friction(
 
 
 def _convert_springs(
-    effect: Springs, to: _SceneConversion, linkage: FourBar
+    effect: Springs,
+    to: _SceneConversion,
+    linkage: FourBar,
 ) -> Springs:
     return Springs(
         tuple(
@@ -449,7 +457,9 @@ def _scale_stroke(stroke: float | None, factor: float) -> float | None:
 
 
 def _convert_torsion(
-    effect: Torsion, to: _SceneConversion, linkage: FourBar
+    effect: Torsion,
+    to: _SceneConversion,
+    linkage: FourBar,
 ) -> Torsion:
     """Convert springs at pins.
 
@@ -475,7 +485,9 @@ def _convert_torsion(
 
 
 def _convert_flywheel(
-    effect: Flywheel, to: _SceneConversion, linkage: FourBar
+    effect: Flywheel,
+    to: _SceneConversion,
+    linkage: FourBar,
 ) -> Flywheel:
     if to.exchanged:
         bar = _OTHER_BAR[effect.bar]

@@ -180,7 +180,10 @@ def toggle(*, distances: tuple[float, ...] = TOGGLE, seeds: range = range(2)) ->
 
 
 def _approach_poles(
-    *, bar: int, distances: tuple[float, ...] = _POLE, seeds: range = range(2)
+    *,
+    bar: int,
+    distances: tuple[float, ...] = _POLE,
+    seeds: range = range(2),
 ) -> Scenes:
     """Approach the position where the driven bar 3 or 4 stands still.
 
@@ -251,7 +254,9 @@ def sweep_change_point(*, steps: int = 145) -> Scenes:
 
 
 def _miss_grashof(
-    *, gaps: tuple[float, ...] = (1e-3, 1e-6, 1e-9, 1e-12), steps: int = 60
+    *,
+    gaps: tuple[float, ...] = (1e-3, 1e-6, 1e-9, 1e-12),
+    steps: int = 60,
 ) -> Scenes:
     """Miss s + l = p + q by a hair on either side.
 
@@ -271,7 +276,8 @@ def _miss_grashof(
             yield (
                 f"{sign * gap:+.0e}",
                 replace(
-                    scene, motion=scene.motion.replace(angle=sweep, acceleration=0.0)
+                    scene,
+                    motion=scene.motion.replace(angle=sweep, acceleration=0.0),
                 ),
             )
 
@@ -281,7 +287,8 @@ def sweep_turn(scene: Scene, steps: int = 36) -> Scene:
     return replace(
         scene,
         motion=scene.motion.replace(
-            angle=Sweep(0.1, 0.1 + 2 * math.pi, steps), acceleration=0.0
+            angle=Sweep(0.1, 0.1 + 2 * math.pi, steps),
+            acceleration=0.0,
         ),
     )
 
@@ -298,7 +305,9 @@ def _vary_mass_ratio(*, exponents: tuple[int, ...] = (-6, -3, 3, 6)) -> Scenes:
     for name, bar in list_moving(base):
         for k in exponents:
             heavy = replace(
-                bar, mass=bar.mass * 10.0**k, inertia=bar.moment_of_inertia * 10.0**k
+                bar,
+                mass=bar.mass * 10.0**k,
+                inertia=bar.moment_of_inertia * 10.0**k,
             )
             yield f"{name} 1e{k:+d}", replace_bars(base, **{name: heavy})
 
@@ -318,7 +327,8 @@ def _remove_inertia() -> Scenes:
     yield (
         "all massless",
         replace_bars(
-            base, **{name: Bar(bar.length) for name, bar in list_moving(base)}
+            base,
+            **{name: Bar(bar.length) for name, bar in list_moving(base)},
         ),
     )
 
@@ -331,7 +341,8 @@ def _move_centres_out(*, times: tuple[float, ...] = (3.0, 100.0, 1e4)) -> Scenes
             yield (
                 f"{name} {k:g}",
                 replace_bars(
-                    base, **{name: replace(bar, centre=(k * bar.length, 2.0))}
+                    base,
+                    **{name: replace(bar, centre=(k * bar.length, 2.0))},
                 ),
             )
 
@@ -371,7 +382,10 @@ def scale_loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:
 
 
 def _sweep_out_and_back(
-    *, beyond: float = 0.5, steps: int = 40, seeds: range = range(2)
+    *,
+    beyond: float = 0.5,
+    steps: int = 40,
+    seeds: range = range(2),
 ) -> Scenes:
     """Sweep out of the range in which the linkage assembles, and back."""
     for seed in seeds:
@@ -402,7 +416,9 @@ def _drive_thesis_to_limits(*, steps: int = 120) -> Scenes:
 
 
 def released(
-    *, durations: tuple[float, ...] = (10.0, 100.0), steps: int = 100
+    *,
+    durations: tuple[float, ...] = (10.0, 100.0),
+    steps: int = 100,
 ) -> Scenes:
     """Release IFToMM benchmark A02 with one window.
 
@@ -482,7 +498,9 @@ def _make_scenes() -> list[tuple[str, Scene]]:
     for family in HARD_FAMILIES:
         for label, scene in family.scenes():
             titled = replace(
-                scene, title=f"{family.name}: {label}", source=family.statement
+                scene,
+                title=f"{family.name}: {label}",
+                source=family.statement,
             )
             scenes.append((f"{family.name} {label}".replace(" ", "-"), titled))
     return sorted(scenes, key=lambda pair: pair[0])

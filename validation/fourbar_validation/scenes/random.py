@@ -121,7 +121,8 @@ class RandomFamily:
         lengths, draw_angles = self.draw_linkage(rng)
         scene = draw_scene(rng, lengths, self.ranges)
         return replace(
-            scene, motion=scene.motion.replace(angle=draw_angles(rng, scene.linkage))
+            scene,
+            motion=scene.motion.replace(angle=draw_angles(rng, scene.linkage)),
         )
 
 
@@ -131,7 +132,9 @@ def command_angle(psi: float) -> DrawAngle:
 
 
 def draw_bars(
-    rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges
+    rng: np.random.Generator,
+    lengths: Sequence[float],
+    ranges: Ranges,
 ) -> list[Bar]:
     """Draw bars 2, 3, 4 of these lengths (m)."""
     bars = []
@@ -143,7 +146,9 @@ def draw_bars(
 
 
 def draw_scene(
-    rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges
+    rng: np.random.Generator,
+    lengths: Sequence[float],
+    ranges: Ranges,
 ) -> Scene:
     """Draw a scene on (ground, input, coupler, output), m, at theta_2 = 0."""
     d, *moving = (float(length) for length in lengths)
@@ -189,7 +194,10 @@ _PLACES_OF_A_FORCE = ("from_pin", "from_centre", "arm")
 
 
 def _draw_load(
-    rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges
+    rng: np.random.Generator,
+    linkage: FourBar,
+    weight: float,
+    ranges: Ranges,
 ) -> Load:
     """Draw a force and a moment, or one of them, on any bar."""
     bar = int(rng.choice(MOVING_BARS))
@@ -205,7 +213,10 @@ def _draw_load(
 
 
 def _draw_springs(
-    rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges
+    rng: np.random.Generator,
+    linkage: FourBar,
+    weight: float,
+    ranges: Ranges,
 ) -> list[Any]:
     """Draw springs, torsion springs and flywheels.
 
@@ -284,7 +295,8 @@ its longest bar, from s + l = p + q.
 
 
 def draw_lengths(
-    rng: np.random.Generator, kind: DrawnType
+    rng: np.random.Generator,
+    kind: DrawnType,
 ) -> tuple[float, float, float, float]:
     """Draw (ground, input, coupler, output) of the given type.
 
@@ -307,7 +319,9 @@ def draw_lengths(
 
 
 def draw_uneven_lengths(
-    rng: np.random.Generator, crank: Draw, coupler: Draw
+    rng: np.random.Generator,
+    crank: Draw,
+    coupler: Draw,
 ) -> tuple[Sequence[float], float]:
     """Draw (ground, input, coupler, output), m, and an angle at which they close.
 

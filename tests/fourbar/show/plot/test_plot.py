@@ -77,7 +77,11 @@ CRANK_ROCKER = crank_rocker()
 def composed(scene, name, branches="one", position=None, units="SI"):
     """A figure of a scene, composed once for all that look at it."""
     return draw_figure(
-        scene, name, position=position, branches=branches, units=fourbar.units(units)
+        scene,
+        name,
+        position=position,
+        branches=branches,
+        units=fourbar.units(units),
     ).figure
 
 
@@ -304,7 +308,8 @@ def test_transmission_angle_marks_limits_and_dead_centres() -> None:
     assert min(abs(marks["dead centre"][0] - e) for e in expected) < 1e-9
     crossed_scene = thesis(FULL_TURN)
     crossed_scene = replace(
-        crossed_scene, motion=crossed_scene.motion.replace(branch=-1)
+        crossed_scene,
+        motion=crossed_scene.motion.replace(branch=-1),
     )
     panel = composed(crossed_scene, "transmission").axes[0]
     crossed = next(
@@ -339,7 +344,9 @@ BETWEEN_NEIGHBOURS = fourbar.LinearDrive(Place(2, (0.17, -1.1)), Place(3, (0.09,
 
 
 @pytest.mark.parametrize(
-    "drive", (2, 3, 4, CYLINDER, BETWEEN_NEIGHBOURS), ids=["2", "3", "4", "2-4", "2-3"]
+    "drive",
+    (2, 3, 4, CYLINDER, BETWEEN_NEIGHBOURS),
+    ids=["2", "3", "4", "2-4", "2-3"],
 )
 @pytest.mark.parametrize(
     "effects",
@@ -347,7 +354,8 @@ BETWEEN_NEIGHBOURS = fourbar.LinearDrive(Place(2, (0.17, -1.1)), Place(3, (0.09,
     ids=lambda some: "+".join(e.key for e in some),
 )
 def test_free_bodies_balance(
-    drive: int | fourbar.LinearDrive, effects: tuple[Effect, ...]
+    drive: int | fourbar.LinearDrive,
+    effects: tuple[Effect, ...],
 ) -> None:
     drive_bar, line = (drive, None) if isinstance(drive, int) else (None, drive)
     shown = make_view(crank_rocker(drive_bar=drive_bar, drive=line, effects=effects))
@@ -476,7 +484,9 @@ def test_hostile_titles_are_text(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_not_allowed_is_named(
-    tmp_path: Path, name: str, options: dict[str, Any]
+    tmp_path: Path,
+    name: str,
+    options: dict[str, Any],
 ) -> None:
     with pytest.raises(InputError, match="must"):
         plot.draw(crank_rocker(), tmp_path / name, **options)
@@ -515,7 +525,9 @@ def test_a_position_that_does_not_assemble_is_refused(tmp_path: Path) -> None:
 
 
 def released(
-    steps: int = 300, duration: float = 0.6, **changes: object
+    steps: int = 300,
+    duration: float = 0.6,
+    **changes: object,
 ) -> fourbar.Scene:
     """The crank-rocker let go from rest under gravity, a load and damping."""
     motion = fourbar.Motion(0.5, 0.0, free=fourbar.Free(duration, steps))
@@ -534,7 +546,9 @@ def by_law() -> fourbar.Scene:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "scene", (released(60, 1.2), by_law()), ids=("released", "by law")
+    "scene",
+    (released(60, 1.2), by_law()),
+    ids=("released", "by law"),
 )
 def test_a_motion_through_time_is_drawn_over_time(scene: fourbar.Scene) -> None:
     solution = solved(scene)
@@ -564,7 +578,9 @@ def test_both_branches_of_a_release_share_their_scales() -> None:
     bars = [fourbar.Bar(0.22, 0.5), fourbar.Bar(0.25, 0.8), fourbar.Bar(0.2, 0.4)]
     motion = fourbar.Motion(math.radians(60.0), 0.0, free=fourbar.Free(2.0, 200))
     scene = fourbar.Scene(
-        fourbar.FourBar(0.3, *bars), motion, effects=(fourbar.Gravity(),)
+        fourbar.FourBar(0.3, *bars),
+        motion,
+        effects=(fourbar.Gravity(),),
     )
     fastest = [
         np.abs(fourbar.solve(set_branch(scene, sign)).omega_4).max() for sign in (1, -1)
@@ -712,13 +728,17 @@ def test_units_get_the_prefix_that_suits() -> None:
 BOTTOM, SIDE = Place(1, (0.25, math.radians(-160.0))), Place(2, (0.09, 0.17))
 COMMANDS = {
     r"$\theta_3$ (°)": fourbar.Motion(
-        theta_3=fourbar.Sweep(1.25, 0.67, 40), omega_3=-2.0
+        theta_3=fourbar.Sweep(1.25, 0.67, 40),
+        omega_3=-2.0,
     ),
     r"$\theta_4$ (°)": fourbar.Motion(
-        theta_4=fourbar.Sweep(1.95, 2.78, 40), omega_4=4.0
+        theta_4=fourbar.Sweep(1.95, 2.78, 40),
+        omega_4=4.0,
     ),
     "stroke (mm)": fourbar.Motion(
-        stroke=fourbar.Sweep(0.2, 0.32, 40), stroke_speed=0.2, side="left"
+        stroke=fourbar.Sweep(0.2, 0.32, 40),
+        stroke_speed=0.2,
+        side="left",
     ),
 }
 """Each command and the name of the axis that curves are drawn over."""
@@ -759,7 +779,10 @@ def test_curves_are_drawn_over_what_is_commanded(label: str) -> None:
     )
     usual = np.abs(s.drive_force[order]) < np.percentile(np.abs(s.drive_force), 80.0)
     np.testing.assert_allclose(
-        drawn_at[usual], s.drive_force[order][usual], rtol=2e-2, atol=2e-2
+        drawn_at[usual],
+        s.drive_force[order][usual],
+        rtol=2e-2,
+        atol=2e-2,
     )
     (linkage,) = composed(scene, "linkage").axes
     place = getattr(make_view(scene).here, name)[0]
@@ -781,7 +804,9 @@ def test_every_figure_takes_every_command(label: str, figure: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "scene", (thesis(), *map(commanding, COMMANDS.values())), ids=("thesis", *COMMANDS)
+    "scene",
+    (thesis(), *map(commanding, COMMANDS.values())),
+    ids=("thesis", *COMMANDS),
 )
 def test_a_film_of_what_swings_goes_there_and_back(scene: fourbar.Scene) -> None:
     shown = make_view(scene)
@@ -807,7 +832,8 @@ def test_one_position_of_another_command_stands_in_its_range() -> None:
     triangle = 0.34, 0.16  # the cylinder's longest and shortest stroke
     places = shown.sweep.at.places
     assert shown.at == "stroke = 300 mm" and shown.here.stroke[0] == pytest.approx(
-        0.3, rel=1e-14
+        0.3,
+        rel=1e-14,
     )
     assert (
         places.max() < triangle[0] and places.min() > triangle[1] and len(places) == 362

@@ -190,7 +190,9 @@ def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
     away = np.abs(stated[:, None] - drawn).min(axis=1)
     assert away.max() < steps.max() < 0.01 * np.abs(drawn).max()
     for panel, of_points in zip(
-        panels[1:], (solution.velocity, solution.acceleration), strict=True
+        panels[1:],
+        (solution.velocity, solution.acceleration),
+        strict=True,
     ):
         line = next(line for line in panel.lines if line.get_label() == "P")
         assert np.allclose(line.get_ydata(), np.hypot(*of_points["P"].T), rtol=1e-15)

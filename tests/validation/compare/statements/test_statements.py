@@ -89,7 +89,9 @@ def test_what_is_stated_holds_of_random_linkages() -> None:
 
 
 def changed(
-    function: str, change: Callable[[Any], Any], module: Any = mobility
+    function: str,
+    change: Callable[[Any], Any],
+    module: Any = mobility,
 ) -> Callable[[pytest.MonkeyPatch], None]:
     """A module's function answers something else."""
     true = getattr(module, function)
@@ -101,7 +103,8 @@ def changed(
 
 
 def moved(
-    limits: tuple[mobility.LimitPosition, ...], field: str
+    limits: tuple[mobility.LimitPosition, ...],
+    field: str,
 ) -> tuple[mobility.LimitPosition, ...]:
     return tuple(
         limit._replace(**{field: getattr(limit, field) + SEEN}) for limit in limits
@@ -254,7 +257,8 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_each_error_in_a_statement_is_seen(
-    fault: str, monkeypatch: pytest.MonkeyPatch
+    fault: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     lengths, quantity, plant = FAULTS[fault]
     plant(monkeypatch)

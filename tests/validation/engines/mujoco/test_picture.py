@@ -56,7 +56,9 @@ def test_the_bars_are_seen_where_the_formulas_put_them() -> None:
 
 
 @pytest.mark.parametrize(
-    "scene", [thesis(), crank_rocker()], ids=["thesis", "crank-rocker"]
+    "scene",
+    [thesis(), crank_rocker()],
+    ids=["thesis", "crank-rocker"],
 )
 def test_no_position_leaves_the_frame(scene: fourbar.Scene) -> None:
     seen = compute_frame(scene.linkage)

@@ -92,7 +92,9 @@ def test_a_motion_law_is_run_through(name: str, drive: int) -> None:
 
 def test_the_law_is_followed_at_its_own_times() -> None:
     posed = crank_rocker(
-        motion=fourbar.Motion(law=LAWS["periodic"]), loads=(), effects=()
+        motion=fourbar.Motion(law=LAWS["periodic"]),
+        loads=(),
+        effects=(),
     )
     command = fourbar.command(posed)
     answer = simulate.MujocoSimulated().answer(posed, command)
@@ -114,7 +116,9 @@ def test_a_table_that_ends_where_the_sweep_does(omega: float) -> None:
     assert (
         failing(
             crank_rocker(
-                motion=motion, loads=(PART_OF_A_TURN, Load(2, moment=-0.2)), effects=()
+                motion=motion,
+                loads=(PART_OF_A_TURN, Load(2, moment=-0.2)),
+                effects=(),
             )
         )
         == set()
@@ -135,10 +139,13 @@ def changed(right: Callable[..., Any], factor: float) -> Callable[..., Any]:
 
 
 @pytest.mark.parametrize(
-    "factor", [-1.0, 2.0, 0.0], ids=["wrong sign", "applied twice", "missing"]
+    "factor",
+    [-1.0, 2.0, 0.0],
+    ids=["wrong sign", "applied twice", "missing"],
 )
 def test_a_fault_in_a_table_fails_the_run(
-    factor: float, monkeypatch: pytest.MonkeyPatch
+    factor: float,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     right = simulate.evaluate_loads
     monkeypatch.setattr(
@@ -155,10 +162,13 @@ def test_a_fault_in_a_table_fails_the_run(
 
 
 @pytest.mark.parametrize(
-    "factor", [-1.0, 1.001, 0.0], ids=["wrong sign", "a thousandth more", "missing"]
+    "factor",
+    [-1.0, 1.001, 0.0],
+    ids=["wrong sign", "a thousandth more", "missing"],
 )
 def test_a_drive_that_does_not_follow_the_law_fails_the_run(
-    factor: float, monkeypatch: pytest.MonkeyPatch
+    factor: float,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The engine is judged at the motion it made.
 
@@ -168,7 +178,9 @@ def test_a_drive_that_does_not_follow_the_law_fails_the_run(
         runner.LawSegment, "alpha", changed(runner.LawSegment.alpha, factor)
     )
     posed = crank_rocker(
-        motion=fourbar.Motion(law=LAWS["periodic"]), loads=(), effects=()
+        motion=fourbar.Motion(law=LAWS["periodic"]),
+        loads=(),
+        effects=(),
     )
     failed = [row for row in simulated(posed) if not row.passed]
     assert any("does not turn as commanded" in row.reason for row in failed)
@@ -177,7 +189,8 @@ def test_a_drive_that_does_not_follow_the_law_fails_the_run(
 def test_the_callback_ends_with_the_run() -> None:
     simulated(
         crank_rocker(
-            motion=fourbar.Motion(law=LAWS["at constant speed"]), loads=(WHOLE_TURN,)
+            motion=fourbar.Motion(law=LAWS["at constant speed"]),
+            loads=(WHOLE_TURN,),
         )
     )
     assert mujoco.get_mjcb_act_bias() is None

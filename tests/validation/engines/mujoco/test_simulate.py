@@ -78,7 +78,8 @@ SCENES = {
     ),
     "thesis": thesis(fourbar.Sweep(math.radians(86.618), math.radians(363.382), 180)),
     "viscous": crank_rocker(
-        motion=fourbar.Motion(TURN, 10.0), effects=(fourbar.Viscous.at(**EVERY_PIN),)
+        motion=fourbar.Motion(TURN, 10.0),
+        effects=(fourbar.Viscous.at(**EVERY_PIN),),
     ),
 }
 
@@ -146,7 +147,8 @@ def test_a_wrong_load_is_seen() -> None:
     posed = SCENES["crank-rocker"]
     answer = MujocoSimulated().answer(posed, fourbar.command(posed))
     on_coupler = replace(
-        posed, loads=(replace(posed.loads[0], bar=3), *posed.loads[1:])
+        posed,
+        loads=(replace(posed.loads[0], bar=3), *posed.loads[1:]),
     )
     assert {row.quantity for row in compared(on_coupler, answer) if not row.passed} >= {
         "F12",
@@ -260,7 +262,10 @@ def hood(links: float, output: float | None = None) -> fourbar.Scene:
     )
     motion = fourbar.Motion(fourbar.Sweep(0.8, 1.8, 12), 0.5)
     return fourbar.Scene(
-        fourbar.FourBar(0.11, *bars), motion, effects=(fourbar.Gravity(),), title="hood"
+        fourbar.FourBar(0.11, *bars),
+        motion,
+        effects=(fourbar.Gravity(),),
+        title="hood",
     )
 
 
@@ -307,7 +312,8 @@ def test_a_simulation_that_fails_names_the_ratio_of_masses(
 
 @pytest.mark.parametrize(("links", "output"), [(0.0, None), (0.01, 0.0)])
 def test_the_mass_that_a_massless_bar_is_advised_to_have_leads_to_a_pass(
-    links: float, output: float | None
+    links: float,
+    output: float | None,
 ) -> None:
     (refused,) = (
         row
@@ -332,7 +338,9 @@ def by_quantity(scene: fourbar.Scene) -> dict[str, Row]:
 @pytest.mark.slow
 @pytest.mark.parametrize(("one", "other"), list(combinations((1, 2, 3, 4), 2)))
 def test_its_own_actuator_between_two_sites_gives_the_force_of_a_cylinder(
-    one: int, other: int, monkeypatch: pytest.MonkeyPatch
+    one: int,
+    other: int,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     drive = fourbar.LinearDrive(Place(one, (0.17, -1.1)), Place(other, (0.09, 0.7)))
     scene = crank_rocker(
@@ -370,7 +378,8 @@ def test_its_own_actuator_between_two_sites_gives_the_force_of_a_cylinder(
     "what", ["theta_3", "theta_4", "stroke of bar 2", "stroke of bar 4"]
 )
 def test_the_input_is_led_so_that_what_is_commanded_moves_as_told(
-    what: str, monkeypatch: pytest.MonkeyPatch
+    what: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     (simulated,) = SIMULATION
     for branch in (1, -1):

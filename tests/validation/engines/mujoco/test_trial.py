@@ -94,14 +94,23 @@ CARRIED = {
     "servo": Case(FAST, IMPLICIT, None, 320, drives.Servo, (1e6, 1e4)),
     "gentle servo": Case(LIGHT, RK4, drive=drives.GentleServo, gains=(1.0, 1.0)),
     "velocity actuator": Case(
-        FAST, IMPLICIT, drive=drives.VelocityActuator, gains=(0.0, 1e4)
+        FAST,
+        IMPLICIT,
+        drive=drives.VelocityActuator,
+        gains=(0.0, 1e4),
     ),
     "gentle velocity actuator": Case(
-        LIGHT, RK4, drive=drives.GentleVelocityActuator, gains=(0.0, 1.0)
+        LIGHT,
+        RK4,
+        drive=drives.GentleVelocityActuator,
+        gains=(0.0, 1.0),
     ),
     "joint equality": Case(LIGHT, RK4, drive=drives.WheelEquality, softness=1.0),
     "joint equality, softness edited": Case(
-        LIGHT, RK4, drive=drives.StiffWheelEquality, softness=1e-8
+        LIGHT,
+        RK4,
+        drive=drives.StiffWheelEquality,
+        softness=1e-8,
     ),
 }
 """What else carries the crank, with the integrator that the study gives it."""
@@ -127,7 +136,9 @@ def make_scene(drive: str) -> fourbar.Scene:
 
 
 def make_carrier(
-    case: Case, inertia: float, omega: float
+    case: Case,
+    inertia: float,
+    omega: float,
 ) -> Servo | TurningWheel | None:
     """Return what keeps the crank's speed in place of a flywheel."""
     if case.gains is not None:
@@ -151,7 +162,10 @@ def compare(drive: str, case: Case) -> None:
     wheel = size_flywheel(scene, settings)
     carrier = make_carrier(case, wheel, float(scene.motion.omega_2))  # type: ignore[arg-type]
     again = replace(
-        case.again, steps_per_revolution=steps, wheel=wheel, carrier=carrier
+        case.again,
+        steps_per_revolution=steps,
+        wheel=wheel,
+        carrier=carrier,
     )
     right = measure(scene, again)
     for quantity in ERROR_NAMES:
@@ -206,7 +220,10 @@ def test_finer_steps_do_not_make_the_defaults_worse_where_bar_4_is_driven() -> N
     errors = []
     for steps in (640.0, 2560.0):
         settings = replace(
-            BEST, pad=None, integrator="Euler", steps_per_revolution=steps
+            BEST,
+            pad=None,
+            integrator="Euler",
+            steps_per_revolution=steps,
         )
         trial = setup.try_out(settings, drives.restore_defaults)
         errors.append(compute_errors(scene, trial.at, trial.quantities).torque)

@@ -64,7 +64,8 @@ def test_every_engine_compares_and_holds() -> None:
 
 
 def altered(
-    call: Callable[..., Any], change: Callable[[Any], None]
+    call: Callable[..., Any],
+    change: Callable[[Any], None],
 ) -> Callable[..., Any]:
     def wrong(*arguments: Any, **options: Any) -> Any:
         answer = call(*arguments, **options)
@@ -163,7 +164,8 @@ def passing_change_points(name: str, branch: int) -> Scene:
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize("name", CHANGE_POINTS)
 def test_members_near_a_change_point_keep_the_nominal_assembly(
-    name: str, branch: int
+    name: str,
+    branch: int,
 ) -> None:
     scene = passing_change_points(name, branch)
     for engine in NEAREST:
@@ -218,7 +220,9 @@ def turned(answer: Any) -> Any:
     ],
 )
 def test_equilibria_that_err_fail(
-    monkeypatch: pytest.MonkeyPatch, change: Callable[[Any], Any], quantities: set[str]
+    monkeypatch: pytest.MonkeyPatch,
+    change: Callable[[Any], Any],
+    quantities: set[str],
 ) -> None:
     call = fourbar.equilibrium
     monkeypatch.setattr(fourbar, "equilibrium", lambda scene: change(call(scene)))
@@ -251,7 +255,8 @@ def test_a_frequency_of_an_inertia_that_is_rounding_fails(
 @pytest.mark.parametrize("gravity", [-0.7, 2.1])
 def test_equilibria_near_a_limit_are_compared_too(gravity: float) -> None:
     scene = replace(
-        FAULT_SCENES["derived, limited"], effects=(fourbar.Gravity(9.81, gravity),)
+        FAULT_SCENES["derived, limited"],
+        effects=(fourbar.Gravity(9.81, gravity),),
     )
     rows = rows_of(scene, "equilibria")
     assert {row.reason for row in rows if row.quantity in ("torque", "slope")} == {
@@ -312,7 +317,8 @@ def test_right_equilibria_hold_where_they_are_hard_to_judge(name: str) -> None:
 def test_where_nothing_assembles_nothing_is_asked(engine: str) -> None:
     scene = FAULT_SCENES["derived, limited"]
     scene = replace(
-        scene, motion=scene.motion.replace(angle=fourbar.Sweep(3.0, 3.1, 4))
+        scene,
+        motion=scene.motion.replace(angle=fourbar.Sweep(3.0, 3.1, 4)),
     )
     with pytest.raises(NotAskedError):
         rows_of(scene, engine)
@@ -338,20 +344,29 @@ def test_a_changed_linkage_that_hardly_assembles_is_no_failure(engine: str) -> N
     d, *moving = BARELY[engine]
     linkage = fourbar.FourBar(d, *(fourbar.Bar(length, 1.0) for length in moving))
     scene = fourbar.Scene(
-        linkage, fourbar.Motion(None, 2.0, 0.5), effects=(fourbar.Gravity(),)
+        linkage,
+        fourbar.Motion(None, 2.0, 0.5),
+        effects=(fourbar.Gravity(),),
     )
     assert not failing(rows_of(scene, engine))
 
 
 COMMANDS = {
     "theta_3": fourbar.Motion(
-        theta_3=fourbar.Sweep(0.67, 1.25, 20), omega_3=2.0, alpha_3=1.0, branch=-1
+        theta_3=fourbar.Sweep(0.67, 1.25, 20),
+        omega_3=2.0,
+        alpha_3=1.0,
+        branch=-1,
     ),
     "theta_4": fourbar.Motion(
-        theta_4=fourbar.Sweep(2.0, 2.75, 20), omega_4=2.0, alpha_4=1.0
+        theta_4=fourbar.Sweep(2.0, 2.75, 20),
+        omega_4=2.0,
+        alpha_4=1.0,
     ),
     "stroke": fourbar.Motion(
-        stroke=fourbar.Sweep(0.2, 0.3, 20), stroke_speed=0.2, side="left"
+        stroke=fourbar.Sweep(0.2, 0.3, 20),
+        stroke_speed=0.2,
+        side="left",
     ),
 }
 
@@ -393,7 +408,8 @@ def test_other_commands_are_judged_too_and_what_is_not_is_named(name: str) -> No
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_study_of_another_command_that_errs_fails(
-    monkeypatch: pytest.MonkeyPatch, name: str
+    monkeypatch: pytest.MonkeyPatch,
+    name: str,
 ) -> None:
     scene, call = commanding(name), fourbar.solve
 
@@ -411,7 +427,9 @@ def test_a_study_of_another_command_that_errs_fails(
     ("engine", "number"), [("sdf", "0.2"), ("sdf", "0.25"), ("usd", "0.2")]
 )
 def test_a_file_with_another_number_fails(
-    monkeypatch: pytest.MonkeyPatch, engine: str, number: str
+    monkeypatch: pytest.MonkeyPatch,
+    engine: str,
+    number: str,
 ) -> None:
     """0.2 kg is the mass of the input, 0.25 m the length of the coupler."""
     text = getattr(files, f"{engine}_text")

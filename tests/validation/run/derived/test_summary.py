@@ -24,7 +24,9 @@ from tests.support.scenes import CYLINDER, crank_rocker
 TURN = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * np.pi, 36), 9.0))
 PUSHED = crank_rocker(
     motion=fourbar.Motion(
-        stroke=fourbar.Sweep(0.19, 0.31, 36), stroke_speed=0.2, side="left"
+        stroke=fourbar.Sweep(0.19, 0.31, 36),
+        stroke_speed=0.2,
+        side="left",
     ),
     drive=CYLINDER,
 )
@@ -58,7 +60,8 @@ FAULTS: dict[str, tuple[str, Callable[[Facts], Facts]]] = {
     "a range that ends late": (
         "ranges",
         lambda f: replace(
-            f, angles={**f.angles, 3: (f.angles[3][0], move_peak(f.angles[3][1], 1e-6))}
+            f,
+            angles={**f.angles, 3: (f.angles[3][0], move_peak(f.angles[3][1], 1e-6))},
         ),
     ),
     "a range that is a whole turn too wide": (
@@ -89,13 +92,15 @@ FAULTS: dict[str, tuple[str, Callable[[Facts], Facts]]] = {
     "a mean of a pin that counts both ends": (
         "pins",
         lambda f: replace(
-            f, pins={**f.pins, "A": f.pins["A"]._replace(rms=f.pins["A"].rms * 1.001)}
+            f,
+            pins={**f.pins, "A": f.pins["A"]._replace(rms=f.pins["A"].rms * 1.001)},
         ),
     ),
     "a bending moment of another place": (
         "bending",
         lambda f: replace(
-            f, bending={**f.bending, 3: f.bending[3]._replace(x=f.bending[3].x * 0.9)}
+            f,
+            bending={**f.bending, 3: f.bending[3]._replace(x=f.bending[3].x * 0.9)},
         ),
     ),
 }
@@ -103,7 +108,8 @@ FAULTS: dict[str, tuple[str, Callable[[Facts], Facts]]] = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fact_that_is_off_fails_its_row(
-    fault: str, monkeypatch: pytest.MonkeyPatch
+    fault: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     name, change = FAULTS[fault]
     summarize = module.summarize
@@ -160,7 +166,8 @@ MISSING: dict[str, tuple[str, Callable[[Facts], Facts]]] = {
 
 @pytest.mark.parametrize("fault", MISSING)
 def test_what_is_missing_or_no_number_fails(
-    fault: str, monkeypatch: pytest.MonkeyPatch
+    fault: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """What the judge cannot find breaks its check down, in a row that fails."""
     name, change = MISSING[fault]
@@ -185,7 +192,8 @@ GROWING["bending"] = grow_bending
 
 @pytest.mark.parametrize("name", GROWING)
 def test_what_is_said_to_grow_far_from_every_pole_fails(
-    name: str, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     summarize = module.summarize
     change = GROWING[name]
@@ -206,7 +214,8 @@ def test_what_grows_between_positions_is_believed(turns: int) -> None:
 
 @pytest.mark.parametrize("part", (0.0, 0.137, 0.479, 0.863))
 def test_a_bar_that_bends_more_elsewhere_fails(
-    part: float, monkeypatch: pytest.MonkeyPatch
+    part: float,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The largest moment that is said may be a true one, at another place."""
     free_piece = module.free_piece
@@ -237,7 +246,9 @@ def test_a_bar_that_bends_more_elsewhere_fails(
     ],
 )
 def test_what_is_missing_in_the_json_or_no_number_fails(
-    key: str, name: str, monkeypatch: pytest.MonkeyPatch
+    key: str,
+    name: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     write = module.write_motor
 
@@ -258,7 +269,8 @@ def test_what_is_missing_in_the_json_or_no_number_fails(
 
 @pytest.mark.parametrize("turns", (1, 2, 3))
 def test_a_turn_that_is_taken_for_an_open_motion_fails(
-    turns: int, monkeypatch: pytest.MonkeyPatch
+    turns: int,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Both the means of the package and its word for a closed motion follow from it."""
     sweep = fourbar.Sweep(0.1, 0.1 + 2 * np.pi * turns, 36 * turns)
@@ -296,7 +308,10 @@ def test_an_open_motion_that_is_taken_for_a_turn_fails(
     ],
 )
 def test_a_number_of_the_json_that_is_off_fails_its_row(
-    key: str, name: str, factor: float, monkeypatch: pytest.MonkeyPatch
+    key: str,
+    name: str,
+    factor: float,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     write = module.write_motor
 

@@ -60,7 +60,10 @@ class Finding(NamedTuple):
 
 
 def make_worst_row(
-    name: str, answer: Answer, quantity: str, findings: Sequence[Finding]
+    name: str,
+    answer: Answer,
+    quantity: str,
+    findings: Sequence[Finding],
 ) -> Row:
     """Make the row of the finding that exceeds most what it is allowed."""
     error, allowed, theta_2 = (
@@ -111,7 +114,10 @@ def _require_answer(engine: Adapter, scene: Scene, command: Command) -> Answer:
 
 
 def _compare_angles(
-    what: str, stated: Sequence[float], answered: Sequence[float], linkage: FourBar
+    what: str,
+    stated: Sequence[float],
+    answered: Sequence[float],
+    linkage: FourBar,
 ) -> Finding:
     """Compare lists of angles, modulo 2 pi in any order.
 
@@ -285,7 +291,8 @@ def _compute_inwards(linkage: FourBar, theta_2: float) -> float:
 
 
 def _list_limits(
-    linkage: FourBar, bar: int
+    linkage: FourBar,
+    bar: int,
 ) -> list[tuple[mobility.LimitPosition, bool]]:
     """List the limits of a bar, each with True if all bars are collinear there.
 
@@ -381,7 +388,9 @@ class StatedLimits(NamedTuple):
 
 
 def compare_ranges(
-    stated: StatedLimits, engine: Adapter, seen: Seen
+    stated: StatedLimits,
+    engine: Adapter,
+    seen: Seen,
 ) -> Iterator[Finding]:
     """Compare ranges, limits and full turns of every moving bar.
 
@@ -491,7 +500,9 @@ def _compute_moved(linkage: FourBar, bar: int, limit: mobility.LimitPosition) ->
 
 
 def _check_dead_centres(
-    stated: StatedLimits, bar: int, seen: Seen
+    stated: StatedLimits,
+    bar: int,
+    seen: Seen,
 ) -> Iterator[Finding]:
     """Check that the other two bars are in one line there, and the bar is at rest."""
     linkage = stated.linkage

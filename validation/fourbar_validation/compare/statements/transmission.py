@@ -165,7 +165,9 @@ class _Claim(NamedTuple):
 
 
 def _compare_over(
-    over: StatedOver, answer: Answer, predicted: Predicted | None
+    over: StatedOver,
+    answer: Answer,
+    predicted: Predicted | None,
 ) -> Iterator[Finding]:
     """Compare the worst position of each statement over a motion."""
     command = over.command
@@ -250,7 +252,11 @@ def _list_claims(over: StatedOver, answer: Answer) -> Iterator[_Claim]:
         closed & (command.omega_2 != 0.0) & ~(allowed >= NOTHING_TO_TELL)
     )  # a missing number is none that holds
     yield _Claim(
-        "mechanical advantage", np.abs(gained), allowed_gain, moving, rates=True
+        "mechanical advantage",
+        np.abs(gained),
+        allowed_gain,
+        moving,
+        rates=True,
     )
 
 

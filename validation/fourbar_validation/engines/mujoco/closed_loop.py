@@ -51,7 +51,8 @@ def load_force(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Arr
 
 
 def _split_load(
-    model: mujoco.MjModel, actuator: int
+    model: mujoco.MjModel,
+    actuator: int,
 ) -> tuple[int, int, tuple[float, float]]:
     """Return an actuator, its site, and its force of size one in the plane.
 

@@ -73,7 +73,10 @@ def find_couple(
 
 
 def bracket_couple(
-    acceleration: Callable[[float], float], wanted: float, trial: float, allowed: float
+    acceleration: Callable[[float], float],
+    wanted: float,
+    trial: float,
+    allowed: float,
 ) -> float | None:
     """Solve for the couple under which an acceleration is the wanted one.
 

@@ -467,7 +467,10 @@ def _describe_tendons(topology: Topology) -> Described:
 
 
 def set_entry(
-    text: str, generated: Mapping[str, ModelEntry], key: str, value: Value | None
+    text: str,
+    generated: Mapping[str, ModelEntry],
+    key: str,
+    value: Value | None,
 ) -> str | None:
     """Set one entry of the generated file, all others as they are.
 
@@ -556,7 +559,10 @@ def _write_setting(value: Value) -> str:
 
 
 def _set_length(
-    root: ET.Element, generated: Mapping[str, ModelEntry], bar: str, value: float
+    root: ET.Element,
+    generated: Mapping[str, ModelEntry],
+    bar: str,
+    value: float,
 ) -> None:
     """Move the pin at the end of a bar along its line.
 

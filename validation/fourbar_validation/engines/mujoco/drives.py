@@ -74,7 +74,11 @@ class _Actuated(Driven):
     """
 
     def __init__(
-        self, mjcf: str, omega: float, position: float, velocity: float
+        self,
+        mjcf: str,
+        omega: float,
+        position: float,
+        velocity: float,
     ) -> None:
         self.kp = position
         self.kv = velocity

@@ -109,7 +109,10 @@ class _WorkOnBars:
     """
 
     def __init__(
-        self, model: mujoco.MjModel, data: mujoco.MjData, timestep: float
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        timestep: float,
     ) -> None:
         self.model = model
         self.data = data
@@ -185,7 +188,8 @@ class MujocoOneState:
 
 
 def extrapolate(
-    impedances: tuple[float, ...], rungs: list[dict[str, Array]]
+    impedances: tuple[float, ...],
+    rungs: list[dict[str, Array]],
 ) -> dict[str, Array]:
     """Extrapolate to x = 0 the polynomial through the rungs (Lagrange).
 
@@ -203,7 +207,9 @@ def extrapolate(
 
 
 def _compute_at_impedance(
-    scene: Scene, command: Command, d: float
+    scene: Scene,
+    command: Command,
+    d: float,
 ) -> tuple[dict[str, Array], NDArray[np.bool_]]:
     """Compute torque and pin forces at every position that assembles."""
     # no flywheel: the torque is on the driven bar itself

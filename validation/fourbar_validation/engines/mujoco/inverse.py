@@ -87,7 +87,9 @@ class MujocoTree(Tree):
     """
 
     def __init__(
-        self, scene: Scene, memory: tuple[mujoco.MjModel, mujoco.MjData] | None = None
+        self,
+        scene: Scene,
+        memory: tuple[mujoco.MjModel, mujoco.MjData] | None = None,
     ) -> None:
         if memory is None:
             model = copy(_compile_bars())
@@ -186,7 +188,9 @@ class MujocoTree(Tree):
         return accelerations
 
     def needed(
-        self, field: tuple[float, float], wrenches: dict[int, list[float]]
+        self,
+        field: tuple[float, float],
+        wrenches: dict[int, list[float]],
     ) -> Array:
         """Return the result of mj_inverse less what loads and effects do.
 

@@ -127,7 +127,10 @@ class ResidualMonitor:
         self._most = dict.fromkeys(RESIDUAL_LIMITS, 0.0)
 
     def look(
-        self, loop: ClosedLoop, torque: float, loop_force: Array
+        self,
+        loop: ClosedLoop,
+        torque: float,
+        loop_force: Array,
     ) -> dict[str, float]:
         """Take in a forwarded state, and return the error to expect of each quantity.
 
@@ -239,7 +242,11 @@ class ResidualMonitor:
         return {name: np.array(force) for name, force in pins.items()}
 
     def _close(
-        self, q: Array, v: Array, a: Array, seen: _MonitoredMotion
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        seen: _MonitoredMotion,
     ) -> _MonitoredMotion:
         """Close the loop at the same theta_2, omega_2, alpha_2.
 

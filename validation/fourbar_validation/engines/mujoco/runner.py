@@ -61,7 +61,11 @@ class SteadySegment:
     """Number of the bar that moves so; None for the stroke."""
 
     def __init__(
-        self, theta_2: Array, segment: Sequence[int], omega: float, alpha: float
+        self,
+        theta_2: Array,
+        segment: Sequence[int],
+        omega: float,
+        alpha: float,
     ) -> None:
         self.theta_2 = theta_2
         commanded = theta_2[list(segment)]
@@ -100,7 +104,10 @@ class LawSegment:
     bar = 2
 
     def __init__(
-        self, law: Law | Rise, command: Command, segment: Sequence[int]
+        self,
+        law: Law | Rise,
+        command: Command,
+        segment: Sequence[int],
     ) -> None:
         assert command.time is not None
         self.law = law
@@ -170,7 +177,8 @@ def order_in_time(values: Array, time: Array | None, speed: float) -> NDArray[np
     The order is by what is commanded or by the times of a law.
     """
     return np.argsort(
-        time if time is not None else values if speed > 0.0 else -values, kind="stable"
+        time if time is not None else values if speed > 0.0 else -values,
+        kind="stable",
     )
 
 
@@ -186,7 +194,10 @@ class Stepper:
     """Counts the steps of a model from its present state on."""
 
     def __init__(
-        self, model: mujoco.MjModel, data: mujoco.MjData, timestep: float
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        timestep: float,
     ) -> None:
         self.model = model
         self.data = data
@@ -276,7 +287,9 @@ class SimulatedRun:
 
 
 def find_assembled(
-    position: Assembler, command: Command, order: Iterable[int]
+    position: Assembler,
+    command: Command,
+    order: Iterable[int],
 ) -> list[Found]:
     """Find the joint angles of every commanded position, one after the other.
 

@@ -172,7 +172,10 @@ def _find_worst_departure(errors: list[tuple[float, str]]) -> tuple[float, str]:
 
 
 def _find_not_driven(
-    scene: Scene, omega_2: float, theta_2: float, seconds: float
+    scene: Scene,
+    omega_2: float,
+    theta_2: float,
+    seconds: float,
 ) -> str | None:
     """Name the declared limit of the simulation that the first steps meet, if any."""
     if abs(omega_2) > FASTEST.boundary:

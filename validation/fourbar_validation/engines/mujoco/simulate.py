@@ -194,7 +194,9 @@ def _make_run_scene(scene: Scene, command: Command) -> Scene:
     return replace(
         scene,
         motion=scene.motion.replace(
-            angle=command.theta_2, speed=omega, acceleration=alpha
+            angle=command.theta_2,
+            speed=omega,
+            acceleration=alpha,
         ),
     )
 
@@ -284,7 +286,11 @@ class _Simulation:
             (self.command.angle - motion_made[0]) / (2.0 * np.pi)
         )
         motion = Command(
-            motion_made[0], self.branch, motion_made[1], motion_made[2], bar=bar
+            motion_made[0],
+            self.branch,
+            motion_made[1],
+            motion_made[2],
+            bar=bar,
         )
         values = {
             name: x for name, x in self.out.items() if bar != 2 or name not in MADE
@@ -330,7 +336,10 @@ class _Simulation:
         else:
             heavy = flywheel
         settings = replace(
-            self.settings, timestep=timestep, timestep_scale=1.0, flywheel=heavy
+            self.settings,
+            timestep=timestep,
+            timestep_scale=1.0,
+            flywheel=heavy,
         )
         return write_mjcf(take_full_size(self.scene), settings, keyframe=False)
 
@@ -439,7 +448,9 @@ class _Simulation:
 
 
 def observe_order(
-    scene: Scene, command: Command, error: Callable[[Answer], float]
+    scene: Scene,
+    command: Command,
+    error: Callable[[Answer], float],
 ) -> tuple[float, float, float]:
     """Return errors at 4h and 2h, and log2 of their ratio.
 
@@ -451,7 +462,9 @@ def observe_order(
             ask_at(
                 MujocoSimulated(
                     replace(
-                        RECIPE, timestep_scale=scale, time_constant_steps=80.0 / scale
+                        RECIPE,
+                        timestep_scale=scale,
+                        time_constant_steps=80.0 / scale,
                     )
                 ),
                 scene,

@@ -135,7 +135,9 @@ def collect_warnings() -> Iterator[list[str]]:
 
 
 def _compile_topology(
-    file: RobotFile, names: Mapping[str, str], scene: Scene
+    file: RobotFile,
+    names: Mapping[str, str],
+    scene: Scene,
 ) -> Topology:
     """Compile a file whose bars have these names, and see it as a scene does."""
     return orient(Topology(compile_robot(file).model, names), scene)
@@ -166,7 +168,9 @@ def orient(topology: Topology, scene: Scene) -> Topology:
 
 
 def examine_file(
-    scene: Scene, file: RobotFile | None, names: Mapping[str, str]
+    scene: Scene,
+    file: RobotFile | None,
+    names: Mapping[str, str],
 ) -> Examined:
     """Describe an MJCF, and evaluate it at single states and through time.
 
@@ -181,7 +185,9 @@ def examine_file(
 
 
 def _examine_motion(
-    scene: Scene, file: RobotFile, names: Mapping[str, str]
+    scene: Scene,
+    file: RobotFile,
+    names: Mapping[str, str],
 ) -> Examined:
     robot = compile_robot(file)
     list_unknown_parts(robot, set(range(robot.model.nbody)))
@@ -219,7 +225,8 @@ def _free_unmet_stops(described: Described, loop: "_UserLoop") -> Iterator[str]:
 
 
 def examine_changed(
-    scene: Scene, changes: Sequence[tuple[str, Value | None]]
+    scene: Scene,
+    changes: Sequence[tuple[str, Value | None]],
 ) -> list[list[Answer] | None]:
     """Answer with the generated file, then with each entry alone changed.
 
@@ -271,7 +278,9 @@ def examine_mended(
 
 
 def predict_softness(
-    scene: Scene, file: RobotFile, names: Mapping[str, str]
+    scene: Scene,
+    file: RobotFile,
+    names: Mapping[str, str],
 ) -> dict[str, float]:
     """Predict what MuJoCo's stiffest constraint leaves in a file, N m and N.
 
@@ -423,7 +432,9 @@ class _UserLoop(Assembled):
         return HEAVY * float(self.model.dof_M0.max())
 
     def leave_out_settling(
-        self, times: Mapping[int, float], seconds: float
+        self,
+        times: Mapping[int, float],
+        seconds: float,
     ) -> list[int]:
         """List the positions that are judged in a motion of some seconds.
 
@@ -602,7 +613,9 @@ class _UserLoop(Assembled):
             self.from_joints @ data.qacc,
         )
         for name, (two, three, four) in zip(
-            ("theta", "omega", "alpha"), turned, strict=True
+            ("theta", "omega", "alpha"),
+            turned,
+            strict=True,
         ):
             values |= {f"{name}_2": two, f"{name}_3": two + three, f"{name}_4": four}
         self._count_stops()
@@ -611,7 +624,9 @@ class _UserLoop(Assembled):
         return values | self._read_forces()
 
     def _solve_drive(
-        self, acceleration: Callable[[float], float], wanted: float
+        self,
+        acceleration: Callable[[float], float],
+        wanted: float,
     ) -> float:
         """Solve for the couple or force of the drive.
 
@@ -685,7 +700,9 @@ def _answer_one_state(loop: _UserLoop, command: Command) -> Answer:
     contacts = 0
 
     def read(
-        _: JointAngles, omega_2: float, alpha_2: float
+        _: JointAngles,
+        omega_2: float,
+        alpha_2: float,
     ) -> dict[str, Array | float]:
         nonlocal contacts
         try:
@@ -716,7 +733,12 @@ def _answer_one_state(loop: _UserLoop, command: Command) -> Answer:
         )
     evidence = {"closure_gap_m": gap, "contacts": float(contacts)}
     return Answer(
-        FILE_AT_ONE_STATE, "as compiled", command, assembled, out, evidence=evidence
+        FILE_AT_ONE_STATE,
+        "as compiled",
+        command,
+        assembled,
+        out,
+        evidence=evidence,
     )
 
 

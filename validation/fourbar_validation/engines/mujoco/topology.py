@@ -47,7 +47,9 @@ def list_body_names(model: mujoco.MjModel) -> str:
 
 
 def _find_stated_body(
-    model: mujoco.MjModel, names: Mapping[str, str], role: str
+    model: mujoco.MjModel,
+    names: Mapping[str, str],
+    role: str,
 ) -> int:
     """Find the body of a bar by its given name, or by the bar's.
 
@@ -430,7 +432,9 @@ class Topology:
 
 
 def find_topology(
-    model: mujoco.MjModel, names: Mapping[str, str], lengths: Sequence[float]
+    model: mujoco.MjModel,
+    names: Mapping[str, str],
+    lengths: Sequence[float],
 ) -> tuple[Topology, list[str]]:
     """Find the four-bar in a model; add a note on what was guessed.
 
@@ -527,7 +531,9 @@ def _open_sites(model: mujoco.MjModel) -> bool:
 
 
 def _list_sites(
-    model: mujoco.MjModel, roles: Mapping[str, str], names: Mapping[str, str]
+    model: mujoco.MjModel,
+    roles: Mapping[str, str],
+    names: Mapping[str, str],
 ) -> list[dict[str, str]]:
     """List pairs of sites that may mark pin B.
 

@@ -187,7 +187,9 @@ class TrialSetup:
             float(np.max(command.alpha_2)),
         )
         motion = scene.motion.replace(
-            angle=command.theta_2, speed=self.omega, acceleration=self.alpha
+            angle=command.theta_2,
+            speed=self.omega,
+            acceleration=self.alpha,
         )
         self.scene = replace(scene, motion=motion)
         self.command = command

@@ -158,7 +158,11 @@ class Piece(BodyWrenches):
 
 
 def free_piece(
-    scene: Scene, motion: BodyMotion, answer: Answer, bar: int, cut: float
+    scene: Scene,
+    motion: BodyMotion,
+    answer: Answer,
+    bar: int,
+    cut: float,
 ) -> Piece:
     """Free the piece of a bar beyond a cut."""
     described = scene.linkage.bar(bar)
@@ -215,7 +219,11 @@ def free_piece(
 
 
 def _push_rigid(
-    piece: Piece, mass: float, ends: tuple[float, float], a_pin: Any, gravity: Any
+    piece: Piece,
+    mass: float,
+    ends: tuple[float, float],
+    a_pin: Any,
+    gravity: Any,
 ) -> None:
     """Put weight and inertia of a piece of a uniform bar on it.
 

@@ -242,7 +242,8 @@ def _count_missed(
 
 
 def _judge_equilibrium(
-    scene: Scene, equilibrium: Equilibrium
+    scene: Scene,
+    equilibrium: Equilibrium,
 ) -> tuple[float, dict[str, float]]:
     """Compare torque, slope, inertia and frequency.
 
@@ -301,7 +302,10 @@ def _difference_over_size(apart: float, size: float) -> float:
 
 
 def _derive_torque(
-    scene: Scene, bar: int, angle: float, branch: int
+    scene: Scene,
+    bar: int,
+    angle: float,
+    branch: int,
 ) -> tuple[Derived, Derived, Derived] | None:
     """Derive the torque on a bar held at rest, its slope, and the bar's inertia.
 

@@ -72,7 +72,9 @@ def usd(question: Question) -> list[Row]:
 
 
 def _judge_file(
-    question: Question, engine: str, read: Callable[[Scene], Contents]
+    question: Question,
+    engine: str,
+    read: Callable[[Scene], Contents],
 ) -> list[Row]:
     """Compare a file at its own position and at some more.
 
@@ -174,7 +176,11 @@ def _read_sdf(text: str) -> Contents:
                 at_pins[pin] = numbers(joint, f"axis/dynamics/{name}")[0]
     gravity = complex(*numbers(next(root.iter("world")), "gravity")[:2])
     return Contents(
-        bodies, pins, [_read_turns(bodies), _read_noted(text)], gravity, **dynamics
+        bodies,
+        pins,
+        [_read_turns(bodies), _read_noted(text)],
+        gravity,
+        **dynamics,
     )
 
 

@@ -62,7 +62,8 @@ def furnish(scene: Scene, question: Question) -> Scene:
             bar: (0.6 * scene.linkage.bar(bar).length, 0.4 * bar) for bar in (2, 3, 4)
         }
         scene = replace(
-            scene, points=tuple(Point(f"P{bar}", bar, arm) for bar, arm in arms.items())
+            scene,
+            points=tuple(Point(f"P{bar}", bar, arm) for bar, arm in arms.items()),
         )
     assert question.free_body is not None
     size = magnitude(question.free_body.quantities["F12"])
@@ -250,7 +251,8 @@ def tolerances(question: Question) -> list[Row]:
         fourbar.Tolerance(f"lengths.{name}", width, name == "output") for name in names
     )
     scene = replace(
-        scene, tolerances=(scene.tolerances or tuple(defaults))[:MOST_TOLERANCES]
+        scene,
+        tolerances=(scene.tolerances or tuple(defaults))[:MOST_TOLERANCES],
     )
     _require_beside(scene)
     spread = fourbar.tolerances(scene, SPREAD_SAMPLES)
@@ -391,7 +393,9 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
         straight = bent <= NEARLY_LINEAR
         if straight.any():
             percentiles[:, straight] = np.percentile(
-                samples @ (slope * widths)[:, straight], (1.0, 99.0), axis=0
+                samples @ (slope * widths)[:, straight],
+                (1.0, 99.0),
+                axis=0,
             )
         worst = np.abs(slope * reaches).sum(axis=0)
         expected[part] = Expected(deviation, first_order, worst, bent, *percentiles)

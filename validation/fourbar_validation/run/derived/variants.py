@@ -293,7 +293,11 @@ def ask_beside(member: Scene, scene: Scene, nominal: Answer) -> Answer:
 
 
 def hold_to(
-    question: Question, engine: str, scene: Scene, solution: Solution, answer: Answer
+    question: Question,
+    engine: str,
+    scene: Scene,
+    solution: Solution,
+    answer: Answer,
 ) -> list[Row]:
     """Compare a solution with the answer of the free bodies.
 

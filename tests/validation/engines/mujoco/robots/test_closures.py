@@ -49,7 +49,8 @@ CUTS = [*product(("A", "B", "O4"), ("anchor", "site")), ("B", "weld")]
 
 @pytest.mark.parametrize(("cut", "by"), CUTS)
 def test_a_loop_has_the_lengths_of_its_pins_wherever_it_is_cut(
-    cut: str, by: str
+    cut: str,
+    by: str,
 ) -> None:
     planar = Planar(cut=cut, by=by)
     loop = loop_of(planar.text())
@@ -148,7 +149,8 @@ def test_five_hinges_are_a_four_bar_once_one_is_held() -> None:
     loop = loop_of(text, held=("d",))
     model = mujoco.MjModel.from_xml_string(text)
     assert loop.lengths == pytest.approx(
-        (0.05, 0.1, math.hypot(0.05, 0.08), math.hypot(0.0, 0.18)), abs=1e-12
+        (0.05, 0.1, math.hypot(0.05, 0.08), math.hypot(0.0, 0.18)),
+        abs=1e-12,
     )
     assert model.joint(loop.joint).name == "a"
     assert model.joint("d").id in loop.held
@@ -192,7 +194,8 @@ def test_two_motors_are_named() -> None:
     ],
 )
 def test_the_reason_is_given_where_it_is_no_four_bar(
-    planar: Planar, words: str
+    planar: Planar,
+    words: str,
 ) -> None:
     closure = closure_of(planar.text())
     assert closure.loop is None

@@ -130,7 +130,8 @@ def test_the_torque_is_the_one_that_mujoco_gives_when_asked_by_itself(
     theta_2 = float(spread_over_range(inside, made, 3)[-1])
     (row,) = inside.answer_states([theta_2], 2.0, 3.0).rows
     assert row.soft.torque == pytest.approx(
-        ask_again(inside, theta_2, 3.0), rel=ASKED_TWICE
+        ask_again(inside, theta_2, 3.0),
+        rel=ASKED_TWICE,
     )
 
 

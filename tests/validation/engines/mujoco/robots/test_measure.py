@@ -29,7 +29,8 @@ def test_both_fingers_of_a_gripper_are_measured_and_are_alike() -> None:
     file = read_robot(ROBOTS / "gripper.xml")
     right, left = measure_loops(file, MeasureOptions(PoseOptions()), None).loops
     assert find_worst_of_loop(right) == pytest.approx(
-        find_worst_of_loop(left), rel=1e-3
+        find_worst_of_loop(left),
+        rel=1e-3,
     )
 
 
@@ -53,7 +54,8 @@ def test_a_scene_with_axes_of_its_own_gives_the_same_errors() -> None:
     )
     (other,) = measure_loops(file, options, turned).loops
     assert find_worst_of_loop(other) == pytest.approx(
-        find_worst_of_loop(made), rel=1e-6
+        find_worst_of_loop(made),
+        rel=1e-6,
     )
 
 
@@ -88,7 +90,8 @@ def test_a_scene_may_see_the_loop_from_behind() -> None:
     assert find_left_out(front) < 1e-9
     assert find_left_out(behind) < 1e-9
     assert find_worst_of_loop(behind) == pytest.approx(
-        find_worst_of_loop(front), rel=1e-3
+        find_worst_of_loop(front),
+        rel=1e-3,
     )
 
 

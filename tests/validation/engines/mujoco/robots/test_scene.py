@@ -89,7 +89,10 @@ class WholeRobot:
         return qpos
 
     def rates(
-        self, jacobian: np.ndarray, driven: float, rest: np.ndarray
+        self,
+        jacobian: np.ndarray,
+        driven: float,
+        rest: np.ndarray,
     ) -> np.ndarray:
         """Solve J rates + rest = 0 with the driven rate given.
 
@@ -168,7 +171,11 @@ class WholeRobot:
 
 
 def read(
-    text: str, *, loop: str | None = None, speed: float = 3.0, **pose: object
+    text: str,
+    *,
+    loop: str | None = None,
+    speed: float = 3.0,
+    **pose: object,
 ) -> LoopScene:
     options = PoseOptions(**pose)  # type: ignore[arg-type]
     return read_loop_scene(RobotFile(Path("robot.xml"), text), options, loop, speed)
@@ -197,7 +204,8 @@ def compare(text: str, made: LoopScene, speed: float = 3.0) -> None:
             qpos = robot.place(qpos, in_pose + part)
         whole = robot.ask(qpos, speed)
         assert whole.torque == pytest.approx(
-            solution.torque[row], abs=EXACT * torque_scale
+            solution.torque[row],
+            abs=EXACT * torque_scale,
         )
         for pin, force in whole.forces.items():
             scale = sizes[pin].max()
@@ -246,7 +254,8 @@ EVERYTHING = {
     "output armature": Planar(cut="A", by="site"),
     "closure on the ground": Planar(cut="O4"),
     "axis the other way": Planar(
-        axes={"O2": "0 0 -1", "A": "0 0 -1"}, joint='stiffness="1"'
+        axes={"O2": "0 0 -1", "A": "0 0 -1"},
+        joint='stiffness="1"',
     ),
 }
 
@@ -364,6 +373,8 @@ def test_a_loop_is_asked_for_where_there_are_several() -> None:
 def test_a_pose_in_a_change_point_is_said() -> None:
     text = GRIPPER.replace('range="-40 40"', 'range="-100 100"')
     made = read(
-        text, loop="right_finger-right_follower", joints={"right_driver": "90deg"}
+        text,
+        loop="right_finger-right_follower",
+        joints={"right_driver": "90deg"},
     )
     assert any("in line in this pose" in remark for remark in made.remarks)

@@ -69,7 +69,9 @@ HINGES_IN_WORDS = {
 
 
 def list_closures(
-    file: RobotFile, options: PoseOptions, name: str | None = None
+    file: RobotFile,
+    options: PoseOptions,
+    name: str | None = None,
 ) -> RobotReport:
     """Compile a robot's file, pose it, and describe each of its equalities.
 
@@ -317,7 +319,10 @@ class _Finder:
         )
 
     def _recognise(
-        self, number: int, name: str, chain: _Chain
+        self,
+        number: int,
+        name: str,
+        chain: _Chain,
     ) -> tuple[RobotLoop | None, str]:
         """Return the four-bar of a closure, or the reason why it is none."""
         model = self.model
@@ -374,7 +379,12 @@ class _Finder:
         )
 
     def _explain_count(
-        self, chain: _Chain, hinges: int, number: int, *, is_pin: bool
+        self,
+        chain: _Chain,
+        hinges: int,
+        number: int,
+        *,
+        is_pin: bool,
     ) -> str:
         """Say what another number of hinges makes.
 
@@ -494,7 +504,12 @@ class _Finder:
         ]
 
     def _make_loop(
-        self, number: int, name: str, chain: _Chain, *, is_pin: bool
+        self,
+        number: int,
+        name: str,
+        chain: _Chain,
+        *,
+        is_pin: bool,
     ) -> tuple[RobotLoop | None, str]:
         """Lay a closed chain of four pins out as ground, input, coupler and output."""
         pins: list[int | None] = [*chain.joints]

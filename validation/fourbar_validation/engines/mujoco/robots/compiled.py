@@ -132,7 +132,9 @@ def _take_out_meshes(spec: mujoco.MjSpec, file: RobotFile) -> tuple[set[str], se
 
 
 def _needs_geoms(
-    spec: mujoco.MjSpec, body: mujoco.MjsBody, geoms: list[mujoco.MjsGeom]
+    spec: mujoco.MjSpec,
+    body: mujoco.MjsBody,
+    geoms: list[mujoco.MjsGeom],
 ) -> bool:
     """Tell whether the inertia of a body follows from these geoms."""
     rule = spec.compiler.inertiafromgeom

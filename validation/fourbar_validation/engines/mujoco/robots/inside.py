@@ -216,7 +216,9 @@ class LoopInside:
         qvel[self.drive] = self.sense * omega_2
         due = -jacobian[:, self.drive] * qvel[self.drive]
         qvel[self.passive] = np.linalg.lstsq(
-            jacobian[:, self.passive], due, rcond=1e-9
+            jacobian[:, self.passive],
+            due,
+            rcond=1e-9,
         )[0]
         return _RobotState(qpos, qvel, theta_2)
 
@@ -290,7 +292,9 @@ class LoopInside:
         return name_joint(self.model, self.loop.joint)
 
     def _solve_rigid(
-        self, state: _RobotState, alpha_2: float
+        self,
+        state: _RobotState,
+        alpha_2: float,
     ) -> tuple[PinsAndTorque, Array]:
         """Solve for torque and pin forces with rigid pins at a closed state.
 
@@ -444,7 +448,10 @@ class LoopInside:
         return 1
 
     def answer_states(
-        self, theta_2: Sequence[float], omega_2: float, alpha_2: float
+        self,
+        theta_2: Sequence[float],
+        omega_2: float,
+        alpha_2: float,
     ) -> InsideAnswer:
         """Answer at closed states, each by itself."""
         answer = InsideAnswer()
@@ -520,7 +527,10 @@ class LoopInside:
         return find_time_constant(self.model, self.loop.equality)
 
     def answer_under_torque(
-        self, theta_2: Iterable[float], torque: float, seconds: float
+        self,
+        theta_2: Iterable[float],
+        torque: float,
+        seconds: float,
     ) -> list[TornState]:
         """Let a motor's torque act from rest at each angle, for some time.
 
@@ -617,7 +627,8 @@ def _find_instant(start: float, angle: float, omega: float, alpha: float) -> flo
 
 
 def _copy_for_closures(
-    model: mujoco.MjModel, closures: Sequence[int]
+    model: mujoco.MjModel,
+    closures: Sequence[int],
 ) -> mujoco.MjModel:
     """Copy a model so that a loop's closures are its only constraints.
 

@@ -54,7 +54,9 @@ _LIGHTER = 0.1
 
 
 def measure_loops(
-    file: RobotFile, options: MeasureOptions, scene: Scene | None
+    file: RobotFile,
+    options: MeasureOptions,
+    scene: Scene | None,
 ) -> RobotMeasurement:
     """Measure the loops of a robot.
 

@@ -75,7 +75,11 @@ def read_joint_equality(file: RobotFile, name: str, scene: Scene) -> JointEquali
 
 
 def _describe_follower(
-    model: mujoco.MjModel, number: int, follower: int, leader: int, scene: Scene
+    model: mujoco.MjModel,
+    number: int,
+    follower: int,
+    leader: int,
+    scene: Scene,
 ) -> JointEquality:
     for joint in (follower, leader):
         if int(model.jnt_type[joint]) != HINGE_JOINT:
@@ -159,7 +163,9 @@ def _find_angle_of_bar(
 
 
 def _list_places(
-    model: mujoco.MjModel, data: mujoco.MjData, body: int
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    body: int,
 ) -> Iterator[list[Array]]:
     """Yield the hinges of the bodies on a body, its sites, and the ends of its rods."""
     on_body = model.body_parentid[model.jnt_bodyid] == body

@@ -43,7 +43,10 @@ angles of a pose have six digits.
 
 
 def close_onto(
-    scene: Scene, posed: PosedRobot, loop: RobotLoop, pose: PoseOptions
+    scene: Scene,
+    posed: PosedRobot,
+    loop: RobotLoop,
+    pose: PoseOptions,
 ) -> tuple[RobotLoop, PosedRobot]:
     """Return the loop as a scene has it, and the robot in a pose of that assembly.
 

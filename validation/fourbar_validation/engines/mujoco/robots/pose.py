@@ -102,7 +102,10 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
 
 
 def _say_open(
-    model: mujoco.MjModel, options: PoseOptions, stated: Array, left: str
+    model: mujoco.MjModel,
+    options: PoseOptions,
+    stated: Array,
+    left: str,
 ) -> str:
     """Say why no pose near the stated one closes all loops.
 

@@ -78,7 +78,10 @@ _SAME_OUTPUT = 1e-6
 
 
 def read_loop_scene(
-    file: RobotFile, options: PoseOptions, name: str | None, speed: float | None
+    file: RobotFile,
+    options: PoseOptions,
+    name: str | None,
+    speed: float | None,
 ) -> LoopScene:
     """Make a scene from a loop of a robot's file.
 
@@ -158,7 +161,10 @@ def _reflect_damping(model: mujoco.MjModel, joint: int) -> float:
 
 
 def _sum_over_motors(
-    model: mujoco.MjModel, joint: int, of_dofs: Array, field: str
+    model: mujoco.MjModel,
+    joint: int,
+    of_dofs: Array,
+    field: str,
 ) -> float:
     total = float(of_dofs[model.jnt_dofadr[joint]])
     of_motors = getattr(model, field, np.zeros(model.nu))  # since MuJoCo 4.0
@@ -207,7 +213,10 @@ def miss_output(scene: Scene, theta_1: float, theta_2: float, theta_4: float) ->
 
 
 def is_seen_from_behind(
-    scene: Scene, theta_1: float, theta_2: float, theta_4: float
+    scene: Scene,
+    theta_1: float,
+    theta_2: float,
+    theta_4: float,
 ) -> bool:
     """Tell whether the plane of a loop is seen from the other side.
 
@@ -234,7 +243,10 @@ class _SceneOfLoop:
     """A scene that is made from one loop."""
 
     def __init__(
-        self, compiled: CompiledRobot, posed: PosedRobot, loop: RobotLoop
+        self,
+        compiled: CompiledRobot,
+        posed: PosedRobot,
+        loop: RobotLoop,
     ) -> None:
         self.model = posed.model
         self.data = posed.data
@@ -370,7 +382,9 @@ class _SceneOfLoop:
         return armature
 
     def _list_effects(
-        self, armature: dict[str, float], betas: dict[str, tuple[float, float]]
+        self,
+        armature: dict[str, float],
+        betas: dict[str, tuple[float, float]],
     ) -> Iterator[Effect]:
         """List the effects, the pins in their order."""
         model = self.model
@@ -398,7 +412,9 @@ class _SceneOfLoop:
             yield Flywheel(round_off(armature["O2"]), 2)
 
     def _list_springs(
-        self, hinges: dict[str, int], betas: dict[str, tuple[float, float]]
+        self,
+        hinges: dict[str, int],
+        betas: dict[str, tuple[float, float]],
     ) -> Iterator[tuple[str, float, float, float]]:
         """List pin, stiffness, rest angle and preload of the hinges' springs.
 
@@ -506,7 +522,10 @@ class _SceneOfLoop:
         return float(min(ends)), float(max(ends))
 
     def _follow(
-        self, linkage: FourBar, angles: Array, in_pose: int
+        self,
+        linkage: FourBar,
+        angles: Array,
+        in_pose: int,
     ) -> dict[str, Array]:
         """Return the angle between the bars of each pin along theta_2, rad.
 

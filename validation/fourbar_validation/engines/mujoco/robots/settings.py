@@ -76,7 +76,9 @@ def _name_value(kinds: type, value: int, words: Sequence[str]) -> str:
 
 
 def _set_settings(
-    model: mujoco.MjModel, loop: RobotLoop, settings: RobotSettings
+    model: mujoco.MjModel,
+    loop: RobotLoop,
+    settings: RobotSettings,
 ) -> mujoco.MjModel:
     """Return a copy of a compiled model with other settings.
 
@@ -248,7 +250,9 @@ def _find_worst_force_error(answer: InsideAnswer) -> float:
 
 
 def _write_elements(
-    file: RobotFile, loop: RobotLoop, tried: TriedSettings
+    file: RobotFile,
+    loop: RobotLoop,
+    tried: TriedSettings,
 ) -> tuple[str, ...]:
     """Write the elements of the file that are to be changed.
 
