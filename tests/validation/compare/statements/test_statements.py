@@ -249,7 +249,9 @@ FAULTS = {
         CHANGE,
         "through",
         lambda patch: patch.setattr(
-            limit_positions, "with_signs", lambda linkage, command: command
+            limit_positions,
+            "find_signs",
+            lambda linkage, angle, branch: np.full_like(angle, branch),
         ),
     ),
 }
