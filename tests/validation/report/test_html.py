@@ -31,9 +31,13 @@ function rgb(text) {
   c.fillStyle = text; c.fillRect(0, 0, 1, 1);
   return [...c.getImageData(0, 0, 1, 1).data].slice(0, 3);
 }
+const lights = new Map();  // of each colour once: a canvas takes milliseconds
 const light = c => {
-  const [r, g, b] = rgb(c).map(v => v / 255).map(v => v <= .03928 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4);
-  return .2126 * r + .7152 * g + .0722 * b;
+  if (!lights.has(c)) {
+    const [r, g, b] = rgb(c).map(v => v / 255).map(v => v <= .03928 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4);
+    lights.set(c, .2126 * r + .7152 * g + .0722 * b);
+  }
+  return lights.get(c);
 };
 const ground = e => {
   for (; e; e = e.parentElement) {
