@@ -43,6 +43,17 @@ def test_a_scene_and_a_robot_need_no_name_of_a_loop(tmp_path: Path) -> None:
     assert "differs from the formulas by less than 1e-08" in checked.output
 
 
+def test_a_loop_too_slow_to_simulate_is_measured_at_single_states(
+    tmp_path: Path,
+) -> None:
+    asked = ("--loop", "rod", "--speed", "0.0001", "-o", str(tmp_path))
+    checked = call(check_mjcf, FOOT, *asked)
+    assert "not simulated: its timestep of" in checked.output
+    held = " ".join(checked.output.split())
+    assert "by generalized forces; contacts, joint limits and motors are off" in held
+    assert "nan" not in checked.output
+
+
 def test_options_that_do_not_go_together_are_refused() -> None:
     for command, arguments in (
         (check_mjcf, ("a.toml", FOOT, "b.xml")),

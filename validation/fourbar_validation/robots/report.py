@@ -81,11 +81,16 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[ReportBlock]:
         f"{loop.name}: {loop.joint} from {min(joints):.4g} to {max(joints):.4g} deg at "
         f"{speed:.4g} rad/s, MuJoCo in the whole robot against the formulas"
     )
+    if math.isfinite(loop.influence):
+        through_time = (
+            ", through time (once the loop has settled) by armature, a tenth of which"
+            f" changes the errors by {loop.influence:.1g}"
+        )
+    else:
+        through_time = ""
     yield (
         f"{loop.held} other degrees of freedom are held: at single states by"
-        " generalized forces, through time (once the loop has settled) by armature, a"
-        f" tenth of which changes the errors by {loop.influence:.1g}; contacts, joint"
-        " limits and motors are off"
+        f" generalized forces{through_time}; contacts, joint limits and motors are off"
     )
     if loop.switched_off:
         names = ", ".join(loop.switched_off)
