@@ -48,21 +48,22 @@ _NO_MOTION = Coefficients(*[np.nan] * 8)
 """Coefficients of NaN, used where only positions are evaluated."""
 
 
-def _find_undecided(
-    factor: Any,
-    constant: Any,
-    size: Any,
-    part: float = NEEDS_DIGITS,
-) -> Any:
+def _needs_many_digits(factor: Any, constant: Any, size: Any) -> Any:
     """Mark where doubles cannot decide the sign of a factor of Heron's formula.
 
-    The factor is a constant and 4 a d times a square.
+    The factor is a constant and 4 a d times a square; where the constant is not
+    negative both are positive and nothing cancels.
+
+    `size`: 4 a d.
     """
-    return (constant < 0.0) & (abs(factor) < part * (abs(constant) + size))
+    return (constant < 0.0) & (abs(factor) < NEEDS_DIGITS * (abs(constant) + size))
 
 
-def find_sign(branch: NDArray[np.int8]) -> Any:
-    """Return the branch of each position, or one number where all have the same."""
+def condense_branch(branch: NDArray[np.int8]) -> Any:
+    """Return the branch of the positions as one number if all have the same.
+
+    It stays an array if they have not. Formulas are quicker with one number.
+    """
     if branch.ndim == 0 or (branch.size and branch.min() == branch.max()):
         if branch.ndim:
             return float(branch.flat[0])
@@ -127,7 +128,7 @@ class Case(NamedTuple):
         scene = scene.settled()
         terms = (*scene.loads, *scene.effects)
         linkage = scene.linkage
-        path = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle, bar)
+        path = prepare_path(linkage.lengths, linkage.ground_angle, bar)
         points = tuple(
             (point.name, point.bar, point.place.vector()) for point in scene.points
         )
@@ -153,15 +154,13 @@ class Case(NamedTuple):
         that misses this change point by less than a perturbation keeps that sign, so
         that it lies beside the nominal one on either side.
         """
-        root = prepare_path(
-            Loop(*nominal.linkage.lengths, 0.0, 0.0), 0.0, self.path.bar
-        ).passing
+        of_nominal = prepare_path(nominal.linkage.lengths, 0.0, self.path.bar).passing
         d, a, b, c, E1, E2 = self.path.lengths
         small = LARGEST_PERTURBATION * (d + a + b + c) ** 2
-        own = self.path.passing
+        of_member = self.path.passing
         passing = Passing(
-            own.outer | (root.outer & (abs(E1) <= small)),
-            own.inner | (root.inner & (abs(E2) <= small)),
+            of_member.outer | (of_nominal.outer & (abs(E1) <= small)),
+            of_member.inner | (of_nominal.inner & (abs(E2) <= small)),
         )
         return self._replace(path=self.path._replace(passing=passing))
 
@@ -170,10 +169,7 @@ class Case(NamedTuple):
         linkage, terms, drive = change_numbers(
             (self.linkage, self.terms, self.drive), lengthen
         )
-        d, a, b, c = linkage.lengths
-        path = prepare_path(
-            Loop(d, a, b, c, 0.0, 0.0), linkage.ground_angle, self.path.bar
-        )
+        path = prepare_path(linkage.lengths, linkage.ground_angle, self.path.bar)
         path = path._replace(passing=self.path.passing)
         bodies = list_bodies(linkage, terms)
         lengths = _restore_unit(linkage, path)
@@ -230,7 +226,7 @@ class Case(NamedTuple):
         Parameters
         ----------
         moving : False: positions only.
-        condition, margin : as in `Path.close`.
+        condition, margin : as in `LoopPath.close`.
         """
         path = self.path
         if moving:
@@ -276,7 +272,7 @@ class Case(NamedTuple):
         state = self.assemble(
             commanded.angle,
             half,
-            find_sign(commanded.branch),
+            condense_branch(commanded.branch),
             0.0 if commanded.speed is None else commanded.speed,
             commanded.acceleration,
             moving=moving,
@@ -331,9 +327,8 @@ class Case(NamedTuple):
         if remainder is None:
             factors = ((half.outer, lengths.E1), (half.inner, lengths.E2))
             for factor, constant in factors:
-                # where it is not negative both terms are positive, nothing cancels
                 if is_any(constant < 0.0):
-                    close = close | _find_undecided(
+                    close = close | _needs_many_digits(
                         factor, constant, 4.0 * lengths.a * lengths.d
                     )
         if not is_any(close):

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError
-from fourbar.evaluation.case import Case, Dynamics, find_margin, find_sign
+from fourbar.evaluation.case import Case, Dynamics, condense_branch, find_margin
 from fourbar.formulas import longer as longer_numbers
 from fourbar.formulas.arithmetic import U, angle, is_any, select
 from fourbar.formulas.longer import lengthen, shorten
@@ -176,7 +176,7 @@ def _asks_angles_alone(case: Case, command: Command, wanted: Set[str]) -> bool:
 def _evaluate_angles(case: Case, command: Command, wanted: Set[str]) -> Evaluated:
     """Evaluate theta_3 and theta_4 alone, without the vectors of the bars."""
     half, _ = case.half_angle(command.angle, None)
-    theta_3, theta_4, root = case.path.angles(half, find_sign(command.branch))
+    theta_3, theta_4, root = case.path.angles(half, condense_branch(command.branch))
     unit = 2.0 * case.path.lengths.b * case.path.lengths.c
     codes = _compute_codes(case.path, root, half, command, unit)
     angles = {"theta_3": theta_3, "theta_4": theta_4}
@@ -277,7 +277,7 @@ def _compute_error_bars(
     refined_rows : indices of the positions whose half angle is evaluated in many
         digits.
     """
-    longer, branch = case.lengthened(), find_sign(command.branch)
+    longer, branch = case.lengthened(), condense_branch(command.branch)
     lost, remainder = command.lost, command.remainder
     if lost is None:
         lost = np.array([0.0 if remainder is None else float(remainder), 0.0, 0.0])
@@ -353,7 +353,7 @@ def _compute_unresolved(
     shifted = case.assemble(
         moved,
         case.path.half_angle(moved),
-        find_sign(command.branch),
+        condense_branch(command.branch),
         state.speed,
         command.acceleration,
         condition=command.condition,

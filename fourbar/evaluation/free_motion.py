@@ -183,7 +183,7 @@ class _Reading:
     """The linkage read in the angle of bar 2, 3 or 4, with its assembly."""
 
     def __init__(self, linkage: FourBar, bar: int) -> None:
-        path = prepare_path(loop(*linkage.lengths), linkage.ground_angle, bar)
+        path = prepare_path(linkage.lengths, linkage.ground_angle, bar)
         self.path = path._replace(
             lengths=_convert_to_floats(path.lengths),
             u1=complex(path.u1),

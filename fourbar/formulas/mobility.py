@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from fourbar.errors import expect
 from fourbar.formulas.path import ROLES_OF_BARS, prepare_path
-from fourbar.formulas.position import TOUCHING, find_parallel_pairs, loop
+from fourbar.formulas.position import TOUCHING, find_parallel_pairs
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar, require_bar
 
 Array = NDArray[np.float64]
@@ -363,9 +363,7 @@ def find_circuit(
         )
     else:  # the two ranges are mirror images in the ground's line
         number = np.where((theta_2 - linkage.ground_angle) % TURN < 0.5 * TURN, 0, 1)
-    half = prepare_path(loop(*linkage.lengths), linkage.ground_angle).half_angle(
-        theta_2
-    )
+    half = prepare_path(linkage.lengths, linkage.ground_angle).half_angle(theta_2)
     return np.where((half.outer >= 0.0) & (half.inner >= 0.0), number, -1).astype(
         np.int8
     )
@@ -502,7 +500,7 @@ def name_assembly(linkage: FourBar, bar: int = 2, branch: int = 1) -> str:
     ('parallelogram', 'antiparallelogram')
     """
     name = classify(linkage).name
-    path = prepare_path(loop(*linkage.lengths), linkage.ground_angle, bar)
+    path = prepare_path(linkage.lengths, linkage.ground_angle, bar)
     parallel, folded = find_parallel_pairs(path.lengths, branch)
     if folded:
         return f"{name}, {BAR_NAMES[ROLES_OF_BARS[bar][2]]} at rest"

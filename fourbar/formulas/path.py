@@ -33,10 +33,10 @@ from fourbar.formulas.motion import (
     Coefficients,
     State,
     coefficients,
+    put_parallel_speeds,
     rates,
     take_sines_of_rates,
 )
-from fourbar.formulas.motion import put_parallel_speeds as parallel_motion
 from fourbar.formulas.position import (
     HalfAngle,
     Loop,
@@ -48,10 +48,10 @@ from fourbar.formulas.position import (
     find_passing,
     half_angle,
     loop,
+    put_parallel_pairs,
     reorder_lengths,
     signed_root,
 )
-from fourbar.formulas.position import put_parallel_pairs as parallel_position
 from fourbar.linkage import FourBar
 
 NO_DIGIT_LEFT = 16.0 * 2.0**-53
@@ -139,7 +139,7 @@ class LoopPath(NamedTuple):
         u2 = self.input_direction(q, half)
         position = close_loop(self.lengths, self.u1, u2, half, branch, self.unit)
         if self.may_stay_parallel:
-            position = parallel_position(
+            position = put_parallel_pairs(
                 position, *find_parallel_pairs(self.lengths, branch)
             )
         return position
@@ -211,7 +211,7 @@ class LoopPath(NamedTuple):
         if self.may_stay_parallel:
             first, second = find_parallel_pairs(self.lengths, branch)
             regular = ~np.isnan(position.root)
-            k = parallel_motion(k, first & regular, second & regular)
+            k = put_parallel_speeds(k, first & regular, second & regular)
         if self.bar == 2:
             return (position, k)
         return (self.in_order(position), _read_from(self.bar, k))
@@ -245,7 +245,8 @@ class LoopPath(NamedTuple):
     def drive_sine(self, position: Position, drive_bar: int) -> Number:
         """Compute the sine between the two bars that are not driven.
 
-        `motion` or `on_curve` made the positions.
+        The positions are those of `motion`; those of `on_curve` in
+        `studies/circuit_curve.py` have no half angle.
         """
         if position.half is None:
             return drive_sine(position, drive_bar)
@@ -270,9 +271,16 @@ class LoopPath(NamedTuple):
         return sine
 
 
-def prepare_path(lengths: Loop, theta_1: Number, bar: int = 2) -> LoopPath:
-    """Prepare the path in the angle of bar 2, 3 or 4."""
-    d, a, b, c, _, _ = lengths
+def prepare_path(
+    lengths: tuple[Number, Number, Number, Number],
+    theta_1: Number,
+    bar: int = 2,
+) -> LoopPath:
+    """Prepare the path in the angle of bar 2, 3 or 4.
+
+    `lengths`: of ground, input, coupler and output, m.
+    """
+    d, a, b, c = lengths
     unit = power_of_two(0.25 * (d + a + b + c))
     reordered = loop(*reorder_lengths(bar, (d / unit, a / unit, b / unit, c / unit)))
     u1 = polar(1.0, theta_1)
@@ -312,9 +320,9 @@ def compute_state(
     """
     with np.errstate(all="ignore"):
         lengths = loop(*linkage.lengths)
-        reading = prepare_path(lengths, linkage.ground_angle)
-        half = reading.half_angle(theta_2)
-        position, k, _ = reading.close(theta_2, half, branch)
+        path = prepare_path(linkage.lengths, linkage.ground_angle)
+        half = path.half_angle(theta_2)
+        position, k, _ = path.close(theta_2, half, branch)
         return State(
             lengths,
             linkage.ground_angle,

@@ -21,7 +21,6 @@ from fourbar.formulas.mobility import (
 )
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import compute_state, prepare_path
-from fourbar.formulas.position import Loop
 from fourbar.linkage import (
     A_BRANCH,
     MOST_INTERVALS,
@@ -189,7 +188,7 @@ def coupler_curve(
     curve = compute_state(linkage, theta_2, assembly).point(3, point)
     x = curve.real
     y = curve.imag
-    path = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle)
+    path = prepare_path(linkage.lengths, linkage.ground_angle)
     signs = path.sign(theta_2, assembly).astype(np.int8)
     theta_2 = np.append(theta_2, theta_2[0] + turns * TURN)
     return CouplerCurve(

@@ -20,7 +20,6 @@ from fourbar.formulas.mobility import (
 )
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import prepare_path
-from fourbar.formulas.position import Loop
 from fourbar.linkage import FourBar
 
 
@@ -158,7 +157,7 @@ def distance_to_singular(
         both count.
     """
     theta_2 = np.asarray(theta_2, dtype=float)
-    path = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle)
+    path = prepare_path(linkage.lengths, linkage.ground_angle)
     points = [(limit.theta_2, 0) for limit in limit_positions(linkage)]
     points += [(point, 0) for point in change_points(linkage)]
     if drive_bar != 2:

@@ -31,7 +31,6 @@ from fourbar.formulas.mobility import (
     turns_fully,
 )
 from fourbar.formulas.path import count_turns, prepare_path
-from fourbar.formulas.position import Loop
 from fourbar.linkage import BAR_NAMES, FourBar, copy_with, require_bar
 from fourbar.quantities import Array
 from fourbar.scene.drawing import DrawnPins
@@ -674,7 +673,7 @@ def find_signs(
 
     `branch`: of the assembly, one for all or (n,). Given signs, it returns assemblies.
     """
-    path = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle, bar)
+    path = prepare_path(linkage.lengths, linkage.ground_angle, bar)
     assemblies = np.broadcast_to(np.asarray(branch, dtype=np.int8), np.shape(angle))
     return np.asarray(path.sign(angle, assemblies)).astype(np.int8)
 

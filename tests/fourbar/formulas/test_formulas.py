@@ -252,7 +252,7 @@ def read_from_the_output(drawn: Drawn) -> tuple[State, Any, Any]:
     """The state read in theta_2, and position and coefficients read in theta_4."""
     moving, from_output = (
         drawn.moving(),
-        prepare_path(loop(*drawn.bars.lengths), drawn.bars.ground_angle, 4),
+        prepare_path(drawn.bars.lengths, drawn.bars.ground_angle, 4),
     )
     theta_4 = np.angle(moving.position.u4)
     # of the triangle B, A, O2: bars 3 and 2 there are as bars 4 and 3 in the order of
@@ -307,7 +307,7 @@ def test_read_in_theta_4_the_input_stands_at_its_limit() -> None:
     """
     bars = FourBar(0.5, Bar(0.4), Bar(0.3), Bar(0.25), 0.2)
     for limit in limit_positions(bars):
-        from_output = prepare_path(loop(*bars.lengths), bars.ground_angle, 4)
+        from_output = prepare_path(bars.lengths, bars.ground_angle, 4)
         sign = math.copysign(1.0, math.sin(limit.theta_3 - limit.theta_2))
         position, k = from_output.motion(
             from_output.position(
@@ -328,7 +328,7 @@ def test_read_in_theta_4_the_input_stands_at_its_limit() -> None:
 
 
 def test_read_in_theta_4_a_parallelogram_stays_parallel_exactly() -> None:
-    from_output = prepare_path(loop(0.3, 0.1, 0.3, 0.1), 0.0, 4)
+    from_output = prepare_path((0.3, 0.1, 0.3, 0.1), 0.0, 4)
     theta_4 = np.array([1e-9, 0.5, 3.0])
     sign = 1.0  # sin(theta_3 - theta_2) > 0 for 180 deg < theta_4 < 360 deg
     position, k = from_output.motion(
@@ -350,7 +350,7 @@ def test_the_sine_of_the_drive_is_that_of_the_two_bars_not_driven(
     d, a, _, _ = lengths
     angles, u1 = np.linspace(-2.9, 3.0, 30), np.exp(0.4j)
     for bar, branch in itertools.product((2, 4), (1.0, -1.0)):
-        reading = prepare_path(loop(*lengths), 0.4, bar)
+        reading = prepare_path(lengths, 0.4, bar)
         with np.errstate(
             invalid="ignore"
         ):  # read from the output the loop does not close at every angle
@@ -425,7 +425,7 @@ def everything(
 ) -> dict[str, Any]:
     """All that the formulas give, on the path in the angle of a bar."""
     lengths = loop(d, a, b, c)
-    from_output = prepare_path(lengths, theta_1, bar)
+    from_output = prepare_path((d, a, b, c), theta_1, bar)
     half = from_output.half_angle(q)
     position, k = from_output.motion(from_output.position(q, half, branch), branch)
     moving = rates(k, 2.0, -3.0)
@@ -801,7 +801,7 @@ def test_a_state_holds_what_it_was_made_from() -> None:
     assert np.array_equal(unit.moving.omega_4, unit.k.h4) and np.array_equal(
         unit.moving.alpha_4, unit.k.dh4
     )
-    assert [prepare_path(unit.lengths, 0.4, bar).bar for bar in (2, 4)] == [2, 4]
+    assert [prepare_path(unit.lengths[:4], 0.4, bar).bar for bar in (2, 4)] == [2, 4]
 
 
 def test_the_factor_that_changes_less_gives_the_other_its_digits() -> None:

@@ -19,7 +19,6 @@ from fourbar.formulas.motion import (
 from fourbar.formulas.path import compute_state, drive_sine, prepare_path
 from fourbar.formulas.pin_forces import Body, Wrenches, coupler_about_B, pin_forces
 from fourbar.formulas.position import (
-    Loop,
     close_loop,
     direction,
     find_parallel_pairs,
@@ -194,7 +193,7 @@ def two_readings() -> tuple[State, State]:
     bars = uniform(0.3, 0.1, 0.25, 0.22)
     by_2 = compute_state(bars, np.array([0.4, 1.0, 4.0]), 1)
     lengths, theta_4 = by_2.lengths, np.angle(by_2.position.u4)
-    reading = prepare_path(lengths, 0.0, 4)
+    reading = prepare_path(lengths[:4], 0.0, 4)
     sign = np.sign(drive_sine(by_2.position, 4))
     position, k = reading.motion(
         reading.position(theta_4, reading.half_angle(theta_4), sign), sign
@@ -204,8 +203,8 @@ def two_readings() -> tuple[State, State]:
 
 def test_grounds_at_several_angles_are_those_of_each() -> None:
     bars, theta_2 = uniform(0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0])
-    lengths, theta_1 = loop(*bars.lengths), np.array([[0.0], [0.4], [1.0]])
-    many = prepare_path(Loop(*(length + 0.0 * theta_1 for length in lengths)), theta_1)
+    lengths, theta_1 = bars.lengths, np.array([[0.0], [0.4], [1.0]])
+    many = prepare_path(tuple(length + 0.0 * theta_1 for length in lengths), theta_1)
     positions = many.position(theta_2, many.half_angle(theta_2), 1)
     for row, angle in enumerate(theta_1[:, 0]):
         one = prepare_path(lengths, float(angle))
