@@ -185,8 +185,8 @@ class Actions:
         total.on_coupler = self.on_coupler + scaled
         return total
 
-    def work(self) -> tuple[Number, Number]:
-        """Compute the generalised force Q of all bars, and of bars 3 and 4, N m.
+    def generalized_forces(self) -> tuple[Number, Number]:
+        """Compute the generalized force Q of all bars, and of bars 3 and 4, N m.
 
         Q is the power over the speed of the independent angle. That of bars 3 and 4 is
         without what goes through pin A.

@@ -43,7 +43,7 @@ class ForceDrive(ABC):
 
     @property
     @abstractmethod
-    def apart(self) -> tuple[int, ...]:
+    def may_be_left_out(self) -> tuple[int, ...]:
         """Return the bars of which one may be left out.
 
         The moments of the other two then give the force between them.
@@ -74,7 +74,7 @@ class ForceDrive(ABC):
 
         It is the work of 1 N over the change of the independent angle.
         """
-        return self.per_newton(Actions(state, MASSLESS)).work()[0]
+        return self.per_newton(Actions(state, MASSLESS)).generalized_forces()[0]
 
     def per_newton(self, actions: Actions) -> Actions:
         """Make what 1 N of it does to the bars."""

@@ -54,7 +54,7 @@ class LinearDrive(ForceDrive):
         return (-1.0, self.start), (1.0, self.end)
 
     @property
-    def apart(self) -> tuple[int, ...]:
+    def may_be_left_out(self) -> tuple[int, ...]:
         """Return the bars of which one may be left out.
 
         The moments of the other two then give the force between them. From the ground

@@ -56,7 +56,7 @@ class PointDrive(ForceDrive):
         return ((1.0, self.place),)
 
     @property
-    def apart(self) -> tuple[int, ...]:
+    def may_be_left_out(self) -> tuple[int, ...]:
         """Return the bars of which one may be left out.
 
         The moments of the other two then give the force between them. The force on bar

@@ -82,20 +82,18 @@ def find_margin(commanded: Command) -> float:
 
 
 class Dynamics(NamedTuple):
-    """Pin forces, what the drive does, and the friction that depends on the pin forces.
-
-    The latter is a `SolvedFriction`.
-    """
+    """Pin forces and effort of the drive under everything that acts."""
 
     pins: PinForces
     from_jamming: Any
+    """As `residual` and `status` from `SolvedFriction`."""
     residual: Any
     status: Any
-    drive: Any
+    effort: Any
     """Torque of the drive, N m, or its force, N."""
-    work: Any
-    """Power of the drive over the commanded angle's speed, N m. It has no pole where
-    the driven bar rests.
+    generalized_force: Any
+    """Generalized force of the drive, its power over the commanded angle's speed, N m.
+    It has no pole where the driven bar rests.
     """
 
 
@@ -341,12 +339,12 @@ class Case(NamedTuple):
         )
         return half, index
 
-    def _compute_inertia(
+    def _compute_inertial_forces(
         self,
         state: State,
         acceleration: Any,
         sine: Any,
-    ) -> "_Inertia":
+    ) -> "_InertialForces":
         """Compute d'Alembert's forces and moments, and their generalized force.
 
         `sine`: of theta_3 - theta_2 if the moment about pin B is wanted, otherwise
@@ -372,7 +370,7 @@ class Case(NamedTuple):
             about_B = coupler_about_B(
                 self.lengths, self.bodies[1], position, state.moving, sine
             )
-        return _Inertia(inertial, others, wrenches, mass_at_A, about_B)
+        return _InertialForces(inertial, others, wrenches, mass_at_A, about_B)
 
     def dynamics(self, state: State, acceleration: Any, side: Any = 0) -> Dynamics:
         """Compute pin forces and the drive under everything that acts.
@@ -382,32 +380,39 @@ class Case(NamedTuple):
         actions = Actions(state, self.bodies, side).add(self.terms)
         if self.drive is None:
             may_be_left_out: tuple[int, ...] = (self.drive_bar,)
+            per_newton = None
+            gain = state.k[self.drive_bar - 2]
         else:
-            may_be_left_out = self.drive.apart
+            may_be_left_out = self.drive.may_be_left_out
+            per_newton = self.drive.per_newton(actions)
+            gain = per_newton.generalized_forces()[0]
         sines = {
             bar: self.path.drive_sine(state.position, bar) for bar in may_be_left_out
         }
-        inertia = self._compute_inertia(state, acceleration, sines.get(4))
-        unit = None if self.drive is None else self.drive.per_newton(actions)
-        gain = state.k[self.drive_bar - 2] if unit is None else unit.work()[0]
-        bodies = _FreeBodies(state, inertia, sines, unit, gain)
-        friction = SolvedFriction(bodies.solve_pin_forces(actions))
+        inertial = self._compute_inertial_forces(state, acceleration, sines.get(4))
+        free_bodies = _FreeBodies(state, inertial, sines, per_newton, gain)
+        friction = SolvedFriction(free_bodies.solve_pin_forces(actions))
         # a scene holds one effect of a kind, and one kind depends on the forces
         for term in self.terms:
             if term.loaded_pins:
                 friction = term.solve_friction(
-                    actions, friction.pins, bodies.solve_pin_forces
+                    actions, friction.pins, free_bodies.solve_pin_forces
                 )
-        Q = actions.work()[0]
+        Q = actions.generalized_forces()[0]
         return Dynamics(
-            *friction, driving_torque(gain, inertia.total, Q), inertia.total - Q
+            pins=friction.pins,
+            from_jamming=friction.from_jamming,
+            residual=friction.residual,
+            status=friction.status,
+            effort=driving_torque(gain, inertial.total, Q),
+            generalized_force=inertial.total - Q,
         )
 
     def drive_interval(
         self,
         state: State,
         acceleration: Any,
-        drive: Any,
+        effort: Any,
     ) -> tuple[Any, Any, Any]:
         """Compute the least and greatest torque or force of the drive.
 
@@ -420,7 +425,7 @@ class Case(NamedTuple):
         actions = Actions(state, self.bodies)
         pins = {pin for term in self.terms for pin in term.dry_pins}
         if np.all(state.speed) and all(np.all(actions.turning(pin)) for pin in pins):
-            return drive, drive, None
+            return effort, effort, None
         ahead, back = (self.dynamics(state, acceleration, side) for side in (1, -1))
         jammed = [
             dynamics.status == JAMMED
@@ -428,8 +433,8 @@ class Case(NamedTuple):
             if dynamics.status is not None
         ]
         low, high = (
-            np.minimum(ahead.drive, back.drive),
-            np.maximum(ahead.drive, back.drive),
+            np.minimum(ahead.effort, back.effort),
+            np.maximum(ahead.effort, back.effort),
         )
         return low, high, np.any(jammed, axis=0) if jammed else None
 
@@ -440,8 +445,8 @@ def _restore_unit(linkage: FourBar, path: LoopPath) -> Loop:
     return Loop(*linkage.lengths, path.lengths.E1 * square, path.lengths.E2 * square)
 
 
-class _Inertia(NamedTuple):
-    """Inertia of the bars in a motion; none by default."""
+class _InertialForces(NamedTuple):
+    """D'Alembert's forces of the bars in a motion; none by default."""
 
     total: Any = 0.0
     """J q'' + J'/2 q'^2 of all bars, N m."""
@@ -458,12 +463,12 @@ class _FreeBodies(NamedTuple):
     """The free bodies at some positions, and the drive that balances what acts."""
 
     state: State
-    inertia: _Inertia
+    inertial: _InertialForces
     sines: dict[int, Any]
     """Sines between the two other bars, by the bar whose moment is left out."""
-    drive: Actions | None
-    """Actions of a drive that exerts a force, per newton. None: the drive is a couple
-    on a bar.
+    per_newton: Actions | None
+    """Actions of a drive that exerts a force, of 1 N. None: the drive is a couple on a
+    bar.
     """
     gain: Any
     """h of the driven bar, or ds/dq of the drive that exerts a force, m."""
@@ -482,18 +487,18 @@ class _FreeBodies(NamedTuple):
         bar 3, the pair of bars whose directions differ most keeps the digits.
         """
         if with_inertia:
-            inertia = self.inertia
+            inertial = self.inertial
         else:
-            inertia = _Inertia()
-        if self.drive is not None:
-            actions = actions.plus(
-                self.drive, driving_torque(self.gain, inertia.total, actions.work()[0])
-            )
+            inertial = _InertialForces()
+        if self.per_newton is not None:
+            Q = actions.generalized_forces()[0]
+            force = driving_torque(self.gain, inertial.total, Q)
+            actions = actions.plus(self.per_newton, force)
         if len(self.sines) == 1:
             (bar,) = self.sines
-            return self._solve_from_two_moments(bar, actions, inertia)
+            return self._solve_from_two_moments(bar, actions, inertial)
         pins = {
-            bar: self._solve_from_two_moments(bar, actions, inertia)
+            bar: self._solve_from_two_moments(bar, actions, inertial)
             for bar in self.sines
         }
         s2, s3, s4 = (abs(self.sines[bar]) for bar in MOVING_BARS)
@@ -508,7 +513,7 @@ class _FreeBodies(NamedTuple):
         self,
         left_out: int,
         actions: Actions,
-        inertia: _Inertia,
+        inertial: _InertialForces,
     ) -> PinForces:
         """Solve from the moments of the two bars other than the one left out."""
         lengths = self.state.lengths
@@ -516,18 +521,19 @@ class _FreeBodies(NamedTuple):
         moment = 0.0
         if left_out == 4:
             # of the coupler about B
-            moment = -(actions.about_B() + inertia.about_B)
+            moment = -(actions.about_B() + inertial.about_B)
         elif left_out == 2 and is_any(lengths.d < lengths.a):
             # of F32 about O2, by the virtual work of bars 3 and 4
-            moment = (actions.work()[1] - inertia.of_others) / self.state.k.h2
-        wrenches = actions.wrenches(inertia.wrenches)
+            Q_of_others = actions.generalized_forces()[1]
+            moment = (Q_of_others - inertial.of_others) / self.state.k.h2
+        wrenches = actions.wrenches(inertial.wrenches)
         pins = pin_forces(
             lengths,
             position,
             left_out,
             self.sines[left_out],
             wrenches,
-            inertia.mass_at_A,
+            inertial.mass_at_A,
             moment,
         )
         return actions.at_pins(pins)

@@ -199,11 +199,11 @@ def _list_forces(
     drive_names = case.drive_names
     values: dict[str, Any] = {
         **dynamics.pins._asdict(),
-        drive_names.value: dynamics.drive,
+        drive_names.value: dynamics.effort,
         **error_bars,
     }
     if "power" in wanted:
-        values["power"] = dynamics.drive * case.drive_speed(state)
+        values["power"] = dynamics.effort * case.drive_speed(state)
     if "drive_condition" in wanted:
         condition = case.drive_condition(state)
         values["drive_condition"] = (
@@ -216,11 +216,15 @@ def _list_forces(
             0.0 if dynamics.residual is None else dynamics.residual
         )
     if drive_names.low in wanted or drive_names.high in wanted:
-        *ends, held = case.drive_interval(state, command.acceleration, dynamics.drive)
-        values |= zip(drive_names[2:], ends, strict=True)
-        if held is not None and dynamics.status is not None:
+        low, high, jammed = case.drive_interval(
+            state, command.acceleration, dynamics.effort
+        )
+        values |= {drive_names.low: low, drive_names.high: high}
+        if jammed is not None and dynamics.status is not None:
             dynamics = dynamics._replace(
-                status=np.where(held & (dynamics.status == OK), JAMMED, dynamics.status)
+                status=np.where(
+                    jammed & (dynamics.status == OK), JAMMED, dynamics.status
+                )
             )
     without: list[Any] = [
         status
@@ -311,8 +315,8 @@ def _compute_error_bars(
     )
     longer_dynamics = longer.dynamics(near, longer_acceleration, case.side)
     pairs = zip(
-        (*dynamics.pins, dynamics.drive),
-        (*longer_dynamics.pins, longer_dynamics.drive),
+        (*dynamics.pins, dynamics.effort),
+        (*longer_dynamics.pins, longer_dynamics.effort),
         strict=True,
     )
     *gaps, drive_gap = (np.abs(shorten(after - before)) for before, after in pairs)
@@ -323,7 +327,7 @@ def _compute_error_bars(
         )
         gap = np.fmax(gap, unresolved)
         drive_gap = np.fmax(drive_gap, drive_unresolved)
-    drive_error = _compute_error_bar(drive_gap, np.abs(dynamics.drive))
+    drive_error = _compute_error_bar(drive_gap, np.abs(dynamics.effort))
     force_error = _compute_error_bar(
         gap, reduce(np.maximum, map(np.abs, dynamics.pins))
     )
@@ -364,8 +368,8 @@ def _compute_unresolved(
     except InputError:  # a load's table ends here
         return np.nan, np.nan
     pairs = zip(
-        (*dynamics.pins, dynamics.drive),
-        (*there.pins, there.drive),
+        (*dynamics.pins, dynamics.effort),
+        (*there.pins, there.effort),
         strict=True,
     )
     with np.errstate(all="ignore"):

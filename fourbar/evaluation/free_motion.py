@@ -353,7 +353,7 @@ class _IntegrationRun:
     def _at(self) -> tuple[Position, Coefficients]:
         return self.reading.evaluate(float(self.y[0]))
 
-    def _compute_generalised_force(
+    def _compute_generalized_force(
         self,
         q: float,
         position: Position,
@@ -365,7 +365,9 @@ class _IntegrationRun:
         The speed is not zero where friction needs a direction.
         """
         state = self._make_state(q, position, k, rate)
-        return float(Actions(state, self.bodies).add(self.terms).work()[0])
+        return float(
+            Actions(state, self.bodies).add(self.terms).generalized_forces()[0]
+        )
 
     def _make_state(
         self,
@@ -388,7 +390,7 @@ class _IntegrationRun:
     def _try_both_senses(self) -> list[float]:
         q = float(self.y[0])
         return [
-            self._compute_generalised_force(q, *self._at(), rate)
+            self._compute_generalized_force(q, *self._at(), rate)
             for rate in (VANISHING_SPEED, -VANISHING_SPEED)
         ]
 
@@ -401,7 +403,7 @@ class _IntegrationRun:
             moving = self.side * max(self.side * rate, VANISHING_SPEED)
         else:
             moving = rate
-        Q = self._compute_generalised_force(q, position, k, moving)
+        Q = self._compute_generalized_force(q, position, k, moving)
         slope = half_slope(self.lengths.a, self.bodies, position, k)
         # NumPy's division raises no error where the inertia vanishes
         return [

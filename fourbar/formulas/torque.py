@@ -3,7 +3,7 @@
     T_k h_k = J q'' + J'/2 q'^2 - Q
 
 J is the equivalent inertia, sum of m |dG/dq|^2 + I h_k^2, J' its derivative by the
-independent angle q (theta_2 where the input is commanded) and Q the generalised force
+independent angle q (theta_2 where the input is commanded) and Q the generalized force
 of loads and effects, their power over q'. Nothing is lost here where the moments about
 a pin are differences of large numbers. T3 has poles where h3 = 0, T4 where h4 = 0.
 
@@ -69,16 +69,16 @@ def half_slope(
     return half
 
 
-def driving_torque(by: Number, inertial: Number, Q: Number) -> Number:
+def driving_torque(gain: Number, inertial: Number, Q: Number) -> Number:
     """Compute T_k = (J q'' + J'/2 q'^2 - Q)/h_k, N m.
 
     With ds/dq for h_k it is the force of a drive, N.
 
     Parameters
     ----------
-    by : h_k of the driven bar, or ds/dq, m.
+    gain : h_k of the driven bar, or ds/dq of the drive that exerts a force, m.
     inertial : J q'' + J'/2 q'^2, N m.
-    Q : generalised force of loads and effects, N m.
+    Q : generalized force of loads and effects, N m.
 
     >>> from math import pi
     >>> from fourbar.formulas.path import compute_state
@@ -95,4 +95,4 @@ def driving_torque(by: Number, inertial: Number, Q: Number) -> Number:
     >>> f"{driving_torque(s.k.h2, inertial, Q):.2f}"
     '243.23'
     """
-    return (inertial - Q) / by
+    return (inertial - Q) / gain

@@ -389,7 +389,7 @@ def compute_energies(scene: Scene, motion: Solution) -> _Energies:
     work = {}
     for name, terms in groups.items():
         actions = Actions(state, list_bodies(scene.linkage)).add(terms)
-        power = np.zeros(len(motion)) + actions.work()[0] * motion.omega_2
+        power = np.zeros(len(motion)) + actions.generalized_forces()[0] * motion.omega_2
         finite = np.isfinite(power)  # bars 3 and 4 in line: the velocities are 0/0
         if np.count_nonzero(finite) > 1 and np.any(power[finite]):
             work[name] = CubicSpline(

@@ -1,6 +1,6 @@
 """The circuit of a scene as a curve that can be walked through its limits.
 
-The generalised force along it is computed here too.
+The generalized force along it is computed here too.
 
 With psi = theta_2 - theta_1 and mu = theta_4 - theta_3, the diagonal from A to O4,
 squared, is in both triangles
@@ -60,7 +60,7 @@ class RestPosition(NamedTuple):
     """+1 or -1; 0 at a limit of theta_2, where the two meet."""
 
 
-def _compute_generalised_force(
+def _compute_generalized_force(
     scene: Scene,
     terms: tuple[Any, ...],
     state: State,
@@ -69,7 +69,11 @@ def _compute_generalised_force(
 
     It is by the parameter of the state's coefficients.
     """
-    return Actions(state, list_bodies(scene.linkage, terms)).add(terms).work()[0]
+    return (
+        Actions(state, list_bodies(scene.linkage, terms))
+        .add(terms)
+        .generalized_forces()[0]
+    )
 
 
 class _Sizes(Actions):
@@ -314,7 +318,7 @@ class CircuitCurve:
     def force(self, points: Array) -> Array:
         """Compute Q of all but dry friction, by the curve's parameter."""
         return np.broadcast_to(
-            _compute_generalised_force(self.scene, self.case.terms, self.state(points)),
+            _compute_generalized_force(self.scene, self.case.terms, self.state(points)),
             len(points),
         )
 
@@ -324,7 +328,7 @@ class CircuitCurve:
         psi, mu = (
             Sloped(x, h[None]) for x, h in zip(points.T, (k.h2, k.h43), strict=True)
         )
-        Q = _compute_generalised_force(
+        Q = _compute_generalized_force(
             self.scene, self.case.terms, on_curve(self.lengths, self.theta_1, psi, mu)
         )
         if isinstance(Q, Sloped):

@@ -450,8 +450,8 @@ def _compute_derivatives(
         dynamics = case.dynamics(state, acceleration)
         quantities |= {
             **dynamics.pins._asdict(),
-            case.drive_names.value: dynamics.drive,
+            case.drive_names.value: dynamics.effort,
         }
-        quantities["power"] = dynamics.work * speed
+        quantities["power"] = dynamics.generalized_force * speed
         quantities["drive_condition"] = case.drive_condition(state)
     return {name: quantities[name] for name in names}, held

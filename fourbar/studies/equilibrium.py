@@ -2,7 +2,7 @@
 
 Weights, springs and loads act.
 
-With Q the generalised force (its power over q') and J the equivalent inertia, at rest
+With Q the generalized force (its power over q') and J the equivalent inertia, at rest
 and with no drive,
     J q'' = Q,   stable where Q = 0 and dQ/dq < 0,   frequency sqrt(-Q'/J)/(2 pi).
 Dry friction holds wherever it takes Q: from the position in which it gives way forwards
@@ -409,7 +409,7 @@ def _add_friction(curve: CircuitCurve, points: Array, side: int) -> Array:
             part = curve.state(points[chosen])
             case = curve.case._replace(drive_bar=bar, drive=None)
             dynamics = case.dynamics(part, 0.0, side)
-            Q = -dynamics.drive * part.k[bar - 2]
+            Q = -dynamics.effort * part.k[bar - 2]
             force[chosen] = (
                 Q
                 if dynamics.status is None

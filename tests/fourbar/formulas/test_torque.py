@@ -397,7 +397,7 @@ def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(
             alone = solve(scene, "force", at=some_of(command, np.arange(5) == i)).torque
             assert alone[0] == pytest.approx(s.torque[i], rel=1e-13)
     state = compute_shown_state(scene, command)
-    assert Actions(state, list_bodies(linkage)).work() == (0.0, 0.0)
+    assert Actions(state, list_bodies(linkage)).generalized_forces() == (0.0, 0.0)
 
 
 def test_positions_that_do_not_close_and_limits_are_quiet() -> None:

@@ -69,9 +69,9 @@ def evaluate_single(scene: Scene, command: Command) -> QuantityValues:
         state = case.assemble(theta_2, half, command.branch, speed, growth)
         state = change_numbers(state, _round_single)
         dynamics = case.dynamics(state, growth)
-    assert dynamics.drive.dtype == np.float32
+    assert dynamics.effort.dtype == np.float32
     return {
-        "torque": dynamics.drive,
+        "torque": dynamics.effort,
         **{
             name: _stack(getattr(dynamics.pins, name), len(theta_2))
             for name in PIN_FORCES
