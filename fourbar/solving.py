@@ -44,8 +44,8 @@ from fourbar.solution import Solution, unwrap
 _LONG_BLOCK = POSITIONS_OF_A_BLOCK // 4
 """Positions with error bars evaluated at a time. Longer numbers fill the cache sooner.
 """
-StudyPart = tuple[Any, ...]
-"""Index of some positions in the arrays of all."""
+PositionIndex = tuple[Any, ...]
+"""Index of some positions in the arrays of all; of a study, of some members too."""
 
 
 class ManyScenes(Protocol):
@@ -169,26 +169,26 @@ class Results:
         self.reverses: bool = False
         """True if sin(theta_4 - theta_3) may have another sign than the branch."""
 
-    def store(self, case: Case, evaluated: Evaluated, part: StudyPart) -> None:
+    def store(self, case: Case, evaluated: Evaluated, index: PositionIndex) -> None:
         """Write what was evaluated.
 
         What is no number has the status that says so.
         """
         withhold_infinite(case, evaluated)
         self.reverses = self.reverses or _may_reverse(case)
-        shape = self.codes[part].shape
-        self.codes[part] = evaluated.codes.reshape(shape)
+        shape = self.codes[index].shape
+        self.codes[index] = evaluated.codes.reshape(shape)
         for name, value in evaluated.values.items():
             array = self.arrays[name]
             if len(shape) > 1 and np.ndim(value):
                 value = value.reshape(shape)  # noqa: PLW2901
             if name in SCALARS:
-                array[part] = value
+                array[index] = value
             elif array.strides[-1] == array.itemsize:
                 # x and y next to each other: one copy
-                array.view(complex)[*part, 0] = value
+                array.view(complex)[*index, 0] = value
             else:
-                array[*part, 0], array[*part, 1] = value.real, value.imag
+                array[*index, 0], array[*index, 1] = value.real, value.imag
 
 
 def _may_reverse(case: Case) -> bool:
@@ -249,11 +249,11 @@ def _solve_blocks(case: Case, commanded: Command, request: _Requested) -> Result
     """Solve the positions of one linkage block by block."""
     results = Results(request)
     evaluated = None
-    for part in split(len(commanded.angle), request.block):
-        block = commanded.part(part)
+    for rows in split(len(commanded.angle), request.block):
+        block = commanded.part(rows)
         # kept until the next block is evaluated, so that its memory is used again
         evaluated = evaluate(case, block, request.last_stage, request.wanted)
-        results.store(case, evaluated, (part,))
+        results.store(case, evaluated, (rows,))
     return results
 
 

@@ -1,8 +1,9 @@
 """The effects that a scene can name, one module each.
 
-Only the effects listed here act. An effect is a frozen subclass of `Effect` and holds
-physics alone; docs/extending.md shows one being added. Each file is imported when its
-effect is first named. A file that is not listed here is found in the folder.
+`FILE_OF` lists those of the package; a file in the folder that it does not list is
+found by being there. An effect is a frozen subclass of `Effect` and holds physics
+alone; docs/extending.md shows one being added. Each file is imported when its effect is
+first named.
 """
 
 from functools import cache

@@ -52,14 +52,14 @@ if TYPE_CHECKING:
 FORCE = STAGES.index("force")
 ERROR = STAGES.index("error")
 _LONG_EPS = float(np.finfo(np.longdouble).eps)
-"""Distance of long doubles beside 1."""
+"""Spacing of long doubles next to 1."""
 ROUNDINGS_IN_FULL = 16.0
 """Roundings of a chain of formulas that count in full. Some fifty move a result by
 sqrt(50) = 7, as a random walk; 16 is a little more than twice that.
 """
 SLOPE_STEP = 2.0**-14
-"""Part of s^2 by which an angle is moved for a slope. A force changes by that part, of
-which doubles keep digits.
+"""Part of s^2 by which an angle is moved for a slope. A force then changes by about
+that part, so that its change has some 40 bits of a double left.
 """
 _LEAST_STEP = 2.0**-46
 """Step as a part of the angle, at least of 1 rad. A shorter step is rounded to less
@@ -384,8 +384,10 @@ def _compute_unresolved(
 def _compute_error_bar(gap: Any, size: Any) -> Any:
     """Compute the error bar from the distance to the longer number.
 
-    The size of the value has a part in it. The error bar is the size of the value, so
-    that no digit is left, where the longer number is not finite as a double.
+    It is at least U times the value. Where the longer number is not finite as a double
+    it is the value itself: no digit is left.
+
+    `size`: of the value.
     """
     width = np.maximum(gap, U * size)  # the value itself was rounded by as much
     return select(np.isfinite(width), width, size)

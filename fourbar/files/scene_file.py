@@ -421,7 +421,9 @@ def _read_motion(read: Reader, value: object) -> Motion:
         place, speed, acceleration = COMMAND_NAMES[bar]
         unit = "rad"
     if place in entry or of_stroke:
-        arguments[place] = _read_places(read, f"motion.{place}", entry.get(place), unit)
+        arguments[place] = _read_commanded(
+            read, f"motion.{place}", entry.get(place), unit
+        )
     if speed in entry:
         arguments[speed] = read.quantity(f"motion.{speed}", entry[speed], f"{unit}/s")
     arguments[acceleration] = read.quantity(
@@ -477,7 +479,7 @@ def _read_rise(read: Reader, key: str, value: object) -> Rise:
     return Rise(kind, steps=steps, **read.numbers(key, entry, Rise.numbers))
 
 
-def _read_places(
+def _read_commanded(
     read: Reader,
     key: str,
     value: object,

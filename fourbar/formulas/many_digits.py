@@ -27,21 +27,22 @@ _RESIDUE = 1e-55
 def exact_half_angle(
     linkage: FourBar,
     theta_2: float,
-    offset: Any = None,
+    remainder: Any = None,
     unit: Any = 1.0,
     member: int = 0,
     bar: int = 2,
     lost: float = 0.0,
 ) -> HalfAngle:
-    """Compute the numbers of `formulas.position.half_angle` that depend on digits.
+    """Compute the half angle of `formulas.position.half_angle` in numbers of mpmath.
 
-    They are five, of mpmath.
+    Its `root_sign` is left at 1, as doubles can tell it.
 
     Parameters
     ----------
     theta_2 : rad.
-    offset : what theta_2 as a double leaves out of the angle meant (rad, mpmath), where
-        that is known. A position beyond the limit then does not assemble, however near.
+    remainder : what theta_2 as a double leaves out of the angle meant (rad, mpmath),
+        where that is known (`Command.remainder`). A position beyond the limit then does
+        not assemble, however near.
     unit : of the lengths, m.
     member : index into numbers of the linkage that are arrays.
     bar : from which the loop is read; theta_2 is its angle.
@@ -60,7 +61,7 @@ def exact_half_angle(
             mpf(theta_2)
             + mpf(lost)
             - own(linkage.ground_angle)
-            + (0 if offset is None else offset)
+            + (0 if remainder is None else remainder)
         ) / 2
         if bar == 4:
             h -= mp.pi / 2
@@ -71,7 +72,7 @@ def exact_half_angle(
         size = 2 * (a + b + c + d) * mp.sqrt(half.inner + (b - c) ** 2)
         least, most = (
             (-TOUCHING * size, 0)
-            if offset is None
+            if remainder is None
             else (-_RESIDUE * size, _RESIDUE * size)
         )
         outer, inner = (
@@ -87,7 +88,7 @@ def decide_half_angles(
     half: HalfAngle,
     index: Any,
     theta_2: Any,
-    offset: Any = None,
+    remainder: Any = None,
     bar: int = 2,
     lost: Any = 0.0,
 ) -> HalfAngle:
@@ -106,19 +107,19 @@ def decide_half_angles(
     high, low = np.zeros((2, 5, flat.size))
     for i in index:
         *numbers, _ = exact_half_angle(
-            linkage, float(flat[i]), offset, unit, i, bar, left_out[i]
+            linkage, float(flat[i]), remainder, unit, i, bar, left_out[i]
         )
         for row, value in enumerate(numbers):
             high[row, i] = float(value)
             low[row, i] = float(value - high[row, i])
-    *numbers, side = half
+    *numbers, root_sign = half
     mask = mask.reshape(shape)
     rows = zip(numbers, high.reshape(5, *shape), low.reshape(5, *shape), strict=True)
     decided = (
         np.where(mask, make_like(rounded, number) + rest, number)[()]
         for number, rounded, rest in rows
     )
-    return HalfAngle(*decided)._replace(side=side)
+    return HalfAngle(*decided)._replace(root_sign=root_sign)
 
 
 def limit_remainder(
@@ -142,8 +143,8 @@ def limit_remainder(
         d, a, b, c = map(mpf, reorder_lengths(bar, linkage.lengths))
         theta_1 = mpf(linkage.ground_angle) + (mp.pi if bar == 4 else 0)
         exact = []
-        for side in (b + c, b - c):
-            cosine = (a * a + d * d - side * side) / (2 * a * d)
+        for span in (b + c, b - c):
+            cosine = (a * a + d * d - span * span) / (2 * a * d)
             psi = mp.acos(min(max(cosine, mpf(-1)), mpf(1)))
             exact += [theta_1 + sign * psi for sign in (1, -1)]
         turn = 2 * mp.pi

@@ -165,8 +165,12 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
         straight = psi in (0.0, math.pi)
         # the loop as a sum of vectors: bar 4 runs from B back to O4, so its vector is
         # -c u4
-        for side in (1.0,) if straight else (1.0, -1.0):
-            vectors = {bar: side * psi, others[0]: -side * eta, others[1]: -side * eta}
+        for mirrored in (1.0,) if straight else (1.0, -1.0):
+            vectors = {
+                bar: mirrored * psi,
+                others[0]: -mirrored * eta,
+                others[1]: -mirrored * eta,
+            }
             if not stretched:
                 vectors[others[1] if reach.x >= reach.y else others[0]] += math.pi
             psi_2 = vectors[2] % TURN

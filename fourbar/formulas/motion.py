@@ -197,10 +197,13 @@ class Frame(NamedTuple):
     u: Number
     """e^{i theta}, which turns an arm of the frame into the world's axes."""
     pin: Number
-    """The first pin, complex, m; its velocity, m/s; its acceleration, m/s^2."""
+    """Place of the first pin, complex, m."""
     v_pin: Number
+    """Its velocity, m/s."""
     a_pin: Number
+    """Its acceleration, m/s^2."""
     i_omega: Number
+    """1/s."""
     turn: Number
     """i alpha - omega^2, 1/s^2."""
 

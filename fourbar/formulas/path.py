@@ -102,7 +102,7 @@ class LoopPath(NamedTuple):
         """
         if not self.has_change_point:
             return branch
-        return branch * self.half_angle(q).side
+        return branch * self.half_angle(q).root_sign
 
     @property
     def has_change_point(self) -> bool:

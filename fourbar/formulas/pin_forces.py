@@ -195,7 +195,7 @@ def pin_forces(
     d, a, b, c, _, _ = lengths
     R2, R3, R4, M2, M3, M4, C = w
     of_3 = M3 - C
-    # bar 2: separate, because a sum of both loses digits
+    # in the frame of bar 2; the sum with R3 would lose the digits of the smaller one
     along = mass_at_A.real
     across = mass_at_A.imag
     if drive_bar == 4:

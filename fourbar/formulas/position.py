@@ -76,7 +76,7 @@ class HalfAngle(NamedTuple):
     sk: Number
     outer: Number
     inner: Number
-    side: Number = 1.0
+    root_sign: Number = 1.0
     """Sign of the product of both roots: +1 or -1, always +1 without a change point."""
 
 
@@ -227,12 +227,13 @@ def half_angle(
     if passing is None:
         passing = find_passing(lengths)
     t = tangent(0.5 * psi)
+    # tan h is zero at this change point: a tiny step off it gives the limits there
     if opposite:
-        collinear = passing.outer
+        passes_at_zero = passing.outer
     else:
-        collinear = passing.inner
-    if is_any(collinear):
-        t = select(collinear, t + np.copysign(_TINY_TANGENT, t), t)
+        passes_at_zero = passing.inner
+    if is_any(passes_at_zero):
+        t = select(passes_at_zero, t + np.copysign(_TINY_TANGENT, t), t)
     kk = 1.0 / (1.0 + t * t)
     sk = t * kk
     ss = t * sk
@@ -240,11 +241,11 @@ def half_angle(
         squares = (kk, ss, -sk)
     else:
         squares = (ss, kk, sk)
-    side = find_side(psi, passing, opposite=opposite)
-    return compute_factors(lengths, *squares, side)
+    root_sign = find_root_sign(psi, passing, opposite=opposite)
+    return compute_factors(lengths, *squares, root_sign)
 
 
-def find_side(psi: Number, passing: Passing, *, opposite: bool) -> Number:
+def find_root_sign(psi: Number, passing: Passing, *, opposite: bool) -> Number:
     """Find the sign that the roots together have at psi (rad, not reduced).
 
     It is 1 unless a root passes through zero. `opposite`: as in `half_angle`.
@@ -265,7 +266,7 @@ def signed_root(half: HalfAngle, branch: Number) -> Number:
 
     `branch`: sigma, +1 or -1, the assembly.
     """
-    return branch * half.side * square_root(half.outer * half.inner)
+    return branch * half.root_sign * square_root(half.outer * half.inner)
 
 
 def compute_factors(
@@ -273,7 +274,7 @@ def compute_factors(
     ss: Number,
     kk: Number,
     sk: Number,
-    side: Number = 1.0,
+    root_sign: Number = 1.0,
 ) -> HalfAngle:
     """Compute the factors of Heron's formula from sin^2 h, cos^2 h and sin h cos h."""
     four_ad = 4.0 * lengths.a * lengths.d
@@ -288,7 +289,7 @@ def compute_factors(
             select(short & (ss < kk), four_bc - inner, outer),
             select(short & (kk <= ss), four_bc - outer, inner),
         )
-    return HalfAngle(ss, kk, sk, outer, inner, side)
+    return HalfAngle(ss, kk, sk, outer, inner, root_sign)
 
 
 def close_loop(

@@ -166,11 +166,11 @@ def distance_to_singular(
             for limit in limit_positions(linkage, drive_bar)
         ]
     nearest = np.full(theta_2.shape, np.inf)
-    for point, side in points:
+    for point, point_branch in points:
         there = point + TURN * np.rint((theta_2 - point) / TURN)
         counts: Any = True
-        if branch is not None and side != 0:
-            counts = path.sign(there, np.asarray(branch)) == side
+        if branch is not None and point_branch != 0:
+            counts = path.sign(there, np.asarray(branch)) == point_branch
         distance = np.abs(theta_2 - there)
         nearest = np.where(counts, np.minimum(nearest, distance), nearest)
     return nearest

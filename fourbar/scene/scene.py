@@ -1,6 +1,6 @@
-"""A scene: linkage, motion, drive, loads and effects.
+"""A scene: linkage, motion, drive, loads and effects; and the command of its motion.
 
-`solve` evaluates only the stages requested.
+`Command` lists the positions that a motion names; `command` makes it of a scene.
 """
 
 from collections.abc import Callable

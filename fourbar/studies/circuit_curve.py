@@ -234,7 +234,7 @@ class CircuitCurve:
         tau = np.asarray(np.remainder(tau, TURN), dtype=float)
         if self.full:
             psi = self.low + tau
-            sign = branch * self.side(psi)
+            sign = branch * self.root_sign(psi)
         else:
             psi = 0.5 * (self.low + self.high) - 0.5 * (self.high - self.low) * np.cos(
                 tau
@@ -266,11 +266,11 @@ class CircuitCurve:
         """The branch of each row; one row holds both where the input has limits."""
         return self.branches if self.full else (1,)
 
-    def side(self, psi: Array) -> Array:
+    def root_sign(self, psi: Array) -> Array:
         """Return the sign of sin mu at places of a row in the open branch, (n,)."""
         if not self.assembly:
             return np.ones(psi.shape)
-        return np.asarray(half_angle(self.ratios, psi).side)
+        return np.asarray(half_angle(self.ratios, psi).root_sign)
 
     def samples(self) -> Array:
         """Sample all rows at even places within the sweep and at its ends, (n, 2).
@@ -300,7 +300,7 @@ class CircuitCurve:
         mu = mu[on_circuit]
         return np.concatenate(
             [
-                np.stack([psi, branch * self.side(psi) * mu], axis=1)
+                np.stack([psi, branch * self.root_sign(psi) * mu], axis=1)
                 for branch in self.branches
             ]
         )

@@ -17,7 +17,7 @@ from fourbar.evaluation.case import Case
 from fourbar.evaluation.evaluate import list_kinematics
 from fourbar.formulas.arithmetic import Number, polar, without_slopes
 from fourbar.formulas.path import LoopPath
-from fourbar.formulas.position import HalfAngle, compute_factors, find_side
+from fourbar.formulas.position import HalfAngle, compute_factors, find_root_sign
 from fourbar.quantities import (
     FORCE_NAMES,
     NOT_ASSEMBLED,
@@ -380,8 +380,8 @@ class _SlopedPath(LoopPath):
         else:
             squares = (s * s, k * k, s * k)
         # a sign has no slope: the linkages beside keep the assembly
-        side = find_side(without_slopes(psi), self.passing, opposite=opposite)
-        return compute_factors(self.lengths, *squares, side)
+        root_sign = find_root_sign(without_slopes(psi), self.passing, opposite=opposite)
+        return compute_factors(self.lengths, *squares, root_sign)
 
     def input_direction(self, q: Number, half: HalfAngle) -> Number:
         """Compute e^{i q}."""

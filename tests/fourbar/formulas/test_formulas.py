@@ -731,7 +731,7 @@ def test_positions_decided_in_many_digits_replace_their_own_alone() -> None:
     half = half_angle(loop(*bars.lengths), theta_2)
     for offset in (None, mp.mpf("1e-3")):
         decided = decide_half_angles(bars, 1.0, half, np.array([1, 4]), theta_2, offset)
-        assert decided.side == half.side == 1.0
+        assert decided.root_sign == half.root_sign == 1.0
         for name, before, after in zip(
             half._fields[:5],
             half[:5],

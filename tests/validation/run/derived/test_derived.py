@@ -182,7 +182,7 @@ def test_a_member_in_the_other_closure_fails(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_derivatives_of_the_other_closure_fail(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(derivatives, "find_side", lambda *_, **__: 1.0)
+    monkeypatch.setattr(derivatives, "find_root_sign", lambda *_, **__: 1.0)
     scene = passing_change_points("a parallelogram", 1)
     assert {"theta_4", "torque"} <= failing(rows_of(scene, "sensitivity"))
     assert {"theta_4", "torque"} <= failing(rows_of(scene, "tolerances"))
