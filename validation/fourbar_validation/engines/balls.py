@@ -14,12 +14,14 @@ from typing import Any, NamedTuple, TypeAlias
 from flint import acb, arb, arb_mat, ctx
 
 from fourbar.effects import (
+    Effect,
     Flywheel,
     Friction,
     Gravity,
     LinearDrive,
     Place,
     PointDrive,
+    Spring,
     Springs,
     Table,
     Torsion,
@@ -33,6 +35,8 @@ Ball: TypeAlias = Any
 ComplexBall: TypeAlias = Any
 """A vector of the plane, x + i y, of two balls."""
 BallValues: TypeAlias = dict[str, Ball]
+_Pushes: TypeAlias = dict[int, tuple[Ball, Ball, Ball]]
+"""Force (x, y) and moment about the mass centre, by bar, for one of the drive."""
 
 
 def polar_ball(r: Ball, angle: Ball) -> ComplexBall:
@@ -67,6 +71,12 @@ OF_PIECE = ("table_start", "table_stop", "table_first", "table_last")
 """Angles and factors of the piece of a load's table that a position is in."""
 LINE_ENDS = ("from", "to")
 """Names of the points between which a linear drive acts."""
+COMMANDED_FIRST = {
+    2: ("a", "b", "c"),
+    3: ("b", "a", "c"),
+    4: ("c", "b", "a"),
+}
+"""Lengths of the commanded bar and of the two others, by the commanded bar."""
 STEP_BITS = 90
 """Sensitivities are difference quotients with a relative step of 2^-90: wrong by about
 2^-90 / (distance to the nearest singular position), and the cancelled 90 bits are there
@@ -80,16 +90,9 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
     The position is of the commanded angle.
     """
     link = scene.linkage
-    motion = scene.motion
     d, a, b, c = link.lengths
     values = {"d": d, "a": a, "b": b, "c": c, "theta_1": link.ground_angle}
-    values |= dict(
-        zip(
-            motion.names,
-            (angle, motion.speed or 0.0, motion.acceleration),
-            strict=True,
-        )
-    )
+    values |= _collect_motion(scene, angle)
     if scene.drive is not None:
         for name, (_, point) in zip(LINE_ENDS, scene.drive.ends, strict=False):
             values |= _collect_place(scene, point, name, f"{name}_angle")
@@ -97,45 +100,73 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
             values["direction"] = scene.drive.direction
     for k in MOVING_BARS:
         bar = link.bar(k)
-        values |= {f"m{k}": find_mass(bar), f"I{k}": find_inertia(bar)}
+        values[f"m{k}"] = find_mass(bar)
+        values[f"I{k}"] = find_inertia(bar)
         values[f"r{k}"], values[f"phi{k}"] = find_centre(bar)
-    for k, load in enumerate(scene.loads):
-        f, f_angle = load.force or (0.0, 0.0)
-        values |= {f"F_{k}": f, f"F_angle_{k}": f_angle, f"M_{k}": load.moment}
-        if load.arm is not None:
-            values |= {f"at_{k}": load.arm[0], f"at_angle_{k}": load.arm[1]}
-        elif load.place is not None:
-            values |= _collect_place(scene, load.place, f"at_{k}", f"at_angle_{k}")
+    for k in range(len(scene.loads)):
+        values |= _collect_load(scene, k)
     for effect in scene.effects:
-        if isinstance(effect, Gravity):
-            values |= {"g": effect.magnitude, "g_angle": effect.angle}
-        elif isinstance(effect, Viscous):
-            values |= {f"viscous_{pin}": value for pin, value in effect.coefficients}
-        elif isinstance(effect, Friction):
-            values |= {f"friction_{pin}": value for pin, value in effect.torques}
-        elif isinstance(effect, Flywheel):
-            values["J"] = effect.inertia
-        elif isinstance(effect, Torsion):
-            for pin, stiffness, rest, preload in effect.springs:
-                values |= {
-                    f"torsion_{pin}": stiffness,
-                    f"rest_{pin}": rest,
-                    f"wound_{pin}": preload,
-                }
-        elif isinstance(effect, Springs):
-            for k, spring in enumerate(effect.springs):
-                values |= {
-                    f"stiffness_{k}": spring.stiffness,
-                    f"length_{k}": spring.length,
-                }
-                values[f"pull_{k}"] = spring.preload
-                for end, point in (("start", spring.start), ("end", spring.end)):
-                    keys = f"{end}_{k}", f"{end}_angle_{k}"
-                    values |= _collect_place(scene, point, *keys)
-        else:
-            raise NotImplementedError(
-                f"the reference knows no effect {type(effect).__name__}"
-            )
+        values |= _collect_effect(scene, effect)
+    return values
+
+
+def _collect_motion(scene: Scene, angle: float) -> dict[str, float]:
+    """Collect what is commanded: a position, its speed and its acceleration."""
+    motion = scene.motion
+    position, speed, acceleration = motion.names
+    return {
+        position: angle,
+        speed: motion.speed or 0.0,
+        acceleration: motion.acceleration,
+    }
+
+
+def _collect_load(scene: Scene, k: int) -> dict[str, float]:
+    """Collect the numbers of one load: force, moment and point of action."""
+    load = scene.loads[k]
+    force, direction = load.force or (0.0, 0.0)
+    values = {
+        f"F_{k}": force,
+        f"F_angle_{k}": direction,
+        f"M_{k}": load.moment,
+    }
+    if load.arm is not None:
+        values[f"at_{k}"], values[f"at_angle_{k}"] = load.arm
+    elif load.place is not None:
+        values |= _collect_place(scene, load.place, f"at_{k}", f"at_angle_{k}")
+    return values
+
+
+def _collect_effect(scene: Scene, effect: Effect) -> dict[str, float]:
+    """Collect the numbers of one effect."""
+    values: dict[str, float] = {}
+    if isinstance(effect, Gravity):
+        values["g"] = effect.magnitude
+        values["g_angle"] = effect.angle
+    elif isinstance(effect, Viscous):
+        for pin, coefficient in effect.coefficients:
+            values[f"viscous_{pin}"] = coefficient
+    elif isinstance(effect, Friction):
+        for pin, torque in effect.torques:
+            values[f"friction_{pin}"] = torque
+    elif isinstance(effect, Flywheel):
+        values["J"] = effect.inertia
+    elif isinstance(effect, Torsion):
+        for pin, stiffness, rest, preload in effect.springs:
+            values[f"torsion_{pin}"] = stiffness
+            values[f"rest_{pin}"] = rest
+            values[f"wound_{pin}"] = preload
+    elif isinstance(effect, Springs):
+        for k, spring in enumerate(effect.springs):
+            values[f"stiffness_{k}"] = spring.stiffness
+            values[f"length_{k}"] = spring.length
+            values[f"pull_{k}"] = spring.preload
+            for end, place in (("start", spring.start), ("end", spring.end)):
+                values |= _collect_place(scene, place, f"{end}_{k}", f"{end}_angle_{k}")
+    else:
+        raise NotImplementedError(
+            f"the reference knows no effect {type(effect).__name__}"
+        )
     return values
 
 
@@ -187,10 +218,8 @@ def make_balls(scene: Scene, angle: float, **motion: float) -> BallValues:
     omega_2 or alpha_2 are replaced where they are given.
     """
     ctx.prec = BITS
-    return {
-        name: arb(value)
-        for name, value in (collect_inputs(scene, angle) | motion).items()
-    }
+    stored = collect_inputs(scene, angle) | motion
+    return {name: arb(value) for name, value in stored.items()}
 
 
 def compute_directions(
@@ -211,18 +240,15 @@ def compute_directions(
     """
     bar = _find_commanded(x)
     d = x["d"]
-    held, b, c = {2: ("a", "b", "c"), 3: ("b", "a", "c"), 4: ("c", "b", "a")}[bar]
-    held = x[held]
-    b = x[b]
-    c = x[c]
+    held, b, c = (x[name] for name in COMMANDED_FIRST[bar])
     side = 1 if bar == 4 else -1
-    w = polar_ball(arb(1), x[f"theta_{bar}"])
+    angle = x[f"theta_{bar}"]
+    w = polar_ball(arb(1), angle)
     D = polar_ball(d, x["theta_1"]) + side * held * w
     # |D|^2 by the angle between ground and input: where they are in line it is exact,
     # and so is a loop that just closes
-    squared = (
-        d**2 + held**2 + side * 2 * d * held * (x[f"theta_{bar}"] - x["theta_1"]).cos()
-    )
+    cosine = (angle - x["theta_1"]).cos()
+    squared = d**2 + held**2 + side * 2 * d * held * cosine
     K = squared + b * b - c * c
     discriminant = 4 * b * b * squared - K * K
     if discriminant < 0:  # an undecided one has no root, and what follows is NaN
@@ -246,7 +272,8 @@ def _solve_linear(rows: list[list[Ball]], right: list[Ball]) -> list[Ball]:
 
     Raises ZeroDivisionError where it is singular to working precision.
     """
-    solution = arb_mat(rows).solve(arb_mat([[value] for value in right]))
+    column = arb_mat([[value] for value in right])
+    solution = arb_mat(rows).solve(column)
     return [solution[k, 0] for k in range(len(right))]
 
 
@@ -255,64 +282,44 @@ def compute_outputs(scene: Scene, branch: int, inputs: BallValues) -> BallValues
 
     Vectors are name_x, name_y; None if the loop does not close.
     """
+    x: BallValues | None = inputs
     if "stroke" in inputs:
         x = _turn_by_stroke(scene, inputs)
-    else:
-        x = inputs
     if x is None:
-        directions = None
-    else:
-        directions = compute_directions(x, branch)
-    if x is None or directions is None:
+        return None
+    directions = compute_directions(x, branch)
+    if directions is None:
         return None
     w = dict(zip(MOVING_BARS, directions, strict=True))
     commanded = _find_commanded(x)
-    sines = {2: wedge(w[3], w[4]), 3: wedge(w[2], w[4]), 4: wedge(w[2], w[3])}
-    y: BallValues = {
-        f"theta_{bar}": w[bar].arg()
-        for bar in MOVING_BARS
-        if f"theta_{bar}" not in inputs
+    sines = {
+        2: wedge(w[3], w[4]),
+        3: wedge(w[2], w[4]),
+        4: wedge(w[2], w[3]),
     }
-    y |= {"sin_mu": sines[2], "condition": abs(sines[commanded]) * x.get("lever", 1)}
-    if (
-        not y["condition"] > 0
-    ):  # singular; NaN where A lies on O4, about which bars 3 and 4 then turn freely
+    y: BallValues = {}
+    for bar in MOVING_BARS:
+        if f"theta_{bar}" not in inputs:
+            y[f"theta_{bar}"] = w[bar].arg()
+    y["sin_mu"] = sines[2]
+    y["condition"] = abs(sines[commanded]) * x.get("lever", 1)
+    # NaN where A lies on O4, about which bars 3 and 4 then turn freely
+    singular = not y["condition"] > 0
+    if singular:
         return y
     bars = _move_balls(x, w, commanded)
     y |= {f"omega_{bar}": bars.omega[bar] for bar in MOVING_BARS}
     y |= {f"alpha_{bar}": bars.alpha[bar] for bar in MOVING_BARS}
     _put_vectors(y, bars.points())
-    if scene.drive:
-        line = _find_line(scene, x, bars)
-    else:
-        line = None
-    if line is None:
-        drive, y["drive_condition"], speed = (
-            "torque",
-            abs(sines[scene.drive_bar]),
-            bars.omega[scene.drive_bar],
-        )
-    else:
-        drive, y["drive_condition"] = (
-            "drive_force",
-            _compute_condition(line, x, bars.tip[2], sines),
-        )
-        speed = line.speed({1: acb(0), **bars.v_pin}, {1: arb(0), **bars.omega})
-        y["stroke_speed"] = speed
-        if line.stroke is not None:
-            y["stroke"] = line.stroke
-        _put_vectors(y, {"drive_line": line.line})
-    drives = {bar: (arb(0), arb(0), arb(bar == scene.drive_bar)) for bar in MOVING_BARS}
-    if line is not None:
-        drives = {bar: line.push(bar, bars.centre[bar]) for bar in MOVING_BARS}
+    drive, speed, drives = _describe_drive(scene, x, bars, sines, y)
+    force, moment = _sum_acting_balls(scene, x, bars)
     try:
-        forces, driving = _solve_thirteen_balls(
-            x, bars, *_sum_acting_balls(scene, x, bars), drives
-        )
+        forces, driving = _solve_thirteen_balls(x, bars, force, moment, drives)
     except ZeroDivisionError:
         return y
     _put_vectors(y, forces)
-    y[drive], y["power"] = driving, driving * speed
+    y[drive] = driving
+    y["power"] = driving * speed
     return y
 
 
@@ -357,12 +364,18 @@ class _BallBars(NamedTuple):
 
         The points are those that are answered.
         """
-        points = {"A": self.tip[2], "B": self.first_pin[4] + self.tip[4]}
-        points |= {"v_A": self.v_pin[3], "v_B": self.turn(4, self.tip[4])}
-        points |= {"a_A": self.a_pin[3], "a_B": self.swing(4, self.tip[4])}
+        points = {
+            "A": self.tip[2],
+            "B": self.first_pin[4] + self.tip[4],
+            "v_A": self.v_pin[3],
+            "v_B": self.turn(4, self.tip[4]),
+            "a_A": self.a_pin[3],
+            "a_B": self.swing(4, self.tip[4]),
+        }
         for bar in MOVING_BARS:
-            points[f"G{bar}"] = self.first_pin[bar] + self.centre[bar]
-            points[f"v_G{bar}"] = self.v_pin[bar] + self.turn(bar, self.centre[bar])
+            centre = self.centre[bar]
+            points[f"G{bar}"] = self.first_pin[bar] + centre
+            points[f"v_G{bar}"] = self.v_pin[bar] + self.turn(bar, centre)
             points[f"a_G{bar}"] = self.acceleration(bar)
         return points
 
@@ -384,25 +397,39 @@ def _move_balls(x: BallValues, w: dict[int, ComplexBall], commanded: int) -> _Ba
         u = acb(0, 1) * side[first]
         v = acb(0, 1) * side[second]
         rest = total - acb(0, stated) * side[commanded]
-        solved = _solve_linear(
-            [[u.real, v.real], [u.imag, v.imag]], [rest.real, rest.imag]
-        )
-        return {commanded: stated, **dict(zip((first, second), solved, strict=True))}
+        rows = [
+            [u.real, v.real],
+            [u.imag, v.imag],
+        ]
+        first_rate, second_rate = _solve_linear(rows, [rest.real, rest.imag])
+        return {
+            commanded: stated,
+            first: first_rate,
+            second: second_rate,
+        }
 
     # a probe opens the loop by slip, m/s, and jerk, m/s^2
     omega = rates(x[f"omega_{commanded}"], x.get("slip", zero))
-    centripetal = sum((side[bar] * square(omega[bar]) for bar in MOVING_BARS), zero)
+    centripetal = zero
+    for bar in MOVING_BARS:
+        centripetal += side[bar] * square(omega[bar])
     alpha = rates(x[f"alpha_{commanded}"], x.get("jerk", zero) + centripetal)
     tip = {2: a * w[2], 3: b * w[3], 4: c * w[4]}
     first_pin = {1: zero, 2: zero, 3: tip[2], 4: polar_ball(x["d"], x["theta_1"])}
-    centre = {
-        bar: w[bar] * polar_ball(x[f"r{bar}"], x[f"phi{bar}"]) for bar in MOVING_BARS
-    }
+    centre = {}
+    for bar in MOVING_BARS:
+        centre[bar] = w[bar] * polar_ball(x[f"r{bar}"], x[f"phi{bar}"])
     v_A = acb(0, omega[2]) * tip[2]
     a_A = acb(-omega[2] * omega[2], alpha[2]) * tip[2]
-    at_rest = {2: zero, 4: zero}
     return _BallBars(
-        w, omega, alpha, tip, first_pin, centre, at_rest | {3: v_A}, at_rest | {3: a_A}
+        w=w,
+        omega=omega,
+        alpha=alpha,
+        tip=tip,
+        first_pin=first_pin,
+        centre=centre,
+        v_pin={2: zero, 3: v_A, 4: zero},
+        a_pin={2: zero, 3: a_A, 4: zero},
     )
 
 
@@ -412,91 +439,142 @@ def _sum_acting_balls(
     bars: _BallBars,
 ) -> tuple[dict[int, ComplexBall], dict[int, Ball]]:
     """Sum what acts on each bar: a force, and a moment about the mass centre."""
-    w, first_pin, centre = bars.directions(x), bars.first_pin, bars.centre
-    force = {
-        bar: x[f"m{bar}"] * polar_ball(x["g"], x["g_angle"]) if "g" in x else acb(0)
-        for bar in MOVING_BARS
-    }
-    moment = {
-        bar: x.get(f"couple_{bar}", arb(0)) for bar in MOVING_BARS
-    }  # a probe may add one
-    for k, load in enumerate(scene.loads):
-        theta_2 = x.get("theta_2", w[2].arg())
-        factor = (
-            _interpolate_factor(load.table, theta_2, x, k) if load.table else arb(1)
-        )
-        moment[load.bar] += factor * x[f"M_{k}"]
-        if load.force is None:
-            continue
-        axes = w[load.bar] if load.frame == "bar" else acb(1)
-        f = axes * polar_ball(x[f"F_{k}"], x[f"F_angle_{k}"])
-        if load.arm is not None:
-            arm = polar_ball(x[f"at_{k}"], x[f"at_angle_{k}"])
-        else:
-            assert load.place is not None
-            stated = find_stated(scene, load.place)
-            at = x[f"at_{k}"], x[f"at_angle_{k}"]
-            arm = _place_from_pin(stated, *at, w, centre) - centre[load.bar]
-        force[load.bar] += factor * f
-        moment[load.bar] += factor * wedge(arm, f)
+    acting = _Acting({}, {})
+    for bar in MOVING_BARS:
+        acting.force[bar] = acb(0)
+        if "g" in x:
+            acting.force[bar] = x[f"m{bar}"] * polar_ball(x["g"], x["g_angle"])
+        acting.moment[bar] = x.get(f"couple_{bar}", arb(0))  # a probe may add one
+    for k in range(len(scene.loads)):
+        _add_load(acting, scene, x, bars, k)
     for effect in scene.effects:
         if isinstance(effect, Flywheel):
-            moment[effect.bar] -= x["J"] * bars.alpha[effect.bar]
+            acting.moment[effect.bar] -= x["J"] * bars.alpha[effect.bar]
         elif isinstance(effect, Torsion):
             for pin, *_ in effect.springs:
-                i, j = PINS[pin]
-                turned = (
-                    w[j] * w[i].conjugate() * polar_ball(arb(1), -x[f"rest_{pin}"])
-                ).arg()
-                _add_twist(
-                    moment, pin, -x[f"wound_{pin}"] - x[f"torsion_{pin}"] * turned
-                )
+                _add_torsion_spring(acting, x, bars, pin)
         elif isinstance(effect, Springs):
             for k, spring in enumerate(effect.springs):
-                start, end = spring.start.bar, spring.end.bar
-                ends = ((spring.start, "start"), (spring.end, "end"))
-                arms = [
-                    _place_from_pin(
-                        find_stated(scene, place),
-                        x[f"{name}_{k}"],
-                        x[f"{name}_angle_{k}"],
-                        bars.directions(x),
-                        centre,
-                    )
-                    for place, name in ends
-                ]
-                across = first_pin[end] + arms[1] - first_pin[start] - arms[0]
-                if (
-                    spring.preload == spring.stiffness * spring.length
-                ):  # k times the distance, wherever that ends
-                    pull = x[f"stiffness_{k}"] * across
-                else:
-                    distance = abs(across)
-                    tension = x[f"pull_{k}"] + x[f"stiffness_{k}"] * (
-                        distance - x[f"length_{k}"]
-                    )
-                    pull = tension / distance * across
-                for bar, arm, f in ((start, arms[0], pull), (end, arms[1], -pull)):
-                    if bar in force:
-                        force[bar] += f
-                        moment[bar] += wedge(arm - centre[bar], f)
+                _add_spring(acting, scene, x, bars, k, spring)
     for pin, (i, j) in PINS.items():
         slip = bars.omega.get(j, 0) - bars.omega.get(i, 0)
-        sign = (
-            arb(1)
-            if slip > 0
-            else arb(-1)
-            if slip < 0
-            else arb(0)
-            if slip == 0
-            else arb(0, 1)
+        damping = x.get(f"viscous_{pin}", arb(0)) * slip
+        friction = x.get(f"friction_{pin}", arb(0)) * _sign(slip)
+        acting.add_couple(pin, -damping - friction)
+    return acting.force, acting.moment
+
+
+class _Acting(NamedTuple):
+    """Force and moment about the mass centre that act on each moving bar."""
+
+    force: dict[int, ComplexBall]
+    moment: dict[int, Ball]
+
+    def add_couple(self, pin: str, couple: Ball) -> None:
+        """Add a couple to bar j of a pin (i, j), its opposite to bar i.
+
+        On the ground it does nothing.
+        """
+        i, j = PINS[pin]
+        for bar, value in ((j, couple), (i, -couple)):
+            if bar in self.moment:
+                self.moment[bar] += value
+
+
+def _sign(ball: Ball) -> Ball:
+    """Return the sign of a ball; one that contains 0 has every sign."""
+    if ball > 0:
+        return arb(1)
+    if ball < 0:
+        return arb(-1)
+    if ball == 0:
+        return arb(0)
+    return arb(0, 1)
+
+
+def _add_load(
+    acting: _Acting,
+    scene: Scene,
+    x: BallValues,
+    bars: _BallBars,
+    k: int,
+) -> None:
+    """Add the moment and the force of one load."""
+    load = scene.loads[k]
+    directions = bars.directions(x)
+    centre = bars.centre
+    factor = arb(1)
+    if load.table:
+        theta_2 = x.get("theta_2", directions[2].arg())
+        factor = _interpolate_factor(load.table, theta_2, x, k)
+    acting.moment[load.bar] += factor * x[f"M_{k}"]
+    if load.force is None:
+        return
+    axes = directions[load.bar] if load.frame == "bar" else acb(1)
+    force = axes * polar_ball(x[f"F_{k}"], x[f"F_angle_{k}"])
+    distance = x[f"at_{k}"]
+    angle = x[f"at_angle_{k}"]
+    if load.arm is not None:
+        arm = polar_ball(distance, angle)
+    else:
+        assert load.place is not None
+        stated = find_stated(scene, load.place)
+        from_pin = _place_from_pin(stated, distance, angle, directions, centre)
+        arm = from_pin - centre[load.bar]
+    acting.force[load.bar] += factor * force
+    acting.moment[load.bar] += factor * wedge(arm, force)
+
+
+def _add_torsion_spring(
+    acting: _Acting,
+    x: BallValues,
+    bars: _BallBars,
+    pin: str,
+) -> None:
+    """Add the couple of the torsion spring at one pin."""
+    i, j = PINS[pin]
+    w = bars.directions(x)
+    unwound = polar_ball(arb(1), -x[f"rest_{pin}"])
+    turned = (w[j] * w[i].conjugate() * unwound).arg()
+    acting.add_couple(pin, -x[f"wound_{pin}"] - x[f"torsion_{pin}"] * turned)
+
+
+def _add_spring(
+    acting: _Acting,
+    scene: Scene,
+    x: BallValues,
+    bars: _BallBars,
+    k: int,
+    spring: Spring,
+) -> None:
+    """Add the pull of one spring at its two ends."""
+    directions = bars.directions(x)
+    arms = []
+    for place, name in ((spring.start, "start"), (spring.end, "end")):
+        arm = _place_from_pin(
+            find_stated(scene, place),
+            x[f"{name}_{k}"],
+            x[f"{name}_angle_{k}"],
+            directions,
+            bars.centre,
         )
-        couple = (
-            -x.get(f"viscous_{pin}", arb(0)) * slip
-            - x.get(f"friction_{pin}", arb(0)) * sign
-        )
-        _add_twist(moment, pin, couple)
-    return force, moment
+        arms.append(arm)
+    start = spring.start.bar
+    end = spring.end.bar
+    across = bars.first_pin[end] + arms[1] - bars.first_pin[start] - arms[0]
+    stiffness = x[f"stiffness_{k}"]
+    # then the pull is k times the distance, wherever that ends
+    pull_at_no_length_is_zero = spring.preload == spring.stiffness * spring.length
+    if pull_at_no_length_is_zero:
+        pull = stiffness * across
+    else:
+        distance = abs(across)
+        tension = x[f"pull_{k}"] + stiffness * (distance - x[f"length_{k}"])
+        pull = tension / distance * across
+    for bar, arm, force in ((start, arms[0], pull), (end, arms[1], -pull)):
+        if bar in acting.force:
+            acting.force[bar] += force
+            acting.moment[bar] += wedge(arm - bars.centre[bar], force)
 
 
 def _solve_thirteen_balls(
@@ -504,7 +582,7 @@ def _solve_thirteen_balls(
     bars: _BallBars,
     force: dict[int, ComplexBall],
     moment: dict[int, Ball],
-    drives: dict[int, tuple[Ball, Ball, Ball]],
+    drives: _Pushes,
 ) -> tuple[dict[str, ComplexBall], Ball]:
     """Solve for the pin forces and the driving torque or force.
 
@@ -523,46 +601,39 @@ def _solve_thirteen_balls(
     matrix = [[arb(0)] * 13 for _ in range(13)]
     constants = []
     for n, bar in enumerate(MOVING_BARS):
-        for column, arms in joints[bar]:
+        newton_x = 3 * n
+        newton_y = newton_x + 1
+        euler = newton_x + 2
+        for joint, arms in joints[bar]:
             arm = arms[bar]
-            matrix[3 * n][2 * column] = matrix[3 * n + 1][2 * column + 1] = arb(1)
-            matrix[3 * n + 2][2 * column], matrix[3 * n + 2][2 * column + 1] = (
-                -arm.imag,
-                arm.real,
-            )
-        for row, value in enumerate(drives[bar], start=3 * n):
+            force_x = 2 * joint
+            force_y = force_x + 1
+            matrix[newton_x][force_x] = arb(1)
+            matrix[newton_y][force_y] = arb(1)
+            matrix[euler][force_x] = -arm.imag
+            matrix[euler][force_y] = arm.real
+        for row, value in enumerate(drives[bar], start=newton_x):
             matrix[row][12] = value
         needed = x[f"m{bar}"] * bars.acceleration(bar) - force[bar]
-        constants += [
-            needed.real,
-            needed.imag,
-            x[f"I{bar}"] * bars.alpha[bar] - moment[bar],
-        ]
+        constants.append(needed.real)
+        constants.append(needed.imag)
+        constants.append(x[f"I{bar}"] * bars.alpha[bar] - moment[bar])
     for row, (i, j) in enumerate(((2, 4), (3, 5), (6, 8), (7, 9)), start=9):
-        matrix[row][i] = matrix[row][j] = arb(1)
+        matrix[row][i] = arb(1)
+        matrix[row][j] = arb(1)
         constants.append(arb(0))
     solved = _solve_linear(matrix, constants)
-    columns = {"F12": 0, "F32": 1, "F43": 3, "F14": 5}
-    return {
-        name: acb(solved[2 * k], solved[2 * k + 1]) for name, k in columns.items()
-    }, solved[12]
+    forces = {}
+    for name, joint in {"F12": 0, "F32": 1, "F43": 3, "F14": 5}.items():
+        forces[name] = acb(solved[2 * joint], solved[2 * joint + 1])
+    return forces, solved[12]
 
 
 def _put_vectors(y: BallValues, vectors: dict[str, ComplexBall]) -> None:
     """Put vectors by their components."""
     for name, vector in vectors.items():
-        y[f"{name}_x"], y[f"{name}_y"] = vector.real, vector.imag
-
-
-def _add_twist(moment: dict[int, Ball], pin: str, couple: Ball) -> None:
-    """Add a couple to bar j of a pin (i, j), its opposite to bar i.
-
-    On the ground it does nothing.
-    """
-    i, j = PINS[pin]
-    for bar, value in ((j, couple), (i, -couple)):
-        if bar in moment:
-            moment[bar] += value
+        y[f"{name}_x"] = vector.real
+        y[f"{name}_y"] = vector.imag
 
 
 def _interpolate_factor(table: Table, theta_2: Ball, x: BallValues, k: int) -> Ball:
@@ -571,19 +642,22 @@ def _interpolate_factor(table: Table, theta_2: Ball, x: BallValues, k: int) -> B
     The angle is taken modulo a turn. Where the inputs have them, the four numbers are
     multiplied by those of `OF_PIECE`.
     """
-    turns = math.floor((float(theta_2.mid()) - table.theta_2[0]) / math.tau + 1e-12)
+    middle = float(theta_2.mid())
+    turns = math.floor((middle - table.theta_2[0]) / math.tau + 1e-12)
     angle = theta_2 - 2 * turns * arb.pi()
-    after = min(
-        max(bisect(table.theta_2, float(angle.mid())), 1), len(table.theta_2) - 1
-    )
+    points_before = bisect(table.theta_2, float(angle.mid()))
+    after = min(max(points_before, 1), len(table.theta_2) - 1)
+    before = after - 1
     piece = (
-        *table.theta_2[after - 1 : after + 1],
-        *table.factor[after - 1 : after + 1],
+        table.theta_2[before],
+        table.theta_2[after],
+        table.factor[before],
+        table.factor[after],
     )
-    start, stop, first, last = (
-        arb(value) * x.get(f"{name}_{k}", 1)
-        for name, value in zip(OF_PIECE, piece, strict=True)
-    )
+    scaled = []
+    for name, value in zip(OF_PIECE, piece, strict=True):
+        scaled.append(arb(value) * x.get(f"{name}_{k}", 1))
+    start, stop, first, last = scaled
     return first + (last - first) * (angle - start) / (stop - start)
 
 
@@ -598,14 +672,16 @@ def _turn_by_stroke(scene: Scene, x: BallValues) -> BallValues | None:
     drive = scene.drive
     motion = scene.motion
     assert isinstance(drive, LinearDrive) and motion.side is not None
-    (_, on_ground), (bar, on_bar) = sorted(
-        zip((drive.start.bar, drive.end.bar), LINE_ENDS, strict=True)
+    ends = zip((drive.start.bar, drive.end.bar), LINE_ENDS, strict=True)
+    (_, on_ground), (bar, on_bar) = sorted(ends)
+    place = drive.start if drive.end.bar == 1 else drive.end
+    held = _place_from_pin(
+        find_stated(scene, place),
+        x[on_bar],
+        x[f"{on_bar}_angle"],
+        {bar: acb(1)},  # at angle zero
+        {bar: polar_ball(x[f"r{bar}"], x[f"phi{bar}"])},
     )
-    stated = find_stated(scene, drive.start if drive.end.bar == 1 else drive.end)
-    centre = {bar: polar_ball(x[f"r{bar}"], x[f"phi{bar}"])}
-    at_zero = {bar: acb(1)}
-    at = x[on_bar], x[f"{on_bar}_angle"]
-    held = _place_from_pin(stated, *at, at_zero, centre)
     fixed = polar_ball(x[on_ground], x[f"{on_ground}_angle"] + x["theta_1"])
     if bar == 4:
         fixed -= polar_ball(x["d"], x["theta_1"])
@@ -617,21 +693,21 @@ def _turn_by_stroke(scene: Scene, x: BallValues) -> BallValues | None:
     if abs(cosine) > 1:
         return None
     beta = cosine.acos()
-    side = (
-        1 if motion.side == "left" else -1
-    )  # to the left the stroke grows with the angle
+    # to the left the stroke grows with the angle
+    side = 1 if motion.side == "left" else -1
     across = length * reach * beta.sin()
     along = length * reach * cosine
     rate = s * speed / across
-    growth = (
-        square(speed) + s * x["stroke_acceleration"] - along * square(rate)
-    ) / across
-    lever = across / s / (length if length > reach else reach)
+    along_the_stroke = square(speed) + s * x["stroke_acceleration"]
+    growth = (along_the_stroke - along * square(rate)) / across
+    longer = length if length > reach else reach
     turned = {
         f"theta_{bar}": fixed.arg() - held.arg() + side * beta,
         f"omega_{bar}": side * rate,
+        f"alpha_{bar}": side * growth,
+        "lever": across / s / longer,
     }
-    return x | turned | {f"alpha_{bar}": side * growth, "lever": lever}
+    return x | turned
 
 
 class _BallLine(NamedTuple):
@@ -648,11 +724,10 @@ class _BallLine(NamedTuple):
 
     def speed(self, foot: dict[int, ComplexBall], omega: dict[int, Ball]) -> Ball:
         """Return ds/dt from the bars' angular speeds and their pins' speeds."""
-        ends = (
-            sense * (foot[k] + acb(0, omega[k]) * self.arms[k])
-            for k, sense in self.sense.items()
-        )
-        return dot_product(self.line, sum(ends, acb(0)))
+        total = acb(0)
+        for k, sense in self.sense.items():
+            total += sense * (foot[k] + acb(0, omega[k]) * self.arms[k])
+        return dot_product(self.line, total)
 
     def push(self, bar: int, centre: ComplexBall) -> tuple[Ball, Ball, Ball]:
         """Force (x, y) and moment about the mass centre of a bar, per newton."""
@@ -668,27 +743,61 @@ def _find_line(scene: Scene, x: BallValues, bars_in_motion: _BallBars) -> _BallL
     The ground's are among them.
     """
     drive = scene.drive
-    first_pin = bars_in_motion.first_pin
     assert drive is not None
+    first_pin = bars_in_motion.first_pin
     w = bars_in_motion.directions(x)
     centre = bars_in_motion.centre
-    arms = {
-        place.bar: _place_from_pin(
-            find_stated(scene, place), x[name], x[f"{name}_angle"], w, centre
+    arms = {}
+    for (_, place), name in zip(drive.ends, LINE_ENDS, strict=False):
+        arms[place.bar] = _place_from_pin(
+            find_stated(scene, place),
+            x[name],
+            x[f"{name}_angle"],
+            w,
+            centre,
         )
-        for (_, place), name in zip(drive.ends, LINE_ENDS, strict=False)
-    }
     if isinstance(drive, PointDrive):
         unit = polar_ball(arb(1), x["direction"])
         if drive.frame == "bar":
             unit = unit * w[drive.place.bar]
         return _BallLine(None, unit, arms, {drive.place.bar: 1})
-    bars = [place.bar for _, place in drive.ends]
-    start, end = (first_pin[k] + arms[k] for k in bars)
+    from_bar, to_bar = (place.bar for _, place in drive.ends)
+    start = first_pin[from_bar] + arms[from_bar]
+    end = first_pin[to_bar] + arms[to_bar]
     stroke = abs(end - start)
     return _BallLine(
-        stroke, (end - start) / stroke, arms, dict(zip(bars, (-1, 1), strict=True))
+        stroke=stroke,
+        line=(end - start) / stroke,
+        arms=arms,
+        sense={from_bar: -1, to_bar: 1},
     )
+
+
+def _describe_drive(
+    scene: Scene,
+    x: BallValues,
+    bars: _BallBars,
+    sines: dict[int, Ball],
+    y: BallValues,
+) -> tuple[str, Ball, _Pushes]:
+    """Return the name of the drive's output, its speed, and the push of one of it.
+
+    The drive's condition and, of a drive along a line, its motion are put into `y`.
+    """
+    if scene.drive is None:
+        y["drive_condition"] = abs(sines[scene.drive_bar])
+        torques = {bar: arb(bar == scene.drive_bar) for bar in MOVING_BARS}
+        drives = {bar: (arb(0), arb(0), torques[bar]) for bar in MOVING_BARS}
+        return "torque", bars.omega[scene.drive_bar], drives
+    line = _find_line(scene, x, bars)
+    y["drive_condition"] = _compute_condition(line, x, bars.tip[2], sines)
+    speed = line.speed({1: acb(0), **bars.v_pin}, {1: arb(0), **bars.omega})
+    y["stroke_speed"] = speed
+    if line.stroke is not None:
+        y["stroke"] = line.stroke
+    _put_vectors(y, {"drive_line": line.line})
+    drives = {bar: line.push(bar, bars.centre[bar]) for bar in MOVING_BARS}
+    return "drive_force", speed, drives
 
 
 def _compute_condition(
@@ -709,7 +818,8 @@ def _compute_condition(
     turning = {1: arb(0), 2: sines[2], 3: -a / b * sines[3], 4: -a / c * sines[4]}
     foot = {1: acb(0), 2: acb(0), 3: acb(0, turning[2]) * tip, 4: acb(0)}
     most = {1: (0, 0), 2: (0, 1), 3: (a, a / b), 4: (0, a / c)}
-    reach = sum(
-        (most[k][0] + most[k][1] * abs(arm) for k, arm in line.arms.items()), arb(0)
-    )
+    reach = arb(0)
+    for k, arm in line.arms.items():
+        of_first_pin, of_arm = most[k]
+        reach += of_first_pin + of_arm * abs(arm)
     return abs(line.speed(foot, turning)) / reach

@@ -29,8 +29,10 @@ FRICTION_PASSES = 1000
 """Passes over pin loads and the friction they make. Each lessens the error where the
 friction is far from a jam.
 """
-STAGES_NEAR_A_JAM, STEPS_OF_A_STAGE = 16, 30
-"""Stages and Newton's steps of each in which friction grows near a jam."""
+STAGES_NEAR_A_JAM = 16
+"""Stages in which friction grows near a jam."""
+STEPS_OF_A_STAGE = 30
+"""Newton's steps of each of these stages."""
 NUDGE = 1e-6
 """Change of each load for the slopes of a pass, in parts of the greatest load."""
 REPEATED = 2.0 * 2.0**-52
@@ -139,7 +141,8 @@ class Loaded(EngineBars, Protocol):
         self.ground_angle = scene.linkage.ground_angle
         self.drive_bar = scene.drive_bar
         self.terms = terms
-        self.force_drive, self.driving = scene.drive, name_driving(scene)
+        self.force_drive = scene.drive
+        self.driving = name_driving(scene)
         self.loaded = [pin for effect in scene.effects for pin in effect.loaded_pins]
 
     # methods that the engine defines
@@ -186,7 +189,8 @@ class Loaded(EngineBars, Protocol):
     def end(self, point: "Place") -> Components:
         """Locate an end of a spring or a place of the drive, m."""
         x, y = self.first_pin(point.bar)
-        along, across = self.rotate(point.bar, *resolve(point.distance, point.angle))
+        in_bar = resolve(point.distance, point.angle)
+        along, across = self.rotate(point.bar, *in_bar)
         return x + along, y + across
 
     def cylinder(self, bar: int) -> tuple[complex, complex]:
@@ -195,26 +199,23 @@ class Loaded(EngineBars, Protocol):
         self.place((0.0, 0.0, 0.0))
         ends = [end for _, end in self.force_drive.ends]
         on_bar, on_ground = sorted(ends, key=lambda end: -end.bar)
-        on, ground = (
-            np.subtract(self.end(point), self.first_pin(bar)).tolist()
-            for point in (on_bar, on_ground)
-        )
-        return complex(*on), complex(*ground)
+        x_0, y_0 = self.first_pin(bar)
+        x, y = self.end(on_bar)
+        ground_x, ground_y = self.end(on_ground)
+        return complex(x - x_0, y - y_0), complex(ground_x - x_0, ground_y - y_0)
 
     def line(self) -> tuple[list[tuple[float, int, Components]], Array]:
         """Place the drive: sense, bar and point of each end, m; and its direction."""
-        assert self.force_drive is not None
-        ends = [
-            (sense, place.bar, self.end(place))
-            for sense, place in self.force_drive.ends
-        ]
-        if isinstance(self.force_drive, PointDrive):
-            along = resolve(1.0, self.force_drive.direction)
-            if self.force_drive.frame == "bar":
-                along = self.rotate(self.force_drive.place.bar, *along)
+        drive = self.force_drive
+        assert drive is not None
+        ends = [(sense, place.bar, self.end(place)) for sense, place in drive.ends]
+        if isinstance(drive, PointDrive):
+            along = resolve(1.0, drive.direction)
+            if drive.frame == "bar":
+                along = self.rotate(drive.place.bar, *along)
             return ends, np.array(along)
-        (*_, one), (*_, second) = ends
-        line = np.subtract(second, one)
+        (_, _, start), (_, _, end) = ends
+        line = np.subtract(end, start)
         return ends, line / math.hypot(*line)
 
     def work(self, size: float) -> None:
@@ -264,23 +265,23 @@ class Loaded(EngineBars, Protocol):
         self.pin_loads = {}
         before = math.inf
         forces = balanced()
-        for _ in range(FRICTION_PASSES if self.loaded else 0):
+        if not self.loaded:
+            return forces
+        for _ in range(FRICTION_PASSES):
             loads = {pin: math.hypot(*forces[FORCE_AT[pin]]) for pin in self.loaded}
             most = max(loads.values())
-            change = max(
-                abs(load - self.pin_loads.get(pin, 0.0)) for pin, load in loads.items()
-            )
-            # once down to the rounding of a pass, the change falls no further
-            if change <= REPEATED * most or before <= change <= ROUNDED * most:
+            changes = []
+            for pin, load in loads.items():
+                changes.append(abs(load - self.pin_loads.get(pin, 0.0)))
+            change = max(changes)
+            if _is_settled(change, before, most):
                 return forces
             if not most < _DIVERGED:
                 break
             before = change
             self.pin_loads = loads
             forces = balanced()
-        if self.loaded:
-            return self._grow(balanced)
-        return forces
+        return self._grow(balanced)
 
     def _grow(self, balanced: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         """Grow friction from none, where passes run away.
@@ -292,9 +293,8 @@ class Loaded(EngineBars, Protocol):
         def passed(loads: Array) -> tuple[dict[str, Any], Array]:
             self.pin_loads = dict(zip(self.loaded, loads.tolist(), strict=True))
             forces = balanced()
-            return forces, np.array(
-                [math.hypot(*forces[FORCE_AT[pin]]) for pin in self.loaded]
-            )
+            sizes = [math.hypot(*forces[FORCE_AT[pin]]) for pin in self.loaded]
+            return forces, np.array(sizes)
 
         unit = np.eye(len(self.loaded))
         forces, loads = passed(np.zeros(len(unit)))
@@ -304,27 +304,35 @@ class Loaded(EngineBars, Protocol):
                 forces, settled_loads = passed(share * loads)
                 most = float(settled_loads.max())
                 change = float(np.abs(settled_loads - loads).max())
-                if (
-                    not most < _DIVERGED
-                    or change <= REPEATED * most
-                    or before <= change <= ROUNDED * most
-                ):
+                if not most < _DIVERGED or _is_settled(change, before, most):
                     break
-                nudge = NUDGE * most
                 before = change
-                moved = [
-                    (passed(share * (loads + nudge * one))[1] - settled_loads) / nudge
-                    for one in unit
-                ]
-                matrix = unit - np.stack(moved, axis=1)
-                if (
-                    np.linalg.det(matrix) <= 0.0
-                ):  # 1 without friction: beyond zero the growth has turned back
+                nudge = NUDGE * most
+                slopes = []
+                for direction in unit:
+                    _, moved = passed(share * (loads + nudge * direction))
+                    slopes.append((moved - settled_loads) / nudge)
+                matrix = unit - np.stack(slopes, axis=1)
+                # 1 without friction: beyond zero the growth has turned back
+                if np.linalg.det(matrix) <= 0.0:
                     return {}
                 loads = loads + np.linalg.solve(matrix, settled_loads - loads)
             if not change <= ROUNDED * most or (loads < 0.0).any():
                 return {}
         return forces
+
+
+def _is_settled(change: float, before: float, most: float) -> bool:
+    """Tell whether passes over the friction repeat the pin loads.
+
+    Once down to the rounding of a pass, the change falls no further.
+
+    Parameters
+    ----------
+    change, before : largest change of a load in this pass and in the one before, N.
+    most : largest load, N.
+    """
+    return change <= REPEATED * most or before <= change <= ROUNDED * most
 
 
 def make_no_wrenches() -> dict[int, list[float]]:

@@ -31,6 +31,13 @@ _COLUMN_OF = {
 """Derivative of each bar's rotation by the joint angles."""
 CYLINDER_SITES = (f"{CYLINDER}_start", f"{CYLINDER}_end")
 """Sites of the cylinder."""
+_SITE_OF = {
+    "O4": "O4",
+    "A": "A",
+    "B": "B3",
+    "B4": "B4",
+}
+"""Sites of the pins; B is that of bar 3, B4 that of bar 4."""
 WARNINGS = (
     mujoco.mjtWarning.mjWARN_BADQPOS,
     mujoco.mjtWarning.mjWARN_BADQVEL,
@@ -43,11 +50,15 @@ def load_force(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Arr
 
     MuJoCo counts it into the force of the parent.
     """
+    axes = data.site_xmat[_find_frame(model, actuator)].reshape(3, 3)
+    gear = model.actuator_gear[actuator, :3]
+    return np.asarray(axes @ gear * data.actuator_force[actuator])
+
+
+def _find_frame(model: mujoco.MjModel, actuator: int) -> int:
+    """Find the site in whose axes an actuator on a site acts."""
     site, frame = model.actuator_trnid[actuator]
-    axes = data.site_xmat[frame if frame >= 0 else site].reshape(3, 3)
-    return np.asarray(
-        axes @ model.actuator_gear[actuator, :3] * data.actuator_force[actuator]
-    )
+    return int(frame if frame >= 0 else site)
 
 
 def _split_load(
@@ -58,9 +69,8 @@ def _split_load(
 
     The force is in the site's axes.
     """
-    site, frame = model.actuator_trnid[actuator]
     x, y = model.actuator_gear[actuator, :2].tolist()
-    return actuator, int(frame if frame >= 0 else site), (x, y)
+    return actuator, _find_frame(model, actuator), (x, y)
 
 
 def open_model(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -84,38 +94,31 @@ class ClosedLoop(Assembled):
     """Model and data of one generated MJCF; nothing is edited after it is compiled."""
 
     def __init__(self, mjcf: str) -> None:
-        self.model = mujoco.MjModel.from_xml_string(mjcf)
-        self.data = mujoco.MjData(self.model)
-        self.site = {
-            self.model.site(number).name: number for number in range(self.model.nsite)
-        }
-        self.body = {
-            name: self.model.body(name).id for name in ("input", "coupler", "output")
-        }
-        loads = [
-            i
-            for i in range(self.model.nu)
-            if self.model.actuator(i).name.startswith("load_")
-        ]
-        self.loads = [
-            (i, self.model.site_bodyid[self.model.actuator_trnid[i, 0]]) for i in loads
-        ]
+        self.model = model = mujoco.MjModel.from_xml_string(mjcf)
+        self.data = mujoco.MjData(model)
+        self.site = {model.site(number).name: number for number in range(model.nsite)}
+        self.body = {name: model.body(name).id for name in _CARRIED_BY}
+        actuators = {model.actuator(i).name: i for i in range(model.nu)}
+        self.drive = actuators.get("drive")
+        self.ram = actuators.get(CYLINDER)
+        self._borne = []
+        for name, load in actuators.items():
+            if name.startswith("load_"):
+                body = model.site_bodyid[model.actuator_trnid[load, 0]]
+                bearers = _CARRIED_BY[model.body(body).name]
+                self._borne.append((*_split_load(model, load), bearers))
         # MuJoCo's own memory: to look a row up anew costs more than to copy it
-        self._carried = {
-            name: self.data.cfrc_int[body, 3:5] for name, body in self.body.items()
-        }
-        self._borne = [
-            (*_split_load(self.model, i), _CARRIED_BY[self.model.body(body).name])
-            for i, body in self.loads
-        ]
-        actuators = {self.model.actuator(i).name: i for i in range(self.model.nu)}
-        self.drive, self.ram = actuators.get("drive"), actuators.get(CYLINDER)
-        self._jac = np.zeros((3, self.model.nv))
+        self._carried = {}
+        for name, body in self.body.items():
+            self._carried[name] = self.data.cfrc_int[body, 3:5]
+        self._jac = np.zeros((3, model.nv))
 
     def gap(self) -> tuple[float, float]:
         """Return B on bar 3 minus B on bar 4, m."""
-        x = self.data.site_xpos[self.site["B3"]] - self.data.site_xpos[self.site["B4"]]
-        return (float(x[0]), float(x[1]))
+        on_bar_3 = self.data.site_xpos[self.site["B3"]]
+        on_bar_4 = self.data.site_xpos[self.site["B4"]]
+        x, y, _ = on_bar_3 - on_bar_4
+        return float(x), float(y)
 
     def jacobian(self) -> Array:
         """Return the derivative of the gap by the joint angles, (2, 3)."""
@@ -134,9 +137,11 @@ class ClosedLoop(Assembled):
 
     def positions(self) -> dict[str, Array]:
         """Locate pins O4 and A, and B at the end of bar 3 and of bar 4, (2,), m."""
-        x = self.data.site_xpos
-        names = {"O4": "O4", "A": "A", "B": "B3", "B4": "B4"}
-        return {name: x[self.site[site]][:2].copy() for name, site in names.items()}
+        places = self.data.site_xpos
+        positions = {}
+        for name, site in _SITE_OF.items():
+            positions[name] = places[self.site[site]][:2].copy()
+        return positions
 
     def branch(self, bar: int = 2) -> int:
         """Return the branch of the state that was last forwarded.
@@ -148,7 +153,8 @@ class ClosedLoop(Assembled):
             a c sin(theta_4 - theta_2),
             a b sin(theta_3 - theta_2).
         """
-        turn = self.drive_column(bar) @ np.cross(*self.jacobian()[:, :3])
+        null_vector = np.cross(*self.jacobian()[:, :3])
+        turn = self.drive_column(bar) @ null_vector
         return int(np.sign(turn if bar != 2 else -turn))
 
     def set_state(self, q: Sequence[float], speed: float, bar: int | None = 2) -> None:
@@ -158,9 +164,9 @@ class ClosedLoop(Assembled):
         """
         mujoco.mj_resetData(self.model, self.data)
         self.place(q)
-        self.data.qvel[:3] = solve_closed(
-            self.jacobian()[:, :3], speed, self.drive_column(bar)
-        )
+        jacobian = self.jacobian()[:, :3]
+        column = self.drive_column(bar)
+        self.data.qvel[:3] = solve_closed(jacobian, speed, column)
 
     def forward(self) -> None:
         """Evaluate the present state.
@@ -203,7 +209,8 @@ class ClosedLoop(Assembled):
         """Return the acceleration that the flywheel's motor is given, rad/s^2."""
         if self.drive is None:
             return 0.0
-        return float(self.data.actuator_force[self.drive] / self.model.dof_armature[O2])
+        motor = self.data.actuator_force[self.drive]
+        return float(motor / self.model.dof_armature[O2])
 
     def crank_torque(self) -> float:
         """Return T2, N m.
@@ -211,9 +218,8 @@ class ClosedLoop(Assembled):
         It is what the flywheel gives the crank, and the motor next to it.
         """
         flywheel = -self.model.dof_armature[O2] * self.data.qacc[O2]
-        if self.drive is None:
-            motor = 0.0
-        else:
+        motor = 0.0
+        if self.drive is not None:
             motor = self.data.actuator_force[self.drive]
         return float(flywheel + motor)
 
@@ -225,11 +231,9 @@ class ClosedLoop(Assembled):
         if drive_bar is not None:
             return _COLUMN_OF[drive_bar]
         start, end = CYLINDER_SITES
-        return np.asarray(
-            self.line()
-            / self.stroke()
-            @ (self.jacobian_at(end) - self.jacobian_at(start))
-        )
+        direction = self.line() / self.stroke()
+        jacobian = self.jacobian_at(end) - self.jacobian_at(start)
+        return np.asarray(direction @ jacobian)
 
     def angle(self, bar: int) -> float:
         """Sum of the joint angles that a bar's direction is, rad."""
@@ -237,8 +241,10 @@ class ClosedLoop(Assembled):
 
     def line(self) -> Array:
         """Return the vector from the cylinder's one site to the other, (2,), m."""
-        start, end = (self.data.site_xpos[self.site[end]] for end in CYLINDER_SITES)
-        return np.asarray((end - start)[:2])
+        start, end = CYLINDER_SITES
+        places = self.data.site_xpos
+        across = places[self.site[end]] - places[self.site[start]]
+        return np.asarray(across[:2])
 
     def stroke(self) -> float:
         """Return the distance of the cylinder's sites, m."""
@@ -255,22 +261,21 @@ class ClosedLoop(Assembled):
         line = self.line()
         stroke = self.stroke()
         v = self.data.qvel
-        x, y = (self.jacobian_at(end) - self.jacobian_at(start)) @ v
+        jacobian = self.jacobian_at(end) - self.jacobian_at(start)
+        rate = self.rate_at(end) - self.rate_at(start)
+        x, y = jacobian @ v
         across = (line[0] * y - line[1] * x) / stroke
-        return float(
-            line / stroke @ (self.rate_at(end) - self.rate_at(start)) @ v
-            + across * across / stroke
-        )
+        along = line / stroke @ rate @ v
+        return float(along + across * across / stroke)
 
     def rate_at(self, site: str) -> Array:
         """Return the rate of `jacobian_at` at the present speeds, (2, nv)."""
-        dot = np.zeros((3, self.model.nv))
+        rate = np.zeros((3, self.model.nv))
         number = self.site[site]
         body = self.model.site_bodyid[number]
-        mujoco.mj_jacDot(
-            self.model, self.data, dot, None, self.data.site_xpos[number], body
-        )
-        return dot[:2]
+        place = self.data.site_xpos[number]
+        mujoco.mj_jacDot(self.model, self.data, rate, None, place, body)
+        return rate[:2]
 
     def cylinder(self, bar: int) -> tuple[complex, complex]:
         """Measure from the ground pin of a bar to the cylinder's ends, m.
@@ -279,16 +284,20 @@ class ClosedLoop(Assembled):
         """
         self.place((0.0, 0.0, 0.0))
         ground = self.model.body("ground").id
-        ends = sorted(
-            (self.site[end] for end in CYLINDER_SITES),
-            key=lambda site: self.model.site_bodyid[site] == ground,
-        )
+        pivot = np.zeros(3)
         if bar == 4:
             pivot = self.data.site_xpos[self.site["O4"]]
-        else:
-            pivot = np.zeros(3)
-        x, y = (complex(*(self.data.site_xpos[site] - pivot)[:2]) for site in ends)
-        return x, y
+
+        def is_on_ground(site: int) -> bool:
+            return bool(self.model.site_bodyid[site] == ground)
+
+        sites = [self.site[end] for end in CYLINDER_SITES]
+        arms = []
+        for site in sorted(sites, key=is_on_ground):
+            x, y, _ = self.data.site_xpos[site] - pivot
+            arms.append(complex(x, y))
+        on_bar, on_ground = arms
+        return on_bar, on_ground
 
     def work(self, drive_bar: int | None, size: float, correction: float = 0.0) -> None:
         """Let a couple act on the driven bar, N m, or the actuator push, N.
@@ -296,7 +305,9 @@ class ClosedLoop(Assembled):
         The actuator is that of the cylinder. A couple acts on the crank too.
         """
         applied = self.data.qfrc_applied
-        applied[O2], applied[A], applied[O4] = correction, 0.0, 0.0
+        applied[O2] = correction
+        applied[A] = 0.0
+        applied[O4] = 0.0
         if drive_bar is None:
             self.data.ctrl[self.ram] = size
             return
@@ -330,7 +341,7 @@ class ClosedLoop(Assembled):
 
         Each resets the data.
         """
-        return sum(int(self.data.warning[kind].number) for kind in WARNINGS)
+        return sum(self.data.warning[kind].number for kind in WARNINGS)
 
 
 def solve_couple_elsewhere(
@@ -349,26 +360,23 @@ def solve_couple_elsewhere(
 
     `alpha_2`: what the flywheel's motor was given, rad/s^2.
     """
-    d = light.data
-    d.qpos[:], d.qvel[:] = (
-        loop.data.qpos[: d.qpos.size],
-        loop.data.qvel[: d.qvel.size],
-    )  # a drive may have its own
-    d.time = loop.data.time
+    data = light.data
+    size = data.qpos.size  # a drive may have coordinates of its own
+    data.qpos[:] = loop.data.qpos[:size]
+    data.qvel[:] = loop.data.qvel[:size]
+    data.time = loop.data.time
     happened = loop.data.qacc[O2]
     # the light flywheel's motor gives it alpha_2 as commanded; this gives it what the
     # crank really had
     correction = light.model.dof_armature[O2] * (happened - alpha_2)
-    column = loop.drive_column(drive_bar)[: d.qvel.size]
-    speed = float(column @ d.qvel)
+    column = loop.drive_column(drive_bar)[:size]
+    speed = float(column @ data.qvel)
+    guess = crank_torque
     if speed:
-        guess = crank_torque * d.qvel[O2] / speed
-    else:
-        guess = crank_torque
+        guess = crank_torque * data.qvel[O2] / speed
+    trials = (-1.0, 1.0)
     if guess:
         trials = (0.5 * guess, 1.5 * guess)
-    else:
-        trials = (-1.0, 1.0)
     return light.solve_drive(drive_bar, happened, trials, correction)
 
 
@@ -393,6 +401,7 @@ def solve_couple(
         return None
     couple = low + (wanted - at_low) / slope
     for _ in range(refinements):
-        couple += (wanted - acceleration(couple)) / slope
+        missing = wanted - acceleration(couple)
+        couple += missing / slope
     acceleration(couple)
     return float(couple)

@@ -31,12 +31,12 @@ def find_limit_met(scene: Scene) -> str:
     """Name the declared limit that a scene meets, if any."""
     if reason := find_unknown(scene, has_term, forces=True):
         return reason
+    least = LIGHTEST.boundary
     for part in list_moving_parts(scene.linkage):
-        if min(part.mass, part.inertia) < LIGHTEST.boundary:
+        if min(part.mass, part.inertia) < least:
             return (
                 f"bar {part.bar} has mass {part.mass:g} kg and inertia {part.inertia:g}"
-                f" kg m^2; MuJoCo compiles no moving body below {LIGHTEST.boundary:g}"
-                " of either"
+                f" kg m^2; MuJoCo compiles no moving body below {least:g} of either"
             )
     return ""
 
@@ -50,12 +50,12 @@ def _compile_bars() -> mujoco.MjModel:
     takes from nobody, `find_limit_met` refuses.
     """
     spec = mujoco.MjSpec()
-    spec.option.disableflags |= (
-        mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT
-    )
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     bodies: dict[int, Any] = {1: spec.worldbody}
     for part in list_moving_parts(uniform(1.0, 1.0, 1.0, 1.0)):
-        body = bodies[part.bar] = bodies[part.bearer].add_body(name=f"bar{part.bar}")
+        body = bodies[part.bearer].add_body(name=f"bar{part.bar}")
+        bodies[part.bar] = body
         body.explicitinertial = True
         body.mass = part.mass
         body.inertia = [part.inertia] * 3
@@ -71,12 +71,10 @@ def _compile_bars() -> mujoco.MjModel:
     # these marks are why
     model.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     model.site_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
-    model.body_simple[:] = model.dof_simplenum[:] = 0
-    assert [int(model.joint(pin).dofadr[0]) for pin in PIN_OF_MOVING_BAR.values()] == [
-        0,
-        1,
-        2,
-    ]
+    model.body_simple[:] = 0
+    model.dof_simplenum[:] = 0
+    dofs = [int(model.joint(pin).dofadr[0]) for pin in PIN_OF_MOVING_BAR.values()]
+    assert dofs == [0, 1, 2]
     return model
 
 
@@ -94,25 +92,28 @@ class MujocoTree(Tree):
         if memory is None:
             model = copy(_compile_bars())
             memory = model, mujoco.MjData(model)
-        self.model, self.data = model, data = memory
+        model, data = memory
+        self.model = model
+        self.data = data
         mujoco.mj_resetData(model, data)
         self.body = {bar: model.body(f"bar{bar}").id for bar in PIN_OF_MOVING_BAR}
         self.site = {model.site(number).name: number for number in range(model.nsite)}
         self._describe(scene)
         # the engine's own memory, read and written in place: to look it up again takes
         # longer than its work
-        self.in_space = {name: data.site_xpos[site] for name, site in self.site.items()}
-        self.at: dict[str, Array] = {
-            name: place[:2] for name, place in self.in_space.items()
-        }
-        self.turned_to: dict[int, Array] = {
-            bar: data.xmat[body].reshape(3, 3)[:2, :2]
-            for bar, body in self.body.items()
-        }
-        self.first_pins = {bar: data.xpos[body] for bar, body in self.body.items()}
-        self.joint_force = {
-            bar: data.cfrc_int[body, 3:5] for bar, body in self.body.items()
-        }
+        self.in_space: dict[str, Array] = {}
+        self.at: dict[str, Array] = {}
+        for name, site in self.site.items():
+            place = data.site_xpos[site]
+            self.in_space[name] = place
+            self.at[name] = place[:2]
+        self.turned_to: dict[int, Array] = {}
+        self.first_pins: dict[int, Array] = {}
+        self.joint_force: dict[int, Array] = {}
+        for bar, body in self.body.items():
+            self.turned_to[bar] = data.xmat[body].reshape(3, 3)[:2, :2]
+            self.first_pins[bar] = data.xpos[body]
+            self.joint_force[bar] = data.cfrc_int[body, 3:5]
         self.qpos = data.qpos
         self.qvel = data.qvel
         self.qacc = data.qacc
@@ -120,8 +121,10 @@ class MujocoTree(Tree):
         self.qfrc_inverse = data.qfrc_inverse
         self.model_gravity = model.opt.gravity
         self._jac = np.zeros((3, 3))
-        self._jacobians, self._rates = np.zeros((2, model.nsite, 3, 3))
-        self._force, self._couple = np.zeros(3), np.zeros(3)
+        self._jacobians = np.zeros((model.nsite, 3, 3))
+        self._rates = np.zeros((model.nsite, 3, 3))
+        self._force = np.zeros(3)
+        self._couple = np.zeros(3)
         self.ready(scene, list_wrenches(scene, self))
 
     def _describe(self, scene: Scene) -> None:
@@ -135,7 +138,8 @@ class MujocoTree(Tree):
             body = self.body[part.bar]
             model.body_pos[body, :2] = part.first_pin
             model.body_ipos[body, :2] = part.centre
-            model.body_mass[body] = model.body_subtreemass[body] = part.mass
+            model.body_mass[body] = part.mass
+            model.body_subtreemass[body] = part.mass
             model.body_inertia[body] = part.inertia
             if part.bearer != 1:
                 model.body_subtreemass[self.body[part.bearer]] += part.mass
@@ -168,7 +172,8 @@ class MujocoTree(Tree):
 
     def set_motion(self, v: Array, a: Array) -> None:
         """Set the speeds of the bodies."""
-        self.qvel[:], self.qacc[:] = v, a
+        self.qvel[:] = v
+        self.qacc[:] = a
         mujoco.mj_comVel(self.model, self.data)
 
     def accelerations(self, names: Iterable[str]) -> list[list[float]]:
@@ -176,15 +181,19 @@ class MujocoTree(Tree):
         model = self.model
         data = self.data
         count = 0
-        for name, J, rate in zip(names, self._jacobians, self._rates, strict=False):
+        for name, jacobian, rate in zip(
+            names, self._jacobians, self._rates, strict=False
+        ):
             site = self.site[name]
+            place = self.in_space[name]
             body = self.body[int(name[-1])]
-            mujoco.mj_jacSite(model, data, J, None, site)
-            mujoco.mj_jacDot(model, data, rate, None, self.in_space[name], body)
+            mujoco.mj_jacSite(model, data, jacobian, None, site)
+            mujoco.mj_jacDot(model, data, rate, None, place, body)
             count += 1
-        J = self._jacobians[:count]
-        rate = self._rates[:count]
-        accelerations: list[list[float]] = (J @ self.a + rate @ self.v)[:, :2].tolist()
+        jacobians = self._jacobians[:count]
+        rates = self._rates[:count]
+        in_space = jacobians @ self.a + rates @ self.v
+        accelerations: list[list[float]] = in_space[:, :2].tolist()
         return accelerations
 
     def needed(
@@ -202,7 +211,8 @@ class MujocoTree(Tree):
         applied = np.zeros(3)
         for bar, wrench in wrenches.items():
             if any(wrench):
-                self._force[:2], self._couple[2] = wrench[:2], wrench[2]
+                self._force[:2] = wrench[:2]
+                self._couple[2] = wrench[2]
                 mujoco.mj_applyFT(
                     self.model,
                     self.data,

@@ -25,7 +25,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects import Load
+from fourbar.effects import Load, Table
 from fourbar.errors import LimitError
 from fourbar.mjcf import RECIPE, Settings, choose_run, write_mjcf
 from fourbar.mjcf.document import FULL_TURN
@@ -72,7 +72,8 @@ class SteadySegment:
         self.run = choose_run(commanded, omega, alpha)
         self.width = len(np.unique(commanded)) - 1
         self.omega = omega
-        self.fastest = self.turning = self.run.fastest
+        self.fastest = self.run.fastest
+        self.turning = self.fastest
 
     def timestep(self, settings: Settings) -> float:
         """Choose the timestep for this segment, s.
@@ -95,7 +96,8 @@ class SteadySegment:
 
         The angle turned gives it.
         """
-        return math.sqrt(max(self.run.omega**2 + 2.0 * self.run.alpha * turned, 0.0))
+        squared = self.run.omega**2 + 2.0 * self.run.alpha * turned
+        return math.sqrt(max(squared, 0.0))
 
 
 class LawSegment:
@@ -112,17 +114,19 @@ class LawSegment:
         assert command.time is not None
         self.law = law
         self.time = command.time
-        self.began, ends = (
-            float(command.time[segment[0]]),
-            float(command.time[segment[-1]]),
-        )
+        self.began = float(command.time[segment[0]])
+        ends = float(command.time[segment[-1]])
         self.intervals = len(segment) - 1
         self.duration = ends - self.began
-        self.omega = float(law.at(np.array([self.began]))[1][0])
+        _, at_begin, _ = law.at(np.array([self.began]))
+        self.omega = float(at_begin[0])
         self.knots = list(law.time)
-        self.at_knots = law.at(np.array(law.time))[2].tolist()
-        angles, speeds, _ = law.at(np.linspace(self.began, ends, INSTANTS_OF_A_LAW))
-        self.fastest = self.turning = float(np.abs(speeds).max())
+        _, _, at_knots = law.at(np.array(law.time))
+        self.at_knots = at_knots.tolist()
+        instants = np.linspace(self.began, ends, INSTANTS_OF_A_LAW)
+        angles, speeds, _ = law.at(instants)
+        self.fastest = float(np.abs(speeds).max())
+        self.turning = self.fastest
         self.width = float(np.ptp(angles))
 
     def timestep(self, settings: Settings) -> float:
@@ -130,11 +134,13 @@ class LawSegment:
         if not self.intervals:
             return 1e-3
         turned = self.duration * self.fastest
-        steps = turned / (2.0 * math.pi) * settings.steps_per_revolution
+        revolutions = turned / (2.0 * math.pi)
+        steps = revolutions * settings.steps_per_revolution
         if 0.0 < self.width < FULL_TURN:
             steps = max(steps, settings.steps_per_window * turned / self.width)
         pieces = math.ceil(steps / self.intervals * (1.0 - 1e-9))
-        return self.duration / (self.intervals * pieces) * settings.timestep_scale
+        timestep = self.duration / (self.intervals * pieces)
+        return timestep * settings.timestep_scale
 
     def seconds(self, index: int) -> float:
         """Return it as the law was sampled."""
@@ -142,7 +148,9 @@ class LawSegment:
 
     def speed(self, turned: float, seconds: float) -> float:
         """Return it by the time."""
-        return float(abs(self.law.at(np.array([self.began + seconds]))[1][0]))
+        instant = np.array([self.began + seconds])
+        _, speed, _ = self.law.at(instant)
+        return float(abs(speed[0]))
 
     def alpha(self, seconds: float) -> float:
         """Interpolate linearly, as the second derivative of cubic pieces is.
@@ -150,13 +158,17 @@ class LawSegment:
         That of a rise is its own.
         """
         instant = self.began + seconds
-        t = self.knots
-        f = self.at_knots
         if isinstance(self.law, Rise):
-            return float(self.law.at(np.array([instant]))[2][0])
-        k = min(max(bisect.bisect_right(t, instant), 1), len(t) - 1)
-        part = (instant - t[k - 1]) / (t[k] - t[k - 1])
-        return float(f[k - 1] + part * (f[k] - f[k - 1]))
+            _, _, alpha = self.law.at(np.array([instant]))
+            return float(alpha[0])
+        times = self.knots
+        knots_before = bisect.bisect_right(times, instant)
+        after = min(max(knots_before, 1), len(times) - 1)
+        before = after - 1
+        part = (instant - times[before]) / (times[after] - times[before])
+        start = self.at_knots[before]
+        stop = self.at_knots[after]
+        return float(start + part * (stop - start))
 
 
 MotionSegment = SteadySegment | LawSegment
@@ -167,7 +179,8 @@ def find_extremes(law: Law | Rise) -> tuple[float, float]:
 
     Flywheel and closure are laid out for them.
     """
-    _, omega, alpha = law.at(np.linspace(law.time[0], law.time[-1], INSTANTS_OF_A_LAW))
+    instants = np.linspace(law.time[0], law.time[-1], INSTANTS_OF_A_LAW)
+    _, omega, alpha = law.at(instants)
     return float(np.abs(omega).max()), float(np.abs(alpha).max())
 
 
@@ -176,10 +189,13 @@ def order_in_time(values: Array, time: Array | None, speed: float) -> NDArray[np
 
     The order is by what is commanded or by the times of a law.
     """
-    return np.argsort(
-        time if time is not None else values if speed > 0.0 else -values,
-        kind="stable",
-    )
+    if time is not None:
+        passed = time
+    elif speed > 0.0:
+        passed = values
+    else:
+        passed = -values
+    return np.argsort(passed, kind="stable")
 
 
 LIGHT_FLYWHEEL = 1e4
@@ -263,7 +279,8 @@ class SimulatedRun:
 
     def progress(self) -> float:
         """Return the angle or stroke of what moves as commanded."""
-        if (bar := self.motion_segment.bar) is None:
+        bar = self.motion_segment.bar
+        if bar is None:
             return self.loop.stroke()
         return self.loop.angle(bar)
 
@@ -281,7 +298,11 @@ class SimulatedRun:
         if self.light is None:
             return torque, self.loop.forces()
         couple = solve_couple_elsewhere(
-            self.loop, self.light, self.scene.drive_bar, self.loop.given(), torque
+            self.loop,
+            self.light,
+            self.scene.drive_bar,
+            self.loop.given(),
+            torque,
         )
         return couple, self.light.forces()
 
@@ -297,9 +318,9 @@ def find_assembled(
     """
     assembled: list[Found] = [None] * len(command.angle)
     for index in order:
-        assembled[index] = position.find(
-            float(command.angle[index]), int(command.branch[index])
-        )
+        angle = float(command.angle[index])
+        branch = int(command.branch[index])
+        assembled[index] = position.find(angle, branch)
     return assembled
 
 
@@ -312,13 +333,16 @@ def split_segments(
 
     They end where the loop does not close, or two neighbours are not joined.
     """
-    split: list[list[int]] = [[]]
+    segments: list[list[int]] = [[]]
     for index in order:
-        if assembled[index] is None or (split[-1] and not joined(split[-1][-1], index)):
-            split.append([])
-        if assembled[index] is not None:
-            split[-1].append(int(index))
-    return [segment for segment in split if segment]
+        current = segments[-1]
+        if assembled[index] is None:
+            segments.append([])
+        elif current and not joined(current[-1], index):
+            segments.append([int(index)])
+        else:
+            current.append(int(index))
+    return [segment for segment in segments if segment]
 
 
 _MOST_UNEVEN = 20.0
@@ -342,57 +366,54 @@ class Lead:
                 " here"
             )
         still = replace(take_full_size(scene), motion=Motion(0.0, 1.0))
-        self.loop = loop = ClosedLoop(
-            write_mjcf(still, replace(RECIPE, timestep=1e-3), keyframe=False)
-        )
-        if command.stroke is not None:
-            self.bar = None
-        else:
-            self.bar = command.bar
+        settings = replace(RECIPE, timestep=1e-3)
+        self.loop = loop = ClosedLoop(write_mjcf(still, settings, keyframe=False))
+        self.bar: int | None = command.bar
         """Number of the commanded bar; None if the stroke is commanded."""
         if command.stroke is not None:
+            self.bar = None
             command = find_angle(command, motion, *loop.cylinder(command.bar))
-        self.command, self.values = (
-            command,
-            command.angle if command.stroke is None else command.stroke,
-        )
-        self.speed, self.acceleration = (
-            float(np.max(motion.speed or 0.0)),
-            float(np.max(motion.acceleration)),
-        )
-        assembled = find_assembled(
-            Assembler(loop, command.bar), command, range(len(self.values))
-        )
+        self.command = command
+        self.values = command.angle if command.stroke is None else command.stroke
+        self.speed = float(np.max(motion.speed or 0.0))
+        self.acceleration = float(np.max(motion.acceleration))
+        positions = range(len(self.values))
+        assembled = find_assembled(Assembler(loop, command.bar), command, positions)
         self.closes = np.array([q is not None for q in assembled])
         if not self.closes.any():
             raise LimitError("the loop closes at none of the positions")
-        self.input, branch = np.full((3, len(assembled)), np.nan), command.branch.copy()
+        self.input = np.full((3, len(assembled)), np.nan)
         """theta_2, omega_2, alpha_2."""
+        branch = command.branch.copy()
         for index, q in enumerate(assembled):
             if q is not None:
-                try:
-                    loop.set_state(q, self.speed, self.bar)
-                except np.linalg.LinAlgError:
-                    raise LimitError(
-                        "the commanded motion stands at a limit of its own"
-                    ) from None
-                mujoco.mj_forward(loop.model, loop.data)
-                self.input[:, index] = (
-                    q[O2],
-                    loop.data.qvel[O2],
-                    self.alpha_2(loop.model, loop.data),
-                )
+                self.input[:, index] = self._find_input(q)
                 branch[index] = loop.branch()
         self.input[0, self.closes] = np.unwrap(self.input[0, self.closes])
         theta_2, omega_2, alpha_2 = self.input[:, self.closes]
         # greatest speed and acceleration, as for a law: flywheel and closure are sized
         # by them
-        most = (
-            float(np.abs(omega_2).max()),
-            float(np.abs(alpha_2).max()) or np.finfo(float).tiny,
-        )
-        self.scene = replace(scene, motion=Motion(theta_2, *most))
-        self.of_input = Command(theta_2, branch[self.closes], *most)
+        fastest = float(np.abs(omega_2).max())
+        most_accelerated = float(np.abs(alpha_2).max()) or np.finfo(float).tiny
+        largest = Motion(theta_2, fastest, most_accelerated)
+        self.scene = replace(scene, motion=largest)
+        self.of_input = Command(theta_2, branch[self.closes], fastest, most_accelerated)
+
+    def _find_input(self, q: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Find theta_2, omega_2 and alpha_2 of the input at joint angles.
+
+        MuJoCo is left at that state.
+        """
+        loop = self.loop
+        try:
+            loop.set_state(q, self.speed, self.bar)
+        except np.linalg.LinAlgError:
+            raise LimitError(
+                "the commanded motion stands at a limit of its own"
+            ) from None
+        mujoco.mj_forward(loop.model, loop.data)
+        omega_2 = float(loop.data.qvel[O2])
+        return q[O2], omega_2, self.alpha_2(loop.model, loop.data)
 
     def alpha_2(self, model: mujoco.MjModel, data: mujoco.MjData) -> float:
         """Solve for the acceleration of the input at a state, rad/s^2.
@@ -404,24 +425,20 @@ class Lead:
         loop.data = data
         drift = (loop.rate_at("B3") - loop.rate_at("B4")) @ data.qvel
         due = self.acceleration - loop.drive_drift(self.bar)
-        return float(
-            solve_closed(
-                loop.jacobian(), due, loop.drive_column(self.bar), *drift.tolist()
-            )[O2]
-        )
+        column = loop.drive_column(self.bar)
+        accelerations = solve_closed(loop.jacobian(), due, column, *drift.tolist())
+        return float(accelerations[O2])
 
     def least_sine(self) -> float:
         """Compute the least |sin(theta_4 - theta_3)| on the way.
 
         It is 0 if the sine changes its sign.
         """
-        if np.ptp(self.of_input.branch):
+        command = self.of_input
+        if np.ptp(command.branch):
             return 0.0
-        return compute_least_sine(
-            self.scene.linkage,
-            self.of_input.theta_2,
-            np.ones(len(self.of_input.theta_2), dtype=bool),
-        )
+        everywhere = np.ones(len(command.theta_2), dtype=bool)
+        return compute_least_sine(self.scene.linkage, command.theta_2, everywhere)
 
 
 class LedSegment(SteadySegment):
@@ -431,24 +448,26 @@ class LedSegment(SteadySegment):
         super().__init__(lead.values, segment, lead.speed, lead.acceleration)
         self.bar = lead.bar
         theta_2, omega_2, _ = lead.input[:, list(segment)]
-        self.turning, self.turned = float(np.abs(omega_2).max()), float(np.ptp(theta_2))
+        self.turning = float(np.abs(omega_2).max())
+        self.turned = float(np.ptp(theta_2))
 
     def timestep(self, settings: Settings) -> float:
         """Divide the time by what the input turns."""
         if not self.width or not self.turned:
             return 1e-3
         duration = self.run.time(self.run.stop)
-        if (uneven := duration * self.turning / self.turned) > _MOST_UNEVEN:
+        most = duration * self.turning
+        uneven = most / self.turned
+        if uneven > _MOST_UNEVEN:
             raise LimitError(
                 f"the input is at most {uneven:.0f} times as fast as on the mean; up to"
                 f" {_MOST_UNEVEN:g} it is led"
             )
-        steps = duration * self.turning / (2.0 * np.pi) * settings.steps_per_revolution
+        steps = most / (2.0 * np.pi) * settings.steps_per_revolution
         if 0.0 < self.turned < FULL_TURN:
             steps = max(steps, settings.steps_per_window * uneven)
-        return float(
-            duration / max(np.ceil(steps), self.width) * settings.timestep_scale
-        )
+        timestep = duration / max(np.ceil(steps), self.width)
+        return float(timestep * settings.timestep_scale)
 
 
 OVERRUN = 1e-7
@@ -467,18 +486,23 @@ def take_full_size(scene: Scene) -> Scene:
     loads = []
     for load in scene.loads:
         peak = _find_peak_of_load(load)
-        if load.force is None:
-            force = None
-        else:
-            force = (load.force[0] * peak, load.force[1])
-        loads.append(replace(load, force=force, moment=load.moment * peak, table=None))
+        force = None
+        if load.force is not None:
+            size, angle = load.force
+            force = (size * peak, angle)
+        full = replace(load, force=force, moment=load.moment * peak, table=None)
+        loads.append(full)
     return replace(scene, loads=tuple(loads))
 
 
 def _find_peak_of_load(load: Load) -> float:
     if load.table is None:
         return 1.0
-    return max(map(abs, load.table.factor)) or 1.0
+    return _find_peak_of_table(load.table)
+
+
+def _find_peak_of_table(table: Table) -> float:
+    return max(abs(factor) for factor in table.factor) or 1.0
 
 
 def evaluate_loads(scene: Scene) -> dict[str, ActuatorForce]:
@@ -486,30 +510,28 @@ def evaluate_loads(scene: Scene) -> dict[str, ActuatorForce]:
 
     It is the factor at MuJoCo's own theta_2, over the largest.
     """
+    forces = {}
+    for number, load in enumerate(scene.loads, 1):
+        if load.table is not None:
+            forces[f"load_{number}"] = _evaluate_table(load.table)
+    return forces
 
-    def force_of(load: Load) -> ActuatorForce:
-        table = load.table
-        peak = _find_peak_of_load(load)
-        assert table is not None
-        first = table.theta_2[0]
-        last = table.theta_2[-1]
 
-        def factor(_: mujoco.MjModel, d: mujoco.MjData) -> float:
-            angle = first + (float(d.qpos[O2]) - first) % math.tau
-            if angle > last:  # the stages of a step may look beyond the end of a table
-                if angle - last < first + math.tau - angle:
-                    angle = last
-                else:
-                    angle = first
-            return look_up(table, angle) / peak
+def _evaluate_table(table: Table) -> ActuatorForce:
+    """Return the function that evaluates a table over its largest factor."""
+    peak = _find_peak_of_table(table)
+    first = table.theta_2[0]
+    last = table.theta_2[-1]
 
-        return factor
+    def factor(_: mujoco.MjModel, data: mujoco.MjData) -> float:
+        turned = (float(data.qpos[O2]) - first) % math.tau
+        angle = first + turned
+        if angle > last:  # the stages of a step may look beyond the end of a table
+            to_first = first + math.tau - angle
+            angle = last if angle - last < to_first else first
+        return look_up(table, angle) / peak
 
-    return {
-        f"load_{index}": force_of(load)
-        for index, load in enumerate(scene.loads, 1)
-        if load.table is not None
-    }
+    return factor
 
 
 def clip_angles(scene: Scene, theta_2: Array) -> Array:
@@ -527,12 +549,14 @@ def clip_angles(scene: Scene, theta_2: Array) -> Array:
         over = angle - last
         under = first + math.tau - angle
         outside = over > 0.0
-        if not (~outside | (np.minimum(over, under) < OVERRUN)).all():
+        near = np.minimum(over, under) < OVERRUN
+        if not (~outside | near).all():
             raise LimitError(
                 f"the motion leaves the table of a load, which covers {first:g} to"
                 f" {last:g} rad"
             )
-        inside = inside + np.where(outside, np.where(over < under, -over, under), 0.0)
+        back = np.where(over < under, -over, under)
+        inside = inside + np.where(outside, back, 0.0)
     return inside
 
 
@@ -553,10 +577,13 @@ def supply_forces(supplied: dict[str, ActuatorForce]) -> Iterator[None]:
     if not supplied:
         yield
         return
+
+    def force(model: mujoco.MjModel, data: mujoco.MjData, number: int) -> float:
+        name = model.actuator(number).name
+        return supplied[name](model, data)
+
     before = mujoco.get_mjcb_act_bias()
-    mujoco.set_mjcb_act_bias(
-        lambda m, d, number: supplied[m.actuator(number).name](m, d)
-    )
+    mujoco.set_mjcb_act_bias(force)
     try:
         yield
     finally:

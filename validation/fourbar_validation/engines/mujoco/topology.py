@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from copy import copy
 from itertools import permutations
+from typing import NamedTuple, NoReturn
 
 import mujoco
 import numpy as np
@@ -41,9 +42,10 @@ def _find_named_body(model: mujoco.MjModel, name: str) -> int | None:
 
 def list_body_names(model: mujoco.MjModel) -> str:
     """List the bodies of a file by name, for a message."""
-    return ", ".join(
-        model.body(i).name or f"(unnamed {i})" for i in range(1, model.nbody)
-    )
+    names = []
+    for number in range(1, model.nbody):
+        names.append(model.body(number).name or f"(unnamed {number})")
+    return ", ".join(names)
 
 
 def _find_stated_body(
@@ -82,12 +84,14 @@ class Topology:
 
         `axes`: x and y of its plane, (2, 3); None: those of the world that are in it.
         """
-        self.model, self.data, self.names = model, mujoco.MjData(model), dict(names)
+        self.model = model
+        self.data = mujoco.MjData(model)
+        self.names = dict(names)
         mujoco.mj_kinematics(model, self.data)
         mujoco.mj_comPos(model, self.data)
-        self.root = {1: 0} | {
-            bar: _find_stated_body(model, names, BAR_NAMES[bar]) for bar in MOVING_BARS
-        }
+        self.root = {1: 0}
+        for bar in MOVING_BARS:
+            self.root[bar] = _find_stated_body(model, names, BAR_NAMES[bar])
         self.bar_of_root = {body: bar for bar, body in self.root.items()}
         if len(self.bar_of_root) < len(self.root):
             raise InputError(
@@ -101,7 +105,8 @@ class Topology:
         self.sense: dict[str, float] = {}
         self._find_plane()
         if axes is not None:
-            self.axes, self.normal = axes, np.cross(*axes)
+            self.axes = axes
+            self.normal = np.cross(*axes)
         for joint in range(model.njnt):
             self._add_hinge(joint)
         if len(self.hinge) != 3:
@@ -114,11 +119,17 @@ class Topology:
         self.closure: int | None = None
         self.closed_by = "nothing"
         self._find_closure(names)
-        lines = {bar: self.line(self.data, bar) for bar in ENDS}
-        self._line = {bar: math.atan2(y, x) for bar, (x, y) in lines.items()}
+        self._line = {}
+        for bar in ENDS:
+            x, y = self.line(self.data, bar)
+            self._line[bar] = math.atan2(y, x)
         self._rest = self.data.qpos.copy()
         self._rest_angles = np.array(
-            (self._line[2], self._line[3] - self._line[2], self._line[4])
+            [
+                self._line[2],
+                self._line[3] - self._line[2],
+                self._line[4],
+            ]
         )
         self.to_joints = self._convert_to_joints()
         """Joint speeds from those of (theta_2, theta_3 - theta_2, theta_4), (3, 3)."""
@@ -132,10 +143,10 @@ class Topology:
     def list_actuators(self, joint: int) -> list[int]:
         """List the actuators on a joint."""
         model = self.model
-        on_joints = np.flatnonzero(
-            model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
-        ).tolist()
-        return [i for i in on_joints if model.actuator_trnid[i, 0] == joint]
+        on_joints = model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
+        on_this = model.actuator_trnid[:, 0] == joint
+        actuators: list[int] = np.flatnonzero(on_joints & on_this).tolist()
+        return actuators
 
     def stops(self, pin: str) -> tuple[float, float] | None:
         """Return the range of a pin, rad, or None without stops.
@@ -146,7 +157,8 @@ class Topology:
         joint = self.hinge[pin]
         if not self._is_limited(joint):
             return None
-        turned = model.jnt_range[joint] - model.qpos0[model.jnt_qposadr[joint]]
+        at_rest = model.qpos0[model.jnt_qposadr[joint]]
+        turned = model.jnt_range[joint] - at_rest
         ends = self.rest_angle(pin) + self.sense[pin] * turned
         return float(ends.min()), float(ends.max())
 
@@ -161,10 +173,10 @@ class Topology:
         Without one a spring is such an actuator too.
         """
         model = self.model
-        on_tendons = np.flatnonzero(
-            model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON
-        ).tolist()
-        return [i for i in on_tendons if model.actuator_gainprm[i].any()]
+        on_tendons = model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON
+        controlled = model.actuator_gainprm.any(axis=1)
+        actuators: list[int] = np.flatnonzero(on_tendons & controlled).tolist()
+        return actuators
 
     def bar(self, body: int) -> int | None:
         """Find the bar that a body belongs to.
@@ -180,10 +192,11 @@ class Topology:
                 "MJCF", None, "must have hinges at three of the pins O2, A, B, O4"
             )
         axis = self.data.xaxis[np.argmax(hinges)]
-        across = int(np.argmax(np.abs(axis)))
-        self.plane, axes = _PLANES[across]
+        nearest = int(np.argmax(np.abs(axis)))
+        self.plane, axes = _PLANES[nearest]
         self.axes = np.eye(3)[list(axes)]
-        if np.abs(axis[list(axes)]).max() > UPRIGHT_HINGE:
+        tilt = np.abs(axis[list(axes)]).max()
+        if tilt > UPRIGHT_HINGE:
             # as `fourbar mjcf --axis` turns it
             tilted = Plane(tuple(axis.tolist()))
             self.plane = "normal to " + " ".join(f"{part:.6g}" for part in axis)
@@ -191,7 +204,8 @@ class Topology:
         self.normal = np.cross(*self.axes)
 
     def _add_hinge(self, joint: int) -> None:
-        model, name = self.model, self.model.joint(joint).name or f"(unnamed {joint})"
+        model = self.model
+        name = model.joint(joint).name or f"(unnamed {joint})"
         body = model.jnt_bodyid[joint]
         bars = [self.bar(body), self.bar(model.body_parentid[body])]
         kind = mujoco.mjtJoint(model.jnt_type[joint])
@@ -210,15 +224,16 @@ class Topology:
                 "joins bars that have no pin in common, or have one already",
             )
         axis = self.data.xaxis[joint]
-        along = float(axis @ self.normal)
-        if float(np.linalg.norm(np.cross(axis, self.normal))) > UPRIGHT_HINGE:
+        tilt = float(np.linalg.norm(np.cross(axis, self.normal)))
+        if tilt > UPRIGHT_HINGE:
             raise InputError(
                 "MJCF",
                 name,
                 "the hinge is not parallel to the others; --loop NAME measures a loop "
                 "whose axes differ a little",
             )
-        self.hinge[pin], self.sense[pin] = joint, math.copysign(1.0, along)
+        self.hinge[pin] = joint
+        self.sense[pin] = math.copysign(1.0, float(axis @ self.normal))
         for bar in bars:
             assert bar is not None
             self.point[bar, pin] = self._find_in_bar(bar, self.data.xanchor[joint])
@@ -227,22 +242,19 @@ class Topology:
         """Return advice on names; where all were stated, which they are."""
         if any(role not in self.names for role in roles):
             return f"; {advice}"
-        if roles:
-            return "; stated: " + ", ".join(
-                f"{role}={self.names[role]}" for role in roles
-            )
+        stated = [f"{role}={self.names[role]}" for role in roles]
+        if stated:
+            return "; stated: " + ", ".join(stated)
         return ""
 
     def _find_in_bar(self, bar: int, world: Array) -> Array:
         body = self.root[bar]
-        return np.asarray(
-            self.data.xmat[body].reshape(3, 3).T @ (world - self.data.xpos[body])
-        )
+        rotation = self.data.xmat[body].reshape(3, 3)
+        return np.asarray(rotation.T @ (world - self.data.xpos[body]))
 
     def _on(self, body: int, local: Array) -> Array:
-        return np.asarray(
-            self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ local
-        )
+        rotation = self.data.xmat[body].reshape(3, 3)
+        return np.asarray(self.data.xpos[body] + rotation @ local)
 
     def _find_closure(self, names: Mapping[str, str]) -> None:
         """Find the equality between the two bars of the cut pin.
@@ -253,10 +265,8 @@ class Topology:
         kinds = mujoco.mjtEq
         for number in range(model.neq):
             kind = kinds(model.eq_type[number])
-            if (
-                kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD)
-                or not model.eq_active0[number]
-            ):
+            closes = kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD)
+            if not closes or not model.eq_active0[number]:
                 continue
             ends = self._find_ends(number, kind)
             bars = [self.bar(body) for body, _ in ends]
@@ -268,18 +278,26 @@ class Topology:
             self.closure = number
             self.first = bars[0]
             by_sites = model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE
-            if kind == kinds.mjEQ_CONNECT:
-                word = "connect"
-            else:
-                word = "weld"
-            self.closed_by = f"{word} of {'sites' if by_sites else 'body anchors'}"
+            word = "connect" if kind == kinds.mjEQ_CONNECT else "weld"
+            ends_at = "sites" if by_sites else "body anchors"
+            self.closed_by = f"{word} of {ends_at}"
             return
-        for role, bar in zip(("B3", "B4"), PINS["B"], strict=True):
+        self._find_sites(names)
+        if (model.eq_type == kinds.mjEQ_TENDON).any():
+            self.closed_by = "tendon"
+
+    def _find_sites(self, names: Mapping[str, str]) -> None:
+        """Find the two sites that mark pin B.
+
+        Raises InputError if one is missing or on another body.
+        """
+        model = self.model
+        for role, bar in zip(_SITES, PINS["B"], strict=True):
             name = names.get(role, role)
             site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
             if self.cut != "B" or site < 0 or self.bar(model.site_bodyid[site]) != bar:
                 advice = self._advise(
-                    (*_SITES,) if self.cut == "B" else (),
+                    _SITES if self.cut == "B" else (),
                     "where something else does, say where pin B is: "
                     "--name B3=SITE on the coupler, --name B4=SITE on the output",
                 )
@@ -289,25 +307,23 @@ class Topology:
                     f"no connect or weld closes the loop at this pin{advice}",
                 )
             self.point[bar, "B"] = self._find_in_bar(bar, self.data.site_xpos[site])
-        if (model.eq_type == kinds.mjEQ_TENDON).any():
-            self.closed_by = "tendon"
 
     def _find_ends(self, number: int, kind: mujoco.mjtEq) -> list[tuple[int, Array]]:
         """Return the body and the world point at either end of an equality."""
         model = self.model
         objects = (int(model.eq_obj1id[number]), int(model.eq_obj2id[number]))
+        ends = []
         if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
-            return [
-                (int(model.site_bodyid[site]), self.data.site_xpos[site].copy())
-                for site in objects
-            ]
+            for site in objects:
+                body = int(model.site_bodyid[site])
+                ends.append((body, self.data.site_xpos[site].copy()))
+            return ends
         anchors = [model.eq_data[number, 0:3], model.eq_data[number, 3:6]]
         if kind == mujoco.mjtEq.mjEQ_WELD:  # it keeps the second body's anchor first
             anchors.reverse()
-        return [
-            (body, self._on(body, anchor))
-            for body, anchor in zip(objects, anchors, strict=True)
-        ]
+        for body, anchor in zip(objects, anchors, strict=True):
+            ends.append((body, self._on(body, anchor)))
+        return ends
 
     def in_plane(self, vector: Array) -> Array:
         """Project on the linkage's plane, (2,)."""
@@ -316,9 +332,8 @@ class Topology:
     def world(self, data: mujoco.MjData, bar: int, pin: str) -> Array:
         """Locate a bar's pin, world axes, (3,)."""
         body = self.root[bar]
-        return np.asarray(
-            data.xpos[body] + data.xmat[body].reshape(3, 3) @ self.point[bar, pin]
-        )
+        rotation = data.xmat[body].reshape(3, 3)
+        return np.asarray(data.xpos[body] + rotation @ self.point[bar, pin])
 
     def line(self, data: mujoco.MjData, bar: int) -> Array:
         """Return a bar's line from its first pin to its second, (2,), m.
@@ -348,8 +363,11 @@ class Topology:
         `behind`: seen from the other side.
         """
         x, y = self.axes
-        y = -y if behind else y
-        angle = (-self.ground_angle if behind else self.ground_angle) - ground_angle
+        seen_angle = self.ground_angle
+        if behind:
+            y = -y
+            seen_angle = -seen_angle
+        angle = seen_angle - ground_angle
         cos = math.cos(angle)
         sin = math.sin(angle)
         axes = np.array([cos * x + sin * y, cos * y - sin * x])
@@ -372,7 +390,8 @@ class Topology:
 
         It is along the bar's line and to its left.
         """
-        return self.turned_back(bar, world - self.world(self.data, bar, ENDS[bar][0]))
+        first_pin = self.world(self.data, bar, ENDS[bar][0])
+        return self.turned_back(bar, world - first_pin)
 
     def turned_back(self, bar: int, vector: Array) -> tuple[float, float]:
         """Resolve a vector along a bar's line in the rest state and to its left."""
@@ -391,9 +410,8 @@ class Topology:
         matrix = np.zeros((self.model.nv, 3))
         for pin, joint in self.hinge.items():
             child, parent = self.turning(pin)
-            matrix[self.model.jnt_dofadr[joint]] = self.sense[pin] * (
-                turns[child] - turns[parent]
-            )
+            dof = self.model.jnt_dofadr[joint]
+            matrix[dof] = self.sense[pin] * (turns[child] - turns[parent])
         return matrix
 
     def turning(self, pin: str) -> tuple[int, int]:
@@ -424,11 +442,11 @@ class Topology:
         """Return (theta_2, theta_3 - theta_2, theta_4) of a state."""
         moved = np.empty(3)
         for joint in self.hinge.values():
+            dof = self.model.jnt_dofadr[joint]
             address = self.model.jnt_qposadr[joint]
-            moved[self.model.jnt_dofadr[joint]] = (
-                data.qpos[address] - self._rest[address]
-            )
-        return np.asarray(np.linalg.solve(self.to_joints, moved) + self._rest_angles)
+            moved[dof] = data.qpos[address] - self._rest[address]
+        turned = np.linalg.solve(self.to_joints, moved)
+        return np.asarray(turned + self._rest_angles)
 
 
 def find_topology(
@@ -446,76 +464,84 @@ def find_topology(
     Raises InputError in one line: why no three bodies fit.
     """
     roles = {role: names.get(role, role) for role in (*ROLE_NAMES, *_SITES)}
-    bodies = [
-        (
-            _find_stated_body(model, names, role)
-            if role in names
-            else _find_named_body(model, role)
-        )
-        for role in ROLE_NAMES
-    ]
-    if None not in bodies and (
-        _find_site(model, roles["B3"])
-        or names.keys() & {*_SITES}
-        or not _open_sites(model)
-    ):
+    bodies: dict[str, int | None] = {}
+    for role in ROLE_NAMES:
+        if role in names:
+            bodies[role] = _find_stated_body(model, names, role)
+        else:
+            bodies[role] = _find_named_body(model, role)
+    missing = [role for role, body in bodies.items() if body is None]
+    if not missing and _is_pin_b_known(model, roles, names):
         return Topology(model, names), []
-    candidates = sorted(
-        {int(model.body_weldid[model.jnt_bodyid[joint]]) for joint in range(model.njnt)}
-    )
-    free = [body for body in candidates if body not in bodies]
-    missing = [
-        role for role, body in zip(ROLE_NAMES, bodies, strict=True) if body is None
-    ]
-    guesses: list[tuple[float, bool, Topology, dict[str, str]]] = []
+    on_hinges = {int(model.body_weldid[body]) for body in model.jnt_bodyid}
+    free = sorted(on_hinges - set(bodies.values()))
+    guesses: list[_Guess] = []
     refused: list[str] = []
     for chosen in permutations(free[:_MOST_BODIES], len(missing)):
-        guess = {
-            role: model.body(body).name
-            for role, body in zip(missing, chosen, strict=True)
-        }
-        if not all(guess.values()):
+        chosen_names = [model.body(body).name for body in chosen]
+        guessed = dict(zip(missing, chosen_names, strict=True))
+        if not all(guessed.values()):
             refused.append("a body without a name, which --name cannot state either")
             continue
-        for sites in _list_sites(model, {**roles, **guess}, names):
+        for sites in _list_sites(model, {**roles, **guessed}, names):
             try:
-                topology = Topology(model, {**names, **guess, **sites})
-                guesses.append(
-                    (
-                        _measure_misfit(topology, lengths),
-                        not topology.drives(),
-                        topology,
-                        {**guess, **sites},
-                    )
-                )
+                topology = Topology(model, {**names, **guessed, **sites})
+                misfit = _measure_misfit(topology, lengths)
+                guesses.append(_Guess(misfit, topology, {**guessed, **sites}))
             except InputError as error:
                 refused.append(error.allowed)
     if not guesses:
-        if len(free) < len(missing):
-            few = "it has fewer bodies on hinges"
+        if refused:
+            why = refused[0]
+        elif len(free) < len(missing):
+            why = "it has fewer bodies on hinges"
         else:
-            few = "no connect, weld or pair of sites closes it"
-        why = refused[0] if refused else few
-        nowhere = (
-            f"no body is named {', '.join(missing) or 'B3, B4'}, and no guess makes a"
-            f" four-bar ({why})"
-        )
-        unstated = [role for role in missing or _SITES if role not in names]
-        advice = ""
-        if unstated:
-            kind = "BODY" if missing else "SITE"
-            advice = f"; say which is which: --name {unstated[0]}={kind}, and so on"
-        raise InputError("MJCF", list_body_names(model), nowhere + advice)
-    best = min(misfit[0] for misfit in guesses)
-    _, _, topology, guessed = min(
-        (misfit for misfit in guesses if misfit[0] <= best + GUESSED_ALIKE),
-        key=lambda misfit: misfit[1],
-    )
-    pairs = ", ".join(f"{role}={name}" for role, name in guessed.items())
-    return topology, [
+            why = "no connect, weld or pair of sites closes it"
+        _refuse_guesses(model, names, missing, why)
+    best = min(guess.misfit for guess in guesses)
+    alike = [guess for guess in guesses if guess.misfit <= best + GUESSED_ALIKE]
+    guess = min(alike, key=lambda guess: not guess.topology.drives())
+    pairs = ", ".join(f"{role}={name}" for role, name in guess.names.items())
+    note = (
         f"guessed from what hangs together and from the lengths: {pairs} (--name states"
         " it otherwise)"
-    ]
+    )
+    return guess.topology, [note]
+
+
+class _Guess(NamedTuple):
+    """A four-bar that a model may be meant to hold."""
+
+    misfit: float
+    topology: Topology
+    names: dict[str, str]
+    """Bodies and sites by the roles that were guessed for them."""
+
+
+def _is_pin_b_known(
+    model: mujoco.MjModel,
+    roles: Mapping[str, str],
+    names: Mapping[str, str],
+) -> bool:
+    """Tell whether an equality, a stated name or the usual name says where pin B is."""
+    stated = bool(names.keys() & {*_SITES})
+    return stated or _find_site(model, roles["B3"]) or not _open_sites(model)
+
+
+def _refuse_guesses(
+    model: mujoco.MjModel,
+    names: Mapping[str, str],
+    missing: list[str],
+    why: str,
+) -> NoReturn:
+    """Raise InputError: no guess makes a four-bar of a model."""
+    unnamed = ", ".join(missing) or "B3, B4"
+    text = f"no body is named {unnamed}, and no guess makes a four-bar ({why})"
+    unstated = [role for role in missing or _SITES if role not in names]
+    if unstated:
+        kind = "BODY" if missing else "SITE"
+        text += f"; say which is which: --name {unstated[0]}={kind}, and so on"
+    raise InputError("MJCF", list_body_names(model), text)
 
 
 def _find_site(model: mujoco.MjModel, name: str) -> bool:
@@ -525,9 +551,8 @@ def _find_site(model: mujoco.MjModel, name: str) -> bool:
 def _open_sites(model: mujoco.MjModel) -> bool:
     """Tell whether only sites can say where the loop closes."""
     kinds = mujoco.mjtEq
-    return not any(
-        kinds(kind) in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) for kind in model.eq_type
-    )
+    closing = (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD)
+    return not any(kinds(kind) in closing for kind in model.eq_type)
 
 
 def _list_sites(
@@ -539,25 +564,27 @@ def _list_sites(
 
     None need be given if a connect or a weld closes the loop.
     """
-    if (
-        not _open_sites(model)
-        or names.keys() & {*_SITES}
-        or _find_site(model, roles["B3"])
-    ):
+    if _is_pin_b_known(model, roles, names):
         return [{}]
-    on = {
-        role: [
-            model.site(i).name
-            for i in range(model.nsite)
-            if model.site(i).name
-            and int(model.body_weldid[model.site_bodyid[i]])
-            == _find_named_body(model, roles[role])
-        ]
-        for role in ("coupler", "output")
-    }
-    return [
-        {"B3": three, "B4": four} for three in on["coupler"] for four in on["output"]
-    ]
+    on_coupler = _list_named_sites(model, roles["coupler"])
+    on_output = _list_named_sites(model, roles["output"])
+    pairs = []
+    for three in on_coupler:
+        for four in on_output:
+            pairs.append({"B3": three, "B4": four})
+    return pairs
+
+
+def _list_named_sites(model: mujoco.MjModel, name: str) -> list[str]:
+    """List the sites with a name on the body of a name."""
+    wanted = _find_named_body(model, name)
+    names = []
+    for number in range(model.nsite):
+        site = model.site(number).name
+        body = int(model.body_weldid[model.site_bodyid[number]])
+        if site and body == wanted:
+            names.append(site)
+    return names
 
 
 def _measure_misfit(topology: Topology, lengths: Sequence[float]) -> float:
@@ -565,6 +592,7 @@ def _measure_misfit(topology: Topology, lengths: Sequence[float]) -> float:
     theirs = [topology.length(bar) for bar in BAR_NAMES]
     if min(theirs) <= 0.0:
         return math.inf
-    return sum(
-        abs(math.log(one / ours)) for one, ours in zip(theirs, lengths, strict=True)
-    )
+    misfit = 0.0
+    for their_length, length in zip(theirs, lengths, strict=True):
+        misfit += abs(math.log(their_length / length))
+    return misfit

@@ -45,6 +45,8 @@ from fourbar_validation.engines.mujoco.robots.pose import (
     pose_robot,
 )
 
+_PIN_BETWEEN = {frozenset(bars): pin for pin, bars in PINS.items()}
+"""Pins by the two bars that each joins."""
 _PARALLEL = math.radians(0.5)
 """Largest angle between the axes of a planar linkage, rad. Beyond it forces across the
 plane reach a hundredth.
@@ -112,10 +114,8 @@ def _find_closure(closures: Sequence[RobotClosure], name: str) -> RobotClosure:
     for closure in closures:
         if closure.name == name:
             return closure
-    names = ", ".join(closure.name for closure in closures)
-    raise InputError(
-        "--loop", name, f"no such closure; the file has: {names or 'none'}"
-    )
+    names = ", ".join(closure.name for closure in closures) or "none"
+    raise InputError("--loop", name, f"no such closure; the file has: {names}")
 
 
 def choose_loop(closures: Sequence[RobotClosure], name: str) -> RobotLoop:
@@ -162,25 +162,32 @@ class _ClosureEnd:
     """Place in world axes in the pose, (3,), m."""
 
 
+def _measure_gap(ends: tuple[_ClosureEnd, _ClosureEnd]) -> float:
+    """Measure the distance of the two ends, m."""
+    first, second = ends
+    return float(np.linalg.norm(first.place - second.place))
+
+
 def _find_ends(posed: PosedRobot, number: int) -> tuple[_ClosureEnd, _ClosureEnd]:
     """Locate both ends of a connect or a weld."""
     model = posed.model
     data = posed.data
     bodies = find_tied_bodies(model, number)
     if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
-        sites = (int(model.eq_obj1id[number]), int(model.eq_obj2id[number]))
-        first, second = (
-            _ClosureEnd(body, data.site_xpos[site].copy())
-            for body, site in zip(bodies, sites, strict=True)
+        first_site = int(model.eq_obj1id[number])
+        second_site = int(model.eq_obj2id[number])
+        return (
+            _ClosureEnd(bodies[0], data.site_xpos[first_site].copy()),
+            _ClosureEnd(bodies[1], data.site_xpos[second_site].copy()),
         )
-        return first, second
     anchors = [model.eq_data[number, 0:3], model.eq_data[number, 3:6]]
     if model.eq_type[number] == mujoco.mjtEq.mjEQ_WELD:
         anchors.reverse()  # it keeps the second body's anchor first
-    first, second = (
-        _ClosureEnd(body, data.xpos[body] + data.xmat[body].reshape(3, 3) @ anchor)
-        for body, anchor in zip(bodies, anchors, strict=True)
-    )
+    ends = []
+    for body, anchor in zip(bodies, anchors, strict=True):
+        rotation = data.xmat[body].reshape(3, 3)
+        ends.append(_ClosureEnd(body, data.xpos[body] + rotation @ anchor))
+    first, second = ends
     return first, second
 
 
@@ -192,39 +199,44 @@ class _Chain:
 
     def __init__(self, finder: "_Finder", first: int, second: int) -> None:
         self.model = finder.model
-        ups = [climb(self.model, body) for body in (first, second)]
         common = find_common(self.model, first, second)
         self.ground = finder.root[common]
         self.ground_name = name_body(self.model, common)
         self.joints: list[int] = []
         self.bars: list[int | None] = [finder.root[first]]
         """One more than joints; None: the joint hangs on another of the same body."""
-        sides = []
-        for up in ups:
-            side = []
-            for body in up[: up.index(common)]:
-                joints = list_joints(self.model, body)
-                moving = [joint for joint in joints if joint not in finder.held]
-                for place, joint in reversed(list(enumerate(moving))):
-                    if place:
-                        bearer = None
-                    else:
-                        bearer = finder.root[find_parent(self.model, body)]
-                    side.append((joint, finder.root[body], bearer))
-            sides.append(side)
-        for joint, _, bearer in sides[0]:
+        for joint, bearer in self._list_side(finder, first, common):
             self.joints.append(joint)
             self.bars.append(bearer)
-        self.up = len(sides[0])
-        downward = list(reversed(sides[1]))
-        for place, (joint, _, _) in enumerate(downward):
-            self.joints.append(joint)
-            if place + 1 < len(downward):
-                deeper = downward[place + 1][2]
-            else:
-                deeper = None
-            last = place + 1 == len(downward)
-            self.bars.append(finder.root[second] if last else deeper)
+        self.up = len(self.joints)
+        downward = list(reversed(self._list_side(finder, second, common)))
+        carried = [bearer for _, bearer in downward[1:]]
+        if downward:
+            carried.append(finder.root[second])
+        self.joints += [joint for joint, _ in downward]
+        self.bars += carried
+
+    def _list_side(
+        self,
+        finder: "_Finder",
+        end: int,
+        common: int,
+    ) -> list[tuple[int, int | None]]:
+        """List the moving joints from an end up to the common ancestor.
+
+        Each has the bar that bears it, or None if that is another joint.
+        """
+        up = climb(self.model, end)
+        side: list[tuple[int, int | None]] = []
+        for body in up[: up.index(common)]:
+            joints = list_joints(self.model, body)
+            moving = [joint for joint in joints if joint not in finder.held]
+            for joint in reversed(moving[1:]):
+                side.append((joint, None))
+            if moving:
+                parent = find_parent(self.model, body)
+                side.append((moving[0], finder.root[parent]))
+        return side
 
     @property
     def kinds(self) -> list[int]:
@@ -260,18 +272,15 @@ class _Finder:
         if kind not in ("connect", "weld"):
             text = f"a {kind} equality is no pin"
             return RobotClosure(name, kind, None, text, solref=solref, solimp=solimp)
-        gap, left = (
-            float(np.linalg.norm(first.place - second.place))
-            for first, second in (
-                _find_ends(self.stated, number),
-                _find_ends(self.posed, number),
-            )
-        )
-        first, second = _find_ends(self.posed, number)
-        chain = _Chain(self, first.body, second.body)
+        ends = _find_ends(self.posed, number)
+        gap: float | None = None
+        left: float | None = None
+        if self._is_pin(number):
+            gap = _measure_gap(_find_ends(self.stated, number))
+            left = _measure_gap(ends)
+        chain = _Chain(self, ends[0].body, ends[1].body)
         hinges = tuple(name_joint(model, j) for j in chain.joints)
         loop, reason = self._recognise(number, name, chain)
-        is_pin = self._is_pin(number)
         return RobotClosure(
             name,
             kind,
@@ -280,8 +289,8 @@ class _Finder:
             chain.ground_name,
             hinges,
             self._measure_axes(chain)[0],
-            gap if is_pin else None,
-            left if is_pin else None,
+            gap,
+            left,
             solref,
             solimp,
         )
@@ -289,10 +298,10 @@ class _Finder:
     def _name(self, number: int) -> str:
         """Name an equality so that no other has the same name."""
         name = describe_equality(self.model, number)
-        names = [
-            describe_equality(self.model, other) for other in range(self.model.neq)
-        ]
-        same = [other for other, text in enumerate(names) if text == name]
+        same = []
+        for other in range(self.model.neq):
+            if describe_equality(self.model, other) == name:
+                same.append(other)
         if len(same) == 1:
             return name
         return f"{name}-{same.index(number) + 1}"
@@ -308,13 +317,14 @@ class _Finder:
         model = self.model
         first = int(model.eq_obj1id[number])
         second = int(model.eq_obj2id[number])
-        coefficients = " ".join(f"{c:.6g}" for c in model.eq_data[number, :5])
+        coefficients = [f"{c:.6g}" for c in model.eq_data[number, :5]]
         follower = name_joint(model, first)
         if second < 0:
-            return f"{follower} is kept at {coefficients.split()[0]} of its rest"
+            return f"{follower} is kept at {coefficients[0]} of its rest"
         leader = name_joint(model, second)
+        polynomial = " ".join(coefficients)
         return (
-            f"{follower} follows {leader}, polycoef {coefficients}: no loop is closed "
+            f"{follower} follows {leader}, polycoef {polynomial}: no loop is closed "
             f"(check-mjcf SCENE FILE --mimic {follower} holds it against one)"
         )
 
@@ -355,19 +365,22 @@ class _Finder:
 
     def _measure_axes(self, chain: _Chain) -> tuple[float | None, str]:
         """Return the largest angle between two hinges' axes, rad, and which two."""
-        hinges = [
-            joint
-            for joint, kind in zip(chain.joints, chain.kinds, strict=True)
-            if kind == HINGE_JOINT
-        ]
-        largest: tuple[float, str] | None = None
+        hinges = []
+        for joint, kind in zip(chain.joints, chain.kinds, strict=True):
+            if kind == HINGE_JOINT:
+                hinges.append(joint)
+        largest: float | None = None
+        names = ""
         for one, other in combinations(hinges, 2):
             across = np.cross(self.data.xaxis[one], self.data.xaxis[other])
-            angle = math.asin(min(1.0, float(np.linalg.norm(across))))
-            if largest is None or angle > largest[0]:
-                names = (name_joint(self.model, j) for j in (one, other))
-                largest = (angle, " and ".join(names))
-        return (None, "") if largest is None else largest
+            sine = float(np.linalg.norm(across))
+            angle = math.asin(min(1.0, sine))
+            if largest is None or angle > largest:
+                first = name_joint(self.model, one)
+                second = name_joint(self.model, other)
+                largest = angle
+                names = f"{first} and {second}"
+        return largest, names
 
     def _find_skew_axes(self, chain: _Chain) -> str:
         angle, names = self._measure_axes(chain)
@@ -391,55 +404,52 @@ class _Finder:
         It says too what would make it a four-bar.
         """
         freedoms = hinges - 3
-        names = [name_joint(self.model, j) for j in chain.joints]
         count = HINGES_IN_WORDS.get(hinges, f"{hinges} hinges")
         if freedoms <= 0:
-            if is_pin:
-                closer = ""
-            else:
-                closer = "a weld that leaves no freedom: "
+            closer = "" if is_pin else "a weld that leaves no freedom: "
             return f"{closer}{count} in a plane cannot move"
         motors = self._list_motors(chain.joints)
-        driven = {joint for joint, _ in motors}
-        several = (
-            len(driven) > 1
-        )  # motors hold: one of them is held while another moves
-        candidates = [
-            name
-            for joint, name in zip(chain.joints, names, strict=True)
-            if (joint in driven) == several
-        ] or names
-        # a spring holds its joint best
-        springs = {
-            name_joint(self.model, joint)
-            for joint in chain.joints
-            if self.model.jnt_stiffness[joint]
-        }
-        candidates.sort(key=lambda name: name not in springs)
+        by = ""
+        if len(motors) > 1:
+            motor_names = ", ".join(self._name_motor(*motor) for motor in motors)
+            by = f", driven by {len(motors)} motors ({motor_names})"
+        candidates = self._list_holdable(chain, motors)
         shared = self._list_shared(chain, number)
         also = f"; {shared}" if shared else ""
-        if len(motors) > 1:
-            by = (
-                f", driven by {len(motors)} motors "
-                f"({', '.join(self._name_motor(*motor) for motor in motors)})"
-            )
-        else:
-            by = ""
         if freedoms == 2:
             which = f"--hold {candidates[0]}"
-            others = candidates[1:]
-            which += f" (or {', '.join(others)})" if others else ""
+            others = ", ".join(candidates[1:])
+            which += f" (or {others})" if others else ""
             return f"{count} and two freedoms{by}; {which} makes it a four-bar{also}"
         return (
             f"{count} and {freedoms} freedoms{by}; {freedoms - 1} of "
             f"{', '.join(candidates)} held (--hold) make it a four-bar{also}"
         )
 
+    def _list_holdable(
+        self,
+        chain: _Chain,
+        motors: list[tuple[int, int]],
+    ) -> list[str]:
+        """List the joints of a chain that may be held, the likeliest first.
+
+        Those are joints without a motor. Several motors hold: one of them is held while
+        another moves. A spring holds its joint best.
+        """
+        driven = {joint for joint, _ in motors}
+        several = len(driven) > 1
+        joints = [joint for joint in chain.joints if (joint in driven) == several]
+
+        def has_no_spring(joint: int) -> bool:
+            return not self.model.jnt_stiffness[joint]
+
+        holdable = sorted(joints or chain.joints, key=has_no_spring)
+        return [name_joint(self.model, joint) for joint in holdable]
+
     def _name_motor(self, joint: int, actuator: int) -> str:
         """Name an actuator: as the file does, or by the joint that it acts on."""
-        return self.model.actuator(actuator).name or (
-            f"on {name_joint(self.model, joint)}"
-        )
+        name = self.model.actuator(actuator).name
+        return name or f"on {name_joint(self.model, joint)}"
 
     def _list_shared(self, chain: _Chain, number: int) -> str:
         """Name other closures that tie bodies of the chain.
@@ -449,12 +459,8 @@ class _Finder:
         bars = {bar for bar in chain.bars if bar is not None} - {chain.ground}
         names = []
         for other in range(self.model.neq):
-            if other == number or EQUALITY_KINDS.get(
-                int(self.model.eq_type[other])
-            ) not in (
-                "connect",
-                "weld",
-            ):
+            kind = EQUALITY_KINDS.get(int(self.model.eq_type[other]))
+            if other == number or kind not in ("connect", "weld"):
                 continue
             ends = _find_ends(self.posed, other)
             carried = {self._find_bar(end.body, bars) for end in ends}
@@ -495,13 +501,14 @@ class _Finder:
         return motors
 
     def _list_joints_of_tendon(self, tendon: int) -> list[int]:
-        start = int(self.model.tendon_adr[tendon])
-        wraps = range(start, start + int(self.model.tendon_num[tendon]))
-        return [
-            int(self.model.wrap_objid[wrap])
-            for wrap in wraps
-            if self.model.wrap_type[wrap] == mujoco.mjtWrap.mjWRAP_JOINT
-        ]
+        model = self.model
+        start = int(model.tendon_adr[tendon])
+        stop = start + int(model.tendon_num[tendon])
+        joints = []
+        for wrap in range(start, stop):
+            if model.wrap_type[wrap] == mujoco.mjtWrap.mjWRAP_JOINT:
+                joints.append(int(model.wrap_objid[wrap]))
+        return joints
 
     def _make_loop(
         self,
@@ -595,28 +602,25 @@ class _Finder:
                 return stated, []
         driven = [joint for joint, _ in motors]
         names = ", ".join(dict.fromkeys(name_joint(model, joint) for joint in driven))
-        chosen = next((joint for joint in driven if joint in at_ground), None)
-        if chosen is not None:
-            if len(set(driven)) == 1:
-                return chosen, []
-            text = (
-                f"motors act on {names}: {name_joint(model, chosen)} is taken as driven"
-            )
-            return chosen, [f"{text} (--drive states another)"]
+        for joint in driven:
+            if joint in at_ground:
+                if len(set(driven)) == 1:
+                    return joint, []
+                taken = f"{name_joint(model, joint)} is taken as driven"
+                text = f"motors act on {names}: {taken} (--drive states another)"
+                return joint, [text]
         pushed, by = self._find_pushed(at_ground, number)
         chosen = min(at_ground) if pushed is None else pushed  # the first of the file
+        if driven:
+            reason = f"the motor on {names} acts between two moving bars"
+        elif by:
+            reason = f"{by} acts on it"
+        else:
+            reason = "no motor acts on it"
         taken = (
             f"{name_joint(model, chosen)} is taken as driven (--drive states another)"
         )
-        if driven:
-            return chosen, [
-                f"the motor on {names} acts between two moving bars: {taken}"
-            ]
-        if by:
-            acts = f"{by} acts on it"
-        else:
-            acts = "no motor acts on it"
-        return chosen, [f"{acts}: {taken}"]
+        return chosen, [f"{reason}: {taken}"]
 
     def _find_pushed(self, at_ground: list[int], number: int) -> tuple[int | None, str]:
         """Return the one hinge of the ground whose bar another closure moves.
@@ -624,15 +628,17 @@ class _Finder:
         That closure's name is returned too.
         """
         pushed: dict[int, str] = {}
-        bars = {self.root[int(self.model.jnt_bodyid[j])]: j for j in at_ground}
+        hinge_of = {self.root[int(self.model.jnt_bodyid[j])]: j for j in at_ground}
         for other in range(self.model.neq):
             kind = EQUALITY_KINDS.get(int(self.model.eq_type[other]))
             if other == number or kind not in ("connect", "weld"):
                 continue
-            ends = (end.body for end in _find_ends(self.posed, other))
-            tied = {self.root[body] for body in ends} & bars.keys()
-            if self.model.eq_active0[other]:
-                pushed |= {bars[root]: self._name(other) for root in tied}
+            if not self.model.eq_active0[other]:
+                continue
+            for end in _find_ends(self.posed, other):
+                root = self.root[end.body]
+                if root in hinge_of:
+                    pushed[hinge_of[root]] = self._name(other)
         if len(pushed) != 1:
             return None, ""
         ((joint, name),) = pushed.items()
@@ -676,9 +682,7 @@ class _Finder:
             if not direct:
                 others.append(other)
                 continue
-            pin = next(
-                (p for p, pair in PINS.items() if set(pair) == set(numbers)), None
-            )
+            pin = _PIN_BETWEEN.get(frozenset(numbers))
             if pin is not None and self._is_pin(other) and layout.is_at(pin, ends):
                 if pin == cut:
                     closures.append(other)
@@ -740,7 +744,8 @@ class _Layout:
 
     def _to_ground(self, vector: Array) -> Array:
         ground = self.bodies[1][0]
-        return np.asarray(self.data.xmat[ground].reshape(3, 3).T @ vector)
+        rotation = self.data.xmat[ground].reshape(3, 3)
+        return np.asarray(rotation.T @ vector)
 
     def measure(self, cut: str | None) -> str:
         """Measure pins, lengths and angles.
@@ -794,16 +799,17 @@ class _Layout:
     def _line(self, bar: int) -> tuple[float, float]:
         first, second = ENDS[bar]
         vector = self.places[bar, second] - self.places[bar, first]
-        along = self.data.xmat[self.bodies[1][0]].reshape(3, 3) @ self.along
+        ground = self.bodies[1][0]
+        along = self.data.xmat[ground].reshape(3, 3) @ self.along
         return float(vector @ along), float(vector @ self.across)
 
     def is_at(self, pin: str, ends: tuple[_ClosureEnd, _ClosureEnd]) -> bool:
         """Tell whether both ends of another equality lie on the axis of a pin."""
         bar = PINS[pin][0]
+        near = max(COINCIDENT_PINS * max(self.lengths), LARGEST_RESIDUAL)
         for end in ends:
             apart = end.place - self.places[bar, pin]
             in_plane = apart - (apart @ self.normal) * self.normal
-            near = max(COINCIDENT_PINS * max(self.lengths), LARGEST_RESIDUAL)
             if float(np.linalg.norm(in_plane)) > near:
                 return False
         return True

@@ -99,7 +99,8 @@ class LoopInside:
     """
 
     def __init__(self, model: mujoco.MjModel, loop: RobotLoop) -> None:
-        self.loop, self.model = loop, copy(model)
+        self.loop = loop
+        self.model = copy(model)
         self.flags = int(model.opt.disableflags)
         for name in ("CONTACT", "LIMIT"):
             flag = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
@@ -123,9 +124,8 @@ class LoopInside:
         self.closure = _copy_for_closures(self.model, loop.closures)
         self.closing = mujoco.MjData(self.closure)
         self._last = loop.qpos.copy()
-        rubs = not self.model.opt.disableflags & int(
-            mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS
-        )
+        without_friction = int(mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS)
+        rubs = not self.model.opt.disableflags & without_friction
         self._friction = self.model.dof_frictionloss * rubs
         bodies = [int(model.jnt_bodyid[joint]) for joint in loop.hinges.values()]
         self.borne = {body: self._find_borne(body) for body in bodies}
@@ -165,22 +165,21 @@ class LoopInside:
 
         The residual is that of the closure. Tell whether it is closed.
         """
-        size = math.inf
+        least = math.inf
         for _ in range(_CLOSING_STEPS):
             residual, jacobian = self._evaluate_closure(qpos)
-            if (
-                np.abs(residual).max() <= RESIDUAL_OF_A_CLOSED_STATE
-                or np.abs(residual).max() >= size
-            ):
-                break
             size = float(np.abs(residual).max())
-            step = np.linalg.lstsq(jacobian[:, self.passive], -residual, rcond=1e-9)[0]
-            for dof, part in zip(self.passive, step, strict=True):
+            closed = size <= RESIDUAL_OF_A_CLOSED_STATE
+            if closed or size >= least:
+                break
+            least = size
+            step = _solve_least_squares(jacobian[:, self.passive], -residual)
+            for dof, turn in zip(self.passive, step, strict=True):
                 joint = int(self.model.dof_jntid[dof])
-                qpos[self.model.jnt_qposadr[joint]] += part
-        return bool(
-            np.abs(residual).max() <= max(RESIDUAL_OF_AN_OPEN_LOOP, self._skew())
-        )
+                address = self.model.jnt_qposadr[joint]
+                qpos[address] += turn
+        allowed = max(RESIDUAL_OF_AN_OPEN_LOOP, self._skew())
+        return bool(np.abs(residual).max() <= allowed)
 
     def measure_transmission(self, qpos: Array) -> float:
         """Return how well the hinges that are not driven close the gap in a pose, m.
@@ -200,8 +199,9 @@ class LoopInside:
         data = self.closing
         data.qpos[:] = qpos
         mujoco.mj_fwdPosition(self.closure, data)
+        residual = data.efc_pos[: data.nefc]
         jacobian = data.efc_J.reshape(-1, self.closure.nv)[: data.nefc]
-        return data.efc_pos[: data.nefc].copy(), jacobian.copy()
+        return residual.copy(), jacobian.copy()
 
     def state(self, theta_2: float, omega_2: float) -> _RobotState | None:
         """Return the closed state at an angle and a speed of bar 2.
@@ -212,14 +212,11 @@ class LoopInside:
         if qpos is None:
             return None
         _, jacobian = self._evaluate_closure(qpos)
+        speed = self.sense * omega_2
+        due = -jacobian[:, self.drive] * speed
         qvel = np.zeros(self.model.nv)
-        qvel[self.drive] = self.sense * omega_2
-        due = -jacobian[:, self.drive] * qvel[self.drive]
-        qvel[self.passive] = np.linalg.lstsq(
-            jacobian[:, self.passive],
-            due,
-            rcond=1e-9,
-        )[0]
+        qvel[self.drive] = speed
+        qvel[self.passive] = _solve_least_squares(jacobian[:, self.passive], due)
         return _RobotState(qpos, qvel, theta_2)
 
     def ask(self, qpos: Array, qvel: Array, alpha_2: float) -> InsideRow:
@@ -242,10 +239,12 @@ class LoopInside:
             raise LimitError(f"the loop does not close at theta_2 = {theta_2:.6g} rad")
         rigid, accelerations = self._solve_rigid(closed, alpha_2)
         mujoco.mj_resetData(model, data)
-        data.qpos[:], data.qvel[:] = qpos, qvel
+        data.qpos[:] = qpos
+        data.qvel[:] = qvel
         held = self._balance(accelerations)[self.held]
         mujoco.mj_resetData(model, data)
-        data.qpos[:], data.qvel[:] = qpos, qvel
+        data.qpos[:] = qpos
+        data.qvel[:] = qvel
         data.qfrc_applied[self.held] = held
 
         def acceleration(couple: float) -> float:
@@ -257,11 +256,16 @@ class LoopInside:
         if couple is None:
             raise LimitError(f"a couple on {self.name} does not move it in this robot")
         mujoco.mj_rnePostConstraint(model, data)
-        soft = PinsAndTorque(couple, self._read_forces(data))
-        gap = self._measure_gap(qpos)
-        joint = float(qpos[self.address])
-        sticking = self._list_sticking()
-        return InsideRow(theta_2, omega_2, alpha_2, joint, soft, rigid, gap, sticking)
+        return InsideRow(
+            theta_2=theta_2,
+            omega_2=omega_2,
+            alpha_2=alpha_2,
+            joint=float(qpos[self.address]),
+            soft=PinsAndTorque(couple, self._read_forces(data)),
+            rigid=rigid,
+            gap=self._measure_gap(qpos),
+            sticking=self._list_sticking(),
+        )
 
     def _list_sticking(self) -> tuple[str, ...]:
         """List the hinges of the loop that turn and stick.
@@ -270,15 +274,17 @@ class LoopInside:
         """
         model = self.model
         data = self.data
-        rubbing = (
-            data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
-        )
+        kinds = data.efc_type[: data.nefc]
+        rubbing = kinds == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
+        of_the_loop = (self.drive, *self.passive)
         names = []
         for row in np.flatnonzero(rubbing):
             dof = int(data.efc_id[row])
-            reached = abs(data.efc_force[row]) >= _REACHED * model.dof_frictionloss[dof]
-            if dof in (self.drive, *self.passive) and not reached and data.qvel[dof]:
-                names.append(name_joint(model, int(model.dof_jntid[dof])))
+            in_full = _REACHED * model.dof_frictionloss[dof]
+            reached = abs(data.efc_force[row]) >= in_full
+            if dof in of_the_loop and not reached and data.qvel[dof]:
+                joint = int(model.dof_jntid[dof])
+                names.append(name_joint(model, joint))
         return tuple(names)
 
     def _measure_gap(self, qpos: Array) -> float:
@@ -302,27 +308,25 @@ class LoopInside:
         """
         model = self.closure
         data = self.closing
-        data.qpos[:], data.qvel[:] = state.qpos, state.qvel
+        data.qpos[:] = state.qpos
+        data.qvel[:] = state.qvel
         mujoco.mj_forward(model, data)
         rows = data.efc_J.reshape(-1, model.nv)[: data.nefc]
-        # MuJoCo's reference is -(dJ/dt) v - B (J v) - K I r
-        damper = data.efc_KBIP[: data.nefc, 1]
-        spring = data.efc_KBIP[: data.nefc, 0]
-        spring = spring * data.efc_KBIP[: data.nefc, 2]
-        drift = data.efc_aref[: data.nefc] + damper * (rows @ state.qvel)
-        drift = drift + spring * data.efc_pos[: data.nefc]
+        free = rows[:, self.passive]
+        driven = rows[:, self.drive]
+        drift = _measure_drift(data, rows @ state.qvel)
         accelerations = np.zeros(model.nv)
         accelerations[self.drive] = self.sense * alpha_2
-        due = drift - rows[:, self.drive] * accelerations[self.drive]
-        free = rows[:, self.passive]
-        accelerations[self.passive] = np.linalg.lstsq(free, due, rcond=1e-9)[0]
+        due = drift - driven * accelerations[self.drive]
+        accelerations[self.passive] = _solve_least_squares(free, due)
         needed = np.zeros(model.nv)
         mujoco.mj_mulM(model, data, needed, accelerations)
         needed += data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator
         needed += self._friction * np.sign(state.qvel)
-        multipliers = np.linalg.lstsq(free.T, needed[self.passive], rcond=1e-9)[0]
-        couple = needed[self.drive] - rows[:, self.drive] @ multipliers
-        data.qacc[:], data.efc_force[: data.nefc] = accelerations, multipliers
+        multipliers = _solve_least_squares(free.T, needed[self.passive])
+        couple = needed[self.drive] - driven @ multipliers
+        data.qacc[:] = accelerations
+        data.efc_force[: data.nefc] = multipliers
         mujoco.mj_rnePostConstraint(model, data)
         forces = self._read_forces(data)
         return PinsAndTorque(float(self.sense * couple), forces), accelerations
@@ -334,6 +338,7 @@ class LoopInside:
         """
         model = self.model
         data = self.data
+        passive = self.passive
         accelerations = start.copy()
         mujoco.mj_forward(model, data)
         loads = data.qfrc_actuator.copy()
@@ -343,47 +348,50 @@ class LoopInside:
             mujoco.mj_inverse(model, data)
             return np.asarray(data.qfrc_inverse - loads)
 
-        passive = self.passive
-        left = forces(accelerations)
+        residual = forces(accelerations)
         for _ in range(_SOLVE_STEPS):
-            inertial = np.abs(data.qfrc_bias[passive]) + np.abs(
-                data.qfrc_constraint[passive]
-            )
-            if np.all(np.abs(left[passive]) <= _BALANCED * (inertial.max() or 1.0)):
+            bias = np.abs(data.qfrc_bias[passive])
+            inertial = bias + np.abs(data.qfrc_constraint[passive])
+            allowed = _BALANCED * (inertial.max() or 1.0)
+            if np.all(np.abs(residual[passive]) <= allowed):
                 break
             slopes = np.empty((len(passive), len(passive)))
             size = max(float(np.abs(accelerations[passive]).max()), 1.0)
             for column, dof in enumerate(passive):
                 moved = accelerations.copy()
                 moved[dof] += size
-                slopes[:, column] = (forces(moved) - left)[passive] / size
-            step = np.linalg.lstsq(slopes, -left[passive], rcond=None)[0]
+                change = (forces(moved) - residual)[passive]
+                slopes[:, column] = change / size
+            step = np.linalg.lstsq(slopes, -residual[passive], rcond=None)[0]
             part = 1.0
-            before = np.abs(left[passive]).max()
+            before = np.abs(residual[passive]).max()
             while True:
                 moved = accelerations.copy()
                 moved[passive] += part * step
                 trial = forces(moved)
-                if np.abs(trial[passive]).max() < before or part < 1e-6:
+                after = np.abs(trial[passive]).max()
+                if after < before or part < 1e-6:
                     break
                 part *= 0.5
-            if np.abs(trial[passive]).max() >= before:
+            if after >= before:
                 break
             accelerations = moved
-            left = trial
+            residual = trial
         forces(accelerations)
-        return np.asarray(left)
+        return np.asarray(residual)
 
     def _read_forces(self, data: mujoco.MjData) -> dict[str, Array]:
         """Read the pin forces of a state that was evaluated, (2,) each, N.
 
         They are in the axes of the plane.
         """
-        ground = data.xmat[self.loop.bodies[1][0]].reshape(3, 3)
+        ground_body = self.loop.bodies[1][0]
+        ground = data.xmat[ground_body].reshape(3, 3)
+        across = np.cross(self.loop.axis, self.loop.along)
         axes = np.array(
             [
                 ground @ self.loop.along,
-                ground @ np.cross(self.loop.axis, self.loop.along),
+                ground @ across,
             ]
         )
         forces = {}
@@ -407,12 +415,14 @@ class LoopInside:
         return np.asarray(force - self.lift[body])
 
     def _find_borne(self, body: int) -> list[int]:
-        sites = self.model.actuator_trnid[:, 0]
-        return [
-            load
-            for load in self.loads
-            if body in climb(self.model, int(self.model.site_bodyid[sites[load]]))
-        ]
+        model = self.model
+        borne = []
+        for load in self.loads:
+            site = model.actuator_trnid[load, 0]
+            acts_on = int(model.site_bodyid[site])
+            if body in climb(model, acts_on):
+                borne.append(load)
+        return borne
 
     def _find_lift(self, body: int) -> Array:
         model = self.model
@@ -427,15 +437,17 @@ class LoopInside:
 
         Return the sum and the bar that it acts on.
         """
+        kinds = data.efc_type[: data.nefc]
+        of_equalities = kinds == mujoco.mjtConstraint.mjCNSTR_EQUALITY
         total = np.zeros(3)
         bars = []
         for equality in self.loop.closures:
-            rows = np.flatnonzero(
-                (data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY)
-                & (data.efc_id[: data.nefc] == equality)
-            )[:3]
-            bars.append(self._find_bar(find_tied_bodies(self.model, equality)[0], pin))
-            sign = 1.0 if bars[-1] == bars[0] else -1.0
+            of_this = data.efc_id[: data.nefc] == equality
+            rows = np.flatnonzero(of_equalities & of_this)[:3]
+            first_body = find_tied_bodies(self.model, equality)[0]
+            bar = self._find_bar(first_body, pin)
+            bars.append(bar)
+            sign = 1.0 if bar == bars[0] else -1.0
             total += sign * data.efc_force[rows]
         return total, bars[0]
 
@@ -477,7 +489,8 @@ class LoopInside:
         """
         answer = InsideAnswer()
         angles = sorted(theta_2, reverse=omega_2 < 0.0)
-        model, data = copy(self.model), mujoco.MjData(self.model)
+        model = copy(self.model)
+        data = mujoco.MjData(self.model)
         timestep = float(model.opt.timestep)
         armature = heavy * float(model.dof_M0.max())
         moved = [self.drive, *self.held]
@@ -485,7 +498,8 @@ class LoopInside:
         state = self.state(angles[0], omega_2)
         if state is None:
             raise LimitError("the loop does not close where the motion starts")
-        data.qpos[:], data.qvel[:] = state.qpos, state.qvel
+        data.qpos[:] = state.qpos
+        data.qvel[:] = state.qvel
 
         def drive(row: InsideRow) -> None:
             couple = armature * alpha_2 + row.soft.torque
@@ -496,16 +510,18 @@ class LoopInside:
         instants = [
             _find_instant(angles[0], angle, omega_2, alpha_2) for angle in angles
         ]
-        if not 1.0 <= instants[-1] / timestep <= MOST_TIMESTEPS:
+        duration = instants[-1]
+        timesteps = duration / timestep
+        if not 1.0 <= timesteps <= MOST_TIMESTEPS:
             raise LimitError(
-                f"its timestep of {timestep:g} s makes {instants[-1] / timestep:.3g}"
+                f"its timestep of {timestep:g} s makes {timesteps:.3g}"
                 f" steps of the motion; must be 1 to {MOST_TIMESTEPS}: --speed states"
                 " another speed"
             )
         spent = 0.0
         # the loop starts exactly closed, and takes some time constants to yield as far
         # as it does
-        settled = settling_time(self.find_constant(), instants[-1])
+        settled = settling_time(self.find_constant(), duration)
         for instant in instants[1:]:
             if instant < settled:
                 continue
@@ -513,12 +529,13 @@ class LoopInside:
             stepper.to(instant)
             spent += time.process_time() - began
             mujoco.mj_forward(model, data)
-            if stepper.lost() or any(data.warning[kind].number for kind in WARNINGS):
+            if stepper.lost() or _has_warned(data):
                 answer.lost = "MuJoCo lost the motion: a value not finite, or too large"
                 break
-            made = float(self.sense * data.qacc[self.drive])
-            answer.rows.append(self.ask(data.qpos, data.qvel, made))
-            drive(answer.rows[-1])
+            acceleration = float(self.sense * data.qacc[self.drive])
+            row = self.ask(data.qpos, data.qvel, acceleration)
+            answer.rows.append(row)
+            drive(row)
         answer.seconds_per_step = spent / max(stepper.done, 1)
         return answer
 
@@ -538,11 +555,11 @@ class LoopInside:
         each angle; of a motion that MuJoCo loses there is none.
         """
         states = []
-        model, data = copy(self.model), mujoco.MjData(self.model)
+        model = copy(self.model)
+        data = mujoco.MjData(self.model)
         model.dof_armature[self.held] += HEAVY * float(model.dof_M0.max())
-        model.opt.disableflags &= ~(
-            LIMITS_OFF & ~self.flags
-        )  # the motor may meet the stops of the file
+        # the motor may meet the stops of the file
+        model.opt.disableflags &= ~(LIMITS_OFF & ~self.flags)
         steps = max(round(seconds / model.opt.timestep), 1)
         for angle in theta_2:
             state = self.state(angle, 0.0)
@@ -556,8 +573,9 @@ class LoopInside:
                 mujoco.mj_step(model, data)
                 mujoco.mj_forward(model, data)
                 mujoco.mj_rnePostConstraint(model, data)
-                if any(data.warning[kind].number for kind in WARNINGS):
-                    worst = TornState(float(state.qpos[self.address]), math.inf, {})
+                if _has_warned(data):
+                    start = float(state.qpos[self.address])
+                    worst = TornState(start, math.inf, {})
                     break
                 gap = self._measure_gap(data.qpos)
                 if worst is None or gap > worst.gap:
@@ -566,6 +584,28 @@ class LoopInside:
             assert worst is not None
             states.append(worst)
         return states
+
+
+def _solve_least_squares(matrix: Array, right: Array) -> Array:
+    """Solve for the least step; directions that move nothing count as none."""
+    return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-9)[0])
+
+
+def _measure_drift(data: mujoco.MjData, speeds: Array) -> Array:
+    """Return -(dJ/dt) v of the constraints, from the reference that MuJoCo gives them.
+
+    The reference is -(dJ/dt) v - B (J v) - K I r. `speeds`: J v.
+    """
+    parameters = data.efc_KBIP[: data.nefc]
+    damper = parameters[:, 1]
+    spring = parameters[:, 0] * parameters[:, 2]
+    drift = data.efc_aref[: data.nefc] + damper * speeds
+    return np.asarray(drift + spring * data.efc_pos[: data.nefc])
+
+
+def _has_warned(data: mujoco.MjData) -> bool:
+    """Tell whether MuJoCo has warned that it loses the motion."""
+    return any(data.warning[kind].number for kind in WARNINGS)
 
 
 def find_time_constant(model: mujoco.MjModel, equality: int) -> float:
@@ -599,11 +639,14 @@ def reflect(model: mujoco.MjModel, loop: RobotLoop) -> Array | None:
     ground, crank = loop.lengths[:2]
     theta_1, theta_2, theta_3, theta_4 = loop.angles
     line = cmath.rect(ground, theta_1) - cmath.rect(crank, theta_2)
-    turned_3, turned_4 = (
-        math.remainder(2.0 * (cmath.phase(line) - theta), math.tau)
-        for theta in (theta_3, theta_4)
-    )
-    turns = {"A": turned_3, "B": turned_4 - turned_3, "O4": turned_4}
+    direction = cmath.phase(line)
+    turned_3 = math.remainder(2.0 * (direction - theta_3), math.tau)
+    turned_4 = math.remainder(2.0 * (direction - theta_4), math.tau)
+    turns = {
+        "A": turned_3,
+        "B": turned_4 - turned_3,
+        "O4": turned_4,
+    }
     qpos = loop.qpos.copy()
     for pin, turn in turns.items():
         if pin in loop.hinges:
@@ -623,7 +666,8 @@ def _find_instant(start: float, angle: float, omega: float, alpha: float) -> flo
     squared = omega**2 + 2.0 * alpha * turned
     if squared <= 0.0:
         raise LimitError(f"alpha_2 brings the input to rest before {angle:.6g} rad")
-    return 2.0 * turned / (omega + math.copysign(math.sqrt(squared), omega))
+    speed = math.copysign(math.sqrt(squared), omega)
+    return 2.0 * turned / (omega + speed)
 
 
 def _copy_for_closures(
@@ -637,7 +681,8 @@ def _copy_for_closures(
     alone = copy(model)
     alone.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     for name in ("CONTACT", "LIMIT", "FRICTIONLOSS", "ISLAND"):
-        alone.opt.disableflags |= int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
+        flag = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
+        alone.opt.disableflags |= flag
     for number in range(alone.neq):
         alone.eq_active0[number] = number in closures
     return alone
