@@ -1,15 +1,18 @@
-# `make validate` runs the main job, `make test` the quick tests, `make test-all` all of them; each sets itself up first.
+# `make validate` runs the main job, `make test` the quick tests, `make test-all` all of
+# them; each sets itself up first.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
-LONG := kills package oldest prereleases machines engines simulators problems benchmark free faults fuzz accuracy suites
+LONG := kills package oldest prereleases machines engines simulators problems
+LONG += benchmark free faults fuzz accuracy suites
 
 .PHONY: validate test test-all check long-test $(LONG:%=long-%) models docs setup clean
 
 
 validate: setup
-	@echo "validate: scenes in MuJoCo and Pinocchio, half a minute; the report is results/report.html"
+	@echo "validate: scenes in MuJoCo and Pinocchio, half a minute;" \
+		"the report is results/report.html"
 	$(BIN)/python -m validation run
 	@echo "validate: what six digits of torque and pin forces cost MuJoCo, some seconds"
 	$(BIN)/python -m validation advise models/crank_rocker.toml --error 1e-6
@@ -31,9 +34,10 @@ check: setup
 	$(BIN)/mypy
 	$(BIN)/python -m tests.support.public_types
 
-# everything that `make test-all` samples, in full; each part ends within one hour on two cores. Minutes of two idle cores: kills
-# at most 16, suites 6, package 3, oldest and prereleases 8 each; from the processor's time of a share: machines 7 for each kernel that the
-# processor has, free 15, fuzz 14, accuracy 12, faults 6; the others below 5
+# everything that `make test-all` samples, in full; each part ends within one hour on
+# two cores. Minutes of two idle cores: kills at most 16, suites 6, package 3, oldest and
+# prereleases 8 each; from the processor's time of a share: machines 7 for each kernel
+# that the processor has, free 15, fuzz 14, accuracy 12, faults 6; the others below 5
 long-test: $(LONG:%=long-%)
 $(LONG:%=long-%): setup
 
@@ -41,11 +45,13 @@ long-kills:
 	KILLS=50 $(BIN)/python -m pytest tests/whole/test_kills.py
 long-package:
 	PACKAGE=all $(BIN)/python -m pytest tests/whole/test_package.py
-# every test with the lowest versions that pyproject.toml declares, and with the newest that are not released yet
+# every test with the lowest versions that pyproject.toml declares, and with the newest
+# that are not released yet
 long-oldest long-prereleases: long-%:
 	$(BIN)/python -m pip install --quiet uv
 	$(BIN)/uv venv --quiet --clear --python $(BIN)/python build/$*
-	$(BIN)/uv pip install --quiet --python build/$* $(VERSIONS_$*) --editable ".[test]" --editable lab
+	$(BIN)/uv pip install --quiet --python build/$* $(VERSIONS_$*) \
+		--editable ".[test]" --editable lab
 	build/$*/bin/python -m pytest -n 2 --dist worksteal
 VERSIONS_oldest := --resolution lowest-direct
 VERSIONS_prereleases := --prerelease allow
@@ -61,7 +67,8 @@ long-benchmark:
 	$(BIN)/python -m fourbar_lab benchmark
 	$(BIN)/python -m fourbar_lab findings
 long-free:
-	FREE_MOTIONS=30 $(BIN)/python -m pytest -n 2 tests/fourbar/evaluation/test_free_motion_reference.py
+	FREE_MOTIONS=30 $(BIN)/python -m pytest -n 2 \
+		tests/fourbar/evaluation/test_free_motion_reference.py
 long-faults:
 	$(BIN)/python -m fourbar_lab faults
 long-fuzz:

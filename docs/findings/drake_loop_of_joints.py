@@ -1,14 +1,17 @@
-"""By default Drake refuses a loop of four revolute joints in SDF; SetEnableLoopTopology(True) takes it.
+"""By default Drake refuses a loop of four revolute joints in SDF;
+SetEnableLoopTopology(True) takes it.
 
 Engine: drake (pydrake)
-Expected: a four-bar written as four links and four revolute joints is simulated, or the error names the option that
-  takes it.
-Found: Finalize() raises a RuntimeError that advises a constraint. With plant.SetEnableLoopTopology(True), marked
-  "internal use only for now", the same text finalizes with one loop constraint and four velocities, and its motion and
-  forces are those of the ball constraint.
+Expected: a four-bar written as four links and four revolute joints is simulated, or the
+  error names the option that takes it.
+Found: Finalize() raises a RuntimeError that advises a constraint. With
+  plant.SetEnableLoopTopology(True), marked "internal use only for now", the same text
+  finalizes with one loop constraint and four velocities, and its motion and forces are
+  those of the ball constraint.
 Since: 1.40.0 or before; SetEnableLoopTopology came with 1.57.0
 Until: still in 1.58.0, by default
-Reported: known and being worked on, RobotLocomotion/drake #9566, #24864, #24917, #24976, #24978
+Reported: known and being worked on, RobotLocomotion/drake #9566, #24864, #24917,
+  #24976, #24978
 """
 
 import sys
@@ -17,7 +20,10 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
 LINK = '<link name="{}"><pose>{} {} 0 0 0 0</pose></link>'
-JOINT = '<joint name="{0}{1}" type="revolute"><parent>{0}</parent><child>{1}</child><axis><xyz>0 0 1</xyz></axis></joint>'
+JOINT = (
+    '<joint name="{0}{1}" type="revolute"><parent>{0}</parent><child>{1}</child>'
+    "<axis><xyz>0 0 1</xyz></axis></joint>"
+)
 links = "".join(LINK.format(*link) for link in (("a", 0, 0), ("b", 0, 1), ("c", 1, 1)))
 joints = "".join(
     JOINT.format(*pair)

@@ -1,11 +1,14 @@
-"""MuJoCo 4.0.0 solves a crank that drives two four-bars wrongly where the constraint Jacobian is sparse.
+"""MuJoCo 4.0.0 solves a crank that drives two four-bars wrongly where the constraint
+Jacobian is sparse.
 
 Engine: mujoco (mujoco)
-Expected: jacobian="sparse" (which "auto" chooses from 60 degrees of freedom on) and "dense" give the same
-  accelerations, after one iteration of Newton's method, as the problem is quadratic.
-Found: After one iteration the accelerations are off by 91 % of the largest where a crank carries two couplers, each
-  closed by a rocker. There is no warning, and they converge slowly. Of 400 random planar trees with loops 16 are off.
-  Loops that share no bar are right: forty four-bars in one file agree to 2e-12.
+Expected: jacobian="sparse" (which "auto" chooses from 60 degrees of freedom on) and
+  "dense" give the same accelerations, after one iteration of Newton's method, as the
+  problem is quadratic.
+Found: After one iteration the accelerations are off by 91 % of the largest where a
+  crank carries two couplers, each closed by a rocker. There is no warning, and they
+  converge slowly. Of 400 random planar trees with loops 16 are off. Loops that share no
+  bar are right: forty four-bars in one file agree to 2e-12.
 Since: 4.0.0 (3.17.0 is right)
 Until: 4.0.1, according to its changelog; not run with it
 Reported: google-deepmind/mujoco #3767

@@ -1,10 +1,13 @@
-"""Pinocchio's lcaba leaves the closing force with the other sign and in local axes, where constraintDynamics does not.
+"""Pinocchio's lcaba leaves the closing force with the other sign and in local axes,
+where constraintDynamics does not.
 
 Engine: pin (pinocchio)
-Expected: for the same RigidConstraintModel (CONTACT_3D, LOCAL_WORLD_ALIGNED) contact_force means the same after
-  constraintDynamics and after lcaba, whose accelerations agree to 1e-6.
-Found: After constraintDynamics, contact_force is the force on joint 1 in world axes; after lcaba it is the force on
-  joint 2 in the axes of joint 1. lcaba's docstring names data.lambdaA[0], which the Python bindings do not have.
+Expected: for the same RigidConstraintModel (CONTACT_3D, LOCAL_WORLD_ALIGNED)
+  contact_force means the same after constraintDynamics and after lcaba, whose
+  accelerations agree to 1e-6.
+Found: After constraintDynamics, contact_force is the force on joint 1 in world axes;
+  after lcaba it is the force on joint 2 in the axes of joint 1. lcaba's docstring names
+  data.lambdaA[0], which the Python bindings do not have.
 Since: 4.0.0 or before (3.9.0 has another interface)
 Until: still in 4.1.0
 Reported: not reported yet
@@ -40,8 +43,14 @@ for name in ("constraintDynamics", "lcaba"):
         pin.StdVec_RigidConstraintModel(),
         pin.StdVec_RigidConstraintData(),
     )
-    models.append(pin.RigidConstraintModel(pin.ContactType.CONTACT_3D, model, *ends,
-                                           pin.ReferenceFrame.LOCAL_WORLD_ALIGNED))  # fmt: skip
+    models.append(
+        pin.RigidConstraintModel(
+            pin.ContactType.CONTACT_3D,
+            model,
+            *ends,
+            pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
+        )
+    )
     datas.append(models[0].createData())
     pin.initConstraintDynamics(model, data, models, datas)
     pin.computeJointMinimalOrdering(model, data, models)

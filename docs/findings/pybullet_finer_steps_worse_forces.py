@@ -1,13 +1,17 @@
-"""PyBullet's default solverResidualThreshold makes forces worse as the timestep falls: 1e-7 is a speed, not a force.
+"""PyBullet's default solverResidualThreshold makes forces worse as the timestep falls:
+1e-7 is a speed, not a force.
 
 Engine: pybullet (pybullet)
 Expected: a motor's torque converges as the timestep falls.
-Found: In a parallelogram that turns at 1 rad/s under its weight, the torque with the default differs from that with
-  solverResidualThreshold=0 over 100 times more at a step of 10 us than at 100 us. The guide says that the solver stops
-  when the speeds of all constraints miss by less than the threshold; over 10 us this is an acceleration of 0.01.
+Found: In a parallelogram that turns at 1 rad/s under its weight, the torque with the
+  default differs from that with solverResidualThreshold=0 over 100 times more at a step
+  of 10 us than at 100 us. The guide says that the solver stops when the speeds of all
+  constraints miss by less than the threshold; over 10 us this is an acceleration of
+  0.01.
 Since: 3.2.7 or before
 Until: still in 3.2.7
-Reported: not reported yet; the threshold became one of speed in bulletphysics/bullet3 #1798
+Reported: not reported yet; the threshold became one of speed in bulletphysics/bullet3
+  #1798
 """
 
 import sys

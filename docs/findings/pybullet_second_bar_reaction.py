@@ -1,12 +1,15 @@
-"""PyBullet's reaction of the second of two bars in series is wrong where both joints turn; its accelerations are right.
+"""PyBullet's reaction of the second of two bars in series is wrong where both joints
+turn; its accelerations are right.
 
 Engine: pybullet (pybullet)
-Expected: enableJointForceTorqueSensor gives the force that Newton's law asks for: mass times acceleration of what hangs
-  on the joint, with the accelerations that the same step found.
-Found: Two bars in series in the plane, without loop, gravity or motor, stand at 0.3 and 0.7 rad and turn at 2 and -3
-  rad/s. The second joint is said to carry 6.14 N where Newton's law asks for 2.62 N. It is exact when either joint
-  stands still: a term with the product of both speeds is in question. gz-physics' bullet-featherstone plugin uses the
-  same code.
+Expected: enableJointForceTorqueSensor gives the force that Newton's law asks for: mass
+  times acceleration of what hangs on the joint, with the accelerations that the same
+  step found.
+Found: Two bars in series in the plane, without loop, gravity or motor, stand at 0.3 and
+  0.7 rad and turn at 2 and -3 rad/s. The second joint is said to carry 6.14 N where
+  Newton's law asks for 2.62 N. It is exact when either joint stands still: a term with
+  the product of both speeds is in question. gz-physics' bullet-featherstone plugin uses
+  the same code.
 Since: 3.2.7 or before
 Until: still in 3.2.7
 Reported: not reported yet; bulletphysics/bullet3 #4451 and #4462 fixed another term
@@ -33,7 +36,10 @@ STEP = 1e-5
 
 
 def reaction(q: tuple[float, float], v: tuple[float, float]) -> tuple[float, float]:
-    """Return the second joint's reaction, as reported and by Newton's law from the speeds before and after the step."""
+    """Return the second joint's reaction, as reported and by Newton's law.
+
+    The accelerations are those from the speeds before and after the step.
+    """
     client = bullet.connect(bullet.DIRECT)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "two.urdf"
@@ -62,13 +68,14 @@ def reaction(q: tuple[float, float], v: tuple[float, float]) -> tuple[float, flo
     a1, a2 = ((state[1] - speed) / STEP for state, speed in zip(states, v, strict=True))
     w, turning = v[0] + v[1], a1 + a2
     parts = []
-    for part in (
-        math.cos,
-        math.sin,
-    ):  # of the mass centre of bar 2: at the end of bar 1, and half a bar further
+    # of the mass centre of bar 2: at the end of bar 1, and half a bar further
+    for part in (math.cos, math.sin):
         across = (lambda x: -math.sin(x)) if part is math.cos else math.cos
-        parts.append(a1 * across(q[0]) - v[0] ** 2 * part(q[0])
-                     + 0.5 * (turning * across(q[0] + q[1]) - w**2 * part(q[0] + q[1])))  # fmt: skip
+        parts.append(
+            a1 * across(q[0])
+            - v[0] ** 2 * part(q[0])
+            + 0.5 * (turning * across(q[0] + q[1]) - w**2 * part(q[0] + q[1]))
+        )
     return math.hypot(*states[1][2][:2]), math.hypot(*parts)
 
 

@@ -1,8 +1,10 @@
-"""MuJoCo Warp does not load a file that switches midphase off, with contacts switched off too.
+"""MuJoCo Warp does not load a file that switches midphase off, with contacts switched
+off too.
 
 Engine: mujoco-warp (mujoco_warp)
 With: mujoco=={version}
-Expected: a flag that changes no result, of a collision stage that is itself switched off, is ignored or warned of.
+Expected: a flag that changes no result, of a collision stage that is itself switched
+  off, is ignored or warned of.
 Found: put_model raises NotImplementedError.
 Since: 3.5.0 or before
 Until: still in 4.0.0

@@ -1,11 +1,14 @@
-"""MuJoCo Warp builds (dJ/dt) v of `connect` and `weld` from the velocities of the previous evaluation.
+"""MuJoCo Warp builds (dJ/dt) v of `connect` and `weld` from the velocities of the
+previous evaluation.
 
 Engine: mujoco-warp (mujoco_warp)
 With: mujoco=={version}
-Expected: mjw.forward of a state gives MuJoCo's closing force, whatever was evaluated before.
-Found: The first forward after a change of qvel gives another force (off by 26 % of the largest in a turn), the second
-  gives MuJoCo's: fwd_position builds the constraint, and only later com_vel, in fwd_velocity, computes the new
-  velocities. Over a simulated turn the error is of first order. Right after make_data the first forward lacks the
+Expected: mjw.forward of a state gives MuJoCo's closing force, whatever was evaluated
+  before.
+Found: The first forward after a change of qvel gives another force (off by 26 % of the
+  largest in a turn), the second gives MuJoCo's: fwd_position builds the constraint, and
+  only later com_vel, in fwd_velocity, computes the new velocities. Over a simulated
+  turn the error is of first order. Right after make_data the first forward lacks the
   term entirely.
 Since: #1294 of May 2026, which brought the term; run with 4.0.0
 Until: still in 4.0.0
@@ -19,12 +22,23 @@ import mujoco_warp as mjw
 import numpy as np
 
 XML = """<mujoco><option gravity="0 0 0"/><worldbody>
-<body><joint type="hinge" axis="0 0 1"/><inertial pos=".5 0 0" mass="1" diaginertia=".1 .1 .1"/>
-  <body pos="1 0 0"><joint type="hinge" axis="0 0 1"/><inertial pos=".5 0 0" mass="1" diaginertia=".1 .1 .1"/>
-  <site name="one" pos="2 0 0"/></body></body>
-<body pos="2 -1 0"><joint type="hinge" axis="0 0 1"/><inertial pos="0 .5 0" mass="1" diaginertia=".1 .1 .1"/>
-  <site name="other" pos="0 2 0"/></body>
-</worldbody><equality><connect site1="one" site2="other"/></equality></mujoco>"""
+<body>
+  <joint type="hinge" axis="0 0 1"/>
+  <inertial pos=".5 0 0" mass="1" diaginertia=".1 .1 .1"/>
+  <body pos="1 0 0">
+    <joint type="hinge" axis="0 0 1"/>
+    <inertial pos=".5 0 0" mass="1" diaginertia=".1 .1 .1"/>
+    <site name="one" pos="2 0 0"/>
+  </body>
+</body>
+<body pos="2 -1 0">
+  <joint type="hinge" axis="0 0 1"/>
+  <inertial pos="0 .5 0" mass="1" diaginertia=".1 .1 .1"/>
+  <site name="other" pos="0 2 0"/>
+</body>
+</worldbody><equality>
+  <connect site1="one" site2="other"/>
+</equality></mujoco>"""
 
 model = mujoco.MjModel.from_xml_string(XML)
 data = mujoco.MjData(model)

@@ -107,9 +107,9 @@ def test_the_run_of_a_pull_request_is_held_against_what_comes_along(
 
 
 def test_every_long_part_is_run_in_the_night() -> None:
-    (parts,) = re.findall(r"^LONG := (.*)$", read("Makefile"), re.MULTILINE)
+    parts = re.findall(r"^LONG [:+]= (.*)$", read("Makefile"), re.MULTILINE)
     (nightly,) = re.findall(r"part: \[(.*)\]", read(".github/workflows/nightly.yml"))
-    assert nightly.split(", ") == parts.split()
+    assert nightly.split(", ") == " ".join(parts).split()
 
 
 def test_one_version_stands_everywhere() -> None:

@@ -20,8 +20,8 @@ from fourbar_validation.places import CHECKOUT
 
 FOLDER = None if CHECKOUT is None else CHECKOUT / "docs" / "findings"
 FIELDS = ("Engine", "With", "Expected", "Found", "Since", "Until", "Reported")
-"""Fields of a script's docstring, after its first sentence. Engine: the name for pip,
-in brackets what is imported.
+"""Fields of a script's docstring, after its first sentence and an empty line. Engine:
+the name for pip, in brackets what is imported. A field's further lines are indented.
 """
 _LOOK = (
     "import importlib.metadata, importlib.util as u, sys; u.find_spec({0!r}) or"
@@ -64,14 +64,15 @@ def _read_outcome(done: Ended) -> str:
 
 def read_docstring(script: Path) -> Reproduction:
     """Read the docstring of a script."""
-    sentence, _, rest = (
-        ast.get_docstring(ast.parse(script.read_text(encoding="utf-8"))) or ""
-    ).partition("\n")
+    module = ast.parse(script.read_text(encoding="utf-8"))
+    sentence, _, rest = (ast.get_docstring(module) or "").partition("\n\n")
     stated = re.findall(
         rf"^({'|'.join(FIELDS)}): (.*(?:\n  .*)*)", dedent(rest), re.MULTILINE
     )
     return Reproduction(
-        script, sentence, {name: " ".join(text.split()) for name, text in stated}
+        script,
+        " ".join(sentence.split()),
+        {name: " ".join(text.split()) for name, text in stated},
     )
 
 

@@ -74,7 +74,7 @@ def test_a_script_that_breaks_down_is_not_fixed(
     tmp_path: Path,
 ) -> None:
     (tmp_path / "one.py").write_text(
-        f'"""It is so.\n\nEngine: pip (pip)\nSince: 1.0 and\n  more\n"""\n{code}\n'
+        f'"""It is\nso.\n\nEngine: pip (pip)\nSince: 1.0 and\n  more\n"""\n{code}\n'
     )
     finding = read_docstring(tmp_path / "one.py")
     assert finding.sentence == "It is so." and finding.fields["Since"] == "1.0 and more"
