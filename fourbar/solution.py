@@ -93,6 +93,10 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
     """
     scene: "Scene | None" = field(default=None, kw_only=True)
     """Scene that was solved; None for a study."""
+    origin: tuple[Any, Any] = field(default=(0.0, 0.0), kw_only=True)
+    """Place of O2 in the coordinates of the scene's drawing, m. Of a study (m, 1) each
+    where they vary.
+    """
     lengths: tuple[Any, Any, Any, Any] | None = field(default=None, kw_only=True)
     """Lengths of ground, input, coupler and output, m. Of a study (m, 1) each where
     they vary.
@@ -571,12 +575,12 @@ def _find_si(solution: Solution, name: str) -> Array | None:
 
 
 def shift_to_drawing(solution: Solution, places: Array) -> Array:
-    """Shift places, (n, 2), from O2 to the origin of the scene's drawing."""
-    if solution.scene is None:
-        origin = (0.0, 0.0)
-    else:
-        origin = solution.scene.origin
-    return places + origin if any(origin) else places
+    """Shift places, (n, 2) or (m, n, 2), from O2 to the origin of the drawing."""
+    x, y = solution.origin
+    if not (np.any(x) or np.any(y)):
+        return places
+    origin = np.stack(np.broadcast_arrays(x, y), axis=-1)
+    return np.asarray(places + origin)
 
 
 def unwrap(angles: Array) -> None:

@@ -69,6 +69,7 @@ from fourbar.scene.pictures import Picture
 from fourbar.studies.keys import (
     COMMAND_KEYS,
     find_misfit,
+    find_overlap,
     list_entries,
     refuse_key,
 )
@@ -659,7 +660,8 @@ def _read_tolerances(
     """
     entries = list_entries(scene)
     tolerances = []
-    for key, stated in _flatten(read, value).items():
+    flat = _flatten(read, value)
+    for key, stated in flat.items():
         name = f'tolerances."{key}"'
         if key in COMMAND_KEYS:
             raise read.refuse(
@@ -688,6 +690,10 @@ def _read_tolerances(
         if (misfit := find_misfit(scene, entry, tolerance)) is not None:
             raise read.refuse(name, width, misfit)
         tolerances.append(tolerance)
+    if (overlap := find_overlap(flat.keys())) is not None:
+        length, pin = overlap
+        allowed = f"follows from {pin}, which has a tolerance too: state one of them"
+        raise read.refuse(f'tolerances."{length}"', flat[length], allowed)
     return tuple(tolerances)
 
 

@@ -86,16 +86,21 @@ def dump(scene: Scene) -> str:
     for picture in scene.pictures:
         bars.setdefault(BAR_NAMES[picture.bar], {})["picture"] = picture.name
     _restore_coordinates({**described, "points": points}, scene.coordinates)
+    pins_or_lengths = _write_lengths(scene, described["lengths"], motion)
+    if "lengths" in dict(pins_or_lengths):
+        read_back = replace(scene, drawing=None)
+    else:
+        read_back = scene
     tables: list[tuple[str, dict[str, Any]]] = [
         ("", top),
-        *_write_lengths(scene, described["lengths"], motion),
+        *pins_or_lengths,
         *((f"bars.{name}", bars[name]) for name in BAR_NUMBERS if name in bars),
         ("motion", motion),
         ("drive", described["drive"]),
         ("points", points),
         *(("[loads]", load) for load in described["loads"]),
         ("effects", described["effects"]),
-        ("tolerances", _write_tolerances(scene)),
+        ("tolerances", _write_tolerances(read_back)),
     ]
     return "\n".join(
         _write_toml_table(name, entries) for name, entries in tables if entries
@@ -130,9 +135,9 @@ def _write_lengths(
     pins = {pin: [write_quantity(x, "m") for x in drawing.place(pin)] for pin in PINS}
     drawn = (*meet_lengths(drawing, pins), drawing.angle(1))
     linkage = scene.linkage
-    assembly = choose_assembly(scene, drawing).motion.branch
-    same = drawn == (*linkage.lengths, linkage.ground_angle)
-    if not same or assembly != scene.motion.branch:
+    if drawn != (*linkage.lengths, linkage.ground_angle):
+        return [("lengths", lengths)]
+    if choose_assembly(scene, drawing).motion.branch != scene.motion.branch:
         return [("lengths", lengths)]
     del motion["branch"]
     return [("pins", pins)]

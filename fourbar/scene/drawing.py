@@ -2,9 +2,10 @@
 
 import math
 from dataclasses import dataclass, fields
+from typing import Any
 
 from fourbar.errors import InputError
-from fourbar.formulas.arithmetic import cross
+from fourbar.formulas.arithmetic import cross, vector
 from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, PINS, require
 
 PINS_IN_LINE = 1e-12
@@ -60,25 +61,28 @@ class DrawnPins:
         x, y = getattr(self, pin)
         return x, y
 
-    def vector(self, bar: int) -> complex:
-        """Return the vector of a bar, from its first pin to its second, m."""
+    def vector(self, bar: int) -> Any:
+        """Return the vector of a bar, from its first pin to its second, complex, m.
+
+        The coordinates may be arrays.
+        """
         first, second = ENDS[bar]
         x, y = self.place(first)
         to_x, to_y = self.place(second)
-        return complex(to_x - x, to_y - y)
+        return vector(to_x - x, to_y - y)
 
     def length(self, bar: int) -> float:
         """Return the length of a bar, m."""
-        vector = self.vector(bar)
-        return math.hypot(vector.real, vector.imag)
+        v = self.vector(bar)
+        return math.hypot(v.real, v.imag)
 
     def angle(self, bar: int) -> float:
         """Return the direction of a bar, rad.
 
         theta_2 less that of the ground lies in (-pi, pi].
         """
-        vector = self.vector(bar)
-        angle = math.atan2(vector.imag, vector.real)
+        v = self.vector(bar)
+        angle = math.atan2(v.imag, v.real)
         if bar != 2:
             return angle
         ground = self.angle(1)
@@ -93,11 +97,11 @@ class DrawnPins:
         It is from the first pin, along + i across.
         """
         x, y = self.place(FIRST_PIN[bar])
-        vector = self.vector(bar)
-        return complex(place[0] - x, place[1] - y) * vector.conjugate() / abs(vector)
+        v: complex = self.vector(bar)
+        return complex(place[0] - x, place[1] - y) * v.conjugate() / abs(v)
 
     def from_bar(self, bar: int, z: complex) -> complex:
         """Return the place in the drawing of a point of a bar, x + i y, m."""
         x, y = self.place(FIRST_PIN[bar])
-        vector = self.vector(bar)
-        return complex(x, y) + z * vector / abs(vector)
+        v: complex = self.vector(bar)
+        return complex(x, y) + z * v / abs(v)

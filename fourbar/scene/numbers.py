@@ -14,6 +14,7 @@ from fourbar.errors import InputError, expect
 from fourbar.linkage import (
     BAR_NAMES,
     MOVING_BARS,
+    PINS,
     POSITIVE,
     Bar,
     Declared,
@@ -116,6 +117,7 @@ TAKEN_NAMES = frozenset(
 
 _THREE_SIGMA = 3.0
 """Half width of a normal distribution in a worst case, in standard deviations."""
+PIN_COORDINATE = Declared("m")
 LENGTH_NUMBERS = {
     **FourBar.numbers,
     **{BAR_NAMES[bar]: Bar.numbers["length"] for bar in MOVING_BARS},
@@ -128,6 +130,9 @@ def find_unit_of_key(key: str) -> str | None:
     None: no scene has such a number.
     """
     table, *names = key.split(".")
+    if table == "pins":
+        is_known = len(names) == 2 and names[0] in PINS and names[1] in ("0", "1")
+        return PIN_COORDINATE.unit if is_known else None
     tables = {
         "lengths": LENGTH_NUMBERS,
         "bars": Bar.numbers,

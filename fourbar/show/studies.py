@@ -251,7 +251,7 @@ def write_sensitivity(derivatives: Sensitivity) -> str:
     names = list_shown(derivatives)
     influences = {name: derivatives.influences(name) for name in names}
     lines = [
-        "largest change over the positions by 1 % of a number, of an angle by 1 deg;"
+        f"largest change over the positions {derivatives.describe_steps()};"
         " pin forces by their magnitude"
     ]
     for name in names:
@@ -289,7 +289,8 @@ def write_sensitivity(derivatives: Sensitivity) -> str:
         rows,
         left=("",),
     )
-    return write_table(derivatives.solution.title, lines, table)
+    wrapped = [part for line in lines for part in wrap_line(line)]
+    return write_table(derivatives.solution.title, wrapped, table)
 
 
 def rank_numbers(derivatives: Sensitivity, names: list[str]) -> list[str]:

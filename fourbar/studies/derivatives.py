@@ -15,7 +15,7 @@ from fourbar.effects.effect import Actions
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.evaluation.evaluate import list_kinematics
-from fourbar.formulas.arithmetic import Number, polar, without_slopes
+from fourbar.formulas.arithmetic import Number, polar, vector, without_slopes
 from fourbar.formulas.path import LoopPath
 from fourbar.formulas.position import HalfAngle, compute_factors, find_root_sign
 from fourbar.quantities import (
@@ -33,7 +33,13 @@ from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.numbers import POINT_STAGES
 from fourbar.scene.scene import compute_bar_motion
-from fourbar.solution import Solution, find_values, split_parts
+from fourbar.solution import (
+    Solution,
+    find_unit_of_quantity,
+    find_values,
+    is_scalar,
+    split_parts,
+)
 from fourbar.solving import solve
 from fourbar.studies.keys import (
     SceneNumber,
@@ -65,7 +71,8 @@ it, jumps with the motion.
 class _Influence(NamedTuple):
     """Largest influence of one number on one quantity.
 
-    The number is changed by a hundredth, an angle by a degree.
+    The number is changed by a hundredth, a coordinate of a drawn pin by a hundredth of
+    the longest bar, an angle by a degree.
     """
 
     key: str
@@ -181,9 +188,7 @@ class Sensitivity:
             self.numbers.tolist(),
             strict=True,
         ):
-            change = (
-                _DEGREE if entry.unit == "rad" else _HUNDREDTH * abs(number)
-            ) * self.of(quantity, key)
+            change = self._find_step(entry, number) * self.of(quantity, key)
             if quantity in PIN_FORCES:
                 with np.errstate(all="ignore"):
                     change = np.sum(value * change, axis=-1) / np.hypot(*value.T)
@@ -200,6 +205,25 @@ class Sensitivity:
             (row for row in rows if row.change != 0.0),
             key=lambda row: -abs(row.change),
         )
+
+    def _find_step(self, entry: SceneNumber, number: float) -> float:
+        """Return the change of a number for which its influence is reported.
+
+        A coordinate of a pin depends on where the drawing has its origin: it is
+        compared with the longest bar.
+        """
+        if entry.unit == "rad":
+            return _DEGREE
+        if entry.place[:1] == ("drawing",):
+            return _HUNDREDTH * max(self.scene.linkage.lengths)
+        return _HUNDREDTH * abs(number)
+
+    def describe_steps(self) -> str:
+        """Say by how much a number is changed where its influence is reported."""
+        steps = "by 1 % of a number, of an angle by 1 deg"
+        if self.scene.drawing is None:
+            return steps
+        return f"{steps}, of a pin's coordinate by 1 % of the longest bar"
 
     def _list_rows(self) -> list[tuple[str, str, str]]:
         """List for each quantity its values and the numbers that change it most."""
@@ -238,7 +262,7 @@ class Sensitivity:
             (
                 "",
                 "value",
-                "changes most by 1 % of a number, of an angle by 1 deg, with",
+                f"changes most {self.describe_steps()}, with",
             ),
             self._list_rows(),
         )
@@ -250,7 +274,8 @@ def sensitivity(scene: Scene) -> Sensitivity:
     d(quantity)/d(key), the other numbers held; what the scene leaves out (the inertia
     of a uniform bar, its centre at mid-bar) follows the length. What is commanded is
     held too, and "motion.theta_2" (or theta_3, theta_4, stroke) is the derivative by
-    it.
+    it. A coordinate of a drawn pin ("pins.A.0") moves the pin in the drawing: lengths
+    and ground_angle follow.
 
     Raises
     ------
@@ -282,7 +307,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
     entries = list_entries(scene)
     moving = commanded.speed is not None
     if not moving:  # positions depend on these alone
-        of_positions = ("lengths", "points", "drive")
+        of_positions = ("pins", "lengths", "points", "drive")
         entries = {
             key: n
             for key, n in entries.items()
@@ -454,4 +479,8 @@ def _compute_derivatives(
         }
         quantities["power"] = dynamics.generalized_force * speed
         quantities["drive_condition"] = case.drive_condition(state)
+    origin = vector(*scene.origin)  # places are those of the drawing
+    for name in names:
+        if find_unit_of_quantity(name) == "m" and not is_scalar(name):
+            quantities[name] = quantities[name] + origin
     return {name: quantities[name] for name in names}, held

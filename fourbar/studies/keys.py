@@ -1,6 +1,6 @@
 """The numbers of a scene by their keys in its file, and scenes of arrays of them."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from difflib import get_close_matches
 from typing import Any, NamedTuple
 
@@ -10,11 +10,14 @@ from fourbar.effects import Gravity, Springs
 from fourbar.effects.effect import PinRows
 from fourbar.effects.place import STATED_PLACES
 from fourbar.errors import InputError, expect, write_in_units
+from fourbar.formulas.arithmetic import angle, dot, sine, vector
 from fourbar.linkage import (
     ANY_NUMBER,
     AT_LEAST_ZERO,
     BAR_NAMES,
+    ENDS,
     MOVING_BARS,
+    PINS,
     POSITIVE,
     Bar,
     Declared,
@@ -22,7 +25,8 @@ from fourbar.linkage import (
     copy_with,
 )
 from fourbar.scene import Scene
-from fourbar.scene.numbers import Tolerance
+from fourbar.scene.drawing import DrawnPins
+from fourbar.scene.numbers import PIN_COORDINATE, Tolerance
 
 COMMAND_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4", "motion.stroke")
 """Keys of the commanded angle or stroke."""
@@ -46,6 +50,8 @@ another form in a study.
 """
 _BY_MATERIAL = ("density", "section", "diameter")
 """Numbers of a bar that are varied only where the scene states them."""
+_LENGTH_OF_BAR = {bar: f"lengths.{name}" for bar, name in BAR_NAMES.items()}
+_GROUND_ANGLE = "lengths.ground_angle"
 NumberPath = tuple[str | int, ...]
 """Attributes and indices that lead from a scene to one of its numbers."""
 
@@ -162,10 +168,20 @@ def _list_bar(bar: Bar, number: int) -> dict[str, SceneNumber]:
     }
 
 
-def list_entries(scene: Scene) -> dict[str, SceneNumber]:
-    """List the numbers of a scene that a study varies, by key, lengths first.
+def _list_pins() -> dict[str, SceneNumber]:
+    """List the coordinates of the drawn pins."""
+    return {
+        f"pins.{pin}.{axis}": SceneNumber(("drawing", pin, axis), PIN_COORDINATE.unit)
+        for pin in PINS
+        for axis in (0, 1)
+    }
 
-    What is commanded is not among them.
+
+def list_entries(scene: Scene) -> dict[str, SceneNumber]:
+    """List the numbers of a scene that a study varies, by key.
+
+    Coordinates of drawn pins come first, then lengths. What is commanded is not among
+    them.
     """
     of_ground = _list_entries(FourBar, "lengths", ("linkage",))
     bars = {
@@ -174,7 +190,11 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
     lengths = {
         f"lengths.{name}": numbers.pop(".length") for name, numbers in bars.items()
     }
-    entries = {"lengths.ground": of_ground["lengths.ground"], **lengths, **of_ground}
+    if scene.drawing is None:
+        entries = dict[str, SceneNumber]()
+    else:
+        entries = _list_pins()
+    entries |= {"lengths.ground": of_ground["lengths.ground"], **lengths, **of_ground}
     entries |= {
         f"bars.{name}{key}": number
         for name, numbers in bars.items()
@@ -213,10 +233,11 @@ def command_key(scene: Scene) -> str:
 def refuse_key(key: str, value: object, keys: list[str]) -> InputError:
     """Make the error for a key that a study cannot vary."""
     expect("key", key, str)
-    if key.split(".", maxsplit=1)[0] == "pins":
+    names_a_pin = key.split(".", maxsplit=1)[0] == "pins"
+    if names_a_pin and not any(name.startswith("pins.") for name in keys):
         lengths = ", ".join(name for name in keys if name.startswith("lengths."))
         return InputError(
-            key, value, f"a drawing is varied by the lengths that follow: {lengths}"
+            key, value, f"the scene has no [pins]; it states lengths: {lengths}"
         )
     inner = [name for name in keys if name.startswith(f"{key}.")]
     if inner:
@@ -232,6 +253,22 @@ def refuse_key(key: str, value: object, keys: list[str]) -> InputError:
         )
     close = get_close_matches(key, keys, 1, 0.0)
     return InputError(key, value, f'unknown key; did you mean "{close[0]}"?')
+
+
+def find_overlap(keys: Collection[str]) -> tuple[str, str] | None:
+    """Return the key of a length and that of a pin by which the length follows.
+
+    None: the keys state no length twice.
+    """
+    ends = {_LENGTH_OF_BAR[bar]: pins for bar, pins in ENDS.items()}
+    ends[_GROUND_ANGLE] = ENDS[1]
+    for length, pins in ends.items():
+        if length not in keys:
+            continue
+        for key in keys:
+            if key.startswith(tuple(f"pins.{pin}." for pin in pins)):
+                return length, key
+    return None
 
 
 LEFT_OUT = (
@@ -327,4 +364,38 @@ def replace_place(holder: Any, place: NumberPath, values: Any) -> Any:
     new = copy_with(holder, **{name: replace_place(old, tuple(rest), values)})
     if isinstance(new, Bar):
         return copy_with(new, mass=new.weigh())
+    if isinstance(new, Scene) and name == "drawing":
+        return _follow_pins(new, old)
     return new
+
+
+def _follow_pins(scene: Scene, drawn: DrawnPins) -> Scene:
+    """Return the scene whose lengths and ground angle follow its moved pins.
+
+        L' = |v'| + (L - |v|),   theta_1' = theta_1 + angle from v to v',
+
+    v and v' from pin to pin of a bar, before and after. A length that was drawn within
+    the rounding of a parallelogram's keeps its equality where no pin moves.
+
+    `drawn`: the pins before the move.
+    """
+    moved = scene.drawing
+    assert moved is not None
+    followed = scene
+    for bar, pins in ENDS.items():
+        if all(getattr(moved, pin) is getattr(drawn, pin) for pin in pins):
+            continue
+        v = drawn.vector(bar)
+        moved_v = moved.vector(bar)
+        place: NumberPath = ("linkage", "ground")
+        if bar in MOVING_BARS:
+            place = ("linkage", BAR_NAMES[bar], "length")
+        rounding = read_place(followed, place) - np.hypot(v.real, v.imag)
+        length = np.hypot(moved_v.real, moved_v.imag) + rounding
+        followed = replace_place(followed, place, length)
+        if bar == 1:
+            turned = angle(vector(dot(v, moved_v), sine(v, moved_v)))
+            ground_angle = followed.linkage.ground_angle + turned
+            place = ("linkage", "ground_angle")
+            followed = replace_place(followed, place, ground_angle)
+    return followed

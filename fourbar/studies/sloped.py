@@ -25,6 +25,7 @@ _RULES: dict[Any, _Rule] = {
     np.divide: lambda z, x, y: (1.0 / y, -z / y),
     np.negative: lambda z, x: (-1.0,),
     np.sqrt: lambda z, x: (0.5 / z,),
+    np.hypot: lambda z, x, y: (x / z, y / z),
     np.tan: lambda z, x: (1.0 + z * z,),
     np.sin: lambda z, x: (np.cos(x),),
     np.cos: lambda z, x: (-np.sin(x),),

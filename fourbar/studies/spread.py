@@ -260,8 +260,7 @@ def tolerances(
         )
         parts = replace(study, at=Command(*pieces))
         width = columns.stop - columns.start
-        # the solution of a study knows of no drawing, in whose coordinates places are
-        solution = replace(solve(parts), scene=scene)
+        solution = solve(parts)
         code = solution.status_code[:, -width:]
         without[columns] = np.count_nonzero(code, axis=0)
         gone |= ((code == NOT_ASSEMBLED) & nominal_closes[columns]).any(axis=1)

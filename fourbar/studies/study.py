@@ -11,7 +11,7 @@ from fourbar.effects.effect import Effect
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.evaluation.evaluate import evaluate
-from fourbar.linkage import convert_to_unit
+from fourbar.linkage import BAR_NAMES, convert_to_unit
 from fourbar.quantities import INVALID, NOT_ASSEMBLED, Array
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
@@ -22,21 +22,13 @@ from fourbar.solving import Results, find_requested, make_solution, split
 from fourbar.studies.keys import (
     COMMAND_KEYS,
     command_key,
+    find_overlap,
     list_entries,
     refuse_key,
     replace_numbers,
     replace_place,
 )
 from fourbar.writing import describe_extent, list_names
-
-LENGTH_KEYS = tuple(
-    f"lengths.{name}"
-    for name in ("ground", "input", "coupler", "output", "ground_angle")
-)
-LEAST_MISS = 1e-12
-"""Least miss of a change point that rounding cannot remove. It is relative to the sum
-of the lengths, squared.
-"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,8 +38,9 @@ class Study:
     scene: Scene
     """Scene with the numbers that do not vary."""
     values: dict[str, Array]
-    """Varied numbers by key, lengths first, (m,). They are NaN in a member that a scene
-    would refuse.
+    """Varied numbers by key, pins and lengths first, (m,).
+
+    They are NaN in a member that a scene would refuse.
     """
     invalid: NDArray[np.bool_]
     """The members that a scene would refuse, (m,)."""
@@ -211,12 +204,16 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
         likewise ("bars.coupler.centre.0"). "motion.theta_2" (or theta_3, theta_4,
         stroke, where that is commanded) is (n,), for all members, or (m, n); a scene
         that states none needs it. What the scene leaves out (the inertia of a uniform
-        bar, its centre at mid-bar) follows the length of each member.
+        bar, its centre at mid-bar) follows the length of each member. Of a scene with
+        `[pins]` also "pins.A.0", a coordinate of a drawn pin: the pin moves in the
+        drawing, and lengths and ground_angle follow. What is commanded, the assembly
+        and the places of the bars stay as they are.
 
     Raises
     ------
     InputError : a key that the scene does not have or that is no number, a value that
-        is no array of numbers, shapes that do not fit, a free motion. A member with
+        is no array of numbers, shapes that do not fit, a free motion, a length beside
+        a pin by which it follows. A member with
         numbers that a scene refuses has the status "invalid", one that never closes
         "not_assembled".
 
@@ -239,6 +236,10 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
         key: _read_members(key, value, [*entries, theta])
         for key, value in values.items()
     }
+    if (overlap := find_overlap(arrays.keys())) is not None:
+        length, pin = overlap
+        allowed = f"follows from {pin}, which varies too: vary one of them"
+        raise InputError(length, _shorten_for_line(values[length]), allowed)
     angles = _read_angles(scene, arrays, theta)
     sizes = {
         key: array.size
@@ -262,6 +263,10 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
     invalid = ~np.broadcast_to(np.isfinite(angles).all(axis=1), (m,))
     for key, array in numbers.items():
         invalid = invalid | ~entries[key].holds(array)
+    drawing = replace_numbers(scene, numbers).drawing
+    if drawing is not None:
+        for bar in BAR_NAMES:
+            invalid = invalid | (drawing.vector(bar) == 0.0)
     numbers = {key: np.where(invalid, np.nan, array) for key, array in numbers.items()}
     commanded = _list_commands(scene, numbers, angles, m)
     rates = {f"motion.{name}" for name in scene.motion.names[1:]}

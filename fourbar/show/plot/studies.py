@@ -231,6 +231,6 @@ def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
             size=6.8,
         )
     shown.notes.append(
-        "Bars: the largest change over the sweep by 1 % of a number, of an angle by 1°;"
+        f"Bars: the largest change over the sweep {derivatives.describe_steps()};"
         " pin forces by their magnitude."
     )

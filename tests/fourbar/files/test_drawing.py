@@ -358,14 +358,6 @@ def test_sdf_and_usd_stand_where_the_drawing_has_them() -> None:
     assert "translate = (1.041, 0.0375, 2.0)" in write_usd(scene, plane=on_a_base)
 
 
-def test_a_study_of_a_drawing_names_the_lengths_that_follow() -> None:
-    with pytest.raises(
-        InputError,
-        match=r"varied by the lengths that follow: lengths\.",
-    ):
-        fourbar.vary(loads(DRAWN), {"pins.A.0": [0.0, 0.1]})
-
-
 @pytest.mark.parametrize("bar", [2, 4])
 def test_a_commanded_bar_that_stands_still_as_drawn_is_refused(bar: int) -> None:
     """A kite folded onto one pin.
