@@ -41,7 +41,7 @@ JUDGED_BY = {
         "fourbar/studies: circuit_curve; fourbar/show: studies"
     ),
     "fourbar/test_solving.py": "fourbar/scene: motion; fourbar/evaluation: case",
-    "fourbar/studies/test_study.py": "fourbar/scene: motion; fourbar/studies: keys",
+    "fourbar/studies/test_study.py": "fourbar/scene: motion",
     # parts of one document or picture
     "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: document model",
     "fourbar/show/test_animate.py": "fourbar/show/plot: film",
