@@ -231,7 +231,9 @@ def measure_case(
         dense, TrialSetup(dense, command(dense)).try_out(advice.best.settings)
     ).worst
     cheapest = try_all_settings(
-        TrialSetup(searched, command(searched)), required, costs
+        TrialSetup(searched, command(searched)),
+        required,
+        costs,
     )
     cost = advice.best.steps * advice.best.step_cost
     return AdviceCase(
@@ -264,7 +266,11 @@ def _find_enough(missed: int) -> int:
     return n
 
 
-def measure_cases(seed: int, count: int, out: Path) -> Iterator[AdviceCase]:
+def measure_cases(
+    seed: int,
+    count: int,
+    out: Path,
+) -> Iterator[AdviceCase]:
     """Yield the cases, each kept as it comes.
 
     Those that an interrupted run left are read.

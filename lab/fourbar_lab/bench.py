@@ -167,13 +167,19 @@ SPEED_LIMITS = {
         ONE_POSITION,
     ),
     "study of linkages / positions": _SpeedLimit(
-        "<=", 2.0, "a member is a column of the same arrays as a position"
+        "<=",
+        2.0,
+        "a member is a column of the same arrays as a position",
     ),
     "growth from 1000 positions on": _SpeedLimit(
-        "<=", 1.3, "the work is linear in the positions: blocks fit the cache"
+        "<=",
+        1.3,
+        "the work is linear in the positions: blocks fit the cache",
     ),
     "memory beyond the result, MB": _SpeedLimit(
-        "<=", 50.0, "work space is that of a block, not of the sweep"
+        "<=",
+        50.0,
+        "work space is that of a block, not of the sweep",
     ),
     "a judged scene / one position": _SpeedLimit(
         "<=",
@@ -191,7 +197,9 @@ SPEED_LIMITS = {
         for library in _PLAIN_LOOPS
     },
     "import fourbar / import numpy": _SpeedLimit(
-        "<=", 1.0, "it loads numpy alone, and less than that of its own"
+        "<=",
+        1.0,
+        "it loads numpy alone, and less than that of its own",
     ),
 }
 """Limits by the name of the row."""
@@ -285,7 +293,12 @@ def _make_floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
     metavar="FILE",
     help="Draw the growth: svg, png or pdf.",
 )
-def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> int:
+def bench(
+    positions: int,
+    rounds: int,
+    largest: int,
+    picture: Path | None,
+) -> int:
     """Time NumPy, C and the 13x13 system side by side; ratios that must hold."""
     if picture is not None:
         format_of(picture)
@@ -357,7 +370,11 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> in
     return FAILED if broken else HOLDS
 
 
-def measure_speed(positions: int, rounds: int, largest: int) -> Measured:
+def measure_speed(
+    positions: int,
+    rounds: int,
+    largest: int,
+) -> Measured:
     """Measure the ratios of SPEED_LIMITS, ns per position, and times by how many."""
     scene = make_example()
     command = command_positions(positions)

@@ -240,7 +240,12 @@ class Benchmark:
                 "command": problem["command"],
             }
             result = self._take_or_ask(
-                row, label, "slopes", {"problem": DIFFERENTIATED}, question, running
+                row,
+                label,
+                "slopes",
+                {"problem": DIFFERENTIATED},
+                question,
+                running,
             )
             row.slopes = compare_slopes(problem, result.get("slopes", []))
 
@@ -274,7 +279,12 @@ class Benchmark:
                 stem = f"{name}-{steps}"
             full = question | ({"setting": asked} if asked else {})
             yield self._take_or_ask(
-                row, label, stem, {"schema": RESULT, "problem": name}, full, running
+                row,
+                label,
+                stem,
+                {"schema": RESULT, "problem": name},
+                full,
+                running,
             )
 
     def _take_or_ask(
@@ -666,7 +676,9 @@ def benchmark_command(
     for name in problems:
         if name not in list_problems():
             raise InputError(
-                "--problem", name, f"must be one of {', '.join(list_problems())}"
+                "--problem",
+                name,
+                f"must be one of {', '.join(list_problems())}",
             )
     entries = read_engines_of(engines or BENCHMARKED_ENGINES)
     out.mkdir(parents=True, exist_ok=True)

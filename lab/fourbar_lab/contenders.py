@@ -80,10 +80,17 @@ def make_example(
     return Scene(linkage, Motion(theta_2, 10.0), 2, (), (Gravity(),))
 
 
-def command_positions(n: int, start: float = 0.0, stop: float = 2.0 * np.pi) -> Command:
+def command_positions(
+    n: int,
+    start: float = 0.0,
+    stop: float = 2.0 * np.pi,
+) -> Command:
     """Command n positions, over a revolution unless specified otherwise."""
     return Command(
-        np.linspace(start, stop, n), np.broadcast_to(np.int8(1), (n,)), 10.0, 0.0
+        np.linspace(start, stop, n),
+        np.broadcast_to(np.int8(1), (n,)),
+        10.0,
+        0.0,
     )
 
 
@@ -190,7 +197,11 @@ def _compile_loop() -> TimedLoop | str:
     return call
 
 
-def time_positions(peers: dict[str, TimedLoop], largest: int, rounds: int) -> Times:
+def time_positions(
+    peers: dict[str, TimedLoop],
+    largest: int,
+    rounds: int,
+) -> Times:
     """Time a position, in ns, for 1000, 10 000, ... of them.
 
     They are written into arrays that exist.
@@ -203,7 +214,9 @@ def time_positions(peers: dict[str, TimedLoop], largest: int, rounds: int) -> Ti
         out = np.zeros((15, at_once))
         actions = {name: partial(loop, theta_2, out) for name, loop in peers.items()}
         for name, value in time_interleaved(
-            actions, rounds if n <= POSITIONS_OF_ONE_CALL else 1, calls
+            actions,
+            rounds if n <= POSITIONS_OF_ONE_CALL else 1,
+            calls,
         ).items():
             times[name][n] = 1e9 * value / at_once
     return times
@@ -237,13 +250,19 @@ def time_linkages(largest: int, rounds: int) -> Times:
         if m <= MOST_LOOPED:
             actions[_LOOPED] = partial(looped, lengths)
         for name, value in time_interleaved(
-            actions, rounds, max(1, MOST_LOOPED // m)
+            actions,
+            rounds,
+            max(1, MOST_LOOPED // m),
         ).items():
             times[name][m] = 1e9 * value / m
     return times
 
 
-def draw_bench(over_positions: Times, over_linkages: Times, path: Path) -> None:
+def draw_bench(
+    over_positions: Times,
+    over_linkages: Times,
+    path: Path,
+) -> None:
     """Draw both growths on logarithmic axes into a file."""
     with apply_style():
         from matplotlib.figure import Figure
@@ -272,7 +291,12 @@ def draw_bench(over_positions: Times, over_linkages: Times, path: Path) -> None:
         Drawing(figure).save(path)
 
 
-def _draw_panel(axes: "Axes", times: Times, title: str, over: str) -> None:
+def _draw_panel(
+    axes: "Axes",
+    times: Times,
+    title: str,
+    over: str,
+) -> None:
     for (who, timed), (colour, mark) in zip(times.items(), _LOOKS, strict=False):
         axes.loglog(
             list(timed),

@@ -182,7 +182,11 @@ class EffectCost(NamedTuple):
     """The middle half of the pairs lies between low and high."""
 
 
-def measure_effect(engine: str, effect: str, rounds: int = PAIRS_OF_RUNS) -> EffectCost:
+def measure_effect(
+    engine: str,
+    effect: str,
+    rounds: int = PAIRS_OF_RUNS,
+) -> EffectCost:
     """Time neighbouring runs with and without an effect.
 
     Both meet the same disturbances.
@@ -263,7 +267,11 @@ def list_pairs(
     type=click.Path(path_type=Path, dir_okay=False),
     help="Write the table as Markdown too.",
 )
-def effects(engines: str, only: str | None, out: Path | None) -> int:
+def effects(
+    engines: str,
+    only: str | None,
+    out: Path | None,
+) -> int:
     """Time each effect in each engine, and each flag of MuJoCo; a minute."""
     from rich.console import Console
     from rich.progress import track

@@ -139,7 +139,9 @@ def _draw_with_ratios(rng: np.random.Generator) -> DrawnLinkage:
     The ratios are crank to ground, coupler to diagonal, and those of masses.
     """
     lengths, angle = draw_uneven_lengths(
-        rng, draw_decades(-6.0, 6.0), draw_decades(-1.0, 1.0)
+        rng,
+        draw_decades(-6.0, 6.0),
+        draw_decades(-1.0, 1.0),
     )
     return lengths, command_angle(angle)
 
@@ -213,7 +215,11 @@ def massless(rng: np.random.Generator) -> Scene:
     )
 
 
-def _draw_place(bar: int, rng: np.random.Generator, nearest: float) -> Place:
+def _draw_place(
+    bar: int,
+    rng: np.random.Generator,
+    nearest: float,
+) -> Place:
     """Draw a place of a bar, from `nearest` to 1 m away from its first pin."""
     distance, angle = rng.uniform((nearest, -3.0), (1.0, 3.0)).tolist()
     return Place(bar, (distance, angle))
@@ -429,7 +435,11 @@ def _near_pins(rng: np.random.Generator) -> Scene:
         force = (1.0, float(rng.uniform(-3.0, 3.0)))
         frame = str(rng.choice(["world", "bar"]))
         linkage = FourBar(
-            scene.linkage.ground, bars[2], bars[3], bars[4], scene.linkage.ground_angle
+            scene.linkage.ground,
+            bars[2],
+            bars[3],
+            bars[4],
+            scene.linkage.ground_angle,
         )
         return replace(
             scene,

@@ -181,7 +181,11 @@ FAULT_SCENES: dict[str, Scene] = {
             Springs(
                 (
                     Spring(
-                        Place(1, (0.2, 0.6)), Place(3, (0.15, -0.4)), 80.0, 0.1, 2.0
+                        Place(1, (0.2, 0.6)),
+                        Place(3, (0.15, -0.4)),
+                        80.0,
+                        0.1,
+                        2.0,
                     ),
                     Spring(Place(2, (0.05, 0.3)), Place(4, (0.1, 0.5)), 50.0, 0.12),
                 )

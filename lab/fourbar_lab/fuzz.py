@@ -298,7 +298,11 @@ def _check_file(scene: Scene) -> list[str]:
     return ["file: a scene that was written and read is another one"]
 
 
-def _check_assembly(scene: Scene, commanded: Command, solution: Solution) -> list[str]:
+def _check_assembly(
+    scene: Scene,
+    commanded: Command,
+    solution: Solution,
+) -> list[str]:
     """Compare the assembly by ball arithmetic.
 
     There is no position where the loop does not close, and none is missing where it
@@ -360,7 +364,11 @@ def examine_scene(seed: int, index: int) -> list[str]:
     return list_findings(draw_fuzz_scene(seed, index))
 
 
-def _find_lost(_: int, error: BaseException, __: object) -> list[str]:
+def _find_lost(
+    _: int,
+    error: BaseException,
+    __: object,
+) -> list[str]:
     return [f"{WORKER_LOST} {say_error(error)}"]
 
 
@@ -423,7 +431,12 @@ def examine_scenes(
     default=Path("results/fuzz"),
     show_default=True,
 )
-def fuzz(scenes: int, seed: int, workers: int, out: Path) -> int:
+def fuzz(
+    scenes: int,
+    seed: int,
+    workers: int,
+    out: Path,
+) -> int:
     """Put random scenes through files, formulas and exact engines.
 
     Every failure is shrunk and kept.

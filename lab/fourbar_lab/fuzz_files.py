@@ -95,7 +95,11 @@ def _mutate_files(
         yield index, text
 
 
-def _mutate(text: str, rng: np.random.Generator, originals: Sequence[str]) -> str:
+def _mutate(
+    text: str,
+    rng: np.random.Generator,
+    originals: Sequence[str],
+) -> str:
     if not text:
         return _PIECES[int(rng.integers(len(_PIECES)))]
     start = int(rng.integers(len(text)))

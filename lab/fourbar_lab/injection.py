@@ -97,7 +97,12 @@ class _FaultFinder(importlib.abc.MetaPathFinder):
 class _Text(importlib.machinery.SourceFileLoader):
     """Loads a module from a text in place of its file's."""
 
-    def __init__(self, fullname: str, path: str, text: str) -> None:
+    def __init__(
+        self,
+        fullname: str,
+        path: str,
+        text: str,
+    ) -> None:
         super().__init__(fullname, path)
         self.text = text
 

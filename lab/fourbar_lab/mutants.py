@@ -242,7 +242,10 @@ def _collect_stated_of_motion(scene: Scene, command: Command) -> dict[str, Any]:
         "speed_ratio": transmission.speed_ratio(state),
         "mechanical_advantage": transmission.mechanical_advantage(state, 0.2, 0.3),
         "to_singular": transmission.distance_to_singular(
-            scene.linkage, command.theta_2, scene.drive_bar, branch
+            scene.linkage,
+            command.theta_2,
+            scene.drive_bar,
+            branch,
         ),
     }
 
@@ -270,7 +273,11 @@ def is_caught(
     rows = list(check_identities(question))
     for engine, answer in answers:
         rows += Comparison(
-            "", scene, answer, solution, make_demands(engine, scene, command, answer)
+            "",
+            scene,
+            answer,
+            solution,
+            make_demands(engine, scene, command, answer),
         ).rows()
         if (
             engine.name == FREE_BODY

@@ -107,7 +107,11 @@ def differentiate(scene: Scene) -> dict[str, Any]:
     return {name: of[rows, 0] for name, of in derivatives.by.items()}
 
 
-def judge_slopes(scene: Scene, tally: Tally, sample: str) -> None:
+def judge_slopes(
+    scene: Scene,
+    tally: Tally,
+    sample: str,
+) -> None:
     """Compare the derivatives at one position with those of the reference."""
     tally.samples += 1
     values, exact = _compute_exact_slopes(scene)

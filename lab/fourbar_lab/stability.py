@@ -58,7 +58,11 @@ def solve_position(scene: Scene, angle: float) -> dict[str, Any]:
     }
 
 
-def judge_sample(scene: Scene, tally: Tally, sample: str) -> None:
+def judge_sample(
+    scene: Scene,
+    tally: Tally,
+    sample: str,
+) -> None:
     """Compare one position with the reference."""
     tally.samples += 1
     angle = float(np.asarray(scene.motion.angle))
@@ -95,7 +99,10 @@ def judge_sample(scene: Scene, tally: Tally, sample: str) -> None:
             ):  # a component that the drive has no part in is left of larger ones
                 rate = max(sensitivity[other] for other, _ in list_components(name))
             part, errors[component] = error_over_allowed(
-                name, own, values[component], rate
+                name,
+                own,
+                values[component],
+                rate,
             )
             tally.note(component, part, sample)
     if drive not in values:
@@ -141,7 +148,9 @@ def judge_samples(
         scene = _feed_back(FAMILY_DRAWERS[family](rng), bar)
         if scene is not None:
             (judge_slopes if derivatives else judge_sample)(
-                scene, tally, f"{family} {number}"
+                scene,
+                tally,
+                f"{family} {number}",
             )
     return tally
 

@@ -66,7 +66,12 @@ class Tally:
         for name, count in other.too_large.items():
             self.too_large[name] = self.too_large.get(name, 0) + count
 
-    def note(self, output: str, ratio: float, sample: str) -> None:
+    def note(
+        self,
+        output: str,
+        ratio: float,
+        sample: str,
+    ) -> None:
         """Keep the largest error over what is allowed."""
         self.worst[output] = max(self.worst.get(output, (0.0, "")), (ratio, sample))
 

@@ -239,7 +239,11 @@ def _read_worlds(text: str, positions: int) -> list[int]:
     type=click.Path(path_type=Path, dir_okay=False),
     help="Write the table as Markdown too.",
 )
-def worlds_command(worlds: str, any_device: bool, out: Path | None) -> int:
+def worlds_command(
+    worlds: str,
+    any_device: bool,
+    out: Path | None,
+) -> int:
     """Time torque and pin forces of many positions at once, on a GPU.
 
     MuJoCo and the formulas stand beside it, on one core. What is not run is named with

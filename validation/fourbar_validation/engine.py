@@ -78,7 +78,11 @@ def open_engine(entry: str) -> tuple[_Factory, dict[str, Any]]:
     return make, hello
 
 
-def _apply_setting(engine: Any, setting: dict[str, Any], names: Sequence[str]) -> Any:
+def _apply_setting(
+    engine: Any,
+    setting: dict[str, Any],
+    names: Sequence[str],
+) -> Any:
     """Return the engine with a setting.
 
     One that takes none has no timestep, and no error but round-off.
@@ -121,7 +125,9 @@ def _open_class(entry: str) -> tuple[_Factory, dict[str, Any]]:
 
     def make(step: float | None = None, **setting: Any) -> Any:
         return _apply_setting(
-            served() if step is None else served(step), setting, hello["settings"]
+            served() if step is None else served(step),
+            setting,
+            hello["settings"],
         )
 
     return make, hello
@@ -155,7 +161,9 @@ def answer(make: _Factory, question: dict[str, Any]) -> dict[str, Any]:
     scene = protocol.scene_from_json(question["scene"])
     if question["ask"] == "release":
         scene = protocol.release_from_json(
-            scene, question["command"], question["times"]
+            scene,
+            question["command"],
+            question["times"],
         )
         if "step" in question:
             step = {"step": float(question["step"])}
@@ -185,7 +193,11 @@ def answer(make: _Factory, question: dict[str, Any]) -> dict[str, Any]:
     return protocol.answer_to_json(scene, command, reply)
 
 
-def serve(entry: str, questions: IO[bytes], replies: IO[bytes]) -> None:
+def serve(
+    entry: str,
+    questions: IO[bytes],
+    replies: IO[bytes],
+) -> None:
     """Answer line by line, until there are no more."""
     engine: _Factory | None = None
     for line in questions:

@@ -69,7 +69,9 @@ class _DrakeTree(Tree):
         for part in list_moving_parts(scene.linkage):
             about_g = RotationalInertia(*[part.inertia] * 3)
             inertia = SpatialInertia.MakeFromCentralInertia(
-                part.mass, np.array([*part.centre, 0.0]), about_g
+                part.mass,
+                np.array([*part.centre, 0.0]),
+                about_g,
             )
             body = self.body[part.bar] = plant.AddRigidBody(f"bar{part.bar}", inertia)
             joint_frame = RigidTransform(np.array([*part.first_pin, 0.0]))
@@ -78,7 +80,10 @@ class _DrakeTree(Tree):
                 FixedOffsetFrame(f"first_pin{part.bar}", bearer, joint_frame)
             )
             joint = RevoluteJoint(
-                PIN_OF_MOVING_BAR[part.bar], frame, body.body_frame(), UP
+                PIN_OF_MOVING_BAR[part.bar],
+                frame,
+                body.body_frame(),
+                UP,
             )
             self.joint[part.bar] = plant.AddJoint(joint)
             self.local |= {
@@ -112,7 +117,9 @@ class _DrakeTree(Tree):
         arguments = (*self.local[name], self.world, self.world)
         return np.asarray(
             self.plant.CalcJacobianTranslationalVelocity(
-                self.context, _BY_SPEEDS, *arguments
+                self.context,
+                _BY_SPEEDS,
+                *arguments,
             )[:2]
         )
 
@@ -121,7 +128,9 @@ class _DrakeTree(Tree):
         arguments = (self.body[bar].body_frame(), self.world, self.world)
         return np.array(
             self.plant.CalcJacobianAngularVelocity(
-                self.context, _BY_SPEEDS, *arguments
+                self.context,
+                _BY_SPEEDS,
+                *arguments,
             )[2]
         )
 
@@ -136,7 +145,9 @@ class _DrakeTree(Tree):
     def _accelerate(self, name: str) -> Array:
         arguments = (*self.local[name], self.world, self.world)
         bias = self.plant.CalcBiasTranslationalAcceleration(
-            self.context, _BY_SPEEDS, *arguments
+            self.context,
+            _BY_SPEEDS,
+            *arguments,
         )
         return np.asarray(self.point_jacobian(name) @ self.a + bias[:2, 0])
 
@@ -154,7 +165,9 @@ class _DrakeTree(Tree):
             self.plant.CalcForceElementsContribution(self.context, forces)
         for bar, wrench in wrenches.items():
             self.body[bar].AddInForceInWorld(
-                self.context, _make_spatial(wrench), forces
+                self.context,
+                _make_spatial(wrench),
+                forces,
             )
         self.balancing = np.array(
             self.plant.CalcInverseDynamics(self.context, self.a, forces)

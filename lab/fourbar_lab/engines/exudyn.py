@@ -226,7 +226,9 @@ class ExudynBars(Loaded):
     def rotation(self, bar: int) -> Array:
         """Return that of the body."""
         matrix = self.mbs.GetObjectOutputBody(
-            self.body[bar], exu.OutputVariableType.RotationMatrix, [0.0, 0.0, 0.0]
+            self.body[bar],
+            exu.OutputVariableType.RotationMatrix,
+            [0.0, 0.0, 0.0],
         )
         return np.reshape(matrix, (3, 3))[:2, :2]
 
@@ -244,7 +246,12 @@ class ExudynBars(Loaded):
         """Locate the points of the bars."""
         return {name: self.point(point) for name, point in PART_POINTS.items()}
 
-    def move(self, bar: int, speed: float, acceleration: float) -> BarValues:
+    def move(
+        self,
+        bar: int,
+        speed: float,
+        acceleration: float,
+    ) -> BarValues:
         """Return speeds, accelerations and multipliers.
 
         Empty where a toggle leaves them 0/0.

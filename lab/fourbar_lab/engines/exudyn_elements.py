@@ -52,7 +52,12 @@ class ExudynBodies:
             )
             self.body[part.bar] = mbs.AddObject(body)
 
-    def point(self, bar: int, x: float = 0.0, y: float = 0.0) -> Any:
+    def point(
+        self,
+        bar: int,
+        x: float = 0.0,
+        y: float = 0.0,
+    ) -> Any:
         """Mark a point of a bar, along and across its line from its first pin.
 
         Of the ground it is in world axes.

@@ -99,7 +99,10 @@ class _OpenSimBars(Loaded):
         for bar, part in self.part.items():
             about_z = osim.Inertia(*[part.inertia] * 3, *ZERO_VECTOR)
             self.body[bar] = osim.Body(
-                f"bar{bar}", part.mass, _make_vec(*part.centre), about_z
+                f"bar{bar}",
+                part.mass,
+                _make_vec(*part.centre),
+                about_z,
             )
             model.addBody(self.body[bar])
         self.local = {
@@ -117,11 +120,18 @@ class _OpenSimBars(Loaded):
             "O2": self._make_joint("O2", 1, ZERO_VECTOR, 2, ZERO_VECTOR),
             "O4": self._make_joint("O4", 1, self.part[4].first_pin, 4, ZERO_VECTOR),
             "B": self._make_joint(
-                "B", 4, (self.length[4], 0.0, 0.0), 3, (self.length[3], 0.0, 0.0)
+                "B",
+                4,
+                (self.length[4], 0.0, 0.0),
+                3,
+                (self.length[3], 0.0, 0.0),
             ),
         }
         self.pin_a = osim.PointConstraint(
-            self.body[2], _make_vec(self.length[2]), self.body[3], _make_vec()
+            self.body[2],
+            _make_vec(self.length[2]),
+            self.body[3],
+            _make_vec(),
         )
         self.pin_a.set_isEnforced(
             False
@@ -250,7 +260,12 @@ class _OpenSimBars(Loaded):
         """Locate the points of the bars."""
         return {name: self.point(point) for name, point in PART_POINTS.items()}
 
-    def move(self, bar: int, speed: float, acceleration: float) -> BarValues:
+    def move(
+        self,
+        bar: int,
+        speed: float,
+        acceleration: float,
+    ) -> BarValues:
         """Compute speeds and accelerations, pin forces and torque.
 
         Empty where a toggle leaves them 0/0.
@@ -323,7 +338,9 @@ class _OpenSimBars(Loaded):
         for name, point in ON_BARS.items():
             bar, place = self.local[point]
             drift = self.matter.calcBiasForStationJacobian(
-                self.state, self.body[bar].getMobilizedBodyIndex(), _make_vec(*place)
+                self.state,
+                self.body[bar].getMobilizedBodyIndex(),
+                _make_vec(*place),
             )
             values[f"a_{name}"] = self._compute_station_jacobian(
                 point
@@ -418,18 +435,28 @@ class _OpenSimBars(Loaded):
         on_mobilities = osim.Vector()
         multipliers = self.state.getMultipliers()
         self.matter.calcConstraintForcesFromMultipliers(
-            self.state, multipliers, on_bodies, on_mobilities
+            self.state,
+            multipliers,
+            on_bodies,
+            on_mobilities,
         )
         force = on_bodies.get(int(self.body[2].getMobilizedBodyIndex())).get(1)
         return np.array([-force.get(0), -force.get(1)])
 
 
 OpenSimConstraints = partial(
-    Exact, "opensim-constraints", _OpenSimBars, ("theta_2", "theta_4", "stroke")
+    Exact,
+    "opensim-constraints",
+    _OpenSimBars,
+    ("theta_2", "theta_4", "stroke"),
 )
 
 
-def _make_vec(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
+def _make_vec(
+    x: float = 0.0,
+    y: float = 0.0,
+    z: float = 0.0,
+) -> Any:
     """Make a vector of three components."""
     return osim.Vec3(float(x), float(y), float(z))
 

@@ -56,7 +56,9 @@ class ExudynIntegrators(Simulator):
             lambda _, t, __, ___: theta_2 + omega_2 * t,
         )
         mbs.SetObjectParameter(
-            bars.drive, "offsetUserFunction_t", lambda _, t, __, ___: omega_2
+            bars.drive,
+            "offsetUserFunction_t",
+            lambda _, t, __, ___: omega_2,
         )
         state.SetODE2Coordinates(bars.q, configuration=initial)
         state.SetODE2Coordinates_t(speeds, configuration=initial)
@@ -86,7 +88,11 @@ class ExudynIntegrators(Simulator):
                 readings.read(
                     scene,
                     Instant(
-                        theta, v[bars.turn[2]], a[bars.turn[2]], exerted[-1], forces
+                        theta,
+                        v[bars.turn[2]],
+                        a[bars.turn[2]],
+                        exerted[-1],
+                        forces,
                     ),
                 )
             return True

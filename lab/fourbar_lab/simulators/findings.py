@@ -67,7 +67,9 @@ def read_docstring(script: Path) -> Reproduction:
     module = ast.parse(script.read_text(encoding="utf-8"))
     sentence, _, rest = (ast.get_docstring(module) or "").partition("\n\n")
     stated = re.findall(
-        rf"^({'|'.join(FIELDS)}): (.*(?:\n  .*)*)", dedent(rest), re.MULTILINE
+        rf"^({'|'.join(FIELDS)}): (.*(?:\n  .*)*)",
+        dedent(rest),
+        re.MULTILINE,
     )
     return Reproduction(
         script,

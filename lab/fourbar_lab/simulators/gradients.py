@@ -33,7 +33,11 @@ class ClosedState(NamedTuple):
     qvel: Array
 
 
-def compile_and_assemble(scene: Scene, theta_2: float, reader: str) -> ClosedState:
+def compile_and_assemble(
+    scene: Scene,
+    theta_2: float,
+    reader: str,
+) -> ClosedState:
     """Compile a scene for a simulator, and assemble it at theta_2 (rad).
 
     It has the speed there.
@@ -68,7 +72,9 @@ def assemble_either_side(
             number = float(read_place(scene, list_entries(scene)[key].place)) + step
             sides.append(
                 compile_and_assemble(
-                    replace_numbers(scene, {key: number}), theta_2, reader
+                    replace_numbers(scene, {key: number}),
+                    theta_2,
+                    reader,
                 )
             )
     return sides

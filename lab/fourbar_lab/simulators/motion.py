@@ -87,7 +87,11 @@ class Readings:
         }
         self.instants.append(
             Instant(
-                theta, float(now.omega_2), float(now.alpha_2), float(now.torque), forces
+                theta,
+                float(now.omega_2),
+                float(now.alpha_2),
+                float(now.torque),
+                forces,
             )
         )
         gap = compute_gap(scene, theta)
@@ -249,7 +253,11 @@ def _refuse_what_no_simulator_holds(scene: Scene, command: Command) -> None:
         )
 
 
-def lay_out(scene: Scene, command: Command, steps: int) -> tuple[Scene, Course]:
+def lay_out(
+    scene: Scene,
+    command: Command,
+    steps: int,
+) -> tuple[Scene, Course]:
     """Lay out a run through the positions of a command.
 
     The scene's motion begins before them, so that it settles.
@@ -276,7 +284,10 @@ def lay_out(scene: Scene, command: Command, steps: int) -> tuple[Scene, Course]:
         angle=np.array([first - sense * lead, *command.theta_2])
     )
     return replace(scene, motion=motion), Course(
-        find_timestep(scene, steps), steps, stops.tolist(), rows
+        find_timestep(scene, steps),
+        steps,
+        stops.tolist(),
+        rows,
     )
 
 
@@ -337,7 +348,11 @@ def start(scene: Scene) -> Start:
     first = usable[[np.argmin(theta_2) if omega_2 >= 0.0 else np.argmax(theta_2)]]
     theta = (commanded.theta_2[first], *closed.theta[:, first])
     omega = speeds_and_accelerations(
-        scene.linkage, theta[0], np.array([omega_2]), np.zeros(1), *theta[1:]
+        scene.linkage,
+        theta[0],
+        np.array([omega_2]),
+        np.zeros(1),
+        *theta[1:],
     ).omega
     q = [float(x[0]) for x in theta]
     v = [float(omega[bar][0]) for bar in (2, 3, 4)]

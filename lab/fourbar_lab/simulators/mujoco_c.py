@@ -100,7 +100,11 @@ def states_of(written: str, scene: Scene) -> list[tuple[Array, Array]]:
     return states
 
 
-def repeat_states(written: str, scene: Scene, worlds: int) -> tuple[Array, Array]:
+def repeat_states(
+    written: str,
+    scene: Scene,
+    worlds: int,
+) -> tuple[Array, Array]:
     """Repeat the scene's assembled positions over many worlds.
 
     Returns qpos and qvel, a row a world; the last world has the last position.
@@ -109,7 +113,11 @@ def repeat_states(written: str, scene: Scene, worlds: int) -> tuple[Array, Array
     return np.resize(q, (worlds, q.shape[1])), np.resize(v, (worlds, v.shape[1]))
 
 
-def read_last(scene: Scene, model: Any, results: tuple[Floats, ...]) -> Readings:
+def read_last(
+    scene: Scene,
+    model: Any,
+    results: tuple[Floats, ...],
+) -> Readings:
     """Read the last worlds, one for each position of the scene.
 
     Raises ArithmeticError if a number of any world is not finite.
@@ -147,7 +155,10 @@ class MujocoFile(Simulator):
         model, data = open_model(text(scene, course.steps, self.settings[self.setting]))
         advance = partial(mujoco.mj_step, model, data)
         return run_through(
-            scene, course, advance, lambda _: _evaluate_mujoco(model, data)
+            scene,
+            course,
+            advance,
+            lambda _: _evaluate_mujoco(model, data),
         )
 
     def states(self, scene: Scene) -> Readings:

@@ -48,7 +48,12 @@ def advance(model: Any, state: Any, steps: int) -> Any:
 
 @jax.jit  # type: ignore[untyped-decorator]
 @partial(jax.vmap, in_axes=(None, None, 0, 0))
-def _forward_all(model: Any, state: Any, q: Any, v: Any) -> tuple[Any, ...]:
+def _forward_all(
+    model: Any,
+    state: Any,
+    q: Any,
+    v: Any,
+) -> tuple[Any, ...]:
     """Evaluate states, and return what torque and pin forces are read from."""
     now = forward(model, state.replace(qpos=q, qvel=v))
     inner = getattr(now, "_impl", now)
@@ -106,7 +111,12 @@ class MujocoMjx(Simulator):
             readings.read(scene, _evaluate_mjx(model, forward(theirs, placed)))
         return readings
 
-    def in_worlds(self, scene: Scene, worlds: int, double: bool = True) -> Worlds:
+    def in_worlds(
+        self,
+        scene: Scene,
+        worlds: int,
+        double: bool = True,
+    ) -> Worlds:
         """Prepare single states of many worlds, in double or single precision.
 
         In single precision the file is that for Warp, whose flywheel is light: beside
@@ -231,7 +241,12 @@ def _torque(
 
 
 @jax.jit  # type: ignore[untyped-decorator]
-def _forwards(inputs: Any, moves: Any, data: Any, steps: int) -> Any:
+def _forwards(
+    inputs: Any,
+    moves: Any,
+    data: Any,
+    steps: int,
+) -> Any:
     _, slope, state = jax.jvp(
         lambda part: _torque(part, inputs, moves, data, steps),
         (0.0,),
@@ -242,7 +257,12 @@ def _forwards(inputs: Any, moves: Any, data: Any, steps: int) -> Any:
 
 
 @partial(jax.jit, static_argnames="iterations")
-def _backwards(inputs: Any, moves: Any, data: Any, iterations: int = 10) -> Any:
+def _backwards(
+    inputs: Any,
+    moves: Any,
+    data: Any,
+    iterations: int = 10,
+) -> Any:
     model, *state = inputs
     once = (model.tree_replace({"opt.iterations": iterations}), *state)
     return jax.grad(lambda part: _torque(part, once, moves, data, None), has_aux=True)(

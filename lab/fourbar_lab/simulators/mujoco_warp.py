@@ -187,7 +187,12 @@ def _forward(theirs: Any, state: Any, times: int) -> None:
     mjw.rne_postconstraint(theirs, state)
 
 
-def _evaluate_warp(model: Any, theirs: Any, state: Any, times: int) -> Instant:
+def _evaluate_warp(
+    model: Any,
+    theirs: Any,
+    state: Any,
+    times: int,
+) -> Instant:
     _forward(theirs, state, times)
     arrays = (state.qpos, state.qvel, state.qacc, state.actuator_force, state.cfrc_int)
     q, v, a, drive, on_bodies = (x.numpy()[-1].astype(float) for x in arrays)

@@ -80,7 +80,11 @@ class NewtonKamino(Simulator):
         now.joint_qd.assign(speeds)
         newton.eval_fk(model, now.joint_q, now.joint_qd, now)
         newton.solvers.SolverKamino(model, config).step(
-            now, then, control, None, course.timestep
+            now,
+            then,
+            control,
+            None,
+            course.timestep,
         )  # compiled before the clock runs
         t_2, t_32, t_4 = begin.qpos
         laid = {"O2": t_2, "A": t_32, "O4": t_4, "B": t_2 + t_32 - t_4}

@@ -48,7 +48,11 @@ class NewtonMujoco(Simulator):
         speeds[:3] = start(scene).qvel
         now.joint_qd.assign(speeds)
         newton.solvers.SolverMuJoCo(model).step(
-            now, then, control, None, course.timestep
+            now,
+            then,
+            control,
+            None,
+            course.timestep,
         )  # compiled before the clock runs
         names = [
             solver.mj_model.body(number).name for number in range(solver.mj_model.nbody)

@@ -48,7 +48,12 @@ class _LoopConstrained(ClosedTree):
         super().__init__(tree, time_constant)
         pin.computeJointMinimalOrdering(tree.model, self.data, self.models)
 
-    def acceleration(self, q: Array, v: Array, tau: Array) -> Any:
+    def acceleration(
+        self,
+        q: Array,
+        v: Array,
+        tau: Array,
+    ) -> Any:
         """Accelerate the closed loop."""
         return pin.lcaba(
             self.tree.model,
@@ -77,7 +82,12 @@ class _Impulses:
     Source: Pinocchio 4.1, examples of its ADMM solver.
     """
 
-    def __init__(self, tree: PinocchioTree, timestep: float, solver: str) -> None:
+    def __init__(
+        self,
+        tree: PinocchioTree,
+        timestep: float,
+        solver: str,
+    ) -> None:
         self.tree = tree
         self.h = timestep
         self.model, self.data = tree.model, tree.model.createData()
@@ -115,13 +125,23 @@ class _Impulses:
         self.closure.calc(model, data, self.closure_data[0])
         if self.cholesky is None:
             self.cholesky = pin.ConstraintCholeskyDecomposition(
-                model, data, self.models, self.closure_data
+                model,
+                data,
+                self.models,
+                self.closure_data,
             )
         self.cholesky.compute(
-            model, data, self.models, self.closure_data, DELASSUS_DIAGONAL
+            model,
+            data,
+            self.models,
+            self.closure_data,
+            DELASSUS_DIAGONAL,
         )
         jacobian = pin.getConstraintsJacobian(
-            model, data, self.models, self.closure_data
+            model,
+            data,
+            self.models,
+            self.closure_data,
         )
         g = (
             jacobian @ free
@@ -168,7 +188,9 @@ class PinocchioSolvers(Simulator):
         tree = PinocchioTree(scene)
         if isinstance(solver, str):
             return _run_by_impulses(
-                scene, course, _Impulses(tree, course.timestep, solver)
+                scene,
+                course,
+                _Impulses(tree, course.timestep, solver),
             )
         q = np.array(begin.qpos)
         v = np.array(begin.qvel)
@@ -221,7 +243,11 @@ class PinocchioSolvers(Simulator):
         return readings
 
 
-def _run_by_impulses(scene: Scene, course: Course, loop: _Impulses) -> Readings:
+def _run_by_impulses(
+    scene: Scene,
+    course: Course,
+    loop: _Impulses,
+) -> Readings:
     begin = start(scene)
     inertia = size_flywheel(scene, RECIPE_WITH_A_LIGHT_FLYWHEEL)
     q = np.array(begin.qpos)

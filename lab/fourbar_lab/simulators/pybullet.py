@@ -114,7 +114,13 @@ class PyBullet(Simulator):
             ]
             none = [0.0, 0.0, 0.0]
             ball = bullet.createConstraint(
-                body, 1, body, 2, bullet.JOINT_POINT2POINT, none, *frames
+                body,
+                1,
+                body,
+                2,
+                bullet.JOINT_POINT2POINT,
+                none,
+                *frames,
             )
             bullet.changeConstraint(ball, maxForce=_STRONG)
 
@@ -142,7 +148,11 @@ class PyBullet(Simulator):
                 )
                 pins = {"F12": F12, "F32": (-F23[0], -F23[1]), "F43": force, "F14": F14}
                 return Instant(
-                    theta, speed, (after[1] - speed) / course.timestep, after[3], pins
+                    theta,
+                    speed,
+                    (after[1] - speed) / course.timestep,
+                    after[3],
+                    pins,
                 )
 
             return run_through(scene, course, advance, read)

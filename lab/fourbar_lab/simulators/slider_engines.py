@@ -205,5 +205,8 @@ if __name__ == "__main__":
             "effects": ["gravity", "loads"],
         }
         serve_slider_crank(
-            hello, partial(answer_slider_positions, loop), sys.stdin.buffer, stdout
+            hello,
+            partial(answer_slider_positions, loop),
+            sys.stdin.buffer,
+            stdout,
         )

@@ -70,7 +70,12 @@ class MujocoSlider:
             mujoco.mj_jacSite(self.model, self.data, slope, None, site)
             body = self.model.site_bodyid[site]
             mujoco.mj_jacDot(
-                self.model, self.data, rate, None, self.data.site_xpos[site], body
+                self.model,
+                self.data,
+                rate,
+                None,
+                self.data.site_xpos[site],
+                body,
             )
         end, slider = (self.data.site_xpos[site][:2] for site in self.sites)
         return (

@@ -34,7 +34,9 @@ class PinocchioSlider:
             placement = pin.SE3(np.eye(3), np.array([*place, 0.0]))
             self.model.addJoint(parent, joint, placement, f"joint {number}")
             inertia = pin.Inertia(
-                body.mass, np.array([*body.centre, 0.0]), np.diag([body.inertia] * 3)
+                body.mass,
+                np.array([*body.centre, 0.0]),
+                np.diag([body.inertia] * 3),
             )
             self.model.appendBodyToJoint(number, inertia, pin.SE3.Identity())
         end = pin.SE3(np.eye(3), np.array([rod, 0.0, 0.0]))
@@ -66,7 +68,10 @@ class PinocchioSlider:
         ]
         drifts = [
             pin.getFrameClassicalAcceleration(
-                self.model, self.data, frame, axes
+                self.model,
+                self.data,
+                frame,
+                axes,
             ).linear[:2]
             for frame in self.frames
         ]

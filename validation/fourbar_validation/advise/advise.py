@@ -188,7 +188,11 @@ class _Advice:
         )
 
 
-def advise(scene: Scene, error: float, setup: TrialSetup | None = None) -> _Advice:
+def advise(
+    scene: Scene,
+    error: float,
+    setup: TrialSetup | None = None,
+) -> _Advice:
     """Search the number of steps, and the time constant, by runs of the scene.
 
     The time constant is searched around what the law says.
@@ -197,10 +201,14 @@ def advise(scene: Scene, error: float, setup: TrialSetup | None = None) -> _Advi
     """
     if not 0.0 < error < 1.0:
         raise InputError(
-            "--error", error, "must be a relative error, above 0 and below 1"
+            "--error",
+            error,
+            "must be a relative error, above 0 and below 1",
         )
     return _CheapestSearch(
-        scene, error, setup or TrialSetup(scene, choose_positions(scene))
+        scene,
+        error,
+        setup or TrialSetup(scene, choose_positions(scene)),
     ).advice()
 
 
@@ -213,7 +221,9 @@ def choose_positions(scene: Scene) -> Command:
     if np.ptp(command.branch) != 0:
         return command
     between = np.linspace(
-        command.theta_2.min(), command.theta_2.max(), INTERVALS_READ + 1
+        command.theta_2.min(),
+        command.theta_2.max(),
+        INTERVALS_READ + 1,
     )
     theta_2 = np.union1d(command.theta_2, between)
     return command._replace(
@@ -251,7 +261,12 @@ def _describe_time(setup: TrialSetup, attempt: SearchRun) -> str:
 class _CheapestSearch:
     """Settings tried on one scene, for one required error."""
 
-    def __init__(self, scene: Scene, error: float, setup: TrialSetup) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        error: float,
+        setup: TrialSetup,
+    ) -> None:
         self.scene = scene
         self.error = error
         self.setup = setup
@@ -521,7 +536,9 @@ def advise_command(
 
     if output is not None and len(scenes) > 1:
         raise InputError(
-            "-o", str(output), f"is the MJCF of one scene, not of {len(scenes)}"
+            "-o",
+            str(output),
+            f"is the MJCF of one scene, not of {len(scenes)}",
         )
     loaded = [(scene, load(scene)) for scene in scenes]
     if output is not None:

@@ -272,7 +272,11 @@ def _describe_setting(
         )
 
 
-def _explain_timestep(setup: TrialSetup, times: float, growth: float) -> str:
+def _explain_timestep(
+    setup: TrialSetup,
+    times: float,
+    growth: float,
+) -> str:
     """Say what of the growth comes from the steps, and what from the curve.
 
     The curve is drawn between the steps.

@@ -339,7 +339,9 @@ def check_command(
         ):
             if value is not None:
                 raise InputError(
-                    option, str(value), "is of a table: a problem has its own levels"
+                    option,
+                    str(value),
+                    "is of a table: a problem has its own levels",
                 )
         return check_problem(scene, theirs)
     table = read_table(theirs)
@@ -364,7 +366,11 @@ def check_command(
     return judgement.status
 
 
-def show_judgement(judgement: Judgement, table: TheirTable, name: str) -> None:
+def show_judgement(
+    judgement: Judgement,
+    table: TheirTable,
+    name: str,
+) -> None:
     """Print what differs, what explains it, and the count."""
     from rich.console import Console
     from rich.markup import escape

@@ -219,7 +219,11 @@ def _is_same_value(
     )
 
 
-def _remark(key: str, ours: Value | None, theirs: Value | None) -> str:
+def _remark(
+    key: str,
+    ours: Value | None,
+    theirs: Value | None,
+) -> str:
     remark = next((text for part, text in _REMARKS.items() if part in key), "")
     if isinstance(ours, float) and isinstance(theirs, float) and ours * theirs > 0.0:
         power = math.log10(abs(theirs)) - math.log10(abs(ours))

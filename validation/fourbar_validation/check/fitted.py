@@ -88,7 +88,12 @@ def _find_ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
         unit = UNITS[name_quantity(key)]
         near = float(ours @ theirs) / squares
         ratio_found = _name_ratio(
-            judge, key, announced.text, announced.factor, unit, near
+            judge,
+            key,
+            announced.text,
+            announced.factor,
+            unit,
+            near,
         )
         if ratio_found is None and np.count_nonzero(ours) >= ENOUGH_NUMBERS and near:
             ratio_found = _round_ratio(judge, key, near)
@@ -135,7 +140,11 @@ def _name_ratio(
     return None
 
 
-def _round_ratio(judge: Judge, key: str, near: float) -> tuple[str, float] | None:
+def _round_ratio(
+    judge: Judge,
+    key: str,
+    near: float,
+) -> tuple[str, float] | None:
     """Round to a power of ten, or keep the ratio as fitted.
 
     A reversed sign is a mistake of its own.
@@ -166,7 +175,12 @@ def _try_exchanged(differing: list[str]) -> Iterator[Mistake]:
             )
 
 
-def _compute_residual(judge: Judge, key: str, one: Array, base: Array) -> Array:
+def _compute_residual(
+    judge: Judge,
+    key: str,
+    one: Array,
+    base: Array,
+) -> Array:
     scale = judge.size(key)
     mask = judge.where(key) & (scale > 0.0)
     scaled = (one[mask] - base[mask]) / (
@@ -419,7 +433,11 @@ def _try_order(judge: Judge) -> Iterator[Mistake]:
     yield Mistake(text, lambda quantity, right: _take_rows(quantity, right, nearest))
 
 
-def _take_rows(quantity: str, right: Solution, rows: Array) -> Array | None:
+def _take_rows(
+    quantity: str,
+    right: Solution,
+    rows: Array,
+) -> Array | None:
     if quantity == "theta_2":
         values = None
     else:

@@ -146,7 +146,10 @@ class Judge:
         if key not in self._sizes:
             quantity = name_quantity(key)
             self._sizes[key] = scale_of(
-                quantity, self.scene, self.right, getattr(self.right, quantity)
+                quantity,
+                self.scene,
+                self.right,
+                getattr(self.right, quantity),
             )
         return self._sizes[key]
 
@@ -174,7 +177,9 @@ class Judge:
         scale = replace_zero_size(size)  # quantities whose terms are all 0
         theirs = self.table.values[key]
         theirs = np.where(
-            np.isnan(theirs), ours, theirs
+            np.isnan(theirs),
+            ours,
+            theirs,
         )  # a component that their table does not have
         apart = compute_difference(quantity, ours, theirs)
         condition = find_condition(quantity, self.scene.linkage, self.right)

@@ -74,7 +74,11 @@ def _change_column(
     return None
 
 
-def _subtract_angle_of(bar: int, quantity: str, right: Solution) -> Array | None:
+def _subtract_angle_of(
+    bar: int,
+    quantity: str,
+    right: Solution,
+) -> Array | None:
     """Take an angle, or its rate, from the line of another bar."""
     if not _is_angular(quantity) or quantity.endswith(str(bar)):
         return None
@@ -86,7 +90,11 @@ def _subtract_angle_of(bar: int, quantity: str, right: Solution) -> Array | None
     return np.asarray(values - base)
 
 
-def _take_from(wrong: Solution, quantity: str, right: Solution) -> Array | None:
+def _take_from(
+    wrong: Solution,
+    quantity: str,
+    right: Solution,
+) -> Array | None:
     return getattr(wrong, quantity, None)
 
 
@@ -154,7 +162,9 @@ def _list_other_problems(
     for text, other_command in _list_other_commands(command):
         yield text, scene, other_command
     for text, changed in chain(
-        _change_gravity(scene), _change_loads(scene), _change_bars(scene)
+        _change_gravity(scene),
+        _change_loads(scene),
+        _change_bars(scene),
     ):
         yield text, changed, command
     for drive in {2, 3, 4} - {scene.drive_bar} if scene.drive is None else ():

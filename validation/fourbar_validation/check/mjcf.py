@@ -181,7 +181,9 @@ def _read_role_names(pairs: tuple[str, ...]) -> dict[str, str]:
         role, equals, name = pair.partition("=")
         if not equals or role not in allowed or not name:
             raise InputError(
-                "--name", pair, f"must be ROLE=NAME, ROLE one of {', '.join(allowed)}"
+                "--name",
+                pair,
+                f"must be ROLE=NAME, ROLE one of {', '.join(allowed)}",
             )
         names[role] = name
     return names
@@ -226,7 +228,14 @@ def examine_model(
         differences = find_differences(generated.described, theirs.described)
         if any(row.failed for row in rows):
             differences = _price_differences(
-                name, scene, file, theirs, differences, rows, tolerance, examined
+                name,
+                scene,
+                file,
+                theirs,
+                differences,
+                rows,
+                tolerance,
+                examined,
             )
     if parts := list_unread(file.text):
         unread = [f"not looked at: {', '.join(parts)}"]
@@ -252,7 +261,9 @@ def _price_differences(
     """
     of_mechanism = [one for one in differences if not is_setting(one.key)]
     answered = examined(
-        _CHANGED, scene, [(one.key, one.theirs) for one in of_mechanism]
+        _CHANGED,
+        scene,
+        [(one.key, one.theirs) for one in of_mechanism],
     )
     unchanged, *changed = (
         _list_rows(name, scene, answers or [], tolerance) for answers in answered
@@ -298,7 +309,11 @@ def _list_rows(
     return rows
 
 
-def show_model_report(report: ModelReport, mjcf: Path, out: Path) -> None:
+def show_model_report(
+    report: ModelReport,
+    mjcf: Path,
+    out: Path,
+) -> None:
     """Print the report and write theirs.md and results.csv."""
     from rich.console import Console
     from rich.markup import escape
@@ -457,7 +472,12 @@ def check_mjcf_command(
         worst = max(map(find_worst_of_loop, measurement.loops))
         return int(wanted is not None and not worst <= wanted)
     examined = examine_model(
-        name, scene, theirs, _read_role_names(names), wanted, assets
+        name,
+        scene,
+        theirs,
+        _read_role_names(names),
+        wanted,
+        assets,
     )
     show_model_report(examined, theirs, out)
     return examined.counts.status

@@ -91,7 +91,10 @@ def _read_document(path: str | Path, schema: str) -> dict[str, Any]:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(
-            "JSON", None, f"cannot be read: {write_one_line(str(error))}", str(path)
+            "JSON",
+            None,
+            f"cannot be read: {write_one_line(str(error))}",
+            str(path),
         ) from None
     if not isinstance(data, dict) or data.get("schema") != schema:
         raise InputError(
@@ -117,7 +120,10 @@ def judge_answers(
         answers, errors = _answer_at(problem, answered["at"])
     return [
         _judge_quantity(
-            name, answers[name], errors[name], answered["answers"].get(name)
+            name,
+            answers[name],
+            errors[name],
+            answered["answers"].get(name),
         )
         for name in answers
     ]
@@ -163,7 +169,12 @@ def collect_answers(solution: Solution) -> tuple[dict[str, Array], dict[str, Arr
     return {name: getattr(solution, name) for name in bars}, bars
 
 
-def _judge_quantity(name: str, values: Any, errors: Any, theirs: Any) -> JudgedQuantity:
+def _judge_quantity(
+    name: str,
+    values: Any,
+    errors: Any,
+    theirs: Any,
+) -> JudgedQuantity:
     group = next(
         (group for group, names in QUANTITIES_OF_GROUP.items() if name in names),
         "motion",

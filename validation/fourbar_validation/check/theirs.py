@@ -201,7 +201,10 @@ def read_table(path: Path) -> TheirTable:
         unit_line = rows.pop(0)[1]
     if not rows:
         raise InputError(
-            "table", path.name, "needs a header and at least one row", str(path)
+            "table",
+            path.name,
+            "needs a header and at least one row",
+            str(path),
         )
     columns, left_out, renamings = _read_headings(path, headings, unit_line)
     _drop_repeated(path, columns, left_out, headings, rows)
@@ -225,11 +228,16 @@ def read_table(path: Path) -> TheirTable:
             else:
                 beside = ""
             raise InputError(
-                f"line {line}", cells, f"needs {len(headings)} cells{beside}", str(path)
+                f"line {line}",
+                cells,
+                f"needs {len(headings)} cells{beside}",
+                str(path),
             )
         for index, (name, unit) in columns.items():
             value, half = _read_cell(
-                path, f"line {line}, {headings[index].strip()}", cells[index]
+                path,
+                f"line {line}, {headings[index].strip()}",
+                cells[index],
             )
             numbers[name][row], halves[name][row] = (
                 value * unit.factor,
@@ -382,7 +390,10 @@ def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
         raise InputError("table", path.name, "must be a CSV file", str(path)) from None
     if len(numbered) < 2:
         raise InputError(
-            "table", path.name, "needs a header and at least one row", str(path)
+            "table",
+            path.name,
+            "needs a header and at least one row",
+            str(path),
         )
     if delimiter != ",":  # there a comma is a decimal comma
         numbered[1:] = [
@@ -505,7 +516,12 @@ def _read_headings(
     return columns, left_out, renamings
 
 
-def _read_unit(path: Path, heading: str, quantity: str, text: str) -> Unit:
+def _read_unit(
+    path: Path,
+    heading: str,
+    quantity: str,
+    text: str,
+) -> Unit:
     if not text or text == UNITS[quantity]:
         return Unit(UNITS[quantity], 1.0)
     from fourbar.quantities.units import find_factor
@@ -518,7 +534,10 @@ def _read_unit(path: Path, heading: str, quantity: str, text: str) -> Unit:
         if (usual := plain.get(_spell(text))) is not None:
             return Unit(text, find_factor(unit, usual))
         raise InputError(
-            "header", heading, f"{text}: {error.allowed}", str(path)
+            "header",
+            heading,
+            f"{text}: {error.allowed}",
+            str(path),
         ) from None
 
 
@@ -528,7 +547,11 @@ def _find_known() -> str:
     )
 
 
-def _read_cell(path: Path, place: str, cell: str) -> tuple[float, float]:
+def _read_cell(
+    path: Path,
+    place: str,
+    cell: str,
+) -> tuple[float, float]:
     """Read the number in a cell and half a unit of its last printed digit.
 
     It is NaN for a blank.

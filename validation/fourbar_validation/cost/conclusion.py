@@ -36,7 +36,11 @@ def list_stepped(curves: Curves) -> list[CostPoint]:
     ]
 
 
-def find_cheapest(curves: Curves, quantity: str, error: float) -> CostPoint | None:
+def find_cheapest(
+    curves: Curves,
+    quantity: str,
+    error: float,
+) -> CostPoint | None:
     """Find the cheapest stepped point within an error.
 
     The error is that at the steps and between them.

@@ -49,7 +49,11 @@ COST_HEADINGS = ("setting", "error", "ms per simulated second", "ms a revolution
     is_flag=True,
     help="Print the cheapest settings of every error, the laws and the warnings too.",
 )
-def cost(scenes: tuple[Path, ...], out: Path, verbose: bool) -> int:
+def cost(
+    scenes: tuple[Path, ...],
+    out: Path,
+    verbose: bool,
+) -> int:
     """Measure what accuracy costs in time.
 
     Every method is measured on SCENES (default: the crank-rocker). An interrupted study

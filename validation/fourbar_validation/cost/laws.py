@@ -275,7 +275,11 @@ def _error_at_steps(point: CostPoint, quantity: str) -> float:
     return float(getattr(point.at_steps, quantity))
 
 
-def _measure_leap(point: CostPoint, ladder: Sequence[CostPoint], quantity: str) -> str:
+def _measure_leap(
+    point: CostPoint,
+    ladder: Sequence[CostPoint],
+    quantity: str,
+) -> str:
     before = _error_at_steps(ladder[ladder.index(point) - 1], quantity)
     after = _error_at_steps(point, quantity)
     return f"jumps from {before:.1e} to {after:.1e} at {point.setting}"

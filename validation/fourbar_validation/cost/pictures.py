@@ -85,7 +85,10 @@ SOFTNESS_LOOKS = {
     "at the scene's speed": Look("softness d", _BLUE, "o"),
     "at 0.1 rad/s": Look("sag d, slow", _ORANGE, "s", _DASHED),
     "at 0.1 rad/s, nothing acts": Look(
-        "sag d, slow, nothing acts", _GREEN, "^", _DOTTED
+        "sag d, slow, nothing acts",
+        _GREEN,
+        "^",
+        _DOTTED,
     ),
 }
 SOLVERS = {
@@ -108,7 +111,11 @@ _NEAR_FRONT = 1.1
 """Time over that of the cheapest within which an advised setting is one of them."""
 
 
-def draw_pictures(curves: Curves, title: str, folder: Path) -> list[Path]:
+def draw_pictures(
+    curves: Curves,
+    title: str,
+    folder: Path,
+) -> list[Path]:
     """Draw all pictures of a scene as SVG and PNG; the files written."""
     with apply_style():
         made = make_pictures(curves, title)
@@ -165,7 +172,11 @@ def _draw_look(
     )
 
 
-def make_figure(height: float, statement: str, title: str) -> Any:
+def make_figure(
+    height: float,
+    statement: str,
+    title: str,
+) -> Any:
     """Make a figure with what it means, and what was run, above it."""
     from matplotlib.figure import Figure
 
@@ -210,7 +221,11 @@ def set_axes(axes: Any, legend_columns: int = 2) -> None:
         )
 
 
-def draw_work_precision(curves: Curves, quantity: str, title: str) -> Any:
+def draw_work_precision(
+    curves: Curves,
+    quantity: str,
+    title: str,
+) -> Any:
     """Draw the error over the time of a simulated second.
 
     It is that of the torque, or of the worst pin force.
@@ -298,7 +313,12 @@ def _name_point(
     labels.add(Label(axes, text, (x, y), (0.5 * x, y), INK, TEXT))
 
 
-def _mark_exact(labels: Labels, axes: Any, point: CostPoint, quantity: str) -> None:
+def _mark_exact(
+    labels: Labels,
+    axes: Any,
+    point: CostPoint,
+    quantity: str,
+) -> None:
     """Mark a method that answers each position by itself."""
     marks = {EXACT_MOTION: ("h", _GREEN), FORMULAS_CURVE: ("*", INK)}
     value = getattr(point.errors, quantity)
@@ -368,7 +388,12 @@ def _find_price(curves: Curves, quantity: str) -> tuple[str, CostPoint | None]:
     return "", None
 
 
-def _mark_price(labels: Labels, axes: Any, curves: Curves, quantity: str) -> None:
+def _mark_price(
+    labels: Labels,
+    axes: Any,
+    curves: Curves,
+    quantity: str,
+) -> None:
     """Ring the point that the title prices, with its digits and time."""
     digits, point = _find_price(curves, quantity)
     if point is None:
@@ -507,7 +532,13 @@ def _draw_solver(curves: Curves, title: str) -> Any:
     return figure
 
 
-def _draw_slope(axes: Any, exponent: float, x: float, y: float, name: str) -> None:
+def _draw_slope(
+    axes: Any,
+    exponent: float,
+    x: float,
+    y: float,
+    name: str,
+) -> None:
     """Draw a slope with its exponent next to it."""
     axes.plot([x, 4.0 * x], [y, y * 4.0**exponent], color=INK, lw=1.0)
     axes.annotate(
@@ -520,7 +551,11 @@ def _draw_slope(axes: Any, exponent: float, x: float, y: float, name: str) -> No
     )
 
 
-def _draw_over_timestep(axes: Any, curves: Curves, quantity: str) -> None:
+def _draw_over_timestep(
+    axes: Any,
+    curves: Curves,
+    quantity: str,
+) -> None:
     """Draw one quantity's error over the timestep, by integrator.
 
     Its jumps are ringed.

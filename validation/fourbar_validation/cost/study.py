@@ -121,7 +121,12 @@ def _read_cost_point(row: dict[str, Any]) -> CostPoint:
 class CostStudy:
     """The parts of a study of one scene, each in its own file."""
 
-    def __init__(self, name: str, scene: Scene, folder: Path) -> None:
+    def __init__(
+        self,
+        name: str,
+        scene: Scene,
+        folder: Path,
+    ) -> None:
         self.name = name
         self.scene = scene
         self.folder = folder
@@ -231,12 +236,16 @@ class CostStudy:
         clocks: dict[tuple[str, int], Callable[[], float]] = {}
         for number, (spot, trial) in enumerate(zip(spots, trials, strict=True)):
             time_steps, time_readings = setup.make_clocks(
-                spot.settings, spot.closure, spot.drive
+                spot.settings,
+                spot.closure,
+                spot.drive,
             )
             steps = min(trial.steps, MOST_STEPS_TIMED) or 1
             clocks["step", number] = partial(_time_each, time_steps, steps)
             clocks["reading", number] = partial(
-                _time_each, time_readings, TIMED_READINGS
+                _time_each,
+                time_readings,
+                TIMED_READINGS,
             )
         times = time_in_turns(clocks, TIMINGS_OF_A_SETTING)
         points = []
@@ -318,7 +327,10 @@ class CostStudy:
         for label, method in formulas.METHODS_TIMED.items():
             try:
                 errors = formulas.compare_with_reference(
-                    self.scene, few, method(self.scene, few), exact
+                    self.scene,
+                    few,
+                    method(self.scene, few),
+                    exact,
                 )
             except (NotImplementedError, AssertionError) as error:
                 self.left_out.append(f"{label}: {error}")
@@ -374,7 +386,12 @@ class CostStudy:
             ]
             points.append(
                 self._make_point(
-                    "inverse", EXACT_MOTION, label, errors, times, len(rows)
+                    "inverse",
+                    EXACT_MOTION,
+                    label,
+                    errors,
+                    times,
+                    len(rows),
                 )
             )
         return points
@@ -406,7 +423,13 @@ class CostStudy:
             errors = compute_errors(self.scene, command, quantities)
             points.append(
                 self._make_point(
-                    "one state", EXACT_MOTION, label, errors, (), len(rows), softness
+                    "one state",
+                    EXACT_MOTION,
+                    label,
+                    errors,
+                    (),
+                    len(rows),
+                    softness,
                 )
             )
         return points

@@ -14,7 +14,11 @@ from fourbar_validation.compare.answer import Adapter, Answer
 from fourbar_validation.engines.protocol import require_near
 
 
-def ask_at(adapter: Adapter, scene: Scene, command: Command) -> Answer:
+def ask_at(
+    adapter: Adapter,
+    scene: Scene,
+    command: Command,
+) -> Answer:
     """Give an engine what is commanded, with the sign of its sine.
 
     The sign is at each position; nothing else of the formulas is given.

@@ -277,7 +277,11 @@ def _solve_linear(rows: list[list[Ball]], right: list[Ball]) -> list[Ball]:
     return [solution[k, 0] for k in range(len(right))]
 
 
-def compute_outputs(scene: Scene, branch: int, inputs: BallValues) -> BallValues | None:
+def compute_outputs(
+    scene: Scene,
+    branch: int,
+    inputs: BallValues,
+) -> BallValues | None:
     """Compute every output at one position as balls.
 
     Vectors are name_x, name_y; None if the loop does not close.
@@ -380,7 +384,11 @@ class _BallBars(NamedTuple):
         return points
 
 
-def _move_balls(x: BallValues, w: dict[int, ComplexBall], commanded: int) -> _BallBars:
+def _move_balls(
+    x: BallValues,
+    w: dict[int, ComplexBall],
+    commanded: int,
+) -> _BallBars:
     """Move the bars: two linear systems of the differentiated loop."""
     a = x["a"]
     b = x["b"]
@@ -636,7 +644,12 @@ def _put_vectors(y: BallValues, vectors: dict[str, ComplexBall]) -> None:
         y[f"{name}_y"] = vector.imag
 
 
-def _interpolate_factor(table: Table, theta_2: Ball, x: BallValues, k: int) -> Ball:
+def _interpolate_factor(
+    table: Table,
+    theta_2: Ball,
+    x: BallValues,
+    k: int,
+) -> Ball:
     """Interpolate between the two points of a table that enclose an angle.
 
     The angle is taken modulo a turn. Where the inputs have them, the four numbers are
@@ -737,7 +750,11 @@ class _BallLine(NamedTuple):
         return force.real, force.imag, wedge(self.arms[bar] - centre, force)
 
 
-def _find_line(scene: Scene, x: BallValues, bars_in_motion: _BallBars) -> _BallLine:
+def _find_line(
+    scene: Scene,
+    x: BallValues,
+    bars_in_motion: _BallBars,
+) -> _BallLine:
     """Find the line of a drive from the directions and first pins of all bars.
 
     The ground's are among them.

@@ -74,7 +74,11 @@ def reduce_angle(angle: float) -> float:
     return math.atan2(math.sin(angle), math.cos(angle))
 
 
-def rotate(angle: float, x: float, y: float) -> tuple[float, float]:
+def rotate(
+    angle: float,
+    x: float,
+    y: float,
+) -> tuple[float, float]:
     """Rotate (x, y) along and across a line at an angle (rad) into world axes."""
     cos = math.cos(angle)
     sin = math.sin(angle)

@@ -178,7 +178,11 @@ def has_term(effect: "Effect") -> bool:
     return effect.key in TERM_OF or declares(effect, "act_on_engine")
 
 
-def list_wrenches(scene: Scene, bars: Loaded, own: Container[str] = ()) -> list[Act]:
+def list_wrenches(
+    scene: Scene,
+    bars: Loaded,
+    own: Container[str] = (),
+) -> list[Act]:
     """List what loads and effects do at each state of the bars.
 
     Gravity is the engine's own, and is set once.

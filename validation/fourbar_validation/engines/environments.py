@@ -104,7 +104,10 @@ def _read_entry(file: Path, table: object) -> Entry:
     lists = ("command", "requires")
     if not isinstance(table, dict) or not table.get("name"):
         raise InputError(
-            "engine", table, "must be a table [[engine]] with a name", str(file)
+            "engine",
+            table,
+            "must be a table [[engine]] with a name",
+            str(file),
         )
     for key, value in table.items():
         if key == "steps" or key in lists:
@@ -120,7 +123,10 @@ def _read_entry(file: Path, table: object) -> Entry:
             raise InputError(f"engine.{key}", value, allowed, str(file))
     if bool(table.get("adapter")) == bool(table.get("command")):
         raise InputError(
-            "engine", table["name"], "must have an adapter or a command", str(file)
+            "engine",
+            table["name"],
+            "must have an adapter or a command",
+            str(file),
         )
     stated: dict[str, Any] = {
         key: tuple(value) if isinstance(value, list) else value
@@ -200,7 +206,10 @@ def prepare_program(entry: Entry, seconds: float | None = None) -> Program:
     )
     if program is None:
         raise InputError(
-            "engine.command", entry.command[0], "no such program", ENGINES_FILE
+            "engine.command",
+            entry.command[0],
+            "no such program",
+            ENGINES_FILE,
         )
     return Program((program, *entry.command[1:]), seconds)
 

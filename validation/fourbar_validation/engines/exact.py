@@ -110,7 +110,11 @@ def compute_exact_sines(linkage: FourBar, command: Command) -> Array:
     return sines
 
 
-def shift_to(linkage: FourBar, theta_2: float, sin_mu: float) -> Any:
+def shift_to(
+    linkage: FourBar,
+    theta_2: float,
+    sin_mu: float,
+) -> Any:
     """Compute what to add to theta_2 for sin(theta_4 - theta_3) to be +-sin_mu.
 
     It is in rad (mpmath); None if beyond rounding.

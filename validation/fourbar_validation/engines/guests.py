@@ -387,7 +387,9 @@ class GuestClient:
         }
         try:
             return protocol.answer_from_json(
-                self.name, command, self._ask(data, len(command.angle))
+                self.name,
+                command,
+                self._ask(data, len(command.angle)),
             )
         except InputError as error:
             raise EngineError(str(error)) from None
@@ -404,7 +406,9 @@ class GuestClient:
         data |= {} if self.step is None else {"step": self.step}
         try:
             return protocol.released_from_json(
-                self.name, len(times), self._ask(data, len(times))
+                self.name,
+                len(times),
+                self._ask(data, len(times)),
             )
         except InputError as error:
             raise EngineError(str(error)) from None

@@ -96,7 +96,12 @@ class EngineBars(Assembled, Protocol):
         The end on the bar is at angle 0 of the bar; the other is on the ground.
         """
 
-    def move(self, bar: int, speed: float, acceleration: float) -> BarValues:
+    def move(
+        self,
+        bar: int,
+        speed: float,
+        acceleration: float,
+    ) -> BarValues:
         """Return motion and forces where the bars are placed, by name.
 
         Empty where a toggle leaves them 0/0.
@@ -169,7 +174,12 @@ class Loaded(EngineBars, Protocol):
         (cosine, _), (sine, _) = self.rotation(bar).tolist()
         return math.atan2(sine, cosine)
 
-    def rotate(self, bar: int, x: float, y: float) -> Components:
+    def rotate(
+        self,
+        bar: int,
+        x: float,
+        y: float,
+    ) -> Components:
         """Rotate (x, y) along and across a bar's line into world axes."""
         if bar == 1:
             return rotate(self.ground_angle, x, y)
@@ -231,7 +241,12 @@ class Loaded(EngineBars, Protocol):
         """Set a field (g_x, g_y) for the engine's own gravity, m/s^2."""
         self.field = field
 
-    def push(self, bar: int, force: Iterable[float], point: Iterable[float]) -> None:
+    def push(
+        self,
+        bar: int,
+        force: Iterable[float],
+        point: Iterable[float],
+    ) -> None:
         """Add a force (N, world axes) at a point (m, world axes).
 
         On the ground it does nothing.
@@ -322,7 +337,11 @@ class Loaded(EngineBars, Protocol):
         return forces
 
 
-def _is_settled(change: float, before: float, most: float) -> bool:
+def _is_settled(
+    change: float,
+    before: float,
+    most: float,
+) -> bool:
     """Tell whether passes over the friction repeat the pin loads.
 
     Once down to the rounding of a pass, the change falls no further.

@@ -139,7 +139,11 @@ class Assembler:
         return None
 
 
-def _compute_triangle_angle(e: float, near: float, far: float) -> float:
+def _compute_triangle_angle(
+    e: float,
+    near: float,
+    far: float,
+) -> float:
     """Compute the angle between the sides e and near, by half-angle tangents."""
     above = (e - near + far) * (far + near - e)
     below = (e + near - far) * (e + near + far)
@@ -258,7 +262,11 @@ class Exact:
         names = list_unknowns(scene, names)
         names += [f"{name_driving(scene)}_inertia"] if bars.alone and moves else []
 
-        def read(q: JointAngles, speed: float, acceleration: float) -> BarValues:
+        def read(
+            q: JointAngles,
+            speed: float,
+            acceleration: float,
+        ) -> BarValues:
             theta_3 = bars.angle(3)
             theta_4 = bars.angle(4)
             values: BarValues = dict(bars.positions())

@@ -139,7 +139,11 @@ def _predict_error(
         theta_2 = float(command.theta_2[i])
         branch = int(command.branch[i])
         moved = _compute_sensitivity(
-            scene, theta_2, branch, float(omega[i]), float(alpha[i])
+            scene,
+            theta_2,
+            branch,
+            float(omega[i]),
+            float(alpha[i]),
         )
         if quantity in OF_THE_INPUT:
             if moved is not None and moved.states(quantity):
@@ -169,7 +173,11 @@ def _predict_error(
     return errors
 
 
-def _bound_touching(linkage: FourBar, theta_2: float, quantity: str) -> float:
+def _bound_touching(
+    linkage: FourBar,
+    theta_2: float,
+    quantity: str,
+) -> float:
     """Bound an error where rounding decides whether the loop closes.
 
     It is infinite without a bound.
@@ -223,7 +231,13 @@ class Sensitivities(NamedTuple):
         """
         return (f"{name}_x" if name in VECTORS else name) in self.data
 
-    def first_order(self, name: str, reach: float, *, carried: bool = False) -> float:
+    def first_order(
+        self,
+        name: str,
+        reach: float,
+        *,
+        carried: bool = False,
+    ) -> float:
         """Predict the error of an output, vectors by their norm.
 
         It is infinite if it has none.
@@ -295,7 +309,9 @@ def _compute_sensitivity(
         for bar in MOVING_BARS:
             _add_response(loop, base, move(**{f"couple_{bar}": strongest * step}))
             _add_response(
-                carried, base, move(**{f"couple_{bar}": heaviest * hardest * step})
+                carried,
+                base,
+                move(**{f"couple_{bar}": heaviest * hardest * step}),
             )
     return Sensitivities(data, loop, carried)
 
@@ -368,7 +384,9 @@ def _add_responses(
         step = weight * arb(2) ** -STEP_BITS
         sides = (move(**{name: inputs[name] + side * step}) for side in (1, -1))
         _add_response(
-            total, base, next((moved for moved in sides if moved is not None), None)
+            total,
+            base,
+            next((moved for moved in sides if moved is not None), None),
         )
 
 

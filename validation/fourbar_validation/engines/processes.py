@@ -88,7 +88,10 @@ def run_to_end(
         return Ended("", "", True, f"no answer within {seconds:g} s")
     why = find_reason(done.stderr) or f"exit status {done.returncode}"
     return Ended(
-        done.stdout, done.stderr, done.returncode not in fine, write_one_line(why)
+        done.stdout,
+        done.stderr,
+        done.returncode not in fine,
+        write_one_line(why),
     )
 
 
@@ -166,7 +169,9 @@ def _take_printed() -> str:
         with suppress(Exception):  # there is none, it was closed, or is somebody else's
             stream.flush()
     with suppress(
-        AttributeError, OSError, TypeError
+        AttributeError,
+        OSError,
+        TypeError,
     ):  # another system than those of the Unix family
         ctypes.CDLL(None).fflush(None)
     text = _take_written(file)

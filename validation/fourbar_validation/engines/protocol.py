@@ -47,7 +47,13 @@ class _Numbers(Reader):
     POLAR = "[1.0, 0.0], in {} and rad"
     COORDINATES = ""
 
-    def in_si(self, key: str, value: object, unit: str, wanted: str) -> float:
+    def in_si(
+        self,
+        key: str,
+        value: object,
+        unit: str,
+        wanted: str,
+    ) -> float:
         if type(value) is int and value.bit_length() < 1024:
             return float(value)
         if type(value) is not float or not math.isfinite(value):
@@ -216,7 +222,11 @@ def _refuse_unknown(data: dict[str, Any], allowed: tuple[str, ...]) -> None:
             )
 
 
-def _read_list(name: str, value: Any, n: int | None = None) -> Array:
+def _read_list(
+    name: str,
+    value: Any,
+    n: int | None = None,
+) -> Array:
     if n is None:
         wanted = "must be a list of one finite number or more"
     else:
@@ -235,7 +245,9 @@ def _read_rate(name: str, value: Any, n: int) -> float | Array:
     array = _make_array([value])
     if array is None or not np.isfinite(array).all():
         raise InputError(
-            f"command.{name}", value, f"must be a finite number, or a list of {n}"
+            f"command.{name}",
+            value,
+            f"must be a finite number, or a list of {n}",
         )
     return float(array[0])
 
@@ -302,7 +314,11 @@ def _make_array(values: Iterable[Any]) -> Array | None:
     return None
 
 
-def answer_to_json(scene: Scene, command: Command, answer: Answer) -> dict[str, Any]:
+def answer_to_json(
+    scene: Scene,
+    command: Command,
+    answer: Answer,
+) -> dict[str, Any]:
     """Write an answer, without the engine's name, which its hello states."""
     if answer.refusal is not None:
         return {"refusal": answer.refusal, "setting": answer.setting}
@@ -343,7 +359,11 @@ def _write_array(array: Array) -> list[Any]:
     return values.tolist()  # type: ignore[no-any-return]
 
 
-def answer_from_json(engine: str, command: Command, data: Any) -> Answer:
+def answer_from_json(
+    engine: str,
+    command: Command,
+    data: Any,
+) -> Answer:
     """Read and check what an engine answered to a command.
 
     Raises InputError for what is no answer, and EngineError with the engine's words
@@ -453,7 +473,11 @@ def _read_values(
     return array.reshape(n, 2) if pairs else array
 
 
-def _read_assembled(value: Any, quantities: dict[str, Array], n: int) -> Any:
+def _read_assembled(
+    value: Any,
+    quantities: dict[str, Array],
+    n: int,
+) -> Any:
     """Read where the loop closes; left out: wherever there is a value."""
     if value is None:
         valued = [
@@ -608,7 +632,11 @@ def release_to_json(scene: Scene) -> dict[str, Any]:
     }
 
 
-def release_from_json(scene: Scene, command: Any, times: Any) -> Scene:
+def release_from_json(
+    scene: Scene,
+    command: Any,
+    times: Any,
+) -> Scene:
     """Read the start of a released motion into a scene.
 
     Raises an InputError that names what is wrong.
@@ -642,7 +670,11 @@ def released_to_json(released: ReleasedAnswer) -> dict[str, Any]:
     return {"answers": answers, "setting": released.setting}
 
 
-def released_from_json(engine: str, n: int, data: Any) -> ReleasedAnswer:
+def released_from_json(
+    engine: str,
+    n: int,
+    data: Any,
+) -> ReleasedAnswer:
     """Read and check a released motion at n times, as `answer_from_json` does."""
     data = _read_reply(data)
     setting = _require_text("setting", data.get("setting", "exact"))

@@ -414,7 +414,9 @@ def make_nearby(
         out = make_blank(len(mask), COMPARED_QUANTITIES)
         for i in np.flatnonzero(mask & np.isfinite(formulas.sin_mu)).tolist():
             shift = shift_to(
-                scene.linkage, float(command.theta_2[i]), float(formulas.sin_mu[i])
+                scene.linkage,
+                float(command.theta_2[i]),
+                float(formulas.sin_mu[i]),
             )
             if shift is not None:
                 row = slice(i, i + 1)

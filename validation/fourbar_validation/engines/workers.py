@@ -122,7 +122,11 @@ def _lost_workers() -> NoWorkersError:
     )
 
 
-def fail(_: object, error: BaseException, __: TaskFunction) -> NoReturn:
+def fail(
+    _: object,
+    error: BaseException,
+    __: TaskFunction,
+) -> NoReturn:
     """Raise what an item failed with."""
     raise error
 

@@ -62,7 +62,11 @@ class PublishedFigure(NamedTuple):
         )
 
 
-def compare_figure(printed: str, value: float, noise: float = 0.0) -> str:
+def compare_figure(
+    printed: str,
+    value: float,
+    noise: float = 0.0,
+) -> str:
     """Compare `value` to the published number of decimals.
 
     It is rounded, truncated, or it differs.

@@ -107,7 +107,10 @@ def make_model_scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
     loads = [fourbar.Load(2, (FORCE_ON_BAR_2, 0.0), arm=(0.01 * LOAD_ARM, LOAD_ANGLE))]
     loads += [fourbar.Load(bar, moment=0.01 * COUPLE_ON_A_BAR) for bar in (2, 3, 4)]
     return fourbar.Scene(
-        linkage, fourbar.Motion(theta_2, OMEGA_2, branch=branch), 4, tuple(loads)
+        linkage,
+        fourbar.Motion(theta_2, OMEGA_2, branch=branch),
+        4,
+        tuple(loads),
     )
 
 

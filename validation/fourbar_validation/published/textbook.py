@@ -48,7 +48,9 @@ def compare_textbooks() -> Iterator[PublishedFigure]:
     """Compare each answer with ours."""
     for answer in list_answers():
         ours = compute_value(
-            _solve_book_scene(answer.scene), answer.quantity, answer.position
+            _solve_book_scene(answer.scene),
+            answer.quantity,
+            answer.position,
         )
         yield PublishedFigure(
             "public test cases",
@@ -58,12 +60,18 @@ def compare_textbooks() -> Iterator[PublishedFigure]:
         )
 
 
-def compute_value(solution: fourbar.Solution, quantity: str, position: int) -> float:
+def compute_value(
+    solution: fourbar.Solution,
+    quantity: str,
+    position: int,
+) -> float:
     """Compute a result, its negative, or the difference of two, at one position."""
     first, minus, second = quantity.partition(" - ")
     if minus:
         return compute_value(solution, first, position) - compute_value(
-            solution, second, position
+            solution,
+            second,
+            position,
         )
     if quantity.startswith("-"):
         return -compute_value(solution, quantity[1:], position)
@@ -107,5 +115,8 @@ def compare_maple() -> Iterator[PublishedFigure]:
         for name, angle in (("theta3", s.theta_3), ("theta4", s.theta_4)):
             key = f"{solution['configuration']} {name}"
             yield PublishedFigure(
-                "Maple", key, solution[f"{name}_printed_rad"], float(angle[0])
+                "Maple",
+                key,
+                solution[f"{name}_printed_rad"],
+                float(angle[0]),
             )

@@ -198,11 +198,17 @@ def _list_limits() -> Iterator[PublishedFigure]:
             )
         if number == 4:
             yield PublishedFigure(
-                "3.2 limits", "row 4 theta_2", row["value_printed_deg"], limits[4]
+                "3.2 limits",
+                "row 4 theta_2",
+                row["value_printed_deg"],
+                limits[4],
             )
             arc = limits[4] - math.degrees(to_ours(THETA_1))
             yield PublishedFigure(
-                "3.2 limits", "row 4 arc cosine", row["acos_printed_deg"], arc
+                "3.2 limits",
+                "row 4 arc cosine",
+                row["acos_printed_deg"],
+                arc,
             )
 
 
@@ -366,7 +372,12 @@ def _list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
     for name, text in source["published"]["section_5_7_hand_constants"].items():
         errata, changed = by_hand.get(name, ((), None))
         yield PublishedFigure(
-            "5.7 constants", name, text, float(ours[name]), errata, changed
+            "5.7 constants",
+            name,
+            text,
+            float(ours[name]),
+            errata,
+            changed,
         )
     matrix = source["published"]["section_5_7_matrix_as_printed"]
     sides = [f"k{bar}{key}" for bar in (2, 3, 4) for key in ("x", "y", "_5")]
@@ -378,7 +389,12 @@ def _list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
             key: value for key, value in slips.items() if "12" not in value[0]
         }.get(name, ((), None))
         yield PublishedFigure(
-            "5.7 matrix", name, text, float(ours[name]), errata, changed
+            "5.7 matrix",
+            name,
+            text,
+            float(ours[name]),
+            errata,
+            changed,
         )
     for number, text in enumerate(matrix["rhs"][9:], 10):
         yield PublishedFigure("5.7 matrix", f"right side, row {number}", text, 0.0)

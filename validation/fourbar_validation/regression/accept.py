@@ -67,7 +67,9 @@ def append(
             table = pa.concat_tables([old, table], promote_options="default")
         except (OSError, ValueError, KeyError, TypeError, pa.ArrowException):
             raise InputError(
-                "--to", str(file), "is damaged, or no table written by `accept`"
+                "--to",
+                str(file),
+                "is damaged, or no table written by `accept`",
             ) from None
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
@@ -198,7 +200,9 @@ def report_differences(
         transient=True,
     )
     differences = compare_runs(
-        (before.about, before.scenes(keep)), (after.about, scenes), engines
+        (before.about, before.scenes(keep)),
+        (after.about, scenes),
+        engines,
     )
     differences.baseline = before.describe()
     unproven = [str(run.table) for run in (before, after) if not run.verified]
@@ -245,7 +249,9 @@ def _is_chosen(
                 offered.add(word)
         for name in sorted(missing) or ([] if names else [text]):
             raise InputError(
-                f"--{option}", name, "must be among " + ", ".join(sorted(offered))
+                f"--{option}",
+                name,
+                "must be among " + ", ".join(sorted(offered)),
             )
         if option == "only":
             both = {
@@ -349,12 +355,16 @@ def accept_command(
         target = to
     if target.resolve() == folder.resolve():
         raise InputError(
-            "--to", str(target), "must be another folder than that of the results"
+            "--to",
+            str(target),
+            "must be another folder than that of the results",
         )
     for name in (*RECORD_FILES, ABOUT_FILE, HISTORY):
         if (target / name).is_dir():
             raise InputError(
-                "--to", str(target / name), "must name a file, not a folder"
+                "--to",
+                str(target / name),
+                "must name a file, not a folder",
             )
     run = open_run(results)
     counts = Counts(run.rows())
@@ -364,7 +374,9 @@ def accept_command(
         else:
             why = "nothing was compared"
         raise InputError(
-            "RESULTS", str(results), f"must hold, or say --even-failing: {why}"
+            "RESULTS",
+            str(results),
+            f"must hold, or say --even-failing: {why}",
         )
     if not run.verified:  # the record does not say whether it lost some of its rows
         raise InputError(

@@ -126,7 +126,11 @@ def compare_row(
     return Change(kind, key, old, new, round_off)
 
 
-def _choose_kind(old: Row, new: Row, round_off: float) -> KindOfChange:
+def _choose_kind(
+    old: Row,
+    new: Row,
+    round_off: float,
+) -> KindOfChange:
     if old.verdict != new.verdict:
         worse = VERDICTS.index(new.verdict) > VERDICTS.index(old.verdict)
         if worse:

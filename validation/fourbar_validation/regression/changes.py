@@ -236,7 +236,11 @@ class Differences:
         return FAILED if self.regressed or self.nothing else HOLDS
 
 
-def _say_why_not_compared(change: Change, old: Row, new: Row) -> str:
+def _say_why_not_compared(
+    change: Change,
+    old: Row,
+    new: Row,
+) -> str:
     if change.kind is KindOfChange.OTHER_SETTING:
         return f"{change.key[0]} / {change.key[1]}: {old.setting} -> {new.setting}"
     other_scene = change.kind is KindOfChange.OTHER_SCENE

@@ -262,7 +262,9 @@ class Recorded:
                     )
         except (KeyError, TypeError, ValueError, csv.Error):
             raise InputError(
-                self.key, str(table), "is not a table of times written by `run`"
+                self.key,
+                str(table),
+                "is not a table of times written by `run`",
             ) from None
 
     def _read(self, entries: Iterator[AnyRow]) -> Iterator[AnyRow]:
@@ -275,7 +277,9 @@ class Recorded:
             OSError,
         ):  # a column, a cell or a number is missing, or is no text
             raise InputError(
-                self.key, str(self.table), "is not a table written by `run`"
+                self.key,
+                str(self.table),
+                "is not a table written by `run`",
             ) from None
 
 
@@ -310,12 +314,18 @@ def open_run(path: Path, key: str = "RESULTS") -> Recorded:
         run = Recorded(NOTHING_KNOWN, table, key=key)
     if next(run.rows(), None) is None:
         raise InputError(
-            key, str(table), "must hold at least one comparison: it has none"
+            key,
+            str(table),
+            "must hold at least one comparison: it has none",
         )
     return run
 
 
-def _open_described(record: Path, table: Path, key: str) -> Recorded:
+def _open_described(
+    record: Path,
+    table: Path,
+    key: str,
+) -> Recorded:
     """Open a table with what its record says of it.
 
     Raises InputError if either is damaged.

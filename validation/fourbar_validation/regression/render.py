@@ -162,7 +162,11 @@ def write_pull_request_comment(diff: Differences) -> str:
     groups, more = _group_rows(diff)
     return (
         _render_differences(
-            "changes.md.j2", diff, groups, lambda kind: _list_worst(diff, kind), more
+            "changes.md.j2",
+            diff,
+            groups,
+            lambda kind: _list_worst(diff, kind),
+            more,
         ).rstrip("\n")
         + "\n"
     )
@@ -254,7 +258,10 @@ def _list_cases_of_changes(diff: Differences) -> Iterator[JunitCase]:
             yield JunitCase(*name, "skipped", kind, _write_change_line(change))
         elif not change.new.compared:
             yield JunitCase(
-                *name, "skipped", kind, f"{change.new.verdict}: {change.new.reason}"
+                *name,
+                "skipped",
+                kind,
+                f"{change.new.verdict}: {change.new.reason}",
             )
         else:
             yield JunitCase(*name, "passed")

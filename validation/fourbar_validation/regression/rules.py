@@ -113,7 +113,11 @@ def list_weakened(old: Mapping[str, Mapping[str, str]], new: Rules) -> list[Weak
     )
 
 
-def _is_weaker(what: str, old: Mapping[str, str], new: Mapping[str, str]) -> bool:
+def _is_weaker(
+    what: str,
+    old: Mapping[str, str],
+    new: Mapping[str, str],
+) -> bool:
     """Return whether an entry that differs makes its rule weaker."""
     if what == FACTOR_CHANGED:
         return _number(new[what]) > _LOOSER * _number(old[what])

@@ -83,7 +83,11 @@ def draw_scene_figure(record: Record) -> str | None:
     return linkage + _draw_answers(record, solution)
 
 
-def _draw_best_position(name: str, scene: Scene, solution: Solution) -> str:
+def _draw_best_position(
+    name: str,
+    scene: Scene,
+    solution: Solution,
+) -> str:
     """Draw the linkage as `fourbar plot` does, at its best conditioned position."""
     from matplotlib.figure import Figure
 

@@ -153,7 +153,11 @@ def draw_picture() -> str:
     return write_svg(figure, "where it gets hard")
 
 
-def _draw_approach(axes: Any, approach: Approach, quantity: str) -> None:
+def _draw_approach(
+    axes: Any,
+    approach: Approach,
+    quantity: str,
+) -> None:
     solution = solve(approach.scene, "force")
     size = magnitude(getattr(solution, quantity))
     singular = _find_singular_angle(approach)

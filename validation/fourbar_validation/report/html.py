@@ -255,7 +255,13 @@ def _make_scene_view(
     )
     engines = _list_engines(cell.row for cell in cells)
     return _SceneView(
-        scene, cells, engines, quantities, by_place, worst, pictures.get(scene.name)
+        scene,
+        cells,
+        engines,
+        quantities,
+        by_place,
+        worst,
+        pictures.get(scene.name),
     )
 
 

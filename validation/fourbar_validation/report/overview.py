@@ -369,7 +369,11 @@ def _take_reason(row: Row) -> str:
     return write_one_line(row.reason.partition("; what it printed")[0])
 
 
-def _name_causes(scene: Record, engine: str, rows: Sequence[Row]) -> list[str]:
+def _name_causes(
+    scene: Record,
+    engine: str,
+    rows: Sequence[Row],
+) -> list[str]:
     """Name the mistakes that explain the failing rows of an engine in a scene.
 
     If there are none, say what fails.

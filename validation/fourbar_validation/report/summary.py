@@ -176,7 +176,9 @@ class Summary:
         compared, loose = _count_compared(scene.rows)
         self.pairs, self.loose = self.pairs + compared, self.loose + len(loose)
         self._loosest = _keep_largest(
-            _LOOSEST_SHOWN, [*self._loosest, *loose], _ALLOWANCE
+            _LOOSEST_SHOWN,
+            [*self._loosest, *loose],
+            _ALLOWANCE,
         )
         for engine, reason in sorted(_list_left_out(scene)):
             kind = (engine, NUMBER_IN_A_REASON.sub("#", reason))
@@ -185,7 +187,9 @@ class Summary:
         worst = _find_worst_row(scene.rows)
         self.judged += len(worst)
         self._worst = _keep_largest(
-            _WORST_SHOWN, [*self._worst, *worst], lambda w: w.used
+            _WORST_SHOWN,
+            [*self._worst, *worst],
+            lambda w: w.used,
         )
         for row in scene.rows:
             if row.reason.startswith(EQUIVALENCE.cause) and math.isfinite(row.error):
@@ -201,7 +205,9 @@ class Summary:
         else:
             most = max((w.used for w in worst), default=0.0)
             self._holding = _keep_largest(
-                SCENES_SHOWN, [*self._holding, (most, scene)], lambda entry: entry[0]
+                SCENES_SHOWN,
+                [*self._holding, (most, scene)],
+                lambda entry: entry[0],
             )
 
     def picture(self, drawn: Record) -> None:
@@ -227,7 +233,9 @@ class Summary:
             if "observed_order" in evidence
         ]
         self._orders = _keep_largest(
-            _ORDERS_SHOWN, [*self._orders, *orders], _find_lowest
+            _ORDERS_SHOWN,
+            [*self._orders, *orders],
+            _find_lowest,
         )
 
     @property
@@ -480,7 +488,11 @@ def _find_worst_row(rows: Sequence[Row]) -> list[Worst]:
     return worst
 
 
-def _keep_largest(most: int, entries: list[T], key: Callable[[T], float]) -> list[T]:
+def _keep_largest(
+    most: int,
+    entries: list[T],
+    key: Callable[[T], float],
+) -> list[T]:
     """Cut the list to its largest once it is twice too long."""
     if len(entries) <= 2 * most:
         return entries

@@ -133,7 +133,12 @@ def write_alone(figure: Any, salt: str) -> str:
     return svg.replace("<style>", f"<style>{rules}", 1)
 
 
-def _draw_svg(figure: Any, salt: str, *, transparent: bool = True) -> str:
+def _draw_svg(
+    figure: Any,
+    salt: str,
+    *,
+    transparent: bool = True,
+) -> str:
     """Draw the figure as matplotlib does, an SVG that stands by itself."""
     import matplotlib
 

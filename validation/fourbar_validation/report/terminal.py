@@ -25,7 +25,12 @@ _MOST_NOTES = 10
 """Lines beneath the table."""
 
 
-def print_table(summary: Summary, out: Path, *, verbose: bool = False) -> None:
+def print_table(
+    summary: Summary,
+    out: Path,
+    *,
+    verbose: bool = False,
+) -> None:
     """Print the verdict, a row of every engine, what is wrong, and the report's path.
 
     `verbose`: the worst row of every scene and engine too, each row that fails, and
@@ -58,7 +63,11 @@ def print_table(summary: Summary, out: Path, *, verbose: bool = False) -> None:
     )
 
 
-def _print_rows(summary: Summary, console: Any, wide: Any) -> None:
+def _print_rows(
+    summary: Summary,
+    console: Any,
+    wide: Any,
+) -> None:
     """Print the worst rows, those that fail, and why others were not compared."""
     from rich.markup import escape
 

@@ -111,7 +111,11 @@ class _RobotReading:
             self._screen(element)
         text = ET.tostring(root, encoding="unicode")
         return RobotFile(
-            self.path, text, self.contents, self.missing, tuple(self.notes)
+            self.path,
+            text,
+            self.contents,
+            self.missing,
+            tuple(self.notes),
         )
 
     def _refuse(self, what: object, allowed: str) -> InputError:
@@ -142,7 +146,12 @@ class _RobotReading:
         root: ET.Element = parsed.root  # type: ignore[attr-defined]
         return root
 
-    def _expand(self, element: ET.Element, inside: Path, depth: int) -> None:
+    def _expand(
+        self,
+        element: ET.Element,
+        inside: Path,
+        depth: int,
+    ) -> None:
         """Put the contents of each included file in the place of <include>."""
         if depth > _DEEPEST:
             raise self._refuse(self.path.name, f"is nested deeper than {_DEEPEST}")

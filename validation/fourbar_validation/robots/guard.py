@@ -53,7 +53,10 @@ def examine_guarded(
                 if not isinstance(error, InputError) or error.key != "MJCF":
                     raise
                 raise InputError(
-                    error.key, error.value or mjcf.name, error.allowed, str(mjcf)
+                    error.key,
+                    error.value or mjcf.name,
+                    error.allowed,
+                    str(mjcf),
                 ) from None
             except TimeoutError:
                 reason = f"MuJoCo did not come back in {seconds:g} s"

@@ -183,7 +183,9 @@ def read_measure_options(
     """
     if wanted is not None and not 0.0 < wanted < 1.0:
         raise InputError(
-            "--error", wanted, "must be a relative error, above 0 and below 1"
+            "--error",
+            wanted,
+            "must be a relative error, above 0 and below 1",
         )
     return MeasureOptions(
         read_pose(robot["pose"], robot["key"], robot["hold"], robot["drive"]),

@@ -142,7 +142,11 @@ def _find_zero(equality: JointEquality, middle: float) -> float:
     return middle + math.remainder(equality.theta_2 - middle, math.tau)
 
 
-def _follow(scene: Scene, theta_2: Array, branch: int) -> tuple[Array, Array]:
+def _follow(
+    scene: Scene,
+    theta_2: Array,
+    branch: int,
+) -> tuple[Array, Array]:
     """Return theta_4, continuous, and omega_4/omega_2 at angles of bar 2."""
     moving = replace(scene, motion=scene.motion.replace(speed=1.0, acceleration=0.0))
     branches = np.full(len(theta_2), branch, dtype=np.int8)
@@ -177,13 +181,21 @@ def _measure_polynomial(
     return _MimicError(tuple(coefficients), angle, speed)
 
 
-def fit_squares(x: Array, y: Array, degree: int) -> tuple[float, ...]:
+def fit_squares(
+    x: Array,
+    y: Array,
+    degree: int,
+) -> tuple[float, ...]:
     """Fit a polynomial by least squares, lowest power first."""
     power = np.polynomial.Polynomial.fit(x, y, degree).convert().coef
     return tuple(np.pad(power, (0, degree + 1 - len(power))).tolist())
 
 
-def fit_minimax(x: Array, y: Array, degree: int) -> tuple[float, ...]:
+def fit_minimax(
+    x: Array,
+    y: Array,
+    degree: int,
+) -> tuple[float, ...]:
     """Fit a polynomial with the smallest largest error, lowest power first.
 
     minimize t subject to |p(x_i) - y_i| <= t, a linear program in the coefficients of

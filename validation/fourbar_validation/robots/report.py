@@ -234,7 +234,11 @@ def _list_states(measurement: RobotMeasurement) -> Iterator[tuple[str | float, .
                 yield escape_controls(loop.name), method, *map(float, numbers)
 
 
-def report_measurement(measurement: RobotMeasurement, robot: Path, out: Path) -> None:
+def report_measurement(
+    measurement: RobotMeasurement,
+    robot: Path,
+    out: Path,
+) -> None:
     """Print a measurement, and write robot.md and robot.csv into a folder."""
     blocks = list(describe_measurement(measurement))
     for block in blocks:

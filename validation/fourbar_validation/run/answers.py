@@ -46,7 +46,11 @@ def _answer_of_engine(question: Question, engine: Engine) -> Iterator[Row]:
         answer.evidence |= _observe_order_of_engine(question, engine)
 
 
-def compare_answer(question: Question, engine: Engine, answer: Answer) -> list[Row]:
+def compare_answer(
+    question: Question,
+    engine: Engine,
+    answer: Answer,
+) -> list[Row]:
     """Compare one answer with the formulas.
 
     The motion is the one that the engine really made.
@@ -58,7 +62,13 @@ def compare_answer(question: Question, engine: Engine, answer: Answer) -> list[R
     formulas = question.solution
     held = make_demands(engine, scene, question.at, answer, formulas)
     comparison = Comparison(
-        name, scene, answer, formulas, held, question.reference, question.scales
+        name,
+        scene,
+        answer,
+        formulas,
+        held,
+        question.reference,
+        question.scales,
     )
     rows = comparison.rows()
     if (ratio := answer.evidence.get("mass_ratio", 1.0)) > LIGHT_BAR_RATIO:
@@ -117,7 +127,12 @@ def compare_statements(question: Question) -> Iterator[Row]:
         except LimitError as limit:
             return [
                 Row.unmeasured(
-                    question.name, engine.name, part, "all", REFUSES, str(limit)
+                    question.name,
+                    engine.name,
+                    part,
+                    "all",
+                    REFUSES,
+                    str(limit),
                 )
             ]
 
@@ -130,7 +145,9 @@ def compare_statements(question: Question) -> Iterator[Row]:
         )
         if exact and answer is not None and answer.refusal is None:
             yield from question.attempt(
-                partial(rows, engine, answer), engine.name, part
+                partial(rows, engine, answer),
+                engine.name,
+                part,
             )
 
 
@@ -190,7 +207,11 @@ def check_statements(
         "range": limit_positions.compare_ranges(limits, engine, seen),
         "limit_positions": limit_positions.compare_limit_positions(limits, seen),
         "transmission": transmission.compare_transmission(
-            of_angle, over, seen, answer, predicted
+            of_angle,
+            over,
+            seen,
+            answer,
+            predicted,
         ),
     }
     if limits.passages:
@@ -230,7 +251,11 @@ def compare_inertia(question: Question) -> Iterator[Row]:
             )
 
 
-def _check_inertia(question: Question, bare: Question, engine: Engine) -> Iterator[Row]:
+def _check_inertia(
+    question: Question,
+    bare: Question,
+    engine: Engine,
+) -> Iterator[Row]:
     answer = bare.answer(engine)
     loaded, _ = question.answered.get(engine.name, (None, 0.0))
     if answer.refusal is not None and loaded is not None and loaded.refusal is not None:

@@ -19,7 +19,11 @@ SAME_NUMBERS = 1e-9
 numbers: it was made in another order of summation than the hypothesis."""
 
 
-def find_causes(question: Question, answer: Answer, tolerance: ErrorBound) -> list[str]:
+def find_causes(
+    question: Question,
+    answer: Answer,
+    tolerance: ErrorBound,
+) -> list[str]:
     """List the mistakes that explain all that differs in an answer, the simplest first.
 
     The scene is stated as an engine is told it, with every place from the bar's first

@@ -137,7 +137,12 @@ def _make_equation_row(
     else:
         reason = NOT_DEMANDED
     return question.row(
-        quantity, error, IDENTITY.factor / condition, reason, judged, condition
+        quantity,
+        error,
+        IDENTITY.factor / condition,
+        reason,
+        judged,
+        condition,
     )
 
 
@@ -153,7 +158,12 @@ class _Balance:
         self.forces: Any = 0.0
         self.moments: Any = 0.0
 
-    def push(self, force: Array, point: Array, sense: float = 1.0) -> None:
+    def push(
+        self,
+        force: Array,
+        point: Array,
+        sense: float = 1.0,
+    ) -> None:
         """Add a force at a point."""
         self.force = self.force + sense * force
         self.forces = self.forces + magnitude(force)
@@ -226,10 +236,18 @@ def _check_sums(question: Question) -> Iterator[Row]:
     forces = divide(magnitude(balance.force), force_size)
     moments = divide(np.abs(balance.moment), moment_size)
     yield _make_equation_row(
-        question, "force_sum", "F12 + F14 + loads = sum of m a_G", forces, judged
+        question,
+        "force_sum",
+        "F12 + F14 + loads = sum of m a_G",
+        forces,
+        judged,
     )
     yield _make_equation_row(
-        question, "moment_sum", "moments about O2, with the torque", moments, judged
+        question,
+        "moment_sum",
+        "moments about O2, with the torque",
+        moments,
+        judged,
     )
 
 
@@ -265,7 +283,11 @@ def _sum_actions(question: Question) -> tuple[Actions, Array]:
     return actions, np.array([O4.real, O4.imag])
 
 
-def _check_power(question: Question, drive: str, judged: Mask) -> Row:
+def _check_power(
+    question: Question,
+    drive: str,
+    judged: Mask,
+) -> Row:
     """Compare the power of the drive with its effort times its speed.
 
     The effort is a torque or a force.
@@ -389,7 +411,9 @@ def compare_status(
         in_line = np.isin(formulas.status_code[near], (SINGULAR, CHANGE_POINT))
         differ[near] |= (formulas.status_code[near] == NOT_ASSEMBLED) == closes
         differ[near] |= closes & np.where(
-            in_line, sine > _IN_ONE_LINE, sine < 1.0 / 16.0 * _IN_ONE_LINE
+            in_line,
+            sine > _IN_ONE_LINE,
+            sine < 1.0 / 16.0 * _IN_ONE_LINE,
         )
     if solutions is not None and len(
         many := np.flatnonzero(formulas.status_code == SEVERAL)[:POSITIONS_OF_FRICTION]

@@ -199,7 +199,11 @@ def judge(
     return question.record(rows, seconds)
 
 
-def ask_engines(name: str, scene: Scene, engines: Sequence[Engine]) -> Question:
+def ask_engines(
+    name: str,
+    scene: Scene,
+    engines: Sequence[Engine],
+) -> Question:
     """Ask the engines that a scene needs, each position once.
 
     List what is left out.

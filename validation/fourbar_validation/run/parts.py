@@ -44,7 +44,12 @@ def judge_part(
 class _Gathered:
     """Finished tasks of one run that lie in several folders."""
 
-    def __init__(self, plan: Plan, folders: Sequence[Path], parts: int) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        folders: Sequence[Path],
+        parts: int,
+    ) -> None:
         self._plan = plan
         self._parts = parts
         self._stores: dict[int, Store] = {}
@@ -124,7 +129,11 @@ def collect_parts(
     help="Folder for tables and report.",
 )
 @click.option("--verbose", is_flag=True, help="Print the worst row of each scene too.")
-def collect_command(folders: tuple[Path, ...], out: Path, verbose: bool) -> int:
+def collect_command(
+    folders: tuple[Path, ...],
+    out: Path,
+    verbose: bool,
+) -> int:
     """Put together the parts of a run.
 
     It writes tables and report from the folders in which `run --part` judged the parts.

@@ -160,7 +160,12 @@ class Plan:
         """Count the scenes of some tasks."""
         return sum(len(self.chunks[chunk]) for chunk in chunks)
 
-    def judge(self, store: Store, part: RunPart, progress: Progress) -> None:
+    def judge(
+        self,
+        store: Store,
+        part: RunPart,
+        progress: Progress,
+    ) -> None:
         """Judge the tasks of a part that the store does not have yet."""
         wanted = self.list_chunks(part)
         done = store.done()

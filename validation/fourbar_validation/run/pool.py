@@ -104,7 +104,9 @@ def _judge_by_engine(
         else:
             breakdowns.append(
                 make_breakdown(
-                    job.name, engines[0].name if engines else "formulas", outcome
+                    job.name,
+                    engines[0].name if engines else "formulas",
+                    outcome,
                 )
             )
     record = record or Record(job.name)

@@ -76,7 +76,10 @@ def check_points(question: Question) -> Iterator[Row]:
         and question.at.speed is not None
     ):
         yield compare_points(
-            question, question.scene, question.solution, question.reference
+            question,
+            question.scene,
+            question.solution,
+            question.reference,
         )
 
 
@@ -111,7 +114,11 @@ def compare_points(
         for bar in theta
     }
 
-    def swing(bar: int, distance: float, angle: float) -> list[NDArray[np.complex128]]:
+    def swing(
+        bar: int,
+        distance: float,
+        angle: float,
+    ) -> list[NDArray[np.complex128]]:
         arm = distance * np.exp(1j * (theta[bar] + angle))
         return [arm, 1j * speed[bar] * arm, (1j * growth[bar] - speed[bar] ** 2) * arm]
 
@@ -135,7 +142,10 @@ def compare_points(
                 if kind != "B":
                     size = np.abs(arm) + np.abs(at_foot) + sizes.sum_terms(kind)
                 apart = find_error(
-                    kind, ours[point.name], theirs, size
+                    kind,
+                    ours[point.name],
+                    theirs,
+                    size,
                 ) * find_condition(kind, link, reference)
                 error = np.where(
                     usable,
@@ -154,7 +164,11 @@ def compare_points(
     )
 
 
-def _find_true_value(reference: Solution, quantity: str, n: int) -> Array:
+def _find_true_value(
+    reference: Solution,
+    quantity: str,
+    n: int,
+) -> Array:
     values: Array | None = getattr(reference, quantity)
     return np.zeros(n) if values is None else values
 
@@ -204,7 +218,9 @@ def check_blocks(question: Question) -> Iterator[Row]:
         size = scale[long[ends]]
         condition = find_condition(quantity, scene.linkage, solution)[long[ends]]
         condition = np.where(
-            np.isnan(condition), 1.0, condition
+            np.isnan(condition),
+            1.0,
+            condition,
         )  # decided by the command where nothing closes
         # evaluated by the same code, but not in the same company of a processor's
         # registers
@@ -269,7 +285,10 @@ def check_error_bars(question: Question) -> Iterator[Row]:
         )
         size = np.max(take_smallest_scales(quantities, sizes, of_balls), axis=0)
         condition = take_strictest_condition(
-            quantities[0], scene.linkage, ours, reference
+            quantities[0],
+            scene.linkage,
+            ours,
+            reference,
         )
         tells = condition * NOTHING_TO_TELL > EPS
         turns = np.array(
@@ -299,7 +318,13 @@ def check_error_bars(question: Question) -> Iterator[Row]:
             f" {size[index]:.1e}"
         )
         yield question.row(
-            bar, share, 1.0, reason, tells, float(condition[index]), sampled.theta_2
+            bar,
+            share,
+            1.0,
+            reason,
+            tells,
+            float(condition[index]),
+            sampled.theta_2,
         )
 
 

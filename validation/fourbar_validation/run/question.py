@@ -176,7 +176,14 @@ class Question:
             place = theta_2
         who = (self.name, FORMULAS, "exact")
         return Row.judged(
-            who, quantity, error, allowed, reason, place, condition, where
+            who,
+            quantity,
+            error,
+            allowed,
+            reason,
+            place,
+            condition,
+            where,
         )
 
     def record(self, rows: list[Row], seconds: float) -> Record:

@@ -173,7 +173,12 @@ def check_released(question: Question) -> Iterator[Row]:
         truth = _Truth(phi + math.pi / 2, rate)
         none = np.zeros(len(solution))
         ours = ReleasedAnswer(
-            "formulas", "exact", solution.theta_2, solution.omega_2, none, none
+            "formulas",
+            "exact",
+            solution.theta_2,
+            solution.omega_2,
+            none,
+            none,
         )
         yield from _make_rows(question, ours, None, truth)
 
@@ -229,7 +234,12 @@ def _compare_forces(question: Question) -> Iterator[Row]:
     )
     what = "a released linkage has no drive"
     yield Row.judged(
-        (name, FORMULAS, "exact"), "torque", np.abs(none), 0.0, what, solution.theta_2
+        (name, FORMULAS, "exact"),
+        "torque",
+        np.abs(none),
+        0.0,
+        what,
+        solution.theta_2,
     )
     held = replace(
         scene,

@@ -155,7 +155,12 @@ def make_plan(request: Request, files: Files | None = None) -> Plan:
     return Plan(suite, present, request.options, missing)
 
 
-def keep_request(request: Request, part: RunPart, suite: Suite, out: Path) -> None:
+def keep_request(
+    request: Request,
+    part: RunPart,
+    suite: Suite,
+    out: Path,
+) -> None:
     """Write what was asked for beside a part, with the text of scene files.
 
     Another machine need not have the files.

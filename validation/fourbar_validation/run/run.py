@@ -220,7 +220,12 @@ def _collect_tasks(
                 name = escape_controls(plan.suite.name(scene))
                 record.rows = record.rows or [
                     Row.unmeasured(
-                        name, FORMULAS, "", "all", FAILS, "nothing was judged"
+                        name,
+                        FORMULAS,
+                        "",
+                        "all",
+                        FAILS,
+                        "nothing was judged",
                     )
                 ]
                 summary.add(record)

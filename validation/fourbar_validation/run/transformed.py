@@ -169,7 +169,9 @@ class _Few:
         Some entries of the command are changed.
         """
         return _solve_from_first(
-            scene, self.command._replace(**changed), self.quantities
+            scene,
+            self.command._replace(**changed),
+            self.quantities,
         )
 
     def solve_forces(self, scene: Scene) -> Solution:
@@ -187,7 +189,9 @@ class _Few:
         """
         signed = self.command._replace(branch=sense * self._signs, **changed)
         return _solve_from_first(
-            scene, with_signs(scene.linkage, signed), self.quantities
+            scene,
+            with_signs(scene.linkage, signed),
+            self.quantities,
         )
 
     def compare(self, convert: Callable[[str], Array]) -> Array:
@@ -298,7 +302,9 @@ def _mark_long_springs(scene: Scene, solution: Solution) -> Mask:
             continue
         for spring in effect.springs:
             line = place_line(
-                scene.linkage, LinearDrive(spring.start, spring.end), theta
+                scene.linkage,
+                LinearDrive(spring.start, spring.end),
+                theta,
             )
             long &= line.stroke >= least
     return long
@@ -380,7 +386,11 @@ def _from_other_end(length: float, pair: tuple[float, float]) -> tuple[float, fl
     return cmath.polar(length - cmath.rect(*pair))
 
 
-def _convert_load(load: Load, to: _SceneConversion, linkage: FourBar) -> Load:
+def _convert_load(
+    load: Load,
+    to: _SceneConversion,
+    linkage: FourBar,
+) -> Load:
     force = None
     if to.exchanged:
         bar = _OTHER_BAR[load.bar]
@@ -414,7 +424,11 @@ def _convert_gravity(
     return Gravity(to.length * effect.magnitude, to.direction(effect.angle))
 
 
-def _convert_couples(effect: Any, to: _SceneConversion, linkage: FourBar) -> Any:
+def _convert_couples(
+    effect: Any,
+    to: _SceneConversion,
+    linkage: FourBar,
+) -> Any:
     """Convert damping and dry friction, whose couples have no sense of their own."""
     square = to.length * to.length
     return type(effect).at(
@@ -515,7 +529,11 @@ _NOT_IN_PARTS = (Friction, PinFriction)
 """Effects that are not the sum of what each adds."""
 
 
-def _convert_drive(drive: Any, to: _SceneConversion, linkage: FourBar) -> Any:
+def _convert_drive(
+    drive: Any,
+    to: _SceneConversion,
+    linkage: FourBar,
+) -> Any:
     if isinstance(drive, LinearDrive):
         ends = (to.place(end, linkage) for end in (drive.start, drive.end))
         return LinearDrive(*ends)
@@ -702,7 +720,11 @@ def _require_linear(scene: Scene) -> None:
         raise NotAskedError("forces with dry friction are no sum of what each adds")
 
 
-def _measure_sum(few: _Few, parts: Sequence[Scene], bare: Scene | None = None) -> Array:
+def _measure_sum(
+    few: _Few,
+    parts: Sequence[Scene],
+    bare: Scene | None = None,
+) -> Array:
     """Compare the forces with the sum of what scenes have, (q, n).
 
     What a bare scene has, if there is one, is taken off.

@@ -93,7 +93,11 @@ def replace_bars(scene: Scene, **bars: Bar) -> Scene:
     return replace(scene, linkage=replace(scene.linkage, **bars))  # type: ignore[arg-type]
 
 
-def _compute_corners(side: float, second_side: float, opposite: float) -> list[float]:
+def _compute_corners(
+    side: float,
+    second_side: float,
+    opposite: float,
+) -> list[float]:
     """Compute the angles between two sides of a triangle by its third side.
 
     They are of either sign, if it closes.
@@ -174,7 +178,9 @@ def toggle(*, distances: tuple[float, ...] = TOGGLE, seeds: range = range(2)) ->
                     yield (
                         label,
                         set_angles(
-                            dress(lengths, seed), [*inside, *beyond[::-1]], branch
+                            dress(lengths, seed),
+                            [*inside, *beyond[::-1]],
+                            branch,
                         ),
                     )
 
@@ -410,7 +416,9 @@ def _drive_thesis_to_limits(*, steps: int = 120) -> Scenes:
     (psi, _), *_ = find_collinear_3_4(linkage.lengths)
     for branch, name in BRANCH_NAMES.items():
         sweep = Sweep(
-            linkage.ground_angle + psi, linkage.ground_angle + 2 * math.pi - psi, steps
+            linkage.ground_angle + psi,
+            linkage.ground_angle + 2 * math.pi - psi,
+            steps,
         )
         yield name, Scene(linkage, Motion(sweep, 0.2244, branch=branch), 4)
 

@@ -45,7 +45,11 @@ def draw_decades(low: float, high: float) -> Draw:
     return lambda rng: float(10.0 ** rng.uniform(low, high))
 
 
-def draw_chance(share: float, draw: Draw, otherwise: float = 0.0) -> Draw:
+def draw_chance(
+    share: float,
+    draw: Draw,
+    otherwise: float = 0.0,
+) -> Draw:
     """Return a draw that is made in this share of all cases."""
     return lambda rng: draw(rng) if rng.random() < share else otherwise
 
@@ -405,7 +409,11 @@ _MACHINE_FAMILIES = {
 }
 
 
-def draw_random_scene(seed: int, index: int, types: tuple[DrawnType, ...]) -> Scene:
+def draw_random_scene(
+    seed: int,
+    index: int,
+    types: tuple[DrawnType, ...],
+) -> Scene:
     """Draw a scene of one of the types, taken in turn; without types an uneven one."""
     rng = np.random.default_rng([seed, index])
     family = _UNEVEN_FAMILY

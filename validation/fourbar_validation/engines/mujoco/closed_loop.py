@@ -45,7 +45,11 @@ WARNINGS = (
 )
 
 
-def load_force(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Array:
+def load_force(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    actuator: int,
+) -> Array:
     """Return the world force of an actuator on a site, (3,).
 
     MuJoCo counts it into the force of the parent.
@@ -157,7 +161,12 @@ class ClosedLoop(Assembled):
         turn = self.drive_column(bar) @ null_vector
         return int(np.sign(turn if bar != 2 else -turn))
 
-    def set_state(self, q: Sequence[float], speed: float, bar: int | None = 2) -> None:
+    def set_state(
+        self,
+        q: Sequence[float],
+        speed: float,
+        bar: int | None = 2,
+    ) -> None:
         """Start from own joint angles at the speed of a bar or of the stroke.
 
         The gap is kept closed.
@@ -299,7 +308,12 @@ class ClosedLoop(Assembled):
         on_bar, on_ground = arms
         return on_bar, on_ground
 
-    def work(self, drive_bar: int | None, size: float, correction: float = 0.0) -> None:
+    def work(
+        self,
+        drive_bar: int | None,
+        size: float,
+        correction: float = 0.0,
+    ) -> None:
         """Let a couple act on the driven bar, N m, or the actuator push, N.
 
         The actuator is that of the cylinder. A couple acts on the crank too.

@@ -90,7 +90,9 @@ def describe_model(topology: Topology, flywheel: float = 0.0) -> Described:
     for axis, size in zip("xy", topology.in_plane(gravity), strict=True):
         described[f"gravity.{axis}"] = ModelEntry(float(size), "option", "gravity")
     described["gravity.across"] = ModelEntry(
-        float(gravity @ topology.normal), "option", "gravity"
+        float(gravity @ topology.normal),
+        "option",
+        "gravity",
     )
     for pin in PINS:
         described |= _describe_pin(topology, pin)
@@ -106,7 +108,9 @@ def describe_model(topology: Topology, flywheel: float = 0.0) -> Described:
         else:
             kind = ""
         described[f"option.{name}"] = ModelEntry(
-            MJCF_WORDS.get(kind, kind) or _read_field(setting), "option", name
+            MJCF_WORDS.get(kind, kind) or _read_field(setting),
+            "option",
+            name,
         )
     touching = model.npair or (
         model.geom_contype.any() and model.geom_conaffinity.any()
@@ -131,7 +135,11 @@ def _name_element(tag: str, name: str, number: int) -> str:
     return f"{tag} {number} (unnamed)"
 
 
-def _describe_bar(topology: Topology, bar: int, flywheel: float) -> Described:
+def _describe_bar(
+    topology: Topology,
+    bar: int,
+    flywheel: float,
+) -> Described:
     """Describe mass, inertia about the mass centre, and its place.
 
     The place is from the first pin; all that is welded to the bar is included. The
@@ -179,7 +187,9 @@ def _describe_bar(topology: Topology, bar: int, flywheel: float) -> Described:
         joint = topology.hinge[FIRST_PIN[bar]]
         hinge = _name_element("joint", model.joint(joint).name, joint)
         described[f"{key}.inertia"] = ModelEntry(
-            inertia + armature, f"{element} inertial and {hinge}", "armature"
+            inertia + armature,
+            f"{element} inertial and {hinge}",
+            "armature",
         )
     return described
 
@@ -209,13 +219,17 @@ def _describe_pin(topology: Topology, pin: str) -> Described:
             continue  # it is inertia of the bar there
         size = float(getattr(model, field)[joint if field.startswith("jnt") else dof])
         acts = not flag or is_enabled(
-            model, flag, *(("passive",) if flag in ("spring", "damper") else ())
+            model,
+            flag,
+            *(("passive",) if flag in ("spring", "damper") else ()),
         )
         described[f"{key}.{name}"] = ModelEntry(size * acts, element, attribute)
     if described[f"{key}.friction"].value:
         for field, attribute in FRICTION_COMPLIANCE.items():
             described[f"{key}.{attribute}"] = ModelEntry(
-                _read_field(getattr(model, field)[dof]), element, attribute
+                _read_field(getattr(model, field)[dof]),
+                element,
+                attribute,
             )
     if described[f"{key}.stiffness"].value:
         address = model.jnt_qposadr[joint]
@@ -223,11 +237,15 @@ def _describe_pin(topology: Topology, pin: str) -> Described:
             model.qpos_spring[address] - model.qpos0[address]
         )
         described[f"{key}.spring angle"] = ModelEntry(
-            topology.rest_angle(pin) + turned, element, "springref"
+            topology.rest_angle(pin) + turned,
+            element,
+            "springref",
         )
     stops = topology.stops(pin)
     described[f"{key}.range"] = ModelEntry(
-        UNLIMITED_RANGE if stops is None else stops, element, "range"
+        UNLIMITED_RANGE if stops is None else stops,
+        element,
+        "range",
     )
     if topology.sense[pin] > 0:
         sense = "counter-clockwise"
@@ -255,15 +273,21 @@ def _describe_closure(topology: Topology) -> Described:
     if number is None:
         return described
     element = _name_element(
-        topology.closed_by.partition(" ")[0], model.equality(number).name, number
+        topology.closed_by.partition(" ")[0],
+        model.equality(number).name,
+        number,
     )
     impedance = float(np.clip(model.eq_solimp[number, 0], _SOFTEST, STIFFEST))
     softness = (1.0 - impedance) / impedance * _sum_inverse_weights(topology, number)
     described["closure.solref"] = ModelEntry(
-        _read_field(model.eq_solref[number]), element, "solref"
+        _read_field(model.eq_solref[number]),
+        element,
+        "solref",
     )
     described["closure.solimp"] = ModelEntry(
-        _read_field(model.eq_solimp[number]), element, "solimp"
+        _read_field(model.eq_solimp[number]),
+        element,
+        "solimp",
     )
     return described | {"closure.softness": ModelEntry(softness, element, "solimp")}
 
@@ -516,7 +540,12 @@ def _find(root: ET.Element, element: str) -> ET.Element:
     raise KeyError(element)
 
 
-def _set_attribute(root: ET.Element, entry: ModelEntry, key: str, value: Value) -> None:
+def _set_attribute(
+    root: ET.Element,
+    entry: ModelEntry,
+    key: str,
+    value: Value,
+) -> None:
     """Set the attribute that states an entry.
 
     A pin's flag is taken off, so that the entry acts.
@@ -668,7 +697,11 @@ def _set_load(
         )
 
 
-def mend_entry(topology: Topology, key: str, value: Value | None) -> bool:
+def mend_entry(
+    topology: Topology,
+    key: str,
+    value: Value | None,
+) -> bool:
     """Make one entry of a compiled model that of the generated file.
 
     False if that is not possible. A weld becomes a pin, contacts are switched off, a

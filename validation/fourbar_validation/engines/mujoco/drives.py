@@ -102,7 +102,12 @@ class _Actuated(Driven):
             joint="O2",
         )
 
-    def set_state(self, q: Sequence[float], speed: float, bar: int | None = 2) -> None:
+    def set_state(
+        self,
+        q: Sequence[float],
+        speed: float,
+        bar: int | None = 2,
+    ) -> None:
         """Start the target where the crank is."""
         super().set_state(q, speed, bar)
         if self.kp:
@@ -123,7 +128,12 @@ class WheelEquality(Driven):
     The wheel is a second, heavy body that turns at omega next to the linkage.
     """
 
-    def __init__(self, mjcf: str, omega: float, softness: float = 1.0) -> None:
+    def __init__(
+        self,
+        mjcf: str,
+        omega: float,
+        softness: float = 1.0,
+    ) -> None:
         """Set `softness`, a factor on dof_invweight0.
 
         It is edited after the compilation; 1: plain MJCF.
@@ -162,7 +172,12 @@ class WheelEquality(Driven):
         """Place the wheel where the crank is."""
         super().place((*q, q[O2]))
 
-    def set_state(self, q: Sequence[float], speed: float, bar: int | None = 2) -> None:
+    def set_state(
+        self,
+        q: Sequence[float],
+        speed: float,
+        bar: int | None = 2,
+    ) -> None:
         """Let the wheel rotate as the crank does."""
         super().set_state(q, speed, bar)
         self.data.qvel[3] = speed

@@ -78,7 +78,9 @@ class MujocoForward:
         q_0 = Assembler(loop).find(float(start.theta_2[0]), int(start.branch[0]))
         if q_0 is None:
             return ReleasedAnswer.refused(
-                RELEASED, setting, "the loop does not close at the start"
+                RELEASED,
+                setting,
+                "the loop does not close at the start",
             )
         loop.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
         loop.set_state(q_0, scene.motion.omega_2 or 0.0)
@@ -217,7 +219,11 @@ def _compute_at_impedance(
     loop = ClosedLoop(write_mjcf(scene, settings, keyframe=False))
     drive = name_driving(scene)
 
-    def read(q: JointAngles, omega_2: float, alpha_2: float) -> BarValues:
+    def read(
+        q: JointAngles,
+        omega_2: float,
+        alpha_2: float,
+    ) -> BarValues:
         loop.set_state(unwind(scene, q), omega_2)
         torque = loop.solve_drive(scene.drive_bar, alpha_2, (0.0, 1.0), refinements=1)
         return {drive: math.nan if torque is None else torque, **loop.forces()}

@@ -182,7 +182,10 @@ class MujocoTree(Tree):
         data = self.data
         count = 0
         for name, jacobian, rate in zip(
-            names, self._jacobians, self._rates, strict=False
+            names,
+            self._jacobians,
+            self._rates,
+            strict=False,
         ):
             site = self.site[name]
             place = self.in_space[name]

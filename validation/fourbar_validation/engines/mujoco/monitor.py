@@ -143,7 +143,9 @@ class ResidualMonitor:
         seen = self._motion(q, v, a)
         power = torque * float(seen.drive @ v)
         self._keep(
-            "acceleration_gap", float(np.hypot(*seen.jerk)), float(np.hypot(*seen.a_B))
+            "acceleration_gap",
+            float(np.hypot(*seen.jerk)),
+            float(np.hypot(*seen.a_B)),
         )
         # at a pole of T3 or T4 the speed of the driven bar, which vanishes, is as
         # uncertain as the others
@@ -182,7 +184,12 @@ class ResidualMonitor:
             expected[name] += min(error, _EXCUSED * float(np.linalg.norm(size)))
         return expected
 
-    def _keep(self, name: str, value: float, size: float) -> None:
+    def _keep(
+        self,
+        name: str,
+        value: float,
+        size: float,
+    ) -> None:
         self.worst[name] = (
             max(self.worst[name], value) if math.isfinite(value) else math.inf
         )
@@ -199,7 +206,12 @@ class ResidualMonitor:
             for name, worst in self.worst.items()
         }
 
-    def _motion(self, q: Array, v: Array, a: Array) -> _MonitoredMotion:
+    def _motion(
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+    ) -> _MonitoredMotion:
         bars, d = self.bars, self.bars.data
         d.qpos[:], d.qvel[:], d.qacc[:] = q, v, a
         mujoco.mj_inverse(bars.model, d)
@@ -222,7 +234,14 @@ class ResidualMonitor:
         jerk = jacobian @ a + (rate_3 - rate_4) @ v
         a_B = bars.jacobian_at("B4") @ a + rate_4 @ v
         return _MonitoredMotion(
-            gap, jacobian @ v, jerk, a_B, jacobian, drive, needed, answer
+            gap,
+            jacobian @ v,
+            jerk,
+            a_B,
+            jacobian,
+            drive,
+            needed,
+            answer,
         )
 
     def _compute_pins(self, loop_force: Array, drive: float) -> dict[str, Array]:

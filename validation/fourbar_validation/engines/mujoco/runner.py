@@ -184,7 +184,11 @@ def find_extremes(law: Law | Rise) -> tuple[float, float]:
     return float(np.abs(omega).max()), float(np.abs(alpha).max())
 
 
-def order_in_time(values: Array, time: Array | None, speed: float) -> NDArray[np.intp]:
+def order_in_time(
+    values: Array,
+    time: Array | None,
+    speed: float,
+) -> NDArray[np.intp]:
     """Order the positions as they are passed, as indices.
 
     The order is by what is commanded or by the times of a law.
@@ -578,7 +582,11 @@ def supply_forces(supplied: dict[str, ActuatorForce]) -> Iterator[None]:
         yield
         return
 
-    def force(model: mujoco.MjModel, data: mujoco.MjData, number: int) -> float:
+    def force(
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        number: int,
+    ) -> float:
         name = model.actuator(number).name
         return supplied[name](model, data)
 

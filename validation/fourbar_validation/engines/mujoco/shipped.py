@@ -37,7 +37,11 @@ times what was measured.
 """
 
 
-def compare_shipped(name: str, scene: Scene, command: Command) -> Row | None:
+def compare_shipped(
+    name: str,
+    scene: Scene,
+    command: Command,
+) -> Row | None:
     """Compare the file's rest pose, its keyframe and its drive.
 
     Give the worst; None if nothing moves.
@@ -105,7 +109,10 @@ def compare_shipped(name: str, scene: Scene, command: Command) -> Row | None:
         moving = omega + scene.motion.alpha_2 * SERVO_STEPS * loop.model.opt.timestep
     if (
         beyond := _find_not_driven(
-            scene, omega, float(d.qpos[O2]), SERVO_STEPS * loop.model.opt.timestep
+            scene,
+            omega,
+            float(d.qpos[O2]),
+            SERVO_STEPS * loop.model.opt.timestep,
         )
     ) is not None:
         error, reason = _find_worst_departure(errors)
@@ -154,7 +161,11 @@ def compare_shipped(name: str, scene: Scene, command: Command) -> Row | None:
     )
 
 
-def _find_commanded(command: Command, theta_2: float, omega_2: float) -> Command:
+def _find_commanded(
+    command: Command,
+    theta_2: float,
+    omega_2: float,
+) -> Command:
     """Find the commanded position at an angle of bar 2, whatever turn it is of.
 
     It is the nearest; of several turns the first in the direction of motion, where the

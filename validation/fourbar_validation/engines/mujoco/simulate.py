@@ -235,7 +235,9 @@ class _Simulation:
             else (lead.values, lead.speed)
         )
         self.order = order_in_time(
-            values, command.time if self.law else None, speed or 0.0
+            values,
+            command.time if self.law else None,
+            speed or 0.0,
         )
         self.out = make_blank(
             n, [*MADE, *list_unknowns(scene), *(_OF_TENDON if scene.drive else ())]
@@ -266,7 +268,9 @@ class _Simulation:
                 f" {NEAREST_TOGGLE.reason}"
             )
         for segment in split_segments(
-            assembled, self.order, partial(self._closes_between, position)
+            assembled,
+            self.order,
+            partial(self._closes_between, position),
         ):
             start = assembled[segment[0]]
             assert start is not None
@@ -315,7 +319,10 @@ class _Simulation:
             return LedSegment(self.lead, segment)
         motion = self.scene.motion
         return SteadySegment(
-            self.command.theta_2, segment, motion.omega_2 or 0.0, motion.alpha_2
+            self.command.theta_2,
+            segment,
+            motion.omega_2 or 0.0,
+            motion.alpha_2,
         )
 
     def _compile_loop(
@@ -343,7 +350,12 @@ class _Simulation:
         )
         return write_mjcf(take_full_size(self.scene), settings, keyframe=False)
 
-    def _closes_between(self, position: Assembler, one: int, second: int) -> bool:
+    def _closes_between(
+        self,
+        position: Assembler,
+        one: int,
+        second: int,
+    ) -> bool:
         """Tell whether the loop closes everywhere between two positions."""
         start = float(self.command.angle[one])
         stop = float(self.command.angle[second])
@@ -389,7 +401,12 @@ class _Simulation:
         for name, value in monitor.evidence().items():
             self.evidence[name] = float(np.maximum(self.evidence.get(name, 0.0), value))
 
-    def _read(self, run: SimulatedRun, monitor: ResidualMonitor, index: int) -> None:
+    def _read(
+        self,
+        run: SimulatedRun,
+        monitor: ResidualMonitor,
+        index: int,
+    ) -> None:
         """Read everything of one sample, and what the engine says of itself there."""
         loop, d, turns = run.loop, run.loop.data, run.turns
         loop.forward()

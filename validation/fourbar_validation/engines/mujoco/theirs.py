@@ -178,7 +178,9 @@ def examine_file(
     """
     with collect_warnings() as warnings:
         examined = _examine_motion(
-            scene, file or RobotFile(GENERATED, write_mjcf(scene)), names
+            scene,
+            file or RobotFile(GENERATED, write_mjcf(scene)),
+            names,
         )
     examined.notes += [f"MuJoCo warns: {warning}" for warning in warnings]
     return examined
@@ -198,7 +200,9 @@ def _examine_motion(
     for key, (value, *_) in described.items():
         if key.startswith(("bars.", "lengths.")) and not math.isfinite(value):  # type: ignore[arg-type]
             raise InputError(
-                "MJCF", None, f"{key} is beyond the range of doubles: {value}"
+                "MJCF",
+                None,
+                f"{key} is beyond the range of doubles: {value}",
             )
     answers = _answer_both_ways(loop, scene)
     notes = [*robot.notes, *guessed, *loop.notes]
@@ -312,7 +316,9 @@ def _answer_both_ways(loop: "_UserLoop", scene: Scene) -> list[Answer]:
     command = _choose_some_positions(command_of(scene))
     answers = [
         _answer_or_refuse(
-            FILE_AT_ONE_STATE, scene, lambda: _answer_one_state(loop, command)
+            FILE_AT_ONE_STATE,
+            scene,
+            lambda: _answer_one_state(loop, command),
         )
     ]
     if (
@@ -322,7 +328,9 @@ def _answer_both_ways(loop: "_UserLoop", scene: Scene) -> list[Answer]:
     ):
         answers.append(
             _answer_or_refuse(
-                FILE_THROUGH_TIME, scene, lambda: answer_through_time(loop, command)
+                FILE_THROUGH_TIME,
+                scene,
+                lambda: answer_through_time(loop, command),
             )
         )
     return answers
@@ -350,7 +358,11 @@ def _choose_some_positions(command: Command) -> Command:
     return Command(command.theta_2[keep], command.branch[keep], omega_2, alpha_2)
 
 
-def _answer_or_refuse(name: str, scene: Scene, ask: Callable[[], Answer]) -> Answer:
+def _answer_or_refuse(
+    name: str,
+    scene: Scene,
+    ask: Callable[[], Answer],
+) -> Answer:
     start = time.perf_counter()
     try:
         answer = ask()
@@ -499,7 +511,9 @@ class _UserLoop(Assembled):
         if self.scene.drive is not None and len(cylinders) != 1:
             counted = f"{len(cylinders)} actuators with a control on tendons"
             raise InputError(
-                "MJCF", counted, "the scene's drive is a cylinder: must be one"
+                "MJCF",
+                counted,
+                "the scene's drive is a cylinder: must be one",
             )
         for i in cylinders:  # takes the force itself as its control
             model.actuator_gaintype[i], model.actuator_biastype[i] = (
@@ -578,7 +592,12 @@ class _UserLoop(Assembled):
         """
         return np.asarray(self.to_joints @ solve_closed(self.jacobian(), omega_2))
 
-    def ask(self, q: Array, v: Array, alpha_2: float) -> dict[str, Array | float]:
+    def ask(
+        self,
+        q: Array,
+        v: Array,
+        alpha_2: float,
+    ) -> dict[str, Array | float]:
         """Evaluate a state at which the crank accelerates at alpha_2.
 
         The couple of the driven bar is solved for.
@@ -715,7 +734,10 @@ def _answer_one_state(loop: _UserLoop, command: Command) -> Answer:
 
     told = with_signs(loop.scene.linkage, command)
     out, assembled, gap = read_each(
-        loop, told, [*list_unknowns(loop.scene), *MADE], read
+        loop,
+        told,
+        [*list_unknowns(loop.scene), *MADE],
+        read,
     )
     if contacts:
         loop.notes.append(

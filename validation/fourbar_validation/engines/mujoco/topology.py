@@ -189,7 +189,9 @@ class Topology:
         hinges = self.model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE
         if not hinges.any():
             raise InputError(
-                "MJCF", None, "must have hinges at three of the pins O2, A, B, O4"
+                "MJCF",
+                None,
+                "must have hinges at three of the pins O2, A, B, O4",
             )
         axis = self.data.xaxis[np.argmax(hinges)]
         nearest = int(np.argmax(np.abs(axis)))
@@ -329,7 +331,12 @@ class Topology:
         """Project on the linkage's plane, (2,)."""
         return np.asarray(self.axes @ vector)
 
-    def world(self, data: mujoco.MjData, bar: int, pin: str) -> Array:
+    def world(
+        self,
+        data: mujoco.MjData,
+        bar: int,
+        pin: str,
+    ) -> Array:
         """Locate a bar's pin, world axes, (3,)."""
         body = self.root[bar]
         rotation = data.xmat[body].reshape(3, 3)

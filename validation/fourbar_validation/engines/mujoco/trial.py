@@ -326,7 +326,12 @@ class TrialSetup:
         timestep = motion_segment.run.timestep(settings)
         loop, light = self.build_loops(settings, timestep, *builds)
         run = SimulatedRun(
-            self.scene, loop, light, motion_segment, self.start[segment[0]], timestep
+            self.scene,
+            loop,
+            light,
+            motion_segment,
+            self.start[segment[0]],
+            timestep,
         )
         driving = name_driving(self.scene)
         for row, index in enumerate(segment):

@@ -34,13 +34,21 @@ def find_roots(model: mujoco.MjModel, held: set[int]) -> list[int]:
     return roots
 
 
-def find_common(model: mujoco.MjModel, first: int, second: int) -> int:
+def find_common(
+    model: mujoco.MjModel,
+    first: int,
+    second: int,
+) -> int:
     """Return the nearest body that carries both of two bodies, or is one of them."""
     above = set(climb(model, second))
     return next(body for body in climb(model, first) if body in above)
 
 
-def list_joints_between(model: mujoco.MjModel, first: int, second: int) -> list[int]:
+def list_joints_between(
+    model: mujoco.MjModel,
+    first: int,
+    second: int,
+) -> list[int]:
     """List the joints on the ways from two bodies to their common ancestor."""
     common = find_common(model, first, second)
     joints: list[int] = []

@@ -197,7 +197,12 @@ class _Chain:
     They lead over the common ancestor.
     """
 
-    def __init__(self, finder: "_Finder", first: int, second: int) -> None:
+    def __init__(
+        self,
+        finder: "_Finder",
+        first: int,
+        second: int,
+    ) -> None:
         self.model = finder.model
         common = find_common(self.model, first, second)
         self.ground = finder.root[common]

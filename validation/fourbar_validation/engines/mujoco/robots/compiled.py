@@ -55,11 +55,15 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
         raise InputError("MJCF", None, complaint) from None
     except RuntimeError:  # "unknown exception": a size that no memory holds
         raise InputError(
-            "MJCF", None, "MuJoCo breaks down over it; is a size in it too large?"
+            "MJCF",
+            None,
+            "MuJoCo breaks down over it; is a size in it too large?",
         ) from None
     if not 0.0 < model.opt.timestep < math.inf:
         raise InputError(
-            "MJCF", None, f"its timestep of {model.opt.timestep:g} s must be above 0"
+            "MJCF",
+            None,
+            f"its timestep of {model.opt.timestep:g} s must be above 0",
         )
     masses = tuple(
         number

@@ -219,7 +219,12 @@ class LoopInside:
         qvel[self.passive] = _solve_least_squares(jacobian[:, self.passive], due)
         return _RobotState(qpos, qvel, theta_2)
 
-    def ask(self, qpos: Array, qvel: Array, alpha_2: float) -> InsideRow:
+    def ask(
+        self,
+        qpos: Array,
+        qvel: Array,
+        alpha_2: float,
+    ) -> InsideRow:
         """Evaluate a state in which bar 2 accelerates at alpha_2.
 
         The couple on it is solved for.
@@ -657,7 +662,12 @@ def reflect(model: mujoco.MjModel, loop: RobotLoop) -> Array | None:
     return qpos
 
 
-def _find_instant(start: float, angle: float, omega: float, alpha: float) -> float:
+def _find_instant(
+    start: float,
+    angle: float,
+    omega: float,
+    alpha: float,
+) -> float:
     """Return the time at which a motion passes an angle, s.
 
     Raises LimitError if it comes to rest before.

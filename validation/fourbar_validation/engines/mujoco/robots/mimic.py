@@ -49,7 +49,11 @@ class JointEquality:
     """+1 if theta_2 grows with the leader, -1 if it falls."""
 
 
-def read_joint_equality(file: RobotFile, name: str, scene: Scene) -> JointEquality:
+def read_joint_equality(
+    file: RobotFile,
+    name: str,
+    scene: Scene,
+) -> JointEquality:
     """Read the equality by which a joint follows another, in the loop of a scene.
 
     The leader turns the input and the follower the output. Where the input points in
@@ -84,7 +88,9 @@ def _describe_follower(
     for joint in (follower, leader):
         if int(model.jnt_type[joint]) != HINGE_JOINT:
             raise InputError(
-                "--mimic", name_joint(model, joint), "is no hinge: both must be hinges"
+                "--mimic",
+                name_joint(model, joint),
+                "is no hinge: both must be hinges",
             )
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -127,7 +133,10 @@ def _measure_input(
         return None, 1.0
     output_angle = _find_angle_of_bar(model, data, follower, output_length, (x, y))
     behind = output_angle is not None and is_seen_from_behind(
-        scene, 0.0, input_angle, output_angle
+        scene,
+        0.0,
+        input_angle,
+        output_angle,
     )
     side = -1.0 if behind else 1.0
     return linkage.ground_angle + side * input_angle, side

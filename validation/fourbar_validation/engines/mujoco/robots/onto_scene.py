@@ -63,7 +63,9 @@ def close_onto(
         loop = choose_loop(find_closures(posed, pose), loop.name)
     if loop.is_flat:
         behind = not _fits_gravity(scene, posed, loop) and _fits_gravity(
-            scene, posed, loop.seen_from_behind()
+            scene,
+            posed,
+            loop.seen_from_behind(),
         )
         return _close_flat(scene, posed, loop, pose, behind)
     theta_1, theta_2, _, theta_4 = loop.angles
@@ -112,7 +114,11 @@ def _close_flat(
     return replace(loop, remarks=(*loop.remarks, text)), posed
 
 
-def _leave_flat(scene: Scene, posed: PosedRobot, loop: RobotLoop) -> Array:
+def _leave_flat(
+    scene: Scene,
+    posed: PosedRobot,
+    loop: RobotLoop,
+) -> Array:
     """Return a pose at an angle of the scene at which the bars are not in line."""
     inside = LoopInside(posed.model, loop)
     turned = find_turn(scene, loop)
@@ -133,7 +139,11 @@ def _measure_sine(loop: RobotLoop) -> float:
     return abs(math.sin(loop.angles[3] - loop.angles[2]))
 
 
-def _require_assembly(scene: Scene, posed: PosedRobot, loop: RobotLoop) -> None:
+def _require_assembly(
+    scene: Scene,
+    posed: PosedRobot,
+    loop: RobotLoop,
+) -> None:
     """Refuse a pose that is of the scene's assembly from the wrong side alone."""
     behind = loop.seen_from_behind()
     if _fits_gravity(scene, posed, loop) or not _fits_gravity(scene, posed, behind):
@@ -153,7 +163,11 @@ def _require_assembly(scene: Scene, posed: PosedRobot, loop: RobotLoop) -> None:
     )
 
 
-def _fits_gravity(scene: Scene, posed: PosedRobot, loop: RobotLoop) -> bool:
+def _fits_gravity(
+    scene: Scene,
+    posed: PosedRobot,
+    loop: RobotLoop,
+) -> bool:
     """Tell whether gravity has the direction that it has in a scene.
 
     Its size is for the comparison; where one of them has none, no side fits.

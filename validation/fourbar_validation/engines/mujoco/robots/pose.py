@@ -81,7 +81,10 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
     before = closing.size(stated)
     if before <= CLOSED_IN_THE_FILE and not set(outside) - fixed:
         return PosedRobot(
-            model, _evaluate_kinematics(model, stated), stated, tuple(notes)
+            model,
+            _evaluate_kinematics(model, stated),
+            stated,
+            tuple(notes),
         )
     closed = closing.close(stated)
     after = closing.size(closed)
@@ -132,11 +135,18 @@ def _say_open(
 def move_to(posed: PosedRobot, qpos: Array) -> PosedRobot:
     """Return a robot whose loops are closed in another pose."""
     return PosedRobot(
-        posed.model, _evaluate_kinematics(posed.model, qpos), qpos, posed.notes
+        posed.model,
+        _evaluate_kinematics(posed.model, qpos),
+        qpos,
+        posed.notes,
     )
 
 
-def find_joint(model: mujoco.MjModel, name: str, option: str) -> int:
+def find_joint(
+    model: mujoco.MjModel,
+    name: str,
+    option: str,
+) -> int:
     """Find a joint by its name, as it is printed.
 
     Raises an InputError that lists the joints.
@@ -171,12 +181,18 @@ def _choose_start(model: mujoco.MjModel, options: PoseOptions) -> tuple[Array, s
     if number < 0:
         names = ", ".join(model.key(i).name or str(i) for i in range(model.nkey))
         raise InputError(
-            "--key", options.key, f"no such keyframe; the file has: {names or 'none'}"
+            "--key",
+            options.key,
+            f"no such keyframe; the file has: {names or 'none'}",
         )
     return model.key_qpos[number].copy(), f"in keyframe {options.key}"
 
 
-def _read_joint_position(name: str, text: str, unit: str) -> float:
+def _read_joint_position(
+    name: str,
+    text: str,
+    unit: str,
+) -> float:
     try:
         float(text)
     except ValueError:

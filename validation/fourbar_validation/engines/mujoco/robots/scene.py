@@ -175,7 +175,11 @@ def _sum_over_motors(
     return total
 
 
-def write_pose(model: mujoco.MjModel, loop: RobotLoop, qpos: Array) -> str:
+def write_pose(
+    model: mujoco.MjModel,
+    loop: RobotLoop,
+    qpos: Array,
+) -> str:
     """Write the hinges of a loop in a pose as the value of --pose.
 
     The digits close the loop to 1e-8 of its bars.
@@ -197,7 +201,12 @@ def _round_angle(angle: float) -> float:
     return round(angle, DIGITS_OF_A_MODEL) + 0.0
 
 
-def miss_output(scene: Scene, theta_1: float, theta_2: float, theta_4: float) -> float:
+def miss_output(
+    scene: Scene,
+    theta_1: float,
+    theta_2: float,
+    theta_4: float,
+) -> float:
     """Return by how much the output of a scene misses that of a loop, rad.
 
     The loop is in its pose; infinite if it is open.
@@ -283,7 +292,12 @@ class _SceneOfLoop:
             lines.append(f"Held as they stand: {', '.join(held)}.")
         return tuple(lines)
 
-    def describe(self, speed: float, title: str, source: str) -> Scene:
+    def describe(
+        self,
+        speed: float,
+        title: str,
+        source: str,
+    ) -> Scene:
         """Describe the scene."""
         lumps = {bar: self._lump(bar) for bar in MOVING_BARS}
         armature = self._list_armature()
@@ -498,7 +512,9 @@ class _SceneOfLoop:
             )
         if not free.any():
             raise InputError(
-                "MJCF", self.loop.name, "no position is within the ranges of its hinges"
+                "MJCF",
+                self.loop.name,
+                "no position is within the ranges of its hinges",
             )
         rows = _find_run(free, in_pose)
         return _MotionOverRange(
@@ -551,7 +567,10 @@ class _SceneOfLoop:
         theta_4 = self.loop.angles[3]
         apart = [
             miss_output(
-                Scene(linkage, Motion(branch=branch)), theta_1, theta_2, theta_4
+                Scene(linkage, Motion(branch=branch)),
+                theta_1,
+                theta_2,
+                theta_4,
             )
             for branch in (OPEN, CROSSED)
         ]

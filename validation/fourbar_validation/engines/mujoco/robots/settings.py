@@ -69,7 +69,11 @@ def read_settings(model: mujoco.MjModel, loop: RobotLoop) -> RobotSettings:
     )
 
 
-def _name_value(kinds: type, value: int, words: Sequence[str]) -> str:
+def _name_value(
+    kinds: type,
+    value: int,
+    words: Sequence[str],
+) -> str:
     """Return the word of MJCF for a value of an enumeration."""
     name = kinds(value).name.partition("_")[2]
     return next(word for word in words if word.upper() == name)
@@ -125,7 +129,13 @@ class SettingsSearch:
         best, reached = self._find_cheapest(wanted)
         typed = _write_elements(file, self.loop, best)
         return SettingsAdvice(
-            wanted, before, tuple(alone), best, reached, len(self.tried), typed
+            wanted,
+            before,
+            tuple(alone),
+            best,
+            reached,
+            len(self.tried),
+            typed,
         )
 
     def measure(self, settings: RobotSettings) -> TriedSettings:
