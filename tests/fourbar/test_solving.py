@@ -331,7 +331,7 @@ def test_an_angle_that_is_no_number_is_not_reported_as_not_closing() -> None:
         assert solution.status == ["overflow", "ok"] and without_value(solution) == {}
 
 
-def test_what_is_beyond_the_range_of_doubles_is_nan_where_the_loop_does_not_close_too() -> (
+def test_what_is_beyond_the_range_of_doubles_is_nan_also_where_the_loop_is_open() -> (
     None
 ):
     rocker = fourbar.uniform(40.0, 25.0, 25.0, 28.0)

@@ -33,10 +33,39 @@ ROOT = Path(__file__).parents[3]
 MODELS = ROOT / "models"
 STROKE = MODELS / "capabilities" / "stroke_input.toml"
 CONTRACT = (
-    "schema", "title", "status", "branch", "theta_2", "theta_3", "theta_4", "omega_2", "omega_3", "omega_4", "alpha_2",
-    "alpha_3", "alpha_4", "A", "B", "G2", "G3", "G4", "a_A", "a_B", "a_G2", "a_G3", "a_G4", "F12", "F32", "F43", "F14",
-    "torque", "drive_bar", "sin_mu", "condition", "assembled",
-)  # fmt: skip
+    "schema",
+    "title",
+    "status",
+    "branch",
+    "theta_2",
+    "theta_3",
+    "theta_4",
+    "omega_2",
+    "omega_3",
+    "omega_4",
+    "alpha_2",
+    "alpha_3",
+    "alpha_4",
+    "A",
+    "B",
+    "G2",
+    "G3",
+    "G4",
+    "a_A",
+    "a_B",
+    "a_G2",
+    "a_G3",
+    "a_G4",
+    "F12",
+    "F32",
+    "F43",
+    "F14",
+    "torque",
+    "drive_bar",
+    "sin_mu",
+    "condition",
+    "assembled",
+)
 """The keys that programs which read the JSON rely on."""
 Ended = tuple[int, str, str]
 Fourbar = Callable[..., Ended]
@@ -916,7 +945,14 @@ to = { bar = 2, from_pin = ["1 in", "0 deg"] }
 """
 GAS_SPRING = """\
 [effects]
-springs = [{ from = { bar = 1, from_pin = ["3 in", "-60 deg"] }, to = { bar = 3, from_pin = ["1 in", "0 deg"] }, gas = { extended = "4 in", stroke = "2 in", extended_force = "30 lbf", compressed_force = "40 lbf" } }]
+[[effects.springs]]
+from = { bar = 1, from_pin = ["3 in", "-60 deg"] }
+to = { bar = 3, from_pin = ["1 in", "0 deg"] }
+[effects.springs.gas]
+extended = "4 in"
+stroke = "2 in"
+extended_force = "30 lbf"
+compressed_force = "40 lbf"
 """
 BY_STROKE = INCHES.replace('theta_2 = "60 deg"', 'stroke = "1 in"\nside = "left"')
 BY_STROKE = BY_STROKE.replace('omega_2 = "60 rpm"', 'stroke_speed = "1 in/s"') + RAM
@@ -937,7 +973,8 @@ BY_STROKE = BY_STROKE.replace('omega_2 = "60 rpm"', 'stroke_speed = "1 in/s"') +
         ),
         (
             INCHES + GAS_SPRING.replace('"40 lbf"', '"20 lbf"'),
-            "compressed_force = 20 lbf: must be no less than the extended_force, 30 lbf",
+            "compressed_force = 20 lbf: must be no less than the extended_force,"
+            " 30 lbf",
         ),
         (
             INCHES + '[tolerances]\n"lengths.input" = "3 in"\n',

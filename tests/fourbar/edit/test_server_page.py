@@ -43,8 +43,10 @@ PIXELS = 4.0
 
 
 OVERLAPS = """
-const boxes = [...picture.querySelectorAll('text')].map(e => [e.textContent, e.getBoundingClientRect()])
-  .filter(([words, box]) => words.trim() && box.width), found = [];
+const boxes = [...picture.querySelectorAll('text')]
+  .map(e => [e.textContent, e.getBoundingClientRect()])
+  .filter(([words, box]) => words.trim() && box.width);
+const found = [];
 boxes.forEach(([a, p], n) => boxes.slice(n + 1).forEach(([b, q]) => {
   const wide = Math.min(p.right, q.right) - Math.max(p.left, q.left);
   const high = Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top);

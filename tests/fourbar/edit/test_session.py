@@ -303,7 +303,7 @@ def test_what_is_dragged_stands_where_it_was_dragged_to(session: Session) -> Non
 
 @pytest.mark.parametrize("frame", ["world", "bar"])
 @pytest.mark.parametrize("size", ["5 N", "-5 N"])
-def test_the_arrow_of_a_load_goes_where_it_is_dragged_in_either_frame_and_a_negative_force_stays(
+def test_the_arrow_of_a_load_goes_where_it_is_dragged_and_a_negative_force_stays(
     session: Session,
     frame: str,
     size: str,

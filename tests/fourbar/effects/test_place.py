@@ -203,11 +203,16 @@ frame = "bar"
 bar = 2
 force = ["1 N", "10 deg"]
 arm = ["5 mm", "7 deg"]
-[effects]
-springs = [
-  { from = { point = "Q" }, to = { point = "P" }, stiffness = "9 N/m", length = "1 mm" },
-  { from = { bar = 1 }, to = { bar = 4, from_centre = ["3 mm", "0 deg"] }, stiffness = "9 N/m", length = "1 mm" },
-]
+[[effects.springs]]
+from = { point = "Q" }
+to = { point = "P" }
+stiffness = "9 N/m"
+length = "1 mm"
+[[effects.springs]]
+from = { bar = 1 }
+to = { bar = 4, from_centre = ["3 mm", "0 deg"] }
+stiffness = "9 N/m"
+length = "1 mm"
 """
 
 

@@ -252,7 +252,7 @@ def test_turns_are_counted_through_change_points(
     branch: int,
     bar: int,
 ) -> None:
-    """A spring winds as its pin turns, from one position to the next, on an assembly."""
+    """A spring winds as its pin turns, from position to position of an assembly."""
     link = replace(fourbar.uniform(*CHANGE_POINTS[name]), ground_angle=0.4)
     least, most = choose_range(link, bar)
     if most - least > 2.0 * math.pi - 1e-6:

@@ -136,17 +136,43 @@ def test_units_are_converted_exactly_and_rounded_once(
     ("degrees", "turns"), [("360", 1.0), ("45", 0.125), ("-90", -0.25), ("1080", 3.0)]
 )
 def test_degrees_are_the_nearest_doubles(degrees: str, turns: float) -> None:
-    # 2 pi times a power of two, or three, of the double nearest to pi: math.tau itself is correctly rounded
+    # 2 pi times a power of two, or three, of the double nearest to pi: math.tau itself
+    # is correctly rounded
     assert to_si(f"{degrees} deg", "rad") == turns * math.tau
     assert to_si(f"{turns!r} rev", "rad") == turns * math.tau
 
 
 @pytest.mark.parametrize(
     "text",
-    ["1", "", "m", "nan m", "inf m", "1e309 m", "1e400 m", "1_0 m", "1 kg", "1 s", "20 degC", "1 rad", "1 m^99",
-     "1 m**2**9", "1 ((cm^9)^9)^9", "1 cm²²", "1 m + 1 m", "1 m; import os", "1 __import__('os')", "1 m" + " m" * 99,
-     "1 (((((((", "0x10 m", "1,5 m", "1.2.3 m", "9" * 200 + " m", "1e9999999 m"],
-)  # fmt: skip
+    [
+        "1",
+        "",
+        "m",
+        "nan m",
+        "inf m",
+        "1e309 m",
+        "1e400 m",
+        "1_0 m",
+        "1 kg",
+        "1 s",
+        "20 degC",
+        "1 rad",
+        "1 m^99",
+        "1 m**2**9",
+        "1 ((cm^9)^9)^9",
+        "1 cm²²",
+        "1 m + 1 m",
+        "1 m; import os",
+        "1 __import__('os')",
+        "1 m" + " m" * 99,
+        "1 (((((((",
+        "0x10 m",
+        "1,5 m",
+        "1.2.3 m",
+        "9" * 200 + " m",
+        "1e9999999 m",
+    ],
+)
 def test_what_is_no_length_is_refused(text: str) -> None:
     with pytest.raises(UnitError):
         to_si(text, "m")
@@ -161,13 +187,23 @@ def test_an_angle_is_a_dimension(text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "unit", "meant"),
     [
-        ("5 lb", "N", "5 lbf"), ("5 lbf", "kg", "5 lb"), ("3 oz in", "N m", "3 ozf in"), ("5 Hz", "rad/s", "5 rev/s"),
-        ("5 RPM", "rad/s", "5 rpm"), ("5 Newton", "N", "5 newton"), ("2 N m", "N m/rad", "2 N m/rad"),
+        ("5 lb", "N", "5 lbf"),
+        ("5 lbf", "kg", "5 lb"),
+        ("3 oz in", "N m", "3 ozf in"),
+        ("5 Hz", "rad/s", "5 rev/s"),
+        ("5 RPM", "rad/s", "5 rpm"),
+        ("5 Newton", "N", "5 newton"),
+        ("2 N m", "N m/rad", "2 N m/rad"),
         ("5 1/s", "rad/s", "5 rad/s"),
-        ("5 1/min", "rad/s", "5 rev/min"), ("5 kg cm2", "kg m^2", "5 kg cm^2"), ("1 m/s2", "m/s^2", "1 m/s^2"),
-        ("30 cms", "m", "30 cm"), ("300 MM", "m", "300 mm"), ("5 pounds", "N", "5 lbf"), ("0,3 m", "m", "0.3 m"),
+        ("5 1/min", "rad/s", "5 rev/min"),
+        ("5 kg cm2", "kg m^2", "5 kg cm^2"),
+        ("1 m/s2", "m/s^2", "1 m/s^2"),
+        ("30 cms", "m", "30 cm"),
+        ("300 MM", "m", "300 mm"),
+        ("5 pounds", "N", "5 lbf"),
+        ("0,3 m", "m", "0.3 m"),
     ],
-)  # fmt: skip
+)
 def test_what_may_have_been_meant_is_one(text: str, unit: str, meant: str) -> None:
     with pytest.raises(UnitError, match=re.escape(f'did you mean "{meant}"?')):
         to_si(text, unit)
@@ -225,7 +261,14 @@ frame = "bar"
 [effects]
 viscous = { O2 = "0.01 N m s/rad", B = "1 N m s/rad" }
 friction = { A = "5 N cm" }
-springs = [{ from = { bar = 1 }, to = { bar = 4, from_pin = ["20 cm", "0 deg"] }, gas = { extended = "50 cm", stroke = "20 cm", extended_force = "400 N", compressed_force = "520 N" } }]
+[[effects.springs]]
+from = { bar = 1 }
+to = { bar = 4, from_pin = ["20 cm", "0 deg"] }
+[effects.springs.gas]
+extended = "50 cm"
+stroke = "20 cm"
+extended_force = "400 N"
+compressed_force = "520 N"
 """
     )
     scene = loads(text)
@@ -318,7 +361,8 @@ def test_any_scene_reads_back_bit_for_bit(scene: fourbar.Scene) -> None:
 PLACES = {
     "bars.coupler.centre": '[bars.coupler]\nmass = "1 kg"\ncentre = {}\n',
     "points.P.from_pin": "[points]\nP = {{ bar = 3, from_pin = {} }}\n",
-    "loads[0].from_pin": '[[loads]]\nbar = 4\nforce = ["1 N", "0 deg"]\nfrom_pin = {}\n',
+    "loads[0].from_pin": "[[loads]]\nbar = 4\n"
+    'force = ["1 N", "0 deg"]\nfrom_pin = {}\n',
     "drive.from.from_pin": "[drive]\nfrom = {{ bar = 1, from_pin = {} }}\n"
     'to = {{ bar = 2, from_pin = ["90 mm", "0 deg"] }}\n',
     "effects.springs[0].to.from_pin": "[effects]\n"
@@ -402,9 +446,11 @@ def test_what_a_bar_leaves_out_follows_its_length(length: float) -> None:
     What is stated stays.
     """
     read = loads(
-        '[lengths]\nground = "30 cm"\ninput = "10 cm"\ncoupler = "25 cm"\noutput = "22 cm"\n'
+        '[lengths]\nground = "30 cm"\ninput = "10 cm"\n'
+        'coupler = "25 cm"\noutput = "22 cm"\n'
         '[bars.coupler]\nmass = "0.5 kg"\n'
-        '[bars.output]\nmass = "2 kg"\ninertia = "3 kg m^2"\ncentre = ["7 cm", "0 deg"]\n'
+        '[bars.output]\nmass = "2 kg"\ninertia = "3 kg m^2"\n'
+        'centre = ["7 cm", "0 deg"]\n'
     ).linkage
     coupler, output = (
         replace(bar, length=length) for bar in (read.coupler, read.output)

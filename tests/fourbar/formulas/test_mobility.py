@@ -235,9 +235,7 @@ def test_ranges_and_circuits_agree_with_a_scan(bars: FourBar) -> None:
         assert len(set(partition)) == len(circuits(bars))
 
 
-def test_positions_that_a_motion_connects_have_one_circuit_and_those_that_do_not_assemble_none() -> (
-    None
-):
+def test_positions_that_a_motion_connects_have_one_circuit_and_open_ones_none() -> None:
     crank_rocker, rocker = uniform(3, 1, 2.5, 2.2), uniform(3, 2.5, 1, 2.2)
     assert find_circuit(
         crank_rocker, np.array([0.1, 3.0, 3.0]), np.array([1, 1, -1])

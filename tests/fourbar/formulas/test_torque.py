@@ -446,7 +446,7 @@ def test_a_bar_as_short_as_the_rounding_of_the_others_keeps_its_length() -> None
     assert loop(3e-6, 3.0000001e-6, 1.0, 1.0).a == 3.0000001e-6
 
 
-def test_directions_are_unit_vectors_and_the_last_rate_is_that_of_bar_4_against_bar_3() -> (
+def test_directions_are_unit_vectors_and_the_last_rate_is_of_bar_4_against_bar_3() -> (
     None
 ):
     lengths = (

@@ -517,8 +517,11 @@ def test_newton_loads_the_usd_and_reads_as_the_comment_says() -> None:
         builder.add_usd(str(file))
     model = builder.finalize(device="cpu")
     solver, now, then = newton.solvers.SolverKamino(model), model.state(), model.state()
-    *angles, omega_2, at_A, omega_4 = (float(x) for x in re.findall(r"= (-?[\d.]+(?:e-?\d+)?) rad", text)[:4] +
-                                       re.findall(r"joint (?:A|O4) (\S+) rad/s", text))  # fmt: skip
+    *angles, omega_2, at_A, omega_4 = (
+        float(x)
+        for x in re.findall(r"= (-?[\d.]+(?:e-?\d+)?) rad", text)[:4]
+        + re.findall(r"joint (?:A|O4) (\S+) rad/s", text)
+    )
     speeds = now.joint_qd.numpy()
     speeds[:3] = omega_2, at_A, omega_4
     now.joint_qd.assign(speeds)

@@ -86,7 +86,8 @@ def test_a_text_with_a_unit_is_its_number(
 def test_a_motion_is_written_as_in_the_file() -> None:
     stated = fourbar.Motion(["10 deg", 1.0], "60 rpm", "30 deg/s^2", branch="crossed")  # type: ignore[arg-type]
     read = loads(
-        '[lengths]\nground = "6 in"\ninput = "2 in"\ncoupler = "5 in"\noutput = "4 in"\n'
+        '[lengths]\nground = "6 in"\ninput = "2 in"\n'
+        'coupler = "5 in"\noutput = "4 in"\n'
         '[motion]\ntheta_2 = ["10 deg", "1 rad"]\nomega_2 = "60 rpm"\n'
         'alpha_2 = "30 deg/s^2"\nbranch = "crossed"\n'
     ).motion

@@ -118,9 +118,9 @@ def test_what_comes_out_fed_back_as_a_command_returns_itself(
             )
             apart = np.abs(sent - returned).max(axis=1) * (lost**3 * drive**2)[ok]
             allowed = RETURNED**2 * size**2 * U * np.abs(sent).max()
-            if (
-                name == "alpha_2"
-            ):  # told to be 0, it comes back as a difference of what speeds and bars make
+            if name == "alpha_2":
+                # told to be 0, it comes back as a difference of what speeds and bars
+                # make
                 allowed += (
                     RETURNED**2
                     * size**2
@@ -511,9 +511,7 @@ def test_what_takes_theta_2_alone_refuses_in_one_line() -> None:
 
 
 @pytest.mark.slow
-def test_the_harness_asks_who_takes_the_command_and_writes_the_refusal_of_the_others() -> (
-    None
-):
+def test_the_harness_asks_who_takes_the_command_and_writes_who_refuses() -> None:
     scene = replace(
         LOADED,
         motion=Motion(theta_4=Sweep(3.9, 4.4, 4), omega_4=2.0, alpha_4=1.0),

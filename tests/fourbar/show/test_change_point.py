@@ -1,4 +1,4 @@
-"""Pin forces on a change point against balances of the whole linkage, and both sides."""
+"""Pin forces on a change point: balances of the whole linkage, and both sides."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Where gas springs are beyond their stroke: against the geometry of a parallelogram."""
+"""Where gas springs are beyond their stroke, by the geometry of a parallelogram."""
 
 import json
 import math

@@ -53,9 +53,13 @@ def shown(driver, *ids: str) -> list[float]:
 
 def pins(driver) -> dict[str, np.ndarray]:
     """The pins as drawn, in lengths of the ground from O2 and in the plane's axes."""
-    script = """return Object.fromEntries(["O2", "A", "B", "O4"].map(name => {
-        const e = document.getElementById("pin-" + name);
-        return [name, [Number(e.getAttribute("cx")), -Number(e.getAttribute("cy"))]]; }));"""
+    script = """
+        const place = name => {
+          const e = document.getElementById("pin-" + name);
+          return [name, [Number(e.getAttribute("cx")), -Number(e.getAttribute("cy"))]];
+        };
+        return Object.fromEntries(["O2", "A", "B", "O4"].map(place));
+    """
     points = {
         name: np.array(point) for name, point in driver.execute_script(script).items()
     }
@@ -147,9 +151,17 @@ def test_play_moves_the_linkage_and_pause_leaves_true_numbers(turning) -> None:
 
 def clockwork(driver, ticks: int) -> list[int]:
     """Play without waiting: frames 50 ms apart, and the row after each."""
-    script = """window.requestAnimationFrame = () => 0; play(true);
-        const rows = []; for (let i = 0; i < arguments[0]; i++) { frame(50 * i); rows.push(row); }
-        play(false); return rows;"""
+    script = """
+        window.requestAnimationFrame = () => 0;
+        play(true);
+        const rows = [];
+        for (let i = 0; i < arguments[0]; i++) {
+          frame(50 * i);
+          rows.push(row);
+        }
+        play(false);
+        return rows;
+    """
     return driver.execute_script(script, ticks)
 
 
@@ -292,7 +304,7 @@ def test_another_command_is_the_axis_and_the_linkage_follows(
 
 
 @pytest.mark.parametrize("width", [360, 400, 480, 1280])
-def test_the_numbers_of_an_axis_stand_clear_of_each_other_and_a_stroke_stays_in_its_column(
+def test_the_numbers_of_an_axis_stand_clear_and_a_stroke_stays_in_its_column(
     browse,
     width: int,
 ) -> None:
@@ -407,9 +419,12 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> No
     driver = browse(animate.write_page(scene))
     driver.execute_script("go(20)")
     s = fourbar.solve(scene)
-    script = """return [...document.querySelectorAll("path.act")].map(e => [e.getAttribute("class"),
-        [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)].map(
-            m => [(m[1] - view.x) / view.k, (view.y - m[2]) / view.k])])"""
+    script = """
+        const points = e => [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)]
+          .map(m => [(m[1] - view.x) / view.k, (view.y - m[2]) / view.k]);
+        return [...document.querySelectorAll("path.act")]
+          .map(e => [e.getAttribute("class"), points(e)]);
+    """
     acting = dict(driver.execute_script(script))
     zigzag, arrow = acting["act act-spring"], acting["act act-force"]
     end = s.B[20] + (0.08 - 0.22) * np.array(
@@ -434,10 +449,11 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> No
     )
     assert driver.execute_script(names) == [["1", "none"], ["3", ""]]
     driver.execute_script("toggle('show-v'); toggle('show-a')")
-    arrows = driver.execute_script(
-        """return [...document.querySelectorAll("#motion path.act")].map(e =>
-        [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)].map(m => [Number(m[1]), -Number(m[2])]))"""
-    )
+    arrows = driver.execute_script("""
+        const points = e => [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)]
+          .map(m => [Number(m[1]), -Number(m[2])]);
+        return [...document.querySelectorAll("#motion path.act")].map(points);
+    """)
     assert len(arrows) == 2 * 5
     shafts = np.diff(arrows, axis=1)[:, 0]
     for (x, y), expected in zip(shafts[[0, 5]], (s.v_A[20], s.a_A[20]), strict=True):
@@ -472,12 +488,19 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(
     scaling: str,
 ) -> None:
     driver, s = turning
-    choose = """const e = document.getElementById("arrow-scale"); e.value = arguments[0];
-        e.dispatchEvent(new Event("change")); go(50)"""
+    choose = """
+        const e = document.getElementById("arrow-scale");
+        e.value = arguments[0];
+        e.dispatchEvent(new Event("change"));
+        go(50);
+    """
     driver.execute_script(choose, scaling)
-    script = """const shaft = document.getElementById("arrow-" + arguments[0]), n = k => Number(shaft.getAttribute(k));
+    script = """
+        const shaft = document.getElementById("arrow-" + arguments[0]);
+        const n = k => Number(shaft.getAttribute(k));
         const tip = shaft.nextElementSibling.getAttribute("d").match(/M(\\S+) ([^L]+)/);
-        return [Number(tip[1]) - n("x1"), n("y1") - Number(tip[2])];"""
+        return [Number(tip[1]) - n("x1"), n("y1") - Number(tip[2])];
+    """
     length = """const e = document.querySelector("#force-scale line");
         return Number(e.getAttribute("x2")) - Number(e.getAttribute("x1"))"""
     bar = driver.execute_script(length)
@@ -505,13 +528,22 @@ def test_no_arrow_and_no_name_of_one_leaves_the_picture(
     driver = browse(
         animate.write_page(thesis() if scaling == "position" else crank_rocker()), width
     )
-    script = """const choice = document.getElementById("arrow-scale"); choice.value = arguments[0];
+    script = """
+        const choice = document.getElementById("arrow-scale");
+        choice.value = arguments[0];
         choice.dispatchEvent(new Event("change"));
-        const least = []; for (let i = 0; i < grid.length; i += 7) { go(i);
-          for (const e of document.querySelectorAll("#arrows .head")) { if (e.style.display === "none") continue;
-            const [x, y] = e.getAttribute("d").slice(1).split("L")[0].split(" ").map(Number);
-            least.push(Math.min(x, y, view.width - x, view.height - y)); } }
-        return least;"""
+        const least = [];
+        for (let i = 0; i < grid.length; i += 7) {
+          go(i);
+          for (const e of document.querySelectorAll("#arrows .head")) {
+            if (e.style.display === "none") continue;
+            const tip = e.getAttribute("d").slice(1).split("L")[0];
+            const [x, y] = tip.split(" ").map(Number);
+            least.push(Math.min(x, y, view.width - x, view.height - y));
+          }
+        }
+        return least;
+    """
     distances = driver.execute_script(script, scaling)
     assert (
         len(distances) > 30 and min(distances) > 15.0
@@ -595,13 +627,23 @@ def test_at_360_pixels_nothing_sticks_out_and_all_text_is_readable(
     ):
         if control.is_displayed():
             assert control.size["height"] >= 40  # large enough for a finger
-    script = """return [...document.querySelectorAll("body *")]
-        .filter(e => [...e.childNodes].some(c => c.nodeType === 3 && c.textContent.trim()))
-        .filter(e => e.checkVisibility() && !e.closest("svg, noscript, script, [disabled]"))
-        .map(e => { let ground = e;
-            while (getComputedStyle(ground).backgroundColor === "rgba(0, 0, 0, 0)") ground = ground.parentElement;
-            const colours = [getComputedStyle(e).color, getComputedStyle(ground).backgroundColor];
-            return [...colours, e.textContent.trim().slice(0, 30)]; })"""
+    script = """
+        const hasText = e => [...e.childNodes]
+          .some(c => c.nodeType === 3 && c.textContent.trim());
+        const leftOut = "svg, noscript, script, [disabled]";
+        const background = e => getComputedStyle(e).backgroundColor;
+        return [...document.querySelectorAll("body *")]
+          .filter(hasText)
+          .filter(e => e.checkVisibility() && !e.closest(leftOut))
+          .map(e => {
+            let ground = e;
+            while (background(ground) === "rgba(0, 0, 0, 0)") {
+              ground = ground.parentElement;
+            }
+            const text = e.textContent.trim().slice(0, 30);
+            return [getComputedStyle(e).color, background(ground), text];
+          });
+    """
     seen = driver.execute_script(script)
     assert len(seen) > 40
     for colour, ground, text in seen:
@@ -627,8 +669,12 @@ def contrast(first: str, second: str) -> float:
 
 def test_labels_of_the_picture_do_not_cover_each_other(browse) -> None:
     driver = browse(animate.write_page(thesis()), 360)
-    script = """return [...document.querySelectorAll("#labels text")].filter(e => e.style.display !== "none")
-        .map(e => { const b = e.getBBox(); return [b.x, b.y, b.x + b.width, b.y + b.height]; })"""
+    script = """
+        return [...document.querySelectorAll("#labels text")]
+          .filter(e => e.style.display !== "none")
+          .map(e => e.getBBox())
+          .map(b => [b.x, b.y, b.x + b.width, b.y + b.height]);
+    """
     for row in (90, 136, 200, 300):
         driver.execute_script("go(arguments[0])", row)
         boxes = driver.execute_script(script)
@@ -671,10 +717,18 @@ def test_a_picture_lies_along_its_bar(browse, tmp_path: Path) -> None:
 
 def test_with_reduced_motion_it_moves_twice_a_second(browse) -> None:
     driver = browse(animate.write_page(crank_rocker()), still=True)
-    script = """window.requestAnimationFrame = () => 0; play(true); const seen = new Set();
+    script = """
+        window.requestAnimationFrame = () => 0;
+        play(true);
+        const seen = new Set();
         const x = () => document.getElementById("pin-A").getAttribute("cx");
-        for (let i = 0; i < 60; i++) { frame(10000 + 50 * i); seen.add(x()); }
-        play(false); return seen.size;"""
+        for (let i = 0; i < 60; i++) {
+          frame(10000 + 50 * i);
+          seen.add(x());
+        }
+        play(false);
+        return seen.size;
+    """
     assert 4 <= driver.execute_script(script) <= 8  # 3 s
 
 

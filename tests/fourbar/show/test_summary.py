@@ -152,7 +152,7 @@ def test_towards_a_pole_no_largest_value_is_made_up() -> None:
     )
 
 
-def test_a_motion_law_is_looked_at_between_its_instants_and_a_list_of_angles_is_not() -> (
+def test_a_motion_law_is_looked_at_between_its_instants_and_listed_angles_are_not() -> (
     None
 ):
     law = Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), steps=20, ends="rest")

@@ -81,8 +81,13 @@ def test_every_number_is_in_the_unit_that_is_named(
     for name, (values, unit) in printed.items():
         if UNITS[name] != unit or unit in ("rad/s^2", "1"):
             expected = getattr(solution, name)
-            assert np.allclose(values * IN_SI[unit], np.full_like(values, np.nan) if expected is None else expected,
-                               rtol=4e-16 * 4, atol=0.0, equal_nan=True), name  # fmt: skip
+            assert np.allclose(
+                values * IN_SI[unit],
+                np.full_like(values, np.nan) if expected is None else expected,
+                rtol=4e-16 * 4,
+                atol=0.0,
+                equal_nan=True,
+            ), name
     assert {unit for _, unit in printed.values()} >= {
         "in",
         "lbf",

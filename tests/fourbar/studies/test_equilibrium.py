@@ -628,7 +628,8 @@ def test_the_command_prints_what_python_finds(
     assert json.loads(capsys.readouterr().out)["not_decided"][0]["theta_4"] is None
     bad = tmp_path / "bad.toml"
     bad.write_text(
-        '[lengths]\nground = "1 m"\ninput = "1.5 m"\ncoupler = "1 m"\noutput = "0.2 m"\n'
+        '[lengths]\nground = "1 m"\ninput = "1.5 m"\n'
+        'coupler = "1 m"\noutput = "0.2 m"\n'
         '[motion]\ntheta_2 = "180 deg"\n'
     )
     assert status(["equilibrium", str(bad)]) == 2

@@ -71,7 +71,7 @@ def test_a_number_that_the_torque_is_proportional_to() -> None:
     assert not torque.parted.any() and study.apart == study.invalid == 0
 
 
-def test_samples_and_first_order_agree_where_it_is_straight_and_shares_are_those_of_the_samples() -> (
+def test_samples_agree_with_first_order_where_it_is_straight_and_so_do_the_shares() -> (
     None
 ):
     both = Tolerance("lengths.input", 5e-5), Tolerance("lengths.output", 2e-5, True)

@@ -420,9 +420,7 @@ def test_a_scene_without_velocity_draws_positions_only(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_position_drawn_of_both_branches_is_one_and_stands_clear_of_their_poles() -> (
-    None
-):
+def test_the_position_drawn_of_both_branches_is_one_and_clear_of_their_poles() -> None:
     alone = make_view(thesis(FULL_TURN)).here
     scenes = [set_branch(thesis(FULL_TURN), sign) for sign in (1, -1)]
     position = choose_common_position(scenes)
