@@ -118,16 +118,16 @@ def _try_every_fault(workers: int) -> Iterator[tuple[str, str | None]]:
         else [row for outcome in rows[0].values() for row in outcome]
     )
     yield "no fault", f"the harness fails without one: {failing}" if failing else None
-    chunks = [
+    batches = [
         range(start, min(start + FAULTS_OF_A_PROCESS, len(entries)))
         for start in range(0, len(entries), FAULTS_OF_A_PROCESS)
     ]
-    for chunk, outcomes in zip(
-        chunks,
-        apply_each(try_in_turn, chunks, workers),
+    for batch, outcomes in zip(
+        batches,
+        apply_each(try_in_turn, batches, workers),
         strict=True,
     ):
-        for number, outcome in zip(chunk, outcomes, strict=True):
+        for number, outcome in zip(batch, outcomes, strict=True):
             why = explain_survival(entries[number], outcome)
             yield (
                 entries[number]["fault"],

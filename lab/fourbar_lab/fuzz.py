@@ -96,7 +96,7 @@ EXACT_ENGINES = tuple(
 """The exact engines, held to full accuracy. Or they are held to what was predicted for
 the position.
 """
-SCENES_OF_A_CHUNK = 200
+SCENES_OF_A_TASK = 200
 """Scenes per task: some seconds, which is what an interruption costs."""
 FAILURES_PRINTED = 20
 WORKER_LOST = "worker:"
@@ -378,20 +378,20 @@ def examine_scenes(
     out: Path,
     workers: int,
 ) -> Iterator[dict[str, list[str]]]:
-    """Examine the scenes chunk by chunk, what is wrong by number.
+    """Examine the scenes task by task, what is wrong by number.
 
-    Chunks of an interrupted run are read.
+    Tasks of an interrupted run are read.
     """
     with Store(out, {"seed": seed, **name_code(LAB_FOLDER)}).held() as store:
-        chunks = {
-            min(start + SCENES_OF_A_CHUNK, count): range(
-                start, min(start + SCENES_OF_A_CHUNK, count)
+        tasks = {
+            min(start + SCENES_OF_A_TASK, count): range(
+                start, min(start + SCENES_OF_A_TASK, count)
             )
-            for start in range(0, count, SCENES_OF_A_CHUNK)
+            for start in range(0, count, SCENES_OF_A_TASK)
         }
-        done = store.done() & chunks.keys()
+        done = store.done() & tasks.keys()
         yield from (store.read(stop)[0] for stop in sorted(done))
-        todo = [chunk for chunk in chunks.items() if chunk[0] not in done]
+        todo = [task for task in tasks.items() if task[0] not in done]
         for stop, outcomes in worker_processes.apply_over_processes(
             partial(examine_scene, seed),
             todo,
@@ -401,7 +401,7 @@ def examine_scenes(
         ):
             wrong = {
                 str(number): outcome
-                for number, outcome in zip(chunks[stop], outcomes, strict=True)
+                for number, outcome in zip(tasks[stop], outcomes, strict=True)
                 if outcome
             }
             store.put(stop, [wrong])
@@ -446,10 +446,10 @@ def fuzz(
 
     console = Console(stderr=True)
     wrong: dict[str, list[str]] = {}
-    chunks = -(-scenes // SCENES_OF_A_CHUNK)
+    tasks = -(-scenes // SCENES_OF_A_TASK)
     running = examine_scenes(scenes, seed, out, workers)
-    for chunk in track(running, "fuzzing", total=chunks, console=console):
-        wrong |= chunk
+    for task in track(running, "fuzzing", total=tasks, console=console):
+        wrong |= task
     for number in sorted(wrong, key=int)[:FAILURES_PRINTED]:
         source = wrong[number][0]
         scene = draw_fuzz_scene(seed, int(number))

@@ -43,11 +43,11 @@ def judge_here(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def over_none(
         function: Callable[[Any], Any],
-        chunks: Iterable[workers.Chunk],
+        tasks: Iterable[workers.Task],
         *_: object,
         **__: object,
     ) -> Iterator[tuple[int, list[Any]]]:
-        for number, items in chunks:
+        for number, items in tasks:
             yield number, [function(item) for item in items]
 
     monkeypatch.setattr(workers, "apply_over_processes", over_none)

@@ -381,9 +381,8 @@ def test_running_out_of_memory_costs_its_own_row(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
-    monkeypatch.setattr(
-        fourbar_validation.run.plan, "SCENES_OF_A_TASK", {True: 2, False: 2}
-    )
+    for size in ("SCENES_OF_A_SLOW_TASK", "SCENES_OF_A_QUICK_TASK"):
+        monkeypatch.setattr(fourbar_validation.run.plan, size, 2)
     greedy = Engine("greedy", Greedy, EQUIVALENCE)
     run(suite, tmp_path / "run", (*EXACT, greedy), RunOptions(workers=1, drawn=False))
     failing = [

@@ -63,13 +63,13 @@ FULL = "KILLS" in os.environ
 KILLS_OF_BLAME = 4
 """Kills of one scene that an engine is blamed for: twice with the others, twice alone.
 """
-COUNT, IN_A_CHUNK = (220, 20) if FULL else (30, 3)
+COUNT, IN_A_TASK = (220, 20) if FULL else (30, 3)
 """Scenes of a run, none of them drawn, so that the work is the judging alone; and as
-many chunks in a small run.
+many tasks in a small run.
 """
 SMALL = (
-    "import fourbar_validation.run.plan as plan; plan.SCENES_OF_A_TASK[False] ="
-    f" {IN_A_CHUNK}; "
+    "import fourbar_validation.run.plan as plan; plan.SCENES_OF_A_QUICK_TASK ="
+    f" {IN_A_TASK}; "
 )
 HARNESS = (
     "import runpy; runpy.run_module('validation', run_name='__main__', alter_sys=True)"
@@ -105,9 +105,8 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(
-        fourbar_validation.run.plan, "SCENES_OF_A_TASK", {True: 2, False: 2}
-    )
+    for size in ("SCENES_OF_A_SLOW_TASK", "SCENES_OF_A_QUICK_TASK"):
+        monkeypatch.setattr(fourbar_validation.run.plan, size, 2)
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     hangs = 2.0 * max(
         1.0, load / (os.cpu_count() or 1)
@@ -195,7 +194,7 @@ def test_the_bytes_do_not_depend_on_the_workers(
 ) -> None:
     """None, in order, or two."""
     monkeypatch.setattr(
-        fourbar_validation.run.plan, "SCENES_OF_A_TASK", {False: IN_A_CHUNK}
+        fourbar_validation.run.plan, "SCENES_OF_A_QUICK_TASK", IN_A_TASK
     )
     judge_all(Random(COUNT, 0, TYPES), tmp_path, workers=2)
     for name in ("results.csv", "results.parquet"):
@@ -286,8 +285,8 @@ def test_damaged_swapped_and_foreign_parts_are_made_again_and_named(
     with Store(tmp_path / "foreign", {"scenes": "two"}).held() as foreign:
         foreign.put(4, [record.kept_all()])
     with Store(tmp_path / "run", {"scenes": "one"}).held() as store:
-        for chunk in range(6):
-            store.put(chunk, [record.kept_all()])
+        for task in range(6):
+            store.put(task, [record.kept_all()])
         assert store.done() == set(range(6)) and repr(
             [Record.restore(kept) for kept in store.read(5)]
         ) == repr([record])
@@ -405,10 +404,10 @@ def test_whatever_ended_it_a_rerun_goes_on_and_ends_with_the_same_bytes(
     assert_unfinished(tmp_path)
 
     rng = np.random.default_rng(SEED)
-    chunks = len(range(0, COUNT, IN_A_CHUNK))
+    tasks = len(range(0, COUNT, IN_A_TASK))
     for _ in range(KILLS):
         process = start(tmp_path, COUNT)
-        wait_for_parts(tmp_path, process, at_least=int(rng.integers(1, chunks)))
+        wait_for_parts(tmp_path, process, at_least=int(rng.integers(1, tasks)))
         time.sleep(float(rng.uniform(0.0, 0.3)))
         assert process.poll() is None, "it ended before it was killed"
         os.killpg(process.pid, signal.SIGKILL)

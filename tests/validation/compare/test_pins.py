@@ -13,7 +13,7 @@ import fourbar
 from fourbar.effects import Place
 from fourbar_validation.compare.pins import find_centre, state_from_pins
 from fourbar_validation.compare.scales import TermSizes
-from fourbar_validation.run.judge import ask_engines
+from fourbar_validation.run.judge import make_question
 from fourbar_validation.run.transformed import _take_plain_positions
 from tests.support.scenes import crank_rocker
 
@@ -66,7 +66,7 @@ def test_a_place_that_the_formulas_misread_widens_nothing(
 def test_a_scene_that_is_stated_otherwise_has_its_places_where_they_are(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    question = ask_engines("scene", LOADED, ())
+    question = make_question("scene", LOADED, ())
     wanted = question.solution.torque
     monkeypatch.setattr(
         Place, "in_one_pair", lambda place: Place(place.bar, (1.0, 0.0))

@@ -96,7 +96,7 @@ def test_both_sides_are_judged_and_the_reversal_itself_is_not(start: float) -> N
     ]
     noted = [row.reason for row in record.rows if "reverses not judged" in row.reason]
     assert bool(noted) == (start == 0.0)
-    assert len(record.jumps) == (
+    assert len(record.reversals) == (
         2 if start else 1
     )  # the ends of a sweep that starts in one have a single side
 

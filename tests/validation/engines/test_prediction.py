@@ -28,7 +28,7 @@ from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import _bound_touching, predict_from_data
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.run.answers import compare_answer
-from fourbar_validation.run.judge import ask_engines
+from fourbar_validation.run.judge import make_question
 from fourbar_validation.run.question import Question
 
 pytest.importorskip("flint")
@@ -54,7 +54,7 @@ def touch() -> Scene:
 @pytest.fixture(scope="module")
 def question() -> Question:
     """Ask nobody of a loop that just closes."""
-    return ask_engines("scene", touch(), ())
+    return make_question("scene", touch(), ())
 
 
 ENGINE = Engine("spoiled", FreeBody, FULL_ACCURACY, predictor=predict_from_data)

@@ -26,7 +26,7 @@ from click.testing import CliRunner
 import fourbar
 from fourbar.errors import InputError
 from fourbar_validation.cli import status
-from fourbar_validation.compare.columns import Columns
+from fourbar_validation.compare.columns import ResultsWriter
 from fourbar_validation.compare.derived import DERIVED_BOUNDS
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, Row
 from fourbar_validation.compare.tolerance import (
@@ -259,7 +259,7 @@ def test_a_damaged_table_is_one_line_and_nothing_is_written(
     run = save_run(tmp_path / "later", [replace(ROW, error=2e-15)])
     another = replace(HERE, date="later")
     write_about(another, run)
-    with Columns(tmp_path) as columns:
+    with ResultsWriter(tmp_path) as columns:
         columns.add([ROW])
     for damage in (
         b"",
@@ -381,7 +381,7 @@ def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(
     tmp_path: Path,
 ) -> None:
     rows = [ROW, replace(ROW, quantity="watch", error=math.nan, verdict=FAILS)]
-    with Columns(tmp_path) as columns:
+    with ResultsWriter(tmp_path) as columns:
         columns.add(rows)
     write_about(HERE, tmp_path)
     from_text = read_run(tmp_path)
@@ -421,7 +421,7 @@ def test_two_long_runs_are_read_scene_by_scene_and_little_of_them_is_kept(
     scenes, kept = 1000, 5
     for name, grown in (("old", 1.0), ("new", 1e3)):
         (tmp_path / name).mkdir()
-        with Columns(tmp_path / name) as columns:
+        with ResultsWriter(tmp_path / name) as columns:
             for k in range(scenes):
                 row = replace(
                     ROW,

@@ -25,7 +25,7 @@ TABLES = ("results.csv", "results.parquet")
 def small_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two scenes a task, judged in this process."""
     judge_here(monkeypatch)
-    monkeypatch.setattr(plan, "SCENES_OF_A_TASK", {True: 1, False: 2})
+    monkeypatch.setattr(plan, "SCENES_OF_A_QUICK_TASK", 2)
 
 
 @pytest.fixture

@@ -11,11 +11,11 @@ from fourbar.errors import DependencyError
 from fourbar_validation.run.store import RunningError, Store
 
 
-def fill(folder: Path, identity: str, *chunks: int) -> Path:
+def fill(folder: Path, identity: str, *tasks: int) -> Path:
     """Leave the parts of an interrupted run."""
     with Store(folder, {"suite": identity}).held() as store:
-        for chunk in chunks:
-            store.put(chunk, [{"chunk": chunk}])
+        for task in tasks:
+            store.put(task, [{"task": task}])
     return folder / "parts"
 
 
@@ -28,7 +28,7 @@ def test_a_run_goes_on_from_its_own_parts(tmp_path: Path) -> None:
     fill(tmp_path, "one", 0, 2)
     assert list_done(tmp_path, "one") == ({0, 2}, [])
     with Store(tmp_path, {"suite": "one"}).held() as store:
-        assert store.read(2) == [{"chunk": 2}]
+        assert store.read(2) == [{"task": 2}]
 
 
 def test_the_parts_of_another_run_are_not_taken(tmp_path: Path) -> None:

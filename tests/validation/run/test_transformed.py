@@ -10,7 +10,7 @@ import fourbar
 from fourbar.effects import Effect, Place
 from fourbar.linkage import FourBar
 from fourbar_validation.run import transformed
-from fourbar_validation.run.judge import ask_engines
+from fourbar_validation.run.judge import make_question
 from fourbar_validation.run.transformed import (
     _CONVERTED,
     SCALE,
@@ -63,7 +63,7 @@ SCENES = {
 
 
 def list_rows(scene: fourbar.Scene) -> dict[str, Any]:
-    question = ask_engines("scene", scene, ())
+    question = make_question("scene", scene, ())
     return {row.quantity: row for row in check_transformed(question)}
 
 
@@ -80,7 +80,7 @@ def test_a_spring_whose_ends_nearly_meet_is_not_judged_there() -> None:
             loads=(),
             effects=(fourbar.Springs((spring,)),),
         )
-        question = ask_engines("scene", scene, ())
+        question = make_question("scene", scene, ())
         few = transformed._take_plain_positions(question)
         rows.append(int(few.fit.sum()))
         assert not [row for row in list_rows(scene).values() if row.failed]
@@ -124,7 +124,7 @@ def test_what_cannot_be_stated_otherwise_is_said_with_its_reason(
     scene: fourbar.Scene,
     lines: list[str],
 ) -> None:
-    question = ask_engines("scene", scene, ())
+    question = make_question("scene", scene, ())
     list(check_transformed(question))
     assert question.left_out == lines
 
@@ -212,7 +212,7 @@ def test_springs_that_are_wound_through_a_change_point_by_rounding_are_not_judge
     left_out = {}
     for d in (0.3 + 4 * np.spacing(0.3), 0.31):
         scene = fourbar.Scene(FourBar(d, *bars), motion, effects=(springs,))
-        question = ask_engines("scene", scene, ())
+        question = make_question("scene", scene, ())
         assert bool(list(check_transformed(question))) == (d == 0.31)
         left_out[d] = [line for line in question.left_out if "wound" in line]
     assert [len(lines) for lines in left_out.values()] == [1, 0]
@@ -241,11 +241,11 @@ def test_one_number_that_differs_fails_its_row(
         return solution
 
     scene = crank_rocker(loads=LOADS, effects=EVERYTHING)
-    few = transformed._take_plain_positions(ask_engines("scene", scene, ()))
+    few = transformed._take_plain_positions(make_question("scene", scene, ()))
     assert few is not None
     monkeypatch.setattr(transformed, "TRANSFORMATIONS", {name: TRANSFORMATIONS[name]})
     monkeypatch.setattr(transformed, "solve", differ)
-    (row,) = check_transformed(ask_engines("scene", scene, ()))
+    (row,) = check_transformed(make_question("scene", scene, ()))
     assert row.failed and row.reason.endswith("worst in torque")
 
 

@@ -1,7 +1,7 @@
 """The results of a run as results.csv and, for pandas and DuckDB, results.parquet.
 
 Both hold the columns of `fourbar_validation.compare.rows.Row`, sorted by scene, engine,
-setting and quantity; both are written as the chunks are read.
+setting and quantity; both are written as the tasks are read.
 """
 
 import math
@@ -15,7 +15,7 @@ from typing import Any
 
 from fourbar.writing import name_file
 from fourbar_validation.compare.rows import (
-    MADE_OF,
+    COLUMN_TYPES,
     RESULT_COLUMNS,
     Row,
     escape_controls,
@@ -33,7 +33,7 @@ CSV_ROWS = 1_000_000
 """Most rows of the text table. Further ones are in results.parquet alone."""
 
 
-class Columns:
+class ResultsWriter:
     """Writer of both files, which are complete at the end of a `with`.
 
     They do not exist if it fails.
@@ -51,7 +51,7 @@ class Columns:
         self._rows_waiting = 0
         self._files = ExitStack()
 
-    def __enter__(self) -> "Columns":
+    def __enter__(self) -> "ResultsWriter":
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -141,7 +141,7 @@ def read_columns(path: Path) -> Iterator[Row]:
 
     Words that recur are kept once.
     """
-    for cells in _read_batches(path, list(MADE_OF)):
+    for cells in _read_batches(path, list(COLUMN_TYPES)):
         words: dict[str, str] = {}
         columns = [
             (
@@ -149,7 +149,7 @@ def read_columns(path: Path) -> Iterator[Row]:
                 if kind is float
                 else _read_words(column, words)
             )
-            for column, kind in zip(cells, MADE_OF.values(), strict=True)
+            for column, kind in zip(cells, COLUMN_TYPES.values(), strict=True)
         ]
         yield from map(Row, *columns)
 
@@ -189,7 +189,7 @@ def _open_csv(path: Path, columns: list[str], files: ExitStack) -> Any:
     from pyarrow import csv
 
     kinds = {
-        name: pa.float64() if MADE_OF[name] is float else pa.string()
+        name: pa.float64() if COLUMN_TYPES[name] is float else pa.string()
         for name in columns
     }
     wanted = csv.ConvertOptions(column_types=kinds, include_columns=columns)

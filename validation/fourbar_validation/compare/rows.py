@@ -193,11 +193,13 @@ def make_breakdown(
     scene: str,
     engine: str,
     error: BaseException,
-    part: str = "",
+    setting: str = "",
 ) -> Row:
     """Make the row of an engine that broke down.
 
-    It raised, took its process with it, or never came back. `part`: in what.
+    It raised, took its process with it, or never came back.
+
+    `setting`: of the row; names what it broke down in, where it is no answer.
     """
     if isinstance(error, TimeoutError):
         reason = "the engine hung and was stopped"
@@ -210,7 +212,7 @@ def make_breakdown(
         reason = str(error)
     else:
         reason = say_error(error)
-    return Row.unmeasured(scene, engine, part, "all", FAILS, reason)
+    return Row.unmeasured(scene, engine, setting, "all", FAILS, reason)
 
 
 def say_error(error: BaseException) -> str:
@@ -314,7 +316,7 @@ def _write_csv_cell(value: object) -> object:
     return value
 
 
-MADE_OF = {column.name: column.type for column in fields(Row) if column.init}
+COLUMN_TYPES = {column.name: column.type for column in fields(Row) if column.init}
 """Columns that make a row, with their types: whether it passed follows from them."""
 
 

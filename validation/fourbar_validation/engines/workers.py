@@ -1,7 +1,7 @@
 """A function over many items by Pebble's processes.
 
-The results are the same whatever the number of processes. Each item is a task with a
-limit of time. A worker that dies or hangs costs the item that it was at.
+The results are the same whatever the number of processes. A task has some items, and
+each item a limit of time. A worker that dies or hangs costs the item that it was at.
 """
 
 from collections import deque
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 SCENE_SECONDS = 60.0
 """A scene takes 0.05 to 3 s; what takes longer than this hangs."""
 _IN_FLIGHT = 4
-"""Chunks submitted per worker. It is always busy then, and the memory stays bounded."""
+"""Tasks submitted per worker. It is always busy then, and the memory stays bounded."""
 _LOCKED = 10.0
 """Seconds for which a worker waits for the pipe that all workers share.
 
@@ -29,11 +29,11 @@ A worker that is killed while it reads or writes there leaves the pipe locked fo
 the others then wait twice as long, and the run ends and can be resumed. A message takes
 milliseconds.
 """
-Chunk = tuple[int, Sequence[Any]]
+Task = tuple[int, Sequence[Any]]
 """Number and items."""
-TaskFunction = Callable[[Any], Any]
+Attempt = Callable[[Any], Any]
 """Do one item by itself: its result, or the exception that it ended with."""
-_Instead = Callable[[Any, BaseException, TaskFunction], Any]
+_Instead = Callable[[Any, BaseException, Attempt], Any]
 """Make the result of an item that failed: item, exception, how to try another one."""
 
 
@@ -55,7 +55,7 @@ def prepare_worker(_: object = None) -> None:
 
 
 @dataclass(frozen=True)
-class Tasks:
+class _PoolOfItems:
     """Items handed to a pool, each with its limit of time."""
 
     pool: "ProcessPool"
@@ -65,20 +65,20 @@ class Tasks:
     def submit(self, item: Any) -> "Future[Any]":
         """Hand in an item; NoWorkersError where the pool is broken."""
         try:
-            task: Future[Any] = self.pool.schedule(
+            future: Future[Any] = self.pool.schedule(
                 self.function,
                 args=(item,),
                 timeout=self.seconds,
             )
         except RuntimeError:
             raise _lost_workers() from None
-        return task
+        return future
 
     def attempt(self, item: Any) -> Any:
         """Do one item: its result, or the exception that it ended with."""
         return self.outcome(item, self.submit(item))
 
-    def outcome(self, item: Any, task: "Future[Any]") -> Any:
+    def outcome(self, item: Any, future: "Future[Any]") -> Any:
         """Return an item's result, or the exception that it ended with.
 
         A worker may have been killed from outside, for example where memory ran out.
@@ -86,20 +86,20 @@ class Tasks:
         """
         from pebble import ProcessExpired
 
-        error = task.exception()
+        error = future.exception()
         if isinstance(error, ProcessExpired):
-            task = self.submit(item)
-            error = task.exception()
+            future = self.submit(item)
+            error = future.exception()
         if isinstance(error, BrokenProcessPool):
             raise _lost_workers()
         if isinstance(error, DependencyError):
             raise error
-        return task.result() if error is None else error
+        return future.result() if error is None else error
 
     def outcomes(
         self,
         items: Sequence[Any],
-        tasks: "Sequence[Future[Any]]",
+        futures: "Sequence[Future[Any]]",
         instead: _Instead,
     ) -> list[Any]:
         """Return the results of items in order.
@@ -107,8 +107,8 @@ class Tasks:
         Of those that failed it is what stands instead.
         """
         results = []
-        for item, task in zip(items, tasks, strict=True):
-            outcome = self.outcome(item, task)
+        for item, future in zip(items, futures, strict=True):
+            outcome = self.outcome(item, future)
             if isinstance(outcome, BaseException):
                 outcome = instead(item, outcome, self.attempt)
             results.append(outcome)
@@ -125,7 +125,7 @@ def _lost_workers() -> NoWorkersError:
 def fail(
     _: object,
     error: BaseException,
-    __: TaskFunction,
+    __: Attempt,
 ) -> NoReturn:
     """Raise what an item failed with."""
     raise error
@@ -137,10 +137,10 @@ def apply_each(
     workers: int,
 ) -> Iterator[Any]:
     """Apply the function to each item, however long it takes; results in order."""
-    chunks = enumerate([item] for item in items)
+    tasks = enumerate([item] for item in items)
     for _, results in apply_over_processes(
         function,
-        chunks,
+        tasks,
         workers,
         seconds=None,
         instead=fail,
@@ -150,13 +150,13 @@ def apply_each(
 
 def apply_over_processes(
     function: Callable[[Any], Any],
-    chunks: Iterable[Chunk],
+    tasks: Iterable[Task],
     workers: int,
     *,
     seconds: float | None,
     instead: _Instead,
 ) -> Iterator[tuple[int, list[Any]]]:
-    """Apply the function to each item of the chunks, over processes; chunks in order.
+    """Apply the function to each item of the tasks, over processes; tasks in order.
 
     `seconds`: after which an item is taken to hang; None: never.
     """
@@ -168,23 +168,24 @@ def apply_over_processes(
         initializer=prepare_worker,
         initargs=[function],
     ) as pool:
-        tasks = Tasks(pool, function, seconds)
+        pool_of_items = _PoolOfItems(pool, function, seconds)
 
         def finish(
             number: int,
             items: Sequence[Any],
             waiting: Sequence[Future[Any]],
         ) -> tuple[int, list[Any]]:
-            return number, tasks.outcomes(items, waiting, instead)
+            return number, pool_of_items.outcomes(items, waiting, instead)
 
         in_flight: deque[tuple[int, Sequence[Any], list[Future[Any]]]] = deque()
         try:
-            for number, items in chunks:
-                in_flight.append((number, items, [tasks.submit(one) for one in items]))
+            for number, items in tasks:
+                waiting = [pool_of_items.submit(item) for item in items]
+                in_flight.append((number, items, waiting))
                 if len(in_flight) > _IN_FLIGHT * workers:
                     yield finish(*in_flight.popleft())
-            for chunk in in_flight:
-                yield finish(*chunk)
+            for submitted in in_flight:
+                yield finish(*submitted)
         except BaseException:
             pool.stop()  # type: ignore[no-untyped-call]
             raise

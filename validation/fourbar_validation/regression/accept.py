@@ -20,7 +20,7 @@ import click
 from fourbar.errors import HOLDS, InputError
 from fourbar.writing import write_bytes, write_text
 from fourbar_validation.compare.columns import CSV_ROWS, number_or_null
-from fourbar_validation.compare.rows import FAILS, MADE_OF, Counts, Row, sort_rows
+from fourbar_validation.compare.rows import COLUMN_TYPES, FAILS, Counts, Row, sort_rows
 from fourbar_validation.regression import render
 from fourbar_validation.regression.changes import Differences, compare_runs
 from fourbar_validation.regression.record import (
@@ -85,9 +85,9 @@ def _write_record_table(
     """Write a run as columns; a text that recurs is kept once."""
     import pyarrow as pa
 
-    nothing: dict[str, Any] = dict.fromkeys((*MADE_OF, "times_formulas"))
+    nothing: dict[str, Any] = dict.fromkeys((*COLUMN_TYPES, "times_formulas"))
     lines = [
-        nothing | {name: number_or_null(getattr(row, name)) for name in MADE_OF}
+        nothing | {name: number_or_null(getattr(row, name)) for name in COLUMN_TYPES}
         for row in sort_rows(rows)
     ]
     for (scene, engine), ratio in sorted(times.items()):
@@ -119,10 +119,10 @@ def _write_record_table(
         )
         for scene, entries in about.scenes.items()
     }
-    kinds = MADE_OF | {"times_formulas": float}
+    kinds = COLUMN_TYPES | {"times_formulas": float}
     word = pa.dictionary(pa.int32(), pa.string())
     number = pa.float64()
-    names = [*run, *MADE_OF, "scene_hash", "times_formulas"]
+    names = [*run, *COLUMN_TYPES, "scene_hash", "times_formulas"]
     schema = pa.schema(
         [(name, number if kinds.get(name) is float else word) for name in names]
     )

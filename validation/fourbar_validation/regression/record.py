@@ -1,6 +1,7 @@
-"""A recorded run: its table, and what it was made with.
+"""A recorded run: its tables, and record.json with what it was made with.
 
-That is versions, machine, settings and scenes.
+That is versions, machine, settings and scenes. The record of one scene is in
+`report/record.py`.
 """
 
 import csv
@@ -31,11 +32,11 @@ SHIPPED = Path(__file__).parent
 """Folder of the accepted state of this project's models."""
 AnyRow = TypeVar("AnyRow")
 ACCEPTED = "accepted"
-TABLE = "results.csv"
-COLUMNS_FILE = "results.parquet"
+CSV_FILE = "results.csv"
+PARQUET_FILE = "results.parquet"
 ABOUT_FILE = "record.json"
 TIMINGS_FILE = "timings.csv"
-RECORD_FILES = (TABLE, COLUMNS_FILE, TIMINGS_FILE)
+RECORD_FILES = (CSV_FILE, PARQUET_FILE, TIMINGS_FILE)
 UNFINISHED = "run.json"
 """File that a run keeps in its folder until it is finished."""
 
@@ -291,15 +292,15 @@ def open_run(path: Path, key: str = "RESULTS") -> Recorded:
     Raises InputError where there is no readable table, an empty or a damaged one, or
     that of an unfinished run.
     """
-    table = path / TABLE if path.is_dir() else path
-    long = path / COLUMNS_FILE
+    table = path / CSV_FILE if path.is_dir() else path
+    long = path / PARQUET_FILE
     if not table.is_file() and long.is_file():  # too many rows for a text
         table = long
     if not table.is_file():
         raise InputError(
             key,
             str(path),
-            f"must be a folder with {TABLE} or {COLUMNS_FILE}, or such a file",
+            f"must be a folder with {CSV_FILE} or {PARQUET_FILE}, or such a file",
         )
     if (table.parent / UNFINISHED).is_file():
         raise InputError(
@@ -374,7 +375,10 @@ def find_baseline(name_or_path: str) -> Path:
 
     The accepted state is that of this project's models.
     """
-    if not Path(name_or_path).exists() and (SHIPPED / name_or_path / TABLE).is_file():
+    if (
+        not Path(name_or_path).exists()
+        and (SHIPPED / name_or_path / CSV_FILE).is_file()
+    ):
         return SHIPPED / name_or_path
     return Path(name_or_path)
 

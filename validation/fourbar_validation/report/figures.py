@@ -171,7 +171,7 @@ def _draw_quantity(
         squeeze=False,
     )
     axes = list(panels[:, 0])
-    _draw_values(axes[0], quantity, solution, [*exact, *simulated], record.jumps)
+    _draw_values(axes[0], quantity, solution, [*exact, *simulated], record.reversals)
     for below, group in zip(axes[1:], groups, strict=True):
         _draw_errors(below, quantity, record, solution, group)
         below.set_ylabel(
@@ -190,9 +190,9 @@ def _draw_values(
     quantity: str,
     solution: Solution,
     answers: list[Answer],
-    jumps: list[Reversal],
+    reversals: list[Reversal],
 ) -> None:
-    """Draw the formulas as a band, broken at jumps, and each engine's marks.
+    """Draw the formulas as a band, broken at reversals, and each engine's marks.
 
     The marks stand at positions of their own.
     """
@@ -200,11 +200,11 @@ def _draw_values(
     ours = np.where(good, _take_plain(quantity, getattr(solution, quantity)), np.nan)
     base = _choose_base(solution, None)
     line = ours
-    if jumps:
+    if reversals:
         theta_2, line = break_curve(
             solution.theta_2,
             ours,
-            jumps,
+            reversals,
             lambda side: _take_plain(quantity, getattr(side, quantity)),
         )
         base = np.degrees(theta_2)

@@ -1,4 +1,7 @@
-"""Record what is known of one scene once it is judged, for every form of the report."""
+"""Record of one scene once it is judged, for every form of the report.
+
+The record of a whole run, record.json, is made in `regression/record.py`.
+"""
 
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
@@ -7,7 +10,7 @@ from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.reversals import Reversal
-from fourbar_validation.compare.rows import FORMULAS, MADE_OF, Row, sort_rows
+from fourbar_validation.compare.rows import COLUMN_TYPES, FORMULAS, Row, sort_rows
 
 
 @dataclass(slots=True)
@@ -36,7 +39,7 @@ class Record:
     rows: list[Row] = field(default_factory=list)
     timings: list[Timing] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
-    reversals: list[str] = field(default_factory=list)
+    reversal_texts: list[str] = field(default_factory=list)
     """Positions where dry friction reverses and the pin forces jump, in words."""
     independence: dict[str, tuple[str, str]] = field(default_factory=dict)
     """engine: (shared with the formulas, found alone)."""
@@ -51,7 +54,7 @@ class Record:
     """Small SVG of linkage and torque, or None."""
     solution: Solution | None = None
     answers: list[Answer] = field(default_factory=list)
-    jumps: list[Reversal] = field(default_factory=list)
+    reversals: list[Reversal] = field(default_factory=list)
 
     def kept(self, figure: str | None = None, thumbnail: str | None = None) -> "Record":
         """Return a copy without the scene, the solution and the answers."""
@@ -67,13 +70,13 @@ class Record:
                 for answer in self.answers
                 if answer.evidence
             },
-            reversals=[str(jump) for jump in self.jumps],
+            reversal_texts=[str(reversal) for reversal in self.reversals],
             figure=figure,
             thumbnail=thumbnail,
             scene=None,
             solution=None,
             answers=[],
-            jumps=[],
+            reversals=[],
         )
 
     def kept_all(self) -> dict[str, Any]:
@@ -82,11 +85,12 @@ class Record:
         The rows are sorted.
         """
         kept = asdict(replace(self, rows=[]))
-        for name in ("scene", "solution", "answers", "jumps"):
+        for name in ("scene", "solution", "answers", "reversals"):
             del kept[name]
         return kept | {
             "rows": [
-                [getattr(row, name) for name in MADE_OF] for row in sort_rows(self.rows)
+                [getattr(row, name) for name in COLUMN_TYPES]
+                for row in sort_rows(self.rows)
             ]
         }
 

@@ -111,7 +111,7 @@ def compare_statements(question: Question) -> Iterator[Row]:
     The statements do not depend on its motion.
     """
     stated = Statements.of(question.scene, question.at)
-    part = "statements of the linkage"
+    setting = "statements of the linkage"
 
     def rows(engine: Engine, answer: Answer) -> list[Row]:
         predicted = make_prediction(engine, question.scene, question.at, answer)
@@ -129,7 +129,7 @@ def compare_statements(question: Question) -> Iterator[Row]:
                 Row.unmeasured(
                     question.name,
                     engine.name,
-                    part,
+                    setting,
                     "all",
                     REFUSES,
                     str(limit),
@@ -147,7 +147,7 @@ def compare_statements(question: Question) -> Iterator[Row]:
             yield from question.attempt(
                 partial(rows, engine, answer),
                 engine.name,
-                part,
+                setting,
             )
 
 

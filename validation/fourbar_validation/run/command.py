@@ -9,7 +9,7 @@ from fourbar.errors import HOLDS
 from fourbar.writing import write_text
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.regression.accept import add_output_options, report_differences
-from fourbar_validation.regression.record import COLUMNS_FILE
+from fourbar_validation.regression.record import PARQUET_FILE
 from fourbar_validation.report.junit import list_cases, write_document
 from fourbar_validation.run.parts import judge_part
 from fourbar_validation.run.plan import SCENES_SAMPLED, WORKERS, RunPart
@@ -140,7 +140,7 @@ def run_command(**stated: Any) -> int:
         part = RunPart.read(request.part)
     plan = make_plan(request)
     if part is not None:
-        scenes = plan.count_scenes(plan.list_chunks(part))
+        scenes = plan.count_scenes(plan.list_tasks(part))
         with ShownProgress(scenes) as progress:
             judge_part(plan, part, request, progress)
         click.echo(f"part {request.part}: {scenes} scenes, in {request.out / 'parts'}")
@@ -165,7 +165,7 @@ def run_command(**stated: Any) -> int:
         write_text(
             request.junit,
             write_document(
-                summary.verdict, list_cases(read_columns(request.out / COLUMNS_FILE))
+                summary.verdict, list_cases(read_columns(request.out / PARQUET_FILE))
             ),
         )
     return plan.conclude(summary.counts, worse=worse)

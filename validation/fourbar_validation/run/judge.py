@@ -58,6 +58,18 @@ class Check(NamedTuple):
     needs_theta_2: str = ""
     """Reason to leave it out where theta_2 is not commanded; empty for any command."""
 
+    def is_due(self, *, free: bool, derived: bool) -> bool:
+        """Return whether it is made of a free or a prescribed motion.
+
+        `derived`: whether the checks of functions other than `solve` are made.
+        """
+        return self.free == free and (derived or not self.derived)
+
+    @property
+    def engine(self) -> str:
+        """Engine of its rows: the function that it checks, or the formulas."""
+        return self.make_rows.__name__ if self.derived else FORMULAS
+
 
 CHECKS = (
     Check(check_identities),
@@ -165,7 +177,7 @@ def judge(
     simulations and changes no row. `derived`: make the derived checks of `CHECKS`
     too, those of functions other than `solve`, which takes a second.
     """
-    question = ask_engines(name, scene, engines)
+    question = make_question(name, scene, engines)
     free = scene.motion.free is not None
     question.order = order
     begin = time.perf_counter()
@@ -188,25 +200,27 @@ def judge(
         derived = False
     rows: list[Row] = []
     for check in CHECKS:
-        if check.free == free and (derived or not check.derived):
-            if check.needs_theta_2 and question.at.commanded != "theta_2":
-                reason = f"{check.needs_theta_2}; {question.at.commanded} is commanded"
-                question.leave_out(check.what, reason)
-                continue
-            called = check.make_rows.__name__
-            engine, part = (called, "") if check.derived else (FORMULAS, called)
-            rows += question.attempt(partial(check.make_rows, question), engine, part)
+        if not check.is_due(free=free, derived=derived):
+            continue
+        if check.needs_theta_2 and question.at.commanded != "theta_2":
+            reason = f"{check.needs_theta_2}; {question.at.commanded} is commanded"
+            question.leave_out(check.what, reason)
+            continue
+        setting = "" if check.derived else check.make_rows.__name__
+        make_rows = partial(check.make_rows, question)
+        rows += question.attempt(make_rows, check.engine, setting)
     return question.record(rows, seconds)
 
 
-def ask_engines(
+def make_question(
     name: str,
     scene: Scene,
     engines: Sequence[Engine],
 ) -> Question:
-    """Ask the engines that a scene needs, each position once.
+    """Make the question of a scene: its positions and the engines that it needs.
 
-    List what is left out.
+    Of a sweep of equal positions one is asked. What is left out is listed. The engines
+    are started when their answers are first read.
     """
     command = command_of(scene)
     if scene.motion.free is not None:

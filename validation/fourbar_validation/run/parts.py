@@ -1,6 +1,6 @@
-"""Parts of one run, judged in folders of their own.
+"""Parts K/N of one run, each judged in a folder of its own, and collected.
 
-A command collects them.
+A part has many tasks; `run/store.py` keeps the file of each.
 """
 
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ def judge_part(
     request: Request,
     progress: Progress = UNHEARD,
 ) -> None:
-    """Judge a part of a run into the parts of its folder.
+    """Judge a part of a run into its folder.
 
     The folder keeps what an interrupted one left.
     """
@@ -71,22 +71,22 @@ class _Gathered:
 
     def _require_all(self) -> None:
         """Raise InputError that names the parts with missing or damaged tasks."""
-        chunks = range(len(self._plan.chunks))
-        missing = [chunk for chunk in chunks if chunk not in self._stores]
+        tasks = range(len(self._plan.tasks))
+        missing = [task for task in tasks if task not in self._stores]
         if not missing:
             return
-        numbers = sorted({chunk % self._parts + 1 for chunk in missing})
+        numbers = sorted({task % self._parts + 1 for task in missing})
         named = [f"--part {number}/{self._parts}" for number in numbers]
         further = len(named) - _MOST_NAMED
         words = ", ".join(named[:_MOST_NAMED]) + (
             f" and {further} more" if further > 0 else ""
         )
-        why = f"{len(missing)} of {len(chunks)} tasks are missing: run {words} again"
+        why = f"{len(missing)} of {len(tasks)} tasks are missing: run {words} again"
         raise InputError("DIR", "; ".join(self._damaged[:_MOST_NAMED]) or None, why)
 
-    def read(self, chunk: int) -> list[Any]:
+    def read(self, task: int) -> list[Any]:
         """Read the results of a task."""
-        return self._stores[chunk].read(chunk)
+        return self._stores[task].read(task)
 
 
 def collect_parts(

@@ -26,13 +26,12 @@ SCENES_SAMPLED = 30
 """Scenes in which everything else that is shipped is judged. In a scene that takes as
 long as judging thirty scenes: a tenth more for 10 000 random ones.
 """
-SCENES_OF_A_TASK = {True: 1, False: 20}
-"""Scenes per task. It is one if something is simulated or drawn (a second each), else
-twenty (a second together).
-"""
-_MOST_PARTS = 10_000
-"""Files that a run keeps while it goes on. Of a million scenes a hundred stand in each.
-"""
+SCENES_OF_A_SLOW_TASK = 1
+"""Scenes per task if something is simulated or drawn: a second each."""
+SCENES_OF_A_QUICK_TASK = 20
+"""Scenes per task otherwise: a second together."""
+_MOST_TASKS = 10_000
+"""Each has a file while the run goes on. Of a million scenes a hundred stand in one."""
 JUDGING, COLLECTING, DRAWING = "judging", "collecting", "drawing"
 """Stages of a run, as its progress is told."""
 
@@ -62,7 +61,7 @@ class Progress:
     """Listener to a run; this one ignores what it is told."""
 
     def note(self, line: str) -> None:
-        """Hear why a part of an earlier run is made again."""
+        """Hear why a task of an earlier run is judged again."""
 
     def advance(self, stage: str, scenes: int) -> None:
         """Hear that a stage has done so many scenes more."""
@@ -89,9 +88,9 @@ class RunPart(NamedTuple):
         allowed = "must be K/N, part K of N parts: --part 1/8 to --part 8/8"
         raise InputError("--part", text, allowed)
 
-    def holds(self, chunk: int) -> bool:
+    def holds(self, task: int) -> bool:
         """Return whether a task, counted from 0, is of this part."""
-        return chunk % self.of == self.number - 1
+        return task % self.of == self.number - 1
 
 
 WHOLE_RUN = RunPart()
@@ -127,12 +126,15 @@ class Plan:
         return self.options.drawn and len(self.suite) <= SKETCHED
 
     @cached_property
-    def chunks(self) -> list[range]:
+    def tasks(self) -> list[range]:
         """Return the scenes of each task."""
         count = len(self.suite)
         simulated = any(engine.through_time for engine in self.engines)
-        least = SCENES_OF_A_TASK[self.draw_at_once or simulated]
-        size = max(least, math.ceil(count / _MOST_PARTS))
+        if self.draw_at_once or simulated:
+            least = SCENES_OF_A_SLOW_TASK
+        else:
+            least = SCENES_OF_A_QUICK_TASK
+        size = max(least, math.ceil(count / _MOST_TASKS))
         return [
             range(start, min(start + size, count)) for start in range(0, count, size)
         ]
@@ -141,7 +143,7 @@ class Plan:
     def identity(self) -> dict[str, Any]:
         """Return all that a result depends on.
 
-        Two folders hold parts of one run if it is equal.
+        Two folders hold results of one run if it is equal.
         """
         return {
             "scenes": self.suite.fingerprint(),
@@ -152,13 +154,13 @@ class Plan:
             "sample": self.options.sample,
         }
 
-    def list_chunks(self, part: RunPart) -> list[int]:
-        """List the tasks of a part."""
-        return [chunk for chunk in range(len(self.chunks)) if part.holds(chunk)]
+    def list_tasks(self, part: RunPart) -> list[int]:
+        """List the numbers of the tasks of a part."""
+        return [task for task in range(len(self.tasks)) if part.holds(task)]
 
-    def count_scenes(self, chunks: Iterable[int]) -> int:
+    def count_scenes(self, tasks: Iterable[int]) -> int:
         """Count the scenes of some tasks."""
-        return sum(len(self.chunks[chunk]) for chunk in chunks)
+        return sum(len(self.tasks[task]) for task in tasks)
 
     def judge(
         self,
@@ -167,25 +169,25 @@ class Plan:
         progress: Progress,
     ) -> None:
         """Judge the tasks of a part that the store does not have yet."""
-        wanted = self.list_chunks(part)
+        wanted = self.list_tasks(part)
         done = store.done()
         for line in store.notes:
             progress.note(line)
         progress.advance(JUDGING, self.count_scenes(done.intersection(wanted)))
-        jobs = self._make_jobs(chunk for chunk in wanted if chunk not in done)
+        jobs = self._make_jobs(task for task in wanted if task not in done)
         workers = self.options.workers
         limit = pool.find_time_limit(self.suite, self.engines)
-        for chunk, records in pool.judge_chunks(jobs, limit, workers):
-            store.put(chunk, [record.kept_all() for record in records])
+        for task, records in pool.judge_tasks(jobs, limit, workers):
+            store.put(task, [record.kept_all() for record in records])
             progress.advance(JUDGING, len(records))
 
-    def _make_jobs(self, chunks: Iterable[int]) -> Iterator[tuple[int, list[pool.Job]]]:
-        for chunk in chunks:
+    def _make_jobs(self, tasks: Iterable[int]) -> Iterator[tuple[int, list[pool.Job]]]:
+        for task in tasks:
             yield (
-                chunk,
+                task,
                 pool.make_jobs(
                     self.suite,
-                    self.chunks[chunk],
+                    self.tasks[task],
                     self.engines,
                     self.draw_at_once,
                     self.options.sample,

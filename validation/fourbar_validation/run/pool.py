@@ -1,6 +1,6 @@
-"""Scenes judged over processes.
+"""Scenes judged over processes, which `engines/workers.py` keeps.
 
-One that breaks down is judged again engine by engine.
+A scene that breaks down is judged again engine by engine.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -18,7 +18,7 @@ from fourbar_validation.scenes.suites import Files, Suite
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One scene for a worker.
+    """One scene of a task, for a worker.
 
     It has its place in a suite, its engines, and what is made of it.
     """
@@ -86,7 +86,7 @@ def judge_job(job: Job) -> Record:
 def _judge_by_engine(
     job: Job,
     _: BaseException,
-    attempt: worker_processes.TaskFunction,
+    attempt: worker_processes.Attempt,
 ) -> Record:
     """Judge a scene that broke down one engine at a time.
 
@@ -126,18 +126,18 @@ def find_time_limit(suite: Suite, engines: Iterable[Engine]) -> float:
     )
 
 
-def judge_chunks(
-    chunks: Iterable[tuple[int, list[Job]]],
+def judge_tasks(
+    tasks: Iterable[tuple[int, list[Job]]],
     limit: float,
     workers: int,
 ) -> Iterator[tuple[int, list[Record]]]:
-    """Judge numbered chunks of jobs, each as it is done.
+    """Judge numbered tasks, each as it is done.
 
     A job that takes longer than `limit` (s) hangs.
     """
     return worker_processes.apply_over_processes(
         judge_job,
-        chunks,
+        tasks,
         workers,
         seconds=limit,
         instead=_judge_by_engine,

@@ -67,7 +67,7 @@ class Question:
     causes: dict[str, list[str]] = field(default_factory=dict)
     """Known mistakes that explain what differs, by engine."""
     timings: list[Timing] = field(default_factory=list)
-    jumps: list[Reversal] = field(default_factory=list)
+    reversals: list[Reversal] = field(default_factory=list)
     """Positions where dry friction reverses and the pin forces jump."""
     answered: dict[str, tuple[Answer, float]] = field(default_factory=dict)
     """Answer of each engine, by its name, and the seconds that it took."""
@@ -145,7 +145,7 @@ class Question:
 
     def find_reversals(self) -> tuple[()]:
         """Find where dry friction reverses; what is drawn there is no comparison."""
-        self.jumps = find_reversals(self.scene, self.at, self.solution)
+        self.reversals = find_reversals(self.scene, self.at, self.solution)
         return ()
 
     def reversing(self, slip: float) -> Mask:
@@ -214,25 +214,27 @@ class Question:
             causes=self.causes,
             solution=self.solution,
             answers=[answer for answer, _ in answered],
-            jumps=self.jumps,
+            reversals=self.reversals,
         )
 
     def attempt(
         self,
         check: Callable[[], Iterable[Row]],
         engine: str,
-        part: str = "",
+        setting: str = "",
     ) -> Iterator[Row]:
         """Yield the rows of a check.
 
         What it raises is a failure of its own, in a row of its own.
+
+        `engine`, `setting`: of that row; the latter names the check.
         """
         try:
             yield from check()
         except NotAskedError as reason:
             self.leave_out(engine, reason)
         except Exception as error:
-            yield make_breakdown(self.name, engine, error, part)
+            yield make_breakdown(self.name, engine, error, setting)
 
 
 def spread_evenly(

@@ -12,7 +12,7 @@ from typing import Any, TextIO
 from fourbar.errors import FourBarError
 from fourbar.mjcf import write_mjcf
 from fourbar.writing import name_file, write_text
-from fourbar_validation.compare.columns import Columns, read_columns
+from fourbar_validation.compare.columns import ResultsWriter, read_columns
 from fourbar_validation.compare.rows import (
     FAILS,
     FORMULAS,
@@ -25,8 +25,8 @@ from fourbar_validation.engines.mujoco.picture import render_pictures
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression.record import (
     ABOUT_FILE,
-    COLUMNS_FILE,
-    TABLE,
+    CSV_FILE,
+    PARQUET_FILE,
     Recorded,
     describe_run,
     open_run,
@@ -65,8 +65,8 @@ TIMING_COLUMNS = (
     "times_formulas",
 )
 _OUTCOME = (
-    TABLE,
-    COLUMNS_FILE,
+    CSV_FILE,
+    PARQUET_FILE,
     ABOUT_FILE,
     "timings.csv",
     "report.md",
@@ -138,7 +138,7 @@ def write_outcome(
     if shown and not plan.draw_at_once:
         jobs = ((index, [_redraw(suite, index, summary, engines)]) for index in shown)
         limit = pool.find_time_limit(suite, engines)
-        for _, records in pool.judge_chunks(jobs, limit, options.workers):
+        for _, records in pool.judge_tasks(jobs, limit, options.workers):
             summary.picture(*records)
             progress.advance(DRAWING, 1)
     about = describe_run(engines, suite.fingerprint(), describe_scenes(suite))
@@ -160,7 +160,7 @@ def write_outcome(
     generated = any(engine.generated for engine in engines)
     models, why_not = _picture_models(suite, shown) if generated else ({}, "")
     sections = collect_sections(
-        read_columns(out / COLUMNS_FILE) if isinstance(suite, Hard) else None, out
+        read_columns(out / PARQUET_FILE) if isinstance(suite, Hard) else None, out
     )
     STYLE_NUMBERS.update(list_numbers(engines))
     page = write_html(
@@ -209,12 +209,12 @@ def _collect_tasks(
     Return each scene's first line.
     """
     with (
-        Columns(out) as columns,
+        ResultsWriter(out) as columns,
         _draft_file(out / OUTPUT) as output,
         _draft_file(out / "timings.csv") as times,
     ):
         times.write(write_csv_rows(TIMING_COLUMNS, []))
-        for number, scenes in enumerate(plan.chunks):
+        for number, scenes in enumerate(plan.tasks):
             records = [Record.restore(kept) for kept in read(number)]
             for scene, record in zip(scenes, records, strict=True):
                 name = escape_controls(plan.suite.name(scene))

@@ -1,11 +1,13 @@
-"""The folder of whatever runs long: a lock, finished parts, and at the end the results.
+"""The folder of whatever runs long: a lock, finished tasks, and at the end the results.
 
 lock               held while a run goes on; the system frees it when the process dies
 run.json           what is being run; a rerun of the same thing resumes, of another
                    starts over
-parts/000012       result of chunk 12, written atomically: a line of JSON that says of
+parts/000012       results of task 12, written atomically: a line of JSON that says of
                    which run it is, and the SHA-256 of what follows; then a line of JSON
                    for each result, packed by gzip
+
+A part K of N, as `run --part` has it, is another thing: the tasks of one machine.
 """
 
 import gzip
@@ -27,7 +29,7 @@ class RunningError(FourBarError):
 
 
 class Store:
-    """The parts of one run in its folder.
+    """The finished tasks of one run in its folder, a file each.
 
     `identity`: what they depend on. `outcome`: the files it ends with.
     """
@@ -46,13 +48,13 @@ class Store:
         self._identity = json.dumps(identity, indent=1, sort_keys=True) + "\n"
         self._run = hashlib.sha256(self._identity.encode()).hexdigest()
         self.notes: list[str] = []
-        """Parts of an earlier run that are made again, each with the reason."""
+        """Tasks of an earlier run that are done again, each with the reason."""
 
     @contextmanager
     def held(self) -> Iterator["Store"]:
         """Hold the folder for one run.
 
-        The parts that an interrupted run of the same thing left are kept.
+        The tasks that an interrupted run of the same thing left are kept.
         """
         from filelock import FileLock, Timeout
 
@@ -112,7 +114,7 @@ class Store:
             return "its run.json is damaged"
 
     def require_same(self, key: str) -> None:
-        """Raise InputError unless the folder holds parts of this run."""
+        """Raise InputError unless the folder holds tasks of this run."""
         marker = self.folder / UNFINISHED
         if not marker.is_file() or not self.parts.is_dir():
             why = "must hold a run.json and the parts that `run --part` wrote"
@@ -122,7 +124,7 @@ class Store:
             raise InputError(key, str(self.folder), why)
 
     def done(self) -> set[int]:
-        """List the chunks whose parts are complete and of this run.
+        """List the tasks whose files are complete and of this run.
 
         Others are removed, and noted.
         """
@@ -138,7 +140,7 @@ class Store:
         return done
 
     def examine(self) -> Iterator[tuple[Path, str]]:
-        """Yield each part with what is wrong with it.
+        """Yield the file of each task with what is wrong with it.
 
         Empty if it is complete and of this run.
         """
@@ -150,21 +152,21 @@ class Store:
             else:
                 yield path, ""
 
-    def put(self, chunk: int, results: Sequence[Any]) -> None:
-        """Write a finished chunk, its results as JSON has them."""
+    def put(self, task: int, results: Sequence[Any]) -> None:
+        """Write a finished task, its results as JSON has them."""
         packed = gzip.compress("\n".join(map(json.dumps, results)).encode(), 1, mtime=0)
         head = {
-            "chunk": chunk,
+            "task": task,
             "run": self._run,
             "sha256": hashlib.sha256(packed).hexdigest(),
         }
-        write_bytes(self._find_path(chunk), json.dumps(head).encode() + b"\n" + packed)
+        write_bytes(self._find_path(task), json.dumps(head).encode() + b"\n" + packed)
 
-    def _find_path(self, chunk: int) -> Path:
-        return self.parts / f"{chunk:06d}"
+    def _find_path(self, task: int) -> Path:
+        return self.parts / f"{task:06d}"
 
     def _unpack(self, path: Path) -> bytes:
-        """Read what follows the first line of a part.
+        """Read what follows the first line of a task's file.
 
         Raises a ValueError that says what is wrong with it.
         """
@@ -179,16 +181,16 @@ class Store:
             raise ValueError("is damaged")
         if head.get("run") != self._run:
             raise ValueError("is of another run")
-        if path.name != str(head.get("chunk")).zfill(6):
+        if path.name != str(head.get("task")).zfill(6):
             raise ValueError("is another part")
         return packed
 
-    def read(self, chunk: int) -> list[Any]:
-        """Read the results of a chunk, in order.
+    def read(self, task: int) -> list[Any]:
+        """Read the results of a task, in order.
 
-        Raises DependencyError if the part was damaged meanwhile.
+        Raises DependencyError if its file was damaged meanwhile.
         """
-        path = self._find_path(chunk)
+        path = self._find_path(task)
         try:
             lines = gzip.decompress(self._unpack(path)).decode().splitlines()
         except (ValueError, FileNotFoundError) as error:
@@ -198,7 +200,7 @@ class Store:
         return [json.loads(line) for line in lines]
 
     def finish(self) -> None:
-        """Remove the parts, once the results are written."""
+        """Remove the files of tasks, once the results are written."""
         shutil.rmtree(self.parts)
         (self.folder / UNFINISHED).unlink()
 

@@ -17,7 +17,7 @@ from fourbar.show.summary import Facts
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.run.derived import summary as module
 from fourbar_validation.run.derived.summary import summary
-from fourbar_validation.run.judge import ask_engines
+from fourbar_validation.run.judge import make_question
 from fourbar_validation.run.question import NotAskedError
 from tests.support.scenes import CYLINDER, crank_rocker
 
@@ -33,7 +33,7 @@ PUSHED = crank_rocker(
 
 
 def judge(scene: fourbar.Scene) -> dict[str, Row]:
-    return {row.quantity: row for row in summary(ask_engines("scene", scene, ()))}
+    return {row.quantity: row for row in summary(make_question("scene", scene, ()))}
 
 
 @pytest.mark.parametrize("scene", (TURN, PUSHED), ids=("turn", "cylinder"))
@@ -173,7 +173,7 @@ def test_what_is_missing_or_no_number_fails(
     name, change = MISSING[fault]
     summarize = module.summarize
     monkeypatch.setattr(module, "summarize", lambda *of: change(summarize(*of)))
-    question = ask_engines("scene", TURN, ())
+    question = make_question("scene", TURN, ())
     rows = [*question.attempt(lambda: summary(question), "summary")]
     assert [row.quantity for row in rows if row.failed] == [name]
 
@@ -207,7 +207,7 @@ def test_what_grows_between_positions_is_believed(turns: int) -> None:
     """The drive's bar stands still between the positions, of which none is near."""
     sweep = fourbar.Sweep(0.12, 0.12 + 2 * np.pi * turns, 40 * turns)
     scene = crank_rocker(motion=fourbar.Motion(sweep, 9.0), drive_bar=4)
-    question = ask_engines("scene", scene, ())
+    question = make_question("scene", scene, ())
     assert module._summarize_scene(question).between.growing
     assert not judge(scene)["peaks"].failed
 
@@ -262,7 +262,7 @@ def test_what_is_missing_in_the_json_or_no_number_fails(
         return {**entry, key: spoiled}
 
     monkeypatch.setattr(module, "write_motor", spoil)
-    question = ask_engines("scene", TURN, ())
+    question = make_question("scene", TURN, ())
     rows = [*question.attempt(lambda: summary(question), "summary")]
     assert [row.quantity for row in rows if row.failed] == [name]
 
