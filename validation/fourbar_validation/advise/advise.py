@@ -295,7 +295,12 @@ class _CheapestSearch:
             best = min(served, key=self._work)
         else:
             best = _find_nearest(self.attempts)
-        return _Advice(self.error, best, tuple(self.attempts), bool(served))
+        return _Advice(
+            self.error,
+            best,
+            tuple(self.attempts),
+            bool(served),
+        )
 
     def _work(self, attempt: SearchRun) -> float:
         """Return the CPU time of a run with its readings, in steps."""

@@ -119,7 +119,12 @@ def _compute_errors_between(
         yield INFINITE_ERRORS
         return
     branch = trial.at.branch[samples][first]
-    at_steps = Command(theta_2, branch, read["omega_2"], read["alpha_2"])
+    at_steps = Command(
+        theta_2,
+        branch,
+        read["omega_2"],
+        read["alpha_2"],
+    )
     places = np.linspace(theta_2[0], theta_2[-1], 2 * n)
     for stretch in split_at_poles(scene, at_steps):
         inside = (theta_2[stretch.start] <= places) & (

@@ -102,7 +102,12 @@ def _take_positions(command: Command, rows: NDArray[np.bool_]) -> Command:
     speed, acceleration = (
         np.broadcast_to(values, n)[rows] for values in list_speeds(command)
     )
-    return Command(command.theta_2[rows], command.branch[rows], speed, acceleration)
+    return Command(
+        command.theta_2[rows],
+        command.branch[rows],
+        speed,
+        acceleration,
+    )
 
 
 def find_greatest(errors: Array | Sequence[float]) -> float:

@@ -95,9 +95,9 @@ class _BarWrenches(NamedTuple):
         moment[2] = moment[2] + cross_vectors(a, self.p[3])
         one, other = (bar for bar in MOVING_BARS if bar != self.drive_bar)
         det = cross_vectors(lever[one], lever[other])[:, None]
-        F43 = (
-            moment[one][:, None] * lever[other] - moment[other][:, None] * lever[one]
-        ) / det
+        by_one = moment[one][:, None] * lever[other]
+        by_other = moment[other][:, None] * lever[one]
+        F43 = (by_one - by_other) / det
         F32 = F43 - self.p[3]
         driven = self.drive_bar
         return {
@@ -184,12 +184,13 @@ def find_wrenches(scene: Scene, right: Solution) -> _BarWrenches:
     q = {}
     for bar in MOVING_BARS:
         G = getattr(right, f"G{bar}")
-        arms[bar], bars[bar] = G - first[bar], second[bar] - first[bar]
+        arms[bar] = G - first[bar]
+        bars[bar] = second[bar] - first[bar]
         at_first, at_second = acting[bar]
         p[bar] = at_first + at_second
-        q[bar] = cross_vectors(first[bar] - G, at_first) + cross_vectors(
-            second[bar] - G, at_second
-        )
+        about_first = cross_vectors(first[bar] - G, at_first)
+        about_second = cross_vectors(second[bar] - G, at_second)
+        q[bar] = about_first + about_second
     q[scene.drive_bar] = q[scene.drive_bar] + np.asarray(right.torque)
     return _BarWrenches(arms, bars, p, q, scene.drive_bar)
 
@@ -288,10 +289,8 @@ class _Calculation:
         centripetal = {}
         tangential = {}
         for bar in MOVING_BARS:
-            omega, alpha = (
-                np.broadcast_to(getattr(right, f"{rate}_{bar}"), len(right))
-                for rate in ("omega", "alpha")
-            )
+            omega = np.broadcast_to(getattr(right, f"omega_{bar}"), len(right))
+            alpha = np.broadcast_to(getattr(right, f"alpha_{bar}"), len(right))
             arm = self.wrenches.arms[bar]
             centripetal[bar] = -(omega**2)[:, None] * arm
             tangential[bar] = alpha[:, None] * _turn_by_quarter(arm)

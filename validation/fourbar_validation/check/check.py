@@ -179,7 +179,12 @@ def judge_table(
         explanations = explain(judge, differing)
     else:
         explanations = []
-    return Judgement(findings, judge.without_answer(), explanations, tolerance)
+    return Judgement(
+        findings,
+        judge.without_answer(),
+        explanations,
+        tolerance,
+    )
 
 
 def write_judgement_json(judgement: Judgement, table: TheirTable) -> str:

@@ -113,7 +113,13 @@ def find_differences(
         else:
             written = ""
         differences.append(
-            Difference(key, mine, yours, _remark(key, mine, yours), written)
+            Difference(
+                key,
+                mine,
+                yours,
+                _remark(key, mine, yours),
+                written,
+            )
         )
     return differences
 

@@ -303,18 +303,20 @@ def _scale_gravity(scene: Scene, f: float) -> Scene:
     return replace(scene, effects=tuple(scaled))
 
 
-def _scale_load(scene: Scene, load: Load, f: float) -> Scene:
-    if load.force is None:
-        force = None
-    else:
-        force = (f * load.force[0], load.force[1])
+def _scale_load(
+    scene: Scene,
+    load: Load,
+    f: float,
+) -> Scene:
+    force = None
+    if load.force is not None:
+        size, angle = load.force
+        force = (f * size, angle)
     scaled = replace(load, force=force, moment=f * load.moment)
-    return replace(
-        scene,
-        loads=tuple(
-            scaled if candidate is load else candidate for candidate in scene.loads
-        ),
-    )
+    loads = []
+    for candidate in scene.loads:
+        loads.append(scaled if candidate is load else candidate)
+    return replace(scene, loads=tuple(loads))
 
 
 def _try_offset(judge: Judge) -> Iterator[Mistake]:
@@ -323,70 +325,79 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
     The offset is that at which theirs fit best, refined by Gauss and Newton.
     """
     keys = [key for key in judge.table.values if judge.size(key).any()]
-    rows = np.unique(
-        np.linspace(0, len(judge.at.theta_2) - 1, _TRIED).round().astype(int)
-    )
-
-    def residuals(offsets: Array, rows: NDArray[np.int_]) -> Array:
-        """Write one line for each offset."""
-        command = judge.at
-        m = len(offsets)
-        many: dict[str, Any] = {
-            name: np.tile(values[rows], m)
-            for name in ("angle", "branch", "speed", "acceleration")
-            if np.ndim(values := getattr(command, name)) == 1
-        }
-        many["angle"] += np.repeat(offsets, len(rows))
-        moved = solve(
-            judge.scene,
-            judge.stage,
-            at=command._replace(**many, remainder=None, time=None),
-        )
-        parts = []
-        for key in keys:
-            theirs = judge.table.values[key][rows].reshape(len(rows), -1)
-            apart = judge.ours(key, moved).reshape(m, *theirs.shape) - theirs
-            if name_quantity(key).startswith("theta"):
-                apart = np.remainder(apart + np.pi, 2.0 * np.pi) - np.pi
-            scaled = apart / replace_zero_size(judge.size(key)[rows])[:, None]
-            parts.append(np.where(np.isfinite(theirs), scaled, 0.0).reshape(m, -1))
-        return np.concatenate(parts, axis=1)
-
-    if sum(np.count_nonzero(judge.where(key)) for key in keys) < ENOUGH_NUMBERS:
+    numbers = sum(np.count_nonzero(judge.where(key)) for key in keys)
+    if numbers < ENOUGH_NUMBERS:
         return
+    n = len(judge.at.theta_2)
+    rows = np.unique(np.linspace(0, n - 1, _TRIED).round().astype(int))
     tried = 2.0 * np.pi * np.arange(1, OFFSETS_TRIED) / OFFSETS_TRIED
-    sizes = np.mean(
-        np.minimum(np.abs(np.nan_to_num(residuals(tried, rows), nan=1.0)), 1.0),
-        axis=1,
-    )
-    offset = float(tried[np.argmin(sizes)])
-    everything = np.arange(len(judge.at.theta_2))
+    residuals = _compute_residuals(judge, keys, tried, rows)
+    sizes = np.abs(np.nan_to_num(residuals, nan=1.0))
+    misfits = np.mean(np.minimum(sizes, 1.0), axis=1)
+    offset = float(tried[np.argmin(misfits)])
+    everything = np.arange(n)
     for _ in range(NEWTON):
-        here, more, less = residuals(
-            offset + np.array([0.0, FIT_STEP, -FIT_STEP]), everything
-        )
+        offsets = offset + np.array([0.0, FIT_STEP, -FIT_STEP])
+        here, more, less = _compute_residuals(judge, keys, offsets, everything)
         slope = (more - less) / (2.0 * FIT_STEP)
         finite = np.isfinite(here) & np.isfinite(slope)
-        if not finite.any() or not (size := float(slope[finite] @ slope[finite])):
+        if not finite.any():
             return
-        step = float(slope[finite] @ here[finite]) / size
+        squared = float(slope[finite] @ slope[finite])
+        if not squared:
+            return
+        step = float(slope[finite] @ here[finite]) / squared
         offset -= step
         if abs(step) < FIT_STEP**2:
             break
     offset = math.remainder(offset, 2.0 * np.pi)
-    wrong = solve(
-        judge.scene,
-        judge.stage,
-        at=judge.at._replace(angle=judge.at.theta_2 + offset, remainder=None),
-    )
+    moved = judge.at._replace(angle=judge.at.theta_2 + offset, remainder=None)
+    wrong = solve(judge.scene, judge.stage, at=moved)
+
+    def take(quantity: str, right: Solution) -> Array | None:
+        if quantity == "theta_2":
+            return None
+        values: Array | None = getattr(wrong, quantity, None)
+        return values
+
     yield Mistake(
         "the crank angle is measured from another zero: theta_2"
         f" {math.degrees(offset):+.6g} deg is what they solved",
-        lambda quantity, right: (
-            None if quantity == "theta_2" else getattr(wrong, quantity, None)
-        ),
+        take,
         times=CARRIED,
     )
+
+
+def _compute_residuals(
+    judge: Judge,
+    keys: list[str],
+    offsets: Array,
+    rows: NDArray[np.int_],
+) -> Array:
+    """Compute theirs against ours at crank angles from other zeros.
+
+    Returns one line for each offset; what they do not state counts as right.
+    """
+    command = judge.at
+    m = len(offsets)
+    repeated: dict[str, Any] = {}
+    for name in ("angle", "branch", "speed", "acceleration"):
+        values = getattr(command, name)
+        if np.ndim(values) == 1:
+            repeated[name] = np.tile(values[rows], m)
+    repeated["angle"] += np.repeat(offsets, len(rows))
+    at = command._replace(**repeated, remainder=None, time=None)
+    moved = solve(judge.scene, judge.stage, at=at)
+    parts = []
+    for key in keys:
+        theirs = judge.table.values[key][rows].reshape(len(rows), -1)
+        apart = judge.ours(key, moved).reshape(m, *theirs.shape) - theirs
+        if name_quantity(key).startswith("theta"):
+            apart = np.remainder(apart + np.pi, 2.0 * np.pi) - np.pi
+        scaled = apart / replace_zero_size(judge.size(key)[rows])[:, None]
+        stated = np.where(np.isfinite(theirs), scaled, 0.0)
+        parts.append(stated.reshape(m, -1))
+    return np.concatenate(parts, axis=1)
 
 
 def _try_order(judge: Judge) -> Iterator[Mistake]:
@@ -396,9 +407,10 @@ def _try_order(judge: Judge) -> Iterator[Mistake]:
     """
     table = judge.table
     n = len(judge.at.theta_2)
-    keys = [
-        key for key in table.values if judge.where(key).all() and judge.size(key).all()
-    ]
+    keys = []
+    for key in table.values:
+        if judge.where(key).all() and judge.size(key).all():
+            keys.append(key)
     if not ENOUGH_NUMBERS <= n <= MOST_ROWS_REORDERED or not keys:
         return
     apart = np.zeros((n, n))
@@ -413,17 +425,17 @@ def _try_order(judge: Judge) -> Iterator[Mistake]:
                 filled = np.full(n, theirs[i])
             apart[i] += compute_difference(name_quantity(key), ours, filled) / scale
     nearest = np.argmin(apart, axis=1)
-    if len(np.unique(nearest)) < n - 1 or np.array_equal(
-        nearest, np.arange(n)
-    ):  # a revolution ends where it began
+    in_place = np.arange(n)
+    # a revolution ends where it began
+    several_alike = len(np.unique(nearest)) < n - 1
+    if several_alike or np.array_equal(nearest, in_place):
         return
     steps = np.diff(nearest)
     if np.all(steps[1:-1] == -1):
         text = "the rows are in reverse order: theta_2 runs the other direction"
     elif np.count_nonzero(steps == 1) >= n - 2:
-        rows = round(
-            float(np.median(np.remainder(nearest - np.arange(n) + n / 2, n) - n / 2))
-        )
+        shifts = np.remainder(nearest - in_place + n / 2, n) - n / 2
+        rows = round(float(np.median(shifts)))
         text = (
             f"the rows are shifted by {rows:+d}: each has the numbers of another"
             " theta_2"

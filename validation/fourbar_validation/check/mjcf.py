@@ -241,7 +241,11 @@ def examine_model(
         unread = [f"not looked at: {', '.join(parts)}"]
     else:
         unread = []
-    return ModelReport(order(differences), costs, [*theirs.notes, *unread])
+    return ModelReport(
+        order(differences),
+        costs,
+        [*theirs.notes, *unread],
+    )
 
 
 def _price_differences(

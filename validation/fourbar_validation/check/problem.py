@@ -61,7 +61,12 @@ def read_problem(path: str | Path) -> dict[str, Any]:
     problem = _read_document(path, PROBLEM_SCHEMA)
     for name in ("answers", "errors", "scene", "command"):
         if not isinstance(problem.get(name), dict):
-            raise InputError(name, problem.get(name), "must be an object", str(path))
+            raise InputError(
+                name,
+                problem.get(name),
+                "must be an object",
+                str(path),
+            )
     return {**problem, "problem": Path(path).stem}
 
 
@@ -207,7 +212,13 @@ def _judge_quantity(
         WORSE,
     )
     worst = int(np.argmax(off))
-    return JudgedQuantity(name, group, level, float(off[worst]), worst)
+    return JudgedQuantity(
+        name,
+        group,
+        level,
+        float(off[worst]),
+        worst,
+    )
 
 
 def find_levels(rows: list[JudgedQuantity]) -> dict[str, str]:

@@ -244,7 +244,12 @@ def read_table(path: Path) -> TheirTable:
                 half * unit.factor,
             )
         if math.isnan(numbers["theta_2"][row]):
-            raise InputError(f"line {line}", cells, "needs a theta_2", str(path))
+            raise InputError(
+                f"line {line}",
+                cells,
+                "needs a theta_2",
+                str(path),
+            )
     units = {name: unit for name, unit in columns.values()}
     notes = _read_degrees(numbers, halves, units, headings, columns)
     left_out |= {
@@ -254,7 +259,16 @@ def read_table(path: Path) -> TheirTable:
     }
     lines = [line for line, _ in rows]
     rounded = _find_rounding(halves["theta_2"], units["theta_2"])
-    table = TheirTable(numbers["theta_2"], {}, {}, {}, lines, rounded, left_out, notes)
+    table = TheirTable(
+        numbers["theta_2"],
+        {},
+        {},
+        {},
+        lines,
+        rounded,
+        left_out,
+        notes,
+    )
     for name in names:
         if name != "theta_2" and not np.isnan(numbers[name]).all():
             _enter_column(table, name, units[name], numbers[name], halves[name])
@@ -300,7 +314,12 @@ def _drop_repeated(
                 f"columns {earlier + 1} and {index + 1} are both {name}, with other "
                 "numbers: rename or remove one"
             )
-            raise InputError("header", headings, allowed, str(path))
+            raise InputError(
+                "header",
+                headings,
+                allowed,
+                str(path),
+            )
         left_out[f"{headings[index].strip()} (column {index + 1})"] = (
             f"repeats column {earlier + 1}"
         )
@@ -387,7 +406,12 @@ def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
             if any(cell.strip() for cell in row)
         ]
     except csv.Error:
-        raise InputError("table", path.name, "must be a CSV file", str(path)) from None
+        raise InputError(
+            "table",
+            path.name,
+            "must be a CSV file",
+            str(path),
+        ) from None
     if len(numbered) < 2:
         raise InputError(
             "table",
@@ -564,12 +588,27 @@ def _read_cell(
     try:
         exact = Decimal(text)
     except InvalidOperation:
-        raise InputError(place, cell, "must be a number", str(path)) from None
+        raise InputError(
+            place,
+            cell,
+            "must be a number",
+            str(path),
+        ) from None
     if not exact.is_finite():
-        raise InputError(place, cell, "must be a finite number", str(path))
+        raise InputError(
+            place,
+            cell,
+            "must be a finite number",
+            str(path),
+        )
     exponent = exact.as_tuple().exponent
     assert isinstance(exponent, int)
     value = float(exact)
     if not math.isfinite(value):
-        raise InputError(place, cell, "is larger than a double can hold", str(path))
+        raise InputError(
+            place,
+            cell,
+            "is larger than a double can hold",
+            str(path),
+        )
     return value, 0.5 * 10.0**exponent

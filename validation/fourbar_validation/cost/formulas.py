@@ -122,14 +122,17 @@ def make_bodies(scene: Scene, command: Command) -> thirteen.EquationTerms:
     force = {}
     moment = {}
     for k, body in zip(MOVING_BARS, parts, strict=True):
-        centre = body.z * state.direction(k)
-        first[k] = _stack(-centre, n)
+        direction = state.direction(k)
+        centre = body.z * direction
         # the thesis's order: bar 4's second pin is B as well, and its first is O4
-        second[k] = _stack(scene.linkage.bar(k).length * state.direction(k) - centre, n)
+        tip = scene.linkage.bar(k).length * direction
+        first[k] = _stack(-centre, n)
+        second[k] = _stack(tip - centre, n)
         R, M = acting.on(k)
         force[k] = _stack(body.m * state.acceleration(k, body.z) - R, n)
         about_G = M - cross(centre, R + 0.0j)
-        moment[k] = np.broadcast_to(body.I * np.asarray(state.alpha(k)), (n,)) - about_G
+        inertial = body.I * np.asarray(state.alpha(k))
+        moment[k] = np.broadcast_to(inertial, (n,)) - about_G
     return thirteen.EquationTerms(first, second, force, moment)
 
 

@@ -261,10 +261,26 @@ def _fit_law(
         if _ABOVE_FLOOR * least < _error_at_steps(p, quantity) < LARGEST_LAWFUL_ERROR
     ]
     if len(used) < FEWEST_FITTED:
-        return ErrorLaw(name, quantity, math.nan, math.inf, expected, len(used), leaps)
+        return ErrorLaw(
+            name,
+            quantity,
+            math.nan,
+            math.inf,
+            expected,
+            len(used),
+            leaps,
+        )
     x = [1.0 / p.setting_value if by_steps else p.setting_value for p in used]
     slope, sigma = fit(x, [_error_at_steps(p, quantity) for p in used])
-    return ErrorLaw(name, quantity, slope, sigma, expected, len(used), leaps)
+    return ErrorLaw(
+        name,
+        quantity,
+        slope,
+        sigma,
+        expected,
+        len(used),
+        leaps,
+    )
 
 
 def _error_at_steps(point: CostPoint, quantity: str) -> float:
@@ -315,9 +331,23 @@ def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> Erro
     }
     name = "floor of RK4 in tc/h"
     if len(floors) < FEWEST_FITTED:
-        return ErrorLaw(name, quantity, math.nan, math.inf, -_FOURTH_ORDER, len(floors))
+        return ErrorLaw(
+            name,
+            quantity,
+            math.nan,
+            math.inf,
+            -_FOURTH_ORDER,
+            len(floors),
+        )
     slope, sigma = fit(list(floors), list(floors.values()))
-    return ErrorLaw(name, quantity, slope, sigma, -_FOURTH_ORDER, len(floors))
+    return ErrorLaw(
+        name,
+        quantity,
+        slope,
+        sigma,
+        -_FOURTH_ORDER,
+        len(floors),
+    )
 
 
 def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:

@@ -221,7 +221,11 @@ def _vary_softness() -> list[Curve]:
     ]
 
 
-def _soften(factor: float, text: str, _: float) -> ClosedLoop:
+def _soften(
+    factor: float,
+    text: str,
+    _: float,
+) -> ClosedLoop:
     return drives.Softened(text, factor)
 
 

@@ -777,7 +777,12 @@ def _find_line(
         unit = polar_ball(arb(1), x["direction"])
         if drive.frame == "bar":
             unit = unit * w[drive.place.bar]
-        return _BallLine(None, unit, arms, {drive.place.bar: 1})
+        return _BallLine(
+            None,
+            unit,
+            arms,
+            {drive.place.bar: 1},
+        )
     from_bar, to_bar = (place.bar for _, place in drive.ends)
     start = first_pin[from_bar] + arms[from_bar]
     end = first_pin[to_bar] + arms[to_bar]

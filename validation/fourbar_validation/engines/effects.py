@@ -44,7 +44,11 @@ def _spin_at_pin(bars: Loaded, pin: str) -> float:
     return bars.velocity(one) - bars.velocity(second)
 
 
-def _apply_twist(bars: Loaded, pin: str, couple: float) -> None:
+def _apply_twist(
+    bars: Loaded,
+    pin: str,
+    couple: float,
+) -> None:
     """Apply a couple to the second bar of a pin, and its opposite to the first."""
     one, second = PINS[pin]
     bars.couple(second, couple)

@@ -91,7 +91,12 @@ def read_engines_of(file: Path) -> dict[str, Entry]:
     try:
         tables = tomllib.loads(text).get("engine", [])
     except tomllib.TOMLDecodeError as error:
-        raise InputError("engine", None, f"is no TOML: {error}", str(file)) from None
+        raise InputError(
+            "engine",
+            None,
+            f"is no TOML: {error}",
+            str(file),
+        ) from None
     entries: dict[str, Entry] = {}
     for table in tables:
         entry = _read_entry(file, table)
@@ -120,7 +125,12 @@ def _read_entry(file: Path, table: object) -> Entry:
                 f"allowed: {', '.join(texts)} (texts), {', '.join(lists)} (lists of"
                 " texts), steps (whole numbers)"
             )
-            raise InputError(f"engine.{key}", value, allowed, str(file))
+            raise InputError(
+                f"engine.{key}",
+                value,
+                allowed,
+                str(file),
+            )
     if bool(table.get("adapter")) == bool(table.get("command")):
         raise InputError(
             "engine",

@@ -41,10 +41,12 @@ class PlainLoop:
     def __init__(self, build: Callable[[Scene], Any], scene: Scene) -> None:
         if scene.drive is not None:
             raise LimitError("the plain loop has a couple on a bar, no cylinder")
-        self.linkage, tree = scene.linkage, build(state_from_pins(scene))
+        self.linkage = scene.linkage
+        self.tree = tree = build(state_from_pins(scene))
         if tree.loaded:
             raise LimitError("the plain loop does not iterate over loads of pins")
-        self.tree, self.model, self.data = tree, tree.model, tree.data
+        self.model = tree.model
+        self.data = tree.data
         self.drive = tree.turns[scene.drive_bar]
 
     def answer(self, command: Command) -> dict[str, Array]:
@@ -53,11 +55,7 @@ class PlainLoop:
         torque = np.empty(n)
         forces = {name: np.empty((n, 2)) for name in PIN_FORCES}
         speeds, accelerations = (values.tolist() for values in list_speeds(command))
-        first = with_signs(self.linkage, command.part(slice(0, 1)))
-        start = Assembler(self.tree).find(float(first.theta_2[0]), int(first.branch[0]))
-        if start is None:
-            raise LimitError("the loop does not close at the first position")
-        q = np.array(start)
+        q = self._assemble_first(command)
         rates = np.zeros(3)
         for row, theta in enumerate(command.theta_2.tolist()):
             # along the motion from the position before
@@ -70,12 +68,23 @@ class PlainLoop:
             a = solve_closed(jacobian, accelerations[row], x=x, y=y)
             needed = self.inverse(q, v, a)
             unknowns = solve_multipliers(jacobian, self.drive, needed)
-            torque[row] = unknowns[2]
-            forces["F43"][row] = loop_force = unknowns[:2]
-            pins = put_back(self.tree.carried(), *loop_force.tolist())
+            *loop_force, drive = unknowns.tolist()
+            torque[row] = drive
+            forces["F43"][row] = loop_force
+            pins = put_back(self.tree.carried(), *loop_force)
             for name, force in pins.items():
                 forces[name][row] = force
         return {"torque": torque, **forces}
+
+    def _assemble_first(self, command: Command) -> Array:
+        """Find the joint angles of the first position, (3,), rad."""
+        first = with_signs(self.linkage, command.part(slice(0, 1)))
+        angle = float(first.theta_2[0])
+        branch = int(first.branch[0])
+        q = Assembler(self.tree).find(angle, branch)
+        if q is None:
+            raise LimitError("the loop does not close at the first position")
+        return np.array(q)
 
     def close(self, q: Array) -> Array:
         """Close the gap by bars 3 and 4, in place.
@@ -104,6 +113,11 @@ class PlainLoop:
         """Return the acceleration of the gap where the joints do not accelerate."""
         raise NotImplementedError
 
-    def inverse(self, q: Array, v: Array, a: Array) -> Array:
+    def inverse(
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+    ) -> Array:
         """Return the generalized forces of the motion beside loads and weights."""
         raise NotImplementedError

@@ -85,7 +85,12 @@ def run_to_end(
             check=False,
         )
     except subprocess.TimeoutExpired:
-        return Ended("", "", True, f"no answer within {seconds:g} s")
+        return Ended(
+            "",
+            "",
+            True,
+            f"no answer within {seconds:g} s",
+        )
     why = find_reason(done.stderr) or f"exit status {done.returncode}"
     return Ended(
         done.stdout,

@@ -69,7 +69,12 @@ def scene_to_json(scene: Scene) -> dict[str, Any]:
     it.
     """
     bars: dict[str, Any] = {
-        BAR_NAMES[number]: Bar(bar.length, find_mass(bar), bar.inertia, bar.centre)
+        BAR_NAMES[number]: Bar(
+            bar.length,
+            find_mass(bar),
+            bar.inertia,
+            bar.centre,
+        )
         for number, bar in zip(MOVING_BARS, scene.linkage.moving, strict=True)
     }
     plain = replace(scene, linkage=replace(scene.linkage, **bars))
@@ -239,7 +244,11 @@ def _read_list(
     return array
 
 
-def _read_rate(name: str, value: Any, n: int) -> float | Array:
+def _read_rate(
+    name: str,
+    value: Any,
+    n: int,
+) -> float | Array:
     if isinstance(value, list):
         return _read_list(name, value, n)
     array = _make_array([value])

@@ -104,13 +104,15 @@ def make_model_scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
         fourbar.Bar(c, MASSES[4], 1e-4 * compute_inertia(4), centre[4]),
         ground_angle=to_ours(THETA_1),
     )
-    loads = [fourbar.Load(2, (FORCE_ON_BAR_2, 0.0), arm=(0.01 * LOAD_ARM, LOAD_ANGLE))]
-    loads += [fourbar.Load(bar, moment=0.01 * COUPLE_ON_A_BAR) for bar in (2, 3, 4)]
+    arm = (0.01 * LOAD_ARM, LOAD_ANGLE)
+    loads = [fourbar.Load(2, (FORCE_ON_BAR_2, 0.0), arm=arm)]
+    for bar in (2, 3, 4):
+        loads.append(fourbar.Load(bar, moment=0.01 * COUPLE_ON_A_BAR))
     return fourbar.Scene(
         linkage,
         fourbar.Motion(theta_2, OMEGA_2, branch=branch),
-        4,
-        tuple(loads),
+        drive_bar=4,
+        loads=tuple(loads),
     )
 
 
@@ -131,12 +133,12 @@ def compute_right_unknowns() -> dict[str, float]:
         "F14": s.F14,
         "F34": -s.F43,
     }
-    forces = {
-        name + axis: float(pins[name][0, k])
-        for name in pins
-        for k, axis in enumerate("xy")
-    }
-    return {**forces, "T4": 100.0 * float(s.torque[0])}
+    unknowns = {}
+    for name, force in pins.items():
+        unknowns[f"{name}x"] = float(force[0, 0])
+        unknowns[f"{name}y"] = float(force[0, 1])
+    unknowns["T4"] = 100.0 * float(s.torque[0])
+    return unknowns
 
 
 def compute_inertia(bar: int, about_long_axis: bool = False) -> float:
@@ -159,14 +161,17 @@ class Kinematics:
 
     def __init__(self) -> None:
         s = compute_motion(np.array([THETA_2]))
-        self.theta_3, self.theta_4 = float(s.theta_3[0]), to_ours(float(s.theta_4[0]))
-        self.omega, self.alpha = (
-            {bar: float(getattr(s, f"{name}_{bar}")[0]) for bar in MOVING_BARS}
-            for name in ("omega", "alpha")
-        )
         assert s.a_A is not None
+        self.theta_3 = float(s.theta_3[0])
+        self.theta_4 = to_ours(float(s.theta_4[0]))
+        self.omega: dict[int, float] = {}
+        self.alpha: dict[int, float] = {}
+        self.a_G: dict[int, Array] = {}
+        for bar in MOVING_BARS:
+            self.omega[bar] = float(getattr(s, f"omega_{bar}")[0])
+            self.alpha[bar] = float(getattr(s, f"alpha_{bar}")[0])
+            self.a_G[bar] = 100.0 * getattr(s, f"a_G{bar}")[0]
         self.a_A = 100.0 * s.a_A[0]
-        self.a_G = {bar: 100.0 * getattr(s, f"a_G{bar}")[0] for bar in MOVING_BARS}
         self.slip = 2.0 * CENTRE[3] * self.alpha[3] * math.sin(self.theta_3)
         """Amount that erratum 4 adds to the x component of A_G3/A. It is -(L w^2
         cos - L alpha sin) for -(... + ...), eq 4.20.

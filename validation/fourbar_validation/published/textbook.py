@@ -105,9 +105,19 @@ def compare_maple() -> Iterator[PublishedFigure]:
     sheet = json.loads(_SHEET.read_text(encoding="utf-8"))
     a, b, c, d = (float(sheet["inputs"][name]) for name in "abcd")
     theta_2 = math.pi / 3.0
-    linkage = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c))
+    linkage = fourbar.FourBar(
+        d,
+        fourbar.Bar(a),
+        fourbar.Bar(b),
+        fourbar.Bar(c),
+    )
     real = sheet["reduced_equations"]["real_constant"]
-    yield PublishedFigure("Maple", "real constant", real, a * math.cos(theta_2) - d)
+    yield PublishedFigure(
+        "Maple",
+        "real constant",
+        real,
+        a * math.cos(theta_2) - d,
+    )
     for branch, solution in zip((1, -1), sheet["solutions"], strict=True):
         s = fourbar.solve(
             fourbar.Scene(linkage, fourbar.Motion(theta_2, branch=branch))

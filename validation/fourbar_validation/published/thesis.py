@@ -110,6 +110,7 @@ def _list_half_angle_constants() -> Iterator[PublishedFigure]:
         "theta4_1": to_ours(float(roots[-1].theta_4[0])),
         "theta4_2": to_ours(float(roots[1].theta_4[0])),
     }
+    printed = read_printed()["published"]["section_2_4_theta2_90"]
     for name, length, second in (("theta4", c, b), ("theta3", b, c)):
         k1 = 2.0 * length * x
         k2 = 2.0 * length * y
@@ -123,12 +124,11 @@ def _list_half_angle_constants() -> Iterator[PublishedFigure]:
             "C": k3 + length**2 + k1,
         }
         ours |= {f"{key}_deg": math.degrees(angle) for key, angle in angles.items()}
-        for key, text in read_printed()["published"]["section_2_4_theta2_90"][
-            name
-        ].items():
+        for key, text in printed[name].items():
+            label = key if key.startswith("theta") else f"{name} {key}"
             yield PublishedFigure(
                 "2.4 constants",
-                key if key.startswith("theta") else f"{name} {key}",
+                label,
                 text,
                 ours[key],
             )
@@ -262,21 +262,24 @@ def _compute_our_kinematics(k: Kinematics) -> dict[str, float]:
         **k.arms,
     }
     for name, (x, y) in vectors.items():
-        values |= {f"{name}_i": x, f"{name}_j": y, f"{name}_mod": math.hypot(x, y)}
+        values[f"{name}_i"] = x
+        values[f"{name}_j"] = y
+        values[f"{name}_mod"] = math.hypot(x, y)
         values[f"{name}_ang_deg"] = to_degrees(math.atan2(y, x))
     return {key: float(value) for key, value in values.items()}
 
 
 def _list_slips(k: Kinematics) -> dict[str, tuple[tuple[str, ...], float]]:
     """List the figures that the errata touch, with the value that these lead to."""
-    x = k.a_G[3][0] + k.slip
-    y = k.a_G[3][1]
+    x, y = k.a_G[3]
+    slipped = x + k.slip
+    x_4, y_4 = k.a_G[4]
     return {
-        "A_G3/A_i": (("4",), k.a_G[3][0] - k.a_A[0] + k.slip),
-        "A_G3_i": (("4",), x),
-        "A_G3_mod": (("4",), math.hypot(x, y)),
-        "A_G3_ang_deg": (("4",), to_degrees(math.atan2(y, x))),
-        "A_G4_ang_deg": (("10",), to_degrees(math.atan(k.a_G[4][1] / k.a_G[4][0]))),
+        "A_G3/A_i": (("4",), x - k.a_A[0] + k.slip),
+        "A_G3_i": (("4",), slipped),
+        "A_G3_mod": (("4",), math.hypot(slipped, y)),
+        "A_G3_ang_deg": (("4",), to_degrees(math.atan2(y, slipped))),
+        "A_G4_ang_deg": (("10",), to_degrees(math.atan(y_4 / x_4))),
     }
 
 
@@ -290,14 +293,22 @@ def list_printed_kinematics(k: Kinematics) -> Iterator[PublishedFigure]:
     }
     for name, text in read_printed()["published"]["section_4_12_hand"].items():
         errata, made = {**slips, **by_hand}.get(name, ((), None))
-        yield PublishedFigure("4.12", name, text, ours[name], errata, made)
+        yield PublishedFigure(
+            "4.12",
+            name,
+            text,
+            ours[name],
+            errata,
+            made,
+        )
+    sizes = {
+        "t": math.degrees(1.0),
+        "R": abs(CENTRE[2]),
+        "A": float(np.abs(k.a_G[2]).max()),
+    }
     for name, text in read_printed()["published"]["manual_program_kinematic"].items():
         errata, made = slips.get(name, ((), None))
-        size = {
-            "t": math.degrees(1.0),
-            "R": abs(CENTRE[2]),
-            "A": float(np.abs(k.a_G[2]).max()),
-        }.get(name[0], 1.0)
+        size = sizes.get(name[0], 1.0)
         yield PublishedFigure(
             "manual, kinematics",
             name,
@@ -315,57 +326,15 @@ def _list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
     They belong to the 13 equations; the matrix is as printed.
     """
     source = read_printed()
-    inertias = source["inputs"]["inertia_kg_cm2_printed"]
-    yield PublishedFigure("5.7 inertias", "I_G2", inertias["I_G2"], INERTIA_2)
-    for bar in (3, 4):
-        yield PublishedFigure(
-            "5.7 inertias",
-            f"I_G{bar}",
-            inertias[f"I_G{bar}"],
-            compute_inertia(bar),
-            ("3",),
-            compute_inertia(bar, about_long_axis=True),
-        )
-    load = split_components(LOAD_ARM, LOAD_ANGLE)
-    ours: dict[str, float] = {
-        "R_ext_i": load[0],
-        "R_ext_j": load[1],
-        "moment_of_force_N_cm": -load[1] * FORCE_ON_BAR_2,
-    }
-    slips: dict[str, tuple[tuple[str, ...], float]] = {}
-    for bar, a_G in k.a_G.items():
-        force = FORCE_ON_BAR_2 if bar == 2 else 0.0
-        slip = k.slip if bar == 3 else 0.0
-        ours[f"k{bar}x"], ours[f"k{bar}y"] = (
-            TO_N * MASSES[bar] * a_G[0] - force,
-            TO_N * MASSES[bar] * a_G[1],
-        )
-        slips[f"k{bar}x"] = (
-            ("4", "1") if slip else ("1",),
-            MASSES[bar] * (a_G[0] + slip) - force,
-        )
-        slips[f"k{bar}y"] = (("1",), MASSES[bar] * a_G[1])
-    ours["k2_5"] = -COUPLE_ON_A_BAR + load[1] * FORCE_ON_BAR_2
-    for bar, alpha, sign in ((3, k.alpha[3], -1.0), (4, k.alpha[4], 1.0)):
-        ours[f"k{bar}_5"] = TO_N * compute_inertia(bar) * alpha - COUPLE_ON_A_BAR
-        # the sign of I alpha is wrong for bar 3 alone, erratum 7
-        made = (
-            sign * compute_inertia(bar, about_long_axis=True) * alpha - COUPLE_ON_A_BAR
-        )
-        slips[f"k{bar}_5"] = (("3", "2", "7") if bar == 3 else ("3", "2"), made)
-    for bar, pins in ((2, ("R12", "R32")), (3, ("R23", "R43")), (4, ("R14", "R34"))):
-        for pair, pin in enumerate(pins):
-            x, y = k.arms[pin]
-            ours[f"k{bar}_{2 * pair + 1}"], ours[f"k{bar}_{2 * pair + 2}"] = -y, x
-    for number, sign in ((1, -1.0), (3, 1.0)):
-        slips[f"k3_{number}"] = (("12",), sign * _compute_cut_arm(k, 6))
-        slips[f"k3_{number}_in_eq_5_6"] = (("12",), sign * _compute_cut_arm(k, 8))
-    ours |= {f"k3_{number}_in_eq_5_6": ours[f"k3_{number}"] for number in (1, 2, 3, 4)}
+    yield from _list_inertias(source["inputs"]["inertia_kg_cm2_printed"])
+    ours = _compute_our_constants(k)
+    slips = _list_slips_of_constants(k)
+    force_2 = MASSES[2] * truncate(k.a_G[2][0], 6)
     by_hand: dict[str, tuple[tuple[str, ...], float | None]] = {
         **slips,
         "k3_2_in_eq_5_6": (("12b",), None),
         "k4_1": (("12b",), None),
-        "k2x": (("1", "12c"), MASSES[2] * truncate(k.a_G[2][0], 6) - FORCE_ON_BAR_2),
+        "k2x": (("1", "12c"), force_2 - FORCE_ON_BAR_2),
         "k2y": (("1", "12c"), MASSES[2] * truncate(k.a_G[2][1], 6)),
         "k4x": (("1", "12c"), MASSES[4] * truncate(k.a_G[4][0], 10)),
     }
@@ -385,9 +354,9 @@ def _list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
     for bar, row in ((2, "row3_bar2"), (3, "row6_bar3"), (4, "row9_bar4")):
         entries += [(f"k{bar}_{n}", text) for n, text in enumerate(matrix[row][:4], 1)]
     for name, text in entries:
-        errata, changed = {
-            key: value for key, value in slips.items() if "12" not in value[0]
-        }.get(name, ((), None))
+        errata, changed = slips.get(name, ((), None))
+        if "12" in errata:  # the matrix has these arms in full
+            errata, changed = (), None
         yield PublishedFigure(
             "5.7 matrix",
             name,
@@ -397,8 +366,85 @@ def _list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
             changed,
         )
     for number, text in enumerate(matrix["rhs"][9:], 10):
-        yield PublishedFigure("5.7 matrix", f"right side, row {number}", text, 0.0)
-    yield PublishedFigure("5.7 matrix", "T4 in row 9", matrix["row9_bar4"][4], 1.0)
+        yield PublishedFigure(
+            "5.7 matrix",
+            f"right side, row {number}",
+            text,
+            0.0,
+        )
+    yield PublishedFigure(
+        "5.7 matrix",
+        "T4 in row 9",
+        matrix["row9_bar4"][4],
+        1.0,
+    )
+
+
+def _list_inertias(printed: dict[str, str]) -> Iterator[PublishedFigure]:
+    """List the three inertias about the mass centres."""
+    yield PublishedFigure(
+        "5.7 inertias",
+        "I_G2",
+        printed["I_G2"],
+        INERTIA_2,
+    )
+    for bar in (3, 4):
+        yield PublishedFigure(
+            "5.7 inertias",
+            f"I_G{bar}",
+            printed[f"I_G{bar}"],
+            compute_inertia(bar),
+            ("3",),
+            compute_inertia(bar, about_long_axis=True),
+        )
+
+
+def _compute_our_constants(k: Kinematics) -> dict[str, float]:
+    """Compute ours by the names of section 5.7."""
+    x, y = split_components(LOAD_ARM, LOAD_ANGLE)
+    ours: dict[str, float] = {
+        "R_ext_i": x,
+        "R_ext_j": y,
+        "moment_of_force_N_cm": -y * FORCE_ON_BAR_2,
+    }
+    for bar, a_G in k.a_G.items():
+        force = FORCE_ON_BAR_2 if bar == 2 else 0.0
+        ours[f"k{bar}x"] = TO_N * MASSES[bar] * a_G[0] - force
+        ours[f"k{bar}y"] = TO_N * MASSES[bar] * a_G[1]
+    ours["k2_5"] = -COUPLE_ON_A_BAR + y * FORCE_ON_BAR_2
+    for bar in (3, 4):
+        inertial = TO_N * compute_inertia(bar) * k.alpha[bar]
+        ours[f"k{bar}_5"] = inertial - COUPLE_ON_A_BAR
+    for bar, pins in ((2, ("R12", "R32")), (3, ("R23", "R43")), (4, ("R14", "R34"))):
+        for pair, pin in enumerate(pins):
+            x, y = k.arms[pin]
+            ours[f"k{bar}_{2 * pair + 1}"] = -y
+            ours[f"k{bar}_{2 * pair + 2}"] = x
+    for number in (1, 2, 3, 4):
+        ours[f"k3_{number}_in_eq_5_6"] = ours[f"k3_{number}"]
+    return ours
+
+
+def _list_slips_of_constants(
+    k: Kinematics,
+) -> dict[str, tuple[tuple[str, ...], float]]:
+    """List the constants that the errata touch, with the value that these lead to."""
+    slips: dict[str, tuple[tuple[str, ...], float]] = {}
+    for bar, a_G in k.a_G.items():
+        force = FORCE_ON_BAR_2 if bar == 2 else 0.0
+        slip = k.slip if bar == 3 else 0.0
+        errata = ("4", "1") if slip else ("1",)
+        slips[f"k{bar}x"] = (errata, MASSES[bar] * (a_G[0] + slip) - force)
+        slips[f"k{bar}y"] = (("1",), MASSES[bar] * a_G[1])
+    # the sign of I alpha is wrong for bar 3 alone, erratum 7
+    inertial_3 = -1.0 * compute_inertia(3, about_long_axis=True) * k.alpha[3]
+    inertial_4 = compute_inertia(4, about_long_axis=True) * k.alpha[4]
+    slips["k3_5"] = (("3", "2", "7"), inertial_3 - COUPLE_ON_A_BAR)
+    slips["k4_5"] = (("3", "2"), inertial_4 - COUPLE_ON_A_BAR)
+    for number, sign in ((1, -1.0), (3, 1.0)):
+        slips[f"k3_{number}"] = (("12",), sign * _compute_cut_arm(k, 6))
+        slips[f"k3_{number}_in_eq_5_6"] = (("12",), sign * _compute_cut_arm(k, 8))
+    return slips
 
 
 def list_printed_unknowns() -> Iterator[PublishedFigure]:

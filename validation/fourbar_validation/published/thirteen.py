@@ -42,29 +42,33 @@ def assemble_equations(bodies: EquationTerms, drive_bar: int) -> tuple[Array, Ar
     n = len(bodies.inertia_moment[2])
     matrix = np.zeros((n, 13, 13))
     right = np.zeros((n, 13))
-    for row, bar, first, second in (
+    for newton_x, bar, first, second in (
         (0, 2, F12, F32),
         (3, 3, F23, F43),
         (6, 4, F14, F34),
     ):
-        for force, arm in (
-            (first, bodies.to_first[bar]),
-            (second, bodies.to_second[bar]),
-        ):
-            matrix[:, row, force] = matrix[:, row + 1, force + 1] = 1.0
-            matrix[:, row + 2, force], matrix[:, row + 2, force + 1] = (
-                -arm[:, 1],
-                arm[:, 0],
-            )
+        newton_y = newton_x + 1
+        euler = newton_x + 2
+        arms = {first: bodies.to_first[bar], second: bodies.to_second[bar]}
+        for force_x, arm in arms.items():
+            force_y = force_x + 1
+            matrix[:, newton_x, force_x] = 1.0
+            matrix[:, newton_y, force_y] = 1.0
+            matrix[:, euler, force_x] = -arm[:, 1]
+            matrix[:, euler, force_y] = arm[:, 0]
         if bar == drive_bar:
-            matrix[:, row + 2, TORQUE_COLUMN] = 1.0
-        right[:, row : row + 2] = bodies.inertia_force[bar]
-        right[:, row + 2] = bodies.inertia_moment[bar]
-    for row, (force, reaction) in enumerate(
-        ((F32, F23), (F32 + 1, F23 + 1), (F43, F34), (F43 + 1, F34 + 1)),
-        start=9,
-    ):
-        matrix[:, row, force] = matrix[:, row, reaction] = 1.0
+            matrix[:, euler, TORQUE_COLUMN] = 1.0
+        right[:, newton_x:euler] = bodies.inertia_force[bar]
+        right[:, euler] = bodies.inertia_moment[bar]
+    opposite = (
+        (F32, F23),
+        (F32 + 1, F23 + 1),
+        (F43, F34),
+        (F43 + 1, F34 + 1),
+    )
+    for row, (force, reaction) in enumerate(opposite, start=9):
+        matrix[:, row, force] = 1.0
+        matrix[:, row, reaction] = 1.0
     return matrix, right
 
 

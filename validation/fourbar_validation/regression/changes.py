@@ -284,7 +284,11 @@ def compare_runs(
             run_for = bool(after) or not engines
         rows = _index_rows(scene, before), _index_rows(scene, after)
         differences.add(
-            _compare_scene(*rows, answering if run_for else set(), scenes.get(scene))
+            _compare_scene(
+                *rows,
+                answering if run_for else set(),
+                scenes.get(scene),
+            )
         )
     if older:
         compared = (

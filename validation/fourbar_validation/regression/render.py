@@ -253,9 +253,19 @@ def _list_cases_of_changes(diff: Differences) -> Iterator[JunitCase]:
         name = (scene, f"{scene}.{engine} {setting}", quantity)
         kind = change.kind.value
         if change.regression or (change.new is not None and change.new.failed):
-            yield JunitCase(*name, "failure", kind, _write_change_line(change))
+            yield JunitCase(
+                *name,
+                "failure",
+                kind,
+                _write_change_line(change),
+            )
         elif change.new is None:
-            yield JunitCase(*name, "skipped", kind, _write_change_line(change))
+            yield JunitCase(
+                *name,
+                "skipped",
+                kind,
+                _write_change_line(change),
+            )
         elif not change.new.compared:
             yield JunitCase(
                 *name,
@@ -267,7 +277,12 @@ def _list_cases_of_changes(diff: Differences) -> Iterator[JunitCase]:
             yield JunitCase(*name, "passed")
     for weakening in diff.weakened:
         name = (weakening.name, weakening.name, f"rule: {weakening.what}")
-        yield JunitCase(*name, "failure", "weaker rule", str(weakening))
+        yield JunitCase(
+            *name,
+            "failure",
+            "weaker rule",
+            str(weakening),
+        )
     yield from count_beyond(diff.rows - len(diff.changes))
     if diff.nothing:
         yield JunitCase(

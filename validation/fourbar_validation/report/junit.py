@@ -46,7 +46,12 @@ def list_cases(rows: Iterable[Row]) -> Iterator[JunitCase]:
             yield (
                 JunitCase(*name, "passed")
                 if row.compared
-                else JunitCase(*name, "skipped", row.verdict, row.reason)
+                else JunitCase(
+                    *name,
+                    "skipped",
+                    row.verdict,
+                    row.reason,
+                )
             )
         else:
             others += 1

@@ -277,7 +277,14 @@ class Overview:
                 words = text
                 if kind.worst.quantity == "all":
                     words = f"{NO_ANSWER_PREFIX}{_take_reason(kind.worst)}"
-                of_engine.append(Cause(engine, words, counts[text], kind.worst))
+                of_engine.append(
+                    Cause(
+                        engine,
+                        words,
+                        counts[text],
+                        kind.worst,
+                    )
+                )
                 left = {t: kind for t, kind in left.items() if t not in explained}
             causes += sorted(of_engine, key=lambda cause: -cause.scenes)
         return causes

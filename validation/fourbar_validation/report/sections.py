@@ -152,7 +152,11 @@ def _read_study(folder: Path) -> Section:
         if picture.is_file() and picture.stat().st_size <= LARGEST_INLINE_PICTURE:
             data = base64.b64encode(picture.read_bytes()).decode("ascii")
             figures.append(
-                SectionFigure(alt, f"{alt}.", image=f"data:image/svg+xml;base64,{data}")
+                SectionFigure(
+                    alt,
+                    f"{alt}.",
+                    image=f"data:image/svg+xml;base64,{data}",
+                )
             )
     text = (
         f"What each digit of {folder.name} costs, from the study in"

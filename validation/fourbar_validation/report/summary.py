@@ -83,11 +83,8 @@ class _EngineLine:
         self.counts.add([row])
         if row.quantity == "undecided":
             self.undecided = max(self.undecided, row.error)
-        if (
-            row.compared
-            and used > self.used
-            and (row.quantity != "undecided" or row.failed)
-        ):
+        is_error = row.quantity != "undecided" or row.failed
+        if row.compared and is_error and used > self.used:
             self.worst = row
             self.used = used
 
@@ -123,17 +120,20 @@ class Summary:
     def __init__(self) -> None:
         self.counts = Counts()
         self.overview = Overview()
-        self.date = self.commit = ""
-        """When it was made, and at which commit of the harness."""
+        self.date = ""
+        """Date on which it was made."""
+        self.commit = ""
+        """Commit of the harness at which it was made."""
         self.asked = ""
         """Name of the scene that was asked for; empty if there are several."""
-        self.versions, self.machine = list_versions(), name_machine()
+        self.versions = list_versions()
+        self.machine = name_machine()
         self.failures: list[Row] = []
         """Failures, at most _FAILURES_KEPT of them."""
-        self.pairs = self.loose = 0
-        """Quantities of a scene that were compared. Those that no row judges tighter
-        than degraded are counted too.
-        """
+        self.pairs = 0
+        """Number of quantities of a scene that were compared."""
+        self.loose = 0
+        """Number of those that no row judges tighter than degraded."""
         self._loosest: list[Row] = []
         self.judged = 0
         """Pairs of scene and engine of which `worst` shows the worst."""
@@ -168,13 +168,12 @@ class Summary:
         bad = [row for row in scene.rows if row.failed]
         self.failures += bad[: _FAILURES_KEPT - len(self.failures)]
         for row, used in zip(scene.rows, compute_shares(scene.rows), strict=True):
-            if row.engine in OWN_ENGINES:
-                name = OWN_CONSISTENCY
-            else:
-                name = row.engine
-            self._engines.setdefault(name, _EngineLine(name)).add(row, used)
+            name = OWN_CONSISTENCY if row.engine in OWN_ENGINES else row.engine
+            line = self._engines.setdefault(name, _EngineLine(name))
+            line.add(row, used)
         compared, loose = _count_compared(scene.rows)
-        self.pairs, self.loose = self.pairs + compared, self.loose + len(loose)
+        self.pairs += compared
+        self.loose += len(loose)
         self._loosest = _keep_largest(
             _LOOSEST_SHOWN,
             [*self._loosest, *loose],
@@ -194,9 +193,8 @@ class Summary:
         for row in scene.rows:
             if row.reason.startswith(EQUIVALENCE.cause) and math.isfinite(row.error):
                 k = row.error * row.condition / EPS
-                self.measured_k[row.engine] = max(
-                    self.measured_k.get(row.engine, 0.0), k
-                )
+                largest = self.measured_k.get(row.engine, 0.0)
+                self.measured_k[row.engine] = max(largest, k)
         self.independence.update(scene.independence)
         self._add_times(scene)
         self._add_orders(scene)
@@ -223,15 +221,15 @@ class Summary:
         for timing in scene.timings:
             times = self._times.setdefault(timing.engine, [])
             if timing.engine not in refused and len(times) < _TIMED:
+                microseconds = 1e6 * timing.seconds / timing.positions
                 ratio = timing.seconds / scene.timings[0].seconds
-                times.append((1e6 * timing.seconds / timing.positions, ratio))
+                times.append((microseconds, ratio))
 
     def _add_orders(self, scene: Record) -> None:
-        orders = [
-            (scene.name, evidence)
-            for evidence in scene.evidence.values()
-            if "observed_order" in evidence
-        ]
+        orders = []
+        for evidence in scene.evidence.values():
+            if "observed_order" in evidence:
+                orders.append((scene.name, evidence))
         self._orders = _keep_largest(
             _ORDERS_SHOWN,
             [*self._orders, *orders],

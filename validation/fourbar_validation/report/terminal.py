@@ -141,7 +141,11 @@ def _make_worst_table(summary: Summary) -> "Table":
                 ),
             )
             words = (f"  {escape(w.row.engine)}", escape(w.row.quantity))
-            shown.add_row(*words, *numbers, style="" if w.failed == 0 else "bold red")
+            shown.add_row(
+                *words,
+                *numbers,
+                style="" if w.failed == 0 else "bold red",
+            )
     return shown
 
 

@@ -50,17 +50,24 @@ def _draw_four_bars(record: Record, solution: Solution) -> str:
     pins = np.array([(0.0, 0.0), solution.A[best], solution.B[best], O4])
     low = pins.min(axis=0)
     high = pins.max(axis=0)
-    room = np.array([LINKAGE_WIDTH, THUMBNAIL_HEIGHT]) - 2.0 * EDGE - 4.0
-    scale = float(np.min(room / np.maximum(high - low, 1e-300)))
-    middle = 0.5 * np.array([LINKAGE_WIDTH, THUMBNAIL_HEIGHT])
-    places = (pins - 0.5 * (low + high)) * [scale, -scale] + middle
-    bars = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
-    ground = " ".join(f"{x:.1f},{y:.1f}" for x, y in places[[0, 3]])
+    picture = np.array([LINKAGE_WIDTH, THUMBNAIL_HEIGHT])
+    room = picture - 2.0 * EDGE - 4.0
+    size = np.maximum(high - low, 1e-300)
+    scale = float(np.min(room / size))
+    from_middle = pins - 0.5 * (low + high)
+    places = from_middle * [scale, -scale] + 0.5 * picture
+    bars = _write_points(places)
+    ground = _write_points(places[[0, 3]])
     dots = "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.6"/>' for x, y in places)
     return (
         f'<polyline class="ground" points="{ground}"/>'
         f'<polyline class="bars" points="{bars}"/>{dots}'
     )
+
+
+def _write_points(places: Array) -> str:
+    """Write the points of a polyline."""
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
 
 
 def _draw_curve(record: Record, solution: Solution) -> str:
@@ -79,17 +86,15 @@ def _draw_curve(record: Record, solution: Solution) -> str:
     span = max(float(high - low), 1e-300)
 
     def place(values: Array) -> tuple[Array, Array]:
-        x = (
-            LINKAGE_WIDTH
-            + EDGE
-            + (_CURVE - 2.0 * EDGE) * np.linspace(0.0, 1.0, len(values))
-        )
+        along = np.linspace(0.0, 1.0, len(values))
+        x = LINKAGE_WIDTH + EDGE + (_CURVE - 2.0 * EDGE) * along
         height = np.clip((values - low) / span, -0.1, 1.1)
-        return x, THUMBNAIL_HEIGHT - 2.0 * EDGE - (
-            THUMBNAIL_HEIGHT - 4.0 * EDGE
-        ) * height
+        bottom = THUMBNAIL_HEIGHT - 2.0 * EDGE
+        room = THUMBNAIL_HEIGHT - 4.0 * EDGE
+        return x, bottom - room * height
 
-    kept = np.linspace(0, len(ours) - 1, min(len(ours), POINTS_OF_A_CURVE)).astype(int)
+    points = min(len(ours), POINTS_OF_A_CURVE)
+    kept = np.linspace(0, len(ours) - 1, points).astype(int)
     x, y = place(np.where(good, ours, np.nan))
     drawn = "".join(_write_path(x[kept], y[kept]))
     marks = ""
@@ -128,13 +133,14 @@ def _draw_marks(
     x, y = place(values)
     if len(values) == len(good):  # a simulation makes positions of its own
         y = np.where(good, y, np.nan)
-    rows = (
-        (np.arange(MARKS_OF_AN_ENGINE) + phase) / MARKS_OF_AN_ENGINE * len(values)
-    ).astype(int)
+    parts = (np.arange(MARKS_OF_AN_ENGINE) + phase) / MARKS_OF_AN_ENGINE
+    rows = (parts * len(values)).astype(int)
     colour = choose_style(answer.engine).variable
-    return "".join(
-        f'<circle class="mark" cx="{x[i]:.1f}" cy="{y[i]:.1f}" r="2.2" '
-        f'style="stroke:var({colour})"/>'
-        for i in np.unique(rows)
-        if np.isfinite(y[i])
-    )
+    marks = ""
+    for i in np.unique(rows):
+        if np.isfinite(y[i]):
+            marks += (
+                f'<circle class="mark" cx="{x[i]:.1f}" cy="{y[i]:.1f}" r="2.2" '
+                f'style="stroke:var({colour})"/>'
+            )
+    return marks

@@ -119,7 +119,12 @@ class _RobotReading:
         )
 
     def _refuse(self, what: object, allowed: str) -> InputError:
-        return InputError("MJCF", what, allowed, str(self.path))
+        return InputError(
+            "MJCF",
+            what,
+            allowed,
+            str(self.path),
+        )
 
     def _parse(self, path: Path) -> ET.Element:
         """Parse one file; no document type, no depth without bound."""

@@ -68,7 +68,12 @@ def examine_guarded(
                 # or the pool would wait for the file to its time limit
                 pool.stop()  # type: ignore[no-untyped-call]
                 raise
-            raise InputError("MJCF", mjcf.name, reason, str(mjcf))
+            raise InputError(
+                "MJCF",
+                mjcf.name,
+                reason,
+                str(mjcf),
+            )
 
         yield examined
 

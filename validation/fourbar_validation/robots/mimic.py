@@ -117,18 +117,21 @@ def measure_mimic(
     own = _measure_polynomial(equality.coefficients, x, turned, ratio)
     left = np.polynomial.polynomial.polyval(x, own.coefficients) - turned
     stated = np.searchsorted(theta_2, positions)
-    squares = (
-        fit_squares(x[stated], turned[stated], degree) for degree in POLYNOMIAL_DEGREES
-    )
-    fitted = (fit_minimax(x, turned, degree) for degree in POLYNOMIAL_DEGREES)
+    squares = []
+    fitted = []
+    for degree in POLYNOMIAL_DEGREES:
+        least_squares = fit_squares(x[stated], turned[stated], degree)
+        minimax = fit_minimax(x, turned, degree)
+        squares.append(_measure_polynomial(least_squares, x, turned, ratio))
+        fitted.append(_measure_polynomial(minimax, x, turned, ratio))
     return _MimicReport(
         equality,
         (low, high),
         own,
-        float(np.abs(left - left[stated].mean()).max()),
-        float(np.ptp(left)) / 2.0,
-        tuple(_measure_polynomial(one, x, turned, ratio) for one in squares),
-        tuple(_measure_polynomial(one, x, turned, ratio) for one in fitted),
+        shifted=float(np.abs(left - left[stated].mean()).max()),
+        centred=float(np.ptp(left)) / 2.0,
+        squares=tuple(squares),
+        fitted=tuple(fitted),
     )
 
 
@@ -203,20 +206,31 @@ def fit_minimax(
     """
     from scipy.optimize import linprog
 
-    domain = (float(x.min()), float(x.max()))
+    low = float(x.min())
+    high = float(x.max())
     size = float(np.ptp(y)) or 1.0
-    basis = np.polynomial.chebyshev.chebvander(
-        (2.0 * x - sum(domain)) / (domain[1] - domain[0]), degree
-    )
+    scaled = (2.0 * x - (low + high)) / (high - low)
+    basis = np.polynomial.chebyshev.chebvander(scaled, degree)
     middle = 0.5 * float(y.max() + y.min())
     wanted = (y - middle) / size
     ones = np.ones((len(x), 1))
-    above = np.block([[basis, -ones], [-basis, -ones]])
+    above = np.block(
+        [
+            [basis, -ones],
+            [-basis, -ones],
+        ]
+    )
     bounds = np.concatenate([wanted, -wanted])
     cost = np.zeros(degree + 2)
     cost[-1] = 1.0
-    best = linprog(cost, A_ub=above, b_ub=bounds, bounds=(None, None), method="highs")
-    fitted = np.polynomial.Chebyshev(size * best.x[:-1], domain=domain)
+    best = linprog(
+        cost,
+        A_ub=above,
+        b_ub=bounds,
+        bounds=(None, None),
+        method="highs",
+    )
+    fitted = np.polynomial.Chebyshev(size * best.x[:-1], domain=(low, high))
     power = fitted.convert(kind=np.polynomial.Polynomial).coef
     coefficients = np.zeros(degree + 1)
     coefficients[: len(power)] = power

@@ -99,7 +99,12 @@ def read_pose(
         if not equals or not joint or not position:
             raise InputError("--pose", entry, "must be like JOINT=20deg")
         joints[joint.strip()] = position.strip()
-    return PoseOptions(joints, key, tuple(_split_at_commas(hold)), drive)
+    return PoseOptions(
+        joints,
+        key,
+        tuple(_split_at_commas(hold)),
+        drive,
+    )
 
 
 def read_speed(text: str | None) -> float | None:

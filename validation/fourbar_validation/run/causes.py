@@ -89,7 +89,15 @@ def make_answer_table(answer: Answer, tolerance: ErrorBound) -> TheirTable:
     units = {name: Unit(UNITS[name], 1.0) for name in values}
     lines = list(range(1, len(theta_2) + 1))
     exact = np.zeros(len(theta_2))
-    return TheirTable(theta_2, values, rounding, units, lines, exact, {})
+    return TheirTable(
+        theta_2,
+        values,
+        rounding,
+        units,
+        lines,
+        exact,
+        {},
+    )
 
 
 def differs(judge: Judge, key: str) -> bool:

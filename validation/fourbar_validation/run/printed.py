@@ -185,58 +185,51 @@ def check_blocks(question: Question) -> Iterator[Row]:
         return
     n = len(command.angle)
     ok = np.flatnonzero(solution.status_code == OK)
-    long = np.concatenate(
-        (np.resize(ok if len(ok) else np.arange(n), POSITIONS_OF_A_BLOCK), np.arange(n))
-    )
-    ends = np.unique([0, POSITIONS_OF_A_BLOCK - 1, POSITIONS_OF_A_BLOCK, len(long) - 1])
-    repeated = select_positions(command, long)
-    if (
-        sum(len(effect.loaded_pins) for effect in scene.effects) > 1
-    ):  # each may take a search
+    answered = ok if len(ok) else np.arange(n)
+    filling = np.resize(answered, POSITIONS_OF_A_BLOCK)
+    rows = np.concatenate((filling, np.arange(n)))
+    last = len(rows) - 1
+    ends = np.unique([0, POSITIONS_OF_A_BLOCK - 1, POSITIONS_OF_A_BLOCK, last])
+    repeated = select_positions(command, rows)
+    loaded_pins = sum(len(effect.loaded_pins) for effect in scene.effects)
+    if loaded_pins > 1:  # each may take a search
         repeated.angle[1 : POSITIONS_OF_A_BLOCK - 1] = np.nan
-    expected = {
-        name: values
-        for name in ("sin_mu", "B", "alpha_3", *FORCE_NAMES)
-        if (values := getattr(solution, name)) is not None
-    }
     # every other quantity of thousands of positions would cost as much again
-    found = {
-        name: np.empty((len(long), *values.shape[1:]))
-        for name, values in expected.items()
-    }
-    together = solve(scene, at=repeated, out=found)
-    error = (together.status_code[ends] != solution.status_code[long[ends]]).astype(
-        float
-    )
+    expected: dict[str, Array] = {}
+    together: dict[str, Array] = {}
+    for name in ("sin_mu", "B", "alpha_3", *FORCE_NAMES):
+        values = getattr(solution, name)
+        if values is not None:
+            expected[name] = values
+            together[name] = np.empty((len(rows), *values.shape[1:]))
+    status = solve(scene, at=repeated, out=together).status_code
+    at_ends = rows[ends]
+    error = (status[ends] != solution.status_code[at_ends]).astype(float)
     with np.errstate(all="ignore"):  # beyond the range of doubles there is no size
         scales = TermSizes(scene, solution).scales([*expected], [*expected.values()])
     for (quantity, ours), scale in zip(expected.items(), scales, strict=True):
-        one = found[quantity][ends]
-        due = ours[long[ends]]
+        one = together[quantity][ends]
+        due = ours[at_ends]
         finite = np.isfinite(magnitude(due))
         error[finite != np.isfinite(magnitude(one))] = np.inf
-        size = scale[long[ends]]
-        condition = find_condition(quantity, scene.linkage, solution)[long[ends]]
-        condition = np.where(
-            np.isnan(condition),
-            1.0,
-            condition,
-        )  # decided by the command where nothing closes
+        size = scale[at_ends]
+        condition = find_condition(quantity, scene.linkage, solution)[at_ends]
+        # decided by the command where nothing closes
+        condition = np.where(np.isnan(condition), 1.0, condition)
         # evaluated by the same code, but not in the same company of a processor's
         # registers
         apart = find_error(quantity, one, due, size) * condition
         error[finite] = np.maximum(error[finite], apart[finite])
     alone = {angle: np.empty(n) for angle in ("theta_3", "theta_4")}
     solve(scene, at=command, out=alone)  # they are found without vectors then
+    half_turns = count_half_turns(scene.linkage.ground_angle, command.angle)
     for angle, angles in alone.items():
         apart = find_error(angle, angles, getattr(solution, angle), np.ones(n))
-        half_turns = count_half_turns(scene.linkage.ground_angle, command.angle)
         apart *= find_condition(angle, scene.linkage, solution) / half_turns
-        error[-1] = max(
-            error[-1], np.nan_to_num(apart[ok], nan=np.inf).max(initial=0.0)
-        )
-    reason = f"{len(long)} positions at once against {n}"
-    theta_2 = solution.theta_2[long[ends]]
+        largest = np.nan_to_num(apart[ok], nan=np.inf).max(initial=0.0)
+        error[-1] = max(error[-1], largest)
+    reason = f"{len(rows)} positions at once against {n}"
+    theta_2 = solution.theta_2[at_ends]
     yield question.row("blocks", error, EQUIVALENCE.factor, reason, theta_2=theta_2)
 
 
@@ -436,26 +429,28 @@ def check_law(question: Question) -> Iterator[Row]:
     t = np.array(law.time)
     angle = np.array(law.angle)
     h = np.diff(t)
+    shortest = float(h.min())
     rise = np.diff(angle) / np.diff(t)
     speed = law.at(t)[1]
     first = (6.0 * rise - 4.0 * speed[:-1] - 2.0 * speed[1:]) / h
     last = (-6.0 * rise + 2.0 * speed[:-1] + 4.0 * speed[1:]) / h
     farthest = float(np.abs(angle).max())
-    size = float(np.abs(rise).max() + np.abs(speed).max()) + farthest / float(h.min())
-    bent = size / float(h.min())
-    errors = [np.abs(first[1:] - last[:-1]) / bent]
+    fastest = float(np.abs(rise).max() + np.abs(speed).max())
+    size = fastest + farthest / shortest
+    bent = size / shortest
+    misfits = [np.abs(first[1:] - last[:-1]) / bent]
     if law.ends == "rest":
-        errors.append(np.abs(speed[[0, -1]]) / size)
+        misfits.append(np.abs(speed[[0, -1]]) / size)
     elif law.ends == "periodic":
-        errors.append(
-            np.abs([speed[0] - speed[-1], (first[0] - last[-1]) / h.min()]) / size
-        )
+        jump_of_speed = speed[0] - speed[-1]
+        jump_of_acceleration = (first[0] - last[-1]) / shortest
+        misfits.append(np.abs([jump_of_speed, jump_of_acceleration]) / size)
     else:  # one cubic through the first two pieces, and through the last two
         jerk = (last - first) / h
-        errors.append(
-            np.abs([jerk[1] - jerk[0], jerk[-1] - jerk[-2]]) * float(h.min()) / bent
-        )
-    piece = np.clip(np.searchsorted(t, command.time, side="right") - 1, 0, len(h) - 1)
+        jumps = np.abs([jerk[1] - jerk[0], jerk[-1] - jerk[-2]])
+        misfits.append(jumps * shortest / bent)
+    knots_before = np.searchsorted(t, command.time, side="right")
+    piece = np.clip(knots_before - 1, 0, len(h) - 1)
     theta, omega, alpha = _interpolate_hermite(
         command.time - t[piece],
         angle[piece],
@@ -470,9 +465,9 @@ def check_law(question: Question) -> Iterator[Row]:
         np.abs(alpha - command.acceleration) / bent,
     ]
     error = np.max(along, axis=0)
-    error[find_worst(error)] = np.max(
-        [error[find_worst(error)], *(misfit.max(initial=0.0) for misfit in errors)]
-    )
+    worst = find_worst(error)
+    largest = [misfit.max(initial=0.0) for misfit in misfits]
+    error[worst] = np.max([error[worst], *largest])
     yield question.row(
         "law",
         error,
@@ -508,10 +503,10 @@ def _check_rise(question: Question, law: Rise) -> Row:
     size = abs(start) + abs(rise)
     # the time of a position is rounded, as a part of the whole motion
     late = law.time[-1] / shortest
-    along = [
-        np.abs(rate - np.asarray(value)) * shortest**order / (size * late)
-        for order, (rate, value) in enumerate(zip(rates, stated, strict=True))
-    ]
+    along = []
+    for order, value in enumerate(stated):
+        apart = np.abs(rates[order] - np.asarray(value))
+        along.append(apart * shortest**order / (size * late))
     reason = f"the {law.kind} law in another form"
     return question.row("law", np.max(along, axis=0), IDENTITY.factor, reason)
 

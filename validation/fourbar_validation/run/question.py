@@ -194,7 +194,13 @@ class Question:
             if engine.name in self.answered
         ]
         timings = [
-            Timing(self.name, FORMULAS, "exact", len(self.solution), seconds),
+            Timing(
+                self.name,
+                FORMULAS,
+                "exact",
+                len(self.solution),
+                seconds,
+            ),
             *self.timings,
         ]
         n = len(self.at.angle)

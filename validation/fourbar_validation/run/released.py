@@ -195,7 +195,13 @@ def check_released(question: Question) -> Iterator[Row]:
         else:
             coarse = start(2.0 * step).release(scene, times)
         question.timings.append(
-            Timing(name, fine.engine, fine.setting, len(times), seconds)
+            Timing(
+                name,
+                fine.engine,
+                fine.setting,
+                len(times),
+                seconds,
+            )
         )
         if fine.refusal is not None:
             question.leave_out(fine.engine, fine.refusal)
@@ -338,43 +344,65 @@ def _prescribe(
     whole torque.
     """
     assert command.omega_2 is not None
-    friction = next(
-        (effect for effect in scene.effects if isinstance(effect, Friction)), None
-    )
+    friction: Friction | None = None
+    others = []
+    for effect in scene.effects:
+        if friction is None and isinstance(effect, Friction):
+            friction = effect
+        else:
+            others.append(effect)
+    resting = np.empty(0, dtype=int)
     if friction is not None:
         resting = np.flatnonzero(command.omega_2 == 0.0)
-    else:
-        resting = np.empty(0, dtype=int)
     moving = np.setdiff1d(np.arange(len(command.theta_2)), resting)
     if len(moving):
         yield scene, moving
     if friction is None:
         return
-    bare = replace(
-        scene,
-        effects=tuple(effect for effect in scene.effects if effect is not friction),
-    )
+    bare = replace(scene, effects=tuple(others))
     numbers = np.stack((command.theta_2, command.alpha_2), axis=1)[resting]
-    for first in resting[np.unique(numbers, axis=0, return_index=True)[1]].tolist():
+    _, different = np.unique(numbers, axis=0, return_index=True)
+    for first in resting[different].tolist():
         index = np.array([first])
         here = select_positions(command, index)
-        needed = ask_at(FreeBody(), bare, here).quantities["torque"][0]
-        begins = float(np.sign(here.alpha_2)[0])
-        at_one = here._replace(speed=np.ones(1))
-        turning = ask_at(FreeBody(), bare, at_one).quantities
-        rate = {1: 0.0, 2: 1.0, 3: turning["omega_3"][0], 4: turning["omega_4"][0]}
-        slips = {
-            pin: rate[PINS[pin][1]] - rate[PINS[pin][0]] for pin, _ in friction.torques
-        }
-        most = sum(torque * abs(slips[pin]) for pin, torque in friction.torques)
-        part = -begins or float(np.clip(needed / most, -1.0, 1.0))
-        loads = [
-            Load(bar, moment=sense * part * torque * float(np.sign(slips[pin])))
-            for pin, torque in friction.torques
-            for bar, sense in zip(PINS[pin], (-1.0, 1.0), strict=True)
-            if bar != 1
-        ]
+        loads = _hold_by_friction(bare, here, friction)
         yield replace(bare, loads=(*scene.loads, *loads)), index
+
+
+def _hold_by_friction(
+    bare: Scene,
+    here: Command,
+    friction: Friction,
+) -> list[Load]:
+    """Return the couples of dry friction at a standstill, as loads.
+
+    `bare`: the scene without this friction.
+    """
+    needed = ask_at(FreeBody(), bare, here).quantities["torque"][0]
+    begins = float(np.sign(here.alpha_2)[0])
+    at_one = here._replace(speed=np.ones(1))
+    turning = ask_at(FreeBody(), bare, at_one).quantities
+    rate = {
+        1: 0.0,
+        2: 1.0,
+        3: turning["omega_3"][0],
+        4: turning["omega_4"][0],
+    }
+    slips = {}
+    most = 0
+    for pin, torque in friction.torques:
+        i, j = PINS[pin]
+        slips[pin] = rate[j] - rate[i]
+        most += torque * abs(slips[pin])
+    part = -begins or float(np.clip(needed / most, -1.0, 1.0))
+    loads = []
+    for pin, torque in friction.torques:
+        couple = part * torque * float(np.sign(slips[pin]))
+        i, j = PINS[pin]
+        for bar, moment in ((i, -couple), (j, couple)):
+            if bar != 1:
+                loads.append(Load(bar, moment=moment))
+    return loads
 
 
 class _Truth(NamedTuple):
@@ -452,6 +480,15 @@ def _make_rows(
             )
         place = float(fine.theta_2[index])
         rows.append(
-            Row(*who, name, float(error[index]), allowed, verdict, reason, place, 1.0)
+            Row(
+                *who,
+                name,
+                float(error[index]),
+                allowed,
+                verdict,
+                reason,
+                place,
+                1.0,
+            )
         )
     return rows

@@ -188,7 +188,11 @@ def read_request(folder: Path) -> tuple[int, Request, Files | None]:
         files = kept.get("files")
         if files is not None:
             texts = tuple((name, text) for name, text in files["texts"])
-            files = Files(texts, files["positions"], frozenset(files["not_drawn"]))
+            files = Files(
+                texts,
+                files["positions"],
+                frozenset(files["not_drawn"]),
+            )
         return int(kept["parts"]), request, files
     except (OSError, KeyError, TypeError, ValueError):
         why = "must be a folder that `run --part` wrote and that was not collected yet"

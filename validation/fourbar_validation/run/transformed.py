@@ -285,7 +285,13 @@ def _take_plain_positions(question: Question) -> _Few:
         placed.effects,
         drive=placed.drive,
     )
-    return _Few(few, command, _solve_from_first(few, command), question, fit[positions])
+    return _Few(
+        few,
+        command,
+        _solve_from_first(few, command),
+        question,
+        fit[positions],
+    )
 
 
 def _mark_long_springs(scene: Scene, solution: Solution) -> Mask:
@@ -334,7 +340,12 @@ def _solve_from_first(
 
 def _make_bar_of_numbers(bar: Bar) -> Bar:
     """Return a bar whose mass, inertia and centre are numbers."""
-    return Bar(bar.length, find_mass(bar), find_inertia(bar), find_centre(bar))
+    return Bar(
+        bar.length,
+        find_mass(bar),
+        find_inertia(bar),
+        find_centre(bar),
+    )
 
 
 @dataclass(frozen=True)
@@ -378,7 +389,12 @@ class _SceneConversion:
             centre = _from_other_end(bar.length, centre)
         square = self.length * self.length
         length = self.length * bar.length
-        return Bar(length, bar.mass, square * bar.inertia, self.pair(centre))
+        return Bar(
+            length,
+            bar.mass,
+            square * bar.inertia,
+            self.pair(centre),
+        )
 
 
 def _from_other_end(length: float, pair: tuple[float, float]) -> tuple[float, float]:
@@ -564,7 +580,13 @@ def _convert(scene: Scene, to: _SceneConversion) -> Scene:
         for terms in (scene.loads, scene.effects)
     ]
     return Scene(
-        FourBar(to.length * link.ground, two, three, four, theta_1),
+        FourBar(
+            to.length * link.ground,
+            two,
+            three,
+            four,
+            theta_1,
+        ),
         Motion(),
         drive_bar,
         tuple(terms[0]),
@@ -706,7 +728,14 @@ def _take_part(linkage: FourBar, part: float) -> FourBar:
         rest = bar.inertia - PART * (1.0 - PART) * bar.mass * apart * apart
         away = apart * ((1.0 - PART) if part == PART else -PART)
         centre = cmath.polar(cmath.rect(*bar.centre) + away)
-        bars.append(Bar(bar.length, mass, part * rest, centre))
+        bars.append(
+            Bar(
+                bar.length,
+                mass,
+                part * rest,
+                centre,
+            )
+        )
     two, three, four = bars
     return FourBar(linkage.ground, two, three, four, linkage.ground_angle)
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from fourbar.effects import Gravity, Load
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
+from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES, Free, Motion, Sweep
 from fourbar_validation.scenes.random import (
@@ -50,9 +51,9 @@ CHANGE = tuple(10.0**-k for k in range(1, 9))
 
 def draw_lengths_of_type(kind: DrawnType, seed: int) -> Lengths:
     """Draw random lengths of a type, from its seed alone."""
-    return draw_lengths(
-        np.random.default_rng([seed, list(DrawnType).index(kind)]), kind
-    )
+    number = list(DrawnType).index(kind)
+    rng = np.random.default_rng([seed, number])
+    return draw_lengths(rng, kind)
 
 
 def dress(lengths: Lengths, seed: int = 0) -> Scene:
@@ -64,16 +65,26 @@ def dress(lengths: Lengths, seed: int = 0) -> Scene:
     d, *moving = lengths
     bars = draw_bars(rng, moving, HEAVY_BARS)
     weight = 9.81 * sum(bar.mass for bar in bars)
+    direction = float(rng.uniform(-3, 3))
+    arm = (0.2 * moving[2], float(rng.uniform(-3, 3)))
     loads = (
-        Load(
-            4,
-            (weight, float(rng.uniform(-3, 3))),
-            arm=(0.2 * moving[2], float(rng.uniform(-3, 3))),
-        ),
+        Load(4, (weight, direction), arm=arm),
         Load(3, moment=0.1 * weight * moving[1]),
     )
-    linkage = FourBar(d, bars[0], bars[1], bars[2], float(rng.uniform(-1, 1)))
-    return Scene(linkage, Motion(0.0, 3.0, 2.0), 2, loads, (Gravity(),))
+    linkage = FourBar(
+        d,
+        bars[0],
+        bars[1],
+        bars[2],
+        float(rng.uniform(-1, 1)),
+    )
+    return Scene(
+        linkage,
+        Motion(0.0, 3.0, 2.0),
+        drive_bar=2,
+        loads=loads,
+        effects=(Gravity(),),
+    )
 
 
 def set_angles(scene: Scene, psi: object, branch: int = 1, **changes: object) -> Scene:
@@ -102,15 +113,14 @@ def _compute_corners(
 
     They are of either sign, if it closes.
     """
-    if second_side:
-        cosine = (side * side + second_side * second_side - opposite * opposite) / (
-            2 * side * second_side
-        )
-    else:
-        cosine = 2.0
-    if abs(cosine) < 1.0:
-        return [math.acos(cosine), -math.acos(cosine)]
-    return []
+    if not second_side:
+        return []
+    squares = side * side + second_side * second_side - opposite * opposite
+    cosine = squares / (2 * side * second_side)
+    if not abs(cosine) < 1.0:
+        return []
+    corner = math.acos(cosine)
+    return [corner, -corner]
 
 
 def find_collinear_3_4(lengths: Lengths) -> list[tuple[float, bool]]:
@@ -119,11 +129,11 @@ def find_collinear_3_4(lengths: Lengths) -> list[tuple[float, bool]]:
     There a^2 + d^2 - 2 a d cos psi = (b +- c)^2.
     """
     d, a, b, c = lengths
-    return [
-        (psi, stretched)
-        for joined, stretched in ((b + c, True), (b - c, False))
-        for psi in _compute_corners(d, a, joined)[:1]
-    ]
+    places = []
+    for joined, stretched in ((b + c, True), (b - c, False)):
+        for psi in _compute_corners(d, a, joined)[:1]:
+            places.append((psi, stretched))
+    return places
 
 
 def find_collinear_2_3(lengths: Lengths) -> list[tuple[float, int]]:
@@ -136,7 +146,8 @@ def find_collinear_2_3(lengths: Lengths) -> list[tuple[float, int]]:
     for along in (a + b, a - b):
         for psi in _compute_corners(d, along, c):
             u = complex(math.cos(psi), math.sin(psi))
-            places.append((psi, _find_sense(d - a * u, (along - a) * u)))
+            branch = _find_sense(d - a * u, (along - a) * u)
+            places.append((psi, branch))
     return places
 
 
@@ -150,7 +161,8 @@ def _find_parallel_2_4(lengths: Lengths) -> list[tuple[float, int]]:
     for joined, side in ((a - c, 1.0), (a + c, -1.0)):
         for psi in _compute_corners(d, joined, b):
             u = complex(math.cos(psi), math.sin(psi))
-            places.append((psi, _find_sense(d - joined * u, side * c * u)))
+            branch = _find_sense(d - joined * u, side * c * u)
+            places.append((psi, branch))
     return places
 
 
@@ -166,23 +178,23 @@ def toggle(*, distances: tuple[float, ...] = TOGGLE, seeds: range = range(2)) ->
     for kind in _ROCKERS:
         for seed in seeds:
             lengths = draw_lengths_of_type(kind, seed)
+            scene = dress(lengths, seed)
             for psi, stretched in find_collinear_3_4(lengths):
                 inward = -1.0 if stretched else 1.0
                 inside = psi + inward * np.array([*REGULAR, *distances])
                 beyond = psi - inward * np.array(distances)
+                angles = [*inside, *beyond[::-1]]
+                in_line = "stretched" if stretched else "folded"
                 for branch, name in BRANCH_NAMES.items():
-                    label = (
-                        f"{kind.value} {seed} {'stretched' if stretched else 'folded'}"
-                        f" {name}"
-                    )
-                    yield (
-                        label,
-                        set_angles(
-                            dress(lengths, seed),
-                            [*inside, *beyond[::-1]],
-                            branch,
-                        ),
-                    )
+                    label = f"{kind.value} {seed} {in_line} {name}"
+                    yield label, set_angles(scene, angles, branch)
+
+
+def _list_both_sides(distances: tuple[float, ...]) -> Array:
+    """List offsets from a singular position: up to it, and on from it, rad."""
+    towards = [*REGULAR, *distances]
+    before = [-distance for distance in towards]
+    return np.array([*before, *reversed(towards)])
 
 
 def _approach_poles(
@@ -195,20 +207,17 @@ def _approach_poles(
 
     It is approached from both sides.
     """
-    offsets = np.array(
-        [*(-x for x in (*REGULAR, *distances)), *distances[::-1], *REGULAR[::-1]]
-    )
+    offsets = _list_both_sides(distances)
     for seed in seeds:
         lengths = draw_lengths_of_type(TYPES_WITH_A_CRANK, seed)
+        scene = dress(lengths, seed)
         if bar == 3:
             poles = _find_parallel_2_4(lengths)
         else:
             poles = find_collinear_2_3(lengths)
         for number, (psi, branch) in enumerate(poles[:3]):
-            yield (
-                f"{seed} {number}",
-                set_angles(dress(lengths, seed), psi + offsets, branch, drive_bar=bar),
-            )
+            near = set_angles(scene, psi + offsets, branch, drive_bar=bar)
+            yield f"{seed} {number}", near
 
 
 def _driven_output(*, steps: int = 180, seeds: range = range(2)) -> Scenes:
@@ -218,8 +227,9 @@ def _driven_output(*, steps: int = 180, seeds: range = range(2)) -> Scenes:
     """
     for seed in seeds:
         scene = dress(draw_lengths_of_type(TYPES_WITH_A_CRANK, seed), seed)
+        turn = Sweep(0.05, 0.05 + 2 * math.pi, steps)
         for branch, name in BRANCH_NAMES.items():
-            motion = Motion(Sweep(0.05, 0.05 + 2 * math.pi, steps), 3.0, 0.0, branch)
+            motion = Motion(turn, 3.0, 0.0, branch)
             yield f"{seed} {name}", replace(scene, motion=motion, drive_bar=4)
 
 
@@ -237,25 +247,23 @@ antiparallelogram. The kite a = d has A on O4 at its change point.
 
 def approach_change_point(*, distances: tuple[float, ...] = CHANGE) -> Scenes:
     """Close to a change point, on both sides and in both assemblies."""
-    offsets = np.array(
-        [*(-x for x in (*REGULAR, *distances)), *distances[::-1], *REGULAR[::-1]]
-    )
+    offsets = _list_both_sides(distances)
     for kind, (lengths, points) in CHANGE_POINTS.items():
+        scene = dress(lengths)
         for psi in points:
             for branch, name in BRANCH_NAMES.items():
-                yield (
-                    f"{kind} {math.degrees(psi):.0f} {name}",
-                    set_angles(dress(lengths), psi + offsets, branch),
-                )
+                label = f"{kind} {math.degrees(psi):.0f} {name}"
+                yield label, set_angles(scene, psi + offsets, branch)
 
 
 def sweep_change_point(*, steps: int = 145) -> Scenes:
     """Sweep two turns through the change points in both assemblies."""
     for kind, (lengths, _) in CHANGE_POINTS.items():
+        scene = dress(lengths)
+        start = scene.linkage.ground_angle + 0.3
+        turns = Sweep(start, start + 4 * math.pi, steps)
         for branch, name in BRANCH_NAMES.items():
-            scene = dress(lengths)
-            start = scene.linkage.ground_angle + 0.3
-            motion = Motion(Sweep(start, start + 4 * math.pi, steps), 3.0, 0.0, branch)
+            motion = Motion(turns, 3.0, 0.0, branch)
             yield f"{kind} {name}", replace(scene, motion=motion)
 
 
@@ -268,41 +276,30 @@ def _miss_grashof(
 
     The sweep passes close to where it would change.
     """
+    d = 0.4
+    a = 0.1
+    b = 0.25
     for gap in gaps:
         for sign in (1.0, -1.0):
-            d = 0.4
-            a = 0.1
-            b = 0.25
             scene = dress((d, a, b, d + a - b + sign * gap))
-            sweep = Sweep(
-                scene.linkage.ground_angle,
-                scene.linkage.ground_angle + 2 * math.pi,
-                steps,
-            )
-            yield (
-                f"{sign * gap:+.0e}",
-                replace(
-                    scene,
-                    motion=scene.motion.replace(angle=sweep, acceleration=0.0),
-                ),
-            )
+            start = scene.linkage.ground_angle
+            sweep = Sweep(start, start + 2 * math.pi, steps)
+            motion = scene.motion.replace(angle=sweep, acceleration=0.0)
+            yield f"{sign * gap:+.0e}", replace(scene, motion=motion)
 
 
 def sweep_turn(scene: Scene, steps: int = 36) -> Scene:
     """Sweep through one turn of the input."""
-    return replace(
-        scene,
-        motion=scene.motion.replace(
-            angle=Sweep(0.1, 0.1 + 2 * math.pi, steps),
-            acceleration=0.0,
-        ),
-    )
+    turn = Sweep(0.1, 0.1 + 2 * math.pi, steps)
+    motion = scene.motion.replace(angle=turn, acceleration=0.0)
+    return replace(scene, motion=motion)
 
 
 def _shorten_crank(*, exponents: range = range(-6, 0)) -> Scenes:
     """Shorten the crank against the coupler, again and again."""
     for k in exponents:
-        yield f"1e{k}", sweep_turn(dress((0.3, 0.25 * 10.0**k, 0.25, 0.22)))
+        crank = 0.25 * 10.0**k
+        yield f"1e{k}", sweep_turn(dress((0.3, crank, 0.25, 0.22)))
 
 
 def _vary_mass_ratio(*, exponents: tuple[int, ...] = (-6, -3, 3, 6)) -> Scenes:
@@ -310,11 +307,9 @@ def _vary_mass_ratio(*, exponents: tuple[int, ...] = (-6, -3, 3, 6)) -> Scenes:
     base = sweep_turn(dress(ORDINARY_LENGTHS))
     for name, bar in list_moving(base):
         for k in exponents:
-            heavy = replace(
-                bar,
-                mass=bar.mass * 10.0**k,
-                inertia=bar.moment_of_inertia * 10.0**k,
-            )
+            times = 10.0**k
+            inertia = bar.moment_of_inertia * times
+            heavy = replace(bar, mass=bar.mass * times, inertia=inertia)
             yield f"{name} 1e{k:+d}", replace_bars(base, **{name: heavy})
 
 
@@ -324,19 +319,13 @@ def _remove_inertia() -> Scenes:
     Some have loads only on massless bars.
     """
     base = sweep_turn(dress(ORDINARY_LENGTHS))
+    massless = {}
     for name, bar in list_moving(base):
-        yield (
-            f"{name} point mass",
-            replace_bars(base, **{name: replace(bar, inertia=0.0)}),
-        )
-        yield f"{name} massless", replace_bars(base, **{name: Bar(bar.length)})
-    yield (
-        "all massless",
-        replace_bars(
-            base,
-            **{name: Bar(bar.length) for name, bar in list_moving(base)},
-        ),
-    )
+        point_mass = replace(bar, inertia=0.0)
+        massless[name] = Bar(bar.length)
+        yield f"{name} point mass", replace_bars(base, **{name: point_mass})
+        yield f"{name} massless", replace_bars(base, **{name: massless[name]})
+    yield "all massless", replace_bars(base, **massless)
 
 
 def _move_centres_out(*, times: tuple[float, ...] = (3.0, 100.0, 1e4)) -> Scenes:
@@ -344,21 +333,16 @@ def _move_centres_out(*, times: tuple[float, ...] = (3.0, 100.0, 1e4)) -> Scenes
     base = sweep_turn(dress(ORDINARY_LENGTHS))
     for name, bar in list_moving(base):
         for k in times:
-            yield (
-                f"{name} {k:g}",
-                replace_bars(
-                    base,
-                    **{name: replace(bar, centre=(k * bar.length, 2.0))},
-                ),
-            )
+            far = replace(bar, centre=(k * bar.length, 2.0))
+            yield f"{name} {k:g}", replace_bars(base, **{name: far})
 
 
 def _scale_sizes(*, exponents: range = range(-6, 7, 2)) -> Scenes:
     """Scale the same shape from micrometres to a thousand kilometres."""
     for k in exponents:
-        ground, input_, coupler, output = ORDINARY_LENGTHS
         size = 10.0**k
-        lengths = (ground * size, input_ * size, coupler * size, output * size)
+        d, a, b, c = ORDINARY_LENGTHS
+        lengths = (d * size, a * size, b * size, c * size)
         yield f"1e{k:+d} m", sweep_turn(dress(lengths))
 
 
@@ -367,23 +351,22 @@ def _scale_speeds(*, exponents: tuple[int, ...] = (-6, -3, 0, 3, 6)) -> Scenes:
     base = sweep_turn(dress(ORDINARY_LENGTHS))
     for k in exponents:
         for sign, name in ((1.0, "+"), (-1.0, "-")):
-            yield (
-                f"{name}1e{k:+d}",
-                replace(base, motion=base.motion.replace(speed=sign * 10.0**k)),
-            )
+            motion = base.motion.replace(speed=sign * 10.0**k)
+            yield f"{name}1e{k:+d}", replace(base, motion=motion)
 
 
 def scale_loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:
     """Load from 1e-9 to 1e9 of the weights."""
     base = sweep_turn(dress(ORDINARY_LENGTHS))
     for k in exponents:
+        times = 10.0**k
         scaled = []
         for load in base.loads:
-            if load.force is None:
-                force = None
-            else:
-                force = (load.force[0] * 10.0**k, load.force[1])
-            scaled.append(replace(load, force=force, moment=load.moment * 10.0**k))
+            force = None
+            if load.force is not None:
+                size, angle = load.force
+                force = (size * times, angle)
+            scaled.append(replace(load, force=force, moment=load.moment * times))
         yield f"1e{k:+d}", replace(base, loads=tuple(scaled))
 
 
@@ -396,14 +379,15 @@ def _sweep_out_and_back(
     """Sweep out of the range in which the linkage assembles, and back."""
     for seed in seeds:
         lengths = draw_lengths_of_type(TYPES_WITH_A_ROCKER, seed)
+        scene = dress(lengths, seed)
         (psi, stretched), *_ = find_collinear_3_4(lengths)
         outward = 1.0 if stretched else -1.0
-        out = np.linspace(psi - outward * 0.6, psi + outward * beyond, steps)
+        inside = psi - outward * 0.6
+        outside = psi + outward * beyond
+        out = np.linspace(inside, outside, steps)
+        angles = [*out, *out[::-1]]
         for branch, name in BRANCH_NAMES.items():
-            yield (
-                f"{seed} {name}",
-                set_angles(dress(lengths, seed), [*out, *out[::-1]], branch),
-            )
+            yield f"{seed} {name}", set_angles(scene, angles, branch)
 
 
 def _drive_thesis_to_limits(*, steps: int = 120) -> Scenes:
@@ -411,15 +395,17 @@ def _drive_thesis_to_limits(*, steps: int = 120) -> Scenes:
 
     Its bars are 20, 48, 55 and 20 cm.
     """
-    bars = (Bar(0.48, 57.0, 11.119275, (0.765, 0.0)), Bar(0.55, 0.544), Bar(0.20, 0.2))
-    linkage = FourBar(0.20, *bars, math.radians(45.0))
+    linkage = FourBar(
+        0.20,
+        Bar(0.48, 57.0, 11.119275, (0.765, 0.0)),
+        Bar(0.55, 0.544),
+        Bar(0.20, 0.2),
+        math.radians(45.0),
+    )
     (psi, _), *_ = find_collinear_3_4(linkage.lengths)
+    theta_1 = linkage.ground_angle
+    sweep = Sweep(theta_1 + psi, theta_1 + 2 * math.pi - psi, steps)
     for branch, name in BRANCH_NAMES.items():
-        sweep = Sweep(
-            linkage.ground_angle + psi,
-            linkage.ground_angle + 2 * math.pi - psi,
-            steps,
-        )
         yield name, Scene(linkage, Motion(sweep, 0.2244, branch=branch), 4)
 
 

@@ -145,7 +145,8 @@ def draw_bars(
     for length in lengths:
         mass = ranges.mass(rng) * (length if ranges.by_length else 1.0)
         centre = (length * ranges.centre(rng), ranges.centre_angle(rng))
-        bars.append(Bar(length, mass, mass * length**2 * ranges.inertia(rng), centre))
+        inertia = mass * length**2 * ranges.inertia(rng)
+        bars.append(Bar(length, mass, inertia, centre))
     return bars
 
 
@@ -157,40 +158,64 @@ def draw_scene(
     """Draw a scene on (ground, input, coupler, output), m, at theta_2 = 0."""
     d, *moving = (float(length) for length in lengths)
     bars = draw_bars(rng, moving, ranges)
-    linkage = FourBar(d, bars[0], bars[1], bars[2], ranges.ground_angle(rng))
-    weight = 9.81 * (math.fsum(bar.mass for bar in bars) or 1.0)
-    loads = tuple(
-        _draw_load(rng, linkage, weight, ranges) for _ in range(int(rng.integers(0, 3)))
+    linkage = FourBar(
+        d,
+        bars[0],
+        bars[1],
+        bars[2],
+        ranges.ground_angle(rng),
     )
+    weight = 9.81 * (math.fsum(bar.mass for bar in bars) or 1.0)
+    loads = []
+    for _ in range(int(rng.integers(0, 3))):
+        loads.append(_draw_load(rng, linkage, weight, ranges))
+    effects: list[Any] = []
     if rng.random() < ranges.gravity:
-        effects: list[Any] = [Gravity()]
-    else:
-        effects = []
+        effects.append(Gravity())
     couple = 0.1 * weight * max(moving)
     for kind, share in ((Viscous, ranges.viscous), (Friction, ranges.friction)):
         if rng.random() < share:
-            effects.append(
-                kind.at(
-                    **{
-                        pin: couple * float(rng.random())
-                        for pin in PINS
-                        if rng.random() < 0.5
-                    }
-                )
-            )
-    effects += _draw_springs(rng, linkage, weight, ranges) if ranges.sprung else []
+            effects.append(kind.at(**_draw_at_pins(rng, couple)))
+    if ranges.sprung:
+        effects += _draw_springs(rng, linkage, weight, ranges)
     drawn = (kind.draw(rng, couple) for kind in list_kinds().values())
     effects += [effect for effect in drawn if effect is not None]
     omega = float(rng.choice([-1.0, 1.0])) * ranges.speed(rng)
     alpha = float(rng.choice([0.0, omega**2 * ranges.acceleration(rng)]))
-    motion = Motion(0.0, omega, alpha, OPEN if rng.random() < 0.5 else CROSSED)
+    branch = OPEN if rng.random() < 0.5 else CROSSED
+    motion = Motion(0.0, omega, alpha, branch)
     bar = int(rng.choice(MOVING_BARS))
     if not ranges.pushed or rng.random() >= ranges.pushed:
-        return Scene(linkage, motion, bar, loads, tuple(effects))
+        return Scene(
+            linkage,
+            motion,
+            bar,
+            tuple(loads),
+            tuple(effects),
+        )
     length = linkage.bar(bar).length
     place = Place(bar, (length * (1.0 + ranges.arm(rng)), _ANY_ANGLE(rng)))
-    drive = PointDrive(place, _ANY_ANGLE(rng), str(rng.choice(FRAMES)))
-    return Scene(linkage, motion, loads=loads, effects=tuple(effects), drive=drive)
+    drive = PointDrive(
+        place,
+        _ANY_ANGLE(rng),
+        str(rng.choice(FRAMES)),
+    )
+    return Scene(
+        linkage,
+        motion,
+        loads=tuple(loads),
+        effects=tuple(effects),
+        drive=drive,
+    )
+
+
+def _draw_at_pins(rng: np.random.Generator, most: float) -> dict[str, float]:
+    """Draw a number up to the most at each pin, or none there."""
+    numbers = {}
+    for pin in PINS:
+        if rng.random() < 0.5:
+            numbers[pin] = most * float(rng.random())
+    return numbers
 
 
 _PLACES_OF_A_FORCE = ("from_pin", "from_centre", "arm")
@@ -205,7 +230,8 @@ def _draw_load(
 ) -> Load:
     """Draw a force and a moment, or one of them, on any bar."""
     bar = int(rng.choice(MOVING_BARS))
-    length, size = linkage.bar(bar).length, weight * ranges.load(rng)
+    length = linkage.bar(bar).length
+    size = weight * ranges.load(rng)
     force = None if rng.random() < ranges.without_force else (size, _ANY_ANGLE(rng))
     place = (length * ranges.arm(rng), _ANY_ANGLE(rng))
     moment = float(rng.choice([0.0, size * length * _EITHER_SIGN(rng)]))
@@ -229,40 +255,26 @@ def _draw_springs(
     effects: list[Any] = []
     size = weight * abs(ranges.load(rng))
     if rng.random() < ranges.sprung:
-        one, second = (
-            int(bar) for bar in rng.choice([1, *MOVING_BARS], 2, replace=False)
+        places = []
+        for bar in rng.choice([1, *MOVING_BARS], 2, replace=False).tolist():
+            length = linkage.lengths[bar - 1]
+            places.append(Place(bar, (length * ranges.arm(rng), _ANY_ANGLE(rng))))
+        start, end = places
+        longest = max(linkage.lengths)
+        spring = Spring(
+            start,
+            end,
+            (size or 1.0) / longest,
+            longest * _ANY_PART(rng),
+            size * _EITHER_SIGN(rng),
         )
-        start, end = (
-            Place(bar, (linkage.lengths[bar - 1] * ranges.arm(rng), _ANY_ANGLE(rng)))
-            for bar in (one, second)
-        )
-        length = max(linkage.lengths)
-        effects.append(
-            Springs(
-                (
-                    Spring(
-                        start,
-                        end,
-                        (size or 1.0) / length,
-                        length * _ANY_PART(rng),
-                        size * _EITHER_SIGN(rng),
-                    ),
-                )
-            )
-        )
+        effects.append(Springs((spring,)))
     if rng.random() < ranges.sprung:
         couple = size * max(linkage.lengths[1:])
-        effects.append(
-            Torsion.at(
-                **{
-                    str(rng.choice(list(PINS))): (
-                        couple or 1.0,
-                        _ANY_ANGLE(rng),
-                        couple * _EITHER_SIGN(rng),
-                    )
-                }
-            )
-        )
+        pin = str(rng.choice(list(PINS)))
+        rest = _ANY_ANGLE(rng)
+        preload = couple * _EITHER_SIGN(rng)
+        effects.append(Torsion.at(**{pin: (couple or 1.0, rest, preload)}))
     if rng.random() < ranges.sprung:
         bar = int(rng.choice([2, 4]))
         inertia = (linkage.bar(bar).mass or 1.0) * linkage.bar(bar).length ** 2

@@ -184,7 +184,12 @@ def _count_positions(scene: Scene, file: Path) -> int:
                     f"must not exceed {_MOST_SECONDS:g} s in a run: engines go through"
                     " it in steps of 1 ms"
                 )
-                raise InputError("motion.free.duration", seconds, allowed, str(file))
+                raise InputError(
+                    "motion.free.duration",
+                    seconds,
+                    allowed,
+                    str(file),
+                )
             return stated.steps + 1 + math.ceil(AS_LONG_AS * seconds)
     return len(default_places(scene))
 
@@ -201,7 +206,12 @@ def read_suite(path: Path) -> Files:
     """
 
     def refuse(entry: object, allowed: str) -> InputError:
-        return InputError("--suite", entry, allowed, str(path))
+        return InputError(
+            "--suite",
+            entry,
+            allowed,
+            str(path),
+        )
 
     if not path.exists():
         raise refuse(

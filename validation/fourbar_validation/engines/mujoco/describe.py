@@ -129,7 +129,11 @@ def _read_field(entry: object) -> Value:
     )
 
 
-def _name_element(tag: str, name: str, number: int) -> str:
+def _name_element(
+    tag: str,
+    name: str,
+    number: int,
+) -> str:
     if name:
         return f'{tag} "{name}"'
     return f"{tag} {number} (unnamed)"

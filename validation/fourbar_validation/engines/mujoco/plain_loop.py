@@ -44,7 +44,12 @@ class MujocoInverseLoop(PlainLoop):
         x, y, _ = ((self.rates[0] - self.rates[1]) @ v).tolist()
         return x, y
 
-    def inverse(self, q: Array, v: Array, a: Array) -> Array:
+    def inverse(
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+    ) -> Array:
         """Return the generalized forces that the motion needs beside what acts."""
         self.data.qacc[:], self.tree.v, self.tree.a = a, v, a
         return np.asarray(self.tree.torques())

@@ -401,7 +401,12 @@ class Lead:
         most_accelerated = float(np.abs(alpha_2).max()) or np.finfo(float).tiny
         largest = Motion(theta_2, fastest, most_accelerated)
         self.scene = replace(scene, motion=largest)
-        self.of_input = Command(theta_2, branch[self.closes], fastest, most_accelerated)
+        self.of_input = Command(
+            theta_2,
+            branch[self.closes],
+            fastest,
+            most_accelerated,
+        )
 
     def _find_input(self, q: tuple[float, float, float]) -> tuple[float, float, float]:
         """Find theta_2, omega_2 and alpha_2 of the input at joint angles.

@@ -91,6 +91,13 @@ then ripples by 1e-3.
 """
 _SAME_GRAVITY = 1e-9
 """Part of gravity by which its direction may differ in the axes of a scene."""
+_BARS_OF_A_FORCE = {
+    "F12": (1, 2),
+    "F32": (3, 2),
+    "F43": (4, 3),
+    "F14": (1, 4),
+}
+"""Bars of each pin force: from the first on the second."""
 GENERATED = Path("generated.xml")
 """Name of the file that is generated from a scene."""
 _NO_BIAS = mujoco.mjtBias.mjBIAS_NONE
@@ -355,7 +362,12 @@ def _choose_some_positions(command: Command) -> Command:
     )
     omega_2 = float(np.max(command.omega_2))
     alpha_2 = float(np.max(command.alpha_2))
-    return Command(command.theta_2[keep], command.branch[keep], omega_2, alpha_2)
+    return Command(
+        command.theta_2[keep],
+        command.branch[keep],
+        omega_2,
+        alpha_2,
+    )
 
 
 def _answer_or_refuse(
@@ -680,19 +692,17 @@ class _UserLoop(Assembled):
             child, parent = topology.turning(pin)
             force = data.cfrc_int[topology.root[child], 3:].copy()
             for load in self._loads:
-                if self._is_carried(
-                    topology.root[child],
-                    self.model.site_bodyid[self.model.actuator_trnid[load, 0]],
-                ):
+                site = self.model.actuator_trnid[load, 0]
+                loaded_body = self.model.site_bodyid[site]
+                if self._is_carried(topology.root[child], loaded_body):
                     force -= load_force(self.model, data, load)
             on[parent, child] = topology.in_plane(force)
         bars = PINS[topology.cut]
         force = np.full(2, np.nan)
         if topology.closure is not None:
-            rows = np.flatnonzero(
-                (data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY)
-                & (data.efc_id == topology.closure)
-            )
+            of_equalities = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
+            of_closure = data.efc_id == topology.closure
+            rows = np.flatnonzero(of_equalities & of_closure)
             if len(rows):
                 force = topology.in_plane(data.efc_force[rows[:3]])
             if topology.first == bars[0]:
@@ -701,11 +711,10 @@ class _UserLoop(Assembled):
                 on[bars[0], bars[1]] = force
         else:
             on[bars] = force
-        wanted = {"F12": (1, 2), "F32": (3, 2), "F43": (4, 3), "F14": (1, 4)}
-        return {
-            name: on[i, j] if (i, j) in on else -on[j, i]
-            for name, (i, j) in wanted.items()
-        }
+        forces = {}
+        for name, (i, j) in _BARS_OF_A_FORCE.items():
+            forces[name] = on[i, j] if (i, j) in on else -on[j, i]
+        return forces
 
     def _is_carried(self, bearer: int, body: int) -> bool:
         """Tell whether a body hangs, however far down, on another."""
@@ -774,41 +783,54 @@ def _require_steps(seconds: float, timestep: float) -> None:
         )
 
 
+def _find_longest_segment(loop: _UserLoop, command: Command) -> list[int]:
+    """Find the most positions in a row that assemble, in order of time.
+
+    The loop is left at the first of them.
+
+    Raises LimitError if there are no two.
+    """
+    assert isinstance(command.omega_2, float)
+    position = Assembler(loop)
+    told = with_signs(loop.scene.linkage, command)
+    order = order_in_time(command.theta_2, None, command.omega_2)
+    segments = split_segments(find_assembled(position, told, order), order)
+    segment = max(segments, key=len, default=[])
+    if len(segment) < 2:
+        raise LimitError("nowhere do two neighbouring positions assemble in this file")
+    start = segment[0]
+    position.find(float(told.theta_2[start]), int(told.branch[start]))
+    return segment
+
+
 def answer_through_time(loop: _UserLoop, command: Command) -> Answer:
     """Run the longest segment of positions at the file's own timestep.
 
     The positions assemble.
     """
-    model, data = loop.model, mujoco.MjData(loop.model)
+    model = loop.model
+    data = mujoco.MjData(model)
     data.eq_active[:] = loop.data.eq_active
     if loop.crank is None:
         raise LimitError(
             "pin O2 is not a hinge in this file: nothing can keep its crank at a speed"
         )
     assert isinstance(command.omega_2, float) and isinstance(command.alpha_2, float)
-    position = Assembler(loop)
-    told = with_signs(loop.scene.linkage, command)
-    order = order_in_time(command.theta_2, None, command.omega_2)
-    segment = max(
-        split_segments(find_assembled(position, told, order), order),
-        key=len,
-        default=[],
-    )
-    if len(segment) < 2:
-        raise LimitError("nowhere do two neighbouring positions assemble in this file")
+    segment = _find_longest_segment(loop, command)
     run = choose_run(command.theta_2[segment], command.omega_2, command.alpha_2)
+    duration = run.time(run.stop)
     timestep = float(model.opt.timestep)
-    _require_steps(run.time(run.stop), timestep)
-    position.find(float(told.theta_2[segment[0]]), int(told.branch[segment[0]]))
-    data.qpos[:], data.qvel[:] = loop.data.qpos, loop.speeds(command.omega_2)
+    _require_steps(duration, timestep)
+    data.qpos[:] = loop.data.qpos
+    data.qvel[:] = loop.speeds(command.omega_2)
     heavy = loop.find_carrier()
-    couple = loop.find_crank_couple(
-        loop.ask(data.qpos.copy(), data.qvel.copy(), command.alpha_2)
-    )
+    values = loop.ask(data.qpos.copy(), data.qvel.copy(), command.alpha_2)
+    couple = loop.find_crank_couple(values)
     times = {index: run.time(float(command.theta_2[index])) for index in segment[1:]}
-    segment = loop.leave_out_settling(times, run.time(run.stop))
+    segment = loop.leave_out_settling(times, duration)
     out = make_blank(len(segment), [*list_unknowns(loop.scene), *MADE])
-    seen = {"closure_gap_m": 0.0, "speed_error": 0.0}
+    largest_gap = 0.0
+    speed_error = 0.0
     alarms: list[str] = []
     stepper = Stepper(model, data, timestep)
     for i, index in enumerate(segment):
@@ -827,10 +849,9 @@ def answer_through_time(loop: _UserLoop, command: Command) -> Answer:
         target = float(command.theta_2[index])
         turned = math.remainder(float(values["theta_2"]) - target, math.tau)
         values["theta_2"] = target + turned  # a joint with stops has turns of its own
-        seen["closure_gap_m"] = max(seen["closure_gap_m"], float(np.hypot(*loop.gap())))
-        seen["speed_error"] = max(
-            seen["speed_error"], abs(float(values["omega_2"]) / command.omega_2 - 1.0)
-        )
+        largest_gap = max(largest_gap, float(np.hypot(*loop.gap())))
+        speed = float(values["omega_2"]) / command.omega_2
+        speed_error = max(speed_error, abs(speed - 1.0))
         for name, array in out.items():
             array[i] = values[name]
     model.dof_armature[loop.crank] = loop.armature
@@ -845,6 +866,6 @@ def answer_through_time(loop: _UserLoop, command: Command) -> Answer:
         motion,
         np.ones(finite.sum(), dtype=bool),
         out,
-        evidence=seen,
+        evidence={"closure_gap_m": largest_gap, "speed_error": speed_error},
         alarms=alarms,
     )

@@ -262,7 +262,12 @@ class _Finder:
         self.before = mujoco.MjData(self.model)
         self.before.qpos[:] = posed.stated
         mujoco.mj_kinematics(self.model, self.before)
-        self.stated = PosedRobot(self.model, self.before, posed.stated, ())
+        self.stated = PosedRobot(
+            self.model,
+            self.before,
+            posed.stated,
+            (),
+        )
 
     def describe(self, number: int) -> RobotClosure:
         """Describe one equality."""

@@ -101,7 +101,12 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
     elif after > LARGEST_RESIDUAL:
         left = f"what is left is {1e3 * after:.3g} mm or mrad"
         notes.append(_say_open(model, options, stated, left))
-    return PosedRobot(model, _evaluate_kinematics(model, closed), stated, tuple(notes))
+    return PosedRobot(
+        model,
+        _evaluate_kinematics(model, closed),
+        stated,
+        tuple(notes),
+    )
 
 
 def _say_open(

@@ -126,7 +126,13 @@ def make_loop_scene(
         remarks.append(
             f"a speed of {DEFAULT_SPEED:g} rad/s is taken; --speed states another"
         )
-    return LoopScene(scene, loop, made.write_parts(), tuple(remarks), ())
+    return LoopScene(
+        scene,
+        loop,
+        made.write_parts(),
+        tuple(remarks),
+        (),
+    )
 
 
 def _list_carried(model: mujoco.MjModel, loop: RobotLoop) -> dict[int, list[int]]:
@@ -315,7 +321,13 @@ class _SceneOfLoop:
                     (round_off(lump.centre[0]), _round_angle(lump.centre[1])),
                 )
         theta_1 = _round_angle(self.loop.angles[0])
-        linkage = FourBar(lengths[0], bars[2], bars[3], bars[4], theta_1)
+        linkage = FourBar(
+            lengths[0],
+            bars[2],
+            bars[3],
+            bars[4],
+            theta_1,
+        )
         path = self._find_sweep(linkage)
         whole = math.tau * math.ceil((-math.pi - path.start) / math.tau)
         start, stop = (_round_angle(end + whole) for end in (path.start, path.stop))
