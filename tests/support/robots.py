@@ -18,91 +18,204 @@ TILT = (0.3, -0.2, 0.7, 0.5)
 
 
 FINGER = """
-<mujoco model="finger of a hand"><compiler angle="radian" autolimits="false"/>
-<default><default class="finger"><joint axis="1 0 0" damping="0.001" limited="true" range="-0.2 1.7"/>
-<default class="driven"><joint armature="2e-5" frictionloss="0.002"/></default></default></default>
-<worldbody><body name="palm" pos="0 0 0.3" euler="0 1.2 0.3">
-<inertial pos="0 0 0.03" mass="0.5" diaginertia="4e-4 4e-4 2e-4"/>
-<body name="knuckle" pos="0 0.02 0.09" childclass="finger">
- <inertial pos="0 0 0" mass="0.01" diaginertia="1e-6 1e-6 1e-6"/><joint name="abduction" axis="0 1 0"/>
- <body name="proximal"><joint name="mcp" class="driven"/>
-  <inertial pos="0 0 0.02" quat="0.9 0.1 0.1 0" mass="0.025" diaginertia="6e-6 6e-6 2e-6"/>
-  <body name="middle" pos="0 0 0.045"><joint name="pip"/>
-   <inertial pos="0 0 0.014" mass="0.015" diaginertia="2e-6 2e-6 6e-7"/>
-   <body name="distal" pos="0 0 0.027"><joint name="dip"/>
-    <inertial pos="0 0 0.01" mass="0.008" diaginertia="8e-7 8e-7 3e-7"/></body></body>
-  <body name="dip_link" pos="0 -0.0068 0.043"><joint name="dip_link"/>
-   <inertial pos="0 0.004 0.015" mass="0.002" diaginertia="1e-7 1e-7 1e-8"/></body></body>
- <body name="pip_link" pos="0 -0.007 0.002"><joint name="pip_link"/>
-  <inertial pos="0 0.004 0.02" mass="0.002" diaginertia="3e-7 3e-7 1e-8"/></body>
-</body></body></worldbody>
-<equality><connect name="dip_loop" body1="dip_link" body2="distal" anchor="0 0.0035 0.0335"/>
-<connect body1="pip_link" body2="middle" anchor="0 0.012 0.047"/></equality>
-<actuator><position name="mcp" joint="mcp" kp="3" forcelimited="true" forcerange="-1 1"/></actuator></mujoco>
+<mujoco model="finger of a hand">
+  <compiler angle="radian" autolimits="false"/>
+  <default>
+    <default class="finger">
+      <joint axis="1 0 0" damping="0.001" limited="true" range="-0.2 1.7"/>
+      <default class="driven">
+        <joint armature="2e-5" frictionloss="0.002"/>
+      </default>
+    </default>
+  </default>
+  <worldbody>
+    <body name="palm" pos="0 0 0.3" euler="0 1.2 0.3">
+      <inertial pos="0 0 0.03" mass="0.5" diaginertia="4e-4 4e-4 2e-4"/>
+      <body name="knuckle" pos="0 0.02 0.09" childclass="finger">
+        <inertial pos="0 0 0" mass="0.01" diaginertia="1e-6 1e-6 1e-6"/>
+        <joint name="abduction" axis="0 1 0"/>
+        <body name="proximal">
+          <joint name="mcp" class="driven"/>
+          <inertial pos="0 0 0.02" quat="0.9 0.1 0.1 0" mass="0.025"
+              diaginertia="6e-6 6e-6 2e-6"/>
+          <body name="middle" pos="0 0 0.045">
+            <joint name="pip"/>
+            <inertial pos="0 0 0.014" mass="0.015" diaginertia="2e-6 2e-6 6e-7"/>
+            <body name="distal" pos="0 0 0.027">
+              <joint name="dip"/>
+              <inertial pos="0 0 0.01" mass="0.008" diaginertia="8e-7 8e-7 3e-7"/>
+            </body>
+          </body>
+          <body name="dip_link" pos="0 -0.0068 0.043">
+            <joint name="dip_link"/>
+            <inertial pos="0 0.004 0.015" mass="0.002" diaginertia="1e-7 1e-7 1e-8"/>
+          </body>
+        </body>
+        <body name="pip_link" pos="0 -0.007 0.002">
+          <joint name="pip_link"/>
+          <inertial pos="0 0.004 0.02" mass="0.002" diaginertia="3e-7 3e-7 1e-8"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <equality>
+    <connect name="dip_loop" body1="dip_link" body2="distal" anchor="0 0.0035 0.0335"/>
+    <connect body1="pip_link" body2="middle" anchor="0 0.012 0.047"/>
+  </equality>
+  <actuator>
+    <position name="mcp" joint="mcp" kp="3" forcelimited="true" forcerange="-1 1"/>
+  </actuator>
+</mujoco>
 """
 """Two loops of which one drives the other."""
 ADAPTIVE = """
-<mujoco model="adaptive gripper"><compiler angle="radian" autolimits="true"/><option cone="elliptic"/>
-<default><joint axis="1 0 0"/><default class="driver"><joint range="0 0.8" armature="0.005" damping="0.1"/></default>
-<default class="spring_link"><joint range="-0.3 0.8" stiffness="0.05" springref="2.62"/></default></default>
-<worldbody><body name="base" quat="1 0 0 -1"><inertial pos="0 0 0.035" mass="0.8" diaginertia="3e-4 2e-4 2e-4"/>
-<body name="driver" pos="0 0.03 0.055"><joint name="driver" class="driver"/>
- <inertial pos="0 0.0178 0.001" quat="0.68 0.73 0 0" mass="0.009" diaginertia="1.7e-6 1.6e-6 3e-7"/>
- <body name="coupler" pos="0 0.0315 -0.0041"><joint name="coupler" range="-1.57 0.2"/>
-  <inertial pos="0 0.003 0.023" quat="0.7 -0.05 0.05 0.7" mass="0.014" diaginertia="4.2e-6 3.5e-6 9e-7"/></body></body>
-<body name="spring_link" pos="0 0.013 0.061"><joint name="spring_link" class="spring_link"/>
- <inertial pos="0 0.018 0.021" quat="0.66 -0.24 0.24 0.66" mass="0.022" diaginertia="9e-6 6.7e-6 2.6e-6"/>
- <body name="follower" pos="0 0.055 0.0375"><joint name="follower" pos="0 -0.018 0.0065" range="-0.87 0.87"/>
-  <inertial pos="0 -0.011 0.0125" mass="0.0125" diaginertia="2.7e-6 2.5e-6 6e-7"/></body></body>
-<body name="other" pos="0 -0.03 0.055"><joint name="other" class="driver"/>
- <inertial pos="0 -0.0178 0.001" mass="0.009" diaginertia="1.7e-6 1.6e-6 3e-7"/></body>
-</body></worldbody>
-<tendon><fixed name="split"><joint joint="driver" coef="0.5"/><joint joint="other" coef="0.5"/></fixed></tendon>
-<equality><connect anchor="0 0 0" body1="follower" body2="coupler" solimp="0.95 0.99 0.001" solref="0.005 1"/>
-<joint joint1="driver" joint2="other" polycoef="0 1 0 0 0"/></equality>
-<actuator><general tendon="split" forcerange="-5 5" gainprm="0.3 0 0" biasprm="0 -100 -10" biastype="affine"/>
-</actuator></mujoco>
+<mujoco model="adaptive gripper">
+  <compiler angle="radian" autolimits="true"/>
+  <option cone="elliptic"/>
+  <default>
+    <joint axis="1 0 0"/>
+    <default class="driver">
+      <joint range="0 0.8" armature="0.005" damping="0.1"/>
+    </default>
+    <default class="spring_link">
+      <joint range="-0.3 0.8" stiffness="0.05" springref="2.62"/>
+    </default>
+  </default>
+  <worldbody>
+    <body name="base" quat="1 0 0 -1">
+      <inertial pos="0 0 0.035" mass="0.8" diaginertia="3e-4 2e-4 2e-4"/>
+      <body name="driver" pos="0 0.03 0.055">
+        <joint name="driver" class="driver"/>
+        <inertial pos="0 0.0178 0.001" quat="0.68 0.73 0 0" mass="0.009"
+            diaginertia="1.7e-6 1.6e-6 3e-7"/>
+        <body name="coupler" pos="0 0.0315 -0.0041">
+          <joint name="coupler" range="-1.57 0.2"/>
+          <inertial pos="0 0.003 0.023" quat="0.7 -0.05 0.05 0.7" mass="0.014"
+              diaginertia="4.2e-6 3.5e-6 9e-7"/>
+        </body>
+      </body>
+      <body name="spring_link" pos="0 0.013 0.061">
+        <joint name="spring_link" class="spring_link"/>
+        <inertial pos="0 0.018 0.021" quat="0.66 -0.24 0.24 0.66" mass="0.022"
+            diaginertia="9e-6 6.7e-6 2.6e-6"/>
+        <body name="follower" pos="0 0.055 0.0375">
+          <joint name="follower" pos="0 -0.018 0.0065" range="-0.87 0.87"/>
+          <inertial pos="0 -0.011 0.0125" mass="0.0125"
+              diaginertia="2.7e-6 2.5e-6 6e-7"/>
+        </body>
+      </body>
+      <body name="other" pos="0 -0.03 0.055">
+        <joint name="other" class="driver"/>
+        <inertial pos="0 -0.0178 0.001" mass="0.009" diaginertia="1.7e-6 1.6e-6 3e-7"/>
+      </body>
+    </body>
+  </worldbody>
+  <tendon>
+    <fixed name="split">
+      <joint joint="driver" coef="0.5"/>
+      <joint joint="other" coef="0.5"/>
+    </fixed>
+  </tendon>
+  <equality>
+    <connect anchor="0 0 0" body1="follower" body2="coupler" solimp="0.95 0.99 0.001"
+        solref="0.005 1"/>
+    <joint joint1="driver" joint2="other" polycoef="0 1 0 0 0"/>
+  </equality>
+  <actuator>
+    <general tendon="split" forcerange="-5 5" gainprm="0.3 0 0" biasprm="0 -100 -10"
+        biastype="affine"/>
+  </actuator>
+</mujoco>
 """
 """Five hinges, one of them with a spring, and a joint that follows that of the other
 finger.
 """
 EXCAVATOR = """
-<mujoco model="excavator"><compiler angle="degree" autolimits="true"/><default><joint axis="0 -1 0" damping="500"/>
-<geom type="capsule" contype="0" conaffinity="0"/></default>
-<worldbody><body name="stick" pos="4 0 1"><joint name="stick" range="-120 10"/>
-<geom fromto="0 0 0 2 0 -0.5" size=".12" mass="450"/>
-<body name="bucket" pos="2 0 -0.5"><joint name="bucket" range="-90 40"/>
- <geom type="box" size=".4 .5 .3" pos="0.3 0 -0.4" mass="600"/></body>
-<body name="rocker" pos="1.7 0 -0.42"><joint name="rocker"/><geom fromto="0 0 0 0.1 0 0.4" size=".05" mass="40"/>
- <site name="rocker_top" pos="0.1 0 0.4"/>
- <body name="link" pos="0.1 0 0.4"><joint name="link"/><geom fromto="0 0 0 0.45 0 -0.1" size=".05" mass="35"/>
- </body></body>
-<body name="cylinder" pos="0.3 0 0.3"><joint name="cylinder"/><geom fromto="0 0 0 0.9 0 -0.1" size=".07" mass="60"/>
- <body name="piston" pos="0.9 0 -0.1"><joint name="stroke" type="slide" axis="0.98 0 -0.19" range="-0.5 0.6"/>
-  <geom fromto="0 0 0 0.6 0 -0.2" size=".04" mass="25"/><site name="piston_end" pos="0.6 0 -0.22"/></body></body>
-</body></worldbody>
-<equality><connect name="bucket_linkage" body1="link" body2="bucket" anchor="0.45 0 -0.1"/>
-<connect name="piston_pin" site1="piston_end" site2="rocker_top"/></equality>
-<actuator><motor joint="stroke"/></actuator></mujoco>
+<mujoco model="excavator">
+  <compiler angle="degree" autolimits="true"/>
+  <default>
+    <joint axis="0 -1 0" damping="500"/>
+    <geom type="capsule" contype="0" conaffinity="0"/>
+  </default>
+  <worldbody>
+    <body name="stick" pos="4 0 1">
+      <joint name="stick" range="-120 10"/>
+      <geom fromto="0 0 0 2 0 -0.5" size=".12" mass="450"/>
+      <body name="bucket" pos="2 0 -0.5">
+        <joint name="bucket" range="-90 40"/>
+        <geom type="box" size=".4 .5 .3" pos="0.3 0 -0.4" mass="600"/>
+      </body>
+      <body name="rocker" pos="1.7 0 -0.42">
+        <joint name="rocker"/>
+        <geom fromto="0 0 0 0.1 0 0.4" size=".05" mass="40"/>
+        <site name="rocker_top" pos="0.1 0 0.4"/>
+        <body name="link" pos="0.1 0 0.4">
+          <joint name="link"/>
+          <geom fromto="0 0 0 0.45 0 -0.1" size=".05" mass="35"/>
+        </body>
+      </body>
+      <body name="cylinder" pos="0.3 0 0.3">
+        <joint name="cylinder"/>
+        <geom fromto="0 0 0 0.9 0 -0.1" size=".07" mass="60"/>
+        <body name="piston" pos="0.9 0 -0.1">
+          <joint name="stroke" type="slide" axis="0.98 0 -0.19" range="-0.5 0.6"/>
+          <geom fromto="0 0 0 0.6 0 -0.2" size=".04" mass="25"/>
+          <site name="piston_end" pos="0.6 0 -0.22"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <equality>
+    <connect name="bucket_linkage" body1="link" body2="bucket" anchor="0.45 0 -0.1"/>
+    <connect name="piston_pin" site1="piston_end" site2="rocker_top"/>
+  </equality>
+  <actuator>
+    <motor joint="stroke"/>
+  </actuator>
+</mujoco>
 """
 """A linkage that the cylinder of another loop moves."""
 
 
 LIFTED = """
-<mujoco model="arm with a tool"><compiler angle="degree" autolimits="true" inertiafromgeom="true"/>
-<default><geom type="capsule" size=".01" contype="0" conaffinity="0"/>
-<default class="pin"><joint axis="0 0 1" stiffness="0.2" springref="20" frictionloss="0.01"/></default></default>
-<worldbody><body name="base" pos="0 0 1" axisangle="1 1 0 40">
-<joint name="lift" axis="0 1 0" type="slide"/><geom type="sphere" size="0.1"/>
-<body name="arm" childclass="pin"><joint name="arm" range="-30 60"/><geom fromto="0 0 0 .08 0 0"/>
- <body name="tool" pos="0.05 0 0.02" gravcomp="1"><joint name="tool" axis="1 0 0" range="-90 90"/>
-  <geom type="box" size=".02 .01 .03"/></body></body>
-<body name="lever" pos=".2 0.01 0" childclass="pin">
- <joint name="lever" axis="0 0 -1" range="-80 80" armature="0.001"/><geom fromto="0 0 0 .03 .12 0"/>
- <body name="rod" pos=".03 .12 0" gravcomp="0.5"><joint name="rod"/><geom fromto="0 0 0 -.08 -.06 0"/></body></body>
-</body></worldbody>
-<equality><weld body1="rod" body2="arm" torquescale="0" anchor=".08 0 0" solref="0.01 1"/></equality>
-<actuator><position joint="arm" kp="5" kv=".1"/><motor joint="tool"/></actuator></mujoco>
+<mujoco model="arm with a tool">
+  <compiler angle="degree" autolimits="true" inertiafromgeom="true"/>
+  <default>
+    <geom type="capsule" size=".01" contype="0" conaffinity="0"/>
+    <default class="pin">
+      <joint axis="0 0 1" stiffness="0.2" springref="20" frictionloss="0.01"/>
+    </default>
+  </default>
+  <worldbody>
+    <body name="base" pos="0 0 1" axisangle="1 1 0 40">
+      <joint name="lift" axis="0 1 0" type="slide"/>
+      <geom type="sphere" size="0.1"/>
+      <body name="arm" childclass="pin">
+        <joint name="arm" range="-30 60"/>
+        <geom fromto="0 0 0 .08 0 0"/>
+        <body name="tool" pos="0.05 0 0.02" gravcomp="1">
+          <joint name="tool" axis="1 0 0" range="-90 90"/>
+          <geom type="box" size=".02 .01 .03"/>
+        </body>
+      </body>
+      <body name="lever" pos=".2 0.01 0" childclass="pin">
+        <joint name="lever" axis="0 0 -1" range="-80 80" armature="0.001"/>
+        <geom fromto="0 0 0 .03 .12 0"/>
+        <body name="rod" pos=".03 .12 0" gravcomp="0.5">
+          <joint name="rod"/>
+          <geom fromto="0 0 0 -.08 -.06 0"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <equality>
+    <weld body1="rod" body2="arm" torquescale="0" anchor=".08 0 0" solref="0.01 1"/>
+  </equality>
+  <actuator>
+    <position joint="arm" kp="5" kv=".1"/>
+    <motor joint="tool"/>
+  </actuator>
+</mujoco>
 """
 """A weld that is a pin, springs, friction, and bodies that are held against gravity."""
 

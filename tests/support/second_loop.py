@@ -1,4 +1,6 @@
-"""Simulate a four-bar a second time, from MuJoCo's documentation alone, and judge it by Newton's law.
+"""Simulate a four-bar a second time, from MuJoCo's documentation alone.
+
+Newton's law judges what is simulated.
 
 Nothing of `fourbar_validation` is used: not its MJCF, its assembly, its stepping, its
 reading of forces, or its comparison. Of `fourbar` only the description of a scene is
@@ -17,9 +19,13 @@ import fourbar
 
 Array = NDArray[np.float64]
 TURNS_AT_LEAST = 0.1
-"""Part of a bar's greatest speed above which a couple on it is judged: it has poles where the bar stands still."""
+"""Part of a bar's greatest speed above which a couple on it is judged: it has poles
+where the bar stands still.
+"""
 SAMPLES = 720
-"""States of a revolution that are read, at most; every step's where there are fewer steps."""
+"""States of a revolution that are read, at most; every step's where there are fewer
+steps.
+"""
 
 
 @dataclass(frozen=True)
@@ -29,7 +35,7 @@ class LoopSettings:
     steps_per_revolution: float
     integrator: str = "RK4"
     solref_steps: float | None = None
-    """solref[0] in timesteps; None leaves solref, solimp and the solver as MuJoCo has them."""
+    """solref[0] in timesteps; None leaves solref, solimp and solver to MuJoCo."""
     impedance: float = 0.9999
     pad: float | None = None
     weight_factor: float = 1.0
@@ -42,7 +48,10 @@ class LoopSettings:
 
 @dataclass(frozen=True)
 class Servo:
-    """An actuator on the crank: position_gain (target - theta_2) + velocity_gain (omega - omega_2)."""
+    """An actuator on the crank.
+
+    Its torque is position_gain (target - theta_2) + velocity_gain (omega - omega_2).
+    """
 
     position_gain: float
     """N m/rad; 0: no target, the speed alone is kept."""
@@ -86,7 +95,10 @@ class Loop:
         self.branch = 1.0 if scene.motion.branch == 1 else -1.0
 
     def assemble(self, theta_2: float) -> tuple[float, float]:
-        """Intersect the circles about A and O4; the branch is the side of the diagonal on which B lies."""
+        """Intersect the circles about A and O4.
+
+        The branch is the side of the diagonal on which B lies.
+        """
         pin_A = self.a * np.exp(1j * theta_2)
         pin_O4 = self.d * np.exp(1j * self.theta_1)
         diagonal = pin_O4 - pin_A
@@ -107,7 +119,7 @@ class Loop:
         omega_2: float,
         alpha_2: float,
     ) -> tuple[Array, Array]:
-        """Differentiate the closure a e^(i t2) + b e^(i t3) - c e^(i t4) = const. twice."""
+        """Differentiate a e^(i t2) + b e^(i t3) - c e^(i t4) = const. twice."""
         arms = np.array([self.a, self.b, -self.c]) * np.exp(1j * angles)
         matrix = np.array(
             [(1j * arms[1:]).real, (1j * arms[1:]).imag],
@@ -125,7 +137,10 @@ class Loop:
         return speeds, accelerations
 
     def outside_forces(self, angles: Array) -> list[tuple[complex, float]]:
-        """Return force and couple about the first pin of gravity and loads on bars 2, 3 and 4."""
+        """Return force and couple of gravity and loads on bars 2, 3 and 4.
+
+        Each couple is about the first pin of the bar.
+        """
         sums = []
         for number in range(3):
             turned = np.exp(1j * angles[number])
@@ -156,13 +171,16 @@ class Loop:
         return push, self.load_place(load, number) * turned
 
     def load_place(self, load: fourbar.Load, number: int) -> complex:
-        """Return where a load acts on its bar, from the first pin; of a couple, at G."""
+        """Return where a load acts on its bar, from the first pin; a couple, at G."""
         if load.from_pin is not None:
             return _polar(load.from_pin)
         return self.centres[number] + _polar(load.from_centre or (0.0, 0.0))
 
     def drive_direction(self, angles: Array) -> tuple[list[complex], list[float]]:
-        """Return the forces and couples about the first pins by which the drive of size one acts on bars 2, 3, 4."""
+        """Return the forces and couples by which the drive of size one acts.
+
+        They act on bars 2, 3 and 4; each couple is about the first pin of the bar.
+        """
         forces, couples = [0j, 0j, 0j], [0.0, 0.0, 0.0]
         if isinstance(self.drive, int):
             couples[self.drive - 2] = 1.0
@@ -204,7 +222,10 @@ class Loop:
         omega_2: float,
         alpha_2: float,
     ) -> dict[str, Array]:
-        """Solve Newton's and Euler's laws of the three bars for F12, F32, F43, F14 and the drive."""
+        """Solve Newton's and Euler's laws of the three bars.
+
+        The unknowns are F12, F32, F43, F14 and the drive.
+        """
         angles = np.array([theta_2, *self.assemble(theta_2)])
         speeds, accelerations = self.rates(angles, omega_2, alpha_2)
         outside = self.outside_forces(angles)
@@ -255,7 +276,11 @@ class Loop:
         carrier: Servo | TurningWheel | None = None,
         omega: float = 0.0,
     ) -> str:
-        """Write the MJCF: crank and coupler in series, the rocker by itself, `connect` between two sites."""
+        """Write the MJCF.
+
+        Crank and coupler are in series, the rocker stands by itself, and a `connect`
+        holds two sites together.
+        """
         lengths = (self.a, self.b, self.c)
 
         def bar(number: int) -> str:
@@ -378,7 +403,7 @@ class Simulation:
         wheel: float,
         carrier: Servo | TurningWheel | None = None,
     ) -> mujoco.MjModel:
-        """Compile the loop with a flywheel on the crank, or with what else keeps its speed."""
+        """Compile the loop with a flywheel, or what else keeps the crank's speed."""
         text = self.loop.write(self.settings, self.timestep, wheel, carrier, self.omega)
         model = mujoco.MjModel.from_xml_string(text)
         model.body_invweight0[:] *= self.settings.weight_factor
@@ -387,7 +412,7 @@ class Simulation:
         return model
 
     def start(self, theta_2: float) -> None:
-        """Close the loop at an angle of the crank, with what keeps its speed in step."""
+        """Close the loop at an angle of the crank; what keeps its speed is in step."""
         angles = np.array([theta_2, *self.loop.assemble(theta_2)])
         speeds, _ = self.loop.rates(angles, self.omega, 0.0)
         self.data.qpos[:3] = angles[0], angles[1] - angles[0], angles[2]
@@ -407,7 +432,10 @@ class Simulation:
         return time.process_time() - began
 
     def run(self, settle: bool = False) -> list[Sample]:
-        """Step through the sweep, one turn ahead of it to settle, and read states on the way."""
+        """Step through the sweep and read states on the way.
+
+        To settle, it begins one turn ahead of the sweep.
+        """
         first = self.sweep[0] if self.omega > 0.0 else self.sweep[-1]
         span = float(np.ptp(self.sweep))
         sign = math.copysign(1.0, self.omega)
@@ -425,7 +453,11 @@ class Simulation:
         return samples
 
     def read(self) -> Sample:
-        """Read one state: the drive is the one that gives the crank the acceleration which the flywheel gives it."""
+        """Read one state.
+
+        The drive is the one that gives the crank the acceleration which the flywheel
+        gives it.
+        """
         mujoco.mj_forward(self.model, self.data)
         alpha_2 = float(self.data.qacc[0])
         angles = np.array(
@@ -459,13 +491,19 @@ class Simulation:
         )
 
     def exerted(self) -> float:
-        """Return what a servo gives the crank, or the multiplier of the equality with the wheel."""
+        """Return the torque on the crank.
+
+        It is what a servo gives it, or the multiplier of the equality with the wheel.
+        """
         if isinstance(self.settings.carrier, Servo):
             return float(self.data.actuator_force[-1])
         return float(self.data.efc_force[3])  # after the three rows of `connect`
 
     def probe_drive(self, angles: Array, alpha_2: float) -> tuple[Array, Array, float]:
-        """Find the drive that gives the crank its acceleration, with joints and closure."""
+        """Find the drive that gives the crank its acceleration.
+
+        Return the accelerations of the joints and the closing force with it.
+        """
         unit = self.generalized_drive(angles)
         answers = []
         wheel_torque = np.array([self.wheel_read * alpha_2, 0.0, 0.0])
@@ -484,7 +522,10 @@ class Simulation:
         return acceleration, closing, float(part * scale)
 
     def generalized_drive(self, angles: Array) -> Array:
-        """Return the forces on the three joints by which the drive of size one acts, by virtual work."""
+        """Return the forces on the three joints by which the drive of size one acts.
+
+        They follow from virtual work.
+        """
         pushes, couples = self.loop.drive_direction(angles)
         crank = self.loop.a * np.exp(1j * angles[0])
         # bar 3 turns with both joints and is carried by A; a force on it acts on the
@@ -537,7 +578,10 @@ def measure(
     settings: LoopSettings,
     settle: bool = False,
 ) -> dict[str, float]:
-    """Return the worst error of the drive and of each pin's force over its largest value in the sweep."""
+    """Return the worst error of the drive and of each pin's force.
+
+    It is relative to the largest value in the sweep.
+    """
     simulation = Simulation(scene, settings)
     samples = simulation.run(settle)
     loop = simulation.loop
@@ -556,7 +600,10 @@ def measure(
 
 
 def _mark_turning(loop: Loop, samples: list[Sample]) -> list[bool]:
-    """Mark the samples at which the driven bar, or the cylinder, moves: elsewhere the drive is near a pole."""
+    """Mark the samples at which the driven bar, or the cylinder, moves.
+
+    Elsewhere the drive is near a pole.
+    """
     if loop.drive == 2:
         return [True] * len(samples)
     speeds = []

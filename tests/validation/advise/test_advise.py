@@ -159,8 +159,10 @@ def test_what_lies_between_two_steps_is_judged_too() -> None:
     assert matters.judge_trial(scene, trial).worst > 0.1
     advice = advise.advise(scene, 1e-2, setup)
     assert advice.reached and advice.best.steps > 4
-    largest = [np.linalg.norm(fourbar.solve(scene, "force", at=commanded).F12, axis=1).max()
-               for commanded in (setup.command, setup.try_out(advice.best.settings).at)]  # fmt: skip
+    largest = [
+        np.linalg.norm(fourbar.solve(scene, "force", at=commanded).F12, axis=1).max()
+        for commanded in (setup.command, setup.try_out(advice.best.settings).at)
+    ]
     assert largest[1] == pytest.approx(largest[0], rel=1e-2)
 
 
@@ -275,8 +277,10 @@ def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason() -> No
         motion,
         effects=(fourbar.Gravity(),),
     )
-    for scene, setting, why in ((hood, "the stiffness by pads", "lighter of coupler and output"),
-                                (turning(10.0, 36), "the timestep", "the steps themselves")):  # fmt: skip
+    for scene, setting, why in (
+        (hood, "the stiffness by pads", "lighter of coupler and output"),
+        (turning(10.0, 36), "the timestep", "the steps themselves"),
+    ):
         setup = TrialSetup(scene, advise.choose_positions(scene))
         first, *others = influences = matters.measure_influences(
             scene, setup, advise.make_settings(40.0, 12.0)
@@ -353,5 +357,9 @@ def test_several_scenes_have_one_table(tmp_path: Path) -> None:
         "-",
     ]
     with pytest.raises(fourbar.InputError, match="MJCF of one scene, not of 2"):
-        CliRunner().invoke(advise.advise_command, [*files, "--error", "1e-4", "-o", "x.xml"], standalone_mode=False,
-                           catch_exceptions=False)  # fmt: skip
+        CliRunner().invoke(
+            advise.advise_command,
+            [*files, "--error", "1e-4", "-o", "x.xml"],
+            standalone_mode=False,
+            catch_exceptions=False,
+        )

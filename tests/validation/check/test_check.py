@@ -94,7 +94,7 @@ def write(
                     ),
                 ]
             )
-    return path  # fmt: skip
+    return path
 
 
 def judged(scene: Scene, path: Path) -> Judgement:
@@ -307,110 +307,525 @@ def exchanged(scene: Scene) -> Numbers:
 OMEGA = {"thesis": 0.2244, "crank_rocker": 10.0}
 MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]] = [
     # id, scene, columns, what was done, words of the explanation
-    ("torque in N cm", "thesis", ALL, units("torque", factor=1e2), "numbers in N cm where N m was announced"),
-    ("torque in N mm", "crank_rocker", ALL, units("torque", factor=1e3), "numbers in N mm where N m"),
-    ("forces in kN", "crank_rocker", ALL, units("F12", "F32", "F43", "F14", factor=1e-3), "numbers in kN where N was"),
-    ("forces in kgf", "thesis", ALL, units("F12", "F32", "F43", "F14", factor=1 / 9.80665), "kgf"),
-    ("torque of the bar on the ground", "thesis", ALL, units("torque", factor=-1.0), "sign reversed"),
-    ("F23 for F32", "crank_rocker", ALL, units("F32", factor=-1.0), "F_ij given for F_ji"),
-    ("angles in degrees", "crank_rocker", ALL, units("theta_3", "theta_4", factor=180 / math.pi), "degrees"),
+    (
+        "torque in N cm",
+        "thesis",
+        ALL,
+        units("torque", factor=1e2),
+        "numbers in N cm where N m was announced",
+    ),
+    (
+        "torque in N mm",
+        "crank_rocker",
+        ALL,
+        units("torque", factor=1e3),
+        "numbers in N mm where N m",
+    ),
+    (
+        "forces in kN",
+        "crank_rocker",
+        ALL,
+        units("F12", "F32", "F43", "F14", factor=1e-3),
+        "numbers in kN where N was",
+    ),
+    (
+        "forces in kgf",
+        "thesis",
+        ALL,
+        units("F12", "F32", "F43", "F14", factor=1 / 9.80665),
+        "kgf",
+    ),
+    (
+        "torque of the bar on the ground",
+        "thesis",
+        ALL,
+        units("torque", factor=-1.0),
+        "sign reversed",
+    ),
+    (
+        "F23 for F32",
+        "crank_rocker",
+        ALL,
+        units("F32", factor=-1.0),
+        "F_ij given for F_ji",
+    ),
+    (
+        "angles in degrees",
+        "crank_rocker",
+        ALL,
+        units("theta_3", "theta_4", factor=180 / math.pi),
+        "degrees",
+    ),
     ("x and y exchanged", "thesis", ALL, exchanged, "x and y exchanged"),
-    ("other branch", "thesis", ALL, solved(same, branch=np.full(12, -1, np.int8)), "other branch"),
-    ("gravity missing", "crank_rocker", FORCES, solved(lambda s: replace(s, effects=())), "gravity is missing"),
-    ("gravity upwards", "crank_rocker", FORCES,
-     solved(lambda s: replace(s, effects=(fourbar.Gravity(-9.81),))), "gravity is reversed"),
-    ("gravity added", "thesis", FORCES,
-     solved(lambda s: replace(s, effects=(fourbar.Gravity(),))), "gravity along -y is included"),
-    ("loads missing", "thesis", FORCES, solved(lambda s: replace(s, loads=())), "the loads are missing"),
-    ("third load missing", "thesis", FORCES,
-     solved(lambda s: replace(s, loads=(*s.loads[:2], s.loads[3]))), "load 3 (bar 3) is missing"),
-    ("statics", "crank_rocker", FORCES, solved(same, omega_2=0.0, alpha_2=0.0), "statics"),
-    ("omega_2 in rev/min", "crank_rocker", ALL, solved(same, omega_2=10.0 * 30 / math.pi), "rev/min"),
-    ("wrong pin", "crank_rocker", FORCES,
-     solved_with(other_pin, "coupler"), "coupler: mass centre measured from the wrong pin"),
-    ("mid-bar", "crank_rocker", FORCES,
-     solved_with(at_mid_bar, "coupler"), "coupler: mass centre taken at mid-bar"),
-    ("inertia about the pin", "crank_rocker", FORCES,
-     solved_with(about_pin, "output"), "output: inertia about the pin"),
-    ("no inertia", "thesis", FORCES,
-     solved_with(without_inertia, "coupler"), "coupler: moment of inertia left out"),
-    ("kg cm^2 for kg m^2", "thesis", FORCES,
-     solved(lambda s: bars(s, output=replace(s.linkage.output, inertia=s.linkage.output.moment_of_inertia * 1e4))),
-     "output: moment of inertia in kg cm^2 taken for kg m^2"),
-    ("drive on bar 2", "thesis", FORCES, solved(lambda s: replace(s, drive_bar=2)), "on bar 2 instead of bar 4"),
-    ("m a in kg cm/s^2", "thesis", FORCES, lambda s: inertial_times(s, 100.0, 1.0), "m a in kg cm/s^2 added to N"),
-    ("I alpha in kg cm^2/s^2", "thesis", FORCES, lambda s: inertial_times(s, 1.0, 100.0), "I alpha in kg cm^2/s^2"),
-    ("both", "crank_rocker", FORCES, lambda s: inertial_times(s, 100.0, 100.0), "m a and I alpha in kg cm/s^2"),
-    ("m a in kg mm/s^2", "crank_rocker", FORCES, lambda s: inertial_times(s, 1e3, 1.0), "m a in kg mm/s^2"),
-    ("d'Alembert's sign", "crank_rocker", FORCES, lambda s: inertial_times(s, -1.0, -1.0), "d'Alembert"),
-    ("lbf ft", "crank_rocker", ALL, units("torque", factor=1 / 1.3558179483314004), "numbers in lbf ft where N m"),
-    ("an unknown ratio", "thesis", ALL, units("F12", "F14", factor=0.37), "every number is 0.37 times ours"),
-    ("inertia halved", "thesis", FORCES,
-     solved(lambda s: bars(s, coupler=replace(s.linkage.coupler, inertia=s.linkage.coupler.moment_of_inertia / 2))),
-     "coupler: moment of inertia halved"),
-    ("inertia times 0.83", "crank_rocker", FORCES,
-     solved(lambda s: bars(s, output=replace(s.linkage.output, inertia=s.linkage.output.moment_of_inertia * 0.83))),
-     "output: moment of inertia 0.83 times ours"),
-    ("mass times 1.2", "crank_rocker", FORCES,
-     solved(lambda s: bars(s, coupler=replace(s.linkage.coupler, mass=s.linkage.coupler.mass * 1.2))),
-     "coupler: mass 1.2 times ours"),
-    ("mass centre turned", "crank_rocker", FORCES,
-     solved_with(turned_over, "output"),
-     "output: mass centre turned by 180 deg"),
-    ("load reversed", "thesis", FORCES,
-     solved(lambda s: replace(s, loads=(reversed_load(s.loads[0]), *s.loads[1:]))), "load 1 (bar 2) is reversed"),
-    ("theta_4 from B", "thesis", ALL, lambda s: right(s) | {"theta_4": right(s)["theta_4"] + math.pi}, "theta_4 or"),
-    ("theta_4 from the coupler", "thesis", ALL,
-     lambda s: right(s) | {"theta_4": right(s)["theta_4"] - right(s)["theta_3"]}, "relative to bar 3"),
-    ("crank from another zero", "crank_rocker", ALL,
-     lambda s: right(s, theta_2=right(s)["theta_2"] + math.radians(37.0)) | {"theta_2": right(s)["theta_2"]},
-     "from another zero: theta_2 +37 deg"),
-    ("backwards", "thesis", ALL, lambda s: {name: x[::-1] for name, x in right(s).items()}
-     | {"theta_2": right(s)["theta_2"]}, "in reverse order"),
-    ("one row down", "crank_rocker", ALL, lambda s: {name: np.roll(x, 1, axis=0) for name, x in right(s).items()}
-     | {"theta_2": right(s)["theta_2"]}, "one step late: numbers of the position before"),
-    ("theta_2 as degrees", "crank_rocker", ALL,
-     lambda s: right(s, theta_2=np.radians(right(s)["theta_2"])) | {"theta_2": right(s)["theta_2"]}, "read as degrees"),
-    ("theta_2 as radians", "crank_rocker", ALL,
-     lambda s: right(s) | {"theta_2": np.radians(right(s)["theta_2"])}, "in radians where degrees"),
-    ("omega_2 in rad/s", "crank_rocker", ALL, solved(same, omega_2=10.0 * math.pi / 30), "rad/s taken for rev/min"),
-    ("columns exchanged", "thesis", ALL,
-     lambda s: right(s) | {"F32": right(s)["F43"], "F43": right(s)["F32"]}, "F32 and F43 are exchanged"),
-    ("mass for weight", "crank_rocker", FORCES,
-     solved(lambda s: replace(s, effects=(fourbar.Gravity(1.0),))), "gravity 0.101937 times ours"),
-    ("a tenth of a load", "thesis", FORCES,
-     solved(lambda s: replace(s, loads=(tenth(s.loads[0]), *s.loads[1:]))), "load 1 (bar 2) 0.1 times ours"),
-    ("I alpha's sign", "thesis", FORCES, lambda s: inertial_times(s, 1.0, -1.0), "I alpha with the wrong sign"),
-    ("both in mm", "thesis", FORCES, lambda s: inertial_times(s, 1e3, 1e3), "m a and I alpha in kg mm/s^2"),
-    ("loads reversed", "thesis", FORCES,
-     solved(lambda s: replace(s, loads=tuple(map(reversed_load, s.loads)))), "the loads are reversed"),
-    *((f"load {k} reversed", "thesis", FORCES, solved(lambda s, k=k: replace(s, loads=tuple(
-        reversed_load(load) if i == k else load for i, load in enumerate(s.loads, 1)))),
-       f"load {k} (bar {SCENES['thesis'].loads[k - 1].bar}) is reversed") for k in (2, 3, 4)),
-    *((f"load {k} missing", "thesis", FORCES, solved(lambda s, k=k: replace(s, loads=tuple(
-        load for i, load in enumerate(s.loads, 1) if i != k))),
-       f"load {k} (bar {SCENES['thesis'].loads[k - 1].bar}) is missing") for k in (1, 2, 4)),
-    ("alpha_2 left out", "accelerating", FORCES, solved(same, alpha_2=0.0), "alpha_2 is left out"),
-    ("theta_4 from bar 2", "crank_rocker", ALL,
-     lambda s: right(s) | {"theta_4": right(s)["theta_4"] - right(s)["theta_2"]}, "relative to bar 2"),
-    ("mirrored", "crank_rocker", FORCES, solved_with(mirrored, "coupler"),
-     "coupler: mass centre on the other side of the bar's line"),
-    ("every other pin", "crank_rocker", FORCES, solved_with(other_pin), "every bar: mass centre measured from the"),
-    ("every mid-bar", "crank_rocker", FORCES, solved_with(at_mid_bar), "every bar: mass centre taken at mid-bar"),
-    ("every centre turned", "crank_rocker", FORCES, solved_with(turned_over), "every bar: mass centre turned by"),
-    ("every centre mirrored", "crank_rocker", FORCES, solved_with(mirrored), "every bar: mass centre on the other"),
-    ("every inertia about the pin", "crank_rocker", FORCES, solved_with(about_pin), "every bar: inertia about the pin"),
-    ("no inertia at all", "thesis", FORCES, solved_with(without_inertia), "every bar: moment of inertia left out"),
-    ("inertia of a bar about its end", "crank_rocker", FORCES, solved_with(
-        lambda bar: replace(bar, inertia=bar.mass * bar.length**2 / 3.0)), "m L^2/3, of a slender bar about its end"),
-    ("gravity along x", "crank_rocker", FORCES, with_gravity(0.0), "gravity is turned by 90 deg"),
-    ("gravity along -x", "crank_rocker", FORCES, with_gravity(180.0), "gravity is turned by -90 deg"),
-    ("load kept", "crank_rocker", FORCES, solved(in_other_frame), "load 2 (bar 3): its direction is kept"),
-    ("load turning", "load_in_the_world", FORCES, solved(in_other_frame), "load 2 (bar 3): its direction turns with"),
-    ("degrees to 180", "drag_link", ALL, in_degrees(-180.0), "degrees from -180 to 180 where radians"),
-    ("degrees to 360", "drag_link", ALL, in_degrees(0.0), "degrees from 0 to 360 where radians"),
-    ("drive on bar 3", "thesis", FORCES, solved(lambda s: replace(s, drive_bar=3)), "on bar 3 instead of bar 4"),
-]  # fmt: skip
+    (
+        "other branch",
+        "thesis",
+        ALL,
+        solved(same, branch=np.full(12, -1, np.int8)),
+        "other branch",
+    ),
+    (
+        "gravity missing",
+        "crank_rocker",
+        FORCES,
+        solved(lambda s: replace(s, effects=())),
+        "gravity is missing",
+    ),
+    (
+        "gravity upwards",
+        "crank_rocker",
+        FORCES,
+        solved(lambda s: replace(s, effects=(fourbar.Gravity(-9.81),))),
+        "gravity is reversed",
+    ),
+    (
+        "gravity added",
+        "thesis",
+        FORCES,
+        solved(lambda s: replace(s, effects=(fourbar.Gravity(),))),
+        "gravity along -y is included",
+    ),
+    (
+        "loads missing",
+        "thesis",
+        FORCES,
+        solved(lambda s: replace(s, loads=())),
+        "the loads are missing",
+    ),
+    (
+        "third load missing",
+        "thesis",
+        FORCES,
+        solved(lambda s: replace(s, loads=(*s.loads[:2], s.loads[3]))),
+        "load 3 (bar 3) is missing",
+    ),
+    (
+        "statics",
+        "crank_rocker",
+        FORCES,
+        solved(same, omega_2=0.0, alpha_2=0.0),
+        "statics",
+    ),
+    (
+        "omega_2 in rev/min",
+        "crank_rocker",
+        ALL,
+        solved(same, omega_2=10.0 * 30 / math.pi),
+        "rev/min",
+    ),
+    (
+        "wrong pin",
+        "crank_rocker",
+        FORCES,
+        solved_with(other_pin, "coupler"),
+        "coupler: mass centre measured from the wrong pin",
+    ),
+    (
+        "mid-bar",
+        "crank_rocker",
+        FORCES,
+        solved_with(at_mid_bar, "coupler"),
+        "coupler: mass centre taken at mid-bar",
+    ),
+    (
+        "inertia about the pin",
+        "crank_rocker",
+        FORCES,
+        solved_with(about_pin, "output"),
+        "output: inertia about the pin",
+    ),
+    (
+        "no inertia",
+        "thesis",
+        FORCES,
+        solved_with(without_inertia, "coupler"),
+        "coupler: moment of inertia left out",
+    ),
+    (
+        "kg cm^2 for kg m^2",
+        "thesis",
+        FORCES,
+        solved(
+            lambda s: bars(
+                s,
+                output=replace(
+                    s.linkage.output, inertia=s.linkage.output.moment_of_inertia * 1e4
+                ),
+            )
+        ),
+        "output: moment of inertia in kg cm^2 taken for kg m^2",
+    ),
+    (
+        "drive on bar 2",
+        "thesis",
+        FORCES,
+        solved(lambda s: replace(s, drive_bar=2)),
+        "on bar 2 instead of bar 4",
+    ),
+    (
+        "m a in kg cm/s^2",
+        "thesis",
+        FORCES,
+        lambda s: inertial_times(s, 100.0, 1.0),
+        "m a in kg cm/s^2 added to N",
+    ),
+    (
+        "I alpha in kg cm^2/s^2",
+        "thesis",
+        FORCES,
+        lambda s: inertial_times(s, 1.0, 100.0),
+        "I alpha in kg cm^2/s^2",
+    ),
+    (
+        "both",
+        "crank_rocker",
+        FORCES,
+        lambda s: inertial_times(s, 100.0, 100.0),
+        "m a and I alpha in kg cm/s^2",
+    ),
+    (
+        "m a in kg mm/s^2",
+        "crank_rocker",
+        FORCES,
+        lambda s: inertial_times(s, 1e3, 1.0),
+        "m a in kg mm/s^2",
+    ),
+    (
+        "d'Alembert's sign",
+        "crank_rocker",
+        FORCES,
+        lambda s: inertial_times(s, -1.0, -1.0),
+        "d'Alembert",
+    ),
+    (
+        "lbf ft",
+        "crank_rocker",
+        ALL,
+        units("torque", factor=1 / 1.3558179483314004),
+        "numbers in lbf ft where N m",
+    ),
+    (
+        "an unknown ratio",
+        "thesis",
+        ALL,
+        units("F12", "F14", factor=0.37),
+        "every number is 0.37 times ours",
+    ),
+    (
+        "inertia halved",
+        "thesis",
+        FORCES,
+        solved(
+            lambda s: bars(
+                s,
+                coupler=replace(
+                    s.linkage.coupler, inertia=s.linkage.coupler.moment_of_inertia / 2
+                ),
+            )
+        ),
+        "coupler: moment of inertia halved",
+    ),
+    (
+        "inertia times 0.83",
+        "crank_rocker",
+        FORCES,
+        solved(
+            lambda s: bars(
+                s,
+                output=replace(
+                    s.linkage.output, inertia=s.linkage.output.moment_of_inertia * 0.83
+                ),
+            )
+        ),
+        "output: moment of inertia 0.83 times ours",
+    ),
+    (
+        "mass times 1.2",
+        "crank_rocker",
+        FORCES,
+        solved(
+            lambda s: bars(
+                s, coupler=replace(s.linkage.coupler, mass=s.linkage.coupler.mass * 1.2)
+            )
+        ),
+        "coupler: mass 1.2 times ours",
+    ),
+    (
+        "mass centre turned",
+        "crank_rocker",
+        FORCES,
+        solved_with(turned_over, "output"),
+        "output: mass centre turned by 180 deg",
+    ),
+    (
+        "load reversed",
+        "thesis",
+        FORCES,
+        solved(lambda s: replace(s, loads=(reversed_load(s.loads[0]), *s.loads[1:]))),
+        "load 1 (bar 2) is reversed",
+    ),
+    (
+        "theta_4 from B",
+        "thesis",
+        ALL,
+        lambda s: right(s) | {"theta_4": right(s)["theta_4"] + math.pi},
+        "theta_4 or",
+    ),
+    (
+        "theta_4 from the coupler",
+        "thesis",
+        ALL,
+        lambda s: right(s) | {"theta_4": right(s)["theta_4"] - right(s)["theta_3"]},
+        "relative to bar 3",
+    ),
+    (
+        "crank from another zero",
+        "crank_rocker",
+        ALL,
+        lambda s: (
+            right(s, theta_2=right(s)["theta_2"] + math.radians(37.0))
+            | {"theta_2": right(s)["theta_2"]}
+        ),
+        "from another zero: theta_2 +37 deg",
+    ),
+    (
+        "backwards",
+        "thesis",
+        ALL,
+        lambda s: (
+            {name: x[::-1] for name, x in right(s).items()}
+            | {"theta_2": right(s)["theta_2"]}
+        ),
+        "in reverse order",
+    ),
+    (
+        "one row down",
+        "crank_rocker",
+        ALL,
+        lambda s: (
+            {name: np.roll(x, 1, axis=0) for name, x in right(s).items()}
+            | {"theta_2": right(s)["theta_2"]}
+        ),
+        "one step late: numbers of the position before",
+    ),
+    (
+        "theta_2 as degrees",
+        "crank_rocker",
+        ALL,
+        lambda s: (
+            right(s, theta_2=np.radians(right(s)["theta_2"]))
+            | {"theta_2": right(s)["theta_2"]}
+        ),
+        "read as degrees",
+    ),
+    (
+        "theta_2 as radians",
+        "crank_rocker",
+        ALL,
+        lambda s: right(s) | {"theta_2": np.radians(right(s)["theta_2"])},
+        "in radians where degrees",
+    ),
+    (
+        "omega_2 in rad/s",
+        "crank_rocker",
+        ALL,
+        solved(same, omega_2=10.0 * math.pi / 30),
+        "rad/s taken for rev/min",
+    ),
+    (
+        "columns exchanged",
+        "thesis",
+        ALL,
+        lambda s: right(s) | {"F32": right(s)["F43"], "F43": right(s)["F32"]},
+        "F32 and F43 are exchanged",
+    ),
+    (
+        "mass for weight",
+        "crank_rocker",
+        FORCES,
+        solved(lambda s: replace(s, effects=(fourbar.Gravity(1.0),))),
+        "gravity 0.101937 times ours",
+    ),
+    (
+        "a tenth of a load",
+        "thesis",
+        FORCES,
+        solved(lambda s: replace(s, loads=(tenth(s.loads[0]), *s.loads[1:]))),
+        "load 1 (bar 2) 0.1 times ours",
+    ),
+    (
+        "I alpha's sign",
+        "thesis",
+        FORCES,
+        lambda s: inertial_times(s, 1.0, -1.0),
+        "I alpha with the wrong sign",
+    ),
+    (
+        "both in mm",
+        "thesis",
+        FORCES,
+        lambda s: inertial_times(s, 1e3, 1e3),
+        "m a and I alpha in kg mm/s^2",
+    ),
+    (
+        "loads reversed",
+        "thesis",
+        FORCES,
+        solved(lambda s: replace(s, loads=tuple(map(reversed_load, s.loads)))),
+        "the loads are reversed",
+    ),
+    *(
+        (
+            f"load {k} reversed",
+            "thesis",
+            FORCES,
+            solved(
+                lambda s, k=k: replace(
+                    s,
+                    loads=tuple(
+                        reversed_load(load) if i == k else load
+                        for i, load in enumerate(s.loads, 1)
+                    ),
+                )
+            ),
+            f"load {k} (bar {SCENES['thesis'].loads[k - 1].bar}) is reversed",
+        )
+        for k in (2, 3, 4)
+    ),
+    *(
+        (
+            f"load {k} missing",
+            "thesis",
+            FORCES,
+            solved(
+                lambda s, k=k: replace(
+                    s, loads=tuple(load for i, load in enumerate(s.loads, 1) if i != k)
+                )
+            ),
+            f"load {k} (bar {SCENES['thesis'].loads[k - 1].bar}) is missing",
+        )
+        for k in (1, 2, 4)
+    ),
+    (
+        "alpha_2 left out",
+        "accelerating",
+        FORCES,
+        solved(same, alpha_2=0.0),
+        "alpha_2 is left out",
+    ),
+    (
+        "theta_4 from bar 2",
+        "crank_rocker",
+        ALL,
+        lambda s: right(s) | {"theta_4": right(s)["theta_4"] - right(s)["theta_2"]},
+        "relative to bar 2",
+    ),
+    (
+        "mirrored",
+        "crank_rocker",
+        FORCES,
+        solved_with(mirrored, "coupler"),
+        "coupler: mass centre on the other side of the bar's line",
+    ),
+    (
+        "every other pin",
+        "crank_rocker",
+        FORCES,
+        solved_with(other_pin),
+        "every bar: mass centre measured from the",
+    ),
+    (
+        "every mid-bar",
+        "crank_rocker",
+        FORCES,
+        solved_with(at_mid_bar),
+        "every bar: mass centre taken at mid-bar",
+    ),
+    (
+        "every centre turned",
+        "crank_rocker",
+        FORCES,
+        solved_with(turned_over),
+        "every bar: mass centre turned by",
+    ),
+    (
+        "every centre mirrored",
+        "crank_rocker",
+        FORCES,
+        solved_with(mirrored),
+        "every bar: mass centre on the other",
+    ),
+    (
+        "every inertia about the pin",
+        "crank_rocker",
+        FORCES,
+        solved_with(about_pin),
+        "every bar: inertia about the pin",
+    ),
+    (
+        "no inertia at all",
+        "thesis",
+        FORCES,
+        solved_with(without_inertia),
+        "every bar: moment of inertia left out",
+    ),
+    (
+        "inertia of a bar about its end",
+        "crank_rocker",
+        FORCES,
+        solved_with(lambda bar: replace(bar, inertia=bar.mass * bar.length**2 / 3.0)),
+        "m L^2/3, of a slender bar about its end",
+    ),
+    (
+        "gravity along x",
+        "crank_rocker",
+        FORCES,
+        with_gravity(0.0),
+        "gravity is turned by 90 deg",
+    ),
+    (
+        "gravity along -x",
+        "crank_rocker",
+        FORCES,
+        with_gravity(180.0),
+        "gravity is turned by -90 deg",
+    ),
+    (
+        "load kept",
+        "crank_rocker",
+        FORCES,
+        solved(in_other_frame),
+        "load 2 (bar 3): its direction is kept",
+    ),
+    (
+        "load turning",
+        "load_in_the_world",
+        FORCES,
+        solved(in_other_frame),
+        "load 2 (bar 3): its direction turns with",
+    ),
+    (
+        "degrees to 180",
+        "drag_link",
+        ALL,
+        in_degrees(-180.0),
+        "degrees from -180 to 180 where radians",
+    ),
+    (
+        "degrees to 360",
+        "drag_link",
+        ALL,
+        in_degrees(0.0),
+        "degrees from 0 to 360 where radians",
+    ),
+    (
+        "drive on bar 3",
+        "thesis",
+        FORCES,
+        solved(lambda s: replace(s, drive_bar=3)),
+        "on bar 3 instead of bar 4",
+    ),
+]
 
 
 def test_every_hypothesis_has_a_case_and_no_two_have_one_text() -> None:
@@ -841,7 +1256,9 @@ def test_blank_cells_state_nothing_and_the_rest_of_their_row_is_judged(
     )
     third = numbers["F12"][1, 0].item()
     path.write_text(
-        f"theta_2,torque,F12_x,F12_y,note\n{one},{first},,,a\n{two},{2 * second},{third},,b\n"
+        "theta_2,torque,F12_x,F12_y,note\n"
+        f"{one},{first},,,a\n"
+        f"{two},{2 * second},{third},,b\n"
     )
     judgement = judged(SCENES["thesis"], path)
     assert [(f.line, f.quantity, f.agrees) for f in judgement.findings] == [

@@ -191,28 +191,116 @@ def test_what_is_welded_to_a_bar_is_part_of_it() -> None:
 
 STOP = 'range="0 1" solreflimit="0.1 1"'
 EDITS = [
-    ("coupler's mass", 'mass="0.5"', 'mass="5"', "bars.coupler.mass", "10^1 times: units?"),
-    ("inertia about the pin", "0.0016133333333333336", "0.0073733333333333336", "bars.output.inertia", ""),
-    ("mass centre", 'pos="0.05 0 0" mass="0.2"', 'pos="0.06 0 0" mass="0.2"', "bars.input.centre.distance", ""),
-    ("length", '"B4" pos="0.22 0 0"', '"B4" pos="0.23 0 0"', "lengths.output", "another linkage"),
+    (
+        "coupler's mass",
+        'mass="0.5"',
+        'mass="5"',
+        "bars.coupler.mass",
+        "10^1 times: units?",
+    ),
+    (
+        "inertia about the pin",
+        "0.0016133333333333336",
+        "0.0073733333333333336",
+        "bars.output.inertia",
+        "",
+    ),
+    (
+        "mass centre",
+        'pos="0.05 0 0" mass="0.2"',
+        'pos="0.06 0 0" mass="0.2"',
+        "bars.input.centre.distance",
+        "",
+    ),
+    (
+        "length",
+        '"B4" pos="0.22 0 0"',
+        '"B4" pos="0.23 0 0"',
+        "lengths.output",
+        "another linkage",
+    ),
     ("gravity left out", "-9.81", "0.0", "gravity.y", "weight"),
-    ("damping", 'name="A" type="hinge"', 'name="A" type="hinge" damping="0.1"', "pins.A.damping", "couple"),
-    ("timestep", 'timestep="0.00100', 'timestep="0.00200', "option.timestep", "integration"),
+    (
+        "damping",
+        'name="A" type="hinge"',
+        'name="A" type="hinge" damping="0.1"',
+        "pins.A.damping",
+        "couple",
+    ),
+    (
+        "timestep",
+        'timestep="0.00100',
+        'timestep="0.00200',
+        "option.timestep",
+        "integration",
+    ),
     ("integrator", '"RK4"', '"Euler"', "option.integrator", "RK4 four"),
-    ("impedance", "0.9999 0.9999", "0.95 0.95", "closure.softness", "at every timestep"),
+    (
+        "impedance",
+        "0.9999 0.9999",
+        "0.95 0.95",
+        "closure.softness",
+        "at every timestep",
+    ),
     ("solimp", "0.9999 0.9999", "0.95 0.95", "closure.solimp", "(1-d)/d"),
     ("solref", 'solref="0.02', 'solref="0.03', "closure.solref", "sags under load"),
-    ("tolerance", 'tolerance="0"', 'tolerance="1e-8"', "option.tolerance", "only 0 is tight"),
-    ("range", 'name="O4" type="hinge"', 'name="O4" type="hinge" range="0 1"', "pins.O4.range", "stop"),
-    ("load missing", '<general gaintype="fixed" gainprm="0" biastype="affine" name="load_2"', "",
-     "loads.coupler, axes of the coupler.force", "summed here bar by bar"),
-    ("load turned", "3.061616997868383e-17 -0.5", "-0.5 0.0", "loads.coupler, axes of the coupler.force", "N; the"),
-    ("load elsewhere", 'name="load_2" pos="0.15', 'name="load_2" pos="0.16',
-     "loads.coupler, axes of the coupler.point", "along the bar"),
-    ("line search", 'iterations="10"', 'iterations="10" ls_iterations="1"', "option.ls_iterations", "line search"),
-    ("wind", 'iterations="10"', 'iterations="10" density="1.2" wind="1 0 0"', "option.wind", "drag"),
-    ("motor at a pin", "</actuator>", '<velocity joint="A" kv="1"/></actuator>', "pins.A.motor", "couple at this pin"),
-]  # fmt: skip
+    (
+        "tolerance",
+        'tolerance="0"',
+        'tolerance="1e-8"',
+        "option.tolerance",
+        "only 0 is tight",
+    ),
+    (
+        "range",
+        'name="O4" type="hinge"',
+        'name="O4" type="hinge" range="0 1"',
+        "pins.O4.range",
+        "stop",
+    ),
+    (
+        "load missing",
+        '<general gaintype="fixed" gainprm="0" biastype="affine" name="load_2"',
+        "",
+        "loads.coupler, axes of the coupler.force",
+        "summed here bar by bar",
+    ),
+    (
+        "load turned",
+        "3.061616997868383e-17 -0.5",
+        "-0.5 0.0",
+        "loads.coupler, axes of the coupler.force",
+        "N; the",
+    ),
+    (
+        "load elsewhere",
+        'name="load_2" pos="0.15',
+        'name="load_2" pos="0.16',
+        "loads.coupler, axes of the coupler.point",
+        "along the bar",
+    ),
+    (
+        "line search",
+        'iterations="10"',
+        'iterations="10" ls_iterations="1"',
+        "option.ls_iterations",
+        "line search",
+    ),
+    (
+        "wind",
+        'iterations="10"',
+        'iterations="10" density="1.2" wind="1 0 0"',
+        "option.wind",
+        "drag",
+    ),
+    (
+        "motor at a pin",
+        "</actuator>",
+        '<velocity joint="A" kv="1"/></actuator>',
+        "pins.A.motor",
+        "couple at this pin",
+    ),
+]
 
 
 @pytest.mark.parametrize(
@@ -338,10 +426,14 @@ def other_plane(
             f' diaginertia="{moments}"/>'
         )
 
-    return f"""<mujoco><option gravity="0 0 -9.81" {option}/><default><joint axis="{axis}"/></default><worldbody>
+    end_of_rod = '<site name="r" pos="0.25 0 0"/>'
+    end_of_rocker = '<site name="q" pos="0.22 0 0"/>'
+    return f"""<mujoco><option gravity="0 0 -9.81" {option}/>
+    <default><joint axis="{axis}"/></default><worldbody>
     <body name="crank" pos="1 2 3"><joint/>{inertial(2)}
-      <body name="rod" pos="0.1 0 0"><joint/>{inertial(3)}<site name="r" pos="0.25 0 0"/></body></body>
-    <body name="rocker" pos="1.3 2 3"><joint/>{inertial(4)}<site name="q" pos="0.22 0 0"/></body></worldbody>
+      <body name="rod" pos="0.1 0 0"><joint/>{inertial(3)}{end_of_rod}</body></body>
+    <body name="rocker" pos="1.3 2 3"><joint/>{inertial(4)}{end_of_rocker}</body>
+    </worldbody>
     <equality>{f"<connect {closure}/>" if closure else ""}</equality></mujoco>"""
 
 
@@ -371,17 +463,37 @@ def test_bodies_and_sites_are_guessed_from_what_hangs_together_and_from_the_leng
 
 COSTLY = [
     ("bars.coupler.mass", 'mass="0.5"', 'mass="0.6"'),
-    ("bars.output.inertia", " ".join(["0.0016133333333333336"] * 3), "0.003 0.003 0.003"),
-    ("bars.output.centre.angle", "0.11883216824898844 0 -0.0167", "0.11883216824898844 0 0.0167"),
-    ("bars.input.centre.distance", 'pos="0.05 0 0.0" mass="0.2"', 'pos="0.06 0 0.0" mass="0.2"'),
+    (
+        "bars.output.inertia",
+        " ".join(["0.0016133333333333336"] * 3),
+        "0.003 0.003 0.003",
+    ),
+    (
+        "bars.output.centre.angle",
+        "0.11883216824898844 0 -0.0167",
+        "0.11883216824898844 0 0.0167",
+    ),
+    (
+        "bars.input.centre.distance",
+        'pos="0.05 0 0.0" mass="0.2"',
+        'pos="0.06 0 0.0" mass="0.2"',
+    ),
     ("lengths.coupler", 'name="r" pos="0.25', 'name="r" pos="0.26'),
     ("lengths.input", 'name="rod" pos="0.1', 'name="rod" pos="0.11'),
     ("lengths.output", 'name="q" pos="0.22', 'name="q" pos="0.23'),
     ("lengths.ground", 'name="rocker" pos="1.3', 'name="rocker" pos="1.31'),
     ("gravity.y", "0 0 -9.81", "0 0 9.81"),
-    ("pins.A.damping", 'name="rod" pos="0.1 0 0"><joint', 'name="rod" pos="0.1 0 0"><joint damping="0.1"'),
-    ("pins.O4.stiffness", 'pos="1.3 2 3"><joint', 'pos="1.3 2 3"><joint stiffness="0.5"'),
-]  # fmt: skip
+    (
+        "pins.A.damping",
+        'name="rod" pos="0.1 0 0"><joint',
+        'name="rod" pos="0.1 0 0"><joint damping="0.1"',
+    ),
+    (
+        "pins.O4.stiffness",
+        'pos="1.3 2 3"><joint',
+        'pos="1.3 2 3"><joint stiffness="0.5"',
+    ),
+]
 
 
 @pytest.mark.slow
@@ -463,7 +575,7 @@ def test_what_is_attached_costs_what_it_does_in_the_file_itself(key: str) -> Non
     )
 
 
-def test_a_servo_on_a_tendon_pulls_also_where_it_is_told_nothing_and_a_motor_does_not() -> (
+def test_a_servo_on_a_tendon_pulls_where_it_is_told_nothing_and_a_motor_does_not() -> (
     None
 ):
     text = write_mjcf(SPRUNG)
@@ -483,9 +595,11 @@ def test_a_load_that_is_missing_and_an_entry_that_cannot_stand_alone() -> None:
     Who turns the other way round, or closes the loop otherwise, is another file.
     """
     changes: list[tuple[str, Value | None]] = [
-        ("loads.coupler, axes of the coupler.force", (0.0, 0.0)), ("pins.A.positive", "clockwise"),
-        ("closure.by", "tendon"), ("contacts", "possible"),
-    ]  # fmt: skip
+        ("loads.coupler, axes of the coupler.force", (0.0, 0.0)),
+        ("pins.A.positive", "clockwise"),
+        ("closure.by", "tendon"),
+        ("contacts", "possible"),
+    ]
     _, missing, *others = examine_changed(CRANK_ROCKER, changes)
     assert missing is not None and others == [None] * 3
     text = re.sub('<general [^>]*name="load_2"[^>]*>', "", GENERATED)
@@ -665,14 +779,41 @@ def test_an_absurd_timestep_is_reported_and_not_run_through(timestep: str) -> No
 
 
 OVERDONE = [
-    ("every mass", 'mass="[^"]*"', 'mass="1e308"', "bars.coupler.mass is beyond the range of doubles: inf"),
-    ("lengths", ' pos="[^"]*"', ' pos="1e308 1e308 0"', "lengths.input is beyond the range"),
-    ("user data", "<worldbody>", '<size nuser_body="2000000000"/><worldbody>', "is a size in it too large?"),
-    ("keyframes", "<worldbody>", '<size nkey="2000000000"/><worldbody>', "asks for 2000000000 keyframes"),
-    *((f"timestep {t}", 'timestep="[^"]*"', f'timestep="{t}"', f"its timestep of {t} s must be above 0")
-      for t in ("-1", "0", "nan")),
+    (
+        "every mass",
+        'mass="[^"]*"',
+        'mass="1e308"',
+        "bars.coupler.mass is beyond the range of doubles: inf",
+    ),
+    (
+        "lengths",
+        ' pos="[^"]*"',
+        ' pos="1e308 1e308 0"',
+        "lengths.input is beyond the range",
+    ),
+    (
+        "user data",
+        "<worldbody>",
+        '<size nuser_body="2000000000"/><worldbody>',
+        "is a size in it too large?",
+    ),
+    (
+        "keyframes",
+        "<worldbody>",
+        '<size nkey="2000000000"/><worldbody>',
+        "asks for 2000000000 keyframes",
+    ),
+    *(
+        (
+            f"timestep {t}",
+            'timestep="[^"]*"',
+            f'timestep="{t}"',
+            f"its timestep of {t} s must be above 0",
+        )
+        for t in ("-1", "0", "nan")
+    ),
     ("no MJCF", "mass=", "weight=", "MuJoCo does not compile it"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.slow
@@ -714,17 +855,52 @@ FIFTH = (
     ' 1"/></body>'
 )
 REFUSED = [
-    ("no such body", other_plane(), {"input": "wheel"}, "the file has: crank, rod, rocker"),
-    ("no guess", other_plane().replace("</worldbody>", FIFTH + "</worldbody>"), {},
-     "no guess makes a four-bar (every joint must be a hinge of the input"),
-    ("a slide", other_plane().replace("<joint/>", '<joint type="slide"/>', 1), MINE, "hinge"),
-    ("nothing closes", re.sub("<site [^>]*>", "", other_plane("")), MINE,
-     "no body is named B3, B4, and no guess makes a four-bar (no connect, weld or pair of sites closes it)"),
-    ("too few", "<mujoco><worldbody><body name='input'><joint/><geom size='.1'/></body></worldbody></mujoco>", {},
-     "no body is named coupler, output, and no guess makes a four-bar (it has fewer bodies on hinges)"),
-    ("does not compile", other_plane().replace("mass=", "weight="), MINE, "does not compile"),
-    ("two names, one body", other_plane(), {**MINE, "coupler": "crank"}, "three bodies"),
-]  # fmt: skip
+    (
+        "no such body",
+        other_plane(),
+        {"input": "wheel"},
+        "the file has: crank, rod, rocker",
+    ),
+    (
+        "no guess",
+        other_plane().replace("</worldbody>", FIFTH + "</worldbody>"),
+        {},
+        "no guess makes a four-bar (every joint must be a hinge of the input",
+    ),
+    (
+        "a slide",
+        other_plane().replace("<joint/>", '<joint type="slide"/>', 1),
+        MINE,
+        "hinge",
+    ),
+    (
+        "nothing closes",
+        re.sub("<site [^>]*>", "", other_plane("")),
+        MINE,
+        "no body is named B3, B4, and no guess makes a four-bar (no connect, weld or"
+        " pair of sites closes it)",
+    ),
+    (
+        "too few",
+        "<mujoco><worldbody><body name='input'><joint/><geom size='.1'/></body>"
+        "</worldbody></mujoco>",
+        {},
+        "no body is named coupler, output, and no guess makes a four-bar (it has fewer"
+        " bodies on hinges)",
+    ),
+    (
+        "does not compile",
+        other_plane().replace("mass=", "weight="),
+        MINE,
+        "does not compile",
+    ),
+    (
+        "two names, one body",
+        other_plane(),
+        {**MINE, "coupler": "crank"},
+        "three bodies",
+    ),
+]
 
 
 @pytest.mark.parametrize(

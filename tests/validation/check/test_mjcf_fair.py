@@ -577,7 +577,8 @@ FINGER = """<mujoco><compiler angle="degree" autolimits="true"/>
 <geom type="capsule" fromto="0 0 0 0.05 0.01 0" size="0.004"/>
 <geom type="box" size="0.03 0.006 0.006" pos="0.06 0.04 0"/>
 <site name="a" pos="0.05 0.01 0"/></body></body>
-<body name="follower" pos="0.035 0 0" euler="0 180 0"><joint name="follow" axis="0 0 1"/>
+<body name="follower" pos="0.035 0 0" euler="0 180 0">
+<joint name="follow" axis="0 0 1"/>
 <geom type="capsule" fromto="0 0 0 0 0.05 0" size="0.004"/>
 <site name="b" pos="0 0.0722 0"/></body>
 </body></worldbody>

@@ -17,7 +17,7 @@ from fourbar_validation.compare.tolerance import WELL_CONDITIONED
 ROCKER = uniform(0.3, 0.25, 0.1, 0.22)
 
 
-def test_the_scale_is_the_greatest_value_of_the_well_conditioned_positions_and_elsewhere_the_value_itself() -> (
+def test_the_scale_is_the_greatest_well_conditioned_value_and_elsewhere_the_value() -> (
     None
 ):
     """It would be larger of terms that cancel.

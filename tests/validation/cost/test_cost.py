@@ -364,8 +364,12 @@ def test_a_jump_in_one_pin_force_is_named_and_its_law_fails(
         f"Euler, tc held: F43: {jump}"
     ]
     assert "F43 jumps" in pictures.state_jumps({"Euler, tc held": ladder})
-    drawn = {line.get_gid(): len(line.get_xdata()) for axes in pictures.draw_orders({"Euler, tc held": ladder}, "").axes
-             for line in axes.lines if line.get_gid() and len(line.get_xdata())}  # fmt: skip
+    drawn = {
+        line.get_gid(): len(line.get_xdata())
+        for axes in pictures.draw_orders({"Euler, tc held": ladder}, "").axes
+        for line in axes.lines
+        if line.get_gid() and len(line.get_xdata())
+    }
     assert drawn == {"jump-F43": 1}
     (line,) = laws.write_laws(list(laws_found.values()))
     assert (

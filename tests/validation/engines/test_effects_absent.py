@@ -144,7 +144,8 @@ import sys
 import fourbar
 from fourbar_validation.run.judge import judge
 link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
-record = judge("scene", fourbar.Scene(link, fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20))))
+scene = fourbar.Scene(link, fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20)))
+record = judge("scene", scene)
 print(sorted(name for name in ("mujoco", "pinocchio") if name in sys.modules))
 print(*record.left_out, sep="\\n")
 print(*sorted({row.engine for row in record.rows}))

@@ -222,9 +222,19 @@ def test_an_answer_comes_back_with_all_that_it_says():
     torque, force = np.linspace(0.0, 1.0, n), np.ones((n, 2))
     torque[3] = np.nan
     answer = Answer(
-        "mine", "RK4", moved, np.arange(n) != 3, {"torque": torque, "F12": force}, None, {"torque": torque},
-        ["it slipped"], {"gap": 1e-9}, "nothing", "everything", 0.25,
-    )  # fmt: skip
+        "mine",
+        "RK4",
+        moved,
+        np.arange(n) != 3,
+        {"torque": torque, "F12": force},
+        None,
+        {"torque": torque},
+        ["it slipped"],
+        {"gap": 1e-9},
+        "nothing",
+        "everything",
+        0.25,
+    )
     back = protocol.answer_from_json(
         "mine",
         commanded,
@@ -337,8 +347,16 @@ WRONG_ANSWERS = [
     {"refusal": " "},
     {"refusal": 3},
 ]
-WRONG_SETTINGS = [[], {"name": 1}, {"steps_per_turn": 3.5}, {"steps_per_turn": 0}, {"error": 1.0}, {"error": "small"},
-                  {"steps_per_turn": 9, "error": 0.1}, {"timestep": 0.1}]  # fmt: skip
+WRONG_SETTINGS = [
+    [],
+    {"name": 1},
+    {"steps_per_turn": 3.5},
+    {"steps_per_turn": 0},
+    {"error": 1.0},
+    {"error": "small"},
+    {"steps_per_turn": 9, "error": 0.1},
+    {"timestep": 0.1},
+]
 
 
 def read_answer(data):

@@ -169,14 +169,28 @@ def test_noise_is_of_the_last_digits_alone() -> None:
 def test_every_figure_is_compared() -> None:
     tables = Counter(figure.table for figure in ALL)
     assert tables == {
-        "2.4 positions": 281 * 4, "2.4 constants": 16, "3.2 limits": 7, "manual, window": 8,
-        "4.12": 52, "manual, kinematics": 26, "5.7 inertias": 3, "5.7 constants": 28, "5.7 matrix": 26,
-        "manual, unknowns": 13, "5.7 unknowns": 13, "Maple": 5, "public test cases": 16,
-    }  # fmt: skip
+        "2.4 positions": 281 * 4,
+        "2.4 constants": 16,
+        "3.2 limits": 7,
+        "manual, window": 8,
+        "4.12": 52,
+        "manual, kinematics": 26,
+        "5.7 inertias": 3,
+        "5.7 constants": 28,
+        "5.7 matrix": 26,
+        "manual, unknowns": 13,
+        "5.7 unknowns": 13,
+        "Maple": 5,
+        "public test cases": 16,
+    }
     assert len({(figure.table, figure.name) for figure in ALL}) == len(ALL)
-    assert Counter(figure.verdict() for figure in ALL if figure.table != "public test cases") == {
-        "rounded": 1233, "truncated": 28, "differs": 60,
-    }  # fmt: skip
+    assert Counter(
+        figure.verdict() for figure in ALL if figure.table != "public test cases"
+    ) == {
+        "rounded": 1233,
+        "truncated": 28,
+        "differs": 60,
+    }
 
 
 def test_every_difference_is_what_its_errata_make_of_ours() -> None:

@@ -207,8 +207,13 @@ def damaged(folder: Path) -> Iterator[tuple[Path, str]]:
     (folder / "results.parquet").write_bytes(b"")
     yield folder / "results.parquet", "is not of this run"
     (folder / "results.parquet").unlink()
-    for old, new in ((b'"K": "50.0"', b'"K": "51.0"'), (b'"sha256"', b'"sha257"'), (b'"rows"', b'"raws"'),
-                     (b'"scenes"', b'"scones"'), (HERE.machine.encode(), b"another machine")):  # fmt: skip
+    for old, new in (
+        (b'"K": "50.0"', b'"K": "51.0"'),
+        (b'"sha256"', b'"sha257"'),
+        (b'"rows"', b'"raws"'),
+        (b'"scenes"', b'"scones"'),
+        (HERE.machine.encode(), b"another machine"),
+    ):
         assert old in files[about]
         about.write_bytes(files[about].replace(old, new))
         yield about, "is damaged"
@@ -481,7 +486,7 @@ def test_two_long_runs_are_read_scene_by_scene_and_little_of_them_is_kept(
     assert status(["compare", str(kept_as), str(tmp_path / "new")]) == 0
 
 
-def test_a_part_of_a_long_run_compares_with_its_part_and_a_table_out_of_order_with_nothing(
+def test_a_part_of_a_long_run_compares_with_its_part_and_a_shuffled_table_with_none(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -919,7 +924,10 @@ def test_the_bound_of_a_derived_result_is_a_rule(
     bound: ErrorBound,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """What bounds a row of a derived check is one of them: its reason begins with the name."""
+    """What bounds a row of a derived check is one of them.
+
+    Its reason begins with the name.
+    """
     before = describe_run([Engine("engine", FreeBody, EQUIVALENCE)], "suite")
     looser = replace(bound, factor=2.0 * bound.factor)
     bounds = tuple(looser if one is bound else one for one in DERIVED_BOUNDS)

@@ -32,9 +32,10 @@ function rgb(text) {
   return [...c.getImageData(0, 0, 1, 1).data].slice(0, 3);
 }
 const lights = new Map();  // of each colour once: a canvas takes milliseconds
+const linear = v => v <= .03928 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4;
 const light = c => {
   if (!lights.has(c)) {
-    const [r, g, b] = rgb(c).map(v => v / 255).map(v => v <= .03928 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4);
+    const [r, g, b] = rgb(c).map(v => linear(v / 255));
     lights.set(c, .2126 * r + .7152 * g + .0722 * b);
   }
   return lights.get(c);
@@ -46,12 +47,15 @@ const ground = e => {
   }
   return "white";
 };
+const texts = "h1, h2, h3, p, li, a, td, th, summary, svg text, figcaption";
 const found = [];
-for (const e of document.querySelectorAll("h1, h2, h3, p, li, a, td, th, summary, svg text, figcaption")) {
+for (const e of document.querySelectorAll(texts)) {
   if (!e.textContent.trim() || !e.getClientRects().length) continue;
   const style = getComputedStyle(e);
-  const [a, b] = [light(e instanceof SVGElement ? style.fill : style.color), light(ground(e))];
-  found.push([(Math.max(a, b) + .05) / (Math.min(a, b) + .05), e.tagName + ": " + e.textContent.trim().slice(0, 40)]);
+  const a = light(e instanceof SVGElement ? style.fill : style.color);
+  const b = light(ground(e));
+  const contrast = (Math.max(a, b) + .05) / (Math.min(a, b) + .05);
+  found.push([contrast, e.tagName + ": " + e.textContent.trim().slice(0, 40)]);
 }
 return found.sort((a, b) => a[0] - b[0]).slice(0, 5);
 """

@@ -330,9 +330,9 @@ def test_many_scenes_give_a_short_report_of_the_worst(
         and summary.judged > 1000
     )
     assert write_summary_page(summary).count("\n") < 160
-    assert (
-        len(text) < 1.0e6
-    )  # 20 scenes, each with 30 kB of compressed rows; the table of all of them is compressed too
+    # 20 scenes, each with 30 kB of compressed rows; the table of all of them is
+    # compressed too
+    assert len(text) < 1.0e6
 
 
 @pytest.mark.slow

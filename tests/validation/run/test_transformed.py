@@ -281,6 +281,6 @@ def test_a_place_of_the_coupler_is_read_from_its_other_pin() -> None:
 
 
 def test_every_effect_of_the_package_can_be_stated_otherwise() -> None:
-    """Without a conversion every scene with the effect would silently lose the check."""
+    """Without a conversion, scenes with the effect would silently lose the check."""
     packaged = {getattr(fourbar.effects, name) for name in fourbar.effects.FILE_OF}
     assert {*_CONVERTED} == {fourbar.Load, *packaged}

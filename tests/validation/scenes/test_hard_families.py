@@ -545,7 +545,7 @@ def test_the_file_as_shipped_is_driven_within_the_declared_limits_of_mujoco(
     )
 
 
-def test_the_file_of_an_input_that_starts_almost_at_rest_is_judged_by_the_speed_that_it_reaches() -> (
+def test_a_file_that_starts_almost_at_rest_is_judged_by_the_speed_that_it_reaches() -> (
     None
 ):
     scene = Scene(

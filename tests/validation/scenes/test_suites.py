@@ -1,5 +1,6 @@
-"""The suite of a run without arguments uses every capability, and how much is judged of a suite does not depend on
-pictures.
+"""The suite of a run without arguments uses every capability.
+
+How much is judged of a suite does not depend on pictures.
 """
 
 import itertools

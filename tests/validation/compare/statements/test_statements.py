@@ -304,9 +304,7 @@ class Shy:
         )
 
 
-def test_an_engine_that_refuses_the_positions_of_the_statements_refuses_them_in_a_row() -> (
-    None
-):
+def test_an_engine_refuses_the_positions_of_the_statements_in_a_row() -> None:
     rows = judge("scene", crank_rocker(), [Engine("shy", Shy, EQUIVALENCE)]).rows
     (row,) = (row for row in rows if row.setting == "statements of the linkage")
     assert (row.verdict, row.reason) == (REFUSES, "too near a limit")

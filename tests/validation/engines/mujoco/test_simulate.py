@@ -235,8 +235,13 @@ def test_a_residual_that_is_no_number_raises_its_alarm(
     monkeypatch.setattr(
         ResidualMonitor, "evidence", lambda self: {"force_gap": math.nan}
     )
-    monkeypatch.setattr(ClosedLoop, "gap", lambda self, right=ClosedLoop.gap: (right(self)[0], math.nan)
-                        if self.data.time else right(self))  # fmt: skip
+    monkeypatch.setattr(
+        ClosedLoop,
+        "gap",
+        lambda self, right=ClosedLoop.gap: (
+            (right(self)[0], math.nan) if self.data.time else right(self)
+        ),
+    )
     posed = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 0.4, 3), 10.0))
     alarms = MujocoSimulated().answer(posed, fourbar.command(posed)).alarms
     assert {alarm.partition(" = ")[0] for alarm in alarms} == {

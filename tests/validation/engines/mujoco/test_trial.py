@@ -30,7 +30,9 @@ AGREES = 0.05
 """
 
 NOISE = 1.6
-"""Factor between the times of a step of two models of one loop: 0.7 to 1.05 were measured on two busy cores."""
+"""Factor between the times of a step of two models of one loop: 0.7 to 1.05 were
+measured on two busy cores.
+"""
 ROUNDS, STEPS = 15, 100
 """Timings of each loop, and the steps of one."""
 
@@ -46,7 +48,9 @@ class Case:
     drive: Build | None = None
     """Builds the loop that is stepped, if no flywheel carries it."""
     gains: tuple[float, float] | None = None
-    """Gains of position and speed of a servo, per (inertia omega^2) and (inertia omega)."""
+    """Gains of position and speed of a servo, per (inertia omega^2) and
+    (inertia omega).
+    """
     softness: float | None = None
     """Factor on dof_invweight0 where a joint equality holds the crank to a wheel."""
 
@@ -199,7 +203,7 @@ def test_so_is_that_of_every_other_drive_of_the_crank(drive: str, case: str) -> 
 @pytest.mark.parametrize("case", ["defaults, Euler", "no pads", "pads"])
 @pytest.mark.parametrize("drive", DRIVES)
 def test_a_step_takes_as_long_as_in_a_second_loop(drive: str, case: str) -> None:
-    """In turns, so that both meet the same machine; the middle one of the ratios counts."""
+    """In turns, so that both meet the same machine; the middle ratio counts."""
     scene, settings = make_scene(drive), CASES[case].settings
     setup = TrialSetup(scene, command(scene))
     settings = replace(settings, steps_per_revolution=float(CASES[case].steps))

@@ -297,7 +297,8 @@ HARD_AT_REST = {
         fourbar.Motion(fourbar.Sweep(-0.3667, 2.037, 36), 7.4, 1.8),
         effects=(fourbar.Gravity(9.81, -2.0),),
     ),
-    "an equilibrium 1e-6 rad beside a limit, where rounding moves the slope by 1e-10 of itself": replace(
+    # where rounding moves the slope by 1e-10 of itself
+    "an equilibrium 1e-6 rad beside a limit": replace(
         FAULT_SCENES["derived, limited"],
         loads=(),
         effects=(fourbar.Gravity(9.81, 2.1920361095494605),),

@@ -132,9 +132,11 @@ def test_bodies_without_joints_are_one_bar_and_what_hangs_on_it_is_held() -> Non
 FIVE_BAR = """
 <mujoco><worldbody><body name="base">
 <body name="a"><joint name="a" axis="0 1 0"/><geom size="0.01"/>
- <body name="b" pos="0 0 0.1"><joint name="b" axis="0 1 0"/><geom size="0.01"/></body></body>
+ <body name="b" pos="0 0 0.1">
+  <joint name="b" axis="0 1 0"/><geom size="0.01"/></body></body>
 <body name="c" pos="0.05 0 0"><joint name="c" axis="0 1 0"/><geom size="0.01"/>
- <body name="d" pos="0.02 0 0.12"><joint name="d" axis="0 1 0"/><geom size="0.01"/></body></body>
+ <body name="d" pos="0.02 0 0.12">
+  <joint name="d" axis="0 1 0"/><geom size="0.01"/></body></body>
 </body></worldbody>
 <equality><connect name="tip" body1="b" body2="d" anchor="0.05 0 0.08"/></equality>
 <actuator><motor name="one" joint="a"/>{more}</actuator></mujoco>

@@ -11,7 +11,9 @@ from fourbar_validation.robots.files import read_robot
 FILE = """<mujoco><worldbody>
 <body name="one"><joint name="lead" axis="0 0 1" ref="30"/><geom size="0.1"/></body>
 <body name="two"><joint name="follow" axis="0 0 -1"/><geom size="0.1"/></body>
-</worldbody><equality><joint joint1="follow" joint2="lead" polycoef="0.1 0.5 0 0.2 0"/></equality></mujoco>"""
+</worldbody><equality>
+<joint joint1="follow" joint2="lead" polycoef="0.1 0.5 0 0.2 0"/>
+</equality></mujoco>"""
 
 
 LOOP = Scene(
