@@ -32,6 +32,7 @@ from fourbar.formulas.mobility import (
     turns_fully,
 )
 from fourbar.formulas.motion import Coefficients, State, rates
+from fourbar.formulas.path import count_turns
 from fourbar.formulas.position import Loop, Position, half_angle, loop
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, with_signs
@@ -133,8 +134,10 @@ class CircuitCurve:
     A row is sampled by an angle tau: psi itself where the input turns fully, otherwise
         psi = middle - half width cos tau,
     on the open branch up to half a turn and back on the crossed one, so that it is
-    smooth through the limits. A linkage with two change points has one row, its
-    assembly: a parallelogram never becomes an antiparallelogram.
+    smooth through the limits. A linkage with change points has one row, its assembly: a
+    parallelogram never becomes an antiparallelogram. With a single change point the row
+    goes through two turns, after which the assembly repeats: a turn of theta_2 leads to
+    the mirror image.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -151,8 +154,13 @@ class CircuitCurve:
             raise NotAssembledError(say_nowhere(scene))
         self.circuit = circuits(linkage)[number[number >= 0][0]]
         self.full = turns_fully(linkage)
-        self.assembly = self.full and len(change_points(linkage)) == 2
+        self.assembly = self.full and len(change_points(linkage)) > 0
         """True if the row is that of one assembly."""
+        turns = int(count_turns(linkage.lengths, 2)) if self.full else 1
+        self.period = turns * TURN
+        """Angle of a whole row, rad."""
+        self.positions = turns * POSITIONS_OF_A_BRANCH
+        """Number of positions of a row."""
         self.branches = self.circuit.branches
         if self.assembly:
             self.branches = (int(commanded.branch[0]),)
@@ -165,7 +173,8 @@ class CircuitCurve:
             else None
         )
         self.singular = [
-            (point - self.theta_1, 0.0 if point == self.theta_1 else math.pi)
+            (point - self.theta_1 + turn, 0.0 if point == self.theta_1 else math.pi)
+            for turn in np.arange(0.0, self.period, TURN).tolist()
             for point in change_points(linkage)
         ]
         self.singular = [
@@ -176,11 +185,11 @@ class CircuitCurve:
 
     def inside(self, psi: Array, radius: Array) -> NDArray[np.bool_]:
         """Mark where psi, within a radius, lies in the sweep, if one is stated."""
-        if self.sweep is None or self.sweep[1] - self.sweep[0] >= TURN:
+        if self.sweep is None or self.sweep[1] - self.sweep[0] >= self.period:
             return np.ones(psi.shape, dtype=bool)
         middle = 0.5 * (self.sweep[0] + self.sweep[1]) - self.theta_1
         half = 0.5 * (self.sweep[1] - self.sweep[0])
-        apart = np.abs(_turn_apart(psi, middle))
+        apart = np.abs(_measure_apart(psi, middle, self.period))
         return np.asarray(apart <= half + radius + AT_END_OF_SWEEP)
 
     def reached(self, points: Array) -> NDArray[np.bool_]:
@@ -196,7 +205,7 @@ class CircuitCurve:
         for low, high, sign in self._runs:
             middle = 0.5 * (low + high)
             half = 0.5 * (high - low)
-            apart = np.abs(_turn_apart(points[:, 0], middle))
+            apart = np.abs(_measure_apart(points[:, 0], middle, TURN))
             here = (apart <= half + AT_END_OF_SWEEP) & (
                 sign * sines >= -AT_END_OF_SWEEP
             )
@@ -221,7 +230,7 @@ class CircuitCurve:
             if stop < len(signs):
                 inner.append(stop - 1)
             for place in places[inner].tolist():
-                away = _turn_apart(between, place)
+                away = _measure_apart(between, place, TURN)
                 psi.append(place + float(away[np.argmin(np.abs(away))]))
             runs.append((min(psi), max(psi), int(signs[first])))
         return runs
@@ -231,7 +240,7 @@ class CircuitCurve:
 
         `branch`: if the input turns fully.
         """
-        tau = np.asarray(np.remainder(tau, TURN), dtype=float)
+        tau = np.asarray(np.remainder(tau, self.period), dtype=float)
         if self.full:
             psi = self.low + tau
             sign = branch * self.root_sign(psi)
@@ -244,7 +253,7 @@ class CircuitCurve:
 
     def tau(self, points: Array) -> tuple[Array, NDArray[np.intp]]:
         """Return the place and the row (index into `rows`) of points."""
-        psi = self.low + np.remainder(points[:, 0] - self.low, TURN)
+        psi = self.low + np.remainder(points[:, 0] - self.low, self.period)
         sign = np.where(np.sin(points[:, 1]) >= 0.0, 1, -1)
         if self.assembly:
             return psi - self.low, np.zeros(len(points), dtype=np.intp)
@@ -278,8 +287,8 @@ class CircuitCurve:
         Limits and change points are left out.
         """
         tau = (
-            np.linspace(0.0, TURN, POSITIONS_OF_A_BRANCH, endpoint=False)
-            + 0.5 * TURN / POSITIONS_OF_A_BRANCH
+            np.linspace(0.0, self.period, self.positions, endpoint=False)
+            + 0.5 * self.period / self.positions
         )
         points = np.concatenate([self.point(tau, branch) for branch in self.rows])
         points = points[self.inside(points[:, 0], np.zeros(1))]
@@ -288,9 +297,9 @@ class CircuitCurve:
     def ends(self) -> Array:
         """Return the ends of the sweep on each branch, (n, 2).
 
-        There are none without a sweep, or if it is a whole turn.
+        There are none without a sweep, or if it is a whole row.
         """
-        if self.sweep is None or self.sweep[1] - self.sweep[0] >= TURN:
+        if self.sweep is None or self.sweep[1] - self.sweep[0] >= self.period:
             return np.empty((0, 2))
         psi = np.array(self.sweep) - self.theta_1
         mu = transmission(self.ratios, psi)
@@ -306,9 +315,13 @@ class CircuitCurve:
         )
 
     def order(self, points: Array) -> NDArray[np.intp]:
-        """Return the indices of the points in the sweep, in order along the rows."""
+        """Return the indices of the points in the sweep, in order along the rows.
+
+        A row that goes round begins where theta_2 is counted from.
+        """
         tau, row = self.tau(points)
-        order = np.lexsort((tau, row))
+        along = self.count(points[:, 0]) if self.full else tau
+        order = np.lexsort((along, row))
         return order[self.inside(points[order, 0], np.zeros(1))]
 
     def state(self, points: Array) -> State:
@@ -353,19 +366,26 @@ class CircuitCurve:
             points[branch == row] = self.point(tau[branch == row], row)
         return points
 
-    def place(self, point: Array) -> RestPosition:
-        """Describe a point by theta_2 within the sweep.
+    def count(self, psi: Array) -> Array:
+        """Return psi as it is counted within the sweep.
 
-        Without a sweep theta_2 is counted from the circuit's range.
+        Without a sweep theta_2 is counted from 0 where the input turns fully, otherwise
+        from the circuit's range.
         """
-        position = self.state(point[None]).position
-        middle = self.low + math.pi
         if self.sweep is not None:
             first, last = self.sweep
-            middle = first + 0.5 * min(last - first, TURN) - self.theta_1
+            middle = first + 0.5 * min(last - first, self.period) - self.theta_1
+        elif self.full:
+            middle = 0.5 * self.period - self.theta_1
+        else:
+            middle = self.low + math.pi
         # an end may lie beyond the sweep by a rounding
-        psi = middle + math.remainder(point[0] - middle, TURN)
-        theta_2 = self.theta_1 + psi
+        return middle + _measure_apart(psi, middle, self.period)
+
+    def place(self, point: Array) -> RestPosition:
+        """Describe a point by theta_2 as it is counted."""
+        position = self.state(point[None]).position
+        theta_2 = self.theta_1 + self.count(point[0])
         theta_3, theta_4 = (float(np.angle(u)[0]) for u in (position.u3, position.u4))
         sine = math.sin(point[1])
         return RestPosition(
@@ -376,10 +396,10 @@ class CircuitCurve:
         )
 
 
-def _turn_apart(psi: Array, middle: float) -> Array:
-    """Return how far psi lies from a middle, within half a turn."""
+def _measure_apart(psi: Array, middle: float, period: float) -> Array:
+    """Return how far psi lies from a middle, within half a period."""
     away = psi - middle
-    return np.asarray(away - TURN * np.rint(away / TURN))
+    return np.asarray(away - period * np.rint(away / period))
 
 
 def closure(lengths: Loop, psi: Number, mu: Number) -> Number:

@@ -37,7 +37,6 @@ from fourbar.scene.scene import default_places
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar.studies.circuit_curve import (
-    POSITIONS_OF_A_BRANCH,
     ROUND_OFF_OF_Q,
     CircuitCurve,
     RestPosition,
@@ -302,8 +301,8 @@ def _make_grid(curve: CircuitCurve, points: Array) -> _Grid:
     for number in range(len(curve.rows)):
         in_row = row[first] == number
         second[in_row] = np.roll(first[in_row], -1)
-    gap = np.remainder(tau[second] - tau[first], TURN)
-    near = gap < 2.5 * TURN / POSITIONS_OF_A_BRANCH
+    gap = np.remainder(tau[second] - tau[first], curve.period)
+    near = gap < 2.5 * curve.period / curve.positions
     first = first[near]
     second = second[near]
     gap = gap[near]
@@ -457,28 +456,22 @@ def _list_ranges(
 
         tau = np.concatenate(
             [
-                (np.arange(POSITIONS_OF_A_BRANCH) + 0.5)
-                * (TURN / POSITIONS_OF_A_BRANCH),
+                (np.arange(curve.positions) + 0.5) * (curve.period / curve.positions),
                 own_tau[own_row == row],
             ]
         )
         order = np.argsort(tau)
         tau, inside = (
             tau[order],
-            (there(tau) | (np.arange(len(tau)) >= POSITIONS_OF_A_BRANCH))[order],
+            (there(tau) | (np.arange(len(tau)) >= curve.positions))[order],
         )
         if inside.all():
-            first, last = curve.point(
-                np.array([0.0, math.nextafter(TURN, 0.0)]), branch
-            )
+            first = curve.place(curve.point(np.zeros(1), branch)[0])
+            last = first
+            if curve.full:
+                last = first._replace(theta_2=first.theta_2 + curve.period)
             ranges.append(
-                _CircuitRange(
-                    (curve.place(first), curve.place(last)),
-                    row,
-                    0.0,
-                    TURN,
-                    POSITIONS_OF_A_BRANCH,
-                )
+                _CircuitRange((first, last), row, 0.0, curve.period, curve.positions)
             )
             continue
         starts, stops = (
@@ -487,12 +480,10 @@ def _list_ranges(
         if len(starts) and stops[0] < starts[0]:
             stops = np.roll(stops, -1)
         following = tau[(stops + 1) % len(tau)]
-        begin = _find_edge(
-            there, tau[starts], np.remainder(tau[starts] - tau[starts - 1], TURN), -1.0
-        )
-        end = _find_edge(
-            there, tau[stops], np.remainder(following - tau[stops], TURN), 1.0
-        )
+        before = np.remainder(tau[starts] - tau[starts - 1], curve.period)
+        after = np.remainder(following - tau[stops], curve.period)
+        begin = _find_edge(there, tau[starts], -before) % curve.period
+        end = _find_edge(there, tau[stops], after) % curve.period
         for low, high, count in zip(
             begin,
             end,
@@ -504,12 +495,12 @@ def _list_ranges(
                 for point in curve.point(np.array([low, high]), branch)
             )
             if curve.full and stop.theta_2 < one.theta_2:
-                stop = stop._replace(theta_2=stop.theta_2 + TURN)
+                stop = stop._replace(theta_2=stop.theta_2 + curve.period)
             if not curve.full and one.branch == stop.branch == -1:
                 ends = (stop, one)
             else:
                 ends = (one, stop)
-            width = float(np.remainder(high - low, TURN))
+            width = float(np.remainder(high - low, curve.period))
             ranges.append(_CircuitRange(ends, row, low, width, int(count)))
     return ranges
 
@@ -517,9 +508,8 @@ def _list_ranges(
 def _is_inside(curve: CircuitCurve, point: Array, part: _CircuitRange) -> bool:
     """Return True if a point lies in a range."""
     tau, row = curve.tau(point[None])
-    return bool(
-        row[0] == part.row and np.remainder(tau[0] - part.low, TURN) <= part.width
-    )
+    beyond = np.remainder(tau[0] - part.low, curve.period)
+    return bool(row[0] == part.row and beyond <= part.width)
 
 
 def _is_reached(curve: CircuitCurve, part: _CircuitRange) -> bool:
@@ -533,14 +523,13 @@ def _find_edge(
     held: Callable[[Array], NDArray[np.bool_]],
     tau: Array,
     gap: Array,
-    sense: float,
 ) -> Array:
     """Find where a range ends between a place that is held and a free one.
 
-    The places are neighbours.
+    The places are neighbours; `gap` leads from the first to the second.
     """
-    inside, _ = bisect(lambda away: held(tau + sense * away), np.zeros(tau.shape), gap)
-    return np.asarray(np.remainder(tau + sense * inside, TURN))
+    inside, _ = bisect(lambda away: held(tau + away), np.zeros(tau.shape), gap)
+    return tau + inside
 
 
 def bisect(

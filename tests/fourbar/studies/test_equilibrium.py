@@ -40,6 +40,7 @@ from tests.support.scenes import CYLINDER, crank_rocker
 from tests.validation.run.derived.test_derived import failing, rows_of
 
 MODELS = Path(__file__).parents[3] / "models"
+TURN = 2.0 * math.pi
 M, R, INERTIA = 1.5, 0.04, 0.002
 DOWN = Gravity()
 CLOSE = 1e-12
@@ -355,6 +356,75 @@ def test_beside_a_change_point_nothing_is_taken_for_a_rest(
         )
         stabilities = sorted(rest.stability for rest in equilibria.found)
         assert stabilities == ["stable"] * 2 + ["unstable"] * 2
+
+
+ONE_CHANGE_POINT = [
+    (1.0, 1.0, 2.0, 2.0),  # folded at theta_1: both kites, and a = d, b = c
+    (2.0, 1.0, 2.5, 1.5),  # folded, of four lengths
+    (1.5, 1.0, 1.25, 1.25),  # stretched at theta_1 + 180 deg
+    (2.0, 0.5, 1.25, 1.25),
+]
+"""Ground, input, coupler and output: the input turns fully, past one change point."""
+FULL = Sweep(0.0, 4.0 * math.pi, 360)
+HALF = Sweep(math.radians(30.0), math.radians(390.0), 180)
+BACK = Sweep(math.radians(500.0), math.radians(-100.0), 300)
+
+
+@pytest.mark.parametrize("motion", [None, FULL, HALF, BACK])
+@pytest.mark.parametrize("branch", [1, -1])
+@pytest.mark.parametrize("lengths", ONE_CHANGE_POINT)
+def test_past_one_change_point_the_angle_is_that_of_the_scenes_assembly(
+    lengths: tuple[float, ...], branch: int, motion: Sweep | None
+) -> None:
+    """An assembly repeats after two turns of the input.
+
+    The scene needs no torque at any angle that is found, and changes the sign of its
+    torque at no others.
+    """
+    d, a, b, c = lengths
+    bars = Bar(a, 10.0), Bar(b, 20.0), Bar(c, 20.0)
+    load = Load(4, force=(0.0, 200.0), from_pin=(c, 0.0))
+    scene = Scene(
+        FourBar(d, *bars, 0.5 * math.pi),
+        Motion(theta_2=motion, omega_2=0.0, alpha_2=0.0, branch=branch),
+        loads=(load,),
+        effects=(Gravity(9.81, 0.1),),
+    )
+    equilibria = equilibrium(scene)
+    angles = np.array([rest.place.theta_2 for rest in equilibria.found])
+    assert all(rest.reached for rest in equilibria.found)
+    swept = FULL if motion is None else motion
+    grid = np.linspace(swept.start, swept.stop, 3000)
+
+    def solve_at(angles: np.ndarray) -> np.ndarray:
+        at = Motion(theta_2=angles, omega_2=0.0, alpha_2=0.0, branch=branch)
+        torque = fourbar.solve(replace(scene, motion=at)).torque
+        assert torque is not None
+        return torque
+
+    torque, torques = solve_at(angles), solve_at(grid)
+    largest = np.nanmax(np.abs(torques))
+    assert np.abs(torque).max() < 1e-9 * largest
+    assert (np.diff(angles) > 0.0).all()
+    signs = np.sign(torques[np.abs(torques) > 1e-9 * largest])
+    assert len(angles) == np.sum(signs[1:] != signs[:-1]) > 0
+
+
+def test_friction_holds_on_past_the_one_change_point() -> None:
+    """Bars in line hold on both sides of it, in one range of the assembly."""
+    linkage = FourBar(1.0, Bar(1.0, 10.0), Bar(2.0, 20.0), Bar(2.0, 20.0))
+    scene = Scene(linkage, Motion(), effects=(DOWN, Friction.at(O2=40.0, O4=40.0)))
+    held = equilibrium(scene).held
+    assert any(first.theta_2 < TURN < last.theta_2 for first, last in held)
+    for first, last in held:
+        angles = np.linspace(first.theta_2, last.theta_2, 101)[1:-1]
+        at = Motion(theta_2=angles, omega_2=0.0, alpha_2=0.0)
+        at_rest = fourbar.solve(replace(scene, motion=at))
+        low, high = at_rest.torque_low, at_rest.torque_high
+        assert low is not None and high is not None
+        solved = np.isfinite(low)
+        assert solved.sum() >= len(angles) - 1
+        assert (low[solved] <= 0.0).all() and (high[solved] >= 0.0).all()
 
 
 def test_a_balanced_linkage_is_indifferent_over_its_sweep_as_it_is_stated() -> None:
