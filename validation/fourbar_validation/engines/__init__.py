@@ -1,4 +1,4 @@
-"""Adapt each engine in a module of its own.
+"""Adapters of the harness's engines, each in a module of its own.
 
-An engine is imported here and nowhere else.
+The library of an engine is imported by its adapter alone.
 """

@@ -38,27 +38,27 @@ def _set_gravity(effect: "Gravity", bars: Loaded) -> None:
     bars.gravity(find_field(effect))
 
 
-def _spin_at_pin(bars: Loaded, pin: str) -> float:
-    """Return how much faster the first bar of a pin spins than the second, rad/s."""
-    one, second = PINS[pin]
-    return bars.velocity(one) - bars.velocity(second)
+def _find_slip(bars: Loaded, pin: str) -> float:
+    """Return omega_j - omega_i of the bars i, j that meet at a pin, rad/s."""
+    i, j = PINS[pin]
+    return bars.velocity(j) - bars.velocity(i)
 
 
-def _apply_twist(
+def _apply_pin_couple(
     bars: Loaded,
     pin: str,
     couple: float,
 ) -> None:
-    """Apply a couple to the second bar of a pin, and its opposite to the first."""
-    one, second = PINS[pin]
-    bars.couple(second, couple)
-    bars.couple(one, -couple)
+    """Apply a couple to bar j of a pin (i, j), and its opposite to bar i."""
+    i, j = PINS[pin]
+    bars.couple(j, couple)
+    bars.couple(i, -couple)
 
 
 def _apply_viscous(effect: "Viscous", bars: Loaded) -> None:
-    """Apply couples in proportion to the spin."""
+    """Apply couples against the slip, in proportion to it."""
     for pin, k in effect.coefficients:
-        _apply_twist(bars, pin, k * _spin_at_pin(bars, pin))
+        _apply_pin_couple(bars, pin, -k * _find_slip(bars, pin))
 
 
 def _apply_friction(effect: "Friction", bars: Loaded) -> None:
@@ -67,7 +67,7 @@ def _apply_friction(effect: "Friction", bars: Loaded) -> None:
     MuJoCo's own frictionloss is a soft constraint.
     """
     for pin, f in effect.torques:
-        _apply_twist(bars, pin, f * float(np.sign(_spin_at_pin(bars, pin))))
+        _apply_pin_couple(bars, pin, -f * float(np.sign(_find_slip(bars, pin))))
 
 
 def _pin_friction(effect: "PinFriction", bars: Loaded) -> None:
@@ -76,22 +76,17 @@ def _pin_friction(effect: "PinFriction", bars: Loaded) -> None:
     The engine computed the load in its last pass.
     """
     for pin, mu, r in effect.pins:
-        _apply_twist(
-            bars,
-            pin,
-            mu
-            * r
-            * bars.pin_loads.get(pin, 0.0)
-            * float(np.sign(_spin_at_pin(bars, pin))),
-        )
+        greatest = mu * r * bars.pin_loads.get(pin, 0.0)
+        sense = float(np.sign(_find_slip(bars, pin)))
+        _apply_pin_couple(bars, pin, -greatest * sense)
 
 
 def _apply_torsion(effect: "Torsion", bars: Loaded) -> None:
     """Apply couples from the engine's own angles of the two bars."""
     for pin, k, rest, preload in effect.springs:
-        one, second = PINS[pin]
-        twist = math.remainder(bars.angle(one) - bars.angle(second) + rest, math.tau)
-        _apply_twist(bars, pin, k * twist - preload)
+        i, j = PINS[pin]
+        turned = math.remainder(bars.angle(j) - bars.angle(i) - rest, math.tau)
+        _apply_pin_couple(bars, pin, -(preload + k * turned))
 
 
 def _apply_springs(effect: "Springs", bars: Loaded) -> None:
