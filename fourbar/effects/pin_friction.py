@@ -13,7 +13,7 @@ to exist.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
@@ -30,6 +30,8 @@ from fourbar.quantities import JAMMED, OK, SEVERAL, Array
 
 ONE_SOLUTION, NO_SOLUTION, MANY = range(3)
 """Number of solutions of the friction equations."""
+STATUS_OF_NUMBER = np.array([OK, JAMMED, SEVERAL], dtype=np.uint8)
+"""Status of a position by the number of solutions."""
 ROUNDING_OF_X = 32.0 * 2.0**-52
 """Change of x, relative, that is the rounding of its evaluation."""
 CONTRACTION_STEPS = 200
@@ -112,109 +114,117 @@ class PinFriction(PinRows):
 
         The pin forces are F_p = F0_p + sum over q of C_pq x_q.
         """
-        names, arms = self.loaded_pins, {pin: mu * r for pin, mu, r in self.pins}
-        senses, per_unit = (
-            {pin: actions.sense(pin) for pin in names},
-            self.per_unit(actions, eliminate),
-        )
+        loaded_pins = self.loaded_pins
+        arms = {pin: mu * r for pin, mu, r in self.pins if pin in loaded_pins}
+        senses = {pin: actions.sense(pin) for pin in loaded_pins}
+        per_unit = self.per_unit(actions, eliminate)
         shape = np.shape(pins.F12)
 
-        def column(force: Any) -> Any:
-            """Return the components of a force over all positions, (n, 2)."""
-            flat = np.broadcast_to(take_doubles(force), shape).ravel()
-            return np.stack([flat.real, flat.imag], axis=-1)
-
-        k = np.stack(
-            [np.broadcast_to(take_doubles(arms[pin]), shape).ravel() for pin in names],
-            axis=1,
-        )
-        F = np.stack([column(getattr(pins, PIN_FORCE[pin])) for pin in names], axis=1)
+        F = _stack_forces(pins, arms, shape)
         C = np.stack(
-            [
-                np.stack(
-                    [column(getattr(per_unit[q], PIN_FORCE[pin])) for q in names],
-                    axis=1,
-                )
-                for pin in names
-            ],
-            axis=1,
+            [_stack_forces(per_unit[pin], arms, shape) for pin in arms],
+            axis=2,
         )
+        k = np.stack([_flatten(arm, shape) for arm in arms.values()], axis=1)
         sliding = solve_sliding(F, C, k)
-        couples = {
-            pin: make_like(sliding.x[:, p].reshape(shape), pins.F12.real)
-            for p, pin in enumerate(names)
-        }
-        couples = self._refine(couples, pins, per_unit)
+
+        couples = {}
+        for column, pin in enumerate(arms):
+            couple = sliding.x[:, column].reshape(shape)
+            couples[pin] = make_like(couple, pins.F12.real)
+        couples = _refine(couples, arms, pins, per_unit)
         for pin, couple in couples.items():
             actions.pin_couple(pin, -senses[pin] * couple)
+
         loaded = eliminate(actions)
-        residuals = [
-            np.abs(
-                take_doubles(
-                    couple - arms[pin] * np.abs(getattr(loaded, PIN_FORCE[pin]))
-                )
-            )
-            for pin, couple in couples.items()
-        ]
-        status = np.where(
-            sliding.number == ONE_SOLUTION,
-            OK,
-            np.where(sliding.number == NO_SOLUTION, JAMMED, SEVERAL),
-        ).astype(np.uint8)
+        residuals = []
+        for pin, couple in couples.items():
+            force = getattr(loaded, PIN_FORCE[pin])
+            residual = couple - arms[pin] * np.abs(force)
+            residuals.append(np.abs(take_doubles(residual)))
         return SolvedFriction(
             loaded,
             sliding.from_jamming.reshape(shape),
             np.max(residuals, axis=0),
-            status.reshape(shape),
+            STATUS_OF_NUMBER[sliding.number].reshape(shape),
         )
-
-    def _refine(
-        self,
-        couples: dict[str, Any],
-        pins: PinForces,
-        per_unit: dict[str, PinForces],
-    ) -> dict[str, Any]:
-        """Take Newton's steps from couples in doubles.
-
-        The numbers are of the kind that the forces are.
-
-        (1 - J) dx = mu r |F + C x| - x, J the slope of the right-hand side by x: of
-        numbers that carry their derivatives the same steps are the theorem of the
-        implicit function.
-        """
-        names = list(couples)
-        arms = {pin: mu * r for pin, mu, r in self.pins}
-        for _ in range(2):
-            gaps = []
-            slopes = []
-            for pin in names:
-                by = [getattr(per_unit[q], PIN_FORCE[pin]) for q in names]
-                force = getattr(pins, PIN_FORCE[pin])
-                for c, couple in zip(by, couples.values(), strict=True):
-                    force = force + c * couple
-                gaps.append(arms[pin] * np.abs(force) - couples[pin])
-                along = take_doubles(force) / np.abs(take_doubles(force))
-                pulls = [
-                    take_doubles(arms[pin]) * (along.conjugate() * take_doubles(c)).real
-                    for c in by
-                ]
-                slopes.append(np.broadcast_arrays(*pulls, along.real)[:-1])
-            slope = np.moveaxis(np.array(slopes), (0, 1), (-2, -1))
-            matrix = np.eye(len(names), dtype=slope.dtype) - slope
-            usable = np.asarray(np.isfinite(matrix).all(axis=(-2, -1)))
-            usable[usable] = np.linalg.det(matrix[usable]) != 0.0
-            inverse = np.zeros_like(matrix)
-            inverse[usable] = np.linalg.inv(matrix[usable])
-            for row, pin in enumerate(names):
-                for column, gap in enumerate(gaps):
-                    couples[pin] = couples[pin] + inverse[..., row, column] * gap
-        return couples
 
     def act_known(self, actions: Actions, forces: Mapping[str, Array]) -> None:
         """Add the friction couples for pin forces that are known (name: (n, 2), N)."""
         for pin, mu, r in self.pins:
-            load = np.hypot(*np.asarray(forces[PIN_FORCE[pin]]).T)
-            actions.pin_couple(pin, -actions.sense(pin) * (mu * r * load))
+            force = np.asarray(forces[PIN_FORCE[pin]])
+            load = np.hypot(force[:, 0], force[:, 1])
+            couple = mu * r * load
+            actions.pin_couple(pin, -actions.sense(pin) * couple)
+
+
+def _flatten(number: Any, shape: tuple[int, ...]) -> Any:
+    """Return the doubles of a number over all positions, (n,)."""
+    return np.broadcast_to(take_doubles(number), shape).ravel()
+
+
+def _stack_forces(
+    forces: PinForces,
+    pins: Iterable[str],
+    shape: tuple[int, ...],
+) -> Array:
+    """Return the components of pin forces over all positions, (n, p, 2)."""
+    columns = []
+    for pin in pins:
+        flat = _flatten(getattr(forces, PIN_FORCE[pin]), shape)
+        columns.append(np.stack([flat.real, flat.imag], axis=-1))
+    return np.stack(columns, axis=1)
+
+
+def _refine(
+    couples: dict[str, Any],
+    arms: dict[str, Any],
+    pins: PinForces,
+    per_unit: dict[str, PinForces],
+) -> dict[str, Any]:
+    """Take Newton's steps from couples in doubles.
+
+    The numbers are of the kind that the forces are.
+
+    (1 - J) dx = mu r |F + C x| - x, J the slope of the right-hand side by x: of
+    numbers that carry their derivatives the same steps are the theorem of the
+    implicit function.
+    """
+    for _ in range(2):
+        gaps = []
+        slopes = []
+        for pin, arm in arms.items():
+            name = PIN_FORCE[pin]
+            force = getattr(pins, name)
+            for other, couple in couples.items():
+                force = force + getattr(per_unit[other], name) * couple
+            gaps.append(arm * np.abs(force) - couples[pin])
+
+            doubles = take_doubles(force)
+            direction = doubles / np.abs(doubles)
+            row = []
+            for forces in per_unit.values():
+                pull = take_doubles(getattr(forces, name))
+                along = (direction.conjugate() * pull).real
+                row.append(take_doubles(arm) * along)
+            slopes.append(np.broadcast_arrays(*row, direction.real)[:-1])
+
+        slope = np.moveaxis(np.array(slopes), (0, 1), (-2, -1))
+        matrix = np.eye(len(arms), dtype=slope.dtype) - slope
+        regular = _find_regular(matrix)
+        inverse = np.zeros_like(matrix)
+        inverse[regular] = np.linalg.inv(matrix[regular])
+        for row_index, pin in enumerate(arms):
+            for column, gap in enumerate(gaps):
+                couples[pin] = couples[pin] + inverse[..., row_index, column] * gap
+    return couples
+
+
+def _find_regular(matrix: Array) -> NDArray[np.bool_]:
+    """Mark the matrices that are finite and can be inverted."""
+    regular = np.asarray(np.isfinite(matrix).all(axis=(-2, -1)))
+    regular[regular] = np.linalg.det(matrix[regular]) != 0.0
+    return regular
 
 
 class _Sliding(NamedTuple):
@@ -233,96 +243,131 @@ def solve_sliding(F: Array, C: Array, k: Array) -> _Sliding:
 
     F (n, p, 2) is in N, C (n, p, p, 2) in 1/m, k (n, p) in m.
     """
-    n, p = F.shape[:2]
     finite = np.isfinite(F).all(axis=(1, 2)) & np.isfinite(C).all(axis=(1, 2, 3))
-    x = np.full((n, p), np.nan)
-    count = np.full(n, ONE_SOLUTION, dtype=np.uint8)
-    if p == 1:
+    if k.shape[1] == 1:
         with np.errstate(invalid="ignore", divide="ignore"):
-            x[:, 0], counted = _solve_quadratic(F[:, 0], C[:, 0, 0], k[:, 0])
-        count[finite] = counted[finite]
+            single, number = _solve_quadratic(F[:, 0], C[:, 0, 0], k[:, 0])
+        x = single[:, None]
+        number[~finite] = ONE_SOLUTION
     else:
-        K = k[:, :, None] * np.hypot(C[..., 0], C[..., 1])
-        radius = np.full(n, np.nan)
-        radius[finite] = np.abs(np.linalg.eigvals(K[finite])).max(axis=1)
-        sure = np.flatnonzero(finite & (radius < 1.0))
-        x[sure] = _iterate(F[sure], C[sure], k[sure], np.zeros((len(sure), p)))
-        unsure = np.flatnonzero(finite & ~(radius < 1.0))
-        for start in range(0, len(unsure), LEAST_SEARCHED):
-            some = unsure[start : start + LEAST_SEARCHED]
-            numbers = np.concatenate(
-                [
-                    array[some].reshape(len(some), math.prod(array.shape[1:]))
-                    for array in (F, C, k)
-                ],
-                axis=1,
-            )
-            _, first, same = np.unique(
-                numbers,
-                axis=0,
-                return_index=True,
-                return_inverse=True,
-            )
-            first = some[first]
-            x[some], count[some] = (
-                array[same.ravel()] for array in _search(F[first], C[first], k[first])
-            )
+        x, number = _solve_coupled(F, C, k, finite)
     with np.errstate(invalid="ignore"):
         for _ in range(2):  # removes the rounding of the search and of the quadratic
             right, slope = _compute_right_side(F, C, k, x)
             x = x + _compute_step(right - x, slope)
         _, slope = _compute_right_side(F, C, k, x)
-    matrix = np.eye(p) - slope
-    far = np.ones(n)
-    usable = np.isfinite(matrix).all(axis=(1, 2))
-    far[usable] = np.minimum(
-        np.linalg.svd(matrix[usable], compute_uv=False)[:, -1], 1.0
+    return _Sliding(x, number, _find_least_stretch(slope))
+
+
+def _find_least_stretch(slope: Array) -> Array:
+    """Return the least singular value of 1 - slope, at most 1, (n,)."""
+    matrix = np.eye(slope.shape[1]) - slope
+    finite = np.isfinite(matrix).all(axis=(1, 2))
+    singular_values = np.linalg.svd(matrix[finite], compute_uv=False)
+    least = np.ones(len(slope))
+    least[finite] = np.minimum(singular_values[:, -1], 1.0)
+    return least
+
+
+def _solve_coupled(
+    F: Array,
+    C: Array,
+    k: Array,
+    finite: NDArray[np.bool_],
+) -> tuple[Array, NDArray[np.uint8]]:
+    """Solve problems of several pins: the least solution, and how many there are."""
+    n, p = k.shape
+    x = np.full((n, p), np.nan)
+    number = np.full(n, ONE_SOLUTION, dtype=np.uint8)
+    K = k[:, :, None] * np.hypot(C[..., 0], C[..., 1])
+    eigenvalues = np.linalg.eigvals(K[finite])
+    radius = np.full(n, np.nan)
+    radius[finite] = np.abs(eigenvalues).max(axis=1)
+
+    contracts = np.flatnonzero(finite & (radius < 1.0))
+    zeros = np.zeros((len(contracts), p))
+    x[contracts] = _iterate(F[contracts], C[contracts], k[contracts], zeros)
+
+    searched = np.flatnonzero(finite & ~(radius < 1.0))
+    for start in range(0, len(searched), LEAST_SEARCHED):
+        block = searched[start : start + LEAST_SEARCHED]
+        first, same = _find_equal_problems(F[block], C[block], k[block])
+        first = block[first]
+        solutions, numbers = _search(F[first], C[first], k[first])
+        x[block] = solutions[same]
+        number[block] = numbers[same]
+    return x, number
+
+
+def _find_equal_problems(
+    F: Array,
+    C: Array,
+    k: Array,
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the first of each group of equal problems, and the group of each one."""
+    flat = [array.reshape(len(k), math.prod(array.shape[1:])) for array in (F, C, k)]
+    _, first, group = np.unique(
+        np.concatenate(flat, axis=1),
+        axis=0,
+        return_index=True,
+        return_inverse=True,
     )
-    return _Sliding(x, count, far)
+    return first, group.ravel()
 
 
 def _solve_quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
     """Solve (k^2 |C|^2 - 1) x^2 + 2 k^2 F.C x + k^2 |F|^2 = 0."""
-    c2 = k * np.hypot(C[:, 0], C[:, 1])
-    a = (c2 - 1.0) * (c2 + 1.0)
-    b = k * k * (F[:, 0] * C[:, 0] + F[:, 1] * C[:, 1])
-    c = (k * k) * (F[:, 0] * F[:, 0] + F[:, 1] * F[:, 1])
+    Fx, Fy = F.T
+    Cx, Cy = C.T
+    kC = k * np.hypot(Cx, Cy)
+    k2 = k * k
+    a = (kC - 1.0) * (kC + 1.0)
+    b = k2 * (Fx * Cx + Fy * Cy)
+    c = k2 * (Fx * Fx + Fy * Fy)
     # b^2 - a c written as k^2 |F|^2 - k^4 (F x C)^2, which cancels only near jamming
-    turned = k * k * (F[:, 0] * C[:, 1] - F[:, 1] * C[:, 0])
-    under = c - turned * turned
-    root = np.sqrt(under)
+    cross = k2 * (Fx * Cy - Fy * Cx)
+    discriminant = c - cross * cross
+    root = np.sqrt(discriminant)
     q = -(b + np.where(b < 0.0, -root, root))
     first = np.where(a == 0.0, np.inf, q / a)
     second = np.where(q == 0.0, 0.0, c / q)
     low = np.fmin(first, second)
     high = np.fmax(first, second)
     x = np.where(a < 0.0, high, low)
-    count = np.full(len(x), ONE_SOLUTION, dtype=np.uint8)
-    count[~(a < 0.0) & ((under < 0.0) | (b >= 0.0)) & (c > 0.0)] = NO_SOLUTION
-    count[(a > 0.0) & (under > 0.0) & (b < 0.0)] = MANY
+
+    number = np.full(len(x), ONE_SOLUTION, dtype=np.uint8)
+    without_root = (discriminant < 0.0) | (b >= 0.0)
+    number[~(a < 0.0) & without_root & (c > 0.0)] = NO_SOLUTION
+    number[(a > 0.0) & (discriminant > 0.0) & (b < 0.0)] = MANY
     x = np.where(c == 0.0, 0.0, x)
-    x[count == NO_SOLUTION] = np.nan
-    return x, count
+    x[number == NO_SOLUTION] = np.nan
+    return x, number
 
 
 def _compute_right_side(F: Array, C: Array, k: Array, x: Array) -> tuple[Array, Array]:
     """Compute k |F + C x| and its derivative, (n, p) and (n, p, p)."""
     force = F + np.einsum("npqi,nq->npi", C, x)
     size = np.hypot(force[..., 0], force[..., 1])
-    unit = force / np.where(size == 0.0, 1.0, size)[..., None]
-    return k * size, k[..., None] * np.einsum("npi,npqi->npq", unit, C)
+    divisor = np.where(size == 0.0, 1.0, size)
+    direction = force / divisor[..., None]
+    slope = np.einsum("npi,npqi->npq", direction, C)
+    return k * size, k[..., None] * slope
 
 
 def _compute_step(gap: Array, slope: Array) -> Array:
     """Solve (1 - slope) step = gap, zero where that cannot be solved, (n, p)."""
     matrix = np.eye(gap.shape[1]) - slope
-    usable = np.asarray(
-        np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(gap).all(axis=1)
-    )
-    usable[usable] = np.linalg.det(matrix[usable]) != 0.0
+    regular = _find_regular(matrix) & np.isfinite(gap).all(axis=1)
+    columns = gap[regular][..., None]
     step = np.zeros_like(gap)
-    step[usable] = np.linalg.solve(matrix[usable], gap[usable][..., None])[..., 0]
+    step[regular] = np.linalg.solve(matrix[regular], columns)[..., 0]
     return step
+
+
+def _compute_gap(F: Array, C: Array, k: Array, x: Array) -> Array:
+    """Return by how much couples miss the equations, the largest of each problem."""
+    right, _ = _compute_right_side(F, C, k, x)
+    return np.asarray(np.abs(right - x).max(axis=1))
 
 
 def _iterate(F: Array, C: Array, k: Array, x: Array) -> Array:
@@ -331,75 +376,88 @@ def _iterate(F: Array, C: Array, k: Array, x: Array) -> Array:
     for _ in range(CONTRACTION_STEPS):
         right, slope = _compute_right_side(F, C, k, x)
         newton = np.maximum(x + _compute_step(right - x, slope), 0.0)
-        plain_gap = np.abs(_compute_right_side(F, C, k, right)[0] - right).max(axis=1)
-        newton_gap = np.abs(_compute_right_side(F, C, k, newton)[0] - newton).max(
-            axis=1
-        )
+        plain_gap = _compute_gap(F, C, k, right)
+        newton_gap = _compute_gap(F, C, k, newton)
         new = np.where((newton_gap < plain_gap)[:, None], newton, right)
-        new = np.where(
-            done[:, None], x, new
-        )  # solved problems keep their digits while others go on
-        done |= np.abs(new - x).max(axis=1, initial=0.0) <= ROUNDING_OF_X * new.max(
-            axis=1,
-            initial=0.0,
-        )
+        # solved problems keep their digits while others go on
+        new = np.where(done[:, None], x, new)
+        change = np.abs(new - x).max(axis=1, initial=0.0)
+        done |= change <= ROUNDING_OF_X * new.max(axis=1, initial=0.0)
         x = new
         if done.all():
             break
     return x
 
 
-def _search(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.int_]]:
+def _search(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
     """Find the least solution of each problem, and how many there are.
 
     The starts cover many magnitudes.
     """
     n, p = k.shape
     size = np.max(k * np.hypot(F[..., 0], F[..., 1]), axis=1)
+    starts = _list_starts(p)
+    problem = np.repeat(np.arange(n), len(starts))
+    ends = _follow_newton(
+        F, C, k, problem, (size[:, None, None] * starts).reshape(-1, p)
+    )
+
+    gap = _compute_gap(F[problem], C[problem], k[problem], ends)
+    solves = gap <= 1e-9 * np.maximum(ends.max(axis=1), size[problem])
+    x = ends.reshape(n, -1, p)
+    solves = solves.reshape(n, -1)
+    sums = np.where(solves, x.sum(axis=2), np.inf)
+    least = x[np.arange(n), np.argmin(sums, axis=1)]
+
+    distance = np.abs(x - least[:, None]).max(axis=2)
+    larger = np.maximum(x.max(axis=2), least.max(axis=1)[:, None])
+    others = solves & (distance > SAME_SOLUTION * larger)
+    number = np.full(n, NO_SOLUTION, dtype=np.uint8)
+    number[solves.any(axis=1)] = ONE_SOLUTION
+    number[others.any(axis=1)] = MANY
+    least[number == NO_SOLUTION] = np.nan
+    return least, number
+
+
+def _list_starts(p: int) -> Array:
+    """List the starts of a search in p unknowns, over the size of the couples."""
+    generator = np.random.default_rng(0)
     directions = np.vstack(
         [
             np.ones(p),
             np.eye(p) + 0.01,
-            np.random.default_rng(0).uniform(0.0, 1.0, (SEARCH_STARTS // p, p)),
+            generator.uniform(0.0, 1.0, (SEARCH_STARTS // p, p)),
         ]
     )
-    starts = np.vstack(
-        [
-            np.zeros((1, p)),
-            (np.logspace(-2, 3, 11)[:, None, None] * directions).reshape(-1, p),
-        ]
-    )
-    x = (size[:, None, None] * starts).reshape(-1, p)
-    problem = np.repeat(np.arange(n), len(starts))
+    magnitudes = np.logspace(-2, 3, 11)
+    scaled = magnitudes[:, None, None] * directions
+    return np.vstack([np.zeros((1, p)), scaled.reshape(-1, p)])
+
+
+def _follow_newton(
+    F: Array,
+    C: Array,
+    k: Array,
+    problem: NDArray[np.intp],
+    x: Array,
+) -> Array:
+    """Take Newton's steps from many starts until they stand still or alternate.
+
+    `problem` is the index of the problem of each start.
+    """
+    size = np.max(k * np.hypot(F[..., 0], F[..., 1]), axis=1)
     moving = np.arange(len(x))
     before = np.full_like(x, np.inf)
     for _ in range(60):
         members = problem[moving]
         last = x[moving]
         right, slope = _compute_right_side(F[members], C[members], k[members], last)
-        new = np.clip(
-            last + _compute_step(right - last, slope), 0.0, 1e12 * size[members, None]
-        )
-        least_change = np.minimum(
-            np.abs(new - last).max(axis=1), np.abs(new - before[moving]).max(axis=1)
-        )
-        x[moving], before[moving] = new, last
-        moving = moving[
-            least_change > SETTLED_START * new.max(axis=1)
-        ]  # the others stand still or alternate
-    right, _ = _compute_right_side(F[problem], C[problem], k[problem], x)
-    solves = np.abs(right - x).max(axis=1) <= 1e-9 * np.maximum(
-        x.max(axis=1), size[problem]
-    )
-    x = x.reshape(n, -1, p)
-    solves = solves.reshape(n, -1)
-    least = x[np.arange(n), np.argmin(np.where(solves, x.sum(axis=2), np.inf), axis=1)]
-    apart = np.abs(x - least[:, None]).max(axis=2) > SAME_SOLUTION * np.maximum(
-        x.max(axis=2), least.max(axis=1)[:, None]
-    )
-    count = np.where(
-        (solves & apart).any(axis=1),
-        MANY,
-        np.where(solves.any(axis=1), ONE_SOLUTION, NO_SOLUTION),
-    )
-    return np.where(count[:, None] == NO_SOLUTION, np.nan, least), count
+        new = last + _compute_step(right - last, slope)
+        new = np.clip(new, 0.0, 1e12 * size[members, None])
+        change = np.abs(new - last).max(axis=1)
+        change_over_two = np.abs(new - before[moving]).max(axis=1)
+        least_change = np.minimum(change, change_over_two)
+        before[moving] = last
+        x[moving] = new
+        moving = moving[least_change > SETTLED_START * new.max(axis=1)]
+    return x
