@@ -132,7 +132,9 @@ def expect(name: str, value: object, *kinds: type) -> None:
     if not isinstance(value, kinds):
         wanted = " or ".join(kind.__name__ for kind in kinds)
         raise InputError(
-            name, value, f"must be of type {wanted}, not {type(value).__name__}"
+            name,
+            value,
+            f"must be of type {wanted}, not {type(value).__name__}",
         )
 
 
@@ -208,9 +210,8 @@ def run(
     )
     sys.stdout, sys.stderr = streams
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(
-            errors="replace"
-        )  # a terminal that has no Greek still gets its table
+        # a terminal that has no Greek still gets its table
+        sys.stdout.reconfigure(errors="replace")
     try:
         returned = group.main(args=words, prog_name=program, standalone_mode=False)
         status = HOLDS if returned is None else int(returned)
@@ -228,12 +229,12 @@ def run(
         return _print_error(str(error), BAD_INPUT)
     except ModuleNotFoundError as error:
         return _print_error(
-            f"{error.name} is not installed: {say_install(extra)}", BROKEN
+            f"{error.name} is not installed: {say_install(extra)}",
+            BROKEN,
         )
     except OSError as error:
-        file = (
-            error.filename2 or error.filename or "output"
-        )  # of a file that is put in place the second is its place
+        # where a file is put in place, the second name is that of the place
+        file = error.filename2 or error.filename or "output"
         return _print_error(f"{file}: {error.strerror or error}", BROKEN)
     except Exception as error:
         if "--traceback" in words or os.environ.get("FOURBAR_TRACEBACK"):
@@ -285,9 +286,9 @@ def _flush() -> None:
     try:
         sys.stdout.flush()
     except BrokenPipeError:
-        os.dup2(
-            os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno()
-        )  # or the interpreter reports it at its end
+        # otherwise the interpreter reports the broken pipe when it ends
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
 
 
 def _print_error(message: str, status: int) -> int:

@@ -277,19 +277,25 @@ class Bar:
         check_numbers(self, "")
         if self.section is not None and self.diameter is not None:
             raise InputError(
-                "diameter", self.diameter, "must be left out beside a section"
+                "diameter",
+                self.diameter,
+                "must be left out beside a section",
             )
         if self.density is None:
             return
         if self.area is None:
             raise InputError(
-                "density", self.density, "needs the cross-section: section or diameter"
+                "density",
+                self.density,
+                "needs the cross-section: section or diameter",
             )
         stated = self.mass
         object.__setattr__(self, "mass", self.weigh())
         if stated not in (0.0, self.mass):
             raise InputError(
-                "mass", stated, "must be left out: density and cross-section state it"
+                "mass",
+                stated,
+                "must be left out: density and cross-section state it",
             )
 
     @property

@@ -233,7 +233,9 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
         if decimal not in (".", ","):
             raise InputError("decimal", decimal, 'must be "." or ","')
         text = write_csv(
-            self, {**require_units(units), **(DEGREES if degrees else SI)}, decimal
+            self,
+            {**require_units(units), **(DEGREES if degrees else SI)},
+            decimal,
         )
         if path is None:
             return text
@@ -597,7 +599,9 @@ def unwrap(angles: Array) -> None:
     rows = angles.reshape(-1, angles.shape[-1])
     finite = ~np.isnan(rows)
     place = np.where(
-        finite, np.arange(rows.shape[1]), np.argmax(finite, axis=1)[:, None]
+        finite,
+        np.arange(rows.shape[1]),
+        np.argmax(finite, axis=1)[:, None],
     )
     raw = np.take_along_axis(rows, np.maximum.accumulate(place, axis=1), axis=1)
     jumps = np.diff(raw, axis=1, prepend=raw[:, :1])

@@ -267,7 +267,11 @@ def _solve_released(
     for index, commanded, side in independent.commands():
         case = Case.of_released(scene, commanded.bar, side)
         evaluated = evaluate_released(
-            case, commanded, scene.drive, request.last_stage, request.wanted
+            case,
+            commanded,
+            scene.drive,
+            request.last_stage,
+            request.wanted,
         )
         results.store(case, evaluated, (index,))
     return results
@@ -326,7 +330,9 @@ def _require_command_at(commanded: Command) -> None:
         if isinstance(value, np.ndarray):
             if value.shape not in ((), (n,)) or value.dtype.kind not in "iuf":
                 raise InputError(
-                    f"at.{name}", value, f"must be numbers, shape () or {(n,)}"
+                    f"at.{name}",
+                    value,
+                    f"must be numbers, shape () or {(n,)}",
                 )
         elif not isinstance(value, float) and not (
             value is None and name == "stroke_speed"
@@ -370,7 +376,9 @@ def find_requested(
             raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
         last_stage = STAGES.index(stage)
         wanted = _list_wanted(
-            last_stage, _list_absent(scene), tuple(point.name for point in scene.points)
+            last_stage,
+            _list_absent(scene),
+            tuple(point.name for point in scene.points),
         )
     else:
         expect("out", out, Mapping)
@@ -395,7 +403,9 @@ def find_requested(
             ):
                 allowed = f"must be float64 of shape {wanted_shape}, writeable"
                 raise InputError(
-                    f"out.{name}", (array.shape, str(array.dtype)), allowed
+                    f"out.{name}",
+                    (array.shape, str(array.dtype)),
+                    allowed,
                 )
         last_stage = max((STAGES.index(stages[name]) for name in out), default=0)
     if last_stage > 0 and commanded.speed is None:

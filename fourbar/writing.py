@@ -92,7 +92,9 @@ def read_text(path: str | Path, key: str, largest: int, *, pipes: bool = False) 
         return read_bytes(path, key, largest, pipes=pipes).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(
-            key, str(path), f"must be UTF-8 text; byte {error.start} is not"
+            key,
+            str(path),
+            f"must be UTF-8 text; byte {error.start} is not",
         ) from None
 
 
@@ -105,13 +107,10 @@ def name_file(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        both = (
-            error.filename,
-            error.filename2,
-        )  # a copy names what it reads first, whichever of the two is full
-        if error.filename is None or any(
-            str(name).endswith(_TEMPORARY) for name in both
-        ):
+        # a copy names the file that it reads first, whichever of the two is full
+        names = (str(error.filename), str(error.filename2))
+        is_temporary = any(name.endswith(_TEMPORARY) for name in names)
+        if error.filename is None or is_temporary:
             error.filename = str(path)
             error.filename2 = None
         raise
@@ -129,7 +128,9 @@ def require_file(target: Path, *read: Path) -> None:
         raise InputError("path", str(target), "must name a file, not a folder")
     if not target.parent.is_dir():
         raise InputError(
-            "path", str(target), f"there is no such folder: {target.parent}"
+            "path",
+            str(target),
+            f"there is no such folder: {target.parent}",
         )
     if any(
         target.exists() and file.exists() and target.samefile(file) for file in read

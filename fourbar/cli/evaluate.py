@@ -60,7 +60,8 @@ def classify_command(
         linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
     lines = write_type(linkage, units, everything=everything)
     given.print_to(
-        write_type_json(linkage) if as_json else "\n".join([*lines, ""]), out
+        write_type_json(linkage) if as_json else "\n".join([*lines, ""]),
+        out,
     )
 
 
@@ -113,7 +114,9 @@ def new(
     assert file is not None
     if file.exists():
         raise InputError(
-            "FILE", str(file), "file exists; give the new scene another name"
+            "FILE",
+            str(file),
+            "file exists; give the new scene another name",
         )
     if lengths is not None:
         texts = [_add_unit("--lengths", text, unit) for text in lengths]
@@ -437,7 +440,8 @@ def _print_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
     if not derivatives.solution.assembled.any():
         raise _assembles_nowhere(scene, stated)
     given.print_to(
-        (write_sensitivity_json if as_json else write_sensitivity)(derivatives), out
+        (write_sensitivity_json if as_json else write_sensitivity)(derivatives),
+        out,
     )
 
 

@@ -84,7 +84,9 @@ def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:
     ) -> Path | None:
         if out is not None and out.suffix and out.suffix.lower() not in endings:
             raise InputError(
-                "path", str(out), f"must end in {', '.join(endings)}, or have no ending"
+                "path",
+                str(out),
+                f"must end in {', '.join(endings)}, or have no ending",
             )
         return out
 
@@ -219,7 +221,9 @@ def read_position(scene: Scene, text: str) -> tuple[str, float]:
     value = value.strip()
     if is_bare(value):  # it may have been meant in any unit
         raise InputError(
-            "--at", text, f'the unit is missing; did you mean "{value} {likely}"?'
+            "--at",
+            text,
+            f'the unit is missing; did you mean "{value} {likely}"?',
         )
     return name, read_number("--at", value, unit)
 

@@ -202,22 +202,21 @@ class SceneDocument:
             or isinstance(last, int)
         ):
             old = self.at(path)
-            if isinstance(
-                old, Table
-            ):  # a table of its own is written anew, with its heading
+            # a table of its own is written anew, with its heading
+            if isinstance(old, Table):
                 del holder[last]
                 old = None
-            own_table = len(path) == 1 and isinstance(
-                value, dict
-            )  # at the top of the file; anywhere else in one line
-            if own_table:
+            is_at_top = len(path) == 1
+            if is_at_top and isinstance(value, dict):
                 new = _make_toml_table(value)
             else:
                 new = _write_inline(value)
             holder[last] = new if old is None else _make_item_like(old, value)
         else:
             raise InputError(
-                name_entry(path), value, "has no table that it could stand in"
+                name_entry(path),
+                value,
+                "has no table that it could stand in",
             )
 
     def remove(self, path: KeyPath) -> None:

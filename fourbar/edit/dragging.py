@@ -207,7 +207,8 @@ def drag(
             force = to_si(size, unit) * dragged.stretch
             angle = cmath.phase(arrow) + (0.0 if force >= 0.0 else math.pi)
             document.put(
-                (*handle.force, 0), write_rounded(force, abs(force) / 50.0, unit)
+                (*handle.force, 0),
+                write_rounded(force, abs(force) / 50.0, unit),
             )
             document.put(
                 (*handle.force, 1),
@@ -228,7 +229,9 @@ def _drag_pin(
 ) -> None:
     if dragged.what not in DRAGGED_PINS:
         raise InputError(
-            "drag", dragged.what, "must be one of " + ", ".join(DRAGGED_PINS)
+            "drag",
+            dragged.what,
+            "must be one of " + ", ".join(DRAGGED_PINS),
         )
     lengths = {
         "A": {"input": "O2"},
@@ -240,7 +243,11 @@ def _drag_pin(
         document.put(
             key,
             _write_like(
-                document.at(key), abs(dragged.to - pins[pin]), dragged.grain, "m", "m"
+                document.at(key),
+                abs(dragged.to - pins[pin]),
+                dragged.grain,
+                "m",
+                "m",
             ),
         )
     if dragged.what == "O4":
@@ -267,7 +274,9 @@ def _drag_drawn_pin(
     """
     if dragged.what not in DRAGGED_PINS:
         raise InputError(
-            "drag", dragged.what, "must be one of " + ", ".join(DRAGGED_PINS)
+            "drag",
+            dragged.what,
+            "must be one of " + ", ".join(DRAGGED_PINS),
         )
     drawn = drawing.angle(2)
     if abs(math.remainder(dragged.theta_2 - drawn, 2.0 * math.pi)) > _SAME_ANGLE:
@@ -335,7 +344,9 @@ def put_place(
         size = abs(place)
         old_angle = document.at((*path, 1)) if before == "polar" else None
         angle = _write_dragged_angle(
-            old_angle, cmath.phase(place), grain / max(size, grain)
+            old_angle,
+            cmath.phase(place),
+            grain / max(size, grain),
         )
         parts = {0: _write_like(length, size, grain, "m", "m"), 1: angle}
         stated = list(parts.values())

@@ -240,7 +240,7 @@ class HarnessRun:
     @staticmethod
     async def _read(stream: asyncio.StreamReader, lines: list[str]) -> None:
         while line := await stream.readline():
-            if "\u2501" not in (
-                text := line.decode(errors="replace").rstrip()
-            ):  # no bars of progress
+            text = line.decode(errors="replace").rstrip()
+            is_progress_bar = "\u2501" in text
+            if not is_progress_bar:
                 lines.append(text)

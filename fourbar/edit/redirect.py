@@ -53,15 +53,15 @@ class Redirect:
                         f" ({error.strerror})"
                     )
                     raise InputError("scene file", str(self.scene), reason) from None
-                handle, name = tempfile.mkstemp(
-                    suffix=REDIRECT_ENDING
-                )  # nothing can be written next to the scene, no state either
+                # nothing can be written next to the scene, no state either
+                handle, name = tempfile.mkstemp(suffix=REDIRECT_ENDING)
                 self.path = Path(name)
             if not _lock(handle):
                 os.close(handle)
                 return False
             if not self.path.exists() or not os.path.samestat(
-                os.fstat(handle), os.stat(self.path)
+                os.fstat(handle),
+                os.stat(self.path),
             ):
                 os.close(handle)  # its server has just ended and taken it away
                 continue

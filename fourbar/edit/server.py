@@ -65,9 +65,8 @@ class Workbench:
         self.address: asyncio.Future[str] = self.loop.create_future()
         self.pages: set[_PageLine] = set()
         self.waiting: deque[tuple[_PageLine, dict[str, Any]]] = deque()
-        self.one = ThreadPoolExecutor(
-            1
-        )  # the session is touched from this thread alone
+        # the session is touched from this thread alone
+        self.one = ThreadPoolExecutor(1)
         self.aside = ThreadPoolExecutor(1)  # what takes seconds
         self.working: asyncio.Task[None] | None = None
         self.timers: dict[str, asyncio.TimerHandle] = {}
@@ -153,7 +152,9 @@ class Workbench:
                 to=line if alone or "refused" in about or "ask" in about else None,
             )
         self.later(
-            "settle", ERROR_BAR_DELAY, lambda: asyncio.create_task(self._settle())
+            "settle",
+            ERROR_BAR_DELAY,
+            lambda: asyncio.create_task(self._settle()),
         )
         self.later("keep", SAVING_DELAY, lambda: self.one.submit(self._keep))
 
@@ -168,7 +169,8 @@ class Workbench:
             self.session.keep()
         except OSError as error:
             self.loop.call_soon_threadsafe(
-                self.tell, {"note": f"the state file cannot be written: {error}"}
+                self.tell,
+                {"note": f"the state file cannot be written: {error}"},
             )
 
     async def _settle(self) -> None:
@@ -226,7 +228,11 @@ class Workbench:
             with suppress(FourBarError):
                 places = data["over"]["values"] or data["theta_2"]
                 spreads = await self.loop.run_in_executor(
-                    self.aside, collect_tolerances, scene, places, give_up
+                    self.aside,
+                    collect_tolerances,
+                    scene,
+                    places,
+                    give_up,
                 )
                 if state is self.session.now:
                     self.tell({"tolerances": spreads})
@@ -246,7 +252,9 @@ class Workbench:
             listening = socket.create_server((_LOOPBACK, port))
         except (OSError, OverflowError) as error:
             raise InputError(
-                "--port", port, f"the port cannot be opened: {error}"
+                "--port",
+                port,
+                f"the port cannot be opened: {error}",
             ) from None
         listening.setblocking(False)
         own_port = listening.getsockname()[1]
@@ -350,7 +358,8 @@ class _Guarded(RequestHandler):
         ):
             raise HTTPError(403)
         if not hmac.compare_digest(
-            self.path_kwargs["token"].encode(), self.bench.session.token.encode()
+            self.path_kwargs["token"].encode(),
+            self.bench.session.token.encode(),
         ):
             raise HTTPError(404)
 

@@ -226,13 +226,18 @@ class Session:
         """Read the text of a scene; InputError where the workbench takes none such."""
         if len(text.encode()) > LARGEST_SCENE_FILE:
             raise InputError(
-                "scene file", len(text), f"must not exceed {LARGEST_SCENE_FILE} bytes"
+                "scene file",
+                len(text),
+                f"must not exceed {LARGEST_SCENE_FILE} bytes",
             )
         plain = parse_tables(text, str(self.path))
         with state_messages_in(units_of_scene(plain)):
             scene = read_tables(plain, str(self.path))
             require_steps(
-                scene.motion, MOST_SOLVED_ANEW, "in the workbench", str(self.path)
+                scene.motion,
+                MOST_SOLVED_ANEW,
+                "in the workbench",
+                str(self.path),
             )
         return SceneState(text, scene, plain)
 
@@ -288,14 +293,15 @@ class Session:
         try:
             if action is None:
                 raise InputError(
-                    "do", asked.get("do"), "must be one of " + ", ".join(_ACTIONS)
+                    "do",
+                    asked.get("do"),
+                    "must be one of " + ", ".join(_ACTIONS),
                 )
             with state_messages_in(self.now.units):
                 note = action(self, asked) or {}
             return self.answer() | note
-        except (
-            Exception
-        ) as error:  # of a page whose request makes no sense too: the server goes on
+        # the server goes on after any error, also after a request without sense
+        except Exception as error:
             self.texts, self.place, self.now = before
             self.document = SceneDocument(self.now.text)
             if isinstance(error, FourBarError | OSError):
@@ -416,16 +422,18 @@ def _drag_point(session: Session, asked: dict[str, Any]) -> None:
     )
     session.change(
         lambda document: drag(
-            document, session.base.scene, session.base.plain, dragged
+            document,
+            session.base.scene,
+            session.base.plain,
+            dragged,
         ),
         str(asked.get("gesture", "")),
     )
 
 
 def _replace_text(session: Session, asked: dict[str, Any]) -> None:
-    text = session.read(
-        str(asked["text"])
-    ).text  # refused in the words of the file's reader
+    # refused in the words of the file's reader
+    text = session.read(str(asked["text"])).text
     session.change(lambda document: document.become(text))
 
 
@@ -451,7 +459,9 @@ def _keep_state(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
 def _refer(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     if asked["to"] not in session.kept:
         raise InputError(
-            "reference", asked["to"], "must be one of " + ", ".join(session.kept)
+            "reference",
+            asked["to"],
+            "must be one of " + ", ".join(session.kept),
         )
     session.reference = asked["to"]
     return {"refer": True}
@@ -491,18 +501,21 @@ def _command_other(session: Session, asked: dict[str, Any]) -> None:
     values = getattr(before, place)
     if values is None:
         raise InputError(
-            "command", place, "needs a cylinder: add one in place of the bar first"
+            "command",
+            place,
+            "needs a cylinder: add one in place of the bar first",
         )
     shown = _find_shown(before.theta_2, asked)
     first, last = _find_monotone(values, shown)
     if last == first:
         raise InputError(
-            "command", place, "does not move in this motion: choose another sweep first"
+            "command",
+            place,
+            "does not move in this motion: choose another sweep first",
         )
     middle = (first + last) // 2
-    inset = 1e-3 * (
-        values[last] - values[first]
-    )  # so that rounding leads to no position beyond
+    # so that rounding leads to no position beyond
+    inset = 1e-3 * (values[last] - values[first])
     shown_units = session.now.units
     ground = find_unit(find_length(session.now.plain), "m")
     unit, si = (ground, "m") if place == "stroke" else ("deg", "rad")
@@ -689,7 +702,9 @@ _ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] 
     "export": _export,
     "bodies": lambda session, asked: {
         "bodies": session.exports.free_bodies(
-            session.now.scene, float(asked["position"]), session.units
+            session.now.scene,
+            float(asked["position"]),
+            session.units,
         )
     },
     "hello": _begin_page,

@@ -98,7 +98,8 @@ class Actions:
             self.forces[bar] = self.forces[bar] + force if bar in self.forces else force
             arm = point * self.state.direction(bar)
             self.moment_about_pin(
-                bar, cross(-force, arm if beyond is None else arm + beyond)
+                bar,
+                cross(-force, arm if beyond is None else arm + beyond),
             )
             if bar == 3:
                 self.on_coupler.append((force, point, beyond, 0.0))
@@ -240,7 +241,9 @@ class Actions:
             return turning * np.sign(slip * self.state.speed)
         moving = np.where(turning, np.sign(slip * self.state.speed), self.side)
         return np.where(
-            np.equal(self.state.speed, 0.0), self.side * turning * np.sign(slip), moving
+            np.equal(self.state.speed, 0.0),
+            self.side * turning * np.sign(slip),
+            moving,
         )
 
     def turning(self, pin: str) -> Number:
@@ -498,5 +501,7 @@ class PinRows(Effect):
             )
             by_pin[pin] = (pin, *checked)
         object.__setattr__(
-            self, self.field, tuple(by_pin[pin] for pin in PINS if pin in by_pin)
+            self,
+            self.field,
+            tuple(by_pin[pin] for pin in PINS if pin in by_pin),
         )

@@ -193,12 +193,16 @@ class Load(Effect):
         }
         if len(forms) > 1:
             raise InputError(
-                "loads", " and ".join(forms), "a force acts at one place: state one"
+                "loads",
+                " and ".join(forms),
+                "a force acts at one place: state one",
             )
         if forms and self.force is None:
             (name,) = forms
             raise InputError(
-                f"loads.{name}", None, "needs a force: state one, or leave this out"
+                f"loads.{name}",
+                None,
+                "needs a force: state one, or leave this out",
             )
         if self.arm is not None and self.frame == "bar":
             allowed = (

@@ -243,7 +243,10 @@ def solve_sliding(F: Array, C: Array, k: Array) -> _Sliding:
 
     F (n, p, 2) is in N, C (n, p, p, 2) in 1/m, k (n, p) in m.
     """
-    finite = np.isfinite(F).all(axis=(1, 2)) & np.isfinite(C).all(axis=(1, 2, 3))
+    finite: NDArray[np.bool_] = np.logical_and(
+        np.isfinite(F).all(axis=(1, 2)),
+        np.isfinite(C).all(axis=(1, 2, 3)),
+    )
     if k.shape[1] == 1:
         with np.errstate(invalid="ignore", divide="ignore"):
             single, number = _solve_quadratic(F[:, 0], C[:, 0, 0], k[:, 0])
@@ -399,7 +402,11 @@ def _search(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
     starts = _list_starts(p)
     problem = np.repeat(np.arange(n), len(starts))
     ends = _follow_newton(
-        F, C, k, problem, (size[:, None, None] * starts).reshape(-1, p)
+        F,
+        C,
+        k,
+        problem,
+        (size[:, None, None] * starts).reshape(-1, p),
     )
 
     gap = _compute_gap(F[problem], C[problem], k[problem], ends)

@@ -129,10 +129,10 @@ class Place(NamedTuple):
             return arm, dot(arm, arm)
         assert self.from_pin is not None
         distance, turned = self.from_pin
-        half = sine_of(
-            0.5 * turned
-        )  # r cos phi - L near the pin, where the cosine rounds to 1
-        arm = vector((distance - length) - 2.0 * distance * half * half, arm.imag)
+        # r cos phi - L, which keeps its digits near the pin: the cosine rounds to 1
+        sine = sine_of(0.5 * turned)
+        along = (distance - length) - 2.0 * distance * sine * sine
+        arm = vector(along, arm.imag)
         return arm, dot(arm, arm)
 
     def locate(self, state: State) -> Any:
@@ -179,7 +179,9 @@ def _require_mass_centre(key: str, bar: int) -> None:
     """Raise InputError for a place from the mass centre of the ground."""
     if bar == 1:
         raise InputError(
-            f"{key}.from_centre", bar, "the ground has no mass centre: state from_pin"
+            f"{key}.from_centre",
+            bar,
+            "the ground has no mass centre: state from_pin",
         )
 
 
@@ -194,7 +196,9 @@ def require_ends(key: str, start: object, end: object) -> tuple[Place, Place]:
     )
     if ends[0].bar == ends[1].bar:
         raise InputError(
-            f"{key}.to.bar", ends[1].bar, "must be another bar than that of `from`"
+            f"{key}.to.bar",
+            ends[1].bar,
+            "must be another bar than that of `from`",
         )
     return ends[0], ends[1]
 

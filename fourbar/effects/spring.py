@@ -33,7 +33,8 @@ GAS = {
     "extended": Declared("m", POSITIVE),
     "stroke": STROKE_FIELD,
     **dict.fromkeys(
-        ("extended_force", "compressed_force"), Declared("N", AT_LEAST_ZERO)
+        ("extended_force", "compressed_force"),
+        Declared("N", AT_LEAST_ZERO),
     ),
 }
 """Numbers of a gas spring, which becomes one of the springs."""

@@ -164,37 +164,42 @@ def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
     direction of (theta_1 + theta_2)/2 less a quarter turn, and a signed length.
     """
     bar = state.bar
-    theta_1 = state.theta_1
-    theta_2 = state.theta_2 if state.q is None else state.q
+    roles = ROLES_OF_BARS[bar]
     d, a, b, c = reorder_lengths(bar, state.lengths[:4])
-    turned = (
-        math.pi if bar == 4 else 0.0
-    )  # turn of the ground, and of the coupler with it
-    u2, u3, u4 = (state.direction(role) for role in ROLES_OF_BARS[bar])
-    theta_3 = np.angle(u3) + turned
+    u2, u3, u4 = (state.direction(role) for role in roles)
+    # read from bar 4, the ground and the coupler point the other way
+    half_turn = math.pi if bar == 4 else 0.0
+    theta_1 = state.theta_1 + half_turn
+    theta_2 = state.theta_2 if state.q is None else state.q
+    theta_3 = np.angle(u3) + half_turn
     theta_4 = np.angle(u4)
-    theta_1 = theta_1 + turned
-    phi = np.angle(
-        state.position.diagonal if bar == 2 else d * np.exp(1j * theta_1) - a * u2
-    )
+
+    if bar == 2:
+        diagonal = state.position.diagonal
+    else:
+        diagonal = d * np.exp(1j * theta_1) - a * u2
+    phi = np.angle(diagonal)
     line = np.where(a < d, theta_1, theta_2 + math.pi)
     phi = line + wrap_angle(phi - line)
     outer, inner = state.passing
     vanishes = inner & (a == d)
-    phi = np.where(vanishes, 0.5 * (theta_1 + theta_2) - 0.5 * math.pi, phi)
+    phi_where_it_vanishes = 0.5 * (theta_1 + theta_2) - 0.5 * math.pi
+    phi = np.where(vanishes, phi_where_it_vanishes, phi)
+
     half = 0.5 * (theta_2 - theta_1)
-    of_3 = _find_middle(b, c, half, outer, inner)
-    of_4 = _find_middle(c, b, half, outer, inner)
-    at_3 = branch * (theta_3 - phi)
-    at_4 = branch * (phi + math.pi - theta_4)
-    angles = (
-        theta_2,
-        phi + branch * (of_3 + wrap_angle(at_3 - of_3)) - turned,
-        phi + math.pi - branch * (of_4 + wrap_angle(at_4 - of_4)),
-    )
+    middle_3 = _find_middle(b, c, half, outer, inner)
+    middle_4 = _find_middle(c, b, half, outer, inner)
+    from_diagonal_3 = branch * (theta_3 - phi)
+    from_diagonal_4 = branch * (phi + math.pi - theta_4)
+    swing_3 = middle_3 + wrap_angle(from_diagonal_3 - middle_3)
+    swing_4 = middle_4 + wrap_angle(from_diagonal_4 - middle_4)
+
+    second, third, fourth = roles
     return {
-        1: np.full_like(theta_2, theta_1 - turned),
-        **dict(zip(ROLES_OF_BARS[bar], angles, strict=True)),
+        1: np.full_like(theta_2, theta_1 - half_turn),
+        second: theta_2,
+        third: phi + branch * swing_3 - half_turn,
+        fourth: phi + math.pi - branch * swing_4,
     }
 
 

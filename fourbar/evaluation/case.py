@@ -165,7 +165,8 @@ class Case(NamedTuple):
     def lengthened(self) -> "Case":
         """Return the case in longer numbers, with all that follows from the scene."""
         linkage, terms, drive = change_numbers(
-            (self.linkage, self.terms, self.drive), lengthen
+            (self.linkage, self.terms, self.drive),
+            lengthen,
         )
         path = prepare_path(linkage.lengths, linkage.ground_angle, self.path.bar)
         path = path._replace(passing=self.path.passing)
@@ -309,7 +310,11 @@ class Case(NamedTuple):
         first = int(np.argmax(assembled))
         return self.begin_at(
             Command(
-                motion.angle[first], motion.branch[first], 0.0, 0.0, motion.remainder
+                motion.angle[first],
+                motion.branch[first],
+                0.0,
+                0.0,
+                motion.remainder,
             )
         )
 
@@ -335,7 +340,13 @@ class Case(NamedTuple):
 
         index = np.flatnonzero(np.broadcast_to(close, np.shape(q)))
         half = decide_half_angles(
-            self.linkage, self.path.unit, half, index, q, remainder, self.path.bar
+            self.linkage,
+            self.path.unit,
+            half,
+            index,
+            q,
+            remainder,
+            self.path.bar,
         )
         return half, index
 
@@ -368,7 +379,11 @@ class Case(NamedTuple):
             about_B = 0.0
         else:
             about_B = coupler_about_B(
-                self.lengths, self.bodies[1], position, state.moving, sine
+                self.lengths,
+                self.bodies[1],
+                position,
+                state.moving,
+                sine,
             )
         return _InertialForces(inertial, others, wrenches, mass_at_A, about_B)
 

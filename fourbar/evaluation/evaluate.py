@@ -105,10 +105,20 @@ def evaluate(
         error_bars = {}
         if last_stage == ERROR:
             error_bars = _compute_error_bars(
-                case, command, state, dynamics, refined_rows
+                case,
+                command,
+                state,
+                dynamics,
+                refined_rows,
             )
         codes, forces = _list_forces(
-            case, command, state, codes, wanted, dynamics, error_bars
+            case,
+            command,
+            state,
+            codes,
+            wanted,
+            dynamics,
+            error_bars,
         )
         values |= {name: value for name, value in forces.items() if name in wanted}
     return Evaluated(codes, values, state)
@@ -323,13 +333,17 @@ def _compute_error_bars(
     gap = reduce(np.maximum, gaps)
     if longer_numbers.HAS_LONG_DOUBLES and remainder is None:
         unresolved, drive_unresolved = _compute_unresolved(
-            case, command, state, dynamics
+            case,
+            command,
+            state,
+            dynamics,
         )
         gap = np.fmax(gap, unresolved)
         drive_gap = np.fmax(drive_gap, drive_unresolved)
     drive_error = _compute_error_bar(drive_gap, np.abs(dynamics.effort))
     force_error = _compute_error_bar(
-        gap, reduce(np.maximum, map(np.abs, dynamics.pins))
+        gap,
+        reduce(np.maximum, map(np.abs, dynamics.pins)),
     )
     return {case.drive_names.error: drive_error, "force_error": force_error}
 
@@ -444,7 +458,9 @@ def _withhold(
         for name in names:
             infinite |= ~np.isfinite(values[name])
             values[name] = np.where(
-                np.isfinite(values[name]), values[name], _make_no_value(values[name])
+                np.isfinite(values[name]),
+                values[name],
+                _make_no_value(values[name]),
             )
         infinite &= promised & ~gone
         code[infinite] = OVERFLOW
@@ -454,7 +470,9 @@ def _withhold(
         for name in names:
             if name != "drive_condition":
                 values[name] = np.where(
-                    gone, _make_no_value(values[name]), values[name]
+                    gone,
+                    _make_no_value(values[name]),
+                    values[name],
                 )
 
 

@@ -123,7 +123,9 @@ def release(scene: Scene) -> Released:
     free = scene.motion.free
     if free is None:
         raise InputError(
-            "motion.free", None, "is needed for a release: its duration and steps"
+            "motion.free",
+            None,
+            "is needed for a release: its duration and steps",
         )
     return release_at(scene, np.linspace(0.0, free.duration, free.steps + 1))
 
@@ -296,7 +298,9 @@ class _IntegrationRun:
         position, k = self.reading.evaluate(theta)
         if not np.isfinite(position.u3):
             raise InputError(
-                f"motion.theta_{bar}", theta, "the linkage does not assemble there"
+                f"motion.theta_{bar}",
+                theta,
+                "the linkage does not assemble there",
             )
         self.theta = {
             2: float(np.angle(position.u2)),
@@ -539,7 +543,9 @@ class _IntegrationRun:
             energy = self._compute_kinetic_energy() - self.start_energy
             self.drift = max(self.drift, abs(energy - float(self.y[2])))
             self.largest = max(
-                self.largest, abs(energy + self.start_energy), abs(float(self.y[2]))
+                self.largest,
+                abs(energy + self.start_energy),
+                abs(float(self.y[2])),
             )
             if rested or self._change_over():
                 return self._starts()

@@ -176,7 +176,8 @@ def _state_place(
     if key.endswith((".from_centre", ".arm")):
         raise read.refuse(key, value, "a place of the drawing is written from_pin")
     z = drawing.into_bar(
-        bar, read_point(read, f"{key}.{DRAWN_WORD}", value[DRAWN_WORD])
+        bar,
+        read_point(read, f"{key}.{DRAWN_WORD}", value[DRAWN_WORD]),
     )
     return {"x": f"{z.real!r} m", "y": f"{z.imag!r} m"}
 

@@ -78,7 +78,9 @@ class Reader:
         names = list(allowed)
         if not isinstance(value, dict):
             raise self.refuse(
-                key, value, "must be a table with the keys " + ", ".join(names)
+                key,
+                value,
+                "must be a table with the keys " + ", ".join(names),
             )
         for name, entry in value.items():
             if name not in names:
@@ -116,7 +118,9 @@ class Reader:
             or not least <= value <= most
         ):
             raise self.refuse(
-                key, value, f"must be a whole number from {least} to {most}"
+                key,
+                value,
+                f"must be a whole number from {least} to {most}",
             )
         return value
 
@@ -140,7 +144,9 @@ class Reader:
             or not math.isfinite(value)
         ):
             raise self.refuse(
-                key, value, "must be a finite number without a unit, and without quotes"
+                key,
+                value,
+                "must be a finite number without a unit, and without quotes",
             )
         return float(value)
 

@@ -128,7 +128,9 @@ def _read_stream(stream: IO[str] | IO[bytes]) -> Scene:
     content = stream.read(LARGEST_SCENE_FILE + 1)
     if len(content) > LARGEST_SCENE_FILE:
         raise InputError(
-            "scene file", shown, f"must not exceed {LARGEST_SCENE_FILE} bytes"
+            "scene file",
+            shown,
+            f"must not exceed {LARGEST_SCENE_FILE} bytes",
         )
     if isinstance(content, bytes):
         try:
@@ -219,7 +221,10 @@ def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
                 f' "{bare[1].strip()[:LONGEST_SHOWN_LINE]}"'
             )
     return InputError(
-        f"line {line}, column {column}", value, f"cannot be read as TOML: {why}", shown
+        f"line {line}, column {column}",
+        value,
+        f"cannot be read as TOML: {why}",
+        shown,
     )
 
 
@@ -235,7 +240,9 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     entries = top.get("loads", [])
     if not isinstance(entries, list) or len(entries) > _MOST_LOADS:
         raise read.refuse(
-            "loads", entries, f"must be written as [[loads]], at most {_MOST_LOADS}"
+            "loads",
+            entries,
+            f"must be written as [[loads]], at most {_MOST_LOADS}",
         )
     effects = read.table("effects", top.get("effects", {}), list_kinds())
     motion = top.get("motion", {})
@@ -322,7 +329,9 @@ def _read_pictures(
     """
     return tuple(
         Picture(
-            number, read.text(f"bars.{name}.picture", bars[name]["picture"]), folder
+            number,
+            read.text(f"bars.{name}.picture", bars[name]["picture"]),
+            folder,
         )
         for name, number in BAR_NUMBERS.items()
         if "picture" in bars.get(name, {})
@@ -331,10 +340,14 @@ def _read_pictures(
 
 def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
     lengths = read.table(
-        "lengths", top.get("lengths", {}), (*BAR_NAMES.values(), "ground_angle")
+        "lengths",
+        top.get("lengths", {}),
+        (*BAR_NAMES.values(), "ground_angle"),
     )
     length = read.numbers(
-        "lengths", lengths, dict.fromkeys(BAR_NAMES.values(), Bar.numbers["length"])
+        "lengths",
+        lengths,
+        dict.fromkeys(BAR_NAMES.values(), Bar.numbers["length"]),
     )
     length = _meet_stated_equalities(length, lengths)
     tables = read.table("bars", top.get("bars", {}), BAR_NUMBERS)
@@ -384,7 +397,9 @@ def _read_bar(read: Reader, key: str, value: object, length: float) -> Bar:
         return Bar(length, **numbers)
     except InputError as error:  # which knows of one bar alone
         raise read.refuse(
-            f"{key}.{error.key}", entry.get(error.key), error.allowed
+            f"{key}.{error.key}",
+            entry.get(error.key),
+            error.allowed,
         ) from None
 
 
@@ -411,7 +426,9 @@ def _read_motion(read: Reader, value: object) -> Motion:
         place, speed, acceleration = STROKE_COMMAND
         unit = "m"
         arguments["side"] = read.choice(
-            "motion.side", entry.get("side"), ("left", "right")
+            "motion.side",
+            entry.get("side"),
+            ("left", "right"),
         )
     else:
         bar = int(stated[0][-1]) if stated else 2
@@ -436,7 +453,10 @@ def _read_motion(read: Reader, value: object) -> Motion:
     if "free" in entry:
         released = read.table("motion.free", entry["free"], ("duration", "steps"))
         duration = read.quantity(
-            "motion.free.duration", released.get("duration"), "s", POSITIVE
+            "motion.free.duration",
+            released.get("duration"),
+            "s",
+            POSITIVE,
         )
         arguments["free"] = Free(
             duration,
@@ -450,7 +470,10 @@ def _read_motion(read: Reader, value: object) -> Motion:
 def _read_steps(read: Reader, key: str, entry: Mapping[str, Any]) -> int:
     """Read the number of steps of a motion, which has a default."""
     return read.whole(
-        f"{key}.steps", entry.get("steps", DEFAULT_STEPS), 1, MOST_INTERVALS
+        f"{key}.steps",
+        entry.get("steps", DEFAULT_STEPS),
+        1,
+        MOST_INTERVALS,
     )
 
 
@@ -672,7 +695,9 @@ def _read_tolerances(
             )
         if key not in entries:
             raise read.refuse(
-                name, stated, refuse_key(key, stated, list(entries)).allowed
+                name,
+                stated,
+                refuse_key(key, stated, list(entries)).allowed,
             )
         entry = entries[key]
         sigma = isinstance(stated, list)

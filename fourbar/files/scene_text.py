@@ -289,7 +289,9 @@ def _write_effect(effect: Effect) -> Any:
         )
     if isinstance(effect, Gravity):
         return write_pair(
-            effect.magnitude, effect.angle, effect.numbers["magnitude"].unit
+            effect.magnitude,
+            effect.angle,
+            effect.numbers["magnitude"].unit,
         )
     if isinstance(effect, Springs):
         return [
@@ -391,7 +393,9 @@ def _write_tolerances(scene: Scene) -> dict[str, Any]:
     for tolerance in scene.tolerances:
         if tolerance.key not in entries:
             raise InputError(
-                "tolerances", tolerance.key, "no number of the scene has this key"
+                "tolerances",
+                tolerance.key,
+                "no number of the scene has this key",
             )
         entry = entries[tolerance.key]
         width = write_quantity(tolerance.width, entry.unit)

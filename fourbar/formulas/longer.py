@@ -188,7 +188,8 @@ def _multiply(x: Any, y: Any) -> Any:
         return _multiply(y, x)
     along = _multiply_real(x.real, y.real) - _multiply_real(x.imag, y.imag)
     return _join_parts(
-        along, _multiply_real(x.real, y.imag) + _multiply_real(x.imag, y.real)
+        along,
+        _multiply_real(x.real, y.imag) + _multiply_real(x.imag, y.real),
     )
 
 
@@ -247,9 +248,9 @@ def _arctangent(y: Any, x: Any) -> Any:
 def _size_of_longer(x: Any) -> Any:
     if not np.iscomplexobj(x.high):
         return _choose(x.high < 0.0, -x, x)
-    unit = np.ldexp(
-        1.0, np.frexp(np.abs(x.high))[1]
-    )  # whose square stays in the range of doubles
+    # the squares of numbers in this unit stay in the range of doubles
+    _, exponent = np.frexp(np.abs(x.high))
+    unit = np.ldexp(1.0, exponent)
     along = x.real / unit
     across = x.imag / unit
     return _root(along * along + across * across) * unit

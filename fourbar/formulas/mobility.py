@@ -118,9 +118,8 @@ def choose_power_of_two(linkage: FourBar) -> float:
 def reach_of(linkage: FourBar, bar: int = 2) -> Reach:
     """Return bar 2, 3 or 4 against the rest of the loop; InputError for another bar."""
     bar = require_bar("bar", bar)
-    unit = choose_power_of_two(
-        linkage
-    )  # exact, and no product of lengths leaves the range of doubles
+    # the division is exact, and no product of lengths leaves the range of doubles
+    unit = choose_power_of_two(linkage)
     d, *moving = (length / unit for length in linkage.lengths)
     driven = moving.pop(bar - 2)
     return Reach(d, driven, *moving)
@@ -182,7 +181,11 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
                 branch = int(math.copysign(1.0, math.sin(theta_4 - theta_3)))
             limits.append(
                 LimitPosition(
-                    theta_1 + psi_2, _wrap(theta_3), _wrap(theta_4), branch, stretched
+                    theta_1 + psi_2,
+                    _wrap(theta_3),
+                    _wrap(theta_4),
+                    branch,
+                    stretched,
                 )
             )
     return tuple(sorted(limits))
@@ -363,7 +366,9 @@ def find_circuit(
         number = np.zeros(theta_2.shape, dtype=np.int8)
     elif len(every[0].branches) == 1:
         number = np.where(
-            np.broadcast_to(branch, theta_2.shape) == every[0].branches[0], 0, 1
+            np.broadcast_to(branch, theta_2.shape) == every[0].branches[0],
+            0,
+            1,
         )
     else:  # the two ranges are mirror images in the ground's line
         number = np.where((theta_2 - linkage.ground_angle) % TURN < 0.5 * TURN, 0, 1)

@@ -123,7 +123,9 @@ def take_sines_of_rates(lengths: Loop, position: Position, k: Coefficients) -> P
     u3 = position.u3 * position.u1.conjugate()
     u4 = position.u4 * position.u1.conjugate()
     u3 = select(
-        fast, vector(u3.real, c * scale * (k.h23 - k.h43)) * position.u1, position.u3
+        fast,
+        vector(u3.real, c * scale * (k.h23 - k.h43)) * position.u1,
+        position.u3,
     )
     u4 = select(fast, vector(u4.real, b * scale * k.h23) * position.u1, position.u4)
     return Position(

@@ -378,7 +378,14 @@ def _read_from(bar: int, k: Coefficients) -> Coefficients:
     """
     if bar == 3:
         return Coefficients(
-            k.h3, k.h2, k.h4, -k.h23, k.h43 - k.h23, k.dh3, k.dh2, k.dh4
+            k.h3,
+            k.h2,
+            k.h4,
+            -k.h23,
+            k.h43 - k.h23,
+            k.dh3,
+            k.dh2,
+            k.dh4,
         )
     if bar == 4:
         return Coefficients(k.h4, k.h3, k.h2, k.h43, k.h23, k.dh4, k.dh3, k.dh2)

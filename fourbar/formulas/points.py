@@ -175,7 +175,10 @@ def coupler_curve(
     every = circuits(linkage)
     point = complex(require("r_along", r_along), require("r_across", r_across))
     circuit = require_whole(
-        "circuit", circuit, range(len(every)), f"must be from 0 to {len(every) - 1}"
+        "circuit",
+        circuit,
+        range(len(every)),
+        f"must be from 0 to {len(every) - 1}",
     )
     branch = require_whole("branch", branch, (1, -1), A_BRANCH)
     steps = require_whole(
@@ -192,7 +195,10 @@ def coupler_curve(
     signs = path.sign(theta_2, assembly).astype(np.int8)
     theta_2 = np.append(theta_2, theta_2[0] + turns * TURN)
     return CouplerCurve(
-        theta_2, np.append(signs, signs[0]), np.append(x, x[0]), np.append(y, y[0])
+        theta_2,
+        np.append(signs, signs[0]),
+        np.append(x, x[0]),
+        np.append(y, y[0]),
     )
 
 

@@ -282,9 +282,8 @@ def compute_factors(
     outer = lengths.E1 + four_ad * kk
     inner = lengths.E2 + four_ad * ss
     short = four_ad > four_bc
-    if is_any(
-        short
-    ):  # outer + inner = 4 b c: the smaller change over psi keeps the digits
+    # outer + inner = 4 b c: the smaller change over psi keeps the digits
+    if is_any(short):
         outer, inner = (
             select(short & (ss < kk), four_bc - inner, outer),
             select(short & (kk <= ss), four_bc - outer, inner),

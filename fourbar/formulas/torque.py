@@ -63,7 +63,8 @@ def half_slope(
     half = half + k.dh3 * AR.real + (k.h3 * k.h23) * AR.imag
     if is_any(k.dh2 != 0.0):  # q is not theta_2
         half = half + (k.h3 * k.dh2) * dot(
-            (a * three.m) * position.u2, three.z * position.u3
+            (a * three.m) * position.u2,
+            three.z * position.u3,
         )
         half = half + (about_first_pin(two) + three.m * a * a) * (k.h2 * k.dh2)
     return half

@@ -190,7 +190,12 @@ def write_sdf(
     else:
         at_B = ""
     for line in _write_comment(
-        scene, "SDF", reader, assembled, at_B, plane
+        scene,
+        "SDF",
+        reader,
+        assembled,
+        at_B,
+        plane,
     ).splitlines():
         root.append(ET.Comment(f" {line} "))
     world = ET.SubElement(root, "world", name="four_bar")
@@ -225,19 +230,22 @@ def write_sdf(
     length_4 = linkage.output.length
     if reader == "gazebo":
         joint = _add_joint(
-            model, "B", "revolute", BAR_NAMES[4], BAR_NAMES[3], dynamics.get("B", {})
+            model,
+            "B",
+            "revolute",
+            BAR_NAMES[4],
+            BAR_NAMES[3],
+            dynamics.get("B", {}),
         )
-        ET.SubElement(joint, "pose").text = write_exactly(
-            length_3, 0, 0, 0, 0, 0
-        )  # in the frame of its child
+        in_frame_of_child = write_exactly(length_3, 0, 0, 0, 0, 0)
+        ET.SubElement(joint, "pose").text = in_frame_of_child
     else:
         ball = ET.SubElement(model, "drake:ball_constraint")
         for key, value in (("body_A", BAR_NAMES[3]), ("body_B", BAR_NAMES[4])):
             ET.SubElement(ball, f"drake:ball_constraint_{key}").text = value
         for key, length in (("p_AP", length_3), ("p_BQ", length_4)):
-            ET.SubElement(ball, f"drake:ball_constraint_{key}").text = write_exactly(
-                length, 0.0, 0.0
-            )
+            end_of_bar = write_exactly(length, 0.0, 0.0)
+            ET.SubElement(ball, f"drake:ball_constraint_{key}").text = end_of_bar
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 
@@ -252,20 +260,15 @@ def _add_link(
     centre: complex,
 ) -> None:
     link = ET.SubElement(model, "link", name=name)
-    ET.SubElement(link, "pose").text = write_exactly(
-        foot.real, foot.imag, 0, 0, 0, turn
-    )
+    pose_of_link = write_exactly(foot.real, foot.imag, 0, 0, 0, turn)
+    ET.SubElement(link, "pose").text = pose_of_link
     inertial = ET.SubElement(link, "inertial")
-    ET.SubElement(inertial, "pose").text = write_exactly(
-        centre.real, centre.imag, 0, 0, 0, 0
-    )
+    pose_of_centre = write_exactly(centre.real, centre.imag, 0, 0, 0, 0)
+    ET.SubElement(inertial, "pose").text = pose_of_centre
     ET.SubElement(inertial, "mass").text = write_exactly(mass)
     tensor = ET.SubElement(inertial, "inertia")
-    for axes in (
-        "ixx",
-        "iyy",
-        "izz",
-    ):  # izz alone acts in the plane; three equal ones are a possible body
+    # izz alone acts in the plane; three equal ones are a possible body
+    for axes in ("ixx", "iyy", "izz"):
         ET.SubElement(tensor, axes).text = write_exactly(inertia)
     for axes in ("ixy", "ixz", "iyz"):
         ET.SubElement(tensor, axes).text = "0"

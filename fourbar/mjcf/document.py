@@ -132,7 +132,9 @@ def write_mjcf(
         timestep = settings.timestep * settings.timestep_scale
     else:
         raise InputError(
-            "timestep", None, "is missing: state it, or request a keyframe"
+            "timestep",
+            None,
+            "is missing: state it, or request a keyframe",
         )
     if settings.pad == "fitted":
         settings = replace(settings, pad=fit_pad(scene))
@@ -362,9 +364,8 @@ def fit_pad(scene: Scene) -> float:
         (1.0 + compute_load_ratio(scene))
         * max(1.0, compute_mass_ratio(scene.linkage) / LIGHT_BAR_RATIO)
     )
-    acceleration = (
-        _compute_acceleration_scale(scene) * a / max(b, c)
-    )  # of bars 3 and 4, by its size
+    # size of the accelerations of bars 3 and 4
+    acceleration = _compute_acceleration_scale(scene) * a / max(b, c)
     if acceleration < QUICK:
         return least_sag
     return min(_STIFF_PAD, least_sag)
@@ -391,7 +392,8 @@ def _compute_acceleration_scale(scene: Scene) -> float:
     """
     return float(
         max(
-            (scene.motion.omega_2 or SPEED_LAID_OUT_FOR) ** 2, abs(scene.motion.alpha_2)
+            (scene.motion.omega_2 or SPEED_LAID_OUT_FOR) ** 2,
+            abs(scene.motion.alpha_2),
         )
     )
 
@@ -589,7 +591,9 @@ def write_mjcf_for(
     """
     if simulator not in SIMULATORS:
         raise InputError(
-            "simulator", simulator, f"must be one of {', '.join(SIMULATORS)}"
+            "simulator",
+            simulator,
+            f"must be one of {', '.join(SIMULATORS)}",
         )
     if drive not in get_args(Drive):
         raise InputError("drive", drive, f"must be one of {', '.join(get_args(Drive))}")

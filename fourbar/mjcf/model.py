@@ -430,10 +430,15 @@ class Model:
             key: write_exactly(*np.atleast_1d(value)) for key, value in numbers.items()
         }
         ET.SubElement(
-            body, "joint", {"name": pin, "type": "hinge", "axis": "0 0 1", **joint}
+            body,
+            "joint",
+            {"name": pin, "type": "hinge", "axis": "0 0 1", **joint},
         )
         self._add_capsule(
-            body, number, bar.length, self.radius if number == 3 else -self.radius
+            body,
+            number,
+            bar.length,
+            self.radius if number == 3 else -self.radius,
         )
         if number == 2:
             self._add_site(body, "A", bar.length)
@@ -514,16 +519,25 @@ class Model:
                 ET.SubElement(fixed, "joint", joint=joint, coef=str(coefficient))
         for index, spring in enumerate(self.springs, 1):
             tendon = self._add_line(
-                root, tendons, f"spring_{index}", spring.start, spring.end
+                root,
+                tendons,
+                f"spring_{index}",
+                spring.start,
+                spring.end,
             )
             if _is_slack_somewhere(spring):
                 tendon.set("stiffness", write_exactly(spring.stiffness))
                 tendon.set(
-                    "springlength", write_exactly(-spring.slack / spring.stiffness)
+                    "springlength",
+                    write_exactly(-spring.slack / spring.stiffness),
                 )
         if self.cylinder is not None:
             self._add_line(
-                root, tendons, CYLINDER, self.cylinder.start, self.cylinder.end
+                root,
+                tendons,
+                CYLINDER,
+                self.cylinder.start,
+                self.cylinder.end,
             )
 
     def _add_line(

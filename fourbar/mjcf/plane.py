@@ -154,7 +154,8 @@ class Plane:
                 element.set("pos", write_exactly(*self.place(*place)))
         for light in root.iterfind("worldbody/light"):
             light.set(
-                "dir", write_exactly(*self.turn(*_read_vector(light.attrib["dir"])))
+                "dir",
+                write_exactly(*self.turn(*_read_vector(light.attrib["dir"]))),
             )
         for camera in root.iterfind("worldbody/camera"):
             camera.set("quat", turned)

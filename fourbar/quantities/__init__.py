@@ -54,10 +54,14 @@ class Quantities:
     theta_3: Array = _scalar("rad", "position", "angle of the coupler", "unknown")
     theta_4: Array = _scalar("rad", "position", "angle of the output", "unknown")
     sin_mu: Array = _scalar(
-        "1", "position", "sin(theta_4 - theta_3); its sign is the branch"
+        "1",
+        "position",
+        "sin(theta_4 - theta_3); its sign is the branch",
     )
     condition: Array = _scalar(
-        "1", "position", "motion condition |sin_mu|, in (0, 1]; 1 is best"
+        "1",
+        "position",
+        "motion condition |sin_mu|, in (0, 1]; 1 is best",
     )
     A: Array = _declare_vector("m", "position", "pin of input and coupler")
     B: Array = _declare_vector("m", "position", "pin of coupler and output")
@@ -65,7 +69,10 @@ class Quantities:
     G3: Array = _declare_vector("m", "position", "mass centre of the coupler")
     G4: Array = _declare_vector("m", "position", "mass centre of the output")
     stroke: Array | None = _scalar(
-        "m", "position", "distance of the linear drive's ends", "linear drive"
+        "m",
+        "position",
+        "distance of the linear drive's ends",
+        "linear drive",
     )
     drive_line: Array | None = _declare_vector(
         "1",
@@ -74,13 +81,21 @@ class Quantities:
         "linear drive",
     )
     omega_2: Array | None = _scalar(
-        "rad/s", "velocity", "angular velocity of the input"
+        "rad/s",
+        "velocity",
+        "angular velocity of the input",
     )
     omega_3: Array | None = _scalar(
-        "rad/s", "velocity", "angular velocity of the coupler", "unknown"
+        "rad/s",
+        "velocity",
+        "angular velocity of the coupler",
+        "unknown",
     )
     omega_4: Array | None = _scalar(
-        "rad/s", "velocity", "angular velocity of the output", "unknown"
+        "rad/s",
+        "velocity",
+        "angular velocity of the output",
+        "unknown",
     )
     v_A: Array | None = _declare_vector("m/s", "velocity", "velocity of A")
     v_B: Array | None = _declare_vector("m/s", "velocity", "velocity of B")
@@ -94,13 +109,21 @@ class Quantities:
         "linear drive",
     )
     alpha_2: Array | None = _scalar(
-        "rad/s^2", "acceleration", "angular acceleration of the input"
+        "rad/s^2",
+        "acceleration",
+        "angular acceleration of the input",
     )
     alpha_3: Array | None = _scalar(
-        "rad/s^2", "acceleration", "angular acceleration of the coupler", "unknown"
+        "rad/s^2",
+        "acceleration",
+        "angular acceleration of the coupler",
+        "unknown",
     )
     alpha_4: Array | None = _scalar(
-        "rad/s^2", "acceleration", "angular acceleration of the output", "unknown"
+        "rad/s^2",
+        "acceleration",
+        "angular acceleration of the output",
+        "unknown",
     )
     a_A: Array | None = _declare_vector("m/s^2", "acceleration", "acceleration of A")
     a_B: Array | None = _declare_vector("m/s^2", "acceleration", "acceleration of B")
@@ -108,19 +131,34 @@ class Quantities:
     a_G3: Array | None = _declare_vector("m/s^2", "acceleration", "acceleration of G3")
     a_G4: Array | None = _declare_vector("m/s^2", "acceleration", "acceleration of G4")
     F12: Array | None = _declare_vector(
-        "N", "force", "force of ground on the input, at O2", "unknown"
+        "N",
+        "force",
+        "force of ground on the input, at O2",
+        "unknown",
     )
     F32: Array | None = _declare_vector(
-        "N", "force", "force of the coupler on the input, at A", "unknown"
+        "N",
+        "force",
+        "force of the coupler on the input, at A",
+        "unknown",
     )
     F43: Array | None = _declare_vector(
-        "N", "force", "force of the output on the coupler, at B", "unknown"
+        "N",
+        "force",
+        "force of the output on the coupler, at B",
+        "unknown",
     )
     F14: Array | None = _declare_vector(
-        "N", "force", "force of ground on the output, at O4", "unknown"
+        "N",
+        "force",
+        "force of ground on the output, at O4",
+        "unknown",
     )
     torque: Array | None = _scalar(
-        "N m", "force", "couple of ground on the driven bar", "unknown"
+        "N m",
+        "force",
+        "couple of ground on the driven bar",
+        "unknown",
     )
     drive_force: Array | None = _scalar(
         "N",
@@ -130,31 +168,55 @@ class Quantities:
     )
     power: Array | None = _scalar("W", "force", "power of the drive")
     drive_condition: Array | None = _scalar(
-        "1", "force", "leverage of the drive, in (0, 1]; 1 is best"
+        "1",
+        "force",
+        "leverage of the drive, in (0, 1]; 1 is best",
     )
     torque_error: Array | None = _scalar(
-        "N m", "error", "error bar of the torque: what rounding makes it scatter by"
+        "N m",
+        "error",
+        "error bar of the torque: what rounding makes it scatter by",
     )
     drive_force_error: Array | None = _scalar(
-        "N", "error", "error bar of the drive's force", "linear drive"
+        "N",
+        "error",
+        "error bar of the drive's force",
+        "linear drive",
     )
     force_error: Array | None = _scalar(
-        "N", "error", "error bar of the pin forces, of the worst of the four"
+        "N",
+        "error",
+        "error bar of the pin forces, of the worst of the four",
     )
     torque_low: Array | None = _scalar(
-        "N m", "force", "least torque while dry friction holds a pin", "dry friction"
+        "N m",
+        "force",
+        "least torque while dry friction holds a pin",
+        "dry friction",
     )
     torque_high: Array | None = _scalar(
-        "N m", "force", "greatest then; otherwise both are torque", "dry friction"
+        "N m",
+        "force",
+        "greatest then; otherwise both are torque",
+        "dry friction",
     )
     drive_force_low: Array | None = _scalar(
-        "N", "force", "least force of the drive then", "dry friction"
+        "N",
+        "force",
+        "least force of the drive then",
+        "dry friction",
     )
     drive_force_high: Array | None = _scalar(
-        "N", "force", "greatest then", "dry friction"
+        "N",
+        "force",
+        "greatest then",
+        "dry friction",
     )
     friction_residual: Array | None = _scalar(
-        "N m", "force", "largest remaining |mu r |F| - couple|", "pin loads"
+        "N m",
+        "force",
+        "largest remaining |mu r |F| - couple|",
+        "pin loads",
     )
     time: Array | None = _scalar("s", None, "of a motion law or a free motion")
 
@@ -178,14 +240,22 @@ UNKNOWNS = tuple(q.name for q in QUANTITIES if q.group == "unknown")
 
 DERIVED_QUANTITIES = (
     Quantity(
-        "shaking_force", "vector", "N", "force", "force of bars and drive on the frame"
+        "shaking_force",
+        "vector",
+        "N",
+        "force",
+        "force of bars and drive on the frame",
     ),
     Quantity("shaking_moment", "scalar", "N m", "force", "their moment about O2"),
     Quantity("transmission", "scalar", "rad", "position", "acute angle of bars 3, 4"),
     Quantity("omega_3/omega_2", "scalar", "1", "position", "speed ratio"),
     Quantity("omega_4/omega_2", "scalar", "1", "position", "speed ratio"),
     Quantity(
-        "mechanical_advantage", "scalar", "1", "position", "omega_2/omega_4, signed"
+        "mechanical_advantage",
+        "scalar",
+        "1",
+        "position",
+        "omega_2/omega_4, signed",
     ),
     Quantity("I13", "vector", "m", "position", "instant centre of the coupler"),
     Quantity("I24", "vector", "m", "position", "instant centre of bars 2 and 4"),
@@ -206,7 +276,10 @@ class DriveNames(NamedTuple):
 COUPLE = DriveNames("torque", "torque_error", "torque_low", "torque_high")
 """Names for a drive that turns a bar."""
 LINE = DriveNames(
-    "drive_force", "drive_force_error", "drive_force_low", "drive_force_high"
+    "drive_force",
+    "drive_force_error",
+    "drive_force_low",
+    "drive_force_high",
 )
 """Names for a drive that exerts a force."""
 LINE_QUANTITIES = (

@@ -289,8 +289,7 @@ def _find_factor(name: str) -> tuple[Fraction, dict[str, Fraction]]:
         raise UnitError(f'the unit "{angle[0]}" is not known')
     try:
         one = registry.Quantity(Fraction(1), registry.parse_units(name)).to_root_units()
-    except (
-        Exception
-    ):  # the parser of the library raises whatever its tokenizer and evaluator do
+    # the parser of the library raises whatever its tokenizer and evaluator do
+    except Exception:
         raise UnitError(f'the unit "{name}" is not known') from None
     return Fraction(one.magnitude), dict(one.dimensionality)

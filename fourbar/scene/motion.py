@@ -107,7 +107,9 @@ class FromLimit:
 
     def __post_init__(self) -> None:
         object.__setattr__(
-            self, "offset", require("motion.theta_2.offset", self.offset, "rad")
+            self,
+            "offset",
+            require("motion.theta_2.offset", self.offset, "rad"),
         )
         limit = require_whole(
             "motion.theta_2.limit",
@@ -217,7 +219,9 @@ class Law(_OverTime):
         expect(f"{key}.ends", self.ends, str)
         if self.ends not in SPLINES:
             raise InputError(
-                f"{key}.ends", self.ends, "must be one of " + ", ".join(SPLINES)
+                f"{key}.ends",
+                self.ends,
+                "must be one of " + ", ".join(SPLINES),
             )
         theta = f"theta_{self.bar}"
         time, angles = (
@@ -530,7 +534,8 @@ class Motion:
             )
         if isinstance(branch, str):
             branch = {name: number for number, name in BRANCH_NAMES.items()}.get(
-                branch, branch
+                branch,
+                branch,
             )
         checked = _require_command(names, *numbers)
         expect("motion.branch", branch, int, np.integer, str)
@@ -543,9 +548,8 @@ class Motion:
             strict=True,
         )
         for name, value in fields:
-            object.__setattr__(
-                self, name, value
-            )  # the class is frozen; this is its constructor
+            # the class is frozen; this is its constructor
+            object.__setattr__(self, name, value)
 
     def replace(self, **changes: Any) -> "Motion":
         """Return a copy with other values of fields.
@@ -635,7 +639,10 @@ def _require_command(
     )
     if angle is not None and not isinstance(angle, (Sweep, FromLimit)):
         angles = require_numbers(
-            f"motion.{theta}", angle, "must be finite angles", unit
+            f"motion.{theta}",
+            angle,
+            "must be finite angles",
+            unit,
         )
         if angles.size == 0:
             raise InputError(f"motion.{theta}", angle, "must be one angle or more")

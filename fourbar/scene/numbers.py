@@ -69,10 +69,15 @@ class Point:
             raise InputError("points", self.name, allowed)
         if {self.name, f"{self.name}_x", f"{self.name}_y"} & TAKEN_NAMES:
             raise InputError(
-                self.key, self.name, "is the name of a quantity; a point needs another"
+                self.key,
+                self.name,
+                "is the name of a quantity; a point needs another",
             )
         bar = require_whole(
-            f"{self.key}.bar", self.bar, BAR_NAMES, "must be 1, 2, 3 or 4"
+            f"{self.key}.bar",
+            self.bar,
+            BAR_NAMES,
+            "must be 1, 2, 3 or 4",
         )
         object.__setattr__(self, "bar", bar)
         check_numbers(self, self.key)

@@ -113,7 +113,8 @@ def encode_picture(key: str, path: str | Path, shown: str | None = None) -> str:
     name = str(path) if shown is None else shown
     content = read_bytes(path, key, LARGEST_PICTURE, shown=name)
     kind = next(
-        (kind for magic, kind in _RASTER.items() if content.startswith(magic)), None
+        (kind for magic, kind in _RASTER.items() if content.startswith(magic)),
+        None,
     )
     if kind is None:
         raise InputError(key, name, "must be a PNG or JPEG picture")

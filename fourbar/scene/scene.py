@@ -456,7 +456,10 @@ class _Triangle(NamedTuple):
         length, reach, zero = self.length, self.reach, 0.0 * self.length
         sign = SIDES[side]
         near = exact_difference(stroke, reach, length, zero) * exact_difference(
-            stroke, length, reach, zero
+            stroke,
+            length,
+            reach,
+            zero,
         )
         far = exact_difference(length, reach, stroke, zero) * (length + reach + stroke)
         with np.errstate(all="ignore"):
@@ -540,7 +543,8 @@ def default_places(scene: Scene, holding: float | None = None) -> Array:
         half = 0.5 * np.array([ANGLE_FROM_LIMITS, np.pi - ANGLE_FROM_LIMITS])
         twice_mean = 2.0 * np.sqrt(triangle.length * triangle.reach)
         first, last = np.hypot(
-            triangle.length - triangle.reach, twice_mean * np.sin(half)
+            triangle.length - triangle.reach,
+            twice_mean * np.sin(half),
         ).tolist()
     else:
         linkage = scene.linkage
@@ -568,7 +572,10 @@ def compute_bar_motion(
     if scene.motion.stroke is None:
         return place, speed, acceleration, None
     return _find_triangle(scene.linkage, scene.settled_drive()).turn_bar(
-        place, speed, acceleration, scene.motion.side
+        place,
+        speed,
+        acceleration,
+        scene.motion.side,
     )
 
 
@@ -583,7 +590,10 @@ def command_stroke(
     The branch is that of the motion.
     """
     angle, omega, alpha, condition = compute_bar_motion(
-        scene, stroke, speed, acceleration
+        scene,
+        stroke,
+        speed,
+        acceleration,
     )
     lost = None
     if speed is not None:  # what angle, speed and acceleration leave out as doubles
@@ -710,7 +720,11 @@ def command(scene: Scene) -> Command:
         limit = limits[stated.limit - 1]
         places = np.array([limit + stated.offset])
         remainder = limit_remainder(
-            linkage, limit, float(places[0]), stated.offset, bar
+            linkage,
+            limit,
+            float(places[0]),
+            stated.offset,
+            bar,
         )
     else:
         places = np.array(stated, dtype=float, ndmin=1)

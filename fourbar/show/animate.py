@@ -351,7 +351,9 @@ def _encode_pictures(
     for name, path in pictures.items():
         if name not in BAR_NUMBERS:
             raise InputError(
-                "picture", name, "must name one of " + ", ".join(BAR_NUMBERS)
+                "picture",
+                name,
+                "must name one of " + ", ".join(BAR_NUMBERS),
             )
         encoded[BAR_NUMBERS[name]] = encode_picture(f"picture.{name}", path)
     by_bar = {
@@ -410,7 +412,9 @@ def write_animation(
         return
     if pictures:
         raise InputError(
-            "picture", sorted(pictures), "pictures are shown in an .html page only"
+            "picture",
+            sorted(pictures),
+            "pictures are shown in an .html page only",
         )
     write_film(scene, target, kind, seconds, units, moving=vectors)
 

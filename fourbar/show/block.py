@@ -207,7 +207,9 @@ class _SceneBlock:
         if abs(place) <= LOCATED * abs(last - first):
             place = 0.0
         text = self._value(
-            place, self.unit, {"m": self.longest, "s": 1.0}.get(self.unit)
+            place,
+            self.unit,
+            {"m": self.longest, "s": 1.0}.get(self.unit),
         )
         if named:
             return f"{self.symbol}{_TIED}={_TIED}{text}"

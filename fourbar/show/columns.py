@@ -109,7 +109,9 @@ def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
             values = solution.time
         if values is None:
             raise InputError(
-                "--columns", name, "the positions are passed at no one speed: no time"
+                "--columns",
+                name,
+                "the positions are passed at no one speed: no time",
             )
         return "s", values
     stem = name
@@ -137,7 +139,9 @@ def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
         values = find_values(solution, stem)
     if values is None:
         raise InputError(
-            "--columns", name, "was not evaluated: the scene states no speed"
+            "--columns",
+            name,
+            "was not evaluated: the scene states no speed",
         )
     if axis is not None:
         return find_unit_of_quantity(stem), values[..., axis]

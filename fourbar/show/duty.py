@@ -154,7 +154,9 @@ def bearing_load(solution: Solution, pin: str) -> BearingLoad:
     theta_2 = np.where(np.isfinite(load), solution.theta_2, np.nan)
     place = np.take_along_axis(theta_2, worst, axis=-1)[..., 0]
     return BearingLoad(
-        _find_peak_value(load), _find_rms(solution, load), _reduce_to_number(place)
+        _find_peak_value(load),
+        _find_rms(solution, load),
+        _reduce_to_number(place),
     )
 
 
@@ -238,7 +240,9 @@ def _require_quantity(solution: Solution, name: str) -> Array:
     values: Array | None = getattr(solution, name)
     if values is None:
         raise InputError(
-            "solution", name, "was not evaluated: solve up to the stage 'force'"
+            "solution",
+            name,
+            "was not evaluated: solve up to the stage 'force'",
         )
     return values
 
@@ -393,7 +397,8 @@ def compute_energies(scene: Scene, motion: Solution) -> _Energies:
         finite = np.isfinite(power)  # bars 3 and 4 in line: the velocities are 0/0
         if np.count_nonzero(finite) > 1 and np.any(power[finite]):
             work[name] = CubicSpline(
-                motion.time[finite], power[finite]
+                motion.time[finite],
+                power[finite],
             ).antiderivative()(motion.time)
     kinetic = np.zeros(len(motion))
     for number, body in zip(

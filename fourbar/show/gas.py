@@ -126,7 +126,9 @@ def _locate_crossings(
 
     def is_as_before(middle: Array) -> NDArray[np.bool_]:
         distance = _measure_end_distance(
-            scene, spring, _command_between(scene, at, middle)
+            scene,
+            spring,
+            _command_between(scene, at, middle),
         )
         return np.equal(distance > end, before)
 

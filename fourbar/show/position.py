@@ -164,7 +164,10 @@ class PositionSheet:
             assert centre is not None
             if np.isfinite(centre).all():
                 row = self._write_vector(
-                    f"centre {name}", centre[0], "m", self._find_largest("", ["A", "B"])
+                    f"centre {name}",
+                    centre[0],
+                    "m",
+                    self._find_largest("", ["A", "B"]),
                 )
                 rows.append(row)
             else:

@@ -303,7 +303,8 @@ def rank_numbers(derivatives: Sensitivity, names: list[str]) -> list[str]:
         size = find_largest(derivatives, name)
         for row in derivatives.influences(name):
             share[row.key] = max(
-                share.get(row.key, 0.0), abs(row.change) / size if size > 0.0 else 0.0
+                share.get(row.key, 0.0),
+                abs(row.change) / size if size > 0.0 else 0.0,
             )
     return sorted(share, key=lambda key: -share[key])
 

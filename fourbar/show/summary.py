@@ -141,21 +141,31 @@ def list_sizes(solution: Solution) -> dict[str, Array]:
     These are torque, power and speed of the drive, and pin forces.
     """
     drive = read_drive_demand(solution)
-    keys = {
-        drive.keys.value: drive.keys.value,
-        "power": "power",
-        "speed": drive.speed_key,
+    torque = drive.keys.value
+    sizes = {
+        torque: np.abs(getattr(solution, torque)),
+        "power": np.abs(np.asarray(solution.power)),
+        "speed": np.abs(getattr(solution, drive.speed_key)),
     }
-    forces = {name: np.hypot(*getattr(solution, name).T) for name in PIN_FORCES}
-    works = {name: np.abs(getattr(solution, key)) for name, key in keys.items()}
-    # what a balanced linkage leaves of a load is rounding, and has no peak
+    forces = _compute_pin_loads(solution)
     largest = np.max([*forces.values()], axis=0)
-    forces = {name: drop_rounding(size, largest) for name, size in forces.items()}
-    lever = _find_lever(solution)
-    idle = works[drive.keys.value] <= SHOWN_AS_ZERO * largest * lever
-    for name in (drive.keys.value, "power"):
-        works[name] = np.where(idle, 0.0, works[name])
-    return {**works, **forces}
+    # what a balanced linkage leaves of a load is rounding, and has no peak
+    rounding = SHOWN_AS_ZERO * largest * _find_lever(solution)
+    idle = sizes[torque] <= rounding
+    for name in (torque, "power"):
+        sizes[name] = np.where(idle, 0.0, sizes[name])
+    for name, force in forces.items():
+        sizes[name] = drop_rounding(force, largest)
+    return sizes
+
+
+def _compute_pin_loads(solution: Solution) -> dict[str, Array]:
+    """Compute the magnitudes of the pin forces, N, by name."""
+    loads = {}
+    for name in PIN_FORCES:
+        force = getattr(solution, name)
+        loads[name] = np.hypot(force[:, 0], force[:, 1])
+    return loads
 
 
 def find_drive_rounding(solution: Solution) -> float:
@@ -169,12 +179,12 @@ def find_drive_rounding(solution: Solution) -> float:
     inertial = 0.0
     for number, bar in zip(MOVING_BARS, solution.scene.linkage.moving, strict=True):
         a_G = getattr(solution, f"a_G{number}")
-        inertial += bar.mass * float(np.nanmax(np.hypot(*a_G.T), initial=0.0))
+        accelerations = np.hypot(a_G[:, 0], a_G[:, 1])
+        inertial += bar.mass * float(np.nanmax(accelerations, initial=0.0))
     usual = 0.0
-    for name in PIN_FORCES:
-        sizes = np.hypot(*getattr(solution, name).T)
-        if np.isfinite(sizes).any():
-            usual = max(usual, float(np.nanmedian(sizes)))
+    for load in _compute_pin_loads(solution).values():
+        if np.isfinite(load).any():
+            usual = max(usual, float(np.nanmedian(load)))
     return SHOWN_AS_ZERO * max(inertial, usual) * _find_lever(solution)
 
 
@@ -199,28 +209,39 @@ def locate_between(scene: Scene, solution: Solution) -> Between:
     """
     if not _has_between(scene, solution):
         return Between(solution, solution, [], {COUPLE.value, LINE.value, *PIN_FORCES})
-    pins, low, high = _find_reversing(scene, solution)
-    for _ in range(LOCATING_ROUNDS if pins else 0):
-        places = _cut_range(low, high)
-        inside = _solve_at(scene, places.ravel(), "velocity")
-        slips = np.array(
-            [
-                _slip_of_pin(inside, pin).reshape(places.shape)[row]
-                for row, pin in enumerate(pins)
-            ]
-        )
-        turned = np.argmax(slips * slips[:, :1] <= 0.0, axis=1)
-        rows = np.arange(len(pins))
-        low = places[rows, turned - 1]
-        high = places[rows, turned]
+    pins, low, high = _locate_reversals(scene, solution)
     merged = _merge(scene, solution, np.concatenate([low, high]))
     if scene.motion.law is None:
         angles = low
     else:
-        angles = scene.motion.law.at(low)[0]
-    peaks, growing = _find_peaks(scene, merged, list_sizes)
+        angles, *_ = scene.motion.law.at(low)
     reversals = sorted(zip(angles.tolist(), pins, strict=True))
+    peaks, growing = _find_peaks(scene, merged, list_sizes)
     return Between(solution, _merge(scene, merged, peaks), reversals, growing)
+
+
+def _locate_reversals(
+    scene: Scene,
+    solution: Solution,
+) -> tuple[list[str], Array, Array]:
+    """Locate where the slip of a pin with dry friction changes sign.
+
+    Returned are the pin of each reversal and the places just before and after it.
+    """
+    pins, low, high = _find_reversing(scene, solution)
+    if not pins:
+        return pins, low, high
+    rows = np.arange(len(pins))
+    for _ in range(LOCATING_ROUNDS):
+        places = _cut_range(low, high)
+        inside = _solve_at(scene, places.ravel(), "velocity")
+        slips = np.empty(places.shape)
+        for row, pin in enumerate(pins):
+            slips[row] = _slip_of_pin(inside, pin).reshape(places.shape)[row]
+        turned = np.argmax(slips * slips[:, :1] <= 0.0, axis=1)
+        low = places[rows, turned - 1]
+        high = places[rows, turned]
+    return pins, low, high
 
 
 def locate_bending(scene: Scene, between: Between) -> dict[int, _BarBending]:
@@ -232,41 +253,49 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, _BarBending]:
     if solution.F12 is None or not np.isfinite(solution.F12).any():
         return {}
 
-    longest = max(scene.linkage.lengths)
-
-    def find(solution: Solution) -> dict[str, Bending]:
-        forces = [np.hypot(*getattr(solution, name).T) for name in PIN_FORCES]
-        size = longest * np.max(forces, axis=0)
-        return {
-            str(bar): _drop_bending_round_off(
-                internal_forces(scene, solution, bar, np.zeros(1)).largest, size
-            )
-            for bar in MOVING_BARS
-        }
-
     def list_moments(solution: Solution) -> dict[str, Array]:
-        return {bar: np.abs(bending.moment) for bar, bending in find(solution).items()}
+        bending = _compute_bending(scene, solution)
+        return {str(bar): np.abs(largest.moment) for bar, largest in bending.items()}
 
     growing = {str(bar) for bar in MOVING_BARS}
-    searched = [(solution, find(solution))]
+    searched = [solution]
     if _has_between(scene, solution):
         places, growing = _find_peaks(
-            scene, solution, list_moments, _BENDING_PEAKS, _BENDING_ROUNDS
+            scene,
+            solution,
+            list_moments,
+            _BENDING_PEAKS,
+            _BENDING_ROUNDS,
         )
         if len(places):
-            peaks = _solve_at(scene, places)
-            searched.append((peaks, find(peaks)))
-    bending = dict[int, _BarBending]()
+            searched.append(_solve_at(scene, places))
+    located = dict[int, _BarBending]()
+    for index, one in enumerate(searched):
+        for bar, largest in _compute_bending(scene, one).items():
+            grows = str(bar) in growing
+            if grows and index > 0:
+                continue  # the peak of another bar may stand beside a pole
+            moment = np.abs(largest.moment)
+            peak = _find_peak(one, moment)
+            if bar not in located or peak.value > located[bar].peak.value:
+                row = int(np.argmax(np.nan_to_num(moment, nan=-1.0)))
+                x = float(largest.x[row])
+                located[bar] = _BarBending(peak, x, one, row, grows)
+    return located
+
+
+def _compute_bending(scene: Scene, solution: Solution) -> dict[int, Bending]:
+    """Compute the largest bending moment of each bar at each position."""
+    loads = _compute_pin_loads(solution)
+    size = max(scene.linkage.lengths) * np.max([*loads.values()], axis=0)
+    round_off = _NO_BENDING * size
+    bending = {}
     for bar in MOVING_BARS:
-        grows = str(bar) in growing
-        for solution, largest in (
-            searched[:1] if grows else searched
-        ):  # the peak of another bar may stand beside a pole
-            moment, x = largest[str(bar)]
-            peak = _find_peak(solution, np.abs(moment))
-            row = int(np.argmax(np.nan_to_num(np.abs(moment), nan=-1.0)))
-            if bar not in bending or peak.value > bending[bar].peak.value:
-                bending[bar] = _BarBending(peak, float(x[row]), solution, row, grows)
+        largest = internal_forces(scene, solution, bar, np.zeros(1)).largest
+        # a two-force bar has none
+        is_round_off = np.abs(largest.moment) <= round_off
+        moment = np.where(is_round_off, 0.0, largest.moment)
+        bending[bar] = largest._replace(moment=moment)
     return bending
 
 
@@ -283,15 +312,6 @@ def _list_stresses(
         modulus = scene.linkage.bar(bar).section_modulus
         stresses[bar] = None if modulus is None else largest.peak.value / modulus
     return stresses
-
-
-def _drop_bending_round_off(bending: Bending, size: Array) -> Bending:
-    """Return bending moments with zero where they are rounding of the pin forces.
-
-    A two-force bar has none.
-    """
-    moment = np.where(np.abs(bending.moment) <= _NO_BENDING * size, 0.0, bending.moment)
-    return bending._replace(moment=moment)
 
 
 def _has_between(scene: Scene, solution: Solution) -> bool:
@@ -326,18 +346,18 @@ def _merge(
     if not len(places):
         return solution
     merged = np.concatenate([solution.at.places, places])
-    order = np.unique(merged, return_index=True)[1][
-        :: 1 if merged[0] < merged[1] else -1
-    ]
+    _, order = np.unique(merged, return_index=True)
+    if merged[0] > merged[1]:
+        order = order[::-1]
     return _solve_at(scene, merged[order], stage)
 
 
 def _slip_of_pin(solution: Solution, pin: str) -> Array:
     """Compute omega_j - omega_i of the bars that meet at a pin."""
-    first, second = (
-        0.0 if bar == 1 else getattr(solution, f"omega_{bar}") for bar in PINS[pin]
-    )
-    return np.asarray(second - first)
+    first, second = PINS[pin]
+    omega_i = 0.0 if first == 1 else getattr(solution, f"omega_{first}")
+    omega_j = 0.0 if second == 1 else getattr(solution, f"omega_{second}")
+    return np.asarray(omega_j - omega_i)
 
 
 def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array, Array]:
@@ -345,18 +365,21 @@ def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array,
 
     Each has the pin and its ends.
     """
-    places = solution.at.places
-    steps = list[tuple[str, int, int]]()
-    for pin in sorted({pin for effect in scene.effects for pin in effect.dry_pins}):
+    dry_pins = {pin for effect in scene.effects for pin in effect.dry_pins}
+    pins = []
+    first = []
+    last = []
+    for pin in sorted(dry_pins):
         slip = np.nan_to_num(_slip_of_pin(solution, pin))
-        moving = np.flatnonzero(np.abs(slip) > SLIP_AT_REST * np.abs(slip).max())
-        steps += [
-            (pin, i, j)
-            for i, j in pairwise(moving.tolist())
-            if slip[i] * slip[j] < 0.0 and solution.assembled[i:j].all()
-        ]
-    first, last = (np.array([step[end] for step in steps], dtype=int) for end in (1, 2))
-    return [pin for pin, *_ in steps], places[first], places[last]
+        size = np.abs(slip)
+        moving = np.flatnonzero(size > SLIP_AT_REST * size.max())
+        for i, j in pairwise(moving.tolist()):
+            if slip[i] * slip[j] < 0.0 and solution.assembled[i:j].all():
+                pins.append(pin)
+                first.append(i)
+                last.append(j)
+    places = solution.at.places
+    return pins, places[np.array(first, dtype=int)], places[np.array(last, dtype=int)]
 
 
 class _Search(NamedTuple):
@@ -386,79 +409,89 @@ def _find_peaks(
     The names of those that grow are returned too. A pole close beside the positions
     looks like one between them after few rounds, so that more follow then.
     """
-    places = solution.at.places
-    searches = list[_Search]()
-    passed = _find_dead_points(scene, solution) + _find_change_points(solution)
     present = sizes(solution)
-    for name, size in present.items():
-        padded = np.concatenate(
-            [[-1.0], np.nan_to_num(size, nan=-1.0, posinf=-1.0), [-1.0]]
-        )
-        before = padded[:-2]
-        here = padded[1:-1]
-        after = padded[2:]
-        tops = np.flatnonzero(
-            (here >= before)
-            & (here >= after)
-            & (here > np.minimum(before, after))
-            & (here > 0.0)
-        )
-        for i in tops[np.argsort(-here[tops], kind="stable")][:most]:
-            start = i - (before[i] >= 0.0)
-            stop = i + (after[i] >= 0.0)
-            searches.append(_Search(name, i, start, stop))
-        for step in passed:
-            rises = bool(padded[step + 1] < padded[step + 2])
-            searches.append(_Search(name, step + rises, step, step + 1))
-        for i, j in pairwise(
-            range(len(places))
-        ):  # towards a gap a magnitude may grow without a local maximum
-            if padded[i + 1] * padded[j + 1] < 0.0:
-                beside = _Search(name, i if padded[j + 1] < 0.0 else j, i, j)
-                searches.append(beside)
-                if solution.assembled[i] and solution.assembled[j]:
-                    searches.append(beside._replace(inward=True))
+    searches = _list_searches(scene, solution, present, most)
     if not searches:
         return np.zeros(0), set()
     names, *columns = zip(*searches, strict=True)
     top, start, stop, inward = map(np.array, columns)
-    opens = inward | ~(solution.assembled[start] & solution.assembled[stop])
-    begins = solution.assembled[start] & ~(inward & (top == stop))
+    assembled = solution.assembled
+    opens = inward | ~(assembled[start] & assembled[stop])
+    begins = assembled[start] & ~(inward & (top == stop))
+    places = solution.at.places
     low = places[start]
     high = places[stop]
     peak_places = places[top]
     reached = [np.array([present[one.name][one.top] for one in searches])]
     growing = np.zeros(len(searches), dtype=bool)
     rows = np.arange(len(searches))
+    steps_inward = np.abs(np.arange(CUTS + 1) - np.where(begins, 0, CUTS)[:, None])
     for count in range(LOCATING_ROUNDS):
         if count >= rounds and not growing.any():
             break
         cut_range = _cut_range(low, high)
         inside = sizes(_solve_at(scene, cut_range.ravel()))
-        values = np.array(
-            [
-                np.nan_to_num(inside[n].reshape(cut_range.shape)[k], nan=-1.0)
-                for k, n in enumerate(names)
-            ]
-        )
-        inwards = np.abs(np.arange(CUTS + 1) - np.where(begins, 0, CUTS)[:, None])
-        best = np.argmax(
-            np.where(opens[:, None] & (values >= 0.0), inwards, values),
-            axis=1,
-        )
-        peak_places, low, high = (
-            cut_range[rows, np.clip(best + step, 0, CUTS)] for step in (0, -1, 1)
-        )
+        values = np.empty(cut_range.shape)
+        for row, name in enumerate(names):
+            values[row] = inside[name].reshape(cut_range.shape)[row]
+        values = np.nan_to_num(values, nan=-1.0)
+        # beside a gap the last value before it, otherwise the largest
+        exists = opens[:, None] & (values >= 0.0)
+        best = np.argmax(np.where(exists, steps_inward, values), axis=1)
+        peak_places = cut_range[rows, best]
+        low = cut_range[rows, np.maximum(best - 1, 0)]
+        high = cut_range[rows, np.minimum(best + 1, CUTS)]
         reached.append(values[rows, best])
         if count + 1 >= rounds:
             growing = _find_growing(reached, values, best)
-    kept = (
-        ~growing & (reached[-1] > reached[0]) & ~opens
-    )  # beside a gap other magnitudes grow
-    return (
-        peak_places[kept],
-        {name for name, grows in zip(names, growing, strict=True) if grows},
-    )
+    # beside a gap other magnitudes grow
+    kept = ~growing & (reached[-1] > reached[0]) & ~opens
+    growing_names = {names[row] for row in np.flatnonzero(growing)}
+    return peak_places[kept], growing_names
+
+
+def _list_searches(
+    scene: Scene,
+    solution: Solution,
+    sizes: dict[str, Array],
+    most: int,
+) -> list[_Search]:
+    """List the steps in which a magnitude may have a maximum or a pole."""
+    assembled = solution.assembled
+    passed = _find_dead_points(scene, solution) + _find_change_points(solution)
+    searches = []
+    for name, size in sizes.items():
+        values = np.nan_to_num(size, nan=-1.0, posinf=-1.0)
+        searches += _list_tops(name, values, most)
+        for step in passed:
+            rises = bool(values[step] < values[step + 1])
+            searches.append(_Search(name, step + rises, step, step + 1))
+        # towards a gap a magnitude may grow without a local maximum
+        for step in _find_sign_changes(values):
+            following = step + 1
+            top = step if values[following] < 0.0 else following
+            beside = _Search(name, top, step, following)
+            searches.append(beside)
+            if assembled[step] and assembled[following]:
+                searches.append(beside._replace(inward=True))
+    return searches
+
+
+def _list_tops(name: str, values: Array, most: int) -> list[_Search]:
+    """List searches around the highest local maxima; values below 0 are missing."""
+    padded = np.concatenate([[-1.0], values, [-1.0]])
+    before = padded[:-2]
+    after = padded[2:]
+    is_highest = (values >= before) & (values >= after)
+    stands_out = values > np.minimum(before, after)
+    tops = np.flatnonzero(is_highest & stands_out & (values > 0.0))
+    falling = np.argsort(-values[tops], kind="stable")
+    searches = []
+    for i in tops[falling][:most]:
+        start = i - (before[i] >= 0.0)
+        stop = i + (after[i] >= 0.0)
+        searches.append(_Search(name, i, start, stop))
+    return searches
 
 
 def _find_change_points(solution: Solution) -> list[int]:
@@ -466,7 +499,12 @@ def _find_change_points(solution: Solution) -> list[int]:
     # on a change point itself the sine is rounding
     between = solution.status_code != CHANGE_POINT
     sine = np.where(between, np.nan_to_num(solution.sin_mu), 0.0)
-    steps: list[int] = np.flatnonzero(sine[:-1] * sine[1:] < 0.0).tolist()
+    return _find_sign_changes(sine)
+
+
+def _find_sign_changes(values: Array) -> list[int]:
+    """List the steps within which values change their sign."""
+    steps: list[int] = np.flatnonzero(values[:-1] * values[1:] < 0.0).tolist()
     return steps
 
 
@@ -476,13 +514,14 @@ def _find_dead_points(scene: Scene, solution: Solution) -> list[int]:
     Forces have a pole there. Its two ends need not be maxima of the positions.
     """
     at = solution.at
-    if at.stroke is not None or (scene.drive is None and scene.drive_bar == at.bar):
+    drives_commanded_bar = scene.drive is None and scene.drive_bar == at.bar
+    if at.stroke is not None or drives_commanded_bar:
         return []
     one = np.ones(len(solution))
-    moving = solve(scene, "velocity", at=at._replace(speed=one, acceleration=0.0 * one))
-    speed = np.nan_to_num(getattr(moving, read_drive_demand(moving).speed_key))
-    steps: list[int] = np.flatnonzero(speed[:-1] * speed[1:] < 0.0).tolist()
-    return steps
+    at_unit_speed = at._replace(speed=one, acceleration=0.0 * one)
+    moving = solve(scene, "velocity", at=at_unit_speed)
+    speed = getattr(moving, read_drive_demand(moving).speed_key)
+    return _find_sign_changes(np.nan_to_num(speed))
 
 
 def _find_growing(
@@ -504,8 +543,10 @@ def _find_growing(
     rises: NDArray[np.bool_] = reached[-1] > (1.0 + GROWING) * reached[-3]
     padded = np.pad(values, ((0, 0), (1, 1)), constant_values=-1.0)
     rows = np.arange(len(best))
-    beside = np.maximum(padded[rows, best], padded[rows, best + 2])
-    return rises | (reached[-1] > (1.0 + GROWING) * beside)
+    before = padded[rows, best]
+    after = padded[rows, best + 2]
+    stands_out = reached[-1] > (1.0 + GROWING) * np.maximum(before, after)
+    return rises | stands_out
 
 
 class _PinLoad(NamedTuple):
@@ -582,61 +623,87 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
     between = locate_between(scene, solution)
     kind = _find_kind(scene, solution)
     places = _list_commanded(solution)
-    codes = solution.status_code
-    fine = solution
-    stretches = list[tuple[float | None, float | None]]()
-    if smooth := kind in ("sweep", "turn", "law"):
+    smooth = kind in ("sweep", "turn", "law")
+    if smooth:
         fine, stretches = _solve_finely(scene, places)
-        if stretches and kind == "turn":
-            kind = "sweep"
+    else:
+        fine = solution
+        stretches = []
+    if stretches and kind == "turn":
+        kind = "sweep"
 
     def find_range(values: Array) -> tuple[Peak, Peak]:
-        low, high = (
-            _find_extreme(sign * values, _list_commanded(fine), sign, smooth)
-            for sign in (-1, 1)
-        )
+        commanded = _list_commanded(fine)
+        low = _find_extreme(-1 * values, commanded, -1, smooth)
+        high = _find_extreme(1 * values, commanded, 1, smooth)
         return low, high
 
-    least, _ = find_range(np.square(fine.sin_mu))
-    mu = math.asin(min(1.0, math.sqrt(max(least.value, 0.0))))
+    angles = {}
+    for bar in MOVING_BARS:
+        angles[bar] = find_range(_join_stretches(solution, fine, bar))
+    stroke_range = None
+    if fine.stroke is not None:
+        stroke_range = find_range(fine.stroke)
+    stroke_limits = None
+    if solution.stroke is not None:
+        stroke_limits = _find_stroke_limits(scene, solution)
     released = scene.motion.free is not None
-    bending = locate_bending(scene, between)
-    if released or solution.F12 is None:
-        drive = None
-    else:
+    drive = None
+    if not released and solution.F12 is not None:
         drive = read_drive_demand(solution)
-    peak = None
-    if drive is not None and np.isfinite(drive.values).any():  # type: ignore[arg-type]
-        located = between.bounded(drive.keys.value)
-        peak = _find_peak(located, read_drive_demand(located).values)
+    peak = _find_drive_peak(between, drive)
+    duty = None
+    if peak is not None and kind != "position":
+        duty = find_duty(between)
+    bending = locate_bending(scene, between)
     return Facts(
         scene=scene,
         solution=solution,
         kind=kind,
-        counts={
-            STATUS_NAMES[code]: int(np.sum(codes == code)) for code in np.unique(codes)
-        },
+        counts=_count_statuses(solution),
         commanded=(float(places[0]), float(places[-1])),
-        angles={
-            bar: find_range(_join_stretches(solution, fine, bar)) for bar in MOVING_BARS
-        },
-        transmission=Peak(mu if mu > ZERO_TRANSMISSION_ANGLE else 0.0, least.place),
+        angles=angles,
+        transmission=_find_transmission(find_range(np.square(fine.sin_mu))[0]),
         stretches=stretches,
-        drive=drive if peak is not None else None,
+        drive=None if peak is None else drive,
         peak=peak,
-        duty=find_duty(between) if peak is not None and kind != "position" else None,
+        duty=duty,
         held=None if drive is None else _find_held(solution, drive),
         pins=_list_pin_loads(solution, between),
         rates=_find_rates(solution, smooth=smooth),
         bending=bending,
         stresses=_list_stresses(scene, bending),
-        stroke_range=None if fine.stroke is None else find_range(fine.stroke),
-        stroke_limits=(
-            None if solution.stroke is None else _find_stroke_limits(scene, solution)
-        ),
+        stroke_range=stroke_range,
+        stroke_limits=stroke_limits,
         between=between,
         error=_find_largest_error_bar(solution, drive),
     )
+
+
+def _count_statuses(solution: Solution) -> dict[str, int]:
+    """Count the positions of each status."""
+    counts = {}
+    codes, numbers = np.unique(solution.status_code, return_counts=True)
+    for code, number in zip(codes, numbers, strict=True):
+        counts[STATUS_NAMES[code]] = int(number)
+    return counts
+
+
+def _find_transmission(least: Peak) -> Peak:
+    """Return the smallest transmission angle from the least sin(mu)^2."""
+    square = min(1.0, max(least.value, 0.0))
+    mu = math.asin(math.sqrt(square))
+    if mu <= ZERO_TRANSMISSION_ANGLE:
+        mu = 0.0
+    return Peak(mu, least.place)
+
+
+def _find_drive_peak(between: Between, drive: Driving | None) -> Peak | None:
+    """Find the largest torque or force of the drive; None without a finite one."""
+    if drive is None or drive.values is None or not np.isfinite(drive.values).any():
+        return None
+    located = between.bounded(drive.keys.value)
+    return _find_peak(located, read_drive_demand(located).values)
 
 
 def _find_rates(solution: Solution, *, smooth: bool) -> dict[int, tuple[Peak, Peak]]:
@@ -644,12 +711,13 @@ def _find_rates(solution: Solution, *, smooth: bool) -> dict[int, tuple[Peak, Pe
 
     They follow what is commanded.
     """
-    places, rates = _list_commanded(solution), dict[int, tuple[Peak, Peak]]()
+    rates = dict[int, tuple[Peak, Peak]]()
     if solution.omega_4 is None or len(solution) == 1:
         return rates
-    moved = () if solution.time is not None else (solution.at.bar,)
+    places = _list_commanded(solution)
+    is_over_time = solution.time is not None
     for bar in MOVING_BARS:
-        if bar in moved:
+        if bar == solution.at.bar and not is_over_time:
             continue
         peaks = []
         for letter in ("omega", "alpha"):
@@ -698,19 +766,17 @@ def _find_extreme(values: Array, places: Array, sign: int, smooth: bool) -> Peak
     i = int(np.nanargmax(values))
     value = float(values[i])
     place = float(places[i])
-    beside = slice(i - 1, i + 2)
-    inside = 0 < i < len(values) - 1
-    if (
-        smooth
-        and inside
-        and np.isfinite(values[beside]).all()
-        and np.isclose(*np.diff(places[beside]))
-    ):
-        rise = values[i + 1] - values[i - 1]
-        bend = values[i + 1] - 2.0 * values[i] + values[i - 1]
-        if bend < 0.0:
-            value -= float(rise * rise / (8.0 * bend))
-            place -= float(0.5 * rise / bend * 0.5 * (places[i + 1] - places[i - 1]))
+    if smooth and 0 < i < len(values) - 1:
+        beside = slice(i - 1, i + 2)
+        first_step, second_step = np.diff(places[beside])
+        even = np.isclose(first_step, second_step)
+        if even and np.isfinite(values[beside]).all():
+            rise = values[i + 1] - values[i - 1]
+            bend = values[i + 1] - 2.0 * values[i] + values[i - 1]
+            width = places[i + 1] - places[i - 1]
+            if bend < 0.0:
+                value -= float(rise * rise / (8.0 * bend))
+                place -= float(0.5 * rise / bend * 0.5 * width)
     return Peak(sign * value, place)
 
 
@@ -729,24 +795,21 @@ def _list_assembled_stretches(
     if places[0] > places[-1]:  # from the smallest place on
         closes = closes[::-1]
         places = places[::-1]
+    ends = list[float | None]()
     if closes[0]:
-        ends: list[float | None] = [None]
-    else:
-        ends = []
+        ends.append(None)
     for i in np.flatnonzero(closes[1:] != closes[:-1]):
         low = places[i]
         high = places[i + 1]
         for _ in range(_END_ROUNDS):
             cut_range = np.linspace(low, high, CUTS + 1)
-            first = int(
-                np.argmax(
-                    _solve_at(scene, cut_range, "position").assembled != closes[i]
-                )
-            )
+            assembled = _solve_at(scene, cut_range, "position").assembled
+            first = int(np.argmax(assembled != closes[i]))
             low = cut_range[max(first - 1, 0)]
             high = cut_range[first]
         ends.append(float(low if closes[i] else high))
-    ends += [None] if closes[-1] else []
+    if closes[-1]:
+        ends.append(None)
     return list(zip(ends[::2], ends[1::2], strict=True))
 
 
@@ -758,9 +821,8 @@ def _solve_finely(
 
     The ends of its stretches are among them.
     """
-    fine = _solve_at(
-        scene, np.linspace(places[0], places[-1], RANGE_POSITIONS + 1), "position"
-    )
+    fine_places = np.linspace(places[0], places[-1], RANGE_POSITIONS + 1)
+    fine = _solve_at(scene, fine_places, "position")
     stretches = _list_assembled_stretches(scene, fine)
     ends = [end for stretch in stretches for end in stretch if end is not None]
     return _merge(scene, fine, np.array(ends), "position"), stretches
@@ -777,15 +839,16 @@ def _join_stretches(solution: Solution, fine: Solution, bar: int) -> Array:
     angles = np.array(getattr(fine, f"theta_{bar}"))
     if bar == fine.at.bar and fine.at.stroke is None:
         return angles  # as it is commanded
-    known = np.flatnonzero(np.isfinite(angles))
-    own = getattr(solution, f"theta_{bar}")
-    first = int(np.flatnonzero(np.isfinite(own))[0])
-    distances = _list_commanded(fine)[known] - _list_commanded(solution)[first]
-    nearest = known[np.argmin(np.abs(distances))]
-    angles += TURN * np.round((own[first] - angles[nearest]) / TURN)
+    finite = np.flatnonzero(np.isfinite(angles))
+    coarse = getattr(solution, f"theta_{bar}")
+    first = int(np.flatnonzero(np.isfinite(coarse))[0])
+    distances = _list_commanded(fine)[finite] - _list_commanded(solution)[first]
+    nearest = finite[np.argmin(np.abs(distances))]
+    angles += TURN * np.round((coarse[first] - angles[nearest]) / TURN)
     low = math.inf
     high = -math.inf
-    for stretch in np.split(known, np.flatnonzero(np.diff(known) > 1) + 1):
+    gaps = np.flatnonzero(np.diff(finite) > 1)
+    for stretch in np.split(finite, gaps + 1):
         start = angles[stretch].min()
         stop = angles[stretch].max()
         if low < high:
@@ -803,13 +866,16 @@ def _find_turns(start: float, stop: float, low: float, high: float) -> int:
 
     With them it covers least together with another.
     """
-    between = round((0.5 * (low + high) - 0.5 * (start + stop)) / TURN)
+    distance = 0.5 * (low + high) - 0.5 * (start + stop)
+    nearest = round(distance / TURN)
 
     def measure(turns: int) -> tuple[int, int]:
-        moved = max(high, stop + TURN * turns) - min(low, start + TURN * turns)
-        return round(moved / _AS_WIDE), abs(turns)
+        top = max(high, stop + TURN * turns)
+        bottom = min(low, start + TURN * turns)
+        width = top - bottom
+        return round(width / _AS_WIDE), abs(turns)
 
-    return min((between - 1, between, between + 1), key=measure)
+    return min((nearest - 1, nearest, nearest + 1), key=measure)
 
 
 def find_duty(between: Between) -> MotorDuty | None:
@@ -837,11 +903,12 @@ def find_duty(between: Between) -> MotorDuty | None:
 
 
 def _find_held(solution: Solution, drive: Driving) -> tuple[float, float] | None:
-    low, high = (getattr(solution, name) for name in (drive.keys.low, drive.keys.high))
-    if (
-        low is None
-        or not (held := np.isfinite(low) & np.isfinite(high) & (low < high)).any()
-    ):
+    low = getattr(solution, drive.keys.low)
+    high = getattr(solution, drive.keys.high)
+    if low is None:
+        return None
+    held = np.isfinite(low) & np.isfinite(high) & (low < high)
+    if not held.any():
         return None
     return float(low[held].min()), float(high[held].max())
 
@@ -850,7 +917,8 @@ def _find_peak(solution: Solution, values: Array | None) -> Peak:
     """Find the value of largest magnitude, and its place."""
     assert values is not None
     worst = int(np.nanargmax(np.abs(values)))
-    return Peak(float(values[worst]), float(_list_commanded(solution)[worst]))
+    place = _list_commanded(solution)[worst]
+    return Peak(float(values[worst]), float(place))
 
 
 def _list_pin_loads(solution: Solution, between: Between) -> dict[str, _PinLoad]:
@@ -859,7 +927,7 @@ def _list_pin_loads(solution: Solution, between: Between) -> dict[str, _PinLoad]
     loads = dict[str, _PinLoad]()
     for pin, name in PIN_FORCE.items():
         bounded = between.bounded(name)
-        size = np.hypot(*getattr(bounded, name).T)
+        size = _compute_pin_loads(bounded)[name]
         peak = _find_peak(bounded, np.where(np.isfinite(size), size, np.nan))
         loads[pin] = _PinLoad(peak, bearing_load(solution, pin).rms)
     return loads
@@ -870,32 +938,37 @@ def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]
 
     The angles are all that it reaches on its branch.
     """
-    positions = solution.at
+    at = solution.at
     first = int(np.argmax(solution.assembled))
-    here = float(positions.angle[first])
-    intervals = find_intervals(scene.linkage, positions.bar)
-    low, high = min(
-        intervals,
-        key=lambda ends: (here - ends[0]) % TURN - (ends[1] - ends[0]),
-    )
+    here = float(at.angle[first])
+
+    def find_excess(interval: tuple[float, float]) -> float:
+        start, stop = interval
+        return (here - start) % TURN - (stop - start)
+
+    low, high = min(find_intervals(scene.linkage, at.bar), key=find_excess)
     width = high - low
-    low = here - ((here - low) % TURN if width < TURN else 0.5 * TURN)
-    angles = np.linspace(
-        low + _INSET * width, low + (1.0 - _INSET) * width, RANGE_POSITIONS + 1
-    )
+    if width < TURN:
+        low = here - (here - low) % TURN
+    else:
+        low = here - 0.5 * TURN
+    inner_low = low + _INSET * width
+    inner_high = low + (1.0 - _INSET) * width
+    angles = np.linspace(inner_low, inner_high, RANGE_POSITIONS + 1)
     motion = Motion(
-        **{f"theta_{positions.bar}": angles},  # type: ignore[arg-type]
-        branch=int(positions.branch[first]),
+        **{f"theta_{at.bar}": angles},  # type: ignore[arg-type]
+        branch=int(at.branch[first]),
     )
     stroke = solve(replace(scene, motion=motion, tolerances=()), "position").stroke
     assert stroke is not None
-    if positions.stroke is not None:  # its side ends where the stroke turns back
+    if at.stroke is not None:  # its side ends where the stroke turns back
         place = int(np.argmin(np.abs(angles - here)))
-        steps = np.sign(np.diff(stroke))
-        way = steps[min(place, RANGE_POSITIONS - 1)]
-        turns = np.flatnonzero(steps != way)
+        senses = np.sign(np.diff(stroke))
+        sense = senses[min(place, RANGE_POSITIONS - 1)]
+        turns = np.flatnonzero(senses != sense)
         start = turns[turns < place].max(initial=-1) + 1
-        stroke = stroke[start : turns[turns >= place].min(initial=RANGE_POSITIONS) + 1]
+        stop = turns[turns >= place].min(initial=RANGE_POSITIONS) + 1
+        stroke = stroke[start:stop]
     return float(np.nanmin(stroke)), float(np.nanmax(stroke))
 
 
@@ -906,14 +979,11 @@ def _find_largest_error_bar(solution: Solution, drive: Driving | None) -> float 
     """
     if solution.force_error is None:
         return None
-    loads = np.max(
-        [np.hypot(*getattr(solution, name).T) for name in PIN_FORCE.values()],
-        axis=0,
-    )
-    pairs = [(solution.force_error, loads)]
+    loads = _compute_pin_loads(solution)
+    pairs = [(solution.force_error, np.max([*loads.values()], axis=0))]
     if drive is not None and drive.error is not None and drive.values is not None:
         pairs.append((drive.error, np.abs(drive.values)))
-    shares = []
+    largest = None
     for error, size in pairs:
         solved = np.isfinite(error) & np.isfinite(size) & (solution.status_code == OK)
         usual = np.median(size[solved]) if solved.any() else 0.0
@@ -921,5 +991,6 @@ def _find_largest_error_bar(solution: Solution, drive: Driving | None) -> float 
         # where most are exactly zero, so may be one with an error bar
         solved &= reference > 0.0
         if solved.any():
-            shares.append(float((error[solved] / reference[solved]).max()))
-    return max(shares, default=None)
+            relative = float((error[solved] / reference[solved]).max())
+            largest = relative if largest is None else max(largest, relative)
+    return largest

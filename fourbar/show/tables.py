@@ -128,7 +128,8 @@ def print_positions(
     if columns:
         cells = {
             f"{column.name}\n{column.label(units)}": write_cells(
-                column.shown(units), _choose_form(column.unit)
+                column.shown(units),
+                _choose_form(column.unit),
             )
             for column in columns
         }
@@ -205,7 +206,8 @@ def list_columns(
     shown["sin mu\n"] = write_cells(solution.sin_mu)
     if solution.time is None and drive.values is not None and drive.error is not None:
         shown[f"digits\nof {drive.symbol[0]}"] = _count_torque_digits(
-            drive.values, drive.error
+            drive.values,
+            drive.error,
         )
     time = compute_times(solution.scene, solution.at)
     if time is not None:

@@ -216,9 +216,8 @@ def collect_tolerances(
             spreads = tolerances(positions, PAGE_SAMPLES, progress=report)
     except (InputError, DependencyError) as error:
         return {"lines": [str(error)], "parts": {}}
-    rows = (
-        np.linspace(0, len(spreads.theta_2) - 1, len(places)).round().astype(int)
-    )  # a law is thinned as in `animate`
+    # a law is thinned as in `animate`
+    rows = np.linspace(0, len(spreads.theta_2) - 1, len(places)).round().astype(int)
 
     def short(values: Array, digits: int) -> list[float | None]:
         return [

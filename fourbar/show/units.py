@@ -92,7 +92,9 @@ def units(text: str) -> Conversion:
     if mass.casefold() in _POUNDS and "N" not in stated:
         reason = "is a mass, and the list names no unit of force"
         raise InputError(
-            "units", mass, f"{reason}: write lbf for pounds-force, or both"
+            "units",
+            mass,
+            f"{reason}: write lbf for pounds-force, or both",
         )
     for unit, (base, form) in FOLLOWING_UNITS.items():
         if base in stated and unit not in stated:

@@ -231,7 +231,8 @@ def draw_angles(axes: "Axes", view: View) -> None:
         ]
     )
     set_degree_ticks(
-        axes.yaxis, 1.3 * float(np.nanmax(shown) - np.nanmin(shown)) + 1e-9
+        axes.yaxis,
+        1.3 * float(np.nanmax(shown) - np.nanmin(shown)) + 1e-9,
     )
     if len(bars) > 2:
         axes.set(ylabel=r"$\theta$ (°)", title="Angles of the bars")
@@ -323,12 +324,16 @@ def _draw_point_sizes(
     curves = {
         name: np.hypot(*vector.T)
         for name, vector in collect_point_vectors(
-            view.scene, view.sweep, letter
+            view.scene,
+            view.sweep,
+            letter,
         ).items()
     }
     limit = choose_limit(list(curves.values()))
     factor, shown_unit = choose_unit(
-        limit or largest_magnitude(*curves.values()), unit, view.units
+        limit or largest_magnitude(*curves.values()),
+        unit,
+        view.units,
     )
     looks = {
         "A": BAR_COLOURS[2],
@@ -386,7 +391,9 @@ def _draw_drive(
     everywhere = [getattr(branch.sweep, name) for branch in view.alike]
     limit = choose_limit(everywhere)
     factor, shown_unit = choose_unit(
-        limit or largest_magnitude(*everywhere), unit, view.units
+        limit or largest_magnitude(*everywhere),
+        unit,
+        view.units,
     )
     if bar:
         symbol = f"${letter}_{bar}$"
@@ -600,15 +607,14 @@ def find_free_place(mu: Array) -> float:
     best = 1.0 - half
     clearance = -1.0
     for place in np.linspace(1.0 - half, half, 25):
-        part = mu[
-            int((place - half) * len(mu)) : max(1, math.ceil((place + half) * len(mu)))
-        ]
-        away = np.abs(
-            part[np.isfinite(part)] - _RECOMMENDED - 3.0
-        )  # the remark stands on the line
-        if away.size and away.min() > clearance:
+        first = int((place - half) * len(mu))
+        last = max(1, math.ceil((place + half) * len(mu)))
+        beside = mu[first:last]
+        # the remark stands on the line of the recommended angle
+        distances = np.abs(beside[np.isfinite(beside)] - _RECOMMENDED - 3.0)
+        if distances.size and distances.min() > clearance:
             best = float(place)
-            clearance = float(away.min())
+            clearance = float(distances.min())
     return best
 
 
@@ -620,45 +626,43 @@ def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
     if view.time is not None:
         return []
     positions = view.sweep.at
-    marked = list[tuple[list[float], list[float], str, str]]()
     degrees = np.degrees(positions.angle)
     order = np.argsort(degrees)
+    margin = 0.0
     if len(degrees) > 1:
         margin = 1.5 * float(np.median(np.abs(np.diff(degrees))))
-    else:
-        margin = 0.0
     one, follower = (bar for bar in MOVING_BARS if bar != positions.bar)
     signs = with_signs(view.scene.linkage, positions).branch
+
+    marked = list[tuple[list[float], list[float], str, str]]()
     for bar in sorted({2, 4, positions.bar}, key=lambda bar: bar != positions.bar):
-        turned = list[float]()
+        is_commanded = bar == positions.bar
+        places = list[float]()
         heights = list[float]()
         for limit in limit_positions(view.scene.linkage, bar):
             theta = {2: limit.theta_2, 3: limit.theta_3, 4: limit.theta_4}
             sign = math.copysign(1.0, math.sin(theta[follower] - theta[one]))
             difference = limit.theta_4 - limit.theta_3
-            for place in _list_inside(
-                degrees, theta[positions.bar], margin if bar == positions.bar else 0.0
-            ):
-                if (
-                    bar == positions.bar
-                    or signs[np.argmin(np.abs(degrees - place))] == sign
-                ):
-                    turned.append(place)
-                    heights.append(
-                        math.degrees(
-                            math.atan2(
-                                abs(math.sin(difference)), abs(math.cos(difference))
-                            )
-                        )
-                    )
-        if (
-            positions.stroke is not None
-        ):  # over which its bar's angle rises or falls throughout
-            turned = np.interp(turned, degrees[order], view.axis.values[order]).tolist()
+            sine = abs(math.sin(difference))
+            cosine = abs(math.cos(difference))
+            mu = math.degrees(math.atan2(sine, cosine))
+            angle = theta[positions.bar]
+            for place in _list_inside(degrees, angle, margin if is_commanded else 0.0):
+                nearest = np.argmin(np.abs(degrees - place))
+                if is_commanded or signs[nearest] == sign:
+                    places.append(place)
+                    heights.append(mu)
+        # over a stroke its bar's angle rises or falls throughout
+        if positions.stroke is not None:
+            places = np.interp(places, degrees[order], view.axis.values[order]).tolist()
+        if not places:
+            continue
         pair = ", ".join(str(number) for number in MOVING_BARS if number != bar)
-        mark, what = ("s", "limit") if bar == positions.bar else ("D", "dead centre")
-        marked.append((turned, heights, mark, f"{what}: bars {pair} in line"))
-    return [entry for entry in marked if entry[0]]
+        if is_commanded:
+            marked.append((places, heights, "s", f"limit: bars {pair} in line"))
+        else:
+            marked.append((places, heights, "D", f"dead centre: bars {pair} in line"))
+    return marked
 
 
 def _list_inside(angles: Array, angle: float, margin: float) -> list[float]:

@@ -315,9 +315,8 @@ def _share_limits(columns: "list[list[Axes]]") -> None:
     for panels in zip(*columns, strict=True):
         if len(panels) == 1 or panels[0].name == "polar" or not panels[0].axison:
             continue
-        if (
-            panels[0].get_aspect() == 1.0
-        ):  # to scale: the data, not the limits, say what has to fit
+        is_to_scale = panels[0].get_aspect() == 1.0
+        if is_to_scale:  # the data, not the limits, say what has to fit
             corners = np.concatenate([axes.dataLim.get_points() for axes in panels])
             for axes in panels:
                 axes.update_datalim(corners)
@@ -325,7 +324,7 @@ def _share_limits(columns: "list[list[Axes]]") -> None:
             continue
         for limits in ("xlim", "ylim"):
             ends = [getattr(axes, f"get_{limits}")() for axes in panels]
+            low = min(low for low, _ in ends)
+            high = max(high for _, high in ends)
             for axes in panels:
-                getattr(axes, f"set_{limits}")(
-                    min(low for low, _ in ends), max(high for _, high in ends)
-                )
+                getattr(axes, f"set_{limits}")(low, high)

@@ -92,7 +92,8 @@ def write_film(
             if shown.time is not None:
                 duration = float(shown.time[-1] - shown.time[0])
                 seconds = min(
-                    max(duration, SHORTEST_FILM), _MAX_FRAMES / FRAMES_PER_SECOND
+                    max(duration, SHORTEST_FILM),
+                    _MAX_FRAMES / FRAMES_PER_SECOND,
                 )
         figure, move = _make_stage(shown, moving)
         order = choose_frames(shown, max(2, round(seconds * FRAMES_PER_SECOND)))
@@ -178,9 +179,8 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
         return labels
 
     closes = np.flatnonzero(sweep.assembled)
-    for index in closes[
-        :: max(1, len(closes) // WINDOW_POSITIONS)
-    ]:  # the window holds what acts at every position
+    # the window holds what acts at every position
+    for index in closes[:: max(1, len(closes) // WINDOW_POSITIONS)]:
         for _, line, _ in put(int(index)).lines:
             axes.update_datalim(line)
     axes.autoscale_view()

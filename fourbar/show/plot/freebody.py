@@ -146,7 +146,10 @@ class _ActionRecorder(Actions):
         arm = point * self.state.direction(bar) + (0.0j if beyond is None else beyond)
         self.arrows[bar].append(
             Arrow(
-                self.name.replace("#", str(bar)), _take_one(arm), _take_one(force), INK
+                self.name.replace("#", str(bar)),
+                _take_one(arm),
+                _take_one(force),
+                INK,
             )
         )
 
@@ -195,7 +198,8 @@ def _record_actions(view: View) -> _ActionRecorder:
         )
         effect.act(recorder, state)
         effect.act_known(
-            recorder, {name: getattr(view.here, name) for name in PIN_FORCE.values()}
+            recorder,
+            {name: getattr(view.here, name) for name in PIN_FORCE.values()},
         )
     return recorder
 
@@ -211,9 +215,8 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
             f" {view.here.status[0]}"
         )
         raise InputError("figure", "freebody", reason)
-    freed = [
-        (v, bar, *list_actions(v, bar)) for v in view.alike for bar in MOVING_BARS
-    ]  # those of this view first
+    # the bars of this view are the first three
+    freed = [(v, bar, *list_actions(v, bar)) for v in view.alike for bar in MOVING_BARS]
     panels, below = figure.subplots(
         2,
         3,
@@ -295,7 +298,8 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
             spread = "weight and inertia at G"
         note(view, f"Bar {bar}: largest |M| = {largest} at x = {foot}, {spread}.")
     note(
-        view, "x runs along the line between the pins, y to its left; N > 0 is tension."
+        view,
+        "x runs along the line between the pins, y to its left; N > 0 is tension.",
     )
 
 
@@ -341,7 +345,8 @@ def _draw_one(
         size = abs(arrow.force)
         if size < LEAST_DRAWN_FORCE * biggest:
             plain = re.sub(r"[$_{}]", "", arrow.text.replace("\\,", " ")).replace(
-                "-", "−"
+                "-",
+                "−",
             )
             short.append(f"{plain} = {write_labelled_quantity(size, 'N', view.units)}")
             continue

@@ -106,9 +106,8 @@ class Labels:
 
         renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
         figure.draw_without_rendering()
-        figure.set_layout_engine(
-            None
-        )  # labels must not move what they were measured against
+        # labels must not move what they were measured against
+        figure.set_layout_engine(None)
         per_point = figure.dpi / 72.0
         texts = [
             (axes, text)
@@ -152,33 +151,30 @@ class Labels:
             boxes = [box for owner, box in taken if owner is axes]
             panel = axes.get_window_extent().extents
             centre = _choose_spot(
-                (x, y), away, half, dots, boxes, per_point, label.dots_clear, panel
+                (x, y),
+                away,
+                half,
+                dots,
+                boxes,
+                per_point,
+                label.dots_clear,
+                panel,
             )
-            taken.append(
-                (
-                    axes,
-                    (
-                        centre[0] - half[0],
-                        centre[1] - half[1],
-                        centre[0] + half[0],
-                        centre[1] + half[1],
-                    ),
-                )
-            )
+            lower = (centre[0] - half[0], centre[1] - half[1])
+            upper = (centre[0] + half[0], centre[1] + half[1])
+            taken.append((axes, (*lower, *upper)))
             to_data = axes.transData.inverted().transform
             text.set_position(tuple(to_data(centre)))
-            edge = np.clip((x, y), *np.reshape(taken[-1][1], (2, 2)))
+            edge = np.clip((x, y), lower, upper)
             if math.dist(edge, (x, y)) > (_LED + label.dots_clear) * per_point:
-                look: dict[str, Any] = {
-                    "scalex": False,
-                    "scaley": False,
-                }  # what was measured stays
+                # the limits stay, by which the labels were placed
+                keep_limits: dict[str, Any] = {"scalex": False, "scaley": False}
                 axes.plot(
                     *zip(label.at, to_data(edge), strict=True),
                     color=label.colour,
                     lw=0.5,
                     zorder=8.5,
-                    **look,
+                    **keep_limits,
                 )
 
 

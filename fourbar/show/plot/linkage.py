@@ -278,14 +278,18 @@ def draw_support(axes: "Axes", pin: DrawnPoint, size: float, labels: Labels) -> 
     for share in (0.5, 1.0, 1.7, 2.1, 2.5):
         half = size * (share / 1.7 if share <= 1.7 else 1.7)
         labels.keep_off(
-            axes, (x - half, y - share * size), (x + half, y - share * size)
+            axes,
+            (x - half, y - share * size),
+            (x + half, y - share * size),
         )
 
 
 def _write_bar_name(view: View, number: int) -> str:
     """Write the number of a bar, with its length where dimensions are wanted."""
     length = write_labelled_quantity(
-        view.scene.linkage.lengths[number - 1], "m", view.units
+        view.scene.linkage.lengths[number - 1],
+        "m",
+        view.units,
     )
     if view.dimensions:
         return f"{number}: {length}"
@@ -299,7 +303,10 @@ def choose_drawing_scale(view: View) -> tuple[float, str, float]:
     """
     most = max(
         largest_magnitude(
-            v.sweep.A, v.sweep.B, v.sweep.G3, *np.array(list(locate_pins(v).values()))
+            v.sweep.A,
+            v.sweep.B,
+            v.sweep.G3,
+            *np.array(list(locate_pins(v).values())),
         )
         for v in view.alike
     )

@@ -72,7 +72,10 @@ def _list_circuit_commands(view: View, steps: int) -> Command:
     here = view.here
     number = int(find_circuit(linkage, here.theta_2, here.branch)[0])
     theta_2, assembly, _ = list_circuit(
-        linkage, number, view.scene.motion.branch, steps
+        linkage,
+        number,
+        view.scene.motion.branch,
+        steps,
     )
     return Command(theta_2, assembly.astype(np.int8), None, 0.0)
 

@@ -172,12 +172,13 @@ def _draw_shares(
         ylabel="share of the variance (%)",
         title=f"{part}: from which dimension",
     )
+    # below the axis and its name
     below = offset_copy(
         axes.transAxes,
         axes.get_figure(root=True),
         y=-_BELOW,
         units="points",
-    )  # of the axis and its name
+    )
     axes.legend(
         loc="upper left",
         bbox_to_anchor=(0.0, 0.0),
@@ -197,7 +198,9 @@ def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
         changes = {row.key: abs(row.change) for row in derivatives.influences(name)}
         sizes = np.array([changes.get(key, 0.0) for key in keys])
         factor, unit = choose_unit(
-            sizes.max(initial=0.0), find_unit_of_quantity(name), shown.units
+            sizes.max(initial=0.0),
+            find_unit_of_quantity(name),
+            shown.units,
         )
         axes.barh(
             range(len(keys)),
@@ -218,7 +221,9 @@ def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
         axes.grid(False, axis="y")
         axes.locator_params(axis="x", nbins=3)
         most, own_unit = choose_unit(
-            find_largest(derivatives, name), find_unit_of_quantity(name), shown.units
+            find_largest(derivatives, name),
+            find_unit_of_quantity(name),
+            shown.units,
         )
         text = f"largest\n{most * find_largest(derivatives, name):.3g} {own_unit}"
         axes.text(

@@ -326,7 +326,12 @@ def draw_symbol(axes: "Axes", symbol: Symbol, place: Pose, size: float) -> _Draw
             drawn.text = f"$T_{symbol.bar}$"
         size = place.small(symbol.pin or FIRST_PIN[symbol.bar], size)
         _draw_turning_arrow(
-            axes, centre, SYMBOL_SIZES[symbol.kind] * size, turn, colour, drawn
+            axes,
+            centre,
+            SYMBOL_SIZES[symbol.kind] * size,
+            turn,
+            colour,
+            drawn,
         )
     else:
         centre, size = place.pins[symbol.pin], place.small(symbol.pin, size)
@@ -363,13 +368,8 @@ def _draw_line(
 ) -> None:
     x = np.real(points)
     y = np.imag(points)
-    drawn.artists += axes.plot(
-        x,
-        y,
-        color=colour,
-        lw=width,
-        zorder=3.5,
-    )  # over supports, under the bars
+    over_supports = 3.5  # and under the bars
+    drawn.artists += axes.plot(x, y, color=colour, lw=width, zorder=over_supports)
     drawn.lines.append([(float(a), float(b)) for a, b in zip(x, y, strict=True)])
 
 

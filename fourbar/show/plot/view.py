@@ -108,7 +108,8 @@ class Axis(NamedTuple):
     def words(self, place: float, digits: int = 4) -> str:
         """Say a place, which is in SI."""
         return f"{self.symbol} = {self.factor * place:.{digits}g}{self.unit}".replace(
-            "-", "−"
+            "-",
+            "−",
         )
 
 
