@@ -96,10 +96,8 @@ class Session:
     """
 
     def __init__(self, path: Path, exports: Path) -> None:
-        self.path, self.exports = (
-            Path(os.path.realpath(path)),
-            Exports(exports, path.stem),
-        )
+        self.path = Path(os.path.realpath(path))
+        self.exports = Exports(exports, path.stem)
         self.state_file = self.path.with_name(self.path.name + STATE_ENDING)
         self.token = secrets.token_urlsafe(32)  # of this process alone
         self.unit_names = _AS_THE_FILE
@@ -128,16 +126,12 @@ class Session:
             state = json.loads(data)
             if state["schema"] != EDIT_SCHEMA:
                 raise ValueError(f"schema {str(state['schema'])[:60]!r}")
-            self.texts, self.place = (
-                [str(text) for text in state["texts"]],
-                int(state["place"]),
-            )
+            self.texts = [str(text) for text in state["texts"]]
+            self.place = int(state["place"])
             self.kept = {str(name): str(text) for name, text in state["kept"].items()}
-            self.reference, self.unit_names, self.disk = (
-                str(state["reference"]),
-                str(state["units"]),
-                state["disk"],
-            )
+            self.reference = str(state["reference"])
+            self.unit_names = str(state["units"])
+            self.disk = state["disk"]
             _require_readable_units(self.unit_names)
             self.pressure_text = _read_typed_pressure(state.get("pressure", ""))
             if self.place < 0 or self.reference not in self.kept:
@@ -161,24 +155,17 @@ class Session:
     def keep(self) -> None:
         """Write the state file, readable by its owner alone as the scene may be."""
         state = {
-            **{
-                "schema": EDIT_SCHEMA,
-                "disk": self.disk,
-                "texts": self.texts,
-                "place": self.place,
-                "kept": self.kept,
-            },
-            **{
-                "reference": self.reference,
-                "units": self.unit_names,
-                "pressure": self.pressure_text,
-            },
+            "schema": EDIT_SCHEMA,
+            "disk": self.disk,
+            "texts": self.texts,
+            "place": self.place,
+            "kept": self.kept,
+            "reference": self.reference,
+            "units": self.unit_names,
+            "pressure": self.pressure_text,
         }
-        write_bytes(
-            self.state_file,
-            json.dumps(state, ensure_ascii=False).encode(),
-            private=True,
-        )
+        data = json.dumps(state, ensure_ascii=False).encode()
+        write_bytes(self.state_file, data, private=True)
 
     def end(self, *, gone: bool) -> None:
         """Remove the state file if everything is saved and no page is left.
@@ -257,7 +244,8 @@ class Session:
 
         `data`: its numbers. `settled`: with error bars and summary.
         """
-        return {
+        entries = list_entries(self.now.scene)
+        description = {
             "data": data,
             "settled": settled,
             "plain": self.now.plain,
@@ -269,11 +257,11 @@ class Session:
             "reference": self.reference,
             "changed": self.now.text != self.kept[self.reference],
             "kept": [*self.kept],
-            "keys": {
-                key: entry.unit for key, entry in list_entries(self.now.scene).items()
-            },
-            **({"saved": self.saved} if settled else {}),
+            "keys": {key: entry.unit for key, entry in entries.items()},
         }
+        if settled:
+            description["saved"] = self.saved
+        return description
 
     def compared(self) -> dict[str, Any]:
         """Describe the state that the present one is held against."""
@@ -304,12 +292,12 @@ class Session:
         except Exception as error:
             self.texts, self.place, self.now = before
             self.document = SceneDocument(self.now.text)
-            if isinstance(error, FourBarError | OSError):
+            if isinstance(error, InputError):
+                words = f"{error.key}: {error.allowed}"
+            elif isinstance(error, FourBarError | OSError):
                 words = str(error)
             else:
                 words = f"this cannot be done: {error}"
-            if isinstance(error, InputError):
-                words = f"{error.key}: {error.allowed}"
             return {"refused": words, "text": self.now.text, "plain": self.now.plain}
 
     def change(self, alter: Callable[[SceneDocument], None], gesture: str = "") -> None:
@@ -325,14 +313,13 @@ class Session:
         if goes_on:
             self.texts = [*self.texts[: self.place], now.text]
         elif now.text != self.now.text:
-            self.texts = [*self.texts[: self.place + 1], now.text]
             self.place += 1
-        while (
-            len(self.texts) > _MOST_STATES
-            or sum(map(len, self.texts)) > MOST_CHARACTERS
-        ):
+            self.texts = [*self.texts[: self.place], now.text]
+        characters = sum(map(len, self.texts))
+        while len(self.texts) > _MOST_STATES or characters > MOST_CHARACTERS:
+            characters -= len(self.texts[0])
             self.texts = self.texts[1:]
-            self.place = self.place - 1
+            self.place -= 1
         self.now = now
         self.gesture = gesture
         if not gesture:
@@ -377,17 +364,17 @@ def _suit_entry(value: Any, own: Conversion) -> Any:
         return [_suit_entry(inner, own) for inner in value]
     if not isinstance(value, str):
         return value
-    names = {si: find_unit_in(si, own)[0] for si in ("m", "N", "N m", "kg")}
     for si, base in _SUITED.items():
-        unit = re.sub(r"N m|kg|N|m", lambda part: names[part[0]], si)
         try:
             number = to_si(value, si)
         except UnitError:
             continue
         if base not in own:
             return value
+        unit = re.sub(r"N m|kg|N|m", lambda part: find_unit_in(part[0], own)[0], si)
         shown = number / to_si(f"1 {unit}", si)
-        return f"{float(f'{shown:.2g}'):g} {unit}"
+        of_two_digits = float(f"{shown:.2g}")
+        return f"{of_two_digits:g} {unit}"
     return value
 
 
@@ -400,35 +387,30 @@ def _add_element(session: Session, asked: dict[str, Any]) -> None:
     if path[0] == "tolerances":
         entries = list_entries(session.now.scene)
         if name in entries:  # a thousandth of the number, until the designer says more
-            size = (
-                abs(float(read_place(session.now.scene, entries[name].place) or 1.0))
-                / 1000.0
-            )
-            value = _suit_entry(f"{size:.1g} {entries[name].unit}", own)
+            entry = entries[name]
+            number = float(read_place(session.now.scene, entry.place) or 1.0)
+            width = abs(number) / 1000.0
+            value = _suit_entry(f"{width:.1g} {entry.unit}", own)
     session.change(lambda document: document.put(path, value))
 
 
 def _drag_point(session: Session, asked: dict[str, Any]) -> None:
-    numbers = {
-        name: float(asked[name])
-        for name in ("grain", "theta_2", "stretch")
-        if name in asked
-    }
+    numbers = {}
+    for name in ("grain", "theta_2", "stretch"):
+        if name in asked:
+            numbers[name] = float(asked[name])
+    x, y = map(float, asked["to"])
     dragged = Dragged(
         asked["what"],
-        complex(*map(float, asked["to"])),
+        complex(x, y),
         branch=int(asked["branch"]),
         **numbers,
     )
-    session.change(
-        lambda document: drag(
-            document,
-            session.base.scene,
-            session.base.plain,
-            dragged,
-        ),
-        str(asked.get("gesture", "")),
-    )
+
+    def alter(document: SceneDocument) -> None:
+        drag(document, session.base.scene, session.base.plain, dragged)
+
+    session.change(alter, str(asked.get("gesture", "")))
 
 
 def _replace_text(session: Session, asked: dict[str, Any]) -> None:
@@ -448,27 +430,28 @@ def _move_in_history(session: Session, by: int) -> None:
 
 
 def _keep_state(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    numbers = (int(kept.split()[1]) for kept in session.kept if kept != "start")
+    earlier = [kept for kept in session.kept if kept != "start"]
+    numbers = [int(kept.removeprefix("state ")) for kept in earlier]
     name = f"state {max(numbers, default=0) + 1}"
     session.kept[name] = session.now.text
     if len(session.kept) > MOST_KEPT:
-        del session.kept[next(name for name in session.kept if name != "start")]
+        oldest, *_ = earlier
+        del session.kept[oldest]
     return _refer(session, {"to": name})
 
 
 def _refer(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    if asked["to"] not in session.kept:
-        raise InputError(
-            "reference",
-            asked["to"],
-            "must be one of " + ", ".join(session.kept),
-        )
-    session.reference = asked["to"]
+    name = asked["to"]
+    if name not in session.kept:
+        known = ", ".join(session.kept)
+        raise InputError("reference", name, f"must be one of {known}")
+    session.reference = name
     return {"refer": True}
 
 
 def _change_units(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    _require_readable_units(name := str(asked["units"]))
+    name = str(asked["units"])
+    _require_readable_units(name)
     session.unit_names = name
     return {"refer": True}
 
@@ -490,96 +473,107 @@ def _command_other(session: Session, asked: dict[str, Any]) -> None:
     The range is what the present motion covers of it without turning back.
     """
     place = str(asked["command"])
-    names = {
-        **{names[0]: names for names in COMMAND_NAMES.values()},
-        STROKE_COMMAND[0]: STROKE_COMMAND,
-    }
-    if place not in names:
-        raise InputError("command", place, "must be one of " + ", ".join(names))
-    scene, document = session.now.scene, SceneDocument(session.now.text)
-    before = solve(scene, "force" if scene.motion.speed is not None else "position")
+    by_place = {names[0]: names for names in (*COMMAND_NAMES.values(), STROKE_COMMAND)}
+    if place not in by_place:
+        known = ", ".join(by_place)
+        raise InputError("command", place, f"must be one of {known}")
+    _, rate_name, *_ = by_place[place]
+    scene = session.now.scene
+    has_speed = scene.motion.speed is not None
+    before = solve(scene, "force" if has_speed else "position")
     values = getattr(before, place)
     if values is None:
-        raise InputError(
-            "command",
-            place,
-            "needs a cylinder: add one in place of the bar first",
-        )
-    shown = _find_shown(before.theta_2, asked)
-    first, last = _find_monotone(values, shown)
+        reason = "needs a cylinder: add one in place of the bar first"
+        raise InputError("command", place, reason)
+    first, last = _find_monotone(values, _find_shown(before.theta_2, asked))
     if last == first:
-        raise InputError(
-            "command",
-            place,
-            "does not move in this motion: choose another sweep first",
-        )
+        reason = "does not move in this motion: choose another sweep first"
+        raise InputError("command", place, reason)
     middle = (first + last) // 2
+
+    document = SceneDocument(session.now.text)
+    stated = session.now.plain["motion"].keys()
+    for name in {*chain(*by_place.values()), "side", "free", "law"} & stated:
+        document.remove(["motion", name])
+    if place == "stroke":
+        unit = find_unit(find_length(session.now.plain), "m")
+        factor = to_si("1 m", unit)
+        rate_unit = f"{unit}/s"
+        rate_factor = factor
+    else:
+        unit = "deg"
+        factor = to_si("1 rad", unit)
+        rate_unit, rate_factor = find_unit_in("rad/s", session.now.units)
     # so that rounding leads to no position beyond
     inset = 1e-3 * (values[last] - values[first])
-    shown_units = session.now.units
-    ground = find_unit(find_length(session.now.plain), "m")
-    unit, si = (ground, "m") if place == "stroke" else ("deg", "rad")
-    factor = to_si(f"1 {si}", unit)
-    ends = [
-        write_rounded(factor * x, abs(factor * inset), unit)
-        for x in (values[first] + inset, values[last] - inset)
-    ]
-    rates = getattr(before, names[place][1], None)
-    speed = (
-        0.1 * abs(values[last] - values[first])
-        if rates is None
-        else float(rates[middle])
-    )
-    stated = {*chain(*names.values()), "side", "free", "law"} & session.now.plain[
-        "motion"
-    ].keys()
-    for name in stated:
-        document.remove(["motion", name])
-    document.put(
-        ["motion", place],
-        {"from": ends[0], "to": ends[1], "steps": max(60, min(last - first, 360))},
-    )
-    if scene.motion.speed is not None:
-        rate_unit, rate_factor = f"{unit}/s", factor
-        if place != "stroke":
-            rate_unit, rate_factor = find_unit_in("rad/s", shown_units)
+    grain = abs(factor * inset)
+    sweep = {
+        "from": write_rounded(factor * (values[first] + inset), grain, unit),
+        "to": write_rounded(factor * (values[last] - inset), grain, unit),
+        "steps": max(60, min(last - first, 360)),
+    }
+    document.put(["motion", place], sweep)
+    if has_speed:
+        rates = getattr(before, rate_name, None)
+        if rates is None:
+            speed = 0.1 * abs(values[last] - values[first])
+        else:
+            speed = float(rates[middle])
         rate = rate_factor * speed
-        document.put(
-            ["motion", names[place][1]],
-            write_rounded(rate, abs(rate) / 100.0, rate_unit),
-        )
-    pose, distances = _read_bar_directions(before, middle), dict[str, float]()
+        rounded = write_rounded(rate, abs(rate) / 100.0, rate_unit)
+        document.put(["motion", rate_name], rounded)
+
+    pose = _read_bar_directions(before, middle)
+    text = _choose_assembly(session, document, place == "stroke", pose)
+    session.change(lambda changed: changed.become(text))
+
+
+def _choose_assembly(
+    session: Session,
+    document: SceneDocument,
+    has_side: bool,
+    pose: Any,
+) -> str:
+    """State the branch and the side whose motion passes nearest to a pose.
+
+    `pose`: directions of the three moving bars.
+    """
     # a drawing states the assembly by its pins, and refuses a branch beside them
     branches = [""] if document.at(["pins"]) is not None else list(BRANCH_OF_NAME)
-    sides = SIDES if place == "stroke" else [""]
+    sides = SIDES if has_side else [""]
+    distances = dict[str, float]()
     for branch, side in product(branches, sides):
         if branch:
             document.put(["motion", "branch"], branch)
         if side:
             document.put(["motion", "side"], side)
-        after = solve(session.read(document.text()).scene, "position")
-        distance = np.abs(_read_bar_directions(after, len(after) // 2) - pose).sum()
-        distances[document.text()] = float(np.nan_to_num(distance, nan=np.inf))
-    text = min(distances, key=distances.__getitem__)
-    session.change(lambda changed: changed.become(text))
+        text = document.text()
+        after = solve(session.read(text).scene, "position")
+        directions = _read_bar_directions(after, len(after) // 2)
+        distance = np.abs(directions - pose).sum()
+        distances[text] = float(np.nan_to_num(distance, nan=np.inf))
+    return min(distances, key=distances.__getitem__)
 
 
 def _read_bar_directions(solution: Solution, index: int) -> Any:
     """Return the directions of the three moving bars at one position."""
-    return np.exp(
-        1j
-        * np.array(
-            [solution.theta_2[index], solution.theta_3[index], solution.theta_4[index]]
-        )
+    angles = np.array(
+        [
+            solution.theta_2[index],
+            solution.theta_3[index],
+            solution.theta_4[index],
+        ]
     )
+    return np.exp(1j * angles)
 
 
 def _find_shown(theta_2: Any, asked: dict[str, Any]) -> int | None:
     """Return the position that the page shows, by its theta_2, or None."""
     if asked.get("theta_2") is None:
         return None
-    turned = np.abs(np.exp(1j * theta_2) - np.exp(1j * float(asked["theta_2"])))
-    return int(np.argmin(np.nan_to_num(turned, nan=np.inf)))
+    shown = np.exp(1j * float(asked["theta_2"]))
+    distances = np.abs(np.exp(1j * theta_2) - shown)
+    return int(np.argmin(np.nan_to_num(distances, nan=np.inf)))
 
 
 def _find_monotone(values: Any, shown: int | None) -> tuple[int, int]:
@@ -588,13 +582,15 @@ def _find_monotone(values: Any, shown: int | None) -> tuple[int, int]:
     It is the one with the position shown, or else the longest.
     """
     signs = np.nan_to_num(np.sign(np.diff(values)))
-    ends = np.concatenate([[0], np.flatnonzero(np.diff(signs)) + 1, [len(signs)]])
-    runs = [
-        (int(start), int(stop))
-        for start, stop in pairwise(ends)
-        if signs[start : start + 1].any()
-    ]
-    around = [run for run in runs if shown is not None and run[0] <= shown <= run[1]]
+    turns = np.flatnonzero(np.diff(signs)) + 1
+    runs = []
+    around = []
+    for start, stop in pairwise([0, *turns.tolist(), len(signs)]):
+        if not signs[start : start + 1].any():
+            continue
+        runs.append((start, stop))
+        if shown is not None and start <= shown <= stop:
+            around.append((start, stop))
     return max(around or runs, key=lambda run: run[1] - run[0], default=(0, 0))
 
 
@@ -617,26 +613,21 @@ def _draw_pins(session: Session, asked: dict[str, Any]) -> None:
     """State four pins in the plane, given in a unit, in place of those of the file."""
     unit = str(asked["unit"])
     grain = float(asked["grain"])
-    pins = {
-        pin: tuple(write_rounded(float(x), grain, unit) for x in place)
-        for pin, place in zip(PINS, asked["pins"], strict=True)
-    }
-    drawn = write_drawn_scene({pin: (x, y) for pin, (x, y) in pins.items()})
-    if session.fresh:
-        text = drawn
-    else:
-        text = session.now.text
+    pins = {}
+    for pin, (x, y) in zip(PINS, asked["pins"], strict=True):
+        written_x = write_rounded(float(x), grain, unit)
+        written_y = write_rounded(float(y), grain, unit)
+        pins[pin] = (written_x, written_y)
+    drawn = write_drawn_scene(pins)
+    text = drawn if session.fresh else session.now.text
 
     def alter(document: SceneDocument) -> None:
         document.become(text)
         plain = tomllib.loads(text)
-        for path in (["lengths"], ["motion", "branch"]):
-            if len(path) == 1:
-                holder = plain
-            else:
-                holder = plain.get(path[0], {})
-            if path[-1] in holder:
-                document.remove(path)
+        if "lengths" in plain:
+            document.remove(["lengths"])
+        if "branch" in plain.get("motion", {}):
+            document.remove(["motion", "branch"])
         for pin, place in pins.items():
             document.put(["pins", pin], list(place))
 
@@ -645,16 +636,13 @@ def _draw_pins(session: Session, asked: dict[str, Any]) -> None:
 
 def _save_file(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     """Write the file; where it is another one than was read, only on demand."""
+    name = session.path.name
     if session._read_disk() != session.disk and not asked.get("over"):
-        return {
-            "ask": (
-                f"{session.path.name} was changed on the disk meanwhile. Overwrite it?"
-            )
-        }
+        return {"ask": f"{name} was changed on the disk meanwhile. Overwrite it?"}
     data = session.now.text.encode()
     write_bytes(session.path, data)
     session.disk = _hash_text(data)
-    return {"note": f"saved {session.path.name}", "saved": True}
+    return {"note": f"saved {name}", "saved": True}
 
 
 def _export(session: Session, asked: dict[str, Any]) -> dict[str, Any]:

@@ -33,9 +33,19 @@ def list_bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> MovingBodies:
         for bar in linkage.moving
     ]
     for effect in effects:
-        for bar, inertia in effect.carried.items():
-            bodies[bar - 2] = bodies[bar - 2]._replace(I=bodies[bar - 2].I + inertia)
-    return bodies[0], bodies[1], bodies[2]
+        for number, inertia in effect.carried.items():
+            body = bodies[number - 2]
+            bodies[number - 2] = body._replace(I=body.I + inertia)
+    two, three, four = bodies
+    return two, three, four
+
+
+def _add_to(sums: dict[Any, Any], key: Any, value: Any) -> None:
+    """Add a value to the sum of a key; the first one is the sum."""
+    if key in sums:
+        sums[key] = sums[key] + value
+    else:
+        sums[key] = value
 
 
 class Actions:
@@ -94,37 +104,34 @@ class Actions:
         beyond : vector from there to where the force acts, complex, m, world axes; left
             out: it acts there.
         """
-        if bar != 1:
-            self.forces[bar] = self.forces[bar] + force if bar in self.forces else force
-            arm = point * self.state.direction(bar)
-            self.moment_about_pin(
-                bar,
-                cross(-force, arm if beyond is None else arm + beyond),
-            )
-            if bar == 3:
-                self.on_coupler.append((force, point, beyond, 0.0))
+        if bar == 1:
+            return
+        arm = point * self.state.direction(bar)
+        if beyond is not None:
+            arm = arm + beyond
+        _add_to(self.forces, bar, force)
+        self.moment_about_pin(bar, cross(-force, arm))
+        if bar == 3:
+            self.on_coupler.append((force, point, beyond, 0.0))
 
     def couple(self, bar: int, moment: Number) -> None:
         """Add a pure couple on a bar, N m; on the ground it does nothing."""
-        if bar != 1:
-            self.moment_about_pin(bar, moment)
-            if bar == 3:
-                self.on_coupler.append((None, 0.0j, None, moment))
+        if bar == 1:
+            return
+        self.moment_about_pin(bar, moment)
+        if bar == 3:
+            self.on_coupler.append((None, 0.0j, None, moment))
 
     def moment_about_pin(self, bar: int, moment: Number) -> None:
         """Add a moment about a bar's first pin."""
-        self.moments[bar] = (
-            self.moments[bar] + moment if bar in self.moments else moment
-        )
+        _add_to(self.moments, bar, moment)
 
     def pin_couple(self, pin: str, couple: Number) -> None:
         """Add a couple on the second of the two bars at a pin, N m.
 
         Its opposite acts on the first bar.
         """
-        self.couples[pin] = (
-            self.couples[pin] + couple if pin in self.couples else couple
-        )
+        _add_to(self.couples, pin, couple)
 
     def pull(self, start: Any, end: Any, force: Number) -> None:
         """Add a force at a point of a bar, and its opposite at one of another bar.
@@ -139,29 +146,21 @@ class Actions:
             self.pull_ends(start, end, force)
             return
         first, second = PINS[pin]
-        if start.bar == second:
-            on_second = force
-        else:
-            on_second = -force
-        (from_start, square), (from_end, other_square) = (
-            point.arm_from(pin, self.state) for point in (start, end)
+        on_second = force if start.bar == second else -force
+        arm_of_start, square_of_start = start.arm_from(pin, self.state)
+        arm_of_end, square_of_end = end.arm_from(pin, self.state)
+        to_start = arm_of_start * self.state.direction(start.bar)
+        to_end = arm_of_end * self.state.direction(end.bar)
+        couple = select(
+            square_of_start < square_of_end,
+            cross(-on_second, to_start),
+            cross(-on_second, to_end),
         )
-        by_one = from_start * self.state.direction(start.bar)
-        by_other = from_end * self.state.direction(end.bar)
-        self.pin_couple(
-            pin,
-            select(
-                square < other_square,
-                cross(-on_second, by_one),
-                cross(-on_second, by_other),
-            ),
-        )
+        self.pin_couple(pin, couple)
         if first == 1:  # the pin is the first one of the other bar
             self.force(second, on_second)
         else:
-            self.through[pin] = (
-                self.through[pin] + on_second if pin in self.through else on_second
-            )
+            _add_to(self.through, pin, on_second)
 
     def pull_ends(self, start: Any, end: Any, force: Number) -> None:
         """Add the two forces where they act."""
@@ -176,14 +175,13 @@ class Actions:
         total = Actions(self.state, self.bodies, self.side)
         for name in ("forces", "moments", "couples", "through"):
             sums = dict(getattr(self, name))
-            for key, of_one in getattr(unit, name).items():
-                sums[key] = sums.get(key, 0.0) + size * of_one
+            for key, per_newton in getattr(unit, name).items():
+                sums[key] = sums.get(key, 0.0) + size * per_newton
             setattr(total, name, sums)
-        scaled = [
-            (None if force is None else size * force, point, beyond, size * moment)
-            for force, point, beyond, moment in unit.on_coupler
-        ]
-        total.on_coupler = self.on_coupler + scaled
+        total.on_coupler = list(self.on_coupler)
+        for force, point, beyond, moment in unit.on_coupler:
+            scaled = None if force is None else size * force
+            total.on_coupler.append((scaled, point, beyond, size * moment))
         return total
 
     def generalized_forces(self) -> tuple[Number, Number]:
@@ -193,26 +191,23 @@ class Actions:
         without what goes through pin A.
         """
         k = self.state.k
-        parts = [
-            self.moments[bar] * h
-            for bar, h in ((3, k.h3), (4, k.h4))
-            if bar in self.moments
-        ]
+        parts = []
+        if 3 in self.moments:
+            parts.append(self.moments[3] * k.h3)
+        if 4 in self.moments:
+            parts.append(self.moments[4] * k.h4)
         if 3 in self.forces:
-            parts.append(
-                cross(
-                    -self.state.lengths.a * k.h2 * self.forces[3],
-                    self.state.position.u2,
-                )
-            )
+            weighted = -self.state.lengths.a * k.h2 * self.forces[3]
+            parts.append(cross(weighted, self.state.position.u2))
         others = sum(parts[1:], parts[0]) if parts else 0.0
         total = others + self.moments[2] * k.h2 if 2 in self.moments else others
         for pin, couple in self.couples.items():
-            total = total + couple * self.state.slip(pin)
-            if pin != "O2":
-                others = others + couple * (
-                    k.h3 if pin == "A" else self.state.slip(pin)
-                )
+            slip = self.state.slip(pin)
+            total = total + couple * slip
+            if pin == "A":
+                others = others + couple * k.h3
+            elif pin != "O2":
+                others = others + couple * slip
         return total, others
 
     def about_B(self) -> Number:
@@ -225,7 +220,9 @@ class Actions:
             total = total + moment
             if force is not None:
                 arm = (point - self.state.lengths.b) * self.state.position.u3
-                total = total + cross(-force, arm if beyond is None else arm + beyond)
+                if beyond is not None:
+                    arm = arm + beyond
+                total = total + cross(-force, arm)
         return total
 
     def sense(self, pin: str) -> Number:
@@ -236,15 +233,14 @@ class Actions:
         linkage that moves turns in either sense.
         """
         slip = self.state.slip(pin)
+        speed = self.state.speed
         turning = self.turning(pin)
+        in_motion = np.sign(slip * speed)
         if not is_any(self.side != 0):
-            return turning * np.sign(slip * self.state.speed)
-        moving = np.where(turning, np.sign(slip * self.state.speed), self.side)
-        return np.where(
-            np.equal(self.state.speed, 0.0),
-            self.side * turning * np.sign(slip),
-            moving,
-        )
+            return turning * in_motion
+        in_motion = np.where(turning, in_motion, self.side)
+        at_rest = self.side * turning * np.sign(slip)
+        return np.where(np.equal(speed, 0.0), at_rest, in_motion)
 
     def turning(self, pin: str) -> Number:
         """Mark where two bars rotate relative to each other.
@@ -253,41 +249,46 @@ class Actions:
         """
         i, j = PINS[pin]
         h = self.state.coefficient
-        return abs(self.state.slip(pin)) > LARGEST_SLIP_AT_REST * (
-            abs(h(2)) + abs(h(i)) + abs(h(j))
-        )
+        sizes = abs(h(2)) + abs(h(i)) + abs(h(j))
+        return abs(self.state.slip(pin)) > LARGEST_SLIP_AT_REST * sizes
 
     def wrenches(self, inertia: Wrenches) -> Wrenches:
         """Sum everything that acts on each bar.
 
         D'Alembert's forces and moments are included.
         """
-        R = [*inertia[:3]]
-        M = [*inertia[3:6]]
+        R2, R3, R4, M2, M3, M4, _ = inertia
+        R = {2: R2, 3: R3, 4: R4}
+        M = {2: M2, 3: M3, 4: M4}
         for bar, force in self.forces.items():
-            R[bar - 2] = R[bar - 2] + force
+            R[bar] = R[bar] + force
         for bar, moment in self.moments.items():
-            M[bar - 2] = M[bar - 2] + moment
+            M[bar] = M[bar] + moment
         for pin, couple in self.couples.items():
             i, j = PINS[pin]
             if pin != "B":  # its couple is a field of the wrenches
-                M[j - 2] = M[j - 2] + couple
+                M[j] = M[j] + couple
                 if i != 1:
-                    M[i - 2] = M[i - 2] - couple
-        return Wrenches(R[0], R[1], R[2], M[0], M[1], M[2], self.couples.get("B", 0.0))
+                    M[i] = M[i] - couple
+        at_B = self.couples.get("B", 0.0)
+        return Wrenches(R[2], R[3], R[4], M[2], M[3], M[4], at_B)
 
     def at_pins(self, pins: PinForces) -> PinForces:
         """Return what the pins themselves carry of the forces between their bars."""
         if not self.through:
             return pins
-        A, B = (self.through.get(pin, 0.0) for pin in ("A", "B"))
+        A = self.through.get("A", 0.0)
+        B = self.through.get("B", 0.0)
         return pins._replace(F32=pins.F32 + A, F43=pins.F43 + B)
 
 
 @cache
 def _find_common_pin(first: int, second: int) -> str | None:
     """Return the pin at which two bars meet, or None if they have none in common."""
-    return next((pin for pin, bars in PINS.items() if {first, second} == {*bars}), None)
+    for pin, bars in PINS.items():
+        if {first, second} == {*bars}:
+            return pin
+    return None
 
 
 class SolvedFriction(NamedTuple):
@@ -454,10 +455,10 @@ class PinRows(Effect):
 
         As ``Viscous.at(O2=0.01)`` or ``PinFriction.at(A=(mu, radius))``.
         """
-        rows = (
-            (pin, *(value if isinstance(value, (tuple, list)) else (value,)))
-            for pin, value in values.items()
-        )
+        rows = []
+        for pin, value in values.items():
+            numbers = value if isinstance(value, (tuple, list)) else (value,)
+            rows.append((pin, *numbers))
         return cls(tuple(rows))  # type: ignore[call-arg]
 
     @property
@@ -477,31 +478,18 @@ class PinRows(Effect):
         expect(key, rows, tuple, list)
         by_pin: dict[str, tuple[Any, ...]] = {}
         for row in rows:
-            if (
-                not isinstance(row, (tuple, list))
-                or len(row) != 1 + len(numbers)
-                or not isinstance(row[0], str)
-            ):
-                raise InputError(
-                    key,
-                    row,
-                    f"must be (pin, {', '.join(name or 'value' for name in numbers)})",
-                )
+            is_row = isinstance(row, (tuple, list)) and len(row) == 1 + len(numbers)
+            if not is_row or not isinstance(row[0], str):
+                named = ", ".join(name or "value" for name in numbers)
+                raise InputError(key, row, f"must be (pin, {named})")
             pin, *values = row
             if pin not in PINS or pin in by_pin:
-                raise InputError(
-                    f"{key}.{pin}",
-                    row[1:],
-                    f"the pins are {', '.join(PINS)}, each once",
-                )
-            pairs = zip(numbers.items(), values, strict=True)
-            checked = (
-                require(f"{key}.{pin}.{name}".rstrip("."), value, *declared[:2])
-                for (name, declared), value in pairs
-            )
+                reason = f"the pins are {', '.join(PINS)}, each once"
+                raise InputError(f"{key}.{pin}", row[1:], reason)
+            checked = []
+            for (name, declared), value in zip(numbers.items(), values, strict=True):
+                path = f"{key}.{pin}.{name}".rstrip(".")
+                checked.append(require(path, value, *declared[:2]))
             by_pin[pin] = (pin, *checked)
-        object.__setattr__(
-            self,
-            self.field,
-            tuple(by_pin[pin] for pin in PINS if pin in by_pin),
-        )
+        in_order = tuple(by_pin[pin] for pin in PINS if pin in by_pin)
+        object.__setattr__(self, self.field, in_order)

@@ -74,7 +74,8 @@ class ForceDrive(ABC):
 
         It is the work of 1 N over the change of the independent angle.
         """
-        return self.per_newton(Actions(state, MASSLESS)).generalized_forces()[0]
+        gain, _ = self.per_newton(Actions(state, MASSLESS)).generalized_forces()
+        return gain
 
     def per_newton(self, actions: Actions) -> Actions:
         """Make what 1 N of it does to the bars."""
@@ -95,11 +96,12 @@ class ForceDrive(ABC):
         h2 = sines[2]
         h3 = (-a / b) * sines[3]
         h4 = (-a / c) * sines[4]
-        turned = state._replace(
-            k=state.k._replace(h2=h2, h3=h3, h4=h4, h23=h2 - h3, h43=h4 - h3)
-        )
-        reach = {1: (0.0, 0.0), 2: (0.0, 1.0), 3: (a, a / b), 4: (0.0, a / c)}
+        k = state.k._replace(h2=h2, h3=h3, h4=h4, h23=h2 - h3, h43=h4 - h3)
+        # largest sines of the first pin and, per distance from it, of the bar
+        of_pin = {1: 0.0, 2: 0.0, 3: a, 4: 0.0}
+        per_distance = {1: 0.0, 2: 1.0, 3: a / b, 4: a / c}
         most = sum(
-            reach[p.bar][0] + reach[p.bar][1] * abs(p.distance) for _, p in self.ends
+            of_pin[place.bar] + per_distance[place.bar] * abs(place.distance)
+            for _, place in self.ends
         )
-        return self.gain(turned), most
+        return self.gain(state._replace(k=k)), most

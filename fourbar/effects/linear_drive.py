@@ -37,12 +37,9 @@ class LinearDrive(ForceDrive):
     has_stroke: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        for name, point in zip(
-            ("start", "end"),
-            require_ends("drive", self.start, self.end),
-            strict=True,
-        ):
-            object.__setattr__(self, name, point)
+        start, end = require_ends("drive", self.start, self.end)
+        object.__setattr__(self, "start", start)
+        object.__setattr__(self, "end", end)
 
     def with_places(self, change: Callable[[Place], Place]) -> "LinearDrive":
         """Return the same drive with its ends changed."""
@@ -93,7 +90,8 @@ class LinearDrive(ForceDrive):
 
     def act(self, actions: Actions, force: Number) -> None:
         """Push its ends apart."""
-        actions.pull(self.end, self.start, force * self.line(actions.state)[1])
+        _, direction = self.line(actions.state)
+        actions.pull(self.end, self.start, force * direction)
 
     def status(self, state: State, sines: dict[int, Number]) -> Number:
         """Return NO_DIRECTION where the ends coincide, NO_LEVER where P vanishes.
@@ -102,16 +100,16 @@ class LinearDrive(ForceDrive):
         rounded by the lengths over which they are reached, the line's direction by that
         over the stroke.
         """
-        stroke = self.line(state)[0]
+        stroke, _ = self.line(state)
         lever, most = self.leverage(state, sines)
-        away = (
-            sum(state.lengths[:4]) + abs(self.start.distance) + abs(self.end.distance)
-        )
-        none = abs(lever) * stroke <= NO_DIGIT_LEFT * most * away
-        meet = stroke <= COINCIDENT_POINTS * away
-        if not is_any(none | meet):
+        perimeter = sum(state.lengths[:4])
+        away = perimeter + abs(self.start.distance) + abs(self.end.distance)
+        without_lever = abs(lever) * stroke <= NO_DIGIT_LEFT * most * away
+        coincide = stroke <= COINCIDENT_POINTS * away
+        if not is_any(without_lever | coincide):
             return None
-        return np.where(meet, NO_DIRECTION, np.where(none, NO_LEVER, OK))
+        status = np.where(without_lever, NO_LEVER, OK)
+        return np.where(coincide, NO_DIRECTION, status)
 
 
 def _list_bars(linkage: FourBar, point: Place) -> set[int]:
@@ -120,10 +118,11 @@ def _list_bars(linkage: FourBar, point: Place) -> set[int]:
     These are its bar and, at a pin of it, the other bar.
     """
     length = linkage.lengths[point.bar - 1]
-    places = zip(ENDS[point.bar], (0.0, length), strict=True)
-    pins = [
-        pin
-        for pin, along in places
-        if abs(point.in_bar - along) <= COINCIDENT_POINTS * length
-    ]
-    return {point.bar}.union(*(PINS[pin] for pin in pins))
+    nothing = COINCIDENT_POINTS * length
+    first_pin, second_pin = ENDS[point.bar]
+    bars = {point.bar}
+    if abs(point.in_bar) <= nothing:
+        bars.update(PINS[first_pin])
+    if abs(point.in_bar - length) <= nothing:
+        bars.update(PINS[second_pin])
+    return bars

@@ -84,13 +84,13 @@ class PointDrive(ForceDrive):
 
     def act(self, actions: Actions, force: Number) -> None:
         """Push its point."""
-        direction = self.line(actions.state)[1]
+        _, direction = self.line(actions.state)
         actions.force(self.place.bar, force * direction, self.place.in_bar)
 
     def status(self, state: State, sines: dict[int, Number]) -> Number:
         """Return NO_LEVER where P lies within its rounding; None: nowhere."""
         lever, most = self.leverage(state, sines)
-        none = abs(lever) <= NO_DIGIT_LEFT * most
-        if is_any(none):
-            return np.where(none, NO_LEVER, OK)
-        return None
+        without_lever = abs(lever) <= NO_DIGIT_LEFT * most
+        if not is_any(without_lever):
+            return None
+        return np.where(without_lever, NO_LEVER, OK)

@@ -64,23 +64,20 @@ class Torsion(PinRows):
         """
         for pin, k, rest, preload in self.springs:
             i, j = PINS[pin]
-            turned = angle(state.direction(j) * state.direction(i).conjugate())
+            relative = state.direction(j) * state.direction(i).conjugate()
+            turned = angle(relative)
             actions.pin_couple(pin, -(preload + k * wrap_angle(turned - rest)))
 
     def begin_at(self, start: State, branch: Number) -> "Torsion":
         """Count whole turns where the motion begins."""
-        away = [
-            followed - rest
-            for followed, (_, _, rest, _) in zip(
-                self._follow_angles(start, branch),
-                self.springs,
-                strict=True,
-            )
-        ]
+        turns = []
+        angles = self._follow_angles(start, branch)
+        for followed, (_, _, rest, _) in zip(angles, self.springs, strict=True):
+            from_rest = followed - rest
+            turns.append(math.tau * np.floor(from_rest / math.tau + 0.5))
         # a constructor checks what a user gives, one number at a time
         counted = copy(self)
-        turns = tuple(math.tau * np.floor(turned / math.tau + 0.5) for turned in away)
-        object.__setattr__(counted, "turns", turns)
+        object.__setattr__(counted, "turns", tuple(turns))
         return counted
 
     def status(
@@ -92,12 +89,9 @@ class Torsion(PinRows):
         if self.turns is None or branch is None:
             return None
         wound = np.zeros(np.shape(state.theta_2), dtype=bool)
-        for followed, turns, (_, _, rest, _) in zip(
-            self._follow_angles(state, branch),
-            self.turns,
-            self.springs,
-            strict=True,
-        ):
+        angles = self._follow_angles(state, branch)
+        rows = zip(angles, self.turns, self.springs, strict=True)
+        for followed, turns, (_, _, rest, _) in rows:
             wound |= np.abs(followed - rest - turns) > HALF_TURN
         return np.where(wound, WOUND, OK).astype(np.uint8)
 
@@ -108,11 +102,10 @@ class Torsion(PinRows):
         """
         for pin, k, rest, preload in self.springs:
             turned = model.linkage.ground_angle if pin in ("O2", "O4") else 0.0
-            model.pin[pin]["stiffness"] = k
             # a tendon's rest is a length
-            model.pin[pin]["springlength" if pin == "B" else "springref"] = (
-                rest + turned - preload / k
-            )
+            rest_of_hinge = "springlength" if pin == "B" else "springref"
+            model.pin[pin]["stiffness"] = k
+            model.pin[pin][rest_of_hinge] = rest + turned - preload / k
 
     def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
         """Return no less than the sum of the couples."""

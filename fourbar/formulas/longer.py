@@ -43,11 +43,12 @@ def shorten(number: Number) -> Number:
     """Return a longer number as doubles; any other one as it is."""
     if isinstance(number, Pair):
         return number.high
-    if isinstance(number, (np.ndarray, np.generic)) and number.dtype in (
-        np.longdouble,
-        np.clongdouble,
-    ):
-        return number.astype(complex if number.dtype.kind == "c" else float)
+    if not isinstance(number, (np.ndarray, np.generic)):
+        return number
+    if number.dtype == np.longdouble:
+        return number.astype(float)
+    if number.dtype == np.clongdouble:
+        return number.astype(complex)
     return number
 
 
@@ -87,7 +88,8 @@ class Pair(NDArrayOperatorsMixin):
     """
 
     def __init__(self, high: Any, low: Any) -> None:
-        self.high, self.low = high, np.where(np.isfinite(high), low, 0.0)
+        self.high = high
+        self.low = np.where(np.isfinite(high), low, 0.0)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -124,9 +126,7 @@ class Pair(NDArrayOperatorsMixin):
     ) -> Any:
         if method != "__call__" or options or function not in LONGER_FUNCTIONS:
             return NotImplemented
-        return LONGER_FUNCTIONS[function](
-            *(x if isinstance(x, Pair) else Pair(np.asarray(x), 0.0) for x in inputs)
-        )
+        return LONGER_FUNCTIONS[function](*map(_as_pair, inputs))
 
     def __array_function__(
         self,
@@ -142,13 +142,20 @@ class Pair(NDArrayOperatorsMixin):
         return NotImplemented
 
 
+def _as_pair(number: Any) -> Pair:
+    """Return a pair as it is, doubles as pairs."""
+    if isinstance(number, Pair):
+        return number
+    return Pair(np.asarray(number), 0.0)
+
+
 def _choose(mask: Any, x: Any, y: Any) -> Any:
     """Return x where a mask holds, y elsewhere."""
-    x, y = (
-        number if isinstance(number, Pair) else Pair(np.asarray(number), 0.0)
-        for number in (x, y)
-    )
-    return Pair(np.where(mask, x.high, y.high), np.where(mask, x.low, y.low))
+    x = _as_pair(x)
+    y = _as_pair(y)
+    high = np.where(mask, x.high, y.high)
+    low = np.where(mask, x.low, y.low)
+    return Pair(high, low)
 
 
 def _renew(high: Any, low: Any) -> Pair:
@@ -176,21 +183,22 @@ def _multiply_real(x: Any, y: Any) -> Any:
     a, b = _halve(x.high)
     c, d = _halve(y.high)
     lost = ((a * c - product) + a * d + b * c) + b * d
-    return _renew(product, lost + (x.high * y.low + x.low * y.high))
+    mixed = x.high * y.low + x.low * y.high
+    return _renew(product, lost + mixed)
 
 
 def _multiply(x: Any, y: Any) -> Any:
-    if not np.iscomplexobj(x.high) and not np.iscomplexobj(y.high):
+    x_is_complex = np.iscomplexobj(x.high)
+    y_is_complex = np.iscomplexobj(y.high)
+    if not x_is_complex and not y_is_complex:
         return _multiply_real(x, y)
-    if not np.iscomplexobj(y.high):
+    if not y_is_complex:
         return _join_parts(_multiply_real(x.real, y), _multiply_real(x.imag, y))
-    if not np.iscomplexobj(x.high):
+    if not x_is_complex:
         return _multiply(y, x)
-    along = _multiply_real(x.real, y.real) - _multiply_real(x.imag, y.imag)
-    return _join_parts(
-        along,
-        _multiply_real(x.real, y.imag) + _multiply_real(x.imag, y.real),
-    )
+    real = _multiply_real(x.real, y.real) - _multiply_real(x.imag, y.imag)
+    imag = _multiply_real(x.real, y.imag) + _multiply_real(x.imag, y.real)
+    return _join_parts(real, imag)
 
 
 def _join_parts(x: Any, y: Any) -> Any:
@@ -200,21 +208,24 @@ def _join_parts(x: Any, y: Any) -> Any:
 
 def _divide_longer(x: Any, y: Any) -> Any:
     if np.iscomplexobj(y.high):
-        return _multiply(x, y.conjugate()) / (
-            _multiply_real(y.real, y.real) + _multiply_real(y.imag, y.imag)
-        )
+        square = _multiply_real(y.real, y.real) + _multiply_real(y.imag, y.imag)
+        return _multiply(x, y.conjugate()) / square
     if np.iscomplexobj(x.high):
         return _join_parts(_divide_longer(x.real, y), _divide_longer(x.imag, y))
     first = x.high / y.high
-    second = (x - _multiply_real(Pair(first, 0.0), y)).high / y.high
-    third = (x - _multiply_real(_renew(first, second), y)).high / y.high
-    return _renew(first, second) + Pair(third, 0.0)
+    remainder = x - _multiply_real(Pair(first, 0.0), y)
+    second = remainder.high / y.high
+    quotient = _renew(first, second)
+    remainder = x - _multiply_real(quotient, y)
+    third = remainder.high / y.high
+    return quotient + Pair(third, 0.0)
 
 
 def _root(x: Any) -> Any:
     near = np.sqrt(x.high)
-    lost = (x - _multiply_real(Pair(near, 0.0), Pair(near, 0.0))).high
-    return _renew(near, np.where(near == 0.0, 0.0, lost / (2.0 * near)))
+    square = _multiply_real(Pair(near, 0.0), Pair(near, 0.0))
+    correction = (x - square).high / (2.0 * near)
+    return _renew(near, np.where(near == 0.0, 0.0, correction))
 
 
 def _sine_and_cosine(x: Any) -> tuple[Any, Any]:
@@ -224,25 +235,33 @@ def _sine_and_cosine(x: Any) -> tuple[Any, Any]:
     for part in (0.5 * np.pi, 0.5 * PI_LOW, _HALF_PI_LOWEST):
         rest = rest - _multiply_real(Pair(quarters, 0.0), Pair(np.asarray(part), 0.0))
     square = _multiply_real(rest, rest)
-    sums = []
-    for last in (SERIES_TERMS, SERIES_TERMS - 1):
-        total = Pair(np.ones_like(rest.high), np.zeros_like(rest.high))
-        for k in range(last, 1, -2):
-            total = 1.0 - square * total / float(k * (k - 1))
-        sums.append(total)
-    sine = rest * sums[0]
-    cosine = sums[1]
+    sine_of_rest = rest * _sum_series(square, SERIES_TERMS)
+    cosine_of_rest = _sum_series(square, SERIES_TERMS - 1)
     odd = quarters % 2.0 == 1.0
-    turned = (quarters % 4.0 >= 2.0, (quarters + 1.0) % 4.0 >= 2.0)
-    sine, cosine = _choose(odd, cosine, sine), _choose(odd, sine, cosine)
-    return _choose(turned[0], -sine, sine), _choose(turned[1], -cosine, cosine)
+    sine = _choose(odd, cosine_of_rest, sine_of_rest)
+    cosine = _choose(odd, sine_of_rest, cosine_of_rest)
+    sine_is_negative = quarters % 4.0 >= 2.0
+    cosine_is_negative = (quarters + 1.0) % 4.0 >= 2.0
+    sine = _choose(sine_is_negative, -sine, sine)
+    cosine = _choose(cosine_is_negative, -cosine, cosine)
+    return sine, cosine
+
+
+def _sum_series(square: Pair, last: int) -> Any:
+    """Sum 1 - x^2/(k (k - 1)) (1 - ...) from k = `last` down by steps of 2."""
+    total: Any = Pair(np.ones_like(square.high), np.zeros_like(square.high))
+    for k in range(last, 1, -2):
+        total = 1.0 - square * total / float(k * (k - 1))
+    return total
 
 
 def _arctangent(y: Any, x: Any) -> Any:
     near = Pair(np.arctan2(y.high, x.high), 0.0)
     sine, cosine = _sine_and_cosine(near)
-    lost = (y * cosine - x * sine) / (x * cosine + y * sine)
-    return _choose(np.isfinite(lost.high), near + lost, near)
+    across = y * cosine - x * sine
+    along = x * cosine + y * sine
+    correction = across / along
+    return _choose(np.isfinite(correction.high), near + correction, near)
 
 
 def _size_of_longer(x: Any) -> Any:

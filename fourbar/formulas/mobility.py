@@ -67,10 +67,10 @@ class Reach(NamedTuple):
 
     def sum(self, d: int, own: int, x: int, y: int) -> float:
         """Sum the lengths with these signs exactly, rounded once."""
-        total = math.fsum((d * self.d, own * self.own, x * self.x, y * self.y))
-        if abs(total) <= TOUCHING * (self.d + self.own + self.x + self.y):
-            return 0.0
-        return total
+        terms = (d * self.d, own * self.own, x * self.x, y * self.y)
+        total = math.fsum(terms)
+        perimeter = self.d + self.own + self.x + self.y
+        return 0.0 if abs(total) <= TOUCHING * perimeter else total
 
     @property
     def beyond_stretched(self) -> float:
@@ -93,26 +93,26 @@ class Reach(NamedTuple):
 
         and the same with d, e for d, l.
         """
-        x, y = (1, 1) if stretched else (1, -1) if self.x >= self.y else (-1, 1)
-        short_d = self.sum(-1, 1, x, y)
-        short_l = self.sum(1, -1, x, y)
-        short_e = self.sum(1, 1, -x, -y)
-        perimeter = self.sum(1, 1, x, y)
-        at_near = math.atan2(
-            math.sqrt(short_d) * math.sqrt(short_l),
-            math.sqrt(short_e) * math.sqrt(perimeter),
-        )
-        at_far = math.atan2(
-            math.sqrt(short_d) * math.sqrt(short_e),
-            math.sqrt(short_l) * math.sqrt(perimeter),
-        )
-        return 2.0 * at_near, 2.0 * at_far
+        sign_x = 1
+        sign_y = 1  # e = x + y
+        if not stretched and self.x >= self.y:
+            sign_y = -1  # e = x - y
+        elif not stretched:
+            sign_x = -1  # e = y - x
+        root_d = math.sqrt(self.sum(-1, 1, sign_x, sign_y))  # e + l - d
+        root_l = math.sqrt(self.sum(1, -1, sign_x, sign_y))  # e + d - l
+        root_e = math.sqrt(self.sum(1, 1, -sign_x, -sign_y))  # d + l - e
+        root_sum = math.sqrt(self.sum(1, 1, sign_x, sign_y))  # d + l + e
+        half_at_near = math.atan2(root_d * root_l, root_e * root_sum)
+        half_at_far = math.atan2(root_d * root_e, root_l * root_sum)
+        return 2.0 * half_at_near, 2.0 * half_at_far
 
 
 def choose_power_of_two(linkage: FourBar) -> float:
     """Return a power of two near the longest bar, m."""
     expect("linkage", linkage, FourBar)
-    return math.ldexp(1.0, math.frexp(max(linkage.lengths))[1])
+    _, exponent = math.frexp(max(linkage.lengths))
+    return math.ldexp(1.0, exponent)
 
 
 def reach_of(linkage: FourBar, bar: int = 2) -> Reach:
@@ -152,42 +152,39 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
     """
     reach = reach_of(linkage, bar)
     theta_1 = linkage.ground_angle
-    others = [k for k in MOVING_BARS if k != bar]
+    first, second = (number for number in MOVING_BARS if number != bar)
+    shorter = second if reach.x >= reach.y else first
+    reversals = []
+    if reach.beyond_folded > 0.0:
+        reversals.append(False)
+    if reach.beyond_stretched > 0.0:
+        reversals.append(True)
     limits: list[LimitPosition] = []
-    for stretched, beyond in (
-        (False, reach.beyond_folded),
-        (True, reach.beyond_stretched),
-    ):
-        if beyond <= 0.0:
-            continue
+    for stretched in reversals:
         psi, eta = reach.triangle(stretched)
         straight = psi in (0.0, math.pi)
-        # the loop as a sum of vectors: bar 4 runs from B back to O4, so its vector is
-        # -c u4
-        for mirrored in (1.0,) if straight else (1.0, -1.0):
-            vectors = {
-                bar: mirrored * psi,
-                others[0]: -mirrored * eta,
-                others[1]: -mirrored * eta,
-            }
+        signs = (1.0,) if straight else (1.0, -1.0)
+        for sign in signs:
+            # directions in the sum of vectors around the loop, in which bar 4 runs
+            # from B back to O4: its vector is -c u4
+            directions = {bar: sign * psi, first: -sign * eta, second: -sign * eta}
             if not stretched:
-                vectors[others[1] if reach.x >= reach.y else others[0]] += math.pi
-            psi_2 = vectors[2] % TURN
-            theta_3 = theta_1 + vectors[3]
-            theta_4 = theta_1 + vectors[4] + math.pi
+                directions[shorter] += math.pi
+            theta_2 = theta_1 + directions[2] % TURN
+            theta_3 = theta_1 + directions[3]
+            theta_4 = theta_1 + directions[4] + math.pi
             if bar == 2 or straight:
                 branch = 0
             else:
                 branch = int(math.copysign(1.0, math.sin(theta_4 - theta_3)))
-            limits.append(
-                LimitPosition(
-                    theta_1 + psi_2,
-                    _wrap(theta_3),
-                    _wrap(theta_4),
-                    branch,
-                    stretched,
-                )
+            limit = LimitPosition(
+                theta_2,
+                _wrap(theta_3),
+                _wrap(theta_4),
+                branch,
+                stretched,
             )
+            limits.append(limit)
     return tuple(sorted(limits))
 
 
@@ -201,24 +198,21 @@ def find_intervals(linkage: FourBar, bar: int = 2) -> tuple[tuple[float, float],
     """
     reach = reach_of(linkage, bar)
     start = linkage.ground_angle + (math.pi if bar == 4 else 0.0)
+    inner = None
+    outer = None
     if reach.beyond_folded > 0.0:
-        inner = reach.triangle(False)[0]
-    else:
-        inner = None
+        inner, _ = reach.triangle(False)
     if reach.beyond_stretched > 0.0:
-        outer = reach.triangle(True)[0]
-    else:
-        outer = None
+        outer, _ = reach.triangle(True)
     if inner is None:
         if outer is None:
             return ((start, start + TURN),)
         return ((start - outer, start + outer),)
     if outer is None:
         return ((start + inner, start + (TURN - inner)),)
-    return (start + inner, start + outer), (
-        start + (TURN - outer),
-        start + (TURN - inner),
-    )
+    first = (start + inner, start + outer)
+    mirrored = (start + (TURN - outer), start + (TURN - inner))
+    return first, mirrored
 
 
 def turns_fully(linkage: FourBar, bar: int = 2) -> bool:
@@ -243,13 +237,12 @@ def choose_range(
     if turns_fully(linkage, bar):
         return 0.0, TURN
     every = find_intervals(linkage, bar)
-    held = (
-        interval
-        for interval in every
-        if holding is not None
-        and (holding - interval[0]) % TURN <= interval[1] - interval[0]
-    )
-    start, stop = next(held, every[0])
+    start, stop = every[0]
+    for low, high in every:
+        if holding is not None and (holding - low) % TURN <= high - low:
+            start = low
+            stop = high
+            break
     margin = min(ANGLE_FROM_LIMITS, (stop - start) / _NARROW)
     return start + margin, stop - margin
 
@@ -365,17 +358,16 @@ def find_circuit(
     if len(every) == 1:
         number = np.zeros(theta_2.shape, dtype=np.int8)
     elif len(every[0].branches) == 1:
-        number = np.where(
-            np.broadcast_to(branch, theta_2.shape) == every[0].branches[0],
-            0,
-            1,
-        )
+        (first_branch,) = every[0].branches
+        is_first = np.broadcast_to(branch, theta_2.shape) == first_branch
+        number = np.where(is_first, 0, 1)
     else:  # the two ranges are mirror images in the ground's line
-        number = np.where((theta_2 - linkage.ground_angle) % TURN < 0.5 * TURN, 0, 1)
-    half = prepare_path(linkage.lengths, linkage.ground_angle).half_angle(theta_2)
-    return np.where((half.outer >= 0.0) & (half.inner >= 0.0), number, -1).astype(
-        np.int8
-    )
+        is_first = (theta_2 - linkage.ground_angle) % TURN < 0.5 * TURN
+        number = np.where(is_first, 0, 1)
+    path = prepare_path(linkage.lengths, linkage.ground_angle)
+    half = path.half_angle(theta_2)
+    assembles = (half.outer >= 0.0) & (half.inner >= 0.0)
+    return np.where(assembles, number, -1).astype(np.int8)
 
 
 _GRASHOF = {
@@ -524,12 +516,17 @@ def find_miss(linkage: FourBar) -> tuple[float, str] | None:
     None: by too much.
     """
     meant = classify(linkage, _NEARLY)
-    own = classify(linkage)
-    if meant.name == own.name or meant.barker is None or meant.barker < 9:
+    exact = classify(linkage)
+    if meant.name == exact.name or meant.barker is None or meant.barker < 9:
         return None
-    sums = [abs(math.fsum(map(mul, signs, linkage.lengths))) for signs in _EQUALITIES]
-    perimeter = math.fsum(linkage.lengths)
-    return max(gap for gap in sums if gap <= _NEARLY * perimeter), meant.name
+    gaps = _find_gaps(linkage.lengths)
+    largest = _NEARLY * math.fsum(linkage.lengths)
+    return max(gap for gap in gaps if gap <= largest), meant.name
+
+
+def _find_gaps(lengths: tuple[float, ...]) -> list[float]:
+    """Return by how much each of the equalities of change points is missed, m."""
+    return [abs(math.fsum(map(mul, signs, lengths))) for signs in _EQUALITIES]
 
 
 def count_equalities(lengths: tuple[float, float, float, float]) -> int:
@@ -538,8 +535,7 @@ def count_equalities(lengths: tuple[float, float, float, float]) -> int:
     Two hold for a parallelogram or a kite, three for a rhombus.
     """
     touching = TOUCHING * math.fsum(lengths)
-    gaps = (abs(math.fsum(map(mul, signs, lengths))) for signs in _EQUALITIES)
-    return sum(gap <= touching for gap in gaps)
+    return sum(gap <= touching for gap in _find_gaps(lengths))
 
 
 def meet_change_points(
@@ -562,22 +558,26 @@ def meet_change_points(
     decimals : half of the last decimals of what was stated, if not the roundings; too
         coarse ones round nothing.
     """
-    largest = _DIGITS_STATED * math.fsum(lengths)
-    pairs = zip(roundings, decimals or roundings, strict=True)
-    fine = [rounding if last <= largest else 0.0 for rounding, last in pairs]
+    perimeter = math.fsum(lengths)
+    fine = []
+    for rounding, last in zip(roundings, decimals or roundings, strict=True):
+        fine.append(rounding if last <= _DIGITS_STATED * perimeter else 0.0)
     allowed = math.fsum(fine)
-    missed = [
-        signs
-        for signs in _EQUALITIES
-        if abs(math.fsum(map(mul, signs, lengths))) <= allowed
-    ]
-    touching = TOUCHING * math.fsum(lengths)
-    if all(abs(math.fsum(map(mul, signs, lengths))) <= touching for signs in missed):
+    meant = []
+    misses = []
+    for signs in _EQUALITIES:
+        miss = math.fsum(map(mul, signs, lengths))
+        if abs(miss) <= allowed:
+            meant.append(signs)
+            misses.append(miss)
+    touching = TOUCHING * perimeter
+    if all(abs(miss) <= touching for miss in misses):
         return lengths  # none is missed by more than the formulas count as nothing
-    equalities = np.array(missed, dtype=float)
+    # least changes, weighted by the roundings: W E^T (E W E^T)^-1 misses
+    equalities = np.array(meant, dtype=float)
     weights = np.square(fine)
-    gaps = np.array([math.fsum(map(mul, signs, lengths)) for signs in missed])
     normal = (equalities * weights) @ equalities.T
-    changes = weights * (equalities.T @ (np.linalg.pinv(normal) @ gaps))
+    multipliers = np.linalg.pinv(normal) @ np.array(misses)
+    changes = weights * (equalities.T @ multipliers)
     d, a, b, c = (np.array(lengths) - changes).tolist()
     return d, a, b, c

@@ -77,17 +77,22 @@ def coefficients(lengths: Loop, position: Position) -> Coefficients:
     xg = x * g
     leaning = xg * per_e2
     n = (grown + a * (a - d)) * per_e2 + leaning
-    rest = (grown + d * (d - a)) * per_e2 - leaning
+    one_less_n = (grown + d * (d - a)) * per_e2 - leaning
     w = (xg - 0.5 * y) * per_e2
     if is_any(_may_turn_fast(lengths)):
         fast = _find_fast_turns(lengths, position)
-        heron = E2 * (d + a) * (d + a) * outer + E1 * (b - c) * (b - c) * (2.0 * grown)
+        of_input = E2 * (d + a) * (d + a) * outer
+        of_output = E1 * (b - c) * (b - c) * (2.0 * grown)
+        heron = of_input + of_output
         w = select(fast, -heron * per_root / (x * S + y * position.root), w)
         n = select(fast, 0.5 + w, n)
-        rest = select(fast, 0.5 - w, rest)
-    dg = ((2.0 * ad * E2) * kk / inner - (2.0 * ad * E1) * ss / outer) * per_root
+        one_less_n = select(fast, 0.5 - w, one_less_n)
+    by_inner = (2.0 * ad * E2) * kk / inner
+    by_outer = (2.0 * ad * E1) * ss / outer
+    dg = (by_inner - by_outer) * per_root
     dn = (x * dg - S * w) * per_e2
-    return Coefficients(1.0, n - g, n + g, rest + g, 2.0 * g, 0.0, dn - dg, dn + dg)
+    h23 = one_less_n + g
+    return Coefficients(1.0, n - g, n + g, h23, 2.0 * g, 0.0, dn - dg, dn + dg)
 
 
 def _may_turn_fast(lengths: Loop) -> Number:
@@ -102,9 +107,8 @@ def _find_fast_turns(lengths: Loop, position: Position) -> Number:
     """
     d, a, b, c, _, _ = lengths
     y = (d - a) * (d + a)
-    return (abs(y) > TURNS_FAST * position.e2) & (
-        (y * position.root) * ((b - c) * position.half.sk) > 0.0
-    )
+    same_sign = (y * position.root) * ((b - c) * position.half.sk) > 0.0
+    return (abs(y) > TURNS_FAST * position.e2) & same_sign
 
 
 def take_sines_of_rates(lengths: Loop, position: Position, k: Coefficients) -> Position:
@@ -120,19 +124,17 @@ def take_sines_of_rates(lengths: Loop, position: Position, k: Coefficients) -> P
         return position
     fast = _find_fast_turns(lengths, position)
     scale = position.sin_mu / d
-    u3 = position.u3 * position.u1.conjugate()
-    u4 = position.u4 * position.u1.conjugate()
-    u3 = select(
-        fast,
-        vector(u3.real, c * scale * (k.h23 - k.h43)) * position.u1,
-        position.u3,
-    )
-    u4 = select(fast, vector(u4.real, b * scale * k.h23) * position.u1, position.u4)
+    sine_3 = c * scale * (k.h23 - k.h43)
+    sine_4 = b * scale * k.h23
+    cosine_3 = (position.u3 * position.u1.conjugate()).real
+    cosine_4 = (position.u4 * position.u1.conjugate()).real
+    u3 = vector(cosine_3, sine_3) * position.u1
+    u4 = vector(cosine_4, sine_4) * position.u1
     return Position(
         position.u1,
         position.u2,
-        u3,
-        u4,
+        select(fast, u3, position.u3),
+        select(fast, u4, position.u4),
         position.sin_mu,
         position.diagonal,
         position.e2,
@@ -147,16 +149,14 @@ def put_parallel_speeds(k: Coefficients, first: Number, second: Number) -> Coeff
     h3, h4 = 0, 1 where `first`; 1, 0 where `second`.
     """
     either = first | second
-    h3 = np.where(either, 1.0 * second, k.h3)
-    h4 = np.where(either, 1.0 * first, k.h4)
-    h23 = np.where(either, 1.0 * first, k.h23)
-    h43 = np.where(either, 1.0 * first - 1.0 * second, k.h43)
+    one_if_first = 1.0 * first
+    one_if_second = 1.0 * second
     return Coefficients(
         k.h2,
-        h3,
-        h4,
-        h23,
-        h43,
+        np.where(either, one_if_second, k.h3),
+        np.where(either, one_if_first, k.h4),
+        np.where(either, one_if_first, k.h23),
+        np.where(either, one_if_first - one_if_second, k.h43),
         k.dh2,
         np.where(either, 0.0, k.dh3),
         np.where(either, 0.0, k.dh4),
@@ -269,17 +269,22 @@ class State(NamedTuple):
         """
         if bar == 3:
             return self.lengths.a * self.position.u2
-        return self.lengths.d * self.position.u1 if bar == 4 else 0.0
+        if bar == 4:
+            return self.lengths.d * self.position.u1
+        return 0.0
 
     def frame(self, bar: int) -> Frame:
         """Return the frame of bar 1, 2, 3 or 4.
 
         Its pin is at rest at O2 and O4; the coupler's pin moves with bar 2.
         """
-        pin, v_pin, a_pin = self.foot(bar), 0.0, 0.0
+        pin = self.foot(bar)
+        v_pin = 0.0
+        a_pin = 0.0
         if bar == 3:
             of_2 = self.frame(2)
-            v_pin, a_pin = of_2.velocity(pin), of_2.acceleration(pin)
+            v_pin = of_2.velocity(pin)
+            a_pin = of_2.acceleration(pin)
         omega = self.omega(bar)
         return Frame(
             self.direction(bar),
@@ -316,6 +321,5 @@ class State(NamedTuple):
 
     def slip(self, pin: str) -> Number:
         """Return h_j - h_i of the bars i, j that meet at a pin."""
-        return {"O2": self.k.h2, "A": -self.k.h23, "B": self.k.h43, "O4": self.k.h4}[
-            pin
-        ]
+        slips = {"O2": self.k.h2, "A": -self.k.h23, "B": self.k.h43, "O4": self.k.h4}
+        return slips[pin]

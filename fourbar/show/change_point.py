@@ -19,11 +19,10 @@ ANGLE_STEP = 2e-4
 parabola through three of them meets a limit within the third power, and rounding, which
 grows beside a change point as 1/ANGLE_STEP, is 1e-11 of them.
 """
-NEAR_STEPS, FAR_STEPS = (1.0, 2.0, 3.0), (2.0, 4.0, 6.0)
-"""Multiples of the step at which each of two parabolas meets the forces of a side."""
-MULTIPLES = np.ravel(
-    [[sign * m for m in (*NEAR_STEPS, *FAR_STEPS)] for sign in (-1.0, 1.0)]
-)
+_ONE_SIDE = np.array([1.0, 2.0, 3.0, 2.0, 4.0, 6.0])
+"""Multiples of the step at which two parabolas, three each, meet the forces of a side.
+"""
+MULTIPLES = np.concatenate([-_ONE_SIDE, _ONE_SIDE])
 """Those of both sides, by side, parabola and place."""
 SAME_LIMIT = 1e-6
 """Part of the forces within which four extrapolations are one limit: as is shown."""
@@ -48,9 +47,9 @@ def find_limits(scene: Scene, solution: Solution) -> Solution | None:
         return None
     rising, order = np.unique(MULTIPLES, return_inverse=True)
     beside = solve(scene, "force", at=_list_places(scene, solution, rising))
-    limits: dict[str, Any] = {
-        name: limit[None] for name, limit in _extrapolate_forces(beside, order).items()
-    }
+    limits: dict[str, Any] = {}
+    for name, limit in _extrapolate_forces(beside, order).items():
+        limits[name] = limit[None]
     return replace(solution, **limits)
 
 
@@ -68,15 +67,16 @@ def has_growing_forces(scene: Scene, solution: Solution) -> bool:
     # a motion that comes to rest before it meets the last of them has fewer instants
     instants = instants[: len(speed)]
     moving = speed != 0.0
-    steps = ANGLE_STEP / np.abs(speed[moving])
-    times = instants[moving, None] + steps[:, None] * MULTIPLES
-    of_motion = (times >= 0.0) & (times <= solution.time[-1])
-    times = times[of_motion.all(axis=1)]
+    time_steps = ANGLE_STEP / np.abs(speed[moving])
+    times = instants[moving, None] + time_steps[:, None] * MULTIPLES
+    within_motion = (times >= 0.0) & (times <= solution.time[-1])
+    times = times[within_motion.all(axis=1)]
+    # the release begins at time 0, which is the first row
     rising, rows = np.unique([0.0, *times.ravel()], return_inverse=True)
     beside = solve(scene, "force", at=release_at(scene, rising).command)
     for rows_of_one in rows[1:].reshape(times.shape):
         limits = _extrapolate_forces(beside, rows_of_one)
-        if any(np.isnan(limit).any() for limit in limits.values()):
+        if np.isnan([*limits.values()]).any():
             return True
     return False
 
@@ -86,33 +86,35 @@ def _list_places(scene: Scene, solution: Solution, multiples: Array) -> Command:
 
     Along a motion over time the bar has the speed and acceleration of each instant.
     """
-    at, motion = solution.at, scene.motion
-    here = float(at.places[0])
-    if motion.law is None and motion.free is None:
+    at = solution.at
+    law = scene.motion.law
+    free = scene.motion.free
+    if law is None and free is None:
         # a stroke changes by as much as turns its bar by the step; an angle has turn 1
+        here = float(at.places[0])
         _, turn, *_ = compute_bar_motion(scene, here, 1.0, 0.0)
         try:
             return command_at(scene, here + ANGLE_STEP / abs(turn) * multiples)
         except InputError as error:
             raise NoSideError("the cylinder is at an end of its range") from error
-    moving = "the law" if motion.free is None else "the release"
-    speed = float(np.abs(np.ravel(np.asarray(at.speed, dtype=float)))[0])
+
+    moving = "the law" if free is None else "the release"
+    speed = abs(float(np.ravel(np.asarray(at.speed, dtype=float))[0]))
     if speed == 0.0:
         raise NoSideError(f"{moving} stands still there")
     assert at.time is not None
     times = float(np.ravel(at.time)[0]) + ANGLE_STEP / speed * multiples
     one_side = NoSideError(f"{moving} begins or ends there, and has one side alone")
-    if motion.free is not None:
-        if times[0] < 0.0:
+    if law is not None:
+        if times[0] < law.time[0] or times[-1] > law.time[-1]:
             raise one_side
-        released = release_at(scene, np.array([0.0, *times])).command
-        if len(released.angle) <= len(times):
-            raise one_side
-        return released.part(slice(1, None))
-    assert motion.law is not None
-    if not motion.law.time[0] <= times[0] < times[-1] <= motion.law.time[-1]:
+        return command_at(scene, times)
+    if times[0] < 0.0:
         raise one_side
-    return command_at(scene, times)
+    released = release_at(scene, np.array([0.0, *times])).command
+    if len(released.angle) <= len(times):
+        raise one_side
+    return released.part(slice(1, None))
 
 
 def _extrapolate_forces(beside: Solution, rows: NDArray[np.intp]) -> dict[str, Array]:
@@ -123,11 +125,14 @@ def _extrapolate_forces(beside: Solution, rows: NDArray[np.intp]) -> dict[str, A
     beside : positions on both sides of it.
     rows : those at the `MULTIPLES` of the step.
     """
-    forces = {
-        name: np.reshape(getattr(beside, name)[rows], (2, 2, 3, 2))
-        for name in PIN_FORCES
-    }
-    size = max(np.abs(values[:, 1, -1]).max() for values in forces.values())
+    forces = {}
+    sizes = []
+    for name in PIN_FORCES:
+        values = np.reshape(getattr(beside, name)[rows], (2, 2, 3, 2))
+        farthest = values[:, 1, -1]
+        sizes.append(np.abs(farthest).max())
+        forces[name] = values
+    size = max(sizes)
     return {name: _extrapolate_force(values, size) for name, values in forces.items()}
 
 
@@ -140,9 +145,9 @@ def _extrapolate_force(values: Array, size: float) -> Array:
     size : of the forces beside the change point, N.
     """
     first, second, third = np.moveaxis(values, 2, 0)
-    met = 3.0 * first - 3.0 * second + third
-    apart = np.ptp(met, axis=(0, 1)).max()
-    if not apart <= SAME_LIMIT * size:
+    extrapolations = 3.0 * first - 3.0 * second + third
+    distance = np.ptp(extrapolations, axis=(0, 1)).max()
+    if not distance <= SAME_LIMIT * size:
         return np.full(2, np.nan)
-    limit = met[:, 0].mean(axis=0)
+    limit = extrapolations[:, 0].mean(axis=0)
     return np.where(np.abs(limit) <= ZERO_LIMIT * size, 0.0, limit)

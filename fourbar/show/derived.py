@@ -23,10 +23,8 @@ def derive(solution: Solution, name: str) -> Array | None:
     It is None if its stage was not evaluated. NaN marks a position where it has no
     value: a ratio at a dead centre of bar 2, a centre at infinity.
     """
-    if (
-        DERIVED_NAMES[name].stage == "force"
-        and read_drive_demand(solution).values is None
-    ):
+    needs_forces = DERIVED_NAMES[name].stage == "force"
+    if needs_forces and read_drive_demand(solution).values is None:
         return None
     with np.errstate(all="ignore"):
         values = _COMPUTE[name](solution)
@@ -48,15 +46,15 @@ def _compute_ratio(solution: Solution, bar: int) -> Array:
     omega_3/omega_2 = -[A x (B - O4)] / [(B - A) x (B - O4)],
     omega_4/omega_2 = [A x (B - A)] / [(B - O4) x (B - A)].
     """
-    A, B = (vector[..., 0] + 1j * vector[..., 1] for vector in (solution.A, solution.B))
     assert solution.ground is not None
     length, angle = solution.ground
-    coupler = B - A
-    output = B - length * np.exp(1j * np.asarray(angle))
-    by_pins = {
-        3: -cross(A, output) / cross(coupler, output),
-        4: cross(A, coupler) / cross(output, coupler),
-    }[bar]
+    A = solution.A[..., 0] + 1j * solution.A[..., 1]
+    B = solution.B[..., 0] + 1j * solution.B[..., 1]
+    O4 = length * np.exp(1j * np.asarray(angle))
+    if bar == 3:
+        by_pins = -cross(A, B - O4) / cross(B - A, B - O4)
+    else:
+        by_pins = cross(A, B - A) / cross(B - O4, B - A)
     if solution.omega_2 is None:
         return np.asarray(by_pins)
     speed = getattr(solution, f"omega_{bar}")
@@ -70,9 +68,9 @@ def _locate_centre(solution: Solution, bars: tuple[int, int]) -> Array:
     It is NaN where its two lines are parallel within rounding.
     """
     centre = instant_centres(solution)[bars]
-    point = np.stack(centre.point, axis=-1)
-    point = shift_to_drawing(solution, point)
-    return np.where(np.abs(centre.w)[..., None] <= NO_DIGIT_LEFT, np.nan, point)
+    point = shift_to_drawing(solution, np.stack(centre.point, axis=-1))
+    parallel = np.abs(centre.w) <= NO_DIGIT_LEFT
+    return np.where(parallel[..., None], np.nan, point)
 
 
 _COMPUTE: dict[str, Callable[[Solution], Array]] = {
@@ -92,6 +90,6 @@ def list_derived(solution: Solution, units: Conversion) -> dict[str, Array | Non
     values: dict[str, Array | None] = {}
     for name, quantity in DERIVED_NAMES.items():
         derived = derive(solution, name)
-        factor = find_unit_in(quantity.unit, units)[1]
+        _, factor = find_unit_in(quantity.unit, units)
         values[name] = None if derived is None else factor * derived
     return values

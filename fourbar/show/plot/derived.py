@@ -4,7 +4,7 @@ These are shaking force and moment, ratios, and paths of instant centres.
 """
 
 from itertools import chain
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -40,6 +40,11 @@ _SYMBOLS = {
     "omega_4/omega_2": "ω₄/ω₂",
     "mechanical_advantage": "T₄/T₂",
 }
+_FORCE_LOOKS: dict[str, dict[str, Any]] = {
+    "|F|": {"color": INK, "ls": "-"},
+    "F_x": {"color": BAR_COLOURS[2], "ls": (0, (4, 1.5))},
+    "F_y": {"color": BAR_COLOURS[4], "ls": (0, (1, 1))},
+}
 FARTHEST_CENTRE = 1.5
 """Instant centres are drawn up to this multiple of the linkage's size from it."""
 
@@ -56,14 +61,12 @@ def draw_shaking_force(axes: "Axes", view: View) -> None:
     over = draw_axes(axes, view)
     poles = find_poles(view)
     vectors = _list_values(view, "shaking_force")
-    x, y = vectors[0].T
-    curves = {"|F|": np.hypot(x, y), "F_x": x, "F_y": y}
-    sizes = [np.hypot(*vector.T) for vector in vectors]
+    sizes = [np.hypot(vector[:, 0], vector[:, 1]) for vector in vectors]
     limit = choose_limit(sizes)
     factor, unit = choose_unit(limit or largest_magnitude(*sizes), "N", view.units)
-    looks = ((INK, "-"), (BAR_COLOURS[2], (0, (4, 1.5))), (BAR_COLOURS[4], (0, (1, 1))))
-    for (name, values), (colour, dashes) in zip(curves.items(), looks, strict=True):
-        look = {"color": colour, "ls": dashes, "label": f"${name}$"}
+    curves = {"|F|": sizes[0], "F_x": vectors[0][:, 0], "F_y": vectors[0][:, 1]}
+    for name, values in curves.items():
+        look = {**_FORCE_LOOKS[name], "label": f"${name}$"}
         plot_between_poles(axes, over, factor * values, poles, **look)
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     axes.set(ylabel=f"$F$ ({unit})", title="Shaking force on the frame")
@@ -108,12 +111,18 @@ def _draw_ratios(axes: "Axes", view: View, names: dict[int, str]) -> None:
     curves = dict[str, Array]()
     for bar, name in names.items():
         values = everywhere[name][0]
-        jumps = np.flatnonzero(values[:-1] * values[1:] < 0.0)
-        far = np.minimum(np.abs(values[:-1]), np.abs(values[1:]))[jumps] > 1.0
-        poles = jumps[far]
+        before = values[:-1]
+        after = values[1:]
+        # a ratio changes its sign at a pole, where it is large, or at zero
+        is_large = np.minimum(np.abs(before), np.abs(after)) > 1.0
+        poles = np.flatnonzero((before * after < 0.0) & is_large)
         curves[_SYMBOLS[name]] = values
-        look = {"color": BAR_COLOURS[bar], "ls": BAR_DASHES[bar]}
-        plot_between_poles(axes, over, values, poles, label=_SYMBOLS[name], **look)
+        look = {
+            "color": BAR_COLOURS[bar],
+            "ls": BAR_DASHES[bar],
+            "label": _SYMBOLS[name],
+        }
+        plot_between_poles(axes, over, values, poles, **look)
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     clip(axes, view, curves, limit, "Ratio", "1")
 
@@ -129,18 +138,27 @@ def draw_centres(axes: "Axes", view: View, labels: Labels) -> None:
         here = derive(view.here, name)
         assert path is not None
         assert here is not None
-        away = np.hypot(*(path - middle).T)
-        shown = np.where((away <= reach)[:, None], path, np.nan)
+        x, y = path.T
+        is_near = np.hypot(x - middle[0], y - middle[1]) <= reach
         subscript = name[1:]
         axes.plot(
-            *(factor * shown).T,
+            factor * np.where(is_near, x, np.nan),
+            factor * np.where(is_near, y, np.nan),
             color=colour,
             ls=dashes,
             lw=1.2,
             label=f"$I_{{{subscript}}}$",
         )
-        if np.hypot(*(here[0] - middle)) <= reach:
-            axes.plot(*(factor * here).T, "o", ms=4.5, color=colour, zorder=6)
+        ((x_here, y_here),) = here
+        if np.hypot(x_here - middle[0], y_here - middle[1]) <= reach:
+            axes.plot(
+                factor * x_here,
+                factor * y_here,
+                "o",
+                ms=4.5,
+                color=colour,
+                zorder=6,
+            )
     draw_mechanism(axes, view, view.here, 0, labels)
     axes.set_aspect("equal", adjustable="datalim")
     axes.grid(color=MUTED, alpha=0.2)

@@ -87,9 +87,9 @@ def _list_range(view: View, steps: int) -> Command:
 
 def _measure_chords(points: Array) -> tuple[Array, float]:
     """Return the chord of each step of a path, NaN beside a gap, and its extent, m."""
-    chords = np.hypot(*np.diff(points, axis=0).T)
-    extent = np.nanmax(np.nanmax(points, axis=0) - np.nanmin(points, axis=0))
-    return chords, float(extent)
+    dx, dy = np.diff(points, axis=0).T
+    extents = np.nanmax(points, axis=0) - np.nanmin(points, axis=0)
+    return np.hypot(dx, dy), float(np.nanmax(extents))
 
 
 def _longest_chord(points: Array) -> float:
@@ -110,12 +110,15 @@ def _thin(path: Array) -> Array:
     """
     chords, extent = _measure_chords(path)
     step = 0.5 * _CHORD * extent
-    gap = np.isnan(path).any(axis=1)
     if step == 0.0:
         return path[[0, -1]]
-    along = np.cumsum(np.nan_to_num(chords))
-    passed = np.floor(np.concatenate([[0.0], along]) / step)
-    beside = np.flatnonzero(np.diff(gap.astype(int)))
-    on = np.flatnonzero(np.diff(passed, prepend=-1.0) > 0.0)
-    kept = np.unique([0, len(path) - 1, *beside, *(beside + 1), *on])
+    is_gap = np.asarray(np.isnan(path).any(axis=1))
+    before_edge = is_gap[1:] != is_gap[:-1]
+    lengths = np.cumsum(np.nan_to_num(chords))
+    steps_passed = np.floor(np.concatenate([[0.0], lengths]) / step)
+    kept = np.diff(steps_passed, prepend=-1.0) > 0.0
+    kept[:-1] |= before_edge
+    kept[1:] |= before_edge
+    kept[0] = True
+    kept[-1] = True
     return np.asarray(path[kept])
