@@ -164,15 +164,17 @@ def _compute_codes(
     if type(size) is float and size > margin:
         return OK
     codes = np.zeros(np.shape(sine), dtype=np.uint8)
-    if not np.min(size, initial=np.inf) > margin:  # NaN where the loop does not close
-        codes[size <= margin] = SINGULAR
-        on_change_point = (abs(sine) <= margin) & path.passes_zero(half)
-        if command.condition is not None:
-            on_change_point = on_change_point & (command.condition > margin)
-        codes[on_change_point] = CHANGE_POINT
-        codes[np.isnan(sine)] = NOT_ASSEMBLED
-        # theta_2 - theta_1 overflows, so the loop cannot be evaluated
-        codes[np.isnan(half.kk)] = OVERFLOW
+    if np.min(size, initial=np.inf) > margin:
+        return codes
+    # some are at a limit, or NaN: the loop does not close there
+    codes[size <= margin] = SINGULAR
+    on_change_point = (abs(sine) <= margin) & path.passes_zero(half)
+    if command.condition is not None:
+        on_change_point = on_change_point & (command.condition > margin)
+    codes[on_change_point] = CHANGE_POINT
+    codes[np.isnan(sine)] = NOT_ASSEMBLED
+    # theta_2 - theta_1 overflows, so the loop cannot be evaluated
+    codes[np.isnan(half.kk)] = OVERFLOW
     return codes
 
 
@@ -216,40 +218,28 @@ def _list_forces(
         values["power"] = dynamics.effort * case.drive_speed(state)
     if "drive_condition" in wanted:
         condition = case.drive_condition(state)
-        values["drive_condition"] = (
-            condition
-            if dynamics.from_jamming is None
-            else condition * dynamics.from_jamming
-        )
+        if dynamics.from_jamming is not None:
+            condition = condition * dynamics.from_jamming
+        values["drive_condition"] = condition
     if "friction_residual" in wanted:
-        values["friction_residual"] = (
-            0.0 if dynamics.residual is None else dynamics.residual
-        )
+        residual = 0.0 if dynamics.residual is None else dynamics.residual
+        values["friction_residual"] = residual
+    friction_status = dynamics.status
     if drive_names.low in wanted or drive_names.high in wanted:
-        low, high, jammed = case.drive_interval(
-            state, command.acceleration, dynamics.effort
-        )
+        acceleration = command.acceleration
+        low, high, jammed = case.drive_interval(state, acceleration, dynamics.effort)
         values |= {drive_names.low: low, drive_names.high: high}
-        if jammed is not None and dynamics.status is not None:
-            dynamics = dynamics._replace(
-                status=np.where(
-                    jammed & (dynamics.status == OK), JAMMED, dynamics.status
-                )
-            )
-    without: list[Any] = [
-        status
-        for term in case.terms
-        if (status := term.status(state, command.branch)) is not None
-    ]
-    if dynamics.status is not None:
-        without.append(dynamics.status)
-    if (
-        case.drive is not None
-        and (status := case.drive.status(state, case.sines(state.position))) is not None
-    ):
-        without.append(status)
-    if without:
-        codes = np.where(codes == OK, np.max(without, axis=0), codes).astype(np.uint8)
+        if jammed is not None and friction_status is not None:
+            newly_jammed = jammed & (friction_status == OK)
+            friction_status = np.where(newly_jammed, JAMMED, friction_status)
+    statuses = [term.status(state, command.branch) for term in case.terms]
+    statuses.append(friction_status)
+    if case.drive is not None:
+        statuses.append(case.drive.status(state, case.sines(state.position)))
+    stated = [status for status in statuses if status is not None]
+    if stated:
+        of_effects = np.max(stated, axis=0)
+        codes = np.where(codes == OK, of_effects, codes).astype(np.uint8)
     if is_any(codes > SINGULAR):
         _withhold_forces(case, codes, values)
     return codes, values
@@ -260,17 +250,15 @@ def _withhold_forces(case: Case, codes: Any, values: dict[str, Any]) -> None:
 
     Pin forces are NaN at change points too.
     """
-    gone = np.isin(codes, _WITHOUT_FORCES)
+    everywhere = np.isin(codes, _WITHOUT_FORCES)
+    at_pins = everywhere | (codes == CHANGE_POINT)
     of_pins = {*PIN_FORCES, "force_error"}
     if any(term.loaded_pins for term in case.terms):
         of_pins |= values.keys()  # the drive balances friction of those forces
     for name, value in values.items():
         if name == "drive_condition":
             continue
-        if name in of_pins:
-            missing = gone | (codes == CHANGE_POINT)
-        else:
-            missing = gone
+        missing = at_pins if name in of_pins else everywhere
         values[name] = np.where(missing, _make_no_value(value), value)
 
 
@@ -291,14 +279,14 @@ def _compute_error_bars(
     refined_rows : indices of the positions whose half angle is evaluated in many
         digits.
     """
-    longer, branch = case.lengthened(), condense_branch(command.branch)
-    lost, remainder = command.lost, command.remainder
+    longer = case.lengthened()
+    remainder = command.remainder
+    lost = command.lost
     if lost is None:
         lost = np.array([0.0 if remainder is None else float(remainder), 0.0, 0.0])
-    numbers = enumerate((state.q, state.speed, command.acceleration))
-    q, speed, longer_acceleration = (
-        lengthen(number) + lost[..., place] for place, number in numbers
-    )
+    q = lengthen(state.q) + lost[..., 0]
+    speed = lengthen(state.speed) + lost[..., 1]
+    longer_acceleration = lengthen(command.acceleration) + lost[..., 2]
     half = longer.path.half_angle(q)
     if refined_rows.size:
         from fourbar.formulas.many_digits import decide_half_angles
@@ -317,20 +305,14 @@ def _compute_error_bars(
     near = longer.assemble(
         q,
         half,
-        branch,
+        condense_branch(command.branch),
         speed,
         longer_acceleration,
         condition=command.condition,
         margin=find_margin(command),
     )
     longer_dynamics = longer.dynamics(near, longer_acceleration, case.side)
-    pairs = zip(
-        (*dynamics.pins, dynamics.effort),
-        (*longer_dynamics.pins, longer_dynamics.effort),
-        strict=True,
-    )
-    *gaps, drive_gap = (np.abs(shorten(after - before)) for before, after in pairs)
-    gap = reduce(np.maximum, gaps)
+    gap, drive_gap = _compute_gaps(dynamics, longer_dynamics)
     if longer_numbers.HAS_LONG_DOUBLES and remainder is None:
         unresolved, drive_unresolved = _compute_unresolved(
             case,
@@ -340,12 +322,23 @@ def _compute_error_bars(
         )
         gap = np.fmax(gap, unresolved)
         drive_gap = np.fmax(drive_gap, drive_unresolved)
-    drive_error = _compute_error_bar(drive_gap, np.abs(dynamics.effort))
-    force_error = _compute_error_bar(
-        gap,
-        reduce(np.maximum, map(np.abs, dynamics.pins)),
-    )
-    return {case.drive_names.error: drive_error, "force_error": force_error}
+    largest_force = reduce(np.maximum, map(np.abs, dynamics.pins))
+    return {
+        case.drive_names.error: _compute_error_bar(drive_gap, np.abs(dynamics.effort)),
+        "force_error": _compute_error_bar(gap, largest_force),
+    }
+
+
+def _compute_gaps(one: Dynamics, other: Dynamics) -> tuple[Any, Any]:
+    """Compute the differences of two results: the largest of the pin forces, the drive.
+
+    The units are N, and N m or N.
+    """
+    gaps = []
+    for before, after in zip(one.pins, other.pins, strict=True):
+        gaps.append(np.abs(shorten(after - before)))
+    drive_gap = np.abs(shorten(other.effort - one.effort))
+    return reduce(np.maximum, gaps), drive_gap
 
 
 def _compute_unresolved(
@@ -381,18 +374,12 @@ def _compute_unresolved(
         there = case.dynamics(shifted, command.acceleration, case.side)
     except InputError:  # a load's table ends here
         return np.nan, np.nan
-    pairs = zip(
-        (*dynamics.pins, dynamics.effort),
-        (*there.pins, there.effort),
-        strict=True,
-    )
+    size = np.fmax(np.abs(state.q), 1.0)
     with np.errstate(all="ignore"):
-        share = np.divide(
-            ROUNDINGS_IN_FULL * _LONG_EPS * np.fmax(np.abs(state.q), 1.0),
-            np.where(step >= _LEAST_STEP * np.fmax(np.abs(state.q), 1.0), step, np.nan),
-        )
-        *pins, drive = (np.abs(after - before) * share for before, after in pairs)
-    return reduce(np.maximum, pins), drive
+        gap, drive_gap = _compute_gaps(dynamics, there)
+        rounding = ROUNDINGS_IN_FULL * _LONG_EPS * size
+        share = rounding / np.where(step >= _LEAST_STEP * size, step, np.nan)
+        return gap * share, drive_gap * share
 
 
 def _compute_error_bar(gap: Any, size: Any) -> Any:
@@ -412,11 +399,11 @@ def is_finite(values: Mapping[str, Any]) -> bool:
 
     It is False too if a square overflows.
     """
-    squares = (
-        np.vdot(value, value) if isinstance(value, np.ndarray) else value
-        for value in values.values()
-    )
-    return all(cmath.isfinite(square) for square in squares)
+    for value in values.values():
+        square = np.vdot(value, value) if isinstance(value, np.ndarray) else value
+        if not cmath.isfinite(square):
+            return False
+    return True
 
 
 def withhold_infinite(case: Case, evaluated: Evaluated) -> None:
@@ -444,11 +431,7 @@ def _withhold(
     """
     gone = np.zeros(code.shape, dtype=bool)
     for stage in STAGES:
-        names = [
-            name
-            for name in values
-            if STAGE_OF.get(name, POINT_STAGES.get(name[:2], "position")) == stage
-        ]
+        names = [name for name in values if _find_stage(name) == stage]
         of_forces = stage in STAGES[3:]
         if of_forces:
             promised = np.isin(code, (OK, SEVERAL))
@@ -456,12 +439,10 @@ def _withhold(
             promised = ~np.isin(code, (NOT_ASSEMBLED, SINGULAR))
         infinite = np.zeros_like(gone)
         for name in names:
-            infinite |= ~np.isfinite(values[name])
-            values[name] = np.where(
-                np.isfinite(values[name]),
-                values[name],
-                _make_no_value(values[name]),
-            )
+            value = values[name]
+            finite = np.isfinite(value)
+            infinite |= ~finite
+            values[name] = np.where(finite, value, _make_no_value(value))
         infinite &= promised & ~gone
         code[infinite] = OVERFLOW
         if of_forces:
@@ -469,11 +450,14 @@ def _withhold(
         gone |= infinite
         for name in names:
             if name != "drive_condition":
-                values[name] = np.where(
-                    gone,
-                    _make_no_value(values[name]),
-                    values[name],
-                )
+                value = values[name]
+                values[name] = np.where(gone, _make_no_value(value), value)
+
+
+def _find_stage(name: str) -> str:
+    """Return the stage of a quantity, also of the scene's points."""
+    of_point = POINT_STAGES.get(name[:2], "position")
+    return STAGE_OF.get(name, of_point)
 
 
 def _make_no_value(quantity: Any) -> complex:
@@ -511,11 +495,13 @@ def list_kinematics(case: Case, state: State, wanted: Set[str]) -> dict[str, Any
         if name in wanted
     }
     if case.drive is not None and not wanted.isdisjoint(LINE_QUANTITIES):
-        stroke, unit = case.drive.line(state)
-        of_line = {"drive_line": unit, "stroke_speed": case.drive_speed(state)}
-        if case.drive.has_stroke:
-            of_line["stroke"] = stroke
-        values |= {name: value for name, value in of_line.items() if name in wanted}
+        stroke, direction = case.drive.line(state)
+        if "drive_line" in wanted:
+            values["drive_line"] = direction
+        if "stroke_speed" in wanted:
+            values["stroke_speed"] = case.drive_speed(state)
+        if "stroke" in wanted and case.drive.has_stroke:
+            values["stroke"] = stroke
     if not case.points and wanted.isdisjoint(POINT_VECTORS):
         return values
     lengths = case.lengths
