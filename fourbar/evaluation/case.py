@@ -332,7 +332,9 @@ class Case(NamedTuple):
             for factor, constant in factors:
                 if is_any(constant < 0.0):
                     close = close | _needs_many_digits(
-                        factor, constant, 4.0 * lengths.a * lengths.d
+                        factor,
+                        constant,
+                        4.0 * lengths.a * lengths.d,
                     )
         if not is_any(close):
             return half, _NO_POSITIONS
@@ -411,7 +413,9 @@ class Case(NamedTuple):
         for term in self.terms:
             if term.loaded_pins:
                 friction = term.solve_friction(
-                    actions, friction.pins, free_bodies.solve_pin_forces
+                    actions,
+                    friction.pins,
+                    free_bodies.solve_pin_forces,
                 )
         Q = actions.generalized_forces()[0]
         return Dynamics(

@@ -440,7 +440,10 @@ def _read_motion(read: Reader, value: object) -> Motion:
         unit = "rad"
     if place in entry or of_stroke:
         arguments[place] = _read_commanded(
-            read, f"motion.{place}", entry.get(place), unit
+            read,
+            f"motion.{place}",
+            entry.get(place),
+            unit,
         )
     if speed in entry:
         arguments[speed] = read.quantity(f"motion.{speed}", entry[speed], f"{unit}/s")

@@ -107,7 +107,13 @@ def decide_half_angles(
     high, low = np.zeros((2, 5, flat.size))
     for i in index:
         *numbers, _ = exact_half_angle(
-            linkage, float(flat[i]), remainder, unit, i, bar, left_out[i]
+            linkage,
+            float(flat[i]),
+            remainder,
+            unit,
+            i,
+            bar,
+            left_out[i],
         )
         for row, value in enumerate(numbers):
             high[row, i] = float(value)

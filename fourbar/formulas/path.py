@@ -140,7 +140,8 @@ class LoopPath(NamedTuple):
         position = close_loop(self.lengths, self.u1, u2, half, branch, self.unit)
         if self.may_stay_parallel:
             position = put_parallel_pairs(
-                position, *find_parallel_pairs(self.lengths, branch)
+                position,
+                *find_parallel_pairs(self.lengths, branch),
             )
         return position
 
