@@ -147,11 +147,11 @@ def test_a_theta_2_rounded_as_the_rest_is_allowed_for_and_excuses_no_more(
 def test_whole_degrees_are_positions_that_somebody_chose(tmp_path: Path) -> None:
     path = tmp_path / "theirs.csv"
     path.write_text("theta_2 [deg],torque\n10,1.0\n20.5,1.0\n")
-    assert not read_table(path).theta_2_rounding.any()
+    assert not read_table(path).places_rounding.any()
     path.write_text(
         "theta_2 [deg],torque\n10,1.0\n20.5003,1.0\n"
     )  # zeros left off: the column has four decimals
-    assert read_table(path).theta_2_rounding == pytest.approx(
+    assert read_table(path).places_rounding == pytest.approx(
         np.radians(0.00005),
         rel=1e-9,
     )
@@ -1419,10 +1419,6 @@ def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(
 @pytest.mark.parametrize(
     ("motion", "words"),
     [
-        (
-            {"theta_4": "140 deg", "omega_4": "1 rad/s"},
-            "motion.theta_4: a table of results takes a command of theta_2",
-        ),
         (
             {"law": Law((0.0, 0.5, 1.0, 1.5), (0.0, 1.0, 2.0, 3.0))},
             "along a law at the scene's own positions",

@@ -267,14 +267,17 @@ class _Calculation:
     def _velocity_terms(self) -> Iterator[Mistake]:
         """Leave out (dJ/dt) v.
 
-        alpha_3 and alpha_4 then follow alpha_2 alone.
+        The accelerations of the other bars then follow that of the commanded one alone.
         """
         right = self.right
         with np.errstate(divide="ignore", invalid="ignore"):
-            gain = np.asarray(right.alpha_2) / np.asarray(right.omega_2)
+            at = right.at
+            gain = np.asarray(at.acceleration) / np.asarray(at.speed)
         wrenches = self.wrenches
         moved = MistakenNumbers()
-        for bar in (3, 4):
+        for bar in MOVING_BARS:
+            if bar == at.bar:
+                continue
             alpha = gain * getattr(right, f"omega_{bar}")
             more = alpha - getattr(right, f"alpha_{bar}")
             a = more[:, None] * _turn_by_quarter(wrenches.arms[bar])
@@ -464,7 +467,7 @@ def _find_impulses(judge: Judge) -> Iterator[Mistake]:
 
 def _find_late(judge: Judge) -> Iterator[Mistake]:
     """Give each position the numbers of the one before, or of the one after."""
-    n = len(judge.at.theta_2)
+    n = len(judge.at.angle)
     if n < ENOUGH_POSITIONS + 1:
         return
     of_forces: Callable[[str], bool] = (*FORCE_NAMES, *PIN_FORCES).__contains__
@@ -480,8 +483,10 @@ def _find_late(judge: Judge) -> Iterator[Mistake]:
                 edge: int = edge,
                 applies: Callable[[str], bool] = applies,
             ) -> Array | None:
+                if quantity == right.commanded or not applies(quantity):
+                    return None
                 values = getattr(right, quantity, None)
-                if values is None or quantity == "theta_2" or not applies(quantity):
+                if values is None:
                     return None
                 moved = np.array(values[rows])
                 theirs = judge.table.values.get(quantity)
@@ -523,7 +528,7 @@ def _find_other_branch(judge: Judge) -> Iterator[Mistake]:
         return
     start = int(places[0])
     later = np.arange(len(left)) >= start
-    here = np.degrees(judge.at.theta_2[start])
+    here = np.degrees(judge.at.angle[start])
 
     def predict(quantity: str, right: Solution) -> Array | None:
         ours, theirs = (getattr(one, quantity, None) for one in (right, other))
@@ -535,4 +540,5 @@ def _find_other_branch(judge: Judge) -> Iterator[Mistake]:
             mask = later
         return np.asarray(np.where(mask, theirs, ours))
 
-    yield Mistake(f"the other branch from theta_2 = {here:.4g} deg on", predict)
+    place = f"{judge.at.commanded} = {here:.4g} deg"
+    yield Mistake(f"the other branch from {place} on", predict)

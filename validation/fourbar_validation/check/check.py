@@ -161,8 +161,8 @@ def judge_table(
     """Judge every number of a table.
 
     The allowed error is K eps/condition, plus half a unit of the last printed digit,
-    and of theta_2's. With a tolerance that decides, and what explains the rest is held
-    to it too.
+    and of the angle's. A tolerance decides if it is given, and what explains the rest
+    is held to it too.
     """
     judge = Judge(scene, table, tolerance)
     _require_information(judge)
@@ -202,6 +202,7 @@ def write_judgement_json(judgement: Judgement, table: TheirTable) -> str:
         "agree_to_round_off": judgement.exact,
         "not_judged": judgement.not_judged,
         "tolerance": None if tolerance is None else asdict(tolerance),
+        "found_by": table.found_by,
         "left_out": table.left_out,
         "lines_without_motion": judgement.not_assembled,
         "differing": [
@@ -333,7 +334,11 @@ def check_command(
     of comments are understood. Half a unit of the last printed digit is allowed; the
     command prints to how many digits the numbers were compared. If --rtol or --atol is
     given, these decide, and the number of exact agreements is printed too. If the scene
-    states no omega_2, each row is judged at its own omega_2 and alpha_2.
+    states no speed, each row is judged at its own, say omega_2 and alpha_2.
+
+    A row is found by the angle that the scene commands (theta_2, theta_3 or theta_4).
+    In its place the angle of another bar may stand, if the motion passes it once or the
+    rows are the scene's own positions.
     """
     if scene.suffix == ".json":
         for option, value in (
@@ -349,7 +354,8 @@ def check_command(
                     "is of a table: a problem has its own levels",
                 )
         return check_problem(scene, theirs)
-    table = read_table(theirs)
+    stated = load(scene)
+    table = read_table(theirs, stated.motion.commanded)
     for path in (json, junit):
         if path is not None:
             require_file(path, scene, theirs)
@@ -360,7 +366,6 @@ def check_command(
         tolerance = None
     else:
         tolerance = Allowance(rtol or 0.0, atol or 0.0)
-    stated = load(scene)
     table = table.from_pin(stated.origin)
     judgement = judge_table(stated, table, tolerance)
     if json is not None:
@@ -396,7 +401,7 @@ def show_judgement(
         )
         head = (
             "line",
-            "theta_2\ndeg",
+            f"{table.found_by}\ndeg",
             "quantity",
             "theirs",
             "ours",
@@ -406,7 +411,7 @@ def show_judgement(
         rows = [
             (
                 str(each.line),
-                f"{math.degrees(each.theta_2):.7g}",
+                f"{math.degrees(each.place):.7g}",
                 *_write_in_their_unit(each, table),
                 f"{each.error:.1e}",
                 f"{each.allowed:.1e}",

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fourbar.effects import Gravity, Load
 from fourbar.errors import FourBarError
-from fourbar.linkage import Bar
+from fourbar.linkage import BAR_NAMES, Bar
 from fourbar.quantities import FORCE_NAMES, UNITS, VECTORS, Array
 from fourbar.quantities.units import find_factor
 from fourbar.scene import Scene
@@ -328,7 +328,7 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
     numbers = sum(np.count_nonzero(judge.where(key)) for key in keys)
     if numbers < ENOUGH_NUMBERS:
         return
-    n = len(judge.at.theta_2)
+    n = len(judge.at.angle)
     rows = np.unique(np.linspace(0, n - 1, _TRIED).round().astype(int))
     tried = 2.0 * np.pi * np.arange(1, OFFSETS_TRIED) / OFFSETS_TRIED
     residuals = _compute_residuals(judge, keys, tried, rows)
@@ -351,18 +351,20 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
         if abs(step) < FIT_STEP**2:
             break
     offset = math.remainder(offset, 2.0 * np.pi)
-    moved = judge.at._replace(angle=judge.at.theta_2 + offset, remainder=None)
+    moved = judge.at._replace(angle=judge.at.angle + offset, remainder=None)
     wrong = solve(judge.scene, judge.stage, at=moved)
 
+    name = judge.at.commanded
+
     def take(quantity: str, right: Solution) -> Array | None:
-        if quantity == "theta_2":
+        if quantity == name:
             return None
         values: Array | None = getattr(wrong, quantity, None)
         return values
 
     yield Mistake(
-        "the crank angle is measured from another zero: theta_2"
-        f" {math.degrees(offset):+.6g} deg is what they solved",
+        f"the angle of the {BAR_NAMES[judge.at.bar]} is measured from another zero:"
+        f" {name} {math.degrees(offset):+.6g} deg is what they solved",
         take,
         times=CARRIED,
     )
@@ -406,7 +408,7 @@ def _try_order(judge: Judge) -> Iterator[Mistake]:
     Each row of theirs goes to the nearest of ours.
     """
     table = judge.table
-    n = len(judge.at.theta_2)
+    n = len(judge.at.angle)
     keys = []
     for key in table.values:
         if judge.where(key).all() and judge.size(key).all():
@@ -432,16 +434,17 @@ def _try_order(judge: Judge) -> Iterator[Mistake]:
         return
     steps = np.diff(nearest)
     if np.all(steps[1:-1] == -1):
-        text = "the rows are in reverse order: theta_2 runs the other direction"
+        direction = f"{table.found_by} runs the other direction"
+        text = f"the rows are in reverse order: {direction}"
     elif np.count_nonzero(steps == 1) >= n - 2:
         shifts = np.remainder(nearest - in_place + n / 2, n) - n / 2
         rows = round(float(np.median(shifts)))
         text = (
             f"the rows are shifted by {rows:+d}: each has the numbers of another"
-            " theta_2"
+            f" {table.found_by}"
         )
     else:
-        text = "the rows are in another order than their theta_2"
+        text = f"the rows are in another order than their {table.found_by}"
     yield Mistake(text, lambda quantity, right: _take_rows(quantity, right, nearest))
 
 
@@ -450,7 +453,7 @@ def _take_rows(
     right: Solution,
     rows: Array,
 ) -> Array | None:
-    if quantity == "theta_2":
+    if quantity == right.commanded:
         values = None
     else:
         values = getattr(right, quantity, None)

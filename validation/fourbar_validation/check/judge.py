@@ -13,10 +13,14 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.formulas.mobility import TURN
 from fourbar.quantities import OK, Array
-from fourbar.scene import Command, Scene, command
-from fourbar.scene.scene import require_input
+from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
+from fourbar_validation.check.rows import (
+    RowCommands,
+    find_row_commands,
+    list_stated_rates,
+)
 from fourbar_validation.check.theirs import TheirTable, name_quantity
 from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import (
@@ -30,10 +34,6 @@ from fourbar_validation.compare.tolerance import (
     magnitude,
     replace_zero_size,
 )
-
-_OWN_MOTION = ("omega_2", "alpha_2")
-_AS_PRINTED = 4.0 * EPS
-"""Relative difference of a position that went to degrees and back."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,8 @@ class Discrepancy:
     """Difference permitted by the stated tolerance and the printed digits. None if no
     tolerance was stated.
     """
-    theta_2: float
+    place: float
+    """Angle by which the row is found, rad."""
 
     @property
     def judged(self) -> bool:
@@ -88,7 +89,8 @@ class Discrepancy:
 class Judge:
     """Numbers of a table against the formulas at its positions.
 
-    `at`: what was commanded at its rows; left out: what the scene and the table state.
+    `rows`: what was commanded at its rows; left out: what the scene and the table
+    state.
     """
 
     def __init__(
@@ -96,12 +98,15 @@ class Judge:
         scene: Scene,
         table: TheirTable,
         tolerance: Allowance | None = None,
-        at: Command | None = None,
+        rows: RowCommands | None = None,
     ) -> None:
         self.scene, self.tolerance = scene, tolerance
-        self.at = make_command(scene, table) if at is None else at
-        moves_itself = at is None and _moves_itself(scene, table)
-        command_names = _OWN_MOTION if moves_itself else ()
+        command_names: tuple[str, ...] = ()
+        if rows is None:
+            rows = find_row_commands(scene, table)
+            command_names = list_stated_rates(scene, table)
+        self.rows = rows
+        self.at = rows.at
         self.table = replace(
             table,
             values={
@@ -110,15 +115,15 @@ class Judge:
                 if key not in command_names
             },
         )
-        self.stage = "position" if self.at.omega_2 is None else "force"
+        self.stage = "position" if self.at.speed is None else "force"
         self.right = solve(scene, self.stage, at=self.at)
         self.ok = self.right.status_code == OK
         self._sizes: dict[str, Array] = {}
         for key in table.values:
             if getattr(self.right, name_quantity(key)) is None:
-                if self.at.omega_2 is None:
+                if self.at.speed is None:
                     raise InputError(
-                        "motion.omega_2",
+                        f"motion.omega_{self.at.bar}",
                         None,
                         f"is needed in the scene or the table to judge {key}",
                     )
@@ -155,18 +160,11 @@ class Judge:
 
     @cached_property
     def near(self) -> list[Solution]:
-        """Solve again half a unit of a rounded theta_2 away, to either side.
+        """Solve again half a unit of a rounded angle away, to either side.
 
-        The result is empty if theta_2 is not rounded.
+        The result is empty if the angle is not rounded.
         """
-        rounding = self.table.theta_2_rounding
-        if not rounding.any():
-            return []
-        moved = (self.at.theta_2 + shift for shift in (-rounding, rounding))
-        return [
-            solve(self.scene, self.stage, at=self.at._replace(angle=x, remainder=None))
-            for x in moved
-        ]
+        return [solve(self.scene, self.stage, at=at) for at in self.rows.near]
 
     def judged(self, key: str, ours: Array) -> tuple[Array, Array, Array]:
         """Return (error, allowed, apart) of the table, each (n,).
@@ -263,7 +261,7 @@ class Judge:
                         mine,
                         *numbers,
                         most,
-                        float(self.at.theta_2[i]),
+                        float(self.table.places[i]),
                     )
                 )
         return findings
@@ -281,55 +279,6 @@ class Judge:
     def _answer(self, key: str) -> Mask:
         finite = np.isfinite(self.ours(key))
         return np.asarray(finite.all(axis=1) if finite.ndim == 2 else finite)
-
-
-def make_command(scene: Scene, table: TheirTable) -> Command:
-    """Build the command at each row of the table.
-
-    It is the scene's if that has the same positions. Where the scene states no speed it
-    is that of the row, as in the log of a simulator or a test stand.
-    """
-    require_input(scene, "a table of results")
-    base = command(scene)
-    if scene.motion.free is not None:
-        allowed = (
-            "not judged while released; without free and omega_2 each row is judged at"
-            " its own omega_2"
-        )
-        raise InputError("motion.free", scene.title, allowed)
-    if _moves_itself(scene, table):
-        base = base._replace(
-            speed=table.values["omega_2"],
-            acceleration=table.values.get("alpha_2", base.acceleration),
-        )
-    theta_2 = table.theta_2
-    if base.theta_2.shape == theta_2.shape and np.allclose(
-        base.theta_2,
-        theta_2,
-        rtol=_AS_PRINTED,
-        atol=0.0,
-    ):
-        return base
-    if scene.motion.law is not None:
-        allowed = (
-            "a table is judged along a law at the scene's own positions, all of them in"
-            " its order"
-        )
-        raise InputError("motion.law", scene.title, allowed)
-    branch = np.full(len(theta_2), scene.motion.branch, dtype=np.int8)
-    return Command(theta_2, branch, base.omega_2, base.alpha_2)
-
-
-def _moves_itself(scene: Scene, table: TheirTable) -> bool:
-    """Return whether the table states the motion that its rows are judged at.
-
-    Otherwise the scene states it.
-    """
-    return (
-        scene.motion.law is None
-        and scene.motion.speed is None
-        and "omega_2" in table.values
-    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,7 +54,7 @@ def list_hypotheses(scene: Scene, command: Command) -> Iterator[Mistake]:
         try:
             wrong = solve(
                 changed,
-                "position" if other_command.omega_2 is None else "force",
+                "position" if other_command.speed is None else "force",
                 at=other_command,
             )
         except FourBarError:  # the mistake leaves no valid scene
@@ -103,7 +103,7 @@ def _scale_inertial(scene: Scene, command: Command) -> Iterator[Mistake]:
 
     Forces and torque are linear in each.
     """
-    if command.omega_2 is None:
+    if command.speed is None:
         return
     bare = replace(scene, loads=(), effects=())
     massless = {
@@ -177,28 +177,30 @@ def _list_other_problems(
 
 def _list_other_commands(command: Command) -> Iterator[tuple[str, Command]]:
     yield "the other branch", command._replace(branch=-command.branch)
-    yield "theta_2 read as degrees", command._replace(angle=np.radians(command.theta_2))
+    name = command.commanded
+    yield f"{name} read as degrees", command._replace(angle=np.radians(command.angle))
     in_degrees = np.degrees(
-        np.fmod(command.theta_2, TURN)
+        np.fmod(command.angle, TURN)
     )  # a whole turn is 6.28 of these degrees
     yield (
-        "theta_2 in radians where degrees were announced",
+        f"{name} in radians where degrees were announced",
         command._replace(angle=in_degrees),
     )
-    if command.omega_2 is not None:
+    if command.speed is not None:
         yield (
             "no inertial forces (statics)",
             command._replace(speed=0.0, acceleration=0.0),
         )
-        if np.any(command.alpha_2):
-            yield "alpha_2 is left out", command._replace(acceleration=0.0)
+        if np.any(command.acceleration):
+            left_out = f"alpha_{command.bar} is left out"
+            yield left_out, command._replace(acceleration=0.0)
         yield (
-            "omega_2 in rev/min taken for rad/s",
-            command._replace(speed=command.omega_2 / RPM),
+            f"omega_{command.bar} in rev/min taken for rad/s",
+            command._replace(speed=command.speed / RPM),
         )
         yield (
-            "omega_2 in rad/s taken for rev/min",
-            command._replace(speed=command.omega_2 * RPM),
+            f"omega_{command.bar} in rad/s taken for rev/min",
+            command._replace(speed=command.speed * RPM),
         )
 
 

@@ -10,7 +10,7 @@ SI (rad). Columns are parted by commas, by tabs, or by a spreadsheet's semicolon
 which a number may have a decimal comma. A blank cell states nothing, and a column that
 is no answer is left out by name. How many digits were printed decides how much rounding
 is theirs: half a unit of the last printed digit is always allowed, and what half a unit
-of a rounded theta_2 changes.
+of a rounded angle changes.
 """
 
 import csv
@@ -34,7 +34,7 @@ _DECIMALS = 4
 one that was rounded.
 """
 NOT_JUDGED = {
-    "time": "a row is found by its theta_2",
+    "time": "a row is found by an angle",
     **dict.fromkeys(
         (COUPLE.error, LINE.error, "force_error", "friction_residual"),
         "an error of the formulas themselves",
@@ -45,16 +45,19 @@ NOT_JUDGED = {
 _BLANK = "blank"
 _COMMENT = ("#", "%", "//")
 """Beginnings of a line that is a comment."""
+_COMMANDED_ANGLE = ("angle", "winkel", "antriebswinkel", "inputangle")
+"""Names of the angle that a scene commands, spelled as in _OTHER_NAMES."""
+_PLACES = ("theta_2", "theta_4", "theta_3")
+"""Angles by which a row may be found where the commanded one has no column."""
 _OTHER_NAMES = {
     **dict.fromkeys(("t2", "t3", "t4", "moment", "drehmoment"), "torque"),
     **dict.fromkeys(
         ("antriebsmoment", "motortorque", "inputtorque", "cranktorque"), "torque"
     ),
     **dict.fromkeys(("drivetorque", "drivingtorque"), "torque"),
-    **dict.fromkeys(
-        ("winkel", "kurbelwinkel", "antriebswinkel", "crankangle", "angle"), "theta_2"
-    ),
-    "inputangle": "theta_2",
+    **dict.fromkeys(("kurbelwinkel", "crankangle"), "theta_2"),
+    **dict.fromkeys(("abtriebswinkel", "outputangle"), "theta_4"),
+    **dict.fromkeys(("koppelwinkel", "couplerangle"), "theta_3"),
     "zeit": "time",
 }
 """Names that other programs and languages use, in small letters. They have no spaces
@@ -129,27 +132,30 @@ class Unit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TheirTable:
-    """Somebody's numbers in SI units: theta_2 (n,) and values by quantity.
+    """Somebody's numbers in SI units: an angle (n,) and values by quantity.
 
     Values are (n,) or (n, 2) and have their rounding. Of a vector (n,) are its
     magnitudes, under |name|. What the table does not state is NaN.
     """
 
-    theta_2: Array
+    places: Array
+    """Angle by which each row is found, rad, (n,)."""
     values: dict[str, Array]
     rounding: dict[str, Array]
-    """Half a unit of the last digit printed, in SI, (n,)."""
+    """Half a unit of the last digit printed, in SI, (n,); of the angle too."""
     units: dict[str, Unit]
     lines: list[int]
     """The line of the file that each row stands in."""
-    theta_2_rounding: Array
-    """Half a unit of the last digit of theta_2, rad, (n,). It is stated if the column
-    is printed with _DECIMALS, else 0.
+    places_rounding: Array
+    """Rounding of the angle, rad, (n,): half a unit of its last digit if the column is
+    printed with _DECIMALS, else 0: somebody chose it.
     """
     left_out: dict[str, str]
     """Headings of columns that are not judged, and why."""
     notes: tuple[str, ...] = ()
     """Sentences on how the table was read where it does not say so itself."""
+    found_by: str = "theta_2"
+    """Name of the angle by which rows are found."""
 
     def label(self, key: str) -> str:
         """Name the quantity, or the one component of it that the table has."""
@@ -193,8 +199,12 @@ def name_quantity(key: str) -> str:
     return key.strip("|")
 
 
-def read_table(path: Path) -> TheirTable:
-    """Read a CSV table; InputError names the column or line that cannot be read."""
+def read_table(path: Path, commanded: str = "theta_2") -> TheirTable:
+    """Read a CSV table; InputError names the column or line that cannot be read.
+
+    `commanded`: name of the angle that the scene commands. Rows are found by it, or by
+    another bar's angle where the table does not have it.
+    """
     (_, headings), *rows = _read_lines(path)
     unit_line = [""] * len(headings)
     if rows and _is_unit_line(rows[0][1]):
@@ -206,15 +216,16 @@ def read_table(path: Path) -> TheirTable:
             "needs a header and at least one row",
             str(path),
         )
-    columns, left_out, renamings = _read_headings(path, headings, unit_line)
+    columns, left_out, renamings = _read_headings(path, headings, unit_line, commanded)
     _drop_repeated(path, columns, left_out, headings, rows)
     names = [name for name, _ in columns.values()]
-    if "theta_2" not in names:
+    found_by = next((name for name in (commanded, *_PLACES) if name in names), None)
+    if found_by is None:
         raise InputError(
             "header",
             headings,
-            "needs a column theta_2 (say theta_2 [deg] for degrees)"
-            + _list_renamings(renamings),
+            f"needs a column {commanded} (say {commanded} [deg] for degrees), or the"
+            " angle of another bar" + _list_renamings(renamings),
             str(path),
         )
     numbers = {name: np.empty(len(rows)) for name in names}
@@ -243,34 +254,34 @@ def read_table(path: Path) -> TheirTable:
                 value * unit.factor,
                 half * unit.factor,
             )
-        if math.isnan(numbers["theta_2"][row]):
+        if math.isnan(numbers[found_by][row]):
             raise InputError(
                 f"line {line}",
                 cells,
-                "needs a theta_2",
+                f"needs a {found_by}",
                 str(path),
             )
     units = {name: unit for name, unit in columns.values()}
-    notes = _read_degrees(numbers, halves, units, headings, columns)
+    notes = _read_degrees(found_by, numbers, halves, units, headings, columns)
     left_out |= {
         headings[index]: _BLANK
         for index, (name, _) in columns.items()
         if np.isnan(numbers[name]).all()
     }
     lines = [line for line, _ in rows]
-    rounded = _find_rounding(halves["theta_2"], units["theta_2"])
     table = TheirTable(
-        numbers["theta_2"],
+        numbers[found_by],
         {},
-        {},
-        {},
+        {found_by: halves[found_by]},
+        {found_by: units[found_by]},
         lines,
-        rounded,
+        _find_rounding(halves[found_by], units[found_by]),
         left_out,
         notes,
+        found_by,
     )
     for name in names:
-        if name != "theta_2" and not np.isnan(numbers[name]).all():
+        if name != found_by and not np.isnan(numbers[name]).all():
             _enter_column(table, name, units[name], numbers[name], halves[name])
     if not table.values:
         examples = "torque, F12_x and F12_y, or F12 (its magnitude)"
@@ -327,28 +338,29 @@ def _drop_repeated(
 
 
 def _read_degrees(
+    name: str,
     numbers: dict[str, Array],
     halves: dict[str, Array],
     units: dict[str, Unit],
     headings: list[str],
     columns: dict[int, tuple[str, Unit]],
 ) -> tuple[str, ...]:
-    """Read a theta_2 without a unit as degrees if it can be nothing else."""
-    values = numbers["theta_2"]
-    heading = next(headings[i] for i, (name, _) in columns.items() if name == "theta_2")
-    bare = not re.search(r"[\[(]", heading) and units["theta_2"].text == "rad"
+    """Read an angle without a unit as degrees if it can be nothing else."""
+    values = numbers[name]
+    heading = next(headings[i] for i, (one, _) in columns.items() if one == name)
+    bare = not re.search(r"[\[(]", heading) and units[name].text == "rad"
     largest = float(np.abs(values).max())
     if not bare or not _TWO_TURNS < largest < _MOST_DEGREES:
         return ()
     if np.any(np.abs(2.0 * values - np.round(2.0 * values)) > 1e-9):
         return ()
     factor = math.pi / 180.0
-    numbers["theta_2"], halves["theta_2"] = values * factor, halves["theta_2"] * factor
-    units["theta_2"] = Unit("deg", factor)
+    numbers[name], halves[name] = values * factor, halves[name] * factor
+    units[name] = Unit("deg", factor)
     return (
         (
-            f"theta_2 has no unit and goes to {largest:g}: it is read as degrees; "
-            "write theta_2 [deg], or theta_2 [rad] if it is not"
+            f"{name} has no unit and goes to {largest:g}: it is read as degrees; "
+            f"write {name} [deg], or {name} [rad] if it is not"
         ),
     )
 
@@ -378,7 +390,7 @@ def _enter_column(
 
 
 def _find_rounding(halves: Array, unit: Unit) -> Array:
-    """Find half a unit of each theta_2's last digit.
+    """Find half a unit of the last digit of each angle by which a row is found.
 
     For a cell whose zeros were left off it is that of the column.
     """
@@ -458,11 +470,13 @@ def _read_comma(cell: str) -> str:
     return text.replace(",", ".")
 
 
-def _find_name(name: str) -> str:
+def _find_name(name: str, commanded: str) -> str:
     """Find the quantity that a column's name means, in any letters."""
     if name in UNITS or name in NOT_JUDGED:
         return name
     plain = _spell(name)
+    if plain in _COMMANDED_ANGLE:
+        return commanded
     known = {**dict.fromkeys(NOT_JUDGED), **UNITS}
     spelled = {one.lower().replace("_", ""): one for one in known}
     for letter in "xy":
@@ -499,6 +513,7 @@ def _read_headings(
     path: Path,
     headings: list[str],
     unit_line: list[str],
+    commanded: str,
 ) -> tuple[dict[int, tuple[str, Unit]], dict[str, str], dict[str, str]]:
     """Return each column's name and unit by its place in a row.
 
@@ -514,7 +529,7 @@ def _read_headings(
             name = match["name"] + (match["letter"] or "")
         else:
             name = heading.strip()
-        name = _find_name(name)
+        name = _find_name(name, commanded)
         if name[-2:] in ("_x", "_y") and name[:-2] in VECTORS:
             quantity = name[:-2]
         else:

@@ -6,6 +6,7 @@ from fourbar.errors import FourBarError
 from fourbar.quantities import OK, UNITS, Array
 from fourbar_validation.check.judge import Judge
 from fourbar_validation.check.mistakes import explain
+from fourbar_validation.check.rows import RowCommands
 from fourbar_validation.check.theirs import NOT_JUDGED, TheirTable, Unit
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.pins import state_from_pins
@@ -34,8 +35,8 @@ def find_causes(
         return []
     try:
         table = make_answer_table(answer, tolerance)
-        commanded = at.part(slice(0, len(table.theta_2)))
-        judge = Judge(state_from_pins(question.scene), table, at=commanded)
+        rows = RowCommands(at.part(slice(0, len(table.places))))
+        judge = Judge(state_from_pins(question.scene), table, rows=rows)
     except FourBarError:
         return []
     differing = [key for key in judge.table.values if differs(judge, key)]
@@ -62,7 +63,7 @@ def make_answer_table(answer: Answer, tolerance: ErrorBound) -> TheirTable:
     """
     assert answer.at is not None and answer.assembled is not None
     rows = slice(MOST_POSITIONS_SEARCHED)
-    theta_2 = np.asarray(answer.at.angle[rows], dtype=float)
+    angle = np.asarray(answer.at.angle[rows], dtype=float)
     blank = ~answer.assembled[rows]
     if not tolerance.conditioned:
         slack = tolerance.factor
@@ -85,12 +86,12 @@ def make_answer_table(answer: Answer, tolerance: ErrorBound) -> TheirTable:
         else:
             scale = largest
         values[name] = kept
-        rounding[name] = np.full(len(theta_2), max(slack, SAME_NUMBERS) * scale)
+        rounding[name] = np.full(len(angle), max(slack, SAME_NUMBERS) * scale)
     units = {name: Unit(UNITS[name], 1.0) for name in values}
-    lines = list(range(1, len(theta_2) + 1))
-    exact = np.zeros(len(theta_2))
+    lines = list(range(1, len(angle) + 1))
+    exact = np.zeros(len(angle))
     return TheirTable(
-        theta_2,
+        angle,
         values,
         rounding,
         units,

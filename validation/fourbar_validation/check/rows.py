@@ -1,0 +1,217 @@
+"""Commands at the rows of a table of results."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.errors import InputError, LimitError
+from fourbar.formulas.mobility import TURN
+from fourbar.quantities import Array
+from fourbar.scene import Command, Scene, command, find_signs
+from fourbar.scene.motion import COMMAND_NAMES
+from fourbar.solution import Solution
+from fourbar.solving import solve
+from fourbar_validation.check.theirs import TheirTable
+from fourbar_validation.compare.tolerance import EPS, wrap_difference
+
+_AS_PRINTED = 4.0 * EPS
+"""Relative difference of a position that went to degrees and back."""
+_ONE_PLACE = 1e-6
+"""Angle, rad, within which two positions are one: at a limit of the bar by which a row
+is found they differ by the square root of round-off.
+"""
+_SINE_BARS = {2: (3, 4), 3: (2, 4), 4: (2, 3)}
+"""Bars whose sine decides the assembly, by the commanded bar."""
+
+
+class RowCommands(NamedTuple):
+    """Commands at the rows of a table."""
+
+    at: Command
+    near: tuple[Command, ...] = ()
+    """Commands half a unit of a rounded angle away, to either side."""
+
+
+def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
+    """Find what is commanded at each row of the table.
+
+    It is the scene's command if that has the same positions. Where the scene states no
+    speed it is that of the row, as in the log of a simulator or a test stand.
+
+    Raises InputError for a motion whose rows are not found by an angle, and for an
+    angle that the motion passes at several positions.
+    """
+    if scene.motion.stroke is not None:
+        raise LimitError(
+            "motion.stroke: a table of results takes a command of an angle alone"
+        )
+    base = command(scene)
+    if scene.motion.free is not None:
+        allowed = (
+            "not judged while released; without free and omega_2 each row is judged at"
+            " its own omega_2"
+        )
+        raise InputError("motion.free", scene.title, allowed)
+    rates = list_stated_rates(scene, table)
+    if rates:
+        speed, acceleration = rates
+        base = base._replace(
+            speed=table.values[speed],
+            acceleration=table.values.get(acceleration, base.acceleration),
+        )
+    if table.found_by == base.commanded:
+        same = base.angle.shape == table.places.shape and np.allclose(
+            base.angle, table.places, rtol=_AS_PRINTED, atol=0.0
+        )
+        if same:
+            return _with_rounding(base, table)
+        _refuse_law(scene)
+        return _with_rounding(_command_each(base, table.places, scene), table)
+    if _has_positions_of(scene, table):
+        return RowCommands(base)
+    _refuse_law(scene)
+    return _find_by_another_bar(scene, table, base)
+
+
+def list_stated_rates(scene: Scene, table: TheirTable) -> tuple[str, ...]:
+    """List speed and acceleration of the command if the table states them.
+
+    Otherwise the scene does, and the list is empty.
+    """
+    motion = scene.motion
+    rates = motion.names[1:]
+    if motion.law is None and motion.speed is None and rates[0] in table.values:
+        return rates
+    return ()
+
+
+def _refuse_law(scene: Scene) -> None:
+    """Raise InputError for a law, whose speed at other positions is not known."""
+    if scene.motion.law is not None:
+        allowed = (
+            "a table is judged along a law at the scene's own positions, all of them in"
+            " its order"
+        )
+        raise InputError("motion.law", scene.title, allowed)
+
+
+def _command_each(base: Command, angle: Array, scene: Scene) -> Command:
+    """Command the angle of each row, at the speed of a command."""
+    branch = np.full(len(angle), scene.motion.branch, dtype=np.int8)
+    return Command(angle, branch, base.speed, base.acceleration, bar=base.bar)
+
+
+def _with_rounding(at: Command, table: TheirTable) -> RowCommands:
+    """Return a command with those at both ends of the rounding of its angle."""
+    rounding = table.places_rounding
+    if not rounding.any():
+        return RowCommands(at)
+    near = (
+        at._replace(angle=at.angle + shift, remainder=None)
+        for shift in (-rounding, rounding)
+    )
+    return RowCommands(at, tuple(near))
+
+
+def _has_positions_of(scene: Scene, table: TheirTable) -> bool:
+    """Return whether the rows are the scene's own positions, as they are printed."""
+    angles = getattr(solve(scene, "position"), table.found_by)
+    if angles.shape != table.places.shape:
+        return False
+    apart = np.abs(wrap_difference(angles - table.places))
+    return bool(np.all(apart <= table.rounding[table.found_by] + _ONE_PLACE))
+
+
+def _find_by_another_bar(
+    scene: Scene,
+    table: TheirTable,
+    base: Command,
+) -> RowCommands:
+    """Find the commanded angle at which another bar has the angle of each row.
+
+    Of two such positions one lies in another assembly, or beyond the scene's motion.
+    """
+    n = len(table.places)
+    found = [_command_other_bar(scene, table, table.places, side) for side in (1, -1)]
+    angles = np.stack([_turn_into(base.angle, one[base.commanded]) for one in found])
+    fits = np.stack(
+        [
+            _is_in_assembly(scene, one, angle)
+            for one, angle in zip(found, angles, strict=True)
+        ]
+    )
+    inside = fits & (angles <= base.angle.max() + _ONE_PLACE)
+    both_fit = fits.all(axis=0)
+    fits = np.where(both_fit & inside.any(axis=0), inside, fits)
+    one_place = np.abs(angles[0] - angles[1]) <= _ONE_PLACE
+    several = fits.all(axis=0) & ~one_place
+    if several.any():
+        _refuse_row(table, base.commanded, angles[:, several], np.argmax(several))
+    chosen = np.argmax(fits, axis=0)
+    angle = np.where(fits.any(axis=0), angles[chosen, np.arange(n)], np.nan)
+    at = _command_each(base, angle, scene)
+    rounding = table.places_rounding
+    if not rounding.any():
+        return RowCommands(at)
+    side = np.where(chosen == 0, 1, -1)
+    near = []
+    for shift in (-rounding, rounding):
+        beside = _command_other_bar(scene, table, table.places + shift, side)
+        moved = angle + wrap_difference(beside[base.commanded] - angle)
+        near.append(at._replace(angle=moved))
+    return RowCommands(at, tuple(near))
+
+
+def _command_other_bar(
+    scene: Scene,
+    table: TheirTable,
+    places: Array,
+    branch: NDArray[np.int_] | int,
+) -> Solution:
+    """Solve the positions at which the bar by which rows are found has these angles."""
+    assembly = np.broadcast_to(np.asarray(branch, dtype=np.int8), places.shape)
+    bar = _find_bar(table.found_by)
+    at = Command(places, assembly, None, 0.0, bar=bar)
+    return solve(scene, "position", at=at)
+
+
+def _find_bar(angle: str) -> int:
+    """Return the bar of an angle by its name."""
+    return next(bar for bar, names in COMMAND_NAMES.items() if names[0] == angle)
+
+
+def _turn_into(motion: Array, angle: Array) -> Array:
+    """Turn angles by whole turns to the first position of a motion or beyond it."""
+    least = motion.min() - _ONE_PLACE
+    return np.asarray(angle + TURN * np.ceil((least - angle) / TURN))
+
+
+def _is_in_assembly(
+    scene: Scene,
+    positions: Solution,
+    angle: Array,
+) -> NDArray[np.bool_]:
+    """Mark the positions that lie in the assembly of the scene's command."""
+    bar = scene.motion.bar
+    first, second = (positions[f"theta_{one}"] for one in _SINE_BARS[bar])
+    sign = find_signs(scene.linkage, angle, scene.motion.branch, bar)
+    return np.asarray(np.isfinite(angle) & (sign * np.sin(second - first) >= -EPS))
+
+
+def _refuse_row(
+    table: TheirTable,
+    commanded: str,
+    angles: Array,
+    row: np.intp,
+) -> None:
+    """Raise InputError for a row at whose angle the motion is twice."""
+    unit = table.units[table.found_by]
+    place = f"{table.places[row] / unit.factor:.6g} {unit.text}"
+    both = " and ".join(f"{math.degrees(angle):.6g}" for angle in sorted(angles[:, 0]))
+    raise InputError(
+        f"line {table.lines[row]}, {table.found_by}",
+        place,
+        f"the motion passes it at {commanded} = {both} deg: add a column {commanded}",
+    )
