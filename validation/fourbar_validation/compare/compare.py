@@ -144,6 +144,14 @@ class _JudgedRow(NamedTuple):
     decided: int = 0
 
 
+class _Pair(NamedTuple):
+    """A quantity that both sides have."""
+
+    quantity: str
+    ours: Array
+    theirs: Array
+
+
 class _Due(NamedTuple):
     """A quantity that both sides have, and the positions at which it is compared."""
 
@@ -296,20 +304,28 @@ class Comparison:
     def _may_reverse(self, quantity: str) -> bool:
         """Return whether a quantity may have two values where friction reverses."""
         return quantity in _OF_FORCES or (
-            quantity == "drive_condition"
-            and any(effect.loaded_pins for effect in self.scene.effects)
+            quantity == "drive_condition" and self._may_jam
         )
+
+    @property
+    def _may_jam(self) -> bool:
+        """Whether friction depends on the loads of pins."""
+        return any(effect.loaded_pins for effect in self.scene.effects)
+
+    @property
+    def _tells_of_jams(self) -> bool:
+        """Whether the answer tells how near a jam is, where there may be one.
+
+        An engine without loads and friction cannot tell.
+        """
+        answered = "drive_condition" in self.answer.quantities
+        return answered or self._solution is None or not self._may_jam
 
     @cached_property
     def _closed(self) -> Mask:
         """Positions where both close the loop."""
         assert self.answer.assembled is not None
         return self.formulas.assembled & self.answer.assembled
-
-    @cached_property
-    def _count(self) -> int:
-        """Number of positions where both close the loop."""
-        return int(np.count_nonzero(self._closed))
 
     def _row(self, quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
         error, allowed, theta_2, condition = (
@@ -349,63 +365,76 @@ class Comparison:
 
         Those that neither side has are left out.
         """
-        prepared = [self._prepare(quantity) for quantity in quantities]
-        judged = iter(self._judge([one for one in prepared if isinstance(one, _Due)]))
-        return [
-            next(judged) if isinstance(one, _Due) else one
-            for one in prepared
-            if one is not None
-        ]
-
-    def _prepare(self, quantity: str) -> _JudgedRow | _Due | None:
-        """Find where both close the loop and the formulas state a value.
-
-        None if neither side has the quantity.
-        """
-        formulas = self.formulas
-        scene = self.scene
-        tolerance = self.demands.tolerance
-        ours = getattr(formulas, quantity, None)
-        theirs = self.answer.quantities.get(quantity)
-        if theirs is None and self._solution is not None:
-            if quantity == "drive_condition" and any(
-                effect.loaded_pins for effect in scene.effects
-            ):
-                # an engine without loads and friction cannot tell how near a jam is
-                return None
-            theirs = getattr(self._solution, quantity)
-        if ours is None and theirs is None:  # the scene states positions only
-            return None
-        if ours is None or theirs is None:
+        judged: dict[str, _JudgedRow] = {}
+        pairs: list[_Pair] = []
+        for quantity in quantities:
+            if quantity == "drive_condition" and not self._tells_of_jams:
+                continue
+            ours = getattr(self.formulas, quantity, None)
+            theirs = self.answer.quantities.get(quantity)
+            if theirs is None and self._solution is not None:
+                theirs = getattr(self._solution, quantity)
+            if ours is None and theirs is None:  # the scene states positions only
+                continue
             if theirs is None:
                 missing = "no answer"
-            else:
+            elif ours is None:
                 missing = "the formulas have no answer"
-            return _JudgedRow(self._row(quantity, FAILS, missing))
-        mask = self._closed & _mark_stated(quantity, formulas, ours)
-        closed = self._count
-        stated = int(np.count_nonzero(mask))
-        note = ""
-        if stated < closed:
-            unstated = _count(formulas.status_code[self._closed & ~mask])
-            if not stated:
-                reason = f"the formulas state no value: {unstated}"
-                return _JudgedRow(self._row(quantity, REFUSES, reason), closed)
-            note += f"; not judged: {unstated}"
-        if quantity in FORCE_NAMES and scene.drive_bar != 2 and tolerance.in_time:
-            mask = mask & _mark_moving_drive(scene, formulas)
-        reversals = 0  # at a reversal the forces of either side are right
-        if self._may_reverse(quantity):
-            reversals = int(np.count_nonzero(mask & self._reversing))
-            mask = mask & ~self._reversing
-        if reversals:
-            note += f"; {reversals} positions at which dry friction reverses not judged"
-        if not mask.any():
-            nowhere = "no position at which this quantity can be compared" + note
-            return _JudgedRow(
-                self._row(quantity, UNDECIDED, nowhere), closed, reversals
-            )
-        return _Due(quantity, ours, theirs, mask, note, closed, reversals)
+            else:
+                pairs.append(_Pair(quantity, ours, theirs))
+                continue
+            judged[quantity] = _JudgedRow(self._row(quantity, FAILS, missing))
+        due: list[_Due] = []
+        for pair, prepared in zip(pairs, self._prepare(pairs), strict=True):
+            if isinstance(prepared, _Due):
+                due.append(prepared)
+            else:
+                judged[pair.quantity] = prepared
+        for one, row in zip(due, self._judge(due), strict=True):
+            judged[one.quantity] = row
+        return [judged[quantity] for quantity in quantities if quantity in judged]
+
+    def _prepare(self, pairs: Sequence[_Pair]) -> Iterator[_JudgedRow | _Due]:
+        """Find where both close the loop and the formulas state a value."""
+        if not pairs:
+            return
+        formulas = self.formulas
+        code = formulas.status_code
+        stated = _mark_stated(pairs, formulas)
+        masks: Mask = self._closed & stated
+        closed = int(np.count_nonzero(self._closed))
+        counts = np.count_nonzero(masks, axis=1).tolist()
+        if self.demands.tolerance.in_time and self.scene.drive_bar != 2:
+            forces = [pair.quantity in FORCE_NAMES for pair in pairs]
+            masks[forces] &= _mark_moving_drive(self.scene, formulas)
+        # at a reversal the forces of either side are right
+        at_reversals = np.zeros(masks.shape, dtype=bool)
+        may_reverse = [self._may_reverse(pair.quantity) for pair in pairs]
+        if any(may_reverse):
+            at_reversals[may_reverse] = masks[may_reverse] & self._reversing
+        masks &= ~at_reversals
+        reversals = np.count_nonzero(at_reversals, axis=1).tolist()
+        compared = np.count_nonzero(masks, axis=1).tolist()
+        for i, (quantity, ours, theirs) in enumerate(pairs):
+            note = ""
+            if counts[i] < closed:
+                unstated = _count(code[self._closed & ~stated[i]])
+                if not counts[i]:
+                    reason = f"the formulas state no value: {unstated}"
+                    yield _JudgedRow(self._row(quantity, REFUSES, reason), closed)
+                    continue
+                note += f"; not judged: {unstated}"
+            if reversals[i]:
+                note += (
+                    f"; {reversals[i]} positions at which dry friction reverses not"
+                    " judged"
+                )
+            if compared[i]:
+                yield _Due(quantity, ours, theirs, masks[i], note, closed, reversals[i])
+            else:
+                nowhere = "no position at which this quantity can be compared" + note
+                row = self._row(quantity, UNDECIDED, nowhere)
+                yield _JudgedRow(row, closed, reversals[i])
 
     def _judge(self, due: Sequence[_Due]) -> Iterator[_JudgedRow]:
         """Judge the errors of quantities at their positions."""
@@ -659,14 +688,21 @@ def judge_errors(
     return _WorstPosition(index, verdict, why + errors.notes, bound[index], decided)
 
 
-def _mark_stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
-    """Mark where the formulas have a single value.
+def _mark_stated(pairs: Sequence[_Pair], formulas: Solution) -> Mask:
+    """Mark where the formulas have a single value of several quantities, (q, n)."""
+    code = formulas.status_code
+    if np.all(code == OK):
+        return np.ones((len(pairs), len(code)), dtype=bool)
+    return np.stack(
+        [_mark_one_stated(pair.quantity, code, pair.ours) for pair in pairs]
+    )
+
+
+def _mark_one_stated(quantity: str, code: NDArray[np.uint8], ours: Array) -> Mask:
+    """Mark where they have a single value of one quantity, (n,).
 
     After an overflow these are the quantities computed before it.
     """
-    code = formulas.status_code
-    if np.all(code == OK):
-        return np.ones(len(code), dtype=bool)
     if quantity in _OF_FORCES:
         # A jam at rest concerns the motion that would begin, so its forces are stated.
         # Forces with several solutions are not: an engine may find another one, or not
