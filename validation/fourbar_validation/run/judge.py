@@ -238,7 +238,6 @@ def make_question(
         question.leave_out("positions", "all are the same, one is evaluated")
         question.at = select_positions(command, np.array([0]))._replace(time=None)
     question.engines = list(_select_needed(engines, question))
-    question.solve()  # not timed: the first call in a process also pays for imports
     return question
 
 
