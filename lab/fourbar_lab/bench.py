@@ -481,7 +481,7 @@ def _read_plainly(loop: PlainLoop, command: Command) -> list[object]:
     inverse = loop.inverse
     answered: list[object] = []
 
-    def inverse_and_read(q: Array, v: Array, a: Array) -> Array:
+    def inverse_and_read(q: Array, v: Array, a: Array) -> list[float]:
         torques = inverse(q, v, a)
         tree.moving(v, a)
         answered.append(

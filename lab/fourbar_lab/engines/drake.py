@@ -155,7 +155,7 @@ class _DrakeTree(Tree):
         self,
         field: tuple[float, float],
         wrenches: dict[int, list[float]],
-    ) -> Array:
+    ) -> list[float]:
         """Compute the inverse dynamics with gravity as a force element.
 
         What acts on the bars are external forces.
@@ -172,7 +172,8 @@ class _DrakeTree(Tree):
         self.balancing = np.array(
             self.plant.CalcInverseDynamics(self.context, self.a, forces)
         )
-        return self.balancing
+        torques: list[float] = self.balancing.tolist()
+        return torques
 
     def carried(self) -> dict[int, Components]:
         """Read the reaction port, which finds the accelerations once more.

@@ -301,10 +301,11 @@ def _read_joint_forces(
     tree.moving(v, a)
     tree.torques()
     torque = float(-inertia * a[0])
+    x, y = loop_force.tolist()
     return Instant(
         (q[0], q[0] + q[1], q[2]),
         v[0],
         a[0],
         torque,
-        {"F43": loop_force, **tree.forces(loop_force, torque)},
+        {"F43": loop_force, **tree.forces((x, y), torque)},
     )

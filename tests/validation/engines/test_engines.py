@@ -37,8 +37,11 @@ from fourbar_validation.engines import loop
 from fourbar_validation.engines.balls import compute_directions, make_balls, wedge
 from fourbar_validation.engines.effects import TERM_OF
 from fourbar_validation.engines.limits import LIGHTEST
-from fourbar_validation.engines.mujoco.inverse import MujocoInverse
+from fourbar_validation.engines.loop import Exact
+from fourbar_validation.engines.mujoco.inverse import MujocoInverse, MujocoTree
+from fourbar_validation.engines.pinocchio import PinocchioTree
 from fourbar_validation.engines.registry import ENGINES, load_further
+from fourbar_validation.engines.tree import KeptTree, keep_tree
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
@@ -418,7 +421,7 @@ def scaled(method: Callable[..., Any], factor: float) -> Callable[..., Any]:
 
 
 def wrong_loop_force(right: Callable[..., Any]) -> Callable[..., Any]:
-    return lambda self, force, torque: right(self, -force, torque)
+    return lambda self, force, torque: right(self, (-force[0], -force[1]), torque)
 
 
 def no_drift(_: Callable[..., Any]) -> Callable[..., Any]:
@@ -692,8 +695,9 @@ def test_a_position_before_leaves_nothing_behind(name: str) -> None:
         assert np.isfinite(alone[quantity]).all(), quantity
 
 
-def test_a_scene_before_leaves_nothing_behind() -> None:
-    """MuJoCo keeps one memory for the trees of an engine."""
+@pytest.mark.parametrize("kind", [PinocchioTree, MujocoTree])
+def test_a_scene_before_leaves_nothing_behind(kind: type[KeptTree]) -> None:
+    """An engine keeps one tree for all its scenes."""
     linkage, motion = (
         bars(MECHANISMS["crank-rocker"]),
         Motion(np.linspace(0.0, 6.0, 5), 10.0, 3.0),
@@ -702,14 +706,14 @@ def test_a_scene_before_leaves_nothing_behind() -> None:
         Scene(linkage, motion),
         Scene(replace(linkage, ground=0.31), motion, 4, LOADS, EFFECTS),
     )
-    engine = MujocoInverse()
-    engine.answer(loaded, command(loaded))
-    kept, fresh = (
-        asked.answer(plain, command(plain)).quantities
-        for asked in (engine, MujocoInverse())
+    kept = Exact("kept", partial(keep_tree, kind))
+    kept.answer(loaded, command(loaded))
+    after, fresh = (
+        engine.answer(plain, command(plain)).quantities
+        for engine in (kept, Exact("fresh", kind))
     )
     for name, values in fresh.items():
-        np.testing.assert_array_equal(kept[name], values, err_msg=name)
+        np.testing.assert_array_equal(after[name], values, err_msg=name)
 
 
 @pytest.mark.parametrize(

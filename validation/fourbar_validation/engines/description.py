@@ -95,6 +95,16 @@ def rotate_by(
     return a * x + b * y, c * x + d * y
 
 
+def rotate_back_by(
+    rotation: Sequence[Sequence[float]],
+    x: float,
+    y: float,
+) -> tuple[float, float]:
+    """Rotate a vector by the transpose of a matrix of two rows."""
+    (a, b), (c, d) = rotation
+    return a * x + c * y, b * x + d * y
+
+
 def find_field(gravity: Gravity) -> tuple[float, float]:
     """Return (g_x, g_y), m/s^2; the angle counts from +x, counter-clockwise."""
     x = math.cos(gravity.angle)

@@ -66,7 +66,7 @@ class Assembled(Protocol):
     def jacobian(self) -> Array:
         """Return the derivative of the gap, (2, 3), m."""
 
-    def positions(self) -> Mapping[str, Array | Components]:
+    def positions(self) -> Mapping[str, Array | Sequence[float]]:
         """Locate O4, A, B and "B4", the end of bar 4; (2,), m.
 
         If pin A is open, "A2" is that of bar 2.

@@ -212,12 +212,14 @@ def _close_gap(
         )
         while True:
             trial = _turn_others(q, bar, theta_3, part * first, part * second)
-            trial_state = look(trial)
-            if (
-                math.hypot(trial_state[0], trial_state[1]) < size
-                and trial_state[6] * branch < 0.0
-            ):
-                break
+            # a step that is lost in the rounding of the angles leaves the gap as it is
+            if trial != q:
+                trial_state = look(trial)
+                if (
+                    math.hypot(trial_state[0], trial_state[1]) < size
+                    and trial_state[6] * branch < 0.0
+                ):
+                    break
             part /= 2.0
             if size <= closed or part < _SHORTEST_STEP:
                 tree.place(q)
@@ -282,8 +284,9 @@ class Exact:
         out, assembled, gap = read_each(bars, command, names, read)
         if reason := bars.refusal():
             return Answer(self.name, "exact", refusal=reason)
-        for name in ANGLES:
-            out[name][assembled] = np.unwrap(out[name][assembled])
+        along = np.stack([out[name][assembled] for name in ANGLES])
+        for name, angles in zip(ANGLES, np.unwrap(along), strict=True):
+            out[name][assembled] = angles
         answer = Answer(
             self.name,
             "exact",

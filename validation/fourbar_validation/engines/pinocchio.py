@@ -21,48 +21,40 @@ from fourbar_validation.engines.description import (
     PIN_OF_MOVING_BAR,
     find_unknown,
     list_moving_parts,
+    rotate_back_by,
     rotate_by,
 )
 from fourbar_validation.engines.effects import has_term, list_wrenches
 from fourbar_validation.engines.loaded import Components
 from fourbar_validation.engines.loop import Assembler, Exact
-from fourbar_validation.engines.tree import Tree, solve_closed
+from fourbar_validation.engines.tree import KeptTree, keep_tree, solve_closed
 
 WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-_UPRIGHT = np.eye(3)
-"""Rotation of a joint or frame whose axes are those of its bearer."""
 
 
-class PinocchioTree(Tree):
-    """The open tree, built from the description."""
+class PinocchioTree(KeptTree):
+    """The open tree, its numbers written from the description."""
 
     def __init__(self, scene: Scene) -> None:
-        if reason := find_unknown(scene, has_term, forces=True):
-            raise LimitError(reason)
         self.model = model = pin.Model()
         self.joint, self.frame = {1: 0}, dict[str, int]()
         for part in list_moving_parts(scene.linkage):
             joint = model.addJoint(
                 self.joint[part.bearer],
                 pin.JointModelRZ(),
-                _place_at(*part.first_pin),
+                pin.SE3.Identity(),
                 PIN_OF_MOVING_BAR[part.bar],
             )
             self.joint[part.bar] = joint
-            # nothing is appended, no frame either: below 2.2e-16 kg the sum of two
-            # inertias has another mass centre
-            about_g = np.diag([0.0, 0.0, part.inertia])
-            model.inertias[joint] = pin.Inertia(
-                part.mass, np.array([*part.centre, 0.0]), about_g
-            )
-            for name, place in part.points.items():
+            for name in part.points:
                 self.frame[name] = model.addFrame(
                     pin.Frame(
-                        name, joint, 0, _place_at(*place), pin.FrameType.OP_FRAME
+                        name, joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME
                     ),
                     False,
                 )
         self.data = data = model.createData()
+        self.ends = self.frame["end3"], self.frame["end4"]
         self.q = np.zeros(3)
         self.external = pin.StdVec_Force([pin.Force.Zero()] * model.njoints)
         # the engine's own memory, read and written in place: to look it up again costs
@@ -80,14 +72,34 @@ class PinocchioTree(Tree):
             bar: (self.external[joint].linear, self.external[joint].angular)
             for bar, joint in self.joint.items()
         }
-        self._fields: dict[tuple[float, float], Any] = {}
-        self.ready(scene, list_wrenches(scene, self))
-        self._weigh(self.field)
+        self.place_of_joint = {
+            bar: model.jointPlacements[joint].translation[:2]
+            for bar, joint in self.joint.items()
+        }
+        self.place_of_frame = {
+            name: model.frames[frame].placement.translation[:2]
+            for name, frame in self.frame.items()
+        }
+        self.model_gravity = model.gravity.linear
+        self.hold(scene)
 
-    def _weigh(self, field: tuple[float, float]) -> None:
-        if field not in self._fields:
-            self._fields[field] = pin.Motion(np.array([*field, 0.0]), np.zeros(3))
-        self.model.gravity = self._fields[field]
+    def hold(self, scene: Scene) -> None:
+        """Write places, masses and inertias."""
+        if reason := find_unknown(scene, has_term, forces=True):
+            raise LimitError(reason)
+        for part in list_moving_parts(scene.linkage):
+            self.place_of_joint[part.bar][:] = part.first_pin
+            # nothing is appended, no frame either: below 2.2e-16 kg the sum of two
+            # inertias has another mass centre
+            about_g = np.diag([0.0, 0.0, part.inertia])
+            self.model.inertias[self.joint[part.bar]] = pin.Inertia(
+                part.mass, np.array([*part.centre, 0.0]), about_g
+            )
+            for name, place in part.points.items():
+                self.place_of_frame[name][:] = place
+        self.field = (0.0, 0.0)
+        self.ready(scene, list_wrenches(scene, self))
+        self.model_gravity[:2] = self.field
 
     def place(self, q: Sequence[float]) -> None:
         """Place joint frames, Jacobian columns and points at q."""
@@ -108,6 +120,16 @@ class PinocchioTree(Tree):
         jacobian: Array = pin.getFrameJacobian(
             self.model, self.data, self.frame[name], WORLD
         )
+        return jacobian[:2]
+
+    def jacobian(self) -> Array:
+        """Return the difference of the two frames' Jacobians."""
+        model = self.model
+        data = self.data
+        one, two = self.ends
+        jacobian: Array = pin.getFrameJacobian(
+            model, data, one, WORLD
+        ) - pin.getFrameJacobian(model, data, two, WORLD)
         return jacobian[:2]
 
     def turn(self, bar: int) -> Array:
@@ -136,21 +158,24 @@ class PinocchioTree(Tree):
         self,
         field: tuple[float, float],
         wrenches: dict[int, list[float]],
-    ) -> Array:
+    ) -> list[float]:
         """Compute recursive Newton-Euler.
 
         What acts on the bars are external forces.
         """
-        self._weigh(field)
+        self.model_gravity[0], self.model_gravity[1] = field
+        motion = self.model, self.data, self.q, self.v, self.a
+        torques: list[float]
         if not any(map(any, wrenches.values())):
-            return np.array(pin.rnea(self.model, self.data, self.q, self.v, self.a))
+            torques = pin.rnea(*motion).tolist()
+            return torques
         for bar, (x, y, moment) in wrenches.items():
             force, couple = self.external_force[bar]
-            force[:2] = rotate_by(self.rotation(bar).T.tolist(), x, y)
+            axes = self.turned_to[bar].tolist()
+            force[0], force[1] = rotate_back_by(axes, x, y)
             couple[2] = moment
-        return np.array(
-            pin.rnea(self.model, self.data, self.q, self.v, self.a, self.external)
-        )
+        torques = pin.rnea(*motion, self.external).tolist()
+        return torques
 
     def carried(self) -> dict[int, Components]:
         """Read what each joint transmits, which the last pass left in its own axes."""
@@ -160,13 +185,9 @@ class PinocchioTree(Tree):
         }
 
 
-PinocchioInverse = partial(Exact, "pinocchio-inverse", PinocchioTree)
-
-
-def _place_at(x: float, y: float) -> Any:
-    return pin.SE3(_UPRIGHT, np.array([x, y, 0.0]))
-
-
+PinocchioInverse = partial(
+    Exact, "pinocchio-inverse", partial(keep_tree, PinocchioTree)
+)
 RELEASED_NAME = "pinocchio-forward"
 BAUMGARTE_TIMESTEPS = 10.0
 """Time constant of Baumgarte's stabilisation of a free motion, in timesteps: with 30

@@ -1,6 +1,5 @@
 """A plain loop over Pinocchio's own calls."""
 
-import numpy as np
 import pinocchio as pin
 
 from fourbar.effects import Gravity
@@ -24,7 +23,7 @@ class PinocchioLoop(PlainLoop):
             not isinstance(effect, Gravity) for effect in scene.effects
         )
         tree.act()
-        self.model.gravity = pin.Motion(np.array([*tree.field, 0.0]), NO_RATES)
+        tree.model_gravity[:2] = tree.field
 
     def look(self, q: Array) -> tuple[float, float, Array]:
         """Return the gap, m, and its derivative, (2, 3)."""
@@ -52,11 +51,13 @@ class PinocchioLoop(PlainLoop):
         ).tolist()
         return x, y
 
-    def inverse(self, q: Array, v: Array, a: Array) -> Array:
+    def inverse(self, q: Array, v: Array, a: Array) -> list[float]:
         """Return the generalized forces that the motion needs beside what acts."""
         tree = self.tree
+        torques: list[float]
         if not self.loaded:
-            return np.asarray(pin.rnea(self.model, self.data, q, v, a))
+            torques = pin.rnea(self.model, self.data, q, v, a).tolist()
+            return torques
         tree.v = v
         tree.a = a
         tree.act()
@@ -66,4 +67,5 @@ class PinocchioLoop(PlainLoop):
             force[0] = cosine * x - minus_sine * y
             force[1] = minus_sine * x + cosine * y
             couple[2] = moment
-        return np.asarray(pin.rnea(self.model, self.data, q, v, a, tree.external))
+        torques = pin.rnea(self.model, self.data, q, v, a, tree.external).tolist()
+        return torques

@@ -67,11 +67,9 @@ class PlainLoop:
             x, y = self.drift(q, v)
             a = solve_closed(jacobian, accelerations[row], x=x, y=y)
             needed = self.inverse(q, v, a)
-            unknowns = solve_multipliers(jacobian, self.drive, needed)
-            *loop_force, drive = unknowns.tolist()
-            torque[row] = drive
-            forces["F43"][row] = loop_force
-            pins = put_back(self.tree.carried(), *loop_force)
+            x, y, torque[row] = solve_multipliers(jacobian, self.drive, needed)
+            forces["F43"][row] = x, y
+            pins = put_back(self.tree.carried(), x, y)
             for name, force in pins.items():
                 forces[name][row] = force
         return {"torque": torque, **forces}
@@ -113,11 +111,6 @@ class PlainLoop:
         """Return the acceleration of the gap where the joints do not accelerate."""
         raise NotImplementedError
 
-    def inverse(
-        self,
-        q: Array,
-        v: Array,
-        a: Array,
-    ) -> Array:
+    def inverse(self, q: Array, v: Array, a: Array) -> list[float]:
         """Return the generalized forces of the motion beside loads and weights."""
         raise NotImplementedError

@@ -13,7 +13,7 @@ lambda is F43, and e_drive the generalized force of the drive per N m or N. Ever
 comes from the engine.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -67,7 +67,7 @@ class Tree(Loaded, Protocol):
     def ready(self, scene: Scene, terms: list[Act]) -> None:
         """Prepare the evaluation.
 
-        An engine calls this once it has built its bars and what acts on them.
+        An engine calls this once it holds the bars and what acts on them.
         """
         super().ready(scene, terms)
         self.alone = bool(scene.loads or scene.effects)
@@ -92,8 +92,8 @@ class Tree(Loaded, Protocol):
         self,
         field: tuple[float, float],
         wrenches: dict[int, list[float]],
-    ) -> Array:
-        """Return the generalized forces of the motion last set, (3,), N m.
+    ) -> list[float]:
+        """Return the three generalized forces of the motion last set, N m.
 
         Gravity and what acts are taken off.
         """
@@ -115,9 +115,9 @@ class Tree(Loaded, Protocol):
         """Return the difference of the two points' Jacobians."""
         return self.point_jacobian("end3") - self.point_jacobian("end4")
 
-    def positions(self) -> dict[str, Components]:
+    def positions(self) -> dict[str, Sequence[float]]:
         """Locate the points of the bars."""
-        return {name: self.locate(point) for name, point in _OPEN_AT_B}
+        return {name: self.point(point).tolist() for name, point in _OPEN_AT_B}
 
     def velocity(self, bar: int) -> float:
         """Return the angular velocity of a bar, rad/s."""
@@ -139,8 +139,8 @@ class Tree(Loaded, Protocol):
         (x, y), (x_4, y_4) = self.accelerations(("end3", "end4"))
         return x - x_4, y - y_4
 
-    def torques(self) -> Array:
-        """Compute what the motion asks for beyond loads and effects, (3,), N m."""
+    def torques(self) -> list[float]:
+        """Compute what the motion asks for beyond loads and effects, N m."""
         self.act()
         return self.needed(self.field, self.wrenches)
 
@@ -166,7 +166,7 @@ class Tree(Loaded, Protocol):
             (-y, x), self.turns[point.bar]
         )
 
-    def forces(self, loop_force: Array, drive: float) -> dict[str, Components]:
+    def forces(self, loop_force: Components, drive: float) -> dict[str, Components]:
         """Return F12, F32, F14 at the motion and wrenches last set.
 
         The open tree carries what acts. The force of the loop on bar 3, its opposite on
@@ -178,8 +178,7 @@ class Tree(Loaded, Protocol):
             ends, along = self.line()
             for sense, bar, _ in ends:
                 carry(on, bar, *(sense * drive * along).tolist())
-        x, y = loop_force.tolist()
-        return put_back(on, x, y)
+        return put_back(on, *loop_force)
 
     def move(self, bar: int, speed: float, acceleration: float) -> BarValues:
         """Return velocities, accelerations and forces where the tree is placed.
@@ -201,14 +200,12 @@ class Tree(Loaded, Protocol):
         solve = partial(solve_multipliers, jacobian, self.drive_column())
 
         def balanced() -> dict[str, Any]:
-            unknowns = solve(self.torques())
-            loop_force = unknowns[:2]
-            drive = float(unknowns[2])
-            return {
-                **self.forces(loop_force, drive),
-                "F43": loop_force,
-                self.driving: drive,
-            }
+            x, y, drive = solve(self.torques())
+            loop_force = x, y
+            forces: BarValues = dict(self.forces(loop_force, drive))
+            forces["F43"] = loop_force
+            forces[self.driving] = drive
+            return forces
 
         try:
             values |= self.settled(balanced)
@@ -217,10 +214,38 @@ class Tree(Loaded, Protocol):
         ):  # no torque or force of the drive balances the linkage here
             return values
         if self.alone:
-            values[f"{self.driving}_inertia"] = float(
-                solve(self.needed((0.0, 0.0), make_no_wrenches()))[2]
-            )
+            *_, inertia = solve(self.needed((0.0, 0.0), make_no_wrenches()))
+            values[f"{self.driving}_inertia"] = inertia
         return values
+
+
+class KeptTree(Tree, Protocol):
+    """A tree whose numbers can be written anew."""
+
+    def __init__(self, scene: Scene) -> None:
+        """Build the tree and hold the bars of a scene."""
+
+    def hold(self, scene: Scene) -> None:
+        """Hold the bars of a scene, in place of those before.
+
+        LimitError says why the engine cannot hold them.
+        """
+
+
+_KEPT: dict[type[KeptTree], KeptTree] = {}
+"""The one tree of its kind in this process. It holds the scene of the last answer."""
+
+
+def keep_tree(kind: type[KeptTree], scene: Scene) -> KeptTree:
+    """Let the one tree of a kind hold a scene.
+
+    To build another tree takes an engine longer than to answer several positions.
+    """
+    if kind not in _KEPT:
+        _KEPT[kind] = kind(scene)
+    else:
+        _KEPT[kind].hold(scene)
+    return _KEPT[kind]
 
 
 def carry(on: dict[int, Components], bar: int, x: float, y: float) -> None:
@@ -278,8 +303,12 @@ def solve_closed(
     )
 
 
-def solve_multipliers(jacobian: Array, turn: Array, needed: Array) -> Array:
-    """Solve [J^T turn] [lambda; T] = tau, (3,).
+def solve_multipliers(
+    jacobian: Array,
+    turn: Array,
+    needed: Sequence[float],
+) -> tuple[float, float, float]:
+    """Solve [J^T turn] [lambda; T] = tau.
 
     Raises LinAlgError if no torque on that bar balances tau. By Cramer's rule: of bar 2
     the determinant is that of `solve_closed` to the last digit: there are forces
@@ -288,7 +317,7 @@ def solve_multipliers(jacobian: Array, turn: Array, needed: Array) -> Array:
     """
     (a, b, c), (d, e, f) = jacobian.tolist()
     p, q, r = turn.tolist()
-    x, y, z = needed.tolist()
+    x, y, z = needed
     u = b * f - c * e
     v = c * d - a * f
     w = a * e - b * d
@@ -297,4 +326,4 @@ def solve_multipliers(jacobian: Array, turn: Array, needed: Array) -> Array:
         raise np.linalg.LinAlgError("the torque is at a pole")
     force_x = x * (e * r - f * q) + y * (f * p - d * r) + z * (d * q - e * p)
     force_y = x * (q * c - r * b) + y * (r * a - p * c) + z * (p * b - q * a)
-    return np.array([force_x / det, force_y / det, (x * u + y * v + z * w) / det])
+    return force_x / det, force_y / det, (x * u + y * v + z * w) / det

@@ -5,7 +5,7 @@ Multipliers close the loop.
 
 from collections.abc import Iterable, Sequence
 from copy import copy
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import mujoco
@@ -17,6 +17,7 @@ from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar_validation.engines.description import (
     PIN_OF_MOVING_BAR,
+    MovingPart,
     find_unknown,
     list_moving_parts,
 )
@@ -24,15 +25,13 @@ from fourbar_validation.engines.effects import has_term, list_wrenches
 from fourbar_validation.engines.limits import LIGHTEST
 from fourbar_validation.engines.loaded import Components
 from fourbar_validation.engines.loop import Exact
-from fourbar_validation.engines.tree import Tree
+from fourbar_validation.engines.tree import KeptTree, keep_tree
 
 
-def find_limit_met(scene: Scene) -> str:
-    """Name the declared limit that a scene meets, if any."""
-    if reason := find_unknown(scene, has_term, forces=True):
-        return reason
+def find_limit_met(parts: Iterable[MovingPart]) -> str:
+    """Name the declared limit that moving bars meet, if any."""
     least = LIGHTEST.boundary
-    for part in list_moving_parts(scene.linkage):
+    for part in parts:
         if min(part.mass, part.inertia) < least:
             return (
                 f"bar {part.bar} has mass {part.mass:g} kg and inertia {part.inertia:g}"
@@ -78,65 +77,64 @@ def _compile_bars() -> mujoco.MjModel:
     return model
 
 
-class MujocoTree(Tree):
-    """The open tree, its numbers written from the description.
+_SITE = mujoco.mjtObj.mjOBJ_SITE.value
 
-    `memory`: of a tree that is no longer asked.
-    """
 
-    def __init__(
-        self,
-        scene: Scene,
-        memory: tuple[mujoco.MjModel, mujoco.MjData] | None = None,
-    ) -> None:
-        if memory is None:
-            model = copy(_compile_bars())
-            memory = model, mujoco.MjData(model)
-        model, data = memory
-        self.model = model
-        self.data = data
-        mujoco.mj_resetData(model, data)
+class MujocoTree(KeptTree):
+    """The open tree, its numbers written from the description."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.model = model = copy(_compile_bars())
+        self.data = data = mujoco.MjData(model)
         self.body = {bar: model.body(f"bar{bar}").id for bar in PIN_OF_MOVING_BAR}
         self.site = {model.site(number).name: number for number in range(model.nsite)}
-        self._describe(scene)
+        self.ends = self.site["end3"], self.site["end4"]
         # the engine's own memory, read and written in place: to look it up again takes
         # longer than its work
-        self.in_space: dict[str, Array] = {}
+        self.place_of_site: dict[str, Array] = {}
         self.at: dict[str, Array] = {}
         for name, site in self.site.items():
-            place = data.site_xpos[site]
-            self.in_space[name] = place
-            self.at[name] = place[:2]
+            self.place_of_site[name] = model.site_pos[site, :2]
+            self.at[name] = data.site_xpos[site, :2]
+        self.place_of_body: dict[int, Array] = {}
         self.turned_to: dict[int, Array] = {}
         self.first_pins: dict[int, Array] = {}
         self.joint_force: dict[int, Array] = {}
+        self.applied: dict[int, Array] = {}
         for bar, body in self.body.items():
+            self.place_of_body[bar] = model.body_pos[body, :2]
             self.turned_to[bar] = data.xmat[body].reshape(3, 3)[:2, :2]
             self.first_pins[bar] = data.xpos[body]
             self.joint_force[bar] = data.cfrc_int[body, 3:5]
+            self.applied[bar] = data.xfrc_applied[body]
         self.qpos = data.qpos
         self.qvel = data.qvel
         self.qacc = data.qacc
-        self.xfrc_applied = data.xfrc_applied
         self.qfrc_inverse = data.qfrc_inverse
         self.model_gravity = model.opt.gravity
         self._jac = np.zeros((3, 3))
-        self._jacobians = np.zeros((model.nsite, 3, 3))
-        self._rates = np.zeros((model.nsite, 3, 3))
+        self._jac_3 = np.zeros((3, 3))
+        self._jac_4 = np.zeros((3, 3))
+        self._acceleration = np.zeros(6)
         self._force = np.zeros(3)
         self._couple = np.zeros(3)
-        self.ready(scene, list_wrenches(scene, self))
+        self.hold(scene)
 
-    def _describe(self, scene: Scene) -> None:
+    def hold(self, scene: Scene) -> None:
         """Write places, masses and inertias.
 
         Of what the compiler derives from them inverse dynamics reads the borne masses
         alone.
         """
+        parts = list_moving_parts(scene.linkage)
+        reason = find_unknown(scene, has_term, forces=True) or find_limit_met(parts)
+        if reason:
+            raise LimitError(reason)
         model = self.model
-        for part in list_moving_parts(scene.linkage):
+        mujoco.mj_resetData(model, self.data)
+        for part in parts:
             body = self.body[part.bar]
-            model.body_pos[body, :2] = part.first_pin
+            self.place_of_body[part.bar][:] = part.first_pin
             model.body_ipos[body, :2] = part.centre
             model.body_mass[body] = part.mass
             model.body_subtreemass[body] = part.mass
@@ -144,7 +142,9 @@ class MujocoTree(Tree):
             if part.bearer != 1:
                 model.body_subtreemass[self.body[part.bearer]] += part.mass
             for name, place in part.points.items():
-                model.site_pos[self.site[name], :2] = place
+                self.place_of_site[name][:] = place
+        self.field = (0.0, 0.0)
+        self.ready(scene, list_wrenches(scene, self))
 
     def place(self, q: Sequence[float]) -> None:
         """Place bodies, sites and the axes of the Jacobians at q."""
@@ -165,6 +165,15 @@ class MujocoTree(Tree):
         mujoco.mj_jacSite(self.model, self.data, self._jac, None, self.site[name])
         return self._jac[:2].copy()
 
+    def jacobian(self) -> Array:
+        """Return the difference of the two sites' Jacobians."""
+        model = self.model
+        data = self.data
+        one, two = self.ends
+        mujoco.mj_jacSite(model, data, self._jac_3, None, one)
+        mujoco.mj_jacSite(model, data, self._jac_4, None, two)
+        return np.asarray(self._jac_3 - self._jac_4)[:2]
+
     def turn(self, bar: int) -> Array:
         """Return the last row of the body's rotational Jacobian."""
         mujoco.mj_jacBody(self.model, self.data, None, self._jac, self.body[bar])
@@ -177,45 +186,36 @@ class MujocoTree(Tree):
         mujoco.mj_comVel(self.model, self.data)
 
     def accelerations(self, names: Iterable[str]) -> list[list[float]]:
-        """Return J a + (dJ/dt) v of sites."""
+        """Return those of sites, in world axes."""
         model = self.model
         data = self.data
-        count = 0
-        for name, jacobian, rate in zip(
-            names,
-            self._jacobians,
-            self._rates,
-            strict=False,
-        ):
-            site = self.site[name]
-            place = self.in_space[name]
-            body = self.body[int(name[-1])]
-            mujoco.mj_jacSite(model, data, jacobian, None, site)
-            mujoco.mj_jacDot(model, data, rate, None, place, body)
-            count += 1
-        jacobians = self._jacobians[:count]
-        rates = self._rates[:count]
-        in_space = jacobians @ self.a + rates @ self.v
-        accelerations: list[list[float]] = in_space[:, :2].tolist()
+        # MuJoCo counts gravity as an acceleration of the world
+        self.model_gravity[:2] = 0.0
+        mujoco.mj_rnePostConstraint(model, data)
+        accelerations = []
+        for name in names:
+            mujoco.mj_objectAcceleration(
+                model, data, _SITE, self.site[name], self._acceleration, 0
+            )
+            *_, x, y, _ = self._acceleration.tolist()
+            accelerations.append([x, y])
         return accelerations
 
     def needed(
         self,
         field: tuple[float, float],
         wrenches: dict[int, list[float]],
-    ) -> Array:
+    ) -> list[float]:
         """Return the result of mj_inverse less what loads and effects do.
 
         It is on the coordinates.
         """
         self.model_gravity[:2] = field
-        self.xfrc_applied[:] = 0.0
         mujoco.mj_inverse(self.model, self.data)
         applied = np.zeros(3)
         for bar, wrench in wrenches.items():
             if any(wrench):
-                self._force[:2] = wrench[:2]
-                self._couple[2] = wrench[2]
+                self._force[0], self._force[1], self._couple[2] = wrench
                 mujoco.mj_applyFT(
                     self.model,
                     self.data,
@@ -225,14 +225,17 @@ class MujocoTree(Tree):
                     self.body[bar],
                     applied,
                 )
-        return np.asarray(self.qfrc_inverse - applied)
+        torques: list[float] = (self.qfrc_inverse - applied).tolist()
+        return torques
 
     def carried(self) -> dict[int, Components]:
         """Return cfrc_int, the force of the parent on each body."""
         for bar, (x, y, _) in self.wrenches.items():
             # the couples about the mass centres, at which these forces act, ask nothing
             # of the pins of a tree
-            self.xfrc_applied[self.body[bar], :2] = x, y
+            applied = self.applied[bar]
+            applied[0] = x
+            applied[1] = y
         mujoco.mj_rnePostConstraint(self.model, self.data)
         forces = {}
         for bar, force in self.joint_force.items():
@@ -241,19 +244,4 @@ class MujocoTree(Tree):
         return forces
 
 
-class MujocoInverse(Exact):
-    """Trees in the memory of the one before.
-
-    Allocating it takes MuJoCo longer than all its work.
-    """
-
-    def __init__(self) -> None:
-        super().__init__("mujoco-inverse", self._make_tree)
-        self.memory: tuple[mujoco.MjModel, mujoco.MjData] | None = None
-
-    def _make_tree(self, scene: Scene) -> MujocoTree:
-        if reason := find_limit_met(scene):
-            raise LimitError(reason)
-        tree = MujocoTree(scene, self.memory)
-        self.memory = tree.model, tree.data
-        return tree
+MujocoInverse = partial(Exact, "mujoco-inverse", partial(keep_tree, MujocoTree))

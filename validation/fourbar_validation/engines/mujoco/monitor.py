@@ -226,7 +226,7 @@ class ResidualMonitor:
         for name, x in (("theta", q), ("omega", v), ("alpha", a)):
             answer[f"{name}_3"], answer[f"{name}_4"] = x[O2] + x[A], x[O4]
         try:
-            multipliers = solve_multipliers(jacobian, drive, needed)
+            multipliers = np.array(solve_multipliers(jacobian, drive, needed.tolist()))
         except np.linalg.LinAlgError:
             multipliers = np.full(3, np.inf)
         answer |= {"F43": multipliers[:2], self.drive: multipliers[2]}

@@ -44,12 +44,8 @@ class MujocoInverseLoop(PlainLoop):
         x, y, _ = ((self.rates[0] - self.rates[1]) @ v).tolist()
         return x, y
 
-    def inverse(
-        self,
-        q: Array,
-        v: Array,
-        a: Array,
-    ) -> Array:
+    def inverse(self, q: Array, v: Array, a: Array) -> list[float]:
         """Return the generalized forces that the motion needs beside what acts."""
         self.data.qacc[:], self.tree.v, self.tree.a = a, v, a
-        return np.asarray(self.tree.torques())
+        torques: list[float] = self.tree.torques()
+        return torques
