@@ -21,7 +21,7 @@ import numpy as np
 
 from fourbar.errors import FAILED, HOLDS, FourBarError
 from fourbar.formulas import mobility, transmission
-from fourbar.formulas.path import compute_state as state_of
+from fourbar.formulas.path import compute_state
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import UNITS
 from fourbar.scene import Command, Scene, with_signs
@@ -235,7 +235,7 @@ def _collect_stated(linkage: FourBar) -> dict[str, Any]:
 
 def _collect_stated_of_motion(scene: Scene, command: Command) -> dict[str, Any]:
     """Compute how well the positions of a motion transmit."""
-    state = state_of(scene.linkage, command.theta_2, command.branch)
+    state = compute_state(scene.linkage, command.theta_2, command.branch)
     branch = command.branch.astype(float)
     return {
         "transmission_angle": transmission.transmission_angle(state),

@@ -531,7 +531,7 @@ class Comparison:
             if theirs is None:
                 reference = None
             else:
-                reference = theirs.formulas
+                reference = theirs.solution
             sizes = take_smallest_scales(missing, ours, theirs)
             for name, size in zip(missing, sizes, strict=True):
                 condition = take_strictest_condition(

@@ -22,7 +22,7 @@ from fourbar.quantities import COUPLE, LINE, OK, UNITS, Array
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.effects import find_size as size_of
+from fourbar_validation.compare.effects import find_size
 from fourbar_validation.compare.line import place_line
 from fourbar_validation.compare.pins import (
     find_centre,
@@ -51,9 +51,9 @@ class TermSizes:
     Each sum of terms is computed once.
     """
 
-    def __init__(self, scene: Scene, formulas: Solution) -> None:
+    def __init__(self, scene: Scene, solution: Solution) -> None:
         self.scene = state_from_pins(scene)
-        self.formulas = formulas
+        self.solution = solution
         self._sums: dict[str, Array] = {}
 
     def scale(self, quantity: str, values: Array) -> Array:
@@ -62,15 +62,15 @@ class TermSizes:
 
     def scales(self, quantities: Sequence[str], values: Sequence[Array]) -> Array:
         """Compute what the errors of several quantities are divided by, (q, n)."""
-        formulas = self.formulas
+        solution = self.solution
         units = [UNITS[quantity] for quantity in quantities]
-        scales = np.ones((len(units), len(formulas)))
+        scales = np.ones((len(units), len(solution)))
         sized = [i for i, unit in enumerate(units) if unit not in ("rad", "1")]
         if not sized:
             return scales
         size = np.stack([magnitude(values[i]) for i in sized])
         terms = np.stack([self.sum_terms(quantities[i]) for i in sized])
-        well = (formulas.condition >= WELL_CONDITIONED) & np.isfinite(size)
+        well = (solution.condition >= WELL_CONDITIONED) & np.isfinite(size)
         # the poles of what the drive does are not where sin_mu vanishes
         driven = [
             row
@@ -78,8 +78,8 @@ class TermSizes:
             if units[i] in ("N m", "W") or quantities[i] == LINE.value
         ]
         if driven:
-            assert formulas.drive_condition is not None
-            well[driven] &= formulas.drive_condition >= WELL_CONDITIONED
+            assert solution.drive_condition is not None
+            well[driven] &= solution.drive_condition >= WELL_CONDITIONED
         nonzero = np.where(size < LOST_IN_CANCELLATION * terms, terms, size)
         largest = np.where(well, size, 0.0).max(axis=1, keepdims=True)
         most = np.where(well, terms, 0.0).max(axis=1, keepdims=True)
@@ -115,7 +115,7 @@ _OF_EACH_BAR = ("rad/s", "rad/s^2")
 
 
 def _return_one(_: str, sizes: TermSizes) -> Array:
-    return np.ones(len(sizes.formulas))
+    return np.ones(len(sizes.solution))
 
 
 def _sum_length_terms(_: str, sizes: TermSizes) -> Array:
@@ -123,11 +123,11 @@ def _sum_length_terms(_: str, sizes: TermSizes) -> Array:
     arms = sum(_compute_arm(scene, number) for number in MOVING_BARS) + sum(
         _compute_drive_arms(scene).values()
     )
-    return np.full(len(sizes.formulas), sum_lengths(scene.linkage) + arms)
+    return np.full(len(sizes.solution), sum_lengths(scene.linkage) + arms)
 
 
 def _sum_speeds(quantity: str, sizes: TermSizes) -> Array:
-    formulas = sizes.formulas
+    formulas = sizes.solution
     _, a, b, c = sizes.scene.linkage.lengths
     assert formulas.omega_2 is not None
     omega_2 = np.abs(formulas.omega_2)
@@ -137,7 +137,7 @@ def _sum_speeds(quantity: str, sizes: TermSizes) -> Array:
 
 
 def _sum_angular_accelerations(quantity: str, sizes: TermSizes) -> Array:
-    formulas = sizes.formulas
+    formulas = sizes.solution
     _, a, b, c = sizes.scene.linkage.lengths
     w2 = formulas.omega_2
     w3 = formulas.omega_3
@@ -161,7 +161,7 @@ def _choose_bars(quantity: str) -> tuple[int, ...]:
 
 def _sum_velocities(quantity: str, sizes: TermSizes) -> Array:
     scene = sizes.scene
-    formulas = sizes.formulas
+    formulas = sizes.solution
     total = np.zeros(len(formulas))
     drive = _compute_drive_arms(scene)
     for number in _choose_bars(quantity):
@@ -176,7 +176,7 @@ def _sum_velocities(quantity: str, sizes: TermSizes) -> Array:
 
 def _sum_accelerations(quantity: str, sizes: TermSizes) -> Array:
     scene = sizes.scene
-    formulas = sizes.formulas
+    formulas = sizes.solution
     total = np.zeros(len(formulas))
     for number in _choose_bars(quantity):
         omega = getattr(formulas, f"omega_{number}")
@@ -189,7 +189,7 @@ def _sum_accelerations(quantity: str, sizes: TermSizes) -> Array:
 
 def _sum_forces(_: str, sizes: TermSizes) -> Array:
     scene = sizes.scene
-    formulas = sizes.formulas
+    formulas = sizes.solution
     assert formulas.drive_condition is not None
     gain = 1.0
     if scene.drive is not None:  # a short lever makes the force as many times larger
@@ -210,7 +210,7 @@ def _sum_torques(_: str, sizes: TermSizes) -> Array:
 def _sum_powers(_: str, sizes: TermSizes) -> Array:
     if sizes.scene.drive is not None:
         return np.asarray(sizes.sum_terms(_A_FORCE) * sizes.sum_terms(_A_VELOCITY))
-    speed = getattr(sizes.formulas, f"omega_{sizes.scene.drive_bar}")
+    speed = getattr(sizes.solution, f"omega_{sizes.scene.drive_bar}")
     return np.asarray(sizes.sum_terms(COUPLE.value) * np.abs(speed))
 
 
@@ -258,7 +258,7 @@ def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
             + find_inertia(bar) * np.abs(alpha) / bar.length
         )
     for term in (*scene.loads, *scene.effects):
-        total += size_of(term, scene.linkage, formulas)
+        total += find_size(term, scene.linkage, formulas)
     return total
 
 
@@ -390,9 +390,9 @@ def take_strictest_condition(
     formulas: Solution,
     reference: Solution | None,
 ) -> Array:
-    """Take the better of two conditions of a quantity at each position, (n,).
+    """Take the stricter of two conditions of a quantity at each position, (n,).
 
-    The better one allows the smaller error.
+    That is the larger one, which allows the smaller error.
     """
     ours = find_condition(quantity, linkage, formulas)
     if reference is None:
@@ -402,15 +402,18 @@ def take_strictest_condition(
 
 def take_smallest_scales(
     quantities: Sequence[str],
-    ours: TermSizes,
-    theirs: TermSizes | None,
+    of_formulas: TermSizes,
+    of_reference: TermSizes | None,
 ) -> Array:
-    """Take the smaller of two sizes of each quantity at each position, (q, n)."""
-    values = [getattr(ours.formulas, quantity) for quantity in quantities]
-    scales = ours.scales(quantities, values)
-    if theirs is None:
+    """Take the smaller of two sizes of each quantity at each position, (q, n).
+
+    They are by the formulas' solution and by the reference, if there is one.
+    """
+    values = [getattr(of_formulas.solution, quantity) for quantity in quantities]
+    scales = of_formulas.scales(quantities, values)
+    if of_reference is None:
         return scales
-    reference = theirs.formulas
+    reference = of_reference.solution
     if reference.omega_2 is not None and any(
         getattr(reference, name) is None for name in _SIZED_BY
     ):
@@ -424,5 +427,5 @@ def take_smallest_scales(
         rows = list(answered)
         names = [quantities[i] for i in rows]
         numbers = list(answered.values())
-        scales[rows] = np.fmin(scales[rows], theirs.scales(names, numbers))
+        scales[rows] = np.fmin(scales[rows], of_reference.scales(names, numbers))
     return scales

@@ -1,6 +1,6 @@
-"""Register the engines (independent solvers).
+"""The engines (independent solvers) of the harness, a line each in `ENGINES`.
 
-The entry says what starts each, what it needs, and how it is judged.
+The line says what starts the engine, what it needs, and how it is judged.
 """
 
 import tomllib
@@ -364,7 +364,7 @@ def make_prediction(
 ) -> Predicted | None:
     """Give what computes the errors to be expected, should any be asked for.
 
-    An alarm leaves no own excuse.
+    After an alarm the engine's own residuals excuse no error.
     """
     if answer.refusal is not None:
         return None

@@ -12,8 +12,7 @@ import numpy as np
 
 from fourbar.formulas import mobility, transmission
 from fourbar.formulas.mobility import TURN
-from fourbar.formulas.path import compute_state as state_of
-from fourbar.formulas.path import drive_sine, find_singular
+from fourbar.formulas.path import compute_state, drive_sine, find_singular
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, with_signs
@@ -102,7 +101,7 @@ class StatedOver(NamedTuple):
     @classmethod
     def of(cls, scene: Scene, command: Command) -> "StatedOver":
         """Evaluate the formulas."""
-        state = state_of(scene.linkage, command.theta_2, command.branch)
+        state = compute_state(scene.linkage, command.theta_2, command.branch)
         half = state.position.half
         with np.errstate(divide="ignore", invalid="ignore"):
             advantage = transmission.mechanical_advantage(state, *_RADII)
