@@ -14,11 +14,10 @@ import numpy as np
 from fourbar.edit.document import KeyPath, SceneDocument
 from fourbar.effects import ForceDrive, Place, Springs
 from fourbar.errors import InputError
-from fourbar.files.drawing import DRAWN_WORD
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
 from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Command, Scene
-from fourbar.scene.drawing import DrawnPins
+from fourbar.scene.drawing import DRAWN_WORD, DrawnPins
 from fourbar.solving import solve
 
 DRAGGED_PINS = ("A", "B", "O4")

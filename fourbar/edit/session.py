@@ -19,18 +19,18 @@ from fourbar.edit.dragging import Dragged, drag, parse_place, put_place, write_r
 from fourbar.edit.exports import Exports, evaluate_scene
 from fourbar.errors import FourBarError, InputError, state_messages_in
 from fourbar.files import parse_tables, read_scene_text, read_tables
-from fourbar.files.drawing import DRAWN_WORD
 from fourbar.files.fields import Reader
 from fourbar.files.scene_file import LARGEST_SCENE_FILE
 from fourbar.files.scene_text import BRANCH_OF_NAME, write_drawn_scene, write_new_scene
 from fourbar.linkage import PINS, POSITIVE
 from fourbar.quantities.units import UnitError, find_unit, to_si
 from fourbar.scene import Scene
+from fourbar.scene.drawing import DRAWN_WORD
 from fourbar.scene.motion import COMMAND_NAMES, SIDES, STROKE_COMMAND, require_steps
 from fourbar.show.units import find_length, units, units_of_scene
 from fourbar.solution import Conversion, Solution, find_unit_in
 from fourbar.solving import solve
-from fourbar.studies.keys import list_entries, read_place
+from fourbar.studies.keys import list_entries, read_number
 from fourbar.writing import read_bytes, write_bytes
 
 EDIT_SCHEMA = "fourbar-edit/2"
@@ -388,7 +388,7 @@ def _add_element(session: Session, asked: dict[str, Any]) -> None:
         entries = list_entries(session.now.scene)
         if name in entries:  # a thousandth of the number, until the designer says more
             entry = entries[name]
-            number = float(read_place(session.now.scene, entry.place) or 1.0)
+            number = float(read_number(session.now.scene, entry) or 1.0)
             width = abs(number) / 1000.0
             value = _suit_entry(f"{width:.1g} {entry.unit}", own)
     session.change(lambda document: document.put(path, value))

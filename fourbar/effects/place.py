@@ -121,12 +121,14 @@ class Place(NamedTuple):
         It is complex, m, in the bar's frame.
         """
         arm = self.in_bar
-        if pin != SECOND_PIN[self.bar]:
-            return arm, self.distance * self.distance
+        at_second = pin == SECOND_PIN[self.bar]
         length = state.lengths[self.bar - 1]
         if self.from_centre is not None:
-            arm = arm - length
+            if at_second:
+                arm = arm - length
             return arm, dot(arm, arm)
+        if not at_second:
+            return arm, self.distance * self.distance
         assert self.from_pin is not None
         distance, turned = self.from_pin
         # r cos phi - L, which keeps its digits near the pin: the cosine rounds to 1

@@ -16,13 +16,11 @@ from fourbar.formulas.mobility import count_equalities, meet_change_points
 from fourbar.linkage import BAR_NAMES, ENDS, MOVING_BARS, PINS, Bar, FourBar
 from fourbar.quantities.units import half_unit_of_text
 from fourbar.scene import Scene, command_at
-from fourbar.scene.drawing import DrawnPins
+from fourbar.scene.drawing import DRAWN_WORD, DrawnPins
 from fourbar.scene.motion import BRANCH_NAMES, COMMAND_NAMES, STROKE_COMMAND, Motion
 from fourbar.scene.scene import require_cylinder
 from fourbar.solving import solve
 
-DRAWN_WORD = "drawn"
-"""Word that stands for the drawn angle, stroke or side; key of a drawn place."""
 _STANDS_ALONE = "must be left out: `drawn` states the place"
 PINS_APART = 0.05
 """Distance of the pins from the drawing above which no motion has that assembly. It is

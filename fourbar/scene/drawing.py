@@ -8,6 +8,8 @@ from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import cross, vector
 from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, PINS, require
 
+DRAWN_WORD = "drawn"
+"""Word that stands for the drawn angle, stroke or side; key of a drawn place."""
 PINS_IN_LINE = 1e-12
 """Part of the drawing's size within which four pins lie in one line: a change point."""
 PlanePoint = tuple[float, float]

@@ -25,6 +25,7 @@ from fourbar.linkage import (
     require_whole,
 )
 from fourbar.quantities import DERIVED_NAMES, UNITS
+from fourbar.scene.drawing import DRAWN_WORD
 from fourbar.scene.motion import Motion
 
 LONGEST_POINT_NAME = 40
@@ -123,6 +124,8 @@ TAKEN_NAMES = frozenset(
 _THREE_SIGMA = 3.0
 """Half width of a normal distribution in a worst case, in standard deviations."""
 PIN_COORDINATE = Declared("m")
+_TABLES_OF_PLACES = ("bars", "points", "drive", "loads", "effects")
+"""Tables of a scene file in which places of bars stand."""
 LENGTH_NUMBERS = {
     **FourBar.numbers,
     **{BAR_NAMES[bar]: Bar.numbers["length"] for bar in MOVING_BARS},
@@ -137,6 +140,9 @@ def find_unit_of_key(key: str) -> str | None:
     table, *names = key.split(".")
     if table == "pins":
         is_known = len(names) == 2 and names[0] in PINS and names[1] in ("0", "1")
+        return PIN_COORDINATE.unit if is_known else None
+    if names[-2:-1] == [DRAWN_WORD]:
+        is_known = table in _TABLES_OF_PLACES and names[-1] in ("0", "1")
         return PIN_COORDINATE.unit if is_known else None
     tables = {
         "lengths": LENGTH_NUMBERS,

@@ -513,7 +513,7 @@ def _find_triangle(linkage: FourBar, drive: "ForceDrive | None") -> _Triangle:
         reach = abs(fixed.distance)
         towards = fixed.angle + linkage.ground_angle + _reverse(fixed)
     else:
-        end = polar(fixed.distance, fixed.angle + linkage.ground_angle)
+        end = fixed.vector() * polar(1.0, linkage.ground_angle)
         across = end - polar(linkage.ground, linkage.ground_angle)
         reach = abs(across)
         towards = angle(across)

@@ -45,8 +45,8 @@ from fourbar.studies.keys import (
     SceneNumber,
     command_key,
     list_entries,
-    read_place,
-    replace_place,
+    read_number,
+    replace_number,
 )
 from fourbar.studies.sloped import Sloped, take_slopes, take_values
 from fourbar.writing import list_names, make_data_frame, make_html, write_between
@@ -71,7 +71,7 @@ it, jumps with the motion.
 class _Influence(NamedTuple):
     """Largest influence of one number on one quantity.
 
-    The number is changed by a hundredth, a coordinate of a drawn pin by a hundredth of
+    The number is changed by a hundredth, a coordinate in the drawing by a hundredth of
     the longest bar, an angle by a degree.
     """
 
@@ -209,12 +209,12 @@ class Sensitivity:
     def _find_step(self, entry: SceneNumber, number: float) -> float:
         """Return the change of a number for which its influence is reported.
 
-        A coordinate of a pin depends on where the drawing has its origin: it is
-        compared with the longest bar.
+        A coordinate depends on where the drawing has its origin: it is compared with
+        the longest bar.
         """
         if entry.unit == "rad":
             return _DEGREE
-        if entry.place[:1] == ("drawing",):
+        if entry.is_coordinate:
             return _HUNDREDTH * max(self.scene.linkage.lengths)
         return _HUNDREDTH * abs(number)
 
@@ -223,7 +223,7 @@ class Sensitivity:
         steps = "by 1 % of a number, of an angle by 1 deg"
         if self.scene.drawing is None:
             return steps
-        return f"{steps}, of a pin's coordinate by 1 % of the longest bar"
+        return f"{steps}, of a drawn coordinate by 1 % of the longest bar"
 
     def _list_rows(self) -> list[tuple[str, str, str]]:
         """List for each quantity its values and the numbers that change it most."""
@@ -275,7 +275,8 @@ def sensitivity(scene: Scene) -> Sensitivity:
     of a uniform bar, its centre at mid-bar) follows the length. What is commanded is
     held too, and "motion.theta_2" (or theta_3, theta_4, stroke) is the derivative by
     it. A coordinate of a drawn pin ("pins.A.0") moves the pin in the drawing: lengths
-    and ground_angle follow.
+    and ground_angle follow. One of a drawn place ("points.P.drawn.0") moves the place
+    alone.
 
     Raises
     ------
@@ -321,7 +322,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
     else:
         most = float(commanded.stroke.max())
     numbers = [
-        most if key == theta else read_place(scene, entry.place)
+        most if key == theta else read_number(scene, entry)
         for key, entry in keys.items()
     ]
     if any(effect.loaded_pins for effect in scene.effects):
@@ -355,11 +356,11 @@ def sensitivity(scene: Scene) -> Sensitivity:
         )
         seeded = scene
         for number, (key, entry) in enumerate(keys.items()):
-            if not key.startswith(
-                "motion."
-            ):  # what is left out carries the slope of its length too
-                sloped = read_place(seeded, entry.place) + _make_unit_slope(number, p)
-                seeded = replace_place(seeded, entry.place, sloped)
+            if key.startswith("motion."):
+                continue
+            # what is left out carries the slope of its length too
+            sloped = read_number(seeded, entry) + _make_unit_slope(number, p)
+            seeded = replace_number(seeded, entry, sloped)
         for start in range(0, len(regular), POSITIONS_AT_ONCE):
             index = regular[start : start + POSITIONS_AT_ONCE]
             derived, held = _compute_derivatives(

@@ -8,14 +8,22 @@ import numpy as np
 
 from fourbar.effects import Gravity, Springs
 from fourbar.effects.effect import PinRows
-from fourbar.effects.place import STATED_PLACES
+from fourbar.effects.place import STATED_PLACES, Place
 from fourbar.errors import InputError, expect, write_in_units
-from fourbar.formulas.arithmetic import angle, dot, sine, vector
+from fourbar.formulas.arithmetic import (
+    angle,
+    dot,
+    polar,
+    sine,
+    vector,
+    without_slopes,
+)
 from fourbar.linkage import (
     ANY_NUMBER,
     AT_LEAST_ZERO,
     BAR_NAMES,
     ENDS,
+    FIRST_PIN,
     MOVING_BARS,
     PINS,
     POSITIVE,
@@ -25,7 +33,7 @@ from fourbar.linkage import (
     copy_with,
 )
 from fourbar.scene import Scene
-from fourbar.scene.drawing import DrawnPins
+from fourbar.scene.drawing import DRAWN_WORD, DrawnPins
 from fourbar.scene.numbers import PIN_COORDINATE, Tolerance
 
 COMMAND_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4", "motion.stroke")
@@ -50,6 +58,8 @@ another form in a study.
 """
 _BY_MATERIAL = ("density", "section", "diameter")
 """Numbers of a bar that are varied only where the scene states them."""
+_MASS_CENTRE = "centre"
+_NUMBERS_OF_BARS = {name: bar for bar, name in BAR_NAMES.items()}
 _LENGTH_OF_BAR = {bar: f"lengths.{name}" for bar, name in BAR_NAMES.items()}
 _GROUND_ANGLE = "lengths.ground_angle"
 NumberPath = tuple[str | int, ...]
@@ -62,6 +72,16 @@ class SceneNumber(NamedTuple):
     place: NumberPath
     unit: str
     bound: str = ANY_NUMBER
+
+    @property
+    def is_drawn_place(self) -> bool:
+        """True for a coordinate, in the drawing, of a place of a bar."""
+        return DRAWN_WORD in self.place
+
+    @property
+    def is_coordinate(self) -> bool:
+        """True for a coordinate in the drawing, of a pin or of a place of a bar."""
+        return self.is_drawn_place or self.place[:1] == ("drawing",)
 
     def holds(self, values: Any) -> Any:
         """Mark the numbers that a scene would accept."""
@@ -177,11 +197,42 @@ def _list_pins() -> dict[str, SceneNumber]:
     }
 
 
+def _list_drawn_places(
+    scene: Scene,
+    entries: Mapping[str, SceneNumber],
+) -> dict[str, SceneNumber]:
+    """List the coordinates, in the drawing, of places stated from a bar's first pin.
+
+    A mass centre on that pin has none: its distance and angle, which a bar states, have
+    no derivative there.
+
+    `entries`: the numbers of the scene, which state each place by distance and angle.
+    """
+    drawn = dict[str, SceneNumber]()
+    for key, entry in entries.items():
+        if len(entry.place) < 3:
+            continue
+        *holder, form, axis = entry.place
+        stem = key.removesuffix(f".{axis}")
+        if form == "from_pin":
+            stem = stem.removesuffix(form) + DRAWN_WORD
+        elif form == _MASS_CENTRE and not _is_left_out(scene, entry):
+            distance, _ = read_place(scene, entry.place[:-1])
+            if distance == 0.0:
+                continue
+            stem = f"{stem}.{DRAWN_WORD}"
+        else:
+            continue
+        place = (*holder, DRAWN_WORD, axis)
+        drawn[f"{stem}.{axis}"] = SceneNumber(place, PIN_COORDINATE.unit)
+    return drawn
+
+
 def list_entries(scene: Scene) -> dict[str, SceneNumber]:
     """List the numbers of a scene that a study varies, by key.
 
-    Coordinates of drawn pins come first, then lengths. What is commanded is not among
-    them.
+    Coordinates of drawn pins come first, then lengths, those of other drawn places
+    last. What is commanded is not among them.
     """
     of_ground = _list_entries(FourBar, "lengths", ("linkage",))
     bars = {
@@ -190,11 +241,7 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
     lengths = {
         f"lengths.{name}": numbers.pop(".length") for name, numbers in bars.items()
     }
-    if scene.drawing is None:
-        entries = dict[str, SceneNumber]()
-    else:
-        entries = _list_pins()
-    entries |= {"lengths.ground": of_ground["lengths.ground"], **lengths, **of_ground}
+    entries = {"lengths.ground": of_ground["lengths.ground"], **lengths, **of_ground}
     entries |= {
         f"bars.{name}{key}": number
         for name, numbers in bars.items()
@@ -222,7 +269,9 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
         entries |= _list_place(point, point.key, ("points", index))
     for index, effect in enumerate(scene.effects):
         entries |= _list_effect(effect, f"effects.{effect.key}", ("effects", index))
-    return entries
+    if scene.drawing is None:
+        return entries
+    return _list_pins() | entries | _list_drawn_places(scene, entries)
 
 
 def command_key(scene: Scene) -> str:
@@ -251,14 +300,77 @@ def refuse_key(key: str, value: object, keys: list[str]) -> InputError:
             "is the same for every member of a study: only numbers vary, theta_2 as"
             " angles",
         )
-    close = get_close_matches(key, keys, 1, 0.0)
-    return InputError(key, value, f'unknown key; did you mean "{close[0]}"?')
+    return InputError(key, value, f"unknown key; {_suggest(key, keys)}")
+
+
+def _suggest(key: str, keys: list[str]) -> str:
+    """Say which of the keys an unknown one may stand for.
+
+    A number of another meaning is named with its meaning: a coordinate is no distance.
+    """
+    stem, _, last = key.rpartition(".")
+    axis = "xy".find(last)
+    if axis >= 0 and _is_coordinate_key(coordinate := f"{stem}.{axis}"):
+        if coordinate in keys:
+            return f'did you mean "{coordinate}"?'
+        key = coordinate
+    place, drawn, _ = key.partition(f".{DRAWN_WORD}.")
+    if drawn:
+        return _suggest_for_drawn(key, place, keys)
+    if axis >= 0 and (pairs := _describe_pairs(f"{stem}.", keys)):
+        return f"no number has the components x and y; it has {pairs}"
+    return _name_closest(key, keys)
+
+
+def _suggest_for_drawn(key: str, place: str, keys: list[str]) -> str:
+    """Say by which numbers a place varies that has no coordinates in the drawing."""
+    forms = [f"{place}.{name}." for name in (*STATED_PLACES, "arm")]
+    if place.endswith(f".{_MASS_CENTRE}"):
+        forms.append(f"{place}.")
+    pairs = "".join(_describe_pairs(form, keys) for form in forms)
+    drawn = [known for known in keys if f".{DRAWN_WORD}." in known]
+    if not any(known.startswith("pins.") for known in keys):
+        reason = "the scene has no [pins], in whose drawing a place has coordinates"
+    elif drawn and not pairs:
+        return _name_closest(key, drawn)
+    else:
+        reason = "here no place has coordinates in the drawing"
+    if pairs:
+        return f"{reason}; it has {pairs}"
+    return reason
+
+
+def _name_closest(key: str, keys: list[str]) -> str:
+    """Name the most similar key, of a list or pair with the same index."""
+    index = key.rpartition(".")[2]
+    alike = [known for known in keys if known.rpartition(".")[2] == index]
+    if index not in ("0", "1") or not alike:
+        alike = keys
+    (close,) = get_close_matches(key, alike, 1, 0.0)
+    return f'did you mean "{close}"?'
+
+
+def _describe_pairs(start: str, keys: list[str]) -> str:
+    """Name the two numbers of a pair with their meaning; empty if there is no pair."""
+    pair = f"{start}0", f"{start}1"
+    if not all(key in keys for key in pair):
+        return ""
+    form = start.split(".")[-2]
+    of_place = form in (*STATED_PLACES, "arm", _MASS_CENTRE)
+    size = "the distance" if of_place else "the magnitude"
+    return f"{pair[0]} ({size}) and {pair[1]} (the angle)"
+
+
+def _is_coordinate_key(key: str) -> bool:
+    """Return True for the form of a key of a coordinate in the drawing."""
+    return key.startswith("pins.") or f".{DRAWN_WORD}." in key
 
 
 def find_overlap(keys: Collection[str]) -> tuple[str, str] | None:
-    """Return the key of a length and that of a pin by which the length follows.
+    """Return the key of a number and that of a coordinate by which it follows.
 
-    None: the keys state no length twice.
+    A length follows from the pins of its bar, distance and angle of a place from the
+    coordinates of the place. None: the keys state no number twice.
     """
     ends = {_LENGTH_OF_BAR[bar]: pins for bar, pins in ENDS.items()}
     ends[_GROUND_ANGLE] = ENDS[1]
@@ -268,6 +380,14 @@ def find_overlap(keys: Collection[str]) -> tuple[str, str] | None:
         for key in keys:
             if key.startswith(tuple(f"pins.{pin}." for pin in pins)):
                 return length, key
+    for key in keys:
+        stem, drawn, _ = key.partition(f".{DRAWN_WORD}.")
+        if not drawn:
+            continue
+        form = stem if stem.endswith(_MASS_CENTRE) else f"{stem}.from_pin"
+        for followed in (f"{form}.0", f"{form}.1"):
+            if followed in keys:
+                return followed, key
     return None
 
 
@@ -278,7 +398,7 @@ LEFT_OUT = (
 
 def _is_left_out(scene: Scene, entry: SceneNumber) -> bool:
     """Return True if the scene leaves a number to a uniform bar."""
-    if entry.place[0] != "linkage" or len(entry.place) < 3:
+    if entry.place[0] != "linkage" or len(entry.place) < 3 or entry.is_drawn_place:
         return False
     bar = getattr(scene.linkage, str(entry.place[1]))
     return getattr(bar, str(entry.place[2])) is None
@@ -291,7 +411,7 @@ def find_misfit(scene: Scene, entry: SceneNumber, tolerance: Tolerance) -> str |
     """
     if _is_left_out(scene, entry):
         return LEFT_OUT
-    number = read_place(scene, entry.place)
+    number = read_number(scene, entry)
     if number is None:
         return (
             "is the tolerance of a number that the scene leaves out: state the number "
@@ -305,6 +425,83 @@ def find_misfit(scene: Scene, entry: SceneNumber, tolerance: Tolerance) -> str |
         itself = write_in_units(entry.unit, number)
         return f"{three}must be less than the number itself, {itself}"
     return None
+
+
+def read_number(scene: Scene, entry: SceneNumber) -> Any:
+    """Read a number of a scene; None where the scene leaves it out."""
+    if not entry.is_drawn_place:
+        return read_place(scene, entry.place)
+    *holder, _, axis = entry.place
+    place = _find_stated_place(scene, tuple(holder))
+    pin, theta = _find_drawn_frame(scene, place.bar)
+    z = place.vector() * polar(1.0, theta)
+    return pin[int(axis)] + (z.real, z.imag)[int(axis)]
+
+
+def replace_number(scene: Scene, entry: SceneNumber, values: Any) -> Scene:
+    """Copy a scene with one of its numbers replaced, unchecked.
+
+    A place of the drawing moves by a vector, which turns with its bar:
+
+        z' = x' e^{-i theta} + y' e^{i (pi/2 - theta)},
+
+    x' and y' from the bar's first pin in the axes of the drawing, theta the drawn angle
+    of the bar. Both terms stay polar, as a place is stated, and have slopes at z = 0.
+    """
+    if not entry.is_drawn_place:
+        changed: Scene = replace_place(scene, entry.place, values)
+        return changed
+    *path, _, axis = entry.place
+    holder = tuple(path)
+    place = _find_stated_place(scene, holder)
+    pin, theta = _find_drawn_frame(scene, place.bar)
+    z = place.vector() * polar(1.0, theta)
+    parts = [z.real, z.imag]
+    parts[int(axis)] = values - pin[int(axis)]
+    moved = place._replace(
+        from_pin=(parts[0], -theta),
+        from_centre=(parts[1], 0.5 * np.pi - theta),
+    )
+    return _put_stated_place(scene, holder, moved)
+
+
+def _find_drawn_frame(scene: Scene, bar: int) -> tuple[tuple[Any, Any], Any]:
+    """Return the first pin of a bar in the drawing, m, and the bar's direction, rad.
+
+    They carry no slopes: a place moves against its bar as the bar was drawn.
+    """
+    assert scene.drawing is not None
+    x, y = scene.drawing.place(FIRST_PIN[bar])
+    direction = without_slopes(scene.drawing.vector(bar))
+    return (without_slopes(x), without_slopes(y)), angle(direction)
+
+
+def _find_stated_place(scene: Scene, holder: NumberPath) -> Place:
+    """Return the place that a point, a load, an end of a line or a bar states.
+
+    That of a bar is its mass centre.
+    """
+    stated = read_place(scene, holder)
+    if isinstance(stated, Place):
+        return stated
+    if isinstance(stated, Bar):
+        return Place(_NUMBERS_OF_BARS[str(holder[-1])], stated.mass_centre)
+    place: Place = stated.place
+    return place
+
+
+def _put_stated_place(scene: Scene, holder: NumberPath, place: Place) -> Scene:
+    """Copy a scene with a place that `_find_stated_place` finds replaced."""
+    stated = read_place(scene, holder)
+    new: Any
+    if isinstance(stated, Place):
+        new = place
+    elif isinstance(stated, Bar):
+        new = copy_with(stated, centre=place.polar_from_pin())
+    else:
+        new = stated.with_places(lambda _: place)
+    changed: Scene = replace_place(scene, holder, new)
+    return changed
 
 
 def read_place(value: Any, place: NumberPath) -> Any:
@@ -327,7 +524,7 @@ def read_numbers(scene: Scene) -> dict[str, Any]:
     What it leaves to a uniform bar is left out.
     """
     return {
-        key: read_place(scene, entry.place)
+        key: read_number(scene, entry)
         for key, entry in list_entries(scene).items()
         if not _is_left_out(scene, entry)
     }
@@ -336,9 +533,11 @@ def read_numbers(scene: Scene) -> dict[str, Any]:
 def replace_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
     """Copy the scene with some of its numbers replaced, by key."""
     entries = list_entries(scene)
+    # a place moves in the drawing before the pins of its bar do
+    places_first = sorted(numbers, key=lambda key: not entries[key].is_drawn_place)
     changed = scene
-    for key, number in numbers.items():
-        changed = replace_place(changed, entries[key].place, number)
+    for key in places_first:
+        changed = replace_number(changed, entries[key], numbers[key])
     return changed
 
 

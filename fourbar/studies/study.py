@@ -207,13 +207,15 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
         bar, its centre at mid-bar) follows the length of each member. Of a scene with
         `[pins]` also "pins.A.0", a coordinate of a drawn pin: the pin moves in the
         drawing, and lengths and ground_angle follow. What is commanded, the assembly
-        and the places of the bars stay as they are.
+        and the places of the bars stay as they are. "points.P.drawn.0" likewise is a
+        coordinate of a place that is stated from a bar's first pin: the place moves in
+        the drawing, and the pins stay.
 
     Raises
     ------
     InputError : a key that the scene does not have or that is no number, a value that
-        is no array of numbers, shapes that do not fit, a free motion, a length beside
-        a pin by which it follows. A member with
+        is no array of numbers, shapes that do not fit, a free motion, a number
+        beside a coordinate by which it follows. A member with
         numbers that a scene refuses has the status "invalid", one that never closes
         "not_assembled".
 

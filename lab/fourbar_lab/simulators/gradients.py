@@ -12,7 +12,7 @@ import numpy as np
 
 from fourbar.quantities import Array
 from fourbar.scene import Scene, find_signs
-from fourbar.studies.keys import command_key, list_entries, read_place, replace_numbers
+from fourbar.studies.keys import command_key, list_entries, read_number, replace_numbers
 from fourbar_lab.simulators.motion import start
 from fourbar_lab.simulators.mujoco_c import text
 from fourbar_validation.engines.loop import Assembler
@@ -69,7 +69,7 @@ def assemble_either_side(
         if key == command_key(scene):
             sides.append(compile_and_assemble(scene, theta_2 + step, reader))
         else:
-            number = float(read_place(scene, list_entries(scene)[key].place)) + step
+            number = float(read_number(scene, list_entries(scene)[key])) + step
             sides.append(
                 compile_and_assemble(
                     replace_numbers(scene, {key: number}),

@@ -305,6 +305,284 @@ def test_tolerances_of_pins_are_written_and_shown(
     assert status(["analyze", str(path), "--sensitivity"]) == 0
     shown = capsys.readouterr().out
     lines = shown.splitlines()
-    assert "of a\n    pin's coordinate by 1 % of the longest bar" in shown
+    assert "of a\n    drawn coordinate by 1 % of the longest bar" in shown
     # the coordinate 0 of A has an influence too
     assert any(line.startswith("pins.A.0") for line in lines)
+
+
+PLACES = {
+    "points.P": ("80 mm", "120 mm"),
+    # the first pins of their bars, where a distance and an angle have no derivative
+    "points.Q": ("0 mm", "100 mm"),
+    "points.G": ("-10 mm", "-10 mm"),
+    "loads.0": ("0 mm", "100 mm"),
+    "loads.1": ("230 mm", "70 mm"),
+    "drive": ("5 mm", "60 mm"),
+    "effects.springs.0.from": ("-10 mm", "-10 mm"),
+    "effects.springs.0.to": ("60 mm", "90 mm"),
+    "effects.springs.1.from": ("120 mm", "80 mm"),
+    "effects.springs.1.to": ("250 mm", "50 mm"),
+    "bars.coupler.centre": ("90 mm", "90 mm"),
+}
+"""Places of every kind, in the drawing."""
+CYLINDERS = {
+    2: {"drive.from": ("250 mm", "120 mm"), "drive.to": ("20 mm", "85 mm")},
+    # from O2, the first pin of the ground
+    4: {"drive.from": ("-10 mm", "-10 mm"), "drive.to": ("230 mm", "90 mm")},
+}
+"""Ends of a cylinder by the bar that it moves."""
+STROKES = {2: "222 mm", 4: "262 mm"}
+PLACE_KEYS = [f"{place}.drawn.{axis}" for place in PLACES for axis in (0, 1)]
+
+
+def place_writer(
+    key: str,
+    by: float,
+    places: dict[str, tuple[str, str]] = PLACES,
+) -> Callable[[str], str]:
+    """Return the function that writes a place in the drawing, one of them moved."""
+
+    def write(place: str) -> str:
+        numbers = [float(text.removesuffix(" mm")) / 1e3 for text in places[place]]
+        if key.startswith(f"{place}.drawn."):
+            numbers[int(key[-1])] += by
+        return f'drawn = ["{numbers[0]!r} m", "{numbers[1]!r} m"]'
+
+    return write
+
+
+def read_places(key: str, by: float) -> Scene:
+    """Read the file of a drawing with a moved place."""
+    at = place_writer(key, by)
+    return loads(
+        f"""{write_pins(DRAWN, "pins.A.0", 0.0)}
+[bars.coupler]
+mass = "1 kg"
+centre = {{ {at("bars.coupler.centre")} }}
+[motion]
+theta_2 = {{ from = "50 deg", to = "80 deg", steps = 4 }}
+omega_2 = "3 rad/s"
+alpha_2 = "-2 rad/s^2"
+[drive]
+bar = 2
+{at("drive")}
+direction = "170 deg"
+[points]
+P = {{ bar = 3, {at("points.P")} }}
+Q = {{ bar = 3, {at("points.Q")} }}
+G = {{ bar = 1, {at("points.G")} }}
+[[loads]]
+bar = 3
+force = ["5 N", "20 deg"]
+{at("loads.0")}
+[[loads]]
+bar = 4
+force = ["5 N", "20 deg"]
+{at("loads.1")}
+[effects]
+gravity = ["9.81 m/s^2", "-90 deg"]
+[[effects.springs]]
+from = {{ bar = 1, {at("effects.springs.0.from")} }}
+to = {{ bar = 3, {at("effects.springs.0.to")} }}
+stiffness = "200 N/m"
+length = "20 mm"
+[[effects.springs]]
+from = {{ bar = 3, {at("effects.springs.1.from")} }}
+to = {{ bar = 4, {at("effects.springs.1.to")} }}
+stiffness = "300 N/m"
+length = "20 mm"
+"""
+    )
+
+
+def test_slopes_by_a_drawn_place_are_differences_of_the_files_with_the_moved_place() -> (
+    None
+):
+    slopes = fourbar.sensitivity(read_places("points.P.drawn.0", 0.0))
+    assert set(PLACE_KEYS) <= slopes.keys.keys()
+    for key in PLACE_KEYS:
+        above, below = (fourbar.solve(read_places(key, by)) for by in (STEP, -STEP))
+        for name in slopes.by:
+            ends = find_values(above, name), find_values(below, name)
+            difference = (ends[0] - ends[1]) / (2.0 * STEP)
+            scale = max(float(np.abs(ends[0]).max()), 1e-3) / 0.1
+            np.testing.assert_allclose(
+                slopes.of(name, key),
+                difference,
+                atol=OF_DIFFERENCES * scale,
+                err_msg=f"{name} by {key}",
+            )
+
+
+@pytest.mark.parametrize("key", PLACE_KEYS)
+def test_a_member_is_the_file_with_the_moved_place(key: str) -> None:
+    place, _, axis = key.rpartition(".drawn.")
+    number = float(PLACES[place][int(axis)].removesuffix(" mm")) / 1e3
+    moves = np.array([0.0, 2e-3, -5e-3])
+    nominal = read_places(key, 0.0)
+    members = fourbar.solve(fourbar.vary(nominal, {key: number + moves}))
+    for member, by in enumerate(moves.tolist()):
+        alone = fourbar.solve(read_places(key, by))
+        for name in list_quantities(alone):
+            np.testing.assert_allclose(
+                find_values(members, name)[member],
+                find_values(alone, name),
+                rtol=OF_READING,
+                atol=OF_READING * float(np.abs(find_values(alone, name)).max()),
+                err_msg=f"{name} of {by}",
+            )
+
+
+def test_a_drawn_place_and_its_pins_move_independently_of_each_other() -> None:
+    """The place moves on its bar as it was drawn, and then goes with the bar."""
+    scene = read_places("points.P.drawn.0", 0.0)
+    together = {
+        "pins.A.0": 0.003,
+        "points.P.drawn.1": 0.124,
+        "points.P.drawn.0": 0.081,
+        "motion.theta_2": [1.0],
+    }
+    moved = read_places("points.P.drawn.0", 0.001)
+    place = loads(dump(moved).replace("pins.A.0", "")).points[0].place
+    up = read_places("points.P.drawn.1", 0.004).points[0].place
+    start = scene.points[0].place
+    z = place.settle(scene.linkage, {}).vector() + up.vector() - start.vector()
+    solution = fourbar.solve(fourbar.vary(scene, together))
+    A = complex(*solution.A[0, 0])
+    along = complex(*solution.B[0, 0]) - A
+    P = complex(*solution.points["P"][0, 0])
+    assert (P - A) / (along / abs(along)) == pytest.approx(z, rel=1e-13)
+
+
+@pytest.mark.parametrize("bar", CYLINDERS)
+def test_slopes_of_a_commanded_stroke_by_the_ends_of_its_cylinder(bar: int) -> None:
+    cylinder = CYLINDERS[bar]
+
+    def read(key: str, by: float) -> Scene:
+        at = place_writer(key, by, cylinder)
+        text = f"""{write_pins(DRAWN, "pins.A.0", 0.0)}
+[motion]
+stroke = "{STROKES[bar]}"
+stroke_speed = "0.1 m/s"
+[drive]
+from = {{ bar = 1, {at("drive.from")} }}
+to = {{ bar = {bar}, {at("drive.to")} }}
+[bars.coupler]
+mass = "1 kg"
+"""
+        return loads(text)
+
+    slopes = fourbar.sensitivity(read("drive.from.drawn.0", 0.0))
+    for key in (f"{end}.drawn.{axis}" for end in cylinder for axis in (0, 1)):
+        above, below = (fourbar.solve(read(key, by)) for by in (STEP, -STEP))
+        for name in ("theta_2", "drive_force", "F12"):
+            ends = find_values(above, name), find_values(below, name)
+            np.testing.assert_allclose(
+                slopes.of(name, key),
+                (ends[0] - ends[1]) / (2.0 * STEP),
+                rtol=1e-6,
+                atol=1e-6,
+                err_msg=f"{name} by {key}",
+            )
+
+
+def test_the_tolerance_of_a_drawn_point_is_that_of_its_coordinate() -> None:
+    """A double wishbone: 3 kN at the tyre's patch, which the coupler carries.
+
+    The force in the upper bar is that of the moment about A, 3000 N (x - 700 mm), over
+    the arm of the line of the upper bar from A.
+    """
+    text = """
+[pins]
+O2 = ["350 mm", "200 mm"]
+A = ["700 mm", "170 mm"]
+B = ["670 mm", "430 mm"]
+O4 = ["420 mm", "445 mm"]
+[motion]
+theta_2 = "drawn"
+omega_2 = "0 rad/s"
+[points]
+patch = { bar = 3, drawn = ["760 mm", "0 mm"] }
+[[loads]]
+point = "patch"
+force = ["3000 N", "90 deg"]
+[tolerances]
+"points.patch.drawn.0" = "5 mm"
+"""
+    spread = tolerances(loads(text), 512).spreads["|F43|"]
+    upper = complex(-0.250, 0.015)
+    arm = abs((upper.conjugate() * complex(0.030, -0.260)).imag) / abs(upper)
+    np.testing.assert_allclose(spread.nominal, 3000.0 * 0.060 / arm, rtol=1e-12)
+    np.testing.assert_allclose(spread.worst, 3000.0 * 0.005 / arm, rtol=1e-12)
+    np.testing.assert_allclose(spread.deviation, spread.first_order, rtol=1e-3)
+    scene = loads(text)
+    assert loads(dump(scene)) == scene
+
+
+@pytest.mark.parametrize(
+    ("key", "line"),
+    [
+        (
+            "points.P.drawn.0",
+            "the scene has no [pins], in whose drawing a place has coordinates; it has"
+            " points.P.from_pin.0 (the distance) and points.P.from_pin.1 (the"
+            " angle)",
+        ),
+        (
+            "points.P.from_pin.x",
+            "no number has the components x and y; it has points.P.from_pin.0 (the"
+            " distance) and points.P.from_pin.1 (the angle)",
+        ),
+        (
+            "loads.0.force.y",
+            "no number has the components x and y; it has loads.0.force.0 (the"
+            " magnitude) and loads.0.force.1 (the angle)",
+        ),
+        ("points.P.from_pn.1", 'did you mean "points.P.from_pin.1"?'),
+    ],
+)
+def test_no_hint_names_a_number_of_another_meaning(key: str, line: str) -> None:
+    lengths = """[lengths]
+ground = "0.3 m"
+input = "0.1 m"
+coupler = "0.25 m"
+output = "0.22 m"
+"""
+    with pytest.raises(InputError) as caught:
+        fourbar.vary(loads(lengths + BY_HAND["theta_2"]), {key: [0.0]})
+    assert line in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "line"),
+    [
+        ("pins.A.y", 'did you mean "pins.A.1"?'),
+        ("points.P.drawn.y", 'did you mean "points.P.drawn.1"?'),
+        ("points.PP.drawn.1", 'did you mean "points.P.drawn.1"?'),
+        ("points.P.drawn", "is more than one number; vary points.P.drawn.0, points.P."),
+    ],
+)
+def test_a_hint_of_a_drawing_names_the_coordinate(key: str, line: str) -> None:
+    with pytest.raises(InputError) as caught:
+        fourbar.vary(read_places("points.P.drawn.0", 0.0), {key: [0.0]})
+    assert line in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_distance_and_coordinate_of_one_place_do_not_vary_together() -> None:
+    scene = read_places("points.P.drawn.0", 0.0)
+    for number, place in (
+        ("points.P.from_pin.0", "points.P"),
+        ("bars.coupler.centre.1", "bars.coupler.centre"),
+    ):
+        values = {number: 0.1, f"{place}.drawn.0": [0.0, 0.01]}
+        with pytest.raises(InputError, match=f"follows from {place}.drawn.0, which"):
+            fourbar.vary(scene, values)
+
+
+def test_a_mass_centre_on_its_pin_has_no_coordinates() -> None:
+    text = write_pins(DRAWN, "pins.A.0", 0.0) + (
+        '[bars.input]\nmass = "1 kg"\ncentre = { drawn = ["-10 mm", "-10 mm"] }\n'
+    )
+    words = r"no place .*; it has bars\.input\.centre\.0 \(the distance\) and"
+    with pytest.raises(InputError, match=words):
+        fourbar.vary(loads(text), {"bars.input.centre.drawn.0": [0.0]})
