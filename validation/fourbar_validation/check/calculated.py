@@ -27,12 +27,15 @@ from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.check.judge import Judge, Mistake
 from fourbar_validation.check.theirs import name_quantity
+from fourbar_validation.engines.description import FORCE_BETWEEN
 
 MistakenNumbers = dict[str, Array]
 """Numbers that a mistake leads to, by quantity; others stay right."""
-FORCE_BETWEEN = {"F12": (1, 2), "F32": (3, 2), "F43": (4, 3), "F14": (1, 4)}
-"""Bar that exerts each pin force, and bar on which it acts."""
-_CHAINS = {"B": ((2, 3), (4,)), "A": ((2,), (4, 3)), "O4": ((2, 3, 4),)}
+_CHAINS = {
+    "B": ((2, 3), (4,)),
+    "A": ((2,), (4, 3)),
+    "O4": ((2, 3, 4),),
+}
 """Pins at which a loop is cut into a tree, the commonest first: the chains of bars that
 are left, each from the ground on.
 """
@@ -136,7 +139,11 @@ class _BarWrenches(NamedTuple):
         """Compute the moment of the driven bar's joint in the tree cut at a pin."""
         A = self.bars[2]
         B = A + self.bars[3]
-        first_pins = {2: np.zeros_like(A), 3: A, 4: B - self.bars[4]}
+        first_pins = {
+            2: np.zeros_like(A),
+            3: A,
+            4: B - self.bars[4],
+        }
         chain = next(chain for chain in _CHAINS[pin] if self.drive_bar in chain)
         place = chain.index(self.drive_bar)
         joint = first_pins[self.drive_bar]
@@ -174,10 +181,18 @@ def find_wrenches(scene: Scene, right: Solution) -> _BarWrenches:
     O4 = scene.linkage.ground * np.array([[np.cos(theta_1), np.sin(theta_1)]])
     A = right.A
     B = right.B
-    first = {2: np.zeros_like(A), 3: A, 4: O4 + np.zeros_like(A)}
+    first = {
+        2: np.zeros_like(A),
+        3: A,
+        4: O4 + np.zeros_like(A),
+    }
     second = {2: A, 3: B, 4: B}
     F12, F32, F43, F14 = (getattr(right, name) for name in PIN_FORCES)
-    acting = {2: (F12, F32), 3: (-F32, F43), 4: (F14, -F43)}
+    acting = {
+        2: (F12, F32),
+        3: (-F32, F43),
+        4: (F14, -F43),
+    }
     arms = {}
     bars = {}
     p = {}

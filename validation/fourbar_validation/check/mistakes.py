@@ -255,39 +255,44 @@ def _change_loads(scene: Scene) -> Iterator[tuple[str, Scene]]:
         if load.frame == "bar":
             other = "world"
             how = "is kept"
-        moved = (*scene.loads[:i], replace(load, frame=other), *scene.loads[i + 1 :])
-        yield f"{name}: its direction {how}", replace(scene, loads=moved)
+        loads = list(scene.loads)
+        loads[i] = replace(load, frame=other)
+        yield f"{name}: its direction {how}", replace(scene, loads=tuple(loads))
 
 
 def _change_bars(scene: Scene) -> Iterator[tuple[str, Scene]]:
     for name, bar in list_moving(scene):
         for text, change in _BAR_MISTAKES:
-            if (changed := change(bar)) is not None:
+            changed = change(bar)
+            if changed is not None:
                 yield f"{name}: {text}", replace_bars(scene, **{name: changed})
     for text, change in _BAR_MISTAKES:
         changed_bars = {}
         for name, bar in list_moving(scene):
-            if (changed := change(bar)) is not None:
+            changed = change(bar)
+            if changed is not None:
                 changed_bars[name] = changed
         if len(changed_bars) > 1:
             yield f"every bar: {text}", replace_bars(scene, **changed_bars)
 
 
 def _reverse_load(load: Load) -> Load:
-    if load.force is None:
-        force = None
-    else:
-        force = (-load.force[0], load.force[1])
+    force = None
+    if load.force is not None:
+        size, angle = load.force
+        force = (-size, angle)
     return replace(load, force=force, moment=-load.moment)
 
 
 def _measure_from_other_pin(bar: Bar) -> Bar | None:
     r, phi = bar.mass_centre
+    if not bar.mass:
+        return None
     x = bar.length - r * np.cos(phi)
     y = r * np.sin(phi)
-    if bar.mass:
-        return replace(bar, centre=(float(np.hypot(x, y)), float(np.arctan2(y, x))))
-    return None
+    distance = float(np.hypot(x, y))
+    angle = float(np.arctan2(y, x))
+    return replace(bar, centre=(distance, angle))
 
 
 def _rotate_bar(bar: Bar) -> Bar | None:
@@ -436,6 +441,5 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
                     tuple(nearer),
                 )
             )
-    return sorted(explanations, key=lambda e: (-len(e.quantities), -len(e.nearer)))[
-        :MOST_EXPLANATIONS
-    ]
+    explanations.sort(key=lambda e: (-len(e.quantities), -len(e.nearer)))
+    return explanations[:MOST_EXPLANATIONS]

@@ -91,7 +91,13 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
     """
     link = scene.linkage
     d, a, b, c = link.lengths
-    values = {"d": d, "a": a, "b": b, "c": c, "theta_1": link.ground_angle}
+    values = {
+        "d": d,
+        "a": a,
+        "b": b,
+        "c": c,
+        "theta_1": link.ground_angle,
+    }
     values |= _collect_motion(scene, angle)
     if scene.drive is not None:
         for name, (_, point) in zip(LINE_ENDS, scene.drive.ends, strict=False):
@@ -394,7 +400,11 @@ def _move_balls(
     b = x["b"]
     c = x["c"]
     zero = acb(0)
-    side = {2: a * w[2], 3: b * w[3], 4: -c * w[4]}  # sides of the loop
+    side = {
+        2: a * w[2],
+        3: b * w[3],
+        4: -c * w[4],
+    }  # sides of the loop
     first, second = (bar for bar in MOVING_BARS if bar != commanded)
 
     def rates(stated: Ball, total: ComplexBall) -> dict[int, Ball]:
@@ -422,8 +432,17 @@ def _move_balls(
     for bar in MOVING_BARS:
         centripetal += side[bar] * square(omega[bar])
     alpha = rates(x[f"alpha_{commanded}"], x.get("jerk", zero) + centripetal)
-    tip = {2: a * w[2], 3: b * w[3], 4: c * w[4]}
-    first_pin = {1: zero, 2: zero, 3: tip[2], 4: polar_ball(x["d"], x["theta_1"])}
+    tip = {
+        2: a * w[2],
+        3: b * w[3],
+        4: c * w[4],
+    }
+    first_pin = {
+        1: zero,
+        2: zero,
+        3: tip[2],
+        4: polar_ball(x["d"], x["theta_1"]),
+    }
     centre = {}
     for bar in MOVING_BARS:
         centre[bar] = w[bar] * polar_ball(x[f"r{bar}"], x[f"phi{bar}"])
@@ -837,9 +856,24 @@ def _compute_condition(
     a = x["a"]
     b = x["b"]
     c = x["c"]
-    turning = {1: arb(0), 2: sines[2], 3: -a / b * sines[3], 4: -a / c * sines[4]}
-    foot = {1: acb(0), 2: acb(0), 3: acb(0, turning[2]) * tip, 4: acb(0)}
-    most = {1: (0, 0), 2: (0, 1), 3: (a, a / b), 4: (0, a / c)}
+    turning = {
+        1: arb(0),
+        2: sines[2],
+        3: -a / b * sines[3],
+        4: -a / c * sines[4],
+    }
+    foot = {
+        1: acb(0),
+        2: acb(0),
+        3: acb(0, turning[2]) * tip,
+        4: acb(0),
+    }
+    most = {
+        1: (0, 0),
+        2: (0, 1),
+        3: (a, a / b),
+        4: (0, a / c),
+    }
     reach = arb(0)
     for k, arm in line.arms.items():
         of_first_pin, of_arm = most[k]

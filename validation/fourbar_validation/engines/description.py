@@ -23,6 +23,13 @@ from fourbar_validation.compare.pins import (
 )
 
 FORCE_AT = {"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}
+FORCE_BETWEEN = {
+    "F12": (1, 2),
+    "F32": (3, 2),
+    "F43": (4, 3),
+    "F14": (1, 4),
+}
+"""Bar that exerts each pin force, and bar on which it acts."""
 PIN_OF_MOVING_BAR = {2: "O2", 3: "A", 4: "O4"}
 PART_POINTS = {
     "A": "first_pin3",

@@ -148,12 +148,16 @@ def look_up(table: "Table", theta_2: float) -> float:
 
     It is apart from the formulas' `at`.
     """
-    angle = table.theta_2[0] + math.fmod(
-        math.fmod(theta_2 - table.theta_2[0], math.tau) + math.tau, math.tau
-    )
-    k = min(max(bisect.bisect_right(table.theta_2, angle), 1), len(table.theta_2) - 1)
-    a, b = table.theta_2[k - 1 : k + 1]
-    f, g = table.factor[k - 1 : k + 1]
+    angles = table.theta_2
+    turned = math.fmod(theta_2 - angles[0], math.tau)
+    angle = angles[0] + math.fmod(turned + math.tau, math.tau)
+    points_before = bisect.bisect_right(angles, angle)
+    after = min(max(points_before, 1), len(angles) - 1)
+    before = after - 1
+    a = angles[before]
+    b = angles[after]
+    f = table.factor[before]
+    g = table.factor[after]
     return (f * (b - angle) + g * (angle - a)) / (b - a)
 
 

@@ -131,15 +131,15 @@ def shift_to(
         cos_mu = mp.sqrt(max(1 - mpf(sin_mu) ** 2, 0))
         for side in (2 * b * c * cos_mu, -2 * b * c * cos_mu):
             cosine = (d * d + a * a - b * b - c * c + side) / (2 * a * d)
-            if abs(cosine) <= 1:
-                shifts += [
-                    theta_1 + sign * mp.acos(cosine) - theta_2 for sign in (1, -1)
-                ]
-        shifts = [shift - 2 * mp.pi * mp.nint(shift / (2 * mp.pi)) for shift in shifts]
+            if abs(cosine) > 1:
+                continue
+            for sign in (1, -1):
+                shift = theta_1 + sign * mp.acos(cosine) - theta_2
+                turns = mp.nint(shift / (2 * mp.pi))
+                shifts.append(shift - 2 * mp.pi * turns)
         nearest = min(shifts, key=abs, default=mp.inf)
-        if abs(nearest) <= RANDOM_WALK * EPS * max(
-            1.0, abs(theta_2), abs(linkage.ground_angle)
-        ):
+        largest = max(1.0, abs(theta_2), abs(linkage.ground_angle))
+        if abs(nearest) <= RANDOM_WALK * EPS * largest:
             return nearest
         return None
 

@@ -122,13 +122,15 @@ def compute_least_sine(
     psi = np.sort(theta_2[assembled] - linkage.ground_angle)
     if not len(psi):
         return 1.0
-    turns = math.pi * np.arange(
-        math.ceil(psi[0] / math.pi), math.floor(psi[-1] / math.pi) + 1
-    )
-    squared = d * d + a * a - 2.0 * d * a * np.cos(np.concatenate((psi, turns)))
+    # between the positions the sine is least where bars 1 and 2 are in line
+    first = math.ceil(psi[0] / math.pi)
+    last = math.floor(psi[-1] / math.pi)
+    in_line = math.pi * np.arange(first, last + 1)
+    angles = np.concatenate((psi, in_line))
+    squared = d * d + a * a - 2.0 * d * a * np.cos(angles)
     cosine = (b * b + c * c - squared) / (2.0 * b * c)
     sine = np.sqrt(np.clip(1.0 - cosine**2, 0.0, None))
-    between = (
-        np.abs(cosine[len(psi) :]) <= 1.0
-    )  # a turn at which the loop is open splits the motion
-    return float(np.concatenate((sine[: len(psi)], sine[len(psi) :][between])).min())
+    # an angle at which the loop is open splits the motion
+    counted = np.abs(cosine) <= 1.0
+    counted[: len(psi)] = True
+    return float(sine[counted].min())

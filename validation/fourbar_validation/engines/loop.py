@@ -68,7 +68,11 @@ of the lengths.
 """
 JointAngles = tuple[float, float, float]
 """Turns of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4, rad."""
-_CLOSING = {2: (3, 4), 3: (2, 4), 4: (3, 2)}
+_CLOSING = {
+    2: (3, 4),
+    3: (2, 4),
+    4: (3, 2),
+}
 """The two bars that close the loop, by the commanded bar. In this order the sine
 between them is the branch's, and they stand on the diagonal between their free ends as
 bars 3 and 4 do from A to O4; bar 2 from A back to O2.
@@ -100,14 +104,18 @@ class Assembler:
 
         None if the loop does not close.
         """
-        bar, near, far, closed = self.bar, self.near, self.far, self.closed
+        bar = self.bar
+        near = self.near
+        far = self.far
+        closed = self.closed
         theta = theta if bar == 2 else reduce_angle(theta)
         held = self.along * complex(math.cos(theta), math.sin(theta))
         diagonal = self.ground + held if bar == 4 else self.ground - held
         e, phi = cmath.polar(diagonal)
         # the gap with a bar held is stationary only where the others lie along the
         # diagonal: this is its least value
-        if max(e - (near + far), abs(near - far) - e) > closed:
+        least_gap = max(e - (near + far), abs(near - far) - e)
+        if least_gap > closed:
             return None
         # the triangle as measured is the nearest start, also where a bar is a millionth
         # of the others
@@ -116,7 +124,8 @@ class Assembler:
             _compute_triangle_angle(e, far, near),
         )
         for alpha, beta in (triangle, *_START_ANGLES):
-            first, second = phi + branch * alpha, phi + math.pi - branch * beta
+            first = phi + branch * alpha
+            second = phi + math.pi - branch * beta
             if bar == 2:
                 theta_2, theta_3, theta_4 = theta, first, second
             elif bar == 3:
@@ -131,7 +140,7 @@ class Assembler:
             assembled = _close_gap(self.tree, q, branch, closed, bar)
             if assembled is not None:
                 return assembled
-        if max(e - (near + far), abs(near - far) - e) < -closed:
+        if least_gap < -closed:
             raise ArithmeticError(
                 f"the loop closes at theta_{bar} = {theta!r}, but Newton's method does"
                 " not find it"
@@ -246,23 +255,23 @@ class Exact:
             bars = self.build(scene)
         except LimitError as error:
             return Answer(self.name, "exact", refusal=str(error))
-        start, moves, asked = time.perf_counter(), command.speed is not None, command
+        start = time.perf_counter()
+        asked = command
+        moves = command.speed is not None
         wanted = STAGES if moves else ("position",)
-        solved_motion = (
-            ()
-            if command.bar == 2 and command.stroke is None
-            else MADE[: 3 if moves else 1]
-        )
-        names = [
-            name
-            for name, stage in STAGE_OF.items()
-            if stage in wanted and name not in NOT_ANSWERED
-        ]
+        solved_motion: tuple[str, ...] = ()
+        if command.bar != 2 or command.stroke is not None:
+            solved_motion = MADE if moves else MADE[:1]
+        names = []
+        for name, stage in STAGE_OF.items():
+            if stage in wanted and name not in NOT_ANSWERED:
+                names.append(name)
         names += [name for name in solved_motion if name not in names]
         if command.stroke is not None:
             command = find_angle(command, scene.motion, *bars.cylinder(command.bar))
         names = list_unknowns(scene, names)
-        names += [f"{name_driving(scene)}_inertia"] if bars.alone and moves else []
+        if bars.alone and moves:
+            names.append(f"{name_driving(scene)}_inertia")
 
         def read(
             q: JointAngles,
@@ -295,11 +304,9 @@ class Exact:
             out,
             evidence={"closure_gap": gap},
         )
-        answer.shared, answer.own, answer.seconds = (
-            SHARED_BY_EXACT_ENGINES,
-            bars.own,
-            time.perf_counter() - start,
-        )
+        answer.shared = SHARED_BY_EXACT_ENGINES
+        answer.own = bars.own
+        answer.seconds = time.perf_counter() - start
         return answer
 
 
@@ -320,25 +327,24 @@ def read_each(
     Return that, where it assembles, and the greatest gap, m.
     """
     n = len(command.angle)
+    angles = command.angle.tolist()
+    branches = command.branch.tolist()
     omega, alpha = (rates.tolist() for rates in list_speeds(command))
-    missing: dict[str, Any] = {
-        name: (math.nan, math.nan) if name in VECTORS else math.nan for name in names
-    }
+    missing: dict[str, Any] = {}
+    for name in names:
+        missing[name] = (math.nan, math.nan) if name in VECTORS else math.nan
     rows = [missing] * n
     assembled = np.zeros(n, dtype=bool)
     gap = 0.0
     position = Assembler(bars, command.bar)
-    for i, (theta, branch) in enumerate(
-        zip(command.angle.tolist(), command.branch.tolist(), strict=True)
-    ):
-        if (q := position.find(theta, branch)) is not None:
-            assembled[i], gap = True, max(gap, math.hypot(*bars.gap()))
+    for i, (theta, branch) in enumerate(zip(angles, branches, strict=True)):
+        q = position.find(theta, branch)
+        if q is not None:
+            assembled[i] = True
+            gap = max(gap, math.hypot(*bars.gap()))
             rows[i] = missing | read(q, omega[i], alpha[i])
-    return (
-        {name: np.array([row[name] for row in rows], float) for name in missing},
-        assembled,
-        gap,
-    )
+    out = {name: np.array([row[name] for row in rows], float) for name in missing}
+    return out, assembled, gap
 
 
 MADE = ("theta_2", "omega_2", "alpha_2")
@@ -350,7 +356,11 @@ def make_blank(
     names: Iterable[str] = (*MADE, "torque", *PIN_FORCES),
 ) -> dict[str, Array]:
     """Return NaN for each of n positions, (n,) or (n, 2)."""
-    return {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}
+    blank = {}
+    for name in names:
+        shape = (n, 2) if name in VECTORS else (n,)
+        blank[name] = np.full(shape, np.nan)
+    return blank
 
 
 def split_answer(

@@ -245,14 +245,12 @@ class Sensitivities(NamedTuple):
         parts = []
         name = "sin_mu" if name == "condition" else name
         for axis in ("_x", "_y") if name in VECTORS else ("",):
-            part = RANDOM_WALK * self.data.get(
-                name + axis, math.inf
-            ) + reach * self.loop.get(name + axis, 0.0)
-            parts.append(
-                part + reach * reach * self.carried.get(name + axis, 0.0)
-                if carried
-                else part
-            )
+            component = name + axis
+            part = RANDOM_WALK * self.data.get(component, math.inf)
+            part += reach * self.loop.get(component, 0.0)
+            if carried:
+                part += reach * reach * self.carried.get(component, 0.0)
+            parts.append(part)
         return EPS * math.hypot(*parts)
 
 
@@ -278,10 +276,9 @@ def _compute_sensitivity(
     def move(**changed: "Ball") -> "BallValues | None":
         return compute_outputs(scene, branch, exact | changed)
 
-    data = {
-        name: 1.0 if name.startswith("theta") else abs(float(value.mid()))
-        for name, value in base.items()
-    }
+    data = {}
+    for name, value in base.items():
+        data[name] = 1.0 if name.startswith("theta") else abs(float(value.mid()))
     weights = _weigh_inputs({name: float(value) for name, value in exact.items()})
     _add_responses(data, base, move, exact, weights)
     data["condition"] = float(base["condition"].mid())
@@ -289,12 +286,12 @@ def _compute_sensitivity(
     carried: dict[str, float] = {}
     if "omega_3" in base:
         fastest = max(abs(base[f"omega_{bar}"]) for bar in MOVING_BARS)
-        hardest = (
-            max(abs(base[f"alpha_{bar}"]) for bar in MOVING_BARS) + fastest * fastest
-        )
+        hardest = max(abs(base[f"alpha_{bar}"]) for bar in MOVING_BARS)
+        hardest += fastest * fastest
         for name in VECTORS:  # points of the bars, by their places in world axes
             if name.startswith("a_"):
-                loop[f"{name}_x"] = loop[f"{name}_y"] = float(hardest)
+                loop[f"{name}_x"] = float(hardest)
+                loop[f"{name}_y"] = float(hardest)
         for name, most in (("slip", fastest), ("jerk", hardest)):
             for direction in (acb(1), acb(0, 1)):
                 _add_response(loop, base, move(**{name: most * step * direction}))
@@ -302,17 +299,14 @@ def _compute_sensitivity(
         strongest = max(
             abs(base[name + axis]) for name in PIN_FORCES for axis in ("_x", "_y")
         )
-        strongest += abs(base["torque"]) / sum_lengths(
-            scene.linkage
-        )  # the couple on a bar is rounded too
+        # the couple on a bar is rounded too
+        strongest += abs(base["torque"]) / sum_lengths(scene.linkage)
         heaviest = max(find_mass(scene.linkage.bar(bar)) for bar in MOVING_BARS)
         for bar in MOVING_BARS:
-            _add_response(loop, base, move(**{f"couple_{bar}": strongest * step}))
-            _add_response(
-                carried,
-                base,
-                move(**{f"couple_{bar}": heaviest * hardest * step}),
-            )
+            rounded = move(**{f"couple_{bar}": strongest * step})
+            _add_response(loop, base, rounded)
+            misplaced = move(**{f"couple_{bar}": heaviest * hardest * step})
+            _add_response(carried, base, misplaced)
     return Sensitivities(data, loop, carried)
 
 

@@ -369,11 +369,9 @@ def _compare_scene(
     """
     renamed = _pair_settings(before, after)
     changes = []
-    for key in sorted((before.keys() | after.keys()) - set(renamed.values())):
-        if key in renamed:
-            differs = KindOfChange.OTHER_SETTING
-        else:
-            differs = None
+    of_either = before.keys() | after.keys()
+    for key in sorted(of_either - set(renamed.values())):
+        differs = KindOfChange.OTHER_SETTING if key in renamed else None
         if change is not None:
             if change.positions_alone:
                 differs = KindOfChange.OTHER_POSITIONS
@@ -404,16 +402,23 @@ def _pair_settings(
     def index_single(keys: Iterable[Key]) -> dict[tuple[str, str, str], Key]:
         groups: dict[tuple[str, str, str], list[Key]] = {}
         for key in keys:
-            groups.setdefault((key[0], key[1], key[3]), []).append(key)
-        return {name: group[0] for name, group in groups.items() if len(group) == 1}
+            scene, engine, _, quantity = key
+            groups.setdefault((scene, engine, quantity), []).append(key)
+        single = {}
+        for name, group in groups.items():
+            if len(group) == 1:
+                single[name] = group[0]
+        return single
 
     old = index_single(before.keys() - after.keys())
     new = index_single(after.keys() - before.keys())
-    return {
-        old[name]: new[name]
-        for name in old.keys() & new.keys()
-        if "-" not in (old[name][2], new[name][2])
-    }
+    pairs = {}
+    for name in old.keys() & new.keys():
+        _, _, old_setting, _ = old[name]
+        _, _, new_setting, _ = new[name]
+        if "-" not in (old_setting, new_setting):
+            pairs[old[name]] = new[name]
+    return pairs
 
 
 def _list_surroundings(

@@ -137,7 +137,9 @@ def _is_weaker(
     if what in (_CONDITIONED, _PREDICTED, _IN_TIME):
         return new[what] == _YES
     if what == ANSWERS_CHECK:
-        return bool(set(old[what].split(", ")) - set(new[what].split(", ")))
+        before = set(old[what].split(", "))
+        after = set(new[what].split(", "))
+        return bool(before - after)
     return True
 
 

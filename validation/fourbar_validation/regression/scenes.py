@@ -108,12 +108,15 @@ def find_renamed(
     """
     names: dict[str, list[str]] = {}
     for name in sorted(new.keys() - old.keys(), reverse=True):
-        names.setdefault(repr(sorted(new[name].items())), []).append(name)
-    pairs = (
-        (name, names.get(repr(sorted(old[name].items()))))
-        for name in sorted(old.keys() - new.keys())
-    )
-    return {name: same.pop() for name, same in pairs if same}
+        stated = repr(sorted(new[name].items()))
+        names.setdefault(stated, []).append(name)
+    renamed = {}
+    for name in sorted(old.keys() - new.keys()):
+        stated = repr(sorted(old[name].items()))
+        same = names.get(stated)
+        if same:
+            renamed[name] = same.pop()
+    return renamed
 
 
 def list_scene_changes(

@@ -154,13 +154,15 @@ class Store:
 
     def put(self, task: int, results: Sequence[Any]) -> None:
         """Write a finished task, its results as JSON has them."""
-        packed = gzip.compress("\n".join(map(json.dumps, results)).encode(), 1, mtime=0)
+        lines = "\n".join(json.dumps(result) for result in results)
+        packed = gzip.compress(lines.encode(), 1, mtime=0)
         head = {
             "task": task,
             "run": self._run,
             "sha256": hashlib.sha256(packed).hexdigest(),
         }
-        write_bytes(self._find_path(task), json.dumps(head).encode() + b"\n" + packed)
+        first_line = json.dumps(head).encode() + b"\n"
+        write_bytes(self._find_path(task), first_line + packed)
 
     def _find_path(self, task: int) -> Path:
         return self.parts / f"{task:06d}"

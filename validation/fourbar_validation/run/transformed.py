@@ -415,16 +415,14 @@ def _convert_load(
     places: dict[str, Any] = {}
     if load.force is not None:
         # a direction from the bar's line turns with the coupler's line
-        if to.exchanged and load.bar == 3 and load.frame == "bar":
-            turned = math.pi
-        else:
-            turned = 0.0
-        force = (
-            to.length * load.force[0],
-            to.direction(load.force[1], load.frame) + turned,
-        )
+        of_coupler = load.bar == 3 and load.frame == "bar"
+        turned = math.pi if to.exchanged and of_coupler else 0.0
+        size, angle = load.force
+        direction = to.direction(angle, load.frame) + turned
+        force = (to.length * size, direction)
         if load.arm is not None:
-            places["arm"] = (to.length * load.arm[0], to.direction(load.arm[1]))
+            distance, angle = load.arm
+            places["arm"] = (to.length * distance, to.direction(angle))
         else:
             assert load.place is not None
             places["from_pin"] = to.place(load.place, linkage).from_pin
@@ -447,9 +445,10 @@ def _convert_couples(
 ) -> Any:
     """Convert damping and dry friction, whose couples have no sense of their own."""
     square = to.length * to.length
-    return type(effect).at(
-        **{_name_pin(pin, to): square * number for pin, number in effect.rows}
-    )
+    converted = {}
+    for pin, number in effect.rows:
+        converted[_name_pin(pin, to)] = square * number
+    return type(effect).at(**converted)
 
 
 def _convert_pin_friction(
@@ -457,9 +456,10 @@ def _convert_pin_friction(
     to: _SceneConversion,
     linkage: FourBar,
 ) -> PinFriction:
-    return PinFriction(
-        tuple((_name_pin(pin, to), mu, to.length * r) for pin, mu, r in effect.pins)
-    )
+    pins = []
+    for pin, coefficient, radius in effect.pins:
+        pins.append((_name_pin(pin, to), coefficient, to.length * radius))
+    return PinFriction(tuple(pins))
 
 
 def _convert_springs(

@@ -168,10 +168,10 @@ def _describe_bar(
         )
     arm = centre - topology.in_plane(topology.world(data, bar, FIRST_PIN[bar]))
     x, y = topology.line(data, bar)
+    angle = 0.0
     if arm.any():
-        angle = math.remainder(math.atan2(arm[1], arm[0]) - math.atan2(y, x), math.tau)
-    else:
-        angle = 0.0
+        turned = math.atan2(arm[1], arm[0]) - math.atan2(y, x)
+        angle = math.remainder(turned, math.tau)
     key = f"bars.{BAR_NAMES[bar]}"
     element = f'body "{model.body(topology.root[bar]).name}"'
     values = {
@@ -536,7 +536,11 @@ def _find(root: ET.Element, element: str) -> ET.Element:
     Raises KeyError if there is none.
     """
     tag, _, name = element.partition(" ")
-    tags = {"tendon": ("fixed", "spatial"), "actuator": ("general",)}.get(tag, (tag,))
+    tags: tuple[str, ...] = (tag,)
+    if tag == "tendon":
+        tags = ("fixed", "spatial")
+    elif tag == "actuator":
+        tags = ("general",)
     for each_tag in tags:
         for candidate in root.iter(each_tag):
             if not name or candidate.get("name") == name.strip('"'):

@@ -75,7 +75,8 @@ class MujocoForward:
             loop = ClosedLoop(write_mjcf(bare, settings, keyframe=False))
         except InputError as error:
             return ReleasedAnswer.refused(RELEASED, setting, str(error))
-        q_0 = Assembler(loop).find(float(start.theta_2[0]), int(start.branch[0]))
+        theta_2 = float(start.theta_2[0])
+        q_0 = Assembler(loop).find(theta_2, int(start.branch[0]))
         if q_0 is None:
             return ReleasedAnswer.refused(
                 RELEASED,
@@ -198,10 +199,10 @@ def extrapolate(
     It is in x = (1-d)/d.
     """
     x = np.array([(1.0 - d) / d for d in impedances])
-    weights = [
-        float(np.prod([xj / (xj - xi) for j, xj in enumerate(x) if j != i]))
-        for i, xi in enumerate(x)
-    ]
+    weights = []
+    for i, xi in enumerate(x):
+        factors = [xj / (xj - xi) for j, xj in enumerate(x) if j != i]
+        weights.append(float(np.prod(factors)))
     return {
         name: sum(w * rung[name] for w, rung in zip(weights, rungs, strict=True))  # type: ignore[misc]
         for name in rungs[0]

@@ -136,52 +136,40 @@ class ResidualMonitor:
 
         The drive's torque and F43 are as read.
         """
-        q, v, a = (
-            np.array(field)
-            for field in (loop.data.qpos, loop.data.qvel, loop.data.qacc)
-        )
+        data = loop.data
+        q = np.array(data.qpos)
+        v = np.array(data.qvel)
+        a = np.array(data.qacc)
         seen = self._motion(q, v, a)
-        power = torque * float(seen.drive @ v)
-        self._keep(
-            "acceleration_gap",
-            float(np.hypot(*seen.jerk)),
-            float(np.hypot(*seen.a_B)),
-        )
+        closing = float(np.hypot(*seen.jerk))
+        self._keep("acceleration_gap", closing, float(np.hypot(*seen.a_B)))
         # at a pole of T3 or T4 the speed of the driven bar, which vanishes, is as
         # uncertain as the others
         lever = float(np.abs(seen.drive).max())
-        terms = abs(torque) * lever * float(np.abs(v).max()) + float(
-            np.abs(seen.needed * v).sum()
-        )
+        power = torque * float(seen.drive @ v)
+        terms = abs(torque) * lever * float(np.abs(v).max())
+        terms += float(np.abs(seen.needed * v).sum())
         self._keep("power_gap", abs(power - float(seen.needed @ v)), terms)
         carried = seen.jacobian.T @ loop_force
         unbalanced = float(np.linalg.norm(seen.needed - carried - seen.drive * torque))
-        self._keep(
-            "force_gap",
-            unbalanced,
-            float(np.linalg.norm(seen.needed) + np.linalg.norm(carried)),
-        )
+        acting = float(np.linalg.norm(seen.needed) + np.linalg.norm(carried))
+        self._keep("force_gap", unbalanced, acting)
         try:
             closed = self._close(q, v, a, seen)
-        except (
-            np.linalg.LinAlgError
-        ):  # exactly at a limit position nothing closes the loop
+        except np.linalg.LinAlgError:
+            # exactly at a limit position nothing closes the loop
             return dict.fromkeys(seen.answer, math.inf)
-        expected = {
-            name: float(np.linalg.norm(value - closed.answer[name]))
-            for name, value in seen.answer.items()
-        }
+        expected = {}
+        for name, value in seen.answer.items():
+            expected[name] = float(np.linalg.norm(value - closed.answer[name]))
         # remainder of the solver: the pin forces differ by as much as F43
-        remaining = {self.drive: abs(torque - float(seen.answer[self.drive]))}
-        remaining |= dict.fromkeys(
-            PIN_FORCES, float(np.linalg.norm(loop_force - seen.answer["F43"]))
-        )
+        of_pins = float(np.linalg.norm(loop_force - seen.answer["F43"]))
+        remaining = dict.fromkeys(PIN_FORCES, of_pins)
+        remaining[self.drive] = abs(torque - float(seen.answer[self.drive]))
         for name, error in remaining.items():
-            if name == COUPLE.value:
-                size = seen.needed
-            else:
-                size = seen.answer[name]
-            expected[name] += min(error, _EXCUSED * float(np.linalg.norm(size)))
+            compared = seen.needed if name == COUPLE.value else seen.answer[name]
+            size = float(np.linalg.norm(compared))
+            expected[name] += min(error, _EXCUSED * size)
         return expected
 
     def _keep(
@@ -190,9 +178,9 @@ class ResidualMonitor:
         value: float,
         size: float,
     ) -> None:
-        self.worst[name] = (
-            max(self.worst[name], value) if math.isfinite(value) else math.inf
-        )
+        if not math.isfinite(value):
+            value = math.inf
+        self.worst[name] = max(self.worst[name], value)
         self._most[name] = max(self._most[name], size)
 
     def evidence(self) -> dict[str, float]:
@@ -200,11 +188,11 @@ class ResidualMonitor:
 
         It is over the largest term that it is a residual of.
         """
-        most = self._most
-        return {
-            name: worst / most[name] if most[name] else worst
-            for name, worst in self.worst.items()
-        }
+        relative = {}
+        for name, worst in self.worst.items():
+            most = self._most[name]
+            relative[name] = worst / most if most else worst
+        return relative
 
     def _motion(
         self,
@@ -212,36 +200,39 @@ class ResidualMonitor:
         v: Array,
         a: Array,
     ) -> _MonitoredMotion:
-        bars, d = self.bars, self.bars.data
-        d.qpos[:], d.qvel[:], d.qacc[:] = q, v, a
-        mujoco.mj_inverse(bars.model, d)
-        mujoco.mj_fwdActuation(bars.model, d)
+        bars = self.bars
+        data = bars.data
+        data.qpos[:] = q
+        data.qvel[:] = v
+        data.qacc[:] = a
+        mujoco.mj_inverse(bars.model, data)
+        mujoco.mj_fwdActuation(bars.model, data)
         jacobian = bars.jacobian()
-        gap = np.array(bars.gap())
         rate_3 = bars.rate_at("B3")
         rate_4 = bars.rate_at("B4")
-        needed = d.qfrc_inverse - d.qfrc_actuator
+        needed = data.qfrc_inverse - data.qfrc_actuator
         drive = bars.drive_column(self.drive_bar)
         answer: dict[str, Array] = {}
         for name, x in (("theta", q), ("omega", v), ("alpha", a)):
-            answer[f"{name}_3"], answer[f"{name}_4"] = x[O2] + x[A], x[O4]
+            answer[f"{name}_3"] = x[O2] + x[A]
+            answer[f"{name}_4"] = x[O4]
         try:
             multipliers = np.array(solve_multipliers(jacobian, drive, needed.tolist()))
         except np.linalg.LinAlgError:
             multipliers = np.full(3, np.inf)
-        answer |= {"F43": multipliers[:2], self.drive: multipliers[2]}
-        answer |= self._compute_pins(multipliers[:2], float(multipliers[2]))
-        jerk = jacobian @ a + (rate_3 - rate_4) @ v
-        a_B = bars.jacobian_at("B4") @ a + rate_4 @ v
+        loop_force = multipliers[:2]
+        answer["F43"] = loop_force
+        answer[self.drive] = multipliers[2]
+        answer |= self._compute_pins(loop_force, float(multipliers[2]))
         return _MonitoredMotion(
-            gap,
-            jacobian @ v,
-            jerk,
-            a_B,
-            jacobian,
-            drive,
-            needed,
-            answer,
+            gap=np.array(bars.gap()),
+            slip=jacobian @ v,
+            jerk=jacobian @ a + (rate_3 - rate_4) @ v,
+            a_B=bars.jacobian_at("B4") @ a + rate_4 @ v,
+            jacobian=jacobian,
+            drive=drive,
+            needed=needed,
+            answer=answer,
         )
 
     def _compute_pins(self, loop_force: Array, drive: float) -> dict[str, Array]:

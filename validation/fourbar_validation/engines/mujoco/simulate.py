@@ -165,18 +165,18 @@ def _passes_change_point(scene: Scene, command: Command) -> bool:
     They do if +-a +-b +-c = d.
     """
     d, a, b, c = scene.linkage.lengths
-    least, most = (
-        float(x) - scene.linkage.ground_angle
-        for x in (command.theta_2.min(), command.theta_2.max())
-    )
+    theta_1 = scene.linkage.ground_angle
+    least = float(command.theta_2.min()) - theta_1
+    most = float(command.theta_2.max()) - theta_1
+    near = COLLINEAR * (a + b + c + d)
     for half_turn in range(
         math.ceil(least / math.pi - COLLINEAR),
         math.floor(most / math.pi + COLLINEAR) + 1,
     ):
         diagonal = abs(d - a if half_turn % 2 == 0 else d + a)
-        if min(abs(diagonal - abs(b - c)), abs(diagonal - (b + c))) <= COLLINEAR * (
-            a + b + c + d
-        ):
+        from_folded = abs(diagonal - abs(b - c))
+        from_stretched = abs(diagonal - (b + c))
+        if min(from_folded, from_stretched) <= near:
             return True
     return False
 
@@ -390,16 +390,16 @@ class _Simulation:
                 light = None
             else:
                 light = self._compile_loop(timestep, supplied, LIGHT_FLYWHEEL)
-            monitor = ResidualMonitor(
-                self._compile_loop(timestep, supplied), self.scene.drive_bar
-            )
+            bars = self._compile_loop(timestep, supplied)
+            monitor = ResidualMonitor(bars, self.scene.drive_bar)
             run = SimulatedRun(self.scene, loop, light, motion_segment, start, timestep)
             for index in segment:
                 run.to(index)
                 self._read(run, monitor, index)
         self.evidence["steps"] += run.stepper.done
         for name, value in monitor.evidence().items():
-            self.evidence[name] = float(np.maximum(self.evidence.get(name, 0.0), value))
+            before = self.evidence.get(name, 0.0)
+            self.evidence[name] = float(np.maximum(before, value))
 
     def _read(
         self,
@@ -408,7 +408,8 @@ class _Simulation:
         index: int,
     ) -> None:
         """Read everything of one sample, and what the engine says of itself there."""
-        loop, d, turns = run.loop, run.loop.data, run.turns
+        loop = run.loop
+        d = loop.data
         loop.forward()
         self._keep_worst(run)
         q = (float(d.qpos[O2]), float(d.qpos[A]), float(d.qpos[O4]))
@@ -419,28 +420,23 @@ class _Simulation:
         self.branch[index] = loop.branch(self.command.bar)
         torque, pins = run.read()
         if torque is None:
+            drive = f"the couple on bar {self.scene.drive_bar}"
             if self.scene.drive:
                 drive = "the cylinder"
-            else:
-                drive = f"the couple on bar {self.scene.drive_bar}"
             raise LimitError(f"{drive} does not move the input: a pole of its size")
         values: BarValues = {name_driving(self.scene): torque, **pins}
         if self.scene.drive is not None:
             tendon = loop.model.tendon(CYLINDER).id
-            values |= {
-                "stroke": d.ten_length[tendon],
-                "stroke_speed": d.ten_velocity[tendon],
-            }
+            values["stroke"] = d.ten_length[tendon]
+            values["stroke_speed"] = d.ten_velocity[tendon]
         for name, x, ahead in (
-            ("theta", d.qpos, turns),
+            ("theta", d.qpos, run.turns),
             ("omega", d.qvel, 0.0),
             ("alpha", d.qacc, 0.0),
         ):
-            values |= {
-                f"{name}_2": x[O2] - ahead,
-                f"{name}_3": x[O2] + x[A] - ahead,
-                f"{name}_4": x[O4],
-            }
+            values[f"{name}_2"] = x[O2] - ahead
+            values[f"{name}_3"] = x[O2] + x[A] - ahead
+            values[f"{name}_4"] = x[O4]
         for name, value in values.items():
             self.out[name][index] = value
         for name, error in monitor.look(loop, torque, pins["F43"]).items():
@@ -448,20 +444,21 @@ class _Simulation:
 
     def _keep_worst(self, run: SimulatedRun) -> None:
         """Keep the worst of what the engine says of itself."""
-        loop, d, seen = run.loop, run.loop.data, self.evidence
-        due = run.motion_segment.speed(run.progress() - run.begins, run.stepper.time)
-        speed = float(loop.drive_column(run.motion_segment.bar) @ d.qvel)
-        worst = {
+        loop = run.loop
+        segment = run.motion_segment
+        due = segment.speed(run.progress() - run.begins, run.stepper.time)
+        speed = float(loop.drive_column(segment.bar) @ loop.data.qvel)
+        missed = abs(abs(speed) - due)
+        values = {
             "closure_gap_m": float(np.hypot(*loop.gap())),
-            "speed_error": float(
-                abs(abs(speed) - due) / (run.motion_segment.fastest or 1.0)
-            ),
-            "solver_iterations": float(d.solver_niter.max()),
+            "speed_error": float(missed / (segment.fastest or 1.0)),
+            "solver_iterations": float(loop.data.solver_niter.max()),
             "bad_states": float(loop.bad()),
             "time_went_back": float(run.stepper.lost()),
         }
-        for name, value in worst.items():
-            seen[name] = float(np.maximum(seen[name], value))
+        for name, value in values.items():
+            worst = np.maximum(self.evidence[name], value)
+            self.evidence[name] = float(worst)
 
 
 def observe_order(

@@ -29,7 +29,12 @@ from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene import command as command_of
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.tolerance import magnitude
-from fourbar_validation.engines.description import Value, list_unknowns, name_driving
+from fourbar_validation.engines.description import (
+    FORCE_BETWEEN,
+    Value,
+    list_unknowns,
+    name_driving,
+)
 from fourbar_validation.engines.loaded import Assembled
 from fourbar_validation.engines.loop import (
     MADE,
@@ -91,13 +96,6 @@ then ripples by 1e-3.
 """
 _SAME_GRAVITY = 1e-9
 """Part of gravity by which its direction may differ in the axes of a scene."""
-_BARS_OF_A_FORCE = {
-    "F12": (1, 2),
-    "F32": (3, 2),
-    "F43": (4, 3),
-    "F14": (1, 4),
-}
-"""Bars of each pin force: from the first on the second."""
 GENERATED = Path("generated.xml")
 """Name of the file that is generated from a scene."""
 _NO_BIAS = mujoco.mjtBias.mjBIAS_NONE
@@ -712,7 +710,7 @@ class _UserLoop(Assembled):
         else:
             on[bars] = force
         forces = {}
-        for name, (i, j) in _BARS_OF_A_FORCE.items():
+        for name, (i, j) in FORCE_BETWEEN.items():
             forces[name] = on[i, j] if (i, j) in on else -on[j, i]
         return forces
 

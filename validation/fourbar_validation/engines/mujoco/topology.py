@@ -20,7 +20,11 @@ from fourbar.mjcf import Plane
 from fourbar.quantities import Array
 
 _PIN_OF = {frozenset(bars): pin for pin, bars in PINS.items()}
-_PLANES = {2: ("x-y", (0, 1)), 1: ("x-z", (0, 2)), 0: ("y-z", (1, 2))}
+_PLANES = {
+    2: ("x-y", (0, 1)),
+    1: ("x-z", (0, 2)),
+    0: ("y-z", (1, 2)),
+}
 """World axis of the hinges: the plane, and the world axes for x and y there."""
 UPRIGHT_HINGE = 1e-9
 """A hinge tilted by more than this (sine) leaves the plane."""

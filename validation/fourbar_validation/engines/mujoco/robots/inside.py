@@ -33,7 +33,7 @@ import numpy as np
 from fourbar.errors import LimitError
 from fourbar.linkage import PINS
 from fourbar.quantities import Array
-from fourbar_validation.engines.description import FORCE_AT
+from fourbar_validation.engines.description import FORCE_AT, FORCE_BETWEEN
 from fourbar_validation.engines.mujoco.closed_loop import WARNINGS, load_force
 from fourbar_validation.engines.mujoco.couple import find_couple
 from fourbar_validation.engines.mujoco.robots.ancestry import (
@@ -79,8 +79,6 @@ _REACHED = 1.0 - 1e-6
 """Part of its couple at which dry friction acts in full."""
 MOST_TIMESTEPS = 60_000
 """Steps of one run; at 0.1 ms a step of a humanoid these are six seconds."""
-_FORCE_ON = {"F12": 2, "F32": 2, "F43": 3, "F14": 4}
-"""The bar that each force acts on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -408,7 +406,8 @@ class LoopInside:
                 body = int(self.model.jnt_bodyid[joint])
                 force = self._read_hinge(data, body)
                 bar = self._find_bar(body, pin)
-            sign = 1.0 if bar == _FORCE_ON[name] else -1.0
+            _, acted_on = FORCE_BETWEEN[name]
+            sign = 1.0 if bar == acted_on else -1.0
             forces[name] = sign * (axes @ force)
         return forces
 

@@ -327,10 +327,12 @@ class _Closing:
             if int(self.model.jnt_type[joint]) in JOINT_UNITS:
                 dof = int(self.model.jnt_dofadr[joint])
                 value = qpos[self.model.jnt_qposadr[joint]]
-                number = place[dof]
                 # scipy asks for room on both sides
-                low[number] = max(low[number], min(self.low[dof] - value, -1e-15))
-                high[number] = min(high[number], max(self.high[dof] - value, 1e-15))
+                down = min(self.low[dof] - value, -1e-15)
+                up = max(self.high[dof] - value, 1e-15)
+                number = place[dof]
+                low[number] = max(low[number], down)
+                high[number] = min(high[number], up)
         return low, high
 
 
