@@ -166,7 +166,7 @@ class Results:
             else:
                 shape_of_one = (*shape, 2)
             self.arrays[name] = given[name] if name in given else np.empty(shape_of_one)
-        self.reverses: bool = False
+        self.sign_may_differ: bool = False
         """True if sin(theta_4 - theta_3) may have another sign than the branch."""
 
     def store(self, case: Case, evaluated: Evaluated, index: PositionIndex) -> None:
@@ -175,7 +175,7 @@ class Results:
         What is no number has the status that says so.
         """
         withhold_infinite(case, evaluated)
-        self.reverses = self.reverses or _may_reverse(case)
+        self.sign_may_differ = self.sign_may_differ or _may_sign_differ(case)
         shape = self.codes[index].shape
         self.codes[index] = evaluated.codes.reshape(shape)
         for name, value in evaluated.values.items():
@@ -191,7 +191,7 @@ class Results:
                 array[*index, 0], array[*index, 1] = value.real, value.imag
 
 
-def _may_reverse(case: Case) -> bool:
+def _may_sign_differ(case: Case) -> bool:
     """Return True if sin(theta_4 - theta_3) may have another sign than the branch."""
     return case.path.bar != 2 or case.path.has_change_point
 
@@ -235,7 +235,7 @@ def _solve_alone(case: Case, commanded: Command, request: _Requested) -> Results
         return None
     results = Results.__new__(Results)
     results.codes = np.array([codes], dtype=np.uint8)
-    results.reverses = _may_reverse(case)
+    results.sign_may_differ = _may_sign_differ(case)
     vectors = table.view(float).reshape(-1, 1, 2)
     scalars = vectors[:, :, 0]
     results.arrays = {
@@ -481,7 +481,7 @@ def make_solution(
             name: array for name, array in quantities.items() if name != "theta_2"
         }
     branch = commanded.branch
-    if results.reverses:
+    if results.sign_may_differ:
         branch = _find_signs(scene, commanded, quantities.get("sin_mu"))
     return Solution.of(
         title=scene.title,

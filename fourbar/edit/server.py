@@ -72,26 +72,26 @@ class Workbench:
         self.timers: dict[str, asyncio.TimerHandle] = {}
         self.check = HarnessRun(session.exports.folder / "check", self.tell)
 
-    def later(self, name: str, seconds: float, what: Any) -> None:
-        """Do something after a while, once: asked for again, it waits anew."""
-        self.never(name)
+    def set_timer(self, name: str, seconds: float, what: Any) -> None:
+        """Do something after a while, once: a timer of the same name begins anew."""
+        self.cancel_timer(name)
         self.timers[name] = self.loop.call_later(seconds, what)
 
-    def never(self, name: str) -> None:
-        """Take back what was to be done later."""
+    def cancel_timer(self, name: str) -> None:
+        """Cancel a timer, if it runs."""
         if name in self.timers:
             self.timers.pop(name).cancel()
 
     def join(self, line: "_PageLine") -> None:
         """Welcome a page."""
         self.pages.add(line)
-        self.never("gone")
+        self.cancel_timer("gone")
 
     def leave(self, line: "_PageLine") -> None:
         """Forget a page; some time after the last one the server ends."""
         self.pages.discard(line)
         if not self.pages:
-            self.later("gone", GONE, self.ended.set)
+            self.set_timer("gone", GONE, self.ended.set)
 
     def tell(self, about: dict[str, Any], *, to: "_PageLine | None" = None) -> None:
         """Send an answer to one page or to all."""
@@ -133,8 +133,8 @@ class Workbench:
             )
             return
         self.waiting.append((line, asked))
-        self.never("settle")
-        self.never("sample")
+        self.cancel_timer("settle")
+        self.cancel_timer("sample")
         if self.working is None or self.working.done():
             self.working = asyncio.create_task(self._run_work())
 
@@ -151,12 +151,14 @@ class Workbench:
                 about,
                 to=line if alone or "refused" in about or "ask" in about else None,
             )
-        self.later(
+        self.set_timer(
             "settle",
             ERROR_BAR_DELAY,
             lambda: asyncio.create_task(self._settle()),
         )
-        self.later("keep", SAVING_DELAY, lambda: self.one.submit(self._keep))
+        self.set_timer(
+            "state file", SAVING_DELAY, lambda: self.one.submit(self._write_state_file)
+        )
 
     def _compare(self) -> dict[str, Any]:
         try:
@@ -164,9 +166,9 @@ class Workbench:
         except FourBarError as error:
             return {"note": str(error)}
 
-    def _keep(self) -> None:
+    def _write_state_file(self) -> None:
         try:
-            self.session.keep()
+            self.session.write_state_file()
         except OSError as error:
             self.loop.call_soon_threadsafe(
                 self.tell,
@@ -210,7 +212,7 @@ class Workbench:
             return
         if about and not self.waiting:
             self.tell(about)
-            self.later(
+            self.set_timer(
                 "sample",
                 SPREAD_DELAY,
                 lambda: asyncio.create_task(self._sample(state, about["data"])),
@@ -263,7 +265,7 @@ class Workbench:
             with suppress(NotImplementedError):  # Windows: KeyboardInterrupt
                 self.loop.add_signal_handler(name, self.ended.set)
         address = f"http://{_LOOPBACK}:{own_port}/{self.session.token}/"
-        self.one.submit(self._keep)
+        self.one.submit(self._write_state_file)
         self.address.set_result(address)
         if redirect is not None:
             redirect.write(address)

@@ -108,7 +108,7 @@ class Session:
             text = write_new_scene(NEW)
         self.disk = self._read_disk()
         self.texts = [text]
-        self.place = 0
+        self.history_index = 0
         self.kept = {"start": text}
         self.reference = "start"
         self.gesture = ""
@@ -127,16 +127,16 @@ class Session:
             if state["schema"] != EDIT_SCHEMA:
                 raise ValueError(f"schema {str(state['schema'])[:60]!r}")
             self.texts = [str(text) for text in state["texts"]]
-            self.place = int(state["place"])
+            self.history_index = int(state["place"])
             self.kept = {str(name): str(text) for name, text in state["kept"].items()}
             self.reference = str(state["reference"])
             self.unit_names = str(state["units"])
             self.disk = state["disk"]
             _require_readable_units(self.unit_names)
             self.pressure_text = _read_typed_pressure(state.get("pressure", ""))
-            if self.place < 0 or self.reference not in self.kept:
+            if self.history_index < 0 or self.reference not in self.kept:
                 raise ValueError("it names a state that it does not hold")
-            self.now = self.read(self.texts[self.place])
+            self.now = self.read(self.texts[self.history_index])
         except (
             ValueError,
             LookupError,
@@ -152,13 +152,13 @@ class Session:
             )
             raise InputError("state file", str(self.state_file), allowed) from None
 
-    def keep(self) -> None:
+    def write_state_file(self) -> None:
         """Write the state file, readable by its owner alone as the scene may be."""
         state = {
             "schema": EDIT_SCHEMA,
             "disk": self.disk,
             "texts": self.texts,
-            "place": self.place,
+            "place": self.history_index,
             "kept": self.kept,
             "reference": self.reference,
             "units": self.unit_names,
@@ -175,7 +175,7 @@ class Session:
         if gone and (self.saved or len(self.texts) == 1):
             self.state_file.unlink(missing_ok=True)
         else:
-            self.keep()
+            self.write_state_file()
 
     @property
     def units(self) -> Conversion:
@@ -252,8 +252,8 @@ class Session:
             "text": self.now.text,
             "units": self.unit_names,
             "pressure": self.pressure_text,
-            "undo": self.place > 0,
-            "redo": self.place + 1 < len(self.texts),
+            "undo": self.history_index > 0,
+            "redo": self.history_index + 1 < len(self.texts),
             "reference": self.reference,
             "changed": self.now.text != self.kept[self.reference],
             "kept": [*self.kept],
@@ -277,7 +277,7 @@ class Session:
         A request that is refused changes nothing.
         """
         action = _ACTIONS.get(str(asked.get("do")))
-        before = (self.texts, self.place, self.now)
+        before = (self.texts, self.history_index, self.now)
         try:
             if action is None:
                 raise InputError(
@@ -290,7 +290,7 @@ class Session:
             return self.answer() | note
         # the server goes on after any error, also after a request without sense
         except Exception as error:
-            self.texts, self.place, self.now = before
+            self.texts, self.history_index, self.now = before
             self.document = SceneDocument(self.now.text)
             if isinstance(error, InputError):
                 words = f"{error.key}: {error.allowed}"
@@ -311,15 +311,15 @@ class Session:
         alter(self.document)
         now = self.read(self.document.text())
         if goes_on:
-            self.texts = [*self.texts[: self.place], now.text]
+            self.texts = [*self.texts[: self.history_index], now.text]
         elif now.text != self.now.text:
-            self.place += 1
-            self.texts = [*self.texts[: self.place], now.text]
+            self.history_index += 1
+            self.texts = [*self.texts[: self.history_index], now.text]
         characters = sum(map(len, self.texts))
         while len(self.texts) > _MOST_STATES or characters > MOST_CHARACTERS:
             characters -= len(self.texts[0])
             self.texts = self.texts[1:]
-            self.place -= 1
+            self.history_index -= 1
         self.now = now
         self.gesture = gesture
         if not gesture:
@@ -420,11 +420,11 @@ def _replace_text(session: Session, asked: dict[str, Any]) -> None:
 
 
 def _move_in_history(session: Session, by: int) -> None:
-    place = session.place + by
-    if not 0 <= place < len(session.texts):
-        raise InputError("history", place, "no further state to undo or redo")
-    session.now = session.read(session.texts[place])
-    session.place = place
+    index = session.history_index + by
+    if not 0 <= index < len(session.texts):
+        raise InputError("history", index, "no further state to undo or redo")
+    session.now = session.read(session.texts[index])
+    session.history_index = index
     session.gesture = ""
     session.document = SceneDocument(session.now.text)
 
@@ -472,30 +472,30 @@ def _command_other(session: Session, asked: dict[str, Any]) -> None:
 
     The range is what the present motion covers of it without turning back.
     """
-    place = str(asked["command"])
-    by_place = {names[0]: names for names in (*COMMAND_NAMES.values(), STROKE_COMMAND)}
-    if place not in by_place:
-        known = ", ".join(by_place)
-        raise InputError("command", place, f"must be one of {known}")
-    _, rate_name, *_ = by_place[place]
+    commanded = str(asked["command"])
+    names_of = {names[0]: names for names in (*COMMAND_NAMES.values(), STROKE_COMMAND)}
+    if commanded not in names_of:
+        known = ", ".join(names_of)
+        raise InputError("command", commanded, f"must be one of {known}")
+    _, rate_name, *_ = names_of[commanded]
     scene = session.now.scene
     has_speed = scene.motion.speed is not None
     before = solve(scene, "force" if has_speed else "position")
-    values = getattr(before, place)
+    values = getattr(before, commanded)
     if values is None:
         reason = "needs a cylinder: add one in place of the bar first"
-        raise InputError("command", place, reason)
+        raise InputError("command", commanded, reason)
     first, last = _find_monotone(values, _find_shown(before.theta_2, asked))
     if last == first:
         reason = "does not move in this motion: choose another sweep first"
-        raise InputError("command", place, reason)
+        raise InputError("command", commanded, reason)
     middle = (first + last) // 2
 
     document = SceneDocument(session.now.text)
     stated = session.now.plain["motion"].keys()
-    for name in {*chain(*by_place.values()), "side", "free", "law"} & stated:
+    for name in {*chain(*names_of.values()), "side", "free", "law"} & stated:
         document.remove(["motion", name])
-    if place == "stroke":
+    if commanded == "stroke":
         unit = find_unit(find_length(session.now.plain), "m")
         factor = to_si("1 m", unit)
         rate_unit = f"{unit}/s"
@@ -512,7 +512,7 @@ def _command_other(session: Session, asked: dict[str, Any]) -> None:
         "to": write_rounded(factor * (values[last] - inset), grain, unit),
         "steps": max(60, min(last - first, 360)),
     }
-    document.put(["motion", place], sweep)
+    document.put(["motion", commanded], sweep)
     if has_speed:
         rates = getattr(before, rate_name, None)
         if rates is None:
@@ -524,7 +524,7 @@ def _command_other(session: Session, asked: dict[str, Any]) -> None:
         document.put(["motion", rate_name], rounded)
 
     pose = _read_bar_directions(before, middle)
-    text = _choose_assembly(session, document, place == "stroke", pose)
+    text = _choose_assembly(session, document, commanded == "stroke", pose)
     session.change(lambda changed: changed.become(text))
 
 

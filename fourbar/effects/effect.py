@@ -408,14 +408,14 @@ class Effect:
         self,
         actions: Actions,
         pins: PinForces,
-        eliminate: Callable[..., PinForces],
+        solve_pin_forces: Callable[..., PinForces],
     ) -> SolvedFriction:
         """Solve for what depends on the pin forces, and add it to the actions.
 
         It is asked of effects with `loaded_pins`.
 
-        `pins`: pin forces under the actions, without it. `eliminate`: computes the pin
-        forces under some actions, and under inertia if `with_inertia`.
+        `pins`: pin forces under the actions, without it. `solve_pin_forces`: solves for
+        those under some actions, and under inertia if `with_inertia`.
         """
         raise NotImplementedError
 

@@ -91,7 +91,7 @@ class PinFriction(PinRows):
     def per_unit(
         self,
         actions: Actions,
-        eliminate: Callable[..., PinForces],
+        solve_pin_forces: Callable[..., PinForces],
     ) -> dict[str, PinForces]:
         """Compute the pin forces that a couple of 1 N m at each pin causes.
 
@@ -101,14 +101,14 @@ class PinFriction(PinRows):
         for pin in self.loaded_pins:
             single = Actions(actions.state, actions.bodies)
             single.pin_couple(pin, -actions.sense(pin))
-            forces[pin] = eliminate(single, with_inertia=False)
+            forces[pin] = solve_pin_forces(single, with_inertia=False)
         return forces
 
     def solve_friction(
         self,
         actions: Actions,
         pins: PinForces,
-        eliminate: Callable[..., PinForces],
+        solve_pin_forces: Callable[..., PinForces],
     ) -> SolvedFriction:
         """Add the couples that fulfil x_p = mu_p r_p |F_p(x)|.
 
@@ -117,7 +117,7 @@ class PinFriction(PinRows):
         loaded_pins = self.loaded_pins
         arms = {pin: mu * r for pin, mu, r in self.pins if pin in loaded_pins}
         senses = {pin: actions.sense(pin) for pin in loaded_pins}
-        per_unit = self.per_unit(actions, eliminate)
+        per_unit = self.per_unit(actions, solve_pin_forces)
         shape = np.shape(pins.F12)
 
         F = _stack_forces(pins, arms, shape)
@@ -136,7 +136,7 @@ class PinFriction(PinRows):
         for pin, couple in couples.items():
             actions.pin_couple(pin, -senses[pin] * couple)
 
-        loaded = eliminate(actions)
+        loaded = solve_pin_forces(actions)
         residuals = []
         for pin, couple in couples.items():
             force = getattr(loaded, PIN_FORCE[pin])

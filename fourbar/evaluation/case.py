@@ -104,8 +104,12 @@ class Case(NamedTuple):
     lengths: Loop
     bodies: MovingBodies
     terms: "tuple[Effect, ...]"
+    """Loads and effects, each a term of what acts; their places are settled."""
     drive_bar: int
     path: LoopPath
+    """Loop in the order of the commanded bar, whose lengths are in a unit of its own.
+    `lengths` are in the usual order, m.
+    """
     points: tuple[tuple[str, int, Any], ...] = ()
     """Points of the scene: name, bar, and place in the bar's frame, complex, m. The
     frame begins at the bar's first pin.

@@ -12,7 +12,7 @@ import numpy as np
 Number = Any
 """A float, or an array that broadcasts over positions and linkages."""
 PLAIN_TYPES = (int, np.generic)
-"""One truth value or code."""
+"""Types of one truth value or status code; a mask of many is an array."""
 _NUMPY = (np.ndarray, np.generic)
 _DOUBLES = {float, np.float64}
 U = 2.0**-53

@@ -1,6 +1,6 @@
 """Output of `analyze`: one block of aligned lines, at most 80 columns wide.
 
-The duty in its JSON belongs to it.
+The duty of the drive in the JSON of `analyze` is made here too.
 """
 
 import math

@@ -704,7 +704,7 @@ DAMAGES = {
 @pytest.mark.parametrize("name", DAMAGES)
 def test_a_damaged_state_file_is_one_line(session: Session, name: str) -> None:
     session.do({"do": "set", "path": ["lengths", "input"], "value": "105 mm"})
-    session.keep()
+    session.write_state_file()
     before = session.state_file.read_text()
     session.state_file.write_text(damaged := DAMAGES[name](before))
     assert damaged != before
@@ -744,7 +744,7 @@ def test_the_history_of_a_large_scene_stays_within_what_the_next_start_reads(
         )
         if size % 20 == 0:
             session.do({"do": "keep"})
-    session.keep()
+    session.write_state_file()
     assert session.state_file.stat().st_size < largest / 2
     again = Session(session.path, session.exports.folder)
     assert (
