@@ -24,7 +24,7 @@ from fourbar.quantities import LINE, PIN_FORCES
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.change_point import has_growing_forces
-from fourbar.show.duty import DUTY_UNITS, bearing_load, describe_drive
+from fourbar.show.duty import DUTY_UNITS, MotorDuty, bearing_load, describe_drive
 from fourbar.show.gas import list_gas_notes
 from fourbar.show.position import PositionSheet
 from fourbar.show.summary import (
@@ -541,7 +541,7 @@ class _SceneBlock:
                 for energy in (duty.energy_in, duty.energy_out)
             )
             row += f"; {forward} {over} given, {back} taken back"
-        lines = [self._row("power", row)]
+        lines = [self._row("power", row), *self._write_cycle(duty)]
         if not facts.linear:
             numbers = (
                 (duty.peak_torque, "N m"),
@@ -553,6 +553,17 @@ class _SceneBlock:
             )
             lines.append(f"motor: at least {torque} at {speed} (RMS {mean}), {peak}")
         return lines
+
+    def _write_cycle(self, duty: MotorDuty) -> list[str]:
+        """Write the mean torque of a closed sweep, and what a flywheel must store."""
+        if duty.energy_swing is None:
+            return []
+        energy = self._value(duty.energy_swing, "J")
+        swing = f"energy swings by {energy} about the mean"
+        if duty.mean_torque is None:
+            return [self._row("cycle", swing)]
+        mean = self._value(self._without_rounding(duty.mean_torque), "N m")
+        return [self._row("cycle", f"mean torque {mean}; {swing}")]
 
     def _write_drive_head(self) -> str:
         scene, motion = self.facts.scene, self.facts.scene.motion

@@ -69,6 +69,14 @@ class MotorDuty(NamedTuple):
     peak_force: float | None = None
     """Largest size of the force of a drive that exerts one, N."""
     rms_force: float | None = None
+    mean_torque: float | None = None
+    """Mean over the angle of the driven bar, N m. None: the sweep is not closed,
+    another bar is commanded, or the drive exerts a force.
+    """
+    energy_swing: float | None = None
+    """Largest minus smallest of the integral over time of power less mean power, J. A
+    flywheel stores it. None: the sweep is not closed.
+    """
 
 
 DUTY_UNITS = {
@@ -80,6 +88,7 @@ DUTY_UNITS = {
         "rms_power": "W",
     },
     **{"energy_in": "J", "energy_out": "J", "peak_force": "N", "rms_force": "N"},
+    **{"mean_torque": "N m", "energy_swing": "J"},
 }
 """SI unit of each number of `MotorDuty`. The speed of a drive that exerts a force is in
 m/s.
@@ -169,6 +178,11 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
     stroke, in a sweep; E_in of the positive part of P, E_out of the negative. Positions
     without a value are left out, and so are the steps from and to them.
 
+    Over a closed sweep of the angle theta the mean torque is (E_in - E_out)/theta, with
+    the sense of the rotation. A flywheel of inertia I on a bar that turns at about
+    omega takes up the swing of the energy dE = max - min of integral (P - mean P) dt
+    with a change of speed of omega dE/(I omega^2).
+
     Returns None where no position has a torque or force of the drive: a released
     linkage, or positions alone.
 
@@ -186,7 +200,13 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
     linear = solution.drive is not None
     peak = _find_peak_value(_require_quantity(solution, drive.keys.value))
     rms = _find_rms(solution, drive.values)
-    energy_in, energy_out = _integrate_power(solution, power)
+    spans = _compute_spans(solution, power)
+    energy_in, energy_out = _integrate_power(spans, power)
+    mean_power, swing = _find_swing(spans, power, closed)
+    mean_torque = None
+    if mean_power is not None and not linear and solution.drive_bar == solution.at.bar:
+        speed = getattr(solution, drive.speed_key)
+        mean_torque = _divide_by_mean(mean_power, spans, speed)
     return MotorDuty(
         peak_torque=None if linear else peak,
         rms_torque=None if linear else rms,
@@ -198,6 +218,8 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
         closed=bool(closed) if np.ndim(closed) == 0 else closed,
         peak_force=peak if linear else None,
         rms_force=rms if linear else None,
+        mean_torque=mean_torque,
+        energy_swing=swing,
     )
 
 
@@ -247,30 +269,32 @@ def _require_quantity(solution: Solution, name: str) -> Array:
     return values
 
 
-def _integrate_power(
-    solution: Solution,
-    power: Array,
-) -> tuple[float | None, float | None]:
-    """Integrate the positive and the negative part of the power, each over time."""
+def _compute_spans(solution: Solution, power: Array) -> Array:
+    """Compute the time between each two positions, s; NaN where nothing moves."""
     stroke = solution.at.stroke
     bar = solution.at.bar
     if solution.time is not None:
-        spans = np.diff(solution.time)
+        return np.asarray(np.diff(solution.time))
+    if stroke is None:
+        speed = getattr(solution, f"omega_{bar}")
     else:
-        if stroke is None:
-            speed = getattr(solution, f"omega_{bar}")
-        else:
-            speed = solution.stroke_speed
-        steps = np.diff(solution.at.places)
-        speed = np.broadcast_to(np.asarray(speed), power.shape)[..., :-1]
-        spans = np.abs(
-            np.divide(
-                steps,
-                speed,
-                out=np.full(speed.shape, np.nan),
-                where=speed != 0.0,
-            )
-        )
+        speed = solution.stroke_speed
+    steps = np.diff(solution.at.places)
+    speed = np.broadcast_to(np.asarray(speed), power.shape)[..., :-1]
+    spans = np.divide(
+        steps,
+        speed,
+        out=np.full(speed.shape, np.nan),
+        where=speed != 0.0,
+    )
+    return np.asarray(np.abs(spans))
+
+
+def _integrate_power(
+    spans: Array,
+    power: Array,
+) -> tuple[float | None, float | None]:
+    """Integrate the positive and the negative part of the power, each over time."""
     parts = [
         0.5 * spans * (part[..., :-1] + part[..., 1:])
         for part in (np.maximum(power, 0.0), np.maximum(-power, 0.0))
@@ -283,6 +307,37 @@ def _integrate_power(
         for part in parts
     )
     return energy_in, energy_out
+
+
+def _find_swing(
+    spans: Array,
+    power: Array,
+    closed: Any,
+) -> tuple[float | None, float | None]:
+    """Find the mean power, and the range of the energy about it, over closed sweeps.
+
+    NaN for a member of a study that is not closed, or has a position without a value.
+    """
+    work = spans * 0.5 * (power[..., :-1] + power[..., 1:])
+    counts = np.asarray(closed) & np.isfinite(work).all(axis=-1)
+    if not counts.any():
+        return None, None
+    spans = np.broadcast_to(spans, work.shape)
+    mean = np.where(counts, work.sum(axis=-1) / spans.sum(axis=-1), np.nan)
+    surplus = np.cumsum(work - mean[..., None] * spans, axis=-1)
+    # the first position counts with an energy of 0
+    most = np.maximum(surplus.max(axis=-1), 0.0)
+    least = np.minimum(surplus.min(axis=-1), 0.0)
+    swing = np.where(counts, most - least, np.nan)
+    return _reduce_to_number(mean), _reduce_to_number(swing)
+
+
+def _divide_by_mean(power: Any, spans: Array, speed: Any) -> Any:
+    """Divide a mean power by the mean speed over time; 0 where that is 0."""
+    speed = np.broadcast_to(np.asarray(speed), (*np.shape(power), spans.shape[-1] + 1))
+    turned = spans * 0.5 * (speed[..., :-1] + speed[..., 1:])
+    mean = turned.sum(axis=-1) / np.broadcast_to(spans, turned.shape).sum(axis=-1)
+    return _reduce_to_number(np.asarray(power) / mean)
 
 
 def _find_peak_value(values: Array) -> Any:

@@ -143,6 +143,12 @@ def test_peaks_and_means_are_those_of_much_finer_steps() -> None:
         text,
         re.MULTILINE,
     )
+    # weights and constant couples give back all that they take
+    assert "cycle    mean torque 0 N m; " in text
+    assert abs(np.trapezoid(fine.torque, fine.theta_2)) < 1e-6
+    (swing,) = re.findall(r"energy swings by (\S+) J about the mean", text)
+    steps = np.diff(fine.theta_2) * 0.5 * (fine.torque[1:] + fine.torque[:-1])
+    assert float(swing) == pytest.approx(np.ptp(np.cumsum(steps)), rel=5e-3)
 
 
 def test_each_kind_of_motion_shows_what_it_has_and_nothing_else() -> None:
@@ -159,6 +165,7 @@ def test_each_kind_of_motion_shows_what_it_has_and_nothing_else() -> None:
     assert (
         "3 positions from theta_2 = 10 deg to 200 deg" in listed
         and "given" not in listed
+        and "mean torque" not in listed
     )
     assert (
         "(of these positions)" in listed

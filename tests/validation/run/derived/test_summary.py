@@ -242,6 +242,8 @@ def test_a_bar_that_bends_more_elsewhere_fails(
         ("rms_power", "means"),
         ("energy_in", "means"),
         ("energy_out", "means"),
+        ("energy_swing", "means"),
+        ("mean_torque", "means"),
         ("pins", "pins"),
     ],
 )
@@ -305,6 +307,7 @@ def test_an_open_motion_that_is_taken_for_a_turn_fails(
         ("rms_power", "means"),
         ("energy_in", "means"),
         ("energy_out", "means"),
+        ("energy_swing", "means"),
     ],
 )
 def test_a_number_of_the_json_that_is_off_fails_its_row(
@@ -323,6 +326,22 @@ def test_a_number_of_the_json_that_is_off_fails_its_row(
     monkeypatch.setattr(module, "write_motor", off)
     rows = judge(TURN)
     assert {row.quantity for row in rows.values() if row.failed} == {name}
+
+
+def test_a_mean_torque_that_is_off_fails_its_row(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """That of a turn without damping is 0: a part of it would be 0 too."""
+    write = module.write_motor
+
+    def off(*of: Any) -> Any:
+        entry = write(*of)
+        assert entry is not None
+        return {**entry, "mean_torque": entry["mean_torque"] + 1e-6}
+
+    monkeypatch.setattr(module, "write_motor", off)
+    rows = judge(TURN)
+    assert {row.quantity for row in rows.values() if row.failed} == {"means"}
 
 
 def test_a_printed_bore_that_is_off_fails_its_row(

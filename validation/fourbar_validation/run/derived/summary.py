@@ -287,7 +287,7 @@ def _find_largest_load(judged: _SummaryJudge) -> float:
 
 
 def _judge_energy(judged: _SummaryJudge, entry: dict[str, Any], power: Array) -> None:
-    """Judge both energies by the trapezoidal rule.
+    """Judge energies, their swing and the mean torque by the trapezoidal rule.
 
     It is over the times at which the positions are passed.
     """
@@ -308,6 +308,21 @@ def _judge_energy(judged: _SummaryJudge, entry: dict[str, Any], power: Array) ->
         sums.append(float((spans * 0.5 * (part[:-1] + part[1:])).sum()))
     for key, total in zip(("energy_in", "energy_out"), sums, strict=True):
         judged.add("means", divide(abs(entry[key] - total), np.max(sums)))
+    swing = entry["energy_swing"]
+    if not entry["closed"]:
+        judged.add("means", 0.0 if swing is None else np.inf)
+        return
+    # the mean power is a straight line from the first to the last instant
+    time = np.concatenate([[0.0], np.cumsum(spans)])
+    steps = spans * 0.5 * (power[:-1] + power[1:])
+    given = np.concatenate([[0.0], np.cumsum(steps)])
+    about_mean = given - given[-1] * time / time[-1]
+    judged.add("means", divide(abs(swing - np.ptp(about_mean)), np.max(sums)))
+    if judged.scene.drive is None and judged.scene.drive_bar == at.bar:
+        sense = np.sign(np.mean(np.asarray(at.speed, float)))
+        turned = sense * abs(at.angle[-1] - at.angle[0])
+        of_mean = given[-1] - entry["mean_torque"] * turned
+        judged.add("means", divide(abs(of_mean), np.max(sums)))
 
 
 def _judge_bore(judged: _SummaryJudge, fine: Array) -> None:
