@@ -6,12 +6,12 @@ Every error names the file, the key, the value and what is allowed.
 import difflib
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from fourbar.errors import InputError, name_unit
 from fourbar.linkage import ANY_NUMBER, BAR_NAMES, REQUIRED_NUMBER, Declared, is_within
-from fourbar.quantities.units import UNIT_MISSING, UnitError, to_si
+from fourbar.quantities.units import UNIT_MISSING, UnitError, find_unit, to_si
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
 LONGEST_FIELD = 60
@@ -40,7 +40,11 @@ _MEANT = {
 }
 """Words that are no keys, and the keys that may be meant by them."""
 _LIKELY = {"rad": "deg", "m": "mm", "rad/s": "rpm"}
-"""Units that a number without one may have been meant in, other than the SI unit."""
+"""Units that a number without one may have been meant in, other than the SI unit. They
+are suggested where no number beside it has a unit of the kind.
+"""
+_STEP_OF_KEY = re.compile(r"[^.\[\]]+")
+"""One name or index of a key like `loads[0].force[1]`."""
 
 
 class Reader:
@@ -55,8 +59,10 @@ class Reader:
     COORDINATES = 'or {{ x = "1 {0}", y = "0 {0}" }}'
     """A place or a force by its components; empty where it has to be polar."""
 
-    def __init__(self, file: str) -> None:
+    def __init__(self, file: str, document: Mapping[str, Any] | None = None) -> None:
         self.file = file
+        self.document: Mapping[str, Any] = document or {}
+        """Tables of the file, for suggestions."""
         self.coordinates: dict[str, tuple[float, float]] = {}
         """x and y of the places (m) and forces that are stated by them, by their keys.
         """
@@ -174,9 +180,8 @@ class Reader:
 
     def in_si(self, key: str, value: object, unit: str, wanted: str) -> float:
         """Convert a text with a unit to a number in `unit`."""
-        likely = name_unit(unit, _LIKELY.get(unit))
         if isinstance(value, (int, float)) and not isinstance(value, bool):
-            like = f"{value:.6g} {likely}"
+            like = f"{value:.6g} {self._find_likely_unit(key, unit)}"
             missing = f'the unit is missing; did you mean "{like}"? {wanted}'
             raise self.refuse(key, value, missing)
         if value == "drawn":
@@ -191,8 +196,31 @@ class Reader:
             if unit == "rad" and value.casefold() in DIRECTION_WORDS:
                 hint = f'did you mean "{DIRECTION_WORDS[value.casefold()]}"? '
             elif str(error) == UNIT_MISSING:
+                likely = self._find_likely_unit(key, unit)
                 hint = f'did you mean "{value.strip()} {likely}"? '
             raise self.refuse(key, value, f"{error}; {hint}{wanted}") from None
+
+    def _find_likely_unit(self, key: str, unit: str) -> str:
+        """Return the unit in which a number without one was probably meant.
+
+        It is that of the nearest number of this kind: in the entry's own table, then in
+        those around it.
+        """
+        around: list[Any] = [self.document]
+        for step in _STEP_OF_KEY.findall(key):
+            holder = around[-1]
+            if isinstance(holder, dict):
+                around.append(holder.get(step))
+            elif isinstance(holder, list) and step.isdigit():
+                around += holder[int(step) : int(step) + 1]
+            else:
+                break
+        for holder in reversed(around):
+            for text in _list_texts(holder):
+                stated = find_unit(text, "")
+                if stated and _converts(stated, unit):
+                    return stated
+        return name_unit(unit, _LIKELY.get(unit))
 
     def declared(self, key: str, value: object, by: Declared) -> Any:
         """Read a number, or a magnitude with its angle, as it is declared."""
@@ -257,6 +285,27 @@ class Reader:
             self.quantity(f"{key}[0]", value[0], unit),
             self.quantity(f"{key}[1]", value[1], "rad"),
         )
+
+
+def _list_texts(holder: Any) -> Iterator[str]:
+    """List the texts of an entry, those of tables and lists within it too."""
+    if isinstance(holder, str):
+        yield holder
+    elif isinstance(holder, Mapping):
+        for entry in holder.values():
+            yield from _list_texts(entry)
+    elif isinstance(holder, list):
+        for entry in holder:
+            yield from _list_texts(entry)
+
+
+def _converts(stated: str, unit: str) -> bool:
+    """Return whether numbers with a stated unit are of the kind of another unit."""
+    try:
+        to_si(f"1 {stated}", unit)
+    except UnitError:
+        return False
+    return True
 
 
 def convert_to_polar(x: float, y: float) -> tuple[float, float]:

@@ -183,7 +183,7 @@ def read_tables(document: dict[str, Any], name: str = "scene") -> Scene:
     """
     shown = _write_name(name)
     try:
-        return read_scene(Reader(shown), document, str(Path(name).parent))
+        return read_scene(Reader(shown, document), document, str(Path(name).parent))
     except InputError as error:
         raise (error if error.file else error.in_file(shown)) from None
 

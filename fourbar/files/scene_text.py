@@ -413,11 +413,11 @@ def write_new_scene(lengths: tuple[str, ...] | list[str]) -> str:
 
     Raises InputError for what is no length, and for bars that cannot close.
     """
-    read = Reader("--lengths")
     stated = [
         (name, " ".join(text.split()))
         for name, text in zip(BAR_NAMES.values(), lengths, strict=True)
     ]
+    read = Reader("--lengths", dict(stated))
     d, a, b, c = (read.quantity(name, text, "m", POSITIVE) for name, text in stated)
     FourBar(d, Bar(a), Bar(b), Bar(c))
     lines = "\n".join(f"{name} = {_quote(text)}" for name, text in stated)

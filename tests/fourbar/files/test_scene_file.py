@@ -19,6 +19,7 @@ from fourbar.cli import status
 from fourbar.errors import BAD_INPUT, FourBarError, InputError
 from fourbar.files import load, loads, read_scene_text
 from fourbar.files.scene_file import LARGEST_SCENE_FILE
+from fourbar.files.scene_text import write_new_scene
 
 GOOD = """title = "good"
 [lengths]
@@ -718,3 +719,72 @@ gravity = { x = "1.5 m/s^2", y = "-9.81 m/s^2" }
 def test_another_mechanism_is_told_where_to_go(key: str) -> None:
     with pytest.raises(InputError, match="sliders and several loops in PMKS"):
         loads(f'[lengths]\n{key} = "1 m"\n')
+
+
+IN_OTHER_UNITS = """\
+[lengths]
+ground = "48 in"
+input = "1.5 ft"
+coupler = "40 in"
+output = "36 in"
+[bars.input]
+mass = "200 g"
+inertia = "30 kg cm^2"
+[bars.coupler]
+mass = "300 g"
+inertia = "3 kg cm^2"
+[motion]
+theta_2 = { from = "1 rad", to = "2 rad" }
+omega_2 = "2 deg/s"
+[points]
+P = { bar = 3, from_pin = ["40 mm", "0.2 rad"] }
+Q = { bar = 3, from_pin = ["50 mm", "0.2 rad"] }
+[[loads]]
+bar = 4
+moment = "3 N cm"
+force = ["2 kgf", "0.1 rad"]
+[[loads]]
+bar = 3
+moment = "4 N cm"
+force = ["2 lbf", "0.1 rad"]
+[effects]
+viscous = { O2 = "0.01 N cm s/deg", A = "3 N cm s/deg" }
+[tolerances]
+"lengths.input" = "0.01 mm"
+"lengths.coupler" = "0.02 mm"
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "meant"),
+    [
+        ('coupler = "40 in"', "coupler = 40", "40 in"),
+        ('coupler = "40 in"', 'coupler = "40"', "40 in"),
+        # the nearest number of its kind stands in another table
+        ('mass = "300 g"', "mass = 300", "300 g"),
+        ('inertia = "3 kg cm^2"', "inertia = 3", "3 kg cm^2"),
+        ('to = "2 rad"', "to = 2", "2 rad"),
+        ('["40 mm", "0.2 rad"]', '[40, "0.2 rad"]', "40 mm"),
+        ('moment = "4 N cm"', "moment = 4", "4 N cm"),
+        # the table's own comes before those of other loads, in the file's order
+        ('["2 lbf", "0.1 rad"]', '[2, "0.1 rad"]', "2 kgf"),
+        ('["2 lbf", "0.1 rad"]', '["2 lbf", 5]', "5 rad"),
+        ('A = "3 N cm s/deg"', "A = 3", "3 N cm s/deg"),
+        ('"lengths.coupler" = "0.02 mm"', '"lengths.coupler" = 0.02', "0.02 mm"),
+        # no number of the file is a speed of rotation
+        ('omega_2 = "2 deg/s"', "omega_2 = 60", "60 rpm"),
+    ],
+)
+def test_a_number_without_a_unit_is_suggested_in_that_of_its_neighbours(
+    old: str, new: str, meant: str
+) -> None:
+    assert IN_OTHER_UNITS.count(old) == 1
+    loads(IN_OTHER_UNITS)
+    with pytest.raises(InputError) as caught:
+        loads(IN_OTHER_UNITS.replace(old, new))
+    assert f'the unit is missing; did you mean "{meant}"?' in str(caught.value)
+
+
+def test_lengths_of_a_new_scene_without_a_unit_are_suggested_alike() -> None:
+    with pytest.raises(InputError, match='did you mean "4 in"'):
+        write_new_scene(["12 in", "4", "10 in", "9 in"])
