@@ -62,6 +62,8 @@ OF_ONE_PREFIX = 1e-3
 """Ratio of the smallest to the largest of several quantities that share a prefix. Below
 it each has a prefix of its own.
 """
+_MOST_HELD = 4
+"""Number of places at which dry friction holds a pin that are listed."""
 LOCATED = 1e-6
 """Part of the motion within which the place of a flat maximum is located. A place
 nearer to zero than that is zero.
@@ -462,22 +464,37 @@ class _SceneBlock:
                 f" {self._value(rms, drive.unit)}"
             )
         lines.append(self._row(word, row))
-        if facts.held is not None:
-            low, high = (
-                self._value(value, drive.unit, max(map(abs, facts.held)))
-                for value in facts.held
-            )
-            if facts.duty is None:
-                holds = "dry friction holds it between them"
-            else:
-                holds = "the range where dry friction holds"
-            lines.append(self._row("at rest", f"{low} to {high}: {holds}"))
+        if facts.held:
+            lines.append(self._row("at rest", self._write_held(drive.unit)))
         if facts.stroke_range is not None:
             lines += self._write_stroke()
         lines += self._write_power()
         if pressure is not None and facts.stroke_range is not None:
             lines += self._write_bore(pressure)
         return lines
+
+    def _write_held(self, unit: str) -> str:
+        """Write between which torques or forces dry friction holds, and where."""
+        facts = self.facts
+        parts = []
+        for held in facts.held[:_MOST_HELD]:
+            size = max(abs(held.low), abs(held.high))
+            low = self._value(held.low, unit, size)
+            high = self._value(held.high, unit, size)
+            first, last = held.ends
+            if len(facts.solution) == 1:
+                return f"{low} to {high}: dry friction holds it between them"
+            if first == last:
+                parts.append(f"{low} to {high} at {self._place(first)}")
+            else:
+                until = self._place(last, named=False)
+                parts.append(
+                    f"{low} to {high} over {self._place(first)} to {until}, a part of"
+                    " it at each position"
+                )
+        if len(facts.held) > _MOST_HELD:
+            parts.append(f"and at {len(facts.held) - _MOST_HELD} more places")
+        return f"{', '.join(parts)}: dry friction holds"
 
     def _without_rounding(self, value: float) -> float:
         """Return zero for a torque or force of the drive within its rounding."""

@@ -107,6 +107,17 @@ class _BarBending(NamedTuple):
     """
 
 
+class HeldRange(NamedTuple):
+    """Neighbouring positions at which dry friction holds a pin at rest."""
+
+    low: float
+    """Least torque or force of the drive that holds one of them."""
+    high: float
+    """Greatest torque or force that holds one of them."""
+    ends: tuple[float, float]
+    """Commanded angle or stroke of the first and the last, rad or m, or the time, s."""
+
+
 class Between(NamedTuple):
     """A sweep with what its steps pass over."""
 
@@ -363,7 +374,7 @@ def _slip_of_pin(solution: Solution, pin: str) -> Array:
 def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array, Array]:
     """List the steps in which the slip of a pin with dry friction changes sign.
 
-    Each has the pin and its ends.
+    Each has the pin and its ends. They are one position where a turn begins and ends.
     """
     dry_pins = {pin for effect in scene.effects for pin in effect.dry_pins}
     pins = []
@@ -378,6 +389,12 @@ def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array,
                 pins.append(pin)
                 first.append(i)
                 last.append(j)
+        # what lies at both ends of a turn is passed like any other position
+        repeats = is_once_round(solution) and solution.assembled.all()
+        if repeats and len(moving) and slip[moving[-1]] * slip[moving[0]] < 0.0:
+            pins.append(pin)
+            first.append(0)
+            last.append(0)
     places = solution.at.places
     return pins, places[np.array(first, dtype=int)], places[np.array(last, dtype=int)]
 
@@ -532,7 +549,9 @@ def _find_growing(
     """Mark the searches for a maximum that end beside a pole.
 
     Towards a pole the values of the last calls rise. A call may hit the pole to within
-    rounding, after which nothing rises; the value then stands out from both beside it.
+    rounding, after which nothing rises; the value then stands out from both beside it,
+    and these from the next. Where dry friction reverses the forces jump, and a position
+    at which the pin rests has one value more, but beside it they are level.
 
     Parameters
     ----------
@@ -541,12 +560,15 @@ def _find_growing(
     best : index of the largest of them, (k,).
     """
     rises: NDArray[np.bool_] = reached[-1] > (1.0 + GROWING) * reached[-3]
-    padded = np.pad(values, ((0, 0), (1, 1)), constant_values=-1.0)
+    padded = np.pad(values, ((0, 0), (2, 2)), constant_values=-1.0)
     rows = np.arange(len(best))
-    before = padded[rows, best]
-    after = padded[rows, best + 2]
-    stands_out = reached[-1] > (1.0 + GROWING) * np.maximum(before, after)
-    return rises | stands_out
+    next_but_one, before, here, after, last = (
+        padded[rows, best + step] for step in range(5)
+    )
+    stands_out = here > (1.0 + GROWING) * np.maximum(before, after)
+    steep = (next_but_one >= 0.0) & (before > (1.0 + GROWING) * next_but_one)
+    steep |= (last >= 0.0) & (after > (1.0 + GROWING) * last)
+    return rises | (stands_out & steep)
 
 
 class _PinLoad(NamedTuple):
@@ -585,8 +607,8 @@ class Facts:
     peak: Peak | None
     """Largest torque or force of the drive, signed."""
     duty: MotorDuty | None
-    held: tuple[float, float] | None
-    """Least and greatest torque or force while dry friction holds a pin at rest."""
+    held: list[HeldRange]
+    """Where dry friction holds a pin at rest, in the order of the positions."""
     pins: dict[str, _PinLoad]
     rates: dict[int, tuple[Peak, Peak]]
     """Largest speed and acceleration, signed, of the bars that follow. Empty if no
@@ -668,7 +690,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
         drive=None if peak is None else drive,
         peak=peak,
         duty=duty,
-        held=None if drive is None else _find_held(solution, drive),
+        held=[] if drive is None else _list_held(solution, drive, kind),
         pins=_list_pin_loads(solution, between),
         rates=_find_rates(solution, smooth=smooth),
         bending=bending,
@@ -902,15 +924,25 @@ def find_duty(between: Between) -> MotorDuty | None:
     )
 
 
-def _find_held(solution: Solution, drive: Driving) -> tuple[float, float] | None:
-    low = getattr(solution, drive.keys.low)
-    high = getattr(solution, drive.keys.high)
+def _list_held(solution: Solution, drive: Driving, kind: str) -> list[HeldRange]:
+    """List where dry friction holds a pin at rest.
+
+    A turn that begins at such a position ends at the same, which is listed once.
+    """
+    low, high = (getattr(solution, name) for name in (drive.keys.low, drive.keys.high))
     if low is None:
-        return None
-    held = np.isfinite(low) & np.isfinite(high) & (low < high)
-    if not held.any():
-        return None
-    return float(low[held].min()), float(high[held].max())
+        return []
+    places = _list_commanded(solution)
+    rows = np.flatnonzero(np.isfinite(low) & np.isfinite(high) & (low < high))
+    ranges = list[HeldRange]()
+    for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1):
+        if len(run) == 0:
+            continue
+        if kind == "turn" and ranges and run[0] == len(solution) - 1 and rows[0] == 0:
+            continue
+        ends = float(places[run[0]]), float(places[run[-1]])
+        ranges.append(HeldRange(float(low[run].min()), float(high[run].max()), ends))
+    return ranges
 
 
 def _find_peak(solution: Solution, values: Array | None) -> Peak:

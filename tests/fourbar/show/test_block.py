@@ -388,9 +388,42 @@ def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held()
     held = replace(bare, effects=(*bare.effects, fourbar.Friction.at(O2=0.5)))
     facts = summarize(held, fourbar.solve(held))
     outer = static.min() - 0.5, static.max() + 0.5
-    assert facts.held == pytest.approx(outer, rel=1e-12)
-    row = f"at rest  {1e3 * outer[0]:.4g} mN m to {1e3 * outer[1]:.4g} mN m: the range"
-    assert row in plain(block(held)).replace("at rest ", "at rest  ")
+    ((low, high, ends),) = facts.held
+    assert (low, high) == pytest.approx(outer, rel=1e-12) and ends == (0.2, 1.4)
+    row = f"at rest {1e3 * outer[0]:.4g} mN m to {1e3 * outer[1]:.4g} mN m over"
+    text = plain(block(held))
+    assert f"{row} theta_2 = 11.46 deg to 80.21 deg, a part of it at each" in text
+
+
+def test_each_position_at_rest_has_its_own_range() -> None:
+    """Pin B stands against the coupler at 0 and 180 deg, pin O4 between positions.
+
+    The torque jumps by each range while B reverses.
+    """
+    lengths = 0.3, fourbar.Bar(0.04), fourbar.Bar(0.29), fourbar.Bar(0.065)
+    pins = ("O2", "A", "B", "O4")
+    friction = fourbar.PinFriction.at(**dict.fromkeys(pins, (0.15, 0.005)))
+    scene = fourbar.Scene(
+        fourbar.FourBar(*lengths),
+        fourbar.Motion(fourbar.Sweep(0.0, math.tau, 72), math.tau),
+        effects=(fourbar.Friction.at(O4=20.0), friction),
+    )
+    facts = summarize(scene, fourbar.solve(scene))
+    assert [held.ends for held in facts.held] == [(0.0, 0.0), (math.pi, math.pi)]
+    for held in facts.held:
+        beside = held.ends[0] + np.array([-1e-9, 1e-9])
+        motion = fourbar.Motion(beside, math.tau)
+        torque = fourbar.solve(replace(scene, motion=motion)).torque
+        assert torque is not None
+        assert sorted(torque) == pytest.approx([held.low, held.high], rel=1e-6)
+    text = plain(block(scene))
+    first, second = ([f"{held.low:.4g}", f"{held.high:.4g}"] for held in facts.held)
+    assert (
+        f"at rest {first[0]} N m to {first[1]} N m at theta_2 = 0 deg, {second[0]} N m"
+        f" to {second[1]} N m at theta_2 = 180 deg: dry friction holds" in text
+    )
+    assert "at theta_2 = 0 deg (B), 10.52 deg (O4), 180 deg (B), 188.7 deg (O4)" in text
+    assert "of these positions" not in text and "without bound" not in text
 
 
 def test_a_reversal_of_a_motion_law_is_named_by_its_angle() -> None:

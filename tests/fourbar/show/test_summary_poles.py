@@ -220,3 +220,39 @@ def test_a_pole_just_beyond_the_last_position_is_none_between(
     assert ("drive_force" in facts.between.growing) == grows
     said = "without bound" in write(scene)
     assert said == grows
+
+
+@pytest.mark.parametrize("steps", (36, 97, 360))
+@pytest.mark.parametrize("start", (0.0, -math.pi, 0.3))
+@pytest.mark.parametrize("pins", (("B",), ("O2", "A", "B", "O4")))
+def test_a_jump_where_pin_friction_reverses_is_no_pole(
+    pins: tuple[str, ...], start: float, steps: int
+) -> None:
+    """Coupler and output turn alike where the diagonal is shortest and longest.
+
+    Pin B reverses there, at positions of some sweeps and at the ends of some turns.
+    """
+    friction = fourbar.PinFriction.at(**dict.fromkeys(pins, (0.15, 0.005)))
+    scene = fourbar.Scene(
+        fourbar.FourBar(0.3, fourbar.Bar(0.04), fourbar.Bar(0.29), fourbar.Bar(0.065)),
+        fourbar.Motion(fourbar.Sweep(start, start + math.tau, steps), math.tau),
+        loads=(fourbar.Load(4, moment=-20.0),),
+        effects=(friction,),
+    )
+    between = locate_between(scene, fourbar.solve(scene))
+    assert not between.growing
+    at_B = [
+        math.remainder(place, math.tau)
+        for place, pin in between.reversals
+        if pin == "B"
+    ]
+    assert np.abs(np.sin(at_B)).max() < 1e-8 and len(at_B) == 2
+    sides = np.concatenate(
+        [base + np.linspace(-1e-9, 1e-9, 2) for base in (0.0, math.pi)]
+    )
+    fine = np.concatenate([np.linspace(0.0, math.tau, 7201) + 0.01, sides])
+    everywhere = fourbar.solve(replace(scene, motion=fourbar.Motion(fine, math.tau)))
+    for name in ("F12", "F14"):
+        most = np.hypot(*getattr(everywhere, name).T).max()
+        located = np.hypot(*getattr(between.solution, name).T).max()
+        assert located == pytest.approx(most, rel=1e-5)
