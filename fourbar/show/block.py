@@ -13,8 +13,10 @@ import numpy as np
 from fourbar.errors import clean_line
 from fourbar.formulas.mobility import (
     PARALLELOGRAM,
+    TURN,
     change_points,
     classify,
+    find_intervals,
     find_miss,
     name_assembly,
     turns_fully,
@@ -366,7 +368,7 @@ class _SceneBlock:
                 name = BAR_NAMES[bar]
             begin = (
                 f"{name} from {self._place(first, named=False)} to"
-                f" {self._place(last, named=False)}"
+                f" {self._place(last, named=False)}{self._write_inset()}"
             )
         if facts.kind == "released":
             following = [2, 4]
@@ -381,6 +383,23 @@ class _SceneBlock:
                 ),
             ]
         )
+
+    def _write_inset(self) -> str:
+        """Write how far a range that the scene leaves out stays inside the limits."""
+        motion = self.facts.scene.motion
+        linkage = self.facts.scene.linkage
+        bar = motion.bar
+        stated = motion.angle is not None or motion.stroke is not None
+        if stated or turns_fully(linkage, bar):
+            return ""
+        first, last = self.facts.commanded
+        inset = min(
+            (first - low) % TURN
+            for low, high in find_intervals(linkage, bar)
+            if (first - low) % TURN <= high - low
+        )
+        inside, low, high = map(self._angle, (inset, first - inset, last + inset))
+        return f", {inside} inside its limits {low} and {high}"
 
     def _write_swing(self, bar: int) -> str:
         low, high = self.facts.angles[bar]

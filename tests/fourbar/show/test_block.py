@@ -514,3 +514,24 @@ def test_the_largest_rates_of_following_bars_are_those_of_fine_steps(
             assert math.remainder(peak.place - fine.theta_2[i], math.tau) == (
                 pytest.approx(0.0, abs=0.07)
             )
+
+
+@pytest.mark.parametrize("lengths", [(0.3, 0.4, 0.2, 0.25), (0.2, 0.25, 0.21, 0.22)])
+@pytest.mark.parametrize("bar", [2, 4])
+def test_a_range_that_is_left_out_is_printed_with_the_limits(
+    lengths: tuple[float, float, float, float], bar: int
+) -> None:
+    """The program chooses one degree less at each end, which is no limit."""
+    motion = fourbar.Motion(**{f"omega_{bar}": 1.0})
+    scene = fourbar.Scene(fourbar.uniform(*lengths), motion)
+    swept = getattr(fourbar.solve(scene, "position"), f"theta_{bar}")
+    limits = swept[[0, -1]] + np.radians([-1.0, 1.0])
+    stated = fourbar.Sweep(float(swept[0]), float(swept[-1]), 72)
+    commanded = {f"theta_{bar}": limits + np.radians([-0.001, 0.001])}
+    beyond = replace(scene, motion=fourbar.Motion(**commanded))
+    assert not fourbar.solve(beyond, "position").assembled.any()
+    low, high = (f"{math.degrees(limit):.4g} deg" for limit in limits)
+    line = f"1 deg inside its limits {low} and {high}; "
+    assert line in plain(block(scene))
+    motion = scene.motion.replace(angle=stated)
+    assert "inside its limits" not in plain(block(replace(scene, motion=motion)))
