@@ -91,6 +91,9 @@ def state_lengths(
 ) -> dict[str, Any]:
     """State a drawing by lengths, and each place of it in its bar's frame."""
     met = meet_lengths(drawing, top["pins"])
+    drawn = tuple(drawing.length(bar) for bar in ENDS)
+    if met != drawn:
+        read.stated_lengths = drawn
     lengths = {name: f"{met[bar - 1]!r} m" for name, bar in _NUMBERS_OF_BARS.items()}
     lengths["ground_angle"] = f"{drawing.angle(1)!r} rad"
     stated = {

@@ -64,6 +64,7 @@ class Reader:
         self.document: Mapping[str, Any] = document or {}
         """Tables of the file, for suggestions."""
         self.coordinates: dict[str, tuple[float, float]] = {}
+        self.stated_lengths: tuple[float, ...] | None = None
         """x and y of the places (m) and forces that are stated by them, by their keys.
         """
 

@@ -271,6 +271,9 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     if drawing is not None:
         scene = choose_assembly(scene, drawing)
     scene = replace(scene, coordinates=tuple(read.coordinates.items()))
+    if read.stated_lengths is not None:
+        pair = read.stated_lengths, linkage.lengths
+        scene = replace(scene, met_lengths=pair)
     return replace(
         scene,
         tolerances=_read_tolerances(read, scene, top.get("tolerances", {})),
@@ -349,7 +352,10 @@ def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
         lengths,
         dict.fromkeys(BAR_NAMES.values(), Bar.numbers["length"]),
     )
-    length = _meet_stated_equalities(length, lengths)
+    met = _meet_stated_equalities(length, lengths)
+    if met != length:
+        read.stated_lengths = tuple(length[name] for name in BAR_NAMES.values())
+    length = met
     tables = read.table("bars", top.get("bars", {}), BAR_NUMBERS)
     bars = {
         name: _read_bar(read, f"bars.{name}", tables.get(name, {}), length[name])

@@ -538,6 +538,40 @@ def count_equalities(lengths: tuple[float, float, float, float]) -> int:
     return sum(gap <= touching for gap in _find_gaps(lengths))
 
 
+def list_met_equalities(
+    stated: tuple[float, ...],
+    met: tuple[float, ...],
+) -> list[tuple[str, str, float]]:
+    """List what is equal in the lengths that `meet_change_points` returns alone.
+
+    Each has the names of both sides and how far they differ as stated, m. They are
+    bars, or sums of two where no bar is as long as another.
+    """
+    touching = TOUCHING * math.fsum(met)
+    bars = tuple(BAR_NAMES.values())
+    pairs = list[tuple[str, str, float]]()
+    for second in range(1, len(met)):
+        for first in range(second):
+            if abs(met[first] - met[second]) <= touching:
+                gap = abs(stated[first] - stated[second])
+                if gap > touching:
+                    pairs.append((bars[first], bars[second], gap))
+                break
+    if pairs:
+        return pairs
+    for signs in _EQUALITIES:
+        gap = abs(math.fsum(map(mul, signs, stated)))
+        if abs(math.fsum(map(mul, signs, met))) <= touching < gap:
+            sides = [
+                " + ".join(
+                    bar for bar, sign in zip(bars, signs, strict=True) if sign == side
+                )
+                for side in (-1, 1)
+            ]
+            pairs.append((sides[0], sides[1], gap))
+    return pairs
+
+
 def meet_change_points(
     lengths: tuple[float, float, float, float],
     roundings: tuple[float, float, float, float],

@@ -83,6 +83,8 @@ class Scene:
         coordinates.
     coordinates : keys of the places that a scene file states by x and y, with these, m;
         a file is written likewise.
+    met_lengths : lengths that a scene file states and those that are read for them, m,
+        if these have an equality that the stated ones miss by rounding.
     """
 
     linkage: FourBar
@@ -100,6 +102,11 @@ class Scene:
     drawing: DrawnPins | None = None
     coordinates: tuple[tuple[str, tuple[float, float]], ...] = field(
         default=(),
+        repr=False,
+        compare=False,
+    )
+    met_lengths: tuple[tuple[float, ...], tuple[float, ...]] | None = field(
+        default=None,
         repr=False,
         compare=False,
     )

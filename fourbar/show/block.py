@@ -18,6 +18,7 @@ from fourbar.formulas.mobility import (
     classify,
     find_intervals,
     find_miss,
+    list_met_equalities,
     name_assembly,
     turns_fully,
 )
@@ -316,7 +317,7 @@ class _SceneBlock:
         linkage = self.facts.scene.linkage
         motion = self.facts.scene.motion
         points = change_points(linkage, motion.bar)
-        lines = []
+        lines = self._write_met_equalities()
         if (miss := find_miss(linkage)) is not None:
             gap = self._value(miss[0], "m")
             has = "one change point, not two" if points else "no change point"
@@ -338,6 +339,22 @@ class _SceneBlock:
                 "motion, a turn apart"
             )
         return [*lines, line]
+
+    def _write_met_equalities(self) -> list[str]:
+        """Write what lengths are read as equal, and by how much they differ."""
+        scene = self.facts.scene
+        if scene.met_lengths is None or scene.met_lengths[1] != scene.linkage.lengths:
+            return []
+        equal = [
+            f"{first} and {second}, which differ by {self._value(gap, 'm')}"
+            for first, second, gap in list_met_equalities(*scene.met_lengths)
+        ]
+        if not equal:
+            return []
+        return [
+            "lengths read as equal within the last decimals of what is stated:"
+            f" {'; '.join(equal)}"
+        ]
 
     def _write_ranges(self) -> str:
         """Write how far the commanded bar goes, or the stroke, and the output.

@@ -248,6 +248,60 @@ def test_a_parallelogram_that_is_missed_by_one_equality_keeps_a_change_point(
     assert found[:2] == [miss, "change point at theta_2 = 180 deg"], lines
 
 
+GRIPPER = """
+[pins]
+O2 = ["38 mm", "69 mm"]
+A = ["77.824 mm", "89.953 mm"]
+B = ["99.824 mm", "85.954 mm"]
+O4 = ["60 mm", "65 mm"]
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            GRIPPER,
+            "ground and coupler, which differ by 0.0001789 mm; input and output, which"
+            " differ by 0.0004656 mm",
+        ),
+        (
+            state(("44.7214 mm", "22.3607 mm", "44.7213 mm", "22.3607 mm")),
+            "ground and coupler, which differ by 0.0001 mm",
+        ),
+        (
+            state(("3.333 m", "1.3333 m", "3.0 m", "1.6667 m")),
+            "ground + input and coupler + output, which differ by 0.4 mm",
+        ),
+        (
+            state(("10.001 mm", "10.0013 mm", "10.0009 mm", "10.0011 mm")),
+            "ground and input, which differ by 0.0003 mm; ground and coupler, which"
+            " differ by 0.0001 mm; ground and output, which differ by 0.0001 mm",
+        ),
+        (state(("300 mm", "100 mm", "0.3 m", "10 cm")), ""),
+        (state(("3 in", "1 in", "76.2 mm", "25.4 mm")), ""),
+        (state(("300 mm", "101 mm", "0.3 m", "10 cm")), ""),
+    ],
+)
+def test_lengths_that_are_read_as_equal_are_said_with_their_difference(
+    tmp_path: Path, text: str, said: str
+) -> None:
+    """The loops of a gripper in CAD and of lengths to the fourth decimal.
+
+    Where the stated lengths are equal, or differ by more, nothing is said.
+    """
+    scene = read(tmp_path, text)
+    in_mm = {**COMMON, **fourbar.units("mm")}
+    lines = " ".join(write_block(scene, fourbar.solve(scene), in_mm)[1:])
+    lines = " ".join(lines.split())
+    start = "lengths read as equal within the last decimals of what is stated: "
+    assert (f"{start}{said}" in lines) == bool(said)
+    assert (start in lines) == bool(said)
+    longer = replace(scene.linkage.coupler, length=1.0001 * scene.linkage.lengths[2])
+    other = replace(scene, linkage=replace(scene.linkage, coupler=longer))
+    assert start not in " ".join(write_block(other, fourbar.solve(other)))
+
+
 def test_one_equality_is_met_by_the_least_change() -> None:
     met = meet_change_points((4.00001, 1.0, 2.0, 3.0), (1e-5, 0.0, 0.0, 0.0))
     assert met == (4.0, 1.0, 2.0, 3.0)
