@@ -23,7 +23,7 @@ from fourbar.formulas.mobility import (
     turns_fully,
 )
 from fourbar.linkage import BAR_NAMES, PIN_FORCE
-from fourbar.quantities import LINE, PIN_FORCES
+from fourbar.quantities import LINE, OK, PIN_FORCES, Array
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.change_point import has_growing_forces
@@ -64,6 +64,12 @@ the digits of a double are lost then.
 OF_ONE_PREFIX = 1e-3
 """Ratio of the smallest to the largest of several quantities that share a prefix. Below
 it each has a prefix of its own.
+"""
+_STATUS_WORDS = {"change_point": "at a change point"}
+"""Words for the statuses of positions that are not the names alone."""
+_BESIDE_CHANGE_POINT = 1e-9
+"""rad; an angle nearer to a change point is rounded from it: files state angles with
+nine decimals and more.
 """
 _MOST_HELD = 4
 """Number of places at which dry friction holds a pin that are listed."""
@@ -280,15 +286,38 @@ class _SceneBlock:
     def _write_statuses(self) -> list[str]:
         """Write how many positions have which status, where one is not ok."""
         facts = self.facts
-        if not any(name != "ok" for name in facts.counts):
+        counts = dict(facts.counts)
+        beside = self._find_beside_change_points()
+        if not len(beside) and all(name == "ok" for name in counts):
             return []
-        counts = ", ".join(
-            f"{count} {name.replace('_', ' ')}" for name, count in facts.counts.items()
-        )
+        if len(beside):
+            counts["ok"] -= len(beside)
+        parts = [
+            f"{count} {_STATUS_WORDS.get(name, name.replace('_', ' '))}"
+            for name, count in counts.items()
+            if count
+        ]
+        if len(beside):
+            away = self._angle(float(beside.max()))
+            parts.append(f"{len(beside)} within {away} of a change point")
         return [
             f"{len(facts.solution)} position{'s' if len(facts.solution) > 1 else ''}:"
-            f" {counts}"
+            f" {', '.join(parts)}"
         ]
+
+    def _find_beside_change_points(self) -> Array:
+        """Find how far positions lie from the change point that is meant, rad, (n,).
+
+        They are evaluated beside it, for the rounding of the angle.
+        """
+        solution = self.facts.solution
+        angle = solution.at.angle[solution.status_code == OK]
+        points = change_points(self.facts.scene.linkage, solution.at.bar)
+        if not points:
+            return np.empty(0)
+        away = angle[:, None] - np.array(points)
+        away = np.abs(away - TURN * np.rint(away / TURN)).min(axis=1)
+        return np.asarray(away[away <= _BESIDE_CHANGE_POINT])
 
     def _is_acted_on(self) -> bool:
         """Return True if anything acts, or a bar has mass.

@@ -302,6 +302,27 @@ def test_lengths_that_are_read_as_equal_are_said_with_their_difference(
     assert start not in " ".join(write_block(other, fourbar.solve(other)))
 
 
+@pytest.mark.parametrize(
+    ("angles", "said"),
+    [
+        ([0.0, 1.0, math.pi], "3 positions: 1 ok, 2 at a change point"),
+        ([0.0, 1.0, 3.14159265359], "1 ok, 1 at a change point, 1 within 1.186e-11"),
+        ([2e-11, 1.0, 9.42477796077], "3 positions: 1 ok, 2 within 1.146e-09 deg"),
+        ([1.0, 3.1416], ""),
+    ],
+)
+def test_a_position_that_misses_a_change_point_by_its_decimals_is_said(
+    angles: list[float], said: str
+) -> None:
+    scene = fourbar.Scene(
+        fourbar.uniform(0.3, 0.1, 0.3, 0.1), fourbar.Motion(np.array(angles), 1.0)
+    )
+    text = " ".join(write_block(scene, fourbar.solve(scene)))
+    text = " ".join(text.split())
+    assert said in text
+    assert (" within " in text) == (" within " in said)
+
+
 def test_one_equality_is_met_by_the_least_change() -> None:
     met = meet_change_points((4.00001, 1.0, 2.0, 3.0), (1e-5, 0.0, 0.0, 0.0))
     assert met == (4.0, 1.0, 2.0, 3.0)

@@ -343,6 +343,14 @@ def test_without_a_range_it_goes_as_far_as_the_loop_assembles() -> None:
     assert width == pytest.approx(2.0 * most - 2.0 * math.radians(1.0))
 
 
+def test_a_right_angle_of_the_pose_meets_both_change_points() -> None:
+    """An upright parallelogram is swept by steps of 3 deg."""
+    square = {"O2": (0.0, 0.0), "A": (0.0, 0.2), "B": (0.3, 0.2), "O4": (0.3, 0.0)}
+    made = read(Planar(pins=square).text())
+    solution = fourbar.solve(made.scene, "position")
+    assert solution.status.count("change_point") == 2
+
+
 def test_a_scene_reads_back_and_says_what_it_is() -> None:
     made = read(FOOT)
     assert loads(fourbar.dump(made.scene)) == made.scene

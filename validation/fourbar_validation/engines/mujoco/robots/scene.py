@@ -61,6 +61,8 @@ DIGITS_OF_A_MODEL = 12
 """Significant digits of a number of the scene. Those beyond are round-off of the
 compiler.
 """
+_DECIMALS_OF_A_DEGREE = 10
+"""The same for an angle in degrees."""
 SWEEP_INTERVALS = 120
 """Intervals of the sweep."""
 RANGE_INTERVALS = 720
@@ -203,8 +205,11 @@ def round_off(number: float) -> float:
 
 
 def _round_angle(angle: float) -> float:
-    """Round an angle to the digits that a compiled model has, rad; -0.0 becomes 0.0."""
-    return round(angle, DIGITS_OF_A_MODEL) + 0.0
+    """Round an angle to the digits that a compiled model has, rad; -0.0 becomes 0.0.
+
+    It is rounded in degrees, so that a right angle stays one to its last digit.
+    """
+    return math.radians(round(math.degrees(angle), _DECIMALS_OF_A_DEGREE) + 0.0)
 
 
 def miss_output(
