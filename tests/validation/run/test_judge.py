@@ -242,7 +242,7 @@ def test_a_loop_said_to_be_open_a_thousand_roundings_from_its_limit_fails() -> N
 def test_an_engine_that_may_answer_within_the_rounding_of_theta_2_is_held_to_it() -> (
     None
 ):
-    engine = Engine("echo", SlightlyOff, FULL_ACCURACY, nearby=True)
+    engine = Engine("echo", SlightlyOff, FULL_ACCURACY, answers_nearby=True)
     rows = {
         row.quantity: row
         for row in judge("", crank_rocker(), [engine]).rows

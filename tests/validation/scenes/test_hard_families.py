@@ -32,7 +32,7 @@ from fourbar_validation.engines.registry import (
     HARD_ENGINES,
     Engine,
     Predictor,
-    make_nearby,
+    make_answer_nearby,
 )
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.released import make_pendulum
@@ -150,7 +150,7 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
         dress(lengths),
         psi + (-1.0 if stretched else 1.0) * np.array([*families.REGULAR, 1e-9]),
     )
-    balls = [engine for engine in HARD_ENGINES if engine.nearby]
+    balls = [engine for engine in HARD_ENGINES if engine.answers_nearby]
 
     def verdicts() -> dict[str, str]:
         return {
@@ -160,7 +160,7 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
         }
 
     assert set(verdicts().values()) == {AGREES}
-    without = [replace(balls[0], nearby=False)]
+    without = [replace(balls[0], answers_nearby=False)]
     rows = {
         row.quantity: row
         for row in judge("", near, without).rows
@@ -183,7 +183,7 @@ def test_an_answer_nearby_is_one_within_the_rounding_of_theta_2() -> None:
         set_angles(scene, [0.7, 0.7 + 4.0 * 2.0**-52, 0.7 + 1e-13])
     )
     formulas, balls = fourbar.solve(set_angles(scene, [0.7] * 3)), HARD_ENGINES[0]
-    nearby = make_nearby(balls, scene, command, formulas)
+    nearby = make_answer_nearby(balls, scene, command, formulas)
     assert nearby is not None and np.isfinite(
         nearby(np.ones(3, dtype=bool))["torque"]
     ).tolist() == [True, True, False]
@@ -200,7 +200,7 @@ def test_an_answer_nearby_has_the_sine_of_the_formulas() -> None:
         dress(lengths), psi + (-1.0 if stretched else 1.0) * np.array([0.3, 1e-3, 1e-9])
     )
     command, formulas = fourbar.command(near), fourbar.solve(near)
-    nearby = make_nearby(HARD_ENGINES[0], near, command, formulas)
+    nearby = make_answer_nearby(HARD_ENGINES[0], near, command, formulas)
     assert nearby is not None
     np.testing.assert_allclose(
         nearby(np.ones(3, dtype=bool))["sin_mu"],
@@ -224,7 +224,7 @@ def test_beyond_a_change_point_an_answer_nearby_is_one_of_the_same_assembly(
             near = set_angles(dress(lengths), psi + away, branch)
             command, formulas = fourbar.command(near), fourbar.solve(near, "force")
             balls = ask_at(HARD_ENGINES[0].start(), near, command).quantities["F43"]
-            nearby = make_nearby(HARD_ENGINES[0], near, command, formulas)
+            nearby = make_answer_nearby(HARD_ENGINES[0], near, command, formulas)
             assert nearby is not None and formulas.F43 is not None
             again = nearby(np.ones(2, dtype=bool))["F43"]
             size = magnitude(formulas.F43)

@@ -69,7 +69,7 @@ Predicted = Callable[[str, Mask], Array]
 """Function that predicts the error of a quantity, in its unit, (n,). It matters at the
 positions of the mask alone.
 """
-Nearby = Callable[[Mask], dict[str, Array]]
+AnswerNearby = Callable[[Mask], dict[str, Array]]
 """Function that evaluates every quantity again at the positions of a mask. theta_2 is
 varied within its rounding; elsewhere it is NaN.
 """
@@ -128,7 +128,7 @@ class Demands(NamedTuple):
     With them an error beyond the tolerance must be within TIMES_PREDICTED times its
     prediction.
     """
-    nearby: Nearby | None = None
+    answer_nearby: AnswerNearby | None = None
     """Evaluation near a position. With it an error beyond the tolerance is taken again
     within theta_2's rounding.
     """
@@ -137,11 +137,13 @@ class Demands(NamedTuple):
 
 
 class _JudgedRow(NamedTuple):
-    """Row of a quantity, and the numbers of positions with it and with a verdict."""
+    """Row of a quantity, and the positions that it speaks for."""
 
     row: Row
-    numbers: int = 0
+    closed: int = 0
+    """Number of positions where both close the loop."""
     decided: int = 0
+    """Number of those with a verdict, or at a reversal, where either side is right."""
 
 
 class _Pair(NamedTuple):
@@ -224,7 +226,7 @@ class Comparison:
             }
         judged = self._compare([name for name in STAGE_OF if name in names])
         alarms = [self._row("watch", FAILS, alarm) for alarm in answer.alarms]
-        numbers = sum(one.numbers for one in judged)
+        numbers = sum(one.closed for one in judged)
         decided = sum(one.decided for one in judged)
         rows = [self._compare_assembled(), *(one.row for one in judged), *alarms]
         if numbers:  # a scene of which most numbers are undecided does not hold
@@ -284,8 +286,8 @@ class Comparison:
     @cached_property
     def _answered_nearby(self) -> dict[str, Array]:
         """Ask again near each position, once an error calls for it."""
-        assert self.demands.nearby is not None
-        return self.demands.nearby(self.formulas.assembled)
+        assert self.demands.answer_nearby is not None
+        return self.demands.answer_nearby(self.formulas.assembled)
 
     @cached_property
     def _reversing(self) -> Mask:
@@ -441,6 +443,7 @@ class Comparison:
         if not due:
             return
         errors = self._measure(due)
+        # most agree, which is seen of all at once; `judge_errors` has the same rule
         beyond = errors.mask & ~(errors.error <= errors.allowed)
         agrees = np.asarray(~beyond.any(axis=1) & errors.decidable.any(axis=1))
         worst_used = _find_worst_used(errors)
@@ -492,7 +495,7 @@ class Comparison:
     def _take_again(self, quantity: str, ours: Array, errors: "Errors") -> "Errors":
         """Ask again within the rounding of theta_2 for an error that is too large."""
         beyond = errors.mask & (errors.error > errors.allowed)
-        if self.demands.nearby is None or not beyond.any():
+        if self.demands.answer_nearby is None or not beyond.any():
             return errors
         theirs = self._answered_nearby[quantity]
         again = find_error(quantity, ours, theirs, errors.unit)
@@ -645,9 +648,10 @@ def judge_errors(
     """Judge errors by the allowed error.
 
     Larger ones are judged by TIMES_PREDICTED times the predicted one, which the row
-    then states as `allowed`. An error that is
-    no number fails. `predicted` is None where nothing predicts it; `method` says for
-    which method it is predicted.
+    then states as `allowed`. An error that is no number fails.
+
+    `predicted`: None where nothing predicts the errors. `method`: for which they are
+    predicted, as the end of a reason.
     """
     beyond = errors.beyond
     if not (errors.decidable | beyond).any():
@@ -656,35 +660,36 @@ def judge_errors(
         return _WorstPosition(index, UNDECIDED, why, errors.allowed[index], 0)
     if not beyond.any():
         return errors.agreeing(int(_find_worst_used(errors)))
+    is_predicted = predicted is not None
     if predicted is None:
-        expected = np.zeros_like(errors.error)
-    else:
-        expected = predicted
-    bound = np.maximum(errors.allowed, TIMES_PREDICTED * expected)
+        predicted = np.zeros_like(errors.error)
+    bound = np.maximum(errors.allowed, TIMES_PREDICTED * predicted)
     used = find_used(errors.error, bound)
     # where a first-order prediction reaches the value itself, no digit is left to judge
-    hopeless = np.where(errors.relative, expected >= 1.0, expected == np.inf)
-    lost = beyond & np.isfinite(errors.error) & hopeless
-    used[lost] = np.minimum(used[lost], 1.0)
+    reaches_value = np.where(errors.relative, predicted >= 1.0, predicted == np.inf)
+    undecided = beyond & np.isfinite(errors.error) & reaches_value
+    used[undecided] = np.minimum(used[undecided], 1.0)
     index = int(np.argmax(np.where(beyond, used, -1.0)))
     error = errors.error[index]
-    foreseen = expected[index]
+    error_predicted = predicted[index]
     if math.isnan(error):
         verdict = FAILS
         why = "NaN"
-    elif lost[index]:
+    elif undecided[index]:
         verdict = UNDECIDED
-        why = f"an error of {foreseen:.1e} of the value is predicted"
-    elif predicted is None:
+        why = f"an error of {error_predicted:.1e} of the value is predicted"
+    elif not is_predicted:
         verdict = FAILS
         why = errors.tolerance.explain(errors.condition[index])
     elif used[index] <= 1.0:
         verdict = DEGRADED
-        why = f"{error:.1e} of {foreseen:.1e} predicted for this position{method}"
+        why = (
+            f"{error:.1e} of {error_predicted:.1e} predicted for this position{method}"
+        )
     else:
         verdict = FAILS
-        why = f"{error:.1e} where {foreseen:.1e} was predicted{method}"
-    decided = int(np.count_nonzero(errors.decidable & ~lost))
+        why = f"{error:.1e} where {error_predicted:.1e} was predicted{method}"
+    decided = int(np.count_nonzero(errors.decidable & ~undecided))
     return _WorstPosition(index, verdict, why + errors.notes, bound[index], decided)
 
 

@@ -37,7 +37,7 @@ _KEPT_FIELDS = (
     "through_time",
     "predictor",
     "residuals",
-    "nearby",
+    "answers_nearby",
     "stated",
 )
 """Fields of an engine that an adapter of ours keeps in every environment."""

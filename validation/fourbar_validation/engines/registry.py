@@ -22,8 +22,8 @@ from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Adapter, Answer
 from fourbar_validation.compare.compare import (
     COMPARED_QUANTITIES,
+    AnswerNearby,
     Demands,
-    Nearby,
     Predicted,
 )
 from fourbar_validation.compare.rows import say_error
@@ -81,7 +81,7 @@ class Engine:
     """
     residuals: bool = False
     """True if the engine's own residuals predict the errors to be expected."""
-    nearby: bool = False
+    answers_nearby: bool = False
     """True if it answers at the angle that `Command.remainder` completes, so that where
     an error is beyond the tolerance it can answer again within the rounding of theta_2.
     """
@@ -255,7 +255,7 @@ BALLS = Engine(
     "ball-arithmetic",
     BallArithmetic,
     FULL_ACCURACY,
-    nearby=True,
+    answers_nearby=True,
     library="flint",
 )
 
@@ -271,7 +271,7 @@ def hold_fully(engine: Engine) -> Engine:
     """
     if engine.tolerance not in (EQUIVALENCE, FULL_ACCURACY):
         return engine
-    if engine.nearby:
+    if engine.answers_nearby:
         unstated = predict_from_data
     else:
         unstated = predict_for_any_method
@@ -337,13 +337,13 @@ def make_demands(
     ----------
     command : what was commanded; errors are predicted at its positions.
     formulas : the formulas' solution at the command. If it is given, an engine with
-        `nearby` may answer again within the rounding of theta_2 where an error is
-        beyond the tolerance.
+        `answers_nearby` may answer again within the rounding of theta_2 where an error
+        is beyond the tolerance.
     """
     if formulas is None:
-        nearby = None
+        answer_nearby = None
     else:
-        nearby = make_nearby(engine, scene, command, formulas)
+        answer_nearby = make_answer_nearby(engine, scene, command, formulas)
     method = ""
     if engine.predictor is predict_for_any_method:
         method = _ANY_METHOD
@@ -351,7 +351,7 @@ def make_demands(
         engine.tolerance,
         engine.answers,
         make_prediction(engine, scene, command, answer),
-        nearby,
+        answer_nearby,
         method,
     )
 
@@ -384,12 +384,12 @@ def make_prediction(
     return lambda quantity, mask: predict(scene, command, quantity, mask)
 
 
-def make_nearby(
+def make_answer_nearby(
     engine: Engine,
     scene: Scene,
     command: Command,
     formulas: Solution,
-) -> Nearby | None:
+) -> AnswerNearby | None:
     """Give what answers within the rounding of the stated theta_2.
 
     None if the engine does not. Near a limit position the last digits of theta_2 decide
@@ -401,7 +401,7 @@ def make_nearby(
     """
     by_input = scene.drive_bar == 2 and command.bar == 2
     if (
-        not engine.nearby
+        not engine.answers_nearby
         or not by_input
         or command.remainder is not None
         or command.speed is None
