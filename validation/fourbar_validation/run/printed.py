@@ -31,6 +31,7 @@ from fourbar_validation.compare.tolerance import (
     IDENTITY,
     NOTHING_TO_TELL,
     K,
+    compute_differences,
     count_half_turns,
     divide,
     find_condition,
@@ -207,19 +208,20 @@ def check_blocks(question: Question) -> Iterator[Row]:
     error = (status[ends] != solution.status_code[at_ends]).astype(float)
     with np.errstate(all="ignore"):  # beyond the range of doubles there is no size
         scales = TermSizes(scene, solution).scales([*expected], [*expected.values()])
-    for (quantity, ours), scale in zip(expected.items(), scales, strict=True):
-        one = together[quantity][ends]
-        due = ours[at_ends]
-        finite = np.isfinite(magnitude(due))
-        error[finite != np.isfinite(magnitude(one))] = np.inf
-        size = scale[at_ends]
-        condition = find_condition(quantity, scene.linkage, solution)[at_ends]
-        # decided by the command where nothing closes
-        condition = np.where(np.isnan(condition), 1.0, condition)
-        # evaluated by the same code, but not in the same company of a processor's
-        # registers
-        apart = find_error(quantity, one, due, size) * condition
-        error[finite] = np.maximum(error[finite], apart[finite])
+    due = [values[at_ends] for values in expected.values()]
+    at_once = [values[ends] for values in together.values()]
+    finite_due = np.isfinite([magnitude(values) for values in due])
+    finite_at_once = np.isfinite([magnitude(values) for values in at_once])
+    conditions = np.stack(
+        [find_condition(name, scene.linkage, solution)[at_ends] for name in expected]
+    )
+    conditions[np.isnan(conditions)] = 1.0  # decided by the command: nothing closes
+    # evaluated by the same code, but not in the same company of a processor's registers
+    differences = compute_differences([*expected], at_once, due)
+    errors = divide(differences, scales[:, at_ends]) * conditions
+    errors[~finite_due] = 0.0
+    errors[finite_due != finite_at_once] = np.inf
+    error = np.maximum(error, errors.max(axis=0))
     alone = {angle: np.empty(n) for angle in ("theta_3", "theta_4")}
     solve(scene, at=command, out=alone)  # they are found without vectors then
     half_turns = count_half_turns(scene.linkage.ground_angle, command.angle)
