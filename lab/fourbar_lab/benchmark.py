@@ -482,11 +482,14 @@ def read_work(table: Iterable[Mapping[str, Any]]) -> dict[str, list[TimedWork]]:
         if row["problem"] == DIFFERENTIATED and timed and wanted:
             name = name_row(row["engine"], row["version"])
             runs = errors.setdefault(name, {})
-            runs.setdefault(float(row["seconds"]), []).append(float(row["error"]))
-    return {
-        name: [TimedWork(seconds, float(np.nanmax(of))) for seconds, of in runs.items()]
-        for name, runs in errors.items()
-    }
+            of_run = runs.setdefault(float(row["seconds"]), [])
+            of_run.append(float(row["error"]))
+    work: dict[str, list[TimedWork]] = {}
+    for name, runs in errors.items():
+        work[name] = []
+        for seconds, of_run in runs.items():
+            work[name].append(TimedWork(seconds, float(np.nanmax(of_run))))
+    return work
 
 
 def find_panel(name: str) -> str:
@@ -517,15 +520,16 @@ def draw_panels(lines: Mapping[str, list[TimedWork]]) -> Any:
         axes.tick_params(which="both", labelcolor=INK)
         markers = cycle(_MARKERS)
         for name, points in lines.items():
-            own = find_panel(name) == family
             look: dict[str, Any] = {"color": BAND, "linewidth": 0.8, "zorder": 1.5}
-            if own:
+            if find_panel(name) == family:
                 look = {
                     "color": LIGHT_COLOURS[colours[family]],
                     "linewidth": 1.5,
                     "zorder": 3.0,
+                    "marker": next(markers),
+                    "markersize": 5.0,
+                    "label": name,
                 }
-                look |= {"marker": next(markers), "markersize": 5.0, "label": name}
             axes.loglog(*zip(*points, strict=True), **look)
         below = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "labelcolor": INK}
         legend = axes.legend(fontsize=8, frameon=False, borderaxespad=0.2, **below)
@@ -541,9 +545,14 @@ def draw_panels(lines: Mapping[str, list[TimedWork]]) -> Any:
 def _list_needs(problem: dict[str, Any]) -> set[str]:
     """List what a problem asks of an engine, in the words of hello's `effects`."""
     scene = problem["scene"]
-    needs = {*scene.get("effects", {}), *(["loads"] if scene.get("loads") else [])}
-    needs |= {"cylinder"} if "from" in scene.get("drive", {}) else set()
-    return needs | ({"release"} if problem["ask"] == "release" else set())
+    needs = set(scene.get("effects", {}))
+    if scene.get("loads"):
+        needs.add("loads")
+    if "from" in scene.get("drive", {}):
+        needs.add("cylinder")
+    if problem["ask"] == "release":
+        needs.add("release")
+    return needs
 
 
 def _ask_question(running: Running, question: dict[str, Any]) -> dict[str, Any]:

@@ -53,11 +53,9 @@ def _compute_exact_slopes(scene: Scene) -> tuple[BallValues, Slopes]:
     numbers = list_numbers_by_key(scene)
     angle = command_key(scene)
     make_balls(scene, numbers[angle])  # sets the precision
-    steps = {
-        key: arb(abs(number) or 1.0) * arb(2) ** -STEP_BITS
-        for key, number in numbers.items()
-    }
-
+    steps = {}
+    for key, number in numbers.items():
+        steps[key] = arb(abs(number) or 1.0) * arb(2) ** -STEP_BITS
     sign = int(with_signs(scene.linkage, command(scene)).branch[0])
 
     def moved(*keys: str) -> BallValues:
@@ -65,39 +63,37 @@ def _compute_exact_slopes(scene: Scene) -> tuple[BallValues, Slopes]:
         for key in keys:
             changed[key] = changed[key] + steps[key]
         stated = changed.pop(angle)
-        mate = replace_numbers(
-            scene, {key: changed[key] for key in set(keys) - {angle}}
-        )
+        replaced = {key: changed[key] for key in set(keys) - {angle}}
+        mate = replace_numbers(scene, replaced)
         return compute_outputs(mate, sign, make_balls(mate, stated)) or {}
 
     base = moved()
     if ("torque" if scene.drive is None else "drive_force") not in base:
         return base, {}
     once = {key: moved(key) for key in numbers}
-    by: dict[str, dict[str, Any]] = {name: {} for name in base}
-    rates: dict[str, dict[str, float]] = {
-        name: dict.fromkeys(numbers, 0.0) for name in base
-    }
+    by: dict[str, dict[str, Any]] = {}
+    rates: dict[str, dict[str, float]] = {}
+    for name in base:
+        by[name] = {}
+        rates[name] = dict.fromkeys(numbers, 0.0)
     for first, mate in combinations_with_replacement(numbers, 2):
-        if (
-            first != mate and numbers[first] == numbers[mate] == 0.0
-        ):  # neither moves the other's derivative
+        if first != mate and numbers[first] == numbers[mate] == 0.0:
+            # neither moves the other's derivative
             continue
         twice = moved(first, mate)
         for name, y in base.items():
             change = twice[name] - once[first][name] - once[mate][name] + y
             second = abs(float((change / (steps[first] * steps[mate])).mid()))
             rates[name][first] += abs(numbers[mate]) * second
-            if (
-                first == mate
-            ):  # a difference to second order: where a number is 0 that may be all
+            if first == mate:
+                # a difference to second order: where a number is 0 that may be all
                 by[name][first] = (once[first][name] - y - change / 2) / steps[first]
             else:
                 rates[name][mate] += abs(numbers[first]) * second
-    return base, {
-        name: {key: (by[name][key], rates[name][key]) for key in numbers}
-        for name in base
-    }
+    slopes = {}
+    for name in base:
+        slopes[name] = {key: (by[name][key], rates[name][key]) for key in numbers}
+    return base, slopes
 
 
 def differentiate(scene: Scene) -> dict[str, Any]:

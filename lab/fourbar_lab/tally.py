@@ -73,7 +73,8 @@ class Tally:
         sample: str,
     ) -> None:
         """Keep the largest error over what is allowed."""
-        self.worst[output] = max(self.worst.get(output, (0.0, "")), (ratio, sample))
+        before = self.worst.get(output, (0.0, ""))
+        self.worst[output] = max(before, (ratio, sample))
 
     def holds(self) -> bool:
         """Return whether error and error bars are as promised.
@@ -120,20 +121,16 @@ def error_over_allowed(
 
     It is 0 where the balls cannot tell it from the truth.
     """
+    is_angle = name.startswith("theta")
+    error = math.inf
     if math.isfinite(ours):
         error = value - float(ours)
-    else:
-        error = math.inf
-    size = abs(float(value.mid()))
-    if name.startswith("theta"):
-        if math.isfinite(ours):
+        if is_angle:
             error = math.remainder(float(error), 2.0 * math.pi)
-        size = 1.0
-    if value.rad() < abs(error):
-        wrong = abs(float(error))
-    else:
-        wrong = 0.0
-    return float(find_used(wrong, _compute_allowed(size, sensitivity))), wrong
+    size = 1.0 if is_angle else abs(float(value.mid()))
+    wrong = abs(float(error)) if value.rad() < abs(error) else 0.0
+    allowed = _compute_allowed(size, sensitivity)
+    return float(find_used(wrong, allowed)), wrong
 
 
 def is_untold(sine: Any, sensitivity: float) -> bool:
@@ -141,9 +138,8 @@ def is_untold(sine: Any, sensitivity: float) -> bool:
 
     There may be no derivatives then.
     """
-    return (
-        _compute_allowed(size := abs(float(sine.mid())), sensitivity) > _UNTOLD * size
-    )
+    size = abs(float(sine.mid()))
+    return _compute_allowed(size, sensitivity) > _UNTOLD * size
 
 
 def _compute_allowed(size: float, sensitivity: float) -> float:

@@ -123,9 +123,10 @@ def solve_eight_equations(
     from mpmath import mp, mpc, mpf
 
     with mp.workdps(REFERENCE_DIGITS):
-        a, b, offset = (
-            mpf(scene["lengths"][name]) for name in ("crank", "rod", "offset")
-        )
+        lengths = scene["lengths"]
+        a = mpf(lengths["crank"])
+        b = mpf(lengths["rod"])
+        offset = mpf(lengths["offset"])
         g = _resolve_force(*scene.get("effects", {}).get("gravity", (0.0, 0.0)))
         theta = mpf(theta_2)
         omega = mpf(omega_2)
@@ -135,9 +136,8 @@ def solve_eight_equations(
         crank = a * mp.expj(theta)
         rod = b * mpc(cosine, sine)
         omega_3 = -omega * crank.real / rod.real
-        alpha_3 = (
-            omega**2 * crank.imag - alpha * crank.real + omega_3**2 * rod.imag
-        ) / rod.real
+        sideways = omega**2 * crank.imag - alpha * crank.real
+        alpha_3 = (sideways + omega_3**2 * rod.imag) / rod.real
         at_A = (1j * alpha - omega**2) * crank
         at_B = at_A + (1j * alpha_3 - omega_3**2) * rod
         forces = []
@@ -152,37 +152,43 @@ def solve_eight_equations(
             mass = mpf(bar.get("mass", 0.0))
             length = abs(line)
             r, phi = bar.get("centre", (0.5 * length, 0.0))
+            arm = mpc(0)
             if length:
                 arm = r * mp.expj(phi) * line / length
-            else:
-                arm = mpc(0)
-            forces.append(mass * (start + (1j * growth - rate**2) * arm - g))
-            moments.append(mpf(bar.get("inertia", mass * length**2 / 12)) * growth)
+            acceleration = start + (1j * growth - rate**2) * arm
+            inertia = mpf(bar.get("inertia", mass * length**2 / 12))
+            forces.append(mass * (acceleration - g))
+            moments.append(inertia * growth)
             arms.append(arm)
         for load in scene.get("loads", ()):  # at the mass centre
             forces[load["bar"] - 2] -= _resolve_force(*load["force"])
         A = mp.zeros(8, 8)
         y = mp.zeros(8, 1)  # F12 x y, F32 x y, F43 x y, guide, torque
-        for row, terms in enumerate(
-            (
-                {0: 1, 2: 1},
-                {1: 1, 3: 1},
-                {2: -1, 4: 1},
-                {3: -1, 5: 1},
-                {4: -1},
-                {5: -1, 6: 1},
-            )
-        ):
-            y[row] = forces[row // 2].imag if row % 2 else forces[row // 2].real
-            for column, factor in terms.items():
+        newton = (
+            {0: 1, 2: 1},
+            {1: 1, 3: 1},
+            {2: -1, 4: 1},
+            {3: -1, 5: 1},
+            {4: -1},
+            {5: -1, 6: 1},
+        )
+        for row, factors in enumerate(newton):
+            force = forces[row // 2]
+            y[row] = force.imag if row % 2 else force.real
+            for column, factor in factors.items():
                 A[row, column] = factor
         # moments about each mass centre: the forces at A on the crank and at O2, those
         # at A and B on the rod
-        for column, arm, factor in ((0, -arms[0], 1), (2, crank - arms[0], 1)):
-            A[6, column], A[6, column + 1] = -factor * arm.imag, factor * arm.real
-        A[6, 7], y[6] = 1, moments[0]
-        for column, arm, factor in ((2, -arms[1], -1), (4, rod - arms[1], 1)):
-            A[7, column], A[7, column + 1] = -factor * arm.imag, factor * arm.real
+        for row, force_x, arm, factor in (
+            (6, 0, -arms[0], 1),
+            (6, 2, crank - arms[0], 1),
+            (7, 2, -arms[1], -1),
+            (7, 4, rod - arms[1], 1),
+        ):
+            A[row, force_x] = -factor * arm.imag
+            A[row, force_x + 1] = factor * arm.real
+        A[6, 7] = 1
+        y[6] = moments[0]
         y[7] = moments[1]
         x = [float(value) for value in mp.lu_solve(A, y)]
         angle = float(mp.atan2(sine, cosine))
@@ -205,7 +211,11 @@ def _resolve_force(size: float, direction: float) -> Any:
     """
     from mpmath import mp, mpc, mpf
 
+    least = mpf(2) ** -53
     x = mp.cos(direction)
     y = mp.sin(direction)
-    least = mpf(2) ** -53
-    return mpf(size) * mpc(x if abs(x) > least else 0, y if abs(y) > least else 0)
+    if abs(x) <= least:
+        x = 0
+    if abs(y) <= least:
+        y = 0
+    return mpf(size) * mpc(x, y)

@@ -117,38 +117,40 @@ def answer_slider_positions(
     """Answer the positions of a question."""
     scene = question["scene"]
     command = question["command"]
-    tree = make(*describe_bodies(scene))
-    _, (crank, rod, _), *_ = describe_bodies(scene)
+    bodies, lengths, field, push = describe_bodies(scene)
+    tree = make(bodies, lengths, field, push)
+    crank, rod, _ = lengths
     rows: dict[str, list[Any]] = {name: [] for name in ANSWERED_QUANTITIES}
     n = len(command["theta_2"])
-    rates = [
-        np.broadcast_to(command.get(name, default), n)
-        for name, default in (("omega_2", 0.0), ("alpha_2", 0.0), ("branch", 1))
-    ]
-    for theta, omega, alpha, branch in zip(command["theta_2"], *rates, strict=True):
+    omegas = np.broadcast_to(command.get("omega_2", 0.0), n)
+    alphas = np.broadcast_to(command.get("alpha_2", 0.0), n)
+    branches = np.broadcast_to(command.get("branch", 1), n)
+    for theta, omega, alpha, branch in zip(
+        command["theta_2"],
+        omegas,
+        alphas,
+        branches,
+        strict=True,
+    ):
+        rod_angle = 0.0 if branch > 0 else math.pi
         q = np.array(
             [
                 theta,
-                (0.0 if branch > 0 else math.pi) - theta,
+                rod_angle - theta,
                 crank * math.cos(theta) + branch * rod,
             ]
         )
-        for _ in range(NEWTON_STEPS_OF_A_POSITION):
-            tree.set(q, np.zeros(3))
-            apart, J, _ = tree.gap()
-            step = np.linalg.solve(J[:, 1:], -apart)
-            q[1:] += step
-            if np.abs(step).max() <= GAP_AT_THE_END * rod:
-                break
+        _close_gap(tree, q, GAP_AT_THE_END * rod)
         tree.set(q, np.zeros(3))
         _, J, _ = tree.gap()
-        v = np.array([omega, *np.linalg.solve(J[:, 1:], -J[:, 0] * omega)])
+        following = np.linalg.solve(J[:, 1:], -J[:, 0] * omega)
+        v = np.array([omega, *following])
         tree.set(q, v)
         _, J, drift = tree.gap()
-        a = np.array([alpha, *np.linalg.solve(J[:, 1:], -J[:, 0] * alpha - drift)])
-        *closing, torque = np.linalg.solve(
-            np.column_stack([J.T, [1.0, 0.0, 0.0]]), tree.inverse(a)
-        )
+        following = np.linalg.solve(J[:, 1:], -J[:, 0] * alpha - drift)
+        a = np.array([alpha, *following])
+        matrix = np.column_stack([J.T, [1.0, 0.0, 0.0]])
+        *closing, torque = np.linalg.solve(matrix, tree.inverse(a))
         F12, F23, guide = tree.borne(a, np.array(closing))
         values = (
             math.remainder(q[0] + q[1], math.tau),
@@ -161,9 +163,19 @@ def answer_slider_positions(
         )
         for name, value in zip(ANSWERED_QUANTITIES, values, strict=True):
             rows[name].append(value)
-    return {
-        "answers": {name: np.array(values).tolist() for name, values in rows.items()}
-    }
+    answers = {name: np.array(values).tolist() for name, values in rows.items()}
+    return {"answers": answers}
+
+
+def _close_gap(tree: _CutLoop, q: Array, least: float) -> None:
+    """Close the gap by the rod and the slider, in place."""
+    for _ in range(NEWTON_STEPS_OF_A_POSITION):
+        tree.set(q, np.zeros(3))
+        apart, J, _ = tree.gap()
+        step = np.linalg.solve(J[:, 1:], -apart)
+        q[1:] += step
+        if np.abs(step).max() <= least:
+            break
 
 
 def serve_slider_crank(
@@ -185,10 +197,8 @@ def serve_slider_crank(
                 reply = {"error": say_error(error)}
         elif question["ask"] != "hello":
             reply = {"refusal": f"{question['ask']} is not answered here"}
-        replies.write(
-            json.dumps({"id": question["id"], **reply}, allow_nan=False).encode()
-            + b"\n"
-        )
+        text = json.dumps({"id": question["id"], **reply}, allow_nan=False)
+        replies.write(text.encode() + b"\n")
         replies.flush()
 
 

@@ -28,9 +28,8 @@ class PinocchioSlider:
             (pin.JointModelRZ(), 1, (crank, 0.0)),
             (pin.JointModelPX(), 0, (0.0, offset)),
         )
-        for number, ((joint, parent, place), body) in enumerate(
-            zip(joints, bodies, strict=True), 1
-        ):
+        for number, body in enumerate(bodies, 1):
+            joint, parent, place = joints[number - 1]
             placement = pin.SE3(np.eye(3), np.array([*place, 0.0]))
             self.model.addJoint(parent, joint, placement, f"joint {number}")
             inertia = pin.Inertia(
@@ -40,17 +39,16 @@ class PinocchioSlider:
             )
             self.model.appendBodyToJoint(number, inertia, pin.SE3.Identity())
         end = pin.SE3(np.eye(3), np.array([rod, 0.0, 0.0]))
-        self.frames = [
-            self.model.addFrame(
-                pin.Frame(f"B{joint}", joint, 0, place, pin.FrameType.OP_FRAME)
-            )
-            for joint, place in ((2, end), (3, pin.SE3.Identity()))
-        ]
+        self.frames = []
+        for joint, place in ((2, end), (3, pin.SE3.Identity())):
+            frame = pin.Frame(f"B{joint}", joint, 0, place, pin.FrameType.OP_FRAME)
+            self.frames.append(self.model.addFrame(frame))
         self.data = self.model.createData()
 
     def set(self, q: Array, v: Array) -> None:
         """Set joint positions and speeds."""
-        self.q, self.v = q.copy(), v.copy()
+        self.q = q.copy()
+        self.v = v.copy()
         pin.forwardKinematics(self.model, self.data, self.q, self.v, np.zeros(3))
         pin.computeJointJacobians(self.model, self.data, self.q)
         pin.updateFramePlacements(self.model, self.data)
@@ -60,22 +58,22 @@ class PinocchioSlider:
 
         These are its Jacobian, and its acceleration at none of q.
         """
+        end, end_slope, end_drift = self._follow(self.frames[0])
+        slider, slider_slope, slider_drift = self._follow(self.frames[1])
+        return end - slider, end_slope - slider_slope, end_drift - slider_drift
+
+    def _follow(self, frame: int) -> tuple[Array, Array, Array]:
+        """Return place, Jacobian and acceleration of a frame in the plane."""
         axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        places = [self.data.oMf[frame].translation[:2] for frame in self.frames]
-        slopes = [
-            pin.getFrameJacobian(self.model, self.data, frame, axes)[:2]
-            for frame in self.frames
-        ]
-        drifts = [
-            pin.getFrameClassicalAcceleration(
-                self.model,
-                self.data,
-                frame,
-                axes,
-            ).linear[:2]
-            for frame in self.frames
-        ]
-        return places[0] - places[1], slopes[0] - slopes[1], drifts[0] - drifts[1]
+        place = self.data.oMf[frame].translation
+        jacobian = pin.getFrameJacobian(self.model, self.data, frame, axes)
+        acceleration = pin.getFrameClassicalAcceleration(
+            self.model,
+            self.data,
+            frame,
+            axes,
+        )
+        return place[:2], jacobian[:2], acceleration.linear[:2]
 
     def inverse(self, a: Array) -> Array:
         """Return the joint forces of accelerations a, without the closing force."""
@@ -88,10 +86,10 @@ class PinocchioSlider:
         slider.
         """
         self._solve(a, closing)
-        forces = [
-            (self.data.oMi[joint].rotation @ self.data.f[joint].linear)[:2]
-            for joint in (1, 2, 3)
-        ]
+        forces = []
+        for joint in (1, 2, 3):
+            rotation = self.data.oMi[joint].rotation
+            forces.append((rotation @ self.data.f[joint].linear)[:2])
         return forces[0], forces[1], forces[2]
 
     def _solve(self, a: Array, closing: Array) -> Array:

@@ -208,30 +208,27 @@ def make_equations(
             compute_inertia(4, errors.inertia_about_long_axis),
         )
     about_G = {2: INERTIA_2, 3: inertias[0], 4: inertias[1]}
-    if errors.mass_times_acceleration_unscaled:
-        per_mass = 1.0
-    else:
-        per_mass = TO_N
-    if errors.inertia_times_alpha_unscaled:
-        per_inertia = 1.0
-    else:
-        per_inertia = TO_N
-    force = {bar: per_mass * MASSES[bar] * k.a_G[bar] for bar in MOVING_BARS}
-    moment = {
-        bar: np.array([per_inertia * about_G[bar] * k.alpha[bar] - COUPLE_ON_A_BAR])
-        for bar in MOVING_BARS
-    }
+    per_mass = 1.0 if errors.mass_times_acceleration_unscaled else TO_N
+    per_inertia = 1.0 if errors.inertia_times_alpha_unscaled else TO_N
+    force = {}
+    moment = {}
+    for bar in MOVING_BARS:
+        force[bar] = per_mass * MASSES[bar] * k.a_G[bar]
+        inertial = per_inertia * about_G[bar] * k.alpha[bar]
+        moment[bar] = np.array([inertial - COUPLE_ON_A_BAR])
     force[2][0] -= FORCE_ON_BAR_2
-    moment[2] += (
-        split_components(LOAD_ARM, LOAD_ANGLE)[1] * FORCE_ON_BAR_2
-    )  # minus the moment of the load, -y F
-    first, second = (
-        {
-            bar: np.array([k.arms[name]])
-            for bar, name in zip(MOVING_BARS, names, strict=True)
-        }
-        for names in (("R12", "R23", "R14"), ("R32", "R43", "R34"))
-    )
+    _, y = split_components(LOAD_ARM, LOAD_ANGLE)
+    moment[2] += y * FORCE_ON_BAR_2  # minus the moment of the load, -y F
+    first = {
+        2: np.array([k.arms["R12"]]),
+        3: np.array([k.arms["R23"]]),
+        4: np.array([k.arms["R14"]]),
+    }
+    second = {
+        2: np.array([k.arms["R32"]]),
+        3: np.array([k.arms["R43"]]),
+        4: np.array([k.arms["R34"]]),
+    }
     matrix, right = assemble_equations(EquationTerms(first, second, force, moment), 4)
     return matrix[0], right[0]
 

@@ -168,17 +168,20 @@ def _list_limits() -> Iterator[PublishedFigure]:
     The limit positions are those that do exist.
     """
     linkage = make_model_scene(THETA_2).linkage
-    output, dead_centre = (limit_positions(linkage, bar) for bar in (4, 2))
+    output = limit_positions(linkage, 4)
+    dead_centre = limit_positions(linkage, 2)
     cosines = {
         1: ((a + b) ** 2 + d**2 - c**2) / (2.0 * (a + b) * d),
         2: ((a - b) ** 2 + d**2 - c**2) / (2.0 * abs(a - b) * d),
         3: (a**2 + d**2 - (b + c) ** 2) / (2.0 * a * d),
         4: (a**2 + d**2 - (b - c) ** 2) / (2.0 * a * d),
     }
-    limits = {2: to_degrees(output[-1].theta_2), 4: to_degrees(dead_centre[0].theta_2)}
-    for row in json.loads((DATA / "limits.json").read_text(encoding="utf-8"))[
-        "table_3_2"
-    ]:
+    limits = {
+        2: to_degrees(output[-1].theta_2),
+        4: to_degrees(dead_centre[0].theta_2),
+    }
+    printed = json.loads((DATA / "limits.json").read_text(encoding="utf-8"))
+    for row in printed["table_3_2"]:
         number = row["row"]
         yield PublishedFigure(
             "3.2 limits",

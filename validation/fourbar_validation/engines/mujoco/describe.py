@@ -325,6 +325,9 @@ def _describe_loads(topology: Topology) -> Described:
         gear = model.actuator_gear[i]
         kind = model.actuator_trntype[i]
         element = _name_element("actuator", model.actuator(i).name, i)
+        bar = None
+        if kind == mujoco.mjtTrn.mjTRN_SITE:
+            bar = topology.bar(model.site_bodyid[number])
         if kind == mujoco.mjtTrn.mjTRN_JOINT:
             pin = next(pin for pin, joint in topology.hinge.items() if joint == number)
             described[f"pins.{pin}.motor"] = ModelEntry(
@@ -334,26 +337,20 @@ def _describe_loads(topology: Topology) -> Described:
             described[f"{_name_tendon(topology, number)}.tension"] = ModelEntry(
                 _read_field(gear[0] * bias), element
             )
-        elif (
-            kind == mujoco.mjtTrn.mjTRN_SITE
-            and (bar := topology.bar(model.site_bodyid[number])) in MOVING_BARS
-        ):
-            bearer = (
-                topology.bar(model.site_bodyid[frame if frame >= 0 else number]) or 1
-            )
-            axes = data.site_xmat[frame if frame >= 0 else number].reshape(3, 3)
-            force, couple = (axes @ part * bias[0] for part in (gear[:3], gear[3:]))
-            turns = bearer in MOVING_BARS
-            fx, fy = (
-                topology.turned_back(bearer, force)
-                if turns
-                else topology.in_plane(force)
-            )
+        elif bar in MOVING_BARS:
+            axes_of = frame if frame >= 0 else number
+            bearer = topology.bar(model.site_bodyid[axes_of]) or 1
+            axes = data.site_xmat[axes_of].reshape(3, 3)
+            force = axes @ gear[:3] * bias[0]
+            couple = axes @ gear[3:] * bias[0]
+            if bearer in MOVING_BARS:
+                fx, fy = topology.turned_back(bearer, force)
+                directions = f"axes of the {BAR_NAMES[bearer]}"
+            else:
+                fx, fy = topology.in_plane(force)
+                directions = "world axes"
             x, y = topology.along_bar(bar, data.site_xpos[number])
-            key = (
-                f"loads.{BAR_NAMES[bar]},"
-                f" {f'axes of the {BAR_NAMES[bearer]}' if turns else 'world axes'}"
-            )
+            key = f"loads.{BAR_NAMES[bar]}, {directions}"
             load = (
                 fx,
                 fy,

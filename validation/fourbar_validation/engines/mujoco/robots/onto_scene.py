@@ -101,7 +101,9 @@ def _close_flat(
         theta_1, theta_2, _, theta_4 = other.angles
         missed_by_other = miss_output(scene, theta_1, theta_2, theta_4)
         if missed_by_other < missed:
-            posed, loop, missed = other_pose, other, missed_by_other
+            posed = other_pose
+            loop = other
+            missed = missed_by_other
     text = (
         "the bars of pin B are in line in the pose before closing, which does not tell"
         " the assembly: "
@@ -130,7 +132,8 @@ def _leave_flat(
             continue
         size = inside.measure_transmission(qpos)
         if size > largest:
-            best, largest = qpos, size
+            best = qpos
+            largest = size
     return best
 
 
@@ -173,8 +176,10 @@ def _fits_gravity(
     Its size is for the comparison; where one of them has none, no side fits.
     """
     model = posed.model
-    effects = [effect for effect in scene.effects if isinstance(effect, Gravity)]
-    wanted = sum((effect.vector for effect in effects), start=np.zeros(2))
+    wanted = np.zeros(2)
+    for effect in scene.effects:
+        if isinstance(effect, Gravity):
+            wanted = wanted + effect.vector
     ground = posed.data.xmat[loop.bodies[1][0]].reshape(3, 3)
     along = ground @ loop.along
     across = ground @ np.cross(loop.axis, loop.along)
@@ -182,7 +187,8 @@ def _fits_gravity(
     angle = scene.linkage.ground_angle - loop.angles[0]
     cos = math.cos(angle)
     sin = math.sin(angle)
-    x, y = float(gravity @ along), float(gravity @ across)
+    x = float(gravity @ along)
+    y = float(gravity @ across)
     of_robot = np.array([cos * x - sin * y, sin * x + cos * y])
     size = float(np.linalg.norm(of_robot))
     wanted_size = float(np.linalg.norm(wanted))

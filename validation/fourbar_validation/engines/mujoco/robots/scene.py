@@ -142,12 +142,14 @@ def _list_carried(model: mujoco.MjModel, loop: RobotLoop) -> dict[int, list[int]
 
     Those that hang on it by held joints are included.
     """
-    bars = {body: bar for bar, bodies in loop.bodies.items() for body in bodies}
+    bar_of = {body: bar for bar, bodies in loop.bodies.items() for body in bodies}
     carried: dict[int, list[int]] = {bar: [] for bar in MOVING_BARS}
     for body in range(1, model.nbody):
-        bar = next((bars[above] for above in climb(model, body) if above in bars), 1)
-        if bar != 1:
-            carried[bar].append(body)
+        for above in climb(model, body):
+            if above in bar_of:
+                if bar_of[above] != 1:
+                    carried[bar_of[above]].append(body)
+                break
     return carried
 
 
@@ -424,18 +426,20 @@ class _SceneOfLoop:
             angle = math.atan2(pull.imag, pull.real)
             yield Gravity(round_off(abs(pull)), _round_angle(angle))
         hinges = {pin: self.loop.hinges[pin] for pin in PINS if pin in self.loop.hinges}
-        damping = {pin: _reflect_damping(model, joint) for pin, joint in hinges.items()}
-        rows = tuple((pin, round_off(k)) for pin, k in damping.items() if k)
-        if rows:
-            yield Viscous(rows)
         rubbing = is_enabled(model, "frictionloss", "constraint")
-        losses = {
-            pin: float(model.dof_frictionloss[model.jnt_dofadr[joint]]) * rubbing
-            for pin, joint in hinges.items()
-        }
-        rows = tuple((pin, round_off(f)) for pin, f in losses.items() if f)
-        if rows:
-            yield Friction(rows)
+        damping = []
+        friction = []
+        for pin, joint in hinges.items():
+            coefficient = _reflect_damping(model, joint)
+            if coefficient:
+                damping.append((pin, round_off(coefficient)))
+            torque = float(model.dof_frictionloss[model.jnt_dofadr[joint]]) * rubbing
+            if torque:
+                friction.append((pin, round_off(torque)))
+        if damping:
+            yield Viscous(tuple(damping))
+        if friction:
+            yield Friction(tuple(friction))
         springs = tuple(self._list_springs(hinges, betas))
         if springs:
             yield Torsion(springs)
@@ -507,7 +511,9 @@ class _SceneOfLoop:
         if math.isinf(low) and math.isinf(high):
             low = theta_2
             high = theta_2 + math.tau
-        low, high = max(low, high - math.tau), min(high, low + math.tau)
+        a_turn_on = low + math.tau
+        low = max(low, high - math.tau)
+        high = min(high, a_turn_on)
         reach = np.linspace(low, high, RANGE_INTERVALS + 1)
         angles = np.union1d(reach, [theta_2])
         in_pose = int(np.searchsorted(angles, theta_2))
@@ -515,10 +521,11 @@ class _SceneOfLoop:
         free = (angles >= low) & (angles <= high)
         stops = []
         for pin in self.loop.hinges.keys() - {"O2"}:
-            least, most = self._find_range(pin, float(betas[pin][in_pose]))
-            inside = (betas[pin] >= least - OUTSIDE_A_RANGE) & (
-                betas[pin] <= most + OUTSIDE_A_RANGE
-            )
+            beta = betas[pin]
+            least, most = self._find_range(pin, float(beta[in_pose]))
+            above = beta >= least - OUTSIDE_A_RANGE
+            below = beta <= most + OUTSIDE_A_RANGE
+            inside = above & below
             if not inside[free].all():
                 stops.append(name_joint(self.model, self.loop.hinges[pin]))
             free &= inside
@@ -534,10 +541,12 @@ class _SceneOfLoop:
                 "no position is within the ranges of its hinges",
             )
         rows = _find_run(free, in_pose)
+        first = rows[0]
+        last = rows[-1]
         return _MotionOverRange(
-            float(angles[rows[0]]),
-            float(angles[rows[-1]]),
-            {pin: (beta[in_pose], beta[rows[0]]) for pin, beta in betas.items()},
+            start=float(angles[first]),
+            stop=float(angles[last]),
+            betas={pin: (beta[in_pose], beta[first]) for pin, beta in betas.items()},
         )
 
     def _find_range(self, pin: str, beta: float) -> tuple[float, float]:
@@ -582,20 +591,15 @@ class _SceneOfLoop:
         """
         theta_1 = linkage.ground_angle
         theta_4 = self.loop.angles[3]
-        apart = [
-            miss_output(
-                Scene(linkage, Motion(branch=branch)),
-                theta_1,
-                theta_2,
-                theta_4,
-            )
-            for branch in (OPEN, CROSSED)
-        ]
-        if not abs(apart[0] - apart[1]) > FLAT:
+        apart = {}
+        for branch in (OPEN, CROSSED):
+            scene = Scene(linkage, Motion(branch=branch))
+            apart[branch] = miss_output(scene, theta_1, theta_2, theta_4)
+        if not abs(apart[OPEN] - apart[CROSSED]) > FLAT:
             text = "the bars of pin B are in line in this pose: open is taken"
             self._remark(f"{text}; --pose states another")
             return OPEN
-        branch = OPEN if apart[0] < apart[1] else CROSSED
+        branch = OPEN if apart[OPEN] < apart[CROSSED] else CROSSED
         if self.loop.is_flat:
             text = (
                 "the bars of pin B are in line in the pose before closing, which does"
@@ -673,11 +677,11 @@ class _SceneOfLoop:
                     touches |= target in joints
                 elif kind == mujoco.mjtWrap.mjWRAP_SITE:
                     touches |= int(model.site_bodyid[target]) in bodies
-            acts = [
-                f"{name} {float(np.max(getattr(model, f'tendon_{name}')[number])):.6g}"
-                for name in ("stiffness", "damping", "frictionloss")
-                if np.any(getattr(model, f"tendon_{name}")[number])
-            ]
+            acts = []
+            for name in ("stiffness", "damping", "frictionloss"):
+                values = getattr(model, f"tendon_{name}")[number]
+                if np.any(values):
+                    acts.append(f"{name} {float(np.max(values)):.6g}")
             if touches and acts:
                 name = model.tendon(number).name or str(number)
                 self._leave_out(f"the tendon {name} ({', '.join(acts)})")
@@ -709,9 +713,15 @@ class _MotionOverRange:
 def _find_run(free: NDArray[np.bool_], near: int) -> NDArray[np.intp]:
     """Return the indices of the run of True that is nearest to an index."""
     edges = np.flatnonzero(np.diff(free)) + 1
-    runs = [run for run in np.split(np.arange(len(free)), edges) if free[run[0]]]
-    distances = [int(np.abs(run - near).min()) for run in runs]
-    return np.asarray(runs[int(np.argmin(distances))])
+    best: NDArray[np.intp] | None = None
+    least = math.inf
+    for run in np.split(np.arange(len(free)), edges):
+        distance = int(np.abs(run - near).min())
+        if free[run[0]] and distance < least:
+            best = run
+            least = distance
+    assert best is not None
+    return np.asarray(best)
 
 
 def _find_assembling(linkage: FourBar, theta_2: float) -> tuple[float, float]:
