@@ -80,8 +80,8 @@ def read_point(read: Reader, key: str, value: object) -> tuple[float, float]:
     """Read a place of the drawing, ["x", "y"], m."""
     if not isinstance(value, list) or len(value) != 2:
         raise read.refuse(key, value, 'must be two coordinates like ["10 mm", "25 mm"]')
-    x, y = (read.quantity(f"{key}[{axis}]", value[axis], "m") for axis in (0, 1))
-    return x, y
+    x, y = value
+    return read.quantity(f"{key}[0]", x, "m"), read.quantity(f"{key}[1]", y, "m")
 
 
 def state_lengths(
@@ -96,12 +96,12 @@ def state_lengths(
         read.stated_lengths = drawn
     lengths = {name: f"{met[bar - 1]!r} m" for name, bar in _NUMBERS_OF_BARS.items()}
     lengths["ground_angle"] = f"{drawing.angle(1)!r} rad"
-    stated = {
-        key: _state_places(read, key, value, drawing)
-        for key, value in top.items()
-        if key != "pins"
-    }
-    return {**stated, "lengths": lengths}
+    stated = {}
+    for key, value in top.items():
+        if key != "pins":
+            stated[key] = _state_places(read, key, value, drawing)
+    stated["lengths"] = lengths
+    return stated
 
 
 def meet_lengths(drawing: DrawnPins, pins: dict[str, Any]) -> tuple[float, ...]:
@@ -111,18 +111,22 @@ def meet_lengths(drawing: DrawnPins, pins: dict[str, Any]) -> tuple[float, ...]:
 
     `pins`: x and y of each pin as they are written.
     """
-    last = {pin: [half_unit_of_text(text, "m") for text in pins[pin]] for pin in PINS}
-    moved = {pin: math.hypot(*roundings) for pin, roundings in last.items()}
-    lengths = tuple(drawing.length(bar) for bar in ENDS)
-    roundings = tuple(moved[first] + moved[second] for first, second in ENDS.values())
-    decimals = tuple(
-        max(*last[first], *last[second]) for first, second in ENDS.values()
-    )
-    met = meet_change_points(lengths, roundings, decimals)  # type: ignore[arg-type]
+    moved = {}
+    coarsest = {}
+    for pin in PINS:
+        in_x, in_y = (half_unit_of_text(text, "m") for text in pins[pin])
+        moved[pin] = math.hypot(in_x, in_y)
+        coarsest[pin] = max(in_x, in_y)
+    lengths = []
+    roundings = []
+    decimals = []
+    for bar, (first, second) in ENDS.items():
+        lengths.append(drawing.length(bar))
+        roundings.append(moved[first] + moved[second])
+        decimals.append(max(coarsest[first], coarsest[second]))
+    met = meet_change_points(tuple(lengths), tuple(roundings), tuple(decimals))  # type: ignore[arg-type]
     # one equality alone is met by chance: nobody draws it
-    if count_equalities(met) > 1:
-        return met
-    return lengths
+    return met if count_equalities(met) > 1 else tuple(lengths)
 
 
 def _state_places(
@@ -141,9 +145,10 @@ def _state_places(
     if not isinstance(value, dict):
         return value
     number = value.get("bar")
-    own = number if isinstance(number, int) and number in BAR_NAMES else bar
+    if isinstance(number, int) and number in BAR_NAMES:
+        bar = number
     if DRAWN_WORD in value:
-        place = _state_place(read, key, value, drawing, own)
+        place = _state_place(read, key, value, drawing, bar)
         if len(value) == 1:
             return place
         if "from_pin" in value:
@@ -152,12 +157,16 @@ def _state_places(
         value["from_pin"] = place
     stated = {}
     for name, entry in value.items():
-        of_bar = (
-            _NUMBERS_OF_BARS[name]
-            if key == "bars" and name in _NUMBERS_OF_BARS
-            else own
+        bar_of_entry = bar
+        if key == "bars":
+            bar_of_entry = _NUMBERS_OF_BARS.get(name, bar)
+        stated[name] = _state_places(
+            read,
+            f"{key}.{name}",
+            entry,
+            drawing,
+            bar_of_entry,
         )
-        stated[name] = _state_places(read, f"{key}.{name}", entry, drawing, of_bar)
     return stated
 
 
@@ -176,10 +185,8 @@ def _state_place(
         raise read.refuse(f"{key}.{DRAWN_WORD}", value[DRAWN_WORD], allowed)
     if key.endswith((".from_centre", ".arm")):
         raise read.refuse(key, value, "a place of the drawing is written from_pin")
-    z = drawing.into_bar(
-        bar,
-        read_point(read, f"{key}.{DRAWN_WORD}", value[DRAWN_WORD]),
-    )
+    point = read_point(read, f"{key}.{DRAWN_WORD}", value[DRAWN_WORD])
+    z = drawing.into_bar(bar, point)
     return {"x": f"{z.real!r} m", "y": f"{z.imag!r} m"}
 
 
@@ -206,14 +213,15 @@ def state_motion(
         drawn = find_drawn(drawing, line, name)
         if drawn is None:
             continue
-        text = f"{drawn!r} {'rad' if name in BAR_OF_ANGLE else 'm'}"
+        unit = "rad" if name in BAR_OF_ANGLE else "m"
+        text = f"{drawn!r} {unit}"
         if place == DRAWN_WORD:
             stated[name] = text
         elif isinstance(place, dict):
-            stated[name] = {
-                end: text if entry == DRAWN_WORD else entry
-                for end, entry in place.items()
-            }
+            stated[name] = dict(place)
+            for end, entry in place.items():
+                if entry == DRAWN_WORD:
+                    stated[name][end] = text
     return stated
 
 
@@ -229,21 +237,22 @@ def find_drawn(drawing: DrawnPins, line: ForceDrive | None, name: str) -> float 
 
 def _draw_ends(drawing: DrawnPins, line: LinearDrive) -> tuple[complex, complex]:
     """Return the drawn places of the ends of a cylinder, m."""
-    start = line.start
-    end = line.end
-    return (
-        drawing.from_bar(start.bar, start.vector()),
-        drawing.from_bar(end.bar, end.vector()),
-    )
+    start = drawing.from_bar(line.start.bar, line.start.vector())
+    end = drawing.from_bar(line.end.bar, line.end.vector())
+    return start, end
 
 
 def _find_side_of_cylinder(drawing: DrawnPins, line: LinearDrive) -> str:
     """Find the side of a cylinder's end on its bar."""
-    bars = line.start.bar, line.end.bar
-    ends = dict(zip(bars, _draw_ends(drawing, line), strict=True))
-    (bar,) = ends.keys() - {1}
+    on_ground, on_bar = _draw_ends(drawing, line)
+    bar = line.end.bar
+    if bar == 1:
+        on_ground, on_bar = on_bar, on_ground
+        bar = line.start.bar
     pivot = complex(*drawing.place("O2" if bar == 2 else "O4"))
-    across = ((ends[1] - pivot).conjugate() * (ends[bar] - pivot)).imag
+    to_ground = on_ground - pivot
+    to_bar = on_bar - pivot
+    across = (to_ground.conjugate() * to_bar).imag
     return "left" if across >= 0.0 else "right"
 
 
@@ -251,19 +260,20 @@ def choose_assembly(scene: Scene, drawing: DrawnPins) -> Scene:
     """Put a scene on the assembly whose pins lie where the drawing has them."""
     bar = scene.motion.bar
     O2 = complex(*drawing.place("O2"))
-    wanted = np.array([complex(*drawing.place(pin)) - O2 for pin in ("A", "B")])
+    drawn_A = complex(*drawing.place("A")) - O2
+    drawn_B = complex(*drawing.place("B")) - O2
+    drawn_angle = drawing.angle(bar)
+    name_of_angle, *_ = COMMAND_NAMES[bar]
     gaps = dict[float, Scene]()
     for branch in BRANCH_NAMES:
+        stated: dict[str, Any] = {name_of_angle: drawn_angle, "branch": branch}
+        at_drawing = replace(scene, motion=Motion(**stated))
+        at = command_at(at_drawing, np.array([drawn_angle]))
+        here = solve(at_drawing, "position", at=at)
+        gap_of_A = abs(complex(*here.A[0]) - drawn_A)
+        gap_of_B = abs(complex(*here.B[0]) - drawn_B)
+        gap = float(gap_of_A + gap_of_B)
         on_branch = replace(scene, motion=scene.motion.replace(branch=branch))
-        stated: dict[str, Any] = {
-            COMMAND_NAMES[bar][0]: drawing.angle(bar),
-            "branch": branch,
-        }
-        turned = replace(on_branch, motion=Motion(**stated))
-        at = command_at(turned, np.array([drawing.angle(bar)]))
-        here = solve(turned, "position", at=at)
-        pins = np.array([complex(*here.A[0]), complex(*here.B[0])])
-        gap = float(np.abs(pins - wanted).sum())
         gaps.setdefault(gap if math.isfinite(gap) else math.inf, on_branch)
     nearest = min(gaps)
     if PINS_APART * max(scene.linkage.lengths) < nearest < math.inf:

@@ -5,6 +5,7 @@ It is tilted about an axis and moved to an origin.
 
 import math
 from dataclasses import dataclass
+from operator import add
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -35,14 +36,13 @@ class Plane:
     origin: Vector = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        axis, origin = (
-            tuple(require(name, number) for number in _require_three(name, value))
-            for name, value in (("axis", self.axis), ("origin", self.origin))
-        )
+        axis = _require_three("axis", self.axis)
+        origin = _require_three("origin", self.origin)
         length = math.hypot(*axis)
         if not 0.0 < length < math.inf:
             raise InputError("axis", self.axis, "must have a length")
-        object.__setattr__(self, "axis", tuple(part / length for part in axis))
+        unit_vector = tuple(part / length for part in axis)
+        object.__setattr__(self, "axis", unit_vector)
         object.__setattr__(self, "origin", origin)
 
     @property
@@ -89,21 +89,23 @@ class Plane:
 
         They are applied in this order about fixed axes.
         """
-        turn = self.rotation
-        pitch = math.atan2(-turn[2, 0], math.hypot(turn[0, 0], turn[1, 0]))
-        roll = math.atan2(turn[2, 1], turn[2, 2])
-        yaw = math.atan2(turn[1, 0], turn[0, 0])
+        (xx, _, _), (yx, _, _), (zx, zy, zz) = self.rotation
+        pitch = math.atan2(-zx, math.hypot(xx, yx))
+        roll = math.atan2(zy, zz)
+        yaw = math.atan2(yx, xx)
         return roll, pitch, yaw
 
     def turn(self, x: float, y: float, z: float = 0.0) -> Vector:
         """Turn a vector of the frame into world axes."""
-        vector = self.rotation @ (x, y, z)
-        return float(vector[0]), float(vector[1]), float(vector[2])
+        in_world = self.rotation @ (x, y, z)
+        world_x, world_y, world_z = in_world.tolist()
+        return world_x, world_y, world_z
 
     def place(self, x: float, y: float, z: float = 0.0) -> Vector:
         """Return a point of the frame in world axes, m."""
-        dx, dy, dz = self.turn(x, y, z)
-        return self.origin[0] + dx, self.origin[1] + dy, self.origin[2] + dz
+        from_origin = self.turn(x, y, z)
+        world_x, world_y, world_z = map(add, self.origin, from_origin)
+        return world_x, world_y, world_z
 
     def moved(self, x: float, y: float) -> "Plane":
         """Return the frame with its origin at a point of this one, m.
@@ -135,36 +137,34 @@ class Plane:
         statistic = root.find("statistic")
         assert option is not None
         assert statistic is not None
-        gravity = _read_vector(option.get("gravity", "0 0 0"))
-        option.set("gravity", write_exactly(*self.turn(*gravity)))
-        statistic.set(
-            "center",
-            write_exactly(*self.place(*_read_vector(statistic.attrib["center"]))),
-        )
-        turned = write_exactly(*self.quaternion)
+        quaternion = write_exactly(*self.quaternion)
+        self._turn_attribute(option, "gravity")
+        self._move_attribute(statistic, "center")
         for body in root.iterfind("worldbody/body"):
-            body.set(
-                "pos",
-                write_exactly(*self.place(*_read_vector(body.get("pos", "0 0 0")))),
-            )
-            body.set("quat", turned)
-        for tag in ("light", "camera"):
-            for element in root.iterfind(f"worldbody/{tag}"):
-                place = _read_vector(element.attrib["pos"])
-                element.set("pos", write_exactly(*self.place(*place)))
+            self._move_attribute(body, "pos")
+            body.set("quat", quaternion)
         for light in root.iterfind("worldbody/light"):
-            light.set(
-                "dir",
-                write_exactly(*self.turn(*_read_vector(light.attrib["dir"]))),
-            )
+            self._move_attribute(light, "pos")
+            self._turn_attribute(light, "dir")
         for camera in root.iterfind("worldbody/camera"):
-            camera.set("quat", turned)
+            self._move_attribute(camera, "pos")
+            camera.set("quat", quaternion)
+
+    def _turn_attribute(self, element: ET.Element, name: str) -> None:
+        """Turn a vector of the frame that an attribute states into world axes."""
+        vector = _read_vector(element.get(name, "0 0 0"))
+        element.set(name, write_exactly(*self.turn(*vector)))
+
+    def _move_attribute(self, element: ET.Element, name: str) -> None:
+        """Move a point of the frame that an attribute states into the world."""
+        point = _read_vector(element.get(name, "0 0 0"))
+        element.set(name, write_exactly(*self.place(*point)))
 
 
 def _require_three(name: str, value: object) -> tuple[float, ...]:
     if not isinstance(value, (tuple, list)) or len(value) != 3:
         raise InputError(name, value, "must be three numbers")
-    return tuple(value)
+    return tuple(require(name, number) for number in value)
 
 
 def _read_vector(text: str) -> Vector:

@@ -80,15 +80,17 @@ class MotorDuty(NamedTuple):
 
 
 DUTY_UNITS = {
-    **{
-        "peak_torque": "N m",
-        "rms_torque": "N m",
-        "peak_speed": "rad/s",
-        "peak_power": "W",
-        "rms_power": "W",
-    },
-    **{"energy_in": "J", "energy_out": "J", "peak_force": "N", "rms_force": "N"},
-    **{"mean_torque": "N m", "energy_swing": "J"},
+    "peak_torque": "N m",
+    "rms_torque": "N m",
+    "peak_speed": "rad/s",
+    "peak_power": "W",
+    "rms_power": "W",
+    "energy_in": "J",
+    "energy_out": "J",
+    "peak_force": "N",
+    "rms_force": "N",
+    "mean_torque": "N m",
+    "energy_swing": "J",
 }
 """SI unit of each number of `MotorDuty`. The speed of a drive that exerts a force is in
 m/s.
@@ -101,9 +103,9 @@ def shaking_force(solution: Solution) -> Array:
     It is F21 + F41 = -(F12 + F14). A linear drive with an end on the ground adds its
     own; a spring pulls there besides.
     """
-    return -(
-        _require_quantity(solution, "F12") + _require_quantity(solution, "F14")
-    ) + _find_push(solution)
+    F12 = _require_quantity(solution, "F12")
+    F14 = _require_quantity(solution, "F14")
+    return -(F12 + F14) + _find_push(solution)
 
 
 def shaking_moment(solution: Solution) -> Array:
@@ -115,38 +117,35 @@ def shaking_moment(solution: Solution) -> Array:
     Couples that effects exert between the bars and ground (pin damping or friction at
     O2, O4) are not part of it.
     """
+    assert solution.ground is not None
+    length, ground_angle = solution.ground
 
     def moment(distance: Any, angle: Any, force: Array) -> Array:
-        return np.asarray(
-            distance * (np.cos(angle) * force[..., 1] - np.sin(angle) * force[..., 0])
-        )
+        x = force[..., 0]
+        y = force[..., 1]
+        return np.asarray(distance * (np.cos(angle) * y - np.sin(angle) * x))
 
-    F14 = _require_quantity(solution, "F14")
-    drive = solution.drive
-    assert solution.ground is not None
-    length, angle = solution.ground
-    if drive is None:
+    at_O4 = moment(length, ground_angle, _require_quantity(solution, "F14"))
+    if solution.drive is None:
         of_drive = -_require_quantity(solution, "torque")
-    else:
-        of_drive = np.zeros(())
-    for point in (
-        [] if drive is None else [point for _, point in drive.ends if point.bar == 1]
-    ):
-        of_drive = moment(point.distance, point.angle + angle, _find_push(solution))
-    return np.asarray(of_drive - moment(length, angle, F14))
+        return np.asarray(of_drive - at_O4)
+    of_drive = np.zeros(())
+    for _, place in solution.drive.ends:
+        if place.bar == 1:
+            angle = place.angle + ground_angle
+            of_drive = moment(place.distance, angle, _find_push(solution))
+    return np.asarray(of_drive - at_O4)
 
 
 def _find_push(solution: Solution) -> Array:
     """Return the force of a linear drive on the frame, N, (n, 2)."""
     ends = () if solution.drive is None else solution.drive.ends
-    sense = sum(sense for sense, point in ends if point.bar == 1)
+    sense = sum(sense for sense, place in ends if place.bar == 1)
     if not sense:
         return np.zeros((*solution.theta_2.shape, 2))
-    return np.asarray(
-        sense
-        * _require_quantity(solution, "drive_force")[..., None]
-        * _require_quantity(solution, "drive_line")
-    )
+    size = _require_quantity(solution, "drive_force")[..., None]
+    direction = _require_quantity(solution, "drive_line")
+    return np.asarray(sense * size * direction)
 
 
 def bearing_load(solution: Solution, pin: str) -> BearingLoad:
@@ -238,13 +237,10 @@ def is_once_round(solution: Solution) -> Any:
     period = count_turns(solution.lengths, bar)
     if period.ndim > 1:  # of a study, a column
         period = period[:, 0]
-    turns = np.abs(angle[..., -1] - angle[..., 0]) / (2.0 * np.pi * period)
-    once_round = (turns > 0.5) & np.isclose(
-        turns,
-        np.round(turns),
-        rtol=1e-12,
-        atol=0.0,
-    )
+    covered = np.abs(angle[..., -1] - angle[..., 0])
+    turns = covered / (2.0 * np.pi * period)
+    is_whole = np.isclose(turns, np.round(turns), rtol=1e-12, atol=0.0)
+    once_round = (turns > 0.5) & is_whole
     for rate in (solution.at.speed, solution.at.acceleration):
         if rate is not None and np.shape(rate)[-1:] == angle.shape[-1:]:
             once_round = once_round & _repeats(np.asarray(rate))
@@ -271,22 +267,15 @@ def _require_quantity(solution: Solution, name: str) -> Array:
 
 def _compute_spans(solution: Solution, power: Array) -> Array:
     """Compute the time between each two positions, s; NaN where nothing moves."""
-    stroke = solution.at.stroke
-    bar = solution.at.bar
     if solution.time is not None:
         return np.asarray(np.diff(solution.time))
-    if stroke is None:
-        speed = getattr(solution, f"omega_{bar}")
+    if solution.at.stroke is None:
+        speed = getattr(solution, f"omega_{solution.at.bar}")
     else:
         speed = solution.stroke_speed
-    steps = np.diff(solution.at.places)
     speed = np.broadcast_to(np.asarray(speed), power.shape)[..., :-1]
-    spans = np.divide(
-        steps,
-        speed,
-        out=np.full(speed.shape, np.nan),
-        where=speed != 0.0,
-    )
+    spans = np.full(speed.shape, np.nan)
+    np.divide(np.diff(solution.at.places), speed, out=spans, where=speed != 0.0)
     return np.asarray(np.abs(spans))
 
 
@@ -295,18 +284,18 @@ def _integrate_power(
     power: Array,
 ) -> tuple[float | None, float | None]:
     """Integrate the positive and the negative part of the power, each over time."""
-    parts = [
-        0.5 * spans * (part[..., :-1] + part[..., 1:])
-        for part in (np.maximum(power, 0.0), np.maximum(-power, 0.0))
-    ]
-    moves = np.isfinite(parts[0]).any(axis=-1)
+
+    def integrate(part: Array) -> Array:
+        return np.asarray(0.5 * spans * (part[..., :-1] + part[..., 1:]))
+
+    steps_in = integrate(np.maximum(power, 0.0))
+    steps_out = integrate(np.maximum(-power, 0.0))
+    moves = np.isfinite(steps_in).any(axis=-1)
     if not moves.any():
         return None, None
-    energy_in, energy_out = (
-        _reduce_to_number(np.where(moves, np.nansum(part, axis=-1), np.nan))
-        for part in parts
-    )
-    return energy_in, energy_out
+    energy_in = np.where(moves, np.nansum(steps_in, axis=-1), np.nan)
+    energy_out = np.where(moves, np.nansum(steps_out, axis=-1), np.nan)
+    return _reduce_to_number(energy_in), _reduce_to_number(energy_out)
 
 
 def _find_swing(
@@ -349,9 +338,12 @@ def _find_rms(solution: Solution, values: Array) -> Any:
 
     Whole turns count their two equal ends once.
     """
-    repeated = np.arange(values.shape[-1]) == values.shape[-1] - 1
-    once = np.where(is_once_round(solution)[..., None] & repeated, np.nan, values)
-    return _reduce_to_number(np.sqrt(_reduce(np.nanmean, np.square(once))))
+    positions = values.shape[-1]
+    is_last = np.arange(positions) == positions - 1
+    is_repeated = is_once_round(solution)[..., None] & is_last
+    once = np.where(is_repeated, np.nan, values)
+    mean_square = _reduce(np.nanmean, np.square(once))
+    return _reduce_to_number(np.sqrt(mean_square))
 
 
 def _reduce(reduce: Any, values: Array) -> Any:
@@ -394,7 +386,8 @@ def read_drive_demand(solution: Solution) -> Driving:
         symbol = "F"
         word = "drive force"
         speed = "stroke_speed"
-    values, error = (getattr(solution, name) for name in names[:2])
+    values = getattr(solution, names.value)
+    error = getattr(solution, names.error)
     return Driving(word, symbol, UNITS[names.value], values, error, names, speed)
 
 
@@ -448,23 +441,19 @@ def compute_energies(scene: Scene, motion: Solution) -> _Energies:
     work = {}
     for name, terms in groups.items():
         actions = Actions(state, list_bodies(scene.linkage)).add(terms)
-        power = np.zeros(len(motion)) + actions.generalized_forces()[0] * motion.omega_2
+        Q, _ = actions.generalized_forces()
+        power = np.zeros(len(motion)) + Q * motion.omega_2
         finite = np.isfinite(power)  # bars 3 and 4 in line: the velocities are 0/0
         if np.count_nonzero(finite) > 1 and np.any(power[finite]):
-            work[name] = CubicSpline(
-                motion.time[finite],
-                power[finite],
-            ).antiderivative()(motion.time)
+            spline = CubicSpline(motion.time[finite], power[finite])
+            integral = spline.antiderivative()
+            work[name] = integral(motion.time)
     kinetic = np.zeros(len(motion))
-    for number, body in zip(
-        MOVING_BARS,
-        list_bodies(scene.linkage, scene.effects),
-        strict=True,
-    ):
+    bodies = list_bodies(scene.linkage, scene.effects)
+    for number, body in zip(MOVING_BARS, bodies, strict=True):
         v = state.velocity(number, body.z)
-        kinetic = (
-            kinetic
-            + 0.5 * body.m * dot(v, v)
-            + 0.5 * body.I * np.square(state.omega(number))
-        )
+        omega = state.omega(number)
+        of_centre = 0.5 * body.m * dot(v, v)
+        about_centre = 0.5 * body.I * np.square(omega)
+        kinetic = kinetic + of_centre + about_centre
     return _Energies(kinetic, work)
