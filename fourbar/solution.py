@@ -592,24 +592,21 @@ def unwrap(angles: Array) -> None:
 
     `angles`: (n,), or (m, n) for as many sweeps.
     """
-    if angles.shape[-1] < 2 or (
-        np.ptp(angles) < np.pi and not (angles[..., 0] == -np.pi).any()
-    ):
+    if angles.shape[-1] < 2:
         return
+    # -pi as a double lies inside (-pi, pi], yet reads as the excluded end
+    begins_at_excluded_end = (angles[..., 0] == -np.pi).any()
+    if np.ptp(angles) < np.pi and not begins_at_excluded_end:
+        return
+    turn = 2.0 * np.pi
     rows = angles.reshape(-1, angles.shape[-1])
     finite = ~np.isnan(rows)
-    place = np.where(
-        finite,
-        np.arange(rows.shape[1]),
-        np.argmax(finite, axis=1)[:, None],
-    )
-    raw = np.take_along_axis(rows, np.maximum.accumulate(place, axis=1), axis=1)
-    jumps = np.diff(raw, axis=1, prepend=raw[:, :1])
-    # -pi as a double lies inside (-pi, pi], yet reads as the excluded end
-    start = np.where(raw[:, :1] == -np.pi, 2.0 * np.pi, 0.0)
-    turned = (
-        rows
-        + start
-        - (2.0 * np.pi) * np.cumsum(np.round(jumps / (2.0 * np.pi)), axis=1)
-    )
-    angles[...] = turned.reshape(angles.shape)
+    # each NaN is replaced by the last angle before it, at the start by the first one
+    first = np.argmax(finite, axis=1)[:, None]
+    place = np.where(finite, np.arange(rows.shape[1]), first)
+    place = np.maximum.accumulate(place, axis=1)
+    filled = np.take_along_axis(rows, place, axis=1)
+    jumps = np.diff(filled, axis=1, prepend=filled[:, :1])
+    turns = np.cumsum(np.round(jumps / turn), axis=1)
+    start = np.where(filled[:, :1] == -np.pi, turn, 0.0)
+    angles[...] = (rows + start - turn * turns).reshape(angles.shape)

@@ -238,10 +238,9 @@ def _solve_alone(case: Case, commanded: Command, request: _Requested) -> Results
     results.sign_may_differ = _may_sign_differ(case)
     vectors = table.view(float).reshape(-1, 1, 2)
     scalars = vectors[:, :, 0]
-    results.arrays = {
-        name: (scalars if name in SCALARS else vectors)[i]
-        for i, name in enumerate(values)
-    }
+    results.arrays = {}
+    for row, name in enumerate(values):
+        results.arrays[name] = scalars[row] if name in SCALARS else vectors[row]
     return results
 
 

@@ -89,22 +89,20 @@ def pack_frame(about: dict[str, Any]) -> bytes:
     if "data" in about:
         branches: dict[str, dict[str, Any]] = {}
         for sign, table in about["data"]["branches"].items():
-            branches[sign] = {
-                name: column
-                for name, column in table.items()
-                if not isinstance(column, np.ndarray)
-            }
+            branches[sign] = {}
             for name, column in table.items():
                 if isinstance(column, np.ndarray):
                     columns.append((sign, name, len(column), column.ndim))
                     arrays.append(np.ascontiguousarray(column, dtype="<f8").tobytes())
-        about = about | {
-            "data": about["data"] | {"branches": branches},
-            "columns": columns,
-        }
+                else:
+                    branches[sign][name] = column
+        data = about["data"] | {"branches": branches}
+        about = about | {"data": data, "columns": columns}
     text = json.dumps(about, allow_nan=False, separators=(",", ":")).encode()
+    # the arrays begin at a multiple of 8 bytes
     text += b" " * (-(len(text) + 4) % 8)
-    return b"".join((struct.pack("<I", len(text)), text, *arrays))
+    length = struct.pack("<I", len(text))
+    return b"".join((length, text, *arrays))
 
 
 class Exports:

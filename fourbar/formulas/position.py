@@ -152,10 +152,10 @@ def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
         a = _replace(a, d, kite_at_A)
         c = _replace(c, b, kite_at_A)
     lengths = d, a, b, c
-    E1 = _vanish(exact_difference(b, c, a, d), lengths) * (a + b + c + d)
-    E2 = _vanish(exact_difference(d, c, a, b), lengths, d - a)
-    E2 = E2 * _vanish(exact_difference(d, b, a, c), lengths, d - a)
-    return Loop(d, a, b, c, E1, E2)
+    stretched = _vanish(exact_difference(b, c, a, d), lengths)
+    with_c = _vanish(exact_difference(d, c, a, b), lengths, d - a)
+    with_b = _vanish(exact_difference(d, b, a, c), lengths, d - a)
+    return Loop(d, a, b, c, stretched * (a + b + c + d), with_c * with_b)
 
 
 def _are_equal(length: Number, other: Number) -> Number:
@@ -284,10 +284,10 @@ def compute_factors(
     short = four_ad > four_bc
     # outer + inner = 4 b c: the smaller change over psi keeps the digits
     if is_any(short):
-        outer, inner = (
-            select(short & (ss < kk), four_bc - inner, outer),
-            select(short & (kk <= ss), four_bc - outer, inner),
-        )
+        outer_by_inner = four_bc - inner
+        inner_by_outer = four_bc - outer
+        outer = select(short & (ss < kk), outer_by_inner, outer)
+        inner = select(short & (kk <= ss), inner_by_outer, inner)
     return HalfAngle(ss, kk, sk, outer, inner, root_sign)
 
 
@@ -348,7 +348,9 @@ def find_parallel_pairs(lengths: Loop, branch: Number) -> tuple[Number, Number]:
     Second: B stays on O2, bars 2, 3 turn together and bar 4 rests (a = b, c = d).
     """
     d, a, b, c, _, _ = lengths
-    return (a == c) & (b == d) & (branch > 0), (a == b) & (c == d) & (branch < 0)
+    first = (a == c) & (b == d) & (branch > 0)
+    second = (a == b) & (c == d) & (branch < 0)
+    return first, second
 
 
 def put_parallel_pairs(position: Position, first: Number, second: Number) -> Position:
@@ -356,8 +358,12 @@ def put_parallel_pairs(position: Position, first: Number, second: Number) -> Pos
 
     u3 = u1, u4 = u2 where `first`; u3 = -u2, u4 = -u1 where `second`.
     """
-    u3 = np.where(first, position.u1, np.where(second, -position.u2, position.u3))
-    u4 = np.where(first, position.u2, np.where(second, -position.u1, position.u4))
     sine = 2.0 * position.half.sk
-    sine = np.where(first, sine, np.where(second, -sine, position.sin_mu))
-    return position._replace(u3=u3, u4=u4, sin_mu=sine)
+    u3 = np.where(second, -position.u2, position.u3)
+    u4 = np.where(second, -position.u1, position.u4)
+    sin_mu = np.where(second, -sine, position.sin_mu)
+    return position._replace(
+        u3=np.where(first, position.u1, u3),
+        u4=np.where(first, position.u2, u4),
+        sin_mu=np.where(first, sine, sin_mu),
+    )

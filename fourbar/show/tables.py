@@ -63,8 +63,13 @@ def write_table(
 
     text = io.StringIO()
     console = Console(file=text, width=width or 10_000, color_system=None)
-    for part in (*([clean_line(title)] if title else []), *lines, shown, *after):
-        console.print(Text(part) if isinstance(part, str) else part)
+    if title:
+        console.print(Text(clean_line(title)))
+    for line in lines:
+        console.print(Text(line))
+    console.print(shown)
+    for line in after:
+        console.print(Text(line))
     return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))
 
 
@@ -200,15 +205,14 @@ def list_columns(
             add(drive.symbol, drive.unit, drive.values)
             add("power", "W", solution.power)
         for name in PIN_FORCES:
-            add(f"|{name}|", "N", np.hypot(*getattr(solution, name).T))
+            x, y = getattr(solution, name).T
+            add(f"|{name}|", "N", np.hypot(x, y))
     for name, unit, values in _list_motion(solution):
         add(name, unit, values)
     shown["sin mu\n"] = write_cells(solution.sin_mu)
     if solution.time is None and drive.values is not None and drive.error is not None:
-        shown[f"digits\nof {drive.symbol[0]}"] = _count_torque_digits(
-            drive.values,
-            drive.error,
-        )
+        heading = f"digits\nof {drive.symbol[0]}"
+        shown[heading] = _count_torque_digits(drive.values, drive.error)
     time = compute_times(solution.scene, solution.at)
     if time is not None:
         add("time", "s", time)
@@ -234,11 +238,13 @@ def _list_motion(solution: Solution) -> Iterator[tuple[str, str, Array]]:
             yield f"{start}{name}_y", unit, vector[:, 1]
     for name in ANGLES:
         yield name, "rad", getattr(solution, name)
-    sought = [bar for bar in "234" if bar != solution.commanded[-1]]
-    rates = (f"{kind}_{bar}" for kind in ("omega", "alpha") for bar in sought)
-    for name in ("stroke", "stroke_speed", *rates):
-        if getattr(solution, name) is not None:
-            yield name, UNITS[name], getattr(solution, name)
+    others = [bar for bar in "234" if bar != solution.commanded[-1]]
+    speeds = [f"omega_{bar}" for bar in others]
+    accelerations = [f"alpha_{bar}" for bar in others]
+    for name in ("stroke", "stroke_speed", *speeds, *accelerations):
+        values = getattr(solution, name)
+        if values is not None:
+            yield name, UNITS[name], values
 
 
 def _list_columns_of(solution: Solution, name: str) -> dict[str, Array]:
@@ -285,12 +291,11 @@ def make_table(
             break
         kept.append(name)
     rows = list(zip(*(cells[name] for name in kept), strict=True))
+    shown = rows[::every]
     if (len(rows) - 1) % every:
-        last = rows[-1:]
-    else:
-        last = []
+        shown += rows[-1:]
     left_out = [name.split("\n")[0] for name in cells if name not in kept]
-    return make_plain_table(kept, rows[::every] + last, gap=GAP - 1), left_out
+    return make_plain_table(kept, shown, gap=GAP - 1), left_out
 
 
 def write_cells(values: Array, form: str = ".6g") -> list[str]:
@@ -310,11 +315,11 @@ def write_cells(values: Array, form: str = ".6g") -> list[str]:
 def _count_torque_digits(torque: Array, error: Array) -> list[str]:
     """Count the digits of the torque that are not round-off."""
     with np.errstate(all="ignore"):
-        digits = np.clip(np.floor(np.log10(np.abs(torque) / error)), 0, MOST_DIGITS)
+        digits = np.floor(np.log10(np.abs(torque) / error))
+    digits = np.clip(digits, 0, MOST_DIGITS)
+    digits = np.where(error == 0.0, MOST_DIGITS, digits)
     finite = np.isfinite(torque) & np.isfinite(error)
-    return write_cells(
-        np.where(finite, np.where(error == 0.0, MOST_DIGITS, digits), np.nan)
-    )
+    return write_cells(np.where(finite, digits, np.nan))
 
 
 @contextmanager

@@ -119,22 +119,21 @@ def find_poles(view: View) -> _Indices:
 
     Each index i stands for positions i and i + 1.
     """
-    s = view.sweep
+    sweep = view.sweep
     if view.scene.motion.free is not None:  # no drive, no pole
         return np.array([], dtype=np.intp)
     if view.scene.drive is not None:
-        case = Case.of(view.scene, s.at.bar)
-        state = compute_shown_state(view.scene, s.at)
+        case = Case.of(view.scene, sweep.at.bar)
+        state = compute_shown_state(view.scene, sweep.at)
         assert case.drive is not None
         with np.errstate(all="ignore"):
-            sine = case.drive.leverage(state, case.sines(state.position))[0]
-        return np.flatnonzero(sine[:-1] * sine[1:] <= 0.0)
-    pair = {
-        2: (s.theta_4, s.theta_3),
-        3: (s.theta_4, s.theta_2),
-        4: (s.theta_3, s.theta_2),
-    }[view.scene.drive_bar]
-    sine = np.sin(pair[0] - pair[1])
+            sine, _ = case.drive.leverage(state, case.sines(state.position))
+    elif view.scene.drive_bar == 2:
+        sine = np.sin(sweep.theta_4 - sweep.theta_3)
+    elif view.scene.drive_bar == 3:
+        sine = np.sin(sweep.theta_4 - sweep.theta_2)
+    else:
+        sine = np.sin(sweep.theta_3 - sweep.theta_2)
     return np.flatnonzero(sine[:-1] * sine[1:] <= 0.0)
 
 
@@ -491,7 +490,10 @@ def _list_force_sizes(view: View, names: Iterable[str] = FORCE_COLOURS) -> list[
 def draw_forces(axes: "Axes", view: View) -> None:
     """Draw the magnitudes of the four pin forces."""
     over = draw_axes(axes, view)
-    sizes = {name: np.hypot(*getattr(view.sweep, name).T) for name in FORCE_COLOURS}
+    sizes = {}
+    for name in FORCE_COLOURS:
+        x, y = getattr(view.sweep, name).T
+        sizes[name] = np.hypot(x, y)
     everywhere = _list_force_sizes(view)
     limit = choose_limit(everywhere)
     factor, unit = choose_unit(limit or largest_magnitude(*everywhere), "N", view.units)
@@ -671,9 +673,8 @@ def _list_inside(angles: Array, angle: float, margin: float) -> list[float]:
     high = float(angles.max()) + margin
     start = math.degrees(angle)
     first = math.ceil((low - start) / 360.0)
-    return [
-        start + 360.0 * k for k in range(first, math.floor((high - start) / 360.0) + 1)
-    ]
+    last = math.floor((high - start) / 360.0)
+    return [start + 360.0 * turn for turn in range(first, last + 1)]
 
 
 EVERY = 60.0
@@ -775,8 +776,7 @@ def _choose_spacing(view: View) -> tuple[float, str]:
 def _find_free_direction(directions: Array) -> float:
     """Find the multiple of 22.5 deg that lies furthest from the curve."""
     candidates = np.radians(np.arange(16) * 22.5)
-    away = np.abs(np.angle(np.exp(1j * (directions - candidates[:, None])))).min(
-        axis=1,
-        initial=math.pi,
-    )
-    return float(np.degrees(candidates[int(np.argmax(away))]))
+    turned = np.exp(1j * (directions - candidates[:, None]))
+    distances = np.abs(np.angle(turned)).min(axis=1, initial=math.pi)
+    freest = candidates[int(np.argmax(distances))]
+    return float(np.degrees(freest))

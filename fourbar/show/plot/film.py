@@ -139,18 +139,27 @@ def choose_frames(shown: View, count: int) -> list[int]:
 
     They are the segment that assembles around the drawn position.
     """
-    closes = shown.sweep.assembled
+    assembled = shown.sweep.assembled
     positions = shown.sweep.at
-    here = int(np.argmin(np.abs(positions.places - shown.here.at.places[0])))
-    gaps = np.flatnonzero(~closes)
+    distances = np.abs(positions.places - shown.here.at.places[0])
+    here = int(np.argmin(distances))
+    gaps = np.flatnonzero(~assembled)
     first = max(gaps[gaps < here], default=-1) + 1
-    last = min(gaps[gaps > here], default=len(closes)) - 1
+    last = min(gaps[gaps > here], default=len(assembled)) - 1
+
+    def spread(number: int, *, endpoint: bool = True) -> list[int]:
+        places = np.linspace(first, last, number, endpoint=endpoint)
+        return [round(place) for place in places.tolist()]
+
     if shown.time is not None:
-        return [round(i) for i in np.linspace(first, last, count)]
-    if abs(positions.angle[last] - positions.angle[first] - math.tau) < 1e-6:
-        return [round(i) for i in np.linspace(first, last, count, endpoint=False)]
-    forward = [round(i) for i in np.linspace(first, last, max(2, count // 2))]
-    return forward + forward[-2:0:-1]
+        return spread(count)
+    covered = positions.angle[last] - positions.angle[first]
+    is_one_turn = abs(covered - math.tau) < 1e-6
+    if is_one_turn:
+        return spread(count, endpoint=False)
+    forward = spread(max(2, count // 2))
+    back = forward[-2:0:-1]
+    return forward + back
 
 
 def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:

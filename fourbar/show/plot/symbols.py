@@ -210,8 +210,15 @@ def _make_drive(drive: ForceDrive) -> Symbol:
 
 def _join_ends(kind: str, name: str, line: LinearDrive | Spring) -> Symbol:
     """Make the symbol of a line between two points."""
-    end = line.end.bar, line.end.vector()
-    return Symbol(kind, name, line.start.bar, line.start.vector(), end=end)
+    start = line.start
+    end = line.end
+    return Symbol(
+        kind,
+        name,
+        start.bar,
+        start.vector(),
+        end=(end.bar, end.vector()),
+    )
 
 
 class Pose(NamedTuple):
@@ -235,10 +242,12 @@ class Pose(NamedTuple):
 
         It would hide the bar.
         """
-        ring = list(self.pins)  # in the order of the loop
-        place = ring.index(pin)
-        beside = [self.pins[ring[(place + step) % len(ring)]] for step in (-1, 1)]
-        shortest = min(abs(pin_beside - self.pins[pin]) for pin_beside in beside)
+        loop = list(self.pins.values())  # in the order of the loop
+        here = self.pins[pin]
+        index = list(self.pins).index(pin)
+        before = loop[index - 1]
+        after = loop[(index + 1) % len(loop)]
+        shortest = min(abs(before - here), abs(after - here))
         return min(size, max(SMALLEST * size, _SHARE * shortest))
 
     def point(self, bar: int, z: complex) -> complex:
@@ -270,88 +279,123 @@ class _DrawnSymbol:
 
 def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) -> Pose:
     """Collect what symbols need of one position of a solution."""
-    A, B = (factor * complex(*point[index]) for point in (solution.A, solution.B))
-    O4 = factor * cmath.rect(linkage.ground, linkage.ground_angle)
-    angles = {k: float(getattr(solution, f"theta_{k}")[index]) for k in (2, 3, 4)}
-    u = {
+    theta_2 = float(solution.theta_2[index])
+    theta_3 = float(solution.theta_3[index])
+    theta_4 = float(solution.theta_4[index])
+    directions = {
         1: cmath.rect(1.0, linkage.ground_angle),
-        **{k: cmath.rect(1.0, angle) for k, angle in angles.items()},
+        2: cmath.rect(1.0, theta_2),
+        3: cmath.rect(1.0, theta_3),
+        4: cmath.rect(1.0, theta_4),
     }
-    if solution.torque is None:
-        torque = float("nan")
-    else:
+    pins = {
+        "O2": 0.0j,
+        "A": factor * complex(*solution.A[index]),
+        "B": factor * complex(*solution.B[index]),
+        "O4": factor * cmath.rect(linkage.ground, linkage.ground_angle),
+    }
+    feet = {1: pins["O2"], 2: pins["O2"], 3: pins["A"], 4: pins["O4"]}
+    torque = math.nan
+    if solution.torque is not None:
         torque = float(solution.torque[index])
-    pins = {"O2": 0.0j, "A": A, "B": B, "O4": O4}
-    return Pose({1: 0.0j, 2: 0.0j, 3: A, 4: O4}, u, pins, factor, angles[2], torque)
+    return Pose(feet, directions, pins, factor, theta_2, torque)
 
 
 def draw_symbol(axes: "Axes", symbol: Symbol, place: Pose, size: float) -> _DrawnSymbol:
     """Draw one symbol at one position; `size` is that of a support."""
-    drawn, colour = (
-        _DrawnSymbol(text=symbol.name),
-        SYMBOL_COLOURS.get(symbol.kind, PIN_COLOUR),
-    )
+    drawn = _DrawnSymbol(text=symbol.name)
     if symbol.kind == "gravity":
         _draw_gravity(axes, symbol, drawn)
     elif symbol.end is not None:
-        start, end = place.point(symbol.bar, symbol.at), place.point(*symbol.end)
-        if symbol.kind == "spring":
-            _draw_line(axes, drawn, _draw_zigzag(start, end, 0.6 * size), colour, 1.0)
-        else:
-            along = (end - start) / abs(end - start)
-            _draw_line(axes, drawn, np.array([start, end]), colour, 1.2)
-            _draw_line(
-                axes,
-                drawn,
-                start + np.array([0.1, 1.0]) * place.barrel * along,
-                colour,
-                4.5,
-            )
-            drawn.text, drawn.away = f"${symbol.name}$", 1j * along
-            drawn.label = split_complex(start + 0.5 * place.barrel * along)
-        x, y = zip(*map(split_complex, (start, end)), strict=True)
-        drawn.artists += axes.plot(x, y, "o", ms=3.5, color=colour, zorder=5.5)
+        _draw_between_ends(axes, symbol, place, size, drawn)
     elif symbol.kind in ("force", "push"):
         _draw_force(axes, symbol, place, size, drawn)
     elif symbol.kind in ("moment", "drive"):
+        _draw_couple(axes, symbol, place, size, drawn)
+    else:
+        _draw_ring(axes, symbol, place, size, drawn)
+    return drawn
+
+
+def _colour_of(symbol: Symbol) -> str:
+    return SYMBOL_COLOURS.get(symbol.kind, PIN_COLOUR)
+
+
+def _draw_between_ends(
+    axes: "Axes",
+    symbol: Symbol,
+    place: Pose,
+    size: float,
+    drawn: _DrawnSymbol,
+) -> None:
+    """Draw a spring as a zigzag, a cylinder as its rod and barrel, and both ends."""
+    assert symbol.end is not None
+    colour = _colour_of(symbol)
+    start = place.point(symbol.bar, symbol.at)
+    end = place.point(*symbol.end)
+    if symbol.kind == "spring":
+        _draw_line(axes, drawn, _draw_zigzag(start, end, 0.6 * size), colour, 1.0)
+    else:
+        along = (end - start) / abs(end - start)
+        rod = np.array([start, end])
+        barrel = start + np.array([0.1, 1.0]) * place.barrel * along
+        _draw_line(axes, drawn, rod, colour, 1.2)
+        _draw_line(axes, drawn, barrel, colour, 4.5)
+        drawn.text = f"${symbol.name}$"
+        drawn.away = 1j * along
+        drawn.label = split_complex(start + 0.5 * place.barrel * along)
+    x = (start.real, end.real)
+    y = (start.imag, end.imag)
+    drawn.artists += axes.plot(x, y, "o", ms=3.5, color=colour, zorder=5.5)
+
+
+def _draw_couple(
+    axes: "Axes",
+    symbol: Symbol,
+    place: Pose,
+    size: float,
+    drawn: _DrawnSymbol,
+) -> None:
+    """Draw a moment, or the torque of the drive, as an arrow that turns."""
+    if symbol.kind == "moment":
         centre = place.point(symbol.bar, symbol.at)
         turn = math.copysign(1.0, symbol.moment) * symbol.sign(place.theta_2)
-        if symbol.kind == "drive":
-            centre = (
-                0.5 * (place.pins["A"] + place.pins["B"])
-                if symbol.bar == 3
-                else place.pins[symbol.pin]
-            )
-            turn = 1.0 if math.isnan(place.torque) else float(np.sign(place.torque))
-            drawn.text = f"$T_{symbol.bar}$"
-        size = place.small(symbol.pin or FIRST_PIN[symbol.bar], size)
-        _draw_turning_arrow(
-            axes,
-            centre,
-            SYMBOL_SIZES[symbol.kind] * size,
-            turn,
-            colour,
-            drawn,
-        )
     else:
-        centre, size = place.pins[symbol.pin], place.small(symbol.pin, size)
-        radius = size * (
-            RING_RADII.get(symbol.kind)
-            or SYMBOL_SIZES.get(symbol.kind, _RING_OF_OTHERS)
-        )
-        spiral = symbol.kind == "torsion"
-        turned = np.linspace(0.0, (2.5 if spiral else 1.0) * math.tau, 90)
-        radii = np.linspace(0.3 * radius, radius, 90) if spiral else radius
-        _draw_line(
-            axes,
-            drawn,
-            centre + radii * np.exp(1j * turned),
-            colour,
-            2.2 if symbol.kind == "flywheel" else 1.2,
-        )
-        drawn.away = cmath.rect(1.0, _NAMED_AT.get(symbol.kind, _NAME_OF_OTHERS))
-        drawn.label = split_complex(centre + radius * drawn.away)
-    return drawn
+        if symbol.bar == 3:
+            centre = 0.5 * (place.pins["A"] + place.pins["B"])
+        else:
+            centre = place.pins[symbol.pin]
+        turn = 1.0 if math.isnan(place.torque) else float(np.sign(place.torque))
+        drawn.text = f"$T_{symbol.bar}$"
+    size = place.small(symbol.pin or FIRST_PIN[symbol.bar], size)
+    radius = SYMBOL_SIZES[symbol.kind] * size
+    _draw_turning_arrow(axes, centre, radius, turn, _colour_of(symbol), drawn)
+
+
+def _draw_ring(
+    axes: "Axes",
+    symbol: Symbol,
+    place: Pose,
+    size: float,
+    drawn: _DrawnSymbol,
+) -> None:
+    """Draw what acts at a pin as a ring around it; a torsion spring is a spiral."""
+    centre = place.pins[symbol.pin]
+    kind = symbol.kind
+    size = place.small(symbol.pin, size)
+    relative = RING_RADII.get(kind) or SYMBOL_SIZES.get(kind, _RING_OF_OTHERS)
+    radius = size * relative
+    radii: Any = radius
+    turns = 1.0
+    if kind == "torsion":
+        radii = np.linspace(0.3 * radius, radius, 90)
+        turns = 2.5
+    angles = np.linspace(0.0, turns * math.tau, 90)
+    ring = centre + radii * np.exp(1j * angles)
+    width = 2.2 if kind == "flywheel" else 1.2
+    _draw_line(axes, drawn, ring, _colour_of(symbol), width)
+    drawn.away = cmath.rect(1.0, _NAMED_AT.get(kind, _NAME_OF_OTHERS))
+    drawn.label = split_complex(centre + radius * drawn.away)
 
 
 def split_complex(z: complex) -> DrawnPoint:

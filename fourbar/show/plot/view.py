@@ -57,13 +57,16 @@ class View:
     @property
     def axis(self) -> "Axis":
         """Quantity on the horizontal axis: time, or the commanded quantity."""
-        if self.time is not None:
-            longest = max(
-                float(view.time[-1]) for view in self.alike if view.time is not None
-            )
-            factor, unit = (1.0, "s") if longest >= 1.0 else choose_unit(longest, "s")
-            return Axis("t", "$t$", f" {unit}", factor, factor * self.time)
-        return axis_of(self.scene, self.sweep.at, self.units)
+        if self.time is None:
+            return axis_of(self.scene, self.sweep.at, self.units)
+        longest = max(
+            float(view.time[-1]) for view in self.alike if view.time is not None
+        )
+        factor = 1.0
+        unit = "s"
+        if longest < 1.0:
+            factor, unit = choose_unit(longest, "s")
+        return Axis("t", "$t$", f" {unit}", factor, factor * self.time)
 
     @property
     def time(self) -> Array | None:
@@ -172,15 +175,13 @@ def list_sweep(scene: Scene) -> Command:
             return command_at(scene, np.unique([*places, drawn]))
         return stated.part(np.argsort(stated.places, kind="stable"))
     wide = command_at(scene, default_places(scene, float(stated.angle[0])))
-    # the same position may lie whole turns away from the default range
+    place = stated.places
     if stated.stroke is None:
-        turns = np.round(
-            (0.5 * (wide.angle[0] + wide.angle[-1]) - stated.angle) / math.tau
-        )
-    else:
-        turns = 0.0
-    places = np.unique(np.concatenate([wide.places, stated.places + turns * math.tau]))
-    return command_at(scene, places)
+        # the same position may lie whole turns away from the default range
+        middle = 0.5 * (wide.angle[0] + wide.angle[-1])
+        turns = np.round((middle - stated.angle) / math.tau)
+        place = place + turns * math.tau
+    return command_at(scene, np.unique(np.concatenate([wide.places, place])))
 
 
 def find_drawn_place(scene: Scene) -> float | None:
@@ -303,20 +304,22 @@ def _choose_position(sweeps: "list[Solution]") -> float:
 
     It is a well-conditioned one if there is any.
     """
-    ends = np.flatnonzero(
-        np.diff(np.concatenate([[False], sweeps[0].assembled, [False]]).astype(int))
-    ).reshape(-1, 2)
-    run = slice(*ends[int(np.argmax(ends[:, 1] - ends[:, 0]))])
-    places = sweeps[0].at.places[run]
-    if sweeps[0].at.stroke is None:
-        lead = _LEAD
-    else:
-        lead = math.inf
+    first_sweep = sweeps[0]
+    assembled = np.concatenate([[False], first_sweep.assembled, [False]])
+    edges = np.flatnonzero(assembled[1:] != assembled[:-1])
+    starts = edges[::2]
+    stops = edges[1::2]
+    longest = int(np.argmax(stops - starts))
+    run = slice(starts[longest], stops[longest])
+    places = first_sweep.at.places[run]
     quality = np.full(len(places), np.inf)
     for sweep in sweeps:
         for condition in (sweep.condition, sweep.drive_condition):
             if condition is not None:
                 quality = np.minimum(quality, np.nan_to_num(condition[run]))
-    good = quality >= min(CLEAR, float(quality.max()))
-    target = places[0] + min(lead, 0.5 * (places[-1] - places[0]))
-    return float(places[good][np.argmin(np.abs(places[good] - target))])
+    good = places[quality >= min(CLEAR, float(quality.max()))]
+    lead = 0.5 * (places[-1] - places[0])
+    if first_sweep.at.stroke is None:
+        lead = min(_LEAD, lead)
+    nearest = np.argmin(np.abs(good - (places[0] + lead)))
+    return float(good[nearest])
