@@ -264,14 +264,16 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
 def _is_equal(one: Any, another: Any) -> bool:
     """Return whether two parts of a solution are equal, arrays in them too."""
     if isinstance(one, np.ndarray) or isinstance(another, np.ndarray):
-        of_numbers = np.issubdtype(np.asarray(one).dtype, np.floating)
-        return np.array_equal(one, another, equal_nan=of_numbers)
+        has_nan = np.issubdtype(np.asarray(one).dtype, np.floating)
+        return np.array_equal(one, another, equal_nan=has_nan)
     if isinstance(one, dict) and isinstance(another, dict):
-        alike = one.keys() == another.keys()
-        return alike and all(_is_equal(one[name], another[name]) for name in one)
+        if one.keys() != another.keys():
+            return False
+        return all(_is_equal(one[name], another[name]) for name in one)
     if isinstance(one, tuple) and isinstance(another, tuple):
-        alike = len(one) == len(another)
-        return alike and all(map(_is_equal, one, another))
+        if len(one) != len(another):
+            return False
+        return all(map(_is_equal, one, another))
     return bool(one == another)
 
 

@@ -57,9 +57,8 @@ def list_offers() -> dict[str, Any]:
     fields; `parts`: what a button adds; `words`: what an entry is one of; `bars`: their
     names; `pairs`: the names of what pairs consist of.
     """
-    offers = tomllib.loads(
-        files("fourbar.edit").joinpath("offers.toml").read_text(encoding="utf-8")
-    )
+    file = files("fourbar.edit").joinpath("offers.toml")
+    offers = tomllib.loads(file.read_text(encoding="utf-8"))
     parts = offers["parts"]
     pairs = dict[str, list[str]]()
     for kind in (Bar, Point, Load):
@@ -73,16 +72,14 @@ def list_offers() -> dict[str, Any]:
         value = tomllib.loads(effect.example)[key]
         parts.append({"at": ["effects", key], "value": value})
         if isinstance(value, dict) and set(value) <= set(PINS):
-            parts += [
-                {"at": ["effects", key, pin], "value": next(iter(value.values()))}
-                for pin in PINS
-            ]
+            of_a_pin, *_ = value.values()
+            for pin in PINS:
+                parts.append({"at": ["effects", key, pin], "value": of_a_pin})
         elif isinstance(value, list) and isinstance(value[0], str):
             pairs[key] = [*effect.numbers]
         elif isinstance(value, list):
-            parts.append(
-                {"at": ["effects", key, -1], "label": "another", "value": value[0]}
-            )
+            path = ["effects", key, -1]
+            parts.append({"at": path, "label": "another", "value": value[0]})
     bars = {number: f"{number} {name}" for number, name in BAR_NAMES.items()}
     return offers | {
         "commands": _offer_commands(),
@@ -95,17 +92,18 @@ def list_offers() -> dict[str, Any]:
 def _offer_bars(offers: dict[str, Any]) -> None:
     """Add the numbers of the moving bars: pairs as parts, the others as fields."""
     fields: dict[str, Any] = offers["fields"].setdefault("bars", {})
-    for bar in (BAR_NAMES[number] for number in MOVING_BARS):
-        for name, number in Bar.numbers.items():
-            if number.pair:
-                polar = [EXAMPLES[number.unit], "0 deg"]
-                if number.pair == "rad":
-                    value = polar
-                else:
-                    value = [*_SECTION]
-                offers["parts"].append({"at": ["bars", bar, name], "value": value})
-            elif number.left_out is not REQUIRED_NUMBER:
-                fields.setdefault(bar, {})[name] = EXAMPLES[number.unit]
+    for bar_number in MOVING_BARS:
+        bar = BAR_NAMES[bar_number]
+        for name, declared in Bar.numbers.items():
+            example = EXAMPLES[declared.unit]
+            if declared.pair == "rad":
+                part = {"at": ["bars", bar, name], "value": [example, "0 deg"]}
+                offers["parts"].append(part)
+            elif declared.pair:
+                part = {"at": ["bars", bar, name], "value": [*_SECTION]}
+                offers["parts"].append(part)
+            elif declared.left_out is not REQUIRED_NUMBER:
+                fields.setdefault(bar, {})[name] = example
 
 
 def _offer_commands() -> dict[str, Any]:

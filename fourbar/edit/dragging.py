@@ -61,17 +61,14 @@ def list_handles(scene: Scene) -> list[_Handle]:
 
     These are mass centres, points, loads, and the ends of what acts on a line.
     """
-    handles = [
-        _Handle(
-            f"mass centre of {name}",
-            ("bars", name, "centre"),
-            n,
-            0j,
-            scene.linkage.bar(n).to_centre,
-        )
-        for n, name in BAR_NAMES.items()
-        if n in MOVING_BARS and scene.linkage.bar(n).mass > 0.0
-    ]
+    handles = []
+    for number in MOVING_BARS:
+        name = BAR_NAMES[number]
+        bar = scene.linkage.bar(number)
+        if bar.mass > 0.0:
+            path: KeyPath = ("bars", name, "centre")
+            mass_centre = f"mass centre of {name}"
+            handles.append(_Handle(mass_centre, path, number, 0j, bar.to_centre))
     for point in scene.points:
         name = f"point {point.name}"
         handles.append(_hold_place(name, ("points", point.name), point.place, scene))
@@ -79,16 +76,16 @@ def list_handles(scene: Scene) -> list[_Handle]:
         if load.force is None:
             continue
         name = f"load {n + 1}"
-        path: tuple[str | int, ...] = ("loads", n)
+        path = ("loads", n)
         if load.arm is not None:
             G = scene.linkage.bar(load.bar).to_centre
             arm = cmath.rect(*load.arm)
             handle = _Handle(name, (*path, "arm"), load.bar, G, arm, turns=False)
         else:
             handle = _hold_place(name, path, load.place, scene)
-        handles.append(
-            handle._replace(force=(*path, "force"), force_turns=load.frame == "bar")
-        )
+        force_turns = load.frame == "bar"
+        handle = handle._replace(force=(*path, "force"), force_turns=force_turns)
+        handles.append(handle)
     if scene.drive is not None:
         handles += _hold_drive(scene.drive, scene)
     for effect in scene.effects:
@@ -123,7 +120,8 @@ def _hold_place(name: str, path: KeyPath, place: Place | None, scene: Scene) -> 
     assert place is not None
     if place.point is not None:
         path = ("points", place.point)
-        place = next(point.place for point in scene.points if point.name == place.point)
+        places = {point.name: point.place for point in scene.points}
+        place = places[place.point]
     if place.from_centre is not None:
         G = scene.linkage.bar(place.bar).to_centre
         pair = cmath.rect(*place.from_centre)
@@ -187,32 +185,30 @@ def drag(
             dragged.theta_2,
             "the linkage does not assemble there; choose another position",
         )
+    in_world = 1.0 + 0.0j
     for handle in list_handles(scene):
-        frame = cmath.rect(1.0, turned[handle.bar])
-        foot = pins[FIRST_PIN[handle.bar]] + frame * handle.at
-        own_frame = frame if handle.turns else 1.0 + 0.0j
-        if handle.force_turns:
-            force_frame = frame
-        else:
-            force_frame = 1.0 + 0.0j
+        bar_frame = cmath.rect(1.0, turned[handle.bar])
+        foot = pins[FIRST_PIN[handle.bar]] + bar_frame * handle.at
+        frame = bar_frame if handle.turns else in_world
         if list(handle.path) == dragged.what:
-            pair = (dragged.to - foot) / own_frame
+            pair = (dragged.to - foot) / frame
             put_place(document, handle.path, pair, dragged.grain)
             return
         if handle.force is not None and list(handle.force) == dragged.what:
-            arrow = (dragged.to - foot - own_frame * handle.beyond) / force_frame
-            size = str(plain["loads"][handle.force[1]]["force"][0])
-            unit = find_unit(size, "N")
-            force = to_si(size, unit) * dragged.stretch
-            angle = cmath.phase(arrow) + (0.0 if force >= 0.0 else math.pi)
-            document.put(
-                (*handle.force, 0),
-                write_rounded(force, abs(force) / 50.0, unit),
-            )
-            document.put(
-                (*handle.force, 1),
-                _write_dragged_angle(document.at((*handle.force, 1)), angle, 0.02),
-            )
+            force_frame = bar_frame if handle.force_turns else in_world
+            arrow = (dragged.to - foot - frame * handle.beyond) / force_frame
+            stated = str(plain["loads"][handle.force[1]]["force"][0])
+            unit = find_unit(stated, "N")
+            force = to_si(stated, unit) * dragged.stretch
+            half_turn = 0.0 if force >= 0.0 else math.pi
+            angle = cmath.phase(arrow) + half_turn
+            path_of_size = (*handle.force, 0)
+            path_of_angle = (*handle.force, 1)
+            old_angle = document.at(path_of_angle)
+            new_size = write_rounded(force, abs(force) / 50.0, unit)
+            new_angle = _write_dragged_angle(old_angle, angle, 0.02)
+            document.put(path_of_size, new_size)
+            document.put(path_of_angle, new_angle)
             return
     raise InputError(
         "drag",
@@ -301,8 +297,11 @@ def parse_place(stated: Any, drawing: DrawnPins | None = None, bar: int = 1) -> 
         x, y = (to_si(text, "m") for text in stated[DRAWN_WORD])
         return drawing.into_bar(bar, (x, y))
     if isinstance(stated, dict):
-        return complex(to_si(stated["x"], "m"), to_si(stated["y"], "m"))
-    return cmath.rect(to_si(stated[0], "m"), to_si(stated[1], "rad"))
+        x = to_si(stated["x"], "m")
+        y = to_si(stated["y"], "m")
+        return complex(x, y)
+    distance, angle = stated
+    return cmath.rect(to_si(distance, "m"), to_si(angle, "rad"))
 
 
 def put_place(
@@ -318,42 +317,45 @@ def put_place(
     file has no place yet, its unit is that of the ground's length.
     """
     old = document.at(path)
-    if isinstance(old, dict):
+    if isinstance(old, dict) and DRAWN_WORD in old:
+        by = by or "xy"  # a place of its bar from now on
+        before = DRAWN_WORD
+        length = document.at((*path, DRAWN_WORD, 0))
+    elif isinstance(old, dict):
         before = "xy"
+        length = document.at((*path, "x"))
     else:
         before = "polar"
-    if isinstance(old, dict) and DRAWN_WORD in old:  # a place of its bar from now on
-        by = by or "xy"
-        before = DRAWN_WORD
-    first = {"xy": "x", DRAWN_WORD: DRAWN_WORD}.get(before, 0)
-    length = document.at((*path, first))
-    if isinstance(length, list):
-        length = length[0]
+        length = document.at((*path, 0))
     if length is None:
         ground = ("lengths", "ground")
         drawn = ("pins", "A", 0)
         length = document.at(ground) or document.at(drawn)
-    if (by or before) == "xy":
-        parts: dict[str | int, str] = {
-            name: _write_like(document.at((*path, name)) or length, x, grain, "m", "m")
-            for name, x in (("x", place.real), ("y", place.imag))
+    by = by or before
+    parts: dict[str | int, str]
+    if by == "xy":
+        like_x = document.at((*path, "x")) or length
+        like_y = document.at((*path, "y")) or length
+        parts = {
+            "x": _write_like(like_x, place.real, grain, "m", "m"),
+            "y": _write_like(like_y, place.imag, grain, "m", "m"),
         }
         stated: Any = parts
     else:
-        size = abs(place)
+        distance = abs(place)
+        angle = cmath.phase(place)
+        angle_grain = grain / max(distance, grain)
         old_angle = document.at((*path, 1)) if before == "polar" else None
-        angle = _write_dragged_angle(
-            old_angle,
-            cmath.phase(place),
-            grain / max(size, grain),
-        )
-        parts = {0: _write_like(length, size, grain, "m", "m"), 1: angle}
+        parts = {
+            0: _write_like(length, distance, grain, "m", "m"),
+            1: _write_dragged_angle(old_angle, angle, angle_grain),
+        }
         stated = list(parts.values())
-    if old is None or (by or before) != before:
+    if old is None or by != before:
         document.put(path, stated)
-    else:
-        for step, text in parts.items():
-            document.put((*path, step), text)
+        return
+    for step, text in parts.items():
+        document.put((*path, step), text)
 
 
 def _write_dragged_angle(old: object, angle: float, grain: float) -> str:

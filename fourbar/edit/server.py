@@ -60,7 +60,8 @@ class Workbench:
     """A session and the pages that show it."""
 
     def __init__(self, session: Session) -> None:
-        self.session, self.ended = session, asyncio.Event()
+        self.session = session
+        self.ended = asyncio.Event()
         self.loop = asyncio.get_running_loop()
         self.address: asyncio.Future[str] = self.loop.create_future()
         self.pages: set[_PageLine] = set()
@@ -304,7 +305,8 @@ class _Entrance:
             idle_connection_timeout=IDLE,
             body_timeout=IDLE,
         )
-        self.listening, self.streams = listening, list[IOStream]()
+        self.listening = listening
+        self.streams = list[IOStream]()
         self._open()
 
     def _open(self) -> None:
@@ -325,8 +327,9 @@ class _Entrance:
         if len(self.streams) >= MOST_CONNECTIONS:
             self.streams = [stream for stream in self.streams if not stream.closed()]
             self._close_oldest(len(self.streams) - MOST_CONNECTIONS + 1)
-        self.streams.append(IOStream(connection, max_buffer_size=2 * LARGEST_REQUEST))
-        self.server.handle_stream(self.streams[-1], peer)
+        stream = IOStream(connection, max_buffer_size=2 * LARGEST_REQUEST)
+        self.streams.append(stream)
+        self.server.handle_stream(stream, peer)
 
     def _close_oldest(self, number: int) -> None:
         for stream in self.streams[: max(number, 0)]:

@@ -96,7 +96,8 @@ class Table:
         turns, of which nothing is rounded but the result.
         """
         first = self.theta_2[0]
-        place = first + np.remainder(shorten(angle(polar(1.0, theta_2))) - first, TURN)
+        wrapped = shorten(angle(polar(1.0, theta_2)))
+        place = first + np.remainder(wrapped - first, TURN)
         place = self._require_covered(place)
         piece = np.searchsorted(np.array(self.theta_2), place, "right") - 1
         piece = np.clip(piece, 0, len(self.theta_2) - 2)
@@ -109,11 +110,8 @@ class Table:
         away, lost = split_sum(theta_2, -start)
         rest = np.fmod(away, TURN)
         turns = np.rint((theta_2 - place) / TURN)
-        past = (
-            rest
-            + (np.rint((away - rest) / TURN) - turns) * TURN
-            + (lost - turns * _BEYOND_TURN)
-        )
+        turns_left = np.rint((away - rest) / TURN) - turns
+        past = rest + turns_left * TURN + (lost - turns * _BEYOND_TURN)
         return before + rise * (past / width)
 
     def _require_covered(self, place: Any) -> Any:
@@ -247,10 +245,7 @@ class Load(Effect):
             if self.frame == "bar":
                 force = force * state.direction(self.bar)
             foot = self.foot(actions.bodies[self.bar - 2].z)
-            if self.arm is None:
-                beyond = None
-            else:
-                beyond = polar(*self.arm)
+            beyond = None if self.arm is None else polar(*self.arm)
             actions.force(self.bar, factor * force, foot, beyond)
         if is_any(self.moment != 0.0):
             actions.couple(self.bar, factor * self.moment)

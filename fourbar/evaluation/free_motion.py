@@ -433,11 +433,12 @@ class _IntegrationRun:
         q = self.theta[bar]
         reading = self.readings[bar]
         reading.branch = float(reading.path.sign(q, math.copysign(1.0, sines[bar])))
-        if self.y[1]:
-            rate = float(self.y[1] * (k.h2 if bar == 2 else k.h4))
-        else:
-            rate = 0.0
-        self.reading, self.y = reading, np.array([q, rate, self.y[2]])
+        _, speed, work = self.y
+        rate = 0.0
+        if speed:
+            rate = float(speed * (k.h2 if bar == 2 else k.h4))
+        self.reading = reading
+        self.y = np.array([q, rate, work])
         return True
 
     def _turn(self, position: Position) -> None:
@@ -567,9 +568,8 @@ class _IntegrationRun:
             if not passes:
                 continue
             point = beginning + psi
-            before, after = (
-                (float(dense(t)[0]) - point) / (2.0 * math.pi) for t in (start, stop)
-            )
+            before = (float(dense(start)[0]) - point) / (2.0 * math.pi)
+            after = (float(dense(stop)[0]) - point) / (2.0 * math.pi)
             passed = range(math.floor(before) + 1, math.floor(after) + 1)
             if after < before:
                 passed = range(math.ceil(after), math.ceil(before))
@@ -582,8 +582,10 @@ class _IntegrationRun:
 
     def _report(self, until: float, dense: Callable[[float], Array]) -> None:
         """Report the instants up to a time, from the motion as a function of time."""
-        while len(self.rows) < len(self.times) and self.times[len(self.rows)] <= until:
-            self.rows.append(self._make_row(dense(float(self.times[len(self.rows)]))))
+        for time in self.times[len(self.rows) :]:
+            if time > until:
+                break
+            self.rows.append(self._make_row(dense(float(time))))
 
     def _make_row(self, y: Array) -> tuple[float, ...]:
         """Return theta_2, omega_2, alpha_2, branch and the independent angle's numbers.

@@ -288,11 +288,14 @@ def _read_drive(
     """Read the bar on which a couple acts, or a force along a line or at a place."""
     allowed = ("bar", "from", "to", *PLACES_OF_ENDS, "direction", "frame")
     entry = read_table_with_place(read, "drive", value, allowed)
-    if "from" in entry or "to" in entry:
-        for name in entry.keys() - {"from", "to"}:
+    stated = entry.keys()
+    if "from" in stated or "to" in stated:
+        for name in stated - {"from", "to"}:
             raise read.refuse(f"drive.{name}", entry[name], _A_LINE)
-        return None, LinearDrive(*_read_ends(read, "drive", entry, bars))
-    if not entry.keys() & {*PLACES_OF_ENDS, "direction", "frame"}:
+        start, end = _read_ends(read, "drive", entry, bars)
+        return None, LinearDrive(start, end)
+    is_couple = stated.isdisjoint({*PLACES_OF_ENDS, "direction", "frame"})
+    if is_couple:
         return read.bar("drive.bar", entry.get("bar", 2)), None
     place = read_stated_place(read, "drive", entry, bars, 2)
     if place == Place(place.bar):
@@ -493,15 +496,13 @@ def _read_law(read: Reader, value: object) -> Law | Rise:
     angles = [names[0] for names in COMMAND_NAMES.values()]
     entry = read.table(key, value, ("time", *angles, "steps", "ends"))
     stated = [name for name in angles if name in entry] or angles[:1]
-    return Law(
-        read.quantities(f"{key}.time", entry.get("time"), "s"),
-        steps=_read_steps(read, key, entry),
-        ends=read.choice(f"{key}.ends", entry.get("ends", "free"), SPLINES),
-        **{
-            name: read.quantities(f"{key}.{name}", entry.get(name), "rad")
-            for name in stated
-        },
-    )
+    times = read.quantities(f"{key}.time", entry.get("time"), "s")
+    steps = _read_steps(read, key, entry)
+    ends = read.choice(f"{key}.ends", entry.get("ends", "free"), SPLINES)
+    positions = {}
+    for name in stated:
+        positions[name] = read.quantities(f"{key}.{name}", entry.get(name), "rad")
+    return Law(times, steps=steps, ends=ends, **positions)
 
 
 def _read_rise(read: Reader, key: str, value: object) -> Rise:
@@ -509,7 +510,8 @@ def _read_rise(read: Reader, key: str, value: object) -> Rise:
     entry = read.table(key, value, ("kind", *Rise.numbers, "steps"))
     kind = read.choice(f"{key}.kind", entry["kind"], RISE_LAWS)
     steps = _read_steps(read, key, entry)
-    return Rise(kind, steps=steps, **read.numbers(key, entry, Rise.numbers))
+    numbers = read.numbers(key, entry, Rise.numbers)
+    return Rise(kind, steps=steps, **numbers)
 
 
 def _read_commanded(
@@ -550,6 +552,20 @@ def _read_commanded(
     return Sweep(start, stop, _read_steps(read, key, sweep))
 
 
+def _read_load_table(read: Reader, key: str, value: object) -> Table:
+    """Read the factors of a load over theta_2."""
+    columns = read.table(key, value, ("theta_2", "factor"))
+    stated = columns.get("factor")
+    if not isinstance(stated, list):
+        allowed = "must be a list of numbers without a unit"
+        raise read.refuse(f"{key}.factor", stated, allowed)
+    angles = read.quantities(f"{key}.theta_2", columns.get("theta_2"), "rad")
+    factors = []
+    for index, factor in enumerate(stated):
+        factors.append(read.number(f"{key}.factor[{index}]", factor))
+    return Table(angles, tuple(factors))
+
+
 def _read_load(read: Reader, key: str, value: object, bars: Mapping[str, int]) -> Load:
     allowed = ("bar", *Load.numbers, "point", "frame", "table")
     turns = isinstance(value, dict) and value.get("frame") == "bar"
@@ -557,22 +573,7 @@ def _read_load(read: Reader, key: str, value: object, bars: Mapping[str, int]) -
     entry = read_table_with_place(read, key, value, allowed, instead)
     table = None
     if "table" in entry:
-        over = read.table(f"{key}.table", entry["table"], ("theta_2", "factor"))
-        factors = over.get("factor")
-        if not isinstance(factors, list):
-            raise read.refuse(
-                f"{key}.table.factor",
-                factors,
-                "must be a list of numbers without a unit",
-            )
-        angles = read.quantities(f"{key}.table.theta_2", over.get("theta_2"), "rad")
-        table = Table(
-            angles,
-            tuple(
-                read.number(f"{key}.table.factor[{i}]", x)
-                for i, x in enumerate(factors)
-            ),
-        )
+        table = _read_load_table(read, f"{key}.table", entry["table"])
     if "force" not in entry and "moment" not in entry:
         raise read.refuse(key, value, "must have a force, a moment or both")
     place = read_stated_place(read, key, entry, bars, 2)

@@ -71,34 +71,37 @@ def dump(scene: Scene) -> str:
     that exceeds it.
     """
     expect("scene", scene, Scene)
-    top = {
-        key: value
-        for key, value in {"title": scene.title, "source": scene.source}.items()
-        if value
-    }
+    top = {}
+    if scene.title:
+        top["title"] = scene.title
+    if scene.source:
+        top["source"] = scene.source
     described = list_scene_tables(scene)
     motion = _write_motion(scene.motion)
-    points = {
-        point.name: {"bar": point.bar, **write_numbers(point)} for point in scene.points
-    }
+    points = {}
+    for point in scene.points:
+        points[point.name] = {"bar": point.bar, **write_numbers(point)}
     bars = described["bars"]
     _add_strokes(described["effects"], scene)
     for picture in scene.pictures:
         bars.setdefault(BAR_NAMES[picture.bar], {})["picture"] = picture.name
     _restore_coordinates({**described, "points": points}, scene.coordinates)
     pins_or_lengths = _write_lengths(scene, described["lengths"], motion)
+    read_back = scene
     if "lengths" in dict(pins_or_lengths):
         read_back = replace(scene, drawing=None)
-    else:
-        read_back = scene
+    tables_of_bars = [
+        (f"bars.{name}", bars[name]) for name in BAR_NUMBERS if name in bars
+    ]
+    loads = [("[loads]", load) for load in described["loads"]]
     tables: list[tuple[str, dict[str, Any]]] = [
         ("", top),
         *pins_or_lengths,
-        *((f"bars.{name}", bars[name]) for name in BAR_NUMBERS if name in bars),
+        *tables_of_bars,
         ("motion", motion),
         ("drive", described["drive"]),
         ("points", points),
-        *(("[loads]", load) for load in described["loads"]),
+        *loads,
         ("effects", described["effects"]),
         ("tolerances", _write_tolerances(read_back)),
     ]
@@ -320,8 +323,10 @@ def _write_effect(effect: Effect) -> Any:
 
 def _write_ends(line: Any) -> dict[str, Any]:
     """Write the entries `from` and `to` of a line between two bars."""
-    ends = {"from": line.start, "to": line.end}
-    return {name: {"bar": end.bar, **_write_place(end)} for name, end in ends.items()}
+    return {
+        "from": {"bar": line.start.bar, **_write_place(line.start)},
+        "to": {"bar": line.end.bar, **_write_place(line.end)},
+    }
 
 
 def _write_drive(scene: Scene) -> dict[str, Any]:
@@ -413,17 +418,19 @@ def write_new_scene(lengths: tuple[str, ...] | list[str]) -> str:
 
     Raises InputError for what is no length, and for bars that cannot close.
     """
-    stated = [
-        (name, " ".join(text.split()))
-        for name, text in zip(BAR_NAMES.values(), lengths, strict=True)
-    ]
-    read = Reader("--lengths", dict(stated))
-    d, a, b, c = (read.quantity(name, text, "m", POSITIVE) for name, text in stated)
+    texts = [" ".join(text.split()) for text in lengths]
+    stated = dict(zip(BAR_NAMES.values(), texts, strict=True))
+    read = Reader("--lengths", stated)
+    rows = ["[lengths]"]
+    numbers = []
+    for name, text in stated.items():
+        numbers.append(read.quantity(name, text, "m", POSITIVE))
+        rows.append(f"{name} = {_quote(text)}")
+    rows.append('ground_angle = "0 deg"  # from O2 to O4')
+    d, a, b, c = numbers
     FourBar(d, Bar(a), Bar(b), Bar(c))
-    lines = "\n".join(f"{name} = {_quote(text)}" for name, text in stated)
-    lines = f'[lengths]\n{lines}\nground_angle = "0 deg"  # from O2 to O4'
-    unit = find_unit(stated[0][1], "m")
-    return _fill_in(lines, (a, b, c), _BRANCH_LINE, unit)
+    unit = find_unit(texts[0], "m")
+    return _fill_in("\n".join(rows), (a, b, c), _BRANCH_LINE, unit)
 
 
 _BRANCH_LINE = '# branch = "crossed"  # left out: open\n'
@@ -436,13 +443,16 @@ def write_drawn_scene(pins: dict[str, tuple[str, str]]) -> str:
     Raises InputError as `DrawnPins` does.
     """
     read = Reader("--pins")
-    places = {pin: read_point(read, pin, list(texts)) for pin, texts in pins.items()}
+    rows = ["[pins]  # x and y in the position that is drawn"]
+    places = {}
+    for pin, (x, y) in pins.items():
+        places[pin] = read_point(read, pin, [x, y])
+        rows.append(f"{pin} = [{_quote(x)}, {_quote(y)}]")
     drawing = DrawnPins(**places)
-    rows = (f"{pin} = [{_quote(x)}, {_quote(y)}]" for pin, (x, y) in pins.items())
-    lines = "\n".join(["[pins]  # x and y in the position that is drawn", *rows])
     a, b, c = (drawing.length(bar) for bar in MOVING_BARS)
-    unit = find_unit(pins["A"][0], "m")
-    return _fill_in(lines, (a, b, c), "", unit)
+    x_of_A, _ = pins["A"]
+    unit = find_unit(x_of_A, "m")
+    return _fill_in("\n".join(rows), (a, b, c), "", unit)
 
 
 def _quote(text: str) -> str:

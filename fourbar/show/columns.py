@@ -91,9 +91,8 @@ def read_column(scene: Scene, solution: Solution, name: str) -> Column:
     of = solution
     if _is_velocity(above) and _is_velocity(below):
         of = _solve_at_unit_speed(scene, solution)
-    (unit, numerator), (divisor, denominator) = (
-        _find_number(of, part) for part in (above, below)
-    )
+    unit, numerator = _find_number(of, above)
+    divisor, denominator = _find_number(of, below)
     with np.errstate(all="ignore"):
         ratio = numerator / denominator
     ratio = np.where(np.isfinite(ratio), ratio, np.nan)

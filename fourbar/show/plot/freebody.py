@@ -86,40 +86,39 @@ def list_actions(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
     couples: list[Couple] = []
     for pin in ENDS[bar]:
         name = PIN_FORCE[pin]
-        onto, shown = (
-            (1.0, name) if name[2] == str(bar) else (-1.0, f"F{name[2]}{name[1]}")
+        sense = 1.0
+        shown = name
+        if name[2] != str(bar):
+            sense = -1.0
+            shown = f"F{name[2]}{name[1]}"
+        arrow = Arrow(
+            write_force_name(shown),
+            pins[pin] - pins[FIRST_PIN[bar]],
+            sense * complex(*getattr(view.here, name)[0]),
+            FORCE_COLOURS[name],
         )
-        force = onto * complex(*getattr(view.here, name)[0])
-        arrows.append(
-            Arrow(
-                write_force_name(shown),
-                pins[pin] - pins[FIRST_PIN[bar]],
-                force,
-                FORCE_COLOURS[name],
-            )
-        )
+        arrows.append(arrow)
     if view.scene.drive_bar == bar and view.scene.motion.free is None:
         couples.append(Couple(f"$T_{bar}$", float(view.here.torque[0])))  # type: ignore[index]
     recorder = _record_actions(view)
     arrows += recorder.arrows[bar]
     couples += recorder.turns[bar]
     described = view.scene.linkage.bar(bar)
-    inertia = -described.mass * complex(*getattr(view.here, f"a_G{bar}")[0])
-    arrows.append(
-        Arrow(
-            rf"$-m_{bar}\,a_{{G{bar}}}$",
-            _take_one(described.to_centre * turned),
-            inertia,
-            INK,
-            True,
-        )
+    a_G = complex(*getattr(view.here, f"a_G{bar}")[0])
+    inertial_force = Arrow(
+        rf"$-m_{bar}\,a_{{G{bar}}}$",
+        _take_one(described.to_centre * turned),
+        -described.mass * a_G,
+        INK,
+        True,
     )
+    arrows.append(inertial_force)
     alpha = float(getattr(view.here, f"alpha_{bar}")[0])
     carried = list_bodies(view.scene.linkage, view.scene.effects)[bar - 2]
     couples.append(Couple(rf"$-I_{bar}\,\alpha_{bar}$", -carried.I * alpha))
-    return [a for a in arrows if a.force != 0.0], [
-        c for c in couples if c.moment != 0.0
-    ]
+    arrows = [arrow for arrow in arrows if arrow.force != 0.0]
+    couples = [couple for couple in couples if couple.moment != 0.0]
+    return arrows, couples
 
 
 class _ActionRecorder(Actions):
@@ -271,11 +270,8 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
         forces = internal_forces(view.scene, worst.solution, bar, x)
         factor, unit = choose_unit(float(x[-1]), "m", view.units)
         place = view.axis.words(float(worst.solution.at.places[worst.row]))
-        for axes, (name, si) in zip(
-            column,
-            {"N": "N", "V": "N", "M": "N m"}.items(),
-            strict=True,
-        ):
+        panels_of_bar = zip(column, ("N", "V", "M"), ("N", "N", "N m"), strict=True)
+        for axes, name, si in panels_of_bar:
             curve = getattr(forces, name)[worst.row]
             scale, shown = choose_unit(largest_magnitude(curve), si, view.units)
             axes.plot(factor * x, scale * curve, color=BAR_COLOURS[bar])
@@ -288,8 +284,9 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
             )
             axes.axhline(0.0, color=INK, lw=0.6)
             axes.set_ylabel(f"${name}$ ({shown})")
+        first_pin = pin_name(FIRST_PIN[bar]).strip("$")
         column[0].set_title(f"Bar {bar} ({BAR_NAMES[bar]})\n{place}")
-        column[2].set_xlabel(f"$x$ from ${pin_name(ENDS[bar][0]).strip('$')}$ ({unit})")
+        column[2].set_xlabel(f"$x$ from ${first_pin}$ ({unit})")
         largest = write_labelled_quantity(worst.peak.value, "N m", view.units)
         foot = write_labelled_quantity(worst.x, "m", view.units)
         if forces.uniform:
@@ -307,7 +304,9 @@ def _reach(view: View, bar: int, arrows: list[Arrow], scale: float) -> Points:
     """List every point that a bar's panel has to show, from the bar's first pin, m."""
     described = view.scene.linkage.bar(bar)
     u = view.state().direction(bar)
-    points = [0.0j, _take_one(described.length * u), _take_one(described.to_centre * u)]
+    second_pin = _take_one(described.length * u)
+    centre = _take_one(described.to_centre * u)
+    points = [0.0j, second_pin, centre]
     for arrow in arrows:
         points += [arrow.at, arrow.at + scale * arrow.force]
     return np.array([split_complex(point) for point in points])
@@ -324,12 +323,13 @@ def _draw_one(
     span: float,
 ) -> None:
     pins = place_of(view.scene.linkage, view.here, 0, 1.0).pins
-    along = pins[ENDS[bar][1]] - pins[ENDS[bar][0]]
+    first_pin, second_pin = ENDS[bar]
+    along = pins[second_pin] - pins[first_pin]
     end = split_complex(along)
     middle = split_complex(0.5 * along)
-    line = ([0.0, end[0]], [0.0, end[1]])
     axes.plot(
-        *line,
+        [0.0, end[0]],
+        [0.0, end[1]],
         color=BAR_COLOURS[bar],
         lw=5.0,
         alpha=0.45,
@@ -343,12 +343,11 @@ def _draw_one(
     short: list[str] = []
     for arrow in arrows:
         size = abs(arrow.force)
+        value = write_labelled_quantity(size, "N", view.units)
         if size < LEAST_DRAWN_FORCE * biggest:
-            plain = re.sub(r"[$_{}]", "", arrow.text.replace("\\,", " ")).replace(
-                "-",
-                "−",
-            )
-            short.append(f"{plain} = {write_labelled_quantity(size, 'N', view.units)}")
+            plain = re.sub(r"[$_{}]", "", arrow.text.replace("\\,", " "))
+            plain = plain.replace("-", "−")
+            short.append(f"{plain} = {value}")
             continue
         draw_plate(axes, bar, (0.0j, arrow.at, along), labels)
         foot = split_complex(arrow.at)
@@ -368,16 +367,8 @@ def _draw_one(
             annotation_clip=False,
         )
         labels.keep_off(axes, foot, tip)
-        labels.add(
-            Label(
-                axes,
-                f"{arrow.text} = {write_labelled_quantity(size, 'N', view.units)}",
-                tip,
-                foot,
-                arrow.colour,
-                7.5,
-            )
-        )
+        text = f"{arrow.text} = {value}"
+        labels.add(Label(axes, text, tip, foot, arrow.colour, 7.5))
     if short:
         note(view, f"Too short to draw on bar {bar}: {', '.join(short)}.")
     centre = view.scene.linkage.bar(bar)
@@ -388,9 +379,9 @@ def _draw_one(
         draw_mass_centre(axes, (x, y), 6.0)
         labels.add(Label(axes, f"$G_{bar}$", (x, y), middle, MUTED, 8.0, 3.0))
     reach = _reach(view, bar, arrows, scale)
-    middle_of = 0.5 * (np.min(reach, axis=0) + np.max(reach, axis=0))
-    axes.set_xlim(middle_of[0] - 0.5 * span, middle_of[0] + 0.5 * span)
-    axes.set_ylim(middle_of[1] - 0.5 * span, middle_of[1] + 0.5 * span)
+    x, y = 0.5 * (np.min(reach, axis=0) + np.max(reach, axis=0))
+    axes.set_xlim(x - 0.5 * span, x + 0.5 * span)
+    axes.set_ylim(y - 0.5 * span, y + 0.5 * span)
     axes.set_aspect("equal", adjustable="box")
     axes.set_axis_off()
     axes.set_title(f"Bar {bar} ({BAR_NAMES[bar]})")

@@ -121,9 +121,9 @@ class Labels:
         samples: dict[int, list[np.ndarray]] = {}
         for axes, points, width in self.lines:
             dots = _sample_line(axes.transData.transform(points), per_point)
-            samples.setdefault(id(axes), []).append(
-                np.column_stack([dots, np.full(len(dots), width)])
-            )
+            widths = np.full(len(dots), width)
+            with_widths = np.column_stack([dots, widths])
+            samples.setdefault(id(axes), []).append(with_widths)
         for label in self.wanted:
             axes = label.axes
             text = axes.text(
@@ -197,11 +197,21 @@ def _sample_line(points: np.ndarray, per_point: float) -> np.ndarray:
             continue
         if np.array_equal(p, q):
             pieces.append(p + _MARK * per_point * RING_POINTS)
-        share = np.linspace(0.0, 1.0, 2 + int(min(np.hypot(*(q - p)) / step, 2000)))
-        pieces.append(p + share[:, None] * (q - p))
+        dx, dy = q - p
+        between = int(min(np.hypot(dx, dy) / step, 2000))
+        shares = np.linspace(0.0, 1.0, 2 + between)
+        pieces.append(p + shares[:, None] * (q - p))
     if pieces:
         return np.concatenate(pieces)
     return np.empty((0, 2))
+
+
+def _overlaps(centre: DrawnPoint, half: DrawnPoint, box: _Box) -> bool:
+    """Return True if a label with this centre and half size overlaps a box."""
+    left, bottom, right, top = box
+    in_x = abs(centre[0] - 0.5 * (left + right)) < half[0] + 0.5 * (right - left)
+    in_y = abs(centre[1] - 0.5 * (bottom + top)) < half[1] + 0.5 * (top - bottom)
+    return bool(in_x and in_y)
 
 
 def _choose_spot(
@@ -222,32 +232,20 @@ def _choose_spot(
     best_cost = math.inf
     edge = 0.5 * per_point * dots[:, 2]
     for reach in _REACH:
+        gap = (reach + mark) * per_point
         for k in range(LABEL_DIRECTIONS):
-            angle = (
-                away + (k + 1) // 2 * (1 if k % 2 else -1) * math.tau / LABEL_DIRECTIONS
-            )
-            cosine = math.cos(angle)
-            sine = math.sin(angle)
-            gap = (reach + mark) * per_point
-            x = point[0] + cosine * (gap + half[0])
-            y = point[1] + sine * (gap + half[1])
-            hit = (np.abs(dots[:, 0] - x) < half[0] + edge) & (
-                np.abs(dots[:, 1] - y) < half[1] + edge
-            )
-            clashes = sum(
-                abs(x - 0.5 * (b[0] + b[2])) < half[0] + 0.5 * (b[2] - b[0])
-                and abs(y - 0.5 * (b[1] + b[3])) < half[1] + 0.5 * (b[3] - b[1])
-                for b in boxes
-            )
+            # outwards first, then by turns to either side
+            side = 1 if k % 2 else -1
+            angle = away + (k + 1) // 2 * side * math.tau / LABEL_DIRECTIONS
+            x = point[0] + math.cos(angle) * (gap + half[0])
+            y = point[1] + math.sin(angle) * (gap + half[1])
+            hit_in_x = np.abs(dots[:, 0] - x) < half[0] + edge
+            hit_in_y = np.abs(dots[:, 1] - y) < half[1] + edge
+            covered = float((hit_in_x & hit_in_y) @ dots[:, 2])
+            clashes = sum(_overlaps((x, y), half, box) for box in boxes)
             outside = x - half[0] < inside[0] or x + half[0] > inside[2]
             outside = outside or y - half[1] < inside[1] or y + half[1] > inside[3]
-            cost = (
-                100.0 * clashes
-                + 30.0 * outside
-                + float(hit @ dots[:, 2])
-                + 0.04 * reach
-                + 0.05 * k
-            )
+            cost = 100.0 * clashes + 30.0 * outside + covered + 0.04 * reach + 0.05 * k
             if cost < best_cost:
                 best = (x, y)
                 best_cost = cost

@@ -59,15 +59,18 @@ def _show_drawing_coordinates(axes: "Axes", view: View, factor: float) -> None:
             ticks = super().tick_values(vmin + self.shift, vmax + self.shift)
             return [float(tick) - self.shift for tick in ticks]
 
-    for axis, x in zip((axes.xaxis, axes.yaxis), view.scene.origin, strict=True):
-        if x != 0.0:
-            shift = factor * x
-            axis.set_major_locator(ShiftedLocator(shift))
-            axis.set_major_formatter(
-                FuncFormatter(
-                    lambda v, _, shift=shift: f"{v + shift:.6g}".replace("-", "−")
-                )
-            )
+    def shift_axis(axis: Any, shift: float) -> None:
+        def write_tick(value: float, _: Any) -> str:
+            return f"{value + shift:.6g}".replace("-", "−")
+
+        axis.set_major_locator(ShiftedLocator(shift))
+        axis.set_major_formatter(FuncFormatter(write_tick))
+
+    x, y = view.scene.origin
+    if x != 0.0:
+        shift_axis(axes.xaxis, factor * x)
+    if y != 0.0:
+        shift_axis(axes.yaxis, factor * y)
 
 
 def locate_pins(view: View, factor: float = 1.0) -> dict[str, DrawnPoint]:
@@ -185,13 +188,15 @@ def _list_off_bars(view: View, place: Pose) -> Iterator[tuple[int, complex]]:
     for point in view.scene.settled().points:
         yield point.bar, place.point(point.bar, point.place.vector())
     for number in MOVING_BARS:
-        if view.scene.linkage.bar(number).mass > 0.0:
-            yield number, place.point(number, view.scene.linkage.bar(number).to_centre)
+        bar = view.scene.linkage.bar(number)
+        if bar.mass > 0.0:
+            yield number, place.point(number, bar.to_centre)
     for symbol in list_acting(view.scene):
         if symbol.kind in ("force", "push", "moment", "spring"):
             yield symbol.bar, place.tail(symbol)
         if symbol.end is not None:
-            yield symbol.end[0], place.point(*symbol.end)
+            bar_of_end, at_end = symbol.end
+            yield bar_of_end, place.point(bar_of_end, at_end)
 
 
 def draw_plate(
@@ -260,28 +265,31 @@ def draw_support(axes: "Axes", pin: DrawnPoint, size: float, labels: Labels) -> 
     x, y = pin
     wide = 1.7 * size
     foot = y - wide
-    axes.add_patch(
-        Polygon(
-            [pin, (x - size, foot), (x + size, foot)],
-            closed=True,
-            fc="white",
-            ec=INK,
-            lw=1.0,
-            zorder=3,
-        )
+    triangle = Polygon(
+        [pin, (x - size, foot), (x + size, foot)],
+        closed=True,
+        fc="white",
+        ec=INK,
+        lw=1.0,
+        zorder=3,
     )
-    strip = ((x - wide, foot - 0.8 * size), 2.0 * wide, 0.8 * size)
-    axes.add_patch(
-        Rectangle(*strip, fc="none", ec=INK, lw=0.0, hatch="//////", zorder=2)
+    hatching = Rectangle(
+        (x - wide, foot - 0.8 * size),
+        2.0 * wide,
+        0.8 * size,
+        fc="none",
+        ec=INK,
+        lw=0.0,
+        hatch="//////",
+        zorder=2,
     )
+    axes.add_patch(triangle)
+    axes.add_patch(hatching)
     axes.plot([x - wide, x + wide], [foot, foot], color=INK, lw=1.0, zorder=3)
     for share in (0.5, 1.0, 1.7, 2.1, 2.5):
+        below = y - share * size
         half = size * (share / 1.7 if share <= 1.7 else 1.7)
-        labels.keep_off(
-            axes,
-            (x - half, y - share * size),
-            (x + half, y - share * size),
-        )
+        labels.keep_off(axes, (x - half, below), (x + half, below))
 
 
 def _write_bar_name(view: View, number: int) -> str:
@@ -392,16 +400,16 @@ def draw_paths(axes: "Axes", view: View, labels: Labels) -> None:
     factor, _, size = choose_drawing_scale(view)
     for path, colour, dashes, name in _list_paths(view):
         scaled = factor * path
-        axes.plot(*scaled.T, color=colour, lw=1.0, ls=dashes, zorder=2, label=name)
-        labels.keep_off(
-            axes,
-            *[(float(x), float(y)) for x, y in scaled[:: max(1, len(scaled) // 120)]],
-        )
+        x, y = scaled.T
+        axes.plot(x, y, color=colour, lw=1.0, ls=dashes, zorder=2, label=name)
+        some = scaled[:: max(1, len(scaled) // 120)]
+        labels.keep_off(axes, *[(float(x), float(y)) for x, y in some])
     pins = locate_pins(view, factor)
     O2 = pins["O2"]
     O4 = pins["O4"]
     axes.plot(
-        *zip(O2, O4, strict=True),
+        (O2[0], O4[0]),
+        (O2[1], O4[1]),
         color=MUTED,
         lw=1.0,
         ls=(0, (8, 3, 2, 3)),
@@ -431,34 +439,24 @@ def _list_paths(view: View) -> list[tuple[Array, str, Any, str]]:
     """
     traced = trace(view)
     sweep = traced.solution
-    massive = view.scene.linkage.coupler.mass > 0.0
-    if massive:
-        middle = sweep.G3
+    paths: list[tuple[Array, str, Any, str]] = []
+
+    def add(points: Array, colour: str, dashes: tuple[float, ...], name: str) -> None:
+        paths.append((traced.path(points), colour, (0, dashes), name))
+
+    add(sweep.A, BAR_COLOURS[2], (1, 2), "path of $A$")
+    add(sweep.B, BAR_COLOURS[4], (3, 2), "path of $B$")
+    if view.scene.linkage.coupler.mass > 0.0:
+        add(sweep.G3, BAR_COLOURS[3], (4, 1.5), "coupler curve of $G_3$")
     else:
         middle = 0.5 * (sweep.A + sweep.B)
-    paths: list[tuple[Array, str, Any, str]] = [
-        (sweep.A, BAR_COLOURS[2], (0, (1, 2)), "path of $A$"),
-        (sweep.B, BAR_COLOURS[4], (0, (3, 2)), "path of $B$"),
-        (
-            middle,
-            BAR_COLOURS[3],
-            (0, (4, 1.5)),
-            "coupler curve of " + ("$G_3$" if massive else "its mid-point"),
-        ),
-    ]
+        add(middle, BAR_COLOURS[3], (4, 1.5), "coupler curve of its mid-point")
     for bar, centre in ((2, sweep.G2), (4, sweep.G4)):
         if view.scene.linkage.bar(bar).mass > 0.0:
-            paths.append(
-                (centre, BAR_COLOURS[bar], (0, (6, 2, 1, 2)), f"path of $G_{bar}$")
-            )
-    paths += [
-        (path, POINT, (0, (3, 1, 1, 1)), f"path of {name}")
-        for name, path in sweep.points.items()
-    ]
-    return [
-        (traced.path(points), colour, dashes, name)
-        for points, colour, dashes, name in paths
-    ]
+            add(centre, BAR_COLOURS[bar], (6, 2, 1, 2), f"path of $G_{bar}$")
+    for name, path in sweep.points.items():
+        add(path, POINT, (3, 1, 1, 1), f"path of {name}")
+    return paths
 
 
 def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
@@ -470,14 +468,14 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     pins = locate_pins(view, factor)
     names = [point.name for point in view.scene.points if point.bar == 3]
     traced = trace(view)
-    for (name, points), (colour, dashes) in zip(
-        _list_coupler_points(traced.solution, names),
-        cycle(_COUPLER_CURVES),
-        strict=False,
-    ):
+    curves = _list_coupler_points(traced.solution, names)
+    looks = cycle(_COUPLER_CURVES)
+    for (name, points), (colour, dashes) in zip(curves, looks, strict=False):
         lw = 1.8 if name in (*names, "0.5") else 1.1
+        x, y = factor * traced.path(points).T
         axes.plot(
-            *(factor * traced.path(points)).T,
+            x,
+            y,
             color=colour,
             lw=lw,
             ls=dashes,

@@ -120,28 +120,30 @@ def _lay_out_positions(axes: "Axes", spreads: Tolerances, units: Conversion) -> 
 def _draw_band(axes: "Axes", spreads: Tolerances, part: str, units: Conversion) -> None:
     spread = spreads.spreads[part]
     over = _lay_out_positions(axes, spreads, units)
-    ends = [spread.low, spread.high, spread.least, spread.greatest]
-    away = [end - spread.nominal for end in ends]
-    sizes = np.abs(np.concatenate([*away, spread.worst]))
+    low = spread.low - spread.nominal
+    high = spread.high - spread.nominal
+    least = spread.least - spread.nominal
+    greatest = spread.greatest - spread.nominal
+    sizes = np.abs(np.concatenate([low, high, least, greatest, spread.worst]))
     sizes = sizes[np.isfinite(sizes)]
+    most = 0.0
     if sizes.size:
         most = 1.1 * float(np.percentile(sizes, _OFF_SCALE))
-    else:
-        most = 0.0
     factor, unit = choose_unit(most, find_part_unit(part), units)
     colour = FORCE_COLOURS.get(part.strip("|"), INK)
     axes.fill_between(
         over,
-        factor * away[0],
-        factor * away[1],
+        factor * low,
+        factor * high,
         color=colour,
         alpha=0.35,
         lw=0.0,
     )
-    for line in away[2:]:
+    for line in (least, greatest):
         axes.plot(over, factor * line, color=colour, lw=0.7)
     for sign in (1.0, -1.0):
-        axes.plot(over, sign * factor * spread.worst, color=INK, lw=0.9, ls=(0, (4, 2)))
+        worst = sign * factor * spread.worst
+        axes.plot(over, worst, color=INK, lw=0.9, ls=(0, (4, 2)))
     if sizes.size and largest_magnitude(sizes) > 2.0 * most > 0.0:
         axes.set_ylim(-factor * most, factor * most)
     axes.axhline(0.0, color=INK, lw=0.6)
