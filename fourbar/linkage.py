@@ -129,7 +129,8 @@ def require_numbers(
         array = np.asarray(convert_to_unit(key, value, unit))
     except ValueError:  # rows of different lengths
         array = np.asarray(None)
-    if array.dtype.kind not in "iuf" or array.ndim > 1 or not np.isfinite(array).all():
+    is_numeric = array.dtype.kind in "iuf"
+    if not is_numeric or array.ndim > 1 or not np.isfinite(array).all():
         raise InputError(key, value, f"{allowed}, shape () or (n,)")
     return array.astype(float)
 
@@ -404,7 +405,12 @@ class FourBar:
     @property
     def lengths(self) -> tuple[float, float, float, float]:
         """(d, a, b, c): ground, input, coupler, output, in m."""
-        return (self.ground, self.input.length, self.coupler.length, self.output.length)
+        return (
+            self.ground,
+            self.input.length,
+            self.coupler.length,
+            self.output.length,
+        )
 
     @property
     def moving(self) -> tuple[Bar, Bar, Bar]:
@@ -432,9 +438,13 @@ def uniform(
     0.1524
     """
     density = require("per_metre", per_metre, "kg/m", AT_LEAST_ZERO)
-    named = zip(BAR_NAMES.values(), (ground, input, coupler, output), strict=True)
-    d, *moving = (
-        require(f"lengths.{name}", length, "m", POSITIVE) for name, length in named
+    d = require("lengths.ground", ground, "m", POSITIVE)
+    a = require("lengths.input", input, "m", POSITIVE)
+    b = require("lengths.coupler", coupler, "m", POSITIVE)
+    c = require("lengths.output", output, "m", POSITIVE)
+    return FourBar(
+        d,
+        Bar(a, mass=density * a),
+        Bar(b, mass=density * b),
+        Bar(c, mass=density * c),
     )
-    two, three, four = (Bar(length, mass=density * length) for length in moving)
-    return FourBar(d, two, three, four)

@@ -281,9 +281,13 @@ def split_parts(name: str, values: Array) -> dict[str, Array]:
     """Split a quantity into scalars: components, and the magnitude of a pin force."""
     if name in SCALARS:
         return {name: values}
-    parts = {f"{name}_x": values[..., 0], f"{name}_y": values[..., 1]}
+    x = values[..., 0]
+    y = values[..., 1]
+    parts = {}
     if name in PIN_FORCES:
-        return {f"|{name}|": np.hypot(values[..., 0], values[..., 1]), **parts}
+        parts[f"|{name}|"] = np.hypot(x, y)
+    parts[f"{name}_x"] = x
+    parts[f"{name}_y"] = y
     return parts
 
 
@@ -545,7 +549,8 @@ def find_unit_of_quantity(name: str) -> str:
     """
     if name in DERIVED_NAMES:
         return DERIVED_NAMES[name].unit
-    return UNITS.get(name) or {"v_": "m/s", "a_": "m/s^2"}.get(name[:2], "m")
+    of_point = {"v_": "m/s", "a_": "m/s^2"}.get(name[:2], "m")
+    return UNITS.get(name) or of_point
 
 
 def find_values(solution: Solution, name: str, units: Conversion = SI) -> Any:
@@ -560,7 +565,8 @@ def find_values(solution: Solution, name: str, units: Conversion = SI) -> Any:
         values = shift_to_drawing(solution, values)
     if values is None or unit not in units:
         return values
-    return values * units[unit][1]
+    _, factor = units[unit]
+    return values * factor
 
 
 def _find_si(solution: Solution, name: str) -> Array | None:
@@ -572,10 +578,12 @@ def _find_si(solution: Solution, name: str) -> Array | None:
     if name in UNITS:
         values = getattr(solution, name)
         return values
-    table = {"v_": solution.velocity, "a_": solution.acceleration}.get(name[:2])
-    if table is None:
-        return solution.points.get(name)
-    return table.get(name[2:])
+    start = name[:2]
+    if start == "v_":
+        return solution.velocity.get(name[2:])
+    if start == "a_":
+        return solution.acceleration.get(name[2:])
+    return solution.points.get(name)
 
 
 def shift_to_drawing(solution: Solution, places: Array) -> Array:

@@ -320,26 +320,31 @@ def _require_command_at(commanded: Command) -> None:
         if value.shape != shape or value.dtype.kind not in "iuf":
             raise InputError(f"at.{key}", value, f"must be numbers, shape {shape}")
     branch = commanded.branch
-    if not (branch.item() in (1, -1) if n == 1 else (np.abs(branch) == 1).all()):
+    if n == 1:
+        are_branches = branch.item() in (1, -1)
+    else:
+        are_branches = (np.abs(branch) == 1).all()
+    if not are_branches:
         raise InputError("at.branch", branch, f"{A_BRANCH} at each position")
-    rates: dict[str, Any] = {acceleration: commanded.acceleration}
+    _require_rate(acceleration, commanded.acceleration, n)
     if commanded.speed is not None:
-        rates |= {speed: commanded.speed, "stroke_speed": commanded.stroke_speed}
-    for name, value in rates.items():
-        if isinstance(value, np.ndarray):
-            if value.shape not in ((), (n,)) or value.dtype.kind not in "iuf":
-                raise InputError(
-                    f"at.{name}",
-                    value,
-                    f"must be numbers, shape () or {(n,)}",
-                )
-        elif not isinstance(value, float) and not (
-            value is None and name == "stroke_speed"
-        ):
-            expect(f"at.{name}", value, float, int, np.integer, np.floating)
-            require(f"at.{name}", value)
+        _require_rate(speed, commanded.speed, n)
+        if commanded.stroke_speed is not None:
+            _require_rate("stroke_speed", commanded.stroke_speed, n)
     if commanded.remainder is not None:
         require("at.remainder", commanded.remainder)
+
+
+def _require_rate(name: str, value: Any, n: int) -> None:
+    """Raise an InputError where a speed or acceleration of n positions is none."""
+    if isinstance(value, float):
+        return
+    if not isinstance(value, np.ndarray):
+        expect(f"at.{name}", value, float, int, np.integer, np.floating)
+        require(f"at.{name}", value)
+    elif value.shape not in ((), (n,)) or value.dtype.kind not in "iuf":
+        allowed = f"must be numbers, shape () or {(n,)}"
+        raise InputError(f"at.{name}", value, allowed)
 
 
 def find_last_stage(scene: Scene) -> str:
@@ -466,7 +471,8 @@ def make_solution(
     of_points: dict[str, dict[str, Array]] = {start: {} for start in POINT_STAGES}
     for point in scene.points:
         for start, arrays in of_points.items():
-            if (array := quantities_by_name.get(start + point.name)) is not None:
+            array = quantities_by_name.get(start + point.name)
+            if array is not None:
                 arrays[point.name] = array
     quantities: Mapping[str, Any] = quantities_by_name
     if scene.points:

@@ -217,7 +217,8 @@ def read_position(scene: Scene, text: str) -> tuple[str, float]:
         raise InputError("--at", name, f'{allowed}, like "theta_4=30 deg"')
     if value.strip() == "drawn":
         return name, _read_drawn(scene, name, text)
-    unit, likely = {"stroke": ("m", "mm"), "time": ("s", "s")}.get(name, ("rad", "deg"))
+    unit = {"stroke": "m", "time": "s"}.get(name, "rad")
+    likely = {"stroke": "mm", "time": "s"}.get(name, "deg")
     value = value.strip()
     if is_bare(value):  # it may have been meant in any unit
         raise InputError(

@@ -282,9 +282,11 @@ def _drag_drawn_pin(
             f" {math.degrees(drawn):.6g} deg",
         )
     x0, y0 = drawing.O2
-    for axis, x in enumerate((dragged.to.real + x0, dragged.to.imag + y0)):
+    place = (dragged.to.real + x0, dragged.to.imag + y0)
+    for axis, coordinate in enumerate(place):
         key = ("pins", str(dragged.what), axis)
-        document.put(key, _write_like(document.at(key), x, dragged.grain, "m", "m"))
+        old = document.at(key)
+        document.put(key, _write_like(old, coordinate, dragged.grain, "m", "m"))
 
 
 def parse_place(stated: Any, drawing: DrawnPins | None = None, bar: int = 1) -> complex:

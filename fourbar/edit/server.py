@@ -113,20 +113,17 @@ class Workbench:
         if self.ended.is_set():  # a page may go on sending while the server ends
             return
         if asked.get("do") in ("check", "stop"):
-            (
+            if asked["do"] == "check":
                 self.check.start(self.session.now.text)
-                if asked["do"] == "check"
-                else self.check.stop()
-            )
+            else:
+                self.check.stop()
             self.tell({"for": asked.get("id")}, to=line)
             return
-        last = self.waiting[-1] if self.waiting else None
-        if (
-            last
-            and asked.get("gesture")
-            and (line, asked["gesture"]) == (last[0], last[1].get("gesture"))
-        ):
-            self.waiting.pop()
+        gesture = asked.get("gesture")
+        if self.waiting and gesture:
+            last_line, last_asked = self.waiting[-1]
+            if last_line == line and last_asked.get("gesture") == gesture:
+                self.waiting.pop()
         if len(self.waiting) >= MOST_WAITING:
             self.tell(
                 {"for": asked.get("id"), "refused": "too many requests wait"},

@@ -145,7 +145,11 @@ class Torsion(PinRows):
         They are continuous in the commanded angle on one branch.
         """
         angles = _remove_jumps(state, branch)
-        return [angles[PINS[pin][1]] - angles[PINS[pin][0]] for pin, *_ in self.springs]
+        relative = []
+        for pin, *_ in self.springs:
+            i, j = PINS[pin]
+            relative.append(angles[j] - angles[i])
+        return relative
 
 
 def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
@@ -223,6 +227,7 @@ def _find_middle(
     of_y = outer | (inner & (beside > opposite))
     winds = math.pi - 2.0 * half
     of_both = np.where(beside == opposite, 0.5 * winds, winds)
-    middle = np.where(of_x, math.pi, np.where(of_y, 0.0, 0.5 * math.pi))
+    middle = np.where(of_y, 0.0, 0.5 * math.pi)
+    middle = np.where(of_x, math.pi, middle)
     wound = outer & inner & (beside <= opposite)
     return np.where(wound, of_both, middle)

@@ -446,20 +446,18 @@ class Case(NamedTuple):
         just before and after its reversal.
         """
         actions = Actions(state, self.bodies)
-        pins = {pin for term in self.terms for pin in term.dry_pins}
-        if np.all(state.speed) and all(np.all(actions.turning(pin)) for pin in pins):
+        dry_pins = {pin for term in self.terms for pin in term.dry_pins}
+        all_turn = all(np.all(actions.turning(pin)) for pin in dry_pins)
+        if np.all(state.speed) and all_turn:
             return effort, effort, None
-        ahead, back = (self.dynamics(state, acceleration, side) for side in (1, -1))
-        jammed = [
-            dynamics.status == JAMMED
-            for dynamics in (ahead, back)
-            if dynamics.status is not None
-        ]
-        low, high = (
-            np.minimum(ahead.effort, back.effort),
-            np.maximum(ahead.effort, back.effort),
-        )
-        return low, high, np.any(jammed, axis=0) if jammed else None
+        ahead = self.dynamics(state, acceleration, 1)
+        back = self.dynamics(state, acceleration, -1)
+        low = np.minimum(ahead.effort, back.effort)
+        high = np.maximum(ahead.effort, back.effort)
+        statuses = [one.status for one in (ahead, back) if one.status is not None]
+        if not statuses:
+            return low, high, None
+        return low, high, np.any(np.equal(statuses, JAMMED), axis=0)
 
 
 def _restore_unit(linkage: FourBar, path: LoopPath) -> Loop:

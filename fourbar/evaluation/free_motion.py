@@ -352,7 +352,9 @@ class _IntegrationRun:
         return sum(inertia(self.lengths.a, self.bodies, position, k))
 
     def _compute_kinetic_energy(self) -> float:
-        return 0.5 * float(self._compute_inertia(*self._at())) * float(self.y[1]) ** 2
+        position, k = self._at()
+        equivalent_inertia = float(self._compute_inertia(position, k))
+        return 0.5 * equivalent_inertia * float(self.y[1]) ** 2
 
     def _at(self) -> tuple[Position, Coefficients]:
         return self.reading.evaluate(float(self.y[0]))
@@ -595,8 +597,9 @@ class _IntegrationRun:
         q = float(y[0])
         rate = float(y[1])
         position, k = self.reading.evaluate(q)
-        now = cmath.phase(position.u2)
-        theta_2 = now + 2.0 * math.pi * round((self.theta[2] - now) / (2.0 * math.pi))
+        wrapped = cmath.phase(position.u2)
+        turns = round((self.theta[2] - wrapped) / (2.0 * math.pi))
+        theta_2 = wrapped + 2.0 * math.pi * turns
         if self.reading.bar == 2:
             theta_2 = q
         still = self.dry and rate == 0.0 and not self.side

@@ -4,6 +4,8 @@ import math
 import tomllib
 from dataclasses import replace
 from importlib.resources import files
+from itertools import cycle
+from operator import add
 from typing import Any, Literal, NamedTuple, get_args
 from xml.etree import ElementTree as ET
 
@@ -199,9 +201,10 @@ def _shift_world(root: ET.Element, origin: tuple[float, float]) -> None:
     assert world is not None
     for element in world:
         for name in {"pos", "fromto"} & element.attrib.keys() or {"pos"}:
-            numbers = [float(x) for x in element.get(name, "0 0 0").split()]
-            shifted = [x + (*origin, 0.0)[i % 3] for i, x in enumerate(numbers)]
-            element.set(name, write_exactly(*shifted))
+            # one point or two
+            numbers = [float(text) for text in element.get(name, "0 0 0").split()]
+            shifts = cycle((*origin, 0.0))
+            element.set(name, write_exactly(*map(add, numbers, shifts)))
 
 
 def _find_cylinder(scene: Scene, drive: Drive) -> LinearDrive | None:
@@ -537,7 +540,11 @@ def find_start(scene: Scene) -> Start:
         float(solution.theta_3[first]),
         float(solution.theta_4[first]),
     )
-    omega = (speed, float(solution.omega_3[first]), float(solution.omega_4[first]))
+    omega = (
+        speed,
+        float(solution.omega_3[first]),
+        float(solution.omega_4[first]),
+    )
     if np.ptp(theta_2) == 0.0:
         theta_2 = theta[0] + np.array([0.0, _compute_span(scene.linkage)])
         alpha = 0.0  # no window is requested: its length only sets the timestep

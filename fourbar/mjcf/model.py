@@ -100,7 +100,9 @@ def compute_frame(linkage: FourBar) -> _CameraView:
     right = max(a, x + c)
     low = min(-a, y - c)
     high = max(a, y + c)
-    half = PICTURE_MARGIN * max(0.5 * (high - low), 0.5 * (right - left) / _ASPECT)
+    half_height = 0.5 * (high - low)
+    half_width = 0.5 * (right - left)
+    half = PICTURE_MARGIN * max(half_height, half_width / _ASPECT)
     return _CameraView(0.5 * (left + right), 0.5 * (low + high), half)
 
 
@@ -152,8 +154,12 @@ def _add_camera(world: ET.Element, linkage: FourBar) -> None:
     """Add the camera `plane`, and a light at the same place."""
     seen = compute_frame(linkage)
     place = write_six_digits(seen.x, seen.y, seen.distance)
-    shining = {"diffuse": ".2 .2 .2", "specular": ".1 .1 .1"}  # with the headlight 1
-    shining |= {"directional": "true", "castshadow": "false"}
+    shining = {
+        "diffuse": ".2 .2 .2",  # with the headlight 1
+        "specular": ".1 .1 .1",
+        "directional": "true",
+        "castshadow": "false",
+    }
     ET.SubElement(world, "light", shining, name="light", pos=place, dir="0 0 -1")
     ET.SubElement(world, "camera", name="plane", pos=place, fovy=f"{_FOVY:g}")
 
@@ -356,20 +362,24 @@ class Model:
 
         A closed loop does not need what they switch off.
         """
-        s = self.settings
+        settings = self.settings
         options = {
             "timestep": write_exactly(self.timestep),
-            "integrator": s.integrator,
-            "solver": s.solver,
-            "tolerance": write_exactly(s.tolerance),
-            "iterations": str(s.iterations),
-            **{key: write_exactly(*value) for key, value in self.option.items()},
+            "integrator": settings.integrator,
+            "solver": settings.solver,
+            "tolerance": write_exactly(settings.tolerance),
+            "iterations": str(settings.iterations),
         }
+        for key, value in self.option.items():
+            options[key] = write_exactly(*value)
         option = ET.SubElement(root, "option", options)
         unneeded = list(_NEVER_NEEDED)
-        unneeded += [] if self.springs or self.used("stiffness") else ["spring"]
-        unneeded += [] if self.used("frictionloss") else ["frictionloss"]
-        unneeded += [] if self.used("damping") else ["damper"]
+        if not self.springs and not self.used("stiffness"):
+            unneeded.append("spring")
+        if not self.used("frictionloss"):
+            unneeded.append("frictionloss")
+        if not self.used("damping"):
+            unneeded.append("damper")
         ET.SubElement(option, "flag", dict.fromkeys(unneeded, "disable"))
 
     def add_bodies(self, root: ET.Element, flywheel: float) -> None:
@@ -510,11 +520,10 @@ class Model:
             return
         tendons = ET.SubElement(root, "tendon")
         if self.pin["B"]:
-            attributes = {
-                key: write_exactly(*np.atleast_1d(value))
-                for key, value in self.pin["B"].items()
-            }
-            fixed = ET.SubElement(tendons, "fixed", {"name": "B", **attributes})
+            attributes = {"name": "B"}
+            for key, value in self.pin["B"].items():
+                attributes[key] = write_exactly(*np.atleast_1d(value))
+            fixed = ET.SubElement(tendons, "fixed", attributes)
             for joint, coefficient in (("O2", -1), ("A", -1), ("O4", 1)):
                 ET.SubElement(fixed, "joint", joint=joint, coef=str(coefficient))
         for index, spring in enumerate(self.springs, 1):

@@ -34,7 +34,8 @@ class DrawnPins:
             key = f"pins.{field.name}"
             if not isinstance(place, (tuple, list)) or len(place) != 2:
                 raise InputError(key, place, "must be a pair (x, y)")
-            x, y = (require(f"{key}.{axis}", place[axis], "m") for axis in (0, 1))
+            x = require(f"{key}.0", place[0], "m")
+            y = require(f"{key}.1", place[1], "m")
             object.__setattr__(self, field.name, (x, y))
         for bar, (first, second) in ENDS.items():
             if self.vector(bar) == 0.0:
@@ -46,11 +47,10 @@ class DrawnPins:
                     unit="m",
                 )
         size = max(abs(self.vector(bar)) for bar in BAR_NAMES)
-        across = (
-            abs(cross(self.vector(first), self.vector(second)))
-            for first, second in ((1, 2), (1, 4), (2, 3))
-        )
-        if max(across) <= PINS_IN_LINE * size * size:
+        areas = []
+        for one, other in ((1, 2), (1, 4), (2, 3)):
+            areas.append(abs(cross(self.vector(one), self.vector(other))))
+        if max(areas) <= PINS_IN_LINE * size * size:
             raise InputError(
                 "pins",
                 tuple(PINS),
@@ -98,9 +98,11 @@ class DrawnPins:
 
         It is from the first pin, along + i across.
         """
-        x, y = self.place(FIRST_PIN[bar])
-        v: complex = self.vector(bar)
-        return complex(place[0] - x, place[1] - y) * v.conjugate() / abs(v)
+        x, y = place
+        pin_x, pin_y = self.place(FIRST_PIN[bar])
+        from_pin = complex(x - pin_x, y - pin_y)
+        along: complex = self.vector(bar)
+        return from_pin * along.conjugate() / abs(along)
 
     def from_bar(self, bar: int, z: complex) -> complex:
         """Return the place in the drawing of a point of a bar, x + i y, m."""

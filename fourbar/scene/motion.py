@@ -7,7 +7,7 @@ import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import accumulate, pairwise
+from itertools import accumulate
 from typing import Any, ClassVar
 
 import numpy as np
@@ -83,16 +83,10 @@ class Sweep:
         set_field(self, "start", require("motion.theta_2.from", self.start, "rad"))
         set_field(self, "stop", require("motion.theta_2.to", self.stop, "rad"))
         if not math.isfinite(self.stop - self.start):
-            raise InputError(
-                "motion.theta_2.to",
-                self.stop,
-                f"must be within the range of doubles from {self.start!r}",
-            )
-        set_field(
-            self,
-            "steps",
-            require_whole("motion.theta_2.steps", self.steps, *ALLOWED_STEPS),
-        )
+            allowed = f"must be within the range of doubles from {self.start!r}"
+            raise InputError("motion.theta_2.to", self.stop, allowed)
+        steps = require_whole("motion.theta_2.steps", self.steps, *ALLOWED_STEPS)
+        set_field(self, "steps", steps)
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,11 +100,8 @@ class FromLimit:
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self,
-            "offset",
-            require("motion.theta_2.offset", self.offset, "rad"),
-        )
+        offset = require("motion.theta_2.offset", self.offset, "rad")
+        object.__setattr__(self, "offset", offset)
         limit = require_whole(
             "motion.theta_2.limit",
             self.limit,
@@ -131,16 +122,10 @@ class Free:
     steps: int
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self,
-            "duration",
-            require("motion.free.duration", self.duration, "s", POSITIVE),
-        )
-        object.__setattr__(
-            self,
-            "steps",
-            require_whole("motion.free.steps", self.steps, *ALLOWED_STEPS),
-        )
+        duration = require("motion.free.duration", self.duration, "s", POSITIVE)
+        object.__setattr__(self, "duration", duration)
+        steps = require_whole("motion.free.steps", self.steps, *ALLOWED_STEPS)
+        object.__setattr__(self, "steps", steps)
 
 
 def _find_bar(key: str, numbers: Mapping[int, tuple[Any, ...]]) -> int | None:
@@ -224,28 +209,22 @@ class Law(_OverTime):
                 "must be one of " + ", ".join(SPLINES),
             )
         theta = f"theta_{self.bar}"
-        time, angles = (
-            tuple(
-                require_numbers(f"{key}.{name}", getattr(self, name), unit=unit)
-                .ravel()
-                .tolist()
-            )
-            for name, unit in (("time", "s"), (theta, "rad"))
-        )
-        if (
-            len(time) != len(angles)
-            or not _FEWEST_POINTS[self.ends] <= len(time) <= MOST_LISTED_POSITIONS
-        ):
+        stated_angles = getattr(self, theta)
+        time = require_numbers(f"{key}.time", self.time, unit="s").ravel()
+        angles = require_numbers(f"{key}.{theta}", stated_angles, unit="rad").ravel()
+        fewest = _FEWEST_POINTS[self.ends]
+        may_be = range(fewest, MOST_LISTED_POSITIONS + 1)
+        if len(time) != len(angles) or len(time) not in may_be:
             allowed = (
-                f"needs {_FEWEST_POINTS[self.ends]} to {MOST_LISTED_POSITIONS} times"
-                " and as many angles"
+                f"needs {fewest} to {MOST_LISTED_POSITIONS} times and as many angles"
             )
             raise InputError(key, (len(time), len(angles)), allowed)
-        if any(b <= a for a, b in pairwise(time)):
-            raise InputError(f"{key}.time", time, "must rise", unit="s")
+        if (np.diff(time) <= 0.0).any():
+            times = tuple(time.tolist())
+            raise InputError(f"{key}.time", times, "must rise", unit="s")
         self._require_steps()
-        object.__setattr__(self, "time", time)
-        object.__setattr__(self, theta, angles)
+        object.__setattr__(self, "time", tuple(time.tolist()))
+        object.__setattr__(self, theta, tuple(angles.tolist()))
 
     @property
     def angle(self) -> tuple[float, ...]:
@@ -276,7 +255,9 @@ class Law(_OverTime):
             angle = angle - mean * (t - t[0])
             angle[-1] = angle[0]
         curve = CubicSpline(t, angle, bc_type=SPLINES[self.ends])
-        theta, omega, alpha = (np.asarray(curve(time, order)) for order in (0, 1, 2))
+        theta = np.asarray(curve(time, 0))
+        omega = np.asarray(curve(time, 1))
+        alpha = np.asarray(curve(time, 2))
         return theta + mean * (time - t[0]), omega + mean, alpha
 
 
@@ -363,8 +344,10 @@ class Rise(_OverTime):
 
         Parts that last no time have none.
         """
-        durations = (self.rise[1], self.dwell, self.fall or 0.0, self.rest)
-        return tuple(accumulate((x for x in durations if x > 0.0), initial=0.0))
+        _, rise_time = self.rise
+        durations = (rise_time, self.dwell, self.fall or 0.0, self.rest)
+        lasting = [duration for duration in durations if duration > 0.0]
+        return tuple(accumulate(lasting, initial=0.0))
 
     def at(self, time: Array) -> tuple[Array, Array, Array]:
         """Compute angle, speed and acceleration of the law's bar, each (n,)."""
@@ -374,11 +357,10 @@ class Rise(_OverTime):
         place, speed, acceleration = _part(self.kind, time, duration)
         if self.fall is not None:
             late = time - (duration + self.dwell)
-            back = _part(self.kind, late, self.fall)
-            place, speed, acceleration = (
-                up - down
-                for up, down in zip((place, speed, acceleration), back, strict=True)
-            )
+            fallen, fall_speed, fall_acceleration = _part(self.kind, late, self.fall)
+            place = place - fallen
+            speed = speed - fall_speed
+            acceleration = acceleration - fall_acceleration
         return first + angle * place, angle * speed, angle * acceleration
 
 

@@ -513,9 +513,11 @@ def require_cylinder(drive: "ForceDrive | None") -> "LinearDrive":
 def _find_triangle(linkage: FourBar, drive: "ForceDrive | None") -> _Triangle:
     """Return the triangle of a cylinder, as `require_cylinder` has it."""
     drive = require_cylinder(drive)
-    moving, fixed = (
-        (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
-    )
+    moving = drive.start
+    fixed = drive.end
+    if drive.start.bar == 1:
+        moving = drive.end
+        fixed = drive.start
     if moving.bar == 2:  # points of the ground are polar about O2
         reach = abs(fixed.distance)
         towards = fixed.angle + linkage.ground_angle + _reverse(fixed)

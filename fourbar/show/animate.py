@@ -178,13 +178,13 @@ def _write_symbol(symbol: Symbol, theta_2: list[float]) -> dict[str, Any]:
     entry: dict[str, Any] = symbol._asdict()
     for name in ("at", "beyond", "vector"):
         entry[name] = [entry[name].real, entry[name].imag]
-    entry["end"] = (
-        None
-        if symbol.end is None
-        else [symbol.end[0], [symbol.end[1].real, symbol.end[1].imag]]
-    )
+    if symbol.end is not None:
+        bar, place = symbol.end
+        entry["end"] = [bar, [place.real, place.imag]]
     table = entry.pop("table")
-    entry["factor"] = None if table is None else np.asarray(table.at(theta_2)).tolist()
+    entry["factor"] = None
+    if table is not None:
+        entry["factor"] = np.asarray(table.at(theta_2)).tolist()
     return entry
 
 
@@ -480,4 +480,6 @@ def _hash_content(text: str) -> str:
 def _embed_json(value: object) -> str:
     """Write JSON that can stand inside a script element, whatever strings it holds."""
     text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    text = text.replace("<", "\\u003c")
+    text = text.replace(">", "\\u003e")
+    return text.replace("&", "\\u0026")

@@ -134,7 +134,9 @@ class _SceneBlock:
             paragraphs = [[*head, *self._write_motion()], self._write_loads(pressure)]
         lines: list[str] = []
         for paragraph in filter(None, paragraphs):
-            for line in [*([""] if lines else []), *paragraph]:
+            if lines:
+                lines += wrap_line("")
+            for line in paragraph:
                 lines += wrap_line(line)
         return [line.replace(_TIED, " ") for line in lines]
 
@@ -161,11 +163,10 @@ class _SceneBlock:
         rows = [("rates", [f"bar {bar} ({BAR_NAMES[bar]})" for bar in rates])]
         for label, unit, index in (("omega", "rad/s", 0), ("alpha", "rad/s^2", 1)):
             peaks = [pair[index] for pair in rates.values()]
-            cells = self._cells([peak.value for peak in peaks], unit)
-            rows += [
-                (f"  {label}", cells),
-                ("  at", [self._place(peak.place, named=False) for peak in peaks]),
-            ]
+            values = self._cells([peak.value for peak in peaks], unit)
+            places = [self._place(peak.place, named=False) for peak in peaks]
+            rows.append((f"  {label}", values))
+            rows.append(("  at", places))
         return [*_align(rows), "no mass, load or effect: nothing loads pins and drive"]
 
     def _write_position(

@@ -141,7 +141,8 @@ def _command_between(scene: Scene, at: Command, places: Array) -> Command:
     """Return the command at places between its own."""
     if at.time is not None or at.stroke is not None:
         return command_at(scene, places)
-    return Command(places, np.full(places.shape, at.branch[0]), None, 0.0, bar=at.bar)
+    branch = np.full(places.shape, at.branch[0])
+    return Command(places, branch, None, 0.0, bar=at.bar)
 
 
 def _write_stretch(solution: Solution, stretch: _Stretch, units: Conversion) -> str:

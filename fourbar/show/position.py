@@ -55,36 +55,47 @@ class PositionSheet:
             del kinds["omega"], kinds["alpha"]
         columns: dict[str, list[str]] = {}
         for letter, unit in kinds.items():
-            values = [getattr(self.solution, f"{letter}_{bar}") for bar in MOVING_BARS]
-            if any(value is None for value in values):
+            numbers = self._list_of_bars(letter)
+            if numbers is None:
                 continue
-            numbers = np.array([value[0] for value in values])
             largest = np.nanmax(np.abs(numbers), initial=0.0)
             if letter == "alpha":
-                speeds = [getattr(self.solution, f"omega_{bar}") for bar in MOVING_BARS]
+                speeds = self._list_of_bars("omega")
+                assert speeds is not None
                 largest = max(largest, np.nanmax(np.square(speeds), initial=0.0))
             numbers = drop_rounding(numbers, largest)
             factor, name = choose_unit(0.0, unit, self.units)
-            if letter == "theta":
-                form = ".4f"
-            else:
-                form = f".{POSITION_DIGITS}g"
+            form = ".4f" if letter == "theta" else f".{POSITION_DIGITS}g"
             columns[f"{letter}, {name}"] = _write_cells_of(factor * numbers, form)
         rows = [_write_row("", columns)]
-        for index, bar in enumerate(MOVING_BARS):
-            cells = (cells[index] for cells in columns.values())
+        cells_of_bars = zip(*columns.values(), strict=True)
+        for bar, cells in zip(MOVING_BARS, cells_of_bars, strict=True):
             rows.append(_write_row(f"bar {bar}", cells))
         return rows
+
+    def _list_of_bars(self, letter: str) -> Array | None:
+        """List angle, speed or acceleration of the moving bars, (3,)."""
+        numbers = []
+        for bar in MOVING_BARS:
+            values = getattr(self.solution, f"{letter}_{bar}")
+            if values is None:
+                return None
+            numbers.append(values[0])
+        return np.array(numbers)
 
     def _rests(self) -> bool:
         """Return True if nothing moves or begins to move.
 
         A static position has no rates to show.
         """
-        of_input = self.solution.omega_2, self.solution.alpha_2
-        of_output = self.solution.omega_4, self.solution.alpha_4
-        rates = [rate for rate in (*of_input, *of_output) if rate is not None]
-        return all(rate[0] == 0.0 for rate in rates)
+        solution = self.solution
+        rates = (
+            solution.omega_2,
+            solution.alpha_2,
+            solution.omega_4,
+            solution.alpha_4,
+        )
+        return all(rate is None or rate[0] == 0.0 for rate in rates)
 
     def write_points(self) -> list[str]:
         """Write place, velocity and acceleration of pins, mass centres, points."""
@@ -103,31 +114,30 @@ class PositionSheet:
                 if vector is None:
                     continue
                 label = name if not start else f"  {start[0]}"
-                rows.append(
-                    self._write_vector(
-                        label,
-                        vector[0],
-                        unit,
-                        largest[start],
-                        sized=bool(start),
-                    )
+                row = self._write_vector(
+                    label,
+                    vector[0],
+                    unit,
+                    largest[start],
+                    sized=bool(start),
                 )
+                rows.append(row)
         return rows
 
     def write_pin_forces(self) -> list[str]:
         """Write the pin forces, and the force and the moment on the frame."""
-        forces = {
-            _FORCE_HEADS[pin]: getattr(self.solution, name)
-            for pin, name in PIN_FORCE.items()
-        }
+        forces = {}
+        for pin, name in PIN_FORCE.items():
+            (force,) = getattr(self.solution, name)
+            forces[_FORCE_HEADS[pin]] = force
         shaking = derive(self.solution, "shaking_force")
         if shaking is not None:
-            forces["shaking force"] = shaking
-        sizes = [float(np.hypot(*vector[0])) for vector in forces.values()]
+            (forces["shaking force"],) = shaking
+        sizes = [float(np.hypot(x, y)) for x, y in forces.values()]
         largest = max(filter(np.isfinite, sizes), default=0.0)
         rows = [_write_row("", ("x", "y", "size"))]
-        for label, vector in forces.items():
-            rows.append(self._write_vector(label, vector[0], "N", largest))
+        for label, force in forces.items():
+            rows.append(self._write_vector(label, force, "N", largest))
         moment = derive(self.solution, "shaking_moment")
         if moment is not None:
             arm = max(self.scene.linkage.lengths)
@@ -138,9 +148,8 @@ class PositionSheet:
         if self.has_limits:
             rows.append(_say_limits([*forces.values()]))
         if self.without_side:
-            rows.append(
-                f"on the change point pin forces have no value: {self.without_side}"
-            )
+            reason = self.without_side
+            rows.append(f"on the change point pin forces have no value: {reason}")
         return rows
 
     def write_ratios(self) -> list[str]:
@@ -223,12 +232,15 @@ class PositionSheet:
 
     def _find_largest(self, start: str, names: Iterable[str]) -> float:
         """Find the largest component of a kind: what is below its rounding is zero."""
-        vectors = [find_values(self.solution, start + name) for name in names]
-        sizes = [
-            float(np.max(np.abs(vector[0]))) for vector in vectors if vector is not None
-        ]
-        finite = [size for size in sizes if np.isfinite(size)]
-        return max(finite, default=0.0)
+        largest = 0.0
+        for name in names:
+            vector = find_values(self.solution, start + name)
+            if vector is None:
+                continue
+            size = float(np.max(np.abs(vector[0])))
+            if np.isfinite(size):
+                largest = max(largest, size)
+        return largest
 
     def _write_vector(
         self,
@@ -241,13 +253,11 @@ class PositionSheet:
     ) -> str:
         """Write the components of a vector, and its size."""
         factor, name = choose_unit(largest, unit, self.units)
-        numbers = drop_rounding(vector, largest)
-        if sized:
-            size = [float(np.hypot(*numbers))]
-        else:
-            size = []
-        cells = _write_cells_of(factor * np.array([*numbers, *size]))
-        return _write_row(label, [*cells, *([] if sized else [""]), name])
+        x, y = drop_rounding(vector, largest)
+        cells = _write_cells_of(factor * np.array([x, y, np.hypot(x, y)]))
+        if not sized:
+            cells[2] = ""
+        return _write_row(label, [*cells, name])
 
     def _write_number(
         self,

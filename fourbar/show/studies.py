@@ -225,7 +225,9 @@ def list_shown(derivatives: Sensitivity) -> list[str]:
     """
     points = [point.name for point in derivatives.scene.points]
     drive = [name for name in (COUPLE.value, LINE.value) if name in derivatives.by]
-    return [*((*drive, *PIN_FORCES) if drive else ("theta_3", "theta_4")), *points]
+    if drive:
+        return [*drive, *PIN_FORCES, *points]
+    return ["theta_3", "theta_4", *points]
 
 
 def find_largest(derivatives: Sensitivity, quantity: str) -> float:
@@ -298,15 +300,14 @@ def rank_numbers(derivatives: Sensitivity, names: list[str]) -> list[str]:
 
     The rank follows from their largest share of a largest value.
     """
-    share: dict[str, float] = {}
+    largest_shares: dict[str, float] = {}
     for name in names:
         size = find_largest(derivatives, name)
         for row in derivatives.influences(name):
-            share[row.key] = max(
-                share.get(row.key, 0.0),
-                abs(row.change) / size if size > 0.0 else 0.0,
-            )
-    return sorted(share, key=lambda key: -share[key])
+            share = abs(row.change) / size if size > 0.0 else 0.0
+            before = largest_shares.get(row.key, 0.0)
+            largest_shares[row.key] = max(before, share)
+    return sorted(largest_shares, key=lambda key: -largest_shares[key])
 
 
 def write_sensitivity_json(derivatives: Sensitivity) -> str:
@@ -416,12 +417,14 @@ def _name_assemblies(rest: Equilibria) -> Equilibria:
         return place._replace(branch=int(assembly))
 
     def name_both(ends: Ends) -> Ends:
-        return name(ends[0]), name(ends[1])
+        first, last = ends
+        return name(first), name(last)
 
-    found = (
-        one._replace(place=name(one.place), held=one.held and name_both(one.held))
-        for one in rest.found
-    )
+    found = []
+    for equilibrium in rest.found:
+        held = equilibrium.held and name_both(equilibrium.held)
+        place = name(equilibrium.place)
+        found.append(equilibrium._replace(place=place, held=held))
     return rest._replace(
         found=tuple(found),
         indifferent=tuple(map(name_both, rest.indifferent)),
@@ -480,35 +483,30 @@ def _write_holding(rest: Equilibria, units: Conversion) -> tuple[list[str], Any]
     high = getattr(positions, drive.keys.high)
     assert values is not None
     unit, factor = find_unit_in(drive.unit, units)
-    heads = ["theta_2 (deg)", f"{drive.name} ({unit})"]
-    columns = [np.degrees(positions.theta_2), factor * values]
-    if low is not None and high is not None:
-        heads = [heads[0], f"from ({unit})", f"to ({unit})"]
-        columns = [columns[0], factor * low, factor * high]
-    still = np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR))
-    released = [
-        status if no else _MOVES[move]
-        for status, no, move in zip(positions.status, still, rest.moves, strict=True)
-    ]
-    rows = list(zip(*map(write_cells, columns), released, strict=True))[
-        :: -(-len(positions) // MOST_ROWS_PRINTED)
-    ]
-    if positions.drive is not None:
-        on = ""
+    columns = {"theta_2 (deg)": write_cells(np.degrees(positions.theta_2))}
+    if low is None or high is None:
+        columns[f"{drive.name} ({unit})"] = write_cells(factor * values)
     else:
-        on = f" on bar {positions.drive_bar}"
+        columns[f"from ({unit})"] = write_cells(factor * low)
+        columns[f"to ({unit})"] = write_cells(factor * high)
+    columns["released"] = []
+    still = np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR))
+    moves = zip(positions.status, still, rest.moves, strict=True)
+    for status, stays, move in moves:
+        columns["released"].append(status if stays else _MOVES[move])
+    rows = list(zip(*columns.values(), strict=True))
+    every = math.ceil(len(positions) / MOST_ROWS_PRINTED)
+
+    on = "" if positions.drive is not None else f" on bar {positions.drive_bar}"
     lines = [f"{drive.name}{on} that holds it at rest, and how it moves when released"]
     if np.isfinite(values).any():
         most = int(np.nanargmax(np.abs(values)))
-        if low is None:
-            largest = "largest"
-        else:
-            largest = "largest without friction"
+        largest = "largest" if low is None else "largest without friction"
         lines.append(
             f"{largest}: {factor * values[most]:.6g} {unit} at theta_2 ="
             f" {_write_degrees(positions.theta_2[most])} deg"
         )
-    return lines, make_plain_table([*heads, "released"], rows, left=("released",))
+    return lines, make_plain_table([*columns], rows[::every], left=("released",))
 
 
 def _write_equilibrium(equilibrium: Equilibrium, units: Conversion) -> list[str]:

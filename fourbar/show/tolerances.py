@@ -5,7 +5,7 @@ The table is of the place where the spread is largest.
 
 import math
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from typing import Any
 
@@ -169,7 +169,9 @@ def describe_parted(spreads: Tolerances, part: str, units: Conversion = DEGREES)
         )
         for run in runs
     ]
-    places = ", ".join(ends[:_MOST_RUNS]) + (", ..." if len(ends) > _MOST_RUNS else "")
+    places = ", ".join(ends[:_MOST_RUNS])
+    if len(ends) > _MOST_RUNS:
+        places += ", ..."
     return (
         f"{part}: the samples spread by more than {100.0 * PARTED:g} % more or less"
         f" than first order says at {rows.size} of {len(spreads.theta_2)} positions"
@@ -179,14 +181,16 @@ def describe_parted(spreads: Tolerances, part: str, units: Conversion = DEGREES)
 
 def _name_largest(spreads: Tolerances, spread: Spread, worst: int) -> str:
     """Name the two tolerances with the largest shares of the variance."""
-    shares, total = spread.shares[:, worst], float(spread.shares[:, worst].sum())
+    shares = spread.shares[:, worst]
+    total = float(shares.sum())
     if not total > 0.0:
         return ""
-    order = [i for i in np.argsort(-shares)[:2] if shares[i] > 0.0]
-    return ", ".join(
-        f"{100.0 * shares[i] / total:.0f} % {spreads.scene.tolerances[i].key}"
-        for i in order
-    )
+    named = []
+    for i in np.argsort(-shares)[:2]:
+        if shares[i] > 0.0:
+            key = spreads.scene.tolerances[i].key
+            named.append(f"{100.0 * shares[i] / total:.0f} % {key}")
+    return ", ".join(named)
 
 
 def collect_tolerances(
@@ -200,17 +204,15 @@ def collect_tolerances(
     none of this (a free motion, SciPy not installed) gives the sentence that says so.
     `progress` is that of `tolerances`; left out, a line in the terminal.
     """
-    positions = (
-        scene
-        if scene.motion.law
-        else replace(scene, motion=scene.motion.replace(angle=np.array(places)))
-    )
-    quiet = progress is not None or scene.motion.free is not None
-    shown = (
-        nullcontext(progress)
-        if quiet
-        else show_running("the samples of the tolerances are solved")
-    )
+    positions = scene
+    if not scene.motion.law:
+        motion = scene.motion.replace(angle=np.array(places))
+        positions = replace(scene, motion=motion)
+    shown: AbstractContextManager[Callable[[float], None] | None]
+    if progress is not None or scene.motion.free is not None:
+        shown = nullcontext(progress)
+    else:
+        shown = show_running("the samples of the tolerances are solved")
     try:
         with shown as report:
             spreads = tolerances(positions, PAGE_SAMPLES, progress=report)

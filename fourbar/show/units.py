@@ -210,7 +210,10 @@ def choose_unit(largest: float, unit: str, units: Conversion = SI) -> tuple[floa
         return factor, name.replace("^2", "²")
     if not math.isfinite(largest) or largest <= 0.0:
         return 1.0, unit
-    size, prefix = next((row for row in PREFIXES if largest >= row[0]), PREFIXES[-1])
+    for size, prefix in PREFIXES:
+        if largest >= size:
+            return 1.0 / size, prefix + unit
+    size, prefix = PREFIXES[-1]
     return 1.0 / size, prefix + unit
 
 

@@ -78,10 +78,9 @@ def draw_axes(axes: "Axes", view: View) -> Array:
     axes.set_xlim(low, high)
     if axis.unit == "°":
         set_degree_ticks(axes.xaxis, high - low)
-    closed = np.flatnonzero(
-        np.diff(np.concatenate([[False], ~view.sweep.assembled, [False]]).astype(int))
-    )
-    for first, after in closed.reshape(-1, 2):
+    is_gap = np.concatenate([[False], ~view.sweep.assembled, [False]])
+    edges = np.flatnonzero(is_gap[1:] != is_gap[:-1])
+    for first, after in edges.reshape(-1, 2):
         if first == 0:
             start = low
         else:
@@ -99,7 +98,7 @@ def draw_axes(axes: "Axes", view: View) -> Array:
             lw=0.0,
             zorder=0,
         )
-    if closed.size:
+    if edges.size:
         note(view, "Hatched: the linkage does not assemble.")
     if low < here < high:
         axes.axvline(here, color=MUTED, lw=0.8, ls=(0, (2, 2)), zorder=1)
@@ -163,11 +162,12 @@ def choose_limit(values: list[Array]) -> float | None:
 
     It is None if no value stands far outside the rest.
     """
-    size = np.concatenate([np.abs(value[np.isfinite(value)]) for value in values])
-    if size.size == 0:
+    every = np.concatenate(values)
+    sizes = np.abs(every[np.isfinite(every)])
+    if sizes.size == 0:
         return None
-    ordinary = float(np.percentile(size, ORDINARY_PERCENTILE))
-    if ordinary > 0.0 and size.max() > OUTLIER * ordinary:
+    ordinary = float(np.percentile(sizes, ORDINARY_PERCENTILE))
+    if ordinary > 0.0 and sizes.max() > OUTLIER * ordinary:
         return CLIPPED * ordinary
     return None
 
@@ -186,7 +186,8 @@ def clip(
     factor, name_of_unit = choose_unit(limit, unit, view.units)
     lowest = min(float(np.nanmin(value)) for value in curves.values())
     axes.set_ylim(0.0 if lowest >= 0.0 else -limit * factor, limit * factor)
-    name, worst = max(curves.items(), key=lambda item: largest_magnitude(item[1]))
+    name = max(curves, key=lambda name: largest_magnitude(curves[name]))
+    worst = curves[name]
     index = find_peak_index(worst)
     if abs(worst[index]) <= limit:
         return
@@ -197,7 +198,8 @@ def clip(
     edge = f"{write_number(limit * factor)} {name_of_unit}"
     largest = write_labelled_quantity(worst[index], unit, view.units)
     if unit == "1":
-        edge, largest = (text.removesuffix(" 1") for text in (edge, largest))
+        edge = edge.removesuffix(" 1")
+        largest = largest.removesuffix(" 1")
     note(
         view,
         f"{what} clipped at {edge}; the largest evaluated, {name} = {largest}, is at"
@@ -703,8 +705,11 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
     poles = find_poles(view)
     over = view.axis.values
     every, apart = _choose_spacing(view)
-    marks = np.unique(np.round((over - over[0]) / every).astype(int))
-    dots = [int(np.argmin(np.abs(over - over[0] - every * k))) for k in marks]
+    from_start = over - over[0]
+    dots = []
+    for mark in np.unique(np.round(from_start / every).astype(int)):
+        distances = np.abs(from_start - every * mark)
+        dots.append(int(np.argmin(distances)))
     # drawn as a polyline in x, y: unwrapped angles keep matplotlib from going round by
     # the longer arc
     finite = np.isfinite(direction)

@@ -66,8 +66,10 @@ def _draw_overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
     curves.draw_accelerations(panels["alpha"], shown)
     # what drives: torque or force, and power, or in a free motion the work of loads and
     # effects
-    (curves.draw_energy if free else curves.draw_drive)(panels["torque"], shown)
-    if not free:
+    if free:
+        curves.draw_energy(panels["torque"], shown)
+    else:
+        curves.draw_drive(panels["torque"], shown)
         curves.draw_power(panels["power"], shown)
     curves.draw_forces(panels["forces"], shown)
     draw_transmission(panels["mu"], shown)
@@ -288,19 +290,23 @@ def _compose(
     """Compose the figure itself, laid out and labelled."""
     from matplotlib.figure import Figure
 
-    stacked = size[0] > 9.0
-    rows, columns = (len(views), 1) if stacked else (1, len(views))
-    figure = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
+    width, height = size
+    rows = 1
+    columns = len(views)
+    if width > 9.0:  # one under the other
+        rows = len(views)
+        columns = 1
+    figure = Figure(figsize=(width * columns, height * rows), layout="constrained")
     parts = figure.subfigures(rows, columns, squeeze=False).ravel()
     labels = Labels()
     for part, shown in zip(parts, views, strict=True):
         painter(part, shown, labels)
         heading = shorten_text(shown.scene.title, 90) or "Four-bar linkage"
-        part.suptitle(
-            f"{heading} ({shown.branch_name} branch)" if len(views) > 1 else heading,
-            **TITLE,
-        )
-        if caption := textwrap.fill(" ".join(shown.notes), int(size[0] * 18.5)):
+        if len(views) > 1:
+            heading = f"{heading} ({shown.branch_name} branch)"
+        part.suptitle(heading, **TITLE)
+        caption = textwrap.fill(" ".join(shown.notes), int(width * 18.5))
+        if caption:
             part.supxlabel(caption, linespacing=1.35, **CAPTION_STYLE)
     _share_limits([part.axes for part in parts])
     labels.settle(figure)

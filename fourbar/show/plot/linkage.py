@@ -329,13 +329,9 @@ def choose_drawing_scale(view: View) -> tuple[float, str, float]:
             list(locate_pins(view).values()),
         ]
     )
-    return (
-        factor,
-        unit,
-        0.03
-        * factor
-        * float(np.max(np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0))),
-    )
+    extents = np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0)
+    size_of_support = 0.03 * factor * float(np.max(extents))
+    return factor, unit, size_of_support
 
 
 def pin_name(name: str) -> str:
@@ -346,11 +342,13 @@ def pin_name(name: str) -> str:
 
 
 _COUPLER_CURVES: tuple[tuple[str, Any], ...] = (
-    *(
-        (colour, "-")
-        for colour in ("#0072B2", "#56A0C8", "#D55E00", "#5FA48B", "#007A5A")
-    ),
-    *(("#8A3B78", dashes) for dashes in ((0, (5, 1.5)), (0, (1.4, 1.4)))),
+    ("#0072B2", "-"),
+    ("#56A0C8", "-"),
+    ("#D55E00", "-"),
+    ("#5FA48B", "-"),
+    ("#007A5A", "-"),
+    ("#8A3B78", (0, (5, 1.5))),
+    ("#8A3B78", (0, (1.4, 1.4))),
 )
 """Colours and dashes, one after the other."""
 
@@ -489,16 +487,13 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
         "zorder": 2,
     }
     for number in MOVING_BARS:
-        start, stop = ENDS[number]
-        axes.plot(*zip(pins[start], pins[stop], strict=True), lw=2.5, **faint)
+        (x_start, y_start), (x_stop, y_stop) = (pins[pin] for pin in ENDS[number])
+        axes.plot((x_start, x_stop), (y_start, y_stop), lw=2.5, **faint)
+    x_A, y_A = pins["A"]
+    x_B, y_B = pins["B"]
     for name in names:
-        x, y = (float(x) for x in factor * view.here.points[name][0])
-        axes.plot(
-            *zip(pins["A"], (x, y), pins["B"], strict=True),
-            lw=0.8,
-            ls=":",
-            **faint,
-        )
+        x, y = (factor * view.here.points[name][0]).tolist()
+        axes.plot((x_A, x, x_B), (y_A, y, y_B), lw=0.8, ls=":", **faint)
         axes.plot(
             [x],
             [y],

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.errors import DependencyError, InputError, clean_line, expect, say_install
-from fourbar.quantities import PIN_FORCES, Array
+from fourbar.quantities import Array
 from fourbar.show.units import choose_unit
 from fourbar.solution import SI, Conversion
 from fourbar.writing import STANDARD_STREAM, write_bytes
@@ -31,18 +31,24 @@ POINT = "#8A3B78"
 # Okabe and Ito's palette: distinguished by colour-blind readers, and by lightness and
 # dashes in grey
 BAR_COLOURS = {2: "#0072B2", 3: "#D55E00", 4: "#007A5A"}
-BAR_DASHES: dict[int, Any] = {2: "-", 3: (0, (5, 1.6)), 4: (0, (7, 1.6, 1.4, 1.6))}
-FORCE_COLOURS = dict(
-    zip(PIN_FORCES, ("#0072B2", "#D55E00", "#8A3B78", "#007A5A"), strict=True)
-)
-FORCE_DASHES: dict[str, Any] = dict(
-    zip(
-        PIN_FORCES,
-        ("-", (0, (5, 1.6)), (0, (1.4, 1.4)), (0, (7, 1.6, 1.4, 1.6))),
-        strict=True,
-    )
-)
-_FORCE_WIDTHS = dict(zip(PIN_FORCES, (2.6, 2.0, 1.6, 1.1), strict=True))
+BAR_DASHES: dict[int, Any] = {
+    2: "-",
+    3: (0, (5, 1.6)),
+    4: (0, (7, 1.6, 1.4, 1.6)),
+}
+FORCE_COLOURS = {
+    "F12": "#0072B2",
+    "F32": "#D55E00",
+    "F43": "#8A3B78",
+    "F14": "#007A5A",
+}
+FORCE_DASHES: dict[str, Any] = {
+    "F12": "-",
+    "F32": (0, (5, 1.6)),
+    "F43": (0, (1.4, 1.4)),
+    "F14": (0, (7, 1.6, 1.4, 1.6)),
+}
+_FORCE_WIDTHS = {"F12": 2.6, "F32": 2.0, "F43": 1.6, "F14": 1.1}
 """Thick beneath thin: forces that are equal still show all four lines."""
 
 
@@ -206,7 +212,8 @@ def largest_magnitude(*values: Array) -> float:
 
 def find_peak_index(values: Array) -> int:
     """Return the index of the largest finite magnitude; one is finite."""
-    return int(np.nanargmax(np.where(np.isfinite(values), np.abs(values), np.nan)))
+    sizes = np.where(np.isfinite(values), np.abs(values), np.nan)
+    return int(np.nanargmax(sizes))
 
 
 RAISED_CHARACTERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

@@ -474,17 +474,12 @@ def _draw_turning_arrow(
     angles = math.radians(-35.0) * turn + turn * np.linspace(0.0, OPENING, 40)
     points = centre + radius * np.exp(1j * angles)
     _draw_line(axes, drawn, points, colour, 1.5)
-    _draw_arrow(
-        axes,
-        complex(points[-2]),
-        complex(points[-1] + 2.0 * (points[-1] - points[-2])),
-        colour,
-        drawn,
-    )
-    drawn.label, drawn.away = (
-        split_complex(complex(points[20])),
-        complex(points[20] - centre) / radius,
-    )
+    before_last, last = points[-2:]
+    tip = last + 2.0 * (last - before_last)
+    _draw_arrow(axes, complex(before_last), complex(tip), colour, drawn)
+    middle = points[20]
+    drawn.label = split_complex(complex(middle))
+    drawn.away = complex(middle - centre) / radius
 
 
 def _draw_zigzag(start: complex, end: complex, width: float) -> Any:
@@ -494,12 +489,13 @@ def _draw_zigzag(start: complex, end: complex, width: float) -> Any:
         across = 1j * along / abs(along) * width
     else:
         across = 0.0
-    teeth = [start, start + 0.15 * along]
-    teeth += [
-        start + (0.15 + 0.7 * (k + 0.5) / COILS) * along + (-1) ** k * across
-        for k in range(COILS)
-    ]
-    return np.array([*teeth, start + 0.85 * along, end])
+    points = [start, start + 0.15 * along]
+    for tooth in range(COILS):
+        share = 0.15 + 0.7 * (tooth + 0.5) / COILS
+        side = (-1) ** tooth
+        points.append(start + share * along + side * across)
+    points += [start + 0.85 * along, end]
+    return np.array(points)
 
 
 def _draw_gravity(axes: "Axes", symbol: Symbol, drawn: _DrawnSymbol) -> None:
@@ -507,7 +503,8 @@ def _draw_gravity(axes: "Axes", symbol: Symbol, drawn: _DrawnSymbol) -> None:
     size = abs(symbol.vector)
     if size == 0.0:
         return
-    x, y = (24.0 * part / size for part in (symbol.vector.real, symbol.vector.imag))
+    x = 24.0 * symbol.vector.real / size
+    y = 24.0 * symbol.vector.imag / size
     style = {**HEADED, "color": SYMBOL_COLOURS["gravity"], "lw": 1.3}
     corner: dict[str, Any] = {
         "xycoords": "axes fraction",
@@ -550,21 +547,20 @@ def draw_vectors(
         if not (top := choose_limit(sizes) or largest_magnitude(*sizes)):
             continue
         vectors = collect_point_vectors(view.scene, solution, letter)
-        feet = [
-            (
-                solution.points[name]
-                if name in solution.points
-                else getattr(solution, name)
-            )
-            for name in vectors
-        ]
-        shafts = [
-            LONGEST_ARROW * size * v / np.maximum(np.hypot(*v.T), top)[:, None]
-            for v in vectors.values()
-        ]
-        tips = np.concatenate(
-            [factor * foot + shaft for foot, shaft in zip(feet, shafts, strict=True)]
-        )
+        feet = []
+        shafts = []
+        tips_of_points = []
+        for name, vector in vectors.items():
+            if name in solution.points:
+                foot = solution.points[name]
+            else:
+                foot = getattr(solution, name)
+            longest = np.maximum(np.hypot(vector[:, 0], vector[:, 1]), top)
+            shaft = LONGEST_ARROW * size * vector / longest[:, None]
+            feet.append(foot)
+            shafts.append(shaft)
+            tips_of_points.append(factor * foot + shaft)
+        tips = np.concatenate(tips_of_points)
         axes.update_datalim(tips[np.isfinite(tips).all(axis=1)])
         look: dict[str, Any] = {
             "angles": "xy",
