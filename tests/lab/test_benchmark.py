@@ -200,19 +200,29 @@ import json, sys
 text = open({path!r}).read().split("for question in")[0]
 exec(text)
 for question in map(json.loads, sys.stdin):
-    reply = {{"engine": "slow", "version": "2", "answers": NAMES, "effects": ["gravity"], "settings": ["good", "bad"]}}
+    reply = {{
+        "engine": "slow",
+        "version": "2",
+        "answers": NAMES,
+        "effects": ["gravity"],
+        "settings": ["good", "bad"],
+    }}
     if question["ask"] == "answer":
         steps, rows = question["setting"]["steps_per_turn"], []
         if steps == 9:
-            print(json.dumps({{"id": question["id"], "error": "too coarse"}}), flush=True)
+            refusal = {{"id": question["id"], "error": "too coarse"}}
+            print(json.dumps(refusal), flush=True)
             continue
         told = question["command"]
+        bad = question["setting"]["name"] == "bad"
         for theta in told["theta_2"]:
-            rows.append(solve(question["scene"], theta, told["omega_2"], 0.0, told["branch"]))
-            rows[-1]["torque"] *= 1.0 + 100.0 / steps**2 * (question["setting"]["name"] == "bad")
-        reply = {{"answers": {{name: [row[name] for row in rows] for name in NAMES}}, "setting": f"RK4 {{steps}}/rev"}}
-        if question["setting"]["name"] == "good":
-            del reply["answers"]["F43"]
+            row = solve(question["scene"], theta, told["omega_2"], 0.0, told["branch"])
+            row["torque"] *= 1.0 + 100.0 / steps**2 * bad
+            rows.append(row)
+        answers = {{name: [row[name] for row in rows] for name in NAMES}}
+        if not bad:
+            del answers["F43"]
+        reply = {{"answers": answers, "setting": f"RK4 {{steps}}/rev"}}
     elif question["ask"] == "slopes":
         reply = {{"slopes": [{{"how": "by hand"}}]}}
     print(json.dumps({{"id": question["id"], **reply}}), flush=True)

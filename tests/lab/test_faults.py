@@ -165,8 +165,11 @@ def test_positions_outside_the_range_fail_the_run(
 
     monkeypatch.setattr(fourbar_validation.run.question, "solve", pretend)
     scene = thesis(np.radians([80.0, 135.0]))  # the range starts at 84.6 deg
-    failing = {(row.engine, row.quantity) for row in judge("", scene, [w for w in ENGINES if w.name in EXACT]).rows
-               if not row.passed}  # fmt: skip
+    failing = {
+        (row.engine, row.quantity)
+        for row in judge("", scene, [w for w in ENGINES if w.name in EXACT]).rows
+        if not row.passed
+    }
     assert {(engine, "assembled") for engine in EXACT} <= failing
 
 

@@ -71,7 +71,7 @@ def test_the_harness_alone_catches_a_wrong_sign(
     assert is_caught(SCENE, command, answers)
 
 
-def test_a_mutant_acts_wherever_its_function_was_imported_and_while_it_is_active_alone() -> (
+def test_a_mutant_acts_wherever_its_function_was_imported_and_only_while_active() -> (
     None
 ):
     command = command_of(SCENE)
@@ -102,12 +102,27 @@ def test_every_operator_and_number_of_functions_methods_and_properties_is_change
     names = sorted(
         mutant.name.partition(", line ")[2] for mutant in compile_mutants(small)
     )
-    assert names == sorted([
-        *("3: -x -> +x", "3: 0 -> 1", "3: 1.5 -> 2.5", "3: 2 -> 3", "3: x ** 2 -> x * 2"),
-        *("3: 0 < x <= 1.5 -> 0 <= x <= 1.5", "3: 0 < x <= 1.5 -> 0 < x < 1.5", "3: x is not None -> x is None"),
-        *("3: 0 < x <= 1.5 and x is not None -> 0 < x <= 1.5 or x is not None", "7: self + k -> self - k"),
-        "7: True -> False",
-    ])  # fmt: skip
+    assert names == sorted(
+        [
+            *(
+                "3: -x -> +x",
+                "3: 0 -> 1",
+                "3: 1.5 -> 2.5",
+                "3: 2 -> 3",
+                "3: x ** 2 -> x * 2",
+            ),
+            *(
+                "3: 0 < x <= 1.5 -> 0 <= x <= 1.5",
+                "3: 0 < x <= 1.5 -> 0 < x < 1.5",
+                "3: x is not None -> x is None",
+            ),
+            *(
+                "3: 0 < x <= 1.5 and x is not None -> 0 < x <= 1.5 or x is not None",
+                "7: self + k -> self - k",
+            ),
+            "7: True -> False",
+        ]
+    )
 
 
 @pytest.mark.posix

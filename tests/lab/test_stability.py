@@ -27,46 +27,36 @@ ONCE_BAD = {
     # seed, number, and what once was beyond its bound there
     "random": [
         (0, 131),  # bar of the torque
-        (
-            0,
-            986,
-        ),  # F43, F14: the moment of -m a_A about O2 as a difference of large numbers
-        (
-            3,
-            78,
-        ),  # sin mu: Heron's factor of a short coupler and output by the longer route
+        # F43, F14: the moment of -m a_A about O2 as a difference of large numbers
+        (0, 986),
+        # sin mu: Heron's factor of a short coupler and output by the longer route
+        (3, 78),
         (3, 1063),  # bars: rounding of theta_2 - theta_1 near a whole turn
     ],
     "scales": [
         (0, 347),  # bars, likewise
         (0, 952),
         (0, 1091),
-        (
-            0,
-            5133,
-        ),  # F32, driven on bar 4: the moment about B of a coupler whose mass centre lies there
+        # F32, driven on bar 4: the moment about B of a coupler whose mass centre lies
+        # there
+        (0, 5133),
     ],
     "speeds": [(0, 246), (0, 784)],  # bars, likewise
     "ratios": [
-        (
-            0,
-            36,
-        ),  # torque: products of constants rounded to doubles in the pass with 32 digits
+        # torque: products of constants rounded to doubles in the pass with 32 digits
+        (0, 36),
         (0, 828),  # drive condition: length of the unit vector of a short bar
     ],
     "drives": [
-        (
-            0,
-            31,
-        ),  # F12_y: the drive of bars 2 and 4 has no part in it, and the contract takes the vector
-        (
-            0,
-            857,
-        ),  # power beside a pole: a stroke's speed and the force had other roundings of ds/dq
-        (
-            0,
-            2997,
-        ),  # condition, of bars that meet: from speeds of the ends in place of the turn at their pin
+        # F12_y: the drive of bars 2 and 4 has no part in it, and the contract takes the
+        # vector
+        (0, 31),
+        # power beside a pole: a stroke's speed and the force had other roundings of
+        # ds/dq
+        (0, 857),
+        # condition, of bars that meet: from speeds of the ends in place of the turn at
+        # their pin
+        (0, 2997),
         (0, 4506),  # bar: the arm about pin B as a difference
     ],
     "strokes": [(0, 42)],  # its own speed, as computed from the angle's
@@ -77,10 +67,9 @@ ONCE_BAD = {
         (0, 164),  # bar of the forces: directions of bars that stay parallel
         (0, 580),  # bars: products of constants
         (0, 464),  # v_B: the small sine of theta_4 as a difference of large angles
-        (
-            0,
-            6915,
-        ),  # bar of the forces: half a last digit lost in theta_2 - theta_1, added to it, was rounded away
+        # bar of the forces: half a last digit lost in theta_2 - theta_1, added to it,
+        # was rounded away
+        (0, 6915),
     ],
 }
 ONCE_TOO_WIDE = [126, 1497, 2410, 6894, 7017]

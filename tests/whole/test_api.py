@@ -27,9 +27,7 @@ from tests.support.scenes import CYLINDER, crank_rocker
 DOCS = Path(__file__).parents[2] / "docs"
 
 
-def test_the_page_of_the_api_names_every_public_name_once_and_its_reference_describes_it() -> (
-    None
-):
+def test_the_page_of_the_api_has_every_public_name_once_and_its_reference_too() -> None:
     names = sorted(dir(fourbar))
     table = (
         (DOCS / "api.md")

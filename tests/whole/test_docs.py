@@ -60,9 +60,7 @@ def blocks(language: str, text: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
 
-def test_the_examples_of_continuous_integration_use_commands_and_options_that_exist() -> (
-    None
-):
+def test_the_examples_of_continuous_integration_use_commands_that_exist() -> None:
     for file in sorted((DOCS / "ci").glob("*.yml")):
         text = re.sub(r"\\\n\s*|>\n\s*|(?<=\S)\n\s+(?=--)", " ", file.read_text())
         lines = re.findall(r"(validation|fourbar_lab) ([\w-]+)(.*)", text)
@@ -405,9 +403,7 @@ def test_paragraphs_are_short_and_tables_hold_the_rest() -> None:
                 )
 
 
-def test_the_page_of_the_commands_lists_each_and_its_reference_describes_every_option() -> (
-    None
-):
+def test_the_page_of_the_commands_lists_each_and_its_reference_every_option() -> None:
     table = (
         read("docs/commands.md")
         .partition("| command | result |")[2]

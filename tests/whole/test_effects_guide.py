@@ -260,8 +260,14 @@ def test_the_places_that_the_guide_to_a_quantity_names_are_there() -> None:
         )
         for name in files
     }
-    for name, word in (("__init__", "_scalar("), ("evaluate", "SCALAR_F"), ("loop", "NOT_ANSWERED"), ("scales", "v_A"),
-                       ("balls", "omega[k]"), ("results", "`v_A`")):  # fmt: skip
+    for name, word in (
+        ("__init__", "_scalar("),
+        ("evaluate", "SCALAR_F"),
+        ("loop", "NOT_ANSWERED"),
+        ("scales", "v_A"),
+        ("balls", "omega[k]"),
+        ("results", "`v_A`"),
+    ):
         assert any(
             file.rpartition("/")[2].startswith(name) and word in text
             for file, text in texts.items()

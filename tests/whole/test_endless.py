@@ -131,9 +131,8 @@ def test_a_long_free_motion_stops_at_ctrl_c(tmp_path: Path) -> None:
         time.sleep(1.0)
         assert running.poll() is None
         presses = 0
-        while (
-            presses < 3
-        ):  # Python drops an interrupt that falls into a destructor; a user presses again
+        # Python drops an interrupt that falls into a destructor; a user presses again
+        while presses < 3:
             presses += 1
             running.send_signal(signal.SIGINT)
             with suppress(subprocess.TimeoutExpired):

@@ -457,9 +457,9 @@ def test_a_worker_killed_at_random_moments_changes_no_byte(
 ) -> None:
     rng = np.random.default_rng(SEED + 1)
     kills = runs = 0
-    while (
-        kills < KILLS
-    ):  # a run is over after some ten of them, or before the first: another one takes the rest
+    # a run is over after some ten of them, or before the first: another one takes the
+    # rest
+    while kills < KILLS:
         out, runs = tmp_path / str(runs), runs + 1
         process = start(out, COUNT, workers=2)
         while kills < KILLS and process.poll() is None:
@@ -601,7 +601,8 @@ def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(
     with pytest.raises(
         InputError,
         match=(
-            rf"{key}.steps = {MOST_POSITIONS_OF_A_SCENE}: must be below {MOST_POSITIONS_OF_A_SCENE} in a run"
+            rf"{key}.steps = {MOST_POSITIONS_OF_A_SCENE}: must be below"
+            rf" {MOST_POSITIONS_OF_A_SCENE} in a run"
         ),
     ):
         read_scene_files([path])

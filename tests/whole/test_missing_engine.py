@@ -21,7 +21,8 @@ class Blocker:
     def find_spec(self, name, path=None, target=None):
         if name.partition(".")[0] in os.environ["BLOCKED"].split():
             if "BROKEN" in os.environ:
-                raise ImportError("libboost.so: cannot open shared object file", name=name)
+                said = "libboost.so: cannot open shared object file"
+                raise ImportError(said, name=name)
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 

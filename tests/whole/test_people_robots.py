@@ -97,7 +97,9 @@ MIMIC = """\
 <inertial pos="0.02 0 0" mass="0.1" diaginertia="1e-5 1e-5 1e-5"/></body>
 <body name="shank" pos="0 -0.3 0"><joint name="s" axis="0 0 1"/>
 <inertial pos="0.1 0 0" mass="0.9" diaginertia="0.012 0.012 0.012"/></body>
-</worldbody><equality><joint joint1="s" joint2="c" polycoef="0 0.8842 0 0 0"/></equality></mujoco>
+</worldbody><equality>
+<joint joint1="s" joint2="c" polycoef="0 0.8842 0 0 0"/>
+</equality></mujoco>
 """
 
 

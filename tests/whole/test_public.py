@@ -38,10 +38,8 @@ def of_commands() -> Iterator[str]:
                     if isinstance(option.type, click.Choice)
                     else ""
                 )
-                yield (
-                    f"{program} {name}:"
-                    f" {' '.join(sorted([*option.opts, *option.secondary_opts]))}{chosen}"
-                )
+                names = " ".join(sorted([*option.opts, *option.secondary_opts]))
+                yield f"{program} {name}: {names}{chosen}"
 
 
 def of_python() -> Iterator[str]:

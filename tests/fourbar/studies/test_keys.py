@@ -171,7 +171,8 @@ def test_a_drawn_place_and_angle_stay_as_they_were_built() -> None:
         assert abs(complex(*from_A)) == pytest.approx(built[0], rel=1e-14)
         assert np.angle(z) == pytest.approx(built[1], abs=1e-14)
     assert (members.theta_2 == scene.motion.theta_2).all()
-    # the input is shorter along its nominal direction, and A lies no more on the drawing
+    # the input is shorter along its nominal direction, and A no longer lies on the
+    # drawing
     assert members.lengths is not None
     a = members.lengths[1][:, 0]
     assert a[1] == pytest.approx(math.hypot(0.006, 0.110), rel=1e-15)

@@ -315,8 +315,13 @@ def test_a02_passes_every_angle_when_energy_says() -> None:
     )
     reached, passed = 0.0, 0
     for i in range(20, len(time), 20):
-        reached += integrate.quad(lambda x: -1.0 / math.sqrt(2.0 * (energy - k * math.sin(x))), *theta[[i - 20, i]],
-                                  epsabs=1e-12, epsrel=1e-12, limit=200)[0]  # fmt: skip
+        reached += integrate.quad(
+            lambda x: -1.0 / math.sqrt(2.0 * (energy - k * math.sin(x))),
+            *theta[[i - 20, i]],
+            epsabs=1e-12,
+            epsrel=1e-12,
+            limit=200,
+        )[0]
         passed += 1
         assert abs(reached - time[i]) * abs(speed[i]) <= errors["theta_2"][i]
     assert passed == 20 and time[-1] == 20.0
@@ -439,8 +444,12 @@ def test_the_proposed_problem_rests_and_swings_as_its_page_says() -> None:
         rel_tol=1e-9,
     )
     assert abs(float(angle) - 2.23433101898) < 5e-11
-    for text in (f"{float(angle):.12f}", f"{float(frequency):.6f}", f"{float(root.real):.9f} ± {float(root.imag):.9f}i",
-                 f"{float(stiffness):.9f}"):  # fmt: skip
+    for text in (
+        f"{float(angle):.12f}",
+        f"{float(frequency):.6f}",
+        f"{float(root.real):.9f} ± {float(root.imag):.9f}i",
+        f"{float(stiffness):.9f}",
+    ):
         assert text in page
 
 
