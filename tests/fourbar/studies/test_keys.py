@@ -396,9 +396,7 @@ length = "20 mm"
     )
 
 
-def test_slopes_by_a_drawn_place_are_differences_of_the_files_with_the_moved_place() -> (
-    None
-):
+def test_slopes_by_a_drawn_place_are_differences_of_files_with_it_moved() -> None:
     slopes = fourbar.sensitivity(read_places("points.P.drawn.0", 0.0))
     assert set(PLACE_KEYS) <= slopes.keys.keys()
     for key in PLACE_KEYS:
