@@ -1604,3 +1604,77 @@ omega_2 = "1 rad/s"
     assert not judged.differing
     as_it_stands = judge_table(fourbar.load(scene), read_table(table))
     assert {finding.quantity for finding in as_it_stands.differing} >= {"A", "B"}
+
+
+def test_what_brings_one_number_nearer_and_no_other_is_no_explanation(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Five numbers of one position, each wrong, by a script of a student.
+
+    Impulses, a sign of I alpha and an offset of 4.1 deg come near to some by chance,
+    and exclude each other.
+    """
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        """
+[lengths]
+ground = "2.22 m"
+input = "1 m"
+coupler = "2.06 m"
+output = "2.33 m"
+[bars.input]
+density = "7850 kg/m^3"
+section = ["50 mm", "25 mm"]
+inertia = "0.82 kg m^2"
+[bars.coupler]
+mass = "219.95674411 kg"
+inertia = "10.35 kg m^2"
+centre = ["1.6476 m", "-18.7352 deg"]
+[bars.output]
+density = "7850 kg/m^3"
+section = ["50 mm", "25 mm"]
+inertia = "50.13 kg m^2"
+[motion]
+theta_2 = "60 deg"
+omega_2 = "10 rad/s"
+alpha_2 = "5 rad/s^2"
+[[loads]]
+bar = 3
+force = ["100 N", "90 deg"]
+from_pin = ["3.06 m", "-31 deg"]
+"""
+    )
+    theirs = tmp_path / "theirs.csv"
+    theirs.write_text(
+        "theta_2 [deg],torque [N m],F12 [N],F32 [N],F43 [N],F14 [N]\n"
+        "60,14271.89,23647.43,24055.14,7798.85,7515.91\n"
+    )
+    assert status(["check", str(scene), str(theirs)]) == FAILED
+    printed = capsys.readouterr().out
+    assert "looks like" not in printed
+    assert "no single known mistake explains it" in printed
+
+
+def test_of_mistakes_that_come_near_to_everything_the_nearest_is_named(
+    tmp_path: Path,
+) -> None:
+    """Gravity is reversed, and a part of 1e-7 of another mistake remains."""
+    scene = replace(SCENES["crank_rocker"], effects=(fourbar.Gravity(),))
+    turned = replace(scene, effects=(fourbar.Gravity(angle=math.pi / 2.0),))
+    numbers = right(turned)
+    for name in FORCES:
+        numbers[name] = numbers[name] * (1.0 + 1e-7)
+    judgement = judged(scene, write(tmp_path / "theirs.csv", numbers))
+    near = [one for one in judgement.explanations if one.whole]
+    assert [one.text for one in near] == ["gravity is reversed"]
+    assert near[0].nearer == FORCES and not near[0].quantities
+
+
+def test_a_factor_is_not_fitted_to_a_single_number(tmp_path: Path) -> None:
+    """Of one torque every mass and every load would be the cause."""
+    numbers = right(SCENES["crank_rocker"])
+    numbers = {name: values[:1] for name, values in numbers.items()}
+    numbers["torque"] = 1.01 * numbers["torque"]
+    path = write(tmp_path / "theirs.csv", numbers, ("torque", "omega_4"))
+    judgement = judged(SCENES["crank_rocker"], path)
+    assert len(judgement.differing) == 1 and not judgement.explanations

@@ -303,6 +303,11 @@ class Mistake:
     makes this mistake.
     """
 
+    @property
+    def fitted(self) -> bool:
+        """Return True if a number of it was fitted to the table."""
+        return self.times > 1.0
+
     def prediction(self, key: str, right: Solution) -> Array | None:
         """Return the numbers that this mistake predicts for a key of the table.
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 
@@ -394,52 +395,94 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
     """Find the mistakes under which quantities that differ agree.
 
     The most complete come first, then those that come near. A mistake that breaks a
-    quantity which agreed as it was is none.
+    quantity which agreed as it was is none. One of the calculation that explains no
+    quantity must bring most that differ nearer: of several only the nearest is named,
+    for they exclude each other.
     """
     explanations: list[Explanation] = []
-    table = judge.table
+    near: list[tuple[float, Explanation]] = []
     for mistake in chain(
         find_miscalculated(judge),
         list_hypotheses(judge.scene, judge.at),
         find_fitted(judge, differing),
     ):
-        explained = []
-        nearer = []
-        broken = False
-        for key in table.values:
-            predicted = mistake.prediction(key, judge.right)
-            if predicted is None or np.array_equal(
-                predicted,
-                judge.ours(key),
-                equal_nan=True,
-            ):
-                continue
-            if judge.explained(key, predicted, mistake.times, mistake.left):
-                if key in differing:
-                    explained.append(table.label(key))
-            elif key not in differing:
-                broken = mistake.whole
-            else:
-                before, allowed, _ = judge.judged(key, judge.ours(key))
-                after = judge.judged(key, predicted)[0]
-                mask = judge.where(key)
-                enough = int((before > allowed)[mask].sum()) >= min(
-                    ENOUGH_NUMBERS, int(mask.sum())
-                )
-                if enough and np.all(
-                    (after <= np.maximum(before / NEARER, allowed))[mask]
-                ):
-                    nearer.append(table.label(key))
-        if (explained or nearer) and not broken:
-            complete = len(explained) == len(differing)
-            explanations.append(
-                Explanation(
-                    mistake.text,
-                    tuple(explained),
-                    complete,
-                    mistake.whole,
-                    tuple(nearer),
-                )
-            )
+        weighed = _weigh(judge, mistake, differing)
+        if weighed is None:
+            continue
+        if weighed.explained or (weighed.nearer and not mistake.whole):
+            explanations.append(weighed.explanation(mistake, differing))
+        elif weighed.is_near(differing):
+            explanation = weighed.explanation(mistake, differing)
+            near.append((weighed.remaining, explanation))
+    if near:
+        _, nearest = min(near, key=lambda pair: pair[0])
+        explanations.append(nearest)
     explanations.sort(key=lambda e: (-len(e.quantities), -len(e.nearer)))
     return explanations[:MOST_EXPLANATIONS]
+
+
+class _Weighed(NamedTuple):
+    """What a mistake accounts for, quantities by their labels."""
+
+    explained: list[str]
+    nearer: list[str]
+    numbers: int
+    """Numbers that differ of the quantities in `nearer`."""
+    remaining: float
+    """Largest error that remains of those."""
+
+    def is_near(self, differing: list[str]) -> bool:
+        """Return True if it brings more numbers nearer than chance does."""
+        most = 2 * len(self.nearer) > len(differing)
+        return most and self.numbers >= ENOUGH_NUMBERS
+
+    def explanation(self, mistake: Mistake, differing: list[str]) -> Explanation:
+        """Return what is reported of the mistake."""
+        return Explanation(
+            mistake.text,
+            tuple(self.explained),
+            len(self.explained) == len(differing),
+            mistake.whole,
+            tuple(self.nearer),
+        )
+
+
+def _weigh(judge: Judge, mistake: Mistake, differing: list[str]) -> _Weighed | None:
+    """Hold what a mistake would make against the table.
+
+    None if it breaks a quantity that agreed. A number that is fitted to fewer than
+    ENOUGH_NUMBERS explains nothing.
+    """
+    explained = []
+    explained_numbers = 0
+    nearer = []
+    numbers = 0
+    remaining = 0.0
+    for key in judge.table.values:
+        predicted = mistake.prediction(key, judge.right)
+        if predicted is None or np.array_equal(
+            predicted,
+            judge.ours(key),
+            equal_nan=True,
+        ):
+            continue
+        before, allowed, _ = judge.judged(key, judge.ours(key))
+        mask = judge.where(key)
+        differs = int((before > allowed)[mask].sum())
+        if judge.explained(key, predicted, mistake.times, mistake.left):
+            if key in differing:
+                explained.append(judge.table.label(key))
+                explained_numbers += differs
+        elif key not in differing:
+            if mistake.whole:
+                return None
+        else:
+            after = judge.judged(key, predicted)[0]
+            enough = differs >= min(ENOUGH_NUMBERS, int(mask.sum()))
+            if enough and np.all((after <= np.maximum(before / NEARER, allowed))[mask]):
+                nearer.append(judge.table.label(key))
+                numbers += differs
+                remaining = max(remaining, float(after[mask].max()))
+    if mistake.whole and mistake.fitted and explained_numbers < ENOUGH_NUMBERS:
+        explained = []
+    return _Weighed(explained, nearer, numbers, remaining)
