@@ -372,10 +372,7 @@ def find_requested(
     shape = commanded.angle.shape
     if out is None:
         if stage is None:
-            if commanded.speed is None:
-                stage = "position"
-            else:
-                stage = "force"
+            stage = "position" if commanded.speed is None else "force"
         if not isinstance(stage, str) or stage not in STAGES:
             raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
         last_stage = STAGES.index(stage)

@@ -524,11 +524,11 @@ def _command_other(session: Session, asked: dict[str, Any]) -> None:
         document.put(["motion", rate_name], rounded)
 
     pose = _read_bar_directions(before, middle)
-    text = _choose_assembly(session, document, commanded == "stroke", pose)
+    text = _choose_nearest_assembly(session, document, commanded == "stroke", pose)
     session.change(lambda changed: changed.become(text))
 
 
-def _choose_assembly(
+def _choose_nearest_assembly(
     session: Session,
     document: SceneDocument,
     has_side: bool,

@@ -125,7 +125,7 @@ class PinFriction(PinRows):
             [_stack_forces(per_unit[pin], arms, shape) for pin in arms],
             axis=2,
         )
-        k = np.stack([_flatten(arm, shape) for arm in arms.values()], axis=1)
+        k = np.stack([_broadcast(arm, shape) for arm in arms.values()], axis=1)
         sliding = solve_sliding(F, C, k)
 
         couples = {}
@@ -158,7 +158,7 @@ class PinFriction(PinRows):
             actions.pin_couple(pin, -actions.sense(pin) * couple)
 
 
-def _flatten(number: Any, shape: tuple[int, ...]) -> Any:
+def _broadcast(number: Any, shape: tuple[int, ...]) -> Any:
     """Return the doubles of a number over all positions, (n,)."""
     return np.broadcast_to(take_doubles(number), shape).ravel()
 
@@ -171,7 +171,7 @@ def _stack_forces(
     """Return the components of pin forces over all positions, (n, p, 2)."""
     columns = []
     for pin in pins:
-        flat = _flatten(getattr(forces, PIN_FORCE[pin]), shape)
+        flat = _broadcast(getattr(forces, PIN_FORCE[pin]), shape)
         columns.append(np.stack([flat.real, flat.imag], axis=-1))
     return np.stack(columns, axis=1)
 
@@ -398,7 +398,7 @@ def _search(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
     The starts cover many magnitudes.
     """
     n, p = k.shape
-    size = np.max(k * np.hypot(F[..., 0], F[..., 1]), axis=1)
+    size = _measure_size(F, k)
     starts = _list_starts(p)
     problem = np.repeat(np.arange(n), len(starts))
     ends = _follow_newton(
@@ -424,6 +424,12 @@ def _search(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
     number[others.any(axis=1)] = MANY
     least[number == NO_SOLUTION] = np.nan
     return least, number
+
+
+def _measure_size(F: Array, k: Array) -> Array:
+    """Return the largest couple k |F| of each problem, N m, (n,)."""
+    forces = np.hypot(F[..., 0], F[..., 1])
+    return np.asarray(np.max(k * forces, axis=1))
 
 
 def _list_starts(p: int) -> Array:
@@ -452,7 +458,7 @@ def _follow_newton(
 
     `problem` is the index of the problem of each start.
     """
-    size = np.max(k * np.hypot(F[..., 0], F[..., 1]), axis=1)
+    size = _measure_size(F, k)
     moving = np.arange(len(x))
     before = np.full_like(x, np.inf)
     for _ in range(60):

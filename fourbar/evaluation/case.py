@@ -463,7 +463,9 @@ class Case(NamedTuple):
 def _restore_unit(linkage: FourBar, path: LoopPath) -> Loop:
     """Return the lengths in m, and what they decide together in m^2."""
     square = path.unit * path.unit
-    return Loop(*linkage.lengths, path.lengths.E1 * square, path.lengths.E2 * square)
+    E1 = path.lengths.E1 * square
+    E2 = path.lengths.E2 * square
+    return Loop(*linkage.lengths, E1, E2)
 
 
 class _InertialForces(NamedTuple):
@@ -525,10 +527,11 @@ class _FreeBodies(NamedTuple):
         s2, s3, s4 = (abs(self.sines[bar]) for bar in MOVING_BARS)
         first = (s2 >= s3) & (s2 >= s4)
         second = s3 >= s4
-        forces = zip(*(pins[bar] for bar in MOVING_BARS), strict=True)
-        return PinForces(
-            *(select(first, x, select(second, y, z)) for x, y, z in forces)
-        )
+        selected = []
+        for of_2, of_3, of_4 in zip(pins[2], pins[3], pins[4], strict=True):
+            of_others = select(second, of_3, of_4)
+            selected.append(select(first, of_2, of_others))
+        return PinForces(*selected)
 
     def _solve_from_two_moments(
         self,

@@ -176,9 +176,11 @@ def _convert_to_floats(numbers: Any) -> Any:
 
     With these a formula of one position is several times quicker.
     """
-    return type(numbers)(
-        *(x.item() if isinstance(x, np.generic | np.ndarray) else x for x in numbers)
-    )
+    converted = []
+    for number in numbers:
+        of_numpy = isinstance(number, np.generic | np.ndarray)
+        converted.append(number.item() if of_numpy else number)
+    return type(numbers)(*converted)
 
 
 class _Reading:
@@ -538,7 +540,8 @@ class _IntegrationRun:
             rested = bool(self.side and self.side * new[1] < 0.0)
             if rested:
                 t = _find_root(dense, lambda y: float(y[1]), solver.t_old, t)
-                new = np.array([dense(t)[0], 0.0, dense(t)[2]])
+                q, _, work = dense(t)
+                new = np.array([q, 0.0, work])
             self._note_change_points(solver.t_old, t, dense)
             self._report(t, dense)
             self.t, self.y = t, np.array(new)

@@ -121,10 +121,7 @@ def load(path: str | Path | IO[str] | IO[bytes]) -> Scene:
 def _read_stream(stream: IO[str] | IO[bytes]) -> Scene:
     """Read the scene of an open file, text or bytes."""
     name = getattr(stream, "name", None)
-    if isinstance(name, str):
-        shown = name
-    else:
-        shown = "stream"
+    shown = name if isinstance(name, str) else "stream"
     content = stream.read(LARGEST_SCENE_FILE + 1)
     if len(content) > LARGEST_SCENE_FILE:
         raise InputError(
@@ -528,10 +525,7 @@ def _read_commanded(
         return read.quantity(key, value, unit)
     if isinstance(value, list) and value:
         return np.array(read.quantities(key, value, unit))
-    if unit == "rad":
-        from_limit = " or { limit, offset }"
-    else:
-        from_limit = ""
+    from_limit = " or { limit, offset }" if unit == "rad" else ""
     if not isinstance(value, dict):
         like = "135 deg" if unit == "rad" else "1.5 m"
         raise read.refuse(

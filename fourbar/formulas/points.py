@@ -217,10 +217,7 @@ def list_circuit(
     branch = branch if branch in branches else branches[0]
     half = np.arange(0.5, steps, dtype=np.float64)
     if turns_fully(linkage):
-        if len(change_points(linkage)) == 1:
-            turns = 2
-        else:
-            turns = 1
+        turns = 2 if len(change_points(linkage)) == 1 else 1
         # odd halves of a multiple of 4 never meet theta_1 or theta_1 + pi
         theta_2: Array = start + half * (turns * TURN / steps)
         return theta_2, np.full(theta_2.shape, branch), turns

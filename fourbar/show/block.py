@@ -859,10 +859,7 @@ class _SceneBlock:
                 "of these instants"
             )
         if facts.between.reversals:
-            if facts.solution.at.stroke is None:
-                unit = "rad"
-            else:
-                unit = "m"
+            unit = "rad" if facts.solution.at.stroke is None else "m"
             places = ", ".join(  # of a motion law too by its angle, not by its time
                 f"{self._value(place, unit, self.longest if unit == 'm' else None)}"
                 f" ({pin})"

@@ -153,10 +153,7 @@ def _write_stretch(solution: Solution, stretch: _Stretch, units: Conversion) -> 
         unit = "s"
     else:
         name = solution.commanded
-        if solution.at.stroke is None:
-            unit = "rad"
-        else:
-            unit = "m"
+        unit = "rad" if solution.at.stroke is None else "m"
     if start is None and stop is None:
         if len(solution) == 1:
             return "here"

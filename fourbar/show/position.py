@@ -43,10 +43,7 @@ class PositionSheet:
         except NoSideError as error:
             self.without_side = str(error)
         self.has_limits = limits is not None
-        if limits is None:
-            self.solution = solution
-        else:
-            self.solution = limits
+        self.solution = solution if limits is None else limits
 
     def write_bars(self) -> list[str]:
         """Write angle, speed and acceleration of the moving bars."""

@@ -193,18 +193,12 @@ def _explain_turning(
     else:
         when = "are never in line"
     yield f"{name}: no limits, {one} and {two} {when}:"
-    if reach.beyond_stretched == 0.0:
-        relation = "="
-    else:
-        relation = "<"
+    relation = "=" if reach.beyond_stretched == 0.0 else "<"
     yield (
         f"    ground + {name} = {write(d + length)} {relation} {one} + {two} ="
         f" {write(x + y)}"
     )
-    if reach.beyond_folded == 0.0:
-        relation = "="
-    else:
-        relation = ">"
+    relation = "=" if reach.beyond_folded == 0.0 else ">"
     yield (
         f"    |ground - {name}| = {write(abs(d - length))} {relation} |{one} - {two}| ="
         f" {write(abs(x - y))}"
@@ -440,10 +434,7 @@ def _count_equilibria(rest: Equilibria, reached: int, units: Conversion) -> list
     grid = (
         f"found between {rest.samples} positions where Q changes its sign or touches 0"
     )
-    if reached == len(rest.found):
-        within = ""
-    else:
-        within = " in this sweep"
+    within = "" if reached == len(rest.found) else " in this sweep"
     lines = [f"{_write_count(reached)}{within} without friction,", grid]
     if rest.not_decided:
         angles = " and ".join(

@@ -341,7 +341,9 @@ def _solve_at(scene: Scene, places: Array, stage: str = "force") -> Solution:
 
 
 def _cut_range(low: Array, high: Array) -> Array:
-    return low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, CUTS + 1)
+    width = high - low
+    shares = np.linspace(0.0, 1.0, CUTS + 1)
+    return low[:, None] + width[:, None] * shares
 
 
 def _merge(
@@ -442,7 +444,8 @@ def _find_peaks(
     reached = [np.array([present[one.name][one.top] for one in searches])]
     growing = np.zeros(len(searches), dtype=bool)
     rows = np.arange(len(searches))
-    steps_inward = np.abs(np.arange(CUTS + 1) - np.where(begins, 0, CUTS)[:, None])
+    outer_end = np.where(begins, 0, CUTS)
+    steps_inward = np.abs(np.arange(CUTS + 1) - outer_end[:, None])
     for count in range(LOCATING_ROUNDS):
         if count >= rounds and not growing.any():
             break
@@ -484,7 +487,7 @@ def _list_searches(
             rises = bool(values[step] < values[step + 1])
             searches.append(_Search(name, step + rises, step, step + 1))
         # towards a gap a magnitude may grow without a local maximum
-        for step in _find_sign_changes(values):
+        for step in _list_sign_changes(values):
             following = step + 1
             top = step if values[following] < 0.0 else following
             beside = _Search(name, top, step, following)
@@ -516,10 +519,10 @@ def _find_change_points(solution: Solution) -> list[int]:
     # on a change point itself the sine is rounding
     between = solution.status_code != CHANGE_POINT
     sine = np.where(between, np.nan_to_num(solution.sin_mu), 0.0)
-    return _find_sign_changes(sine)
+    return _list_sign_changes(sine)
 
 
-def _find_sign_changes(values: Array) -> list[int]:
+def _list_sign_changes(values: Array) -> list[int]:
     """List the steps within which values change their sign."""
     steps: list[int] = np.flatnonzero(values[:-1] * values[1:] < 0.0).tolist()
     return steps
@@ -538,7 +541,7 @@ def _find_dead_points(scene: Scene, solution: Solution) -> list[int]:
     at_unit_speed = at._replace(speed=one, acceleration=0.0 * one)
     moving = solve(scene, "velocity", at=at_unit_speed)
     speed = getattr(moving, read_drive_demand(moving).speed_key)
-    return _find_sign_changes(np.nan_to_num(speed))
+    return _list_sign_changes(np.nan_to_num(speed))
 
 
 def _find_growing(

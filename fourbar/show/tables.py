@@ -141,10 +141,7 @@ def print_positions(
     shown, left_out = make_table(solution, width, units, every=step, cells=cells)
     notes = []
     if step > 1:
-        if every is None:
-            more = "; --all shows each"
-        else:
-            more = ""
+        more = "; --all shows each" if every is None else ""
         notes.append(
             f"shown: every {step}{_write_ordinal(step)} of the {len(solution)}"
             f" positions{more}"

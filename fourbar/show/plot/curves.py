@@ -462,10 +462,7 @@ def mark_peak(axes: "Axes", over: Array, values: Array, unit: str) -> None:
 def draw_drive(axes: "Axes", view: View) -> None:
     """Draw the torque or force of the drive."""
     drive = read_drive_demand(view.sweep)
-    if view.scene.drive is None:
-        what = "Torque"
-    else:
-        what = "Force"
+    what = "Torque" if view.scene.drive is None else "Force"
     _draw_drive(axes, view, drive.keys.value, drive.symbol[0], drive.unit, what)
 
 
