@@ -4,17 +4,24 @@ The table is of the place where the spread is largest.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fourbar.errors import DependencyError, InputError
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNITS, Array
 from fourbar.scene import Scene
-from fourbar.show.tables import make_plain_table, show_running, wrap_line, write_table
+from fourbar.show.tables import (
+    BLOCK_WIDTH,
+    make_plain_table,
+    show_running,
+    wrap_line,
+    write_table,
+)
+from fourbar.show.units import drop_rounding, write_cell
 from fourbar.solution import DEGREES, Conversion, find_unit_in
 from fourbar.studies.spread import (
     BAND_PERCENTILES,
@@ -25,9 +32,16 @@ from fourbar.studies.spread import (
 )
 from fourbar.writing import write_object
 
+if TYPE_CHECKING:
+    from rich.table import Table
+
 PAGE_SAMPLES = 2048
 """Samples behind the bands of a page. They take seconds, and give a percentile to a
 fiftieth of the deviation.
+"""
+_MOST_DIGITS, _FEWEST_DIGITS = 6, 3
+"""Significant digits of the table; fewer than the most where it would be wider than a
+block.
 """
 _MOST_RUNS = 5
 """Intervals of theta_2 that one line names."""
@@ -75,15 +89,35 @@ def write_spreads(spreads: Tolerances, units: Conversion = DEGREES) -> str:
             " there is due to"
         ),
     ]
+    shown = {
+        part: int(np.nanargmax(spreads.spreads[part].worst))
+        for part in list_shown_parts(spreads)
+        if np.isfinite(spreads.spreads[part].worst).any()
+    }
+    for part, worst in shown.items():
+        if most := _name_largest(spreads, spreads.spreads[part], worst):
+            lines.append(f"  {part}: {most}")
+    wrapped = [part for line in lines for part in wrap_line(line)]
+    title = spreads.scene.title
+    for digits in range(_MOST_DIGITS, _FEWEST_DIGITS - 1, -1):
+        table = _make_table(spreads, shown, units, digits)
+        written = write_table("", [], table)
+        if max(map(len, written.split("\n"))) <= BLOCK_WIDTH:
+            break
+    return write_table(title, wrapped, table)
+
+
+def _make_table(
+    spreads: Tolerances,
+    shown: Mapping[str, int],
+    units: Conversion,
+    digits: int,
+) -> "Table":
+    """Make the table of parts, each at its position, with so many digits."""
     rows = []
     angle_unit, of_angle = find_unit_in("rad", units)
-    for part in list_shown_parts(spreads):
+    for part, worst in shown.items():
         spread = spreads.spreads[part]
-        if not np.isfinite(spread.worst).any():
-            continue
-        worst = int(np.nanargmax(spread.worst))
-        if most := _name_largest(spreads, spread, worst):
-            lines.append(f"  {part}: {most}")
         columns = (
             spread.nominal,
             spread.deviation,
@@ -93,9 +127,12 @@ def write_spreads(spreads: Tolerances, units: Conversion = DEGREES) -> str:
             spread.greatest,
         )
         unit, factor = find_unit_in(find_part_unit(part), units)
-        numbers = [f"{factor * column[worst]:.6g}" for column in columns]
-        numbers[1] = f"{factor * spread.deviation[worst]:.3g}"
-        angle = f"{of_angle * spreads.theta_2[worst]:.6g}"
+        largest = max(np.nanmax(np.abs(column), initial=0.0) for column in columns)
+        at_worst = np.array([column[worst] for column in columns])
+        cleaned = factor * drop_rounding(at_worst, largest)
+        numbers = [write_cell(number, f".{digits}g") for number in cleaned.tolist()]
+        numbers[1] = write_cell(float(cleaned[1]), ".3g")
+        angle = write_cell(of_angle * spreads.theta_2[worst], f".{digits}g")
         rows.append(
             [part, unit, angle, *numbers, f"{factor * spread.worst[worst]:.3g}"]
         )
@@ -108,14 +145,12 @@ def write_spreads(spreads: Tolerances, units: Conversion = DEGREES) -> str:
         f"\n{BAND_PERCENTILES[0]:g} %",
         f"\n{BAND_PERCENTILES[1]:g} %",
     )
-    table = make_plain_table(
+    return make_plain_table(
         (*heads, "\nleast", "\ngreatest", "worst\n+-"),
         rows,
         left=("",),
         gap=0,
     )
-    wrapped = [part for line in lines for part in wrap_line(line)]
-    return write_table(spreads.scene.title, wrapped, table)
 
 
 def _describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[str]:

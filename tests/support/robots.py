@@ -353,3 +353,40 @@ def rotation(quaternion: Sequence[float]) -> np.ndarray:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+PARALLELOGRAM = """
+<mujoco>
+  <option gravity="{gravity}"/>
+  <worldbody>
+    <body name="link_1">
+      <geom type="capsule" size=".02" fromto="0 0 0 0 0 {ground}"/>
+      <body name="link_2">
+        <joint name="hinge_1" axis="1 0 0"/>
+        <geom type="capsule" size=".02" fromto="0 0 0 0 {crank} 0"/>
+        <body name="link_3" pos="0 {crank} 0">
+          <joint name="hinge_2" axis="1 0 0"/>
+          <geom type="capsule" size=".02" fromto="0 0 0 0 0 {ground}"/>
+          <body name="link_4" pos="0 0 {ground}">
+            <joint name="hinge_3" axis="1 0 0"/>
+            <geom type="capsule" size=".02" fromto="0 0 0 0 -{crank} 0"/>
+          </body>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <equality>
+    <connect name="link" body1="link_1" body2="link_4" anchor="0 0 {ground}"/>
+  </equality>
+  <actuator>
+    <motor joint="hinge_1"/>
+    <motor joint="hinge_2"/>
+  </actuator>
+</mujoco>
+"""
+"""Bars of uniform rods; the rest pose is the rectangle."""
+
+
+def make_parallelogram(ground: float, crank: float, gravity: str) -> RobotFile:
+    text = PARALLELOGRAM.format(ground=ground, crank=crank, gravity=gravity)
+    return RobotFile(Path("parallelogram.xml"), text)

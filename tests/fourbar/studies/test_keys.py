@@ -441,11 +441,15 @@ def test_a_drawn_place_and_its_pins_move_independently_of_each_other() -> None:
         "points.P.drawn.0": 0.081,
         "motion.theta_2": [1.0],
     }
-    moved = read_places("points.P.drawn.0", 0.001)
-    place = loads(dump(moved).replace("pins.A.0", "")).points[0].place
-    up = read_places("points.P.drawn.1", 0.004).points[0].place
-    start = scene.points[0].place
-    z = place.settle(scene.linkage, {}).vector() + up.vector() - start.vector()
+    start, right, up = (
+        read_places(key, by).points[0].place.settle(scene.linkage, {}).vector()
+        for key, by in (
+            ("points.P.drawn.0", 0.0),
+            ("points.P.drawn.0", 0.001),
+            ("points.P.drawn.1", 0.004),
+        )
+    )
+    z = right + up - start
     solution = fourbar.solve(fourbar.vary(scene, together))
     A = complex(*solution.A[0, 0])
     along = complex(*solution.B[0, 0]) - A
@@ -485,13 +489,7 @@ mass = "1 kg"
             )
 
 
-def test_the_tolerance_of_a_drawn_point_is_that_of_its_coordinate() -> None:
-    """A double wishbone: 3 kN at the tyre's patch, which the coupler carries.
-
-    The force in the upper bar is that of the moment about A, 3000 N (x - 700 mm), over
-    the arm of the line of the upper bar from A.
-    """
-    text = """
+WISHBONE = """
 [pins]
 O2 = ["350 mm", "200 mm"]
 A = ["700 mm", "170 mm"]
@@ -508,13 +506,21 @@ force = ["3000 N", "90 deg"]
 [tolerances]
 "points.patch.drawn.0" = "5 mm"
 """
-    spread = tolerances(loads(text), 512).spreads["|F43|"]
+
+
+def test_the_tolerance_of_a_drawn_point_is_that_of_its_coordinate() -> None:
+    """A double wishbone: 3 kN at the tyre's patch, which the coupler carries.
+
+    The force in the upper bar is that of the moment about A, 3000 N (x - 700 mm), over
+    the arm of the line of the upper bar from A.
+    """
+    spread = tolerances(loads(WISHBONE), 512).spreads["|F43|"]
     upper = complex(-0.250, 0.015)
     arm = abs((upper.conjugate() * complex(0.030, -0.260)).imag) / abs(upper)
     np.testing.assert_allclose(spread.nominal, 3000.0 * 0.060 / arm, rtol=1e-12)
     np.testing.assert_allclose(spread.worst, 3000.0 * 0.005 / arm, rtol=1e-12)
     np.testing.assert_allclose(spread.deviation, spread.first_order, rtol=1e-3)
-    scene = loads(text)
+    scene = loads(WISHBONE)
     assert loads(dump(scene)) == scene
 
 
@@ -585,3 +591,21 @@ def test_a_mass_centre_on_its_pin_has_no_coordinates() -> None:
     words = r"no place .*; it has bars\.input\.centre\.0 \(the distance\) and"
     with pytest.raises(InputError, match=words):
         fourbar.vary(loads(text), {"bars.input.centre.drawn.0": [0.0]})
+
+
+def test_the_table_of_tolerances_fits_a_terminal_and_shows_no_rounding(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+) -> None:
+    """At the drawn position the patch is at y = 0, within the rounding of doubles."""
+    path = tmp_path / "wishbone.toml"
+    text = WISHBONE.replace(
+        'theta_2 = "drawn"',
+        'theta_2 = { from = "drawn", to = "-8 deg", steps = 4 }',
+    )
+    path.write_text(text.replace("drawn.0", "drawn.1"), encoding="utf-8")
+    assert status(["tolerance", str(path), "--samples", "64"]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert max(map(len, shown)) <= 80
+    (row,) = (line.split() for line in shown if line.startswith("patch_y  "))
+    assert row[3] == "0"

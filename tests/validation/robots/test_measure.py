@@ -8,6 +8,7 @@ from click.testing import CliRunner, Result
 from fourbar_validation.advise.advise import advise_command as advise
 from fourbar_validation.check.mjcf import check_mjcf_command as check_mjcf
 from fourbar_validation.robots.command import robot_command as loops
+from tests.support.robots import make_parallelogram
 
 FOOT = str(Path(__file__).parents[3] / "models" / "robots" / "biped_foot.xml")
 
@@ -63,3 +64,28 @@ def test_options_that_do_not_go_together_are_refused() -> None:
     ):
         result = call(command, *arguments)
         assert result.exception is not None, arguments
+
+
+def test_a_turn_of_a_parallelogram_is_reported_in_lines_of_a_terminal(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "parallelogram.xml"
+    file.write_text(make_parallelogram(0.5, 0.4, "0 0 0").text, encoding="utf-8")
+    checked = call(check_mjcf, str(file), "-o", str(tmp_path))
+    assert checked.return_value == 0, checked.output
+    said = " ".join(checked.output.split())
+    assert (
+        "left out: 2 of 37 states, with coupler and output in line (hinge_1 = -270, -90"
+        " deg), where the loop may go on in two ways"
+    ) in said
+    assert (
+        "torque is (nearly) zero throughout: its error is of the largest pin force times"
+        " the longest moving bar, "
+    ) in said
+    assert "hinge_1 from -360 to 0 deg" in said
+    printed = checked.output.replace(str(tmp_path), "").splitlines()
+    assert max(map(len, printed)) <= 80
+    advised = call(advise, str(file), "--error", "0.01")
+    assert advised.return_value == 0, advised.output
+    sentences = [line for line in advised.output.splitlines() if "<connect" not in line]
+    assert max(map(len, sentences)) <= 80

@@ -26,7 +26,6 @@ from fourbar_validation.advise.matters import (
     write_sentence,
 )
 from fourbar_validation.advise.worst_errors import WorstErrors
-from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.trial import (
     FEWEST_STEPS,
@@ -39,7 +38,7 @@ from fourbar_validation.engines.mujoco.trial import (
     guess,
     make_settings,
 )
-from fourbar_validation.report.terminal import make_words_table
+from fourbar_validation.report.terminal import make_words_table, print_sentence
 from fourbar_validation.robots.measure import (
     measure_robot,
     read_measure_options,
@@ -480,15 +479,15 @@ def _advise_robot(
     measurement = measure_robot(files[-1], options, scene, assets)
     reached = True
     for measured in measurement.loops:
-        click.echo(escape_controls(f"{measured.name}, driven by {measured.joint}"))
+        print_sentence(f"{measured.name}, driven by {measured.joint}")
         assert measured.advice is not None
         for block in describe_advice(measured.advice):
             show_block(block)
         for remark in measured.remarks:
-            click.echo(escape_controls(f"note: {measured.name}: {remark}"))
+            print_sentence(f"note: {measured.name}: {remark}")
         reached &= measured.advice.reached
     for note in measurement.notes:
-        click.echo(escape_controls(f"note: {note}"))
+        print_sentence(f"note: {note}")
     return 0 if reached else 1
 
 
@@ -559,16 +558,16 @@ def advise_command(
                 f"cannot be simulated: {error}; inverse dynamics with loop multipliers"
                 " can answer it"
             )
-            click.echo(f"{file.name}: {reason}")
+            print_sentence(f"{file.name}: {reason}")
             rows.append((file.name, "-", "-", "-", "cannot be simulated"))
             reached = False
             continue
         influences = measure_influences(scene, setup, advice.best.settings)
-        click.echo(f"{file.name}: {advice.reason}")
-        click.echo(_describe_time(setup, advice.best))
-        click.echo(f"{write_sentence(influences)}")
+        print_sentence(f"{file.name}: {advice.reason}")
+        print_sentence(_describe_time(setup, advice.best))
+        print_sentence(write_sentence(influences))
         steps = sum(attempt.steps for attempt in advice.attempts)
-        click.echo(
+        print_sentence(
             f"The search ran the scene {len(advice.attempts)} times, {steps} steps in"
             " all."
         )

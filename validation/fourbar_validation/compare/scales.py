@@ -45,6 +45,17 @@ Cancellation costs it more than K covers.
 """
 
 
+def replace_vanishing(size: Array | float, terms: Array | float) -> Array:
+    """Return sizes of a quantity, and the sum of its terms where it (nearly) vanishes.
+
+    Parameters
+    ----------
+    size, terms : size of the quantity and sum of the absolute terms of its equation, in
+        one unit and of shapes that broadcast.
+    """
+    return np.where(size < LOST_IN_CANCELLATION * terms, terms, size)
+
+
 class TermSizes:
     """Sizes of the quantities of one solution of a scene.
 
@@ -80,10 +91,10 @@ class TermSizes:
         if driven:
             assert solution.drive_condition is not None
             well[driven] &= solution.drive_condition >= WELL_CONDITIONED
-        nonzero = np.where(size < LOST_IN_CANCELLATION * terms, terms, size)
+        nonzero = replace_vanishing(size, terms)
         largest = np.where(well, size, 0.0).max(axis=1, keepdims=True)
         most = np.where(well, terms, 0.0).max(axis=1, keepdims=True)
-        largest = np.where(largest < LOST_IN_CANCELLATION * most, most, largest)
+        largest = replace_vanishing(largest, most)
         scales[sized] = np.where(well, largest, nonzero)
         return scales
 

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fourbar.errors import clean_line
-from fourbar_validation.compare.rows import FAILS
+from fourbar.show.tables import wrap_line
+from fourbar_validation.compare.rows import FAILS, escape_controls
 from fourbar_validation.report.overview import OVERVIEW_GROUPS
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.report.templating import write_error
@@ -23,6 +24,14 @@ MOST_CAUSES_PRINTED = 18
 """Causes of failures that are printed, one line each; the report has all."""
 _MOST_NOTES = 10
 """Lines beneath the table."""
+
+
+def print_sentence(text: str) -> None:
+    """Print a sentence, broken where it is wider than a block."""
+    import click
+
+    for line in wrap_line(escape_controls(text)):
+        click.echo(line)
 
 
 def print_table(

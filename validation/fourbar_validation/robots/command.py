@@ -17,6 +17,7 @@ from fourbar_validation.engines.mujoco.robots.loop import (
     RobotReport,
     write_length,
 )
+from fourbar_validation.report.terminal import print_sentence
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.guard import examine_guarded
 from fourbar_validation.robots.options import (
@@ -72,9 +73,9 @@ def _show_report(report: RobotReport) -> None:
     for closure in report.closures:
         remarks = () if closure.loop is None else closure.loop.remarks
         for remark in remarks:
-            click.echo(escape_controls(f"note: {closure.name}: {remark}"))
+            print_sentence(f"note: {closure.name}: {remark}")
     for note in report.notes:
-        click.echo(escape_controls(f"note: {note}"))
+        print_sentence(f"note: {note}")
 
 
 def _write_scene(made: LoopScene) -> str:
@@ -131,5 +132,5 @@ def robot_command(
         return
     write_text(out, _write_scene(made))
     for line in [*made.parts, *made.remarks, *made.notes]:
-        click.echo(escape_controls(line))
+        print_sentence(line)
     click.echo(escape_controls(f"written to {out}"))

@@ -23,6 +23,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     LoopMeasurement,
     MeasureOptions,
     RobotMeasurement,
+    find_scales,
     measure_sizes,
 )
 from fourbar_validation.robots.files import read_robot
@@ -34,6 +35,8 @@ MEASURE_SECONDS = 600.0
 """s; a busy machine takes several times the two minutes of an idle one."""
 STATES = "single states"
 MEASURED_THROUGH_TIME = "through time"
+_DECIMALS_OF_A_POSE = 9
+"""Decimals of a position in degrees; those beyond are rounding."""
 _SLIP = 1e-9
 """Part of the speeds below which a pin with dry friction is at rest. It may then rub
 either way.
@@ -41,25 +44,29 @@ either way.
 
 
 @dataclass(frozen=True, slots=True)
-class _InsideError:
+class InsideError:
     """Worst error of one quantity of a loop by one method."""
 
     method: str
     quantity: str
     error: float
     """N m or N."""
-    largest: float
-    """Largest size of the quantity by the formulas, N m or N."""
+    scale: float
+    """Largest size of the quantity by the formulas, or what replaces it where that
+    vanishes, N m or N.
+    """
+    vanishes: bool
+    """True where the scale is not the largest size of the quantity."""
     joint: float
     """Position of the driven joint where the error is largest, rad."""
 
     @property
     def part(self) -> float:
-        """The error over the largest size; infinite without an answer."""
+        """The error over its scale; infinite without an answer."""
         if not math.isfinite(self.error):
             return math.inf
-        if self.largest:
-            return self.error / self.largest
+        if self.scale:
+            return self.error / self.scale
         return 0.0
 
     def cells(self) -> tuple[str, ...]:
@@ -70,8 +77,13 @@ class _InsideError:
             self.quantity,
             f"{self.error:.3g} {unit}",
             f"{100.0 * self.part:.3g} %",
-            f"{math.degrees(self.joint):.4g} deg",
+            f"{write_degrees(self.joint)} deg",
         )
+
+
+def write_degrees(joint: float) -> str:
+    """Write the position of a joint, rad, in degrees."""
+    return f"{round(math.degrees(joint), _DECIMALS_OF_A_POSE) + 0.0:.4g}"
 
 
 def measure_robot(
@@ -87,7 +99,7 @@ def measure_robot(
     return measurement
 
 
-def list_errors_by_method(loop: LoopMeasurement) -> list[_InsideError]:
+def list_errors_by_method(loop: LoopMeasurement) -> list[InsideError]:
     """List the worst errors of torque and pin forces, by method.
 
     They are against the formulas.
@@ -112,7 +124,7 @@ def _compare(
     method: str,
     loop: LoopMeasurement,
     answer: InsideAnswer,
-) -> Iterator[_InsideError]:
+) -> Iterator[InsideError]:
     """Compare an answer with the formulas at its own theta_2, omega_2 and alpha_2.
 
     Where dry friction reverses the forces on both sides of the jump are right, and
@@ -129,6 +141,11 @@ def _compare(
     formulas = solve(loop.scene, "force", at=commanded)
     judged = formulas.status_code == OK
     reversing = mark_reversing(loop.scene, formulas, _SLIP)
+    largest = {
+        name: float(np.max(measure_sizes(getattr(formulas, name))[judged], initial=0.0))
+        for name in FORCE_QUANTITIES
+    }
+    scales = find_scales(largest, max(loop.scene.linkage.lengths[1:]))
     for name in FORCE_QUANTITIES:
         ours = np.asarray(getattr(formulas, name))
         theirs = np.array([row.soft.values()[name] for row in rows])
@@ -138,12 +155,18 @@ def _compare(
         sizes = np.where(judged & np.isfinite(sizes), sizes, math.inf)
         sizes = np.where(judged & reversing, 0.0, sizes)
         worst = int(np.argmax(sizes))
-        largest = float(np.max(measure_sizes(ours)[judged], initial=0.0))
         if answer.lost:
             error = math.inf
         else:
             error = float(sizes[worst])
-        yield _InsideError(method, name, error, largest, rows[worst].joint)
+        yield InsideError(
+            method,
+            name,
+            error,
+            scales[name],
+            scales[name] != largest[name],
+            rows[worst].joint,
+        )
 
 
 def _turn_vectors(vectors: Array, angle: float) -> Array:
@@ -154,7 +177,7 @@ def _turn_vectors(vectors: Array, angle: float) -> Array:
 
 
 def find_worst_of_loop(loop: LoopMeasurement) -> float:
-    """Return the worst error of torque and pin forces, over the largest of each."""
+    """Return the worst error of torque and pin forces, over the scale of each."""
     return max(error.part for error in list_errors_by_method(loop))
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import click
 
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import PIN_FORCES, UNITS
 from fourbar.writing import write_text
 from fourbar_validation.compare.rows import escape_controls, write_csv_rows
 from fourbar_validation.engines.mujoco.robots.answers import (
@@ -20,13 +20,15 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     TriedSettings,
 )
 from fourbar_validation.report.templating import escape_cell
-from fourbar_validation.report.terminal import make_words_table
+from fourbar_validation.report.terminal import make_words_table, print_sentence
 from fourbar_validation.robots.measure import (
     MEASURED_THROUGH_TIME,
     STATES,
+    InsideError,
     find_left_out,
     find_worst_of_loop,
     list_errors_by_method,
+    write_degrees,
 )
 
 ERROR_HEADINGS = ("method", "quantity", "error", "of its largest", "at")
@@ -75,10 +77,11 @@ def describe_measurement(measurement: RobotMeasurement) -> Iterator[ReportBlock]
 
 
 def _describe_loop(loop: LoopMeasurement) -> Iterator[ReportBlock]:
-    joints = [math.degrees(row.joint) for row in loop.states.rows]
+    joints = [row.joint for row in loop.states.rows]
+    first, last = (write_degrees(end) for end in (min(joints), max(joints)))
     speed = loop.states.rows[0].omega_2
     yield (
-        f"{loop.name}: {loop.joint} from {min(joints):.4g} to {max(joints):.4g} deg at "
+        f"{loop.name}: {loop.joint} from {first} to {last} deg at "
         f"{speed:.4g} rad/s, MuJoCo in the whole robot against the formulas"
     )
     if math.isfinite(loop.influence):
@@ -104,9 +107,17 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[ReportBlock]:
         f"with rigid pins the robot differs from the formulas by {size} of the largest:"
         " what the scene leaves out; the rest is MuJoCo's soft constraint"
     )
-    yield TextTable(
-        ERROR_HEADINGS, [error.cells() for error in list_errors_by_method(loop)]
-    )
+    if loop.states.in_line:
+        places = ", ".join(map(write_degrees, loop.states.in_line))
+        count = len(loop.states.in_line)
+        yield (
+            f"left out: {count} of {count + len(loop.states.rows)} states, with coupler"
+            f" and output in line ({loop.joint} = {places} deg), where the loop may go"
+            " on in two ways"
+        )
+    errors = list_errors_by_method(loop)
+    yield TextTable(ERROR_HEADINGS, [error.cells() for error in errors])
+    yield from _describe_vanishing(errors)
     if loop.through_time is None:
         yield f"not simulated: {loop.refusal}"
     elif loop.through_time.lost:
@@ -115,7 +126,7 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[ReportBlock]:
         worst = max(loop.through_time.rows, key=lambda row: row.gap)
         yield (
             f"gap through time: {1e3 * worst.gap:.3g} mm at {loop.joint} = "
-            f"{math.degrees(worst.joint):.4g} deg; a step takes "
+            f"{write_degrees(worst.joint)} deg; a step takes "
             f"{1e6 * loop.through_time.seconds_per_step:.3g} us"
         )
     sticking = {name for row in loop.states.rows for name in row.sticking}
@@ -132,6 +143,20 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[ReportBlock]:
         yield f"note: {loop.name}: {remark}"
 
 
+def _describe_vanishing(errors: Sequence[InsideError]) -> Iterator[ReportBlock]:
+    """Say what the errors of a quantity are divided by that (nearly) vanishes."""
+    scales = {error.quantity: error.scale for error in errors if error.vanishes}
+    for quantity, scale in scales.items():
+        size = f"{scale:.4g} {UNITS[quantity]}"
+        factor = ""
+        if quantity == "torque":
+            factor = " times the longest moving bar"
+        yield (
+            f"{quantity} is (nearly) zero throughout: its error is of the largest pin"
+            f" force{factor}, {size}"
+        )
+
+
 def _describe_torn(loop: LoopMeasurement) -> Iterator[ReportBlock]:
     """Describe the state of the largest gap under a motor's torque."""
     if not loop.torn:
@@ -145,7 +170,7 @@ def _describe_torn(loop: LoopMeasurement) -> Iterator[ReportBlock]:
     )
     yield (
         f"under the torque: gap at most {1e3 * worst.gap:.3g} mm, at {loop.joint} = "
-        f"{math.degrees(worst.joint):.4g} deg with {forces}"
+        f"{write_degrees(worst.joint)} deg with {forces}"
     )
 
 
@@ -191,8 +216,10 @@ def show_block(block: ReportBlock) -> None:
 
         table = make_words_table(block.headings, block.rows, show_edge=False)
         Console().print(table)
+    elif isinstance(block, Typed):
+        click.echo(escape_controls(block.text))
     else:
-        click.echo(escape_controls(block.text if isinstance(block, Typed) else block))
+        print_sentence(block)
 
 
 def write_markdown(title: str, blocks: Sequence[ReportBlock]) -> str:

@@ -51,8 +51,9 @@ def find_couple(
     """
     free = acceleration(0.0)
     # without a couple it may already accelerate as wanted, to the rounding of the
-    # others
-    others = float(np.abs(data.qacc_smooth).max()) or 1.0
+    # others, which may vanish too: a bar that turns uniformly has omega^2
+    speed = float(np.abs(data.qvel).max())
+    others = max(float(np.abs(data.qacc_smooth).max()), speed * speed) or 1.0
     sought = max(abs(wanted - free), LEAST_ACCELERATION * others)
     trial = float(model.dof_M0.sum()) * sought
     couple = solve_couple(acceleration, wanted, 0.0, trial, _REFINEMENTS)

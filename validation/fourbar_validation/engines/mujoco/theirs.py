@@ -57,7 +57,10 @@ from fourbar_validation.engines.mujoco.describe import (
     mend_entry,
     set_entry,
 )
-from fourbar_validation.engines.mujoco.robots.ancestry import is_enabled
+from fourbar_validation.engines.mujoco.robots.ancestry import (
+    describe_actuator,
+    is_enabled,
+)
 from fourbar_validation.engines.mujoco.robots.compiled import (
     compile_robot,
     list_unknown_parts,
@@ -472,9 +475,9 @@ class _UserLoop(Assembled):
         judged = [index for index, instant in times.items() if instant >= settled]
         if not self.flywheel:
             self.notes.append(
-                f"through time {self.find_carrier():.3g} kg m^2 on pin O2, which are"
-                " not the file's, and at each position the torque solved for keep the"
-                " speed"
+                "through time the speed is kept by"
+                f" {self.find_carrier():.3g} kg m^2 on pin O2, which are not the"
+                " file's, and by the torque that is solved for at each position"
             )
         if len(judged) < len(times):
             left_out = len(times) - len(judged)
@@ -511,8 +514,8 @@ class _UserLoop(Assembled):
         for i in self.topology.drives():
             model.actuator_gainprm[i], model.actuator_biasprm[i] = 0.0, 0.0
             self.notes.append(
-                f"its drive {model.actuator(i).name!r} on pin O2 is taken off: the"
-                " torque is solved for"
+                f"its drive on pin O2, {describe_actuator(model, i)}, is taken off:"
+                " the torque is solved for"
             )
         if self.scene.drive is not None:
             cylinders = self.topology.cylinders()

@@ -11,6 +11,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     LoopMotion,
     PinsAndTorque,
     RobotSettings,
+    find_scales,
 )
 
 PINS = ("F12", "F32", "F43", "F14")
@@ -31,8 +32,17 @@ def test_errors_are_sizes_of_differences_and_scales_of_the_rigid_answer() -> Non
     answer = InsideAnswer([make_row(2.0, 0.5), make_row(-4.0, -0.25)])
     assert answer.errors()["torque"] == pytest.approx([0.5, 0.25])
     assert answer.errors()["F43"] == pytest.approx([0.5, 0.25])
-    assert answer.scales()["torque"] == 4.0
-    assert answer.scales()["F12"] == pytest.approx(5.0)
+    assert answer.scales(0.5)["torque"] == 4.0
+    assert answer.scales(0.5)["F12"] == pytest.approx(5.0)
+
+
+def test_what_vanishes_is_scaled_by_the_largest_pin_force() -> None:
+    """A torque is a sum of couples of pin forces; they may cancel, and a pin be idle."""
+    largest = {"torque": 1e-12, "F12": 30.0, "F32": 20.0, "F43": 0.0, "F14": 1.0}
+    scales = find_scales(largest, 0.5)
+    assert scales == {"torque": 15.0, "F12": 30.0, "F32": 20.0, "F43": 30.0, "F14": 1.0}
+    nothing = dict.fromkeys(largest, 0.0)
+    assert find_scales(nothing, 0.5) == nothing
 
 
 def test_fewer_positions_keep_both_ends() -> None:

@@ -3,6 +3,7 @@
 All, one by name, by a scene of one's own.
 """
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,13 +13,24 @@ import pytest
 import fourbar
 from fourbar.errors import InputError
 from fourbar.mjcf import Plane, write_mjcf
-from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
+from fourbar_validation.engines.mujoco.robots.answers import (
+    FORCE_QUANTITIES,
+    MeasureOptions,
+)
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
-from fourbar_validation.engines.mujoco.robots.measure import measure_loops
+from fourbar_validation.engines.mujoco.robots.measure import (
+    POSITIONS_OF_A_LOOP,
+    measure_loops,
+)
 from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
 from fourbar_validation.robots.files import read_robot
-from fourbar_validation.robots.measure import find_left_out, find_worst_of_loop
-from tests.support.robots import FINGER
+from fourbar_validation.robots.measure import (
+    STATES,
+    find_left_out,
+    find_worst_of_loop,
+    list_errors_by_method,
+)
+from tests.support.robots import FINGER, make_parallelogram
 from tests.support.scenes import mirrored
 
 ROBOTS = Path(__file__).parents[5] / "models" / "robots"
@@ -127,3 +139,61 @@ def test_a_loop_that_is_not_there_is_refused() -> None:
     file = read_robot(ROBOTS / "gripper.xml")
     with pytest.raises(InputError, match="no such closure"):
         measure_loops(file, MeasureOptions(PoseOptions(), "tail"), None)
+
+
+@pytest.mark.parametrize(
+    ("ground", "gravity"),
+    [(0.4, "0 0 0"), (0.4, "0 0 -9.81"), (0.5, "0 0 -9.81")],
+    ids=["no torque", "rhombus", "rectangle"],
+)
+def test_a_full_turn_of_a_parallelogram_is_measured_but_for_its_change_points(
+    ground: float,
+    gravity: str,
+) -> None:
+    """The loop stays a parallelogram past the positions in line."""
+    file = make_parallelogram(ground, 0.4, gravity)
+    (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), None).loops
+    assert len(loop.states.in_line) == 2
+    across = [math.cos(joint) for joint in loop.states.in_line]
+    assert across == pytest.approx([0.0, 0.0], abs=1e-6)
+    assert len(loop.states.rows) == POSITIONS_OF_A_LOOP - 2
+    assert find_left_out(loop) < 1e-8
+    errors = list_errors_by_method(loop)
+    assert len(errors) == 2 * len(FORCE_QUANTITIES)
+    assert all(math.isfinite(error.part) for error in errors)
+
+
+def test_a_torque_that_vanishes_is_judged_on_the_pin_forces_times_a_bar() -> None:
+    """A parallelogram of equal cranks that turns uniformly needs no torque."""
+    file = make_parallelogram(0.5, 0.4, "0 0 0")
+    (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), None).loops
+    (torque,) = (
+        error
+        for error in list_errors_by_method(loop)
+        if (error.method, error.quantity) == (STATES, "torque")
+    )
+    # mass of the capsule times the centripetal acceleration of A, and of half the crank
+    speed = loop.states.rows[0].omega_2
+    rod = 1000.0 * math.pi * 0.02**2
+    crank = rod * (0.4 + 4.0 / 3.0 * 0.02)
+    coupler = rod * (0.5 + 4.0 / 3.0 * 0.02)
+    largest = (0.5 * coupler + 0.5 * crank) * 0.4 * speed**2
+    assert torque.vanishes
+    assert torque.scale == pytest.approx(largest * 0.5, rel=1e-6)
+    assert torque.part == torque.error / torque.scale
+    assert loop.influence < 1.0
+
+
+def test_a_couple_is_found_where_nothing_accelerates() -> None:
+    """At rest without weights no acceleration tells how large a trial is to be."""
+    file = make_parallelogram(0.5, 0.4, "0 0 0")
+    options = MeasureOptions(PoseOptions(), speed=0.0)
+    (loop,) = measure_loops(file, options, None).loops
+    assert len(loop.states.rows) == POSITIONS_OF_A_LOOP - 2
+    assert all(abs(row.soft.torque) < 1e-9 for row in loop.states.rows)
+
+
+def test_an_actuator_without_a_name_is_told_by_its_joint() -> None:
+    file = make_parallelogram(0.5, 0.4, "0 0 0")
+    made = read_loop_scene(file, PoseOptions(), None, None)
+    assert "not in the scene: an actuator without a name, on hinge_2" in made.remarks

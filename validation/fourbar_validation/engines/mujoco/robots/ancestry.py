@@ -74,6 +74,21 @@ def name_joint(model: mujoco.MjModel, joint: int) -> str:
     return model.joint(joint).name or f"joint {joint}"
 
 
+def describe_actuator(model: mujoco.MjModel, actuator: int) -> str:
+    """Describe an actuator: as the file names it, or by what it acts on."""
+    name = model.actuator(actuator).name
+    if name:
+        return f"the actuator {name}"
+    kind = mujoco.mjtTrn(int(model.actuator_trntype[actuator]))
+    target = int(model.actuator_trnid[actuator, 0])
+    where = f"number {actuator} of the file"
+    if kind == mujoco.mjtTrn.mjTRN_JOINT:
+        where = f"on {name_joint(model, target)}"
+    elif kind == mujoco.mjtTrn.mjTRN_SITE and model.site(target).name:
+        where = f"on the site {model.site(target).name}"
+    return f"an actuator without a name, {where}"
+
+
 def takes_control(model: mujoco.MjModel, actuator: int) -> bool:
     """Tell a motor from a load, a spring or a damper that is written as an actuator."""
     return bool(model.actuator_gainprm[actuator].any())

@@ -1,6 +1,7 @@
 """Results of MuJoCo on the loops of a robot, as plain data."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -8,6 +9,7 @@ import numpy as np
 
 from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import Scene
+from fourbar_validation.compare.scales import replace_vanishing
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
 
 FORCE_QUANTITIES = ("torque", *PIN_FORCES)
@@ -48,6 +50,28 @@ def measure_sizes(values: Any) -> Array:
     return np.asarray(np.abs(numbers) if numbers.ndim == 1 else np.hypot(*numbers.T))
 
 
+def find_scales(largest: Mapping[str, float], longest: float) -> dict[str, float]:
+    """Return what the errors of torque and pin forces are divided by, N m and N.
+
+    It is the largest of each. One that (nearly) vanishes is a sum whose terms cancel:
+    pin forces, and for the torque their couples on the bars. Its error is divided by
+    the largest pin force, for the torque times the longest moving bar.
+
+    Parameters
+    ----------
+    largest : largest torque and largest of each pin force, N m and N.
+    longest : longest moving bar, m.
+    """
+    force = max(largest[name] for name in PIN_FORCES)
+    scales = {}
+    for name in FORCE_QUANTITIES:
+        terms = force
+        if name == "torque":
+            terms = force * longest
+        scales[name] = float(replace_vanishing(largest[name], terms))
+    return scales
+
+
 @dataclass(frozen=True, slots=True)
 class InsideRow:
     """One state of a loop in its robot."""
@@ -74,6 +98,10 @@ class InsideAnswer:
     """Results of MuJoCo on a loop at some states of the whole robot."""
 
     rows: list[InsideRow] = field(default_factory=list)
+    in_line: tuple[float, ...] = ()
+    """Positions of the driven joint that are left out, because the bars of pin B are in
+    line there, rad.
+    """
     lost: str = ""
     """Why the run ended early; empty where it did not."""
     seconds_per_step: float = math.nan
@@ -93,17 +121,20 @@ class InsideAnswer:
             sizes[name] = measure_sizes(soft - rigid)
         return sizes
 
-    def scales(self) -> dict[str, float]:
-        """Return the largest torque and the largest of each pin force.
+    def scales(self, longest: float) -> dict[str, float]:
+        """Return what the errors are divided by, as `find_scales` does.
 
-        They are those of rigid pins, N m and N.
+        The torque and the pin forces are those of rigid pins, N m and N.
+
+        `longest`: longest moving bar, m.
         """
-        return {
+        largest = {
             name: float(
                 measure_sizes([row.rigid.values()[name] for row in self.rows]).max()
             )
             for name in FORCE_QUANTITIES
         }
+        return find_scales(largest, longest)
 
 
 @dataclass(frozen=True, slots=True)

@@ -61,6 +61,10 @@ _STRIDE = math.radians(2.0)
 """Largest turn of the driven hinge from one closed state to the next. The assembly is
 kept so.
 """
+LEAST_TRANSMISSION = 1e-5
+"""Transmission over the longest bar below which the bars of pin B are in line. A closed
+pose is known to the residual over it, and to less than that below.
+"""
 _SOLVE_STEPS = 60
 """Newton steps for the hinges' accelerations; without friction one is enough."""
 _BALANCED = 1e-10
@@ -114,6 +118,9 @@ class LoopInside:
         dofs = {pin: int(model.jnt_dofadr[j]) for pin, j in loop.hinges.items()}
         self.drive = dofs["O2"]
         self.passive = [dof for pin, dof in dofs.items() if pin != "O2"]
+        self.passive_addresses = [
+            int(model.jnt_qposadr[model.dof_jntid[dof]]) for dof in self.passive
+        ]
         free = {self.drive, *self.passive}
         self.held = [dof for dof in range(model.nv) if dof not in free]
         self.sense = loop.senses["O2"]
@@ -122,6 +129,10 @@ class LoopInside:
         self.closure = _copy_for_closures(self.model, loop.closures)
         self.closing = mujoco.MjData(self.closure)
         self._last = loop.qpos.copy()
+        self._rates = self._find_rates(self._last)
+        """Turn of the hinges that are not driven by that of the driven one, at the last
+        pose.
+        """
         without_friction = int(mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS)
         rubs = not self.model.opt.disableflags & without_friction
         self._friction = self.model.dof_frictionloss * rubs
@@ -146,17 +157,37 @@ class LoopInside:
     def close(self, theta_2: float) -> Array | None:
         """Return the pose at an angle of bar 2, or None if the loop is open.
 
-        It is reached from the last one in small strides.
+        It is reached from the last one in small strides. Each begins as the one before
+        it went on, so that the motion passes a change point smoothly.
         """
         start = self.angle(self._last)
         strides = max(math.ceil(abs(theta_2 - start) / _STRIDE), 1)
         qpos = self._last.copy()
+        rates = self._rates
         for angle in np.linspace(start, theta_2, strides + 1)[1:]:
+            before = qpos.copy()
             qpos[self.address] = self.position(float(angle))
+            turned = qpos[self.address] - before[self.address]
+            qpos[self.passive_addresses] += rates * turned
             if not self.close_gap(qpos):
                 return None
+            if turned:
+                moved = (qpos - before)[self.passive_addresses]
+                rates = moved / turned
         self._last = qpos.copy()
+        self._rates = rates
         return qpos
+
+    def _find_rates(self, qpos: Array) -> Array:
+        """Return the turn of the hinges that are not driven by that of the driven one.
+
+        It is that of the closed loop in a pose, (number of these hinges,).
+        """
+        _, jacobian = self._evaluate_closure(qpos)
+        return _solve_least_squares(
+            jacobian[:, self.passive],
+            -jacobian[:, self.drive],
+        )
 
     def close_gap(self, qpos: Array) -> bool:
         """Move the hinges that are not driven until the residual is least.
@@ -172,10 +203,7 @@ class LoopInside:
                 break
             least = size
             step = _solve_least_squares(jacobian[:, self.passive], -residual)
-            for dof, turn in zip(self.passive, step, strict=True):
-                joint = int(self.model.dof_jntid[dof])
-                address = self.model.jnt_qposadr[joint]
-                qpos[address] += turn
+            qpos[self.passive_addresses] += step
         allowed = max(RESIDUAL_OF_AN_OPEN_LOOP, self._skew())
         return bool(np.abs(residual).max() <= allowed)
 
@@ -187,6 +215,14 @@ class LoopInside:
         _, jacobian = self._evaluate_closure(qpos)
         sizes = np.linalg.svd(jacobian[:, self.passive], compute_uv=False)
         return float(sizes[1])
+
+    def _is_in_line(self, qpos: Array) -> bool:
+        """Tell whether the bars of pin B are in line: at a change point or a limit.
+
+        The loop may go on in two ways there, or no way, and forces are not determined.
+        """
+        least = LEAST_TRANSMISSION * self.loop.longest
+        return self.measure_transmission(qpos) < least
 
     def _skew(self) -> float:
         """Return what axes that are not parallel leave of the gap, m."""
@@ -469,12 +505,21 @@ class LoopInside:
         omega_2: float,
         alpha_2: float,
     ) -> InsideAnswer:
-        """Answer at closed states, each by itself."""
+        """Answer at closed states, each by itself.
+
+        States in which the bars of pin B are in line are left out and listed.
+        """
         answer = InsideAnswer()
+        in_line = []
         for angle in theta_2:
             state = self.state(angle, omega_2)
-            if state is not None:
-                answer.rows.append(self.ask(state.qpos, state.qvel, alpha_2))
+            if state is None:
+                continue
+            if self._is_in_line(state.qpos):
+                in_line.append(float(state.qpos[self.address]))
+                continue
+            answer.rows.append(self.ask(state.qpos, state.qvel, alpha_2))
+        answer.in_line = tuple(in_line)
         return answer
 
     def answer_through_time(

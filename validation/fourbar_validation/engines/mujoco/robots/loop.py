@@ -102,6 +102,11 @@ class RobotLoop:
         return self.hinges["O2"]
 
     @property
+    def longest(self) -> float:
+        """Longest moving bar, m."""
+        return max(self.lengths[1:])
+
+    @property
     def is_flat(self) -> bool:
         """Tell whether the bars of pin B were in line before the loops were closed.
 

@@ -118,6 +118,12 @@ def _measure_loop(
     turned = find_turn(scene, loop)
     motion = _choose_motion(scene, turned).thin_out(POSITIONS_OF_A_LOOP)
     states = inside.answer_states(*motion)
+    if not states.rows and states.in_line:
+        raise LimitError(
+            f"{loop.name} is measured at no position: coupler and output are in line at"
+            " all of them, where the loop may go on in two ways; choose others by the"
+            " motion of a SCENE"
+        )
     if not states.rows:
         raise LimitError(
             f"{loop.name} closes at none of the positions of the scene; its lengths "
@@ -132,7 +138,7 @@ def _measure_loop(
             raise LimitError("nothing moves: a sweep at a speed is needed")
         through = inside.answer_through_time(*closing)
         lighter = inside.answer_through_time(*closing, HEAVY * _LIGHTER)
-        influence = _compare_at_same_angles(through, lighter)
+        influence = _compare_at_same_angles(through, lighter, loop.longest)
     except LimitError as error:
         refusal = str(error)
     torn: tuple[TornState, ...] = ()
@@ -171,13 +177,19 @@ def _choose_motion(scene: Scene, turned: float) -> LoopMotion:
     return LoopMotion(tuple(angles.tolist()), speed, acceleration)
 
 
-def _compare_at_same_angles(one: InsideAnswer, other: InsideAnswer) -> float:
+def _compare_at_same_angles(
+    one: InsideAnswer,
+    other: InsideAnswer,
+    longest: float,
+) -> float:
     """Return by how much the errors of two runs differ at the same angles.
 
-    It is over the largest of each quantity. Each is the error at its own state: the
+    It is over the scale of each quantity. Each is the error at its own state: the
     motions differ too, and near a limit position the forces with them.
+
+    `longest`: longest moving bar, m.
     """
-    scales = one.scales()
+    scales = one.scales(longest)
     worst = 0.0
     if one.lost or other.lost:
         return math.inf

@@ -29,6 +29,7 @@ from fourbar.solving import solve
 from fourbar_validation.engines.free_body_closure import close
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     climb,
+    describe_actuator,
     is_enabled,
     name_joint,
 )
@@ -694,8 +695,7 @@ class _SceneOfLoop:
                 and int(model.site_bodyid[target]) in bodies
             )
             if on_site or (on_joint and target != self.loop.joint):
-                name = model.actuator(number).name or str(number)
-                self._leave_out(f"the actuator {name}")
+                self._leave_out(describe_actuator(model, number))
 
 
 @dataclass(frozen=True, slots=True)

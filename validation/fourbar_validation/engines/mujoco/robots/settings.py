@@ -146,9 +146,11 @@ class SettingsSearch:
         motion = self.motion
         states = through = gap = seconds = math.inf
         try:
-            states = _find_worst_force_error(inside.answer_states(*motion))
+            states = _find_worst_force_error(
+                inside.answer_states(*motion), self.loop.longest
+            )
             answer = inside.answer_through_time(*motion)
-            through = _find_worst_force_error(answer)
+            through = _find_worst_force_error(answer, self.loop.longest)
             seconds = answer.seconds_per_step
             gap = max((row.gap for row in answer.rows), default=math.inf)
         except LimitError:
@@ -241,14 +243,16 @@ class SettingsSearch:
         return evaluations, len(changes), -settings.solref[0]
 
 
-def _find_worst_force_error(answer: InsideAnswer) -> float:
-    """Return the worst error of torque and pin forces over the largest of each.
+def _find_worst_force_error(answer: InsideAnswer, longest: float) -> float:
+    """Return the worst error of torque and pin forces over the scale of each.
 
     It is infinite without an answer.
+
+    `longest`: longest moving bar, m.
     """
     if answer.lost or not answer.rows:
         return math.inf
-    scales = answer.scales()
+    scales = answer.scales(longest)
     worst = 0.0
     for name, errors in answer.errors().items():
         largest = float(np.max(errors))
