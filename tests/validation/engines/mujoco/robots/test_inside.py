@@ -171,7 +171,7 @@ def test_the_start_of_a_simulation_is_not_judged() -> None:
     angles = (start + np.linspace(0.0, 0.6, 31)).tolist()
     through = inside.answer_through_time(angles, 1.0, 0.0)
     assert min(row.theta_2 for row in through.rows) >= start + 0.1 - 1e-3
-    errors, scales = through.errors(), through.scales()
+    errors, scales = through.errors(), through.scales(inside.loop.longest)
     single = inside.answer_states(angles[5:], 1.0, 0.0)
     for quantity in FORCE_QUANTITIES:
         settled = errors[quantity].max() / scales[quantity]

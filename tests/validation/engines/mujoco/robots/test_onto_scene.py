@@ -146,7 +146,7 @@ def test_a_four_bar_alone_is_simulated_as_it_is_in_a_robot() -> None:
         alone = float(errors.max() / measure_sizes(ours).max())
         # the last position of the one is the first of the other, and the like
         assert alone == pytest.approx(inside[name], rel=0.2), name
-    (note,) = [note for note in examined.notes if "keep the speed" in note]
+    (note,) = [note for note in examined.notes if "the speed is kept" in note]
     assert "1.44e+03 kg m^2 on pin O2, which are not the file's" in note
     (note,) = [note for note in examined.notes if "not judged" in note]
     judged = len(answer.quantities["torque"])
