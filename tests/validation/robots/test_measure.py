@@ -84,8 +84,8 @@ def test_a_turn_of_a_parallelogram_is_reported_in_lines_of_a_terminal(
         " deg), where the loop may go on in two ways"
     ) in said
     assert (
-        "torque is (nearly) zero throughout: its error is of the largest pin force times"
-        " the longest moving bar, "
+        "torque is (nearly) zero throughout: its error is of the largest pin force"
+        " times the longest moving bar, "
     ) in said
     assert "hinge_1 from -360 to 0 deg" in said
     printed = checked.output.replace(str(tmp_path), "").splitlines()

@@ -37,7 +37,7 @@ def test_errors_are_sizes_of_differences_and_scales_of_the_rigid_answer() -> Non
 
 
 def test_what_vanishes_is_scaled_by_the_largest_pin_force() -> None:
-    """A torque is a sum of couples of pin forces; they may cancel, and a pin be idle."""
+    """A torque is a sum of couples of pin forces, which may cancel."""
     largest = {"torque": 1e-12, "F12": 30.0, "F32": 20.0, "F43": 0.0, "F14": 1.0}
     scales = find_scales(largest, 0.5)
     assert scales == {"torque": 15.0, "F12": 30.0, "F32": 20.0, "F43": 30.0, "F14": 1.0}
