@@ -55,6 +55,7 @@ NOT_QUANTITIES = (
         "ground",
         "change_points",
         "lengths",
+        "origin",
         "at",
     ),
     *("points", "velocity", "acceleration"),
