@@ -272,6 +272,7 @@ def test_of_several_timesteps_the_finest_is_judged_and_each_setting_is_a_row(
     )
 
 
+@pytest.mark.slow
 def test_a_simulator_answers_single_states_at_its_own_motion(folder: Path) -> None:
     pytest.importorskip("mujoco")
     adapter = "fourbar_lab.simulators.mujoco_c:MujocoFile"
@@ -286,6 +287,7 @@ def test_a_simulator_answers_single_states_at_its_own_motion(folder: Path) -> No
     assert "at" in json.loads(file.read_text())
 
 
+@pytest.mark.slow
 def test_an_entry_of_one_kind_of_problem_answers_in_the_row_of_another(
     folder: Path,
 ) -> None:

@@ -432,6 +432,7 @@ def test_the_page_of_the_commands_lists_each_and_its_reference_every_option() ->
     assert "None |" not in reference
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("package", ["fourbar", "fourbar_validation"])
 def test_the_architecture_names_every_layer_and_no_other(package: str) -> None:
     table = (
@@ -453,6 +454,7 @@ def test_the_figure_of_the_theory_is_the_one_that_is_drawn() -> None:
     assert read("docs/theory.svg") == runpy.run_path(str(DOCS / "theory.py"))["text"]()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "options"),
     [

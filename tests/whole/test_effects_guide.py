@@ -76,6 +76,7 @@ def test_one_file_is_all_that_the_example_needs(latch: Any) -> None:
     assert "latch" in effects.list_kinds()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["act_on_engine", "act_on_free_bodies", "act"])
 def test_the_test_of_the_page_fails_for_a_mistake_in_one_derivation(
     latch: Any,

@@ -411,6 +411,7 @@ PROCESSES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("program", "line", "status"),
     PROCESSES,

@@ -167,6 +167,7 @@ def modules(package: str) -> dict[str, Path]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("package", LAYERS)
 def test_layers_stand_on_floors(package: str) -> None:
     floors = [floor.split() for floor in LAYERS[package]]
@@ -199,6 +200,7 @@ def test_layers_stand_on_floors(package: str) -> None:
                 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("package", PACKAGES)
 def test_no_modules_import_each_other_in_a_circle_types_included(package: str) -> None:
     names = modules(package)
@@ -211,6 +213,7 @@ def test_no_modules_import_each_other_in_a_circle_types_included(package: str) -
     assert not uses
 
 
+@pytest.mark.slow
 def test_no_class_name_stands_for_two_things() -> None:
     names = Counter(
         node.name

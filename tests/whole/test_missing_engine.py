@@ -114,6 +114,7 @@ def test_the_others_run_and_the_missing_named_with_the_reason(
     assert done.returncode == 3  # the environment, not the formulas
 
 
+@pytest.mark.slow
 def test_requested_by_name_nothing_is_run(tmp_path: Path) -> None:
     done = without("mujoco", tmp_path, "--engines", "free-body,mujoco-inverse")
     reason = 'mujoco is not installed: pip install ".[validation]" in the checkout'

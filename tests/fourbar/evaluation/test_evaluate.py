@@ -131,6 +131,7 @@ def test_error_bars_are_of_the_size_of_the_error(
         assert np.median(width / np.maximum(error, half_a_digit)) < 5.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILY_DRAWERS)
 def test_error_bars_hold_with_pairs_of_doubles(
     family: str,

@@ -209,6 +209,7 @@ def forces_by_energy(theta: np.ndarray, start: np.ndarray) -> np.ndarray:
     return np.linalg.solve(left, right)[9:].reshape(4, 2)
 
 
+@pytest.mark.slow
 def test_a_release_is_computed_once_and_solved_as_any_command() -> None:
     released, solution = fourbar.release(SWING), solve(SWING, "force")
     again = solve(SWING, "force", at=released.command)
@@ -357,6 +358,7 @@ def test_what_begins_to_move_against_friction_does_so_at_once() -> None:
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preload", (0.0, 5.0))
 def test_a_spring_between_places_that_are_one_is_refused_where_it_is_released(
     preload: float,

@@ -395,6 +395,7 @@ def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held()
     assert f"{row} theta_2 = 11.46 deg to 80.21 deg, a part of it at each" in text
 
 
+@pytest.mark.slow
 def test_each_position_at_rest_has_its_own_range() -> None:
     """Pin B stands against the coupler at 0 and 180 deg, pin O4 between positions.
 

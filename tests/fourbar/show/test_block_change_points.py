@@ -467,6 +467,7 @@ def test_the_peak_of_a_release_over_change_points_is_said_to_grow() -> None:
         assert abs(math.sin(angle)) < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", [50, 100, 1000])
 def test_the_peak_of_a_release_with_limits_is_not_said_to_grow(steps: int) -> None:
     """Of equal halves each arm carries its own: no pin force grows, however near."""

@@ -89,6 +89,7 @@ def test_a_commanded_stroke_has_the_limits_of_the_angle_that_it_commands() -> No
     assert rows == ask_forces(by_angle, "theta_2", 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("direction", [0.0, -0.5 * np.pi])
 def test_a_release_has_the_limits_of_its_own_motion(direction: float) -> None:
     """No torque acts: forces are bounded under any weight.

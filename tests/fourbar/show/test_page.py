@@ -70,6 +70,7 @@ def state_of(driver, expression: str):
     return driver.execute_script(f"return {expression};")
 
 
+@pytest.mark.slow
 def test_numbers_are_shown_in_the_units_of_the_page(browse) -> None:
     scene = crank_rocker()
     driver = browse(animate.write_page(scene, units=fourbar.units("mm kN N.mm rpm")))
@@ -103,6 +104,7 @@ def turning(browse):
     return browse(animate.write_page(crank_rocker())), fourbar.solve(crank_rocker())
 
 
+@pytest.mark.slow
 def test_each_step_shows_the_numbers_of_its_position(turning) -> None:
     driver, s = turning
     assert driver.title == "crank-rocker"
@@ -128,6 +130,7 @@ def test_each_step_shows_the_numbers_of_its_position(turning) -> None:
     assert "torque" in state_of(driver, "document.getElementById('live').textContent")
 
 
+@pytest.mark.slow
 def test_play_moves_the_linkage_and_pause_leaves_true_numbers(turning) -> None:
     driver, s = turning
     start = pins(driver)["A"]
@@ -165,6 +168,7 @@ def clockwork(driver, ticks: int) -> list[int]:
     return driver.execute_script(script, ticks)
 
 
+@pytest.mark.slow
 def test_an_input_that_turns_fully_goes_round_and_one_that_does_not_swings(
     browse,
 ) -> None:
@@ -234,6 +238,7 @@ OUTPUT = fourbar.Motion(theta_4=fourbar.Sweep(1.75, 2.95, 40), omega_4=4.0)
 """Its ends do not assemble."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("motion", "name", "place", "over", "pace"),
     [
@@ -303,6 +308,7 @@ def test_another_command_is_the_axis_and_the_linkage_follows(
     assert driver.find_element("id", "status").is_displayed() == (not s.assembled[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [360, 400, 480, 1280])
 def test_the_numbers_of_an_axis_stand_clear_and_a_stroke_stays_in_its_column(
     browse,
@@ -332,6 +338,7 @@ def test_the_numbers_of_an_axis_stand_clear_and_a_stroke_stays_in_its_column(
     assert all(after - before > 3.0 for (_, before), (after, _) in pairwise(boxes))
 
 
+@pytest.mark.slow
 def test_the_page_replays_the_positions_speeds_and_accelerations_of_fourbar(
     browse,
 ) -> None:
@@ -370,6 +377,7 @@ def test_the_page_replays_the_positions_speeds_and_accelerations_of_fourbar(
             )
 
 
+@pytest.mark.slow
 def test_what_is_downloaded_is_the_scene_on_the_branch_shown(
     browse,
     tmp_path: Path,
@@ -516,6 +524,7 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("width", "scaling"),
     [(360, "position"), (1100, "position"), (360, "sweep"), (1100, "sweep")],
@@ -550,6 +559,7 @@ def test_no_arrow_and_no_name_of_one_leaves_the_picture(
     )  # its name stands beyond the tip
 
 
+@pytest.mark.slow
 def test_keyboard_drives_it(turning) -> None:
     from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.keys import Keys
@@ -589,6 +599,7 @@ def test_keyboard_drives_it(turning) -> None:
     ]  # first the link that skips to the controls
 
 
+@pytest.mark.slow
 def test_every_control_has_a_name(turning) -> None:
     driver, _ = turning
     controls = driver.find_elements("css selector", "button, select, input, [role=img]")
@@ -603,6 +614,7 @@ def test_every_control_has_a_name(turning) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dark", (False, True))
 @pytest.mark.parametrize(
     "scene",
@@ -805,6 +817,7 @@ def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse) -> No
     )
 
 
+@pytest.mark.slow
 def test_a_scene_without_bands_says_why_or_shows_nothing(browse) -> None:
     driver = browse(
         animate.write_page(
@@ -820,6 +833,7 @@ def test_a_scene_without_bands_says_why_or_shows_nothing(browse) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("names", "head", "mass", "inertia"),
     [
@@ -864,6 +878,7 @@ return least;
 """Least distance of the name of a bar from the middle line of the bar, px."""
 
 
+@pytest.mark.slow
 def test_a_printed_page_is_one_sheet_with_lengths_bars_and_the_chart_s_name(
     browse,
 ) -> None:

@@ -173,6 +173,7 @@ def test_a_gap_within_a_step_is_no_full_turn() -> None:
     assert "input turns fully" not in text and "per turn" not in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", (0.0, 5.0))
 def test_a_pole_between_two_positions_that_rise_past_it_is_found(speed: float) -> None:
     """The output stands still where bars 2 and 3 are in line.
@@ -222,6 +223,7 @@ def test_a_pole_just_beyond_the_last_position_is_none_between(
     assert said == grows
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", (36, 97, 360))
 @pytest.mark.parametrize("start", (0.0, -math.pi, 0.3))
 @pytest.mark.parametrize("pins", (("B",), ("O2", "A", "B", "O4")))

@@ -49,6 +49,7 @@ LEFT_OUT = (
 """Of the studies' linkage: stated, they would not follow the length."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drive", [2, 3, 4])
 def test_derivatives_are_those_of_a_50_digit_reference(drive: int) -> None:
     """By what a scene leaves out too, which the reference does not move.

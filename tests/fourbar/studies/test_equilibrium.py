@@ -370,6 +370,7 @@ HALF = Sweep(math.radians(30.0), math.radians(390.0), 180)
 BACK = Sweep(math.radians(500.0), math.radians(-100.0), 300)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motion", [None, FULL, HALF, BACK])
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize("lengths", ONE_CHANGE_POINT)

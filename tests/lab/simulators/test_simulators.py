@@ -421,6 +421,7 @@ def test_exudyn_refuses_what_it_has_no_element_for() -> None:
         )
 
 
+@pytest.mark.slow
 @pytest.mark.nightly
 @pytest.mark.usefixtures("sealed")
 @pytest.mark.parametrize(

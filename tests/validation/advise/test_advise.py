@@ -31,6 +31,7 @@ from fourbar_validation.scenes.suites import MODELS
 from tests.validation.cost.test_cost import turning
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("omega", "required", "most"),
     [(10.0, 1e-4, 75), (1000.0, 1e-6, 300), (100.0, 2e-9, 1000)],

@@ -112,6 +112,7 @@ def test_the_right_numbers_agree_also_when_rounded(
     assert judged(SCENES[name], path).differing == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_a_torque_off_by_one_in_the_last_of_six_digits_is_found(
     name: str,
@@ -123,6 +124,7 @@ def test_a_torque_off_by_one_in_the_last_of_six_digits_is_found(
     assert {finding.quantity for finding in judgement.differing} == {"torque"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_a_theta_2_rounded_as_the_rest_is_allowed_for_and_excuses_no_more(
     name: str,
@@ -903,6 +905,7 @@ def test_a_position_that_agrees_by_chance_does_not_hide_a_mistake(
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("what", "scene", "columns", "planted", "words"),
     MISTAKES,

@@ -36,6 +36,7 @@ def driven(one: int, other: int, **changes: Any) -> Scene:
     return crank_rocker(motion=motion, drive=LinearDrive(*ends), **changes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("one", "other"), PAIRS)
 def test_every_pair_of_bars_agrees_with_thirteen_equations(
     one: int,
@@ -69,6 +70,7 @@ def test_every_pair_of_bars_agrees_with_thirteen_equations(
             assert "drive_force_inertia" in agreeing and "torque" not in agreeing
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", EXACT, ids=lambda engine: engine.name)
 @pytest.mark.parametrize(("one", "other"), PAIRS)
 def test_every_pair_of_bars_agrees_with_the_multipliers_of_an_engine(

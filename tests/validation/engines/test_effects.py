@@ -265,6 +265,7 @@ class FaultyTree:
         self.tree.gravity((self.factor * vector[0], self.factor * vector[1]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in ACTING if name != "pin_friction"])
 @pytest.mark.parametrize(
     "factor",
@@ -314,6 +315,7 @@ def test_what_the_formulas_make_of_a_spring_does_not_reach_the_engines(
     assert {engine for engine, _, _ in failed} >= ON_TREES
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ACTING)
 @pytest.mark.parametrize(
     "factor",

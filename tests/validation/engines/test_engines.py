@@ -159,6 +159,7 @@ def test_thesis_figures(name: str) -> None:
         assert got[force][0] == pytest.approx(figure, abs=PRINTED, rel=0.0), force
 
 
+@pytest.mark.slow
 @each_engine
 @pytest.mark.parametrize("lengths", MECHANISMS.values(), ids=MECHANISMS.keys())
 def test_agrees_to_round_off(name: str, lengths: tuple[float, ...]) -> None:
@@ -193,6 +194,7 @@ def test_random_linkages(name: str) -> None:
         assert failures(name, drawn, every=6) == [], suite.name(index)
 
 
+@pytest.mark.slow
 @further
 @pytest.mark.parametrize("frame", ["world", "bar"])
 @pytest.mark.parametrize("bar", [2, 3, 4])
@@ -204,6 +206,7 @@ def test_a_force_at_a_point_drives(name: str, bar: int, frame: str) -> None:
         assert failures(name, case, every=12) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", present(*TREES, "free-body"))
 def test_it_assembles_where_the_circles_meet_and_on_the_commanded_branch(
     name: str,

@@ -438,6 +438,7 @@ def test_a_guest_that_integrates_is_asked_for_released_motions(
     } == by_engine["mujoco-forward"]
 
 
+@pytest.mark.slow
 def test_names_stand_apart() -> None:
     """Of another engine, of two guests, and of those whose hello fails.
 
@@ -455,6 +456,7 @@ def test_names_stand_apart() -> None:
     assert names == ["free-body-2", "right", "right-2", "Nameless", "false", "sh"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("entry", "part"),
     [
@@ -474,6 +476,7 @@ def test_what_is_not_there_is_refused_in_one_line(entry: str, part: str) -> None
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "reason"),
     [("Nameless", "engine"), ("Loose", "tolerance"), ("Else", "answers")],

@@ -180,6 +180,7 @@ def test_what_an_engine_writes_is_what_the_schema_says(engine: Path) -> None:
         check("reply").validate(json.loads(json.dumps(data)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("part", "wrong"),
     [

@@ -24,6 +24,7 @@ accepted` asks it too.
 """
 
 
+@pytest.mark.slow
 def test_nothing_got_worse_since_the_accepted_state() -> None:
     """Of prescribed motions; a released one is simulated."""
     record, accepted = read_run(find_baseline(ACCEPTED))

@@ -190,6 +190,7 @@ def test_the_comment_of_a_pull_request_holds_200_scenes_that_all_fail() -> None:
     assert len(write_summary_page(summary_of(copies(200, failing=200)))) < COMMENT_LIMIT
 
 
+@pytest.mark.slow
 def test_a_section_of_another_module_is_shown_and_linked() -> None:
     _, text = report(
         copies(2),
@@ -440,6 +441,7 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
     assert table[2].startswith(f"| MuJoCo {version}, simulated | - | 2.5e-07 of 1e-05")
 
 
+@pytest.mark.slow
 def test_the_picture_shows_the_pin_force_that_fails() -> None:
     """Without a failure it shows the largest."""
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))

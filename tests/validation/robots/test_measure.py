@@ -49,6 +49,7 @@ def test_a_scene_and_a_robot_need_no_name_of_a_loop(tmp_path: Path) -> None:
     assert "differs from the formulas by less than 1e-08" in join_lines(checked)
 
 
+@pytest.mark.slow
 def test_a_loop_too_slow_to_simulate_is_measured_at_single_states(
     tmp_path: Path,
 ) -> None:

@@ -304,6 +304,7 @@ def find_causes(guest: type, scene: Scene = SCENE) -> list[str]:
     return record.causes.get("plain", [])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bug", BUGS)
 def test_a_mistake_is_named_first(bug: str) -> None:
     guest, text = BUGS[bug]

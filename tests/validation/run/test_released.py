@@ -213,6 +213,7 @@ def test_an_engine_that_predicts_nothing_of_itself_is_undecided(
     assert row(rows, "pinocchio-forward", "theta_2").verdict == UNDECIDED
 
 
+@pytest.mark.slow
 def test_the_summary_names_the_change_points_of_a_release() -> None:
     from fourbar.show.block import write_block
     from fourbar.solution import write_json

@@ -181,6 +181,7 @@ IN_LINE = (
 """Lengths of ground, input, coupler and output that come in line but for rounding."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gap", (0, 1, 2, 3, 5, 8, 13, 21, 31, 33, 64, 1000))
 @pytest.mark.parametrize("command", (2, 3, 4))
 def test_lengths_that_miss_a_change_point_by_roundings_are_the_same(

@@ -660,6 +660,7 @@ def test_figures_that_a_motion_does_not_have_are_refused_in_one_line(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ("overview", "coupler", "hodograph", "freebody"))
 def test_both_branches_are_drawn_to_one_scale(name: str) -> None:
     figure = composed(CRANK_ROCKER, name, "both")

@@ -138,6 +138,7 @@ def changed(right: Callable[..., Any], factor: float) -> Callable[..., Any]:
     return lambda *arguments: factor * right(*arguments)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "factor",
     [-1.0, 2.0, 0.0],

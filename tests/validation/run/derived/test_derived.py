@@ -161,6 +161,7 @@ def passing_change_points(name: str, branch: int) -> Scene:
     return fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize("name", CHANGE_POINTS)
 def test_members_near_a_change_point_keep_the_nominal_assembly(

@@ -79,6 +79,7 @@ def test_a_flat_rest_pose_is_closed_onto_the_assembly_of_the_scene(branch: str) 
     assert f"onto the {branch} one of the scene" in remark
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("branch", ["open", "crossed"])
 @pytest.mark.parametrize("axis", ["0 -1 0", "0 1 0"])
 def test_gravity_tells_the_side_by_its_direction_alone(branch: str, axis: str) -> None:
