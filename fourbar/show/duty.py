@@ -204,8 +204,7 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
     mean_power, swing = _find_swing(spans, power, closed)
     mean_torque = None
     if mean_power is not None and not linear and solution.drive_bar == solution.at.bar:
-        speed = getattr(solution, drive.speed_key)
-        mean_torque = _divide_by_mean(mean_power, spans, speed)
+        mean_torque = _find_mean_torque(solution, mean_power, spans)
     return MotorDuty(
         peak_torque=None if linear else peak,
         rms_torque=None if linear else rms,
@@ -321,12 +320,17 @@ def _find_swing(
     return _reduce_to_number(mean), _reduce_to_number(swing)
 
 
-def _divide_by_mean(power: Any, spans: Array, speed: Any) -> Any:
-    """Divide a mean power by the mean speed over time; 0 where that is 0."""
-    speed = np.broadcast_to(np.asarray(speed), (*np.shape(power), spans.shape[-1] + 1))
-    turned = spans * 0.5 * (speed[..., :-1] + speed[..., 1:])
-    mean = turned.sum(axis=-1) / np.broadcast_to(spans, turned.shape).sum(axis=-1)
-    return _reduce_to_number(np.asarray(power) / mean)
+def _find_mean_torque(solution: Solution, mean_power: Any, spans: Array) -> Any:
+    """Find the mean torque over the angle that the driven bar turns; NaN for no angle.
+
+    The angle is the commanded one: the integral of the speed would be off by its rule.
+    """
+    work = np.asarray(mean_power) * spans.sum(axis=-1)
+    angle = np.asarray(solution.at.angle)
+    speed = np.atleast_1d(np.asarray(solution.at.speed))
+    sense = np.sign(speed.mean(axis=-1))
+    turned = sense * np.abs(angle[..., -1] - angle[..., 0])
+    return _reduce_to_number(work / turned)
 
 
 def _find_peak_value(values: Array) -> Any:

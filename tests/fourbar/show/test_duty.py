@@ -124,6 +124,19 @@ def test_the_swing_of_the_energy_of_a_balanced_weight_is_known_by_hand() -> None
         assert duty.energy_swing == pytest.approx(2.0 * 2.0 * 9.81 * 0.1, rel=1e-4)
 
 
+def test_the_mean_torque_of_a_law_is_the_work_over_the_angle() -> None:
+    """The positions are few: the rule's integral of the speed is not the angle."""
+    places = (0.1, 1.2, 3.7, 0.1 + math.tau)
+    law = Law((0.0, 0.2, 0.5, 1.0), places, ends="periodic", steps=16)
+    duty = motor_duty(fourbar.solve(crank_rocker(motion=fourbar.Motion(law=law))))
+    assert duty is not None and duty.closed
+    assert duty.energy_in is not None and duty.energy_out is not None
+    work = duty.energy_in - duty.energy_out
+    # the difference of the energies has the roundings of the larger one
+    error = abs(duty.mean_torque * math.tau - work)
+    assert error < ROUND_OFF * duty.energy_in
+
+
 def test_a_flywheel_of_the_swing_keeps_the_speed_within_what_was_allowed() -> None:
     """A released crank with the mean torque and a flywheel, integrated over a turn.
 
