@@ -117,6 +117,7 @@ def shaking_moment(solution: Solution) -> Array:
     Couples that effects exert between the bars and ground (pin damping or friction at
     O2, O4) are not part of it.
     """
+    F14 = _require_quantity(solution, "F14")
     assert solution.ground is not None
     length, ground_angle = solution.ground
 
@@ -125,7 +126,7 @@ def shaking_moment(solution: Solution) -> Array:
         y = force[..., 1]
         return np.asarray(distance * (np.cos(angle) * y - np.sin(angle) * x))
 
-    at_O4 = moment(length, ground_angle, _require_quantity(solution, "F14"))
+    at_O4 = moment(length, ground_angle, F14)
     if solution.drive is None:
         of_drive = -_require_quantity(solution, "torque")
         return np.asarray(of_drive - at_O4)

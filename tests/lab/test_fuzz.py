@@ -173,7 +173,7 @@ def test_an_interrupted_run_goes_on(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("fourbar_lab.fuzz.SCENES_OF_A_CHUNK", 4)
+    monkeypatch.setattr("fourbar_lab.fuzz.SCENES_OF_A_TASK", 4)
     first = examine_scenes(12, 1, tmp_path, 1)
     next(first)
     first.close()

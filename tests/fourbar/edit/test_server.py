@@ -32,7 +32,7 @@ pytest.importorskip(
 from tornado.httpclient import AsyncHTTPClient, HTTPRequest
 from tornado.websocket import websocket_connect
 
-from fourbar.edit import exports, server
+from fourbar.edit import exports, server, session
 from fourbar.edit.redirect import REDIRECT_ENDING, Redirect
 from fourbar.edit.server import (
     GONE,
@@ -385,17 +385,18 @@ def test_a_change_overtakes_a_summary_that_is_being_computed(
     monkeypatch,
 ) -> None:
     evaluate, asked_for, released, summaries = (
-        server.evaluate_scene,
+        session.evaluate_scene,
         threading.Event(),
         threading.Event(),
         [],
     )
 
-    def slow(scene, units, **options):
-        asked_for.set()
-        released.wait(20)
-        summaries.append(scene.linkage.input.length)
-        return evaluate(scene, units, **options)
+    def slow(scene, units, *, settled=False, **options):
+        if settled:  # the summary; a change is answered without it
+            asked_for.set()
+            released.wait(20)
+            summaries.append(scene.linkage.input.length)
+        return evaluate(scene, units, settled=settled, **options)
 
     async def ask(made: Workbench, address: str) -> None:
         line = await page(address)
@@ -418,7 +419,7 @@ def test_a_change_overtakes_a_summary_that_is_being_computed(
             0.11,
         ]  # the one of each state between was given up
 
-    monkeypatch.setattr(server, "evaluate_scene", slow)
+    monkeypatch.setattr(session, "evaluate_scene", slow)
     bench(ask)
 
 

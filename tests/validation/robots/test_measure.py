@@ -81,14 +81,14 @@ def test_a_turn_of_a_parallelogram_is_reported_in_lines_of_a_terminal(
     assert checked.return_value == 0, checked.output
     said = join_lines(checked)
     assert (
-        "left out: 2 of 37 states, with coupler and output in line (hinge_1 = -270, -90"
+        "left out: 2 of 37 states, with coupler and output in line (hinge_1 = 90, 270"
         " deg), where the loop may go on in two ways"
     ) in said
     assert (
         "torque is (nearly) zero throughout: its error is of the largest pin force"
         " times the longest moving bar, "
     ) in said
-    assert "hinge_1 from -360 to 0 deg" in said
+    assert "hinge_1 from 0 to 360 deg" in said
     printed = checked.output.replace(str(tmp_path), "").splitlines()
     assert max(map(len, printed)) <= 80
     advised = call(advise, str(file), "--error", "0.01")
