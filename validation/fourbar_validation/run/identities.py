@@ -195,7 +195,7 @@ def _check_sums(question: Question) -> Iterator[Row]:
         and solution.drive_condition is not None
     )
     assert solution.F32 is not None and solution.F43 is not None
-    actions, O4 = _sum_actions(question)
+    actions, of_drive, O4 = _sum_actions(question)
     drive = name_driving(question.scene)
     balance = _Balance()
     if solution.torque is not None:
@@ -205,6 +205,7 @@ def _check_sums(question: Question) -> Iterator[Row]:
     balance.carry(solution.F32, solution.A)
     balance.carry(solution.F43, solution.B)
     acting = actions.wrenches(Wrenches())
+    driving = of_drive.wrenches(Wrenches())
     first_pins = {2: np.zeros(2), 3: solution.A, 4: O4}
     for number in MOVING_BARS:
         force_on, couple = acting.on(number)
@@ -216,6 +217,10 @@ def _check_sums(question: Question) -> Iterator[Row]:
         load = np.broadcast_to(resultant, len(solution))
         balance.push(np.stack([load.real, load.imag], axis=1), first_pins[number])
         balance.couple(couple)
+        # a force that drives and the loads nearly cancel in the couple of their bar,
+        # and the force has the rounding of its own moment
+        _, couple_of_drive = driving.on(number)
+        balance.moments = balance.moments + np.abs(couple_of_drive)
         accelerated = scene.linkage.bar(number).mass * getattr(solution, f"a_G{number}")
         balance.push(accelerated, getattr(solution, f"G{number}"), -1.0)
         balance.couple(
@@ -251,10 +256,11 @@ def _check_sums(question: Question) -> Iterator[Row]:
     )
 
 
-def _sum_actions(question: Question) -> tuple[Actions, Array]:
+def _sum_actions(question: Question) -> tuple[Actions, Actions, Array]:
     """Sum what acts at the speeds that were answered.
 
-    Another evaluation of them is not used; the place of O4 is returned too.
+    Another evaluation of them is not used. What a drive that exerts a force does is
+    returned alone too, and the place of O4.
     """
     scene = question.scene
     command = question.at
@@ -277,10 +283,12 @@ def _sum_actions(question: Question) -> tuple[Actions, Array]:
                     actions,
                     {name: getattr(solution, name) for name in PIN_FORCE.values()},
                 )
+        of_drive = Actions(state, list_bodies(scene.linkage, scene.effects))
         if solution.drive is not None:
             solution.drive.act(actions, solution.drive_force)
+            solution.drive.act(of_drive, solution.drive_force)
     O4 = complex(np.ravel(state.foot(4))[0])
-    return actions, np.array([O4.real, O4.imag])
+    return actions, of_drive, np.array([O4.real, O4.imag])
 
 
 def _check_power(
