@@ -17,9 +17,9 @@ validate: setup
 	@echo "validate: what six digits of torque and pin forces cost MuJoCo, some seconds"
 	$(BIN)/python -m validation advise models/crank_rocker.toml --error 1e-6
 
-# the contributor's loop: some five minutes on two idle cores
+# the contributor's loop: some three minutes on two idle cores
 test: check
-	@echo "test: the quick tests, some five minutes"
+	@echo "test: the quick tests, some three minutes"
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
 
 # every test that is not of a night
