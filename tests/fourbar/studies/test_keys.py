@@ -92,6 +92,25 @@ def list_quantities(solution: fourbar.Solution) -> list[str]:
     return [*solution.evaluated(), *solution.points, "v_P", "a_P"]
 
 
+def assert_slopes_are_differences(
+    slopes: fourbar.Sensitivity,
+    key: str,
+    read: Callable[[str, float], Scene],
+) -> None:
+    """Hold the slopes by a key against solutions of files in which it is moved."""
+    above, below = (fourbar.solve(read(key, by)) for by in (STEP, -STEP))
+    for name in slopes.by:
+        ends = find_values(above, name), find_values(below, name)
+        difference = (ends[0] - ends[1]) / (2.0 * STEP)
+        scale = max(float(np.abs(ends[0]).max()), 1e-3) / 0.1
+        np.testing.assert_allclose(
+            slopes.of(name, key),
+            difference,
+            atol=OF_DIFFERENCES * scale,
+            err_msg=f"{name} by {key}",
+        )
+
+
 @pytest.mark.parametrize("command", BY_HAND)
 def test_slopes_by_a_pin_are_differences_of_the_files_with_the_moved_pin(
     command: str,
@@ -100,17 +119,7 @@ def test_slopes_by_a_pin_are_differences_of_the_files_with_the_moved_pin(
     slopes = fourbar.sensitivity(read("pins.A.0", 0.0))
     assert tuple(slopes.keys)[1:14] == (*PIN_KEYS, *LENGTH_KEYS)
     for key in PIN_KEYS:
-        above, below = (fourbar.solve(read(key, by)) for by in (STEP, -STEP))
-        for name in slopes.by:
-            ends = find_values(above, name), find_values(below, name)
-            difference = (ends[0] - ends[1]) / (2.0 * STEP)
-            scale = max(float(np.abs(ends[0]).max()), 1e-3) / 0.1
-            np.testing.assert_allclose(
-                slopes.of(name, key),
-                difference,
-                atol=OF_DIFFERENCES * scale,
-                err_msg=f"{name} by {key}",
-            )
+        assert_slopes_are_differences(slopes, key, read)
 
 
 @pytest.mark.parametrize("command", BY_HAND)
@@ -400,17 +409,7 @@ def test_slopes_by_a_drawn_place_are_differences_of_files_with_it_moved() -> Non
     slopes = fourbar.sensitivity(read_places("points.P.drawn.0", 0.0))
     assert set(PLACE_KEYS) <= slopes.keys.keys()
     for key in PLACE_KEYS:
-        above, below = (fourbar.solve(read_places(key, by)) for by in (STEP, -STEP))
-        for name in slopes.by:
-            ends = find_values(above, name), find_values(below, name)
-            difference = (ends[0] - ends[1]) / (2.0 * STEP)
-            scale = max(float(np.abs(ends[0]).max()), 1e-3) / 0.1
-            np.testing.assert_allclose(
-                slopes.of(name, key),
-                difference,
-                atol=OF_DIFFERENCES * scale,
-                err_msg=f"{name} by {key}",
-            )
+        assert_slopes_are_differences(slopes, key, read_places)
 
 
 @pytest.mark.parametrize("key", PLACE_KEYS)
