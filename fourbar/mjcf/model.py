@@ -202,9 +202,11 @@ def _find_body(root: ET.Element, bar: int) -> ET.Element:
 _UNCONTROLLED = {"gaintype": "fixed", "gainprm": "0", "biastype": "affine"}
 
 
-_PASSIVE = {"input": "none", "motorconst": "0", "resistance": "1"}
+_PASSIVE = {"input": "none", "motorconst": "1e-200", "resistance": "1"}
 """A motor without a control and without back-EMF: what is left is its cogging, which
 here does not depend on the angle. To MuJoCo, and so to Gymnasium, it is no control.
+MuJoCo 3 refuses a motor constant of 0. The back-EMF goes as its square, and that of
+1e-200 is 0 in double precision.
 """
 
 

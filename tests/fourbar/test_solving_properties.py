@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 
 import fourbar
@@ -34,6 +34,8 @@ EXAMPLES = settings(
 )
 """The same examples on every run: what is new is looked for by fuzzing."""
 FORCES = ("F12", "F32", "F43", "F14")
+_KITE = FourBar(1.0, Bar(1.0), Bar(0.5160425119921928), Bar(0.5160425119921928))
+"""Ground and input are equal, and so are coupler and output."""
 
 
 def between(low: float, high: float) -> st.SearchStrategy[float]:
@@ -448,6 +450,7 @@ def test_frame_rotation(scene: Scene, turn: float) -> None:
 
 @EXAMPLES
 @given(scenes())
+@example(Scene(_KITE, Motion(0.5, -1.0, branch=-1)))
 def test_relabelled_from_the_other_end(scene: Scene) -> None:
     """Bars 2 and 4 exchanged, the ground turned end for end.
 
@@ -486,13 +489,14 @@ def test_relabelled_from_the_other_end(scene: Scene) -> None:
         return load
 
     pins = {"O2": "O4", "A": "B", "B": "A", "O4": "O2"}
+    ends = FourBar(link.ground, link.output, coupler, link.input, theta_1)
     other_end = Scene(
-        FourBar(link.ground, link.output, coupler, link.input, theta_1),
+        ends,
         Motion(
             float(s.theta_4[0]),
             float(s.omega_4[0]),
             float(s.alpha_4[0]),
-            _branch_from_the_other_end(s),
+            _branch_from_the_other_end(ends, s),
         ),
         names[scene.drive_bar],
         tuple(relabelled(load) for load in scene.loads),
@@ -522,13 +526,19 @@ def test_relabelled_from_the_other_end(scene: Scene) -> None:
     )
 
 
-def _branch_from_the_other_end(s: Solution) -> int:
-    """B' = A seen from B and O2.
+def _branch_from_the_other_end(ends: FourBar, s: Solution) -> int:
+    """B' = A: the branch on which bar 4' lies where bar 2 did.
 
-    The side of the diagonal from B to O2 on which A lies.
+    It is no side of a diagonal. A kite or a parallelogram keeps its branch where it
+    passes a change point, and its bars change sides there.
     """
-    diagonal, coupler = -s.B[0], s.A[0] - s.B[0]
-    return 1 if diagonal[0] * coupler[1] - diagonal[1] * coupler[0] > 0.0 else -1
+
+    def miss(branch: int) -> float:
+        motion = Motion(float(s.theta_4[0]), branch=branch)
+        of_ends = fourbar.solve(Scene(ends, motion))
+        return abs(math.remainder(float(of_ends.theta_4[0] - s.theta_2[0]), math.tau))
+
+    return min((1, -1), key=miss)
 
 
 def shape(scene: Scene) -> float:

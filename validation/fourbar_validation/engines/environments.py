@@ -174,19 +174,11 @@ def make_environment(entry: Entry, cache: Path = _CACHE) -> str:
     cache.mkdir(parents=True, exist_ok=True)
     with FileLock(f"{folder}.lock"):
         if not (folder / _DONE).is_file():
-            pip = [
-                sys.executable,
-                "-m",
-                "pip",
-                "--python",
-                inside,
-                "--disable-pip-version-check",
-                "install",
-                *wanted,
-            ]
+            # an environment made by uv, which may be the one that runs here, has no pip
+            pip = [inside, "-m", "pip", "--disable-pip-version-check"]
             for line in (
-                [python, "-m", "venv", "--clear", "--without-pip", folder],
-                pip,
+                [python, "-m", "venv", "--clear", folder],
+                [*pip, "install", *wanted],
             ):
                 if why := run_to_end(line).why:
                     raise DependencyError(
