@@ -193,28 +193,16 @@ def _close_gap(
     near a change point these decide whether forces can be told.
     """
     theta_3 = q[0] + q[1]
-
-    def look(q: JointAngles) -> tuple[float, float, float, float, float, float, float]:
-        tree.place(q)
-        x, y = tree.gap()
-        (e, a, b), (f, c, d) = tree.jacobian().tolist()
-        if (
-            bar == 3
-        ):  # bar 2 turns alone where its own joint turns and that of bar 3 turns back
-            a = e - a
-            c = f - c
-        elif bar == 4:
-            b = e - a
-            d = f - c
-        return x, y, a, b, c, d, a * d - b * c
-
-    state = look(q)
-    if state[6] * branch >= 0.0:
+    tree.place(q)
+    x, y = tree.gap()
+    size = math.hypot(x, y)
+    a, b, c, d = _find_slopes(tree, bar)
+    det = a * d - b * c
+    if det * branch >= 0.0:
         return None
     for _ in range(NEWTON_STEPS):
-        x, y, a, b, c, d, det = state
-        first, second = (b * y - d * x) / det, (c * x - a * y) / det
-        size = math.hypot(x, y)
+        first = (b * y - d * x) / det
+        second = (c * x - a * y) / det
         part = min(
             1.0,
             LONGEST_CLOSURE_STEP / max(abs(first), abs(second), LONGEST_CLOSURE_STEP),
@@ -223,18 +211,35 @@ def _close_gap(
             trial = _turn_others(q, bar, theta_3, part * first, part * second)
             # a step that is lost in the rounding of the angles leaves the gap as it is
             if trial != q:
-                trial_state = look(trial)
-                if (
-                    math.hypot(trial_state[0], trial_state[1]) < size
-                    and trial_state[6] * branch < 0.0
-                ):
-                    break
+                tree.place(trial)
+                x, y = tree.gap()
+                trial_size = math.hypot(x, y)
+                if trial_size < size:
+                    a, b, c, d = _find_slopes(tree, bar)
+                    det = a * d - b * c
+                    if det * branch < 0.0:
+                        break
             part /= 2.0
             if size <= closed or part < _SHORTEST_STEP:
                 tree.place(q)
                 return q if size <= closed else None
-        q, state = trial, trial_state
-    return q if math.hypot(state[0], state[1]) <= closed else None
+        q = trial
+        size = trial_size
+    return q if size <= closed else None
+
+
+def _find_slopes(tree: Assembled, bar: int) -> tuple[float, float, float, float]:
+    """Return the derivatives of the gap by the angles of the bars that close the loop.
+
+    They are those of its x by one and the other, then those of its y.
+    """
+    (e, a, b), (f, c, d) = tree.jacobian().tolist()
+    if bar == 3:
+        # bar 2 turns alone where its own joint turns and that of bar 3 turns back
+        return e - a, b, f - c, d
+    if bar == 4:
+        return a, e - a, c, f - c
+    return a, b, c, d
 
 
 @dataclass(slots=True)

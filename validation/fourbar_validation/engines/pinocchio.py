@@ -59,10 +59,10 @@ class PinocchioTree(KeptTree):
         self.external = pin.StdVec_Force([pin.Force.Zero()] * model.njoints)
         # the engine's own memory, read and written in place: to look it up again costs
         # more than a pass of the engine
-        self.at: dict[str, Array] = {
+        self.at = {
             name: data.oMf[frame].translation[:2] for name, frame in self.frame.items()
         }
-        self.turned_to: dict[int, Array] = {
+        self.turned_to = {
             bar: data.oMi[joint].rotation[:2, :2] for bar, joint in self.joint.items()
         }
         self.joint_force = {
@@ -106,14 +106,6 @@ class PinocchioTree(KeptTree):
         self.q[:] = q
         pin.computeJointJacobians(self.model, self.data, self.q)
         pin.updateFramePlacements(self.model, self.data)
-
-    def point(self, name: str) -> Array:
-        """Place of a frame."""
-        return self.at[name]
-
-    def rotation(self, bar: int) -> Array:
-        """Return that of the joint."""
-        return self.turned_to[bar]
 
     def point_jacobian(self, name: str) -> Array:
         """Return that of a frame."""

@@ -221,7 +221,12 @@ class Tree(Loaded, Protocol):
 
 
 class KeptTree(Tree, Protocol):
-    """A tree whose numbers can be written anew."""
+    """A tree whose numbers can be written anew, and whose places are read in place."""
+
+    at: dict[str, Array]
+    """Places of the points that `description.parts` names, m: the engine's memory."""
+    turned_to: dict[int, Array]
+    """Axes along and across each bar's line: the engine's memory."""
 
     def __init__(self, scene: Scene) -> None:
         """Build the tree and hold the bars of a scene."""
@@ -231,6 +236,20 @@ class KeptTree(Tree, Protocol):
 
         LimitError says why the engine cannot hold them.
         """
+
+    def point(self, name: str) -> Array:
+        """Read a place."""
+        return self.at[name]
+
+    def rotation(self, bar: int) -> Array:
+        """Read a bar's axes."""
+        return self.turned_to[bar]
+
+    def gap(self) -> tuple[float, float]:
+        """Return B on bar 3 minus B on bar 4; read twice for each assembly and more."""
+        x, y = self.at["end3"].tolist()
+        x_4, y_4 = self.at["end4"].tolist()
+        return x - x_4, y - y_4
 
 
 _KEPT: dict[type[KeptTree], KeptTree] = {}

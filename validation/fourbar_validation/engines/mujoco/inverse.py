@@ -92,12 +92,12 @@ class MujocoTree(KeptTree):
         # the engine's own memory, read and written in place: to look it up again takes
         # longer than its work
         self.place_of_site: dict[str, Array] = {}
-        self.at: dict[str, Array] = {}
+        self.at = {}
         for name, site in self.site.items():
             self.place_of_site[name] = model.site_pos[site, :2]
             self.at[name] = data.site_xpos[site, :2]
         self.place_of_body: dict[int, Array] = {}
-        self.turned_to: dict[int, Array] = {}
+        self.turned_to = {}
         self.first_pins: dict[int, Array] = {}
         self.joint_force: dict[int, Array] = {}
         self.applied: dict[int, Array] = {}
@@ -151,14 +151,6 @@ class MujocoTree(KeptTree):
         self.qpos[:] = q
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
-
-    def point(self, name: str) -> Array:
-        """Place of a site."""
-        return self.at[name]
-
-    def rotation(self, bar: int) -> Array:
-        """Return that of the body."""
-        return self.turned_to[bar]
 
     def point_jacobian(self, name: str) -> Array:
         """Return that of a site."""
