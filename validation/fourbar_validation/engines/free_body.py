@@ -568,4 +568,5 @@ def _solve_couples(
 
 
 def _stack_components(vectors: ComplexArray) -> Array:
-    return np.stack((vectors.real, vectors.imag), axis=-1)
+    """Return x and y of vectors (n,) as (n, 2), as they lie in memory."""
+    return vectors.view(float).reshape(-1, 2)
