@@ -96,7 +96,8 @@ class FreeBody:
             command.bar,
             close(scene.linkage, command.angle, command.branch, command.bar),
         )
-        theta = np.insert(closed.theta, bar - 2, command.angle, axis=0)
+        theta = list(closed.theta)
+        theta.insert(bar - 2, command.angle)
         answer = Answer(
             NAME,
             "exact",

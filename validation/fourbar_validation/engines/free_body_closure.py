@@ -117,6 +117,23 @@ def _compute_angle_between(e: Array, near: float, far: float) -> Array:
     return np.clip(angle, NEARLY_IN_LINE, np.pi - 2.0 * NEARLY_IN_LINE)
 
 
+def _look(
+    theta: Array,
+    diagonal: ComplexArray,
+    branch: NDArray[np.int8],
+    b: float,
+    c: float,
+) -> tuple[ComplexArray, ComplexArray, ComplexArray, Array]:
+    """Return e^{i theta_3}, e^{i theta_4}, the gap and its size, infinite off a branch.
+
+    `theta`: (2, n).
+    """
+    u_3, u_4 = np.exp(1j * theta)
+    gap = b * u_3 - c * u_4 - diagonal
+    inside = cross_products(u_3, u_4) * branch > 0.0
+    return u_3, u_4, gap, np.where(inside, np.abs(gap), np.inf)
+
+
 def _solve_newton(
     diagonal: ComplexArray,
     b: float,
@@ -131,24 +148,19 @@ def _solve_newton(
     c sin(theta_4 - theta_3), whose sign is the branch's. A step is halved until the gap
     falls and that sign is kept; so it ends where no smaller gap is to be had.
     """
-
-    def look(
-        theta: Array,
-        indices: NDArray[np.intp],
-    ) -> tuple[ComplexArray, ComplexArray, ComplexArray, Array]:
-        u_3, u_4 = np.exp(1j * theta)
-        gap = b * u_3 - c * u_4 - diagonal[indices]
-        inside = cross_products(u_3, u_4) * branch[indices] > 0.0
-        return u_3, u_4, gap, np.where(inside, np.abs(gap), np.inf)
-
     theta = theta.copy()
-    every = np.arange(theta.shape[1])
-    size = look(theta, every)[3]
+    size = _look(theta, diagonal, branch, b, c)[3]
     moving = np.flatnonzero(np.isfinite(size))
     for _ in range(NEWTON_STEPS):
         if not len(moving):
             break
-        u_3, u_4, gap, _ = look(theta[:, moving], moving)
+        u_3, u_4, gap, _ = _look(
+            theta[:, moving],
+            diagonal[moving],
+            branch[moving],
+            b,
+            c,
+        )
         sine = cross_products(u_3, u_4)
         # b step_3 u_3 - c step_4 u_4 = i gap
         step = np.array(
@@ -167,12 +179,10 @@ def _solve_newton(
         for _ in range(MOST_HALVINGS):
             indices = moving[pending]
             trial = theta[:, indices] + part[pending] * step[:, pending]
-            trial_size = look(trial, indices)[3]
+            trial_size = _look(trial, diagonal[indices], branch[indices], b, c)[3]
             falls = trial_size < size[indices]
-            theta[:, indices[falls]], size[indices[falls]] = (
-                trial[:, falls],
-                trial_size[falls],
-            )
+            theta[:, indices[falls]] = trial[:, falls]
+            size[indices[falls]] = trial_size[falls]
             moved[pending[falls]] = True
             pending = pending[~falls & (size[indices] > closed)]
             if not len(pending):

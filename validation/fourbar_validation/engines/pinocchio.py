@@ -87,11 +87,12 @@ class PinocchioTree(KeptTree):
         """Write places, masses and inertias."""
         if reason := find_unknown(scene, has_term, forces=True):
             raise LimitError(reason)
+        about_g = np.zeros((3, 3))
         for part in list_moving_parts(scene.linkage):
             self.place_of_joint[part.bar][:] = part.first_pin
             # nothing is appended, no frame either: below 2.2e-16 kg the sum of two
             # inertias has another mass centre
-            about_g = np.diag([0.0, 0.0, part.inertia])
+            about_g[2, 2] = part.inertia
             self.model.inertias[self.joint[part.bar]] = pin.Inertia(
                 part.mass, np.array([*part.centre, 0.0]), about_g
             )

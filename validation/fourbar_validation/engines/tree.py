@@ -13,7 +13,7 @@ lambda is F43, and e_drive the generalized force of the drive per N m or N. Ever
 comes from the engine.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -57,8 +57,11 @@ class Tree(Loaded, Protocol):
         " (own dJ/dt v), inverse dynamics, effects from its own state, loop"
         " multipliers, pin forces"
     )
-    turns: dict[int, Array]
-    """Derivatives of the bars' rotations by the coordinates, constant in the plane."""
+    turns: Mapping[int, Array] = {}
+    """Derivatives of the bars' rotations by the coordinates.
+
+    They are constant in the plane, whatever the bars: a tree is asked for them once.
+    """
     rows: Array
     """Derivatives of the rotations of bars 2, 3, 4 as rows, (3, 3)."""
     v: Array
@@ -71,9 +74,10 @@ class Tree(Loaded, Protocol):
         """
         super().ready(scene, terms)
         self.alone = bool(scene.loads or scene.effects)
-        self.place((0.0, 0.0, 0.0))
-        self.turns = {1: np.zeros(3)} | {bar: self.turn(bar) for bar in MOVING_BARS}
-        self.rows = np.stack([self.turns[bar] for bar in MOVING_BARS])
+        if not self.turns:
+            self.place((0.0, 0.0, 0.0))
+            self.turns = {1: np.zeros(3)} | {bar: self.turn(bar) for bar in MOVING_BARS}
+            self.rows = np.stack([self.turns[bar] for bar in MOVING_BARS])
 
     # methods that the engine defines
     def point_jacobian(self, name: str) -> Array:
