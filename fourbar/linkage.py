@@ -56,6 +56,8 @@ def require(key: str, value: object, unit: str = "1", bound: str = ANY_NUMBER) -
     `unit`: of the number; a text like "48 cm" and a `pint.Quantity` are converted to
     it. "1": there is none, and neither is read.
     """
+    if type(value) is float and math.isfinite(value) and is_within(value, bound):
+        return value
     number = math.nan
     if unit != "1":
         value = _read_quantity(value)
@@ -192,14 +194,15 @@ def check_numbers(description: Any, key: str) -> None:
     Those with units are converted.
     """
     for name, stated in description.numbers.items():
-        value, full_key = getattr(description, name), f"{key}.{name}".strip(".")
-        if value is not None or stated.left_out is not None:
-            checked = (
-                require_pair(full_key, value, stated)
-                if stated.pair
-                else require(full_key, value, *stated[:2])
-            )
-            object.__setattr__(description, name, checked)
+        value = getattr(description, name)
+        if value is None and stated.left_out is None:
+            continue
+        full_key = f"{key}.{name}".strip(".")
+        if stated.pair:
+            checked: Any = require_pair(full_key, value, stated)
+        else:
+            checked = require(full_key, value, stated.unit, stated.bound)
+        object.__setattr__(description, name, checked)
 
 
 Description = TypeVar("Description")
