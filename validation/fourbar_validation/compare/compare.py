@@ -45,7 +45,7 @@ from fourbar_validation.compare.scales import (
     TermSizes,
     make_reference,
     take_smallest_scales,
-    take_strictest_condition,
+    take_strictest_conditions,
 )
 from fourbar_validation.compare.tolerance import (
     EPS,
@@ -478,7 +478,7 @@ class Comparison:
         vanishes = scale == 0.0
         unit = replace_zero_size(scale)
         tolerance = self.demands.tolerance
-        mask = decidable = np.stack(masks)
+        mask = decidable = np.array(masks)
         if tolerance.conditioned:
             decidable = mask & (condition * NOTHING_TO_TELL > EPS)
         return Errors(
@@ -536,16 +536,13 @@ class Comparison:
             else:
                 reference = theirs.solution
             sizes = take_smallest_scales(missing, ours, theirs)
-            for name, size in zip(missing, sizes, strict=True):
-                condition = take_strictest_condition(
-                    name, self.scene.linkage, self.formulas, reference
-                )
-                self.scales[name] = size, condition
-        scales, conditions = zip(
-            *(self.scales[name] for name in quantities),
-            strict=True,
-        )
-        return np.stack(scales), np.stack(conditions)
+            conditions = take_strictest_conditions(
+                missing, self.scene.linkage, self.formulas, reference
+            )
+            of_missing = zip(sizes, conditions, strict=True)
+            self.scales |= zip(missing, of_missing, strict=True)
+        of_each = np.array([self.scales[name] for name in quantities])
+        return of_each[:, 0], of_each[:, 1]
 
     @cached_property
     def _sizes(self) -> tuple[TermSizes, TermSizes | None]:
@@ -698,7 +695,7 @@ def _mark_stated(pairs: Sequence[_Pair], formulas: Solution) -> Mask:
     code = formulas.status_code
     if np.all(code == OK):
         return np.ones((len(pairs), len(code)), dtype=bool)
-    return np.stack(
+    return np.array(
         [_mark_one_stated(pair.quantity, code, pair.ours) for pair in pairs]
     )
 

@@ -34,8 +34,9 @@ from fourbar_validation.compare.tolerance import (
     OF_THE_INPUT,
     WELL_CONDITIONED,
     K,
-    find_condition,
+    find_conditions,
     magnitude,
+    magnitudes,
     sum_lengths,
 )
 
@@ -79,8 +80,8 @@ class TermSizes:
         sized = [i for i, unit in enumerate(units) if unit not in ("rad", "1")]
         if not sized:
             return scales
-        size = np.stack([magnitude(values[i]) for i in sized])
-        terms = np.stack([self.sum_terms(quantities[i]) for i in sized])
+        size = magnitudes([values[i] for i in sized])
+        terms = self.sum_terms_of([quantities[i] for i in sized])
         well = (solution.condition >= WELL_CONDITIONED) & np.isfinite(size)
         # the poles of what the drive does are not where sin_mu vanishes
         driven = [
@@ -98,6 +99,11 @@ class TermSizes:
         scales[sized] = np.where(well, largest, nonzero)
         return scales
 
+    def sum_terms_of(self, quantities: Sequence[str]) -> Array:
+        """Sum the absolute terms of several equations, (q, n), in their units."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.array([self.sum_terms(quantity) for quantity in quantities])
+
     def sum_terms(self, quantity: str) -> Array:
         """Sum the absolute terms of the equation of a quantity, (n,), in its unit.
 
@@ -110,8 +116,7 @@ class TermSizes:
         else:
             key = f"{unit} {_choose_bars(quantity)}"
         if key not in self._sums:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                terms = TERMS_OF_UNIT[unit](quantity, self)
+            terms = TERMS_OF_UNIT[unit](quantity, self)
             self._sums[key] = np.asarray(terms, dtype=float)
         return self._sums[key]
 
@@ -395,20 +400,21 @@ def _find_velocities(
     return velocities
 
 
-def take_strictest_condition(
-    quantity: str,
+def take_strictest_conditions(
+    quantities: Sequence[str],
     linkage: FourBar,
     formulas: Solution,
     reference: Solution | None,
 ) -> Array:
-    """Take the stricter of two conditions of a quantity at each position, (n,).
+    """Take the stricter of two conditions of each quantity at each position, (q, n).
 
     That is the larger one, which allows the smaller error.
     """
-    ours = find_condition(quantity, linkage, formulas)
+    ours = find_conditions(quantities, linkage, formulas)
     if reference is None:
         return ours
-    return np.fmin(np.fmax(ours, find_condition(quantity, linkage, reference)), 1.0)
+    theirs = find_conditions(quantities, linkage, reference)
+    return np.fmin(np.fmax(ours, theirs), 1.0)
 
 
 def take_smallest_scales(

@@ -126,6 +126,7 @@ POWER = {
 """Power of 1/s by unit. Angles and positions lose digits as 1/s, everything that
 follows from them as 1/s^2.
 """
+_UNITS_OF_FORCES = ("N", "N m", "W")
 OF_THE_INPUT = frozenset(
     ("theta_2", "omega_2", "alpha_2", "A", "G2", "v_A", "v_G2", "a_A", "a_G2")
 )
@@ -165,36 +166,56 @@ def find_lever(linkage: FourBar, bar: int = 2) -> float:
     Without it 28 of 10 008 comparisons on 300 random linkages exceed K = 50 (at most
     83); with it none exceeds 17.
     """
-    return min(
-        linkage.bar(number).length for number in MOVING_BARS if number != bar
-    ) / max(linkage.lengths)
+    lengths = linkage.lengths
+    others = [lengths[number - 1] for number in MOVING_BARS if number != bar]
+    return min(others) / max(lengths)
+
+
+def find_conditions(
+    quantities: Sequence[str],
+    linkage: FourBar,
+    formulas: Solution,
+) -> Array:
+    """Compute the conditions of several quantities at each position, (q, n).
+
+    They are s for positions and s^2 for what follows, times lever and drive.
+    """
+    bar = formulas.at.bar
+    units = [UNITS[quantity] for quantity in quantities]
+    powers = np.array([[POWER[unit]] for unit in units])
+    conditions = find_lever(linkage, bar) * _raise_to(powers, formulas.condition)
+    of_forces = [unit in _UNITS_OF_FORCES for unit in units]
+    if formulas.stroke is not None:
+        directed = [
+            of_force or quantity in _OF_DIRECTION
+            for quantity, of_force in zip(quantities, of_forces, strict=True)
+        ]
+        longest = max(linkage.lengths)
+        conditions[directed] *= np.minimum(formulas.stroke / longest, 1.0)
+    if any(of_forces):
+        assert formulas.drive_condition is not None
+        conditions[of_forces] *= formulas.drive_condition
+    if bar == 2:
+        decided = OF_THE_INPUT
+    else:
+        decided = frozenset((f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}"))
+    of_input = [quantity in decided for quantity in quantities]
+    commanded = formulas.at.condition
+    if commanded is None:
+        conditions[of_input] = 1.0
+    else:  # a stroke commands the bar as far as its cylinder has a lever
+        conditions[of_input] = _raise_to(powers[of_input], commanded)
+    return conditions
 
 
 def find_condition(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
-    """Compute a quantity's condition at each position.
+    """Compute a quantity's condition at each position, (n,)."""
+    return np.asarray(find_conditions([quantity], linkage, formulas)[0])
 
-    It is s for positions and s^2 for what follows, times lever and drive.
-    """
-    s = formulas.condition
-    unit = UNITS[quantity]
-    bar = formulas.at.bar
-    commanded = formulas.at.condition
-    if quantity in (
-        OF_THE_INPUT if bar == 2 else (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}")
-    ):
-        # a stroke commands the bar as far as its cylinder has a lever
-        if commanded is None:
-            return np.ones_like(s)
-        return np.asarray(commanded ** POWER[unit], dtype=float)
-    condition = find_lever(linkage, bar) * s ** POWER[unit]
-    if formulas.stroke is not None and (
-        quantity in _OF_DIRECTION or unit in ("N", "N m", "W")
-    ):
-        condition = condition * np.minimum(formulas.stroke / max(linkage.lengths), 1.0)
-    if unit in ("N", "N m", "W"):
-        assert formulas.drive_condition is not None
-        condition = condition * formulas.drive_condition
-    return np.asarray(condition, dtype=float)
+
+def _raise_to(powers: NDArray[np.intp], numbers: Array) -> Array:
+    """Raise numbers to the first or second power, (q, n)."""
+    return np.where(powers == 1, numbers, numbers * numbers)
 
 
 def wrap_difference(angle: Angle) -> Angle:
@@ -268,6 +289,19 @@ def magnitude(values: Array) -> Array:
     )
 
 
+def magnitudes(values: Sequence[Array]) -> Array:
+    """Return those of several quantities, (q, n)."""
+    sizes = np.empty((len(values), len(values[0])))
+    for axes in (1, 2):
+        if rows := [i for i in range(len(values)) if values[i].ndim == axes]:
+            alike = np.array([values[i] for i in rows])
+            if axes == 2:
+                sizes[rows] = np.hypot(alike[:, :, 0], alike[:, :, 1])
+            else:
+                sizes[rows] = np.abs(alike)
+    return sizes
+
+
 def compute_differences(
     quantities: Sequence[str],
     ours: Sequence[Array],
@@ -282,12 +316,9 @@ def compute_differences(
     alike = [i for i in range(len(ours)) if theirs[i].shape == ours[i].shape]
     for axes in (1, 2):
         if rows := [i for i in alike if ours[i].ndim == axes]:
-            difference = np.stack([ours[i] for i in rows])
-            difference -= np.stack([theirs[i] for i in rows])
+            difference = np.array([ours[i] - theirs[i] for i in rows])
             if axes == 2:
-                apart[rows] = magnitude(difference.reshape(-1, 2)).reshape(
-                    len(rows), -1
-                )
+                apart[rows] = np.hypot(difference[:, :, 0], difference[:, :, 1])
                 continue
             turned = [quantities[i].startswith("theta") for i in rows]
             difference[turned] = wrap_difference(difference[turned])

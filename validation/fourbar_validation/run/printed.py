@@ -23,7 +23,7 @@ from fourbar_validation.compare.scales import (
     TermSizes,
     make_reference,
     take_smallest_scales,
-    take_strictest_condition,
+    take_strictest_conditions,
 )
 from fourbar_validation.compare.tolerance import (
     EPS,
@@ -35,9 +35,11 @@ from fourbar_validation.compare.tolerance import (
     count_half_turns,
     divide,
     find_condition,
+    find_conditions,
     find_error,
     find_worst,
     magnitude,
+    magnitudes,
     sum_lengths,
 )
 from fourbar_validation.engines.asking import ask_at
@@ -210,11 +212,9 @@ def check_blocks(question: Question) -> Iterator[Row]:
         scales = TermSizes(scene, solution).scales([*expected], [*expected.values()])
     due = [values[at_ends] for values in expected.values()]
     at_once = [values[ends] for values in together.values()]
-    finite_due = np.isfinite([magnitude(values) for values in due])
-    finite_at_once = np.isfinite([magnitude(values) for values in at_once])
-    conditions = np.stack(
-        [find_condition(name, scene.linkage, solution)[at_ends] for name in expected]
-    )
+    finite_due = np.isfinite(magnitudes(due))
+    finite_at_once = np.isfinite(magnitudes(at_once))
+    conditions = find_conditions([*expected], scene.linkage, solution)[:, at_ends]
     conditions[np.isnan(conditions)] = 1.0  # decided by the command: nothing closes
     # evaluated by the same code, but not in the same company of a processor's registers
     differences = compute_differences([*expected], at_once, due)
@@ -275,16 +275,16 @@ def check_error_bars(question: Question) -> Iterator[Row]:
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
         width = getattr(ours, bar)
         true = np.max(
-            [magnitude(getattr(ours, q) - exact.quantities[q]) for q in quantities],
+            magnitudes([getattr(ours, q) - exact.quantities[q] for q in quantities]),
             axis=0,
         )
         size = np.max(take_smallest_scales(quantities, sizes, of_balls), axis=0)
-        condition = take_strictest_condition(
-            quantities[0],
+        condition = take_strictest_conditions(
+            quantities[:1],
             scene.linkage,
             ours,
             reference,
-        )
+        )[0]
         tells = condition * NOTHING_TO_TELL > EPS
         turns = np.array(
             [

@@ -52,9 +52,10 @@ from fourbar_validation.compare.tolerance import (
     compute_differences,
     count_half_turns,
     divide,
-    find_condition,
+    find_conditions,
     find_worst,
     magnitude,
+    magnitudes,
     mark_touching,
     sum_lengths,
 )
@@ -149,13 +150,11 @@ class _Few:
         """Return the sizes of all quantities."""
         sizes = TermSizes(self.scene, self.solution)
         linkage = self.scene.linkage
-        conditions = [
-            find_condition(name, linkage, self.solution) for name in self.quantities
-        ]
+        conditions = find_conditions(self.quantities, linkage, self.solution)
         return _QuantitySizes(
             sizes.scales(self.quantities, self.numbers),
-            np.minimum(np.stack(conditions), 1.0),
-            np.stack([sizes.sum_terms(name) for name in self.quantities]),
+            np.minimum(conditions, 1.0),
+            sizes.sum_terms_of(self.quantities),
         )
 
     @cached_property
@@ -643,11 +642,11 @@ def _measure_scaled(few: _Few) -> Array:
     """
     other = few.solve(_convert(few.scene, _SceneConversion(length=SCALE)))
     power = {"N": SCALE, "N m": SCALE**2, "W": SCALE**2}
-    errors = []
+    differences = []
     for name, ours in zip(few.quantities, few.numbers, strict=True):
         theirs = np.array(getattr(other, name)) / power.get(UNITS[name], 1.0)
-        errors.append(magnitude(theirs - ours))
-    return np.stack(errors)
+        differences.append(theirs - ours)
+    return magnitudes(differences)
 
 
 def _measure_exchanged(few: _Few) -> Array:
