@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,8 +112,6 @@ speed of the drive vanishes.
 """
 CLOSURE = "a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}"
 NOT_DEMANDED = "no position at which it is demanded"
-ROW_NUMBERS = ("error", "allowed", "theta_2", "condition")
-"""Names of the numbers of a row."""
 
 
 class Demands(NamedTuple):
@@ -200,23 +198,10 @@ class Comparison:
         """
         answer = self.answer
         if answer.refusal is not None:
-            return [
-                Row.unmeasured(
-                    self.name,
-                    answer.engine,
-                    answer.setting,
-                    "all",
-                    REFUSES,
-                    answer.refusal,
-                )
-            ]
+            return [self._unmeasured("all", REFUSES, answer.refusal)]
         if answer.assembled is None or len(answer.assembled) != len(self.formulas):
             what = "the engine did not say where the loop closes"
-            return [
-                Row.unmeasured(
-                    self.name, answer.engine, answer.setting, "assembled", FAILS, what
-                )
-            ]
+            return [self._unmeasured("assembled", FAILS, what)]
         names = set(self.demands.quantities)
         if self.scene.drive is not None:
             names |= {
@@ -225,7 +210,7 @@ class Comparison:
                 if quantity in names or line in answer.quantities
             }
         judged = self._compare([name for name in STAGE_OF if name in names])
-        alarms = [self._row("watch", FAILS, alarm) for alarm in answer.alarms]
+        alarms = [self._unmeasured("watch", FAILS, alarm) for alarm in answer.alarms]
         numbers = sum(one.closed for one in judged)
         decided = sum(one.decided for one in judged)
         rows = [self._compare_assembled(), *(one.row for one in judged), *alarms]
@@ -329,20 +314,9 @@ class Comparison:
         assert self.answer.assembled is not None
         return self.formulas.assembled & self.answer.assembled
 
-    def _row(self, quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
-        error, allowed, theta_2, condition = (
-            float(numbers.get(key, math.nan)) for key in ROW_NUMBERS
-        )
-        return Row(
-            *self._who,
-            quantity,
-            error,
-            allowed,
-            verdict,
-            escape_controls(reason),
-            theta_2,
-            condition,
-        )
+    def _unmeasured(self, quantity: str, verdict: str, reason: str) -> Row:
+        """Make a row without numbers."""
+        return Row.unmeasured(*self._who, quantity, verdict, reason)
 
     def _compare_assembled(self) -> Row:
         """Compare where both close the loop."""
@@ -385,7 +359,7 @@ class Comparison:
             else:
                 pairs.append(_Pair(quantity, ours, theirs))
                 continue
-            judged[quantity] = _JudgedRow(self._row(quantity, FAILS, missing))
+            judged[quantity] = _JudgedRow(self._unmeasured(quantity, FAILS, missing))
         due: list[_Due] = []
         for pair, prepared in zip(pairs, self._prepare(pairs), strict=True):
             if isinstance(prepared, _Due):
@@ -423,7 +397,8 @@ class Comparison:
                 unstated = _count(code[self._closed & ~stated[i]])
                 if not counts[i]:
                     reason = f"the formulas state no value: {unstated}"
-                    yield _JudgedRow(self._row(quantity, REFUSES, reason), closed)
+                    row = self._unmeasured(quantity, REFUSES, reason)
+                    yield _JudgedRow(row, closed)
                     continue
                 note += f"; not judged: {unstated}"
             if reversals[i]:
@@ -435,7 +410,7 @@ class Comparison:
                 yield _Due(quantity, ours, theirs, masks[i], note, closed, reversals[i])
             else:
                 nowhere = "no position at which this quantity can be compared" + note
-                row = self._row(quantity, UNDECIDED, nowhere)
+                row = self._unmeasured(quantity, UNDECIDED, nowhere)
                 yield _JudgedRow(row, closed, reversals[i])
 
     def _judge(self, due: Sequence[_Due]) -> Iterator[_JudgedRow]:
@@ -446,24 +421,24 @@ class Comparison:
         # most agree, which is seen of all at once; `judge_errors` has the same rule
         beyond = errors.mask & ~(errors.error <= errors.allowed)
         agrees = np.asarray(~beyond.any(axis=1) & errors.decidable.any(axis=1))
-        worst_used = _find_worst_used(errors)
+        agreeing = _state_agreements(errors)
         for i, one in enumerate(due):
-            of_one = errors.select(i)
             if agrees[i]:
-                worst = of_one.agreeing(int(worst_used[i]))
+                worst = agreeing[i]
             else:
+                of_one = errors.select(i)
                 of_one = self._take_again(one.quantity, one.ours, of_one)
                 predicted = self._predict(one.quantity, of_one)
                 worst = judge_errors(of_one, predicted, self.demands.method)
-            position = worst.position
-            row = self._row(
+            row = Row(
+                *self._who,
                 one.quantity,
+                worst.error,
+                worst.allowed,
                 worst.verdict,
-                worst.reason + one.note,
-                error=of_one.error[position],
-                allowed=worst.allowed,
-                theta_2=self.formulas.theta_2[position],
-                condition=of_one.condition[position],
+                escape_controls(worst.reason + one.note),
+                float(self.formulas.theta_2[worst.position]),
+                worst.condition,
             )
             yield _JudgedRow(row, one.closed, one.reversals + worst.decided)
 
@@ -582,22 +557,13 @@ class Errors(NamedTuple):
 
     def select(self, i: int) -> "Errors":
         """Select the errors of one quantity of several."""
-        return Errors(
-            error=self.error[i],
-            allowed=self.allowed[i],
-            unit=self.unit[i],
-            relative=self.relative[i],
-            condition=self.condition[i],
-            mask=self.mask[i],
-            decidable=self.decidable[i],
-            tolerance=self.tolerance,
-        )
+        parts: Any = (x[i] if isinstance(x, np.ndarray) else x for x in self)
+        return Errors(*parts)
 
-    def agreeing(self, position: int) -> "_WorstPosition":
-        """Give the verdict where no error of the quantity is beyond the allowed one."""
-        decided = int(np.count_nonzero(self.decidable))
-        why = self.tolerance.explain(self.condition[position]) + self.notes
-        return _WorstPosition(position, AGREES, why, self.allowed[position], decided)
+    def as_several(self) -> "Errors":
+        """Return the errors of one quantity as those of several, (1, n)."""
+        parts: Any = (x[None] if isinstance(x, np.ndarray) else x for x in self)
+        return Errors(*parts)
 
     @property
     def beyond(self) -> Mask:
@@ -606,13 +572,17 @@ class Errors(NamedTuple):
         return np.asarray(excessive | (self.mask & ~np.isfinite(self.error)))
 
     @property
-    def notes(self) -> str:
-        """Positions that were not judged, or were asked again.
+    def undecided(self) -> Mask:
+        """Positions that are compared and have too few digits to decide by."""
+        return np.asarray(self.mask & ~self.decidable)
 
-        They are the end of a reason.
+    def write_notes(self, undecided: int) -> str:
+        """Write how many positions were not judged, or were asked again.
+
+        It is the end of a reason.
         """
         notes = ""
-        if undecided := int(np.count_nonzero(self.mask & ~self.decidable)):
+        if undecided:
             limit = f"eps/condition > {NOTHING_TO_TELL:g}"
             notes += f"; {undecided} positions with {limit} not judged"
         if self.settled:
@@ -626,15 +596,39 @@ class _WorstPosition(NamedTuple):
     position: int
     verdict: str
     reason: str
+    error: float
     allowed: float
+    condition: float
     decided: int
     """Number of positions that have a verdict."""
 
 
-def _find_worst_used(errors: Errors) -> NDArray[np.intp]:
-    """Find where the error of each quantity uses most of what is allowed."""
+def _state_agreements(errors: Errors) -> list[_WorstPosition]:
+    """Give the verdicts on several quantities where no error is beyond the allowed one.
+
+    The position is that where an error uses most of what is allowed.
+    """
     used = find_used(errors.error, errors.allowed)
-    return np.asarray(np.argmax(np.where(errors.decidable, used, -1.0), axis=-1))
+    positions = np.where(errors.decidable, used, -1.0).argmax(axis=1)
+    there = (np.arange(len(positions)), positions)
+    columns = (
+        positions,
+        errors.error[there],
+        errors.allowed[there],
+        errors.condition[there],
+        errors.decidable.sum(axis=1),
+        errors.undecided.sum(axis=1),
+    )
+    agreements = []
+    for position, error, allowed, condition, decided, undecided in zip(
+        *(column.tolist() for column in columns),
+        strict=True,
+    ):
+        why = errors.tolerance.explain(condition) + errors.write_notes(undecided)
+        agreements.append(
+            _WorstPosition(position, AGREES, why, error, allowed, condition, decided)
+        )
+    return agreements
 
 
 def judge_errors(
@@ -653,10 +647,20 @@ def judge_errors(
     beyond = errors.beyond
     if not (errors.decidable | beyond).any():
         index = int(np.flatnonzero(errors.mask)[0])
+        condition = float(errors.condition[index])
         why = f"eps/condition = {EPS / errors.condition[index]:.1e}"
-        return _WorstPosition(index, UNDECIDED, why, errors.allowed[index], 0)
+        return _WorstPosition(
+            index,
+            UNDECIDED,
+            why,
+            float(errors.error[index]),
+            float(errors.allowed[index]),
+            condition,
+            0,
+        )
     if not beyond.any():
-        return errors.agreeing(int(_find_worst_used(errors)))
+        (agreement,) = _state_agreements(errors.as_several())
+        return agreement
     is_predicted = predicted is not None
     if predicted is None:
         predicted = np.zeros_like(errors.error)
@@ -667,7 +671,8 @@ def judge_errors(
     undecided = beyond & np.isfinite(errors.error) & reaches_value
     used[undecided] = np.minimum(used[undecided], 1.0)
     index = int(np.argmax(np.where(beyond, used, -1.0)))
-    error = errors.error[index]
+    error = float(errors.error[index])
+    condition = float(errors.condition[index])
     error_predicted = predicted[index]
     if math.isnan(error):
         verdict = FAILS
@@ -677,7 +682,7 @@ def judge_errors(
         why = f"an error of {error_predicted:.1e} of the value is predicted"
     elif not is_predicted:
         verdict = FAILS
-        why = errors.tolerance.explain(errors.condition[index])
+        why = errors.tolerance.explain(condition)
     elif used[index] <= 1.0:
         verdict = DEGRADED
         why = (
@@ -686,8 +691,15 @@ def judge_errors(
     else:
         verdict = FAILS
         why = f"{error:.1e} where {error_predicted:.1e} was predicted{method}"
-    decided = int(np.count_nonzero(errors.decidable & ~undecided))
-    return _WorstPosition(index, verdict, why + errors.notes, bound[index], decided)
+    return _WorstPosition(
+        index,
+        verdict,
+        why + errors.write_notes(int(np.count_nonzero(errors.undecided))),
+        error,
+        float(bound[index]),
+        condition,
+        int(np.count_nonzero(errors.decidable & ~undecided)),
+    )
 
 
 def _mark_stated(pairs: Sequence[_Pair], formulas: Solution) -> Mask:

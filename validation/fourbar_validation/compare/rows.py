@@ -152,12 +152,9 @@ class Row:
         """
         errors = np.atleast_1d(np.asarray(error, dtype=float))
         errors = errors if where is None else np.where(where, errors, 0.0)
-        index = int(np.argmax(find_used(errors, allowed)))
-        numbers = (np.ravel(x) for x in (allowed, theta_2, condition))
-        bound, place, worst_condition = (
-            float(x[index] if len(x) > 1 else x[0]) for x in numbers
-        )
+        index = int(find_used(errors, allowed).argmax())
         worst = float(errors[index])
+        bound = _take_at(index, allowed)
         if math.isfinite(worst) and worst <= bound:
             verdict = AGREES
         else:
@@ -171,8 +168,8 @@ class Row:
             bound,
             verdict,
             escape_controls(reason),
-            place,
-            worst_condition,
+            _take_at(index, theta_2),
+            _take_at(index, condition),
         )
 
     @property
@@ -187,6 +184,13 @@ class Row:
         It fails too if an answer that was due is missing.
         """
         return self.verdict == FAILS
+
+
+def _take_at(index: int, number: Array | float) -> float:
+    """Take the number of a position, or the one number of all positions."""
+    if isinstance(number, np.ndarray):
+        number = number.flat[index if number.size > 1 else 0]
+    return float(number)
 
 
 def make_breakdown(
