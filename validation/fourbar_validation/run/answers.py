@@ -161,21 +161,21 @@ class Statements(NamedTuple):
     transmission: transmission.StatedTransmission
     over: transmission.StatedOver | None
     """None where the motion has no speed."""
-    places: list[limit_positions.LimitPlace]
+    visit: limit_positions.Visit
     """Places where an engine is asked."""
 
     @classmethod
     def of(cls, scene: Scene, at: Command | None) -> "Statements":
         """Evaluate the formulas."""
+        limits = limit_positions.StatedLimits.of(scene.linkage)
         over = None
         if at is not None and at.omega_2 is not None:
-            over = transmission.StatedOver.of(scene, at)
-        linkage = scene.linkage
-        limits = limit_positions.StatedLimits.of(linkage)
-        of_angle = transmission.StatedTransmission.of(linkage)
+            over = transmission.StatedOver.of(scene, at, limits)
+        of_angle = transmission.StatedTransmission.of(limits)
         places = limit_positions.choose_places(limits)
         places += transmission.choose_places(of_angle)
-        return cls(limits, of_angle, over, places)
+        visit = limit_positions.plan_visit(scene.linkage, places)
+        return cls(limits, of_angle, over, visit)
 
 
 def check_statements(
@@ -201,8 +201,8 @@ def check_statements(
         stated.over is not None and stated.over.command is not answer.at
     ):
         stated = Statements.of(scene, answer.at)
-    limits, of_angle, over, places = stated
-    seen = look(engine, scene.linkage, places)
+    limits, of_angle, over, visit = stated
+    seen = look(engine, visit)
     findings = {
         "range": limit_positions.compare_ranges(limits, engine, seen),
         "limit_positions": limit_positions.compare_limit_positions(limits, seen),

@@ -20,7 +20,7 @@ import numpy as np
 from fourbar.errors import LimitError
 from fourbar.formulas import mobility
 from fourbar.formulas.mobility import TURN
-from fourbar.linkage import MOVING_BARS, FourBar, uniform
+from fourbar.linkage import MOVING_BARS, FourBar, copy_with, uniform
 from fourbar.quantities import FORCE_NAMES, UNKNOWNS, Array
 from fourbar.scene import Command, Scene, find_signs
 from fourbar.scene.motion import Motion
@@ -76,32 +76,41 @@ def make_worst_row(
     return Row.judged(who, quantity, error, allowed, worst.what, theta_2, condition)
 
 
-def look(engine: Adapter, linkage: FourBar, places: Iterable[LimitPlace]) -> Seen:
-    """Ask an engine at some places where bar 2 turns at 1 rad/s.
+class Visit(NamedTuple):
+    """Places at which engines are asked, as a motion of bar 2 at 1 rad/s."""
 
-    The bars are uniform: masses play no part. `assembled` is 1.0 where it finds that
-    the loop closes, 0.0 elsewhere.
+    scene: Scene
+    command: Command
+    places: list[LimitPlace]
+    """In the order of the command."""
+
+
+def plan_visit(linkage: FourBar, places: Iterable[LimitPlace]) -> Visit:
+    """Plan a visit of some places.
+
+    The bars are uniform: masses play no part.
     """
     # neighbours in turn: an engine starts from the position before
     ordered = sorted(set(places), key=lambda place: place[::-1])
-    bars = uniform(*linkage.lengths)
-    scene = Scene(
-        FourBar(
-            bars.ground, bars.input, bars.coupler, bars.output, linkage.ground_angle
-        ),
-        Motion(0.0, 1.0),
-    )
+    bars = copy_with(uniform(*linkage.lengths), ground_angle=linkage.ground_angle)
     theta_2, branch = (np.array(column) for column in zip(*ordered, strict=True))
-    answer = _require_answer(
-        engine, scene, Command(theta_2, branch.astype(np.int8), 1.0, 0.0)
-    )
+    command = Command(theta_2, branch.astype(np.int8), 1.0, 0.0)
+    return Visit(Scene(bars, Motion(0.0, 1.0)), command, ordered)
+
+
+def look(engine: Adapter, visit: Visit) -> Seen:
+    """Ask an engine at the places of a visit.
+
+    `assembled` is 1.0 where it finds that the loop closes, 0.0 elsewhere.
+    """
+    answer = _require_answer(engine, visit.scene, visit.command)
     assert answer.assembled is not None
     names = ["assembled"] + [name for name in _OF_BARS if name in answer.quantities]
     columns = [answer.assembled] + [answer.quantities[name] for name in names[1:]]
     rows = zip(*(column.astype(float).tolist() for column in columns), strict=True)
     return {
         place: dict(zip(names, row, strict=True))
-        for place, row in zip(ordered, rows, strict=True)
+        for place, row in zip(visit.places, rows, strict=True)
     }
 
 
@@ -221,7 +230,11 @@ class _LimitTrial(NamedTuple):
         return list(zip(theta_2, branch, strict=True))
 
 
-def _try_bar(linkage: FourBar, bar: int) -> _LimitTrial:
+def _try_bar(
+    linkage: FourBar,
+    bar: int,
+    limits: Iterable[mobility.LimitPosition],
+) -> _LimitTrial:
     second, third = (linkage.bar(k) for k in MOVING_BARS if k != bar)
     first = FourBar(
         linkage.ground, linkage.bar(bar), second, third, linkage.ground_angle
@@ -255,14 +268,10 @@ def _try_bar(linkage: FourBar, bar: int) -> _LimitTrial:
     if bar == 2:
         expected += [(angle, True) for angle in mobility.choose_range(linkage)]
     angles, inside = (np.array(column) for column in zip(*expected, strict=True))
-    limits = [
-        limit[MOVING_BARS.index(bar)]
-        for limit in mobility.limit_positions(linkage, bar)
-    ]
     findings = (
         _compare_angles(
             f"limits of bar {bar}",
-            limits,
+            [limit[MOVING_BARS.index(bar)] for limit in limits],
             [] if full else [end for span in spans for end in span],
             linkage,
         ),
@@ -290,18 +299,53 @@ def _compute_inwards(linkage: FourBar, theta_2: float) -> float:
     return step if ahead > behind else -step
 
 
+class _InputLimit(NamedTuple):
+    """A limit of bar 2, where rounding decides if the loop closes."""
+
+    limit: mobility.LimitPosition
+    step: float
+    """Small angle from the limit to where an engine is asked, rad."""
+    turned: float
+    """Angle by which bars 3 and 4 turn meanwhile, and by which rounding may, rad."""
+
+    @classmethod
+    def of(
+        cls,
+        linkage: FourBar,
+        limit: mobility.LimitPosition,
+        roundoff: float,
+    ) -> "_InputLimit":
+        """Compute how far inside it an engine is asked."""
+        d, a, *_ = linkage.lengths
+        step = _compute_inwards(linkage, limit.theta_2)
+        e = abs(d - a * np.exp(1j * (limit.theta_2 - linkage.ground_angle)))
+        moved = _compute_moved(linkage, 2, limit, roundoff)
+        return cls(limit, step, a / e * (abs(step) + moved))
+
+
+class _OtherLimit(NamedTuple):
+    """A limit of bar 3 or 4."""
+
+    limit: mobility.LimitPosition
+    collinear: bool
+    """True if all bars are collinear there. Rounding counts as collinear."""
+    moved: float
+    """Angle by which rounding may turn it, rad."""
+
+
 def _list_limits(
     linkage: FourBar,
     bar: int,
-) -> list[tuple[mobility.LimitPosition, bool]]:
-    """List the limits of a bar, each with True if all bars are collinear there.
-
-    Rounding counts as collinear.
-    """
-    limits = mobility.limit_positions(linkage, bar)
+    limits: Sequence[mobility.LimitPosition],
+    roundoff: float,
+) -> list[_OtherLimit]:
+    """List the limits of bar 3 or 4."""
     angles = np.array([limit.theta_2 for limit in limits])
     touching = np.abs(compute_closing_margin(linkage, angles)) <= TOUCHING_MARGIN
-    return list(zip(limits, touching.tolist(), strict=True))
+    return [
+        _OtherLimit(limit, collinear, _compute_moved(linkage, bar, limit, roundoff))
+        for limit, collinear in zip(limits, touching.tolist(), strict=True)
+    ]
 
 
 class _Passage(NamedTuple):
@@ -347,16 +391,18 @@ class StatedLimits(NamedTuple):
     """
 
     linkage: FourBar
+    lever: float
+    """As from `find_lever`."""
+    roundoff: float
+    """As from `find_roundoff`, rad."""
+    positions: dict[int, tuple[mobility.LimitPosition, ...]]
+    """Limits as the formulas list them, by moving bar."""
     trials: dict[int, _LimitTrial]
     """Trials by moving bar."""
-    inside: list[tuple[mobility.LimitPosition, float]]
-    """Limits of bar 2, and the small angle that it turns from each. At the limit
-    rounding decides if the loop closes.
-    """
-    limits: dict[int, list[tuple[mobility.LimitPosition, bool]]]
-    """Limits of bars 3 and 4, each with True if all bars are collinear there. Rounding
-    counts as collinear.
-    """
+    inside: list[_InputLimit]
+    """Limits of bar 2."""
+    limits: dict[int, list[_OtherLimit]]
+    """Limits of bars 3 and 4."""
     passages: list[_Passage]
     change_points: Finding
     """Finding from comparing the change points with exact sums of the lengths."""
@@ -364,26 +410,29 @@ class StatedLimits(NamedTuple):
     @classmethod
     def of(cls, linkage: FourBar) -> "StatedLimits":
         """Evaluate the formulas."""
-        inside = [
-            (limit, _compute_inwards(linkage, limit.theta_2))
-            for limit in mobility.limit_positions(linkage)
-        ]
-        trials = {bar: _try_bar(linkage, bar) for bar in MOVING_BARS}
+        roundoff = find_roundoff(linkage)
+        positions = {bar: mobility.limit_positions(linkage, bar) for bar in MOVING_BARS}
         return cls(
             linkage,
-            trials,
-            inside,
-            {bar: _list_limits(linkage, bar) for bar in (3, 4)},
+            find_lever(linkage),
+            roundoff,
+            positions,
+            {bar: _try_bar(linkage, bar, positions[bar]) for bar in MOVING_BARS},
+            [_InputLimit.of(linkage, limit, roundoff) for limit in positions[2]],
+            {
+                bar: _list_limits(linkage, bar, positions[bar], roundoff)
+                for bar in (3, 4)
+            },
             list(_list_passages(linkage)),
             _compare_change_points(linkage),
         )
 
-    def dead_centres(self, bar: int) -> list[mobility.LimitPosition]:
+    def dead_centres(self, bar: int) -> list[_OtherLimit]:
         """Select the limits of a bar that are of one branch, as they should be."""
         return [
-            limit
-            for limit, collinear in self.limits[bar]
-            if not collinear and limit.branch != 0
+            one
+            for one in self.limits[bar]
+            if not one.collinear and one.limit.branch != 0
         ]
 
 
@@ -421,13 +470,13 @@ def choose_places(stated: StatedLimits) -> list[LimitPlace]:
     places = [*stated.trials[2].places]
     places += [
         (limit.theta_2 + step, branch)
-        for limit, step in stated.inside
+        for limit, step, _ in stated.inside
         for branch in (1, -1)
     ]
     places += [
         (limit.theta_2, limit.branch)
         for bar in (3, 4)
-        for limit in stated.dead_centres(bar)
+        for limit, *_ in stated.dead_centres(bar)
     ]
     for passage in stated.passages:
         places += passage.places
@@ -450,9 +499,7 @@ def _check_input(stated: StatedLimits, seen: Seen) -> Iterator[Finding]:
 
     They are off their common line by the same angles on both branches.
     """
-    linkage = stated.linkage
-    d, a, *_ = linkage.lengths
-    for limit, step in stated.inside:
+    for limit, step, turned in stated.inside:
         open_, crossed = (
             {
                 name: seen[(limit.theta_2 + step, branch)][name]
@@ -466,15 +513,10 @@ def _check_input(stated: StatedLimits, seen: Seen) -> Iterator[Finding]:
             limit.theta_2,
             "both branches meet at a limit of bar 2",
         )
-        digits = find_lever(linkage) * abs(
-            math.sin(open_["theta_4"] - open_["theta_3"])
-        )
+        digits = stated.lever * abs(math.sin(open_["theta_4"] - open_["theta_3"]))
         if digits * NOTHING_TO_TELL <= EPS:
             continue
-        e = abs(d - a * np.exp(1j * (limit.theta_2 - linkage.ground_angle)))
-        allowed = find_roundoff(linkage) / digits + a / e * (
-            abs(step) + _compute_moved(linkage, 2, limit)
-        )
+        allowed = stated.roundoff / digits + turned
         middle = {}
         for name, angle in (("theta_3", limit.theta_3), ("theta_4", limit.theta_4)):
             middle[name] = open_[name] + 0.5 * wrap_difference(
@@ -488,7 +530,12 @@ def _check_input(stated: StatedLimits, seen: Seen) -> Iterator[Finding]:
         )
 
 
-def _compute_moved(linkage: FourBar, bar: int, limit: mobility.LimitPosition) -> float:
+def _compute_moved(
+    linkage: FourBar,
+    bar: int,
+    limit: mobility.LimitPosition,
+    roundoff: float,
+) -> float:
     """Compute by what rounding may turn a limit.
 
     The triangle is that of the ground, the bar, and the other two in one line.
@@ -496,7 +543,7 @@ def _compute_moved(linkage: FourBar, bar: int, limit: mobility.LimitPosition) ->
     upright = abs(math.sin(limit[MOVING_BARS.index(bar)] - linkage.ground_angle))
     d, *moving = linkage.lengths
     spread = sum(linkage.lengths) / d * (1.0 + sum(moving) / linkage.bar(bar).length)
-    return find_roundoff(linkage) * spread / max(upright, EPS)
+    return roundoff * spread / max(upright, EPS)
 
 
 def _check_dead_centres(
@@ -505,8 +552,7 @@ def _check_dead_centres(
     seen: Seen,
 ) -> Iterator[Finding]:
     """Check that the other two bars are in one line there, and the bar is at rest."""
-    linkage = stated.linkage
-    for limit, collinear in stated.limits[bar]:
+    for limit, collinear, _ in stated.limits[bar]:
         signs = (
             (0, 1, -1) if collinear else (1, -1)
         )  # all bars collinear: rounding decides
@@ -516,7 +562,7 @@ def _check_dead_centres(
             limit.theta_2,
             f"branch of a limit of bar {bar}",
         )
-    for limit in stated.dead_centres(bar):
+    for limit, _, moved in stated.dead_centres(bar):
         what = f"bar {bar} at theta_2 = {limit.theta_2!r}"
         place = (limit.theta_2, limit.branch)
         theta_3, theta_4, omega_3, omega_4 = (
@@ -524,15 +570,14 @@ def _check_dead_centres(
         )
         sine = abs(math.sin(theta_4 - theta_3))
         speed = max(1.0, abs(omega_3), abs(omega_4))
-        digits = find_lever(linkage) * sine
+        digits = stated.lever * sine
         if digits * NOTHING_TO_TELL <= EPS:
             continue
-        moved = _compute_moved(linkage, bar, limit)
         for angle, of_formula in ((theta_3, limit.theta_3), (theta_4, limit.theta_4)):
             error = abs(wrap_difference(angle - of_formula))
             yield Finding(
                 error,
-                find_roundoff(linkage) / digits + moved * speed,
+                stated.roundoff / digits + moved * speed,
                 limit.theta_2,
                 what,
             )
@@ -544,7 +589,7 @@ def _check_dead_centres(
             float(aligned != limit.stretched), 0.0, limit.theta_2, "stretched or folded"
         )
         slowing = abs(seen[place][f"alpha_{bar}"])
-        at_rest = find_roundoff(linkage) * speed / (digits * sine) + slowing * moved
+        at_rest = stated.roundoff * speed / (digits * sine) + slowing * moved
         yield Finding(
             abs({3: omega_3, 4: omega_4}[bar]),
             at_rest,

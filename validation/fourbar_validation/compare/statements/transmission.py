@@ -13,7 +13,7 @@ import numpy as np
 from fourbar.formulas import mobility, transmission
 from fourbar.formulas.mobility import TURN
 from fourbar.formulas.path import compute_state, drive_sine, find_singular
-from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.answer import Answer
@@ -22,6 +22,7 @@ from fourbar_validation.compare.statements.limit_positions import (
     Finding,
     LimitPlace,
     Seen,
+    StatedLimits,
 )
 from fourbar_validation.compare.tolerance import (
     EPS,
@@ -30,10 +31,8 @@ from fourbar_validation.compare.tolerance import (
     TIMES_PREDICTED,
     Mask,
     count_half_turns,
-    find_lever,
     find_roundoff,
     find_used,
-    find_worst,
     wrap_difference,
 )
 
@@ -47,7 +46,7 @@ class StatedTransmission(NamedTuple):
     They are evaluated once for all engines.
     """
 
-    linkage: FourBar
+    limits: StatedLimits
     extremes: transmission.TransmissionExtremes
     collinear: list[float]
     """theta_2 where bars 3 and 4 are collinear on either branch, rad."""
@@ -57,10 +56,10 @@ class StatedTransmission(NamedTuple):
     """
 
     @classmethod
-    def of(cls, linkage: FourBar) -> "StatedTransmission":
-        """Evaluate the formulas."""
-        extremes = transmission.transmission_extremes(linkage)
-        return cls(linkage, extremes, _find_collinear(linkage), _find_strokes(linkage))
+    def of(cls, limits: StatedLimits) -> "StatedTransmission":
+        """Evaluate the formulas of a linkage whose limits are stated."""
+        extremes = transmission.transmission_extremes(limits.linkage)
+        return cls(limits, extremes, _find_collinear(limits), _find_strokes(limits))
 
     @property
     def ends(self) -> tuple[tuple[float, float, float], ...]:
@@ -84,6 +83,10 @@ class StatedOver(NamedTuple):
 
     scene: Scene
     command: Command
+    lever: float
+    """As from `find_lever`."""
+    roundoff: float
+    """As from `find_roundoff`, at the angles of the motion, rad."""
     closed: Mask
     """True where the loop closes, and not in one line."""
     sin_mu: Array
@@ -99,7 +102,7 @@ class StatedOver(NamedTuple):
     """
 
     @classmethod
-    def of(cls, scene: Scene, command: Command) -> "StatedOver":
+    def of(cls, scene: Scene, command: Command, limits: StatedLimits) -> "StatedOver":
         """Evaluate the formulas."""
         state = compute_state(scene.linkage, command.theta_2, command.branch)
         half = state.position.half
@@ -108,6 +111,8 @@ class StatedOver(NamedTuple):
         return cls(
             scene,
             command,
+            limits.lever,
+            find_roundoff(scene.linkage, command.theta_2),
             (half.outer >= 0.0) & (half.inner >= 0.0) & ~find_singular(state.position),
             state.position.sin_mu,
             # the leverage of a line is a quantity
@@ -115,7 +120,7 @@ class StatedOver(NamedTuple):
             transmission.transmission_angle(state),
             transmission.transmission_extremes(scene.linkage),
             advantage,
-            _compare_distance(scene, command),
+            _compare_distance(scene, command, limits),
         )
 
 
@@ -169,31 +174,32 @@ def _compare_over(
     predicted: Predicted | None,
 ) -> Iterator[Finding]:
     """Compare the worst position of each statement over a motion."""
-    command = over.command
-    for claim in _list_claims(over, answer):
-        allowed, mask = claim.allowed, claim.where & ~(claim.allowed >= NOTHING_TO_TELL)
-        beyond = mask & ~(claim.error <= allowed)
-        if predicted is not None and beyond.any():
-            if claim.rates:
-                lost = predicted("omega_4", beyond) / np.abs(
-                    answer.quantities["omega_4"]
-                )
+    claims = list(_list_claims(over, answer))
+    error = np.array([claim.error for claim in claims])
+    allowed = np.array([claim.allowed for claim in claims])
+    mask = np.array([claim.where for claim in claims])
+    mask &= ~(allowed >= NOTHING_TO_TELL)
+    beyond = mask & ~(error <= allowed)
+    if predicted is not None and beyond.any():
+        for i in np.flatnonzero(beyond.any(axis=1)):
+            if claims[i].rates:
+                speed = np.abs(answer.quantities["omega_4"])
+                lost = predicted("omega_4", beyond[i]) / speed
             else:
-                lost = predicted("theta_3", beyond) + predicted("theta_4", beyond)
-            allowed = np.where(
-                beyond, np.fmax(allowed, TIMES_PREDICTED * lost), allowed
-            )
-            mask = mask & ~(allowed >= NOTHING_TO_TELL)
-        if mask.any():
-            most = np.flatnonzero(mask)[
-                find_worst(find_used(claim.error[mask], allowed[mask]))
-            ]
-            yield Finding(
-                float(claim.error[most]),
-                float(allowed[most]),
-                float(command.theta_2[most]),
-                claim.what,
-            )
+                lost = predicted("theta_3", beyond[i]) + predicted("theta_4", beyond[i])
+            larger = np.fmax(allowed[i], TIMES_PREDICTED * lost)
+            allowed[i] = np.where(beyond[i], larger, allowed[i])
+        mask &= ~(allowed >= NOTHING_TO_TELL)
+    used = np.where(mask, find_used(error, allowed), -1.0)
+    worst = used.argmax(axis=1)
+    for i in np.flatnonzero(mask.any(axis=1)):
+        most = worst[i]
+        yield Finding(
+            float(error[i, most]),
+            float(allowed[i, most]),
+            float(over.command.theta_2[most]),
+            claims[i].what,
+        )
     yield over.to_singular
 
 
@@ -203,7 +209,6 @@ def _list_claims(over: StatedOver, answer: Answer) -> Iterator[_Claim]:
     It is held against the engine's angles and speeds.
     """
     command = over.command
-    linkage = over.scene.linkage
     drive = over.scene.drive_bar or 2
     assert command.omega_2 is not None and answer.assembled is not None
     theta = {
@@ -216,8 +221,7 @@ def _list_claims(over: StatedOver, answer: Answer) -> Iterator[_Claim]:
     # a row of its own compares whether both say that the loop closes
     closed = answer.assembled & over.closed
     with np.errstate(divide="ignore", invalid="ignore"):
-        half_turns = count_half_turns(linkage.ground_angle, command.theta_2)
-        allowed = EQUIVALENCE.factor * half_turns / (find_lever(linkage) * sine)
+        allowed = over.roundoff / (over.lever * sine)
         ratio = answer.quantities["omega_4"] / command.omega_2
         gained = over.advantage * ratio * (_RADII[1] / _RADII[0]) - 1.0
         largest = np.maximum(
@@ -259,7 +263,11 @@ def _list_claims(over: StatedOver, answer: Answer) -> Iterator[_Claim]:
     )
 
 
-def _compare_distance(scene: Scene, command: Command) -> Finding:
+def _compare_distance(
+    scene: Scene,
+    command: Command,
+    limits: StatedLimits,
+) -> Finding:
     """Compare the distance to a singular position.
 
     It is held against the limits and dead centres that are stated.
@@ -268,7 +276,7 @@ def _compare_distance(scene: Scene, command: Command) -> Finding:
     ours = transmission.distance_to_singular(
         scene.linkage, command.theta_2, drive, command.branch
     )
-    theirs = _compute_to_singular(scene, command)
+    theirs = _compute_to_singular(scene, command, limits)
     error = np.where(np.isinf(ours) == np.isinf(theirs), 0.0, math.inf)
     finite = np.isfinite(ours) & np.isfinite(theirs)
     error[finite] = np.abs(ours[finite] - theirs[finite])
@@ -286,21 +294,25 @@ def _compare_distance(scene: Scene, command: Command) -> Finding:
     )
 
 
-def _find_collinear(linkage: FourBar) -> list[float]:
+def _find_collinear(limits: StatedLimits) -> list[float]:
     """Return theta_2 where bars 3 and 4 are collinear on either branch."""
-    limits = mobility.limit_positions(linkage)
-    return [*(limit.theta_2 for limit in limits), *mobility.change_points(linkage)]
+    of_input = [limit.theta_2 for limit in limits.positions[2]]
+    return [*of_input, *mobility.change_points(limits.linkage)]
 
 
-def _compute_to_singular(scene: Scene, command: Command) -> Array:
+def _compute_to_singular(
+    scene: Scene,
+    command: Command,
+    limits: StatedLimits,
+) -> Array:
     """Compute the angle to the nearest singular position.
 
     Bars that must not be collinear are so there; inf if there is none.
     """
     drive = scene.drive_bar or 2
-    always = _find_collinear(scene.linkage)
+    always = _find_collinear(limits)
     if drive != 2:
-        dead = mobility.limit_positions(scene.linkage, drive)
+        dead = limits.positions[drive]
     else:
         dead = ()
     theta_2 = command.theta_2
@@ -320,7 +332,6 @@ def _compute_to_singular(scene: Scene, command: Command) -> Array:
 
 
 def _compare_extremes(stated: StatedTransmission, seen: Seen) -> Iterator[Finding]:
-    linkage = stated.linkage
     for value, theta_2, collinear in stated.ends:
         if value == collinear:
             error = min(
@@ -339,11 +350,11 @@ def _compare_extremes(stated: StatedTransmission, seen: Seen) -> Iterator[Findin
                 seen[(theta_2, 1)]["theta_4"] - seen[(theta_2, 1)]["theta_3"]
             )
         )
-        digits = find_lever(linkage) * math.sin(angle)
+        digits = stated.limits.lever * math.sin(angle)
         if not digits * NOTHING_TO_TELL <= EPS:
             yield Finding(
                 abs(angle - value),
-                find_roundoff(linkage) / digits,
+                stated.limits.roundoff / digits,
                 theta_2,
                 "extreme of the angle at B",
             )
@@ -357,21 +368,17 @@ def _compare_extremes(stated: StatedTransmission, seen: Seen) -> Iterator[Findin
     )
 
 
-def _find_strokes(linkage: FourBar) -> tuple[float, tuple[float, float]] | None:
+def _find_strokes(limits: StatedLimits) -> tuple[float, tuple[float, float]] | None:
     """Find the turn of bar 2 while bar 4 goes between its limits, rad.
 
     It is on one branch; theta_2 in the middle of it and of the rest follow. Bar 4 turns
     in the other sense for the rest of the turn.
     """
-    dead = [
-        limit.theta_2
-        for limit in mobility.limit_positions(linkage, 4)
-        if limit.branch == -1
-    ]
+    dead = [limit.theta_2 for limit in limits.positions[4] if limit.branch == -1]
     if (
         len(dead) != 2
-        or not mobility.turns_fully(linkage)
-        or mobility.change_points(linkage)
+        or not mobility.turns_fully(limits.linkage)
+        or mobility.change_points(limits.linkage)
     ):
         return None
     stroke = (dead[1] - dead[0]) % TURN
@@ -379,7 +386,7 @@ def _find_strokes(linkage: FourBar) -> tuple[float, tuple[float, float]] | None:
 
 
 def _compare_time_ratio(stated: StatedTransmission, seen: Seen) -> Iterator[Finding]:
-    linkage = stated.linkage
+    linkage = stated.limits.linkage
     strokes = stated.strokes
     ratio = mobility.time_ratio(linkage)
     theta_1 = linkage.ground_angle
@@ -396,7 +403,7 @@ def _compare_time_ratio(stated: StatedTransmission, seen: Seen) -> Iterator[Find
         # both angles are differences of two that were rounded
         yield Finding(
             abs(ratio / (longer / shorter) - 1.0),
-            find_roundoff(linkage) * TURN / shorter,
+            stated.limits.roundoff * TURN / shorter,
             place,
             "time ratio",
         )
