@@ -15,6 +15,7 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import Law, Rise
 from fourbar_validation.engines.effects import TERM_OF
 from fourbar_validation.run import pool
+from fourbar_validation.run.derived.coordinates import is_coordinate
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import FREE_BODY
 from fourbar_validation.run.run import RunOptions, run
@@ -53,6 +54,10 @@ def uses(scene: Scene) -> Iterator[Any]:
         yield "tolerances"
     if scene.points:
         yield "points"
+    if scene.drawing is not None:
+        yield "drawing"
+    if any(is_coordinate(tolerance.key) for tolerance in scene.tolerances):
+        yield "tolerance of a coordinate"
 
 
 def uses_of_law(law: Law | Rise) -> Iterator[str]:
@@ -81,7 +86,9 @@ def test_the_default_suite_uses_every_capability() -> None:
         *(f"load by {name}" for name in ("from_pin", "from_centre", "point", "arm")),
         "load over a table",
         "tolerances",
+        "tolerance of a coordinate",
         "points",
+        "drawing",
     }
     wanted |= {
         "law with ends rest",

@@ -13,7 +13,11 @@ DIFFERENCES = ErrorBound(
     1e-7,
     conditioned=False,
 )
-"""Tolerance of the derivatives along one direction in which every number changes."""
+"""Tolerance of the derivatives along one direction.
+
+Every number of a scene stated by lengths changes in it, or every coordinate of a
+drawing, by 1e-4 of the shortest bar at most.
+"""
 SPREAD = ErrorBound(
     "spread",
     "3 % of a deviation or of a worst case, of a percentile 30 % of one: 1024"

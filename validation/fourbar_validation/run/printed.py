@@ -5,6 +5,7 @@ These are error bars, the residual of friction, the motion's law, long sweeps.
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,6 +101,55 @@ def compare_points(
     `least`: the condition from which on they are judged.
     """
     link = scene.linkage
+    error = np.zeros(len(reference))
+    sizes = TermSizes(scene, reference)
+    usable = (solution.status_code == OK) & (reference.condition >= least)
+    usable &= find_condition("F12", link, reference) * NOTHING_TO_TELL > EPS
+    tables = (solution.points, solution.velocity, solution.acceleration)
+    like = ("B", "v_B", "a_B")
+    for name, (arms, feet) in move_points(scene, reference).items():
+        for ours, kind, arm, at_foot in zip(tables, like, arms, feet, strict=True):
+            if name in ours:
+                theirs = np.stack(((arm + at_foot).real, (arm + at_foot).imag), axis=1)
+                size = np.abs(arm) + np.abs(at_foot) + sum_lengths(scene.linkage)
+                if kind != "B":
+                    size = np.abs(arm) + np.abs(at_foot) + sizes.sum_terms(kind)
+                apart = find_error(
+                    kind,
+                    ours[name],
+                    theirs,
+                    size,
+                ) * find_condition(kind, link, reference)
+                error = np.where(
+                    usable,
+                    np.maximum(error, np.where(np.isnan(apart), np.inf, apart)),
+                    error,
+                )
+    allowed = EQUIVALENCE.factor * count_half_turns(link.ground_angle, solution.theta_2)
+    what = f"the {len(scene.points)} points of the scene"
+    return question.row(
+        "points",
+        error,
+        allowed,
+        what,
+        usable,
+        theta_2=solution.theta_2,
+    )
+
+
+class PointMotion(NamedTuple):
+    """A point's place, velocity and acceleration, each as x + i y over the positions.
+
+    They are those of its bar's first pin, from O2, and its own against that pin.
+    """
+
+    arms: list[NDArray[np.complex128]]
+    feet: list[NDArray[np.complex128]]
+
+
+def move_points(scene: Scene, reference: Solution) -> dict[str, PointMotion]:
+    """Move a scene's own points as the angles of another derivation have them."""
+    link = scene.linkage
     n = len(reference)
     zero = np.zeros(n)
     theta = {
@@ -129,42 +179,12 @@ def compare_points(
         3: swing(2, link.input.length, 0.0),
         4: [link.ground * np.exp(1j * theta[1]), 0.0 * zero, 0.0 * zero],
     }
-    error = np.zeros(n)
-    sizes = TermSizes(scene, reference)
-    usable = (solution.status_code == OK) & (reference.condition >= least)
-    usable &= find_condition("F12", link, reference) * NOTHING_TO_TELL > EPS
+    moved = {}
     for point in state_from_pins(scene).points:
         arms = swing(point.bar, *point.place.polar_from_pin())
-        first_pin = first_pins.get(point.bar, [zero, zero, zero])
-        tables = (solution.points, solution.velocity, solution.acceleration)
-        like = ("B", "v_B", "a_B")
-        for ours, kind, arm, at_foot in zip(tables, like, arms, first_pin, strict=True):
-            if point.name in ours:
-                theirs = np.stack(((arm + at_foot).real, (arm + at_foot).imag), axis=1)
-                size = np.abs(arm) + np.abs(at_foot) + sum_lengths(scene.linkage)
-                if kind != "B":
-                    size = np.abs(arm) + np.abs(at_foot) + sizes.sum_terms(kind)
-                apart = find_error(
-                    kind,
-                    ours[point.name],
-                    theirs,
-                    size,
-                ) * find_condition(kind, link, reference)
-                error = np.where(
-                    usable,
-                    np.maximum(error, np.where(np.isnan(apart), np.inf, apart)),
-                    error,
-                )
-    allowed = EQUIVALENCE.factor * count_half_turns(link.ground_angle, solution.theta_2)
-    what = f"the {len(scene.points)} points of the scene"
-    return question.row(
-        "points",
-        error,
-        allowed,
-        what,
-        usable,
-        theta_2=solution.theta_2,
-    )
+        feet = first_pins.get(point.bar, [zero, zero, zero])
+        moved[point.name] = PointMotion(arms, feet)
+    return moved
 
 
 def _find_true_value(

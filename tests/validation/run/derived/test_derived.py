@@ -22,6 +22,7 @@ from fourbar_validation.compare.rows import DERIVED_CHECKS as DERIVED_ROWS
 from fourbar_validation.compare.rows import FAILS, REFUSES, Row
 from fourbar_validation.run import judge
 from fourbar_validation.run.derived import files
+from fourbar_validation.run.derived.coordinates import DRAWN_SETTING
 from fourbar_validation.run.derived.variants import SceneFile
 from fourbar_validation.run.question import NotAskedError, Question
 from tests.support.scenes import crank_rocker
@@ -524,15 +525,63 @@ gravity = ["9.81 m/s^2", "-90 deg"]
 
 
 @pytest.mark.parametrize("check", ["sensitivity", "tolerances", "study"])
-def test_a_drawn_scene_is_judged_by_the_lengths_that_follow(check: str) -> None:
-    """Its file has pins; the numbers that vary are lengths and polar pairs."""
+def test_a_drawn_scene_is_judged_by_lengths_and_by_its_coordinates(check: str) -> None:
     rows = rows_of(loads(LIFT), check)
     assert not failing(rows)
-    judged = {row.quantity for row in rows if row.compared}
-    assert judged >= {"theta_4", "drive_force", "F12"}
+    judged = {(row.setting, row.quantity): row.reason for row in rows if row.compared}
+    settings = ["exact"] if check == "tolerances" else ["exact", DRAWN_SETTING]
+    for setting in settings:
+        assert {(setting, name) for name in ("theta_4", "drive_force", "F12")} <= (
+            judged.keys()
+        )
     if check == "sensitivity":
-        # by pins alone it would be six, of which no length
-        assert all(row.reason.endswith("in 17 numbers") for row in rows)
+        assert judged["exact", "points"].endswith("in 17 numbers")
+        # x and y of four pins, of the point and of both ends of the cylinder
+        assert judged[DRAWN_SETTING, "points"].endswith("in 14 numbers")
+
+
+def test_a_scene_stated_by_lengths_has_no_coordinates_to_judge() -> None:
+    for check in ("sensitivity", "study"):
+        assert {row.setting for row in rows_of(DERIVED, check)} == {"exact"}
+
+
+@pytest.mark.parametrize("key", ["pins.B.1", "drive.to.drawn.0", "points.edge.drawn.1"])
+def test_a_wrong_slope_by_a_coordinate_fails_in_the_rows_of_the_drawing(
+    monkeypatch: pytest.MonkeyPatch,
+    key: str,
+) -> None:
+    def steepen(answer: Any) -> None:
+        for slopes in answer.by.values():
+            slopes[list(answer.keys).index(key)] *= 1.00001
+
+    call = altered(fourbar.sensitivity, steepen)
+    monkeypatch.setattr(fourbar, "sensitivity", call)
+    failed = [row for row in rows_of(loads(LIFT), "sensitivity") if row.failed]
+    assert {row.setting for row in failed} == {DRAWN_SETTING}
+    assert "points" in {row.quantity for row in failed}
+
+
+def test_tolerances_of_coordinates_are_judged() -> None:
+    """A load acts at the point: it changes forces, and the pins the motion."""
+    text = (
+        LIFT
+        + """
+[[loads]]
+point = "edge"
+force = ["900 N", "-80 deg"]
+[tolerances]
+"pins.O4.1" = "0.1 mm"
+"points.edge.drawn.0" = ["0.2 mm", "sigma"]
+"""
+    )
+    scene = loads(text)
+    for check in ("sensitivity", "tolerances", "study"):
+        rows = rows_of(scene, check)
+        assert not failing(rows)
+        assert {row.quantity for row in rows if row.compared} >= {"theta_4", "F43"}
+        if check == "tolerances":
+            keys = "pins.O4.1, points.edge.drawn.0"
+            assert {row.reason for row in rows} == {f"spread: {keys}"}
 
 
 def test_what_a_balanced_linkage_leaves_of_a_torque_is_not_judged() -> None:

@@ -4,6 +4,7 @@ These are of what free bodies say of changed linkages.
 """
 
 import math
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
@@ -16,12 +17,15 @@ from fourbar.effects import Load
 from fourbar.effects.load import Table
 from fourbar.quantities import FORCE_NAMES, LINE, UNKNOWNS, Array
 from fourbar.scene import Scene
-from fourbar.scene.numbers import Point
+from fourbar.scene.numbers import POINT_STAGES, Point
 from fourbar.studies.keys import command_key
 from fourbar.studies.spread import Spread
+from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.derived import DIFFERENCES, SPREAD
 from fourbar_validation.compare.rows import Row
+from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import divide, magnitude
+from fourbar_validation.run.derived.coordinates import DRAWN_SETTING, is_coordinate
 from fourbar_validation.run.derived.variants import (
     SceneFile,
     ask_beside,
@@ -36,6 +40,7 @@ from fourbar_validation.run.derived.variants import (
     take_few,
     take_member,
 )
+from fourbar_validation.run.printed import move_points
 from fourbar_validation.run.question import NotAskedError, Question
 
 _MEMBERS = 5
@@ -46,6 +51,8 @@ MEMBERS_APART = 1e-2
 """Difference of its numbers from member to member, relative, for angles in rad."""
 _APART_NEAR_CHANGE_POINT = 1e-5
 """The same near a change point, where larger differences make linkages of their own."""
+_POINTS = "points"
+"""Quantity of the row of all points of a scene."""
 _CORNERS = (0.07, 2.3, 4.1, 0.07 + 2.0 * np.pi)
 """rad from the first position; where the table of a load that the run adds is bent."""
 
@@ -87,25 +94,48 @@ def furnish(scene: Scene, question: Question) -> Scene:
     return scene
 
 
-def _take_few_by_lengths(question: Question) -> Scene:
-    """Take the scene at a few of its positions, stated by lengths and polar pairs.
+def _group_keys(keys: Iterable[str]) -> dict[str, list[str]]:
+    """Group the keys of numbers that vary together, by the setting of their rows.
 
-    The numbers that vary then stand in its file, and places are from O2, as those of
-    the free bodies are.
+    Lengths and polar pairs follow from the coordinates of a drawing: these are a group
+    of their own.
     """
-    return replace(take_few(question), drawing=None, coordinates=())
+    groups = dict[str, list[str]]()
+    for key in keys:
+        setting = DRAWN_SETTING if is_coordinate(key) else "exact"
+        groups.setdefault(setting, []).append(key)
+    return groups
 
 
 def study(question: Question) -> list[Row]:
-    """Judge a square study in which every number varies, member by member."""
-    scene = furnish(_take_few_by_lengths(question), question)
+    """Judge square studies in which many numbers vary, member by member.
+
+    In one these are the numbers of a scene that is stated by lengths, of a drawn scene
+    in another one all coordinates of its drawing.
+    """
+    scene = furnish(take_few(question), question)
+    nominal = ask_free_bodies(scene)
+    rows = []
+    for setting, keys in _group_keys(fourbar.sensitivity(scene).keys).items():
+        judged = _judge_study(question, scene, nominal, keys)
+        rows += [replace(row, setting=setting) for row in keep_worst(judged)]
+    return rows
+
+
+def _judge_study(
+    question: Question,
+    scene: Scene,
+    nominal: Answer,
+    keys: list[str],
+) -> list[Row]:
+    """Judge a study in which the numbers of some keys vary."""
     places = np.asarray(scene.motion.angle)
-    key = command_key(scene)
     apart = MEMBERS_APART
     if is_near_change_point(scene.linkage):
         apart = _APART_NEAR_CHANGE_POINT
-    stated = SceneFile(scene).find_stated(fourbar.sensitivity(scene).keys)
-    del stated[key]
+    stated = SceneFile(scene).find_stated(keys)
+    commanded = command_key(scene)
+    stated.pop(commanded, None)
     values = {
         key: np.array([x + number * apart * step for number in range(_MEMBERS)])
         for key, (x, step) in stated.items()
@@ -129,10 +159,9 @@ def study(question: Question) -> list[Row]:
             members[number] = SceneFile(at_places(scene, member_positions)).move(
                 changes
             )
-    nominal = ask_free_bodies(scene)
     rows = []
     with np.errstate(all="ignore"):
-        solved = fourbar.solve(fourbar.vary(scene, values | {key: positions}))
+        solved = fourbar.solve(fourbar.vary(scene, values | {commanded: positions}))
         for number, one in members.items():
             rows += hold_to(
                 question,
@@ -141,7 +170,7 @@ def study(question: Question) -> list[Row]:
                 take_member(solved, number),
                 ask_beside(one, scene, nominal),
             )
-    return keep_worst(rows)
+    return rows
 
 
 RELATIVE_STEP = 1e-4
@@ -181,27 +210,47 @@ distribution; the nodes are in parts of the width.
 def sensitivity(question: Question) -> list[Row]:
     """Judge the derivatives of the unknowns and of the scene's points.
 
-    They are along one direction.
+    They are along one direction in the numbers of a scene that is stated by lengths,
+    and along another one in the coordinates of a drawing.
     """
-    scene = _take_few_by_lengths(question)
+    scene = take_few(question)
     derivatives = fourbar.sensitivity(scene)
     file = SceneFile(scene)
-    directions = {
-        key: step for key, (_, step) in file.find_stated(derivatives.keys).items()
-    }
-    if scene.motion.stroke is None:
-        directions[command_key(scene)] = 1.0
-
     nominal = ask_free_bodies(scene)
+    rows = []
+    for setting, keys in _group_keys(derivatives.keys).items():
+        direction = {key: step for key, (_, step) in file.find_stated(keys).items()}
+        if command_key(scene) in direction and scene.motion.stroke is None:
+            direction[command_key(scene)] = 1.0
+        judged = _judge_slopes(question, derivatives, file, nominal, direction)
+        rows += [replace(row, setting=setting) for row in judged]
+    return rows
+
+
+def _judge_slopes(
+    question: Question,
+    derivatives: fourbar.Sensitivity,
+    file: SceneFile,
+    nominal: Answer,
+    direction: dict[str, float],
+) -> list[Row]:
+    """Judge the derivatives along a direction, by the numbers of its keys."""
+    scene = file.scene
 
     def along(part: float) -> dict[str, Array]:
-        changes = {key: part * RELATIVE_STEP * step for key, step in directions.items()}
-        return ask_beside(file.move(changes), scene, nominal).quantities
+        changes = {key: part * RELATIVE_STEP * step for key, step in direction.items()}
+        moved = file.move(changes)
+        answer = ask_beside(moved, scene, nominal)
+        points = _place_points(moved, answer, file.find_origin(changes))
+        return answer.quantities | points
 
+    points_at = _place_points(scene, nominal, file.find_origin({}))
+    at_nominal = nominal.quantities | points_at
     near, far = [(along(part), along(-part)) for part in (1.0, 2.0)]
-    rows = []
-    for name in (*UNKNOWNS, LINE.value):
-        if name not in nominal.quantities:
+    comparable = np.array([status == "ok" for status in derivatives.status])
+    errors = dict[str, Array]()
+    for name in (*UNKNOWNS, LINE.value, *points_at):
+        if name not in at_nominal:
             continue
         first, second = (
             _subtract(name, up[name], down[name]) for up, down in (near, far)
@@ -209,34 +258,52 @@ def sensitivity(question: Question) -> list[Row]:
         slope = (8.0 * first - second) / (12.0 * RELATIVE_STEP)
         coarse = first / (2.0 * RELATIVE_STEP)
         terms = np.array(
-            [step * derivatives.of(name, key) for key, step in directions.items()]
+            [step * derivatives.of(name, key) for key, step in direction.items()]
         )
-        size = magnitude(nominal.quantities[name]) + sum(
-            magnitude(term) for term in terms
-        )
-        comparable = np.array([status == "ok" for status in derivatives.status]) | (
-            name not in FORCE_NAMES
-        )
+        size = magnitude(at_nominal[name]) + sum(magnitude(term) for term in terms)
         # a derivative that is no number is compared, and fails
         bent = divide(magnitude(slope - coarse), size) > _CONVERGED
-        comparable &= np.isfinite(magnitude(slope)) & ~bent
-        error = np.where(
-            comparable, divide(magnitude(terms.sum(axis=0) - slope), size), 0.0
+        straight = np.isfinite(magnitude(slope)) & ~bent
+        if name in FORCE_NAMES:
+            straight &= comparable
+        if not straight.any():
+            continue
+        error = divide(magnitude(terms.sum(axis=0) - slope), size)
+        error = np.where(straight, error, 0.0)
+        judged_as = _POINTS if name in points_at else name
+        errors[judged_as] = np.maximum(errors.get(judged_as, 0.0), error)
+    reason = f"along one direction in {len(direction)} numbers"
+    return [
+        make_row(
+            question,
+            "sensitivity",
+            name,
+            error,
+            DIFFERENCES,
+            derivatives.solution.theta_2,
+            reason,
         )
-        if comparable.any():
-            reason = f"along one direction in {len(directions)} numbers"
-            rows.append(
-                make_row(
-                    question,
-                    "sensitivity",
-                    name,
-                    error,
-                    DIFFERENCES,
-                    derivatives.solution.theta_2,
-                    reason,
-                )
-            )
-    return rows
+        for name, error in errors.items()
+    ]
+
+
+def _place_points(scene: Scene, answer: Answer, origin: complex) -> dict[str, Array]:
+    """Place the scene's points, in the coordinates of a drawing, by an answer's angles.
+
+    Their velocities and accelerations are added.
+
+    `origin`: place of O2 in the drawing, m.
+    """
+    reference = make_reference(scene, answer)
+    assert reference is not None
+    placed = {}
+    for name, moved in move_points(scene, reference).items():
+        shifts = (origin, 0j, 0j)
+        parts = zip(POINT_STAGES, moved.arms, moved.feet, shifts, strict=True)
+        for start, arm, foot, shift in parts:
+            vector = arm + foot + shift
+            placed[f"{start}{name}"] = np.stack((vector.real, vector.imag), axis=1)
+    return placed
 
 
 def tolerances(question: Question) -> list[Row]:
@@ -244,7 +311,7 @@ def tolerances(question: Question) -> list[Row]:
 
     They are those of the scene, or those that the run gives it.
     """
-    scene = _take_few_by_lengths(question)
+    scene = take_few(question)
     width = _GIVEN * min(scene.linkage.lengths)
     names = ("input", "coupler", "output")
     defaults = (
@@ -292,7 +359,7 @@ def _require_beside(scene: Scene) -> None:
     Raises NotAskedError if they reach past the change point of the nominal linkage by
     more than a perturbation.
     """
-    file = SceneFile(replace(scene, tolerances=()))
+    file = SceneFile(scene)
     # what moves neither a length nor a drawn pin moves no change point
     of_lengths = [
         tolerance
@@ -362,7 +429,7 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
         weights.append(math.prod(w for _, w in node))
     slopes = []
     for tolerance in scene.tolerances:
-        h = FIRST_ORDER_STEP * max(abs(numbers[tolerance.key].number), tolerance.width)
+        h = FIRST_ORDER_STEP * max(abs(numbers[tolerance.key].step), tolerance.width)
         up, down = (changed({tolerance.key: change}) for change in (h, -h))
         slopes.append({part: (up[part] - down[part]) / (2.0 * h) for part in nominal})
     rng = np.random.default_rng(0)

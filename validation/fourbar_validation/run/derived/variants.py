@@ -37,6 +37,11 @@ from fourbar_validation.compare.tolerance import (
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import make_prediction
+from fourbar_validation.run.derived.coordinates import (
+    Coordinates,
+    find_entry,
+    is_coordinate,
+)
 from fourbar_validation.run.printed import compare_points
 from fourbar_validation.run.question import (
     FREE_BODY,
@@ -114,7 +119,7 @@ def at_places(scene: Scene, places: Array) -> Scene:
 class _FileNumber(NamedTuple):
     """A number that a scene's file states, and what it may be moved by.
 
-    Most of itself, or of an angle most of 1 rad.
+    Most of itself, of an angle most of 1 rad, of a coordinate most of the shortest bar.
     """
 
     number: float
@@ -124,12 +129,18 @@ class _FileNumber(NamedTuple):
 class SceneFile:
     """The text of a scene's file, in which numbers are moved.
 
-    What it leaves out follows the lengths.
+    It states lengths and polar pairs, and what it leaves out follows the lengths. The
+    coordinates of a drawing move what it states.
     """
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self._document = tomllib.loads(dump(scene))
+        # tolerances may be of coordinates, which this file does not have
+        stated = replace(scene, drawing=None, coordinates=(), tolerances=())
+        self._document = tomllib.loads(dump(stated))
+        self._coordinates = None
+        if scene.drawing is not None:
+            self._coordinates = Coordinates(scene.drawing, self._document)
         self._lines = {
             key: _write_toml_line(key, value) for key, value in self._document.items()
         }
@@ -141,17 +152,35 @@ class SceneFile:
         """
         stated = {}
         for index, key in enumerate(keys):
+            # no two alike, between 1/2 and 1
+            part = 0.5 + 0.5 * ((index + 1) * _GOLDEN % 1.0)
             with suppress(KeyError):
-                table, last = _find_entry(self._document, key)
-                number, _, unit = str(
-                    table[last][0] if isinstance(table[last], list) else table[last]
-                ).partition(" ")
-                # no two alike, between 1/2 and 1
-                part = 0.5 + 0.5 * ((index + 1) * _GOLDEN % 1.0)
-                stated[key] = _FileNumber(
-                    float(number), part * (1.0 if unit == "rad" else float(number))
-                )
+                number, size = self._find_number(key)
+                stated[key] = _FileNumber(number, part * size)
         return stated
+
+    def _find_number(self, key: str) -> tuple[float, float]:
+        """Find a number and the size of what it may be moved by.
+
+        Raises KeyError if the file leaves it out.
+        """
+        if self._coordinates is not None and is_coordinate(key):
+            return self._coordinates.read(key), self._coordinates.shortest
+        table, last = find_entry(self._document, key)
+        entry = table[last]
+        if isinstance(entry, list):
+            entry = entry[0]
+        text, _, unit = str(entry).partition(" ")
+        number = float(text)
+        if unit == "rad":
+            return number, 1.0
+        return number, number
+
+    def find_origin(self, changes: Mapping[str, float]) -> complex:
+        """Return the place of O2, m, after coordinates of a drawing were changed."""
+        if self._coordinates is None:
+            return 0j
+        return self._coordinates.move_origin(changes)
 
     def move(self, changes: Mapping[str, float]) -> Scene:
         """Read the file after some of its numbers were changed by so much.
@@ -160,6 +189,8 @@ class SceneFile:
 
         Raises NotAskedError where the changed linkage can never assemble.
         """
+        if self._coordinates is not None:
+            changes = self._coordinates.follow(changes)
         lengths = [
             length + changes.get(f"lengths.{bar}", 0.0)
             for bar, length in zip(
@@ -175,7 +206,7 @@ class SceneFile:
             for top in {key.partition(".")[0] for key in changes}
         }
         for key, change in changes.items():
-            table, last = _find_entry(tables, key)
+            table, last = find_entry(tables, key)
             old = table[last]
             if isinstance(old, list):
                 moved = [_change_entry(entry, change) for entry in old]
@@ -186,19 +217,6 @@ class SceneFile:
             key: _write_toml_line(key, value) for key, value in tables.items()
         }
         return loads("\n".join(lines.values()))
-
-
-def _find_entry(document: Any, key: str) -> tuple[Any, Any]:
-    """Find the table that holds a number, and its name or index there.
-
-    Raises KeyError if the file leaves it out.
-    """
-    *path, last = [int(part) if part.isdecimal() else part for part in key.split(".")]
-    for part in path:
-        document = document[part]
-    if isinstance(last, str) and last not in document:
-        raise KeyError(key)
-    return document, last
 
 
 def _change_entry(quantity: str | float, change: float) -> str | float:
