@@ -130,6 +130,12 @@ def test_of_a_sample_what_else_is_shipped_is_judged(
     ] == [j.derived for j in jobs]
 
 
+def test_a_run_without_arguments_judges_what_else_is_shipped_in_every_scene() -> None:
+    sample = RunOptions().sample
+    jobs = pool.make_jobs(SUITE, range(len(SUITE)), (), True, sample)
+    assert jobs and all(job.derived for job in jobs)
+
+
 @pytest.mark.slow
 def test_pictures_change_nothing_that_is_judged(tmp_path: Path) -> None:
     suite = replace(read_default_suite(), texts=read_default_suite().texts[:1])
