@@ -197,14 +197,17 @@ def _solve_stable_quadratic(a: Array, b: Array, c: Array) -> tuple[Array, Array]
         return q / a, c / q
 
 
+_Item = tuple[Any, Any, Any]
+"""Place from the first pin and force in the bar's axes, and couple."""
+
+
 class _Recorder(Actions):
     """Forces and couples on one bar, each where it acts."""
 
     def __init__(self, state: State, scene: Scene, bar: int) -> None:
         super().__init__(state, list_bodies(scene.linkage))
         self.bar, self.length = bar, scene.linkage.bar(bar).length
-        self.items: list[tuple[Any, Any, Any]] = []
-        """Place from the first pin and force in the bar's axes, and couple."""
+        self.items: list[_Item] = []
         self.place: Any = 0.0j
         """Point in the bar's axes where a pure couple acts."""
 
@@ -257,7 +260,6 @@ def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
         case = Case.of(scene, solution.at.bar).begin_with(solution.at)
         state, _ = case.at(solution.at)
         recorder = _Recorder(state, scene, bar)
-        _record_pins(recorder, solution)
         _record_drive(recorder, scene, solution)
         gravity = 0.0j
         back = np.conj(state.direction(bar))
@@ -283,26 +285,27 @@ def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
             np.zeros(n) + getattr(solution, f"{letter}_{bar}")
             for letter in ("omega", "alpha")
         )
-        if not uniform:
-            a_G = getattr(solution, f"a_G{bar}")
-            recorder.items.append(
-                (
-                    described.to_centre,
-                    -described.mass * (a_G[:, 0] + 1j * a_G[:, 1]) * back,
-                    0.0,
-                )
-            )
-            recorder.items.append(
-                (described.to_centre, 0.0j, -described.moment_of_inertia * alpha)
-            )
         for term in terms:  # a flywheel turns about the bar's ground pin
             recorder.items += [
                 (0.0j, 0.0j, -inertia * alpha)
                 for on, inertia in term.carried.items()
                 if on == bar
             ]
+        a_G = getattr(solution, f"a_G{bar}")
+        inertial = [
+            (
+                described.to_centre,
+                -described.mass * (a_G[:, 0] + 1j * a_G[:, 1] - gravity) * back,
+                0.0,
+            ),
+            (described.to_centre, 0.0j, -described.moment_of_inertia * alpha),
+        ]
+        supports = _support(recorder, inertial, solution)
+        acting = [*recorder.items, *supports]
+        if not uniform:
+            acting += inertial
         foot, force, couple = _sum_by_foot(
-            recorder.items, np.zeros(n), SAME_FOOT * described.length
+            acting, np.zeros(n), SAME_FOOT * described.length
         )
         if uniform:
             density = described.mass / described.length
@@ -322,7 +325,7 @@ def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
 
 
 def _sum_by_foot(
-    items: list[tuple[Any, Any, Any]],
+    items: list[_Item],
     zero: Array,
     same: float,
 ) -> tuple[Array, ComplexArray, Array]:
@@ -364,23 +367,43 @@ def _couple_place(load: Any, G: Any, back: Any) -> Any:
     return load.foot(G)
 
 
-def _record_pins(recorder: _Recorder, solution: Solution) -> None:
-    """Record the forces at both pins."""
-    for pin in ENDS[recorder.bar]:
+def _support(
+    recorder: _Recorder,
+    inertial: list[_Item],
+    solution: Solution,
+) -> list[_Item]:
+    """Return the forces at both pins of a bar.
+
+    Their parts along the bar are those of the solution. Those across it are the
+    reactions of a beam on two supports, by the moments of all else about the other pin:
+
+        F_y (x - x_other) = -sum(moments about the other pin).
+
+    Beside a pole of the drive the part along a bar without drive may be any number of
+    times larger than all that bends it. Its rounding must not enter M.
+
+    Parameters
+    ----------
+    recorder : with all else that acts on the bar.
+    inertial : weight and inertia that are not recorded, as if they acted at G.
+    """
+    back = np.conj(recorder.state.direction(recorder.bar))
+    ends = (0.0, recorder.length)
+    supports = []
+    for pin, x, x_other in zip(ENDS[recorder.bar], ends, ends[::-1], strict=True):
         name = PIN_FORCE[pin]
         force = getattr(solution, name)
         if name[2] == str(recorder.bar):
             sign = 1.0
         else:
             sign = -1.0
-        back = np.conj(recorder.state.direction(recorder.bar))
-        if pin == ENDS[recorder.bar][0]:
-            place = 0.0
-        else:
-            place = recorder.length
-        recorder.items.append(
-            (place, sign * (force[:, 0] + 1j * force[:, 1]) * back, 0.0)
-        )
+        along = (sign * (force[:, 0] + 1j * force[:, 1]) * back).real
+        moments = 0.0
+        for place, acting, couple in [*recorder.items, *inertial]:
+            moments = moments + cross(place - x_other, acting) + couple
+        across = np.where(np.isfinite(along), -moments / (x - x_other), np.nan)
+        supports.append((x, along + 1j * across, 0.0))
+    return supports
 
 
 def _record_drive(recorder: _Recorder, scene: Scene, solution: Solution) -> None:

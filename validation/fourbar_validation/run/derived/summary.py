@@ -33,7 +33,13 @@ from fourbar_validation.compare.derived import (
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.scales import make_reference
-from fourbar_validation.compare.tolerance import divide, magnitude, wrap_difference
+from fourbar_validation.compare.tolerance import (
+    EPS,
+    K,
+    divide,
+    magnitude,
+    wrap_difference,
+)
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.run.derived.cuts import (
     CUT_POSITIONS,
@@ -59,6 +65,10 @@ own position lies between two of them.
 _LEAST_CONDITION = 1e-2
 """Condition below which a motion counts as one with poles. Beside a pole peaks are
 those of the positions.
+"""
+_LEAST_KNOWN_CONDITION = K * EPS / PRINTED.factor
+"""Condition below which the rounding of the free bodies, K eps over it, is more than a
+row allows.
 """
 BALANCED_SHARE = 1e-13
 """Part of the largest pin force, at the longest bar of a torque, below which a load is
@@ -99,9 +109,16 @@ class _SummaryJudge:
 
     @cached_property
     def fine(self) -> Answer:
-        """Return their answer at many positions."""
-        places = self.solution.at.places
-        return self.ask(np.linspace(places[0], places[-1], PEAK_INTERVALS + 1))
+        """Return their answer at many positions.
+
+        Left out are those beside a pole that they cannot know.
+        """
+        own = self.solution.at.places
+        places = np.linspace(own[0], own[-1], PEAK_INTERVALS + 1)
+        answer = self.ask(places)
+        least = _find_conditions(self.scene, answer).min(axis=0)
+        known = least > _LEAST_KNOWN_CONDITION
+        return answer if known.all() else self.ask(places[known])
 
     @cached_property
     def motor(self) -> dict[str, Any]:
@@ -163,6 +180,13 @@ class _SummaryJudge:
         NaN if one is no number.
         """
         self.add(row, np.max((*excess, 0.0)))
+
+
+def _find_conditions(scene: Scene, answer: Answer) -> Array:
+    """Find the conditions of motion and drive by the free bodies' angles, (2, n)."""
+    reference = make_reference(scene, answer)
+    assert reference is not None and reference.drive_condition is not None
+    return np.stack((reference.condition, reference.drive_condition))
 
 
 def summary(question: Question) -> list[Row]:
@@ -433,9 +457,7 @@ def _judge_growth(judged: _SummaryJudge) -> None:
     grows = any(bending.grows for bending in facts.bending.values())
     if not facts.between.growing and not grows:
         return
-    reference = make_reference(judged.scene, judged.fine)
-    assert reference is not None and reference.drive_condition is not None
-    conditions = np.stack((reference.condition, reference.drive_condition))
+    conditions = _find_conditions(judged.scene, judged.fine)
     # a sine that passes through zero between two positions is no further from it there
     # than it changes in a step
     least = conditions.min() - np.abs(np.diff(conditions)).max()
