@@ -178,9 +178,10 @@ class Results:
         self.sign_may_differ = self.sign_may_differ or _may_sign_differ(case)
         shape = self.codes[index].shape
         self.codes[index] = evaluated.codes.reshape(shape)
+        of_study = len(shape) > 1
         for name, value in evaluated.values.items():
             array = self.arrays[name]
-            if len(shape) > 1 and np.ndim(value):
+            if of_study and np.ndim(value):
                 value = value.reshape(shape)  # noqa: PLW2901
             if name in SCALARS:
                 array[index] = value
@@ -408,7 +409,8 @@ def find_requested(
                     (array.shape, str(array.dtype)),
                     allowed,
                 )
-        last_stage = max((STAGES.index(stages[name]) for name in out), default=0)
+        needed = {stages[name] for name in out}
+        last_stage = max(map(STAGES.index, needed), default=0)
     if last_stage > 0 and commanded.speed is None:
         raise InputError(
             f"motion.omega_{commanded.bar}",

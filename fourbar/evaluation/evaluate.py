@@ -395,15 +395,14 @@ def _compute_error_bar(gap: Any, size: Any) -> Any:
 
 
 def is_finite(values: Mapping[str, Any]) -> bool:
-    """Return True if the sum of the squares of each quantity is finite.
+    """Return True if the sum of the squares of all quantities is finite.
 
-    It is False too if a square overflows.
+    It is False too if a square overflows, or the sum.
     """
+    total: Any = 0.0
     for value in values.values():
-        square = np.vdot(value, value) if isinstance(value, np.ndarray) else value
-        if not cmath.isfinite(square):
-            return False
-    return True
+        total += np.vdot(value, value) if isinstance(value, np.ndarray) else value
+    return cmath.isfinite(total)
 
 
 def withhold_infinite(case: Case, evaluated: Evaluated) -> None:

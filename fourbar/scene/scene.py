@@ -124,9 +124,10 @@ class Scene:
             "tolerances": Tolerance,
         }
         for name, each_kind in many.items():
-            expect(name, getattr(self, name), tuple, list)
-            object.__setattr__(self, name, tuple(getattr(self, name)))
-            for entry in getattr(self, name):
+            entries = getattr(self, name)
+            expect(name, entries, tuple, list)
+            object.__setattr__(self, name, tuple(entries))
+            for entry in entries:
                 expect(name, entry, each_kind)
         names = [point.name for point in self.points]
         if len(set(names)) < len(names):

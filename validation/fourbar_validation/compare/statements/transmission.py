@@ -15,7 +15,7 @@ from fourbar.formulas.mobility import TURN
 from fourbar.formulas.path import compute_state, drive_sine, find_singular
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
-from fourbar.scene import Command, Scene, with_signs
+from fourbar.scene import Command, Scene, find_signs
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Predicted
 from fourbar_validation.compare.statements.limit_positions import (
@@ -315,20 +315,14 @@ def _compute_to_singular(
         dead = limits.positions[drive]
     else:
         dead = ()
-    theta_2 = command.theta_2
-    nearest = np.full(theta_2.shape, math.inf)
-    for point, side in [
-        *((point, 0) for point in always),
-        *((limit.theta_2, limit.branch) for limit in dead),
-    ]:
-        apart = np.angle(np.exp(1j * (theta_2 - point)))
-        there = with_signs(scene.linkage, command._replace(angle=theta_2 - apart))
-        nearest = np.where(
-            (there.branch == side) | (side == 0),
-            np.minimum(nearest, np.abs(apart)),
-            nearest,
-        )
-    return nearest
+    points = np.array([*always, *(limit.theta_2 for limit in dead)])
+    sides = np.array([*(0 for _ in always), *(limit.branch for limit in dead)])
+    side = sides[:, None]
+    apart = np.angle(np.exp(1j * (command.theta_2 - points[:, None])))
+    there = find_signs(scene.linkage, command.theta_2 - apart, command.branch)
+    reached = (there == side) | (side == 0)
+    distances = np.where(reached, np.abs(apart), math.inf)
+    return np.asarray(distances.min(axis=0, initial=math.inf))
 
 
 def _compare_extremes(stated: StatedTransmission, seen: Seen) -> Iterator[Finding]:
