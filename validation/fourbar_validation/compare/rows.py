@@ -150,8 +150,9 @@ class Row:
             `theta_2` and `condition`; one that is no finite number fails.
         where : positions that are held to it; undecided where there are none.
         """
-        errors = np.atleast_1d(np.asarray(error, dtype=float))
-        errors = errors if where is None else np.where(where, errors, 0.0)
+        errors = np.array(error, dtype=float, ndmin=1)
+        if where is not None:
+            errors = np.where(where, errors, 0.0)
         index = int(find_used(errors, allowed).argmax())
         worst = float(errors[index])
         bound = _take_at(index, allowed)

@@ -35,6 +35,7 @@ from fourbar_validation.compare.tolerance import (
     WELL_CONDITIONED,
     K,
     find_conditions,
+    join_components,
     magnitude,
     magnitudes,
     sum_lengths,
@@ -300,7 +301,6 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
 
     Its conditions follow from the sines between its own angles; None without angles.
     """
-    scene = state_from_pins(scene)
     if answer.at is None or not has_angles(answer):
         return None
     answered = answer.quantities
@@ -315,18 +315,20 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
         for name, x in (
             rates if answer.at.stroke is None else ()
         ):  # the engine finds them if a stroke is commanded
-            rate = np.broadcast_to(np.asarray(x, float), theta_2.shape)
-            known[f"{name}_{answer.at.bar}"] = rate
+            known[f"{name}_{answer.at.bar}"] = x + np.zeros(theta_2.shape)
         if {"omega_3", "omega_4"} <= known.keys():
             known |= _find_velocities(scene.linkage, theta, known)
-    if scene.drive is not None:
-        known |= _find_line_of_drive(scene.linkage, scene.drive, theta, known)
+    drive = scene.drive
+    if drive is not None:
+        drive = state_from_pins(scene).drive
+        assert drive is not None
+        known |= _find_line_of_drive(scene.linkage, drive, theta, known)
     known["sin_mu"] = np.sin(theta[4] - theta[3])
     one, second = (theta[bar] for bar in theta if bar != answer.at.bar)
     known["condition"] = np.abs(np.sin(second - one))
     at = answer.at
-    if at.stroke is not None and scene.drive is not None:
-        lever = place_line(scene.linkage, scene.drive, theta).lever
+    if at.stroke is not None and drive is not None:
+        lever = place_line(scene.linkage, drive, theta).lever
         at = at._replace(condition=lever)
         known["condition"] = known["condition"] * lever
     if "drive_condition" not in known:
@@ -343,7 +345,7 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
         np.full(len(theta_2), OK, dtype=np.uint8),
         answer.at.branch,
         **{**known, "theta_2": theta_2},
-        drive=scene.drive,
+        drive=drive,
         at=at,
     )
 
@@ -359,7 +361,7 @@ def _find_line_of_drive(
     They follow from the answer's own angles and speeds.
     """
     line = place_line(linkage, drive, theta)
-    quantities = {"drive_line": np.stack((line.unit.real, line.unit.imag), axis=1)}
+    quantities = {"drive_line": join_components(line.unit.real, line.unit.imag)}
     if drive.has_stroke:
         quantities["stroke"] = line.stroke
     if all(f"omega_{bar}" in known for bar in MOVING_BARS):
@@ -384,7 +386,7 @@ def _find_velocities(
     def swung(bar: int, distance: float, angle: float) -> Array:
         speed = distance * known[f"omega_{bar}"]
         direction = theta[bar] + angle
-        return np.stack((-speed * np.sin(direction), speed * np.cos(direction)), axis=1)
+        return join_components(-speed * np.sin(direction), speed * np.cos(direction))
 
     velocities = {
         "v_A": swung(2, linkage.input.length, 0.0),

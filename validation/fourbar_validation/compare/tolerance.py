@@ -289,6 +289,14 @@ def magnitude(values: Array) -> Array:
     )
 
 
+def join_components(x: Array, y: Array) -> Array:
+    """Join the components of vectors, (n, 2)."""
+    vectors = np.empty((len(x), 2))
+    vectors[:, 0] = x
+    vectors[:, 1] = y
+    return vectors
+
+
 def magnitudes(values: Sequence[Array]) -> Array:
     """Return those of several quantities, (q, n)."""
     sizes = np.empty((len(values), len(values[0])))

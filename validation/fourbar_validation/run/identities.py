@@ -46,6 +46,7 @@ from fourbar_validation.compare.tolerance import (
     find_gap,
     find_lever,
     find_worst,
+    join_components,
     magnitude,
     mark_touching,
 )
@@ -215,7 +216,7 @@ def _check_sums(question: Question) -> Iterator[Row]:
             {2: "O2", 4: "O4"}.get(number, ""), 0.0
         )
         load = np.broadcast_to(resultant, len(solution))
-        balance.push(np.stack([load.real, load.imag], axis=1), first_pins[number])
+        balance.push(join_components(load.real, load.imag), first_pins[number])
         balance.couple(couple)
         # a force that drives and the loads nearly cancel in the couple of their bar,
         # and the force has the rounding of its own moment

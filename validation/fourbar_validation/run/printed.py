@@ -39,6 +39,7 @@ from fourbar_validation.compare.tolerance import (
     find_conditions,
     find_error,
     find_worst,
+    join_components,
     magnitude,
     magnitudes,
     sum_lengths,
@@ -110,7 +111,7 @@ def compare_points(
     for name, (arms, feet) in move_points(scene, reference).items():
         for ours, kind, arm, at_foot in zip(tables, like, arms, feet, strict=True):
             if name in ours:
-                theirs = np.stack(((arm + at_foot).real, (arm + at_foot).imag), axis=1)
+                theirs = join_components((arm + at_foot).real, (arm + at_foot).imag)
                 size = np.abs(arm) + np.abs(at_foot) + sum_lengths(scene.linkage)
                 if kind != "B":
                     size = np.abs(arm) + np.abs(at_foot) + sizes.sum_terms(kind)
@@ -292,6 +293,12 @@ def check_error_bars(question: Question) -> Iterator[Row]:
         of_balls = None
     else:
         of_balls = TermSizes(scene, reference)
+    turns = np.array(
+        [
+            count_half_turns(scene.linkage.ground_angle, theta_2)
+            for theta_2 in sampled.theta_2
+        ]
+    )
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
         width = getattr(ours, bar)
         true = np.max(
@@ -306,12 +313,6 @@ def check_error_bars(question: Question) -> Iterator[Row]:
             reference,
         )[0]
         tells = condition * NOTHING_TO_TELL > EPS
-        turns = np.array(
-            [
-                count_half_turns(scene.linkage.ground_angle, theta_2)
-                for theta_2 in sampled.theta_2
-            ]
-        )
         wide = divide(width, size) * condition / (K * EPS * turns)
         if (
             beyond := tells & (wide > 1.0)

@@ -54,12 +54,12 @@ from fourbar_validation.compare.tolerance import (
     divide,
     find_conditions,
     find_worst,
+    join_components,
     magnitude,
     magnitudes,
     mark_touching,
     sum_lengths,
 )
-from fourbar_validation.engines.loop import make_blank
 from fourbar_validation.run.question import NotAskedError, Question, spread_evenly
 
 POSITIONS_STATED_OTHERWISE = 5
@@ -167,15 +167,12 @@ class _Few:
 
         Some entries of the command are changed.
         """
-        return _solve_from_first(
-            scene,
-            self.command._replace(**changed),
-            self.quantities,
-        )
+        command = self.command._replace(**changed)
+        return _solve_from_first(scene, command, self._make_arrays())
 
     def solve_forces(self, scene: Scene) -> Solution:
         """Solve another scene at the same positions for forces and torques alone."""
-        return _solve_from_first(scene, self.command, self.quantities[self.forces])
+        return _solve_from_first(scene, self.command, self._make_arrays(self.forces))
 
     def solve_alike(self, scene: Scene, sense: int, **changed: Any) -> Solution:
         """Solve another scene whose loop lies on the same side, or on the other.
@@ -187,11 +184,15 @@ class _Few:
         the same in both scenes, the name of the assembly need not be.
         """
         signed = self.command._replace(branch=sense * self._signs, **changed)
-        return _solve_from_first(
-            scene,
-            with_signs(scene.linkage, signed),
-            self.quantities,
-        )
+        command = with_signs(scene.linkage, signed)
+        return _solve_from_first(scene, command, self._make_arrays())
+
+    def _make_arrays(self, rows: slice = slice(None)) -> dict[str, Array]:
+        """Make arrays to solve some of the quantities into; the command is given."""
+        pairs = zip(self.quantities[rows], self.numbers[rows], strict=True)
+        return {
+            name: np.empty_like(values) for name, values in pairs if name in STAGE_OF
+        }
 
     def compare(self, convert: Callable[[str], Array]) -> Array:
         """Compare all quantities with those of another scene, converted; (q, n)."""
@@ -318,23 +319,22 @@ def _mark_long_springs(scene: Scene, solution: Solution) -> Mask:
 def _solve_from_first(
     scene: Scene,
     command: Command,
-    names: Sequence[str] | None = None,
+    out: dict[str, Array] | None = None,
 ) -> Solution:
     """Solve a scene whose motion begins at the first position.
 
-    Springs count their turns from there. `names`: quantities to evaluate; None: all.
+    Springs count their turns from there. `out`: arrays to write into, as of `solve`.
     """
     bar = command.bar
     branch = int(command.branch[0])
     begin: Any = {f"theta_{bar}": float(command.angle[0]), "branch": branch}
     # only the motion is new, and it is checked
     begun = copy_with(scene, motion=Motion(**begin))
-    if names is None or len(command.angle) == 1:
+    if out is None or len(command.angle) == 1:
         # a single position is solved in Python's own numbers, but not where arrays to
         # write into are given; "scaled" demands the same digits
         return solve(begun, "force", at=command)
-    evaluated = [name for name in names if name in STAGE_OF]
-    return solve(begun, at=command, out=make_blank(len(command.angle), evaluated))
+    return solve(begun, at=command, out=out)
 
 
 def _make_bar_of_numbers(bar: Bar) -> Bar:
@@ -627,7 +627,7 @@ def _measure_turned(few: _Few) -> Array:
         values = np.array(getattr(other, name))
         if name in PIN_FORCES:
             turned = (values @ [1.0, 1j]) * np.exp(-1j * TURNED)
-            return np.stack((turned.real, turned.imag), axis=1)
+            return join_components(turned.real, turned.imag)
         if name.startswith("theta"):
             return values - TURNED
         return values
