@@ -4,7 +4,7 @@ It has one row per quantity, at the position where it is worst.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -134,14 +134,16 @@ class Demands(NamedTuple):
     """Method for which the errors are predicted, as the end of a reason."""
 
 
-class _JudgedRow(NamedTuple):
-    """Row of a quantity, and the positions that it speaks for."""
+@dataclass
+class _Judged:
+    """Rows of quantities that were compared, and the numbers that they speak for."""
 
-    row: Row
-    closed: int = 0
-    """Number of positions where both close the loop."""
+    rows: dict[str, Row] = field(default_factory=dict)
+    """Rows by quantity."""
+    numbers: int = 0
+    """Numbers of all quantities at positions where both close the loop."""
     decided: int = 0
-    """Number of those with a verdict, or at a reversal, where either side is right."""
+    """Those with a verdict, or at a reversal, where either side is right."""
 
 
 class _Pair(NamedTuple):
@@ -161,10 +163,6 @@ class _Due(NamedTuple):
     mask: Mask
     note: str
     """Positions that are not judged, as the end of a reason."""
-    closed: int
-    """Number of positions where both close the loop."""
-    reversals: int
-    """Number of those at which dry friction reverses."""
 
 
 @dataclass
@@ -211,19 +209,15 @@ class Comparison:
             }
         judged = self._compare([name for name in STAGE_OF if name in names])
         alarms = [self._unmeasured("watch", FAILS, alarm) for alarm in answer.alarms]
-        numbers = sum(one.closed for one in judged)
-        decided = sum(one.decided for one in judged)
-        rows = [self._compare_assembled(), *(one.row for one in judged), *alarms]
+        of_quantities = [judged.rows[name] for name in STAGE_OF if name in judged.rows]
+        rows = [self._compare_assembled(), *of_quantities, *alarms]
+        numbers = judged.numbers
         if numbers:  # a scene of which most numbers are undecided does not hold
-            reason = f"{numbers - decided} of {numbers} numbers are undecided"
+            undecided = numbers - judged.decided
+            reason = f"{undecided} of {numbers} numbers are undecided"
+            share = undecided / numbers
             rows.append(
-                Row.judged(
-                    self._who,
-                    "undecided",
-                    (numbers - decided) / numbers,
-                    _MOST_UNDECIDED,
-                    reason,
-                )
+                Row.judged(self._who, "undecided", share, _MOST_UNDECIDED, reason)
             )
         return rows
 
@@ -336,12 +330,12 @@ class Comparison:
             self._who, "assembled", float(count) * differ, 0.0, reason, ours.theta_2
         )
 
-    def _compare(self, quantities: Sequence[str]) -> list[_JudgedRow]:
-        """Compare all quantities of the answer at once, in their order.
+    def _compare(self, quantities: Sequence[str]) -> _Judged:
+        """Compare all quantities of the answer at once.
 
         Those that neither side has are left out.
         """
-        judged: dict[str, _JudgedRow] = {}
+        judged = _Judged()
         pairs: list[_Pair] = []
         for quantity in quantities:
             if quantity == "drive_condition" and not self._tells_of_jams:
@@ -359,27 +353,24 @@ class Comparison:
             else:
                 pairs.append(_Pair(quantity, ours, theirs))
                 continue
-            judged[quantity] = _JudgedRow(self._unmeasured(quantity, FAILS, missing))
-        due: list[_Due] = []
-        for pair, prepared in zip(pairs, self._prepare(pairs), strict=True):
-            if isinstance(prepared, _Due):
-                due.append(prepared)
-            else:
-                judged[pair.quantity] = prepared
-        for one, row in zip(due, self._judge(due), strict=True):
-            judged[one.quantity] = row
-        return [judged[quantity] for quantity in quantities if quantity in judged]
+            judged.rows[quantity] = self._unmeasured(quantity, FAILS, missing)
+        if pairs:
+            due = self._prepare(pairs, judged)
+            if due:
+                self._judge(due, judged)
+        return judged
 
-    def _prepare(self, pairs: Sequence[_Pair]) -> Iterator[_JudgedRow | _Due]:
-        """Find where both close the loop and the formulas state a value."""
-        if not pairs:
-            return
+    def _prepare(self, pairs: Sequence[_Pair], judged: _Judged) -> list[_Due]:
+        """Find where both close the loop and the formulas state a value.
+
+        What cannot be compared anywhere has its row.
+        """
         formulas = self.formulas
         code = formulas.status_code
         stated = _mark_stated(pairs, formulas)
         masks: Mask = self._closed & stated
         closed = int(np.count_nonzero(self._closed))
-        counts = np.count_nonzero(masks, axis=1).tolist()
+        counts = masks.sum(axis=1).tolist()
         if self.demands.tolerance.in_time and self.scene.drive_bar != 2:
             forces = [pair.quantity in FORCE_NAMES for pair in pairs]
             masks[forces] &= _mark_moving_drive(self.scene, formulas)
@@ -389,16 +380,18 @@ class Comparison:
         if any(may_reverse):
             at_reversals[may_reverse] = masks[may_reverse] & self._reversing
         masks &= ~at_reversals
-        reversals = np.count_nonzero(at_reversals, axis=1).tolist()
-        compared = np.count_nonzero(masks, axis=1).tolist()
+        reversals = at_reversals.sum(axis=1).tolist()
+        compared = masks.sum(axis=1).tolist()
+        judged.numbers += closed * len(pairs)
+        judged.decided += sum(reversals)
+        due = []
         for i, (quantity, ours, theirs) in enumerate(pairs):
             note = ""
             if counts[i] < closed:
                 unstated = _count(code[self._closed & ~stated[i]])
                 if not counts[i]:
                     reason = f"the formulas state no value: {unstated}"
-                    row = self._unmeasured(quantity, REFUSES, reason)
-                    yield _JudgedRow(row, closed)
+                    judged.rows[quantity] = self._unmeasured(quantity, REFUSES, reason)
                     continue
                 note += f"; not judged: {unstated}"
             if reversals[i]:
@@ -407,16 +400,14 @@ class Comparison:
                     " judged"
                 )
             if compared[i]:
-                yield _Due(quantity, ours, theirs, masks[i], note, closed, reversals[i])
+                due.append(_Due(quantity, ours, theirs, masks[i], note))
             else:
                 nowhere = "no position at which this quantity can be compared" + note
-                row = self._unmeasured(quantity, UNDECIDED, nowhere)
-                yield _JudgedRow(row, closed, reversals[i])
+                judged.rows[quantity] = self._unmeasured(quantity, UNDECIDED, nowhere)
+        return due
 
-    def _judge(self, due: Sequence[_Due]) -> Iterator[_JudgedRow]:
+    def _judge(self, due: Sequence[_Due], judged: _Judged) -> None:
         """Judge the errors of quantities at their positions."""
-        if not due:
-            return
         errors = self._measure(due)
         # most agree, which is seen of all at once; `judge_errors` has the same rule
         beyond = errors.mask & ~(errors.error <= errors.allowed)
@@ -430,7 +421,8 @@ class Comparison:
                 of_one = self._take_again(one.quantity, one.ours, of_one)
                 predicted = self._predict(one.quantity, of_one)
                 worst = judge_errors(of_one, predicted, self.demands.method)
-            row = Row(
+            judged.decided += worst.decided
+            judged.rows[one.quantity] = Row(
                 *self._who,
                 one.quantity,
                 worst.error,
@@ -440,7 +432,6 @@ class Comparison:
                 float(self.formulas.theta_2[worst.position]),
                 worst.condition,
             )
-            yield _JudgedRow(row, one.closed, one.reversals + worst.decided)
 
     def _measure(self, due: Sequence[_Due]) -> "Errors":
         """Measure the errors of quantities, and what is allowed at each position.
@@ -448,7 +439,7 @@ class Comparison:
         A quantity whose scale is 0 vanishes with all its terms. Nothing is relative to
         it: its error is in its own unit, and none is allowed.
         """
-        names, ours, theirs, masks, *_ = zip(*due, strict=True)
+        names, ours, theirs, masks, _ = zip(*due, strict=True)
         scale, condition = self._scale(names)
         vanishes = scale == 0.0
         unit = replace_zero_size(scale)

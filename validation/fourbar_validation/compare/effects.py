@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 def _find_shortest(linkage: FourBar) -> float:
     """Find the least length of a moving bar, m."""
-    return min(linkage.bar(number).length for number in MOVING_BARS)
+    return min(linkage.lengths[1:])
 
 
 def _multiply_levers(linkage: FourBar, places: Iterable[tuple[int, float]]) -> float:
@@ -44,7 +44,7 @@ def _multiply_levers(linkage: FourBar, places: Iterable[tuple[int, float]]) -> f
     The forces act at distances along bars.
     """
     return sum(
-        1.0 + abs(distance) / linkage.bar(bar).length
+        1.0 + abs(distance) / linkage.lengths[bar - 1]
         for bar, distance in places
         if bar != 1
     )
@@ -52,7 +52,7 @@ def _multiply_levers(linkage: FourBar, places: Iterable[tuple[int, float]]) -> f
 
 def _find_gravity(gravity: "Gravity", linkage: FourBar, _: Solution) -> float:
     """Sum the weights with their levers about the bars' first pins."""
-    bars = [(number, linkage.bar(number)) for number in MOVING_BARS]
+    bars = zip(MOVING_BARS, linkage.moving, strict=True)
     return sum(
         find_mass(bar)
         * abs(gravity.magnitude)

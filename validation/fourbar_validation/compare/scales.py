@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from fourbar.effects import ForceDrive
-from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import COUPLE, LINE, OK, UNITS, Array
 from fourbar.scene import Scene
 from fourbar.solution import Solution
@@ -137,7 +137,7 @@ def _return_one(_: str, sizes: TermSizes) -> Array:
 
 def _sum_length_terms(_: str, sizes: TermSizes) -> Array:
     scene = sizes.scene
-    arms = sum(_compute_arm(scene, number) for number in MOVING_BARS) + sum(
+    arms = sum(map(_compute_arm, scene.linkage.moving)) + sum(
         _compute_drive_arms(scene).values()
     )
     return np.full(len(sizes.solution), sum_lengths(scene.linkage) + arms)
@@ -182,11 +182,8 @@ def _sum_velocities(quantity: str, sizes: TermSizes) -> Array:
     total = np.zeros(len(formulas))
     drive = _compute_drive_arms(scene)
     for number in _choose_bars(quantity):
-        arm = (
-            scene.linkage.bar(number).length
-            + _compute_arm(scene, number)
-            + drive.get(number, 0.0)
-        )
+        bar = scene.linkage.bar(number)
+        arm = bar.length + _compute_arm(bar) + drive.get(number, 0.0)
         total += arm * np.abs(getattr(formulas, f"omega_{number}"))
     return total
 
@@ -196,11 +193,11 @@ def _sum_accelerations(quantity: str, sizes: TermSizes) -> Array:
     formulas = sizes.solution
     total = np.zeros(len(formulas))
     for number in _choose_bars(quantity):
+        bar = scene.linkage.bar(number)
         omega = getattr(formulas, f"omega_{number}")
         alpha = getattr(formulas, f"alpha_{number}")
-        total += (scene.linkage.bar(number).length + _compute_arm(scene, number)) * (
-            omega * omega + np.abs(alpha)
-        )
+        growth = omega * omega + np.abs(alpha)
+        total += (bar.length + _compute_arm(bar)) * growth
     return total
 
 
@@ -254,9 +251,9 @@ def _compute_drive_arms(scene: Scene) -> dict[int, float]:
     return {end.bar: abs(end.distance) for _, end in ends}
 
 
-def _compute_arm(scene: Scene, number: int) -> float:
+def _compute_arm(bar: Bar) -> float:
     """Compute the distance of a bar's mass centre from its first pin, m."""
-    return abs(find_centre(scene.linkage.bar(number))[0])
+    return abs(find_centre(bar)[0])
 
 
 def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
@@ -265,11 +262,10 @@ def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
     Couples are divided by their bar's length.
     """
     total = np.zeros(len(formulas))
-    for number in MOVING_BARS:
-        bar = scene.linkage.bar(number)
+    for number, bar in zip(MOVING_BARS, scene.linkage.moving, strict=True):
         acceleration = getattr(formulas, f"a_G{number}")
         alpha = getattr(formulas, f"alpha_{number}")
-        lever = 1.0 + abs(find_centre(bar)[0]) / bar.length
+        lever = 1.0 + _compute_arm(bar) / bar.length
         total += (
             lever * find_mass(bar) * magnitude(acceleration)
             + find_inertia(bar) * np.abs(alpha) / bar.length
@@ -392,13 +388,13 @@ def _find_velocities(
         "v_A": swung(2, linkage.input.length, 0.0),
         "v_B": swung(4, linkage.output.length, 0.0),
     }
-    for bar in MOVING_BARS:
-        centre = swung(bar, *find_centre(linkage.bar(bar)))
-        if bar == 3:
+    for number, bar in zip(MOVING_BARS, linkage.moving, strict=True):
+        centre = swung(number, *find_centre(bar))
+        if number == 3:
             moved = centre + velocities["v_A"]
         else:
             moved = centre
-        velocities[f"v_G{bar}"] = moved
+        velocities[f"v_G{number}"] = moved
     return velocities
 
 

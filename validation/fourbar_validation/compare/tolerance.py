@@ -251,8 +251,9 @@ def compute_closing_margin(linkage: FourBar, theta: Array, bar: int = 2) -> Arra
 
     It is a part of the sum of the lengths.
     """
-    held = linkage.bar(bar).length * (-1.0 if bar == 4 else 1.0)
-    b, c = (linkage.bar(number).length for number in MOVING_BARS if number != bar)
+    lengths = linkage.lengths
+    held = lengths[bar - 1] * (-1.0 if bar == 4 else 1.0)
+    b, c = (lengths[number - 1] for number in MOVING_BARS if number != bar)
     e = np.abs(
         linkage.ground * np.exp(1j * linkage.ground_angle) - held * np.exp(1j * theta)
     )
