@@ -612,11 +612,12 @@ def unwrap(angles: Array) -> None:
     rows = angles.reshape(-1, angles.shape[-1])
     finite = ~np.isnan(rows)
     # each NaN is replaced by the last angle before it, at the start by the first one
-    first = np.argmax(finite, axis=1)[:, None]
+    first = finite.argmax(axis=1)[:, None]
     place = np.where(finite, np.arange(rows.shape[1]), first)
     place = np.maximum.accumulate(place, axis=1)
-    filled = np.take_along_axis(rows, place, axis=1)
-    jumps = np.diff(filled, axis=1, prepend=filled[:, :1])
-    turns = np.cumsum(np.round(jumps / turn), axis=1)
+    filled = rows[np.arange(len(rows))[:, None], place]
+    turns = np.zeros_like(filled)
+    jumps = filled[:, 1:] - filled[:, :-1]
+    turns[:, 1:] = np.rint(jumps / turn).cumsum(axis=1)
     start = np.where(filled[:, :1] == -np.pi, turn, 0.0)
     angles[...] = (rows + start - turn * turns).reshape(angles.shape)

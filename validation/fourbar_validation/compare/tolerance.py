@@ -27,6 +27,7 @@ Mask = NDArray[np.bool_]
 Angle = TypeVar("Angle", float, Array)
 
 EPS = 2.0**-52
+_LEAST_DOUBLE = 2.0**-1074
 K = 50.0
 """One factor for every exact comparison. Two evaluations of about fifty roundings each
 differ by sqrt(2 * 50) = 10 of them as a random walk; 50 covers the tails of some 10^5
@@ -346,7 +347,7 @@ def divide(apart: Array | float, size: Array | float) -> Array:
     A size of 0 demands exactly 0: over the least double any other difference is huge.
     """
     with np.errstate(over="ignore"):
-        return np.asarray(apart / np.where(size == 0.0, np.nextafter(0.0, 1.0), size))
+        return np.asarray(apart / np.where(size == 0.0, _LEAST_DOUBLE, size))
 
 
 def find_error(quantity: str, ours: Array, theirs: Array, size: Array) -> Array:
@@ -368,7 +369,7 @@ def find_used(error: Array | float, allowed: Array | float) -> Array:
     allowed = np.asarray(allowed, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         share = np.where(error == 0.0, 0.0, error / allowed)
-    return np.where(np.isfinite(error) & ~np.isnan(share), share, np.inf)
+    return np.asarray(np.fmin(share, np.inf))  # of NaN and inf it is inf
 
 
 def find_worst(errors: Array) -> int:

@@ -293,11 +293,8 @@ def check_error_bars(question: Question) -> Iterator[Row]:
         of_balls = None
     else:
         of_balls = TermSizes(scene, reference)
-    turns = np.array(
-        [
-            count_half_turns(scene.linkage.ground_angle, theta_2)
-            for theta_2 in sampled.theta_2
-        ]
+    turns = np.maximum(
+        count_half_turns(scene.linkage.ground_angle), np.abs(sampled.theta_2) / np.pi
     )
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
         width = getattr(ours, bar)
