@@ -276,9 +276,9 @@ def _take_plain_positions(question: Question) -> _Few:
     positions = np.concatenate([[begin], chosen[chosen != begin]])
     command = at.part(positions)._replace(remainder=None)
     link = scene.linkage
-    two, three, four = (_make_bar_of_numbers(link.bar(bar)) for bar in MOVING_BARS)
+    bars = [_make_bar_of_numbers(bar) for bar in link.moving]
     few = Scene(
-        FourBar(link.ground, two, three, four, link.ground_angle),
+        _put_bars(link, bars, link.ground, link.ground_angle),
         Motion(),
         scene.drive_bar,
         placed.loads,
@@ -386,13 +386,11 @@ class _SceneConversion:
         centre = bar.centre
         if reversed_:
             centre = _from_other_end(bar.length, centre)
-        square = self.length * self.length
-        length = self.length * bar.length
-        return Bar(
-            length,
-            bar.mass,
-            square * bar.inertia,
-            self.pair(centre),
+        return copy_with(
+            bar,
+            length=self.length * bar.length,
+            inertia=self.length * self.length * bar.inertia,
+            centre=self.pair(centre),
         )
 
 
@@ -573,24 +571,35 @@ def _convert(scene: Scene, to: _SceneConversion) -> Scene:
         bars = bars[::-1]
         theta_1 = theta_1 + math.pi
         drive_bar = _OTHER_BAR.get(drive_bar, drive_bar)
-    two, three, four = bars
-    terms = [
-        [_CONVERTED[type(term)](term, to, link) for term in terms]
+    loads, effects = (
+        tuple(_CONVERTED[type(term)](term, to, link) for term in terms)
         for terms in (scene.loads, scene.effects)
-    ]
-    return Scene(
-        FourBar(
-            to.length * link.ground,
-            two,
-            three,
-            four,
-            theta_1,
-        ),
-        Motion(),
-        drive_bar,
-        tuple(terms[0]),
-        tuple(terms[1]),
+    )
+    return copy_with(
+        scene,
+        linkage=_put_bars(link, bars, to.length * link.ground, theta_1),
+        drive_bar=drive_bar,
+        loads=loads,
+        effects=effects,
         drive=_convert_drive(scene.drive, to, link),
+    )
+
+
+def _put_bars(
+    linkage: FourBar,
+    bars: Sequence[Bar],
+    ground: float,
+    ground_angle: float,
+) -> FourBar:
+    """Put other moving bars on another ground."""
+    two, three, four = bars
+    return copy_with(
+        linkage,
+        ground=ground,
+        input=two,
+        coupler=three,
+        output=four,
+        ground_angle=ground_angle,
     )
 
 
@@ -704,9 +713,9 @@ def _measure_split_masses(few: _Few) -> Array:
         raise NotAskedError("no bar has a mass")
     weight = tuple(effect for effect in scene.effects if isinstance(effect, Gravity))
     loaded = scene
-    bare = replace(scene, loads=(), effects=weight)
+    bare = copy_with(scene, loads=(), effects=weight)
     parts = [
-        replace(part, linkage=_take_part(scene.linkage, share))
+        copy_with(part, linkage=_take_part(scene.linkage, share))
         for part, share in ((loaded, PART), (bare, 1.0 - PART))
     ]
     return _measure_sum(few, parts)
@@ -727,16 +736,8 @@ def _take_part(linkage: FourBar, part: float) -> FourBar:
         rest = bar.inertia - PART * (1.0 - PART) * bar.mass * apart * apart
         away = apart * ((1.0 - PART) if part == PART else -PART)
         centre = cmath.polar(cmath.rect(*bar.centre) + away)
-        bars.append(
-            Bar(
-                bar.length,
-                mass,
-                part * rest,
-                centre,
-            )
-        )
-    two, three, four = bars
-    return FourBar(linkage.ground, two, three, four, linkage.ground_angle)
+        bars.append(copy_with(bar, mass=mass, inertia=part * rest, centre=centre))
+    return _put_bars(linkage, bars, linkage.ground, linkage.ground_angle)
 
 
 def _require_linear(scene: Scene) -> None:
