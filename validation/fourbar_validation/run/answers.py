@@ -11,6 +11,7 @@ from functools import partial
 from typing import NamedTuple
 
 from fourbar.errors import LimitError
+from fourbar.linkage import copy_with
 from fourbar.mjcf.document import LIGHT_BAR_RATIO
 from fourbar.quantities import COUPLE, FORCE_NAMES
 from fourbar.scene import Command, Scene
@@ -233,7 +234,7 @@ def compare_inertia(question: Question) -> Iterator[Row]:
         return
     bare = Question(
         question.name,
-        replace(scene, loads=(), effects=()),
+        copy_with(scene, loads=(), effects=()),
         question.at,
         output=question.output,
     )

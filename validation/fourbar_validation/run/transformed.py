@@ -325,11 +325,14 @@ def _solve_from_first(
 
     Springs count their turns from there. `out`: arrays to write into, as of `solve`.
     """
-    bar = command.bar
-    branch = int(command.branch[0])
-    begin: Any = {f"theta_{bar}": float(command.angle[0]), "branch": branch}
-    # only the motion is new, and it is checked
-    begun = copy_with(scene, motion=Motion(**begin))
+    begun = scene
+    if scene.counts_turns:
+        branch = int(command.branch[0])
+        begin: Any = {
+            f"theta_{command.bar}": float(command.angle[0]),
+            "branch": branch,
+        }
+        begun = copy_with(scene, motion=Motion(**begin))
     if out is None or len(command.angle) == 1:
         # a single position is solved in Python's own numbers, but not where arrays to
         # write into are given; "scaled" demands the same digits

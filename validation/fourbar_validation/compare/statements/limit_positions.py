@@ -86,7 +86,7 @@ class Visit(NamedTuple):
 
 
 def plan_visit(linkage: FourBar, places: Iterable[LimitPlace]) -> Visit:
-    """Plan a visit of some places.
+    """Plan a visit of some places of a linkage.
 
     The bars are uniform: masses play no part.
     """
@@ -231,14 +231,14 @@ class _LimitTrial(NamedTuple):
 
 
 def _try_bar(
-    linkage: FourBar,
+    scene: Scene,
     bar: int,
     limits: Iterable[mobility.LimitPosition],
 ) -> _LimitTrial:
+    """Plan the trial of a bar of a scene that has nothing but a linkage."""
+    linkage = scene.linkage
     second, third = (linkage.bar(k) for k in MOVING_BARS if k != bar)
-    first = FourBar(
-        linkage.ground, linkage.bar(bar), second, third, linkage.ground_angle
-    )
+    first = copy_with(linkage, input=linkage.bar(bar), coupler=second, output=third)
     shift = math.pi if bar == 4 else 0.0  # the loop runs along bar 4 from B to O4
     spans = mobility.find_intervals(linkage, bar)
     full = mobility.turns_fully(linkage, bar)
@@ -287,7 +287,8 @@ def _try_bar(
     )
     decidable = np.abs(compute_closing_margin(first, angles + shift)) > TOUCHING_MARGIN
     command = Command(angles + shift, np.ones(len(angles), np.int8), None, 0.0)
-    return _LimitTrial(Scene(first), command, angles, inside, decidable, findings)
+    tried = copy_with(scene, linkage=first)
+    return _LimitTrial(tried, command, angles, inside, decidable, findings)
 
 
 def _compute_inwards(linkage: FourBar, theta_2: float) -> float:
@@ -410,6 +411,7 @@ class StatedLimits(NamedTuple):
     @classmethod
     def of(cls, linkage: FourBar) -> "StatedLimits":
         """Evaluate the formulas."""
+        scene = Scene(linkage)
         roundoff = find_roundoff(linkage)
         positions = {bar: mobility.limit_positions(linkage, bar) for bar in MOVING_BARS}
         return cls(
@@ -417,7 +419,7 @@ class StatedLimits(NamedTuple):
             find_lever(linkage),
             roundoff,
             positions,
-            {bar: _try_bar(linkage, bar, positions[bar]) for bar in MOVING_BARS},
+            {bar: _try_bar(scene, bar, positions[bar]) for bar in MOVING_BARS},
             [_InputLimit.of(linkage, limit, roundoff) for limit in positions[2]],
             {
                 bar: _list_limits(linkage, bar, positions[bar], roundoff)
