@@ -694,7 +694,7 @@ def find_signs(
     `branch`: of the assembly, one for all or (n,). Given signs, it returns assemblies.
     """
     path = prepare_path(linkage.lengths, linkage.ground_angle, bar)
-    assemblies = np.broadcast_to(np.asarray(branch, dtype=np.int8), np.shape(angle))
+    assemblies = np.full(np.shape(angle), branch, dtype=np.int8)
     return np.asarray(path.sign(angle, assemblies)).astype(np.int8)
 
 

@@ -191,12 +191,11 @@ def list_speeds(command: Command) -> tuple[Array, Array]:
 
     A speed that is not stated is 0.
     """
-    rates = (
-        0.0 if rate is None else rate for rate in (command.speed, command.acceleration)
-    )
-    omega, alpha = (
-        np.broadcast_to(np.asarray(rate, float), command.angle.shape) for rate in rates
-    )
+    rates = np.zeros((2, len(command.angle)))
+    if command.speed is not None:
+        rates[0] = command.speed
+    rates[1] = command.acceleration
+    omega, alpha = rates
     return omega, alpha
 
 
