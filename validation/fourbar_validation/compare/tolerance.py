@@ -369,7 +369,7 @@ def find_used(error: Array | float, allowed: Array | float) -> Array:
     allowed = np.asarray(allowed, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         share = np.where(error == 0.0, 0.0, error / allowed)
-    return np.asarray(np.fmin(share, np.inf))  # of NaN and inf it is inf
+    return np.where(np.isfinite(share), share, np.inf)
 
 
 def find_worst(errors: Array) -> int:
