@@ -390,3 +390,32 @@ PARALLELOGRAM = """
 def make_parallelogram(ground: float, crank: float, gravity: str) -> RobotFile:
     text = PARALLELOGRAM.format(ground=ground, crank=crank, gravity=gravity)
     return RobotFile(Path("parallelogram.xml"), text)
+
+
+FOOT_PARALLELOGRAM = """
+<mujoco>
+  <compiler angle="radian"/>
+  <default><geom type="capsule" contype="0" conaffinity="0"/></default>
+  <worldbody>
+    <body name="foot" pos="0 0 0.15">
+      <joint name="pitch" axis="0 1 0" damping="0.5"/>
+      <geom fromto="-0.055821 0 0.022 0 0 0" size="0.01" mass="0.27"/>
+      <body name="rod" pos="-0.055821 0 0.022">
+        <joint name="ankle" axis="0 1 0"/>
+        <geom fromto="0 0 0 0 0 0.14" size="0.005" mass="0.014"/>
+      </body>
+    </body>
+    <body name="crank" pos="0 0 0.29" quat="0.982434 0 0.18661 0">
+      <joint name="motor" axis="0 1 0" range="-1.2 1.2" damping="0.5"/>
+      <geom fromto="0 0 0 -0.06 0 0" size="0.005" mass="0.016"/>
+    </body>
+  </worldbody>
+  <equality>
+    <connect name="rod" body1="crank" body2="rod" anchor="-0.06 0 0"/>
+  </equality>
+  <actuator><motor joint="motor"/></actuator>
+</mujoco>
+"""
+"""A foot that a crank moves by a parallelogram of six-digit numbers: 140, 60, 140 and
+60 mm but for 0.2 um. The range of its motor ends at a change point.
+"""

@@ -17,12 +17,18 @@ from tests.whole.test_imports import ROOT
 MODELS = ROOT / "models" / "robots"
 
 
+def unfold(printed: str) -> list[str]:
+    """Return the lines of a text whose folds are indented by four blanks."""
+    return printed.replace("\n    ", " ").splitlines()
+
+
 @pytest.mark.slow
 def test_a_line_for_each_closure() -> None:
     arguments = [str(MODELS / "gripper.xml")]
     result = CliRunner().invoke(robot_command, arguments, standalone_mode=False)
     assert result.exception is None
-    right, left = result.output.splitlines()
+    assert max(map(len, result.output.splitlines())) <= 80
+    right, left = unfold(result.output)
     assert right == (
         "right_finger-right_follower: connect; ground palm; hinges right_finger, "
         "right_driver, right_follower; ground 20.00, input 60.00, coupler 20.00, "
@@ -36,7 +42,7 @@ def test_a_line_for_each_closure() -> None:
 def test_the_gap_is_that_of_the_stated_pose() -> None:
     arguments = [str(MODELS / "biped_foot.xml"), "--pose", "crank=20deg,knee=30deg"]
     result = CliRunner().invoke(robot_command, arguments, standalone_mode=False)
-    line, note = result.output.splitlines()
+    line, note = unfold(result.output)
     assert line.startswith("rod: connect; ground ankle_frame; hinges rod, crank, ankle")
     # the crank turned by 20 deg carries the rod's end along: 2 . 0.31905 m sin(10 deg)
     assert "gap 110.8 mm" in line

@@ -36,7 +36,7 @@ _LIST = "fourbar_validation.engines.mujoco.robots.closures:list_closures"
 
 
 def _write_closure(closure: RobotClosure) -> str:
-    """Write what is known of a closure in one line."""
+    """Write what is known of a closure."""
     parts = [f"{closure.name}: {closure.kind}"]
     if closure.loop is None:
         parts[0] += f", no four-bar: {closure.reason}"
@@ -57,7 +57,7 @@ def _write_closure(closure: RobotClosure) -> str:
         parts.append(f"gap {write_length(gap) if gap else 0} mm")
     parts.append(f"solref {_join_numbers(closure.solref)}")
     parts.append(f"solimp {_join_numbers(closure.solimp)}")
-    return escape_controls("; ".join(parts))
+    return "; ".join(parts)
 
 
 def _join_numbers(numbers: tuple[float, ...]) -> str:
@@ -67,7 +67,7 @@ def _join_numbers(numbers: tuple[float, ...]) -> str:
 def _show_report(report: RobotReport) -> None:
     """Print a line for each closure, and what was done to the file and its pose."""
     for closure in report.closures:
-        click.echo(_write_closure(closure))
+        print_sentence(_write_closure(closure))
     if not report.closures:
         click.echo("The file has no equality: no loop is closed in it.")
     for closure in report.closures:

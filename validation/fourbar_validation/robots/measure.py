@@ -1,11 +1,11 @@
-"""Torque and pin forces of a robot's loops against the formulas.
+"""Errors of torque and pin forces of a robot's loops.
 
 `check-mjcf` and `advise` ask for them.
 """
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +15,17 @@ from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar.quantities import OK, UNITS, Array
 from fourbar.scene import Command, Scene
+from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.compare.reversals import mark_reversing
 from fourbar_validation.engines.mujoco.robots.answers import (
     FORCE_QUANTITIES,
     InsideAnswer,
+    InsideRow,
     LoopMeasurement,
     MeasureOptions,
     RobotMeasurement,
-    find_scales,
+    find_median_part,
     measure_sizes,
 )
 from fourbar_validation.robots.files import read_robot
@@ -33,6 +35,7 @@ from fourbar_validation.robots.options import read_pose, read_speed
 _MEASURE = "fourbar_validation.engines.mujoco.robots.measure:measure_loops"
 MEASURE_SECONDS = 600.0
 """s; a busy machine takes several times the two minutes of an idle one."""
+RIGID = "rigid pins"
 STATES = "single states"
 MEASURED_THROUGH_TIME = "through time"
 _DECIMALS_OF_A_POSE = 9
@@ -52,13 +55,17 @@ class InsideError:
     error: float
     """N m or N."""
     scale: float
-    """Largest size of the quantity by the formulas, or what replaces it where that
-    vanishes, N m or N.
-    """
+    """Largest size of the quantity, or of its terms where it vanishes, N m or N."""
     vanishes: bool
-    """True where the scale is not the largest size of the quantity."""
+    """True where the scale is that of the terms."""
     joint: float
     """Position of the driven joint where the error is largest, rad."""
+    theta_2: float
+    """Angle of bar 2 there in the axes of the scene, rad."""
+    median: float
+    """Median over the states of the error over the scale of its state; infinite
+    without an answer.
+    """
 
     @property
     def part(self) -> float:
@@ -70,7 +77,7 @@ class InsideError:
         return 0.0
 
     def cells(self) -> tuple[str, ...]:
-        """Return method, quantity, error, its relative size, and place, as text."""
+        """Return method, quantity, error, relative size, place and median, as text."""
         unit = UNITS[self.quantity]
         return (
             self.method,
@@ -78,6 +85,7 @@ class InsideError:
             f"{self.error:.3g} {unit}",
             f"{100.0 * self.part:.3g} %",
             f"{write_degrees(self.joint)} deg",
+            f"{100.0 * self.median:.2g} %",
         )
 
 
@@ -102,9 +110,11 @@ def measure_robot(
 def list_errors_by_method(loop: LoopMeasurement) -> list[InsideError]:
     """List the worst errors of torque and pin forces, by method.
 
-    They are against the formulas.
+    Those of rigid pins are against the formulas: what the scene leaves out. MuJoCo's
+    are against rigid pins at the same states: what its soft constraint costs.
     """
-    errors = list(_compare(STATES, loop, loop.states))
+    errors = list(_compare(RIGID, loop, loop.states))
+    errors += _compare(STATES, loop, loop.states)
     if loop.through_time is not None:
         errors += _compare(MEASURED_THROUGH_TIME, loop, loop.through_time)
     return errors
@@ -115,9 +125,7 @@ def find_left_out(loop: LoopMeasurement) -> float:
 
     It is the worst difference of rigid pins from the formulas.
     """
-    rigid = [replace(row, soft=row.rigid) for row in loop.states.rows]
-    answer = replace(loop.states, rows=rigid)
-    return max(error.part for error in _compare(STATES, loop, answer))
+    return max(error.part for error in _compare(RIGID, loop, loop.states))
 
 
 def _compare(
@@ -125,48 +133,68 @@ def _compare(
     loop: LoopMeasurement,
     answer: InsideAnswer,
 ) -> Iterator[InsideError]:
-    """Compare an answer with the formulas at its own theta_2, omega_2 and alpha_2.
+    """Compare an answer at its own theta_2, omega_2 and alpha_2, as its method says.
 
     Where dry friction reverses the forces on both sides of the jump are right, and
     nothing is judged.
     """
     rows = answer.rows
     motion = loop.scene.motion
+    theta_2 = np.array([row.theta_2 for row in rows]) - loop.turned
     commanded = Command(
-        np.array([row.theta_2 for row in rows]) - loop.turned,
+        theta_2,
         np.full(len(rows), motion.branch, dtype=np.int8),
         np.array([row.omega_2 for row in rows]),
         np.array([row.alpha_2 for row in rows]),
     )
     formulas = solve(loop.scene, "force", at=commanded)
-    judged = formulas.status_code == OK
     reversing = mark_reversing(loop.scene, formulas, _SLIP)
-    largest = {
-        name: float(np.max(measure_sizes(getattr(formulas, name))[judged], initial=0.0))
-        for name in FORCE_QUANTITIES
-    }
-    scales = find_scales(largest, max(loop.scene.linkage.lengths[1:]))
+    if method == RIGID:
+        errors = _subtract_formulas(rows, formulas, loop.turned)
+    else:
+        errors = answer.errors()
+    largest = answer.sizes()
+    scales = answer.scales(max(loop.scene.linkage.lengths[1:]))
     for name in FORCE_QUANTITIES:
-        ours = np.asarray(getattr(formulas, name))
-        theirs = np.array([row.soft.values()[name] for row in rows])
-        if theirs.ndim == 2:
-            theirs = _turn_vectors(theirs, -loop.turned)
-        sizes = measure_sizes(theirs - ours)
-        sizes = np.where(judged & np.isfinite(sizes), sizes, math.inf)
-        sizes = np.where(judged & reversing, 0.0, sizes)
+        sizes = np.where(np.isfinite(errors[name]), errors[name], math.inf)
+        sizes = np.where(reversing, 0.0, sizes)
         worst = int(np.argmax(sizes))
+        error = float(sizes[worst])
+        median = find_median_part(sizes, scales[name])
         if answer.lost:
             error = math.inf
-        else:
-            error = float(sizes[worst])
+            median = math.inf
         yield InsideError(
             method,
             name,
             error,
-            scales[name],
-            scales[name] != largest[name],
+            float(scales[name].max()),
+            bool(np.any(scales[name] != largest[name])),
             rows[worst].joint,
+            float(theta_2[worst]),
+            median,
         )
+
+
+def _subtract_formulas(
+    rows: Sequence[InsideRow],
+    formulas: Solution,
+    turned: float,
+) -> dict[str, Array]:
+    """Return by how much torque and pin forces of rigid pins differ from the formulas.
+
+    They are sizes at each state, (n,), N m and N; infinite where the formulas have no
+    value. `turned`: angle of the scene's axes in the plane of the loop, rad.
+    """
+    judged = formulas.status_code == OK
+    differences = {}
+    for name in FORCE_QUANTITIES:
+        rigid = np.array([row.rigid.values()[name] for row in rows])
+        if rigid.ndim == 2:
+            rigid = _turn_vectors(rigid, -turned)
+        sizes = measure_sizes(rigid - np.asarray(getattr(formulas, name)))
+        differences[name] = np.where(judged, sizes, math.inf)
+    return differences
 
 
 def _turn_vectors(vectors: Array, angle: float) -> Array:

@@ -10,6 +10,11 @@ from pathlib import Path
 
 import click
 
+from fourbar.formulas.mobility import (
+    change_points,
+    find_intervals,
+    turns_fully,
+)
 from fourbar.quantities import PIN_FORCES, UNITS
 from fourbar.writing import write_text
 from fourbar_validation.compare.rows import escape_controls, write_csv_rows
@@ -23,6 +28,7 @@ from fourbar_validation.report.templating import escape_cell
 from fourbar_validation.report.terminal import make_words_table, print_sentence
 from fourbar_validation.robots.measure import (
     MEASURED_THROUGH_TIME,
+    RIGID,
     STATES,
     InsideError,
     find_left_out,
@@ -31,11 +37,20 @@ from fourbar_validation.robots.measure import (
     write_degrees,
 )
 
-ERROR_HEADINGS = ("method", "quantity", "error", "of its largest", "at")
+ERROR_HEADINGS = ("method", "quantity", "error", "of largest", "at", "median")
 _SETTINGS = ("changed alone", "single states", "through time", "cost")
 SCENE_ROUND_OFF = 1e-8
 """Difference of two exact answers that the digits of the scene make. It is over the
 largest torque and pin forces.
+"""
+LEAST_LEFT_OUT = 1e-4
+"""Part of the largest that a scene leaves out, below which the table has no rows of
+it: MuJoCo's errors have about as many digits.
+"""
+NEAR_A_LIMIT = math.radians(5.0)
+"""Angle of the driven bar from a limit position or a change point within which forces
+are told to grow: at 5 deg they are about three times those of a well-conditioned
+position.
 """
 STATES_FILE = (
     *("loop", "method", "joint [deg]", "omega_2 [rad/s]", "alpha_2 [rad/s^2]"),
@@ -82,19 +97,10 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[ReportBlock]:
     speed = loop.states.rows[0].omega_2
     yield (
         f"{loop.name}: {loop.joint} from {first} to {last} deg at "
-        f"{speed:.4g} rad/s, MuJoCo in the whole robot against the formulas"
+        f"{speed:.4g} rad/s, MuJoCo in the whole robot against rigid pins, and these"
+        " against the formulas"
     )
-    if math.isfinite(loop.influence):
-        through_time = (
-            ", through time (once the loop has settled) by armature, a tenth of which"
-            f" changes the errors by {loop.influence:.1g}"
-        )
-    else:
-        through_time = ""
-    yield (
-        f"{loop.held} other degrees of freedom are held: at single states by"
-        f" generalized forces{through_time}; contacts, joint limits and motors are off"
-    )
+    yield _write_held(loop)
     if loop.switched_off:
         names = ", ".join(loop.switched_off)
         yield f"switched off, because it ties its bars to joints that are held: {names}"
@@ -105,7 +111,8 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[ReportBlock]:
         size = f"less than {SCENE_ROUND_OFF:g}"
     yield (
         f"with rigid pins the robot differs from the formulas by {size} of the largest:"
-        " what the scene leaves out; the rest is MuJoCo's soft constraint"
+        " what the scene leaves out; MuJoCo differs from rigid pins by its soft"
+        " constraint"
     )
     if loop.states.in_line:
         places = ", ".join(map(write_degrees, loop.states.in_line))
@@ -116,8 +123,11 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[ReportBlock]:
             " on in two ways"
         )
     errors = list_errors_by_method(loop)
+    if left_out <= LEAST_LEFT_OUT:
+        errors = [error for error in errors if error.method != RIGID]
     yield TextTable(ERROR_HEADINGS, [error.cells() for error in errors])
     yield from _describe_vanishing(errors)
+    yield from _describe_worst_near_limits(loop, errors)
     if loop.through_time is None:
         yield f"not simulated: {loop.refusal}"
     elif loop.through_time.lost:
@@ -143,6 +153,59 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[ReportBlock]:
         yield f"note: {loop.name}: {remark}"
 
 
+def _write_held(loop: LoopMeasurement) -> str:
+    """Write what holds the other joints, what keeps the speed, and what is off."""
+    if loop.held:
+        text = (
+            f"{loop.held} other degrees of freedom are held: at single states by"
+            " generalized forces"
+        )
+    else:
+        text = "no other degree of freedom is there to be held"
+    if loop.influence is not None:
+        if loop.held:
+            text += ", through time (once the loop has settled) by armature"
+        else:
+            text += (
+                "; through time (once the loop has settled) armature keeps the speed of"
+                f" {loop.joint}"
+            )
+        text += (
+            f", a tenth of which changes the errors by {loop.influence.worst:.1g} of"
+            f" the largest, {loop.influence.median:.1g} in the median"
+        )
+    return f"{text}; contacts, joint limits and motors are off"
+
+
+def _describe_worst_near_limits(
+    loop: LoopMeasurement,
+    errors: Sequence[InsideError],
+) -> Iterator[ReportBlock]:
+    """Say where errors are worst because forces grow there without bound.
+
+    That is near a limit position or a change point of the driven bar.
+    """
+    linkage = loop.scene.linkage
+    places = [(angle, "a change point") for angle in change_points(linkage, 2)]
+    if not turns_fully(linkage):
+        limits = [end for ends in find_intervals(linkage) for end in ends]
+        places += [(limit, "a limit position") for limit in limits]
+    joints = {error.joint: error.theta_2 for error in errors}
+    for joint, theta_2 in joints.items():
+        near = [
+            (abs(math.remainder(theta_2 - angle, math.tau)), kind)
+            for angle, kind in places
+        ]
+        distance, kind = min(near, default=(math.inf, ""))
+        if distance <= NEAR_A_LIMIT:
+            yield (
+                f"{write_degrees(joint)} deg is {math.degrees(distance):.2g} deg from"
+                f" {kind}, where forces grow without bound: the median tells of the"
+                " rest of the motion"
+            )
+            return
+
+
 def _describe_vanishing(errors: Sequence[InsideError]) -> Iterator[ReportBlock]:
     """Say what the errors of a quantity are divided by that (nearly) vanishes."""
     scales = {error.quantity: error.scale for error in errors if error.vanishes}
@@ -152,7 +215,7 @@ def _describe_vanishing(errors: Sequence[InsideError]) -> Iterator[ReportBlock]:
         if quantity == "torque":
             factor = " times the longest moving bar"
         yield (
-            f"{quantity} is (nearly) zero throughout: its error is of the largest pin"
+            f"{quantity} is zero but for rounding: its error is of the largest pin"
             f" force{factor}, {size}"
         )
 
@@ -178,6 +241,12 @@ def describe_advice(advice: SettingsAdvice) -> Iterator[ReportBlock]:
     """Describe what to type, what it reaches, and what each setting does alone."""
     before = advice.before
     best = advice.best
+    yield (
+        f"Errors are the worst of torque and pin forces at {advice.positions}"
+        " positions, against rigid pins, over the largest of each. check-mjcf takes"
+        " more positions and renews the torque at each, which changes its errors"
+        " through time."
+    )
     if not best.changes:
         yield f"The file is within {advice.wanted:g} as it is."
     elif advice.reached:

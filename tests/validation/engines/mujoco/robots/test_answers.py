@@ -11,6 +11,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     LoopMotion,
     PinsAndTorque,
     RobotSettings,
+    find_median_part,
     find_scales,
 )
 
@@ -20,29 +21,68 @@ OWN = RobotSettings(
 )
 
 
-def make_row(torque: float, off: float) -> InsideRow:
+def make_row(torque: float, off: float, condition: float = 0.5) -> InsideRow:
     rigid = PinsAndTorque(torque, {name: np.array([3.0, 4.0]) for name in PINS})
     soft = PinsAndTorque(
         torque + off, {name: np.array([3.0, 4.0 + off]) for name in PINS}
     )
-    return InsideRow(0.1, 1.0, 0.0, 0.2, soft, rigid, 1e-4)
+    return InsideRow(0.1, 1.0, 0.0, 0.2, soft, rigid, 1e-4, condition)
 
 
-def test_errors_are_sizes_of_differences_and_scales_of_the_rigid_answer() -> None:
+def test_errors_are_sizes_of_differences_and_scales_those_of_rigid_pins() -> None:
     answer = InsideAnswer([make_row(2.0, 0.5), make_row(-4.0, -0.25)])
     assert answer.errors()["torque"] == pytest.approx([0.5, 0.25])
     assert answer.errors()["F43"] == pytest.approx([0.5, 0.25])
-    assert answer.scales(0.5)["torque"] == 4.0
-    assert answer.scales(0.5)["F12"] == pytest.approx(5.0)
+    assert answer.sizes()["torque"] == pytest.approx([2.0, 4.0])
+    assert answer.scales(0.5)["torque"] == pytest.approx([2.0, 4.0])
+    assert answer.scales(0.5)["F12"] == pytest.approx([5.0, 5.0])
 
 
-def test_what_vanishes_is_scaled_by_the_largest_pin_force() -> None:
-    """A torque is a sum of couples of pin forces, which may cancel."""
-    largest = {"torque": 1e-12, "F12": 30.0, "F32": 20.0, "F43": 0.0, "F14": 1.0}
-    scales = find_scales(largest, 0.5)
-    assert scales == {"torque": 15.0, "F12": 30.0, "F32": 20.0, "F43": 30.0, "F14": 1.0}
-    nothing = dict.fromkeys(largest, 0.0)
-    assert find_scales(nothing, 0.5) == nothing
+FORCES = {
+    "F12": np.array([30.0, 3000.0]),
+    "F32": np.array([20.0, 2000.0]),
+    "F43": np.zeros(2),
+    "F14": np.array([1.0, 100.0]),
+}
+"""Pin forces of a well-conditioned state and of one beside a change point."""
+CONDITIONS = np.array([0.9, 0.01])
+
+
+@pytest.mark.parametrize("torque", [[0.0, 0.0], [1e-6 * 15.0, 1.0]])
+def test_what_vanishes_is_judged_by_the_largest_pin_force(torque: list[float]) -> None:
+    """A torque is a sum of couples of pin forces, which may cancel.
+
+    Rounded lengths leave little of it, and more beside a change point.
+    """
+    sizes = {"torque": np.array(torque), **FORCES}
+    scales = find_scales(sizes, CONDITIONS, 0.5)
+    assert scales["torque"] == pytest.approx([15.0, 1500.0])
+    assert scales["F43"] == pytest.approx([30.0, 3000.0])
+    for name in ("F12", "F32", "F14"):
+        assert scales[name] == pytest.approx(sizes[name])
+
+
+@pytest.mark.parametrize("torque", [[1.0, 1.0], [1e-3, 0.0]])
+def test_a_torque_is_none_because_pin_forces_grow_beside_a_change_point(
+    torque: list[float],
+) -> None:
+    sizes = {"torque": np.array(torque), **FORCES}
+    scales = find_scales(sizes, CONDITIONS, 0.5)
+    assert scales["torque"] == pytest.approx(torque)
+
+
+def test_where_nothing_acts_there_is_no_scale() -> None:
+    sizes = dict.fromkeys(("torque", *FORCES), np.zeros(2))
+    assert not any(
+        scale.any() for scale in find_scales(sizes, CONDITIONS, 0.5).values()
+    )
+
+
+def test_the_median_is_of_errors_over_the_size_of_their_states() -> None:
+    errors = np.array([1.0, 2.0, 3.0])
+    assert find_median_part(errors, np.array([100.0, 10.0, 1.0])) == 0.2
+    assert find_median_part(np.zeros(3), np.zeros(3)) == 0.0
+    assert find_median_part(errors, np.zeros(3)) == np.inf
 
 
 def test_fewer_positions_keep_both_ends() -> None:

@@ -226,9 +226,42 @@ def test_axes_that_a_file_rounds_are_parallel_and_measured() -> None:
     assert np.allclose(closure.loop.lengths, planar.lengths(), rtol=1e-6)
 
 
+@pytest.mark.parametrize("limited", ["", 'limited="true" range="0 3"'])
+def test_a_hinge_in_place_of_a_ball_among_parallel_axes_is_what_to_type(
+    limited: str,
+) -> None:
+    """The frame of the ball's body is tilted: its axis is not that of the others.
+
+    What is advised makes the linkage of the pins.
+    """
+    planar = Planar()
+    joint = 'name="A" axis="0 0 1" '
+    place = planar.text().index(joint)
+    before = planar.text()[:place]
+    tilted = 'quat="0.6 0.8 0 0"><joint '
+    opened = before.rindex("><joint ")
+    start = before[:opened] + " " + tilted + 'name="A" '
+    # the end of the coupler stays where it was: turned back by the same angle
+    x, y = np.subtract(planar.pins["B"], planar.pins["A"]).tolist()
+    _, there, z = (rotation((0.6, -0.8, 0.0, 0.0)) @ (x, y, 0.0)).tolist()
+    end = planar.text()[place + len(joint) :].replace(
+        f'anchor="{x!r} {y!r} 0"', f'anchor="{x!r} {there!r} {z!r}"'
+    )
+    reason = closure_of(f'{start}type="ball" {limited}{end}').reason
+    typed = reason.partition("(")[2].partition(" in the file)")[0]
+    assert ("limited" in typed) == bool(limited)
+    loop = loop_of(f"{start}{typed}{end}")
+    assert loop.lengths == pytest.approx(planar.lengths(), rel=1e-6)
+    assert loop.misaligned < 1e-6
+
+
 def test_a_ball_joint_and_a_floating_body_are_named() -> None:
     ball = Planar().text().replace('name="A" axis="0 0 1"', 'name="A" type="ball"')
-    assert "A is a ball joint" in closure_of(ball).reason
+    assert "A is a ball joint, but the axes" in closure_of(ball).reason
+    spatial = ball.replace('name="O4" axis="0 0 1"', 'name="O4" axis="1 0 0"')
+    assert closure_of(spatial).reason == "A is a ball joint: the loop is spatial"
+    two = ball.replace('name="O4" axis="0 0 1"', 'name="O4" type="ball"')
+    assert closure_of(two).reason.endswith("is a ball joint: the loop is spatial")
     loose = (
         '<mujoco><worldbody><body name="a"><freejoint name="float"/><geom'
         " size=\"1\"/></body></worldbody><equality><connect body1='a' anchor='0 0"

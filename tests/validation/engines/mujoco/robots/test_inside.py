@@ -174,9 +174,10 @@ def test_the_start_of_a_simulation_is_not_judged() -> None:
     errors, scales = through.errors(), through.scales(inside.loop.longest)
     single = inside.answer_states(angles[5:], 1.0, 0.0)
     for quantity in FORCE_QUANTITIES:
-        settled = errors[quantity].max() / scales[quantity]
+        scale = scales[quantity].max()
+        settled = errors[quantity].max() / scale
         assert settled < 0.02
-        assert single.errors()[quantity].max() / scales[quantity] > 10.0 * settled
+        assert single.errors()[quantity].max() / scale > 10.0 * settled
 
 
 def test_what_ties_the_loop_to_held_joints_is_off_and_the_rest_is_not() -> None:

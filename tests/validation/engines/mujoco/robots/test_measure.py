@@ -25,12 +25,14 @@ from fourbar_validation.engines.mujoco.robots.measure import (
 from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.measure import (
+    MEASURED_THROUGH_TIME,
+    RIGID,
     STATES,
     find_left_out,
     find_worst_of_loop,
     list_errors_by_method,
 )
-from tests.support.robots import FINGER, make_parallelogram
+from tests.support.robots import FINGER, FOOT_PARALLELOGRAM, make_parallelogram
 from tests.support.scenes import mirrored
 
 ROBOTS = Path(__file__).parents[5] / "models" / "robots"
@@ -159,7 +161,7 @@ def test_a_full_turn_of_a_parallelogram_is_measured_but_for_its_change_points(
     assert len(loop.states.rows) == POSITIONS_OF_A_LOOP - 2
     assert find_left_out(loop) < 1e-8
     errors = list_errors_by_method(loop)
-    assert len(errors) == 2 * len(FORCE_QUANTITIES)
+    assert len(errors) == 3 * len(FORCE_QUANTITIES)
     assert all(math.isfinite(error.part) for error in errors)
 
 
@@ -181,7 +183,53 @@ def test_a_torque_that_vanishes_is_judged_on_the_pin_forces_times_a_bar() -> Non
     assert torque.vanishes
     assert torque.scale == pytest.approx(largest * 0.5, rel=1e-6)
     assert torque.part == torque.error / torque.scale
-    assert loop.influence < 1.0
+    assert loop.influence is not None and loop.influence.worst < 1.0
+
+
+def test_a_torque_beside_a_change_point_is_judged_by_itself() -> None:
+    """Viscous couples of 0.5 N m at O2 and O4, and the weights on level cranks."""
+    file = RobotFile(Path("foot.xml"), FOOT_PARALLELOGRAM)
+    (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), None).loops
+    largest = 2.0 * 0.5 + 9.81 * (0.016 * 0.03 + 0.014 * 0.06 + 0.27 * 0.03)
+    torques = [
+        error for error in list_errors_by_method(loop) if error.quantity == "torque"
+    ]
+    assert len(torques) == 3
+    for torque in torques:
+        assert not torque.vanishes
+        assert torque.scale == pytest.approx(largest, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_what_the_scene_leaves_out_is_no_error_of_mujoco() -> None:
+    """An armature I between bars 2 and 3 takes I (a3 - a2)(w3 - w2)/w2 of the motor."""
+    bare = replace(ROCKER, loads=(), effects=())
+    armature = 0.01
+    text = write_mjcf(bare, drive="motor")
+    file = RobotFile(Path("arm.xml"), text)
+    changed = text.replace('joint name="A"', f'joint name="A" armature="{armature}"')
+    assert changed != text
+    with_armature = RobotFile(Path("arm.xml"), changed)
+    options = MeasureOptions(PoseOptions())
+    (loop,) = measure_loops(with_armature, options, bare).loops
+    errors = {
+        error.method: error
+        for error in list_errors_by_method(loop)
+        if error.quantity == "torque"
+    }
+    at = bare.motion.replace(angle=np.array(made_angles(loop)))
+    solution = fourbar.solve(replace(bare, motion=at))
+    alpha = solution.alpha_3 - solution.alpha_2
+    omega = solution.omega_3 - solution.omega_2
+    taken = armature * alpha * omega / solution.omega_2
+    assert errors[RIGID].error == pytest.approx(np.abs(taken).max(), rel=1e-8)
+    soft = np.array([row.soft.torque - row.rigid.torque for row in loop.states.rows])
+    assert errors[STATES].error == np.abs(soft).max()
+    # the closure of a generated file is nearly rigid, with the armature or without
+    (plain,) = measure_loops(file, options, bare).loops
+    assert find_worst_of_loop(plain) < 0.1 * errors[RIGID].part
+    assert errors[STATES].part < 0.1 * errors[RIGID].part
+    assert errors[MEASURED_THROUGH_TIME].part < 0.1 * errors[RIGID].part
 
 
 def test_a_couple_is_found_where_nothing_accelerates() -> None:

@@ -9,10 +9,15 @@ import numpy as np
 
 from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import Scene
-from fourbar_validation.compare.scales import replace_vanishing
+from fourbar_validation.compare.tolerance import WELL_CONDITIONED
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
 
 FORCE_QUANTITIES = ("torque", *PIN_FORCES)
+ROUND_OFF_OF_A_FILE = 1e-5
+"""Part of its terms below which a torque or a pin force is the rounding of a file.
+MuJoCo saves six significant digits: half of the last is up to 5e-6 of a length, and the
+difference of two lengths is off by twice as much.
+"""
 
 
 class LoopMotion(NamedTuple):
@@ -50,25 +55,44 @@ def measure_sizes(values: Any) -> Array:
     return np.asarray(np.abs(numbers) if numbers.ndim == 1 else np.hypot(*numbers.T))
 
 
-def find_scales(largest: Mapping[str, float], longest: float) -> dict[str, float]:
-    """Return what the errors of torque and pin forces are divided by, N m and N.
+def find_median_part(errors: Array, scales: Array) -> float:
+    """Return the median of errors, each over the scale of its state.
 
-    It is the largest of each. One that (nearly) vanishes is a sum whose terms cancel:
-    pin forces, and for the torque their couples on the bars. Its error is divided by
-    the largest pin force, for the torque times the longest moving bar.
+    Where the scale is zero an error is infinite; no error is zero.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        parts = np.where(errors > 0.0, errors / scales, 0.0)
+    return float(np.median(parts))
+
+
+def find_scales(
+    sizes: Mapping[str, Array],
+    conditions: Array,
+    longest: float,
+) -> dict[str, Array]:
+    """Return what the errors of torque and pin forces are judged by, N m and N.
+
+    It is the size of each. One that is the round-off of its terms at every
+    well-conditioned state is a sum that cancels: its errors are judged by the terms,
+    which are the largest pin force of the state, for the torque times the longest
+    moving bar.
 
     Parameters
     ----------
-    largest : largest torque and largest of each pin force, N m and N.
+    sizes : size of the torque and of each pin force at each state, (n,), N m and N.
+    conditions : |sin(theta_4 - theta_3)| at each state, (n,).
     longest : longest moving bar, m.
     """
-    force = max(largest[name] for name in PIN_FORCES)
+    force = np.max([sizes[name] for name in PIN_FORCES], axis=0)
+    well = conditions >= WELL_CONDITIONED
     scales = {}
     for name in FORCE_QUANTITIES:
         terms = force
         if name == "torque":
             terms = force * longest
-        scales[name] = float(replace_vanishing(largest[name], terms))
+        cancels = sizes[name] <= ROUND_OFF_OF_A_FILE * terms
+        vanishes = well.any() and cancels[well].all()
+        scales[name] = terms if vanishes else sizes[name]
     return scales
 
 
@@ -89,6 +113,8 @@ class InsideRow:
     """
     gap: float
     """Distance of the ends of the closure, m."""
+    condition: float
+    """|sin(theta_4 - theta_3)| of the closed state of the same theta_2."""
     sticking: tuple[str, ...] = ()
     """Hinges that turn and whose dry friction MuJoCo has not let reach its couple."""
 
@@ -121,20 +147,34 @@ class InsideAnswer:
             sizes[name] = measure_sizes(soft - rigid)
         return sizes
 
-    def scales(self, longest: float) -> dict[str, float]:
-        """Return what the errors are divided by, as `find_scales` does.
+    def sizes(self) -> dict[str, Array]:
+        """Return the sizes of torque and pin forces of rigid pins, (n,), N m and N."""
+        return {
+            name: measure_sizes([row.rigid.values()[name] for row in self.rows])
+            for name in FORCE_QUANTITIES
+        }
 
-        The torque and the pin forces are those of rigid pins, N m and N.
+    def scales(self, longest: float) -> dict[str, Array]:
+        """Return what the errors are judged by at each state, as `find_scales` does.
+
+        The torque and the pin forces are those of rigid pins, (n,), N m and N.
 
         `longest`: longest moving bar, m.
         """
-        largest = {
-            name: float(
-                measure_sizes([row.rigid.values()[name] for row in self.rows]).max()
-            )
-            for name in FORCE_QUANTITIES
-        }
-        return find_scales(largest, longest)
+        conditions = np.array([row.condition for row in self.rows])
+        return find_scales(self.sizes(), conditions, longest)
+
+
+@dataclass(frozen=True, slots=True)
+class Influence:
+    """Largest changes of the errors of torque and pin forces, relative."""
+
+    worst: float
+    """Change at the worst state, over the largest of the quantity. Infinite without an
+    answer.
+    """
+    median: float
+    """Median over the states, each over the size of the quantity there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,6 +248,8 @@ class SettingsAdvice:
     """Settings and errors of one loop, for one wanted error."""
 
     wanted: float
+    positions: int
+    """Number of positions at which settings are tried."""
     before: TriedSettings
     alone: tuple[TriedSettings, ...]
     """Each setting changed by itself, the one that helps most first."""
@@ -257,9 +299,9 @@ class LoopMeasurement:
     through_time: InsideAnswer | None
     refusal: str
     """Why it was not simulated; empty where it was."""
-    influence: float
-    """Change of the errors if the joints are held a tenth as firmly. It is over the
-    largest torque and pin forces.
+    influence: Influence | None
+    """Change of the errors if the joints are held a tenth as firmly. None where it was
+    not simulated.
     """
     torn: tuple[TornState, ...]
     advice: SettingsAdvice | None

@@ -350,16 +350,56 @@ class _Finder:
             return None, 'it is switched off in the file (active="false")'
         if not chain.joints:
             return None, "both ends are on one rigid body"
-        reason = self._find_other_joint(chain) or self._find_skew_axes(chain)
+        is_pin = self._is_pin(number)
+        reason = (
+            self._find_ball_in_a_plane(chain, is_pin=is_pin)
+            or self._find_other_joint(chain)
+            or self._find_skew_axes(chain)
+        )
         if reason:
             return None, reason
-        is_pin = self._is_pin(number)
         hinges = len(chain.joints) + is_pin
         if hinges != 4:
             return None, self._explain_count(chain, hinges, number, is_pin=is_pin)
         if None in chain.bars:
             return None, "two of its hinges are on one body: a bar has no body"
         return self._make_loop(number, name, chain, is_pin=is_pin)
+
+    def _find_ball_in_a_plane(self, chain: _Chain, *, is_pin: bool) -> str:
+        """Say what to type for one ball among hinges with parallel axes.
+
+        Both ends of the bar that it carries stay in their planes, so that a hinge moves
+        as the ball does. Empty where the loop is another.
+        """
+        hinges = []
+        others = []
+        for joint, kind in zip(chain.joints, chain.kinds, strict=True):
+            if kind == HINGE_JOINT:
+                hinges.append(joint)
+            else:
+                others.append(joint)
+        kinds = [int(self.model.jnt_type[joint]) for joint in others]
+        pins = len(chain.joints) + is_pin
+        if kinds != [BALL] or pins != len(PINS) or self._find_skew_axes(chain):
+            return ""
+        (ball,) = others
+        rest = mujoco.MjData(self.model)
+        rest.qpos[:] = self.data.qpos
+        address = int(self.model.jnt_qposadr[ball])
+        rest.qpos[address : address + 4] = self.model.qpos0[address : address + 4]
+        mujoco.mj_kinematics(self.model, rest)
+        body = int(self.model.jnt_bodyid[ball])
+        # a joint states its axis in the frame of its body
+        axis = rest.xmat[body].reshape(3, 3).T @ rest.xaxis[hinges[0]]
+        numbers = " ".join(f"{part:.6g}" for part in np.round(axis, 12) + 0.0)
+        typed = f'type="hinge" axis="{numbers}"'
+        if self.model.jnt_limited[ball]:  # its range is not that of a hinge
+            typed += ' limited="false"'
+        return (
+            f"{name_joint(self.model, ball)} is a ball joint, but the axes of the"
+            f" hinges are parallel: a hinge in its place ({typed} in the file) moves"
+            " alike and makes it a four-bar"
+        )
 
     def _find_other_joint(self, chain: _Chain) -> str:
         words = {

@@ -31,7 +31,7 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import LimitError
-from fourbar.linkage import PINS
+from fourbar.linkage import ENDS, PINS
 from fourbar.quantities import Array
 from fourbar_validation.engines.description import FORCE_AT, FORCE_BETWEEN
 from fourbar_validation.engines.mujoco.closed_loop import WARNINGS, load_force
@@ -216,6 +216,25 @@ class LoopInside:
         sizes = np.linalg.svd(jacobian[:, self.passive], compute_uv=False)
         return float(sizes[1])
 
+    def _measure_condition(self, qpos: Array) -> float:
+        """Return |sin(theta_4 - theta_3)| in a pose."""
+        self._evaluate_closure(qpos)
+        coupler, output = (self._find_line(bar) for bar in (3, 4))
+        return float(np.linalg.norm(np.cross(coupler, output)))
+
+    def _find_line(self, bar: int) -> Array:
+        """Return the unit vector from the first pin of a bar to its second, (3,).
+
+        It is in world axes, in the pose in which the closure was evaluated last.
+        """
+        body = self.loop.bodies[bar][0]
+        first, second = (self.loop.points[bar, pin] for pin in ENDS[bar])
+        line = self.closing.xmat[body].reshape(3, 3) @ (second - first)
+        ground = self.closing.xmat[self.loop.bodies[1][0]].reshape(3, 3)
+        normal = ground @ self.loop.axis
+        line = line - (line @ normal) * normal
+        return np.asarray(line / np.linalg.norm(line))
+
     def _is_in_line(self, qpos: Array) -> bool:
         """Tell whether the bars of pin B are in line: at a change point or a limit.
 
@@ -303,6 +322,7 @@ class LoopInside:
             soft=PinsAndTorque(couple, self._read_forces(data)),
             rigid=rigid,
             gap=self._measure_gap(qpos),
+            condition=self._measure_condition(closed.qpos),
             sticking=self._list_sticking(),
         )
 

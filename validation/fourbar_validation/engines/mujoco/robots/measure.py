@@ -12,12 +12,14 @@ import numpy as np
 from fourbar.errors import InputError, LimitError
 from fourbar.scene import Scene, command
 from fourbar_validation.engines.mujoco.robots.answers import (
+    Influence,
     InsideAnswer,
     LoopMeasurement,
     LoopMotion,
     MeasureOptions,
     RobotMeasurement,
     TornState,
+    find_median_part,
     measure_sizes,
 )
 from fourbar_validation.engines.mujoco.robots.closures import (
@@ -132,7 +134,7 @@ def _measure_loop(
     closing = motion._replace(theta_2=tuple(row.theta_2 for row in states.rows))
     through: InsideAnswer | None = None
     refusal = ""
-    influence = math.nan
+    influence: Influence | None = None
     try:
         if motion.omega_2 == 0.0 or len(closing.theta_2) < 2:
             raise LimitError("nothing moves: a sweep at a speed is needed")
@@ -181,19 +183,19 @@ def _compare_at_same_angles(
     one: InsideAnswer,
     other: InsideAnswer,
     longest: float,
-) -> float:
+) -> Influence:
     """Return by how much the errors of two runs differ at the same angles.
 
-    It is over the scale of each quantity. Each is the error at its own state: the
-    motions differ too, and near a limit position the forces with them.
+    Each is the error at its own state: the motions differ too, and near a limit
+    position the forces with them.
 
     `longest`: longest moving bar, m.
     """
-    scales = one.scales(longest)
-    worst = 0.0
     if one.lost or other.lost:
-        return math.inf
-    for name, scale in scales.items():
+        return Influence(math.inf, math.inf)
+    worst = 0.0
+    median = 0.0
+    for name, scales in one.scales(longest).items():
         first, second = (
             np.array(
                 [
@@ -203,6 +205,8 @@ def _compare_at_same_angles(
             )
             for answer in (one, other)
         )
-        if scale:
-            worst = max(worst, float(measure_sizes(first - second).max()) / scale)
-    return worst
+        changes = measure_sizes(first - second)
+        if scales.any():
+            worst = max(worst, float(changes.max() / scales.max()))
+            median = max(median, find_median_part(changes, scales))
+    return Influence(worst, median)

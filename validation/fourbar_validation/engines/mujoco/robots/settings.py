@@ -130,6 +130,7 @@ class SettingsSearch:
         typed = _write_elements(file, self.loop, best)
         return SettingsAdvice(
             wanted,
+            len(self.motion.theta_2),
             before,
             tuple(alone),
             best,
@@ -258,8 +259,9 @@ def _find_worst_force_error(answer: InsideAnswer, longest: float) -> float:
         largest = float(np.max(errors))
         if not math.isfinite(largest):
             return math.inf
-        if scales[name]:
-            worst = max(worst, largest / scales[name])
+        scale = float(scales[name].max())
+        if scale:
+            worst = max(worst, largest / scale)
     return worst
 
 
