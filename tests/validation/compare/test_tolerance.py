@@ -17,6 +17,7 @@ from fourbar_validation.compare.tolerance import (
     compute_difference,
     divide,
     find_condition,
+    find_conditions,
     find_error,
     find_lever,
     find_used,
@@ -73,6 +74,27 @@ def test_what_is_no_number_uses_more_than_is_allowed(
 def test_the_worst_error_is_the_one_that_is_no_number() -> None:
     assert find_worst(np.array([1.0, NAN, 3.0])) == 1
     assert find_worst(np.array([1.0, 2.0, 0.0])) == 1
+
+
+def test_conditions_of_several_quantities_are_those_of_their_units() -> None:
+    """Of angles s, of rates s^2, of forces s^2 times the drive's; of the input 1."""
+    scene = crank_rocker(
+        motion=fourbar.Motion(theta_3=np.linspace(0.7, 1.3, 5), omega_3=1.0),
+        drive_bar=4,
+    )
+    s = fourbar.solve(scene)
+    lever = find_lever(scene.linkage, 3)
+    wanted = {
+        "theta_3": np.ones(5),
+        "omega_3": np.ones(5),
+        "theta_2": lever * s.condition,
+        "alpha_4": lever * s.condition**2,
+        "torque": lever * s.condition**2 * s.drive_condition,
+        "F12": lever * s.condition**2 * s.drive_condition,
+    }
+    found = find_conditions([*wanted], scene.linkage, s)
+    assert np.ptp(s.drive_condition) > 0.0 and np.ptp(s.condition) > 0.0
+    np.testing.assert_allclose(found, [*wanted.values()], rtol=1e-15)
 
 
 def test_of_a_stroke_the_angle_of_its_bar_is_conditioned_by_the_lever() -> None:
