@@ -387,12 +387,10 @@ def find_requested(
         wanted = out.keys()
         foreign = _list_foreign(scene)
         stages = _list_stages(tuple(point.name for point in scene.points))
-        stages = {
-            name: stage_of for name, stage_of in stages.items() if name not in foreign
-        }
         for name, array in out.items():
-            if name not in stages:
-                raise InputError("out", name, "must be among " + ", ".join(stages))
+            if name not in stages or name in foreign:
+                known = ", ".join(name for name in stages if name not in foreign)
+                raise InputError("out", name, f"must be among {known}")
             if name in SCALARS:
                 wanted_shape = shape
             else:

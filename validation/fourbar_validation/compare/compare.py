@@ -282,11 +282,12 @@ class Comparison:
             in_time=tolerance.in_time,
         )
 
-    def _may_reverse(self, quantity: str) -> bool:
-        """Return whether a quantity may have two values where friction reverses."""
-        return quantity in _OF_FORCES or (
-            quantity == "drive_condition" and self._may_jam
-        )
+    @property
+    def _reversible(self) -> tuple[str, ...]:
+        """Quantities that may have two values where friction reverses."""
+        if self._may_jam:
+            return (*_OF_FORCES, "drive_condition")
+        return _OF_FORCES
 
     @property
     def _may_jam(self) -> bool:
@@ -376,7 +377,8 @@ class Comparison:
             masks[forces] &= _mark_moving_drive(self.scene, formulas)
         # at a reversal the forces of either side are right
         at_reversals = np.zeros(masks.shape, dtype=bool)
-        may_reverse = [self._may_reverse(pair.quantity) for pair in pairs]
+        reversible = self._reversible
+        may_reverse = [pair.quantity in reversible for pair in pairs]
         if any(may_reverse):
             at_reversals[may_reverse] = masks[may_reverse] & self._reversing
         masks &= ~at_reversals

@@ -374,4 +374,4 @@ def find_used(error: Array | float, allowed: Array | float) -> Array:
 
 def find_worst(errors: Array) -> int:
     """Return the index of the largest error; NaN counts as the largest."""
-    return int(np.argmax(np.where(np.isnan(errors), np.inf, errors)))
+    return int(np.where(np.isnan(errors), np.inf, errors).argmax())

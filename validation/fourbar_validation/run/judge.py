@@ -147,7 +147,7 @@ def judge_for_report(
     """
     record = judge(name, scene, engines, order=draw, derived=derived)
     for i, row in enumerate(record.rows):
-        if row.failed and row.engine in record.output:
+        if row.engine in record.output and row.failed:
             record.rows[i] = replace(
                 row,
                 reason=f"{row.reason}; what it printed: {OUTPUT}",

@@ -288,27 +288,22 @@ def check_error_bars(question: Question) -> Iterator[Row]:
     exact = ask_at(BallArithmetic(), scene, sampled)
     ours = solve(scene, "error", at=sampled)
     reference = make_reference(scene, exact)
-    sizes = TermSizes(scene, ours)
-    if reference is None:
-        of_balls = None
-    else:
-        of_balls = TermSizes(scene, reference)
     turns = np.maximum(
         count_half_turns(scene.linkage.ground_angle), np.abs(sampled.theta_2) / np.pi
     )
-    for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
+    names = ("torque", *PIN_FORCES)
+    differences = magnitudes([getattr(ours, q) - exact.quantities[q] for q in names])
+    sizes = take_smallest_scales(
+        names,
+        TermSizes(scene, ours),
+        None if reference is None else TermSizes(scene, reference),
+    )
+    conditions = take_strictest_conditions(names, scene.linkage, ours, reference)
+    for bar, rows in (("torque_error", slice(0, 1)), ("force_error", slice(1, None))):
         width = getattr(ours, bar)
-        true = np.max(
-            magnitudes([getattr(ours, q) - exact.quantities[q] for q in quantities]),
-            axis=0,
-        )
-        size = np.max(take_smallest_scales(quantities, sizes, of_balls), axis=0)
-        condition = take_strictest_conditions(
-            quantities[:1],
-            scene.linkage,
-            ours,
-            reference,
-        )[0]
+        true = differences[rows].max(axis=0)
+        size = sizes[rows].max(axis=0)
+        condition = conditions[rows][0]
         tells = condition * NOTHING_TO_TELL > EPS
         wide = divide(width, size) * condition / (K * EPS * turns)
         if (
@@ -317,7 +312,7 @@ def check_error_bars(question: Question) -> Iterator[Row]:
             expected = np.max(
                 [
                     predict_from_data(scene, sampled, quantity, beyond)
-                    for quantity in quantities
+                    for quantity in names[rows]
                 ],
                 axis=0,
             )

@@ -66,14 +66,19 @@ def make_worst_row(
     findings: Sequence[Finding],
 ) -> Row:
     """Make the row of the finding that exceeds most what it is allowed."""
-    error, allowed, theta_2 = (
-        np.array(column)
-        for column in zip(*(finding[:3] for finding in findings), strict=True)
+    errors = np.array([finding.error for finding in findings])
+    allowed = np.array([finding.allowed for finding in findings])
+    worst = findings[int(find_used(errors, allowed).argmax())]
+    condition = EQUIVALENCE.factor / max(worst.allowed, EQUIVALENCE.factor)
+    return Row.judged(
+        (name, answer.engine, answer.setting),
+        quantity,
+        worst.error,
+        worst.allowed,
+        worst.what,
+        worst.theta_2,
+        condition,
     )
-    worst = findings[int(np.argmax(find_used(error, allowed)))]
-    condition = EQUIVALENCE.factor / np.maximum(allowed, EQUIVALENCE.factor)
-    who = (name, answer.engine, answer.setting)
-    return Row.judged(who, quantity, error, allowed, worst.what, theta_2, condition)
 
 
 class Visit(NamedTuple):
