@@ -299,7 +299,7 @@ def join_components(x: Array, y: Array) -> Array:
     return vectors
 
 
-def magnitudes(values: Sequence[Array]) -> Array:
+def magnitudes(values: Sequence[Array] | Array) -> Array:
     """Return those of several quantities, (q, n)."""
     sizes = np.empty((len(values), len(values[0])))
     for axes in (1, 2):

@@ -618,7 +618,7 @@ def _measure_mirrored(few: _Few) -> Array:
     )
 
     def convert(name: str) -> Array:
-        values = np.array(getattr(other, name))
+        values: Array = getattr(other, name)
         if name in PIN_FORCES:
             return values * [1.0, -1.0]
         if name in ("drive_force", "power"):
@@ -636,7 +636,7 @@ def _measure_turned(few: _Few) -> Array:
     )
 
     def convert(name: str) -> Array:
-        values = np.array(getattr(other, name))
+        values: Array = getattr(other, name)
         if name in PIN_FORCES:
             turned = (values @ [1.0, 1j]) * np.exp(-1j * TURNED)
             return join_components(turned.real, turned.imag)
@@ -656,7 +656,7 @@ def _measure_scaled(few: _Few) -> Array:
     power = {"N": SCALE, "N m": SCALE**2, "W": SCALE**2}
     differences = []
     for name, ours in zip(few.quantities, few.numbers, strict=True):
-        theirs = np.array(getattr(other, name)) / power.get(UNITS[name], 1.0)
+        theirs = getattr(other, name) / power.get(UNITS[name], 1.0)
         differences.append(theirs - ours)
     return magnitudes(differences)
 
@@ -680,11 +680,13 @@ def _measure_exchanged(few: _Few) -> Array:
     def convert(name: str) -> Array:
         if name in PIN_FORCES:
             same, sign = _OTHER_FORCE[name]
-            return sign * np.array(getattr(other, same))
+            return np.asarray(sign * getattr(other, same))
+        values: Array
         if name[:6] in ("theta_", "omega_", "alpha_"):
             values = getattr(other, f"{name[:6]}{_OTHER_BAR[int(name[6])]}")
-            return values - math.pi if name == "theta_3" else np.array(values)
-        return np.array(getattr(other, name))
+            return values - math.pi if name == "theta_3" else values
+        values = getattr(other, name)
+        return values
 
     return few.compare(convert)
 
@@ -767,11 +769,11 @@ def _measure_sum(
     totals = []
     summed = []
     for name in names:
-        of_parts = [np.array(getattr(part, name)) for part in solved]
-        total = np.sum(of_parts, axis=0)
-        size = np.sum([magnitude(of_part) for of_part in of_parts], axis=0)
+        of_parts = np.array([getattr(part, name) for part in solved])
+        total = of_parts.sum(axis=0)
+        size = magnitudes(of_parts).sum(axis=0)
         if none is not None:
-            nothing = np.array(getattr(none, name))
+            nothing = getattr(none, name)
             total = total - (len(parts) - 1) * nothing
             size = size + len(parts) * magnitude(nothing)
         totals.append(total)

@@ -462,7 +462,7 @@ def compare_ranges(
             assert answer.assembled is not None
             closes = answer.assembled
         wrong = tried.decidable & (closes != tried.inside)
-        angle = float(tried.angles[int(np.argmax(wrong))])
+        angle = float(tried.angles[wrong.argmax()])
         if wrong.any():
             what = f"bar {bar} at {angle!r} rad: the engine finds the opposite"
         else:
