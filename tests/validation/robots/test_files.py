@@ -1,5 +1,6 @@
 """A robot's file with its includes and meshes: what is read, left out and refused."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -218,7 +219,10 @@ def test_a_million_copies_end_in_one_line(
     """A robot may have <replicate>; what it becomes is bounded where it is compiled."""
     monkeypatch.setattr(guard, "ROBOT_SECONDS", 5.0)
     scene = ROOT / "models" / "crank_rocker.toml"
-    text, path = write_mjcf(fourbar.load(scene)), tmp_path / "robot.xml"
+    # MuJoCo 3.14 counts the coordinates of a keyframe before it makes the copies
+    text = write_mjcf(fourbar.load(scene))
+    text = re.sub("<keyframe>.*</keyframe>", "", text, flags=re.DOTALL)
+    path = tmp_path / "robot.xml"
     bodies = "<body><geom size='.1'/></body>"
     copies = f"<replicate count='1000000'>{bodies}</replicate>"
     path.write_text(text.replace("<worldbody>", f"<worldbody>{copies}"))
