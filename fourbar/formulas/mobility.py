@@ -383,7 +383,7 @@ CHANGE_POINT_TYPES = {1: "SCCC", 2: "SCRR", 3: "SRCR", 4: "SRRC"}
 PARALLELOGRAM = "parallelogram"
 _NEARLY = 1e-3
 """Miss of a change point, over the sum of the lengths, up to which it is reported."""
-_DIGITS_STATED = 1e-4
+DIGITS_STATED = 1e-4
 """Part of the sum of the lengths up to which the last decimal of a length is a
 rounding; a coarser one is meant as it stands.
 """
@@ -595,7 +595,7 @@ def meet_change_points(
     perimeter = math.fsum(lengths)
     fine = []
     for rounding, last in zip(roundings, decimals or roundings, strict=True):
-        fine.append(rounding if last <= _DIGITS_STATED * perimeter else 0.0)
+        fine.append(rounding if last <= DIGITS_STATED * perimeter else 0.0)
     allowed = math.fsum(fine)
     meant = []
     misses = []

@@ -11,7 +11,7 @@ from fourbar.mjcf import write_mjcf
 from fourbar_validation.advise.advise import advise_command as advise
 from fourbar_validation.check.mjcf import check_mjcf_command as check_mjcf
 from fourbar_validation.robots.command import robot_command as loops
-from tests.support.robots import make_parallelogram
+from tests.support.robots import FOOT_PARALLELOGRAM, make_parallelogram
 
 FOOT = str(Path(__file__).parents[3] / "models" / "robots" / "biped_foot.xml")
 
@@ -129,3 +129,16 @@ def test_errors_beside_a_limit_are_told_from_those_of_the_motion(
     said = join_lines(checked)
     assert "deg is 2 deg from a limit position, where forces grow" in said
     assert "of largest at median" in said
+
+
+def test_what_the_digits_of_a_file_leave_open_is_said(tmp_path: Path) -> None:
+    file = tmp_path / "foot.xml"
+    file.write_text(FOOT_PARALLELOGRAM, encoding="utf-8")
+    checked = call(check_mjcf, str(file), "-o", str(tmp_path))
+    assert checked.return_value == 0, checked.output
+    said = join_lines(checked)
+    assert "what the scene leaves out and the lengths that it reads as equal;" in said
+    assert "in line within the digits of the file (motor = 68.75 deg)" in said
+    assert "note: rod: lengths read as equal within the digits of the file: " in said
+    assert "3.2 deg from a change point" in said
+    assert "zero" not in said

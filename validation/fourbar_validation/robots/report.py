@@ -109,18 +109,23 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[ReportBlock]:
         size = f"{left_out:.1e}"
     else:
         size = f"less than {SCENE_ROUND_OFF:g}"
+    and_lengths = ""
+    within_digits = ""
+    if loop.rounding:
+        and_lengths = " and the lengths that it reads as equal"
+        within_digits = " within the digits of the file"
     yield (
         f"with rigid pins the robot differs from the formulas by {size} of the largest:"
-        " what the scene leaves out; MuJoCo differs from rigid pins by its soft"
-        " constraint"
+        f" what the scene leaves out{and_lengths}; MuJoCo differs from rigid pins by"
+        " its soft constraint"
     )
     if loop.states.in_line:
         places = ", ".join(map(write_degrees, loop.states.in_line))
         count = len(loop.states.in_line)
         yield (
             f"left out: {count} of {count + len(loop.states.rows)} states, with coupler"
-            f" and output in line ({loop.joint} = {places} deg), where the loop may go"
-            " on in two ways"
+            f" and output in line{within_digits} ({loop.joint} = {places} deg), where"
+            " the loop may go on in two ways"
         )
     errors = list_errors_by_method(loop)
     if left_out <= LEAST_LEFT_OUT:

@@ -291,6 +291,10 @@ class LoopMeasurement:
     """Angle of the scene's axes in the plane of the loop, rad."""
     remarks: tuple[str, ...]
     settings: RobotSettings
+    rounding: float
+    """Sum by which the lengths of the scene differ from the file's within its digits,
+    m.
+    """
     held: int
     """Number of degrees of freedom that are held."""
     switched_off: tuple[str, ...]

@@ -4,6 +4,7 @@ What is missing and moves nothing is left out.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import mujoco
@@ -29,6 +30,10 @@ class CompiledRobot:
     notes: tuple[str, ...]
     unknown_masses: tuple[int, ...]
     """Bodies whose mass a missing mesh would have given."""
+    quaternions: Mapping[int, tuple[float, ...]]
+    """Quaternion of each body whose orientation the file states by one, as it stands
+    there: the compiled one is normalized, which hides its digits.
+    """
 
 
 def compile_robot(file: RobotFile) -> CompiledRobot:
@@ -49,6 +54,11 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
                 f"asks for {spec.nkey} keyframes; up to {_MOST_KEYFRAMES} are read",
             )
         left_out, unknown = _take_out_meshes(spec, file)
+        quaternions = {
+            number: tuple(body.quat.tolist())
+            for number, body in enumerate(spec.bodies)
+            if body.alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT
+        }
         model = spec.compile()
     except ValueError as error:
         complaint = " ".join(f"MuJoCo does not compile it: {error}".split())
@@ -80,7 +90,7 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
             f"the masses of {names} are unknown: their meshes are missing and no "
             "inertial is stated; --assets DIR says where the meshes are"
         )
-    return CompiledRobot(model, tuple(notes), masses)
+    return CompiledRobot(model, tuple(notes), masses, quaternions)
 
 
 def list_unknown_parts(robot: CompiledRobot, bodies: set[int]) -> list[str]:

@@ -65,6 +65,14 @@ LEAST_TRANSMISSION = 1e-5
 """Transmission over the longest bar below which the bars of pin B are in line. A closed
 pose is known to the residual over it, and to less than that below.
 """
+GAP_OF_ROUNDING = 2.0
+"""Gap of a closed loop over the rounding of its lengths. Where the bars are in line the
+least gap is that rounding, and Newton's steps end beside it.
+"""
+KNOWN_TRANSMISSION = 0.01
+"""Part of the angle between bars 3 and 4 up to which the digits of a file may turn it:
+forces have two digits.
+"""
 _SOLVE_STEPS = 60
 """Newton steps for the hinges' accelerations; without friction one is enough."""
 _BALANCED = 1e-10
@@ -195,17 +203,22 @@ class LoopInside:
         The residual is that of the closure. Tell whether it is closed.
         """
         least = math.inf
+        best = qpos.copy()
         for _ in range(_CLOSING_STEPS):
             residual, jacobian = self._evaluate_closure(qpos)
             size = float(np.abs(residual).max())
-            closed = size <= RESIDUAL_OF_A_CLOSED_STATE
-            if closed or size >= least:
+            if size >= least:
                 break
             least = size
+            best = qpos.copy()
+            if size <= RESIDUAL_OF_A_CLOSED_STATE:
+                break
             step = _solve_least_squares(jacobian[:, self.passive], -residual)
             qpos[self.passive_addresses] += step
-        allowed = max(RESIDUAL_OF_AN_OPEN_LOOP, self._skew())
-        return bool(np.abs(residual).max() <= allowed)
+        rounding = GAP_OF_ROUNDING * self.loop.rounding
+        allowed = max(RESIDUAL_OF_AN_OPEN_LOOP, self._skew(), rounding)
+        qpos[:] = best
+        return least <= allowed
 
     def measure_transmission(self, qpos: Array) -> float:
         """Return how well the hinges that are not driven close the gap in a pose, m.
@@ -239,9 +252,14 @@ class LoopInside:
         """Tell whether the bars of pin B are in line: at a change point or a limit.
 
         The loop may go on in two ways there, or no way, and forces are not determined.
+        Nor are they where the digits of the file turn bars 3 and 4 by a part of the
+        angle between them, which is their rounding over the squared sine.
         """
-        least = LEAST_TRANSMISSION * self.loop.longest
-        return self.measure_transmission(qpos) < least
+        longest = self.loop.longest
+        if self.measure_transmission(qpos) < LEAST_TRANSMISSION * longest:
+            return True
+        turned = self.loop.rounding / longest
+        return turned > KNOWN_TRANSMISSION * self._measure_condition(qpos) ** 2
 
     def _skew(self) -> float:
         """Return what axes that are not parallel leave of the gap, m."""

@@ -95,6 +95,10 @@ class RobotLoop:
     other_equalities: tuple[int, ...]
     """Active equalities that act on its moving bars and are no closure of it."""
     remarks: tuple[str, ...] = ()
+    rounding: float = 0.0
+    """Sum by which the lengths of its scene differ from its own, m. They differ where
+    the digits of the file cannot tell the linkage from one with a change point.
+    """
 
     @property
     def joint(self) -> int:

@@ -98,6 +98,7 @@ def measure_loops(
             else:
                 remarks = loop.remarks
             share = 1.0 / len(loops)
+            loop = made.loop
             measurement = _measure_loop(posed.model, loop, stated, options, file, share)
             measured.append(replace(measurement, remarks=(*remarks,)))
     notes = [*compiled.notes, *posed.notes]
@@ -159,6 +160,7 @@ def _measure_loop(
         turned,
         (),
         read_settings(model, loop),
+        loop.rounding,
         len(inside.held),
         tuple(describe_equality(model, number) for number in loop.other_equalities),
         states,

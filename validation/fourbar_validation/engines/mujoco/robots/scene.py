@@ -19,6 +19,7 @@ from fourbar.errors import InputError
 from fourbar.formulas.mobility import (
     ANGLE_FROM_LIMITS,
     find_intervals,
+    list_met_equalities,
     turns_fully,
 )
 from fourbar.linkage import BAR_NAMES, ENDS, MOVING_BARS, PINS, Bar, FourBar
@@ -44,6 +45,7 @@ from fourbar_validation.engines.mujoco.robots.compiled import (
     compile_robot,
     list_unknown_parts,
 )
+from fourbar_validation.engines.mujoco.robots.digits import meet_lengths
 from fourbar_validation.engines.mujoco.robots.inside import reflect
 from fourbar_validation.engines.mujoco.robots.loop import (
     FLAT,
@@ -131,7 +133,7 @@ def make_loop_scene(
         )
     return LoopScene(
         scene,
-        loop,
+        made.loop,
         made.write_parts(),
         tuple(remarks),
         (),
@@ -271,6 +273,7 @@ class _SceneOfLoop:
         posed: PosedRobot,
         loop: RobotLoop,
     ) -> None:
+        self.compiled = compiled
         self.model = posed.model
         self.data = posed.data
         self.loop = loop
@@ -315,7 +318,7 @@ class _SceneOfLoop:
         """Describe the scene."""
         lumps = {bar: self._lump(bar) for bar in MOVING_BARS}
         armature = self._list_armature()
-        lengths = [round_off(length) for length in self.loop.lengths]
+        lengths = self._meet_lengths()
         bars = {}
         for bar, lump in lumps.items():
             inertia = lump.inertia + (armature.get("O4", 0.0) if bar == 4 else 0.0)
@@ -352,6 +355,24 @@ class _SceneOfLoop:
             title=title,
             source=source,
         )
+
+    def _meet_lengths(self) -> tuple[float, ...]:
+        """Return the lengths within the digits of the file, and say which are equal."""
+        d, a, b, c = map(round_off, self.loop.lengths)
+        stated = (d, a, b, c)
+        met = tuple(map(round_off, meet_lengths(self.compiled, self.loop, stated)))
+        equal = [
+            f"{first} and {second}, which differ by {gap:.4g} m"
+            for first, second, gap in list_met_equalities(stated, met)
+        ]
+        if equal and met != stated:
+            self.remarks.append(
+                "lengths read as equal within the digits of the file:"
+                f" {'; '.join(equal)}"
+            )
+            changes = (abs(x - y) for x, y in zip(stated, met, strict=True))
+            self.loop = replace(self.loop, rounding=math.fsum(changes))
+        return met
 
     def _in_plane(self, vector: Array) -> complex:
         return complex(float(vector @ self.along), float(vector @ self.across))

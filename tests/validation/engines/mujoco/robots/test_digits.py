@@ -1,0 +1,212 @@
+"""Lengths of a robot's loop within the digits of its file."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.formulas.mobility import classify
+from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
+from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
+from fourbar_validation.engines.mujoco.robots.digits import find_rounding
+from fourbar_validation.engines.mujoco.robots.inside import (
+    RESIDUAL_OF_AN_OPEN_LOOP,
+    LoopInside,
+)
+from fourbar_validation.engines.mujoco.robots.loop import (
+    LoopScene,
+    PoseOptions,
+    RobotFile,
+)
+from fourbar_validation.engines.mujoco.robots.measure import (
+    POSITIONS_OF_A_LOOP,
+    measure_loops,
+)
+from fourbar_validation.engines.mujoco.robots.pose import pose_robot
+from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
+from fourbar_validation.robots.measure import RIGID, list_errors_by_method
+from tests.support.robots import FOOT_PARALLELOGRAM, rotation
+
+ANCHOR = 'anchor="-0.06 0 0"'
+QUATERNION = "0.982434 0 0.18661 0"
+ROD = "-0.055821 0 0.022"
+FREE = FOOT_PARALLELOGRAM.replace(' range="-1.2 1.2"', "")
+FIVE_DIGITS = FREE.replace(ROD, "-0.05582 0 0.022").replace("0.982434", "0.98243")
+
+TURNED = FREE.replace(ROD, "-0.06 0 0").replace(
+    'pos="0 0 0.15"', 'pos="0 0 0.15" quat="0.98243 0 0.18661 0"'
+)
+"""Round places, and two quaternions of one turn with five digits and six."""
+LARGE = (
+    FREE.replace(ROD, "-0.5582 0 0.22")
+    .replace(ANCHOR, 'anchor="-0.6 0 0"')
+    .replace("0 0 0.15", "0 0 1.5")
+    .replace("0 0 0.29", "0 0 2.9")
+)
+"""Ten times as large with two digits less: its gap is beyond that of a closed loop."""
+ROUNDINGS = 20.0
+"""Relative roundings of the lengths by which torque and pin forces may be off in the
+median: they turn bars 3 and 4 by some of them.
+"""
+CHANGE_POINT = """
+<mujoco><compiler angle="radian"/>
+  <default><geom type="capsule" size="0.1" contype="0" conaffinity="0"/></default>
+  <worldbody>
+    <body name="crank"><joint name="motor" axis="0 1 0"/>
+      <geom fromto="0 0 0 1.00001 0 0"/>
+      <body name="rod" pos="1.00001 0 0"><joint name="A" axis="0 1 0"/>
+        <geom fromto="0 0 0 2.00001 0 0"/><site name="end" pos="2.00001 0 0"/></body>
+    </body>
+    <body name="output" pos="4 0 0"><joint name="O4" axis="0 1 0"/>
+      <geom fromto="0 0 0 -3.00001 0 0"/><site name="top" pos="-3.00001 0 0"/></body>
+  </worldbody>
+  <equality><connect name="B" site1="end" site2="top"/></equality>
+  <actuator><motor joint="motor"/></actuator>
+</mujoco>
+"""
+
+
+def read(text: str) -> LoopScene:
+    return read_loop_scene(RobotFile(Path("foot.xml"), text), PoseOptions(), None, 1.0)
+
+
+def list_equal(made: LoopScene) -> list[str]:
+    return [remark for remark in made.remarks if "read as equal" in remark]
+
+
+@pytest.mark.parametrize(
+    ("vector", "rounding"),
+    [
+        ((-0.055821, 0.0, 0.022), 5e-7 * math.sqrt(2.0)),
+        ((0.982434, 0.0, 0.18661, 0.0), 5e-7 * math.sqrt(2.0)),
+        ((12.3456,), 5e-5),
+        ((1.23456e-05,), 5e-11),
+        ((0.0, 0.0, 0.15), 5e-3),
+        ((0.0, 0.0, 0.0), 0.0),
+    ],
+)
+def test_the_rounding_of_numbers_is_half_of_the_last_digit_that_one_shows(
+    vector: tuple[float, ...],
+    rounding: float,
+) -> None:
+    assert find_rounding(vector) == pytest.approx(rounding, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "size"),
+    [(FREE, 1.0), (FIVE_DIGITS, 1.0), (TURNED, 1.0), (LARGE, 10.0)],
+    ids=["six digits", "five digits", "quaternions", "large"],
+)
+def test_a_parallelogram_of_rounded_numbers_is_the_one_that_was_built(
+    text: str,
+    size: float,
+) -> None:
+    made = read(text)
+    lengths = np.multiply(size, (0.14, 0.06, 0.14, 0.06))
+    assert made.scene.linkage.lengths == pytest.approx(lengths, rel=1e-12)
+    assert made.loop.rounding > 1e-8 * size
+    assert classify(made.scene.linkage).name == "parallelogram"
+    sweep = made.scene.motion.angle
+    assert isinstance(sweep, fourbar.Sweep)
+    assert sweep.stop - sweep.start == pytest.approx(math.tau)
+
+
+def test_what_is_read_as_equal_is_said_with_its_difference() -> None:
+    """The pins of the file: A on the turned crank, B on the foot."""
+    quaternion = [float(number) for number in QUATERNION.split()]
+    pin_a = np.array([0.0, 0.0, 0.29]) + rotation(quaternion) @ (-0.06, 0.0, 0.0)
+    pin_b = np.array([-0.055821, 0.0, 0.15 + 0.022])
+    coupler = 0.14 - np.linalg.norm(pin_a - pin_b)
+    output = 0.06 - math.hypot(0.055821, 0.022)
+    (said,) = list_equal(read(FOOT_PARALLELOGRAM))
+    assert said == (
+        "lengths read as equal within the digits of the file: ground and coupler, which"
+        f" differ by {coupler:.4g} m; input and output, which differ by {output:.4g} m"
+    )
+
+
+def test_the_range_of_the_motor_is_that_of_the_file() -> None:
+    """It passes the change point at which the rounded lengths would stop it."""
+    made = read(FOOT_PARALLELOGRAM)
+    sweep = made.scene.motion.angle
+    assert isinstance(sweep, fourbar.Sweep)
+    assert sweep.stop - sweep.start == pytest.approx(2.4, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        FREE.replace(ANCHOR, 'anchor="-0.060002 0 0"'),  # off by four of its last digit
+        FREE.replace(ROD, "-0.055821000001 0 0.022").replace("434", "434000001"),
+    ],
+    ids=["another length", "more digits"],
+)
+def test_what_the_digits_tell_apart_stays(text: str) -> None:
+    made = read(text)
+    assert not list_equal(made)
+    assert made.loop.rounding == 0.0
+    assert made.scene.linkage.lengths == pytest.approx(made.loop.lengths, rel=1e-11)
+    assert classify(made.scene.linkage).name != "parallelogram"
+
+
+def test_a_file_that_mujoco_saved_is_read_as_the_one_that_was_written(
+    tmp_path: Path,
+) -> None:
+    """Exact lengths and a turn of all digits, of which MuJoCo writes six."""
+    half = 0.5 * math.radians(21.51)
+    exact = FREE.replace(QUATERNION, f"{math.cos(half)!r} 0 {math.sin(half)!r} 0")
+    x, z = 0.06 * math.cos(2.0 * half), 0.06 * math.sin(2.0 * half)
+    exact = exact.replace(ROD, f"{-x!r} 0 {z!r}")
+    assert not list_equal(read(exact))
+    assert classify(read(exact).scene.linkage).name == "parallelogram"
+    saved = tmp_path / "saved.xml"
+    mujoco.mj_saveLastXML(str(saved), mujoco.MjModel.from_xml_string(exact))
+    made = read(saved.read_text(encoding="utf-8"))
+    assert list_equal(made)
+    assert made.scene.linkage.lengths == pytest.approx((0.14, 0.06) * 2, rel=2e-6)
+    assert classify(made.scene.linkage).name == "parallelogram"
+
+
+@pytest.mark.parametrize("text", [FREE, FIVE_DIGITS, LARGE])
+def test_a_turn_is_measured_but_where_the_digits_do_not_tell_the_pose(
+    text: str,
+) -> None:
+    """The rigid robot is that of the formulas within the digits of its lengths."""
+    file = RobotFile(Path("foot.xml"), text)
+    (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), None).loops
+    assert loop.rounding > 1e-7
+    assert len(loop.states.in_line) == 2
+    assert len(loop.states.rows) == POSITIONS_OF_A_LOOP - 2
+    assert not loop.refusal
+    assert loop.through_time is not None and not loop.through_time.lost
+    for error in list_errors_by_method(loop):
+        assert math.isfinite(error.part)
+        if error.method == RIGID:
+            assert error.part < 0.01
+            relative = loop.rounding / min(loop.scene.linkage.lengths)
+            assert error.median < ROUNDINGS * relative
+
+
+def test_a_loop_is_closed_on_a_change_point_that_its_lengths_miss() -> None:
+    """The bars are in line there, and leave a gap of what a + d = b + c misses by."""
+    file = RobotFile(Path("foot.xml"), LARGE)
+    made = read(LARGE)
+    model = pose_robot(compile_robot(file).model, PoseOptions()).model
+    in_line = 0.5 * math.pi
+    ground, crank, coupler, output = made.loop.lengths
+    miss = abs(ground + crank - coupler - output)
+    assert RESIDUAL_OF_AN_OPEN_LOOP < miss == pytest.approx(made.loop.rounding)
+    assert LoopInside(model, made.loop).close(in_line) is not None
+    exact = replace(made.loop, rounding=0.0)
+    assert LoopInside(model, exact).close(in_line) is None
+
+
+def test_one_equality_alone_is_met_by_chance() -> None:
+    """The sum d + a is b + c but for 1e-5: less than three roundings of 5e-6."""
+    made = read(CHANGE_POINT)
+    assert not list_equal(made)
+    assert made.scene.linkage.lengths == pytest.approx((4.0, 1.00001, 2.00001, 3.00001))
