@@ -610,14 +610,20 @@ def unwrap(angles: Array) -> None:
         return
     turn = 2.0 * np.pi
     rows = angles.reshape(-1, angles.shape[-1])
-    finite = ~np.isnan(rows)
-    # each NaN is replaced by the last angle before it, at the start by the first one
-    first = finite.argmax(axis=1)[:, None]
-    place = np.where(finite, np.arange(rows.shape[1]), first)
-    place = np.maximum.accumulate(place, axis=1)
-    filled = rows[np.arange(len(rows))[:, None], place]
+    filled = _fill_gaps(rows)
     turns = np.zeros_like(filled)
     jumps = filled[:, 1:] - filled[:, :-1]
     turns[:, 1:] = np.rint(jumps / turn).cumsum(axis=1)
     start = np.where(filled[:, :1] == -np.pi, turn, 0.0)
     angles[...] = (rows + start - turn * turns).reshape(angles.shape)
+
+
+def _fill_gaps(rows: Array) -> Array:
+    """Replace each NaN by the number before it, at the start by the first one."""
+    finite = ~np.isnan(rows)
+    if finite.all():
+        return rows
+    first = finite.argmax(axis=1)[:, None]
+    place = np.where(finite, np.arange(rows.shape[1]), first)
+    place = np.maximum.accumulate(place, axis=1)
+    return np.asarray(rows[np.arange(len(rows))[:, None], place])
