@@ -11,6 +11,7 @@ import pytest
 import fourbar
 from fourbar import Point, Scene
 from fourbar.errors import InputError
+from fourbar.solution import unwrap
 from tests.support.scenes import crank_rocker
 
 
@@ -79,3 +80,12 @@ def test_a_data_frame_names_the_unit_of_each_column() -> None:
     inches = fourbar.solve(pointed()).to_pandas(fourbar.units("imperial")).attrs
     assert inches["units"]["torque [lbf in]"] == "lbf in"
     assert inches["units"]["P_x [in]"] == "in"
+
+
+@pytest.mark.parametrize("missing", [[], [0, 1], [4, 8, 12, 17, 21, 26]])
+def test_angles_of_several_turns_are_continuous_across_gaps(missing: list[int]) -> None:
+    sweep = np.array([np.linspace(-3.0, 16.0, 30), np.linspace(2.0, -14.0, 30)])
+    sweep[:, missing] = np.nan
+    wrapped = np.angle(np.exp(1j * sweep))
+    unwrap(wrapped)
+    np.testing.assert_allclose(wrapped, sweep, atol=1e-14)
