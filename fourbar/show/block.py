@@ -34,6 +34,8 @@ from fourbar.show.summary import (
     Facts,
     find_drive_rounding,
     find_duty,
+    find_pin_rms,
+    fit_motion,
     locate_between,
     summarize,
 )
@@ -858,6 +860,7 @@ class _SceneBlock:
                 "at a change point pin forces grow without bound: the peaks are those "
                 "of these instants"
             )
+        lines += self._write_sums()
         if facts.between.reversals:
             unit = "rad" if facts.solution.at.stroke is None else "m"
             places = ", ".join(  # of a motion law too by its angle, not by its time
@@ -878,8 +881,7 @@ class _SceneBlock:
                 below = f"below 1e{math.ceil(math.log10(facts.error)):+03d}"
             else:
                 below = "zero"
-            limit = _HALF_OF_LAST * 10.0 ** (1 - self.digits) / 10.0
-            if facts.error < limit:
+            if facts.error < self._changes_a_digit:
                 changed = "none of these"
             else:
                 changed = "some"
@@ -888,6 +890,39 @@ class _SceneBlock:
                 " value)"
             )
         return lines
+
+    def _write_sums(self) -> list[str]:
+        """Write which means and energies depend on the positions, and by how much."""
+        facts = self.facts
+        sums = facts.sums
+        if sums is None or sums.change < self._changes_a_digit:
+            return []
+        sizes = self._without_small([load.peak.value for load in facts.pins.values()])
+        means = [
+            pin
+            for pin, size in zip(facts.pins, sizes, strict=True)
+            if size and PIN_FORCE[pin] in sums.names
+        ]
+        energies = []
+        if facts.drive and facts.duty and not self._is_balanced():
+            if facts.drive.keys.value in sums.names:
+                means.insert(0, facts.drive.name.removeprefix("drive "))
+            if "power" in sums.names and facts.duty.energy_in is not None:
+                energies = ["energies"]
+        parts = [f"RMS of {', '.join(means)}"] if means else []
+        parts += energies
+        if not parts:
+            return []
+        line = f"{' and '.join(parts)}: sums over these {len(facts.solution)} positions"
+        if math.isfinite(sums.change):
+            percent = write_digits(100.0 * sums.change, 2)
+            line += f", which change by up to {percent} % over half of them"
+        return [line]
+
+    @property
+    def _changes_a_digit(self) -> float:
+        """Part of a value that changes the last digit shown."""
+        return _HALF_OF_LAST * 10.0 ** (1 - self.digits) / 10.0
 
     def _warn(self) -> list[str]:
         """Write where the drive's torque or force has few digits left.
@@ -974,7 +1009,8 @@ def write_motor(
     They have the units of the output, and the keys of `motor_duty`.
     """
     between = locate_between(scene, solution)
-    duty = find_duty(between)
+    panels = fit_motion(scene, between)
+    duty = find_duty(scene, between, panels)
     if duty is None:
         return None
     if solution.drive is None:
@@ -986,8 +1022,7 @@ def write_motor(
     force = find_unit_in("N", units)[1]
     angle = find_unit_in("rad", units)[1]
     loads = {
-        pin: (bearing_load(between.bounded(name), pin), bearing_load(solution, pin))
-        for pin, name in PIN_FORCE.items()
+        pin: bearing_load(between.bounded(name), pin) for pin, name in PIN_FORCE.items()
     }
     return {
         "closed": duty.closed,
@@ -998,10 +1033,10 @@ def write_motor(
         "pins": {
             pin: {
                 "peak": peak.largest * force,
-                "rms": load.rms * force,
+                "rms": find_pin_rms(solution, panels, pin) * force,
                 "theta_2": peak.where * angle,
             }
-            for pin, (peak, load) in loads.items()
+            for pin, peak in loads.items()
         },
         "units": {name: unit for name, (unit, _) in shown.items()},
     }

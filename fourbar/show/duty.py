@@ -205,7 +205,8 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
     mean_power, swing = _find_swing(spans, power, closed)
     mean_torque = None
     if mean_power is not None and not linear and solution.drive_bar == solution.at.bar:
-        mean_torque = _find_mean_torque(solution, mean_power, spans)
+        work = np.asarray(mean_power) * spans.sum(axis=-1)
+        mean_torque = find_mean_torque(solution, work)
     return MotorDuty(
         peak_torque=None if linear else peak,
         rms_torque=None if linear else rms,
@@ -321,12 +322,12 @@ def _find_swing(
     return _reduce_to_number(mean), _reduce_to_number(swing)
 
 
-def _find_mean_torque(solution: Solution, mean_power: Any, spans: Array) -> Any:
+def find_mean_torque(solution: Solution, work: Any) -> Any:
     """Find the mean torque over the angle that the driven bar turns; NaN for no angle.
 
-    The angle is the commanded one: the integral of the speed would be off by its rule.
+    `work`: of the drive over the motion, J, of a study (m,). The angle is the commanded
+    one: the integral of the speed would be off by its rule.
     """
-    work = np.asarray(mean_power) * spans.sum(axis=-1)
     angle = np.asarray(solution.at.angle)
     speed = np.atleast_1d(np.asarray(solution.at.speed))
     sense = np.sign(speed.mean(axis=-1))

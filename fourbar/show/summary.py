@@ -32,10 +32,12 @@ from fourbar.show.duty import (
     Driving,
     MotorDuty,
     bearing_load,
+    find_mean_torque,
     is_once_round,
     motor_duty,
     read_drive_demand,
 )
+from fourbar.show.panels import Panels, fit_panels
 from fourbar.show.units import SHOWN_AS_ZERO, drop_rounding
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -65,6 +67,12 @@ RANGE_POSITIONS = 7200
 _INSET = 1e-9
 """Part of a range that is left out at its limit positions. These may not assemble as
 doubles.
+"""
+_LEAST_PANELS = 48
+"""Panels that a motion is cut to at least, before they are halved."""
+_MOST_EDGES = 200
+"""Positions of a sweep that its first panels end at. Of more every second is taken, or
+every third, and so on.
 """
 _END_ROUNDS = 9
 """Rounds of cutting the interval in which the assembly ends by 40. They go down to the
@@ -116,6 +124,17 @@ class HeldRange(NamedTuple):
     """Greatest torque or force that holds one of them."""
     ends: tuple[float, float]
     """Commanded angle or stroke of the first and the last, rad or m, or the time, s."""
+
+
+class Sums(NamedTuple):
+    """What is summed over the positions, for want of an integral."""
+
+    names: list[str]
+    """Of torque, power, drive force and pin forces."""
+    change: float
+    """Largest change of a mean or energy by leaving out every second position, over
+    its value. NaN where so few are left that none is known.
+    """
 
 
 class Between(NamedTuple):
@@ -229,6 +248,54 @@ def locate_between(scene: Scene, solution: Solution) -> Between:
     reversals = sorted(zip(angles.tolist(), pins, strict=True))
     peaks, growing = _find_peaks(scene, merged, list_sizes)
     return Between(solution, _merge(scene, merged, peaks), reversals, growing)
+
+
+def fit_motion(scene: Scene, between: Between) -> Panels | None:
+    """Fit panels to drive, power and pin forces over a sweep or motion law.
+
+    What grows without bound has no integral, and is left out. None where the linkage
+    does not assemble throughout, or nothing stands between the positions.
+    """
+    sweep = between.sweep
+    if not _has_between(scene, sweep) or not sweep.assembled.all():
+        return None
+    drive = read_drive_demand(sweep)
+    rounding = find_drive_rounding(sweep)
+    speed = float(np.nanmax(np.abs(getattr(sweep, drive.speed_key)), initial=0.0))
+    loads = _compute_pin_loads(sweep)
+    largest = max(float(np.nanmax(load, initial=0.0)) for load in loads.values())
+    roundings = {drive.keys.value: rounding, "power": rounding * speed}
+    for name in PIN_FORCES:
+        roundings[name] = SHOWN_AS_ZERO * largest
+    bounded = [name for name in roundings if name not in between.growing]
+
+    def compute(places: Array) -> dict[str, Array]:
+        there = _solve_at(scene, places)
+        return {name: np.asarray(getattr(there, name)) for name in bounded}
+
+    return fit_panels(compute, _list_edges(scene, between), roundings)
+
+
+def _list_edges(scene: Scene, between: Between) -> Array:
+    """List where the first panels of a motion end, in rising order.
+
+    They are positions of the sweep and places found between them, where friction may
+    reverse, and the times at which one part of a law follows on another.
+    """
+    places = between.sweep.at.places
+    found = np.setdiff1d(between.solution.at.places, places)
+    every = -(-len(places) // _MOST_EDGES)
+    law = scene.motion.law
+    return np.unique(
+        np.concatenate(
+            [
+                np.linspace(places[0], places[-1], _LEAST_PANELS + 1),
+                places[::every],
+                found,
+                [] if law is None else law.time,
+            ]
+        )
+    )
 
 
 def _locate_reversals(
@@ -629,6 +696,9 @@ class Facts:
     """
     between: Between
     """Events within the steps of the sweep."""
+    sums: Sums | None
+    """None: the means and energies do not depend on the positions, or these are a list.
+    """
     error: float | None
     """Largest error bar of the drive and of the pin forces, over the value. None: no
     error bar was computed.
@@ -646,6 +716,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
     At least one position assembles.
     """
     between = locate_between(scene, solution)
+    panels = fit_motion(scene, between)
     kind = _find_kind(scene, solution)
     places = _list_commanded(solution)
     smooth = kind in ("sweep", "turn", "law")
@@ -679,7 +750,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
     peak = _find_drive_peak(between, drive)
     duty = None
     if peak is not None and kind != "position":
-        duty = find_duty(between)
+        duty = find_duty(scene, between, panels)
     bending = locate_bending(scene, between)
     return Facts(
         scene=scene,
@@ -694,13 +765,14 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
         peak=peak,
         duty=duty,
         held=[] if drive is None else _list_held(solution, drive, kind),
-        pins=_list_pin_loads(solution, between),
+        pins=_list_pin_loads(solution, between, panels),
         rates=_find_rates(solution, smooth=smooth),
         bending=bending,
         stresses=_list_stresses(scene, bending),
         stroke_range=stroke_range,
         stroke_limits=stroke_limits,
         between=between,
+        sums=_find_sums(scene, solution, panels, kind),
         error=_find_largest_error_bar(solution, drive),
     )
 
@@ -903,10 +975,16 @@ def _find_turns(start: float, stop: float, low: float, high: float) -> int:
     return min((nearest - 1, nearest, nearest + 1), key=measure)
 
 
-def find_duty(between: Between) -> MotorDuty | None:
-    """Return the duty of the drive, each peak located between the positions.
+def find_duty(
+    scene: Scene,
+    between: Between,
+    panels: Panels | None,
+) -> MotorDuty | None:
+    """Return the duty of the drive over the motion, whatever its steps.
 
-    A peak without a bound is that of the positions.
+    Each peak is located between the positions; one without a bound is that of the
+    positions. Means and energies are integrals over the panels. What has no panels is
+    summed over the positions.
     """
     duty = motor_duty(between.sweep)
     drive = read_drive_demand(between.sweep)
@@ -919,12 +997,58 @@ def find_duty(between: Between) -> MotorDuty | None:
 
     peak = find_largest(drive.keys.value, drive.keys.value)
     linear = between.sweep.drive is not None
-    return duty._replace(
+    duty = duty._replace(
         peak_torque=None if linear else peak,
         peak_force=peak if linear else None,
         peak_speed=find_largest("speed", drive.speed_key),
         peak_power=find_largest("power", "power"),
     )
+    if panels is None:
+        return duty
+    if drive.keys.value in panels.values:
+        rms = math.sqrt(panels.find_mean_square(drive.keys.value))
+        duty = duty._replace(
+            rms_torque=None if linear else rms,
+            rms_force=rms if linear else None,
+        )
+    if "power" in panels.values:
+        rms_power = math.sqrt(panels.find_mean_square("power"))
+        duty = duty._replace(rms_power=rms_power)
+        if duty.energy_in is not None:
+            duty = _integrate_energies(scene, between.sweep, panels, duty)
+    return duty
+
+
+def _integrate_energies(
+    scene: Scene,
+    sweep: Solution,
+    panels: Panels,
+    duty: MotorDuty,
+) -> MotorDuty:
+    """Integrate the power over time, from each of its zeros to the next.
+
+    Of a closed motion the swing of the energy goes between zeros of the power less its
+    mean.
+    """
+    if scene.motion.law is not None:
+        second = 1.0  # a law is integrated over its time
+    else:
+        assert scene.motion.speed is not None
+        second = abs(scene.motion.speed)
+    work = np.diff(panels.accumulate("power")) / second
+    duty = duty._replace(
+        energy_in=float(work[work > 0.0].sum()),
+        energy_out=float(-work[work < 0.0].sum()),
+    )
+    if duty.energy_swing is None:
+        return duty
+    length = float(panels.high[-1] - panels.low[0])
+    mean_power = panels.integrate("power") / length
+    swing = float(np.ptp(panels.accumulate("power", mean_power))) / second
+    mean_torque = duty.mean_torque
+    if mean_torque is not None:
+        mean_torque = find_mean_torque(sweep, mean_power * length / second)
+    return duty._replace(energy_swing=swing, mean_torque=mean_torque)
 
 
 def _list_held(solution: Solution, drive: Driving, kind: str) -> list[HeldRange]:
@@ -956,7 +1080,22 @@ def _find_peak(solution: Solution, values: Array | None) -> Peak:
     return Peak(float(values[worst]), float(place))
 
 
-def _list_pin_loads(solution: Solution, between: Between) -> dict[str, _PinLoad]:
+def find_pin_rms(solution: Solution, panels: Panels | None, pin: str) -> float:
+    """Return the RMS load of a pin over the motion, N.
+
+    Without panels it is that of the positions.
+    """
+    name = PIN_FORCE[pin]
+    if panels is not None and name in panels.values:
+        return math.sqrt(panels.find_mean_square(name))
+    return bearing_load(solution, pin).rms
+
+
+def _list_pin_loads(
+    solution: Solution,
+    between: Between,
+    panels: Panels | None,
+) -> dict[str, _PinLoad]:
     if solution.F12 is None or not np.isfinite(solution.F12).any():
         return {}
     loads = dict[str, _PinLoad]()
@@ -964,8 +1103,59 @@ def _list_pin_loads(solution: Solution, between: Between) -> dict[str, _PinLoad]
         bounded = between.bounded(name)
         size = _compute_pin_loads(bounded)[name]
         peak = _find_peak(bounded, np.where(np.isfinite(size), size, np.nan))
-        loads[pin] = _PinLoad(peak, bearing_load(solution, pin).rms)
+        loads[pin] = _PinLoad(peak, find_pin_rms(solution, panels, pin))
     return loads
+
+
+def _find_sums(
+    scene: Scene,
+    solution: Solution,
+    panels: Panels | None,
+    kind: str,
+) -> Sums | None:
+    """Find the means and energies that are sums, and what half the positions change."""
+    if kind in ("position", "list") or solution.F12 is None:
+        return None
+    names = [*PIN_FORCES]
+    if kind != "released":
+        names += [read_drive_demand(solution).keys.value, "power"]
+    if panels is not None:
+        names = [name for name in names if name not in panels.values]
+    if not names:
+        return None
+    positions = len(solution)
+    kept = np.unique([*range(0, positions, 2), positions - 1])
+    if len(kept) == positions:
+        return Sums(names, math.nan)
+    half = solve(scene, "force", at=solution.at.part(kept))
+    changes = [0.0]
+    sums = [_list_sums(one, names) for one in (solution, half)]
+    for all_positions, half_of_them in zip(*sums, strict=True):
+        size = np.max(np.abs(all_positions))
+        if size > 0.0:
+            change = np.max(np.abs(half_of_them - all_positions)) / size
+            changes.append(float(change))
+    return Sums(names, max(changes))
+
+
+def _list_sums(solution: Solution, names: list[str]) -> list[Array]:
+    """List means and energies over the positions, those of one kind together."""
+    pins = [
+        bearing_load(solution, pin).rms
+        for pin, name in PIN_FORCE.items()
+        if name in names
+    ]
+    sums = [np.array(pins or [0.0])]
+    duty = None if names == [*PIN_FORCES] else motor_duty(solution)
+    if duty is None:
+        return sums
+    rms = duty.rms_torque if solution.drive is None else duty.rms_force
+    if read_drive_demand(solution).keys.value in names:
+        sums.append(np.array([rms]))
+    if "power" in names:
+        sums.append(np.array([duty.rms_power]))
+        sums.append(np.array([duty.energy_in or 0.0, duty.energy_out or 0.0]))
+    return sums
 
 
 def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]:

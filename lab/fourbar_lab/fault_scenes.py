@@ -374,6 +374,11 @@ FAULT_SCENES: dict[str, Scene] = {
         effects=(_WEIGHT,),
     ),
     "derived, loaded": Scene(_SLENDER, MOTION_OF_A_TURN, 2, LOADS, (_WEIGHT,)),
+    "derived, part of a turn": Scene(
+        _SLENDER,
+        Motion(Sweep(0.1, 2.0, 8), 10.0, 5.0),
+        effects=(_WEIGHT,),
+    ),
     "simulated": Scene(
         CRANK_ROCKER_LINKAGE,
         Motion(Sweep(0.1, 6.0, 12), 10.0),

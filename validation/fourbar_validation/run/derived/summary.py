@@ -11,21 +11,24 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import OK, Array
 from fourbar.scene import Scene, command_at
 from fourbar.scene.motion import FromLimit
 from fourbar.show.block import write_block, write_motor
-from fourbar.show.duty import shaking_force
+from fourbar.show.duty import MotorDuty, bearing_load, motor_duty, shaking_force
 from fourbar.show.summary import Facts, Peak, summarize
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.derived import (
     CUT,
+    INTEGRATED,
     LOCATED_ROUGHLY,
     PRINTED,
     PRINTED_TO_FOUR_DIGITS,
@@ -50,7 +53,16 @@ from fourbar_validation.run.derived.cuts import (
 from fourbar_validation.run.derived.variants import ask_free_bodies, make_row
 from fourbar_validation.run.question import NotAskedError, Question
 
-ROW_NAMES = ("ranges", "peaks", "means", "pins", "frame_force", "bending", "bore")
+ROW_NAMES = (
+    "ranges",
+    "peaks",
+    "means",
+    "integrals",
+    "pins",
+    "frame_force",
+    "bending",
+    "bore",
+)
 """Names of the rows."""
 _CUT_BESIDE = 1e-10
 """Part of the length by which a bar is cut on either side of a place. A couple that
@@ -80,7 +92,11 @@ parts of the largest.
 """
 _PRESSURE = 1e6
 """Pressure of the cylinder whose bore is judged, Pa."""
-ROW_TOLERANCES = {"bore": PRINTED_TO_FOUR_DIGITS, "bending": LOCATED_ROUGHLY}
+ROW_TOLERANCES = {
+    "bore": PRINTED_TO_FOUR_DIGITS,
+    "bending": LOCATED_ROUGHLY,
+    "integrals": INTEGRATED,
+}
 
 
 @dataclass
@@ -108,17 +124,47 @@ class _SummaryJudge:
         return ask_free_bodies(self.scene, self.solution.at)
 
     @cached_property
+    def bends(self) -> Array:
+        """Return the times within the motion at which one part of a law follows."""
+        law = self.scene.motion.law
+        if law is None:
+            return np.empty(0)
+        return np.array(law.time[1:-1])
+
+    @cached_property
+    def fine_places(self) -> Array:
+        """Return many places between the scene's own."""
+        own = self.solution.at.places
+        places = np.linspace(own[0], own[-1], PEAK_INTERVALS + 1)
+        if len(self.bends):
+            places = np.union1d(places, self.bends)
+        return places
+
+    @cached_property
+    def has_integrals(self) -> bool:
+        """Return whether the motion has integrals: no part of it is left out."""
+        return len(self.fine.quantities["theta_2"]) == len(self.fine_places) and (
+            self.facts.sums is None
+        )
+
+    @cached_property
     def fine(self) -> Answer:
         """Return their answer at many positions.
 
         Left out are those beside a pole that they cannot know.
         """
-        own = self.solution.at.places
-        places = np.linspace(own[0], own[-1], PEAK_INTERVALS + 1)
+        places = self.fine_places
         answer = self.ask(places)
         least = _find_conditions(self.scene, answer).min(axis=0)
         known = least > _LEAST_KNOWN_CONDITION
         return answer if known.all() else self.ask(places[known])
+
+    @cached_property
+    def duty(self) -> MotorDuty:
+        """Return the sums over the scene's own positions."""
+        duty = motor_duty(self.solution)
+        assert duty is not None
+        return duty
 
     @cached_property
     def motor(self) -> dict[str, Any]:
@@ -289,7 +335,7 @@ def _judge_drive(judged: _SummaryJudge) -> None:
     for key, of_own in ((f"rms_{kind}", values), ("rms_power", power)):
         if np.abs(of_own).max() != 0.0:
             mean = math.sqrt(np.square(of_own[judged.counted]).mean())
-            judged.add_value("means", entry[key], mean)
+            judged.add_value("means", getattr(judged.duty, key), mean)
     for key, fine in (
         ("peak_speed", fine_speed),
         ("peak_power", fine_values * fine_speed),
@@ -300,7 +346,8 @@ def _judge_drive(judged: _SummaryJudge) -> None:
             judged.add_excess(
                 "peaks", entry[key] / most - 1.0 - EXCESS_BETWEEN_POSITIONS
             )
-    _judge_energy(judged, entry, power)
+    _judge_energy(judged, power)
+    _judge_integrals(judged, fine_values, fine_values * fine_speed)
     _judge_bore(judged, fine_values)
 
 
@@ -310,7 +357,7 @@ def _find_largest_load(judged: _SummaryJudge) -> float:
     return float(np.max(sizes))
 
 
-def _judge_energy(judged: _SummaryJudge, entry: dict[str, Any], power: Array) -> None:
+def _judge_energy(judged: _SummaryJudge, power: Array) -> None:
     """Judge energies, their swing and the mean torque by the trapezoidal rule.
 
     It is over the times at which the positions are passed.
@@ -330,10 +377,12 @@ def _judge_energy(judged: _SummaryJudge, entry: dict[str, Any], power: Array) ->
     sums = []
     for part in (np.maximum(power, 0.0), np.maximum(-power, 0.0)):
         sums.append(float((spans * 0.5 * (part[:-1] + part[1:])).sum()))
-    for key, total in zip(("energy_in", "energy_out"), sums, strict=True):
-        judged.add("means", divide(abs(entry[key] - total), np.max(sums)))
-    swing = entry["energy_swing"]
-    if not entry["closed"]:
+    duty = judged.duty
+    for energy, total in zip((duty.energy_in, duty.energy_out), sums, strict=True):
+        error = math.nan if energy is None else abs(energy - total)
+        judged.add("means", divide(error, np.max(sums)))
+    swing = duty.energy_swing
+    if not duty.closed:
         judged.add("means", 0.0 if swing is None else np.inf)
         return
     # the mean power is a straight line from the first to the last instant
@@ -341,12 +390,101 @@ def _judge_energy(judged: _SummaryJudge, entry: dict[str, Any], power: Array) ->
     steps = spans * 0.5 * (power[:-1] + power[1:])
     given = np.concatenate([[0.0], np.cumsum(steps)])
     about_mean = given - given[-1] * time / time[-1]
-    judged.add("means", divide(abs(swing - np.ptp(about_mean)), np.max(sums)))
+    off = math.nan if swing is None else abs(swing - np.ptp(about_mean))
+    judged.add("means", divide(off, np.max(sums)))
     if judged.scene.drive is None and judged.scene.drive_bar == at.bar:
-        sense = np.sign(np.mean(np.asarray(at.speed, float)))
-        turned = sense * abs(at.angle[-1] - at.angle[0])
-        of_mean = given[-1] - entry["mean_torque"] * turned
+        mean = math.nan if duty.mean_torque is None else duty.mean_torque
+        of_mean = given[-1] - mean * _find_turned(judged)
         judged.add("means", divide(abs(of_mean), np.max(sums)))
+
+
+def _find_turned(judged: _SummaryJudge) -> float:
+    """Find the angle that the commanded bar turns, with its sense, rad."""
+    at = judged.solution.at
+    sense = np.sign(np.mean(np.asarray(at.speed, float)))
+    return float(sense * abs(at.angle[-1] - at.angle[0]))
+
+
+class _Curve(NamedTuple):
+    """A curve over the motion, as splines between the bends of a law."""
+
+    splines: list[CubicSpline]
+    length: float
+    """Angle, stroke or time over which it goes."""
+
+    @classmethod
+    def through(cls, judged: _SummaryJudge, values: Array) -> "_Curve":
+        """Lay splines through values at the many positions."""
+        places = judged.fine_places
+        length = abs(float(places[-1] - places[0]))
+        if places[0] > places[-1]:
+            places = places[::-1]
+            values = values[::-1]
+        bends = np.searchsorted(places, judged.bends)
+        edges = [0, *bends.tolist(), len(places) - 1]
+        splines = []
+        for first, last in pairwise(edges):
+            of_piece = slice(first, last + 1)
+            splines.append(CubicSpline(places[of_piece], values[of_piece]))
+        return cls(splines, length)
+
+    def integrate(self) -> float:
+        """Return the integral over the motion."""
+        return float(sum(one.integrate(one.x[0], one.x[-1]) for one in self.splines))
+
+    def accumulate(self) -> Array:
+        """Return the integral up to each position and to each zero, in order."""
+        totals = [np.zeros(1)]
+        for one in self.splines:
+            zeros = one.roots(discontinuity=False, extrapolate=False)
+            # a piece that vanishes throughout is marked by a NaN
+            places = np.sort(np.concatenate([one.x, zeros[np.isfinite(zeros)]]))
+            totals.append(totals[-1][-1] + one.antiderivative()(places))
+        return np.concatenate(totals)
+
+
+def _find_rms(judged: _SummaryJudge, *components: Array) -> float:
+    """Return the root of the mean square of a vector over the motion."""
+    squares = np.sum([np.square(component) for component in components], axis=0)
+    curve = _Curve.through(judged, squares)
+    return math.sqrt(curve.integrate() / curve.length)
+
+
+def _judge_integrals(judged: _SummaryJudge, values: Array, power: Array) -> None:
+    """Judge RMS, energies, swing and mean torque of the drive over the motion.
+
+    Nothing may be a sum over the positions far from every pole.
+    """
+    facts, entry = judged.facts, judged.motor
+    if not judged.has_integrals:
+        return
+    kind = "force" if facts.linear else "torque"
+    for key, of_motion in ((f"rms_{kind}", values), ("rms_power", power)):
+        if np.abs(of_motion).max() != 0.0:
+            rms = _find_rms(judged, of_motion)
+            judged.add_value("integrals", entry[key], rms)
+    motion = judged.scene.motion
+    second = 1.0 if motion.law is not None else abs(motion.speed or 0.0)
+    if second == 0.0:
+        return
+    curve = _Curve.through(judged, power)
+    work = np.diff(curve.accumulate()) / second
+    sums = (float(work[work > 0.0].sum()), float(-work[work < 0.0].sum()))
+    most = max(sums)
+    for key, total in zip(("energy_in", "energy_out"), sums, strict=True):
+        judged.add("integrals", divide(abs(entry[key] - total), most))
+    if not entry["closed"]:
+        judged.add("integrals", 0.0 if entry["energy_swing"] is None else np.inf)
+        return
+    mean_power = curve.integrate() / curve.length
+    surplus = _Curve.through(judged, power - mean_power).accumulate() / second
+    swing = abs(entry["energy_swing"] - np.ptp(surplus))
+    judged.add("integrals", divide(swing, most))
+    at = judged.solution.at
+    if judged.scene.drive is None and judged.scene.drive_bar == at.bar:
+        given = sums[0] - sums[1]
+        of_mean = given - entry["mean_torque"] * _find_turned(judged)
+        judged.add("integrals", divide(abs(of_mean), most))
 
 
 def _judge_bore(judged: _SummaryJudge, fine: Array) -> None:
@@ -380,7 +518,11 @@ def _judge_pins(judged: _SummaryJudge) -> None:
         if own.max() <= BALANCED_SHARE * _find_largest_load(judged):
             continue
         mean = math.sqrt(np.square(own[judged.counted]).mean())
-        judged.add_value("pins", load.rms, mean)
+        judged.add_value("pins", bearing_load(judged.solution, pin).rms, mean)
+        if judged.has_integrals:
+            rms = _find_rms(judged, *judged.fine.quantities[name].T)
+            judged.add_value("integrals", load.rms, rms)
+            judged.add_value("integrals", judged.motor["pins"][pin]["rms"], rms)
         if name in facts.between.growing:
             continue
         there = judged.ask(load.peak.place)
@@ -389,7 +531,6 @@ def _judge_pins(judged: _SummaryJudge) -> None:
         judged.add_peak("pins", load.peak, at_peak, fine)
         of_pin = judged.motor["pins"][pin]
         judged.add_value("pins", of_pin["peak"], load.peak.value)
-        judged.add_value("pins", of_pin["rms"], mean)
         apart = there.quantities["theta_2"] - of_pin["theta_2"]
         judged.add("pins", np.abs(wrap_difference(apart)))
     if judged.scene.drive is None:
@@ -451,15 +592,16 @@ def _judge_growth(judged: _SummaryJudge) -> None:
     """Fail what is said to grow without bound far from every pole.
 
     The bars are far from poles throughout the motion. What grows has no peak that could
-    be judged, so none of it is believed.
+    be judged, and what is summed no integral, so none of it is believed.
     """
     facts = judged.facts
     grows = any(bending.grows for bending in facts.bending.values())
-    if not facts.between.growing and not grows:
+    unbounded = facts.between.growing or grows
+    if not unbounded and facts.sums is None:
         return
     conditions = _find_conditions(judged.scene, judged.fine)
     # a sine that passes through zero between two positions is no further from it there
     # than it changes in a step
     least = conditions.min() - np.abs(np.diff(conditions)).max()
     if least > _LEAST_CONDITION:
-        judged.add("peaks", math.inf)
+        judged.add("peaks" if unbounded else "integrals", math.inf)
