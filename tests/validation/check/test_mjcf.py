@@ -668,6 +668,47 @@ def test_body_anchors_on_an_open_rest_state_build_another_linkage() -> None:
     assert values(examination)["lengths.output"] == pytest.approx(0.05)
 
 
+def test_lengths_of_another_linkage_come_before_what_costs_more() -> None:
+    """A length that is off by its rounding is no cause of what a soft closure costs."""
+    entries = [
+        Difference("contacts", "off", "possible", "", cost=70.0),
+        Difference("closure.solimp", (0.9999,), (0.9,), "", cost=14.0),
+        Difference("pins.A.positive", "on", "off", ""),
+        Difference("lengths.input", 0.1, 0.10000001, "", cost=1e-6),
+        Difference("lengths.coupler", 3.5, 2.66, "", cost=0.6),
+    ]
+    assert [one.key for one in order(entries)] == [
+        *("lengths.coupler", "contacts", "closure.solimp", "lengths.input"),
+        "pins.A.positive",
+    ]
+
+
+@pytest.mark.slow
+def test_the_cause_is_printed_first_and_entries_keep_their_indent(
+    tmp_path: Path,
+) -> None:
+    """The anchor of an open rest pose makes another linkage, which is soft as well."""
+    path = tmp_path / "mine.xml"
+    path.write_text(other_plane('body1="rod" body2="rocker" anchor="0.25 0 0"'))
+    scene = tmp_path / "scene.toml"
+    scene.write_text(fourbar.dump(BARE))
+    names = [f"--name={role}={name}" for role, name in MINE.items()]
+    arguments = [str(scene), str(path), *names, "--out", str(tmp_path / "out")]
+    process = CliRunner().invoke(
+        mjcf.check_mjcf_command, arguments, standalone_mode=False
+    )
+    assert process.return_value == 1, process.output
+    said = " ".join(process.output.split())
+    assert "the lengths of another linkage first, then the dearest difference" in said
+    assert said.index("lengths.output") < said.index("closure.solimp")
+    printed = process.output.partition("held to\n\n")[2].partition("note:")[0]
+    entries = [line.rstrip() for line in printed.splitlines() if line.strip()]
+    assert max(map(len, entries)) <= 80
+    priced = re.compile(r" *(?:[0-9.e+-]+ \w+|-)  \S")
+    assert all(line.startswith(" " * 18) or priced.match(line) for line in entries)
+    assert any(line.split() == ["0.001", "0.5", "2"] for line in entries)
+
+
 def test_cut_at_another_pin_it_is_the_same_linkage() -> None:
     """The rocker hangs on the coupler, and the loop closes at O4."""
     text = other_plane().replace(

@@ -23,6 +23,10 @@ the world, which cost digits.
 """
 _TENFOLD = 1e-9
 """Relative distance from a power of ten at which a ratio is called one."""
+ANOTHER_LINKAGE = 1e-3
+"""Cost of a length above which torque and pin forces are those of another linkage. What
+the rounding of a length costs is below it.
+"""
 ENTRIES_THAT_MAY_LACK = ("loads.", "tendons.", "actuators.")
 """Entries that a file may lack: what is missing on one side is a difference."""
 MISSING_LOAD: dict[str, Value] = {".force": (0.0, 0.0), ".couple": 0.0}
@@ -161,9 +165,23 @@ def _collect_errors(rows: Sequence[Row]) -> dict[tuple[str, str], float]:
 def order(differences: Sequence[Difference]) -> list[Difference]:
     """Order differences by their cost, the worst first.
 
-    Those without a cost keep their order.
+    Lengths of another linkage come before the others, and those without a cost behind
+    them, in their own order.
     """
-    return sorted(differences, key=lambda one: (one.cost is None, -(one.cost or 0.0)))
+
+    def rank(one: Difference) -> tuple[bool, bool, float]:
+        first = is_of_another_linkage(one)
+        return not first, one.cost is None, -(one.cost or 0.0)
+
+    return sorted(differences, key=rank)
+
+
+def is_of_another_linkage(one: Difference) -> bool:
+    """Tell whether a difference is a length that makes another linkage.
+
+    What the others cost is then a cost in that linkage.
+    """
+    return _is_length(one.key) and (one.cost or 0.0) >= ANOTHER_LINKAGE
 
 
 def is_setting(key: str) -> bool:

@@ -21,6 +21,7 @@ from fourbar.writing import write_text
 from fourbar_validation.check.differences import (
     Difference,
     find_differences,
+    is_of_another_linkage,
     is_setting,
     order,
     price,
@@ -75,6 +76,8 @@ _ADVICE = (
     "What to type into the file for an error E, if its settings are the cause: "
     "fourbar-validation advise SCENE FILE.xml --error E"
 )
+_WIDTH_OF_PRICES = 16
+"""Columns of the costs: one with the longest name of a quantity."""
 JUDGED_QUANTITIES = tuple(
     name for name in UNKNOWNS if name not in ("alpha_3", "alpha_4")
 )
@@ -321,27 +324,32 @@ def show_model_report(
     """Print the report and write theirs.md and results.csv."""
     from rich.console import Console
     from rich.markup import escape
-    from rich.padding import Padding
+    from rich.table import Table
 
     console = Console()
     if not report.differences:
         console.print("It differs in nothing from the generated MJCF.")
     else:
+        if any(map(is_of_another_linkage, report.differences)):
+            order = "the lengths of another linkage first, then the dearest difference"
+        else:
+            order = "the dearest difference first"
         console.print(
-            f"{escape(escape_controls(mjcf.name))} against the generated MJCF,"
-            " the dearest difference first"
+            f"{escape(escape_controls(mjcf.name))} against the generated MJCF, {order}"
         )
         console.print(f"[dim]{_ABOUT_COSTS}[/]\n")
+    entries = Table.grid(padding=(0, 2, 0, 0))
+    entries.add_column(justify="right", min_width=_WIDTH_OF_PRICES)
+    entries.add_column(overflow="fold")
     for difference in report.differences:
-        console.print(
-            f"{difference.price:>16}  {escape(escape_controls(difference.line()))}"
-        )
+        entries.add_row(difference.price, escape(escape_controls(difference.line())))
         for text in (
             f"in the file: {difference.written}" if difference.written else "",
             difference.remark,
         ):
             if text:
-                console.print(Padding(escape(escape_controls(text)), (0, 0, 0, 18)))
+                entries.add_row("", escape(escape_controls(text)))
+    console.print(entries)
     for note in report.notes:
         console.print(f"note: {escape(escape_controls(note))}")
     for method in report.methods():
