@@ -701,6 +701,8 @@ def test_the_cause_is_printed_first_and_entries_keep_their_indent(
     said = " ".join(process.output.split())
     assert "the lengths of another linkage first, then the dearest difference" in said
     assert said.index("lengths.output") < said.index("closure.solimp")
+    assert "Mend the lengths first" in said
+    assert "fourbar-validation advise" not in said
     printed = process.output.partition("held to\n\n")[2].partition("note:")[0]
     entries = [line.rstrip() for line in printed.splitlines() if line.strip()]
     assert max(map(len, entries)) <= 80

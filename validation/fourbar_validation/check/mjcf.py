@@ -76,6 +76,10 @@ _ADVICE = (
     "What to type into the file for an error E, if its settings are the cause: "
     "fourbar-validation advise SCENE FILE.xml --error E"
 )
+_LENGTHS_FIRST = (
+    "Mend the lengths first: what contacts and settings cost here is a cost in another"
+    " linkage."
+)
 _WIDTH_OF_PRICES = 16
 """Columns of the costs: one with the longest name of a quantity."""
 JUDGED_QUANTITIES = tuple(
@@ -167,8 +171,15 @@ class ModelReport:
                 "The file is right as far as MuJoCo's constraints let it be: the "
                 f"stiffest (solimp 0.9999) leaves {left} of {softest.quantity} in it."
             )
-        if self.counts[FAILS]:
+        if self.is_of_another_linkage:
+            yield _LENGTHS_FIRST
+        elif self.counts[FAILS]:
             yield _ADVICE
+
+    @property
+    def is_of_another_linkage(self) -> bool:
+        """Tell whether lengths make their file one of another linkage."""
+        return any(map(is_of_another_linkage, self.differences))
 
     @property
     def counts(self) -> Counts:
@@ -330,7 +341,7 @@ def show_model_report(
     if not report.differences:
         console.print("It differs in nothing from the generated MJCF.")
     else:
-        if any(map(is_of_another_linkage, report.differences)):
+        if report.is_of_another_linkage:
             order = "the lengths of another linkage first, then the dearest difference"
         else:
             order = "the dearest difference first"
