@@ -509,8 +509,11 @@ class Comparison:
             )
             of_missing = zip(sizes, conditions, strict=True)
             self.scales |= zip(missing, of_missing, strict=True)
-        of_each = np.array([self.scales[name] for name in quantities])
-        return of_each[:, 0], of_each[:, 1]
+        of_each = [self.scales[name] for name in quantities]
+        return (
+            np.array([scale for scale, _ in of_each]),
+            np.array([condition for _, condition in of_each]),
+        )
 
     @cached_property
     def _sizes(self) -> tuple[TermSizes, TermSizes | None]:

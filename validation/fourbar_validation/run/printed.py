@@ -246,11 +246,12 @@ def check_blocks(question: Question) -> Iterator[Row]:
     alone = {angle: np.empty(n) for angle in ("theta_3", "theta_4")}
     solve(scene, at=command, out=alone)  # they are found without vectors then
     half_turns = count_half_turns(scene.linkage.ground_angle, command.angle)
-    for angle, angles in alone.items():
-        apart = find_error(angle, angles, getattr(solution, angle), np.ones(n))
-        apart *= find_condition(angle, scene.linkage, solution) / half_turns
-        largest = np.nan_to_num(apart[ok], nan=np.inf).max(initial=0.0)
-        error[-1] = max(error[-1], largest)
+    names = [*alone]
+    angles = [getattr(solution, name) for name in names]
+    apart = compute_differences(names, [*alone.values()], angles)
+    apart *= find_conditions(names, scene.linkage, solution) / half_turns
+    largest = np.nan_to_num(apart[:, ok], nan=np.inf).max(initial=0.0)
+    error[-1] = max(error[-1], largest)
     reason = f"{len(rows)} positions at once against {n}"
     theta_2 = solution.theta_2[at_ends]
     yield question.row("blocks", error, EQUIVALENCE.factor, reason, theta_2=theta_2)
