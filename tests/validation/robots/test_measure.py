@@ -92,7 +92,7 @@ def test_a_turn_of_a_parallelogram_is_reported_in_lines_of_a_terminal(
         " times the longest moving bar, "
     ) in said
     assert "hinge_1 from 0 to 360 deg" in said
-    assert "no other degree of freedom is there to be held; through time" in said
+    assert "no other degree of freedom is held; through time" in said
     assert "0 other" not in said
     printed = checked.output.replace(str(tmp_path), "").splitlines()
     assert max(map(len, printed)) <= 80

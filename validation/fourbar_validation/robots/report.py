@@ -166,7 +166,7 @@ def _write_held(loop: LoopMeasurement) -> str:
             " generalized forces"
         )
     else:
-        text = "no other degree of freedom is there to be held"
+        text = "no other degree of freedom is held"
     if loop.influence is not None:
         if loop.held:
             text += ", through time (once the loop has settled) by armature"
