@@ -52,13 +52,15 @@ class BallArithmetic:
         out = make_blank(n, names)
         assembled = np.zeros(n, dtype=bool)
         omega, alpha = list_speeds(command)
+        stated = make_balls(scene, 0.0)
+        remainder = arb(0 if command.remainder is None else command.remainder)
         for i in range(n):
-            motion = {"omega_2": float(omega[i]), "alpha_2": float(alpha[i])}
-            exact = make_balls(scene, float(command.theta_2[i]), **motion)
-            exact["theta_2"] += arb(
-                0 if command.remainder is None else command.remainder
-            )
-            values = compute_outputs(scene, int(command.branch[i]), exact)
+            moved = {
+                "theta_2": arb(float(command.theta_2[i])) + remainder,
+                "omega_2": arb(float(omega[i])),
+                "alpha_2": arb(float(alpha[i])),
+            }
+            values = compute_outputs(scene, int(command.branch[i]), stated | moved)
             if values is None:
                 continue
             assembled[i] = True
