@@ -123,17 +123,11 @@ def _write_comment(
         *([notes["without_loads"]] if scene.loads else []),
     ]
     if plane.is_moved:
+        lines.append(notes["moved"].format(origin=write_exactly(*plane.origin)))
+    if plane.is_tilted:
         axes = ", ".join(f"({write_six_digits(*axis)})" for axis in plane.rotation.T)
-        origin = plane.origin
-        gravity = plane.turn(*assembly.gravity)
-        tilted = notes["tilted"].strip()
-        lines.append(
-            tilted.format(
-                axes=axes,
-                origin=write_exactly(*origin),
-                gravity=write_exactly(*gravity),
-            )
-        )
+        gravity = write_exactly(*plane.turn(*assembly.gravity))
+        lines.append(notes["tilted"].strip().format(axes=axes, gravity=gravity))
     return "\n".join([*lines, notes[reader].strip()])
 
 

@@ -187,9 +187,10 @@ def write_mjcf(
 
 
 def _move_into_plane(root: ET.Element, plane: Plane) -> None:
-    """Move the model into its plane, and say so in a comment."""
+    """Move the model into its plane, and say in a comment that it is tilted."""
     if plane.is_moved:
         plane.move_mjcf(root)
+    if plane.is_tilted:
         root.insert(0, ET.Comment(f" {NOTES['mjcf']['tilted']} "))
 
 

@@ -51,6 +51,11 @@ class Plane:
         return self != LEVEL
 
     @property
+    def is_tilted(self) -> bool:
+        """Return True if the axes of the frame are not those of the world."""
+        return self.axis != LEVEL.axis
+
+    @property
     def quaternion(self) -> tuple[float, float, float, float]:
         """Return the turn from world axes to the frame: (w, x, y, z), of length 1."""
         x, y, z = self.axis

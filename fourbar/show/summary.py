@@ -1180,12 +1180,18 @@ def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]
     inner_low = low + _INSET * width
     inner_high = low + (1.0 - _INSET) * width
     angles = np.linspace(inner_low, inner_high, RANGE_POSITIONS + 1)
-    motion = Motion(
-        **{f"theta_{at.bar}": angles},  # type: ignore[arg-type]
-        branch=int(at.branch[first]),
-    )
-    stroke = solve(replace(scene, motion=motion, tolerances=()), "position").stroke
-    assert stroke is not None
+
+    def compute_stroke(angles: Array) -> Array:
+        motion = Motion(
+            **{f"theta_{at.bar}": angles},  # type: ignore[arg-type]
+            branch=int(at.branch[first]),
+        )
+        moved = replace(scene, motion=motion, tolerances=())
+        stroke = solve(moved, "position").stroke
+        assert stroke is not None
+        return stroke
+
+    stroke = compute_stroke(angles)
     if at.stroke is not None:  # its side ends where the stroke turns back
         place = int(np.argmin(np.abs(angles - here)))
         senses = np.sign(np.diff(stroke))
@@ -1193,8 +1199,25 @@ def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]
         turns = np.flatnonzero(senses != sense)
         start = turns[turns < place].max(initial=-1) + 1
         stop = turns[turns >= place].min(initial=RANGE_POSITIONS) + 1
+        angles = angles[start:stop]
         stroke = stroke[start:stop]
-    return float(np.nanmin(stroke)), float(np.nanmax(stroke))
+
+    def find_limit(sign: float) -> float:
+        """Cut the steps around the least of sign * stroke until it is located."""
+        cut_range = angles
+        strokes = stroke
+        for _ in range(_END_ROUNDS):
+            best = int(np.nanargmin(sign * strokes))
+            start = cut_range[max(best - 1, 0)]
+            stop = cut_range[min(best + 1, len(cut_range) - 1)]
+            cut_range = np.linspace(start, stop, CUTS + 1)
+            strokes = compute_stroke(cut_range)
+        return sign * float(np.nanmin(sign * strokes))
+
+    least = find_limit(1.0)
+    most = find_limit(-1.0)
+    # a cylinder whose ends meet has the rounding of their places
+    return float(drop_rounding(np.array(least), most)), most
 
 
 def _find_largest_error_bar(solution: Solution, drive: Driving | None) -> float | None:

@@ -141,8 +141,8 @@ def units_of_scene(document: Mapping[str, Any]) -> Conversion:
 
     They are imperial where the lengths are in inches or feet; otherwise lengths have
     the unit of lengths.ground, and speeds and accelerations of bars those that the
-    motion is stated in. They are `COMMON` if the tables are no scene: the reader says
-    what is wrong with them.
+    motion is stated in, or rad/s if it is a released one. They are `COMMON` if the
+    tables are no scene: the reader says what is wrong with them.
     """
     try:
         length = str(find_length(document))
@@ -151,6 +151,9 @@ def units_of_scene(document: Mapping[str, Any]) -> Conversion:
             (str(motion.get(f"omega_{bar}", "")), str(motion.get(f"alpha_{bar}", "")))
             for bar in MOVING_BARS
         )
+        if "free" in motion:
+            # what it reaches is read beside its acceleration, unless it states more
+            rates = (("0 rad/s", ""), *rates)
     except (LookupError, TypeError, AttributeError):
         return COMMON
     return _suit_texts(length, rates)

@@ -51,6 +51,20 @@ def _draw_overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
         curves.draw_angles(panels["angles"], shown)
         draw_transmission(panels["mu"], shown)
         return
+    if shown.rests:
+        panels = figure.subplot_mosaic(
+            [
+                ["linkage", "linkage", "torque"],
+                ["linkage", "linkage", "angles"],
+                ["forces", "forces", "mu"],
+            ],
+        )
+        linkage.draw_linkage(panels["linkage"], shown, labels)
+        curves.draw_drive(panels["torque"], shown)
+        curves.draw_angles(panels["angles"], shown)
+        curves.draw_forces(panels["forces"], shown)
+        draw_transmission(panels["mu"], shown)
+        return
     free = shown.scene.motion.free is not None
     panels = figure.subplot_mosaic(
         [
@@ -76,7 +90,8 @@ def _draw_overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
 
 
 def _draw_kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
-    panels = figure.subplots(3 if shown.moves else 1, 1, squeeze=False)[:, 0]
+    has_rates = shown.moves and not shown.rests
+    panels = figure.subplots(3 if has_rates else 1, 1, squeeze=False)[:, 0]
     painters: tuple[Any, ...] = (
         curves.draw_angles,
         curves.draw_velocities,

@@ -87,6 +87,13 @@ class View:
         return self.sweep.omega_2 is not None
 
     @property
+    def rests(self) -> bool:
+        """Return True if each position is one at rest: nothing has a speed or power."""
+        motion = self.scene.motion
+        commanded = motion.law is None and motion.free is None
+        return commanded and motion.speed == 0.0 and motion.acceleration == 0.0
+
+    @property
     def branch_name(self) -> str:
         """Return "open" or "crossed", the assembly that the scene states."""
         return BRANCH_NAMES[self.scene.motion.branch]

@@ -105,6 +105,25 @@ def test_an_sdf_has_its_model_and_gravity_turned(
     assert poses[0] == poses[1]
 
 
+def test_only_a_plane_that_is_tilted_is_called_so() -> None:
+    """A plane that is moved alone says where O2 is."""
+    texts = {}
+    for name, plane in (
+        ("level", Plane()),
+        ("moved", Plane(origin=ORIGIN)),
+        ("tilted", Plane((0.3, 0.0, 1.0), ORIGIN)),
+    ):
+        texts[name] = [
+            write_sdf(scene(), without_loads=True, plane=plane),
+            write_mjcf(scene(), plane=plane),
+        ]
+    for name, written in texts.items():
+        for text in written:
+            assert bool(re.search("tilted", text, re.IGNORECASE)) == (name == "tilted")
+        place = "O2 is at 1 -2 0.5 m of the world." in written[0]
+        assert place == (name != "level")
+
+
 @pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), *AXES])
 def test_the_joints_of_a_usd_meet_wherever_the_plane_is(
     axis: tuple[float, float, float],

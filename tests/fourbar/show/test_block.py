@@ -312,6 +312,33 @@ def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore() -> None:
     )
 
 
+@pytest.mark.parametrize("bar", (2, 3))
+def test_a_cylinder_assembles_from_where_its_ends_meet(bar: int) -> None:
+    """On bar 2 they lie as far from O2. On bar 3 the end on the ground is on its path.
+
+    That end stands where the place of bar 3 is at theta_2 = 40 deg.
+    """
+    linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+    motion = fourbar.Motion(fourbar.Sweep(1.0, 2.0, 10), 0.0)
+    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    if bar == 2:
+        ground = fourbar.Place(1, (0.1, -1.5))
+        moving = fourbar.Place(2, (0.1, 0.0))
+    else:
+        met = fourbar.solve(replace(scene, motion=fourbar.Motion(math.radians(40.0))))
+        x = 0.1 * math.cos(math.radians(40.0)) + 0.1 * math.cos(met.theta_3[0])
+        y = 0.1 * math.sin(math.radians(40.0)) + 0.1 * math.sin(met.theta_3[0])
+        ground = fourbar.Place(1, (math.hypot(x, y), math.atan2(y, x)))
+        moving = fourbar.Place(3, (0.1, 0.0))
+    pushed = replace(scene, drive_bar=None, drive=fourbar.LinearDrive(ground, moving))
+    limits = summarize(pushed, fourbar.solve(pushed)).stroke_limits
+    assert limits is not None
+    assert limits[0] == 0.0
+    assert "assembles from 0 mm to" in block(pushed)
+    if bar == 2:
+        assert limits[1] == pytest.approx(0.2, rel=1e-12)
+
+
 def test_the_command_line_states_the_bore(capsys: pytest.CaptureFixture[str]) -> None:
     path = Path(__file__).parents[3] / "models" / "gallery" / "excavator_bucket.toml"
     assert status(["analyze", str(path), "--pressure", "3000 psi"]) == 0

@@ -14,7 +14,7 @@ from fourbar.cli import status
 from fourbar.errors import HOLDS, InputError
 from fourbar.quantities import UNITS
 from fourbar.show import notebook
-from fourbar.show.units import units
+from fourbar.show.units import units, units_of_scene
 from tests.support.scenes import crank_rocker
 
 PURE = (
@@ -219,3 +219,18 @@ def test_pounds_without_a_unit_of_force_are_one_line_that_says_what_to_write(
     with pytest.raises(InputError, match="write lbf for pounds-force"):
         units(text)
     assert units("in lb lbf")["N"][0] == "lbf"
+
+
+@pytest.mark.parametrize(
+    ("stated", "shown"),
+    [({}, "rad/s"), ({"omega_2": "60 rpm"}, "rpm"), ({"omega_2": "9 deg/s"}, "deg/s")],
+)
+@pytest.mark.parametrize("length", ("300 mm", "12 in"))
+def test_a_released_motion_has_speeds_that_suit_its_accelerations(
+    stated: dict[str, str],
+    shown: str,
+    length: str,
+) -> None:
+    motion = {"theta_2": "0 deg", "free": {"duration": "1 s"}, **stated}
+    of_scene = units_of_scene({"lengths": {"ground": length}, "motion": motion})
+    assert of_scene["rad/s"][0] == shown

@@ -1103,6 +1103,48 @@ def test_the_thesis_itself_differs_and_its_unit_slip_is_hinted(
     assert "F12" in hint
 
 
+def test_no_line_is_wider_than_a_terminal_and_none_ends_within_a_word(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The longest says which mistake explains all quantities of a table in kg mm/s^2.
+
+    Its words are one line when the lines are put together again.
+    """
+    scene_file = tmp_path / "scene.toml"
+    scene_file.write_text(
+        """
+[lengths]
+ground = "1000 mm"
+input = "250 mm"
+coupler = "650 mm"
+output = "600 mm"
+[bars.input]
+mass = "3 kg"
+[bars.coupler]
+mass = "6 kg"
+[bars.output]
+mass = "4 kg"
+[motion]
+theta_2 = ["10 deg", "40 deg", "90 deg"]
+omega_2 = "60 rad/s"
+"""
+    )
+    solution = fourbar.solve(fourbar.load(scene_file))
+    forces = ("F12", "F32", "F43", "F14")
+    sizes = [1e3 * np.hypot(*getattr(solution, name).T) for name in forces]
+    columns = [np.degrees(solution.theta_2), 1e3 * solution.torque, *sizes]
+    heading = "theta_2 [deg],torque [N m],F12 [N],F32 [N],F43 [N],F14 [N]"
+    rows = [",".join(f"{x:.7g}" for x in row) for row in np.transpose(columns)]
+    theirs = tmp_path / "theirs.csv"
+    theirs.write_text("\n".join((heading, *rows)))
+    assert status(["check", str(scene_file), str(theirs)]) == FAILED
+    printed = capsys.readouterr().out
+    assert max(map(len, printed.splitlines())) <= 80
+    together = " ".join(printed.split())
+    assert "1000 times (explains everything that differs: torque, |F12|," in together
+
+
 BAD_TABLES = [
     ("empty", "", "header and at least one row"),
     ("header alone", "theta_2,torque\n", "header and at least one row"),

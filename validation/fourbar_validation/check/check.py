@@ -21,7 +21,7 @@ from fourbar_validation.check.theirs import TheirTable, name_quantity, read_tabl
 from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.compare.tolerance import EPS, magnitude
 from fourbar_validation.report.junit import JunitCase, write_document
-from fourbar_validation.report.terminal import make_words_table
+from fourbar_validation.report.terminal import make_words_table, print_sentence
 
 
 @dataclass(frozen=True, slots=True)
@@ -385,14 +385,13 @@ def show_judgement(
     from rich.console import Console
     from rich.markup import escape
 
-    console = Console(soft_wrap=True)
     for note in table.notes:
-        console.print(escape(escape_controls(note)))
+        print_sentence(note)
     for why in dict.fromkeys(table.left_out.values()):
         headings = ", ".join(
             heading for heading, reason in table.left_out.items() if reason == why
         )
-        console.print(f"left out ({why}): {escape(escape_controls(headings))}")
+        print_sentence(f"left out ({why}): {headings}")
     differing = judgement.differing
     if differing:
         title = (
@@ -418,7 +417,7 @@ def show_judgement(
             )
             for each in _choose_worst(differing)
         ]
-        console.print(
+        Console(soft_wrap=True).print(
             make_words_table(
                 head,
                 rows,
@@ -428,19 +427,17 @@ def show_judgement(
             )
         )
         counted = Counter(finding.quantity for finding in differing)
-        console.print(
+        print_sentence(
             "in all: "
             + ", ".join(f"{count} of {quantity}" for quantity, count in counted.items())
         )
     for line in judgement.not_assembled:
-        console.print(
+        print_sentence(
             f"line {line}: the linkage has no motion there (it does not assemble, or is"
             " singular)"
         )
     for explanation in judgement.explanations:
-        console.print(
-            f"looks like: {escape(explanation.text)} ({_write_extent(explanation)})"
-        )
+        print_sentence(f"looks like: {explanation.text} ({_write_extent(explanation)})")
     if differing and not any(
         explanation.complete for explanation in judgement.explanations
     ):
@@ -448,8 +445,8 @@ def show_judgement(
             together = "these together explain all of it"
         else:
             together = "no single known mistake explains it"
-        console.print(together)
-    console.print(f"[bold]{judgement.sentence()}[/]")
+        print_sentence(together)
+    print_sentence(judgement.sentence())
 
 
 def _choose_worst(differing: list[Discrepancy]) -> list[Discrepancy]:

@@ -184,6 +184,19 @@ def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit() -> None
             )
 
 
+@pytest.mark.parametrize(("figure", "panels"), [("overview", 5), ("kinematics", 1)])
+def test_positions_at_rest_have_no_panel_of_zeros(figure: str, panels: int) -> None:
+    """With a speed there are speeds, accelerations and power besides."""
+    sweep = fourbar.Sweep(1.0, 2.0, 10)
+    at_rest = replace(CRANK_ROCKER, motion=fourbar.Motion(sweep, 0.0))
+    axes = composed(at_rest, figure).axes
+    assert len(axes) == panels
+    labels = " ".join(one.get_ylabel() for one in axes)
+    assert "rad/s" not in labels and "W)" not in labels
+    moving = replace(CRANK_ROCKER, motion=fourbar.Motion(sweep, 1.0))
+    assert len(composed(moving, figure).axes) > panels
+
+
 def solved(scene: fourbar.Scene) -> fourbar.Solution:
     """At the positions of a scene, and those that a figure shows between them."""
     return locate_between(scene, fourbar.solve(scene)).solution
