@@ -44,7 +44,7 @@ def stated(scene):
     """What a guest is told.
 
     Every place from its bar's pin, every mass, the motion apart. No words, pictures,
-    points and tolerances.
+    points, tolerances, and no drawing.
     """
     scene = state_from_pins(scene)
     link = scene.linkage
@@ -61,6 +61,7 @@ def stated(scene):
         pictures=(),
         points=(),
         tolerances=(),
+        drawing=None,
     )
 
 
