@@ -140,12 +140,14 @@ class _SummaryJudge:
             places = np.union1d(places, self.bends)
         return places
 
-    @cached_property
-    def has_integrals(self) -> bool:
-        """Return whether the motion has integrals: no part of it is left out."""
-        return len(self.fine.quantities["theta_2"]) == len(self.fine_places) and (
-            self.facts.sums is None
-        )
+    def integrates(self, name: str) -> bool:
+        """Return whether a quantity is integrated over the motion, and not summed.
+
+        The free bodies must know it at all of the many positions.
+        """
+        sums = self.facts.sums
+        known = len(self.fine.quantities["theta_2"]) == len(self.fine_places)
+        return known and (sums is None or name not in sums.names)
 
     @cached_property
     def fine(self) -> Answer:
@@ -455,14 +457,17 @@ def _judge_integrals(judged: _SummaryJudge, values: Array, power: Array) -> None
 
     Nothing may be a sum over the positions far from every pole.
     """
-    facts, entry = judged.facts, judged.motor
-    if not judged.has_integrals:
-        return
-    kind = "force" if facts.linear else "torque"
-    for key, of_motion in ((f"rms_{kind}", values), ("rms_power", power)):
-        if np.abs(of_motion).max() != 0.0:
+    entry = judged.motor
+    kind = "force" if judged.facts.linear else "torque"
+    for key, name, of_motion in (
+        (f"rms_{kind}", name_driving(judged.scene), values),
+        ("rms_power", "power", power),
+    ):
+        if judged.integrates(name) and np.abs(of_motion).max() != 0.0:
             rms = _find_rms(judged, of_motion)
             judged.add_value("integrals", entry[key], rms)
+    if not judged.integrates("power"):
+        return
     motion = judged.scene.motion
     second = 1.0 if motion.law is not None else abs(motion.speed or 0.0)
     if second == 0.0:
@@ -519,7 +524,7 @@ def _judge_pins(judged: _SummaryJudge) -> None:
             continue
         mean = math.sqrt(np.square(own[judged.counted]).mean())
         judged.add_value("pins", bearing_load(judged.solution, pin).rms, mean)
-        if judged.has_integrals:
+        if judged.integrates(name):
             rms = _find_rms(judged, *judged.fine.quantities[name].T)
             judged.add_value("integrals", load.rms, rms)
             judged.add_value("integrals", judged.motor["pins"][pin]["rms"], rms)
