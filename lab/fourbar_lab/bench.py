@@ -183,8 +183,8 @@ SPEED_LIMITS = {
     ),
     "a judged scene / one position": _SpeedLimit(
         "<=",
-        350.0,
-        "35 ms where a position takes 0.1 ms: two million scenes a night on 20 cores",
+        300.0,
+        "30 ms where a position takes 0.1 ms: two million scenes a night on 20 cores",
         JUDGED_SCENE,
         ONE_POSITION,
     ),
