@@ -4,6 +4,7 @@ Each effect, drive, branch and kind of motion is in one of them.
 """
 
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -65,7 +66,7 @@ CRANK_ROCKER = Scene(
     (_WEIGHT,),
     points=POINTS_OF_BARS,
 )
-FAULT_SCENES: dict[str, Scene] = {
+_WRITTEN_SCENES: dict[str, Scene] = {
     "crank-rocker": CRANK_ROCKER,
     "coupler driven": replace(
         CRANK_ROCKER,
@@ -421,12 +422,40 @@ FAULT_SCENES: dict[str, Scene] = {
         effects=(Flywheel(0.003, 4),),
     ),
 }
+
+
+class _FaultScenes(Mapping[str, Scene]):
+    """Scenes by name, those above and those of the suite's files.
+
+    A file is read when its scene is asked for: a fault may leave it unreadable, and the
+    other scenes are judged all the same.
+    """
+
+    def __init__(self) -> None:
+        self._suite = suite = read_default_suite()
+        self._of_files: dict[str, int] = {}
+        for index in range(len(suite)):
+            if (name := suite.name(index)) in suite.not_drawn:
+                for judged in ("simulated", "derived"):
+                    self._of_files[f"{judged}, {name}"] = index
+
+    def __getitem__(self, name: str) -> Scene:
+        """Return a scene by its name."""
+        if name in _WRITTEN_SCENES:
+            return _WRITTEN_SCENES[name]
+        return self._suite.scene(self._of_files[name])
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names."""
+        yield from _WRITTEN_SCENES
+        yield from self._of_files
+
+    def __len__(self) -> int:
+        """Count the scenes."""
+        return len(_WRITTEN_SCENES) + len(self._of_files)
+
+
+FAULT_SCENES = _FaultScenes()
 """Scenes by the name under which an entry of faults.toml tries its fault; scenes called
-"derived" judge what is derived from `solve` too."""
-_CAPABILITIES = read_default_suite()
-for index in range(len(_CAPABILITIES)):
-    if (name := _CAPABILITIES.name(index)) in _CAPABILITIES.not_drawn:
-        FAULT_SCENES |= {
-            f"{judged}, {name}": _CAPABILITIES.scene(index)
-            for judged in ("simulated", "derived")
-        }
+"derived" judge what is derived from `solve` too.
+"""

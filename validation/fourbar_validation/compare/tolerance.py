@@ -286,9 +286,14 @@ def mark_touching(linkage: FourBar, theta: Array, bar: int = 2) -> Mask:
 
 def magnitude(values: Array) -> Array:
     """Return the absolute value of a scalar, the Euclidean norm of a vector, (n,)."""
-    return np.asarray(
-        np.hypot(values[:, 0], values[:, 1]) if values.ndim == 2 else np.abs(values)
-    )
+    if values.ndim == 2:
+        return _measure_vectors(values)
+    return np.abs(values)
+
+
+def _measure_vectors(vectors: Array) -> Array:
+    """Return the Euclidean norm of vectors, (..., 2)."""
+    return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
 
 
 def join_components(x: Array, y: Array) -> Array:
@@ -306,7 +311,7 @@ def magnitudes(values: Sequence[Array] | Array) -> Array:
         if rows := [i for i in range(len(values)) if values[i].ndim == axes]:
             alike = np.array([values[i] for i in rows])
             if axes == 2:
-                sizes[rows] = np.hypot(alike[:, :, 0], alike[:, :, 1])
+                sizes[rows] = _measure_vectors(alike)
             else:
                 sizes[rows] = np.abs(alike)
     return sizes
@@ -328,7 +333,7 @@ def compute_differences(
         if rows := [i for i in alike if ours[i].ndim == axes]:
             difference = np.array([ours[i] - theirs[i] for i in rows])
             if axes == 2:
-                apart[rows] = np.hypot(difference[:, :, 0], difference[:, :, 1])
+                apart[rows] = _measure_vectors(difference)
                 continue
             turned = [quantities[i].startswith("theta") for i in rows]
             difference[turned] = wrap_difference(difference[turned])
