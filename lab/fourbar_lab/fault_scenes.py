@@ -6,6 +6,7 @@ Each effect, drive, branch and kind of motion is in one of them.
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from fourbar.linkage import PINS, Bar, FourBar, uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import CROSSED, Free, FromLimit, Law, Motion, Rise, Sweep
 from fourbar.scene.numbers import Point
-from fourbar_validation.scenes.suites import read_default_suite
+from fourbar_validation.scenes.suites import list_capability_files, read_scene_files
 
 CRANK_ROCKER_LINKAGE = FourBar(
     0.3,
@@ -425,34 +426,32 @@ _WRITTEN_SCENES: dict[str, Scene] = {
 
 
 class _FaultScenes(Mapping[str, Scene]):
-    """Scenes by name, those above and those of the suite's files.
+    """Scenes by name, those above and those of the files of small scenes.
 
     A file is read when its scene is asked for: a fault may leave it unreadable, and the
     other scenes are judged all the same.
     """
 
     def __init__(self) -> None:
-        self._suite = suite = read_default_suite()
-        self._of_files: dict[str, int] = {}
-        for index in range(len(suite)):
-            if (name := suite.name(index)) in suite.not_drawn:
-                for judged in ("simulated", "derived"):
-                    self._of_files[f"{judged}, {name}"] = index
+        self._files: dict[str, Path] = {}
+        for file in list_capability_files():
+            for judged in ("simulated", "derived"):
+                self._files[f"{judged}, {file.stem}"] = file
 
     def __getitem__(self, name: str) -> Scene:
         """Return a scene by its name."""
         if name in _WRITTEN_SCENES:
             return _WRITTEN_SCENES[name]
-        return self._suite.scene(self._of_files[name])
+        return read_scene_files([self._files[name]]).scene(0)
 
     def __iter__(self) -> Iterator[str]:
         """Iterate over the names."""
         yield from _WRITTEN_SCENES
-        yield from self._of_files
+        yield from self._files
 
     def __len__(self) -> int:
         """Count the scenes."""
-        return len(_WRITTEN_SCENES) + len(self._of_files)
+        return len(_WRITTEN_SCENES) + len(self._files)
 
 
 FAULT_SCENES = _FaultScenes()

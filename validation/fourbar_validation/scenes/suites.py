@@ -116,12 +116,14 @@ def list_model_files() -> list[Path]:
     return sorted(MODELS.glob("*.toml"))
 
 
-def read_default_suite() -> Files:
-    """Read the scene files of `models/` and the suite of small scenes.
+def list_capability_files() -> list[Path]:
+    """List the files of small scenes that together use every capability, sorted."""
+    return sorted((MODELS / "capabilities").glob("*.toml"))
 
-    The small scenes together use every capability.
-    """
-    capabilities = sorted((MODELS / "capabilities").glob("*.toml"))
+
+def read_default_suite() -> Files:
+    """Read the scene files of `models/` and the suite of small scenes."""
+    capabilities = list_capability_files()
     suite = read_scene_files([*list_model_files(), *capabilities])
     return replace(suite, not_drawn=frozenset(file.stem for file in capabilities))
 
