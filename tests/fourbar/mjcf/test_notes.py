@@ -393,6 +393,11 @@ def has_passive_motors(file: Opened) -> None:
     others = [i for i in range(m.nactuator) if m.actuator(i).name != drive]
     assert len(others) >= len(file.scene.loads)
     assert all(m.actuator_ctrlnum[i] == 0 for i in others)
+    # MuJoCo 3 refuses 0, and the back-EMF goes as the square
+    for motor in ET.fromstring(file.text).iter("dcmotor"):
+        constant = float(motor.get("motorconst", "nan"))
+        assert constant > 0.0
+        assert constant * constant == 0.0
     file.forward()
     before = d.actuator_force[others].copy()
     file.step(50)

@@ -23,6 +23,7 @@ from fourbar_validation.engines.environments import (
     start_engine,
 )
 from fourbar_validation.engines.guests import adjust_engines
+from fourbar_validation.engines.processes import Ended
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.engines.table import choose_engines, fill_table
 from fourbar_validation.regression.record import describe_run
@@ -128,6 +129,27 @@ def test_an_environment_that_cannot_be_made_is_one_line(
     assert (
         make_environment(Entry("here", adapter="free-body"), tmp_path) == sys.executable
     )
+
+
+def test_an_environment_is_filled_by_its_own_pip(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The environment that runs may have been made by uv, and have none."""
+    lines = []
+
+    def fails_at_pip(line: list[object]) -> Ended:
+        lines.append(list(map(str, line)))
+        return Ended("", "", failed="pip" in lines[-1], last="stop")
+
+    monkeypatch.setattr(environments, "run_to_end", fails_at_pip)
+    with pytest.raises(DependencyError, match="none: its environment cannot be made"):
+        make_environment(Entry("none", adapter="a:B", requires=("x",)), tmp_path)
+    (made, filled) = lines
+    assert made[:3] == [sys.executable, "-m", "venv"]
+    assert "--without-pip" not in made
+    assert Path(filled[0]).is_relative_to(tmp_path)
+    assert filled[-2:] == ["install", "x"]
 
 
 def test_an_adapter_of_ours_is_held_to_what_it_is_held_to_here() -> None:
