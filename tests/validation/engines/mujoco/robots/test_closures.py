@@ -292,6 +292,18 @@ def test_a_joint_equality_is_a_mimic() -> None:
     assert one.loop.other_equalities == (1,)
 
 
+def test_a_fixed_tendon_over_two_joints_is_a_mimic() -> None:
+    tendon = (
+        '<tendon><fixed name="T"><joint joint="O4" coef="2"/>'
+        '<joint joint="O2" coef="-1"/></fixed></tendon><equality>'
+    )
+    text = Planar().text().replace("<equality>", f'{tendon}<tendon tendon1="T"/>')
+    other, one = report_of(text).closures
+    assert (other.name, other.kind) == ("T", "tendon")
+    assert "O4 follows O2, polycoef 0 0.5 0 0 0" in other.reason
+    assert one.loop is not None
+
+
 def test_another_hinge_of_the_ground_can_be_the_driven_one() -> None:
     planar = Planar()
     loop = loop_of(planar.text(), drive="O4")

@@ -2,9 +2,14 @@
 
 from pathlib import Path
 
+import mujoco
+import numpy as np
+import pytest
+
 import fourbar
 from fourbar.linkage import Bar, FourBar
 from fourbar.scene import Scene
+from fourbar_validation.engines.mujoco.robots.ancestry import list_followers
 from fourbar_validation.engines.mujoco.robots.mimic import read_joint_equality
 from fourbar_validation.robots.files import read_robot
 
@@ -30,3 +35,52 @@ def test_coefficients_zero_and_sense_are_those_of_the_file(tmp_path: Path) -> No
     assert round(equality.leader_zero, 6) == 0.523599
     assert equality.sense == -1.0
     assert equality.theta_2 is None
+
+
+TENDONS = """<mujoco><worldbody>
+<body name="one"><joint name="lead" axis="0 0 1" ref="30"/><geom size="0.1"/></body>
+<body name="two"><joint name="follow" axis="0 0 -1" ref="9"/><geom size="0.1"/></body>
+</worldbody><tendon>
+<fixed name="both"><joint joint="lead" coef="-3"/><joint joint="follow" coef="2"/>
+</fixed>
+<fixed name="first"><joint joint="follow" coef="0.5"/></fixed>
+<fixed name="second"><joint joint="lead" coef="-1.5"/></fixed>
+<fixed name="none"><joint joint="follow" coef="0"/></fixed>
+<fixed name="half"><joint joint="lead" coef="1"/>
+<joint joint="follow" coef="0"/></fixed>
+</tendon><equality>{}</equality></mujoco>"""
+EXACT = 1e-13
+"""m; lengths of tendons of a few metres in double precision."""
+
+
+@pytest.mark.parametrize(
+    ("equality", "followers"),
+    [
+        ('<tendon tendon1="both"/>', ["lead", "follow"]),
+        ('<tendon tendon1="both" polycoef="0.3 1 0 0 0"/>', ["lead", "follow"]),
+        (
+            '<tendon tendon1="first" tendon2="second" polycoef=".1 .2 .3 .4 .5"/>',
+            ["follow"],
+        ),
+        ('<joint joint1="follow" joint2="lead" polycoef=".1 2 3 4 5"/>', ["follow"]),
+        ('<tendon tendon1="both" tendon2="second"/>', []),
+        ('<tendon tendon1="none" tendon2="second"/>', []),
+        ('<tendon tendon1="half"/>', []),
+        ('<tendon tendon1="first"/>', []),
+        ('<joint joint1="follow"/>', []),
+    ],
+)
+def test_a_follower_at_its_polynomial_leaves_the_equality_no_residual(
+    equality: str, followers: list[str]
+) -> None:
+    model = mujoco.MjModel.from_xml_string(TENDONS.format(equality))
+    data = mujoco.MjData(model)
+    ties = list_followers(model, 0)
+    assert [model.joint(tie.joint).name for tie in ties] == followers
+    for tie in ties:
+        for angle in (-0.7, 0.0, 0.4):
+            data.qpos[tie.leader] = model.qpos0[tie.leader] + angle
+            turned = np.polynomial.polynomial.polyval(angle, tie.coefficients)
+            data.qpos[tie.joint] = model.qpos0[tie.joint] + turned
+            mujoco.mj_fwdPosition(model, data)
+            assert abs(data.efc_pos[0]) <= EXACT

@@ -1,5 +1,7 @@
 """Bodies of a model, the joints between them, and what acts on them."""
 
+from typing import NamedTuple
+
 import mujoco
 
 
@@ -72,6 +74,62 @@ def find_tied_bodies(model: mujoco.MjModel, equality: int) -> tuple[int, int]:
 def name_joint(model: mujoco.MjModel, joint: int) -> str:
     """Name a joint: as the file does, or by its number."""
     return model.joint(joint).name or f"joint {joint}"
+
+
+class Follower(NamedTuple):
+    """Joint that an equality lets follow another, both counted from their rest pose."""
+
+    joint: int
+    leader: int
+    coefficients: tuple[float, ...]
+    """a0 to a4 of the follower's position over the leader's."""
+
+
+def list_followers(model: mujoco.MjModel, equality: int) -> list[Follower]:
+    """List the joints that an equality of joints or fixed tendons lets follow others.
+
+    A tendon over two joints that is kept at a length, c1 q1 + c2 q2 = a0, lets each of
+    them follow the other. Of two tendons over a joint each the first one follows.
+    """
+    kind = mujoco.mjtEq(int(model.eq_type[equality]))
+    first = int(model.eq_obj1id[equality])
+    second = int(model.eq_obj2id[equality])
+    powers = model.eq_data[equality, :5].tolist()
+    if kind == mujoco.mjtEq.mjEQ_JOINT and second >= 0:
+        return [Follower(first, second, tuple(powers))]
+    if kind != mujoco.mjtEq.mjEQ_TENDON:
+        return []
+    ends = list_tendon_joints(model, first)
+    if second < 0:
+        if len(ends) != 2 or not all(ends.values()):
+            return []
+        pairs = zip(ends.items(), reversed(ends.items()), strict=True)
+        return [
+            Follower(
+                joint, leader, (powers[0] / factor, -other / factor, 0.0, 0.0, 0.0)
+            )
+            for (joint, factor), (leader, other) in pairs
+        ]
+    leaders = list_tendon_joints(model, second)
+    if len(ends) != 1 or len(leaders) != 1:
+        return []
+    ((joint, factor),) = ends.items()
+    ((leader, other),) = leaders.items()
+    if not factor or joint == leader:
+        return []
+    scaled = (power * other**k / factor for k, power in enumerate(powers))
+    return [Follower(joint, leader, tuple(scaled))]
+
+
+def list_tendon_joints(model: mujoco.MjModel, tendon: int) -> dict[int, float]:
+    """Return the coefficient of each joint of a fixed tendon; none of a spatial one."""
+    start = int(model.tendon_adr[tendon])
+    wraps = range(start, start + int(model.tendon_num[tendon]))
+    return {
+        int(model.wrap_objid[wrap]): float(model.wrap_prm[wrap])
+        for wrap in wraps
+        if model.wrap_type[wrap] == mujoco.mjtWrap.mjWRAP_JOINT
+    }
 
 
 def describe_actuator(model: mujoco.MjModel, actuator: int) -> str:

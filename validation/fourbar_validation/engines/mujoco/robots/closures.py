@@ -22,7 +22,9 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     find_parent,
     find_roots,
     find_tied_bodies,
+    list_followers,
     list_joints,
+    list_tendon_joints,
     name_joint,
     takes_control,
 )
@@ -143,6 +145,9 @@ def describe_equality(model: mujoco.MjModel, number: int) -> str:
         names = [name_body(model, body) for body in find_tied_bodies(model, number)]
     elif kind == "joint":
         names = [name_joint(model, i) for i in (first, second) if i >= 0]
+    elif kind == "tendon":
+        tendons = [i for i in (first, second) if i >= 0]
+        names = [model.tendon(i).name or f"tendon {i}" for i in tendons]
     else:
         return f"equality {number}"
     return "-".join(names)
@@ -276,8 +281,8 @@ class _Finder:
         kind = EQUALITY_KINDS.get(int(model.eq_type[number]), "flex")
         solref = tuple(model.eq_solref[number].tolist())
         solimp = tuple(model.eq_solimp[number].tolist())
-        if kind == "joint":
-            text = self._describe_mimic(number)
+        if kind in ("joint", "tendon"):
+            text = self._describe_mimic(number, kind)
             return RobotClosure(name, kind, None, text, solref=solref, solimp=solimp)
         if kind not in ("connect", "weld"):
             text = f"a {kind} equality is no pin"
@@ -322,21 +327,24 @@ class _Finder:
             return True
         return bool(self.model.eq_data[number, 10] == 0.0)  # torquescale
 
-    def _describe_mimic(self, number: int) -> str:
+    def _describe_mimic(self, number: int, kind: str) -> str:
         """Write which joint follows which, by which polynomial."""
         model = self.model
-        first = int(model.eq_obj1id[number])
-        second = int(model.eq_obj2id[number])
-        coefficients = [f"{c:.6g}" for c in model.eq_data[number, :5]]
-        follower = name_joint(model, first)
-        if second < 0:
-            return f"{follower} is kept at {coefficients[0]} of its rest"
-        leader = name_joint(model, second)
-        polynomial = " ".join(coefficients)
-        return (
-            f"{follower} follows {leader}, polycoef {polynomial}: no loop is closed "
-            f"(check-mjcf SCENE FILE --mimic {follower} holds it against one)"
-        )
+        followers = list_followers(model, number)
+        if followers:
+            joint, leader, numbers = followers[0]
+            follower = name_joint(model, joint)
+            polynomial = " ".join(f"{c + 0.0:.6g}" for c in numbers)
+            return (
+                f"{follower} follows {name_joint(model, leader)}, polycoef "
+                f"{polynomial}: no loop is closed (check-mjcf SCENE FILE --mimic "
+                f"{follower} holds it against one)"
+            )
+        if kind == "tendon":
+            return "a tendon equality is no pin"
+        joint = int(model.eq_obj1id[number])
+        rest = float(model.eq_data[number, 0])
+        return f"{name_joint(model, joint)} is kept at {rest:.6g} of its rest"
 
     def _recognise(
         self,
@@ -544,21 +552,11 @@ class _Finder:
             if kind in (transmission.mjTRN_JOINT, transmission.mjTRN_JOINTINPARENT):
                 acted = [target]
             elif kind == transmission.mjTRN_TENDON:
-                acted = self._list_joints_of_tendon(target)
+                acted = list(list_tendon_joints(model, target))
             else:
                 acted = []
             motors += [(joint, number) for joint in acted if joint in joints]
         return motors
-
-    def _list_joints_of_tendon(self, tendon: int) -> list[int]:
-        model = self.model
-        start = int(model.tendon_adr[tendon])
-        stop = start + int(model.tendon_num[tendon])
-        joints = []
-        for wrap in range(start, stop):
-            if model.wrap_type[wrap] == mujoco.mjtWrap.mjWRAP_JOINT:
-                joints.append(int(model.wrap_objid[wrap]))
-        return joints
 
     def _make_loop(
         self,

@@ -1,7 +1,4 @@
-"""A joint equality of a robot's file.
-
-By its polynomial one joint follows another.
-"""
+"""An equality by whose polynomial one joint of a robot's file follows another."""
 
 import math
 from collections.abc import Iterator
@@ -13,7 +10,11 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.quantities import Array
 from fourbar.scene import Scene
-from fourbar_validation.engines.mujoco.robots.ancestry import name_joint
+from fourbar_validation.engines.mujoco.robots.ancestry import (
+    Follower,
+    list_followers,
+    name_joint,
+)
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 from fourbar_validation.engines.mujoco.robots.pose import HINGE_JOINT, find_joint
@@ -67,24 +68,23 @@ def read_joint_equality(
     model = compile_robot(file).model
     joint = find_joint(model, name, "--mimic")
     for number in range(model.neq):
-        ties = model.eq_type[number] == mujoco.mjtEq.mjEQ_JOINT
-        leader = int(model.eq_obj2id[number])
-        if ties and int(model.eq_obj1id[number]) == joint and leader >= 0:
-            return _describe_follower(model, number, joint, leader, scene)
+        for tie in list_followers(model, number):
+            if tie.joint == joint:
+                return _describe_follower(model, tie, scene)
     raise InputError(
         "--mimic",
         name,
-        f'follows no other joint: the file has no <joint joint1="{name}" joint2="...">',
+        f'follows no other joint: the file has no <joint joint1="{name}" joint2="...">'
+        " and no equality of a fixed tendon over it and one other joint",
     )
 
 
 def _describe_follower(
     model: mujoco.MjModel,
-    number: int,
-    follower: int,
-    leader: int,
+    tie: Follower,
     scene: Scene,
 ) -> JointEquality:
+    follower, leader, coefficients = tie
     for joint in (follower, leader):
         if int(model.jnt_type[joint]) != HINGE_JOINT:
             raise InputError(
@@ -99,7 +99,7 @@ def _describe_follower(
     return JointEquality(
         name_joint(model, follower),
         name_joint(model, leader),
-        tuple(model.eq_data[number, :5].tolist()),
+        coefficients,
         float(model.qpos0[model.jnt_qposadr[leader]]),
         math.copysign(1.0, along),
         theta_2,
