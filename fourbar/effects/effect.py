@@ -425,6 +425,17 @@ class Effect:
         `forces`: by name, (n, 2), N; they are known by now.
         """
 
+    def breaks(self, state: State) -> dict[str, Number]:
+        """Return functions of the motion, (n,), at whose zeros forces jump or bend.
+
+        Each function passes smoothly through zero there, as the slip of a pin with dry
+        friction does, or the length of a spring less the length at which it goes slack.
+        What is said of a motion as a whole (peaks, means, energies) is found on panels
+        that end at the zeros. A slip has the name of its pin; other names tell one
+        function from another, within all effects.
+        """
+        return {pin: state.slip(pin) * state.speed for pin in self.dry_pins}
+
     def begin_at(self, start: State, branch: Number) -> Self:
         """Return the effect in a motion that begins at this position and branch."""
         return self

@@ -16,6 +16,7 @@ from fourbar.effects.place import STATED_PLACES, Place
 from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.arithmetic import (
     PI_LOW,
+    Number,
     angle,
     is_any,
     make_like,
@@ -249,6 +250,15 @@ class Load(Effect):
             actions.force(self.bar, factor * force, foot, beyond)
         if is_any(self.moment != 0.0):
             actions.couple(self.bar, factor * self.moment)
+
+    def breaks(self, state: State) -> dict[str, Number]:
+        """Return sin((theta_2 - corner)/2) for each corner of the table."""
+        if self.table is None:
+            return {}
+        return {
+            f"theta_2 = {corner!r}": np.sin(0.5 * (state.theta_2 - corner))
+            for corner in self.table.theta_2
+        }
 
     def greatest_force(self, linkage: FourBar) -> float:
         """Return the force with its lever, and the couple over the bar's length, N.

@@ -24,7 +24,8 @@ from fourbar.effects import (
 )
 from fourbar.effects.pin_friction import MANY, NO_SOLUTION, ONE_SOLUTION, solve_sliding
 from fourbar.errors import InputError, LimitError
-from fourbar.scene import Scene
+from fourbar.evaluation.case import compute_shown_state
+from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Law, Motion, Rise, Sweep
 from fourbar.solving import solve
 from fourbar_validation.engines.effects import look_up
@@ -309,6 +310,33 @@ def test_a_load_over_theta_2_is_the_load_times_its_factor() -> None:
         loads=(replace(load, force=(6.0, 0.7), moment=0.4),),
     )
     assert tabled[1].torque == pytest.approx(solve(twice).torque, rel=1e-14)
+
+
+def test_breaks_change_their_sign_where_forces_jump_or_bend() -> None:
+    """Corners of a table lie whole turns apart; the output turns back in line."""
+    stated = Table((0.4, 1.0, 1.5), (1.0, 3.0, 2.0))
+    load = fourbar.Load(2, moment=1.0, table=stated)
+    places = {f"theta_2 = {corner!r}": [corner] for corner in stated.theta_2}
+    lengths = 0.3, 0.1, 0.25, 0.22
+    d, a, b, c = lengths
+    places["O4"] = [
+        turned + math.acos((r * r + d * d - c * c) / (2.0 * r * d))
+        for r, turned in ((b + a, 0.0), (b - a, math.pi))
+    ]
+    friction = fourbar.Friction.at(O4=0.1)
+    scene = fourbar.Scene(fourbar.uniform(*lengths), loads=(load,), effects=(friction,))
+    angles = np.linspace(0.0, 2.0 * math.tau, 1009)
+    branch = np.ones(len(angles), dtype=np.int8)
+    for speed in (3.0, -3.0):
+        state = compute_shown_state(scene, Command(angles, branch, speed, 0.0))
+        breaks = load.breaks(state) | friction.breaks(state)
+        assert breaks.keys() == places.keys()
+        for name, values in breaks.items():
+            crossed = np.flatnonzero(values[1:] * values[:-1] < 0.0)
+            right = np.add.outer(places[name], [0.0, math.tau])
+            assert crossed.tolist() == sorted(
+                np.searchsorted(angles, right.ravel()) - 1
+            ), name
 
 
 def test_a_law_through_a_cubic_is_that_cubic() -> None:
