@@ -73,7 +73,7 @@ def list_handles(scene: Scene) -> list[_Handle]:
         name = f"point {point.name}"
         handles.append(_hold_place(name, ("points", point.name), point.place, scene))
     for n, load in enumerate(scene.loads):
-        if load.force is None:
+        if load.arm is None and load.place is None:  # a couple without a place
             continue
         name = f"load {n + 1}"
         path = ("loads", n)
@@ -83,8 +83,9 @@ def list_handles(scene: Scene) -> list[_Handle]:
             handle = _Handle(name, (*path, "arm"), load.bar, G, arm, turns=False)
         else:
             handle = _hold_place(name, path, load.place, scene)
-        force_turns = load.frame == "bar"
-        handle = handle._replace(force=(*path, "force"), force_turns=force_turns)
+        if load.force is not None:
+            turns = load.frame == "bar"
+            handle = handle._replace(force=(*path, "force"), force_turns=turns)
         handles.append(handle)
     if scene.drive is not None:
         handles += _hold_drive(scene.drive, scene)

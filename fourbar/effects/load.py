@@ -142,8 +142,9 @@ class Table:
 class Load(Effect):
     """A force and a couple on a moving bar.
 
-    The force acts at a place that turns with the bar, in a direction that is kept in
-    the world's axes or turns with the bar too.
+    Both act at a place that turns with the bar. The force keeps its direction in the
+    world's axes or turns with the bar too. Only the bending of the bar depends on where
+    the couple acts.
 
     Parameters
     ----------
@@ -152,7 +153,8 @@ class Load(Effect):
     from_pin : (distance, angle) from the bar's first pin (O2, A, O4) to where the force
         acts, m, the angle from the bar's line, rad.
     from_centre : likewise from the mass centre G; (0, 0), which is G itself, where the
-        place of a force is left out.
+        place of a force is left out. A couple alone without a place acts at the shafts
+        O2 and O4 of bars 2 and 4, and at G of bar 3.
     point : name of the point of the scene at which the force acts.
     arm : (distance, angle) from G in world axes, m and rad: the force keeps its lever
         about G as the bar turns. In place of a place of the bar, for "world" alone.
@@ -194,15 +196,11 @@ class Load(Effect):
             raise InputError(
                 "loads",
                 " and ".join(forms),
-                "a force acts at one place: state one",
+                "a load acts at one place: state one",
             )
-        if forms and self.force is None:
-            (name,) = forms
-            raise InputError(
-                f"loads.{name}",
-                None,
-                "needs a force: state one, or leave this out",
-            )
+        if self.arm is not None and self.force is None:
+            allowed = "needs a force; a moment alone acts at from_pin or from_centre"
+            raise InputError("loads.arm", None, allowed)
         if self.arm is not None and self.frame == "bar":
             allowed = (
                 "is in world axes, for a force of fixed direction; where the force "
@@ -214,20 +212,18 @@ class Load(Effect):
 
     @property
     def place(self) -> Place | None:
-        """Place of the force; None: there is no force, or it is stated by its arm."""
-        if self.force is None or self.arm is not None:
-            return None
-        return Place(self.bar, self.from_pin, self.from_centre, self.point)
+        """Place of the load; None: its arm states it, or a couple alone has none."""
+        forms = self.from_pin, self.from_centre, self.point
+        return None if forms == (None, None, None) else Place(self.bar, *forms)
 
     def foot(self, G: Any) -> Any:
-        """Return where the settled load acts in the bar's frame, m.
+        """Return where the settled load acts from the bar's first pin, complex, m.
 
-        It is its place, or else G, from the bar's first pin.
-
-        G, likewise, is where an arm begins, and where a couple alone is shown.
+        The vector is in the bar's frame, as G is, from which an arm begins.
         """
-        place = self.place
-        return G if place is None else place.vector()
+        if (place := self.place) is not None:
+            return place.vector()
+        return G if self.arm is not None or self.bar == 3 else 0.0j
 
     def with_places(self, change: Callable[[Place], Place]) -> "Load":
         """Return the same load with its place changed."""
@@ -271,7 +267,8 @@ class Load(Effect):
             reach = abs(bar.mass_centre[0])
             if self.arm is not None:
                 reach += abs(self.arm[0])
-            elif self.place is not None:
+            else:
+                assert self.place is not None
                 reach = abs(self.place.distance)
             total += abs(self.force[0]) * (1.0 + reach / bar.length)
         if self.table is None:

@@ -574,10 +574,7 @@ class Model:
         return tendon
 
     def add_load_sites(self, root: ET.Element) -> None:
-        """Add the point at which each load acts.
-
-        It is the load's place, or G where an arm becomes a couple or no force acts.
-        """
+        """Add the point at which each load acts; an arm becomes a couple at G."""
         for index, load in enumerate(self.loads, 1):
             z = load.foot(self.linkage.bar(load.bar).to_centre)
             body = _find_body(root, load.bar)

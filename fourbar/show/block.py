@@ -26,6 +26,7 @@ from fourbar.linkage import BAR_NAMES, PIN_FORCE
 from fourbar.quantities import LINE, OK, PIN_FORCES, Array
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
+from fourbar.show.acting import list_couple_notes
 from fourbar.show.change_point import has_growing_forces
 from fourbar.show.duty import DUTY_UNITS, MotorDuty, bearing_load, describe_drive
 from fourbar.show.gas import list_gas_notes
@@ -778,7 +779,7 @@ class _SceneBlock:
         ]
         if any(facts.stresses.values()):
             rows.append(("  stress", self._write_stresses()))
-        return _align(rows)
+        return [*_align(rows), *list_couple_notes(facts.scene)]
 
     def _write_stresses(self) -> list[str]:
         """Write the largest bending stress of each bar.

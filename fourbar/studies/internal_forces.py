@@ -358,10 +358,7 @@ def _sum_by_foot(
 
 
 def _couple_place(load: Any, G: Any, back: Any) -> Any:
-    """Return where the couple of a load acts in the bar's axes.
-
-    It is where its force acts, or else G.
-    """
+    """Return where the couple of a load acts, in the bar's axes."""
     if load.arm is not None:
         return G + polar(*load.arm) * back
     return load.foot(G)

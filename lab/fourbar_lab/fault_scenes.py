@@ -375,7 +375,13 @@ _WRITTEN_SCENES: dict[str, Scene] = {
         Motion(Sweep(0.3, 1.4, 22), 3.0),
         effects=(_WEIGHT,),
     ),
-    "derived, loaded": Scene(_SLENDER, MOTION_OF_A_TURN, 2, LOADS, (_WEIGHT,)),
+    "derived, loaded": Scene(
+        _SLENDER,
+        MOTION_OF_A_TURN,
+        2,
+        (*LOADS, Load(3, moment=-0.3, from_pin=(0.2, 0.4)), Load(4, moment=0.2)),
+        (_WEIGHT,),
+    ),
     "derived, part of a turn": Scene(
         _SLENDER,
         Motion(Sweep(0.1, 2.0, 8), 10.0, 5.0),

@@ -93,7 +93,7 @@ function drawActing(p, i) {
     } else if (one.kind === "moment" || one.kind === "drive") {
       const turn = Math.sign(one.kind === "moment" ? one.moment * factor : torque ?? 1);
       const middle = one.bar === 3 ? [0, 1].map(j => 0.5 * (p.A[j] + p.B[j])) : p[one.pin];
-      const at = toScreen(one.kind === "moment" ? framed(p, one.bar, one.at) : middle), radius = (one.kind === "moment" ? 2.2 : 2.9) * S;
+      const at = toScreen(one.kind === "moment" ? forceFoot(p, one) : middle), radius = (one.kind === "moment" ? 2.2 : 2.9) * S;
       if (turn) headed(ring(at, radius, -35 / DEG * turn, turn * OPENING, 30), one.kind);
       if (turn) named(one.name, at[0], at[1] - turn * (radius + 9));
     } else if (one.kind === "torsion") {

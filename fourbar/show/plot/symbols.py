@@ -172,7 +172,8 @@ def list_acting(scene: Scene) -> list[Symbol]:
                     "moment",
                     f"load {number}",
                     load.bar,
-                    G,
+                    load.foot(G),
+                    0.0j if load.arm is None else cmath.rect(*load.arm),
                     moment=load.moment,
                     table=load.table,
                 )
@@ -358,7 +359,7 @@ def _draw_couple(
 ) -> None:
     """Draw a moment, or the torque of the drive, as an arrow that turns."""
     if symbol.kind == "moment":
-        centre = place.point(symbol.bar, symbol.at)
+        centre = place.point(symbol.bar, symbol.at) + symbol.beyond
         turn = math.copysign(1.0, symbol.moment) * symbol.sign(place.theta_2)
     else:
         if symbol.bar == 3:

@@ -250,6 +250,8 @@ def test_what_is_dragged_stands_where_it_was_dragged_to(session: Session) -> Non
     }
     session.document.put(["points"], added["points"])
     session.document.put(["effects", "springs"], added["effects"]["x"])
+    couple = {"bar": 4, "moment": "1 N m", "from_pin": ["1 in", "20 deg"]}
+    session.document.put(["loads", -1], couple)
     session.do({"do": "text", "text": session.document.text()})
     for what, to in (("A", 0.08 + 0.09j), ("B", 0.2 + 0.25j), ("O4", 0.33 + 0.05j)):
         dragged(session, what, to)
@@ -281,6 +283,11 @@ def test_what_is_dragged_stands_where_it_was_dragged_to(session: Session) -> Non
         0.1 - 0.05j,
         abs=2 * PIXEL,
     )
+    dragged(session, ["loads", 2, "from_pin"], 0.3 + 0.1j)
+    s = at_50(session)
+    O4 = linkage.ground * np.exp(1j * linkage.ground_angle)
+    couple_at = O4 + session.now.scene.loads[2].foot(0j) * np.exp(1j * s.theta_4[0])
+    assert couple_at == pytest.approx(0.3 + 0.1j, abs=2 * PIXEL)
     dragged(session, ["loads", 1, "from_centre"], 0.12 + 0.12j)
     load, s = session.now.scene.loads[1], at_50(session)
     foot = complex(*s.G3[0]) + cmath.rect(*load.from_centre) * np.exp(1j * s.theta_3[0])

@@ -282,7 +282,7 @@ def test_a_place_that_is_stated_wrongly_is_refused_with_what_to_write(
     "make",
     [
         lambda: Load(3, (1.0, 0.0), from_pin=(0.1, 0.0), arm=(0.1, 0.0)),
-        lambda: Load(3, None, from_pin=(0.1, 0.0), moment=1.0),
+        lambda: Load(3, None, arm=(0.1, 0.0), moment=1.0),
         lambda: Load(3, (1.0, 0.0), arm=(0.1, 0.0), frame="bar"),
         lambda: crank_rocker(loads=(Load(3, (1.0, 0.0), point="P"),)),
         lambda: crank_rocker(

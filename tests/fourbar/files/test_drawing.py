@@ -144,10 +144,16 @@ P = { bar = 3, PLACE ["120 mm", "80 mm"] CLOSED }
 bar = 4
 force = ["10 N", "0 deg"]
 PLACE ["240 mm", "70 mm"] CLOSED
+[[loads]]
+bar = 3
+moment = "1 N m"
+PLACE ["120 mm", "80 mm"] CLOSED
 """
     short = acts.replace("PLACE", "drawn =").replace("CLOSED", "")
     nested = acts.replace("PLACE", "from_pin = { drawn =").replace("CLOSED", "}")
-    assert loads(DRAWN + short) == loads(DRAWN + nested)
+    scene = loads(DRAWN + short)
+    assert loads(DRAWN + nested) == loads(dump(scene)) == scene
+    assert scene.loads[1].from_pin == scene.points[0].from_pin
     for text, said in (
         (short.replace("bar = 3, ", ""), "must name the bar it is of"),
         (short.replace("bar = 3, ", 'bar = 3, from_pin = ["1 m", "0"], '), "left out"),

@@ -245,9 +245,9 @@ MISTAKES = [
     ),
     (
         "arm without a force",
-        'force = ["3 N", "40 deg"]',
-        'moment = "1 N m"',
-        ["loads[0].from_pin", "needs a force"],
+        'force = ["3 N", "40 deg"]\nfrom_pin',
+        'moment = "1 N m"\narm',
+        ["loads[0].arm", "needs a force"],
     ),
     (
         "force without an angle",

@@ -5,6 +5,7 @@ Beams of the textbook, equilibrium at the far end, and V as the slope of M.
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -51,17 +52,40 @@ def test_a_force_across_the_coupler_bends_it_as_a_beam_on_two_supports() -> None
     assert internal.largest.x[0] == pytest.approx(0.075)
 
 
-def test_a_couple_on_the_output_jumps_where_it_acts() -> None:
-    load = fourbar.Load(4, (0.0, 0.0), from_pin=(0.05, 0.0), moment=3.0)
-    internal = solved(fourbar.Scene(BARE, AT, loads=(load,)), 4, [0.049999, 0.05, 0.1])
-    before, after = internal.M[0, :2]
-    assert before - after == pytest.approx(3.0, rel=1e-4) and internal.V[
-        0, 0
-    ] == pytest.approx(internal.V[0, 2])
-    assert max(abs(before), abs(after)) == pytest.approx(
-        abs(internal.largest.moment[0]),
-        rel=1e-4,
-    )
+@pytest.mark.parametrize(
+    ("bar", "load", "foot"),
+    [
+        (4, {}, 0.0),
+        (3, {}, 0.125),
+        (4, {"from_pin": (0.22, 0.0)}, 0.22),
+        (3, {"from_pin": (0.25, 0.0)}, 0.25),
+        (3, {"from_centre": (0.05, math.pi)}, 0.075),
+        (4, {"point": "P"}, 0.05),
+        (4, {"force": (0.0, 0.0), "from_pin": (0.05, 0.0)}, 0.05),
+        (4, {"force": (0.0, 0.0)}, 0.11),
+    ],
+    ids=str,
+)
+def test_a_couple_bends_its_bar_from_its_place_on(
+    bar: int, load: dict[str, Any], foot: float
+) -> None:
+    """M(x) = T x/L before the place and T (x/L - 1) behind it, on two supports.
+
+    Without a place the couple enters the output at O4 and the coupler at G.
+    """
+    couple = fourbar.Load(bar, moment=3.0, **load)
+    point = fourbar.Point("P", 4, from_pin=(0.05, 0.0))
+    scene = fourbar.Scene(BARE, AT, loads=(couple,), points=(point,))
+    x = np.array([0.01, 0.06, 0.12, 0.2])
+    internal = solved(scene, bar, x)
+    length = BARE.bar(bar).length
+    M = 3.0 * (x / length - (x > foot))
+    np.testing.assert_allclose(internal.M[0], M, atol=3.0 * ROUNDED)
+    largest = 3.0 * max(foot, length - foot) / length
+    assert abs(internal.largest.moment[0]) == pytest.approx(largest, rel=ROUNDED)
+    assert internal.largest.x[0] == pytest.approx(foot, abs=ROUNDED)
+    elsewhere = replace(scene, loads=(fourbar.Load(bar, moment=3.0),))
+    assert fourbar.solve(elsewhere).torque[0] == fourbar.solve(scene).torque[0]
 
 
 def test_a_bar_that_hangs_in_its_pins_bends_by_its_own_weight() -> None:
@@ -144,9 +168,13 @@ def test_each_part_of_a_bar_up_to_a_cut_is_in_balance_under_all_that_acts(
     Where friction jams there are none.
     """
     motion = fourbar.Motion(fourbar.Sweep(0.1, 6.0, 60), 8.0, 5.0)
-    rows = rows_of(
-        crank_rocker(motion=motion, effects=EVERYTHING, **drive), "internal_forces"
+    couples = (
+        fourbar.Load(2, moment=0.4),
+        fourbar.Load(3, moment=-0.7, from_pin=(0.12, 0.6)),
+        fourbar.Load(4, moment=0.5, from_centre=(0.03, 2.0)),
     )
+    scene = crank_rocker(motion=motion, loads=couples, effects=EVERYTHING, **drive)
+    rows = rows_of(scene, "internal_forces")
     assert {row.quantity for row in rows} == {
         f"{part}{bar}" for part in "NVM" for bar in (2, 3, 4)
     }

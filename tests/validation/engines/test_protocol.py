@@ -167,9 +167,10 @@ def test_a_gas_spring_travels_as_its_file_is_written_and_a_table_in_radians():
     table = fourbar.Table((0.0, math.pi, 2 * math.pi), (1.0, 0.5, 1.0))
     scene = crank_rocker(
         effects=(fourbar.Springs((gas,)),),
-        loads=(fourbar.Load(4, moment=1.0, table=table),),
+        loads=(fourbar.Load(4, moment=1.0, from_centre=(0.1, 0.0), table=table),),
     )
     data = protocol.scene_to_json(scene)
+    assert "from_pin" not in data["loads"][0], "a couple acts alike wherever it is"
     spring = data["effects"]["springs"][0]
     assert (spring["stiffness"], spring["length"], spring["preload"]) == (
         gas.stiffness,

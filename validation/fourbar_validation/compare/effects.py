@@ -118,10 +118,9 @@ def _find_load(load: "Load", linkage: FourBar, _: Solution) -> float:
     bar = linkage.bar(load.bar)
     size = abs(load.moment) / bar.length
     if load.force is not None:
-        if load.place is not None:
+        if load.arm is None:
             reach = _find_reach(load.place)
         else:
-            assert load.arm is not None
             reach = abs(find_centre(bar)[0]) + abs(load.arm[0])
         size += abs(load.force[0]) * (1.0 + reach / bar.length)
     if load.table is not None:

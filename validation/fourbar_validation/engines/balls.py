@@ -138,7 +138,8 @@ def _collect_load(scene: Scene, k: int) -> dict[str, float]:
     }
     if load.arm is not None:
         values[f"at_{k}"], values[f"at_angle_{k}"] = load.arm
-    elif load.place is not None:
+    elif load.force is not None:
+        assert load.place is not None
         values |= _collect_place(scene, load.place, f"at_{k}", f"at_angle_{k}")
     return values
 

@@ -271,13 +271,13 @@ def apply_load(load: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
 def find_arm(load: Any, motion: BodyMotion) -> Any:
     """Return the vector from the bar's first pin to where a load acts.
 
-    It is G for a couple alone.
+    A couple without a place enters bars 2 and 4 at the shaft and bar 3 at G.
     """
     if load.arm is not None:
         return motion.to_centre(load.bar) + make_vector(load.arm)
-    if load.place is None:
-        return motion.to_centre(load.bar)
-    return motion.unit[load.bar] * make_vector(load.place.from_pin)
+    if load.place is not None:
+        return motion.unit[load.bar] * make_vector(load.place.from_pin)
+    return motion.to_centre(3) if load.bar == 3 else 0.0 * motion.unit[load.bar]
 
 
 def _interpolate_table(table: Any, theta_2: Array) -> Array:

@@ -66,7 +66,7 @@ def scene_to_json(scene: Scene) -> dict[str, Any]:
 
     Raises InputError for an effect that no scene file holds. Every place is a pair from
     its bar's first pin, but for the arm of a load. A bar has its mass, whatever states
-    it.
+    it. The place of a moment alone, which changes no answer, is left out.
     """
     bars: dict[str, Any] = {
         BAR_NAMES[number]: Bar(
@@ -79,6 +79,9 @@ def scene_to_json(scene: Scene) -> dict[str, Any]:
     }
     plain = replace(scene, linkage=replace(scene.linkage, **bars))
     tables: dict[str, Any] = _take_numbers(list_scene_tables(state_from_pins(plain)))
+    for load in tables["loads"]:
+        if "force" not in load:
+            load.pop("from_pin", None)
     return {name: table for name, table in tables.items() if table}
 
 

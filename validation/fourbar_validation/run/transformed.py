@@ -420,12 +420,11 @@ def _convert_load(
         size, angle = load.force
         direction = to.direction(angle, load.frame) + turned
         force = (to.length * size, direction)
-        if load.arm is not None:
-            distance, angle = load.arm
-            places["arm"] = (to.length * distance, to.direction(angle))
-        else:
-            assert load.place is not None
-            places["from_pin"] = to.place(load.place, linkage).from_pin
+    if load.arm is not None:
+        distance, angle = load.arm
+        places["arm"] = (to.length * distance, to.direction(angle))
+    elif load.place is not None:
+        places["from_pin"] = to.place(load.place, linkage).from_pin
     moment = to.length * to.length * to.sense * load.moment
     return Load(bar, force, **places, moment=moment, frame=load.frame)
 
