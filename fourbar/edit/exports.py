@@ -22,11 +22,13 @@ from typing import Any
 import numpy as np
 
 from fourbar.edit.dragging import list_handles
+from fourbar.edit.headline import list_peaks, write_headline
 from fourbar.errors import DependencyError, InputError, NotAssembledError, say_install
 from fourbar.scene import Scene
 from fourbar.show.animate import collect_live_data
-from fourbar.show.block import write_block
+from fourbar.show.block import write_facts
 from fourbar.show.studies import write_type
+from fourbar.show.summary import summarize
 from fourbar.show.units import COMMON
 from fourbar.solution import Conversion, write_csv
 from fourbar.solving import find_last_stage, solve
@@ -56,7 +58,8 @@ def evaluate_scene(
 ) -> dict[str, Any]:
     """Evaluate a scene for the page.
 
-    `settled`: with error bars and summary, which cost more than the rest.
+    `settled`: with error bars, located peaks and summary, which cost more than the
+    rest.
 
     `pressure`: of a cylinder, Pa; the summary then has the bore that it needs.
 
@@ -75,10 +78,16 @@ def evaluate_scene(
         "toml": None,
     }
     data["handles"] = [handle.drawn() for handle in list_handles(scene)]
+    shown_units = {**COMMON, **units}
+    facts = None
     if settled:  # what `analyze` and `classify` print
-        block = write_block(scene, solution, {**COMMON, **units}, pressure=pressure)
-        limits = write_type(scene.linkage, {**COMMON, **units}, everything=True)
+        facts = summarize(scene, solution)
+        block = write_facts(facts, shown_units, pressure=pressure)
+        limits = write_type(scene.linkage, shown_units, everything=True)
         data["summary"] = [*block, "", *limits]
+        if len(solution) > 1:  # the curves are those of a sweep
+            data["peaks"] = list_peaks(solution, facts)
+    data["headline"] = write_headline(solution, shown_units, facts)
     return data
 
 

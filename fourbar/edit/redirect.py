@@ -8,6 +8,7 @@ two servers on one file would share its state file and lose work.
 
 import os
 import re
+import stat
 import sys
 import tempfile
 import time
@@ -24,6 +25,9 @@ REDIRECT_PAGE = """<!DOCTYPE html>
 <title>The workbench</title></head>
 <body><a href="{address}">The workbench</a></body></html>
 """
+_OWN_PAGE = re.compile(
+    re.escape(REDIRECT_PAGE.encode()).replace(re.escape(b"{address}"), rb"\S+")
+)
 _LOCKED_BYTE = 1 << 30
 """Byte of the page that Windows locks: far behind its text, which others read."""
 PATIENCE = 10.0
@@ -66,8 +70,17 @@ class Redirect:
                 os.close(handle)  # its server has just ended and taken it away
                 continue
             self.handle = handle
-        os.chmod(self.path, 0o600)
+        if not _is_own_page(self.handle):
+            os.close(self.handle)
+            self.handle = None
+            reason = (
+                f"needs the name {self.path.name} beside it, and that is another file:"
+                " move it away"
+            )
+            raise InputError("scene file", str(self.scene), reason)
+        os.chmod(self.handle if os.chmod in os.supports_fd else self.path, 0o600)
         os.ftruncate(self.handle, 0)
+        os.lseek(self.handle, 0, os.SEEK_SET)
         return True
 
     def write(self, address: str) -> None:
@@ -108,6 +121,21 @@ class Redirect:
             if sys.platform != "win32":
                 os.close(self.handle)
             self.handle = None
+
+
+def _is_own_page(handle: int) -> bool:
+    """Return True for an empty file, or a page that this module has written.
+
+    Another user's file, and one that has a second name, are somebody else's.
+    """
+    about = os.fstat(handle)
+    if not stat.S_ISREG(about.st_mode) or about.st_nlink > 1:
+        return False
+    if sys.platform != "win32" and about.st_uid != os.geteuid():
+        return False
+    longest = 2 * len(REDIRECT_PAGE)
+    content = os.read(handle, longest)
+    return not content or _OWN_PAGE.fullmatch(content) is not None
 
 
 def _lock(handle: int) -> bool:

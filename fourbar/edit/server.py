@@ -36,6 +36,8 @@ LARGEST_REQUEST = 2_000_000
 _MOST_PAGES = 16
 MOST_WAITING = 100
 """Requests of all pages that wait; of a drag only the latest does."""
+MOST_UNREAD = 4_000_000
+"""Bytes that wait for a page which does not read, besides one frame."""
 MOST_CONNECTIONS = 64
 """Connections besides those of pages; where there are more the oldest one is closed."""
 IDLE = 10.0
@@ -98,12 +100,7 @@ class Workbench:
         """Send an answer to one page or to all."""
         data = pack_frame(about)
         for line in [to] if to else list(self.pages):
-            with suppress(WebSocketClosedError):
-                # a page may close while it is sent: that is no error
-                sent = asyncio.ensure_future(line.write_message(data, binary=True))
-                sent.add_done_callback(
-                    lambda done: done.cancelled() or done.exception()
-                )
+            line.send(data)
 
     def take(self, line: "_PageLine", asked: dict[str, Any]) -> None:
         """Put a request in the queue.
@@ -193,7 +190,8 @@ class Workbench:
         def evaluate() -> dict[str, Any] | None:
             if not is_present():
                 return None
-            return state.evaluate(units, settled=True, pressure=pressure)
+            data = state.evaluate(units, settled=True, pressure=pressure)
+            return data | {"kept_peaks": session.locate_kept_peaks()}
 
         def describe(data: dict[str, Any]) -> dict[str, Any] | None:
             if is_present():
@@ -280,6 +278,7 @@ class Workbench:
             timer.cancel()
         for line in list(self.pages):
             line.close(1001, "the server ends")
+            line.drop()
         self.check.stop()
         if self.check.task is not None:
             await asyncio.wait({self.check.task}, timeout=5.0)
@@ -443,8 +442,35 @@ class _PageLine(WebSocketHandler, _Guarded):
     def open(self, *args: str, **kwargs: str) -> None:
         """Welcome the page."""
         self.set_nodelay(True)
-        self.bench.entrance.spare(getattr(self.ws_connection, "stream", None))
+        self.unread = 0
+        self.stream = getattr(self.ws_connection, "stream", None)
+        self.bench.entrance.spare(self.stream)
         self.bench.join(self)
+
+    def send(self, data: bytes) -> None:
+        """Send a frame, or drop the line of a page that does not read.
+
+        A page that reads again opens another line.
+        """
+        if self.unread > MOST_UNREAD:
+            self.drop()
+            return
+
+        def forget(sent: asyncio.Future[None]) -> None:
+            self.unread -= len(data)
+            # a page may close while it is sent: that is no error
+            if not sent.cancelled():
+                sent.exception()
+
+        with suppress(WebSocketClosedError):
+            written = asyncio.ensure_future(self.write_message(data, binary=True))
+            self.unread += len(data)
+            written.add_done_callback(forget)
+
+    def drop(self) -> None:
+        """Close the connection with what it has not read."""
+        if self.stream is not None:
+            self.stream.close()
 
     def on_message(self, message: str | bytes) -> None:
         """Take a request, one JSON object."""

@@ -17,6 +17,7 @@ import numpy as np
 from fourbar.edit.document import SceneDocument, list_offers, name_entry
 from fourbar.edit.dragging import Dragged, drag, parse_place, put_place, write_rounded
 from fourbar.edit.exports import Exports, evaluate_scene
+from fourbar.edit.headline import list_peaks
 from fourbar.errors import FourBarError, InputError, state_messages_in
 from fourbar.files import parse_tables, read_scene_text, read_tables
 from fourbar.files.fields import Reader
@@ -27,6 +28,7 @@ from fourbar.quantities.units import UnitError, find_unit, to_si
 from fourbar.scene import Scene
 from fourbar.scene.drawing import DRAWN_WORD
 from fourbar.scene.motion import COMMAND_NAMES, SIDES, STROKE_COMMAND, require_steps
+from fourbar.show.summary import summarize
 from fourbar.show.units import find_length, units, units_of_scene
 from fourbar.solution import Conversion, Solution, find_unit_in
 from fourbar.solving import solve
@@ -112,6 +114,7 @@ class Session:
         self.kept = {"start": text}
         self.reference = "start"
         self.gesture = ""
+        self.located: dict[str, dict[str, float | None]] = {}
         if self.state_file.exists():
             self._resume()
         else:
@@ -270,6 +273,15 @@ class Session:
             "compared": self.reference,
             "data": kept.evaluate(self.units),
         }
+
+    def locate_kept_peaks(self) -> dict[str, float | None]:
+        """List the located peaks of the state that the present one is held against."""
+        text = self.kept[self.reference]
+        if text not in self.located:
+            scene = self.read(text).scene
+            solution = solve(scene)
+            self.located = {text: list_peaks(solution, summarize(scene, solution))}
+        return self.located[text]
 
     def do(self, asked: dict[str, Any]) -> dict[str, Any]:
         """Do what a page asks for and describe the state after it.

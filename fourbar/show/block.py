@@ -104,7 +104,19 @@ def write_block(
     pressure : pressure of a cylinder, Pa; adds the bore that it needs.
     headed : begin with the linkage.
     """
-    return _SceneBlock(summarize(scene, solution), units).write(pressure, headed=headed)
+    facts = summarize(scene, solution)
+    return write_facts(facts, units, pressure=pressure, headed=headed)
+
+
+def write_facts(
+    facts: Facts,
+    units: Conversion = COMMON,
+    *,
+    pressure: float | None = None,
+    headed: bool = True,
+) -> list[str]:
+    """Write facts that are collected already, as `write_block` does."""
+    return _SceneBlock(facts, units).write(pressure, headed=headed)
 
 
 class _SceneBlock:

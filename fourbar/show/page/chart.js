@@ -63,19 +63,24 @@ const peakOf = values => values.reduce((most, v) => Math.abs(v) > Math.abs(most)
 let unchanged = false;   // whether the scene is the one it is compared with
 // A change of a peak in percent; one of more than ten times as a factor, and none from what rounding leaves of zero.
 function changeOf(then, now) {
-  if (!(then > 1e-9 * now)) return "";
+  if (!(then > 1e-9 * now && now < Infinity)) return "";
   const grown = now / then - 1;
   if (grown > 9) return ` (${text(now / then, 3)} times)`;
   return ` (${grown < 0 ? "\u2212" : "+"}${Math.abs(100 * grown).toFixed(Math.abs(grown) < 0.1 ? 1 : 0)}\u00a0%)`;
 }
+// A largest magnitude in words, and as a number: located as `analyze` does, or that of the positions, which is reached at least.
+function told(name, values, peaks) {
+  const located = name in (peaks ?? {}), size = located ? Math.abs((peaks[name] ?? NaN) * QUANTITIES.find(q => q[0] === name)[2]) : Math.abs(peakOf(values));
+  return { size, words: located && peaks[name] === null ? "grows without bound" : `${located ? "" : "at least "}${text(size, 4)}` };
+}
 function comparison(name, values) {
   const before = reference?.values[name];
   if (!before || unchanged) return "";
-  const [then, now] = [peakOf(before), peakOf(values)].map(Math.abs), label = QUANTITIES.find(q => q[0] === name)[1], cut = label.lastIndexOf(", ");
-  const change = changeOf(then, now);
-  return `Peak ${label.slice(0, cut)}: ${text(then, 3)} \u2192 ${text(now, 3)} ${label.slice(cut + 2)}${change}, against ${reference.name}.`;
+  const then = told(name, before, data.kept_peaks), now = told(name, values, data.peaks), label = QUANTITIES.find(q => q[0] === name)[1], cut = label.lastIndexOf(", ");
+  return `Peak ${label.slice(0, cut)}, ${label.slice(cut + 2)}: ${then.words} \u2192 ${now.words}${changeOf(then.size, now.size)}, against ${reference.name}.`;
 }
 
+const cutNote = (what, top, words) => `The ${what} is cut at ${text(top, 3)}; it ${words.startsWith("grows") ? words : `reaches ${words}`}.`;
 function drawChart() {
   const available = QUANTITIES.filter(([name]) => (/^[va]_/.test(name) ? "omega_3" : name) in table());
   const select = byId("quantity"), wanted = available.some(q => q[0] === select.value) ? select.value : (available.find(q => ["torque", "drive_force"].includes(q[0])) ?? available[0])[0];
@@ -87,7 +92,7 @@ function drawChart() {
   if (limit.cut) { low = Math.max(low, -limit.top); high = Math.min(high, limit.top); }
   if (!wanted.startsWith("theta")) { low = Math.min(low, 0); high = Math.max(high, 0); }
   if (high - low < 1e-300) { high += 1; low -= 1; }
-  byId("chart-note").textContent = limit.cut ? `The curve is cut at ${text(limit.top, 3)}; it reaches ${text(finite.reduce((m, v) => Math.abs(v) > Math.abs(m) ? v : m, 0), 4)}.` : "";
+  byId("chart-note").textContent = limit.cut ? cutNote("curve", limit.top, told(wanted, values, data.peaks).words) : "";
   plotted = { ...chartFrame(chart, low, high), values, low, high };
   const { over, x, y, width, height, bottom } = plotted;
   const curve = (values, over, kind) => {

@@ -128,20 +128,10 @@ function lineOf(line) {
   return shown;
 }
 
-// ---- the strip beside the drawing: the largest numbers, while one drags -----------------------------------
+// ---- the strip beside the drawing: the largest numbers -----------------------------------
 let typeBefore = null;
 function showStrip() {
-  const t = table(), drive = ["torque", "drive_force"].find(name => name in t);
-  const most = name => Math.abs(peakOf(column(name))), words = [];
-  if (drive) words.push(`peak ${drive.replace("_", " ")} ${text(most(drive))} ${nameOf(drive === "torque" ? "N m" : "N")}`);
-  const pins = FORCES.filter(name => name in t);
-  if (pins.length) {
-    const largest = pins.reduce((a, b) => most(b) > most(a) ? b : a);
-    words.push(`largest pin force ${text(most(largest))} ${nameOf("N")} at ${FORCE_PIN[largest]}`);
-  }
-  const angles = "transmission" in t ? column("transmission").filter(Number.isFinite) : [];
-  if (angles.length) words.push(`transmission angle at least ${Math.min(...angles).toFixed(1)}\u00b0`);
-  byId("strip").textContent = words.join("; ");
+  byId("strip").textContent = data.headline;
   if (typeBefore && typeBefore !== data.type) {
     byId("type-change").textContent = `The type has changed from ${typeBefore} to ${data.type}.`;
     byId("type-change").hidden = false;

@@ -44,7 +44,9 @@ function drawBands() {
   if (!spreadsShown()) return;
   const s = loose.parts[byId("tolerance-quantity").value], f = factorOf(s), scaled = name => s[name].map(v => v === null ? NaN : v * f);
   const away = Object.fromEntries(["low", "high", "least", "greatest", "worst"].map(name => [name, scaled(name)]));
-  const limit = ceiling(Object.values(away).flat().filter(Number.isFinite)), top = (limit.cut ? limit.top : Math.max(...Object.values(away).flat().filter(Number.isFinite).map(Math.abs))) || 1;
+  const all = Object.values(away).flat().filter(Number.isFinite), limit = ceiling(all), top = limit.top || 1;
+  byId("band-unit").textContent = `, ${spreadUnit(s)}`;
+  byId("band-note").textContent = limit.cut ? cutNote("band", top, text(Math.abs(peakOf(all)), 3)) : "";
   banded = chartFrame(bands, -top, top);
   const { x, y, over } = banded, inside = v => Math.max(-top, Math.min(top, v));
   const line = values => values.map((v, i) => Number.isFinite(v) ? `${i && Number.isFinite(values[i - 1]) ? "L" : "M"}${x(over[i]).toFixed(2)} ${y(inside(v)).toFixed(2)}` : "").join("");
@@ -54,7 +56,6 @@ function drawBands() {
   for (const name of ["least", "greatest"]) make(bands, "path", { class: "edge", d: line(away[name]) });
   for (const sign of [1, -1]) make(bands, "path", { class: "worst", d: line(away.worst.map(v => sign * v)) });
   banded.cursor = make(bands, "line", { class: "cursor", y1: 10, y2: banded.height - banded.bottom });
-  byId("band-unit").textContent = `, ${spreadUnit(s)}`;
 }
 
 function furnishTolerances() {

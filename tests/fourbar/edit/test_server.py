@@ -30,10 +30,11 @@ pytest.importorskip(
     reason="the workbench edits scene files by tomlkit: pip install tomlkit",
 )
 from tornado.httpclient import AsyncHTTPClient, HTTPRequest
+from tornado.ioloop import IOLoop
 from tornado.websocket import websocket_connect
 
 from fourbar.edit import exports, server, session
-from fourbar.edit.redirect import REDIRECT_ENDING, Redirect
+from fourbar.edit.redirect import REDIRECT_ENDING, REDIRECT_PAGE, Redirect
 from fourbar.edit.server import (
     GONE,
     LARGEST_REQUEST,
@@ -427,6 +428,9 @@ def test_a_change_overtakes_a_summary_that_is_being_computed(
 def test_a_page_that_closes_while_answers_wait_leaves_no_trace(bench, caplog) -> None:
     async def ask(made: Workbench, address: str) -> None:
         line = await page(address)
+        reading = asyncio.create_task(
+            heard(line, lambda about: about.get("for") == "last")
+        )
         for _ in range(3):
             reader, writer = await asyncio.open_connection(
                 "127.0.0.1", int(port_of(address))
@@ -454,7 +458,37 @@ def test_a_page_that_closes_while_answers_wait_leaves_no_trace(bench, caplog) ->
             writer.transport.abort()
         await asyncio.sleep(0.5)
         gc.collect()
-        assert (await told(line, {"do": "hello"}))["file"] == "scene.toml"
+        await line.write_message(json.dumps({"do": "hello", "id": "last"}))
+        assert (await reading)["file"] == "scene.toml"
+
+    bench(ask)
+    gc.collect()
+    assert not caplog.records
+
+
+def test_the_line_of_a_page_that_does_not_read_is_dropped(
+    bench,
+    caplog,
+    monkeypatch,
+) -> None:
+    """One page changes the scene, another one that reads nothing is told each time."""
+    monkeypatch.setattr(server, "MOST_UNREAD", 100_000)
+    frame = {"note": "x" * 60_000}
+
+    async def ask(made: Workbench, address: str) -> None:
+        reading = await page(address)
+        silent = await page(address)
+        silent.stream.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        IOLoop.current().remove_handler(silent.stream.socket)
+        waiting = []
+        for _ in range(200):
+            made.tell(frame)
+            waiting.append(max(line.unread for line in made.pages))
+            await heard(reading, lambda about: "note" in about)
+        assert len(made.pages) == 1
+        assert max(waiting) <= 100_000 + 2 * 60_000
+        made.tell(frame)
+        assert await heard(reading, lambda about: "note" in about)
 
     bench(ask)
     gc.collect()
@@ -626,6 +660,44 @@ def test_a_file_that_another_one_locks_and_gives_no_address_for_is_named(
     first.remove()
     assert second.claim()
     second.remove()
+
+
+@pytest.mark.posix
+@pytest.mark.parametrize("how", ["linked", "another's", "written by hand", "longer"])
+def test_a_file_of_the_page_s_name_that_is_somebody_else_s_stays_as_it_is(
+    tmp_path: Path,
+    monkeypatch,
+    how: str,
+) -> None:
+    ours = REDIRECT_PAGE.format(address="http://127.0.0.1:4000/token/")
+    content = {"written by hand": "<html>", "longer": ours + "<p>"}.get(how, ours)
+    page = tmp_path / f"a.toml{REDIRECT_ENDING}"
+    page.write_text(content)
+    page.chmod(0o644)
+    if how == "linked":
+        os.link(page, tmp_path / "precious")
+    if how == "another's":
+        monkeypatch.setattr(os, "geteuid", lambda: page.stat().st_uid + 1)
+    with pytest.raises(InputError, match="is another file: move it away"):
+        Redirect(tmp_path / "a.toml").claim()
+    assert (page.read_text(), page.stat().st_mode & 0o777) == (content, 0o644)
+
+
+@pytest.mark.posix
+@pytest.mark.parametrize("left", ["", REDIRECT_PAGE.format(address="http://x/")])
+def test_an_empty_page_and_one_of_a_killed_server_are_written_over(
+    tmp_path: Path,
+    left: str,
+) -> None:
+    page = tmp_path / f"a.toml{REDIRECT_ENDING}"
+    page.write_text(left)
+    redirect = Redirect(tmp_path / "a.toml")
+    assert redirect.claim()
+    redirect.write("http://127.0.0.1:5000/other/")
+    assert page.read_text() == REDIRECT_PAGE.format(
+        address="http://127.0.0.1:5000/other/"
+    )
+    redirect.remove()
 
 
 @pytest.mark.slow

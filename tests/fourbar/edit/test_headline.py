@@ -1,0 +1,86 @@
+"""The largest numbers beside the drawing are those that `analyze` prints."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.show.block import write_block
+from fourbar.show.units import COMMON
+
+pytest.importorskip(
+    "tomlkit",
+    reason="the workbench edits scene files by tomlkit: pip install tomlkit",
+)
+from fourbar.edit.exports import evaluate_scene
+
+MODELS = Path(__file__).parents[3] / "models"
+BOUNDED = (
+    "crank_rocker",
+    "drag_link",
+    "gallery/bonnet_hinge",
+    "capabilities/cylinder_3_4",
+)
+UNBOUNDED = ("thesis", "capabilities/cylinder_1_4", "capabilities/cylinder_1_2")
+LAST_DIGIT = 5e-4
+"""Relative: the headline and the block have four digits."""
+
+
+def load_coarse(name: str) -> fourbar.Scene:
+    """Load a scene with a tenth of its positions, between which its peaks lie."""
+    scene = fourbar.load(MODELS / f"{name}.toml")
+    steps = max(len(fourbar.solve(scene, "position")) // 10, 12)
+    coarse = replace(scene.motion.angle, steps=steps)
+    return replace(scene, motion=scene.motion.replace(angle=coarse))
+
+
+@pytest.mark.parametrize("name", BOUNDED)
+def test_at_rest_the_headline_has_the_numbers_of_analyze(name: str) -> None:
+    scene = load_coarse(name)
+    block = " ".join(write_block(scene, fourbar.solve(scene), COMMON))
+    headline = evaluate_scene(scene, COMMON, settled=True)["headline"]
+    drive, pins, _ = headline.split("; ")
+    peak = re.sub(r"^peak (torque|drive force) ", "", drive)
+    assert re.search(rf"(torque|force) +peak -?{re.escape(peak)} at", block), drive
+    load = re.fullmatch(r"largest pin force (\S+ \S+) at \w\d?", pins)
+    assert load is not None and load[1] in block, pins
+
+
+@pytest.mark.parametrize("name", BOUNDED)
+def test_while_one_drags_the_numbers_of_the_positions_are_reached_at_least(
+    name: str,
+) -> None:
+    scene = load_coarse(name)
+    solution = fourbar.solve(scene)
+    headline = evaluate_scene(scene, COMMON)["headline"]
+    drive, pins, angle = headline.split("; ")
+    assert re.match(r"peak (torque|drive force) at least \d", drive)
+    assert re.match(r"largest pin force at least \d", pins)
+    least = np.degrees(np.arcsin(np.abs(solution.sin_mu).min()))
+    assert angle == f"least transmission angle at most {least:.1f}°"
+    located = evaluate_scene(scene, COMMON, settled=True)["peaks"]
+    for force in ("F12", "F32", "F43", "F14"):
+        sampled = np.hypot(*getattr(solution, force).T).max()
+        assert located[force] >= sampled * (1.0 - LAST_DIGIT)
+
+
+@pytest.mark.parametrize("name", UNBOUNDED)
+def test_what_grows_without_bound_is_no_number(name: str) -> None:
+    scene = fourbar.load(MODELS / f"{name}.toml")
+    data = evaluate_scene(scene, COMMON, settled=True)
+    drive, pins, _ = data["headline"].split("; ")
+    assert re.fullmatch("(torque|drive force) grows without bound", drive)
+    assert re.match("pin forces grow without bound at O2", pins)
+    unbounded = {name for name, peak in data["peaks"].items() if peak is None}
+    assert unbounded & {"torque", "drive_force"}
+
+
+def test_a_balanced_drive_has_no_peak_of_rounding() -> None:
+    """Nothing acts on this linkage at a constant speed but inertia, which is zero."""
+    scene = fourbar.load(MODELS / "capabilities" / "parallelogram.toml")
+    gravity_only = replace(scene, effects=(), loads=())
+    peaks = evaluate_scene(gravity_only, COMMON, settled=True)["peaks"]
+    assert peaks["torque"] == 0.0
