@@ -44,10 +44,7 @@ from fourbar_validation.engines.loop import (
     read_each,
     split_answer,
 )
-from fourbar_validation.engines.mujoco.closed_loop import (
-    WARNINGS,
-    load_force,
-)
+from fourbar_validation.engines.mujoco.closed_loop import WARNINGS
 from fourbar_validation.engines.mujoco.couple import find_couple
 from fourbar_validation.engines.mujoco.describe import (
     STIFFEST,
@@ -64,6 +61,10 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
 from fourbar_validation.engines.mujoco.robots.compiled import (
     compile_robot,
     list_unknown_parts,
+)
+from fourbar_validation.engines.mujoco.robots.forces import (
+    BearerForces,
+    read_equality_force,
 )
 from fourbar_validation.engines.mujoco.robots.inside import (
     HEAVY,
@@ -422,11 +423,7 @@ class _UserLoop(Assembled):
         drive.
         """
         self._take_off_the_drive()
-        self._loads = [
-            i
-            for i in range(len(self.model.actuator_trntype))
-            if self.model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_SITE
-        ]
+        self.bearers = BearerForces(self.model)
         # a sweep over the range of a joint ends at its limits, to round-off on either
         # side: they push where they are passed, not where they are touched
         self.model.jnt_margin[:] -= _TOUCHED
@@ -691,21 +688,12 @@ class _UserLoop(Assembled):
         on: dict[tuple[int, int], Array] = {}
         for pin in topology.hinge:
             child, parent = topology.turning(pin)
-            force = data.cfrc_int[topology.root[child], 3:].copy()
-            for load in self._loads:
-                site = self.model.actuator_trnid[load, 0]
-                loaded_body = self.model.site_bodyid[site]
-                if self._is_carried(topology.root[child], loaded_body):
-                    force -= load_force(self.model, data, load)
+            force = self.bearers.read(data, topology.root[child])
             on[parent, child] = topology.in_plane(force)
         bars = PINS[topology.cut]
         force = np.full(2, np.nan)
         if topology.closure is not None:
-            of_equalities = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
-            of_closure = data.efc_id == topology.closure
-            rows = np.flatnonzero(of_equalities & of_closure)
-            if len(rows):
-                force = topology.in_plane(data.efc_force[rows[:3]])
+            force = topology.in_plane(read_equality_force(data, topology.closure))
             if topology.first == bars[0]:
                 on[bars[1], bars[0]] = force
             else:
@@ -716,12 +704,6 @@ class _UserLoop(Assembled):
         for name, (i, j) in FORCE_BETWEEN.items():
             forces[name] = on[i, j] if (i, j) in on else -on[j, i]
         return forces
-
-    def _is_carried(self, bearer: int, body: int) -> bool:
-        """Tell whether a body hangs, however far down, on another."""
-        while body not in (bearer, 0):
-            body = int(self.model.body_parentid[body])
-        return body == bearer
 
 
 def _answer_one_state(loop: _UserLoop, command: Command) -> Answer:

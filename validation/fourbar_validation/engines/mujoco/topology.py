@@ -18,6 +18,7 @@ from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, ENDS, MOVING_BARS, PINS
 from fourbar.mjcf import Plane
 from fourbar.quantities import Array
+from fourbar_validation.engines.mujoco.robots.ancestry import find_ends
 
 _PIN_OF = {frozenset(bars): pin for pin, bars in PINS.items()}
 _PLANES = {
@@ -258,10 +259,6 @@ class Topology:
         rotation = self.data.xmat[body].reshape(3, 3)
         return np.asarray(rotation.T @ (world - self.data.xpos[body]))
 
-    def _on(self, body: int, local: Array) -> Array:
-        rotation = self.data.xmat[body].reshape(3, 3)
-        return np.asarray(self.data.xpos[body] + rotation @ local)
-
     def _find_closure(self, names: Mapping[str, str]) -> None:
         """Find the equality between the two bars of the cut pin.
 
@@ -274,13 +271,13 @@ class Topology:
             closes = kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD)
             if not closes or not model.eq_active0[number]:
                 continue
-            ends = self._find_ends(number, kind)
-            bars = [self.bar(body) for body, _ in ends]
+            ends = find_ends(model, self.data, number)
+            bars = [self.bar(end.body) for end in ends]
             if None in bars or _PIN_OF.get(frozenset(bars)) != self.cut:  # type: ignore[arg-type]
                 continue
-            for bar, (_, world) in zip(bars, ends, strict=True):
+            for bar, end in zip(bars, ends, strict=True):
                 assert bar is not None
-                self.point[bar, self.cut] = self._find_in_bar(bar, world)
+                self.point[bar, self.cut] = self._find_in_bar(bar, end.place)
             self.closure = number
             self.first = bars[0]
             by_sites = model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE
@@ -313,23 +310,6 @@ class Topology:
                     f"no connect or weld closes the loop at this pin{advice}",
                 )
             self.point[bar, "B"] = self._find_in_bar(bar, self.data.site_xpos[site])
-
-    def _find_ends(self, number: int, kind: mujoco.mjtEq) -> list[tuple[int, Array]]:
-        """Return the body and the world point at either end of an equality."""
-        model = self.model
-        objects = (int(model.eq_obj1id[number]), int(model.eq_obj2id[number]))
-        ends = []
-        if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
-            for site in objects:
-                body = int(model.site_bodyid[site])
-                ends.append((body, self.data.site_xpos[site].copy()))
-            return ends
-        anchors = [model.eq_data[number, 0:3], model.eq_data[number, 3:6]]
-        if kind == mujoco.mjtEq.mjEQ_WELD:  # it keeps the second body's anchor first
-            anchors.reverse()
-        for body, anchor in zip(objects, anchors, strict=True):
-            ends.append((body, self._on(body, anchor)))
-        return ends
 
     def in_plane(self, vector: Array) -> Array:
         """Project on the linkage's plane, (2,)."""

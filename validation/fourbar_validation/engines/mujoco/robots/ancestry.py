@@ -1,8 +1,12 @@
 """Bodies of a model, the joints between them, and what acts on them."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import mujoco
+import numpy as np
+
+from fourbar.quantities import Array
 
 
 def find_parent(model: mujoco.MjModel, body: int) -> int:
@@ -147,6 +151,28 @@ def describe_actuator(model: mujoco.MjModel, actuator: int) -> str:
     return f"an actuator without a name, {where}"
 
 
+def list_dofs(model: mujoco.MjModel, joint: int) -> list[int]:
+    """List the degrees of freedom of a joint."""
+    dofs: list[int] = np.flatnonzero(model.dof_jntid == joint).tolist()
+    return dofs
+
+
+def list_motors(model: mujoco.MjModel) -> list[tuple[int, int]]:
+    """List (joint, actuator) of what takes a control and acts on joints."""
+    transmission = mujoco.mjtTrn
+    motors = []
+    for number in range(model.nu):
+        kind = transmission(int(model.actuator_trntype[number]))
+        target = int(model.actuator_trnid[number, 0])
+        if not takes_control(model, number):
+            continue
+        if kind in (transmission.mjTRN_JOINT, transmission.mjTRN_JOINTINPARENT):
+            motors.append((target, number))
+        elif kind == transmission.mjTRN_TENDON:
+            motors += [(joint, number) for joint in list_tendon_joints(model, target)]
+    return motors
+
+
 def takes_control(model: mujoco.MjModel, actuator: int) -> bool:
     """Tell a motor from a load, a spring or a damper that is written as an actuator."""
     return bool(model.actuator_gainprm[actuator].any())
@@ -162,3 +188,45 @@ def is_enabled(model: mujoco.MjModel, *flags: str) -> bool:
         for flag in flags
     )
     return not any(model.opt.disableflags & bit for bit in bits)
+
+
+def list_lifted_masses(model: mujoco.MjModel) -> Array:
+    """Return the mass of each body that MuJoCo compensates gravity of, (nbody,), kg.
+
+    Gravity compensation is a passive force: it is off with gravity, and where neither
+    springs nor dampers act.
+    """
+    factors = getattr(model, "body_gravcomp", np.zeros(model.nbody))
+    passive = is_enabled(model, "spring") or is_enabled(model, "damper")
+    acts = passive and is_enabled(model, "gravity", "passive")
+    return np.asarray(model.body_mass * factors * acts)
+
+
+@dataclass(frozen=True, slots=True)
+class ClosureEnd:
+    """One end of a connect or a weld."""
+
+    body: int
+    place: Array
+    """Place in world axes, (3,), m."""
+
+
+def find_ends(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    equality: int,
+) -> tuple[ClosureEnd, ClosureEnd]:
+    """Locate both ends of a connect or a weld."""
+    bodies = find_tied_bodies(model, equality)
+    if model.eq_objtype[equality] == mujoco.mjtObj.mjOBJ_SITE:
+        sites = (model.eq_obj1id[equality], model.eq_obj2id[equality])
+        first, second = (data.site_xpos[site].copy() for site in sites)
+        return ClosureEnd(bodies[0], first), ClosureEnd(bodies[1], second)
+    anchors = [model.eq_data[equality, 0:3], model.eq_data[equality, 3:6]]
+    if model.eq_type[equality] == mujoco.mjtEq.mjEQ_WELD:
+        anchors.reverse()  # it keeps the second body's anchor first
+    first, second = (
+        data.xpos[body] + data.xmat[body].reshape(3, 3) @ anchor
+        for body, anchor in zip(bodies, anchors, strict=True)
+    )
+    return ClosureEnd(bodies[0], first), ClosureEnd(bodies[1], second)

@@ -7,7 +7,6 @@ no joint parts, or a held one, are one bar.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 import mujoco
@@ -17,16 +16,17 @@ from fourbar.errors import InputError
 from fourbar.linkage import ENDS, PINS
 from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
+    ClosureEnd,
     climb,
     find_common,
+    find_ends,
     find_parent,
     find_roots,
     find_tied_bodies,
     list_followers,
     list_joints,
-    list_tendon_joints,
+    list_motors,
     name_joint,
-    takes_control,
 )
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.loop import (
@@ -35,6 +35,12 @@ from fourbar_validation.engines.mujoco.robots.loop import (
     RobotFile,
     RobotLoop,
     RobotReport,
+    write_length,
+)
+from fourbar_validation.engines.mujoco.robots.planes import (
+    PARALLEL,
+    find_normals,
+    find_offset,
 )
 from fourbar_validation.engines.mujoco.robots.pose import (
     BALL,
@@ -49,10 +55,6 @@ from fourbar_validation.engines.mujoco.robots.pose import (
 
 _PIN_BETWEEN = {frozenset(bars): pin for pin, bars in PINS.items()}
 """Pins by the two bars that each joins."""
-_PARALLEL = math.radians(0.5)
-"""Largest angle between the axes of a planar linkage, rad. Beyond it forces across the
-plane reach a hundredth.
-"""
 COINCIDENT_PINS = 1e-6
 """Two pins are one where they are nearer than this part of the longest bar."""
 LEVEL_PLANE = 1e-6
@@ -158,42 +160,16 @@ def name_body(model: mujoco.MjModel, body: int) -> str:
     return model.body(body).name or f"body {body}"
 
 
-@dataclass(frozen=True, slots=True)
-class _ClosureEnd:
-    """One end of a connect or a weld."""
-
-    body: int
-    place: Array
-    """Place in world axes in the pose, (3,), m."""
-
-
-def _measure_gap(ends: tuple[_ClosureEnd, _ClosureEnd]) -> float:
-    """Measure the distance of the two ends, m."""
+def _measure_gap(
+    ends: tuple[ClosureEnd, ClosureEnd],
+    normal: Array | None = None,
+) -> float:
+    """Measure the distance of the two ends, in a plane if there is one, m."""
     first, second = ends
-    return float(np.linalg.norm(first.place - second.place))
-
-
-def _find_ends(posed: PosedRobot, number: int) -> tuple[_ClosureEnd, _ClosureEnd]:
-    """Locate both ends of a connect or a weld."""
-    model = posed.model
-    data = posed.data
-    bodies = find_tied_bodies(model, number)
-    if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
-        first_site = int(model.eq_obj1id[number])
-        second_site = int(model.eq_obj2id[number])
-        return (
-            _ClosureEnd(bodies[0], data.site_xpos[first_site].copy()),
-            _ClosureEnd(bodies[1], data.site_xpos[second_site].copy()),
-        )
-    anchors = [model.eq_data[number, 0:3], model.eq_data[number, 3:6]]
-    if model.eq_type[number] == mujoco.mjtEq.mjEQ_WELD:
-        anchors.reverse()  # it keeps the second body's anchor first
-    ends = []
-    for body, anchor in zip(bodies, anchors, strict=True):
-        rotation = data.xmat[body].reshape(3, 3)
-        ends.append(_ClosureEnd(body, data.xpos[body] + rotation @ anchor))
-    first, second = ends
-    return first, second
+    apart = first.place - second.place
+    if normal is not None:
+        apart = apart - (apart @ normal) * normal
+    return float(np.linalg.norm(apart))
 
 
 class _Chain:
@@ -264,6 +240,7 @@ class _Finder:
         self.data = posed.data
         self.held = {find_joint(self.model, name, "--hold") for name in options.held}
         self.root = find_roots(self.model, self.held)
+        self.normals = find_normals(self.model, self.data, self.held)
         self.before = mujoco.MjData(self.model)
         self.before.qpos[:] = posed.stated
         mujoco.mj_kinematics(self.model, self.before)
@@ -287,12 +264,13 @@ class _Finder:
         if kind not in ("connect", "weld"):
             text = f"a {kind} equality is no pin"
             return RobotClosure(name, kind, None, text, solref=solref, solimp=solimp)
-        ends = _find_ends(self.posed, number)
+        ends = find_ends(self.model, self.data, number)
         gap: float | None = None
         left: float | None = None
         if self._is_pin(number):
-            gap = _measure_gap(_find_ends(self.stated, number))
-            left = _measure_gap(ends)
+            normal = self.normals.get(number)
+            gap = _measure_gap(find_ends(self.model, self.before, number), normal)
+            left = _measure_gap(ends, normal)
         chain = _Chain(self, ends[0].body, ends[1].body)
         hinges = tuple(name_joint(model, j) for j in chain.joints)
         loop, reason = self._recognise(number, name, chain)
@@ -442,7 +420,7 @@ class _Finder:
 
     def _find_skew_axes(self, chain: _Chain) -> str:
         angle, names = self._measure_axes(chain)
-        if angle is None or angle <= _PARALLEL:
+        if angle is None or angle <= PARALLEL:
             return ""
         return (
             f"the axes of {names} are {math.degrees(angle):.3g} deg apart: "
@@ -520,7 +498,7 @@ class _Finder:
             kind = EQUALITY_KINDS.get(int(self.model.eq_type[other]))
             if other == number or kind not in ("connect", "weld"):
                 continue
-            ends = _find_ends(self.posed, other)
+            ends = find_ends(self.model, self.data, other)
             carried = {self._find_bar(end.body, bars) for end in ends}
             if len(carried - {None}) and len(carried) > 1:
                 names.append(self._name(other))
@@ -541,22 +519,7 @@ class _Finder:
 
     def _list_motors(self, joints: Sequence[int]) -> list[tuple[int, int]]:
         """List (joint, actuator) of what takes a control and acts on these joints."""
-        model = self.model
-        transmission = mujoco.mjtTrn
-        motors = []
-        for number in range(model.nu):
-            kind = transmission(int(model.actuator_trntype[number]))
-            target = int(model.actuator_trnid[number, 0])
-            if not takes_control(model, number):
-                continue
-            if kind in (transmission.mjTRN_JOINT, transmission.mjTRN_JOINTINPARENT):
-                acted = [target]
-            elif kind == transmission.mjTRN_TENDON:
-                acted = list(list_tendon_joints(model, target))
-            else:
-                acted = []
-            motors += [(joint, number) for joint in acted if joint in joints]
-        return motors
+        return [motor for motor in list_motors(self.model) if motor[0] in joints]
 
     def _make_loop(
         self,
@@ -602,6 +565,7 @@ class _Finder:
         if rigid:
             return None, rigid[0]
         remarks += layout.remarks
+        remarks += _describe_offset(self.posed, tuple(closures), layout)
         moving = set(hinges.values())
         return (
             RobotLoop(
@@ -683,7 +647,7 @@ class _Finder:
                 continue
             if not self.model.eq_active0[other]:
                 continue
-            for end in _find_ends(self.posed, other):
+            for end in find_ends(self.model, self.data, other):
                 root = self.root[end.body]
                 if root in hinge_of:
                     pushed[hinge_of[root]] = self._name(other)
@@ -721,7 +685,7 @@ class _Finder:
                 continue
             if kind not in ("connect", "weld"):
                 continue
-            ends = _find_ends(self.posed, other)
+            ends = find_ends(self.model, self.data, other)
             carried = [self._find_bar(end.body, moving) for end in ends]
             numbers = [1 if root is None else bars[root] for root in carried]
             if numbers[0] == numbers[1]:
@@ -743,6 +707,27 @@ class _Finder:
         return closures, others
 
 
+def _describe_offset(
+    posed: PosedRobot,
+    closures: tuple[int, ...],
+    layout: "_Layout",
+) -> list[str]:
+    """Say how far the ends of a closure are apart along the axes, and what that costs.
+
+    The list is empty where they lie in one plane.
+    """
+    offset, across, in_plane = find_offset(
+        posed.model, posed.data.qpos, closures, layout.normal
+    )
+    if offset <= COINCIDENT_PINS * max(layout.lengths):
+        return []
+    return [
+        f"its ends are {write_length(offset)} mm apart along the axes, which no motion"
+        f" closes: MuJoCo's constraint carries {across:.4g} N across the plane and"
+        f" {in_plane:.4g} N in it, let go at rest in this pose"
+    ]
+
+
 class _Layout:
     """Geometry of a four-bar in its plane, measured in the pose."""
 
@@ -759,7 +744,7 @@ class _Layout:
         self.hinges = hinges
         self.model = posed.model
         self.data = posed.data
-        self.ends = _find_ends(posed, equality)
+        self.ends = find_ends(posed.model, posed.data, equality)
         self.remarks: list[str] = []
         self.senses: dict[str, float] = {}
         self.points: dict[tuple[int, str], Array] = {}
@@ -851,7 +836,7 @@ class _Layout:
         along = self.data.xmat[ground].reshape(3, 3) @ self.along
         return float(vector @ along), float(vector @ self.across)
 
-    def is_at(self, pin: str, ends: tuple[_ClosureEnd, _ClosureEnd]) -> bool:
+    def is_at(self, pin: str, ends: tuple[ClosureEnd, ClosureEnd]) -> bool:
         """Tell whether both ends of another equality lie on the axis of a pin."""
         bar = PINS[pin][0]
         near = max(COINCIDENT_PINS * max(self.lengths), LARGEST_RESIDUAL)

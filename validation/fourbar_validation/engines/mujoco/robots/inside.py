@@ -34,12 +34,11 @@ from fourbar.errors import LimitError
 from fourbar.linkage import ENDS, PINS
 from fourbar.quantities import Array
 from fourbar_validation.engines.description import FORCE_AT, FORCE_BETWEEN
-from fourbar_validation.engines.mujoco.closed_loop import WARNINGS, load_force
+from fourbar_validation.engines.mujoco.closed_loop import WARNINGS
 from fourbar_validation.engines.mujoco.couple import find_couple
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     climb,
     find_tied_bodies,
-    is_enabled,
     name_joint,
     takes_control,
 )
@@ -49,7 +48,15 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     PinsAndTorque,
     TornState,
 )
+from fourbar_validation.engines.mujoco.robots.forces import (
+    BearerForces,
+    read_equality_force,
+)
 from fourbar_validation.engines.mujoco.robots.loop import RobotLoop
+from fourbar_validation.engines.mujoco.robots.planes import (
+    copy_for_closures,
+    project_closures,
+)
 from fourbar_validation.engines.mujoco.runner import Stepper
 
 RESIDUAL_OF_A_CLOSED_STATE = 1e-12
@@ -118,8 +125,6 @@ class LoopInside:
         motors = [i for i in range(model.nu) if takes_control(model, i)]
         self.model.actuator_gainprm[motors] = 0.0
         self.model.actuator_biasprm[motors] = 0.0
-        on_sites = model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE
-        self.loads = [int(i) for i in np.flatnonzero(on_sites) if i not in motors]
         # while joints are held, what ties them to the moving bars would only be torn
         self.model.eq_active0[list(loop.other_equalities)] = 0
         self.data = mujoco.MjData(self.model)
@@ -134,7 +139,7 @@ class LoopInside:
         self.sense = loop.senses["O2"]
         self.address = int(model.jnt_qposadr[loop.joint])
         # the closure alone, for kinematics: with every row, and a dense derivative
-        self.closure = _copy_for_closures(self.model, loop.closures)
+        self.closure = copy_for_closures(self.model, loop.closures)
         self.closing = mujoco.MjData(self.closure)
         self._last = loop.qpos.copy()
         self._rates = self._find_rates(self._last)
@@ -144,13 +149,7 @@ class LoopInside:
         without_friction = int(mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS)
         rubs = not self.model.opt.disableflags & without_friction
         self._friction = self.model.dof_frictionloss * rubs
-        bodies = [int(model.jnt_bodyid[joint]) for joint in loop.hinges.values()]
-        self.borne = {body: self._find_borne(body) for body in bodies}
-        """Actuators on sites of each body of a hinge and of all that it bears."""
-        self.lift = {body: self._find_lift(body) for body in bodies}
-        """Gravity compensation of each body of a hinge (gravcomp), (3,), N. It is that
-        of all that the body bears too.
-        """
+        self.bearers = BearerForces(self.model)
 
     def angle(self, qpos: Array) -> float:
         """Return theta_2 of a pose, rad."""
@@ -266,13 +265,20 @@ class LoopInside:
         return self.loop.misaligned * max(self.loop.lengths)
 
     def _evaluate_closure(self, qpos: Array) -> tuple[Array, Array]:
-        """Return the residual of the closure and its derivative, (m,) and (m, nv)."""
+        """Return the closure's residual in the plane and its derivative.
+
+        Their shapes are (m,) and (m, nv).
+        """
         data = self.closing
         data.qpos[:] = qpos
         mujoco.mj_fwdPosition(self.closure, data)
-        residual = data.efc_pos[: data.nefc]
-        jacobian = data.efc_J.reshape(-1, self.closure.nv)[: data.nefc]
-        return residual.copy(), jacobian.copy()
+        normal = data.xmat[self.loop.bodies[1][0]].reshape(3, 3) @ self.loop.axis
+        return project_closures(
+            data.efc_pos[: data.nefc],
+            data.efc_J.reshape(-1, self.closure.nv)[: data.nefc],
+            data.efc_id[: data.nefc],
+            dict.fromkeys(self.loop.closures, normal),
+        )
 
     def state(self, theta_2: float, omega_2: float) -> _RobotState | None:
         """Return the closed state at an angle and a speed of bar 2.
@@ -365,7 +371,7 @@ class LoopInside:
         return tuple(names)
 
     def _measure_gap(self, qpos: Array) -> float:
-        """Measure the distance of the ends of the closure, m."""
+        """Measure the distance of the ends of the closure in the plane, m."""
         residual, _ = self._evaluate_closure(qpos)
         return float(np.linalg.norm(residual[:3]))
 
@@ -478,55 +484,26 @@ class LoopInside:
                 force, bar = self._read_closure(data, pin)
             else:
                 body = int(self.model.jnt_bodyid[joint])
-                force = self._read_hinge(data, body)
+                force = self.bearers.read(data, body)
                 bar = self._find_bar(body, pin)
             _, acted_on = FORCE_BETWEEN[name]
             sign = 1.0 if bar == acted_on else -1.0
             forces[name] = sign * (axes @ force)
         return forces
 
-    def _read_hinge(self, data: mujoco.MjData, body: int) -> Array:
-        """Return the force on a body from the one that bears it, (3,), N."""
-        force = data.cfrc_int[body, 3:].copy()
-        for load in self.borne[body]:  # MuJoCo counts them into it
-            force -= load_force(self.model, data, load)
-        return np.asarray(force - self.lift[body])
-
-    def _find_borne(self, body: int) -> list[int]:
-        model = self.model
-        borne = []
-        for load in self.loads:
-            site = model.actuator_trnid[load, 0]
-            acts_on = int(model.site_bodyid[site])
-            if body in climb(model, acts_on):
-                borne.append(load)
-        return borne
-
-    def _find_lift(self, body: int) -> Array:
-        model = self.model
-        if not hasattr(model, "body_gravcomp") or not is_enabled(model, "gravity"):
-            return np.zeros(3)
-        lifted = model.body_mass * model.body_gravcomp
-        borne = [b for b in np.flatnonzero(lifted) if body in climb(model, int(b))]
-        return np.asarray(-lifted[borne].sum() * model.opt.gravity)
-
     def _read_closure(self, data: mujoco.MjData, pin: str) -> tuple[Array, int]:
         """Sum the forces of the equalities at the cut pin.
 
         Return the sum and the bar that it acts on.
         """
-        kinds = data.efc_type[: data.nefc]
-        of_equalities = kinds == mujoco.mjtConstraint.mjCNSTR_EQUALITY
         total = np.zeros(3)
         bars = []
         for equality in self.loop.closures:
-            of_this = data.efc_id[: data.nefc] == equality
-            rows = np.flatnonzero(of_equalities & of_this)[:3]
             first_body = find_tied_bodies(self.model, equality)[0]
             bar = self._find_bar(first_body, pin)
             bars.append(bar)
             sign = 1.0 if bar == bars[0] else -1.0
-            total += sign * data.efc_force[rows]
+            total += sign * read_equality_force(data, equality)
         return total, bars[0]
 
     def _find_bar(self, body: int, pin: str) -> int:
@@ -760,21 +737,3 @@ def _find_instant(
         raise LimitError(f"alpha_2 brings the input to rest before {angle:.6g} rad")
     speed = math.copysign(math.sqrt(squared), omega)
     return 2.0 * turned / (omega + speed)
-
-
-def _copy_for_closures(
-    model: mujoco.MjModel,
-    closures: Sequence[int],
-) -> mujoco.MjModel:
-    """Copy a model so that a loop's closures are its only constraints.
-
-    The derivative is dense.
-    """
-    alone = copy(model)
-    alone.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-    for name in ("CONTACT", "LIMIT", "FRICTIONLOSS", "ISLAND"):
-        flag = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
-        alone.opt.disableflags |= flag
-    for number in range(alone.neq):
-        alone.eq_active0[number] = number in closures
-    return alone

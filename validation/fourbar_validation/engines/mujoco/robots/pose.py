@@ -3,9 +3,11 @@
 It is that of the file, or the stated one, closed again by least squares. The residuals
 are those of MuJoCo's own active equalities, the unknowns the joints that they depend
 on. A step of Gauss and Newton is a linear least-squares problem within the joints'
-ranges; damping keeps the pose near the one that was stated.
+ranges; damping keeps the pose near the one that was stated. Joints that a motor holds
+move only where the others cannot close the loops.
 """
 
+import math
 from dataclasses import dataclass
 
 import mujoco
@@ -16,10 +18,16 @@ from fourbar.linkage import require
 from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     find_tied_bodies,
+    list_dofs,
     list_joints_between,
+    list_motors,
     name_joint,
 )
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
+from fourbar_validation.engines.mujoco.robots.planes import (
+    find_normals,
+    project_closures,
+)
 
 FREE_JOINT, BALL, SLIDE, HINGE_JOINT = (
     int(getattr(mujoco.mjtJoint, f"mjJNT_{name}"))
@@ -70,7 +78,8 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
             raise InputError("--pose", f"{name}={text}", "must be a hinge or a slide")
         stated[model.jnt_qposadr[joint]] = _read_joint_position(name, text, unit)
         fixed.add(joint)
-    closing = _Closing(model, fixed)
+    held = {find_joint(model, name, "--hold") for name in options.held}
+    closing = _Closing(model, fixed, held)
     tied = {*closing.joints, *fixed}
     outside = [joint for joint in _find_outside(model, stated) if joint in tied]
     names = _list_some([name_joint(model, joint) for joint in outside])
@@ -86,18 +95,15 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
             stated,
             tuple(notes),
         )
-    closed = closing.close(stated)
+    motors = {joint for joint, _ in list_motors(model)} - set(outside)
+    passive = _Closing(model, fixed | motors, held)
+    closed = passive.close(stated)
+    if passive.size(closed) > CLOSED_IN_THE_FILE:
+        closed = closing.close(stated)
     after = closing.size(closed)
-    moved = [
-        name_joint(model, joint)
-        for joint in closing.joints
-        if abs(closed[model.jnt_qposadr[joint]] - stated[model.jnt_qposadr[joint]])
-        > OUTSIDE_A_RANGE
-    ]
+    moved = _list_moved(model, stated, closed)
     if moved and after <= LARGEST_RESIDUAL:
-        notes.append(
-            f"the loops are closed again by least squares: {_list_some(moved)} moved"
-        )
+        notes.append(f"the loops are closed again by least squares: {', '.join(moved)}")
     elif after > LARGEST_RESIDUAL:
         left = f"what is left is {1e3 * after:.3g} mm or mrad"
         notes.append(_say_open(model, options, stated, left))
@@ -107,6 +113,25 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
         stated,
         tuple(notes),
     )
+
+
+def _list_moved(model: mujoco.MjModel, stated: Array, closed: Array) -> list[str]:
+    """List the joints that closing the loops moved, each with its amount."""
+    change = np.zeros(model.nv)
+    mujoco.mj_differentiatePos(model, change, 1.0, stated, closed)
+    moved = []
+    for joint in range(model.njnt):
+        dofs = list_dofs(model, joint)
+        amount = float(change[dofs[0]])
+        if len(dofs) > 1:
+            amount = float(np.linalg.norm(change[dofs]))
+        if abs(amount) <= OUTSIDE_A_RANGE:
+            continue
+        text = f"{math.degrees(amount):.4g} deg"
+        if int(model.jnt_type[joint]) == SLIDE:
+            text = f"{1e3 * amount:.4g} mm"
+        moved.append(f"{name_joint(model, joint)} by {text}")
+    return moved
 
 
 def _say_open(
@@ -121,7 +146,7 @@ def _say_open(
     and the loops close without that.
     """
     held = {find_joint(model, name, "--hold") for name in options.held}
-    free = _Closing(model, held)
+    free = _Closing(model, held, held)
     closes = free.size(free.close(stated)) <= LARGEST_RESIDUAL
     ranges = any(model.jnt_limited[joint] for joint in free.joints)
     if options.joints and closes and not ranges:
@@ -244,8 +269,19 @@ def _list_some(names: list[str], most: int = 6) -> str:
 class _Closing:
     """Least squares of a model's active equalities over the joints that may move."""
 
-    def __init__(self, model: mujoco.MjModel, fixed: set[int]) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        fixed: set[int],
+        held: set[int],
+    ) -> None:
+        """Take a model.
+
+        `fixed`: joints that closing does not move; `held`: those of them that are no
+        joints of a loop.
+        """
         self.model = _copy_for_equalities(model)
+        self.held = held
         self.data = mujoco.MjData(self.model)
         self.low, self.high = _list_bounds(model)
         self.joints = [
@@ -253,15 +289,7 @@ class _Closing:
             for joint in _list_tied_joints(model)
             if joint not in fixed and int(model.jnt_type[joint]) != FREE_JOINT
         ]
-        self.dofs = [dof for joint in self.joints for dof in self._list_dofs(joint)]
-
-    def _list_dofs(self, joint: int) -> list[int]:
-        first = int(self.model.jnt_dofadr[joint])
-        if int(self.model.jnt_type[joint]) == BALL:
-            count = 3
-        else:
-            count = 1
-        return list(range(first, first + count))
+        self.dofs = [dof for joint in self.joints for dof in list_dofs(model, joint)]
 
     def _residuals(self) -> tuple[Array, Array]:
         """Return residuals of the equalities and their derivatives.
@@ -273,7 +301,12 @@ class _Closing:
             return np.zeros(0), np.zeros((0, self.model.nv))
         rows = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
         jacobian = data.efc_J.reshape(-1, self.model.nv)[: data.nefc]
-        return data.efc_pos[: data.nefc][rows].copy(), jacobian[rows].copy()
+        return project_closures(
+            data.efc_pos[: data.nefc][rows],
+            jacobian[rows],
+            data.efc_id[: data.nefc][rows],
+            find_normals(self.model, data, self.held),
+        )
 
     def _move_to(self, qpos: Array) -> tuple[Array, Array]:
         self.data.qpos[:] = qpos

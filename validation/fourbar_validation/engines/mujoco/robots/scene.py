@@ -32,6 +32,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     climb,
     describe_actuator,
     is_enabled,
+    list_lifted_masses,
     name_joint,
 )
 from fourbar_validation.engines.mujoco.robots.closures import (
@@ -504,13 +505,11 @@ class _SceneOfLoop:
 
         They act where the bodies have them.
         """
-        model = self.model
         data = self.data
-        if not hasattr(model, "body_gravcomp"):
-            return
+        lifted_masses = list_lifted_masses(self.model)
         for bar in MOVING_BARS:
             bodies = self.carried[bar]
-            lifted = model.body_mass[bodies] * model.body_gravcomp[bodies]
+            lifted = lifted_masses[bodies]
             force = -float(lifted.sum()) * self._in_plane(self.gravity)
             if not force:
                 continue

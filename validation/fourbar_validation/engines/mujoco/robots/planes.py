@@ -1,0 +1,140 @@
+"""Closures of a loop whose hinges are parallel, seen in the plane of its motion.
+
+Nothing moves the ends of such a closure along the axes, or tilts them: what is left
+there decides neither whether the loop closes nor how it moves.
+"""
+
+import math
+from collections.abc import Iterable
+from copy import copy
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.quantities import Array
+from fourbar_validation.engines.mujoco.robots.ancestry import (
+    find_ends,
+    find_tied_bodies,
+    list_joints_between,
+)
+from fourbar_validation.engines.mujoco.robots.forces import read_equality_force
+
+PARALLEL = math.radians(0.5)
+"""Largest angle between the axes of a planar linkage, rad. Beyond it forces across the
+plane reach a hundredth.
+"""
+_CLOSURES = (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD)
+
+
+def find_mean_axis(data: mujoco.MjData, hinges: Iterable[int]) -> Array:
+    """Return the mean direction of the axes of hinges, up to its sign, (3,)."""
+    axes = data.xaxis[[*hinges]]
+    axes = axes * np.sign(axes @ axes[0])[:, None]
+    total = axes.sum(axis=0)
+    return np.asarray(total / np.linalg.norm(total))
+
+
+def find_normals(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    held: set[int],
+) -> dict[int, Array]:
+    """Return the normal of the plane of each connect and weld that moves in one, (3,).
+
+    `held`: joints that stay where they are.
+    """
+    normals = {}
+    for number in range(model.neq):
+        if mujoco.mjtEq(int(model.eq_type[number])) not in _CLOSURES:
+            continue
+        ends = find_tied_bodies(model, number)
+        joints = [j for j in list_joints_between(model, *ends) if j not in held]
+        hinges = model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_HINGE
+        if not joints or not hinges.all():
+            continue
+        normal = find_mean_axis(data, joints)
+        tilts = np.linalg.norm(np.cross(data.xaxis[joints], normal), axis=1)
+        if tilts.max() <= math.sin(PARALLEL):
+            normals[number] = normal
+    return normals
+
+
+def project_rows(rows: Array, normal: Array) -> Array:
+    """Return rows of a connect or a weld without what no planar motion changes.
+
+    The first three rows are a shift, (3,) or (3, nv), and three more of a weld are a
+    turn.
+    """
+    across = np.outer(normal, normal)
+    parts = [rows[:3] - across @ rows[:3]]
+    if len(rows) > len(normal):
+        parts.append(across @ rows[3:])
+    return np.concatenate(parts)
+
+
+def project_closures(
+    residual: Array,
+    jacobian: Array,
+    equalities: NDArray[np.int32],
+    normals: dict[int, Array],
+) -> tuple[Array, Array]:
+    """Project the residuals of closures on their planes, and their derivatives.
+
+    Parameters
+    ----------
+    residual, jacobian : of all rows, (m,) and (m, nv).
+    equalities : number of the equality of each row, (m,).
+    normals : of the plane of each equality that has one.
+    """
+    residual = residual.copy()
+    jacobian = jacobian.copy()
+    for number, normal in normals.items():
+        rows = np.flatnonzero(equalities == number)
+        if len(rows):
+            residual[rows] = project_rows(residual[rows], normal)
+            jacobian[rows] = project_rows(jacobian[rows], normal)
+    return residual, jacobian
+
+
+def copy_for_closures(
+    model: mujoco.MjModel,
+    closures: Iterable[int],
+) -> mujoco.MjModel:
+    """Copy a model so that a loop's closures are its only constraints.
+
+    The derivative is dense.
+    """
+    alone = copy(model)
+    alone.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    for name in ("CONTACT", "LIMIT", "FRICTIONLOSS", "ISLAND"):
+        flag = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
+        alone.opt.disableflags |= flag
+    alone.eq_active0[:] = 0
+    alone.eq_active0[[*closures]] = 1
+    return alone
+
+
+def find_offset(
+    model: mujoco.MjModel,
+    qpos: Array,
+    closures: Iterable[int],
+    normal: Array,
+) -> tuple[float, float, float]:
+    """Return how far the ends of closures are apart along the normal, and the forces.
+
+    The largest distance is in m. The forces are those that the closures carry where the
+    robot is let go at rest in a pose, along the normal and in the plane, N.
+    """
+    alone = copy_for_closures(model, closures)
+    data = mujoco.MjData(alone)
+    data.qpos[:] = qpos
+    mujoco.mj_forward(alone, data)
+    offset = 0.0
+    total = np.zeros(3)
+    for number in closures:
+        first, second = find_ends(alone, data, number)
+        offset = max(offset, abs(float((first.place - second.place) @ normal)))
+        total += read_equality_force(data, number)
+    across = float(total @ normal)
+    return offset, abs(across), float(np.linalg.norm(total - across * normal))
