@@ -39,7 +39,9 @@ CRANK_ROCKER_LINKAGE = FourBar(
     Bar(0.22, 0.4, 0.002, (0.12, -0.2)),
     ground_angle=0.2,
 )
-_SLENDER = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4), ground_angle=0.2)
+SLENDER_LINKAGE = FourBar(
+    0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4), ground_angle=0.2
+)
 _ROUND_AND_FLAT = FourBar(
     0.3,
     Bar(0.1, density=7850.0, diameter=0.02),
@@ -53,7 +55,7 @@ LOADS = (
     Load(3, (2.0, -0.4), from_centre=(0.06, 0.5), moment=0.1, frame="bar"),
     Load(2, (1.0, 0.3), from_pin=(0.07, -0.2)),
 )
-_WEIGHT = Gravity(9.81, -1.3)
+WEIGHT = Gravity(9.81, -1.3)
 POINTS_OF_BARS = (
     Point("P", 3, (0.1, 0.7)),
     Point("Q", 4, (0.05, -0.3)),
@@ -64,7 +66,7 @@ CRANK_ROCKER = Scene(
     MOTION_OF_A_TURN,
     2,
     LOADS,
-    (_WEIGHT,),
+    (WEIGHT,),
     points=POINTS_OF_BARS,
 )
 _WRITTEN_SCENES: dict[str, Scene] = {
@@ -131,7 +133,7 @@ _WRITTEN_SCENES: dict[str, Scene] = {
         drive_bar=None,  # type: ignore[arg-type]
         drive=LinearDrive(Place(1, (0.17, -1.1)), Place(3, (0.09, 0.7))),
     ),
-    "slender bars": Scene(_SLENDER, MOTION_OF_A_TURN),
+    "slender bars": Scene(SLENDER_LINKAGE, MOTION_OF_A_TURN),
     "drag link": Scene(
         uniform(0.08, 0.24, 0.2, 0.26),
         MOTION_OF_A_TURN,
@@ -141,12 +143,12 @@ _WRITTEN_SCENES: dict[str, Scene] = {
     "limited": Scene(
         ROCKER_CRANK_LINKAGE,
         Motion(Sweep(0.3, 1.4, 22), 3.0),
-        effects=(_WEIGHT,),
+        effects=(WEIGHT,),
     ),
     "parallelogram": Scene(
         FourBar(0.3, Bar(0.1, 0.2), Bar(0.3, 0.5), Bar(0.1, 0.4)),
         Motion(Sweep(-1.0, 1.1, 14), 4.0, branch=-1),
-        effects=(_WEIGHT,),
+        effects=(WEIGHT,),
     ),
     "near a limit": Scene(
         ROCKER_CRANK_LINKAGE,
@@ -154,7 +156,7 @@ _WRITTEN_SCENES: dict[str, Scene] = {
             limit_positions(ROCKER_CRANK_LINKAGE)[0].theta_2 + np.array([1e-2, 1e-3]),
             1.0,
         ),
-        effects=(_WEIGHT,),
+        effects=(WEIGHT,),
     ),
     "nearest to a limit": Scene(
         ROCKER_CRANK_LINKAGE,
@@ -162,12 +164,12 @@ _WRITTEN_SCENES: dict[str, Scene] = {
             limit_positions(ROCKER_CRANK_LINKAGE)[0].theta_2 + np.array([1e-3, 1e-13]),
             1.0,
         ),
-        effects=(_WEIGHT,),
+        effects=(WEIGHT,),
     ),
     "a hair from a limit": Scene(
         ROCKER_CRANK_LINKAGE,
         Motion(FromLimit(1, 1e-9), 1.0),
-        effects=(_WEIGHT,),
+        effects=(WEIGHT,),
     ),
     "positions": Scene(CRANK_ROCKER_LINKAGE, Motion(Sweep(0.0, 6.0, 12))),
     "damped": replace(
@@ -218,11 +220,11 @@ _WRITTEN_SCENES: dict[str, Scene] = {
     ),
     "sliding pins": replace(
         CRANK_ROCKER,
-        effects=(_WEIGHT, PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03))),
+        effects=(WEIGHT, PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03))),
     ),
     "one sliding pin": replace(
         CRANK_ROCKER,
-        effects=(_WEIGHT, PinFriction.at(B=(0.3, 0.03))),
+        effects=(WEIGHT, PinFriction.at(B=(0.3, 0.03))),
         drive_bar=4,
     ),
     "at rest": Scene(
@@ -230,7 +232,7 @@ _WRITTEN_SCENES: dict[str, Scene] = {
         Motion(Sweep(0.1, 6.0, 12), 0.0),
         2,
         LOADS,
-        (_WEIGHT, Friction.at(A=0.05, B=0.02), PinFriction.at(O4=(0.2, 0.02))),
+        (WEIGHT, Friction.at(A=0.05, B=0.02), PinFriction.at(O4=(0.2, 0.02))),
     ),
     "table": replace(
         CRANK_ROCKER,
@@ -256,7 +258,7 @@ _WRITTEN_SCENES: dict[str, Scene] = {
                 "periodic",
             )
         ),
-        effects=(_WEIGHT,),
+        effects=(WEIGHT,),
     ),
     "law at rest": Scene(
         CRANK_ROCKER_LINKAGE,
@@ -265,7 +267,7 @@ _WRITTEN_SCENES: dict[str, Scene] = {
     "rises": Scene(
         _ROUND_AND_FLAT,
         Motion(law=Rise("cycloidal", (1.2, 0.4), 0.3, 0.1, 0.3, 0.1, steps=24)),
-        effects=(_WEIGHT,),
+        effects=(WEIGHT,),
     ),
     "3-4-5 rise": Scene(
         _ROUND_AND_FLAT, Motion(law=Rise("345", (1.2, 0.4), 0.3, 0.1, steps=24))
@@ -277,14 +279,14 @@ _WRITTEN_SCENES: dict[str, Scene] = {
     "released": Scene(
         CRANK_ROCKER_LINKAGE,
         Motion(1.0, 3.0, free=Free(0.5, 50)),
-        effects=(_WEIGHT,),
+        effects=(WEIGHT,),
     ),
     "released, damped": Scene(
         CRANK_ROCKER_LINKAGE,
         Motion(1.0, 3.0, free=Free(0.5, 50)),
         2,
         (Load(4, moment=0.1),),
-        (_WEIGHT, Viscous.at(O4=0.01, B=0.003), Friction.at(O2=0.02)),
+        (WEIGHT, Viscous.at(O4=0.01, B=0.003), Friction.at(O2=0.02)),
     ),
     "released, pushed from G": Scene(
         CRANK_ROCKER_LINKAGE,
@@ -336,17 +338,17 @@ _WRITTEN_SCENES: dict[str, Scene] = {
     "held by friction": Scene(
         CRANK_ROCKER_LINKAGE,
         Motion(1.0, 0.0, free=Free(0.5, 5)),
-        effects=(_WEIGHT, Friction.at(B=0.3, O2=2.0)),
+        effects=(WEIGHT, Friction.at(B=0.3, O2=2.0)),
     ),
     "held in the end": Scene(
         CRANK_ROCKER_LINKAGE,
         Motion(1.0, 3.0, free=Free(1.0, 20)),
-        effects=(_WEIGHT, Friction.at(A=0.3, O4=1.0)),
+        effects=(WEIGHT, Friction.at(A=0.3, O4=1.0)),
     ),
     "from rest against friction": Scene(
         CRANK_ROCKER_LINKAGE,
         Motion(1.0, 0.0, free=Free(0.5, 20)),
-        effects=(_WEIGHT, Friction.at(A=0.01, O4=0.02)),
+        effects=(WEIGHT, Friction.at(A=0.01, O4=0.02)),
     ),
     "turning over change points": Scene(
         FourBar(0.3, Bar(0.1, 0.2), Bar(0.3, 0.5), Bar(0.1, 0.4)),
@@ -356,36 +358,13 @@ _WRITTEN_SCENES: dict[str, Scene] = {
     "to full accuracy: short diagonal": Scene(
         uniform(0.859375, 0.853515625, 0.58984375, 0.583984375),
         Motion(np.array([0.0018, 0.01]), 10.0),
-        effects=(_WEIGHT,),
+        effects=(WEIGHT,),
     ),
     "no torque": Scene(
         uniform(0.3, 0.1, 0.3, 0.1),
         Motion(np.array([0.5, 1.0]), 10.0),
         3,
-        effects=(_WEIGHT,),
-    ),
-    "derived": Scene(
-        _SLENDER,
-        MOTION_OF_A_TURN,
-        effects=(_WEIGHT,),
-        points=POINTS_OF_BARS,
-    ),
-    "derived, limited": Scene(
-        ROCKER_CRANK_LINKAGE,
-        Motion(Sweep(0.3, 1.4, 22), 3.0),
-        effects=(_WEIGHT,),
-    ),
-    "derived, loaded": Scene(
-        _SLENDER,
-        MOTION_OF_A_TURN,
-        2,
-        (*LOADS, Load(3, moment=-0.3, from_pin=(0.2, 0.4)), Load(4, moment=0.2)),
-        (_WEIGHT,),
-    ),
-    "derived, part of a turn": Scene(
-        _SLENDER,
-        Motion(Sweep(0.1, 2.0, 8), 10.0, 5.0),
-        effects=(_WEIGHT,),
+        effects=(WEIGHT,),
     ),
     "simulated": Scene(
         CRANK_ROCKER_LINKAGE,
@@ -393,7 +372,7 @@ _WRITTEN_SCENES: dict[str, Scene] = {
         2,
         LOADS,
         (
-            _WEIGHT,
+            WEIGHT,
             Viscous.at(A=0.002, B=0.003),
             Springs(
                 (Spring(Place(1, (0.2, 0.6)), Place(3, (0.15, -0.4)), 80.0, 0.1, 2.0),)
@@ -439,10 +418,9 @@ class _FaultScenes(Mapping[str, Scene]):
     """
 
     def __init__(self) -> None:
-        self._files: dict[str, Path] = {}
-        for file in list_capability_files():
-            for judged in ("simulated", "derived"):
-                self._files[f"{judged}, {file.stem}"] = file
+        self._files: dict[str, Path] = {
+            f"simulated, {file.stem}": file for file in list_capability_files()
+        }
 
     def __getitem__(self, name: str) -> Scene:
         """Return a scene by its name."""
@@ -461,6 +439,4 @@ class _FaultScenes(Mapping[str, Scene]):
 
 
 FAULT_SCENES = _FaultScenes()
-"""Scenes by the name under which an entry of faults.toml tries its fault; scenes called
-"derived" judge what is derived from `solve` too.
-"""
+"""Scenes by the name under which an entry of faults.toml tries its fault."""

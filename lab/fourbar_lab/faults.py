@@ -22,7 +22,7 @@ from fourbar_validation.places import CHECKOUT, FORMULAS_FOLDER, PACKAGE
 _TESTS_FAIL = 1
 """Exit status of pytest where a test fails."""
 TEST_SECONDS = 10.0
-"""Processor time within which the tests of what judges must fail, s."""
+"""Processor time within which the tests that an entry names must fail, s."""
 FAULTS_OF_A_PROCESS = 8
 """Faults of one process, which loads the engines once."""
 FAULT_SECONDS = 300
@@ -59,12 +59,12 @@ def _inject(*arguments: str) -> Ended:
     return run_to_end(line, seconds=FAULT_SECONDS, folder=CHECKOUT, variables=variables)
 
 
-def try_judging_fault(number: int) -> str | None:
-    """Try a fault of what judges on the tests of its folder.
+def try_tests(number: int) -> str | None:
+    """Try a fault on the tests that its entry names.
 
     Return why it survives them, or None.
     """
-    done = _inject("--tests", str(number))
+    done = _inject(str(number))
     if done.why:
         return f"it raises: {done.why}"
     outcome = json.loads(done.out.splitlines()[-1])
@@ -118,25 +118,25 @@ def _try_every_fault(workers: int) -> Iterator[tuple[str, str | None]]:
         else [row for outcome in rows[0].values() for row in outcome]
     )
     yield "no fault", f"the harness fails without one: {failing}" if failing else None
+    judged = [i for i, entry in enumerate(entries) if "scenes" in entry]
     batches = [
-        range(start, min(start + FAULTS_OF_A_PROCESS, len(entries)))
-        for start in range(0, len(entries), FAULTS_OF_A_PROCESS)
+        judged[start : start + FAULTS_OF_A_PROCESS]
+        for start in range(0, len(judged), FAULTS_OF_A_PROCESS)
     ]
-    for batch, outcomes in zip(
-        batches,
-        apply_each(try_in_turn, batches, workers),
-        strict=True,
-    ):
-        for number, outcome in zip(batch, outcomes, strict=True):
+    outcomes = apply_each(try_in_turn, batches, workers)
+    for batch, of_batch in zip(batches, outcomes, strict=True):
+        for number, outcome in zip(batch, of_batch, strict=True):
             why = explain_survival(entries[number], outcome)
             yield (
                 entries[number]["fault"],
                 None if why and "harmless" in entries[number] else why,
             )
-    judging = read_faults("judging") if CHECKOUT is not None else []
-    outcomes_of_tests = apply_each(try_judging_fault, range(len(judging)), workers)
-    for entry, reason in zip(judging, outcomes_of_tests, strict=True):
-        yield entry["fault"], reason
+    tested = [i for i, entry in enumerate(entries) if "tests" in entry]
+    if CHECKOUT is None:
+        tested = []
+    reasons = apply_each(try_tests, tested, workers)
+    for number, reason in zip(tested, reasons, strict=True):
+        yield entries[number]["fault"], reason
 
 
 @click.command()
@@ -144,9 +144,7 @@ def _try_every_fault(workers: int) -> Iterator[tuple[str, str | None]]:
 def faults_command(workers: int) -> int:
     """Make each fault of faults.toml, one at a time; each must be caught.
 
-    Those in formulas, effects, MJCF and engines must fail a comparison, those in what
-    judges (comparison, tolerance, rows, report, regression, store, cost, advice) the
-    quick tests of their folder.
+    An entry says by which scenes of a run, or by which quick tests.
     """
     from rich.console import Console
     from rich.progress import track
@@ -155,7 +153,7 @@ def faults_command(workers: int) -> int:
         track(
             _try_every_fault(workers),
             "injecting",
-            total=len(read_faults()) + len(read_faults("judging")) + 1,
+            total=len(read_faults()) + 1,
             console=Console(stderr=True),
         )
     )

@@ -30,7 +30,6 @@ from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.registry import ENGINES, hold_fully, make_demands
 from fourbar_validation.places import CHECKOUT
 from fourbar_validation.report.machine import name_code
-from fourbar_validation.run.answers import check_statements
 from fourbar_validation.run.identities import check_identities
 from fourbar_validation.run.question import Question
 from fourbar_validation.run.store import Store
@@ -341,16 +340,6 @@ def _check_engines(question: Question) -> list[str]:
         answer = ask_at(engine.start(), scene, commanded)
         held = make_demands(engine, scene, commanded, answer)
         rows += Comparison("", scene, answer, solution, held).rows()
-        if (
-            engine.name == "pinocchio-inverse" and answer.refusal is None
-        ):  # the quicker of two exact engines
-            rows += check_statements(
-                "",
-                scene,
-                engine.start(),
-                answer,
-                predicted=held.predicted,
-            )
     # half of the scenes are drawn where doubles have few digits: that they are
     # undecided is no fault
     failed = [

@@ -3,9 +3,9 @@
 A module is loaded with another text, then the harness checks the test scenes. Run by
 its path, with the packages on PYTHONPATH: `python -P injection.py NUMBER...` prints
 what failed as JSON, a line for each fault; without a number nothing is injected and
-every test scene must hold. `injection.py --tests NUMBER` runs the tests that an entry
-of what judges names, and prints how they ended. As a module it would import the project
-before the fault stands.
+every test scene must hold. The number of an entry that a test catches, alone, runs its
+tests and prints how they ended. As a module it would import the project before the
+fault stands.
 """
 
 import importlib.abc
@@ -19,20 +19,18 @@ from types import CodeType
 from typing import Any
 
 FAULTS = Path(__file__).parent / "faults.toml"
-CHANGEABLE_PACKAGES = ("fourbar", "fourbar_validation")
+CHANGEABLE_PACKAGES = ("fourbar", "fourbar_validation", "tests")
 """Packages that an entry may change, in the checkout or as they are installed."""
 
 
-def read_faults(table: str = "injected") -> list[dict[str, Any]]:
-    """Read a table of the list.
+def read_faults() -> list[dict[str, Any]]:
+    """Read the list.
 
-    The keys of an entry are fault, file, old and new; of what is "injected" into
-    formulas and engines also scenes, caught_by and perhaps harmless, of what is
-    "judging" tests.
+    The keys of an entry are fault, file, old and new; scenes, caught_by and perhaps
+    harmless where a run catches it, tests where a test does.
     """
-    entries: list[dict[str, Any]] = tomllib.loads(FAULTS.read_text(encoding="utf-8"))[
-        table
-    ]
+    document = tomllib.loads(FAULTS.read_text(encoding="utf-8"))
+    entries: list[dict[str, Any]] = document["injected"]
     return entries
 
 
@@ -129,12 +127,7 @@ def _list_failing(names: list[str]) -> dict[str, list[str]]:
         else:
             offered = ENGINES
         engines = [engine for engine in offered if simulated or not engine.through_time]
-        rows = judge(
-            name,
-            FAULT_SCENES[name],
-            engines,
-            derived=name.startswith("derived"),
-        ).rows
+        rows = judge(name, FAULT_SCENES[name], engines).rows
         failing[name] = [
             f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.failed
         ]
@@ -159,12 +152,13 @@ def _run_tests(entry: dict[str, Any]) -> dict[str, float]:
 
 def inject_and_judge() -> None:
     """Inject the fault of each number, check its test scenes, print what fails."""
-    if sys.argv[1:2] == ["--tests"]:
-        print(json.dumps(_run_tests(read_faults("judging")[int(sys.argv[2])])))
-        return
-    if len(sys.argv) == 1:
+    numbers = [int(number) for number in sys.argv[1:]]
+    if not numbers:
         print(json.dumps(_list_failing([])))
-    for number in map(int, sys.argv[1:]):
+    if len(numbers) == 1 and "tests" in (entry := read_faults()[numbers[0]]):
+        print(json.dumps(_run_tests(entry)))
+        return
+    for number in numbers:
         for name in [
             name
             for name in sys.modules

@@ -9,7 +9,6 @@ import pytest
 from fourbar_validation.engines import workers
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import Summary
-from fourbar_validation.run import judge
 from fourbar_validation.run.run import Progress
 
 
@@ -38,7 +37,7 @@ def summary_of(records: Iterable[Record]) -> Summary:
 def judge_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Do in this process, one item after another, what workers would do.
 
-    It is not under test here; shipped neither.
+    It is not under test here.
     """
 
     def over_none(
@@ -51,14 +50,3 @@ def judge_here(monkeypatch: pytest.MonkeyPatch) -> None:
             yield number, [function(item) for item in items]
 
     monkeypatch.setattr(workers, "apply_over_processes", over_none)
-    judge_solve_alone(monkeypatch)
-
-
-def judge_solve_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out what is shipped besides `solve`.
-
-    It takes a second for each scene that is drawn.
-    """
-    monkeypatch.setattr(
-        judge, "CHECKS", tuple(check for check in judge.CHECKS if not check.derived)
-    )

@@ -90,7 +90,7 @@ def judge_all(
         suite,
         out,
         engines,
-        RunOptions(workers=workers, drawn=False, sample=0),
+        RunOptions(workers=workers, drawn=False),
         progress=heard,
     )
     assert heard.scenes[COLLECTING] == len(suite)
@@ -345,8 +345,6 @@ def start(
             "--engines",
             "free-body",
             "--no-pictures",
-            "--sample-derived",
-            "0",
             "--out",
             str(out),
             *more,

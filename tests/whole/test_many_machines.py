@@ -26,7 +26,6 @@ CI = ROOT / "docs" / "ci"
 SCENES = 41
 """Scenes of the run: three tasks, the last of which has one scene."""
 OPTIONS = ["--random", str(SCENES), "--engines", "free-body", "--no-pictures"]
-OPTIONS += ["--sample-derived", "0"]
 TABLES = ("results.csv", "results.parquet")
 PROGRAM = Path(sys.executable).with_name("fourbar-validation")
 TIME = 240.0

@@ -52,12 +52,9 @@ JUDGED_BY = {
     # a comparison is tested by engines with given answers
     "validation/run/test_judge.py": (
         "validation/compare: answer effects; "
-        "validation/run: answers command identities question"
+        "validation/run: answers command identities law question"
     ),
     "validation/run/test_parts.py": "validation/run: plan progress request",
-    "validation/compare/statements/test_statements.py": (
-        "validation/compare/statements: limit_positions transmission"
-    ),
     # adapters: judged against printed figures, each other, and faults put in front of
     # them
     "validation/engines/test_engines.py": (
@@ -79,13 +76,9 @@ JUDGED_BY = {
     "validation/engines/mujoco/test_simulate.py": (
         "validation/engines/mujoco: drives monitor"
     ),
-    "validation/run/derived/test_derived.py": (
-        "validation/run/derived: cuts sensitivities equilibria files variants"
-    ),
     "validation/run/test_released.py": "validation/engines/mujoco: forward",
     "validation/check/test_check.py": (
-        "validation/check: calculated fitted judge "
-        "mistakes theirs; validation/run: printed"
+        "validation/check: calculated fitted judge mistakes theirs"
     ),
     "validation/check/test_mjcf.py": (
         "validation/check: differences; validation/robots: guard; "
@@ -100,8 +93,7 @@ JUDGED_BY = {
         "validation/published: comparison figures program textbook thesis thirteen"
     ),
     "validation/regression/test_regression.py": (
-        "validation/compare: derived;"
-        " validation/regression: accept changes fault record render rules scenes"
+        "validation/regression: accept changes fault record render rules scenes"
     ),
     "validation/report/test_report.py": (
         "validation/report: figures machine overview record "

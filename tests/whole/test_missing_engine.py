@@ -72,7 +72,6 @@ def without(
             "--workers",
             "1",
             "--no-pictures",
-            "--sample-derived=0",
             "--out",
             "out",
             *arguments,

@@ -31,8 +31,8 @@ from fourbar_lab.stability import judge_samples
 from fourbar_lab.tally import TOO_SMALL
 from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.exact import BallArithmetic
-from fourbar_validation.run import printed
 from fourbar_validation.run.question import Question
+from tests.oracle import printed
 
 TURNS = 2000.0 * np.pi
 
@@ -172,7 +172,7 @@ def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(
         "solve",
         lambda *args, at: seen.append(at.theta_2) or true(*args, at=at),
     )
-    rows = list(printed.check_error_bars(question))
+    rows = list(printed.error_bars(question))
     assert {row.verdict for row in rows} == {"agrees"}
     assert {swept.theta_2[np.argmin(np.abs(gap))] for gap in away} <= set(seen[0])
 
@@ -198,7 +198,7 @@ def test_a_bar_is_as_wide_as_what_a_position_loses() -> None:
     That is no power of any sine.
     """
     scene = FAULT_SCENES["ends of a spring nearly meet"]
-    rows = printed.check_error_bars(Question("", scene, command(scene)))
+    rows = printed.error_bars(Question("", scene, command(scene)))
     assert [row.verdict for row in rows] == ["agrees", "agrees"]
 
 
@@ -223,7 +223,7 @@ def test_a_long_sweep_searches_for_friction_at_its_ends_alone(
     question = Question("", jammed, command(jammed))
     assert set(question.solution.status) == {"jammed"}
     del searched[:]
-    (row,) = printed.check_blocks(question)
+    (row,) = printed.blocks(question)
     assert row.passed
     assert 0 < len(searched) < 10
 

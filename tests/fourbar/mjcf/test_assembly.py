@@ -25,8 +25,8 @@ from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
 from fourbar_validation.scenes.suites import list_model_files
+from tests.oracle.oracles import judge_by
 from tests.support.scenes import crank_rocker
-from tests.validation.run.derived.test_derived import rows_of
 
 STEPS = 20
 NUMBER = r"-?[\d.]+(?:e-?\d+)?"
@@ -408,7 +408,7 @@ def test_a_file_holds_the_linkage_its_pins_and_what_acts(
     effects: tuple[Any, ...],
 ) -> None:
     """As a run judges it, which reads the text and asks free bodies."""
-    rows = rows_of(crank_rocker(effects=effects), engine)
+    rows = judge_by(crank_rocker(effects=effects), engine)
     assert len(rows) > 5 and all(row.compared and not row.failed for row in rows)
 
 

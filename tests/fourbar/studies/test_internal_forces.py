@@ -13,8 +13,8 @@ import pytest
 import fourbar
 from fourbar.effects import Place
 from fourbar.errors import InputError
+from tests.oracle.oracles import judge_by
 from tests.support.scenes import ON_COUPLER, crank_rocker
-from tests.validation.run.derived.test_derived import rows_of
 
 ROUNDED = 1e-12
 """Relative to the sum of the terms: some tens of roundings and a division by sin mu,
@@ -174,7 +174,7 @@ def test_each_part_of_a_bar_up_to_a_cut_is_in_balance_under_all_that_acts(
         fourbar.Load(4, moment=0.5, from_centre=(0.03, 2.0)),
     )
     scene = crank_rocker(motion=motion, loads=couples, effects=EVERYTHING, **drive)
-    rows = rows_of(scene, "internal_forces")
+    rows = judge_by(scene, "internal_forces")
     assert {row.quantity for row in rows} == {
         f"{part}{bar}" for part in "NVM" for bar in (2, 3, 4)
     }

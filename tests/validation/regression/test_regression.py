@@ -27,7 +27,6 @@ import fourbar
 from fourbar.errors import InputError
 from fourbar_validation.cli import status
 from fourbar_validation.compare.columns import ResultsWriter
-from fourbar_validation.compare.derived import DERIVED_BOUNDS
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, Row
 from fourbar_validation.compare.tolerance import (
     EPS,
@@ -917,26 +916,6 @@ def test_k_and_a_stated_limit_are_rules_whoever_changes_them(
         "K: factor 50.0 -> 500.0",
         f"limit of {harsher.engine}: {harsher.name}: boundary 0.05 -> 0.5",
     ]
-
-
-@pytest.mark.parametrize("bound", DERIVED_BOUNDS, ids=lambda bound: bound.name)
-def test_the_bound_of_a_derived_result_is_a_rule(
-    bound: ErrorBound,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """What bounds a row of a derived check is one of them.
-
-    Its reason begins with the name.
-    """
-    before = describe_run([Engine("engine", FreeBody, EQUIVALENCE)], "suite")
-    looser = replace(bound, factor=2.0 * bound.factor)
-    bounds = tuple(looser if one is bound else one for one in DERIVED_BOUNDS)
-    monkeypatch.setattr(rules, "DERIVED_BOUNDS", bounds)
-    after = describe_run([Engine("engine", FreeBody, EQUIVALENCE)], "suite")
-    (weakening,) = compare_rows((before, [ROW]), (after, [ROW])).weakened
-    assert weakening.name == f"derived results: {bound.name}"
-    derived = replace(ROW, reason=f"{bound.name}: 5 positions")
-    assert rules.find_class(derived) == bound.name
 
 
 def test_rows_alone_say_that_their_class_is_another() -> None:

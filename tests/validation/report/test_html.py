@@ -10,9 +10,8 @@ import re
 
 import pytest
 
-from fourbar_validation.compare.rows import write_rows
+from fourbar_validation.compare.rows import FORMULAS, write_rows
 from fourbar_validation.report.html import ALL_OPEN
-from fourbar_validation.report.overview import OWN_ENGINES
 from tests.validation.report.test_report import copies, report
 from tests.whole.test_imports import ROOT
 
@@ -128,11 +127,11 @@ def test_engines_stand_before_what_checks_fourbar_against_itself(browse) -> None
         ".querySelectorAll('thead th').values().map(e => e.textContent).toArray()"
     )
     names = [re.sub("^[^a-z]+", "", head) for head in heads[1:]]
-    own = [name in OWN_ENGINES for name in names]
+    own = [name == FORMULAS for name in names]
     assert own == sorted(own) and True in own and False in own
     caption = driver.find_element("css selector", "details.scene[open] .pictures + p")
     told = [name for name in names if re.search(rf"\W {name}\b", caption.text)]
-    assert told == [name for name in names if name not in OWN_ENGINES]
+    assert told == [name for name in names if name != FORMULAS]
 
 
 @pytest.mark.slow

@@ -48,7 +48,7 @@ from fourbar_validation.report.svg import LEAST_DRAWN_ERROR
 from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run.judge import judge_for_report
 from tests.support.guests import write_program
-from tests.support.here import judge_solve_alone, summary_of
+from tests.support.here import summary_of
 from tests.support.scenes import crank_rocker
 
 COMMENT_LIMIT = 65_536
@@ -65,7 +65,6 @@ def demo(*, draw: bool = True) -> Record:
         scene,
         tuple(w for w in ENGINES if w.name != "mujoco-simulated"),
         draw=draw,
-        derived=draw,
     )
 
 
@@ -274,7 +273,6 @@ def test_every_kind_of_scene_is_drawn(
     pictures: int,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    judge_solve_alone(monkeypatch)
     engines = tuple(w for w in ENGINES if w.name == "free-body")
     made = judge_for_report("kind", crank_rocker(motion=motion), engines)
     assert made.figure is not None and made.figure.count("<svg") == pictures

@@ -28,7 +28,9 @@ from fourbar_validation.compare.rows import (
 from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, FULL_ACCURACY, K
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import ENGINES, Engine, make_prediction
+from fourbar_validation.run import judge as judging
 from fourbar_validation.run.judge import judge
+from fourbar_validation.run.question import Question
 from tests.support.scenes import crank_rocker
 
 
@@ -100,12 +102,8 @@ def rows_of(adapter: type, scene: Scene | None = None) -> dict[str, Row]:
 
 def test_an_equal_answer_agrees_in_every_quantity() -> None:
     rows = rows_of(Echo)
-    stated = {"range", "limit_positions", "transmission"}
-    assert (
-        set(rows)
-        == {*COMPARED_QUANTITIES, "assembled", "undecided", "closure", "torque_inertia"}
-        | stated
-    )
+    of_engines = {"assembled", "undecided", "closure", "torque_inertia"}
+    assert set(rows) == {*COMPARED_QUANTITIES, *of_engines}
     assert all(row.verdict == AGREES for row in rows.values())
 
 
@@ -406,3 +404,23 @@ def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(
         assert all(
             np.isnan(values).all() for values in (at.angle, at.speed, at.acceleration)
         )
+
+
+def test_a_check_that_raises_costs_its_own_rows_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def check_nothing(_: Question) -> list[Row]:
+        raise ArithmeticError("lost")
+
+    scene = crank_rocker()
+    all_rows = judge("", scene, ()).rows
+    checks = (judging.Check(check_nothing), *judging.CHECKS)
+    monkeypatch.setattr(judging, "CHECKS", checks)
+    (row,) = (row for row in judge("", scene, ()).rows if row not in all_rows)
+    assert (row.engine, row.setting, row.quantity, row.verdict) == (
+        "formulas",
+        "check_nothing",
+        "all",
+        FAILS,
+    )
+    assert len(all_rows) > 3

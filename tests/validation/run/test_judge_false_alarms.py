@@ -19,11 +19,12 @@ from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.registry import ENGINES, Engine, hold_fully
-from fourbar_validation.run import printed, released
+from fourbar_validation.run import released
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import Question
 from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.random import draw_random_scene
+from tests.oracle import printed
 
 EXACT = [engine for engine in ENGINES if not engine.through_time]
 BY_ITSELF = [engine for engine in EXACT if not engine.library]
@@ -141,7 +142,7 @@ def test_an_exact_zero_needs_no_error_bar(monkeypatch: pytest.MonkeyPatch) -> No
     true, added = printed.solve, 0.0
 
     def judged() -> str:
-        rows = printed.check_error_bars(Question("", scene, fourbar.command(scene)))
+        rows = printed.error_bars(Question("", scene, fourbar.command(scene)))
         return {row.quantity: row.verdict for row in rows}["torque_error"]
 
     def with_more(scene: Scene, *stage: str, **keywords: object) -> Solution:
@@ -161,7 +162,7 @@ def test_an_error_bar_of_no_error_fails(monkeypatch: pytest.MonkeyPatch) -> None
     true = printed.solve
 
     def judged() -> str:
-        rows = printed.check_error_bars(Question("", scene, fourbar.command(scene)))
+        rows = printed.error_bars(Question("", scene, fourbar.command(scene)))
         return {row.quantity: row.verdict for row in rows}["force_error"]
 
     def without(scene: Scene, *stage: str, **keywords: object) -> Solution:

@@ -72,7 +72,7 @@ def test_a_rule_that_is_weaker_than_before_stands_first(
         "fourbar_validation.run.pool.judge_job",
         lambda job: Record(job.name, rows=[replace(ROW, allowed=1e-2)]),
     )
-    options = RunOptions(drawn=False, sample=0, against=before.table.parent)
+    options = RunOptions(drawn=False, against=before.table.parent)
     engine = Engine("mine", FreeBody, stated)
     summary = run(Few(("a",)), tmp_path / "now", (engine,), options)
     assert summary.headline.startswith("WEAKER RULE: mine: factor 1.11")
@@ -108,7 +108,7 @@ def test_the_verdict_says_since_when_of_the_failure_that_it_names(
         tmp_path / "before",
         [rows["a"][0], replace(ROW, scene="b"), replace(ROW, scene="c")],
     )
-    options = RunOptions(drawn=False, sample=0, against=before.table.parent)
+    options = RunOptions(drawn=False, against=before.table.parent)
     engine = Engine("mine", FreeBody, EQUIVALENCE)
     summary = run(Few(("a", "b", "c")), tmp_path / "now", (engine,), options)
     assert "mine is wrong: F32 and F43 are exchanged" in summary.headline

@@ -14,13 +14,11 @@ import pytest
 from fourbar.scene import Scene
 from fourbar.scene.motion import Law, Rise
 from fourbar_validation.engines.effects import TERM_OF
-from fourbar_validation.run import pool
-from fourbar_validation.run.derived.coordinates import is_coordinate
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import FREE_BODY
 from fourbar_validation.run.run import RunOptions, run
-from fourbar_validation.scenes.random import DrawnType
-from fourbar_validation.scenes.suites import Files, Random, read_default_suite
+from fourbar_validation.scenes.suites import Files, read_default_suite
+from tests.oracle.coordinates import is_coordinate
 
 
 def scenes() -> list[Scene]:
@@ -111,29 +109,6 @@ def test_every_scene_of_it_holds(index: int) -> None:
     rows = judge(SUITE.name(index), SUITE.scene(index), [FREE_BODY], order=False).rows
     assert not [row for row in rows if row.failed]
     assert any(row.compared and row.engine == FREE_BODY.name for row in rows)
-
-
-@pytest.mark.parametrize(
-    ("count", "sample", "shipped"),
-    [(6, 30, 6), (60, 30, 30), (1000, 30, 30), (6, 0, 0)],
-)
-def test_of_a_sample_what_else_is_shipped_is_judged(
-    count: int,
-    sample: int,
-    shipped: int,
-) -> None:
-    suite = Random(count, 0, tuple(DrawnType))
-    jobs = pool.make_jobs(suite, range(count), (), True, sample)
-    assert sum(job.derived for job in jobs) == shipped
-    assert [
-        job.derived for job in pool.make_jobs(suite, range(count), (), False, sample)
-    ] == [j.derived for j in jobs]
-
-
-def test_a_run_without_arguments_judges_what_else_is_shipped_in_every_scene() -> None:
-    sample = RunOptions().sample
-    jobs = pool.make_jobs(SUITE, range(len(SUITE)), (), True, sample)
-    assert jobs and all(job.derived for job in jobs)
 
 
 @pytest.mark.slow

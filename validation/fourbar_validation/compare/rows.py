@@ -32,36 +32,7 @@ the engine declared a limit, or the formulas state no value.
 """
 
 FORMULAS = "formulas"
-IDENTITIES = (
-    *(
-        "closure",
-        "force_sum",
-        "moment_sum",
-        "power",
-        "status",
-        "blocks",
-        "points",
-        "law",
-        "sweep",
-    ),
-    *("torque", "torque_error", "force_error", "friction_residual"),
-    *("mirrored", "turned", "scaled", "exchanged", "superposed", "split masses"),
-)
-"""Rows of the formulas that no engine answers: they do not count as compared."""
-
-DERIVED_CHECKS = (
-    "study",
-    "sensitivity",
-    "internal_forces",
-    "summary",
-    "tolerances",
-    "equilibria",
-    "sdf",
-    "usd",
-)
-"""Engines of the rows that check functions other than `solve`. With `formulas` they are
-those of fourbar itself.
-"""
+"""Engine of the rows that no engine answers: identities of the formulas."""
 LONGEST_REASON = 500
 """Characters of what somebody else's code gives as a reason."""
 
@@ -347,42 +318,41 @@ class Counts:
     """
 
     def __init__(self, rows: Iterable[Row] = ()) -> None:
-        self._of = Counter(dict.fromkeys(VERDICTS, 0))
-        self.scenes = self.scenes_compared = self._answered = 0
+        self._answers = Counter(dict.fromkeys(VERDICTS, 0))
+        self._identities = Counter(dict.fromkeys(VERDICTS, 0))
+        self.scenes = self.scenes_compared = 0
         self.add(rows)
 
     def __getitem__(self, verdict: str) -> int:
-        return self._of[verdict]
+        return self._answers[verdict] + self._identities[verdict]
 
     def add(self, rows: Iterable[Row]) -> None:
         """Take in rows."""
         for row in rows:
-            self._of[row.verdict] += 1
-            self._answered += row.compared and not (
-                row.engine == FORMULAS and row.quantity in IDENTITIES
-            )
+            of = self._identities if row.engine == FORMULAS else self._answers
+            of[row.verdict] += 1
 
     def add_scene(self, rows: Iterable[Row]) -> None:
         """Take in all rows of one scene."""
-        before = self._answered
+        before = self.compared
         self.add(rows)
         self.scenes += 1
-        self.scenes_compared += self._answered > before
+        self.scenes_compared += self.compared > before
 
     @property
     def total(self) -> int:
         """Return the number of all rows."""
-        return self._of.total()
+        return self._answers.total() + self._identities.total()
 
     @property
     def compared(self) -> int:
-        """Comparisons that were made."""
-        return sum(self[verdict] for verdict in _COMPARED_VERDICTS)
+        """Comparisons with an engine's answer that were made."""
+        return sum(self._answers[verdict] for verdict in _COMPARED_VERDICTS)
 
     @property
     def nothing(self) -> bool:
         """Return whether nothing was compared and no answer that was due is missing."""
-        return not self._answered and not self[FAILS]
+        return not self.compared and not self[FAILS]
 
     @property
     def status(self) -> int:
@@ -416,24 +386,20 @@ class Counts:
 
         "all hold" is stated only of what was compared.
         """
-        total = self.compared
-        failed = self[FAILS]
+        failed = []
+        if self._answers[FAILS]:
+            failed.append(f"{self._answers[FAILS]} of {self.compared} comparisons")
+        if wrong := self._identities[FAILS]:
+            failed.append(f"{wrong} identities of the formulas")
         if failed:
-            verdict = (
-                f"FAILS: {failed} of {total} comparisons{self._write_where()} do not"
-                " hold"
-            )
+            verdict = f"FAILS: {' and '.join(failed)}{self._write_where()} do not hold"
         elif self.nothing:
             verdict = f"Nothing was compared{self._write_where()}"
         else:
-            verdict = f"All {total} comparisons{self._write_where()} hold"
-        if self.nothing:
-            if total:
-                held = [f"{total} of the formulas' own identities hold"]
-            else:
-                held = []
-        else:
-            held = self._write_worded(_COMPARED_VERDICTS)
+            verdict = f"All {self.compared} comparisons{self._write_where()} hold"
+        held = self._write_worded(_COMPARED_VERDICTS)
+        if self.nothing and (true := self._identities[AGREES]):
+            held = [f"{true} of the formulas' own identities hold"]
         apart = self._write_worded((UNDECIDED, REFUSES))
         if apart and not self.nothing:
             apart[0] = "not compared: " + apart[0]
@@ -451,7 +417,21 @@ class Counts:
 
     def _write_worded(self, verdicts: Iterable[str]) -> list[str]:
         return [
-            f"{self[verdict]} {_WORDING[verdict][self[verdict] != 1]}"
+            f"{count} {_WORDING[verdict][count != 1]}"
             for verdict in verdicts
-            if self[verdict]
+            if (count := self._answers[verdict])
         ]
+
+
+def keep_worst(rows: Iterable[Row]) -> list[Row]:
+    """Keep the worst of several rows of a quantity."""
+    worst: dict[tuple[str, str], Row] = {}
+
+    def badness(row: Row) -> tuple[int, float]:
+        return VERDICTS.index(row.verdict), float(find_used(row.error, row.allowed))
+
+    for row in rows:
+        key = row.setting, row.quantity
+        if key not in worst or badness(row) > badness(worst[key]):
+            worst[key] = row
+    return list(worst.values())

@@ -148,7 +148,6 @@ def name_guests(
             positions=tuple(
                 quantity for quantity in hello.answers if quantity in ANGLES
             ),
-            stated=False,
             code=hash_files(filter(os.path.isfile, program.command)),
             version=" on ".join(filter(None, (hello.version, hello.device))),
             seconds=program.seconds,

@@ -85,10 +85,6 @@ class Engine:
     """True if it answers at the angle that `Command.remainder` completes, so that where
     an error is beyond the tolerance it can answer again within the rounding of theta_2.
     """
-    stated: bool = True
-    """True if an exact engine also checks what the formulas state of the linkage. These
-    statements do not depend on its motion.
-    """
     code: str = ""
     """Hash of an adapter that the harness does not ship. No answer of another one is
     resumed.

@@ -8,7 +8,6 @@ pass, so the rules themselves are kept with a run.
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from fourbar_validation.compare.derived import DERIVED_BOUNDS
 from fourbar_validation.compare.rows import AGREES, Row
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
@@ -43,19 +42,16 @@ kernels of a processor, and K eps/condition with it: 139 of 2093 allowances grew
 CLASSES = {
     STATED_BY_THE_ENGINE,
     *(bound.cause for bound in (IDENTITY, EQUIVALENCE, SIMULATED, FULL_ACCURACY)),
-    *(bound.name for bound in DERIVED_BOUNDS),
 }
 """Names of the classes of tolerance, with which the reason of a row begins."""
 
 
 def list_rules(engines: Iterable[Engine]) -> Rules:
-    """List the rules of a run: of identities, derived results, engines and limits."""
+    """List the rules of a run: of identities, engines and limits."""
     rules: Rules = {
         "identities": _describe_bound(IDENTITY),
         "K": {FACTOR_CHANGED: repr(K)},
     }
-    for bound in DERIVED_BOUNDS:
-        rules[f"derived results: {bound.name}"] = _describe_bound(bound)
     for engine in engines:
         predicted = engine.predictor is not None or engine.residuals
         rules[engine.name] = _describe_bound(engine.tolerance) | {

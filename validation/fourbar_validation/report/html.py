@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNKNOWNS
 from fourbar_validation.compare.rows import (
     FAILS,
+    FORMULAS,
     REFUSES,
     UNDECIDED,
     Counts,
@@ -17,7 +18,7 @@ from fourbar_validation.compare.rows import (
     sort_rows,
     write_rows,
 )
-from fourbar_validation.report.overview import OVERVIEW_GROUPS, OWN_ENGINES
+from fourbar_validation.report.overview import OVERVIEW_GROUPS
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import (
     OWN_CONSISTENCY,
@@ -121,7 +122,7 @@ class _SceneView:
         return [
             engine
             for engine in self.engines
-            if engine not in OWN_ENGINES
+            if engine != FORMULAS
             and any(
                 cell.row.compared
                 for (quantity, name), cell in self.by_place.items()
@@ -169,8 +170,8 @@ def write_html(
         "report.html.j2",
         s=summary,
         views=views,
-        engines=[name for name in engines if name not in OWN_ENGINES],
-        own_engines=[name for name in OWN_ENGINES if name in engines],
+        engines=[name for name in engines if name != FORMULAS],
+        own_engines=[name for name in engines if name == FORMULAS],
         own=OWN_CONSISTENCY,
         failing=failing,
         groups=OVERVIEW_GROUPS,
@@ -269,5 +270,5 @@ def _list_engines(rows: Any) -> list[str]:
     """List the engines by name: independent ones first, the formulas last."""
     return sorted(
         {row.engine for row in rows},
-        key=lambda name: (name in OWN_ENGINES, name == OWN_CONSISTENCY, name),
+        key=lambda name: (name == FORMULAS, name),
     )

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 
 from fourbar.quantities import LINE, PIN_FORCES, UNITS
 from fourbar_validation.compare.rows import (
-    DERIVED_CHECKS,
     FORMULAS,
     HOLDING_VERDICTS,
     REFUSES,
@@ -22,10 +21,6 @@ from fourbar_validation.compare.tolerance import find_used
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.words import NUMBER_IN_A_REASON, AlikeTexts
 
-OWN_ENGINES = (FORMULAS, *DERIVED_CHECKS)
-"""Engines whose rows check fourbar against itself. They are identities, and functions
-other than `solve`.
-"""
 TORQUE_GROUP = "torque"
 PIN_FORCE_GROUP = "pin forces"
 MOTION_GROUP = "motion"
@@ -204,7 +199,7 @@ class Overview:
             self.not_compared[AT_A_LIMIT if row.quantity == "all" else _NO_VALUE] += 1
         elif row.verdict == UNDECIDED:
             self.not_compared[NO_DIGITS] += 1
-        if row.engine in OWN_ENGINES:
+        if row.engine == FORMULAS:
             self.statements += row.compared
             self.statements_failed += row.failed
             return
@@ -227,7 +222,7 @@ class Overview:
                 name = "torque"
             else:
                 name = row.quantity
-            if row.engine not in OWN_ENGINES and name in ("torque", *PIN_FORCES):
+            if row.engine != FORMULAS and name in ("torque", *PIN_FORCES):
                 asked.setdefault(row.engine, {})[name] = row.verdict in HOLDING_VERDICTS
         whole = len(PIN_FORCES) + 1
         agreeing = [all(of.values()) for of in asked.values() if len(of) == whole]
@@ -337,8 +332,8 @@ class Overview:
             if self.statements_failed:
                 held = f"{self.statements_failed} FAIL"
             notes.append(
-                f"also checked, without an engine: {self.statements} statements on "
-                f"identities, studies and files; {held}"
+                f"also checked, without an engine: {self.statements} identities of"
+                f" the formulas; {held}"
             )
         if self.with_forces:
             notes.append(
@@ -362,7 +357,7 @@ def _list_reasons(scene: Record) -> Iterable[tuple[str, str]]:
     """List the engines that a scene was not compared with, each with the reason."""
     for row in scene.rows:
         whole = row.verdict == REFUSES and row.quantity == "all"
-        if whole and row.engine not in OWN_ENGINES:
+        if whole and row.engine != FORMULAS:
             yield row.engine, row.reason
     refused = {row.engine for row in scene.rows}
     for line in scene.left_out:
@@ -392,7 +387,7 @@ def _name_causes(
         ]
     if known := scene.causes.get(engine):
         return [f"{text}, all else agrees" for text in known]
-    if engine in OWN_ENGINES:
+    if engine == FORMULAS:
         names = sorted({row.quantity for row in rows})
         return [
             f"{', '.join(names[:3])} {'does' if len(names) == 1 else 'do'} not hold"

@@ -31,7 +31,7 @@ from fourbar_validation.compare.tolerance import (
 )
 from fourbar_validation.engines.registry import WORK
 from fourbar_validation.report.machine import list_versions, name_machine
-from fourbar_validation.report.overview import OWN_ENGINES, Overview, OverviewLine
+from fourbar_validation.report.overview import Overview, OverviewLine
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.words import NUMBER_IN_A_REASON
 
@@ -168,7 +168,7 @@ class Summary:
         bad = [row for row in scene.rows if row.failed]
         self.failures += bad[: _FAILURES_KEPT - len(self.failures)]
         for row, used in zip(scene.rows, compute_shares(scene.rows), strict=True):
-            name = OWN_CONSISTENCY if row.engine in OWN_ENGINES else row.engine
+            name = OWN_CONSISTENCY if row.engine == FORMULAS else row.engine
             line = self._engines.setdefault(name, _EngineLine(name))
             line.add(row, used)
         compared, loose = _count_compared(scene.rows)
@@ -269,7 +269,7 @@ class Summary:
         else:
             others = ""
         first = causes[0]
-        if first.engine not in OWN_ENGINES:
+        if first.engine != FORMULAS:
             named = first.engine
         else:
             named = "fourbar itself"

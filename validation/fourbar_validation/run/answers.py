@@ -8,21 +8,16 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
 
-from fourbar.errors import LimitError
 from fourbar.linkage import copy_with
 from fourbar.mjcf.document import LIGHT_BAR_RATIO
 from fourbar.quantities import COUPLE, FORCE_NAMES
-from fourbar.scene import Command, Scene
-from fourbar_validation.compare.answer import Adapter, Answer
-from fourbar_validation.compare.compare import Comparison, Predicted
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
 from fourbar_validation.compare.scales import has_angles
-from fourbar_validation.compare.statements import limit_positions, transmission
-from fourbar_validation.compare.statements.limit_positions import look, make_worst_row
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.engines.registry import Engine, make_demands, make_prediction
+from fourbar_validation.engines.registry import Engine, make_demands
 from fourbar_validation.run.causes import find_causes
 from fourbar_validation.run.question import Question
 
@@ -104,123 +99,6 @@ def _observe_order_of_engine(question: Question, engine: Engine) -> dict[str, fl
     return (
         seen if all(map(math.isfinite, seen.values())) else {}
     )  # a coarse run may leave what the scene covers
-
-
-def compare_statements(question: Question) -> Iterator[Row]:
-    """Compare what the formulas state of the linkage with every exact engine.
-
-    The statements do not depend on its motion.
-    """
-    stated = Statements.of(question.scene, question.at)
-    setting = "statements of the linkage"
-
-    def rows(engine: Engine, answer: Answer) -> list[Row]:
-        predicted = make_prediction(engine, question.scene, question.at, answer)
-        try:
-            return check_statements(
-                question.name,
-                question.scene,
-                question.adapter(engine),
-                answer,
-                stated,
-                predicted,
-            )
-        except LimitError as limit:
-            return [
-                Row.unmeasured(
-                    question.name,
-                    engine.name,
-                    setting,
-                    "all",
-                    REFUSES,
-                    str(limit),
-                )
-            ]
-
-    for engine in question.engines:
-        answer, _ = question.answered.get(engine.name, (None, 0.0))
-        exact = (
-            engine.stated
-            and engine.tolerance.conditioned
-            and "theta_3" in engine.answers
-        )
-        if exact and answer is not None and answer.refusal is None:
-            yield from question.attempt(
-                partial(rows, engine, answer),
-                engine.name,
-                setting,
-            )
-
-
-class Statements(NamedTuple):
-    """Statements of the formulas on a linkage and over a motion.
-
-    They are evaluated once for all engines.
-    """
-
-    limits: limit_positions.StatedLimits
-    transmission: transmission.StatedTransmission
-    over: transmission.StatedOver | None
-    """None where the motion has no speed."""
-    visit: limit_positions.Visit
-    """Places where an engine is asked."""
-
-    @classmethod
-    def of(cls, scene: Scene, at: Command | None) -> "Statements":
-        """Evaluate the formulas."""
-        limits = limit_positions.StatedLimits.of(scene.linkage)
-        over = None
-        if at is not None and at.omega_2 is not None:
-            over = transmission.StatedOver.of(scene, at, limits)
-        of_angle = transmission.StatedTransmission.of(limits)
-        places = limit_positions.choose_places(limits)
-        places += transmission.choose_places(of_angle)
-        visit = limit_positions.plan_visit(scene.linkage, places)
-        return cls(limits, of_angle, over, visit)
-
-
-def check_statements(
-    name: str,
-    scene: Scene,
-    engine: Adapter,
-    answer: Answer,
-    stated: Statements | None = None,
-    predicted: Predicted | None = None,
-) -> list[Row]:
-    """Make a row for each of `range`, `limit_positions`, `transmission`.
-
-    If there are change points, `through` has one.
-
-    Parameters
-    ----------
-    answer : what the engine found over the scene's own motion.
-    stated : what the formulas state, where several engines are held to it at one
-        motion.
-    predicted : the errors to be expected of the answer.
-    """
-    if stated is None or (
-        stated.over is not None and stated.over.command is not answer.at
-    ):
-        stated = Statements.of(scene, answer.at)
-    limits, of_angle, over, visit = stated
-    seen = look(engine, visit)
-    findings = {
-        "range": limit_positions.compare_ranges(limits, engine, seen),
-        "limit_positions": limit_positions.compare_limit_positions(limits, seen),
-        "transmission": transmission.compare_transmission(
-            of_angle,
-            over,
-            seen,
-            answer,
-            predicted,
-        ),
-    }
-    if limits.passages:
-        findings["through"] = limit_positions.check_through(limits, seen)
-    return [
-        make_worst_row(name, answer, quantity, list(rows))
-        for quantity, rows in findings.items()
-    ]
 
 
 def compare_inertia(question: Question) -> Iterator[Row]:

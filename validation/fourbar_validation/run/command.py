@@ -12,7 +12,7 @@ from fourbar_validation.regression.accept import add_output_options, report_diff
 from fourbar_validation.regression.record import PARQUET_FILE
 from fourbar_validation.report.junit import list_cases, write_document
 from fourbar_validation.run.parts import judge_part
-from fourbar_validation.run.plan import SCENES_SAMPLED, WORKERS, RunPart
+from fourbar_validation.run.plan import WORKERS, RunPart
 from fourbar_validation.run.progress import ShownProgress
 from fourbar_validation.run.request import ALL_TYPES, Request, make_plan
 from fourbar_validation.run.run import run
@@ -91,17 +91,6 @@ from fourbar_validation.run.run import run
     help=(
         "End a guest that takes longer for one answer; left out: a minute, and more for"
         " many positions."
-    ),
-)
-@click.option(
-    "--sample-derived",
-    type=click.IntRange(min=0),
-    default=SCENES_SAMPLED,
-    show_default=True,
-    metavar="N",
-    help=(
-        "Judge studies, derivatives, internal forces, the summary of `analyze`,"
-        " tolerances, equilibria, SDF and USD in this many scenes, evenly chosen."
     ),
 )
 @click.option(

@@ -23,21 +23,9 @@ from fourbar_validation.run.answers import (
     check_mjcf,
     compare_answers,
     compare_inertia,
-    compare_statements,
 )
-from fourbar_validation.run.derived.cuts import internal_forces
-from fourbar_validation.run.derived.equilibria import equilibria
-from fourbar_validation.run.derived.files import sdf, usd
-from fourbar_validation.run.derived.sensitivities import sensitivity, study, tolerances
-from fourbar_validation.run.derived.summary import summary
 from fourbar_validation.run.identities import check_identities, check_status
-from fourbar_validation.run.printed import (
-    check_blocks,
-    check_error_bars,
-    check_law,
-    check_points,
-    check_residual,
-)
+from fourbar_validation.run.law import check_law
 from fourbar_validation.run.question import Question, select_positions
 from fourbar_validation.run.released import check_released
 from fourbar_validation.run.transformed import check_transformed
@@ -47,10 +35,6 @@ class Check(NamedTuple):
     """A check, and when it is made."""
 
     make_rows: Callable[[Question], Iterable[Row]]
-    derived: bool = False
-    """True if it checks a function of fourbar other than `solve`. The function's name
-    is then the engine of its rows.
-    """
     free: bool = False
     """True if it checks a free motion, False for a prescribed one."""
     what: str = ""
@@ -58,33 +42,11 @@ class Check(NamedTuple):
     needs_theta_2: str = ""
     """Reason to leave it out where theta_2 is not commanded; empty for any command."""
 
-    def is_due(self, *, free: bool, derived: bool) -> bool:
-        """Return whether it is made of a free or a prescribed motion.
-
-        `derived`: whether the checks of functions other than `solve` are made.
-        """
-        return self.free == free and (derived or not self.derived)
-
-    @property
-    def engine(self) -> str:
-        """Engine of its rows: the function that it checks, or the formulas."""
-        return self.make_rows.__name__ if self.derived else FORMULAS
-
 
 CHECKS = (
     Check(check_identities),
     Check(check_status),
-    Check(check_points),
     Check(check_law),
-    Check(check_blocks),
-    Check(
-        check_error_bars,
-        what="error bars",
-        needs_theta_2=(
-            "balls are asked at theta_2, and `stability --bar` at the other bars"
-        ),
-    ),
-    Check(check_residual),
     Check(check_transformed),
     Check(
         Question.find_reversals,
@@ -92,11 +54,6 @@ CHECKS = (
         needs_theta_2="they are drawn over theta_2",
     ),
     Check(compare_answers),
-    Check(
-        compare_statements,
-        what="statements of the linkage",
-        needs_theta_2="engines are led to its limits by theta_2",
-    ),
     Check(check_mjcf, what="MJCF as shipped", needs_theta_2="it drives bar 2"),
     Check(compare_inertia),
     Check(
@@ -104,26 +61,6 @@ CHECKS = (
         free=True,
         what="released motions",
         needs_theta_2="engines begin at theta_2",
-    ),
-    *(
-        Check(rows, derived=True)
-        for rows in (
-            study,
-            sensitivity,
-            internal_forces,
-            summary,
-            tolerances,
-            equilibria,
-        )
-    ),
-    *(
-        Check(
-            rows,
-            derived=True,
-            what=rows.__name__,
-            needs_theta_2="the file opens at theta_2",
-        )
-        for rows in (sdf, usd)
     ),
 )
 """All checks of a scene. An exception in a check fails its own rows only."""
@@ -138,14 +75,12 @@ def judge_for_report(
     *,
     draw: bool = True,
     sketch: bool = False,
-    derived: bool = False,
 ) -> Record:
     """Judge a scene and keep what the report needs of it.
 
     `draw`: with its pictures and observed orders. `sketch`: with its small picture.
-    `derived`: with checks of functions other than `solve`.
     """
-    record = judge(name, scene, engines, order=draw, derived=derived)
+    record = judge(name, scene, engines, order=draw)
     for i, row in enumerate(record.rows):
         if row.engine in record.output and row.failed:
             record.rows[i] = replace(
@@ -169,13 +104,11 @@ def judge(
     engines: Sequence[Engine] = ENGINES,
     *,
     order: bool = True,
-    derived: bool = False,
 ) -> Record:
     """Make every check of one scene.
 
     `order`: measure the observed order of what is simulated, which takes two more
-    simulations and changes no row. `derived`: make the derived checks of `CHECKS`
-    too, those of functions other than `solve`, which takes a second.
+    simulations and changes no row.
     """
     question = make_question(name, scene, engines)
     free = scene.motion.free is not None
@@ -183,32 +116,16 @@ def judge(
     begin = time.perf_counter()
     question.solution  # noqa: B018 - timed
     seconds = time.perf_counter() - begin
-    if (
-        derived
-        and not free
-        and (
-            question.at.speed is None
-            or question.free_body is None
-            or question.free_body.refusal
-        )
-    ):
-        reason = (
-            "they are checked against the free bodies, which have no forces for this"
-            " scene"
-        )
-        question.leave_out("functions other than solve", reason)
-        derived = False
     rows: list[Row] = []
     for check in CHECKS:
-        if not check.is_due(free=free, derived=derived):
+        if check.free != free:
             continue
         if check.needs_theta_2 and question.at.commanded != "theta_2":
             reason = f"{check.needs_theta_2}; {question.at.commanded} is commanded"
             question.leave_out(check.what, reason)
             continue
-        setting = "" if check.derived else check.make_rows.__name__
         make_rows = partial(check.make_rows, question)
-        rows += question.attempt(make_rows, check.engine, setting)
+        rows += question.attempt(make_rows, FORMULAS, check.make_rows.__name__)
     return question.record(rows, seconds)
 
 

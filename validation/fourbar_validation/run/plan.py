@@ -22,11 +22,6 @@ from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.suites import Files, Suite
 
 WORKERS = 2
-SCENES_SAMPLED = 40
-"""Scenes in which everything else that is shipped is judged: no fewer than the suite of
-a run without arguments has. In a scene that takes as long as judging thirty scenes: an
-eighth more for 10 000 random ones.
-"""
 SCENES_OF_A_SLOW_TASK = 1
 """Scenes per task if something is simulated or drawn: a second each."""
 SCENES_OF_A_QUICK_TASK = 20
@@ -39,7 +34,7 @@ JUDGING, COLLECTING, DRAWING = "judging", "collecting", "drawing"
 
 @dataclass(frozen=True, slots=True)
 class RunOptions:
-    """Options of a run; only the sample changes a result."""
+    """Options of a run; none changes a result."""
 
     workers: int = WORKERS
     """Number of processes."""
@@ -51,8 +46,6 @@ class RunOptions:
     """Earlier run that `--against` names. The failure that the verdict names is looked
     up there, and its rules must not be stricter.
     """
-    sample: int = SCENES_SAMPLED
-    """Scenes, evenly chosen, in which functions other than `solve` are checked."""
 
 
 DEFAULTS = RunOptions()
@@ -152,7 +145,6 @@ class Plan:
             **name_code(),
             "draw": self.draw_at_once,
             "sketch": self.sketch,
-            "sample": self.options.sample,
         }
 
     def list_tasks(self, part: RunPart) -> list[int]:
@@ -191,7 +183,6 @@ class Plan:
                     self.tasks[task],
                     self.engines,
                     self.draw_at_once,
-                    self.options.sample,
                     self.sketch,
                 ),
             )

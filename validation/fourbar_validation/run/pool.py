@@ -27,8 +27,6 @@ class Job:
     scene: int
     engines: Sequence[Engine]
     draw: bool
-    derived: bool
-    """True if functions other than `solve` are checked."""
     sketch: bool = False
 
     @property
@@ -42,17 +40,11 @@ def make_jobs(
     scenes: Iterable[int],
     engines: Sequence[Engine],
     draw: bool,
-    sample: int = 0,
     sketch: bool = False,
 ) -> list[Job]:
-    """Make the jobs of some scenes; one of a file carries its own text alone.
-
-    `sample`: number of scenes of the suite, evenly chosen, in which functions other
-    than `solve` are checked too.
-    """
+    """Make the jobs of some scenes; one of a file carries its own text alone."""
     jobs = []
     for i in scenes:
-        derived = (i + 1) * sample // len(suite) > i * sample // len(suite)
         if isinstance(suite, Files):
             drawn = draw and suite.name(i) not in suite.not_drawn
             jobs.append(
@@ -61,12 +53,11 @@ def make_jobs(
                     0,
                     engines,
                     drawn,
-                    derived,
                     sketch,
                 )
             )
         else:
-            jobs.append(Job(suite, i, engines, draw, derived, sketch))
+            jobs.append(Job(suite, i, engines, draw, sketch))
     return jobs
 
 
@@ -79,7 +70,6 @@ def judge_job(job: Job) -> Record:
         job.engines,
         draw=job.draw,
         sketch=job.sketch,
-        derived=job.derived,
     )
 
 

@@ -5,8 +5,9 @@ The answer of the formulas is among them; all are computed once.
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -260,3 +261,18 @@ def spread_evenly(
 def select_positions(command: Command, indices: NDArray[np.intp]) -> Command:
     """Take some positions of a command."""
     return command.part(indices)._replace(remainder=None)
+
+
+def take_member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
+    """Take one linkage of a solved study, or some positions of one linkage."""
+
+    def take(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {name: values[index] for name, values in value.items()}
+        if isinstance(value, np.ndarray):
+            return value[index]
+        return value
+
+    taken = {field.name: take(getattr(study, field.name)) for field in fields(study)}
+    taken |= {"at": study.at.part(index), "ground": None, "lengths": None}
+    return Solution(**taken)

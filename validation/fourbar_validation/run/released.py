@@ -31,6 +31,7 @@ from fourbar_validation.compare.rows import (
     REFUSES,
     UNDECIDED,
     Row,
+    keep_worst,
 )
 from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import (
@@ -45,8 +46,7 @@ from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.guests import Guest
 from fourbar_validation.engines.registry import Engine, find_missing, make_demands
 from fourbar_validation.report.record import Timing
-from fourbar_validation.run.derived.variants import keep_worst, take_member
-from fourbar_validation.run.question import Question, select_positions
+from fourbar_validation.run.question import Question, select_positions, take_member
 
 
 def _answer_mujoco(step: float) -> Any:

@@ -16,7 +16,6 @@ from fourbar_validation.engines.table import choose_engines, fill_table
 from fourbar_validation.regression.accept import FORMS
 from fourbar_validation.regression.record import find_baseline, open_run
 from fourbar_validation.run.plan import (
-    SCENES_SAMPLED,
     WORKERS,
     Plan,
     RunOptions,
@@ -50,7 +49,7 @@ _REQUEST = "request.json"
 """File beside a part that says what was asked for, so that parts can be collected."""
 OPTIONS_OF_A_PART = (
     *("scenes", "engines", "error", "suite", "random", "seed", "type"),
-    *("guest", "time_limit", "sample_derived", "no_pictures"),
+    *("guest", "time_limit", "no_pictures"),
 )
 """Options that a part keeps."""
 
@@ -74,7 +73,6 @@ class Request:
     against: str | None = None
     guest: tuple[str, ...] = ()
     time_limit: float | None = None
-    sample_derived: int = SCENES_SAMPLED
     part: str | None = None
     verbose: bool = False
     no_pictures: bool = False
@@ -135,7 +133,6 @@ class Request:
             self.workers,
             not self.no_pictures,
             against=against,
-            sample=self.sample_derived,
         )
 
 

@@ -22,15 +22,14 @@ from fourbar.mjcf.assembly import write_usd as usd_text
 from fourbar.scene import Scene
 from fourbar.solving import solve
 from fourbar_validation.compare.pins import state_from_pins
-from fourbar_validation.compare.rows import REFUSES, Row
+from fourbar_validation.compare.rows import REFUSES, Row, keep_worst
 from fourbar_validation.compare.tolerance import EPS, K
-from fourbar_validation.run.derived.variants import (
+from fourbar_validation.run.question import Question
+from tests.oracle.variants import (
     ask_free_bodies,
     hold_to,
-    keep_worst,
     take_few,
 )
-from fourbar_validation.run.question import Question
 
 NUMBER_IN_A_FILE = r"[-+.\deE]+"
 

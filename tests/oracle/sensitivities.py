@@ -21,27 +21,25 @@ from fourbar.scene.numbers import POINT_STAGES, Point
 from fourbar.studies.keys import command_key
 from fourbar.studies.spread import Spread
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.derived import DIFFERENCES, SPREAD
-from fourbar_validation.compare.rows import Row
+from fourbar_validation.compare.rows import Row, keep_worst
 from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import divide, magnitude
-from fourbar_validation.run.derived.coordinates import DRAWN_SETTING, is_coordinate
-from fourbar_validation.run.derived.variants import (
+from fourbar_validation.run.question import NotAskedError, Question, take_member
+from tests.oracle.bounds import DIFFERENCES, SPREAD
+from tests.oracle.coordinates import DRAWN_SETTING, is_coordinate
+from tests.oracle.printed import move_points
+from tests.oracle.variants import (
     SceneFile,
     ask_beside,
     ask_free_bodies,
     at_places,
     hold_to,
     is_near_change_point,
-    keep_worst,
     make_row,
     split_unknowns,
     stays_beside,
     take_few,
-    take_member,
 )
-from fourbar_validation.run.printed import move_points
-from fourbar_validation.run.question import NotAskedError, Question
 
 _MEMBERS = 5
 """Members of the study, as many as positions. It is a square study, whose axes only its

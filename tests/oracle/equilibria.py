@@ -24,7 +24,6 @@ from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, find_signs
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.studies.equilibrium import Equilibrium
-from fourbar_validation.compare.derived import REST
 from fourbar_validation.compare.pins import (
     find_centre,
     find_inertia,
@@ -41,8 +40,9 @@ from fourbar_validation.compare.tolerance import (
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import LARGEST_FIRST_ORDER
 from fourbar_validation.engines.registry import find_missing
-from fourbar_validation.run.derived.variants import make_row
 from fourbar_validation.run.question import NotAskedError, Question
+from tests.oracle.bounds import REST
+from tests.oracle.variants import make_row
 
 POSITIONS_OF_A_TURN = 720
 """Positions of a turn of the input. Between two of them the torque changes its sign at

@@ -11,23 +11,18 @@ import numpy as np
 import pytest
 
 import fourbar
-import fourbar_validation.compare.statements.transmission
 from fourbar.formulas import mobility, transmission
 from fourbar.linkage import uniform
-from fourbar.scene import Command, Scene, command
-from fourbar_validation import Answer
-from fourbar_validation.compare.rows import REFUSES, Row
-from fourbar_validation.compare.statements import limit_positions
-from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar.scene import Scene, command
+from fourbar_validation.compare.rows import Row
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.mujoco.inverse import MujocoInverse
 from fourbar_validation.engines.pinocchio import PinocchioInverse
-from fourbar_validation.engines.registry import Engine
-from fourbar_validation.run.answers import check_statements
-from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
-from tests.support.scenes import crank_rocker
+from tests.oracle import limit_positions
+from tests.oracle import transmission as stated_transmission
+from tests.oracle.statements import check_statements
 
 ROCKER, TRIPLE, CHANGE = (
     (0.3, 0.1, 0.25, 0.22),
@@ -222,7 +217,7 @@ FAULTS = {
         changed(
             "drive_sine",
             lambda sine: sine * (1.0 + SEEN),
-            fourbar_validation.compare.statements.transmission,
+            stated_transmission,
         ),
     ),
     "mechanical advantage": (
@@ -286,26 +281,3 @@ def test_an_engine_that_does_not_answer_agrees_with_nothing(
     for lengths in (ROCKER, TRIPLE):
         assert not judged(lengths)["limit_positions"].passed
         assert not judged(lengths)["transmission"].passed
-
-
-class Shy:
-    """Refuses whatever is not the scene of the test.
-
-    The positions of the statements.
-    """
-
-    name = "shy"
-
-    def answer(self, scene: Scene, command: Command) -> Answer:
-        return (
-            PinocchioInverse().answer(scene, command)
-            if scene.title
-            else Answer("shy", "exact", refusal="too near a limit")
-        )
-
-
-def test_an_engine_refuses_the_positions_of_the_statements_in_a_row() -> None:
-    rows = judge("scene", crank_rocker(), [Engine("shy", Shy, EQUIVALENCE)]).rows
-    (row,) = (row for row in rows if row.setting == "statements of the linkage")
-    assert (row.verdict, row.reason) == (REFUSES, "too near a limit")
-    assert not any(row.failed for row in rows)

@@ -9,11 +9,10 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from copy import deepcopy
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.files import dump, loads
 from fourbar.linkage import MOVING_BARS, FourBar
@@ -24,31 +23,30 @@ from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES, Comparison, Demands
 from fourbar_validation.compare.reversals import mark_reversing
-from fourbar_validation.compare.rows import VERDICTS, Row
+from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
     WELL_CONDITIONED,
     ErrorBound,
-    find_used,
     magnitude,
     sum_lengths,
 )
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import make_prediction
-from fourbar_validation.run.derived.coordinates import (
-    Coordinates,
-    find_entry,
-    is_coordinate,
-)
-from fourbar_validation.run.printed import compare_points
 from fourbar_validation.run.question import (
     FREE_BODY,
     NotAskedError,
     Question,
     spread_evenly,
 )
+from tests.oracle.coordinates import (
+    Coordinates,
+    find_entry,
+    is_coordinate,
+)
+from tests.oracle.printed import compare_points
 
 POSITIONS_OF_VARIANTS = 5
 """Positions at which whatever takes more than one call is judged."""
@@ -343,20 +341,6 @@ def hold_to(
     return rows
 
 
-def keep_worst(rows: Iterable[Row]) -> list[Row]:
-    """Keep the worst of several rows of a quantity."""
-    worst: dict[tuple[str, str], Row] = {}
-
-    def badness(row: Row) -> tuple[int, float]:
-        return VERDICTS.index(row.verdict), float(find_used(row.error, row.allowed))
-
-    for row in rows:
-        key = row.setting, row.quantity
-        if key not in worst or badness(row) > badness(worst[key]):
-            worst[key] = row
-    return list(worst.values())
-
-
 def make_row(
     question: Question,
     engine: str,
@@ -374,21 +358,6 @@ def make_row(
     return Row.judged(
         who, quantity, error, tolerance.factor, f"{tolerance.name}: {reason}", theta_2
     )
-
-
-def take_member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
-    """Take one linkage of a solved study, or some positions of one linkage."""
-
-    def take(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {name: values[index] for name, values in value.items()}
-        if isinstance(value, np.ndarray):
-            return value[index]
-        return value
-
-    taken = {field.name: take(getattr(study, field.name)) for field in fields(study)}
-    taken |= {"at": study.at.part(index), "ground": None, "lengths": None}
-    return Solution(**taken)
 
 
 def split_unknowns(answer: Answer) -> dict[str, Array]:

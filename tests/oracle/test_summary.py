@@ -16,10 +16,10 @@ import fourbar
 from fourbar.show import duty
 from fourbar.show.summary import Facts
 from fourbar_validation.compare.rows import Row
-from fourbar_validation.run.derived import summary as module
-from fourbar_validation.run.derived.summary import summary
 from fourbar_validation.run.judge import make_question
 from fourbar_validation.run.question import NotAskedError
+from tests.oracle import summary as module
+from tests.oracle.summary import summary
 from tests.support.scenes import CYLINDER, crank_rocker
 
 TURN = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * np.pi, 36), 9.0))
@@ -362,7 +362,7 @@ def test_a_printed_bore_that_is_off_fails_its_row(
 def test_a_bar_that_bends_the_same_everywhere_agrees_beside_a_pole() -> None:
     """A force drives the coupler, and has no lever at two places within steps."""
     scene = fourbar.load(
-        Path(__file__).parents[3]
+        Path(__file__).parents[1]
         / "counterexamples"
         / "bar_without_drive_beside_a_pole.toml"
     )

@@ -16,7 +16,6 @@ from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.derived import CUT
 from fourbar_validation.compare.line import place_line
 from fourbar_validation.compare.pins import (
     find_centre,
@@ -36,8 +35,9 @@ from fourbar_validation.engines.free_body_effects import (
     list_sliding_pins,
     make_vector,
 )
-from fourbar_validation.run.derived.variants import ask_free_bodies, make_row, take_few
 from fourbar_validation.run.question import Question
+from tests.oracle.bounds import CUT
+from tests.oracle.variants import ask_free_bodies, make_row, take_few
 
 CUT_POSITIONS = (0.0, 0.137, 0.479, 0.863)
 """Cuts, in parts of the bar's length from its first pin. The first is just beyond that

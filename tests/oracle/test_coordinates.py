@@ -7,8 +7,8 @@ import fourbar
 from fourbar.files import dump, loads
 from fourbar.scene import Scene
 from fourbar_validation.places import MODELS
-from fourbar_validation.run.derived.coordinates import is_coordinate
-from fourbar_validation.run.derived.variants import SceneFile, ask_free_bodies
+from tests.oracle.coordinates import is_coordinate
+from tests.oracle.variants import SceneFile, ask_free_bodies
 
 DRAWN = MODELS / "capabilities" / "drawn.toml"
 ROUNDING = 1e-13

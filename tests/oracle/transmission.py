@@ -18,12 +18,6 @@ from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, find_signs
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Predicted
-from fourbar_validation.compare.statements.limit_positions import (
-    Finding,
-    LimitPlace,
-    Seen,
-    StatedLimits,
-)
 from fourbar_validation.compare.tolerance import (
     EPS,
     EQUIVALENCE,
@@ -34,6 +28,12 @@ from fourbar_validation.compare.tolerance import (
     find_roundoff,
     find_used,
     wrap_difference,
+)
+from tests.oracle.limit_positions import (
+    Finding,
+    LimitPlace,
+    Seen,
+    StatedLimits,
 )
 
 _RADII = (0.2, 0.3)

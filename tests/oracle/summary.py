@@ -26,13 +26,6 @@ from fourbar.show.duty import MotorDuty, bearing_load, motor_duty, shaking_force
 from fourbar.show.summary import Facts, Peak, summarize
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.derived import (
-    CUT,
-    INTEGRATED,
-    LOCATED_ROUGHLY,
-    PRINTED,
-    PRINTED_TO_FOUR_DIGITS,
-)
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.scales import make_reference
@@ -44,14 +37,21 @@ from fourbar_validation.compare.tolerance import (
     wrap_difference,
 )
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.run.derived.cuts import (
+from fourbar_validation.run.question import NotAskedError, Question
+from tests.oracle.bounds import (
+    CUT,
+    INTEGRATED,
+    LOCATED_ROUGHLY,
+    PRINTED,
+    PRINTED_TO_FOUR_DIGITS,
+)
+from tests.oracle.cuts import (
     CUT_POSITIONS,
     Piece,
     free_piece,
     move_bars,
 )
-from fourbar_validation.run.derived.variants import ask_free_bodies, make_row
-from fourbar_validation.run.question import NotAskedError, Question
+from tests.oracle.variants import ask_free_bodies, make_row
 
 ROW_NAMES = (
     "ranges",

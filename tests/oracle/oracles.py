@@ -1,0 +1,84 @@
+"""Second derivations of what fourbar derives from a solution: one oracle for each.
+
+An oracle takes a question of the harness and yields its rows. No run makes them.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+
+import pytest
+
+from fourbar.scene import Scene
+from fourbar_validation.compare.rows import Row
+from fourbar_validation.engines.registry import ENGINES, make_prediction
+from fourbar_validation.run.judge import make_question
+from fourbar_validation.run.question import NotAskedError, Question
+from tests.oracle.cuts import internal_forces
+from tests.oracle.equilibria import equilibria
+from tests.oracle.files import sdf, usd
+from tests.oracle.printed import blocks, error_bars, friction_residual, points
+from tests.oracle.sensitivities import sensitivity, study, tolerances
+from tests.oracle.statements import check_statements
+from tests.oracle.summary import summary
+
+PINOCCHIO = next(engine for engine in ENGINES if engine.name == "pinocchio-inverse")
+
+
+def statements(question: Question) -> list[Row]:
+    """Hold ranges, limits, transmission and assemblies to Pinocchio's open trees."""
+    pytest.importorskip("pinocchio")
+    answer = question.answer(PINOCCHIO)
+    if answer.refusal is not None:
+        raise NotAskedError(answer.refusal)
+    return check_statements(
+        question.name,
+        question.scene,
+        question.adapter(PINOCCHIO),
+        answer,
+        predicted=make_prediction(PINOCCHIO, question.scene, question.at, answer),
+    )
+
+
+Oracle = Callable[[Question], Iterable[Row]]
+AT_POSITIONS: tuple[Oracle, ...] = (points, blocks, error_bars, friction_residual)
+"""Oracles of the numbers of a solution."""
+OF_FORCES: tuple[Oracle, ...] = (
+    *(study, sensitivity, tolerances, internal_forces),
+    *(summary, equilibria, sdf, usd),
+)
+"""Oracles that need the forces of the free bodies."""
+ORACLES = {
+    oracle.__name__: oracle for oracle in (*AT_POSITIONS, statements, *OF_FORCES)
+}
+AT_THETA_2 = (error_bars, statements, sdf, usd)
+"""Oracles that need a command of theta_2."""
+
+
+def ask(oracle: Oracle, question: Question) -> Iterator[Row]:
+    """Yield the rows of an oracle.
+
+    Raises NotAskedError where the scene has nothing that it could compare.
+    """
+    if question.at.speed is None and oracle is not statements:
+        raise NotAskedError("the scene has no speed")
+    if oracle in AT_THETA_2 and question.at.commanded != "theta_2":
+        raise NotAskedError(f"{question.at.commanded} is commanded")
+    if oracle in OF_FORCES:
+        answer = question.free_body
+        if answer is None or answer.refusal is not None:
+            raise NotAskedError("the free bodies have no forces for this scene")
+    yield from oracle(question)
+
+
+def judge_by(scene: Scene, *names: str) -> list[Row]:
+    """Return the rows of some oracles, or of all that the scene has something for."""
+    if scene.motion.free is not None:
+        return []
+    question = make_question("", scene, ())
+    rows: list[Row] = []
+    for name in names or ORACLES:
+        try:
+            rows += ask(ORACLES[name], question)
+        except NotAskedError:
+            if names:
+                raise
+    return rows

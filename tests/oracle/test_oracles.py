@@ -1,0 +1,63 @@
+"""What fourbar derives from a solution holds by every oracle, over many scenes."""
+
+import pytest
+
+from fourbar_validation.compare.rows import Row
+from fourbar_validation.scenes.random import DrawnType, draw_random_scene
+from fourbar_validation.scenes.suites import read_default_suite
+from tests.oracle.oracles import ORACLES, judge_by
+from tests.oracle.scenes import take_scene
+
+SHIPPED = read_default_suite()
+RANDOM_SCENES = 200
+SEED = 68
+SAMPLE = {
+    "slender": ORACLES.keys()
+    - {"blocks", "error_bars", "friction_residual", "statements"},
+    "limited": {"study", "sensitivity", "equilibria"},
+    "loaded": {"internal_forces", "summary"},
+    "part of a turn": {"summary"},
+    "simulated, damped": {"sdf"},
+    "simulated, tolerances": {"tolerances", "sdf"},
+    "simulated, drawn": {"study", "sensitivity"},
+    "crank-rocker": {"points", "blocks", "error_bars", "statements"},
+    "parallelogram": {"statements"},
+    "sliding pins": {"blocks", "friction_residual"},
+    "near a limit": {"error_bars"},
+    "short output": {"error_bars"},
+    "short coupler and output near a limit": {"error_bars"},
+}
+"""Oracles that have something to compare in each scene of the quick sample."""
+
+
+def find_failing(rows: list[Row]) -> list[str]:
+    return [f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.failed]
+
+
+@pytest.mark.parametrize(
+    ("name", "oracle"),
+    [(name, oracle) for name, oracles in SAMPLE.items() for oracle in sorted(oracles)],
+)
+def test_the_sample_is_compared_and_holds(name: str, oracle: str) -> None:
+    rows = judge_by(take_scene(name), oracle)
+    assert any(row.compared for row in rows)
+    assert not find_failing(rows)
+
+
+def test_every_oracle_is_in_the_sample() -> None:
+    assert set().union(*SAMPLE.values()) == ORACLES.keys()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "number", range(len(SHIPPED)), ids=[SHIPPED.name(i) for i in range(len(SHIPPED))]
+)
+def test_every_shipped_scene_holds(number: int) -> None:
+    assert not find_failing(judge_by(SHIPPED.scene(number)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(RANDOM_SCENES))
+def test_random_scenes_hold(number: int) -> None:
+    scene = draw_random_scene(SEED, number, tuple(DrawnType))
+    assert not find_failing(judge_by(scene))

@@ -1,1 +1,0 @@
-"""Judge what is derived from `solve`, through its public calls and by other means."""

@@ -1,0 +1,152 @@
+"""Check a motion law by its own table, or by another form of a standard law.
+
+Engines are handed the angles of a law, so that none of them would notice.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fourbar.quantities import Array
+from fourbar.scene.motion import Rise
+from fourbar_validation.compare.rows import Row
+from fourbar_validation.compare.tolerance import IDENTITY, find_worst
+from fourbar_validation.run.question import Question
+
+
+def check_law(question: Question) -> Iterator[Row]:
+    """Check a motion law by its own table.
+
+    It is the piecewise cubic through its points whose acceleration is continuous. Each
+    piece is the cubic of Hermite through the table's angles with the speeds at its
+    ends; that it is the law's is decided by the accelerations of neighbouring pieces
+    and by the ends alone. Angle, speed and acceleration of every position, and the
+    conditions on the pieces, by the worst of them.
+    """
+    law = question.scene.motion.law
+    command = question.at
+    if law is None or command.time is None:
+        return
+    assert isinstance(command.speed, np.ndarray)
+    if isinstance(law, Rise):
+        yield _check_rise(question, law)
+        return
+    t = np.array(law.time)
+    angle = np.array(law.angle)
+    h = np.diff(t)
+    shortest = float(h.min())
+    rise = np.diff(angle) / np.diff(t)
+    speed = law.at(t)[1]
+    first = (6.0 * rise - 4.0 * speed[:-1] - 2.0 * speed[1:]) / h
+    last = (-6.0 * rise + 2.0 * speed[:-1] + 4.0 * speed[1:]) / h
+    farthest = float(np.abs(angle).max())
+    fastest = float(np.abs(rise).max() + np.abs(speed).max())
+    size = fastest + farthest / shortest
+    bent = size / shortest
+    misfits = [np.abs(first[1:] - last[:-1]) / bent]
+    if law.ends == "rest":
+        misfits.append(np.abs(speed[[0, -1]]) / size)
+    elif law.ends == "periodic":
+        jump_of_speed = speed[0] - speed[-1]
+        jump_of_acceleration = (first[0] - last[-1]) / shortest
+        misfits.append(np.abs([jump_of_speed, jump_of_acceleration]) / size)
+    else:  # one cubic through the first two pieces, and through the last two
+        jerk = (last - first) / h
+        jumps = np.abs([jerk[1] - jerk[0], jerk[-1] - jerk[-2]])
+        misfits.append(jumps * shortest / bent)
+    knots_before = np.searchsorted(t, command.time, side="right")
+    piece = np.clip(knots_before - 1, 0, len(h) - 1)
+    theta, omega, alpha = _interpolate_hermite(
+        command.time - t[piece],
+        angle[piece],
+        speed[piece],
+        first[piece],
+        last[piece],
+        h[piece],
+    )
+    along = [
+        np.abs(theta - command.angle) / max(1.0, farthest),
+        np.abs(omega - command.speed) / size,
+        np.abs(alpha - command.acceleration) / bent,
+    ]
+    error = np.max(along, axis=0)
+    worst = find_worst(error)
+    largest = [misfit.max(initial=0.0) for misfit in misfits]
+    error[worst] = np.max([error[worst], *largest])
+    yield question.row(
+        "law",
+        error,
+        IDENTITY.factor,
+        "the piecewise cubic through the table, its acceleration continuous",
+    )
+
+
+def _check_rise(question: Question, law: Rise) -> Row:
+    """Check a rise, its dwell and its fall, part by part.
+
+    They are checked by other forms of the standard laws:
+
+        cycloidal, with x = pi u:  u - sin x cos x/pi,  2 sin^2 x,  4 pi sin x cos x;
+        345: the polynomial of Bernstein with the coefficients 0, 0, 0, 1, 1, 1.
+    """
+    command = question.at
+    assert command.time is not None
+    assert command.speed is not None
+    rise, duration = law.rise
+    start = getattr(law, f"theta_{law.bar}")
+    parts = [(0.0, duration, rise)]
+    if law.fall is not None:
+        parts.append((duration + law.dwell, law.fall, -rise))
+    rates = np.zeros((3, len(command.time)))
+    rates[0] += start
+    for begin, lasts, height in parts:
+        u = np.clip((command.time - begin) / lasts, 0.0, 1.0)
+        for order, rate in enumerate(_restate_law(law.kind, u)):
+            rates[order] += height * rate / lasts**order
+    shortest = min(lasts for _, lasts, _ in parts)
+    stated = [command.angle, command.speed, command.acceleration]
+    size = abs(start) + abs(rise)
+    # the time of a position is rounded, as a part of the whole motion
+    late = law.time[-1] / shortest
+    along = []
+    for order, value in enumerate(stated):
+        apart = np.abs(rates[order] - np.asarray(value))
+        along.append(apart * shortest**order / (size * late))
+    reason = f"the {law.kind} law in another form"
+    return question.row("law", np.max(along, axis=0), IDENTITY.factor, reason)
+
+
+def _restate_law(kind: str, u: Array) -> tuple[Array, Array, Array]:
+    """Compute a standard law from 0 to 1 and its two derivatives in other forms."""
+    v = 1.0 - u
+    if kind == "cycloidal":
+        sine = np.sin(np.pi * u)
+        cosine = np.cos(np.pi * u)
+        return (
+            u - sine * cosine / np.pi,
+            2.0 * sine * sine,
+            4.0 * np.pi * sine * cosine,
+        )
+    place = u**3 * (10.0 * v * v + 5.0 * u * v + u * u)
+    speed = 30.0 * (u**4 - 2.0 * u**3 + u * u)
+    return place, speed, 60.0 * (2.0 * u**3 - 3.0 * u * u + u)
+
+
+def _interpolate_hermite(
+    s: Array,
+    angle: Array,
+    speed: Array,
+    first: Array,
+    last: Array,
+    h: Array,
+) -> tuple[Array, Array, Array]:
+    """Compute angle, speed and acceleration a time s into a piece.
+
+    They follow from its acceleration at both ends.
+    """
+    jerk = (last - first) / h
+    return (
+        angle + s * (speed + s * (first / 2.0 + s * jerk / 6.0)),
+        speed + s * (first + s * jerk / 2.0),
+        first + s * jerk,
+    )
