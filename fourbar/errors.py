@@ -7,7 +7,9 @@ import io
 import os
 import re
 import select
+import signal
 import sys
+import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -213,7 +215,8 @@ def run(
         # a terminal that has no Greek still gets its table
         sys.stdout.reconfigure(errors="replace")
     try:
-        returned = group.main(args=words, prog_name=program, standalone_mode=False)
+        with _interrupted_by_sigterm():
+            returned = group.main(args=words, prog_name=program, standalone_mode=False)
         status = HOLDS if returned is None else int(returned)
         _flush()
         return status
@@ -244,6 +247,22 @@ def run(
             " shows where)",
             BROKEN,
         )
+
+
+@contextmanager
+def _interrupted_by_sigterm() -> Iterator[None]:
+    """Let SIGTERM interrupt the body as Ctrl-C does.
+
+    Python lets only the main thread handle signals; in another thread nothing changes.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _read_exit(raised: SystemExit, streams: tuple[TextIO, ...]) -> int:

@@ -5,6 +5,7 @@ The memory of this process is bounded, and its output kept.
 
 import ctypes
 import json
+import math
 import os
 import re
 import signal
@@ -16,6 +17,7 @@ import time
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from multiprocessing import parent_process
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
@@ -45,6 +47,57 @@ def bound_memory(process: int = 0) -> None:
         else:
             soft = min(WORKER_MEMORY, hard)
         prlimit(process, RLIMIT_DATA, (soft, hard))
+
+
+_LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None
+"""Loaded before any fork, after which nothing may be loaded."""
+_PR_SET_PDEATHSIG = 1
+"""The option of prctl(2) that sets the parent-death signal."""
+
+
+def set_parent_death_signal() -> None:
+    """Let Linux kill this process when its parent ends, whatever this process does.
+
+    Only Linux has this signal; elsewhere nothing happens.
+    """
+    if _LIBC is not None:
+        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def end_with_parent() -> None:
+    """Let this process of `multiprocessing` end when its parent does.
+
+    A thread sees on every system that the pipe from the parent closes. While a library
+    holds the interpreter's lock the thread sees nothing; on Linux the parent-death
+    signal ends the process all the same.
+    """
+    set_parent_death_signal()
+    parent = parent_process()
+    if parent is None:
+        return
+
+    def wait_for_end() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=wait_for_end, daemon=True).start()
+
+
+def bound_processor_time(seconds: float) -> None:
+    """Bound the processor time that this process takes from now on, on every core.
+
+    The system ends a process that exceeds the bound. Windows has no such limit; there
+    nothing happens.
+    """
+    try:
+        from resource import RLIM_INFINITY, RLIMIT_CPU, getrlimit, setrlimit
+    except ImportError:
+        return
+    most = math.ceil(time.process_time() + seconds * (os.cpu_count() or 1))
+    _, hard = getrlimit(RLIMIT_CPU)
+    if hard != RLIM_INFINITY:
+        most = min(most, hard)
+    setrlimit(RLIMIT_CPU, (most, hard))
 
 
 class Ended(NamedTuple):
@@ -369,6 +422,7 @@ class Running:
             stderr=self._errors,
             env={**os.environ, **dict(self.program.variables)},
             start_new_session=True,
+            preexec_fn=None if _LIBC is None else set_parent_death_signal,  # noqa: PLW1509 - only prctl is called between fork and exec
         )
         bound_memory(self._process.pid)
         self._number = 0

@@ -13,7 +13,11 @@ from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from fourbar.errors import DependencyError
-from fourbar_validation.engines.processes import bound_memory, keep_output
+from fourbar_validation.engines.processes import (
+    bound_memory,
+    end_with_parent,
+    keep_output,
+)
 
 if TYPE_CHECKING:
     from pebble import ProcessPool
@@ -50,6 +54,7 @@ def prepare_worker(_: object = None) -> None:
     from pebble import CONSTS
 
     CONSTS.channel_lock_timeout = _LOCKED
+    end_with_parent()
     bound_memory()
     keep_output()
 

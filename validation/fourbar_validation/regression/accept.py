@@ -193,11 +193,13 @@ def report_differences(
         names,
     )
     engines = set(after.words("engine"))
+    console = Console(stderr=True)
     scenes = track(
         after.scenes(keep),
         "comparing",
-        console=Console(stderr=True),
+        console=console,
         transient=True,
+        disable=not console.is_terminal,
     )
     differences = compare_runs(
         (before.about, before.scenes(keep)),

@@ -1,16 +1,21 @@
 """A process with limits, in which MuJoCo looks at somebody's file."""
 
 import os
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from pkgutil import resolve_name
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from fourbar.errors import FourBarError, InputError
 from fourbar.show.tables import show_running
-from fourbar_validation.engines.processes import WORKER_MEMORY, bound_memory
+from fourbar_validation.engines.processes import (
+    WORKER_MEMORY,
+    bound_memory,
+    bound_processor_time,
+    end_with_parent,
+)
 
 ROBOT_SECONDS = 120.0
 """A four-bar takes less than one, a humanoid a few."""
@@ -35,10 +40,12 @@ def examine_guarded(
     waiting = show_running(f"MuJoCo examines the file, in {seconds:g} s at most")
     with (
         waiting,
+        TemporaryDirectory() as folder,
         ProcessPool(
             max_workers=1,
             context=get_context("spawn"),
             initializer=_confine,
+            initargs=[folder],
         ) as pool,
     ):
 
@@ -46,7 +53,7 @@ def examine_guarded(
             try:
                 return pool.schedule(
                     _examine_robot,
-                    args=arguments,
+                    args=(seconds, *arguments),
                     timeout=seconds,
                 ).result()
             except FourBarError as error:
@@ -78,11 +85,16 @@ def examine_guarded(
         yield examined
 
 
-def _confine() -> None:
-    """Bound the memory, and put MuJoCo's log where it is swept away."""
-    os.chdir(tempfile.gettempdir())
+def _confine(folder: str) -> None:
+    """Bound the memory, end with the parent, and leave MuJoCo's log in a folder.
+
+    The folder goes with the call.
+    """
+    os.chdir(folder)
     bound_memory()
+    end_with_parent()
 
 
-def _examine_robot(adapter: str, *arguments: object) -> Any:
+def _examine_robot(seconds: float, adapter: str, *arguments: object) -> Any:
+    bound_processor_time(seconds)
     return resolve_name(adapter)(*arguments)

@@ -7,10 +7,7 @@ from fourbar_validation.run.plan import DRAWING, Progress
 
 
 class ShownProgress(Progress):
-    """Progress of a run on standard error.
-
-    It is a bar for each stage, and the notes above them.
-    """
+    """Progress of a run on standard error: notes, and on a terminal a bar per stage."""
 
     def __init__(self, scenes: int) -> None:
         from rich.console import Console
@@ -28,11 +25,10 @@ class ShownProgress(Progress):
             MofNCompleteColumn(),
             TimeRemainingColumn(),
         )
-        self.bars, self.scenes, self.tasks = (
-            Bars(*columns, console=Console(stderr=True)),
-            scenes,
-            dict[str, Any](),
-        )
+        console = Console(stderr=True)
+        self.bars = Bars(*columns, console=console, disable=not console.is_terminal)
+        self.scenes = scenes
+        self.tasks: dict[str, Any] = {}
 
     def __enter__(self) -> "ShownProgress":
         """Begin to show."""
