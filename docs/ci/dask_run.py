@@ -25,7 +25,7 @@ def judge(part: str, code: dict[str, str], options: list[str]) -> bytes:
 
 
 def unpack(packed: bytes, folder: Path) -> None:
-    """Unpack a part beside its place, so that the folder appears whole or not at all."""
+    """Unpack a part beside its place, so that its folder appears whole or never."""
     with tempfile.TemporaryDirectory(dir=folder.parent) as beside:
         archive = Path(beside, "part.zip")
         archive.write_bytes(packed)

@@ -9,29 +9,68 @@ import click
 
 from fourbar import __version__
 from fourbar.errors import run
-from fourbar_validation.cli import LazyGroup
+from fourbar_validation.cli import LazyGroup, Listed
 
 LAB_PROGRAM = "python -m fourbar_lab"
 LAB_COMMANDS = {
-    "stability": "fourbar_lab.stability:stability",
-    "bench": "fourbar_lab.bench:bench",
-    "effects": "fourbar_lab.effects:effects",
-    "worlds": "fourbar_lab.worlds:worlds_command",
-    "advice": "fourbar_lab.advice:advice_command",
-    "fuzz": "fourbar_lab.fuzz:fuzz",
-    "fuzz-files": "fourbar_lab.fuzz_files:fuzz_files",
-    "faults": "fourbar_lab.faults:faults_command",
-    "mutants": "fourbar_lab.mutants:mutants_command",
-    "findings": "fourbar_lab.simulators.findings:findings_command",
-    "write": "fourbar_lab.write:write_command",
-    "problems": "fourbar_lab.simulators.problems:problems_command",
-    "benchmark": "fourbar_lab.benchmark:benchmark_command",
+    "stability": Listed(
+        "fourbar_lab.stability:stability",
+        "Measure the error of every output against 50-digit arithmetic.",
+    ),
+    "bench": Listed(
+        "fourbar_lab.bench:bench",
+        "Time NumPy, C and the 13x13 system side by side; ratios that must hold.",
+    ),
+    "effects": Listed(
+        "fourbar_lab.effects:effects",
+        "Time each effect in each engine, and each flag of MuJoCo; a minute.",
+    ),
+    "worlds": Listed(
+        "fourbar_lab.worlds:worlds_command",
+        "Time torque and pin forces of many positions at once, on a GPU.",
+    ),
+    "advice": Listed(
+        "fourbar_lab.advice:advice_command",
+        "Measure the advice on random linkages.",
+    ),
+    "fuzz": Listed(
+        "fourbar_lab.fuzz:fuzz",
+        "Put random scenes through files, formulas and exact engines.",
+    ),
+    "fuzz-files": Listed(
+        "fourbar_lab.fuzz_files:fuzz_files",
+        "Read mutated scene files.",
+    ),
+    "faults": Listed(
+        "fourbar_lab.faults:faults_command",
+        "Make each fault of faults.toml, one at a time; each must be caught.",
+    ),
+    "mutants": Listed(
+        "fourbar_lab.mutants:mutants_command",
+        "Change operators and numbers of the formulas, one at a time.",
+    ),
+    "findings": Listed(
+        "fourbar_lab.simulators.findings:findings_command",
+        "Run the scripts of docs/findings where their simulators are.",
+    ),
+    "write": Listed(
+        "fourbar_lab.write:write_command",
+        "Write the MJCF of every scene in models/ for which it is stale.",
+    ),
+    "problems": Listed(
+        "fourbar_lab.simulators.problems:problems_command",
+        "Write the problems of models/problems and their answers as JSON.",
+    ),
+    "benchmark": Listed(
+        "fourbar_lab.benchmark:benchmark_command",
+        "Ask every engine every problem of models/problems.",
+    ),
 }
 
 
 @click.group(
     cls=LazyGroup,
-    modules=LAB_COMMANDS,
+    listed=LAB_COMMANDS,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

@@ -32,6 +32,7 @@ from fourbar.errors import (
 from fourbar.writing import write_text
 from fourbar_lab.bench import Measured
 from fourbar_lab.tally import Tally
+from fourbar_validation.cli import LazyGroup
 from fourbar_validation.compare.rows import AGREES, FAILS, Row, write_results
 from fourbar_validation.published.figures import PublishedFigure
 from tests.support.alone import alone
@@ -437,6 +438,26 @@ def test_every_command_is_in_the_table_of_processes() -> None:
         *(("validation", name) for name in fourbar_validation.cli.COMMANDS),
         *(("fourbar_lab", name) for name in fourbar_lab.cli.LAB_COMMANDS),
     }
+
+
+@pytest.mark.parametrize(
+    "group",
+    [fourbar_validation.cli.group, fourbar_lab.cli.group],
+    ids=lambda group: group.callback.__module__,
+)
+def test_the_help_says_of_each_command_what_the_command_says(group: LazyGroup) -> None:
+    context = click.Context(group)
+    for name, listed in group.listed.items():
+        command = group.get_command(context, name)
+        assert command is not None
+        assert listed.about == command.get_short_help_str(limit=200)
+
+
+def test_the_help_of_the_harness_imports_no_engine() -> None:
+    code = "import sys; from fourbar_validation.cli import status; status(['--help']); "
+    code += "sys.exit(bool({'scipy', 'mujoco', 'pint', 'rich'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False)
+    assert done.returncode == HOLDS
 
 
 @pytest.mark.slow

@@ -5,8 +5,9 @@ Each lives in its own module and is imported when it is called.
 
 import sys
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pkgutil import resolve_name
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 
@@ -14,64 +15,111 @@ from fourbar import __version__
 from fourbar.errors import run
 from fourbar_validation.places import HARNESS_PROGRAM
 
+
+class Listed(NamedTuple):
+    """A command as the help lists it, which imports nothing."""
+
+    target: str
+    """Module and function, as "module:function"."""
+    about: str
+    """First sentence of the command's own help."""
+    needs: str = ""
+    """Library without which the module cannot be imported."""
+
+
 COMMANDS = {
-    "run": "fourbar_validation.run.command:run_command",
-    "collect": "fourbar_validation.run.parts:collect_command",
-    "accept": "fourbar_validation.regression.accept:accept_command",
-    "compare": "fourbar_validation.regression.accept:compare_command",
-    "check": "fourbar_validation.check:check_command",
-    "loops": "fourbar_validation.robots.command:robot_command",
-    "check-mjcf": "fourbar_validation.check.mjcf:check_mjcf_command",
-    "published": "fourbar_validation.published.comparison:published",
-    "cost": "fourbar_validation.cost.cost:cost",
-    "advise": "fourbar_validation.advise.advise:advise_command",
+    "run": Listed(
+        "fourbar_validation.run.command:run_command",
+        "Judge scenes and write a report.",
+        "filelock",
+    ),
+    "collect": Listed(
+        "fourbar_validation.run.parts:collect_command",
+        "Put together the parts of a run.",
+        "filelock",
+    ),
+    "accept": Listed(
+        "fourbar_validation.regression.accept:accept_command",
+        "Record a run as the accepted state.",
+    ),
+    "compare": Listed(
+        "fourbar_validation.regression.accept:compare_command",
+        "Say what changed from OLD to NEW.",
+    ),
+    "check": Listed(
+        "fourbar_validation.check:check_command",
+        "Judge your own torques and forces.",
+    ),
+    "loops": Listed(
+        "fourbar_validation.robots.command:robot_command",
+        "List the closed loops of a robot's MJCF.",
+    ),
+    "check-mjcf": Listed(
+        "fourbar_validation.check.mjcf:check_mjcf_command",
+        "Compare your own MJCF with a scene.",
+        "mujoco",
+    ),
+    "published": Listed(
+        "fourbar_validation.published.comparison:published",
+        "Compare the figures of the sources with ours.",
+    ),
+    "cost": Listed(
+        "fourbar_validation.cost.cost:cost",
+        "Measure what accuracy costs in time.",
+        "mujoco",
+    ),
+    "advise": Listed(
+        "fourbar_validation.advise.advise:advise_command",
+        "Find the cheapest MuJoCo settings.",
+        "mujoco",
+    ),
 }
+"""Commands by name, in the order in which a newcomer needs them."""
 
 
 class LazyGroup(click.Group):
-    """A group whose commands are imported on demand."""
+    """A group that imports a command only when it is called."""
 
-    def __init__(self, *, modules: Mapping[str, str], **settings: Any) -> None:
+    def __init__(self, *, listed: Mapping[str, Listed], **settings: Any) -> None:
         super().__init__(**settings)
-        self.modules = modules
-        """Module and function of each subcommand, by name. They are in the order in
-        which a newcomer needs them.
-        """
+        self.listed = listed
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """List the commands in their order."""
-        return list(self.modules)
+        return list(self.listed)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import a command."""
-        if cmd_name not in self.modules:
+        if cmd_name not in self.listed:
             return None
-        try:
-            command: click.Command = resolve_name(self.modules[cmd_name])
-        except ModuleNotFoundError as error:
-            return _stand_in(cmd_name, error)
+        command: click.Command = resolve_name(self.listed[cmd_name].target)
         return command
 
+    def format_commands(
+        self,
+        ctx: click.Context,
+        formatter: click.HelpFormatter,
+    ) -> None:
+        """Write a line for each command."""
+        with formatter.section("Commands"):
+            formatter.write_dl(
+                [
+                    (name, _say_missing(command.needs) or command.about)
+                    for name, command in self.listed.items()
+                ]
+            )
 
-def _stand_in(name: str, missing: ModuleNotFoundError) -> click.Command:
-    """Stand in for a command whose library is not installed.
 
-    It is listed, and says so when it is called.
-    """
-
-    @click.command(name, help=f"Not available: {missing.name} is not installed.")
-    @click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
-    def unavailable(arguments: tuple[str, ...]) -> None:
-        del arguments
-        raise missing
-
-    unavailable.context_settings["ignore_unknown_options"] = True
-    return unavailable
+def _say_missing(library: str) -> str:
+    """Say that a library is not installed, or return an empty string if it is."""
+    if not library or find_spec(library) is not None:
+        return ""
+    return f"Not available: {library} is not installed."
 
 
 @click.group(
     cls=LazyGroup,
-    modules=COMMANDS,
+    listed=COMMANDS,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
