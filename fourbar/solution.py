@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from fourbar.errors import InputError, expect
 from fourbar.linkage import POSITIVE, require
 from fourbar.quantities import (
-    DERIVED_NAMES,
     LINE_QUANTITIES,
     NOT_ASSEMBLED,
     PIN_FORCES,
@@ -24,6 +23,7 @@ from fourbar.quantities import (
     UNITS,
     Array,
     Quantities,
+    find_derived,
 )
 from fourbar.scene import Command, Scene
 from fourbar.scene.scene import load_show
@@ -456,8 +456,9 @@ def _split_columns(name: str, values: Array | None) -> dict[str, Array | None]:
 
 def is_scalar(name: str) -> bool:
     """Return True if a quantity is one number at a position."""
-    if name in DERIVED_NAMES:
-        return DERIVED_NAMES[name].kind == "scalar"
+    derived = find_derived(name)
+    if derived is not None:
+        return derived.kind == "scalar"
     return name in SCALARS
 
 
@@ -547,8 +548,9 @@ def find_unit_of_quantity(name: str) -> str:
 
     Of a point it is that of its path, velocity or acceleration.
     """
-    if name in DERIVED_NAMES:
-        return DERIVED_NAMES[name].unit
+    derived = find_derived(name)
+    if derived is not None:
+        return derived.unit
     of_point = {"v_": "m/s", "a_": "m/s^2"}.get(name[:2], "m")
     return UNITS.get(name) or of_point
 

@@ -11,7 +11,7 @@ from fourbar.cli import given
 from fourbar.errors import InputError, NotAssembledError, state_messages_in
 from fourbar.linkage import POSITIVE
 from fourbar.quantities import Array
-from fourbar.scene import Scene
+from fourbar.scene import Command, Scene
 from fourbar.solution import DEGREES, SI, Conversion, Solution
 
 if TYPE_CHECKING:
@@ -286,21 +286,19 @@ def analyze(  # noqa: PLR0913 - one for each option
         _print_sensitivity(scene, form == "json", out)
         return
     from fourbar.solving import find_last_stage, solve
-    from fourbar.studies.passing import find_positions
+    from fourbar.studies.passing import join_commands
 
     with given.open_scene(scene) as described, given.show_waiting(described):
         bore = _read_pressure(described, pressure)
         shown = _choose_units(form, units, degrees)
-        wanted = [given.read_position(described, text) for text in at]
-        if wanted:
-            positions = find_positions(described, wanted)
-        else:
-            positions = None
+        asked = {text: given.find_positions(described, text) for text in at}
+        positions = join_commands([*asked.values()]) if asked else None
         solution = solve(described, find_last_stage(described), at=positions)
     if not solution.assembled.any():
         raise _assembles_nowhere(scene, described)
     if form == "summary":
-        text = _write_summary(described, solution, shown, bore, apart=bool(wanted))
+        with state_messages_in(shown):
+            text = _write_summary(described, solution, shown, bore, asked)
     else:
         text = _write_positions(solution, form, shown, columns, every, decimal, out)
     given.print_to(text, out)
@@ -332,20 +330,27 @@ def _write_summary(
     solution: Solution,
     units: Conversion,
     pressure: float | None,
-    *,
-    apart: bool,
+    asked: dict[str, Command],
 ) -> str:
-    """Write the block of a scene, or one block for each of its positions."""
+    """Write the block of a scene, or what `--at` asked for.
+
+    That is a block if one position answers it, otherwise a line for each.
+    """
     from fourbar.show.block import write_block
+    from fourbar.show.located import list_positions
     from fourbar.solving import find_last_stage, solve
 
-    if not apart:
+    if not asked:
         return "\n".join([*write_block(scene, solution, units, pressure=pressure), ""])
     lines: list[str] = []
-    for row in range(len(solution)):
-        at = solution.at.part(slice(row, row + 1))
+    headed = True
+    for text, at in asked.items():
+        if len(at.angle) > 1:
+            lines += [*list_positions(text, at), ""]
+            continue
         one = solve(scene, find_last_stage(scene), at=at)
-        block = write_block(scene, one, units, pressure=pressure, headed=row == 0)
+        block = write_block(scene, one, units, pressure=pressure, headed=headed)
+        headed = False
         lines += [*block, ""]
     return "\n".join(lines)
 

@@ -174,9 +174,7 @@ def _find_place(scene: Scene, text: str) -> float:
 
     For a motion over time it is the angle at that time.
     """
-    from fourbar.studies.passing import find_positions
-
-    positions = find_positions(scene, [given.read_position(scene, text)])
+    positions = given.find_positions(scene, text)
     if positions.stroke is None:
         places = positions.angle
     else:

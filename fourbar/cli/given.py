@@ -10,7 +10,7 @@ import click
 
 from fourbar.errors import InputError, state_messages_in
 from fourbar.linkage import ANY_NUMBER, POSITIVE, require
-from fourbar.scene import Scene
+from fourbar.scene import Command, Scene
 from fourbar.solution import Conversion
 
 _FILE_UNITS = "fourbar.file_units"
@@ -54,7 +54,10 @@ at_option = click.option(
     "at",
     multiple=True,
     metavar="PLACE",
-    help='Position, like "60 deg", "theta_4=30 deg" or "time=0.2 s"; repeatable.',
+    help=(
+        'Position, like "60 deg", "time=0.2 s", "B_x=80 mm" or any column with a value;'
+        " repeatable."
+    ),
 )
 
 
@@ -200,33 +203,33 @@ def read_number(key: str, text: str, unit: str, bound: str = ANY_NUMBER) -> floa
     return require(key, float(text) if is_bare(text) else text, unit, bound)
 
 
-def read_position(scene: Scene, text: str) -> tuple[str, float]:
-    """Read a position like "60 deg" or "theta_4=30 deg".
+def find_positions(scene: Scene, text: str) -> Command:
+    """Find the positions of a text like "60 deg", "theta_4=30 deg" or "P_y=30 mm".
 
-    Without a name the number is what the scene commands.
+    Without a name the number is what the scene commands. Angles, strokes and times are
+    those that the linkage can have, any other column has its value in the scene's
+    motion.
     """
+    from fourbar.show.located import locate
     from fourbar.studies.passing import STATED_POSITIONS
+    from fourbar.studies.passing import find_positions as find_stated
 
-    name, equals, value = text.rpartition("=")
-    if equals:
-        name = name.strip()
-    else:
+    name, equals, value = (part.strip() for part in text.rpartition("="))
+    if not equals:
         name = scene.motion.commanded
+    if value == "drawn":
+        return find_stated(scene, [(name, _read_drawn(scene, name, text))])
     if name not in STATED_POSITIONS:
-        allowed = f"must be one of {', '.join(STATED_POSITIONS)}"
-        raise InputError("--at", name, f'{allowed}, like "theta_4=30 deg"')
-    if value.strip() == "drawn":
-        return name, _read_drawn(scene, name, text)
+        return locate(scene, name, value)
     unit = {"stroke": "m", "time": "s"}.get(name, "rad")
     likely = {"stroke": "mm", "time": "s"}.get(name, "deg")
-    value = value.strip()
     if is_bare(value):  # it may have been meant in any unit
         raise InputError(
             "--at",
             text,
             f'the unit is missing; did you mean "{value} {likely}"?',
         )
-    return name, read_number("--at", value, unit)
+    return find_stated(scene, [(name, read_number("--at", value, unit))])
 
 
 def read_three(key: str, text: str, unit: str = "m") -> tuple[float, float, float]:

@@ -146,6 +146,10 @@ class Spring:
         """
         return self.preload - self.stiffness * self.length
 
+    def pull(self, distance: Any) -> Any:
+        """Compute the force with which it pulls at a distance of its ends, N."""
+        return self.preload + self.stiffness * (distance - self.length)
+
     def greatest_tension(self, linkage: FourBar) -> float:
         """Return a bound of the tension, N.
 

@@ -4,6 +4,7 @@ Every other list of them follows from these.
 """
 
 # ruff: noqa: RUF009 - the lines are fields
+import re
 from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
@@ -262,6 +263,23 @@ DERIVED_QUANTITIES = (
 )
 """Quantities that follow from those of a solution; tables, plots and CSV have them."""
 DERIVED_NAMES = {q.name: q for q in DERIVED_QUANTITIES}
+SPRING_QUANTITIES = (
+    Quantity("length", "scalar", "m", "position", "distance of the ends of a spring"),
+    Quantity("force", "scalar", "N", "force", "pull of a spring; negative: it pushes"),
+)
+"""Derived quantities of each spring, under names like "spring_0_length"."""
+SPRING_NAME = re.compile(
+    rf"spring_(0|[1-9][0-9]*)_({'|'.join(q.name for q in SPRING_QUANTITIES)})"
+)
+"""Name of a quantity of a spring: its index in the file, from 0, and what it is."""
+
+
+def find_derived(name: str) -> Quantity | None:
+    """Return a derived quantity by its name, a spring's too; None for another name."""
+    of_spring = SPRING_NAME.fullmatch(name)
+    if of_spring is None:
+        return DERIVED_NAMES.get(name)
+    return next(q for q in SPRING_QUANTITIES if q.name == of_spring[2])
 
 
 class DriveNames(NamedTuple):

@@ -24,7 +24,7 @@ from fourbar.linkage import (
     require,
     require_whole,
 )
-from fourbar.quantities import DERIVED_NAMES, UNITS
+from fourbar.quantities import DERIVED_NAMES, UNITS, find_derived
 from fourbar.scene.drawing import DRAWN_WORD
 from fourbar.scene.motion import Motion
 
@@ -68,7 +68,9 @@ class Point:
                 " v_ or a_"
             )
             raise InputError("points", self.name, allowed)
-        if {self.name, f"{self.name}_x", f"{self.name}_y"} & TAKEN_NAMES:
+        if {self.name, f"{self.name}_x", f"{self.name}_y"} & TAKEN_NAMES or (
+            find_derived(self.name)
+        ):
             raise InputError(
                 self.key,
                 self.name,

@@ -1,11 +1,12 @@
 """Quantities by the names that the command line takes.
 
-These are sizes, components, and ratios of any two. `torque` and `omega_4` are numbers,
-`F12` and `v_B` the sizes of vectors, `F12_x` a component, `A` a place with two
-coordinates, `omega_4/omega_2` a ratio, `F_jaw/F_handle` that of the forces along the
-paths of two points.
+These are sizes, components, and ratios and differences of any two. `torque` and
+`omega_4` are numbers, `F12` and `v_B` the sizes of vectors, `F12_x` a component, `A` a
+place with two coordinates, `omega_4/omega_2` a ratio, `theta_3-theta_2` a difference,
+`F_jaw/F_handle` the ratio of the forces along the paths of two points.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 from difflib import get_close_matches
 from typing import NamedTuple
@@ -13,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.quantities import DERIVED_NAMES, STAGE_OF, Array
+from fourbar.quantities import STAGE_OF, Array, find_derived
 from fourbar.scene import Command, Scene, command_at, with_signs
-from fourbar.show.derived import derive
+from fourbar.show.derived import derive, list_derived_names
 from fourbar.solution import (
     Conversion,
     Solution,
@@ -24,6 +25,7 @@ from fourbar.solution import (
     find_unit_of_quantity,
     find_values,
     is_scalar,
+    unwrap,
 )
 from fourbar.solving import solve
 
@@ -82,7 +84,13 @@ def choose_columns(scene: Scene, solution: Solution, names: str) -> list[Column]
 
 def read_column(scene: Scene, solution: Solution, name: str) -> Column:
     """Read one column by its name; InputError as of `choose_columns`."""
-    if name in DERIVED_NAMES or "/" not in name:
+    for first, second in _split_difference(solution, name):
+        return _subtract(
+            name,
+            read_column(scene, solution, first),
+            read_column(scene, solution, second),
+        )
+    if _is_number(solution, name) or "/" not in name:
         return Column(name, *_find_number(solution, name))
     above, _, below = (part.strip() for part in name.partition("/"))
     if _is_force_along_path(solution, above) and _is_force_along_path(solution, below):
@@ -99,6 +107,43 @@ def read_column(scene: Scene, solution: Solution, name: str) -> Column:
     return Column(name, unit, ratio, divisor)
 
 
+def _split_difference(solution: Solution, name: str) -> Iterator[tuple[str, str]]:
+    """Yield the columns of which a name is the difference.
+
+    The sign of a difference may also stand in the name of a point.
+    """
+    if _is_number(solution, name):
+        return
+    words = name.split("-")
+    for count in range(1, len(words)):
+        first, second = "-".join(words[:count]), "-".join(words[count:])
+        if all(
+            _is_number(solution, number) or _is_force_along_path(solution, number)
+            for part in (first, second)
+            for number in map(str.strip, part.split("/"))
+        ):
+            yield first.strip(), second.strip()
+
+
+def _subtract(name: str, first: Column, second: Column) -> Column:
+    """Return the difference of two columns of one unit.
+
+    That of two angles is in (-pi, pi] at the first position, and continuous from there.
+    """
+    if (first.unit, first.divisor) != (second.unit, second.divisor):
+        raise InputError(
+            "--columns",
+            name,
+            f"{first.name} is in {first.label({}) or '1'} and {second.name} in"
+            f" {second.label({}) or '1'}: a difference is of two columns of one kind",
+        )
+    values = first.values - second.values
+    if (first.unit, first.divisor) == ("rad", "1"):
+        values = np.angle(np.exp(1j * values))
+        unwrap(values)
+    return first._replace(name=name, values=values)
+
+
 def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
     """Return the SI unit of a number of each position and its values."""
     if name == "time":
@@ -113,13 +158,9 @@ def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
                 "the positions are passed at no one speed: no time",
             )
         return "s", values
-    stem = name
-    axis = None
-    if name[-2:] in COLUMN_AXES:
-        stem = name[:-2]
-        axis = COLUMN_AXES[name[-2:]]
+    stem, axis = _split_axis(name)
     quantities = _list_column_quantities(solution)
-    if stem not in quantities or (axis is not None and is_scalar(stem)):
+    if not _is_number(solution, name):
         close = get_close_matches(name, ["time", *quantities], 1)
         if close:
             hint = f'did you mean "{close[0]}"? '
@@ -129,10 +170,11 @@ def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
             "--columns",
             name,
             f"unknown; {hint}quantities are {', '.join(['time', *quantities])}; "
-            "F12_x is a component, omega_4/omega_2 a ratio, F_P/F_Q that of the forces"
-            " along the paths of two points",
+            "F12_x is a component, omega_4/omega_2 a ratio, theta_3-theta_2 a"
+            " difference, F_P/F_Q the ratio of the forces along the paths of two"
+            " points",
         )
-    if stem in DERIVED_NAMES:
+    if find_derived(stem) is not None:
         values = derive(solution, stem)
     else:
         values = find_values(solution, stem)
@@ -151,6 +193,21 @@ def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
     return find_unit_of_quantity(stem), np.hypot(values[..., 0], values[..., 1])
 
 
+def _split_axis(name: str) -> tuple[str, int | None]:
+    """Split a name into that of a quantity and its component, which may be none."""
+    axis = COLUMN_AXES.get(name[-2:])
+    return (name, None) if axis is None else (name[:-2], axis)
+
+
+def _is_number(solution: Solution, name: str) -> bool:
+    """Return True for the time, a quantity or a component of one."""
+    stem, axis = _split_axis(name)
+    if name == "time":
+        return True
+    known = stem in _list_column_quantities(solution)
+    return known and (axis is None or not is_scalar(stem))
+
+
 def _list_column_quantities(solution: Solution) -> list[str]:
     """List the quantities that a scene has, those of its points among them.
 
@@ -160,7 +217,7 @@ def _list_column_quantities(solution: Solution) -> list[str]:
     points = [
         f"{start}{name}" for start in ("", "v_", "a_") for name in solution.points
     ]
-    return [*names, *points, *DERIVED_NAMES]
+    return [*names, *points, *list_derived_names(solution)]
 
 
 def _is_place(solution: Solution, name: str) -> bool:
@@ -171,7 +228,7 @@ def _is_place(solution: Solution, name: str) -> bool:
 
 def _is_velocity(name: str) -> bool:
     """Return True for a quantity that grows with the speed of the command."""
-    stem = name[:-2] if name[-2:] in COLUMN_AXES else name
+    stem, _ = _split_axis(name)
     return stem.startswith("v_") or STAGE_OF.get(stem) == "velocity"
 
 

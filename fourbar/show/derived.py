@@ -1,8 +1,7 @@
 """Quantities that follow from those of a solution.
 
-These are shaking, ratios of speeds, instant centres. They are
-declared in `fourbar.quantities.DERIVED_QUANTITIES`; tables, CSV, plots and the
-workbench show them.
+These are shaking, ratios of speeds, instant centres, and lengths and forces of springs.
+Tables, CSV, plots and the workbench show what `fourbar.quantities` declares of them.
 """
 
 from collections.abc import Callable
@@ -11,9 +10,22 @@ import numpy as np
 
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.quantities import DERIVED_NAMES, Array
+from fourbar.quantities import (
+    DERIVED_NAMES,
+    SPRING_NAME,
+    SPRING_QUANTITIES,
+    Array,
+    find_derived,
+)
 from fourbar.show.duty import read_drive_demand, shaking_force, shaking_moment
-from fourbar.solution import Conversion, Solution, find_unit_in, shift_to_drawing
+from fourbar.show.gas import list_springs, measure_end_distance
+from fourbar.solution import (
+    Conversion,
+    Solution,
+    find_unit_in,
+    find_unit_of_quantity,
+    shift_to_drawing,
+)
 from fourbar.studies.points import instant_centres
 
 
@@ -23,12 +35,42 @@ def derive(solution: Solution, name: str) -> Array | None:
     It is None if its stage was not evaluated. NaN marks a position where it has no
     value: a ratio at a dead centre of bar 2, a centre at infinity.
     """
-    needs_forces = DERIVED_NAMES[name].stage == "force"
-    if needs_forces and read_drive_demand(solution).values is None:
+    quantity = find_derived(name)
+    assert quantity is not None
+    if quantity.stage == "force" and read_drive_demand(solution).values is None:
         return None
     with np.errstate(all="ignore"):
-        values = _COMPUTE[name](solution)
+        of_spring = SPRING_NAME.fullmatch(name)
+        if of_spring is None:
+            values = _COMPUTE[name](solution)
+        else:
+            values = _measure_spring(solution, int(of_spring[1]), of_spring[2])
         return np.asarray(np.where(np.isfinite(values), values, np.nan))
+
+
+def list_derived_names(solution: Solution) -> list[str]:
+    """List the derived quantities of a solution, those of its springs last."""
+    if solution.scene is None:
+        count = 0
+    else:
+        count = len(list_springs(solution.scene))
+    springs = [
+        f"spring_{number}_{quantity.name}"
+        for number in range(count)
+        for quantity in SPRING_QUANTITIES
+    ]
+    return [*DERIVED_NAMES, *springs]
+
+
+def _measure_spring(solution: Solution, number: int, kind: str) -> Array:
+    """Measure the length of a spring, m, or its pull, N."""
+    assert solution.scene is not None
+    spring = list_springs(solution.scene)[number]
+    distance = measure_end_distance(solution.scene, spring, solution.at)
+    distance = np.where(solution.assembled, distance, np.nan)
+    if kind == "length":
+        return distance
+    return np.asarray(spring.pull(distance))
 
 
 def _compute_transmission(solution: Solution) -> Array:
@@ -88,8 +130,8 @@ _COMPUTE: dict[str, Callable[[Solution], Array]] = {
 def list_derived(solution: Solution, units: Conversion) -> dict[str, Array | None]:
     """List every derived quantity by name, in the given units."""
     values: dict[str, Array | None] = {}
-    for name, quantity in DERIVED_NAMES.items():
+    for name in list_derived_names(solution):
         derived = derive(solution, name)
-        _, factor = find_unit_in(quantity.unit, units)
+        _, factor = find_unit_in(find_unit_of_quantity(name), units)
         values[name] = None if derived is None else factor * derived
     return values

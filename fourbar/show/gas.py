@@ -27,10 +27,10 @@ def list_gas_notes(scene: Scene, solution: Solution, units: Conversion) -> list[
     `units`: units of the numbers; one that is left out is the SI unit with a prefix.
     """
     notes = []
-    for number, spring in enumerate(_list_springs(scene), 1):
+    for number, spring in enumerate(list_springs(scene), 1):
         if spring.stroke is None:
             continue
-        distance = _measure_end_distance(scene, spring, solution.at)
+        distance = measure_end_distance(scene, spring, solution.at)
         distance = np.where(solution.assembled, distance, np.nan)
         for sign, end, word in (
             (1.0, spring.length, "longer than its extended length of"),
@@ -57,7 +57,7 @@ def list_gas_notes(scene: Scene, solution: Solution, units: Conversion) -> list[
     return notes
 
 
-def _list_springs(scene: Scene) -> tuple[Spring, ...]:
+def list_springs(scene: Scene) -> tuple[Spring, ...]:
     """List the springs of a scene in the order of its file."""
     for effect in scene.settled().effects:
         if isinstance(effect, Springs):
@@ -65,7 +65,7 @@ def _list_springs(scene: Scene) -> tuple[Spring, ...]:
     return ()
 
 
-def _measure_end_distance(scene: Scene, spring: Spring, at: Command) -> Array:
+def measure_end_distance(scene: Scene, spring: Spring, at: Command) -> Array:
     """Measure how far the ends of a spring are apart at each position, m."""
     state = compute_shown_state(scene, at)
     across = spring.end.locate(state) - spring.start.locate(state)
@@ -120,12 +120,10 @@ def _locate_crossings(
     rows = rows[assembled]
     low = at.places[rows]
     high = at.places[rows + 1]
-    before = (
-        _measure_end_distance(scene, spring, _command_between(scene, at, low)) > end
-    )
+    before = measure_end_distance(scene, spring, _command_between(scene, at, low)) > end
 
     def is_as_before(middle: Array) -> NDArray[np.bool_]:
-        distance = _measure_end_distance(
+        distance = measure_end_distance(
             scene,
             spring,
             _command_between(scene, at, middle),

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fourbar.errors import clean_line
-from fourbar.quantities import ANGLES, DERIVED_NAMES, OK, PIN_FORCES, UNITS, Array
+from fourbar.quantities import ANGLES, OK, PIN_FORCES, UNITS, Array
 from fourbar.show.columns import Column
-from fourbar.show.derived import derive
+from fourbar.show.derived import derive, list_derived_names
 from fourbar.show.duty import read_drive_demand
 from fourbar.show.units import drop_rounding, write_cell
 from fourbar.solution import (
@@ -213,9 +213,9 @@ def list_columns(
     time = compute_times(solution.scene, solution.at)
     if time is not None:
         add("time", "s", time)
-    for name, quantity in DERIVED_NAMES.items():
+    for name in list_derived_names(solution):
         for part, values in _list_columns_of(solution, name).items():
-            add(part, quantity.unit, values)
+            add(part, find_unit_of_quantity(name), values)
     return shown
 
 

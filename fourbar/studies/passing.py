@@ -57,7 +57,7 @@ def find_positions(scene: Scene, wanted: list[tuple[str, float]]) -> Command:
     NotAssembledError : no position has the value; the message says the range.
     """
     if scene.motion.free is not None:
-        return _join_commands([_find_released(scene, *entry) for entry in wanted])
+        return join_commands([_find_released(scene, *entry) for entry in wanted])
     if scene.motion.law is None:
         find = _find_places
     else:
@@ -76,11 +76,11 @@ def _find_places(scene: Scene, name: str, value: float) -> list[float]:
         return [_find_place_of_sweep(scene, value)]
     places: list[float] = []
     for place in _list_candidates(scene, name, value):
-        if any(_is_same_position(motion.commanded, place, other) for other in places):
+        if any(is_same_position(motion.commanded, place, other) for other in places):
             continue
         here = solve(scene, "position", at=command_at(scene, np.array([place])))
         reached = getattr(here, name)[0]
-        if math.isfinite(reached) and _is_same_position(name, reached, value):
+        if math.isfinite(reached) and is_same_position(name, reached, value):
             places.append(place)
     if not places:
         # of the range that the scene's own motion is in
@@ -203,7 +203,7 @@ def _list_candidates(scene: Scene, name: str, value: float) -> list[float]:
     return sorted(turned, key=lambda place: not low <= place <= high)
 
 
-def _is_same_position(name: str, first: float, second: float) -> bool:
+def is_same_position(name: str, first: float, second: float) -> bool:
     """Return True if two values of an angle (whole turns apart) or a stroke are one."""
     if name in COMMANDED_ANGLES:
         return abs(math.remainder(first - second, TURN)) <= SAME_POSITION
@@ -362,8 +362,8 @@ def _take_last(motion: Command, time: float) -> Command:
     return motion.part(slice(-1, None))
 
 
-def _join_commands(commands: list[Command]) -> Command:
-    """Join instants of one released motion."""
+def join_commands(commands: list[Command]) -> Command:
+    """Join positions of one motion."""
     fields = (_join_field(values) for values in zip(*commands, strict=True))
     return Command(*fields)
 

@@ -1,5 +1,6 @@
 """Columns by name: sizes, components and ratios."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -91,3 +92,23 @@ def test_a_steady_command_of_another_bar_or_a_stroke_has_a_time() -> None:
     stroke = fourbar.solve(cylinder).stroke
     passed = np.abs(stroke - stroke[0]) / abs(cylinder.motion.speed)
     assert time == pytest.approx(passed, rel=1e-9, abs=1e-9)
+
+
+def test_a_difference_of_angles_goes_on_from_its_first_position() -> None:
+    """Over two turns bar 2 gains them on the rocker; the first is within half a turn.
+
+    theta_4 - theta_2 is -1.4 turns of bar 2 at first where that is commanded so.
+    """
+    start = 2.0 * np.pi + 5.0
+    motion = fourbar.Motion(fourbar.Sweep(start, start + 2.0 * math.tau, 100), 10.0)
+    scene = replace(TURN, motion=motion)
+    solution = fourbar.solve(scene)
+    difference = columns(scene, "theta_2 - theta_4")["theta_2 - theta_4"]
+    assert -np.pi < difference[0] <= np.pi
+    assert difference - difference[0] == pytest.approx(
+        solution.theta_2 - solution.theta_4 - (start - solution.theta_4[0]), abs=1e-12
+    )
+    assert columns(scene, "F12-F14,F12_x/F14-F12_y/F14").keys() == {
+        "F12-F14",
+        "F12_x/F14-F12_y/F14",
+    }

@@ -1,0 +1,332 @@
+"""Positions of a scene's motion at which a column has a value.
+
+Between the places of a grid a column that changes its side of the value passes it, and
+one that comes nearest to it there may touch it. A column that changes its side by a
+jump does not have the value.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.errors import InputError, NotAssembledError, name_unit, write_in_units
+from fourbar.linkage import require
+from fourbar.quantities import Array
+from fourbar.quantities.units import NUMBER_TEXT
+from fourbar.scene import Command, Scene, command, command_at
+from fourbar.scene.motion import Sweep
+from fourbar.scene.scene import default_places
+from fourbar.show.columns import Column, read_column
+from fourbar.show.units import drop_rounding
+from fourbar.solution import Solution
+from fourbar.solving import find_last_stage, solve
+from fourbar.studies.equilibrium import bisect
+from fourbar.studies.passing import SAME_POSITION, is_same_position
+
+INTERVALS = 2000
+"""Least number of intervals of a motion in which a value is looked for."""
+LADDER = 0.5 ** np.arange(1, 50)
+"""Parts of the interval in which the linkage ceases to assemble: a column may grow
+there as the root of what is commanded.
+"""
+JUMP = 1e-3
+"""Part of its change over an interval by which a column jumps at one place in it."""
+TOUCHES = 1e-9
+"""Part of a column's extent by which an extreme may miss the value: where it has a
+corner, it is located to the root of round-off.
+"""
+LOCATED = 1e-11
+"""Part of the motion within which an extreme is located."""
+CONSTANT = 1e-12
+"""Part of a column's usual value within which two values are one."""
+USUAL = 90.0
+"""Percentile of a column's sizes, and of its distances from the median."""
+
+
+def locate(scene: Scene, name: str, text: str) -> Command:
+    """Locate the positions of a scene's motion at which a column has a value.
+
+    A scene that states single positions is searched over the range that holds the
+    first of them.
+
+    Parameters
+    ----------
+    name : a column, as `read_column` takes it.
+    text : the value with its unit; a pure number has none.
+
+    Raises
+    ------
+    InputError : no column has the name, or the value is none of it.
+    NotAssembledError : no position has the value; the message says the range.
+    """
+    try:
+        return _Search(scene, name).locate(text)
+    except InputError as error:
+        if error.key not in ("--columns", "value"):
+            raise
+        raise error.moved_to("--at", None) from None
+
+
+class _Search:
+    """A column over the motion of a scene."""
+
+    def __init__(self, scene: Scene, name: str) -> None:
+        self.scene = scene
+        self.name = name
+        if find_last_stage(scene) == "position":
+            self.stage = "position"
+        elif name.endswith("_error"):
+            self.stage = "error"
+        else:
+            self.stage = "force"
+        self.places = self._list_places()
+        solution = self._solve(self.places)
+        self.commanded = solution.commanded if solution.time is None else "time"
+        assembled = solution.assembled
+        edges = np.flatnonzero(assembled[1:] != assembled[:-1])
+        if edges.size:
+            self.places = self._refine_edges(edges, assembled)
+            solution = self._solve(self.places)
+        span = float(np.ptp(self.places))
+        self._located = {"xatol": LOCATED * span, "xrtol": 0.0}
+        column = read_column(scene, solution, name)
+        self.unit = _find_unit(column)
+        self.values = column.values
+
+    def _list_places(self) -> Array:
+        """List the places of the motion, with others between them."""
+        motion = self.scene.motion
+        stated = self._command(None).places
+        over_time = motion.free is not None or motion.law is not None
+        if not over_time and not isinstance(motion.angle, Sweep | None):
+            first = float(command(self.scene).angle[0])
+            stated = default_places(self.scene, first)
+        steps = len(stated) - 1
+        parts = -(-INTERVALS // max(steps, 1))
+        rows = np.linspace(0.0, steps, parts * steps + 1)
+        return np.interp(rows, np.arange(steps + 1), stated)
+
+    def _command(self, places: Array | None) -> Command:
+        """Return the command at some places of the motion, or at its own."""
+        if self.scene.motion.free is None:
+            if places is None:
+                return command(self.scene)
+            return command_at(self.scene, places)
+        from fourbar.evaluation.free_motion import release, release_at
+
+        if places is None:
+            return release(self.scene).command
+        times, rows = np.unique(np.append(0.0, places), return_inverse=True)
+        return release_at(self.scene, times).command.part(rows[1:])
+
+    def _solve(self, places: Array) -> Solution:
+        return solve(self.scene, self.stage, at=self._command(places))
+
+    def _refine_edges(
+        self, rows: NDArray[np.intp], assembled: NDArray[np.bool_]
+    ) -> Array:
+        """Return the places with more of them where the linkage ceases to assemble."""
+        before = assembled[rows]
+        inside = np.where(before, self.places[rows], self.places[rows + 1])
+        outside = np.where(before, self.places[rows + 1], self.places[rows])
+        edge, _ = bisect(
+            lambda places: self._solve(places).assembled,
+            inside,
+            outside,
+        )
+        more = edge[:, None] + (inside - edge)[:, None] * LADDER
+        places = np.unique(np.concatenate([self.places, more.ravel(), edge]))
+        return places if self.places[0] <= self.places[-1] else places[::-1]
+
+    def _measure_gaps(self, values: Array) -> Array:
+        """Return how far values lie from the one sought, of angles modulo a turn."""
+        gaps = values - self.value
+        if self.unit == "rad":
+            gaps = np.angle(np.exp(1j * gaps))
+        return np.asarray(gaps)
+
+    def _read(self, places: Array) -> Array:
+        """Return the column at places in an array of any shape."""
+        solution = self._solve(np.ravel(places))
+        values = read_column(self.scene, solution, self.name).values
+        return values.reshape(np.shape(places))
+
+    def _gap(self, places: Array) -> Array:
+        """Return the gaps at places in an array of any shape."""
+        return self._measure_gaps(self._read(places))
+
+    def locate(self, text: str) -> Command:
+        """Locate the positions that have a value, in the order of the motion."""
+        self.value = self._read_value(text)
+        finite = self.values[np.isfinite(self.values)]
+        if not finite.size:
+            raise NotAssembledError(f"--at {self.name}: it has no value in this motion")
+        if np.ptp(finite) <= CONSTANT * np.abs(finite).max():
+            raise self._refuse(text, "it is constant", finite)
+        # the largest value may stand beside a pole
+        usual = float(np.percentile(np.abs(finite), USUAL))
+        gaps = self._measure_gaps(self.values)
+        gaps[np.abs(gaps) <= CONSTANT * max(usual, abs(self.value))] = 0.0
+        zeros = gaps == 0.0
+        if (zeros[1:] & zeros[:-1]).any():
+            raise self._refuse(text, "it is constant there", finite)
+        extent = float(np.percentile(np.abs(finite - np.median(finite)), USUAL))
+        touches, brackets = self._find_touches(gaps, extent)
+        passed, jumps = self._find_crossings(gaps, brackets)
+        found = np.concatenate([self.places[zeros], touches, passed])
+        if not found.size and jumps.size:
+            places = drop_rounding(np.sort(jumps), np.ptp(self.places)).tolist()
+            where = ", ".join(write_place(self.commanded, place) for place in places)
+            raise self._refuse(
+                text,
+                f"it jumps over it at {self.commanded} = {where}",
+                finite,
+            )
+        if not found.size:
+            raise self._refuse(text, "no position has it", finite)
+        order = np.argsort(found)
+        if self.places[0] > self.places[-1]:
+            order = order[::-1]
+        return self._command(self._drop_repeated(found[order]))
+
+    def _read_value(self, text: str) -> float:
+        """Read the value that is sought; InputError where its unit is missing."""
+        if self.unit != "1" and NUMBER_TEXT.fullmatch(text):
+            likely = name_unit(self.unit)
+            raise InputError(
+                "value",
+                f"{self.name}={text}",
+                f'the unit is missing; did you mean "{text} {likely}"?',
+            )
+        if self.unit == "1" and NUMBER_TEXT.fullmatch(text):
+            return require("value", float(text))
+        return require("value", text, self.unit)
+
+    def _find_touches(self, gaps: Array, extent: float) -> tuple[Array, list[Array]]:
+        """Find where the column turns round at the value, or beyond it.
+
+        The latter are returned as two intervals on each of which it passes the value.
+        """
+        from scipy.optimize.elementwise import find_minimum
+
+        sides = np.sign(gaps)
+        before, here, after = np.abs(gaps[:-2]), np.abs(gaps[1:-1]), np.abs(gaps[2:])
+        # between two places a curve goes no farther beyond them than they are apart
+        in_reach = here <= np.maximum(before, after) - here
+        nearest = (here <= before) & (here <= after) & in_reach
+        alike = (sides[1:-1] == sides[:-2]) & (sides[1:-1] == sides[2:])
+        rows = 1 + np.flatnonzero(nearest & alike & (sides[1:-1] != 0.0))
+        if not rows.size:
+            return np.empty(0), []
+        side = sides[rows]
+        low, middle, high = (self.places[rows + shift] for shift in (-1, 0, 1))
+        least = find_minimum(
+            lambda places, side: side * self._gap(places),
+            (low, middle, high),
+            args=(side,),
+            tolerances=self._located,
+        )
+        beyond = least.f_x < -TOUCHES * extent
+        at = np.abs(least.f_x) <= TOUCHES * extent
+        between = [
+            np.stack([first[beyond], last[beyond]])
+            for first, last in ((low, least.x), (least.x, high))
+        ]
+        return least.x[at], between
+
+    def _find_crossings(
+        self,
+        gaps: Array,
+        brackets: list[Array],
+    ) -> tuple[Array, Array]:
+        """Find where the column passes the value, and where it jumps over it.
+
+        `brackets`: further intervals on which it changes its side, (2, k) each.
+        """
+        from scipy.optimize.elementwise import find_root
+
+        before, after = gaps[:-1], gaps[1:]
+        crosses = before * after < 0.0
+        if self.unit == "rad":  # half a turn away it changes its side, too
+            crosses &= np.abs(after - before) < np.pi
+        rows = np.flatnonzero(crosses)
+        intervals = [np.stack([self.places[rows], self.places[rows + 1]]), *brackets]
+        low, high = np.concatenate(intervals, axis=1)
+        if not low.size:
+            return low, low
+        root = find_root(self._gap, (low, high))
+        change = np.abs(self._gap(high) - self._gap(low))
+        left = np.abs(root.f_bracket[1] - root.f_bracket[0])
+        steady = (root.f_x == 0.0) | (left <= JUMP * change)
+        return root.x[steady], root.x[~steady]
+
+    def _drop_repeated(self, places: Array) -> Array:
+        """Drop the positions that are an earlier one after whole turns."""
+        if self.commanded not in ("theta_2", "theta_3", "theta_4"):
+            return places
+        pins = self._solve(places).B
+        room = SAME_POSITION * max(self.scene.linkage.lengths)
+        kept: list[int] = []
+        for row, place in enumerate(places.tolist()):
+            if not any(
+                is_same_position(self.commanded, place, float(places[other]))
+                and np.hypot(*(pins[row] - pins[other])) <= room
+                for other in kept
+            ):
+                kept.append(row)
+        return places[kept]
+
+    def _refuse(self, text: str, why: str, values: Array) -> NotAssembledError:
+        """Make the error of a value that no position has, with the column's range."""
+        ends = dict.fromkeys(self._find_extent(values))
+        unit = "" if self.unit == "1" else self.unit
+        extent = write_in_units(unit, *ends, between=" to ")
+        word = "is" if len(ends) == 1 else "goes from"
+        return NotAssembledError(
+            f"--at {self.name} = {text}: {why}; {self.name} {word} {extent}"
+        )
+
+    def _find_extent(self, values: Array) -> list[float]:
+        """Find the least and the largest value of the column, located between places.
+
+        `values`: those that are finite.
+        """
+        from scipy.optimize.elementwise import find_minimum
+
+        ends = [float(values.min()), float(values.max())]
+        for number, side in enumerate((1.0, -1.0)):
+            row = int(np.nanargmin(side * self.values))
+            around = self.values[row - 1 : row + 2]
+            if 0 < row < len(self.values) - 1 and np.isfinite(around).all():
+                least = find_minimum(
+                    lambda place, side=side: side * self._read(place),
+                    tuple(self.places[row - 1 : row + 2]),
+                    tolerances=self._located,
+                )
+                ends[number] = side * float(least.f_x)
+        largest = float(np.abs(values).max())
+        cleaned: list[float] = drop_rounding(np.array(ends), largest).tolist()
+        return cleaned
+
+
+def _find_unit(column: Column) -> str:
+    """Return the SI unit of a column; that of a pure number is 1."""
+    if not column.label({}):
+        return "1"
+    if column.divisor == "1":
+        return column.unit
+    return f"({column.unit})/({column.divisor})"
+
+
+def write_place(name: str, place: float) -> str:
+    """Write what is commanded, or the time, so that `--at` finds it again."""
+    unit = {"time": "s", "stroke": "m"}.get(name, "rad")
+    return write_in_units(unit, place, digits=12)
+
+
+def list_positions(text: str, at: Command) -> list[str]:
+    """List the positions of a value as the texts of `--at` that name each of them."""
+    name = at.commanded if at.time is None else "time"
+    lines = [f"{text} at {len(at.places)} positions:"]
+    return lines + [
+        f'  --at "{name}={write_place(name, place)}"' for place in at.places.tolist()
+    ]

@@ -1,0 +1,214 @@
+"""Positions at which a column has a value, against closed forms."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.errors import FourBarError, InputError, NotAssembledError
+from fourbar.files import loads
+from fourbar.show.columns import choose_columns
+from fourbar.show.located import list_positions, locate
+
+MODELS = Path(__file__).parents[3] / "models"
+LOCATED = 1e-11
+"""rad or s: a place is located to round-off, times the slope of what is asked for."""
+TOUCHED = 1e-6
+"""rad: where a curve is flat, its extreme is located to the root of round-off."""
+PARALLELOGRAM = """\
+[lengths]
+ground = "0.8 m"
+input = "0.5 m"
+coupler = "0.8 m"
+output = "0.5 m"
+[motion]
+theta_2 = {motion}
+omega_2 = "1 rad/s"
+[effects]
+[[effects.springs]]
+from = {{ bar = 1 }}
+to = {{ bar = 4 }}
+stiffness = "20 N/m"
+length = "0.7 m"
+[[loads]]
+bar = 2
+moment = "3 N m"
+table = {{ theta_2 = ["0 deg", "90 deg", "180 deg"], factor = [0.0, 1.0, 0.0] }}
+"""
+"""B = (0.8 + 0.5 cos theta_2, 0.5 sin theta_2), and bar 3 does not turn. The spring
+joins O2 and O4.
+"""
+SWEEP = '{ from = "0 deg", to = "180 deg", steps = 180 }'
+STILL = PARALLELOGRAM.split("[motion]", maxsplit=1)[0]
+DWELL = f"""\
+{STILL}[motion]
+law = {{ kind = "345", theta_2 = "30 deg", rise = ["60 deg", "1 s"], dwell = "1 s", \
+fall = "1 s", steps = 30 }}
+"""
+"""At 0.5 s and 2.5 s bar 2 is at 60 deg, by the symmetry of the polynomial."""
+
+
+def parallelogram(motion: str = SWEEP) -> fourbar.Scene:
+    return loads(PARALLELOGRAM.format(motion=motion))
+
+
+@pytest.mark.parametrize(
+    "motion",
+    [
+        SWEEP,
+        '{ from = "0 deg", to = "180 deg", steps = 3 }',
+        '{ from = "180 deg", to = "0 deg", steps = 7 }',
+    ],
+)
+@pytest.mark.parametrize(
+    ("name", "value", "places"),
+    [
+        ("B_x", "0.855 m", [math.acos(0.11)]),
+        ("B_y", "499.9 mm", [math.asin(0.9998), math.pi - math.asin(0.9998)]),
+        ("B_x-B_y", "80 cm", [math.pi / 4]),
+        ("theta_2-theta_3", "-330 deg", [math.pi / 6]),
+        ("v_B_x", "-0.25 m/s", [math.pi / 6, 5 * math.pi / 6]),
+        ("v_B_x/v_B_y", "-1", [math.pi / 4]),
+        ("torque", "-1 N m", [math.pi / 6, 5 * math.pi / 6]),
+    ],
+)
+def test_every_position_with_a_value_is_located(
+    name: str,
+    value: str,
+    places: list[float],
+    motion: str,
+) -> None:
+    """By cosines; two of one step of the sweep too, in the order of the motion."""
+    found = locate(parallelogram(motion), name, value).places
+    assert found == pytest.approx(
+        places if '"0 deg", to' in motion else places[::-1], abs=LOCATED
+    )
+
+
+def test_an_extreme_that_touches_the_value_is_a_position() -> None:
+    """B_y is flat at 90 deg, where the transmission angle has a corner."""
+    sweep = '{ from = "0.3 deg", to = "178 deg", steps = 7 }'
+    for name, value in (("B_y", "0.5 m"), ("transmission", "90 deg")):
+        found = locate(parallelogram(sweep), name, value).places
+        assert found == pytest.approx([math.pi / 2], abs=TOUCHED)
+
+
+def test_the_ends_of_a_motion_are_positions_and_one_position_is_one() -> None:
+    """B_y is 0.25 m at 30 deg and at 150 deg, B_x 1.3 m at 0 and again at 360 deg."""
+    scene = parallelogram('{ from = "10 deg", to = "150 deg", steps = 20 }')
+    assert np.degrees(locate(scene, "B_y", "0.25 m").places) == pytest.approx([30, 150])
+    turn = loads(STILL + '[motion]\ntheta_2 = "90 deg"\n')
+    assert locate(turn, "B_x", "1.3 m").places == pytest.approx([0.0], abs=TOUCHED)
+
+
+def test_a_scene_of_single_positions_is_searched_over_its_range() -> None:
+    """Over a turn B_x = 0.8 + 0.5 cos theta_2 has the value twice, by the cosine."""
+    for motion in ("60 deg", "10 deg"):
+        scene = loads(
+            DWELL.split("law", maxsplit=1)[0] + f'theta_2 = ["{motion}", "20 deg"]\n'
+        )
+        found = np.degrees(locate(scene, "B_x", "0.4 m").places)
+        first = math.degrees(math.acos(-0.8))
+        assert found == pytest.approx([first, 360.0 - first])
+
+
+def test_a_law_has_a_value_at_times_and_none_while_it_dwells() -> None:
+    scene = loads(DWELL)
+    at = locate(scene, "B_x", "1.05 m")
+    assert at.time == pytest.approx([0.5, 2.5], abs=LOCATED)
+    assert list_positions("B_x=1.05 m", at)[0] == "B_x=1.05 m at 2 positions:"
+    with pytest.raises(NotAssembledError, match="it is constant there; B_x goes"):
+        locate(scene, "B_x", "0.8 m")
+
+
+def test_a_release_has_a_value_at_times() -> None:
+    """A parallelogram of massless cranks swings its coupler as a point mass on one.
+
+    From rest at -30 deg its speed is sqrt(2 g (sin 30 deg - sin theta_2')/a) there.
+    """
+    scene = loads(
+        f'{STILL}[motion]\ntheta_2 = "-30 deg"\n'
+        'free = { duration = "1 s", steps = 40 }\n'
+        '[bars.coupler]\nmass = "1 kg"\n[effects]\n'
+        'gravity = ["9.81 m/s^2", "-90 deg"]\n'
+    )
+    speed = math.sqrt(2.0 * 9.81 * (math.sin(math.radians(50.0)) - 0.5) / 0.5)
+    at = locate(scene, "omega_2", f"{-speed!r} rad/s")
+    assert np.degrees(at.angle) == pytest.approx([-50.0, -130.0], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "kind", "words"),
+    [
+        ("B_y", "0.6 m", NotAssembledError, "no position has it; B_y goes from 0 to"),
+        ("omega_4", "1 rad/s", NotAssembledError, "constant; omega_4 is 1 rad/s"),
+        ("tork", "1 N m", InputError, '--at = .tork.: unknown; did you mean "torque"'),
+        ("B_y", "0.6", InputError, 'unit is missing; did you mean "0.6 m"'),
+        ("B_y", "6 s", InputError, "--at"),
+        ("omega_4/omega_2", "1 s", InputError, "--at"),
+        ("B_x-theta_2", "1 m", InputError, "difference is of two columns of one kind"),
+    ],
+)
+def test_what_no_position_has_is_refused_with_the_range(
+    name: str,
+    value: str,
+    kind: type[FourBarError],
+    words: str,
+) -> None:
+    with pytest.raises(kind, match=words):
+        locate(parallelogram(), name, value)
+
+
+def test_a_column_that_jumps_over_a_value_does_not_have_it() -> None:
+    """Dry friction alone: the torque is 2 N m up to 1 s and -2 N m from there."""
+    scene = loads(
+        DWELL.replace('dwell = "1 s", ', "")
+        + '[effects]\nfriction = { O2 = "2 N m" }\n'
+    )
+    with pytest.raises(NotAssembledError, match="jumps over it at time = 0 s, 1 s;"):
+        locate(scene, "torque", "0.5 N m")
+
+
+def test_a_linkage_is_searched_up_to_where_it_ceases_to_assemble() -> None:
+    """There theta_3 grows as the root of the angle: by cosines, 0.01 deg from the end.
+
+    Beyond the end of the range it has no value.
+    """
+    scene = loads(
+        '[lengths]\nground = "50 mm"\ninput = "20 mm"\ncoupler = "40 mm"\n'
+        'output = "25 mm"\n[motion]\ntheta_2 = { from = "30 deg", to = "170 deg", '
+        "steps = 20 }\n"
+    )
+    limit = math.acos((50**2 + 20**2 - 65**2) / (2 * 50 * 20))
+    place = limit - math.radians(0.001)
+    at = fourbar.solve(
+        loads(
+            '[lengths]\nground = "50 mm"\ninput = "20 mm"\ncoupler = "40 mm"\n'
+            f'output = "25 mm"\n[motion]\ntheta_2 = "{place!r} rad"\n'
+        )
+    )
+    found = locate(scene, "transmission", f"{float(math.asin(at.sin_mu[0]))!r} rad")
+    assert found.places == pytest.approx([place], abs=1e-9)
+
+
+def test_springs_have_their_length_and_pull_as_columns() -> None:
+    """20 N/m over the ground of 0.8 m; and by cosines to a point of bar 4."""
+    scene = loads(
+        PARALLELOGRAM.format(motion=SWEEP).replace(
+            "to = { bar = 4 }",
+            'to = { bar = 4, from_pin = ["0.5 m", "0 deg"] }\npreload = "-1 N"',
+        )
+    )
+    solution = fourbar.solve(scene)
+    length, force = choose_columns(scene, solution, "spring_0_length,spring_0_force")
+    distance = np.sqrt(0.8**2 + 0.5**2 + 0.8 * np.cos(solution.theta_2))
+    assert length.unit == "m" and length.values == pytest.approx(distance, rel=1e-13)
+    assert force.unit == "N"
+    assert force.values == pytest.approx(20.0 * (distance - 0.7) - 1.0, abs=1e-12)
+    assert {"spring_0_length [m]", "spring_0_force [N]"} <= set(
+        str(solution.to_csv(units=fourbar.units("m N"))).split("\n")[0].split(",")
+    )
+    with pytest.raises(InputError, match="is the name of a quantity"):
+        fourbar.Point("spring_1_force", 3, (0.1, 0.0))
