@@ -133,7 +133,7 @@ def test_no_file_outside_is_opened(tmp_path: Path) -> None:
         ("<mujoco model='a\0b'/>", "no XML"),
         (b"\xff\xfe\x00", "UTF-8"),
         (b"<mujoco model='\xff'/>", "UTF-8"),
-        ("<robot/>", "a URDF holds no closed loop"),
+        ("<svg/>", "must be an MJCF, an SDF or a URDF"),
         ("<mujoco>", "no XML"),
         ("<mujoco>" + 200 * "<body>" + 200 * "</body>" + "</mujoco>", "deeper"),
     ],

@@ -65,7 +65,7 @@ MOST_STEPS_OF_A_RUN = 16_000
 """Most steps of one run, a fifth of a second. An error that needs more steps counts as
 not reachable.
 """
-ROBOTS = (".xml", ".mjcf")
+ROBOTS = (".xml", ".mjcf", ".sdf", ".world", ".urdf")
 """Suffixes of a robot's file."""
 _LEAST_GAIN = 0.8
 """More steps that leave the error above this part of what it was have met a floor."""

@@ -89,7 +89,7 @@ def _write_scene(made: LoopScene) -> str:
 
 
 @click.command()
-@click.argument("robot", metavar="ROBOT.xml", type=ROBOT_PATH)
+@click.argument("robot", metavar="FILE", type=ROBOT_PATH)
 @pose_options
 @loop_option
 @speed_option
@@ -111,7 +111,7 @@ def robot_command(
     speed: str | None,
     out: Path | None,
 ) -> None:
-    """List the closed loops of a robot's MJCF.
+    """List the closed loops of a robot's MJCF or SDF.
 
     The command says which loops are planar four-bars.
     """

@@ -23,6 +23,10 @@ LARGEST_ASSETS = 512 * 2**20
 _DEEPEST = 100
 """Nested elements; the readers of XML recurse."""
 MOST_INCLUDES = 200
+NOT_THERE = (
+    "is not there; it must lie in the folder of the file, in a folder beside it, or in "
+    "that of --assets DIR"
+)
 _HINGES = 3
 """Joints of a four-bar whose fourth pin is an equality."""
 _REACHING_OUT = (
@@ -98,11 +102,15 @@ class _RobotReading:
         if self.assets is not None and not self.assets.is_dir():
             raise InputError("--assets", str(self.assets), "must be a folder")
         root = self._parse(self.path)
-        if root.tag != "mujoco":
+        if root.tag == "sdf":
+            root = self._convert_sdf(root)
+        elif root.tag == "robot":
+            self._reduce_urdf(root)
+        elif root.tag != "mujoco":
             raise self._refuse(
                 root.tag,
-                "must be an MJCF, whose outermost element is <mujoco>; a URDF holds no "
-                "closed loop",
+                "must be an MJCF, an SDF or a URDF, whose outermost element is "
+                "<mujoco>, <sdf> or <robot>",
             )
         self._expand(root, self.path, 0)
         self._take_meshes(root)
@@ -116,6 +124,46 @@ class _RobotReading:
             self.contents,
             self.missing,
             tuple(self.notes),
+        )
+
+    def _convert_sdf(self, root: ET.Element) -> ET.Element:
+        """Return an SDF as MJCF; its includes lie in its folder or beside it."""
+        from fourbar_validation.robots.sdf import convert_sdf
+
+        home = self.path.resolve().parent
+
+        def find(uri: str) -> ET.Element:
+            name = uri.rpartition("://")[2]
+            for candidate in (name, f"{name}/model.sdf"):
+                path = self._find(candidate, (home, home.parent))
+                if path is not None:
+                    return self._include(path, name)
+            raise self._refuse(f"<uri>{uri}</uri>", NOT_THERE)
+
+        try:
+            root, notes = convert_sdf(root, find)
+        except InputError as error:
+            raise InputError(
+                error.key, error.value, error.allowed, str(self.path)
+            ) from None
+        self.notes += notes
+        return root
+
+    def _reduce_urdf(self, root: ET.Element) -> None:
+        """Leave what MuJoCo's own reader of URDF needs: inertias and joints."""
+        left_out = {child.tag for child in root} - {"link", "joint", "material"}
+        for child in list(root):
+            if child.tag not in ("link", "joint"):
+                root.remove(child)
+        for link in root.iter("link"):
+            for child in list(link):
+                if child.tag != "inertial":
+                    link.remove(child)
+        if left_out:
+            self.notes.append(f"left out of the URDF: {', '.join(sorted(left_out))}")
+        self.notes.append(
+            "a URDF is a tree: its only loops are mimic joints, and check-mjcf SCENE "
+            "FILE --mimic JOINT judges one"
         )
 
     def _refuse(self, what: object, allowed: str) -> InputError:
@@ -168,21 +216,19 @@ class _RobotReading:
             # MuJoCo counts from the folder of the main file
             path = self._find(name, (self.path.parent, inside.parent))
             if path is None:
-                raise self._refuse(
-                    f'<include file="{name}">',
-                    "is not there; it must lie in the folder of the file, in a folder "
-                    "beside it, or in that of --assets DIR",
-                )
-            self.included.append(path)
-            if len(self.included) > MOST_INCLUDES:
-                raise self._refuse(
-                    name, f"more than {MOST_INCLUDES} files are included"
-                )
-            content = self._parse(path)
+                raise self._refuse(f'<include file="{name}">', NOT_THERE)
+            content = self._include(path, name)
             if content.tag not in ("mujoco", "mujocoinclude"):
                 raise self._refuse(content.tag, f"must be <mujocoinclude>, in {name}")
             self._expand(content, path, depth + 1)
             element[place : place + 1] = list(content)
+
+    def _include(self, path: Path, name: str) -> ET.Element:
+        """Parse an included file."""
+        self.included.append(path)
+        if len(self.included) > MOST_INCLUDES:
+            raise self._refuse(name, f"more than {MOST_INCLUDES} files are included")
+        return self._parse(path)
 
     def _find(self, name: str, folders: tuple[Path, ...]) -> Path | None:
         """Find a file that may be read, in these folders or that of --assets."""

@@ -1,0 +1,486 @@
+"""An SDF is the mechanism that it states, in whichever way it states it."""
+
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import fourbar
+from fourbar.errors import InputError
+from fourbar.linkage import Bar, FourBar
+from fourbar.scene import Scene
+from fourbar.scene import command as command_of
+from fourbar.solving import solve
+from fourbar_validation.engines.mujoco.robots.closures import list_closures
+from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
+from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
+from fourbar_validation.robots.files import read_robot
+from tests.validation.robots.test_files import TETRAHEDRON
+
+AGREES = 1e-9
+"""Parts of the largest: sines of angles that are written with 17 digits, and a linear
+system of 13 equations.
+"""
+D, A, B, C = 0.3, 0.1, 0.25, 0.22
+DENSITY = 2700.0
+WIDTH, DEPTH = 0.02, 0.01
+
+
+def find_pin(near: complex, far: complex, r_near: float, r_far: float) -> complex:
+    """Return the upper point at two distances from two points."""
+    apart = abs(far - near)
+    along = (r_near**2 - r_far**2 + apart**2) / (2.0 * apart)
+    up = math.sqrt(r_near**2 - along**2)
+    return near + (far - near) / apart * complex(along, up)
+
+
+START = math.radians(50.0)
+PIN_A = A * complex(math.cos(START), math.sin(START))
+PIN_B = find_pin(PIN_A, D + 0j, B, C)
+ROD = math.atan2((PIN_B - PIN_A).imag, (PIN_B - PIN_A).real)
+ROCKER = math.atan2(PIN_B.imag, PIN_B.real - D)
+
+
+def make_bar(length: float) -> Bar:
+    """Return a bar that is a box of WIDTH in the plane."""
+    mass = DENSITY * length * WIDTH * DEPTH
+    return Bar(length, mass, inertia=mass * (length**2 + WIDTH**2) / 12.0)
+
+
+SCENE = Scene(
+    FourBar(D, make_bar(A), make_bar(B), make_bar(C)),
+    fourbar.Motion(np.radians(np.arange(0.0, 360.0, 30.0)), 10.0),
+    effects=(fourbar.effects.Gravity(9.81, -0.5 * math.pi),),
+)
+
+
+def write_inertial(length: float) -> str:
+    bar = make_bar(length)
+    around = f"<ixx>1</ixx><iyy>1</iyy><izz>{bar.inertia}</izz>"
+    return (
+        f"<inertial><pose>{length / 2} 0 0 0 0 0</pose><mass>{bar.mass}</mass>"
+        f"<inertia>{around}</inertia></inertial>"
+    )
+
+
+def write_link(name: str, length: float, pose: str) -> str:
+    return f'<link name="{name}">{pose}{write_inertial(length)}</link>'
+
+
+AXIS = "<axis><xyz>0 0 1</xyz></axis>"
+CRANK = write_link("crank", A, f"<pose>0 0 0 0 0 {START}</pose>")
+COUPLER = write_link("rod", B, f"<pose>{PIN_A.real} {PIN_A.imag} 0 0 0 {ROD}</pose>")
+OUTPUT = write_link("rocker", C, f"<pose>{D} 0 0 0 0 {ROCKER}</pose>")
+PIN_OF_CRANK = (
+    '<joint name="A" type="revolute"><parent>crank</parent><child>rod</child>'
+    f"{AXIS}</joint>"
+)
+CLOSING = (
+    '<joint name="B" type="revolute"><parent>rocker</parent><child>rod</child>'
+    f"<pose>{B} 0 0 0 0 0</pose>{AXIS}</joint>"
+)
+UNIVERSAL = '"A" type="universal"'
+MODEL = f"""<model name="linkage">
+{CRANK}{COUPLER}{OUTPUT}
+<joint name="O2" type="revolute"><parent>world</parent><child>crank</child>{AXIS}
+</joint>
+<joint name="O4" type="continuous"><parent>world</parent><child>rocker</child>{AXIS}
+</joint>{PIN_OF_CRANK}{CLOSING}</model>"""
+PLAIN = f"""<sdf version="1.9"><world name="w"><gravity>0 -9.81 0</gravity>{MODEL}
+</world></sdf>"""
+
+
+def write_box(length: float) -> str:
+    return (
+        f'<inertial auto="true"/><collision name="c"><density>{DENSITY}</density>'
+        f"<pose>{length / 2} 0 0 0 0 0</pose><geometry><box><size>{length} {WIDTH} "
+        f"{DEPTH}</size></box></geometry></collision><collision name='p'><geometry>"
+        "<plane/></geometry></collision>"
+    )
+
+
+def put(*changes: tuple[str, str]) -> str:
+    """Return the plain file with texts replaced that stand in it once."""
+    text = PLAIN
+    for old, new in changes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return text
+
+
+STATED = {
+    "plain": PLAIN,
+    "turned out of its plane, gravity too": put(
+        (
+            '<model name="linkage">',
+            '<model name="linkage"><pose degrees="true">1 2 3 90 0 30</pose>',
+        ),
+        ("<gravity>0 -9.81 0<", "<gravity>0 0 -9.81<"),
+    ),
+    "joints from the other side": put(
+        (
+            "<parent>crank</parent><child>rod</child>",
+            f"<parent>rod</parent><child>crank</child><pose>{A} 0 0 0 0 0</pose>",
+        ),
+    ),
+    "frames, degrees": put(
+        (
+            f"<pose>{PIN_A.real} {PIN_A.imag} 0 0 0 {ROD}</pose>",
+            '<pose relative_to="turned"/>',
+        ),
+        (
+            PIN_OF_CRANK,
+            f'{PIN_OF_CRANK}<frame name="end" attached_to="crank"><pose>{A} 0 0 0 0 0'
+            '</pose></frame><frame name="turned" attached_to="end">'
+            '<pose degrees="true">'
+            f"0 0 0 0 0 {math.degrees(ROD - START)}</pose></frame>",
+        ),
+        (
+            "<parent>world</parent><child>crank</child>",
+            "<parent>world</parent><child>foot</child>",
+        ),
+        (CRANK, f'{CRANK}<frame name="foot" attached_to="crank"/>'),
+    ),
+    "placed by a joint": put(
+        (
+            f"<pose>{D} 0 0 0 0 {ROCKER}</pose>",
+            f'<pose relative_to="B">{-C} 0 0 0 0 0</pose>',
+        ),
+        (
+            f"<pose>{B} 0 0 0 0 0</pose>",
+            f'<pose relative_to="rod">{B} 0 0 0 0 {ROCKER - ROD}</pose>',
+        ),
+    ),
+    "quaternion": put(
+        (
+            f"<pose>{D} 0 0 0 0 {ROCKER}</pose>",
+            f'<pose rotation_format="quat_xyzw">{D} 0 0 0 0 {math.sin(ROCKER / 2)} '
+            f"{math.cos(ROCKER / 2)}</pose>",
+        )
+    ),
+    "nested model": put(
+        (
+            COUPLER,
+            f'<model name="inner"><pose>0 0 0 0 0 0.3</pose>{COUPLER}</model>'.replace(
+                f"{PIN_A.real} {PIN_A.imag} 0 0 0 {ROD}",
+                f"{(PIN_A * np.exp(-0.3j)).real} {(PIN_A * np.exp(-0.3j)).imag} "
+                f"0 0 0 {ROD - 0.3}",
+            ),
+        ),
+        (PIN_OF_CRANK, PIN_OF_CRANK.replace(">rod<", ">inner::rod<")),
+        (CLOSING, CLOSING.replace(">rod<", ">inner::rod<")),
+    ),
+    "included, placed by a frame": put(
+        (
+            COUPLER,
+            "<include><uri>model://rod</uri><name>inner</name><pose>"
+            f"{PIN_A.real} {PIN_A.imag} 0 0 0 {ROD}</pose><placement_frame>start"
+            "</placement_frame></include>",
+        ),
+        (PIN_OF_CRANK, PIN_OF_CRANK.replace(">rod<", ">inner::rod<")),
+        (CLOSING, CLOSING.replace(">rod<", ">inner::rod<")),
+    ),
+    "ball constraint": put(
+        ("<sdf ", '<sdf xmlns:drake="http://drake.mit.edu" '),
+        (
+            CLOSING,
+            "<drake:ball_constraint><drake:ball_constraint_body_A>rod"
+            "</drake:ball_constraint_body_A><drake:ball_constraint_body_B>rocker"
+            f"</drake:ball_constraint_body_B><drake:ball_constraint_p_AP>{B} 0 0"
+            f"</drake:ball_constraint_p_AP><drake:ball_constraint_p_BQ>{C} 0 0"
+            "</drake:ball_constraint_p_BQ></drake:ball_constraint>",
+        ),
+    ),
+    "auto-inertials": put(
+        *((write_inertial(length), write_box(length)) for length in (A, B, C))
+    ),
+    "inertia in a turned frame": put(
+        (
+            f"<pose>{B / 2} 0 0 0 0 0</pose><mass>{make_bar(B).mass}</mass>"
+            f"<inertia><ixx>1</ixx><iyy>1</iyy><izz>{make_bar(B).inertia}</izz>",
+            f"<pose>{B / 2} 0 0 {math.pi / 2} 0 0</pose><mass>{make_bar(B).mass}</mass>"
+            f"<inertia><ixx>1</ixx><izz>1</izz><iyy>{make_bar(B).inertia}</iyy>",
+        )
+    ),
+    "axis in another frame": put(
+        (
+            PIN_OF_CRANK,
+            PIN_OF_CRANK.replace(
+                "<xyz>0 0 1</xyz>", '<xyz expressed_in="lying">0 -1 0</xyz>'
+            )
+            + f'<frame name="lying"><pose>5 5 5 {math.pi / 2} 0 0</pose></frame>',
+        ),
+    ),
+}
+ROD_MODEL = f"""<sdf version="1.9"><model name="rod"><pose>9 9 9 0 0 0</pose>
+{COUPLER.replace(f"{PIN_A.real} {PIN_A.imag} 0 0 0 {ROD}", "1 2 3 0 0 0.4")}
+<frame name="start" attached_to="rod"/></model></sdf>"""
+
+
+def read(folder: Path, text: str) -> RobotFile:
+    path = folder / "linkage.sdf"
+    path.write_text(text)
+    return read_robot(path)
+
+
+@pytest.mark.parametrize("way", STATED)
+def test_torque_and_pin_forces_are_those_of_the_bars(way: str, tmp_path: Path) -> None:
+    (tmp_path / "rod").mkdir()
+    (tmp_path / "rod" / "model.sdf").write_text(ROD_MODEL)
+    made = read_loop_scene(read(tmp_path, STATED[way]), PoseOptions(), None, 10.0)
+    assert made.scene.linkage.lengths == pytest.approx((D, A, B, C), rel=AGREES)
+    turned = made.scene.linkage.ground_angle
+    command = command_of(SCENE)
+    expected = solve(SCENE, at=command)
+    theirs = solve(made.scene, at=command._replace(angle=command.theta_2 + turned))
+    for name in ("torque", "F12", "F32", "F43", "F14"):
+        sizes = [np.abs(getattr(each, name)) for each in (expected, theirs)]
+        if name != "torque":
+            sizes = [np.hypot(*size.T) for size in sizes]
+        np.testing.assert_allclose(
+            sizes[1], sizes[0], atol=AGREES * sizes[0].max(), rtol=0.0
+        )
+
+
+def compile_text(folder: Path, text: str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
+    robot = compile_robot(read(folder, text))
+    return robot.model, robot.notes
+
+
+@pytest.mark.parametrize("way", ["plain", "joints from the other side"])
+def test_angles_of_a_joint_turn_the_child_against_the_parent(
+    way: str, tmp_path: Path
+) -> None:
+    text = STATED[way].replace(CLOSING, "").replace('"A" type="revolute"', UNIVERSAL)
+    text = text.replace(AXIS, f"{AXIS}<axis2><xyz>1 0 0</xyz></axis2>")
+    model, _ = compile_text(tmp_path, text)
+    data = mujoco.MjData(model)
+    angles = (0.2, 0.3)
+    relative = []
+    for turned in ((0.0, 0.0), angles):
+        data.joint("A").qpos[0], data.joint("A::axis2").qpos[0] = turned
+        mujoco.mj_kinematics(model, data)
+        ends = ("crank", "rod") if way == "plain" else ("rod", "crank")
+        parent, child = (data.body(name).xmat.reshape(3, 3) for name in ends)
+        relative.append(parent.T @ child)
+    expected = relative[0] @ Rotation.from_euler("ZX", angles).as_matrix()
+    np.testing.assert_allclose(relative[1], expected, atol=AGREES)
+
+
+def closes(folder: Path, text: str) -> str:
+    return compile_text(folder, text)[0].eq(0).name
+
+
+def test_the_joint_farthest_from_the_world_closes_the_loop(tmp_path: Path) -> None:
+    last = put((PIN_OF_CRANK, ""), (CRANK, PIN_OF_CRANK + CRANK))
+    assert closes(tmp_path, last) == "B"
+    both = last.replace(CLOSING, "").replace(CRANK, CLOSING + CRANK)
+    assert closes(tmp_path, both) in ("A", "B")
+    mimic = '<mimic joint="O2"><multiplier>0</multiplier></mimic></axis>'
+    follows = CLOSING.replace("</axis>", mimic)
+    assert compile_text(tmp_path, put((CLOSING, follows)))[0].eq("A").id == 0
+
+
+def test_a_tensor_is_turned_with_its_frame(tmp_path: Path) -> None:
+    stated = (
+        "<inertial><pose>0 0 0 0.3 0.4 0.5</pose><mass>1</mass><inertia><ixx>2</ixx>"
+        "<iyy>3</iyy><izz>4</izz><ixy>0.1</ixy><ixz>0.2</ixz><iyz>0.3</iyz></inertia>"
+        "</inertial>"
+    )
+    model, _ = compile_text(tmp_path, put((write_inertial(A), stated)))
+    body = model.body("crank")
+    principal = Rotation.from_quat(body.iquat, scalar_first=True).as_matrix()
+    turned = Rotation.from_euler("xyz", (0.3, 0.4, 0.5)).as_matrix()
+    own = np.array([[2.0, 0.1, 0.2], [0.1, 3.0, 0.3], [0.2, 0.3, 4.0]])
+    np.testing.assert_allclose(
+        principal @ np.diag(body.inertia) @ principal.T,
+        turned @ own @ turned.T,
+        atol=AGREES,
+    )
+
+
+@pytest.mark.parametrize(
+    ("shape", "volume"),
+    [
+        ("<box><size>1 2 3</size></box>", 6.0),
+        ("<sphere><radius>2</radius></sphere>", 32.0 * math.pi / 3.0),
+        (
+            "<cylinder><radius>2</radius><length>3</length></cylinder>",
+            12.0 * math.pi,
+        ),
+        (
+            "<capsule><radius>2</radius><length>3</length></capsule>",
+            12.0 * math.pi + 32.0 * math.pi / 3.0,
+        ),
+        ("<ellipsoid><radii>1 2 3</radii></ellipsoid>", 8.0 * math.pi),
+        ("<mesh><uri>model://rod/part.obj</uri><scale>2 1 1</scale></mesh>", 1e-3 / 3),
+    ],
+)
+@pytest.mark.parametrize(
+    ("density", "stated"),
+    [(1000.0, ""), (500.0, "<density>500</density>")],
+)
+def test_auto_inertials_are_volumes_by_densities(
+    shape: str, volume: float, density: float, stated: str, tmp_path: Path
+) -> None:
+    (tmp_path / "rod").mkdir()
+    (tmp_path / "rod" / "part.obj").write_text(TETRAHEDRON)
+    collision = f"<collision name='c'>{stated}<geometry>{shape}</geometry>"
+    text = f'<inertial auto="true"/>{collision}</collision>'
+    model, _ = compile_text(tmp_path, put((write_inertial(A), text)))
+    assert model.body("crank").mass[0] == pytest.approx(density * volume, rel=1e-7)
+
+
+def test_numbers_of_a_joint_are_those_of_its_file(tmp_path: Path) -> None:
+    axis = (
+        "<axis><xyz>0 0 1</xyz><dynamics><damping>0.1</damping><friction>0.2</friction>"
+        "<spring_stiffness>0.3</spring_stiffness><spring_reference>0.4"
+        "</spring_reference></dynamics><limit><lower>-1e16</lower><upper>0.7</upper>"
+        "</limit></axis>"
+    )
+    joint = CLOSING.replace(AXIS, axis)
+    text = put(
+        (CLOSING, joint),
+        (
+            "<gravity>",
+            "<physics><max_step_size>0.002</max_step_size></physics><gravity>",
+        ),
+        ('<link name="rod">', '<link name="rod"><gravity>false</gravity>'),
+    )
+    model, notes = compile_text(tmp_path, text)
+    number = model.joint("B").id  # what would lose its damping closes no loop
+    assert model.dof_damping[number] == 0.1
+    assert model.dof_frictionloss[number] == 0.2
+    assert model.jnt_stiffness[number] == 0.3
+    assert model.qpos_spring[number] == 0.4
+    assert model.jnt_range[number].tolist() == [-1e9, 0.7]
+    assert model.opt.timestep == 0.002
+    assert model.body_gravcomp[model.body("rod").id] == 1.0
+    assert model.eq("A").id == 0
+    assert notes == (
+        "A closes a loop: it is a <connect>, which holds its point and not its axis",
+    )
+    every = text
+    for pin in ("O2", "O4", "A"):
+        start = every.index(f'<joint name="{pin}"')
+        every = every[:start] + every[start:].replace(AXIS, axis, 1)
+    _, notes = compile_text(tmp_path, every)
+    assert notes[0].endswith("; its damping, friction and spring are lost")
+
+
+@pytest.mark.parametrize(
+    ("kind", "names", "freedoms"),
+    [
+        ("fixed", [], 0),
+        ("prismatic", ["A"], 1),
+        ("ball", ["A"], 3),
+        ("universal", ["A", "A::axis2"], 2),
+        ("screw", [], 6),
+    ],
+)
+def test_joints_of_each_type_leave_its_freedoms(
+    kind: str, names: list[str], freedoms: int, tmp_path: Path
+) -> None:
+    joint = PIN_OF_CRANK.replace("revolute", kind)
+    joint = joint.replace(AXIS, f"{AXIS}<axis2><xyz>1 0 0</xyz></axis2>")
+    model, notes = compile_text(tmp_path, put((PIN_OF_CRANK, joint), (CLOSING, "")))
+    assert model.nv == 2 + freedoms
+    joints = [model.joint(number).name for number in range(model.njnt)]
+    assert [name for name in joints if name[0] == "A"] == names
+    assert notes == (("left out of the SDF: the screw joint A",) * (kind == "screw"))
+
+
+def test_a_joint_follows_by_its_multiplier_offset_and_reference(tmp_path: Path) -> None:
+    mimic = (
+        '<mimic joint="O2"><multiplier>-2</multiplier><offset>0.3</offset>'
+        "<reference>0.1</reference></mimic></axis>"
+    )
+    joint = PIN_OF_CRANK.replace("</axis>", mimic)
+    report = list_closures(
+        read(tmp_path, put((PIN_OF_CRANK, joint), (CLOSING, ""))), PoseOptions()
+    )
+    (closure,) = report.closures
+    assert closure.reason.startswith("A follows O2, polycoef 0.5 -2 0 0 0")
+
+
+def test_what_stands_and_what_floats(tmp_path: Path) -> None:
+    alone = "<model name='{}'>{}<link name='part'/></model>"
+    shelf = alone.format("shelf", f"<static>1</static>{alone.format('board', '')}")
+    models = shelf + alone.format("ball", "")
+    model, notes = compile_text(
+        tmp_path, put(("</world>", f"{models}<plugin/><light/></world>"))
+    )
+    names = {model.body(number).name for number in range(model.nbody)}
+    assert {"shelf::part", "ball::part"} <= names
+    assert model.body("shelf::part").weldid == 0
+    assert model.body("shelf::board::part").weldid == 0
+    assert model.body("ball::part").mass == 1.0
+    assert model.body("ball::part").inertia.tolist() == [1.0, 1.0, 1.0]
+    assert model.nv == 3 + 6
+    assert "left out of the SDF: plugin" in notes
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (MODEL, "", None),
+        ("<parent>crank</parent>", "<parent>crunk</parent>", "'crunk'.*is no link"),
+        (f"<pose>0 0 0 0 0 {START}</pose>", "<pose>0 0 0</pose>", "6 finite numbers"),
+        (
+            f"<pose>0 0 0 0 0 {START}</pose>",
+            "<pose relative_to='crank'/>",
+            "placed relative to itself",
+        ),
+        (write_inertial(A), '<inertial auto="true"/>', "has no collision"),
+        (
+            write_inertial(A),
+            '<inertial auto="true"><mass>1</mass></inertial>',
+            "not read",
+        ),
+        (
+            write_inertial(A),
+            write_box(A).replace("box", "cone"),
+            "'cone'.*has no inertia here",
+        ),
+        (CRANK, CRANK + CRANK, "name of its own"),
+        (CRANK, "<include><uri>model://nowhere</uri></include>", "is not there"),
+        (f"<mass>{make_bar(A).mass}</mass>", "<mass>-1</mass>", "above 0"),
+    ],
+)
+def test_what_contradicts_itself_is_refused_in_one_line(
+    old: str, new: str, message: str | None, tmp_path: Path
+) -> None:
+    text = put((old, new))
+    if message is None:
+        assert compile_text(tmp_path, text)[0].nbody == 1
+        return
+    with pytest.raises(InputError, match=message):
+        compile_text(tmp_path, text)
+
+
+URDF = """<robot name="r"><link name="base"/>
+<link name="one"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0"
+ixz="0" iyz="0"/></inertial><visual><geometry><mesh filename="none.dae"/></geometry>
+</visual></link>
+<link name="two"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0"
+ixz="0" iyz="0"/></inertial></link><gazebo/>
+<joint name="hip" type="continuous"><parent link="base"/><child link="one"/></joint>
+<joint name="knee" type="continuous"><parent link="one"/><child link="two"/>
+<mimic joint="hip" multiplier="-1.5" offset="0.2"/></joint></robot>"""
+
+
+def test_of_a_urdf_mimic_joints_are_listed_and_the_way_on_is_said(
+    tmp_path: Path,
+) -> None:
+    report = list_closures(read(tmp_path, URDF), PoseOptions())
+    (closure,) = report.closures
+    assert closure.reason.startswith("knee follows hip, polycoef 0.2 -1.5 0 0 0")
+    assert report.notes[:2] == (
+        "left out of the URDF: gazebo",
+        "a URDF is a tree: its only loops are mimic joints, and check-mjcf SCENE FILE"
+        " --mimic JOINT judges one",
+    )
