@@ -46,9 +46,9 @@ def _declare_vector(*line: str | None) -> Any:
 class Quantities:
     """The quantities, one line each.
 
-    `Solution` inherits them as fields, and tables have them in this order. The
-    positions are None only where `out` of `solve` named other quantities, which then
-    are all that is wanted.
+    `Solution` inherits them as fields, and tables have them in this order. A quantity
+    of a stage that was not asked for, or of a drive that the scene does not have, is
+    None. The types are those of what was asked for, so that nobody asserts the arrays.
     """
 
     theta_2: Array = _scalar("rad", None, "angle of the input")
@@ -69,157 +69,157 @@ class Quantities:
     G2: Array = _declare_vector("m", "position", "mass centre of the input")
     G3: Array = _declare_vector("m", "position", "mass centre of the coupler")
     G4: Array = _declare_vector("m", "position", "mass centre of the output")
-    stroke: Array | None = _scalar(
+    stroke: Array = _scalar(
         "m",
         "position",
         "distance of the linear drive's ends",
         "linear drive",
     )
-    drive_line: Array | None = _declare_vector(
+    drive_line: Array = _declare_vector(
         "1",
         "position",
         "unit vector from its one end to the other, or of the force at a point",
         "linear drive",
     )
-    omega_2: Array | None = _scalar(
+    omega_2: Array = _scalar(
         "rad/s",
         "velocity",
         "angular velocity of the input",
     )
-    omega_3: Array | None = _scalar(
+    omega_3: Array = _scalar(
         "rad/s",
         "velocity",
         "angular velocity of the coupler",
         "unknown",
     )
-    omega_4: Array | None = _scalar(
+    omega_4: Array = _scalar(
         "rad/s",
         "velocity",
         "angular velocity of the output",
         "unknown",
     )
-    v_A: Array | None = _declare_vector("m/s", "velocity", "velocity of A")
-    v_B: Array | None = _declare_vector("m/s", "velocity", "velocity of B")
-    v_G2: Array | None = _declare_vector("m/s", "velocity", "velocity of G2")
-    v_G3: Array | None = _declare_vector("m/s", "velocity", "velocity of G3")
-    v_G4: Array | None = _declare_vector("m/s", "velocity", "velocity of G4")
-    stroke_speed: Array | None = _scalar(
+    v_A: Array = _declare_vector("m/s", "velocity", "velocity of A")
+    v_B: Array = _declare_vector("m/s", "velocity", "velocity of B")
+    v_G2: Array = _declare_vector("m/s", "velocity", "velocity of G2")
+    v_G3: Array = _declare_vector("m/s", "velocity", "velocity of G3")
+    v_G4: Array = _declare_vector("m/s", "velocity", "velocity of G4")
+    stroke_speed: Array = _scalar(
         "m/s",
         "velocity",
         "speed at which the stroke grows, or of the driven point along the force",
         "linear drive",
     )
-    alpha_2: Array | None = _scalar(
+    alpha_2: Array = _scalar(
         "rad/s^2",
         "acceleration",
         "angular acceleration of the input",
     )
-    alpha_3: Array | None = _scalar(
+    alpha_3: Array = _scalar(
         "rad/s^2",
         "acceleration",
         "angular acceleration of the coupler",
         "unknown",
     )
-    alpha_4: Array | None = _scalar(
+    alpha_4: Array = _scalar(
         "rad/s^2",
         "acceleration",
         "angular acceleration of the output",
         "unknown",
     )
-    a_A: Array | None = _declare_vector("m/s^2", "acceleration", "acceleration of A")
-    a_B: Array | None = _declare_vector("m/s^2", "acceleration", "acceleration of B")
-    a_G2: Array | None = _declare_vector("m/s^2", "acceleration", "acceleration of G2")
-    a_G3: Array | None = _declare_vector("m/s^2", "acceleration", "acceleration of G3")
-    a_G4: Array | None = _declare_vector("m/s^2", "acceleration", "acceleration of G4")
-    F12: Array | None = _declare_vector(
+    a_A: Array = _declare_vector("m/s^2", "acceleration", "acceleration of A")
+    a_B: Array = _declare_vector("m/s^2", "acceleration", "acceleration of B")
+    a_G2: Array = _declare_vector("m/s^2", "acceleration", "acceleration of G2")
+    a_G3: Array = _declare_vector("m/s^2", "acceleration", "acceleration of G3")
+    a_G4: Array = _declare_vector("m/s^2", "acceleration", "acceleration of G4")
+    F12: Array = _declare_vector(
         "N",
         "force",
         "force of ground on the input, at O2",
         "unknown",
     )
-    F32: Array | None = _declare_vector(
+    F32: Array = _declare_vector(
         "N",
         "force",
         "force of the coupler on the input, at A",
         "unknown",
     )
-    F43: Array | None = _declare_vector(
+    F43: Array = _declare_vector(
         "N",
         "force",
         "force of the output on the coupler, at B",
         "unknown",
     )
-    F14: Array | None = _declare_vector(
+    F14: Array = _declare_vector(
         "N",
         "force",
         "force of ground on the output, at O4",
         "unknown",
     )
-    torque: Array | None = _scalar(
+    torque: Array = _scalar(
         "N m",
         "force",
         "couple of ground on the driven bar",
         "unknown",
     )
-    drive_force: Array | None = _scalar(
+    drive_force: Array = _scalar(
         "N",
         "force",
         "force of the drive, pushing its ends apart or along its direction",
         "linear drive",
     )
-    power: Array | None = _scalar("W", "force", "power of the drive")
-    drive_condition: Array | None = _scalar(
+    power: Array = _scalar("W", "force", "power of the drive")
+    drive_condition: Array = _scalar(
         "1",
         "force",
         "leverage of the drive, in (0, 1]; 1 is best",
     )
-    torque_error: Array | None = _scalar(
+    torque_error: Array = _scalar(
         "N m",
         "error",
         "error bar of the torque: what rounding makes it scatter by",
     )
-    drive_force_error: Array | None = _scalar(
+    drive_force_error: Array = _scalar(
         "N",
         "error",
         "error bar of the drive's force",
         "linear drive",
     )
-    force_error: Array | None = _scalar(
+    force_error: Array = _scalar(
         "N",
         "error",
         "error bar of the pin forces, of the worst of the four",
     )
-    torque_low: Array | None = _scalar(
+    torque_low: Array = _scalar(
         "N m",
         "force",
         "least torque while dry friction holds a pin",
         "dry friction",
     )
-    torque_high: Array | None = _scalar(
+    torque_high: Array = _scalar(
         "N m",
         "force",
         "greatest then; otherwise both are torque",
         "dry friction",
     )
-    drive_force_low: Array | None = _scalar(
+    drive_force_low: Array = _scalar(
         "N",
         "force",
         "least force of the drive then",
         "dry friction",
     )
-    drive_force_high: Array | None = _scalar(
+    drive_force_high: Array = _scalar(
         "N",
         "force",
         "greatest then",
         "dry friction",
     )
-    friction_residual: Array | None = _scalar(
+    friction_residual: Array = _scalar(
         "N m",
         "force",
         "largest remaining |mu r |F| - couple|",
         "pin loads",
     )
-    time: Array | None = _scalar("s", None, "of a motion law or a free motion")
+    time: Array = _scalar("s", None, "of a motion law or a free motion")
 
 
 QUANTITIES = tuple(

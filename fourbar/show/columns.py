@@ -146,6 +146,7 @@ def _subtract(name: str, first: Column, second: Column) -> Column:
 
 def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
     """Return the SI unit of a number of each position and its values."""
+    values: Array | None
     if name == "time":
         if solution.time is None:
             values = compute_times(solution.scene, solution.at)

@@ -473,7 +473,7 @@ def draw_stroke(axes: "Axes", view: View) -> None:
     """Draw the stroke of a linear drive."""
     over = draw_axes(axes, view)
     factor, unit = choose_unit(max(view.scene.linkage.lengths), "m", view.units)
-    axes.plot(over, factor * view.sweep.stroke, color=INK)  # type: ignore[operator]
+    axes.plot(over, factor * view.sweep.stroke, color=INK)
     axes.set(ylabel=f"stroke ({unit})", title="Stroke of the drive")
 
 

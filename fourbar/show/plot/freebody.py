@@ -99,7 +99,7 @@ def list_actions(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
         )
         arrows.append(arrow)
     if view.scene.drive_bar == bar and view.scene.motion.free is None:
-        couples.append(Couple(f"$T_{bar}$", float(view.here.torque[0])))  # type: ignore[index]
+        couples.append(Couple(f"$T_{bar}$", float(view.here.torque[0])))
     recorder = _record_actions(view)
     arrows += recorder.arrows[bar]
     couples += recorder.turns[bar]
@@ -208,7 +208,7 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
 
     All arrows have one scale.
     """
-    if not np.isfinite(view.here.F12).all():  # type: ignore[arg-type]
+    if not np.isfinite(view.here.F12).all():
         reason = (
             f"needs forces, which have no value at {where_in_words(view.here)}:"
             f" {view.here.status[0]}"
