@@ -365,9 +365,9 @@ def _write_positions(
     out: Path | None,
 ) -> str:
     """Write every position, as JSON, CSV or a table, whose columns may be named."""
+    from fourbar.show.acting import list_spring_notes
     from fourbar.show.block import write_motor
     from fourbar.show.columns import choose_columns
-    from fourbar.show.gas import list_gas_notes
     from fourbar.show.tables import print_positions
     from fourbar.solution import write_csv, write_json
 
@@ -379,7 +379,7 @@ def _write_positions(
         columns = choose_columns(scene, solution, names)
     if form == "json":
         motor = write_motor(scene, solution, units)
-        notes = list_gas_notes(scene, solution, units)
+        notes = list_spring_notes(scene, solution, units)
         return write_json(solution, units, motor=motor, notes=notes)
     if form == "csv":
         if columns:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fourbar.effects.effect import Actions, Effect
 from fourbar.effects.place import STATED_PLACES, Place, change_each, require_ends
 from fourbar.errors import InputError, expect, write_in_units
-from fourbar.formulas.arithmetic import is_any, select
+from fourbar.formulas.arithmetic import Number, is_any, select
 from fourbar.formulas.motion import State
 from fourbar.linkage import (
     AT_LEAST_ZERO,
@@ -38,6 +38,8 @@ GAS = {
     ),
 }
 """Numbers of a gas spring, which becomes one of the springs."""
+SENSES = ("push", "pull")
+"""Senses in which a spring that acts one way may act."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +48,8 @@ class Spring:
 
     The pull is preload + stiffness (distance - length), N. Where that is negative it
     pushes them apart: a compression spring is shorter than `length`, a gas spring has a
-    negative preload. With stiffness 0 the force is constant.
+    negative preload. With stiffness 0 the force is constant. A spring that acts one way
+    comes off where its force would change its sign, and the force is 0 beyond.
 
     Parameters
     ----------
@@ -56,6 +59,7 @@ class Spring:
     preload : N, > 0 pulls, < 0 pushes.
     stroke : by which a gas spring can be shorter than `length`, m; None: not stated.
         It changes no force, so that it does not count where springs are compared.
+    acts : "push" or "pull", the one way in which it acts; None: both.
     """
 
     start: Place
@@ -64,6 +68,7 @@ class Spring:
     length: float = 0.0
     preload: float = 0.0
     stroke: float | None = field(default=None, compare=False, repr=False)
+    acts: str | None = None
     numbers: ClassVar[dict[str, Declared]] = {
         "stiffness": Declared("N/m", AT_LEAST_ZERO),
         "length": Declared("m", AT_LEAST_ZERO),
@@ -86,6 +91,26 @@ class Spring:
                 allowed = f"must be less than the length, {longest}"
                 raise InputError(key, stroke, allowed, unit="m")
             object.__setattr__(self, "stroke", stroke)
+        if self.acts is not None:
+            self._require_one_way()
+
+    def _require_one_way(self) -> None:
+        """Raise InputError unless the force changes its sign at some length."""
+        key = "effects.springs.acts"
+        expect(key, self.acts, str)
+        if self.acts not in SENSES:
+            allowed = " or ".join(f'"{name}"' for name in SENSES)
+            raise InputError(key, self.acts, f"must be {allowed}")
+        if self.stiffness == 0.0:
+            allowed = "leave it out: the force is constant, and comes off at no length"
+            raise InputError(key, self.acts, allowed)
+        if self.slack >= 0.0:
+            most = write_in_units("N", self.stiffness * self.length)
+            allowed = (
+                "leave it out, or state a preload below stiffness times length,"
+                f" {most}: the spring pulls at every length"
+            )
+            raise InputError(key, self.acts, allowed)
 
     @classmethod
     def gas(
@@ -96,6 +121,7 @@ class Spring:
         stroke: float,
         extended_force: float,
         compressed_force: float | None = None,
+        acts: str | None = None,
     ) -> "Spring":
         """Make a gas spring, which pushes its two points apart.
 
@@ -108,6 +134,7 @@ class Spring:
         stroke : by which it can be shortened, m, less than `extended`.
         extended_force : at no stroke, N, >= 0.
         compressed_force : at full stroke, N, no less; left out: the same.
+        acts : as of any spring.
         """
         key = "effects.springs.gas"
         last = extended_force if compressed_force is None else compressed_force
@@ -132,7 +159,8 @@ class Spring:
                 f" {write_in_units('N', first)}",
                 unit="N",
             )
-        return cls(start, end, (last - first) / stroke, extended, -first, stroke)
+        stiffness = (last - first) / stroke
+        return cls(start, end, stiffness, extended, -first, stroke, acts)
 
     def with_places(self, change: Callable[[Place], Place]) -> "Spring":
         """Return the same spring with its ends changed."""
@@ -148,7 +176,23 @@ class Spring:
 
     def pull(self, distance: Any) -> Any:
         """Compute the force with which it pulls at a distance of its ends, N."""
-        return self.preload + self.stiffness * (distance - self.length)
+        tension = self.preload + self.stiffness * (distance - self.length)
+        if self.acts == "push":
+            return np.minimum(tension, 0.0)
+        return np.maximum(tension, 0.0) if self.acts == "pull" else tension
+
+    def across(self, state: State) -> Any:
+        """Return the vector from `start` to `end`, complex, m."""
+        return self.end.locate(state) - self.start.locate(state)
+
+    def reach(self, state: State) -> Any:
+        """Return the path from one end to the other, bar by bar, m."""
+        distances = abs(self.start.distance) + abs(self.end.distance)
+        return sum(state.lengths[:4]) + distances
+
+    def beyond_free_length(self, state: State) -> Any:
+        """Return the distance of the ends less that at which the force is 0, m."""
+        return np.abs(self.across(state)) + self.slack / self.stiffness
 
     def greatest_tension(self, linkage: FourBar) -> float:
         """Return a bound of the tension, N.
@@ -165,7 +209,7 @@ class Springs(Effect):
 
     Where the two points of a spring coincide its pull has no direction: status
     "no_direction". A spring that pulls with stiffness times distance alone pulls with 0
-    there; its preload is stiffness times length.
+    there; its preload is stiffness times length. So does one that only pulls.
     """
 
     springs: tuple[Spring, ...]
@@ -192,12 +236,33 @@ class Springs(Effect):
     def act(self, actions: Actions, state: State) -> None:
         """Add the tension at `start` towards `end`, and its opposite at `end`."""
         for spring in self.springs:
-            across = spring.end.locate(state) - spring.start.locate(state)
+            across = spring.across(state)
             by_distance = spring.stiffness
             if is_any(spring.slack != 0.0):
                 # NaN at a distance of 0, where the status says so
                 by_distance = by_distance + spring.slack / np.abs(across)
+            if spring.acts == "push":
+                by_distance = select(by_distance < 0.0, by_distance, 0.0 * by_distance)
+            elif spring.acts == "pull":
+                by_distance = select(by_distance > 0.0, by_distance, 0.0)
             actions.pull(spring.start, spring.end, by_distance * across)
+
+    def comes_off(self, state: State) -> Any:
+        """Mark where a spring that acts one way just comes off; slopes jump there."""
+        marks: Any = False
+        for spring in self.springs:
+            if spring.acts is not None:
+                near = COINCIDENT_POINTS * spring.reach(state)
+                marks = marks | (np.abs(spring.beyond_free_length(state)) <= near)
+        return marks
+
+    def breaks(self, state: State) -> dict[str, Number]:
+        """Return the length of each spring that acts one way, less where it is off."""
+        return {
+            f"spring {number}": spring.beyond_free_length(state)
+            for number, spring in enumerate(self.springs, 1)
+            if spring.acts is not None
+        }
 
     def status(
         self,
@@ -207,15 +272,11 @@ class Springs(Effect):
         """Return NO_DIRECTION where the two points of a spring with slack coincide."""
         codes = None
         for spring in self.springs:
-            if not is_any(spring.slack != 0.0):
+            is_off = spring.acts == "pull" and not is_any(spring.slack > 0.0)
+            if is_off or not is_any(spring.slack != 0.0):
                 continue
-            across = spring.end.locate(state) - spring.start.locate(state)
-            away = (
-                sum(state.lengths[:4])
-                + abs(spring.start.distance)
-                + abs(spring.end.distance)
-            )
-            coincide = np.abs(across) <= COINCIDENT_POINTS * away
+            near = COINCIDENT_POINTS * spring.reach(state)
+            coincide = np.abs(spring.across(state)) <= near
             here = coincide & (spring.slack != 0.0)
             codes = select(here, NO_DIRECTION, OK if codes is None else codes)
         return codes

@@ -30,7 +30,7 @@ from fourbar.effects import (
 from fourbar.effects.effect import PinRows
 from fourbar.effects.load import FRAMES
 from fourbar.effects.place import AT_FIRST_PIN, STATED_PLACES, settler
-from fourbar.effects.spring import GAS, STROKE_FIELD
+from fourbar.effects.spring import GAS, SENSES, STROKE_FIELD
 from fourbar.errors import InputError, expect
 from fourbar.files.drawing import (
     choose_assembly,
@@ -630,10 +630,14 @@ def _read_springs(
     springs = []
     for index, entry in enumerate(value):
         path = f"{key}[{index}]"
-        row = read.table(path, entry, ("from", "to", *Spring.numbers, "stroke", "gas"))
+        keys = ("from", "to", *Spring.numbers, "stroke", "gas", "acts")
+        row = read.table(path, entry, keys)
         start, end = _read_ends(read, path, row, bars)
+        acts = None
+        if "acts" in row:
+            acts = read.choice(f"{path}.acts", row["acts"], SENSES)
         if gas := "gas" in row:
-            read.table(path, entry, ("from", "to", "gas"))
+            read.table(path, entry, ("from", "to", "gas", "acts"))
             words = read.table(f"{path}.gas", row["gas"], GAS)
             stated = read.numbers(
                 f"{path}.gas",
@@ -647,9 +651,9 @@ def _read_springs(
                 stated["stroke"] = stroke
         try:
             springs.append(
-                Spring.gas(start, end, **stated)
+                Spring.gas(start, end, **stated, acts=acts)
                 if gas
-                else Spring(start, end, **stated)
+                else Spring(start, end, **stated, acts=acts)
             )
         except InputError as error:  # which knows of one spring alone
             raise error.moved_to(error.key.replace(key, path), read.file) from None

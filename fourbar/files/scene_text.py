@@ -297,10 +297,11 @@ def _write_effect(effect: Effect) -> Any:
             effect.numbers["magnitude"].unit,
         )
     if isinstance(effect, Springs):
-        return [
-            {**_write_ends(spring), **write_numbers(spring)}
-            for spring in effect.springs
-        ]
+        entries = []
+        for spring in effect.springs:
+            acts = {} if spring.acts is None else {"acts": spring.acts}
+            entries.append({**_write_ends(spring), **write_numbers(spring), **acts})
+        return entries
     if isinstance(effect, PinRows):
         rows = {}
         for pin, *values in effect.rows:

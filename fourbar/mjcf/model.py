@@ -165,6 +165,8 @@ def _add_camera(world: ET.Element, linkage: FourBar) -> None:
 
 
 CYLINDER = "cylinder"
+_NEVER_REACHED = "1e10"
+"""Length, m, up to which the tendon of a spring that only pushes has no force."""
 """Name of the tendon of a linear drive, and of the actuator on it."""
 LEAST_MASS = 1e-15
 """mjMINVAL: MuJoCo refuses a moving body of less mass (kg) or inertia (kg m^2)."""
@@ -538,10 +540,10 @@ class Model:
             )
             if _is_slack_somewhere(spring):
                 tendon.set("stiffness", write_exactly(spring.stiffness))
-                tendon.set(
-                    "springlength",
-                    write_exactly(-spring.slack / spring.stiffness),
-                )
+                free = write_exactly(-spring.slack / spring.stiffness)
+                # between two lengths a tendon has no force
+                dead_band = {"push": f"{free} {_NEVER_REACHED}", "pull": f"0 {free}"}
+                tendon.set("springlength", dead_band.get(spring.acts or "", free))
         if self.cylinder is not None:
             self._add_line(
                 root,

@@ -1,7 +1,21 @@
-"""Remarks on loads and effects whose meaning the reader of a result may miss."""
+"""Remarks on what acts: couples without a place, and springs that go on too far."""
 
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.effects import Spring, Springs
+from fourbar.evaluation.case import compute_shown_state
 from fourbar.linkage import FIRST_PIN
-from fourbar.scene import Scene
+from fourbar.quantities import Array
+from fourbar.scene import Command, Scene, command_at
+from fourbar.show.units import write_short
+from fourbar.solution import Conversion, Solution
+from fourbar.studies.equilibrium import bisect
+
+AT_END_OF_STROKE = 1e-6
+"""Part of a gas spring's length within which it is at its end. A scene that states the
+end as a place has fewer digits than that.
+"""
 
 
 def list_couple_notes(scene: Scene) -> list[str]:
@@ -17,3 +31,167 @@ def list_couple_notes(scene: Scene) -> list[str]:
     return [
         f"  a moment alone: {', '.join(entries)}; its from_pin states another place"
     ]
+
+
+def list_spring_notes(scene: Scene, solution: Solution, units: Conversion) -> list[str]:
+    """List where gas springs are beyond their stroke, and springs change their sense.
+
+    A gas spring is taken to push on along the same line, and another one both to push
+    and to pull: either may be a spring that does not exist.
+
+    `units`: units of the numbers; one that is left out is the SI unit with a prefix.
+    """
+    notes = []
+    for number, spring in enumerate(list_springs(scene), 1):
+        distance = measure_end_distance(scene, spring, solution.at)
+        distance = np.where(solution.assembled, distance, np.nan)
+        if spring.stroke is None:
+            if spring.acts is None and spring.stiffness > 0.0 and spring.slack < 0.0:
+                end = -spring.slack / spring.stiffness
+                pulls = distance > end
+                if pulls.any() and (distance < end).any():
+                    stretches = _list_stretches(scene, solution, spring, end, pulls)
+                    where = _write_stretches(solution, stretches, units)
+                    notes.append(
+                        f"spring {number} pulls {where} and pushes elsewhere: with acts"
+                        ' = "push" or "pull" it acts one way'
+                    )
+            continue
+        for sign, end, word in (
+            (1.0, spring.length, "longer than its extended length of"),
+            (
+                -1.0,
+                spring.length - spring.stroke,
+                "shorter than its compressed length of",
+            ),
+        ):
+            room = AT_END_OF_STROKE * spring.length
+            with np.errstate(invalid="ignore"):
+                beyond = sign * (distance - end) > room
+            stretches = _list_stretches(scene, solution, spring, end, beyond)
+            if not stretches:
+                continue
+            length = write_short(end, "m", units)
+            where = _write_stretches(solution, stretches, units)
+            notes.append(
+                f"spring {number}, a gas spring, is {word} {length} {where}: it is"
+                " taken to push on, and has no stops"
+            )
+    return notes
+
+
+def list_springs(scene: Scene) -> tuple[Spring, ...]:
+    """List the springs of a scene in the order of its file."""
+    for effect in scene.settled().effects:
+        if isinstance(effect, Springs):
+            return effect.springs
+    return ()
+
+
+def measure_end_distance(scene: Scene, spring: Spring, at: Command) -> Array:
+    """Measure how far the ends of a spring are apart at each position, m."""
+    state = compute_shown_state(scene, at)
+    across = spring.end.locate(state) - spring.start.locate(state)
+    return np.broadcast_to(np.abs(across), at.places.shape)
+
+
+_Stretch = tuple[float | None, float | None]
+"""Places of the start and of the end; None: the motion begins or ends within."""
+
+
+def _list_stretches(
+    scene: Scene,
+    solution: Solution,
+    spring: Spring,
+    end: float,
+    beyond: NDArray[np.bool_],
+) -> list[_Stretch]:
+    """List where a spring is beyond a length, from where it is at positions."""
+    rows = np.flatnonzero(beyond[1:] != beyond[:-1])
+    crossings = _locate_crossings(scene, solution, spring, end, rows)
+    stretches = list[_Stretch]()
+    start = None
+    for row, place in zip(rows, crossings, strict=True):
+        if beyond[row]:
+            stretches.append((start, float(place)))
+        else:
+            start = float(place)
+    if beyond[-1]:
+        stretches.append((start, None))
+    return stretches
+
+
+def _locate_crossings(
+    scene: Scene,
+    solution: Solution,
+    spring: Spring,
+    end: float,
+    rows: NDArray[np.intp],
+) -> Array:
+    """Find where a spring reaches a length in the steps that begin at rows.
+
+    It is the later position of a step in which nothing lies between the two: of a
+    release, of a list, and where the loop does not close.
+    """
+    at = solution.at
+    places = np.array(at.places[rows + 1], dtype=float)
+    assembled = solution.assembled[rows] & solution.assembled[rows + 1]
+    if scene.motion.free is not None or isinstance(scene.motion.angle, np.ndarray):
+        assembled[:] = False
+    if not assembled.any():
+        return places
+    rows = rows[assembled]
+    low = at.places[rows]
+    high = at.places[rows + 1]
+    before = measure_end_distance(scene, spring, _command_between(scene, at, low)) > end
+
+    def is_as_before(middle: Array) -> NDArray[np.bool_]:
+        distance = measure_end_distance(
+            scene,
+            spring,
+            _command_between(scene, at, middle),
+        )
+        return np.equal(distance > end, before)
+
+    low, high = bisect(is_as_before, low, high)
+    places[assembled] = 0.5 * (low + high)
+    return places
+
+
+def _command_between(scene: Scene, at: Command, places: Array) -> Command:
+    """Return the command at places between its own."""
+    if at.time is not None or at.stroke is not None:
+        return command_at(scene, places)
+    branch = np.full(places.shape, at.branch[0])
+    return Command(places, branch, None, 0.0, bar=at.bar)
+
+
+def _write_stretches(
+    solution: Solution, stretches: list[_Stretch], units: Conversion
+) -> str:
+    """Write stretches, joined by "and"."""
+    return " and ".join(_write_stretch(solution, one, units) for one in stretches)
+
+
+def _write_stretch(solution: Solution, stretch: _Stretch, units: Conversion) -> str:
+    """Write a stretch as "from theta_2 = 61.2 deg on"."""
+    start, stop = stretch
+    if solution.time is not None:
+        name = "t"
+        unit = "s"
+    else:
+        name = solution.commanded
+        unit = "rad" if solution.at.stroke is None else "m"
+    if start is None and stop is None:
+        if len(solution) == 1:
+            return "here"
+        return "throughout"
+    ends = [
+        "" if place is None else f"{name} = {write_short(place, unit, units)}"
+        for place in stretch
+    ]
+    if start is None:
+        return f"up to {ends[1]}"
+    if stop is None:
+        return f"from {ends[0]} on"
+    return f"from {ends[0]} to {ends[1]}"

@@ -17,8 +17,8 @@ from fourbar.quantities import (
     Array,
     find_derived,
 )
+from fourbar.show.acting import list_springs, measure_end_distance
 from fourbar.show.duty import read_drive_demand, shaking_force, shaking_moment
-from fourbar.show.gas import list_springs, measure_end_distance
 from fourbar.solution import (
     Conversion,
     Solution,

@@ -26,8 +26,8 @@ from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar
 from fourbar.quantities import COUPLE, LINE, NOT_ASSEMBLED, PIN_FORCES, SINGULAR
 from fourbar.scene import find_signs
 from fourbar.scene.motion import BRANCH_NAMES
+from fourbar.show.acting import list_spring_notes
 from fourbar.show.duty import read_drive_demand
-from fourbar.show.gas import list_gas_notes
 from fourbar.show.tables import (
     MOST_ROWS_PRINTED,
     make_plain_table,
@@ -462,7 +462,7 @@ def _list_notes(rest: Equilibria, units: Conversion) -> list[str]:
     """List where gas springs of the scene are beyond their stroke."""
     scene = rest.positions.scene
     assert scene is not None
-    return list_gas_notes(scene, rest.positions, units)
+    return list_spring_notes(scene, rest.positions, units)
 
 
 def _write_holding(rest: Equilibria, units: Conversion) -> tuple[list[str], Any]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.effects import Springs
 from fourbar.effects.effect import Actions
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
@@ -66,6 +67,8 @@ AT_REST = "at_rest"
 """Status where dry friction holds a pin at rest. Its couple, and all that follows from
 it, jumps with the motion.
 """
+AT_FREE_LENGTH = "at_free_length"
+"""Status where a spring that acts one way just comes off: slopes jump there."""
 
 
 class _Influence(NamedTuple):
@@ -101,8 +104,9 @@ class Sensitivity:
     """
     status: list[str]
     """Status of each position, as in `Solution.status`; "at_rest": dry friction holds a
-    pin, torque and pin forces have no derivative there. Quantities that a status other
-    than ok concerns are NaN.
+    pin; "at_free_length": a spring that acts one way just comes off. Torque and pin
+    forces have no derivative there. Quantities that a status other than ok concerns are
+    NaN.
     """
     by: dict[str, Array]
     """Derivatives by quantity, (p, n) or (p, n, 2)."""
@@ -363,10 +367,12 @@ def sensitivity(scene: Scene) -> Sensitivity:
             seeded = replace_number(seeded, entry, sloped)
         for start in range(0, len(regular), POSITIONS_AT_ONCE):
             index = regular[start : start + POSITIONS_AT_ONCE]
-            derived, held = _compute_derivatives(
+            derived, marks = _compute_derivatives(
                 seeded, keys, commanded, index, by.keys(), moving
             )
-            status[index[held & (solution.status_code[index] == OK)]] = AT_REST
+            is_ok = solution.status_code[index] == OK
+            status[index[marks[AT_FREE_LENGTH] & is_ok]] = AT_FREE_LENGTH
+            status[index[marks[AT_REST] & is_ok]] = AT_REST
             for name, number in derived.items():
                 slopes = np.broadcast_to(take_slopes(number), (p, len(index)))
                 if by[name].ndim == 3:
@@ -426,10 +432,10 @@ def _compute_derivatives(
     index: NDArray[np.intp],
     names: KeysView[str],
     moving: bool,
-) -> tuple[dict[str, Any], NDArray[np.bool_]]:
+) -> tuple[dict[str, Any], dict[str, NDArray[np.bool_]]]:
     """Compute the quantities at some positions, with their slopes.
 
-    It returns too where dry friction holds a pin at rest.
+    It returns too the marks, by status, of positions where forces have no slopes.
     """
     place = {key: number for number, key in enumerate(keys)}
 
@@ -466,13 +472,16 @@ def _compute_derivatives(
     quantities = {**list_kinematics(case, state, names), **commanded}
     if condition is not None:
         quantities["condition"] = quantities["condition"] * condition
-    held = np.zeros(len(index), dtype=bool)
+    held, off = np.zeros((2, len(index)), dtype=bool)
     if moving:
         actions = Actions(state, case.bodies)
         for pin in {pin for term in case.terms for pin in term.dry_pins}:
             held |= ~np.broadcast_to(actions.turning(pin), held.shape) | (
                 take_values(speed) == 0.0
             )
+        for term in case.terms:
+            if isinstance(term, Springs):
+                off |= term.comes_off(state)
         dynamics = case.dynamics(state, acceleration)
         quantities |= {
             **dynamics.pins._asdict(),
@@ -484,4 +493,7 @@ def _compute_derivatives(
     for name in names:
         if find_unit_of_quantity(name) == "m" and not is_scalar(name):
             quantities[name] = quantities[name] + origin
-    return {name: quantities[name] for name in names}, held
+    return {name: quantities[name] for name in names}, {
+        AT_REST: held,
+        AT_FREE_LENGTH: off,
+    }

@@ -50,6 +50,7 @@ _SAME_FOR_ALL = (
         "frame",
         "table",
         "picture",
+        "acts",
     ),
     *("from", "to", "steps", "limit", "offset"),
 )

@@ -552,6 +552,8 @@ def _list_needs(problem: dict[str, Any]) -> set[str]:
         needs.add("cylinder")
     if problem["ask"] == "release":
         needs.add("release")
+    if any("acts" in spring for spring in scene.get("effects", {}).get("springs", ())):
+        needs.add(protocol.ONE_SIDED)
     return needs
 
 

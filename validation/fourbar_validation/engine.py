@@ -60,7 +60,7 @@ def open_engine(entry: str) -> tuple[_Factory, dict[str, Any]]:
         "engine": entry,
         "answers": list(engine.answers),
         "commands": list(getattr(adapter, "commands", ("theta_2",))),
-        "effects": [*_ALL_BUT_CYLINDER, "cylinder", "push"],
+        "effects": [*_ALL_BUT_CYLINDER, "cylinder", "push", protocol.ONE_SIDED],
     }
     library = engine.library.removeprefix("py")  # pydrake is of the distribution drake
     try:

@@ -135,8 +135,22 @@ def _add_springs(effect: Any, bodies: ExudynBodies) -> None:
                 referenceLength=spring.length,
                 stiffness=spring.stiffness,
                 force=spring.preload,
+                **_act_one_way(spring),
             )
         )
+
+
+def _act_one_way(spring: Any) -> dict[str, Any]:
+    """Return the force law of a spring that acts one way, as Exudyn takes it."""
+    if spring.acts is None:
+        return {}
+    clip = min if spring.acts == "push" else max
+
+    def pull(*state: Any) -> float:
+        _, _, _, beyond, _, stiffness, _, preload = state
+        return float(clip(preload + stiffness * beyond, 0.0))
+
+    return {"springForceUserFunction": pull}
 
 
 ELEMENT_OF: dict[str, Callable[[Any, ExudynBodies], None]] = {

@@ -389,7 +389,7 @@ def test_the_page_s_example_reads_an_answer_without_this_project() -> None:
     code = page[page.index("```python") + 9 :].partition("```")[0]
     names: dict[str, Any] = {}
     exec(code, names)
-    assert "fourbar" not in code.replace("fourbar-problem/3", "")
+    assert "fourbar" not in code.replace("fourbar-problem/4", "")
     file, right = (
         PROBLEMS / "newton_128.json",
         read_stored("newton_128")["answers"]["F43"],

@@ -55,6 +55,15 @@ ACTING: dict[str, Effect] = {
             Spring.gas(Place(1, (0.2, 2.0)), Place(3, (0.05, 1.0)), 0.5, 0.3, 4.0, 7.0),
             Spring(Place(1, (0.15, -0.6)), Place(4, (0.1, 0.4)), 0.0, preload=-2.0),
             Spring(Place(1, (0.12, -2.0)), Place(2, (0.05, 0.4)), 30.0, 0.0, 2.0),
+            Spring(Place(1, (0.0, 0.0)), Place(3, (0.1, 0.3)), 90.0, 0.15, acts="push"),
+            Spring(
+                Place(1, (0.0, 0.0)),
+                Place(4, (0.1, 0.3)),
+                70.0,
+                0.25,
+                -2.0,
+                acts="pull",
+            ),
         )
     ),
     "flywheel": Flywheel(0.02, 2),

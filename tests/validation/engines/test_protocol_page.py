@@ -103,7 +103,7 @@ def test_the_page_s_engine_answers_what_the_formulas_do(
         "command": protocol.command_to_json(scene, told),
     }
     hello, reply = ask(
-        engine, {"ask": "hello", "protocol": 3}, {"ask": "answer", **question}
+        engine, {"ask": "hello", "protocol": 4}, {"ask": "answer", **question}
     )
     answer = protocol.answer_from_json(hello["engine"], commanded, reply)
     truth, compared = fourbar.solve(scene, at=commanded), 0
@@ -168,7 +168,7 @@ def test_what_an_engine_writes_is_what_the_schema_says(engine: Path) -> None:
         "command": protocol.command_to_json(scene, told),
     }
     hello, reply = ask(
-        engine, {"ask": "hello", "protocol": 3}, {"ask": "answer", **question}
+        engine, {"ask": "hello", "protocol": 4}, {"ask": "answer", **question}
     )
     check("hello").validate(hello)
     check("answer").validate(reply)

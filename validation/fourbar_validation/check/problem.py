@@ -21,7 +21,7 @@ from fourbar_validation.compare.rows import escape_controls, write_one_line
 from fourbar_validation.compare.tolerance import EPS, K, magnitude
 from fourbar_validation.engines import protocol
 
-PROBLEM_SCHEMA = "fourbar-problem/3"
+PROBLEM_SCHEMA = "fourbar-problem/4"
 RESULT = "fourbar-result/1"
 LEVELS = {"A": 1e-9, "B": 1e-6, "C": 1e-3}
 """Largest error of each level, over the largest value; D is worse. Error bars of the

@@ -598,11 +598,21 @@ def _add_spring(
     else:
         distance = abs(across)
         tension = x[f"pull_{k}"] + stiffness * (distance - x[f"length_{k}"])
+        if spring.acts is not None:
+            tension = _keep_one_way(tension, spring.acts)
         pull = tension / distance * across
     for bar, arm, force in ((start, arms[0], pull), (end, arms[1], -pull)):
         if bar in acting.force:
             acting.force[bar] += force
             acting.moment[bar] += wedge(arm - bars.centre[bar], force)
+
+
+def _keep_one_way(tension: Ball, acts: str) -> Ball:
+    """Return the tension of a spring that acts one way; where unsure, both cases."""
+    sense = -1 if acts == "push" else 1
+    if sense * tension > 0:
+        return tension
+    return arb(0) if sense * tension <= 0 else tension.union(arb(0))
 
 
 def _solve_thirteen_balls(

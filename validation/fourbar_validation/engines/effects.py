@@ -101,6 +101,8 @@ def _apply_springs(effect: "Springs", bars: Loaded) -> None:
             per_metre = spring.stiffness
         else:
             tension = spring.preload + spring.stiffness * (distance - spring.length)
+            if spring.acts is not None and (tension < 0.0) != (spring.acts == "push"):
+                continue
             if distance:
                 per_metre = tension / distance
             else:

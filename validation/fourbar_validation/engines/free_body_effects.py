@@ -195,11 +195,13 @@ def _add_spring_pulls(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -
                 + abs(spring.end.distance)
             )
             distance = np.where(np.abs(across) <= _MEET * reach, np.nan, np.abs(across))
-            pull = (
-                (spring.preload + spring.stiffness * (distance - spring.length))
-                / distance
-                * across
-            )
+            tension = spring.preload + spring.stiffness * (distance - spring.length)
+            if spring.acts == "push":
+                tension = np.minimum(tension, 0.0)
+            elif spring.acts == "pull":  # off where the ends meet
+                tension = np.maximum(np.nan_to_num(tension), 0.0)
+                distance = np.nan_to_num(distance, nan=1.0)
+            pull = tension / distance * across
         wrenches.push(spring.start.bar, pull, arms[0])
         wrenches.push(spring.end.bar, -pull, arms[1])
 

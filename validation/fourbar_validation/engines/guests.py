@@ -16,6 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from fourbar.effects import Springs
 from fourbar.errors import InputError
 from fourbar.quantities import ANGLES, DRY_FRICTION_QUANTITIES, Array
 from fourbar.scene import Command, Scene
@@ -337,6 +338,9 @@ def _find_needs(scene: Scene) -> list[str]:
     """List what a scene asks of an engine, in the words of hello's `effects`."""
     needs = [effect.key for effect in scene.effects]
     needs += ["loads"] * bool(scene.loads)
+    for effect in scene.effects:
+        if isinstance(effect, Springs) and any(one.acts for one in effect.springs):
+            needs.append(protocol.ONE_SIDED)
     needs += (
         [name_drive(scene.drive)]
         if scene.drive is not None

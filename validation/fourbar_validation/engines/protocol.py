@@ -28,12 +28,14 @@ from fourbar_validation.compare.answer import Answer, EngineError, ReleasedAnswe
 from fourbar_validation.compare.pins import find_mass, state_from_pins
 from fourbar_validation.compare.rows import write_one_line
 
-PROTOCOL = 3
+PROTOCOL = 4
 """Number of the contract; a change that an engine must know of raises it."""
 _FURTHEST = 0.1
 """rad, and part of the greatest speed and acceleration: a motion that ends further from
 the command than this answers another question.
 """
+ONE_SIDED = "one_sided"
+"""Word of a hello's `effects` for springs that act one way."""
 DESCRIBED_TABLES = ("lengths", "bars", "drive", "loads", "effects")
 KINDS_OF_COMMAND = (*COMMAND_NAMES.values(), STROKE_COMMAND)
 _OF_RELEASED = ("theta_2", "omega_2", "energy", "terms")

@@ -1,0 +1,207 @@
+"""Springs that act one way, by the energy of a linkage that circles close.
+
+The torque is the slope of the energy over the angle, and a released motion conserves
+it: nothing of the formulas is used.
+"""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import fourbar
+from fourbar.effects import Place, Spring
+from fourbar.errors import InputError
+from fourbar.files import dump, loads
+from fourbar.quantities import NO_DIRECTION
+from tests.support.scenes import crank_rocker
+
+SLOPES = 1e-7
+"""Relative: a central difference over 1e-5 rad, of positions with 16 digits."""
+DOOR = """
+[lengths]
+ground = "60 mm"
+input = "25 mm"
+coupler = "70 mm"
+output = "55 mm"
+[bars.input]
+mass = "0.02 kg"
+[bars.coupler]
+mass = "0.06 kg"
+inertia = "35 kg mm^2"
+centre = { x = "40 mm", y = "5 mm" }
+[bars.output]
+mass = "0.04 kg"
+[motion]
+MOTION
+[[loads]]
+bar = 3
+from_pin = ["70 mm", "0 deg"]
+force = ["200 mN", "-90 deg"]
+[effects]
+gravity = ["9.81 m/s^2", "-90 deg"]
+torsion = { O2 = { stiffness = "0.05 N m/rad", rest = "20 deg" } }
+[[effects.springs]]
+from = { bar = 1 }
+to = { bar = 3, from_pin = ["50 mm", "0 deg"] }
+stiffness = "0.5 N/mm"
+length = "60 mm"
+ACTS
+"""
+
+
+def make_door(motion: str, acts: str = 'acts = "push"') -> fourbar.Scene:
+    return loads(DOOR.replace("MOTION", motion).replace("ACTS", acts))
+
+
+def close(theta: float) -> tuple[complex, complex]:
+    """Return A and B of the door, m, by the intersection of two circles."""
+    A = 0.025 * np.exp(1j * theta)
+    to_O4 = 0.06 - A
+    d = abs(to_O4)
+    along = (0.07**2 - 0.055**2 + d * d) / (2.0 * d)
+    across = math.sqrt(0.07**2 - along**2)
+    return A, A + (along + 1j * across) * to_O4 / d
+
+
+def energy_of_door(theta: float) -> float:
+    """Return weights, load, torsion spring and the spring that only pushes, J."""
+    A, B = close(theta)
+    line = (B - A) / 0.07
+    G3 = A + (0.04 + 0.005j) * line
+    lifted = 0.02 * A.imag / 2.0 + 0.06 * G3.imag + 0.04 * B.imag / 2.0
+    pushed = min(abs(A + 0.05 * line) - 0.06, 0.0)
+    turned = theta - math.radians(20.0)
+    return float(
+        9.81 * lifted + 0.2 * B.imag + 0.025 * turned**2 + 0.5 * 500.0 * pushed**2
+    )
+
+
+def inertia_of_door(theta: float) -> float:
+    """Return the equivalent inertia at bar 2, kg m^2, by differences of positions."""
+    step = 1e-5
+    (A, B), (A_1, B_1) = close(theta - step), close(theta + step)
+    lines = [((one - A_0) / 0.07) for A_0, one in ((A, B), (A_1, B_1))]
+    G = [A_0 + (0.04 + 0.005j) * u for A_0, u in ((A, lines[0]), (A_1, lines[1]))]
+    turn = np.angle(lines[1] / lines[0]) / (2.0 * step)
+    swing = np.angle((B_1 - 0.06) / (B - 0.06)) / (2.0 * step)
+    speed = abs(G[1] - G[0]) / (2.0 * step)
+    slender = 0.02 * 0.025**2 / 3.0 + 0.04 * 0.055**2 / 3.0 * swing**2
+    return float(slender + 0.06 * speed**2 + 35e-6 * turn**2)
+
+
+def test_the_door_is_held_by_what_its_energy_asks() -> None:
+    """At 40 deg the spring is longer than its free length, at 120 deg shorter."""
+    scene = make_door('theta_2 = ["40 deg", "100 deg", "120 deg"]\nomega_2 = "0 rad/s"')
+    assert loads(dump(scene)) == scene
+    s = fourbar.solve(scene)
+    step = 1e-5
+    right = [
+        (energy_of_door(t + step) - energy_of_door(t - step)) / (2.0 * step)
+        for t in s.theta_2
+    ]
+    np.testing.assert_allclose(s.torque, right, rtol=SLOPES)
+    fastened = fourbar.solve(make_door('theta_2 = "40 deg"\nomega_2 = "0 rad/s"', ""))
+    assert s.torque[0] - fastened.torque[0] == pytest.approx(0.0265373, abs=6e-8)
+
+
+def test_a_door_without_other_forces_is_free_beyond_the_springs_length() -> None:
+    scene = make_door('theta_2 = ["40 deg", "120 deg"]\nomega_2 = "0 rad/s"')
+    alone = replace(scene, loads=(), effects=scene.effects[-1:])
+    torque = fourbar.solve(alone).torque
+    assert torque[0] == 0.0 and torque[1] == pytest.approx(0.0506291, abs=6e-8)
+
+
+def test_no_equilibrium_is_found_where_the_spring_would_have_to_pull() -> None:
+    sweep = 'theta_2 = { from = "40 deg", to = "150 deg", steps = 11 }'
+    found = fourbar.equilibrium(make_door(sweep, "")).found
+    assert [math.degrees(one.place.theta_2) for one in found] == pytest.approx(
+        [80.88], abs=5e-3
+    )
+    assert fourbar.equilibrium(make_door(sweep)).found == ()
+
+
+def test_a_released_door_arrives_as_its_energy_says() -> None:
+    """t = integral of d theta/omega, omega^2 = 2 (U(start) - U)/J."""
+    motion = 'theta_2 = "150 deg"\nfree = { duration = "0.04 s", steps = 4000 }'
+    s = fourbar.solve(make_door(motion))
+    row = int(np.argmax(s.theta_2 <= math.radians(40.0)))
+    start = math.radians(150.0)
+
+    def speed(theta: float) -> float:
+        lost = energy_of_door(start) - energy_of_door(theta)
+        return math.sqrt(2.0 * lost / inertia_of_door(theta))
+
+    end = float(s.theta_2[row])
+    # with theta = start - x^2 the integrand has a value where the door is let go
+    time, _ = quad(
+        lambda x: 2.0 * x / speed(start - x * x), 1e-6, math.sqrt(start - end)
+    )
+    assert s.omega_2[row] == pytest.approx(-speed(end), rel=1e-6)
+    assert s.time[row] == pytest.approx(time, rel=1e-4)
+    assert (time, speed(end)) == pytest.approx((31.83e-3, 139.4), rel=1e-3)
+
+
+ENDS = Place(1, (0.1, 0.5)), Place(2, (0.1, 0.0))
+"""They meet at 0.7 rad: the ground lies at 0.2 rad."""
+
+
+@pytest.mark.parametrize(("acts", "status"), [("push", NO_DIRECTION), ("pull", 0)])
+def test_where_its_ends_meet_a_spring_that_only_pulls_is_off(
+    acts: str, status: int
+) -> None:
+    spring = Spring(*ENDS, 200.0, 0.05, acts=acts)
+    scene = crank_rocker(
+        motion=fourbar.Motion([0.7, 0.9], 8.0), effects=(fourbar.Springs((spring,)),)
+    )
+    s = fourbar.solve(scene)
+    assert s.status_code.tolist() == [status, 0]
+    if acts == "pull":
+        bare = fourbar.solve(replace(scene, effects=()))
+        assert s.torque[0] == bare.torque[0]
+
+
+def test_a_sensitivity_is_null_where_a_spring_comes_off_and_nowhere_else() -> None:
+    """The distance of the ends is 2 r sin(half the angle between them)."""
+    off = 0.2 * math.sin(0.5)
+    scene = crank_rocker(
+        motion=fourbar.Motion([1.4, 1.7, 2.0], 0.0),
+        effects=(fourbar.Springs((Spring(*ENDS, 200.0, off, acts="pull"),)),),
+    )
+    slopes = fourbar.sensitivity(scene)
+    assert slopes.status == ["ok", "at_free_length", "ok"]
+    by_length = slopes.of("torque", "effects.springs.0.length")
+    assert by_length[0] == 0.0 and math.isnan(by_length[1]) and by_length[2] != 0.0
+
+
+@pytest.mark.parametrize(
+    ("acts", "numbers", "words"),
+    [
+        ("both", {}, '"push" or "pull"'),
+        ("push", {"stiffness": 0.0, "preload": -3.0}, "constant"),
+        ("push", {"preload": 10.0}, "10 N"),
+        ("pull", {"length": 0.0}, "0 N"),
+    ],
+)
+def test_a_spring_that_never_comes_off_is_refused(
+    acts: str, numbers: dict[str, Any], words: str
+) -> None:
+    stated = {"stiffness": 200.0, "length": 0.05} | numbers
+    with pytest.raises(InputError) as refused:
+        Spring(*ENDS, **stated, acts=acts)
+    assert "springs.acts" in str(refused.value) and words in str(refused.value)
+
+
+def test_a_gas_spring_acts_one_way_too_and_a_study_keeps_the_sense() -> None:
+    gas = Spring.gas(*ENDS, 0.12, 0.05, 0.0, 20.0, acts="push")
+    scene = crank_rocker(
+        motion=fourbar.Motion([1.0, 2.5], 0.0), effects=(fourbar.Springs((gas,)),)
+    )
+    assert loads(dump(scene)).effects[0].springs[0].acts == "push"
+    bare, s = fourbar.solve(replace(scene, effects=())), fourbar.solve(scene)
+    assert s.torque[0] != bare.torque[0] and s.torque[1] == bare.torque[1]
+    study = fourbar.vary(scene, {"effects.springs.0.length": [0.02, 0.12]})
+    np.testing.assert_array_equal(fourbar.solve(study).torque, [bare.torque, s.torque])
