@@ -21,8 +21,8 @@ from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.rows import FAILS, FORMULAS, UNDECIDED, Row
 from fourbar_validation.compare.scales import (
     TermSizes,
+    find_scale_of_answer,
     make_reference,
-    take_smallest_scales,
     take_strictest_conditions,
 )
 from fourbar_validation.compare.tolerance import (
@@ -228,7 +228,7 @@ def blocks(question: Question) -> Iterator[Row]:
     at_ends = rows[ends]
     error = (status[ends] != solution.status_code[at_ends]).astype(float)
     with np.errstate(all="ignore"):  # beyond the range of doubles there is no size
-        scales = TermSizes(scene, solution).scales([*expected], [*expected.values()])
+        scale = TermSizes(scene, solution).scales([*expected], [*expected.values()])
     due = [values[at_ends] for values in expected.values()]
     at_once = [values[ends] for values in together.values()]
     finite_due = np.isfinite(magnitudes(due))
@@ -237,7 +237,7 @@ def blocks(question: Question) -> Iterator[Row]:
     conditions[np.isnan(conditions)] = 1.0  # decided by the command: nothing closes
     # evaluated by the same code, but not in the same company of a processor's registers
     differences = compute_differences([*expected], at_once, due)
-    errors = divide(differences, scales[:, at_ends]) * conditions
+    errors = divide(differences, scale.of_terms[:, at_ends]) * conditions
     errors[~finite_due] = 0.0
     errors[finite_due != finite_at_once] = np.inf
     error = np.maximum(error, errors.max(axis=0))
@@ -292,11 +292,11 @@ def error_bars(question: Question) -> Iterator[Row]:
     )
     names = ("torque", *PIN_FORCES)
     differences = magnitudes([getattr(ours, q) - exact.quantities[q] for q in names])
-    sizes = take_smallest_scales(
-        names,
-        TermSizes(scene, ours),
-        None if reference is None else TermSizes(scene, reference),
-    )
+    scale = TermSizes(scene, ours).scales(names, [getattr(ours, q) for q in names])
+    if reference is not None:
+        theirs = find_scale_of_answer(names, scene, reference)
+        scale = scale if theirs is None else scale.take_strictest(theirs)
+    sizes = scale.of_terms
     conditions = take_strictest_conditions(names, scene.linkage, ours, reference)
     for bar, rows in (("torque_error", slice(0, 1)), ("force_error", slice(1, None))):
         width = getattr(ours, bar)

@@ -40,6 +40,18 @@ def crank_rocker(**changes: object) -> fourbar.Scene:
     return fourbar.Scene(**{**parts, **changes})  # type: ignore[arg-type]
 
 
+def balance(left: float, omega_2: float = 0.01) -> fourbar.Scene:
+    """Make a crank whose counterweight leaves a part of its weight's moment."""
+    linkage = fourbar.FourBar(
+        0.3,
+        fourbar.Bar(0.1, 0.5, 0.001, (0.1 * (1.0 - left), math.pi)),
+        fourbar.Bar(0.25, 0.5, 0.004, (0.0, 0.0)),
+        fourbar.Bar(0.22, 0.4, 0.002, (0.0, 0.0)),
+    )
+    motion = fourbar.Motion(fourbar.Sweep(0.1, 0.1 + math.tau, 36), omega_2)
+    return fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+
+
 TURN = crank_rocker(
     motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + math.tau, 24), 10.0),
     points=(fourbar.Point("P", 3, (0.1, 0.7)), fourbar.Point("J", 4, (0.05, 0.2))),

@@ -4,6 +4,7 @@ The unit of an error where nothing is allowed is tested too.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from fourbar_validation.compare.compare import (
     judge_errors,
 )
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, Row
+from fourbar_validation.compare.scales import Scale
 from fourbar_validation.compare.tolerance import EPS as LAST_DIGIT
 from fourbar_validation.compare.tolerance import EQUIVALENCE, K
 from tests.support.scenes import crank_rocker
@@ -30,11 +32,10 @@ def make_errors(*error: float, condition: float = 1.0, **changes: object) -> Err
     parts: dict[str, object] = {
         "error": np.array(error),
         "allowed": np.full(n, ALLOWED),
-        "unit": np.ones(n),
+        "scale": Scale(np.ones(n), np.ones(n), np.zeros(n, dtype=bool)),
         "relative": np.ones(n, dtype=bool),
         "condition": np.full(n, condition),
         "mask": np.ones(n, dtype=bool),
-        "decidable": np.ones(n, dtype=bool),
         "tolerance": EQUIVALENCE,
     }
     return Errors(**{**parts, **changes})  # type: ignore[arg-type]
@@ -46,7 +47,8 @@ def make_errors(*error: float, condition: float = 1.0, **changes: object) -> Err
         (None, FAILS, ALLOWED),
         (1e-14, FAILS, 1e-13),
         (2e-13, DEGRADED, 2e-12),
-        (2.0, UNDECIDED, 20.0),
+        (0.99, DEGRADED, 9.9),
+        (1.0, UNDECIDED, 10.0),
     ],
 )
 def test_an_error_beyond_the_allowed_one_is_held_to_its_prediction(
@@ -66,13 +68,37 @@ def test_within_what_is_allowed_no_prediction_is_needed() -> None:
 
 
 def test_no_number_fails_wherever_it_stands() -> None:
-    nowhere = np.zeros(2, dtype=bool)
-    worst = judge_errors(make_errors(np.nan, 0.0, decidable=nowhere), None)
+    worst = judge_errors(make_errors(np.nan, 0.0, allowed=np.ones(2)), None)
     assert (worst.position, worst.verdict, worst.reason[:3]) == (0, FAILS, "NaN")
-    undecided = judge_errors(
-        make_errors(1.0, condition=1e-20, decidable=np.zeros(1, dtype=bool)), None
-    )
-    assert undecided.verdict == UNDECIDED and undecided.decided == 0
+
+
+@pytest.mark.parametrize(
+    ("allowed", "declared", "verdict"),
+    [
+        (0.049, K * LAST_DIGIT, FAILS),
+        (0.051, K * LAST_DIGIT, UNDECIDED),
+        (0.2, 0.2, FAILS),
+        (0.21, 0.2, UNDECIDED),
+    ],
+)
+def test_a_position_at_which_too_much_is_allowed_is_undecided(
+    allowed: float, declared: float, verdict: str
+) -> None:
+    """One position that decides is enough for a row."""
+    tolerance = replace(EQUIVALENCE, factor=declared)
+    scale = Scale(np.ones(2), np.full(2, 123.0), np.zeros(2, dtype=bool))
+
+    def judge(*allowed: float) -> tuple[str, int]:
+        errors = make_errors(
+            1.0, 0.0, allowed=np.array(allowed), scale=scale, tolerance=tolerance
+        )
+        worst = judge_errors(errors, None)
+        assert "the terms cancel 1.2e+02-fold" in worst.reason
+        return worst.verdict, worst.decided
+
+    decided = 2 if verdict == FAILS else 0
+    assert judge(allowed, allowed) == (verdict, decided)
+    assert judge(allowed, ALLOWED) == ((FAILS, 2) if verdict == FAILS else (AGREES, 1))
 
 
 def test_a_prediction_of_the_whole_value_leaves_no_digit_but_in_a_unit_of_its_own() -> (

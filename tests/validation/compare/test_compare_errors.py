@@ -15,7 +15,8 @@ from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES, Comparison, Demands
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, Row
 from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, K
-from tests.support.scenes import crank_rocker
+from fourbar_validation.engines.free_body import FreeBody
+from tests.support.scenes import balance, crank_rocker
 
 POSITIONS = 40
 SCENE = crank_rocker(
@@ -137,6 +138,47 @@ def test_angles_that_do_not_close_the_loop_fail_beside_their_own_row() -> None:
     rows = compare(make_answer(theta_4=moved("theta_4", FIRST, 1e-10)))
     assert rows["closure"].failed
     assert rows["closure"].allowed == pytest.approx(IDENTITY.factor, rel=1.0)
+
+
+@pytest.mark.parametrize("shrunk", ("formulas", "answer"))
+def test_neither_side_chooses_what_it_is_allowed(shrunk: str) -> None:
+    """A torque a millionth of the right one would have terms that cancel."""
+    small = 1e-6 * np.asarray(FORMULAS.torque)
+    formulas = replace(FORMULAS, torque=small) if shrunk == "formulas" else FORMULAS
+    answer = make_answer(**({"torque": small} if shrunk == "answer" else {}))
+    held = Demands(EQUIVALENCE, ("torque",))
+    rows = Comparison("", SCENE, answer, formulas, held).rows()
+    (row,) = (row for row in rows if row.quantity == "torque")
+    assert row.failed and row.error > 0.9 and row.error / row.allowed > 1e12
+    # an answer without rates has no terms of its own: the reference stands in
+    if shrunk == "formulas":
+        for name in ("omega_3", "omega_4", "alpha_3", "alpha_4"):
+            del answer.quantities[name]
+        alone = Comparison("", SCENE, answer, formulas, held, FORMULAS).rows()
+        assert [r for r in alone if r.quantity == "torque"] == [row]
+
+
+@pytest.mark.parametrize("name", ("torque", "F12", "alpha_4"))
+@pytest.mark.parametrize("left", (1e-1, 1e-2, 1e-4))
+def test_a_balanced_crank_agrees_and_a_slip_of_1e_9_does_not(
+    left: float, name: str
+) -> None:
+    scene = balance(left)
+    formulas = fourbar.solve(scene, "force")
+    answer = FreeBody().answer(scene, formulas.at)
+    held = Demands(EQUIVALENCE, COMPARED_QUANTITIES)
+    rows = {
+        row.quantity: row
+        for row in Comparison("", scene, answer, formulas, held).rows()
+    }
+    assert {row.verdict for row in rows.values()} == {AGREES}
+    assert "times N/K: the terms cancel" in rows["torque"].reason
+    answer.quantities[name] *= 1.0 + 1e-9
+    rows = {
+        row.quantity: row
+        for row in Comparison("", scene, answer, formulas, held).rows()
+    }
+    assert {row.quantity for row in rows.values() if row.failed} == {name}
 
 
 @pytest.mark.parametrize(("times", "verdict"), [(9.0, DEGRADED), (11.0, FAILS)])

@@ -3,7 +3,10 @@
 No other size than that of the quantity itself, where it has one.
 """
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from fourbar.effects import Load
 from fourbar.formulas.mobility import limit_positions
@@ -11,8 +14,9 @@ from fourbar.linkage import uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.solving import solve
-from fourbar_validation.compare.scales import scale_of
+from fourbar_validation.compare.scales import find_scale_of_answer, scale_of
 from fourbar_validation.compare.tolerance import WELL_CONDITIONED
+from tests.support.scenes import balance
 
 ROCKER = uniform(0.3, 0.25, 0.1, 0.22)
 
@@ -44,7 +48,7 @@ def test_the_scale_is_the_greatest_well_conditioned_value_and_elsewhere_the_valu
         size = np.abs(values) if values.ndim == 1 else np.hypot(*values.T)
         expected = np.append(np.full(7, size[:-1].max()), size[-1])
         np.testing.assert_allclose(
-            scale_of(quantity, scene, solution, values), expected
+            scale_of(quantity, scene, solution, values).size, expected
         )
 
 
@@ -60,8 +64,9 @@ def test_where_everything_cancels_the_scale_is_that_of_the_forces_that_cancel() 
     scene = Scene(ROCKER, Motion(Sweep(0.5, 0.6, 3), 0.0), loads=loads)
     solution = solve(scene)
     scale = scale_of("torque", scene, solution, solution.torque)
-    assert np.all(scale >= 0.25 * 100.0)
-    assert np.all(scale <= 4.0 * 0.25 * 100.0)
+    assert np.all(scale.size >= 0.25 * 100.0)
+    assert np.all(scale.size <= 4.0 * 0.25 * 100.0)
+    assert np.all(scale.vanishes) and np.all(scale.cancellation == 1.0)
 
 
 def test_what_the_input_alone_decides_has_no_scale_of_the_other_bars() -> None:
@@ -73,4 +78,67 @@ def test_what_the_input_alone_decides_has_no_scale_of_the_other_bars() -> None:
     for name in ("v_A", "v_G2", "a_A", "a_G2"):
         values = getattr(solution, name)
         size = np.hypot(*values.T)
-        np.testing.assert_allclose(scale_of(name, scene, solution, values), size)
+        np.testing.assert_allclose(scale_of(name, scene, solution, values).size, size)
+
+
+def test_terms_that_cancel_raise_what_is_allowed_by_what_they_exceed_the_rest() -> None:
+    """The weights of counterweight and coupler have moments of 0.5 kg g 0.1 m each.
+
+    The rest is `left` of one of them; in the harness's sum every force has a lever as
+    long as the longest bar.
+    """
+    cancelled = {}
+    for left in (1e-1, 1e-2, 1e-4):
+        scene = balance(left)
+        solution = solve(scene)
+        scale = scale_of("torque", scene, solution, solution.torque)
+        moment = 0.5 * 9.80665 * 0.1
+        np.testing.assert_allclose(scale.size, left * moment, rtol=0.02)
+        assert not scale.vanishes.any()
+        cancelled[left] = scale.cancellation[0]
+        assert 2.0 / left <= cancelled[left] <= 100.0 / left
+        np.testing.assert_allclose(scale.factor, cancelled[left] / 50.0)
+        np.testing.assert_allclose(scale.of_terms, cancelled[left] * scale.size)
+    assert cancelled[1e-4] / cancelled[1e-2] == pytest.approx(100.0, rel=0.01)
+    scene = balance(1.0)
+    solution = solve(scene)
+    scale = scale_of("torque", scene, solution, solution.torque)
+    assert np.all(scale.factor == 1.0) and np.all(scale.of_terms == scale.size)
+    angles = scale_of("theta_3", scene, solution, solution.theta_3)
+    assert np.all(angles.size == 1.0) and np.all(angles.cancellation == 1.0)
+
+
+def test_what_vanishes_is_judged_by_its_terms_and_what_has_none_by_nothing() -> None:
+    scene = balance(1e-13, 0.0)
+    solution = solve(scene)
+    scale = scale_of("torque", scene, solution, solution.torque)
+    assert np.all(scale.vanishes) and np.all(scale.cancellation == 1.0)
+    assert np.all(scale.size > 0.5 * 9.8 * 0.1)
+    nothing = scale_of("omega_3", scene, solution, solution.omega_3)
+    assert not (nothing.size.any() or nothing.vanishes.any())
+
+
+def test_the_terms_of_an_angular_acceleration_are_those_of_its_own_bar() -> None:
+    """The accelerations of A and B, over the bar's length and the sine between both."""
+    solution = solve(Scene(ROCKER, Motion(np.array([0.9]), 10.0, 7.0)))
+    a, b, c = 0.25, 0.1, 0.22
+    terms = a * 107.0 + b * solution.omega_3**2 + c * solution.omega_4**2
+    assert solution.scene is not None
+    for name, length in (("alpha_3", b), ("alpha_4", c)):
+        values = getattr(solution, name)
+        scale = scale_of(name, solution.scene, solution, values)
+        expected = terms / (length * solution.condition * np.abs(values))
+        np.testing.assert_allclose(scale.cancellation, expected)
+
+
+def test_an_answer_has_a_scale_of_its_own_from_its_rates_alone() -> None:
+    """Accelerations of mass centres that it lacks follow from its own motion."""
+    scene = balance(1e-2, 5.0)
+    solution = solve(scene)
+    names = ("torque", "F12")
+    expected = find_scale_of_answer(names, scene, solution)
+    bare = replace(solution, a_G2=None, a_G3=None, a_G4=None)
+    scale = find_scale_of_answer(names, scene, bare)
+    assert expected is not None and scale is not None
+    np.testing.assert_allclose(scale.cancellation, expected.cancellation, rtol=1e-12)
+    assert find_scale_of_answer(names, scene, replace(bare, alpha_4=None)) is None

@@ -184,6 +184,6 @@ def test_the_scale_is_of_positions_whose_condition_is_a_tenth_at_least() -> None
     size = np.hypot(*s.F12.T)
     well = s.condition >= 0.1
     assert well.any() and not well.all() and size[~well].max() > 10.0 * size[well].max()
-    scale = scale_of("F12", s.scene, s, s.F12)
+    scale = scale_of("F12", s.scene, s, s.F12).size
     assert scale[well] == pytest.approx(size[well].max())
     assert (scale[~well] < 2.0 * size[~well]).all()

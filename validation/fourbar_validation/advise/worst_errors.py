@@ -73,8 +73,8 @@ def compute_errors(
         else:
             name = field
         ours = getattr(formulas, name)
-        scale = scale_of(name, scene, formulas, ours)
-        error = find_error(name, ours, quantities[name][judged], scale)
+        size = scale_of(name, scene, formulas, ours).size
+        error = find_error(name, ours, quantities[name][judged], size)
         worst[field] = find_greatest(error)
     return WorstErrors(**worst)
 

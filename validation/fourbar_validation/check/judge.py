@@ -22,11 +22,10 @@ from fourbar_validation.check.rows import (
     list_stated_rates,
 )
 from fourbar_validation.check.theirs import TheirTable, name_quantity
-from fourbar_validation.compare.scales import scale_of
+from fourbar_validation.compare.scales import Scale, scale_of
 from fourbar_validation.compare.tolerance import (
-    EPS,
     EQUIVALENCE,
-    NOTHING_TO_TELL,
+    MOST_ALLOWED,
     Mask,
     compute_difference,
     divide,
@@ -118,7 +117,7 @@ class Judge:
         self.stage = "position" if self.at.speed is None else "force"
         self.right = solve(scene, self.stage, at=self.at)
         self.ok = self.right.status_code == OK
-        self._sizes: dict[str, Array] = {}
+        self._scales: dict[str, Scale] = {}
         for key in table.values:
             if getattr(self.right, name_quantity(key)) is None:
                 if self.at.speed is None:
@@ -146,17 +145,21 @@ class Judge:
         """Mark the rows in which both have a number, (n,)."""
         return np.asarray(self._answer(key) & self.table.stated(key))
 
-    def size(self, key: str) -> Array:
-        """Compute what the error of a key is divided by at each position, (n,)."""
-        if key not in self._sizes:
+    def scale(self, key: str) -> Scale:
+        """Compute size of a key and how far its terms cancel, (n,)."""
+        if key not in self._scales:
             quantity = name_quantity(key)
-            self._sizes[key] = scale_of(
+            self._scales[key] = scale_of(
                 quantity,
                 self.scene,
                 self.right,
                 getattr(self.right, quantity),
             )
-        return self._sizes[key]
+        return self._scales[key]
+
+    def size(self, key: str) -> Array:
+        """Compute what the error of a key is divided by at each position, (n,)."""
+        return self.scale(key).size
 
     @cached_property
     def near(self) -> list[Solution]:
@@ -171,7 +174,8 @@ class Judge:
 
         `ours` is taken for the right numbers.
         """
-        quantity, size = name_quantity(key), self.size(key)
+        quantity = name_quantity(key)
+        size, factor = self.size(key), self.scale(key).factor
         scale = replace_zero_size(size)  # quantities whose terms are all 0
         theirs = self.table.values[key]
         theirs = np.where(
@@ -194,11 +198,11 @@ class Judge:
             for other in self.near
         ]
         spread = divide(np.fmax.reduce(moves), scale) if moves else 0.0
-        exact = np.where(size == 0.0, 0.0, EQUIVALENCE.allowed(condition))
+        exact = np.where(size == 0.0, 0.0, factor * EQUIVALENCE.allowed(condition))
         allowed = (exact + spread) * larger + divide(self.table.rounding[key], scale)
         return (
             divide(apart, scale),
-            np.where(condition * NOTHING_TO_TELL > EPS, allowed, np.inf),
+            np.where(exact <= MOST_ALLOWED, allowed, np.inf),
             apart,
         )
 

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,17 +42,19 @@ from fourbar_validation.compare.rows import (
     escape_controls,
 )
 from fourbar_validation.compare.scales import (
+    Scale,
     TermSizes,
+    find_scale_of_answer,
     make_reference,
-    take_smallest_scales,
     take_strictest_conditions,
 )
 from fourbar_validation.compare.tolerance import (
     EPS,
     IDENTITY,
-    NOTHING_TO_TELL,
+    MOST_ALLOWED,
     TIMES_PREDICTED,
     ErrorBound,
+    K,
     Mask,
     compute_differences,
     count_half_turns,
@@ -73,8 +75,8 @@ AnswerNearby = Callable[[Mask], dict[str, Array]]
 """Function that evaluates every quantity again at the positions of a mask. theta_2 is
 varied within its rounding; elsewhere it is NaN.
 """
-Scales = dict[str, tuple[Array, Array]]
-"""Size and condition of each quantity at each position."""
+Scales = dict[str, tuple[Scale, Array]]
+"""Scale by the formulas and condition of each quantity at each position."""
 
 _OF_THE_FORMULAS = (
     *DRY_FRICTION_QUANTITIES,
@@ -177,12 +179,12 @@ class Comparison:
     demands: Demands
     reference: Solution | None = None
     """Second derivation at the same positions; by default the answer itself. The
-    stricter of its scale and condition and those of the formulas sets the allowed
-    error.
+    stricter of its condition and that of the formulas sets the allowed error; its scale
+    stands in for that of an answer which has too few quantities for one.
     """
     scales: Scales = field(default_factory=dict)
-    """Scales of `formulas` and `reference`. They are kept if an earlier answer was
-    compared with them.
+    """Scales of `formulas`, conditions of it and `reference`. They are kept if an
+    earlier answer was compared with them.
     """
 
     def __post_init__(self) -> None:
@@ -411,18 +413,10 @@ class Comparison:
     def _judge(self, due: Sequence[_Due], judged: _Judged) -> None:
         """Judge the errors of quantities at their positions."""
         errors = self._measure(due)
-        # most agree, which is seen of all at once; `judge_errors` has the same rule
-        beyond = errors.mask & ~(errors.error <= errors.allowed)
-        agrees = np.asarray(~beyond.any(axis=1) & errors.decidable.any(axis=1))
-        agreeing = _state_agreements(errors)
         for i, one in enumerate(due):
-            if agrees[i]:
-                worst = agreeing[i]
-            else:
-                of_one = errors.select(i)
-                of_one = self._take_again(one.quantity, one.ours, of_one)
-                predicted = self._predict(one.quantity, of_one)
-                worst = judge_errors(of_one, predicted, self.demands.method)
+            of_one = self._take_again(one.quantity, one.ours, errors.select(i))
+            predicted = self._predict(one.quantity, of_one)
+            worst = judge_errors(of_one, predicted, self.demands.method)
             judged.decided += worst.decided
             judged.rows[one.quantity] = Row(
                 *self._who,
@@ -438,25 +432,22 @@ class Comparison:
     def _measure(self, due: Sequence[_Due]) -> "Errors":
         """Measure the errors of quantities, and what is allowed at each position.
 
-        A quantity whose scale is 0 vanishes with all its terms. Nothing is relative to
+        A quantity whose size is 0 vanishes with all its terms. Nothing is relative to
         it: its error is in its own unit, and none is allowed.
         """
         names, ours, theirs, masks, _ = zip(*due, strict=True)
         scale, condition = self._scale(names)
-        vanishes = scale == 0.0
-        unit = replace_zero_size(scale)
+        vanishes = scale.size == 0.0
+        unit = replace_zero_size(scale.size)
         tolerance = self.demands.tolerance
-        mask = decidable = np.array(masks)
-        if tolerance.conditioned:
-            decidable = mask & (condition * NOTHING_TO_TELL > EPS)
+        allowed = np.where(vanishes, 0.0, tolerance.allowed(condition) * scale.factor)
         return Errors(
             error=divide(compute_differences(names, ours, theirs), unit),
-            allowed=np.where(vanishes, 0.0, tolerance.allowed(condition)),
-            unit=unit,
+            allowed=allowed,
+            scale=Scale(unit, *scale[1:]),
             relative=~vanishes,
             condition=condition,
-            mask=mask,
-            decidable=decidable,
+            mask=np.array(masks),
             tolerance=tolerance,
         )
 
@@ -466,7 +457,7 @@ class Comparison:
         if self.demands.answer_nearby is None or not beyond.any():
             return errors
         theirs = self._answered_nearby[quantity]
-        again = find_error(quantity, ours, theirs, errors.unit)
+        again = find_error(quantity, ours, theirs, errors.scale.size)
         return errors._replace(
             error=np.where(beyond, np.fmin(errors.error, again), errors.error),
             again=again,
@@ -485,48 +476,38 @@ class Comparison:
         beyond = errors.beyond
         if not beyond.any():
             return np.zeros_like(errors.error)
-        share = divide(predicted(quantity, beyond), errors.unit)
+        share = divide(predicted(quantity, beyond), errors.scale.size)
         if errors.again is not None:
             was_asked = np.isfinite(errors.again)
             share = np.where(was_asked, np.fmin(share, errors.allowed), share)
         return np.nan_to_num(share, nan=0.0, posinf=np.inf)
 
-    def _scale(self, quantities: Sequence[str]) -> tuple[Array, Array]:
-        """Return size and condition of quantities at each position, (q, n).
+    def _scale(self, quantities: Sequence[str]) -> tuple[Scale, Array]:
+        """Return scale and condition of quantities at each position, (q, n).
 
-        Each is the stricter of formulas and reference.
+        Each is the stricter of formulas and another derivation.
         """
         missing = [name for name in quantities if name not in self.scales]
+        formulas = self.formulas
+        answered = self._solution
         if missing:
-            ours, theirs = self._sizes
-            if theirs is None:
-                reference = None
-            else:
-                reference = theirs.solution
-            sizes = take_smallest_scales(missing, ours, theirs)
+            reference = answered if self.reference is None else self.reference
             conditions = take_strictest_conditions(
-                missing, self.scene.linkage, self.formulas, reference
+                missing, self.scene.linkage, formulas, reference
             )
-            of_missing = zip(sizes, conditions, strict=True)
-            self.scales |= zip(missing, of_missing, strict=True)
+            values = [getattr(formulas, name) for name in missing]
+            scale = TermSizes(self.scene, formulas).scales(missing, values)
+            for i, name in enumerate(missing):
+                self.scales[name] = scale.select(i), conditions[i]
         of_each = [self.scales[name] for name in quantities]
-        return (
-            np.array([scale for scale, _ in of_each]),
-            np.array([condition for _, condition in of_each]),
-        )
-
-    @cached_property
-    def _sizes(self) -> tuple[TermSizes, TermSizes | None]:
-        """Sizes by the formulas and by the reference, if there is one."""
-        if self.reference is None:
-            reference = self._solution
-        else:
-            reference = self.reference
-        if reference is None:
-            theirs = None
-        else:
-            theirs = TermSizes(self.scene, reference)
-        return TermSizes(self.scene, self.formulas), theirs
+        scale = Scale(*map(np.array, zip(*(one for one, _ in of_each), strict=True)))
+        for solution in (answered, self.reference):
+            if solution is not None:
+                theirs = find_scale_of_answer(quantities, self.scene, solution)
+                if theirs is not None:
+                    scale = scale.take_strictest(theirs)
+                    break
+        return scale, np.array([condition for _, condition in of_each])
 
 
 class Errors(NamedTuple):
@@ -534,16 +515,13 @@ class Errors(NamedTuple):
 
     error: Array
     allowed: Array
-    unit: Array
-    """Divisor of the errors. It is the scale, or 1 of the quantity's unit if that is 0.
-    """
+    scale: Scale
+    """Divisor of the errors and N. The size is 1 of the quantity's unit if it is 0."""
     relative: Mask
-    """Positions at which they are parts of the quantity's scale."""
+    """Positions at which they are parts of the quantity's size."""
     condition: Array
     mask: Mask
     """Positions that are compared."""
-    decidable: Mask
-    """Positions of the mask at which digits are left to decide by."""
     tolerance: ErrorBound
     """Tolerance that the errors are held to."""
     again: Array | None = None
@@ -553,24 +531,49 @@ class Errors(NamedTuple):
 
     def select(self, i: int) -> "Errors":
         """Select the errors of one quantity of several."""
-        parts: Any = (x[i] if isinstance(x, np.ndarray) else x for x in self)
-        return Errors(*parts)
+        return self._replace(
+            error=self.error[i],
+            allowed=self.allowed[i],
+            scale=self.scale.select(i),
+            relative=self.relative[i],
+            condition=self.condition[i],
+            mask=self.mask[i],
+        )
 
-    def as_several(self) -> "Errors":
-        """Return the errors of one quantity as those of several, (1, n)."""
-        parts: Any = (x[None] if isinstance(x, np.ndarray) else x for x in self)
-        return Errors(*parts)
+    @property
+    def decidable(self) -> Mask:
+        """Positions that are compared and have enough digits to decide by."""
+        most = max(MOST_ALLOWED, self.tolerance.factor)
+        return np.asarray(self.mask & (self.allowed <= most))
+
+    @property
+    def judged(self) -> Mask:
+        """Positions that have a verdict: an error that is no number needs no digits."""
+        return np.asarray(self.decidable | (self.mask & ~np.isfinite(self.error)))
 
     @property
     def beyond(self) -> Mask:
         """Positions at which the error is beyond the allowed one, or is no number."""
-        excessive = self.decidable & ~(self.error <= self.allowed)
-        return np.asarray(excessive | (self.mask & ~np.isfinite(self.error)))
+        return np.asarray(self.judged & ~(self.error <= self.allowed))
 
-    @property
-    def undecided(self) -> Mask:
-        """Positions that are compared and have too few digits to decide by."""
-        return np.asarray(self.mask & ~self.decidable)
+    def explain(self, i: int) -> str:
+        """Say in a sentence what is allowed at a position, and why."""
+        condition = float(self.condition[i])
+        why = self.tolerance.explain(condition)
+        cancellation = float(self.scale.cancellation[i])
+        if cancellation > K:
+            why += f", times N/K: the terms cancel {cancellation:.2g}-fold"
+        if self.scale.vanishes[i]:
+            why += ", of the sum of its terms, which cancel"
+        return why
+
+    def explain_undecided(self, i: int) -> str:
+        """Say why a position has too few digits to decide by."""
+        why = f"eps/condition = {EPS / self.condition[i]:.1e}"
+        cancellation = float(self.scale.cancellation[i])
+        if cancellation > K:
+            why += f", the terms cancel {cancellation:.2g}-fold"
+        return why
 
     def write_notes(self, undecided: int) -> str:
         """Write how many positions were not judged, or were asked again.
@@ -579,7 +582,7 @@ class Errors(NamedTuple):
         """
         notes = ""
         if undecided:
-            limit = f"eps/condition > {NOTHING_TO_TELL:g}"
+            limit = f"more than {MOST_ALLOWED:g} allowed"
             notes += f"; {undecided} positions with {limit} not judged"
         if self.settled:
             notes += f"; {self.settled} positions within the rounding of theta_2"
@@ -599,34 +602,6 @@ class _WorstPosition(NamedTuple):
     """Number of positions that have a verdict."""
 
 
-def _state_agreements(errors: Errors) -> list[_WorstPosition]:
-    """Give the verdicts on several quantities where no error is beyond the allowed one.
-
-    The position is that where an error uses most of what is allowed.
-    """
-    used = find_used(errors.error, errors.allowed)
-    positions = np.where(errors.decidable, used, -1.0).argmax(axis=1)
-    there = (np.arange(len(positions)), positions)
-    columns = (
-        positions,
-        errors.error[there],
-        errors.allowed[there],
-        errors.condition[there],
-        errors.decidable.sum(axis=1),
-        errors.undecided.sum(axis=1),
-    )
-    agreements = []
-    for position, error, allowed, condition, decided, undecided in zip(
-        *(column.tolist() for column in columns),
-        strict=True,
-    ):
-        why = errors.tolerance.explain(condition) + errors.write_notes(undecided)
-        agreements.append(
-            _WorstPosition(position, AGREES, why, error, allowed, condition, decided)
-        )
-    return agreements
-
-
 def judge_errors(
     errors: Errors,
     predicted: Array | None,
@@ -635,66 +610,60 @@ def judge_errors(
     """Judge errors by the allowed error.
 
     Larger ones are judged by TIMES_PREDICTED times the predicted one, which the row
-    then states as `allowed`. An error that is no number fails.
+    then states as `allowed`. An error that is no number fails. The position is that
+    where an error uses most of what is allowed.
 
     `predicted`: None where nothing predicts the errors. `method`: for which they are
     predicted, as the end of a reason.
     """
+    decidable = errors.decidable
+    judged = errors.judged
     beyond = errors.beyond
-    if not (errors.decidable | beyond).any():
-        index = int(np.flatnonzero(errors.mask)[0])
-        condition = float(errors.condition[index])
-        why = f"eps/condition = {EPS / errors.condition[index]:.1e}"
-        return _WorstPosition(
-            index,
-            UNDECIDED,
-            why,
-            float(errors.error[index]),
-            float(errors.allowed[index]),
-            condition,
-            0,
-        )
-    if not beyond.any():
-        (agreement,) = _state_agreements(errors.as_several())
-        return agreement
-    is_predicted = predicted is not None
-    if predicted is None:
-        predicted = np.zeros_like(errors.error)
-    bound = np.maximum(errors.allowed, TIMES_PREDICTED * predicted)
+    bound = errors.allowed
+    no_digit = np.zeros_like(beyond)
+    if predicted is not None and beyond.any():
+        bound = np.where(beyond, np.maximum(bound, TIMES_PREDICTED * predicted), bound)
+        # where a first-order prediction reaches the value itself, no digit is left
+        reaches = np.where(errors.relative, predicted >= 1.0, predicted == np.inf)
+        no_digit = beyond & np.isfinite(errors.error) & reaches
     used = find_used(errors.error, bound)
-    # where a first-order prediction reaches the value itself, no digit is left to judge
-    reaches_value = np.where(errors.relative, predicted >= 1.0, predicted == np.inf)
-    undecided = beyond & np.isfinite(errors.error) & reaches_value
-    used[undecided] = np.minimum(used[undecided], 1.0)
-    index = int(np.argmax(np.where(beyond, used, -1.0)))
-    error = float(errors.error[index])
-    condition = float(errors.condition[index])
-    error_predicted = predicted[index]
+    used[no_digit] = np.minimum(used[no_digit], 1.0)
+    candidates = next(mask for mask in (beyond, judged, errors.mask) if mask.any())
+    i = int(np.argmax(np.where(candidates, used, -1.0)))
+    error = float(errors.error[i])
     if math.isnan(error):
         verdict = FAILS
         why = "NaN"
-    elif undecided[index]:
+    elif no_digit[i]:
+        assert predicted is not None
         verdict = UNDECIDED
-        why = f"an error of {error_predicted:.1e} of the value is predicted"
-    elif not is_predicted:
+        why = f"an error of {predicted[i]:.1e} of the value is predicted"
+    elif not judged[i]:
+        verdict = UNDECIDED
+        why = errors.explain_undecided(i)
+    elif not beyond[i]:
+        verdict = AGREES
+        why = errors.explain(i)
+    elif predicted is None:
         verdict = FAILS
-        why = errors.tolerance.explain(condition)
-    elif used[index] <= 1.0:
+        why = errors.explain(i)
+    elif used[i] <= 1.0:
         verdict = DEGRADED
-        why = (
-            f"{error:.1e} of {error_predicted:.1e} predicted for this position{method}"
-        )
+        why = f"{error:.1e} of {predicted[i]:.1e} predicted for this position{method}"
     else:
         verdict = FAILS
-        why = f"{error:.1e} where {error_predicted:.1e} was predicted{method}"
+        why = f"{error:.1e} where {predicted[i]:.1e} was predicted{method}"
+    if judged.any():
+        undecided = int(np.count_nonzero(errors.mask & ~decidable))
+        why += errors.write_notes(undecided)
     return _WorstPosition(
-        index,
+        i,
         verdict,
-        why + errors.write_notes(int(np.count_nonzero(errors.undecided))),
+        why,
         error,
-        float(bound[index]),
-        condition,
-        int(np.count_nonzero(errors.decidable & ~undecided)),
+        float(bound[i]),
+        float(errors.condition[i]),
+        int(np.count_nonzero(decidable & ~no_digit)),
     )
 
 

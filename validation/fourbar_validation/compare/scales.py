@@ -1,20 +1,22 @@
-"""Compute the scale of a quantity's error and its condition.
+"""Compute what errors are divided by, and how far the terms of a quantity cancel.
 
-They come from the formulas and from another derivation. The scale of a quantity is its
-largest magnitude over the well-conditioned positions; a position below that is judged
-relative to its own magnitude, or the forces that diverge near a limit would excuse
-every other row. A quantity that (nearly) vanishes is judged against the sum of the
-absolute terms of its equation; if those vanish too, the answer must be exactly zero.
+The size of a quantity is its largest magnitude over the well-conditioned positions; at
+a position below that it is the magnitude there, or the forces that diverge near a limit
+would excuse every other row. N is the sum of the absolute terms of its equation over
+that size: the terms of a counterweighted linkage cancel, and two right derivations
+agree to as many digits less. What is allowed is multiplied by max(1, N/K).
 
-A wrong formula would widen what it is allowed: an angle between bars 3 and 4 that is
-too small, an acceleration that is too large. So another derivation, the reference, is
-asked too, and the stricter of the two decides.
+A wrong formula would choose its own size and N: an angle between bars 3 and 4 that is
+too small, an acceleration that is too large. So both are taken of the engine's answer
+too, and the stricter pair of error and allowance counts.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.effects import ForceDrive
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
@@ -34,6 +36,7 @@ from fourbar_validation.compare.tolerance import (
     OF_THE_INPUT,
     WELL_CONDITIONED,
     K,
+    Mask,
     find_conditions,
     join_components,
     magnitude,
@@ -41,21 +44,47 @@ from fourbar_validation.compare.tolerance import (
     sum_lengths,
 )
 
-LOST_IN_CANCELLATION = 1.0 / K
-"""Part of the sum of its terms below which a quantity has lost too many digits.
-Cancellation costs it more than K covers.
+VANISHING = 2.0**-40
+"""Part of the sum of its terms below which a quantity is taken to vanish. A double has
+12 digits of it left there; the terms are what its error is relative to.
 """
 
 
-def replace_vanishing(size: Array | float, terms: Array | float) -> Array:
-    """Return sizes of a quantity, and the sum of its terms where it (nearly) vanishes.
+class Scale(NamedTuple):
+    """Size of quantities at each position, and how far their terms cancel, (q, n)."""
 
-    Parameters
-    ----------
-    size, terms : size of the quantity and sum of the absolute terms of its equation, in
-        one unit and of shapes that broadcast.
+    size: Array
+    """Divisor of the errors, in the unit of the quantity: its largest magnitude, or the
+    sum of its terms where it vanishes. It is 0 where they vanish too.
     """
-    return np.where(size < LOST_IN_CANCELLATION * terms, terms, size)
+    cancellation: Array
+    """N, the sum of the terms over the size; 1 for angles, pure numbers and a quantity
+    that vanishes.
+    """
+    vanishes: Mask
+    """Positions at which the size is the sum of the terms, as they cancel."""
+
+    @property
+    def factor(self) -> Array:
+        """Factor of the allowed error, max(1, N/K)."""
+        return np.maximum(1.0, self.cancellation / K)
+
+    @property
+    def of_terms(self) -> Array:
+        """Divisor of an identity: the sum of the terms where they cancel K-fold."""
+        return np.where(self.cancellation > K, self.cancellation * self.size, self.size)
+
+    def select(self, i: int) -> "Scale":
+        """Select one quantity of several."""
+        return Scale(*(part[i] for part in self))
+
+    def take_strictest(self, other: "Scale") -> "Scale":
+        """Take the size and N that allow less of an absolute error, (q, n)."""
+        ours = self.size * self.factor
+        theirs = other.size * other.factor
+        stricter = (theirs < ours) | np.isnan(ours)
+        pairs = zip(self, other, strict=True)
+        return Scale(*(np.where(stricter, theirs, ours) for ours, theirs in pairs))
 
 
 class TermSizes:
@@ -69,18 +98,15 @@ class TermSizes:
         self.solution = solution
         self._sums: dict[str, Array] = {}
 
-    def scale(self, quantity: str, values: Array) -> Array:
-        """Compute what the error of a quantity is divided by at each position, (n,)."""
-        return np.asarray(self.scales([quantity], [values])[0])
-
-    def scales(self, quantities: Sequence[str], values: Sequence[Array]) -> Array:
-        """Compute what the errors of several quantities are divided by, (q, n)."""
+    def scales(self, quantities: Sequence[str], values: Sequence[Array]) -> Scale:
+        """Compute sizes of quantities and how far their terms cancel, (q, n)."""
         solution = self.solution
         units = [UNITS[quantity] for quantity in quantities]
-        scales = np.ones((len(units), len(solution)))
+        ones = np.ones((len(units), len(solution)))
+        scale = Scale(ones, ones.copy(), np.zeros(ones.shape, dtype=bool))
         sized = [i for i, unit in enumerate(units) if unit not in ("rad", "1")]
         if not sized:
-            return scales
+            return scale
         size = magnitudes([values[i] for i in sized])
         terms = self.sum_terms_of([quantities[i] for i in sized])
         well = (solution.condition >= WELL_CONDITIONED) & np.isfinite(size)
@@ -93,12 +119,17 @@ class TermSizes:
         if driven:
             assert solution.drive_condition is not None
             well[driven] &= solution.drive_condition >= WELL_CONDITIONED
-        nonzero = replace_vanishing(size, terms)
         largest = np.where(well, size, 0.0).max(axis=1, keepdims=True)
         most = np.where(well, terms, 0.0).max(axis=1, keepdims=True)
-        largest = replace_vanishing(largest, most)
-        scales[sized] = np.where(well, largest, nonzero)
-        return scales
+        size = np.where(well, largest, size)
+        terms = np.where(well, most, terms)
+        vanishes = size < VANISHING * terms
+        size = np.where(vanishes, terms, size)
+        scale.size[sized] = size
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            scale.cancellation[sized] = np.where(size == 0.0, 1.0, terms / size)
+        scale.vanishes[sized] = vanishes
+        return scale
 
     def sum_terms_of(self, quantities: Sequence[str]) -> Array:
         """Sum the absolute terms of several equations, (q, n), in their units."""
@@ -122,9 +153,9 @@ class TermSizes:
         return self._sums[key]
 
 
-def scale_of(quantity: str, scene: Scene, formulas: Solution, values: Array) -> Array:
-    """Compute what the error of a quantity is divided by at each position, (n,)."""
-    return TermSizes(scene, formulas).scale(quantity, values)
+def scale_of(quantity: str, scene: Scene, solution: Solution, values: Array) -> Scale:
+    """Compute size and N of one quantity at each position, (n,)."""
+    return TermSizes(scene, solution).scales([quantity], [values]).select(0)
 
 
 _OF_EACH_BAR = ("rad/s", "rad/s^2")
@@ -275,8 +306,8 @@ def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
     return total
 
 
-_SIZED_BY = ("omega_3", "omega_4", "alpha_3", "alpha_4", "a_G2", "a_G3", "a_G4")
-"""Quantities from which the size of a force is computed. A reference without them has
+_RATES = ("omega_2", "omega_3", "omega_4", "alpha_2", "alpha_3", "alpha_4")
+"""Quantities from which the size of a force is computed. An answer without them has
 none.
 """
 
@@ -398,6 +429,25 @@ def _find_velocities(
     return velocities
 
 
+def _find_accelerations(linkage: FourBar, answered: Solution) -> dict[str, Array]:
+    """Find the accelerations of the mass centres, m/s^2, from an answer's own rates."""
+
+    def swing(bar: int, distance: float, angle: float) -> NDArray[np.complex128]:
+        omega = getattr(answered, f"omega_{bar}")
+        arm = distance * np.exp(1j * (getattr(answered, f"theta_{bar}") + angle))
+        swung = (1j * getattr(answered, f"alpha_{bar}") - omega * omega) * arm
+        return np.asarray(swung)
+
+    of_A = swing(2, linkage.input.length, 0.0)
+    accelerations = {}
+    for number, bar in zip(MOVING_BARS, linkage.moving, strict=True):
+        centre = swing(number, *find_centre(bar))
+        if number == 3:
+            centre = centre + of_A
+        accelerations[f"a_G{number}"] = join_components(centre.real, centre.imag)
+    return accelerations
+
+
 def take_strictest_conditions(
     quantities: Sequence[str],
     linkage: FourBar,
@@ -415,32 +465,30 @@ def take_strictest_conditions(
     return np.fmin(np.fmax(ours, theirs), 1.0)
 
 
-def take_smallest_scales(
+def find_scale_of_answer(
     quantities: Sequence[str],
-    of_formulas: TermSizes,
-    of_reference: TermSizes | None,
-) -> Array:
-    """Take the smaller of two sizes of each quantity at each position, (q, n).
+    scene: Scene,
+    answered: Solution,
+) -> Scale | None:
+    """Compute size and N of quantities by an answer, (q, n).
 
-    They are by the formulas' solution and by the reference, if there is one.
+    NaN for a quantity that it does not have; None without the motion that the sums of
+    terms need.
     """
-    values = [getattr(of_formulas.solution, quantity) for quantity in quantities]
-    scales = of_formulas.scales(quantities, values)
-    if of_reference is None:
-        return scales
-    reference = of_reference.solution
-    if reference.omega_2 is not None and any(
-        getattr(reference, name) is None for name in _SIZED_BY
-    ):
-        return scales
-    answered = {
-        i: numbers
-        for i, quantity in enumerate(quantities)
-        if (numbers := getattr(reference, quantity)) is not None
-    }
-    if answered:
-        rows = list(answered)
-        names = [quantities[i] for i in rows]
-        numbers = list(answered.values())
-        scales[rows] = np.fmin(scales[rows], of_reference.scales(names, numbers))
-    return scales
+    if answered.at.speed is not None:
+        if any(getattr(answered, name) is None for name in _RATES):
+            return None
+        if answered.a_G2 is None or answered.a_G3 is None or answered.a_G4 is None:
+            accelerations = _find_accelerations(scene.linkage, answered)
+            answered = replace(answered, **accelerations)  # type: ignore[arg-type]
+    values = [getattr(answered, quantity) for quantity in quantities]
+    rows = [i for i, numbers in enumerate(values) if numbers is not None]
+    shape = len(values), len(answered)
+    found = Scale(np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(shape, bool))
+    if rows:
+        of_rows = TermSizes(scene, answered).scales(
+            [quantities[i] for i in rows], [values[i] for i in rows]
+        )
+        for all_rows, part in zip(found, of_rows, strict=True):
+            all_rows[rows] = part
+    return found

@@ -37,10 +37,13 @@ RANDOM_WALK = 8.0
 """Last digits by which a chain of some fifty roundings moves a result, as a random
 walk. It is sqrt(50) = 7.
 """
-NOTHING_TO_TELL = 1e-3
-"""Greatest eps/condition with a verdict. Beyond it two correct programs may differ in
-the third digit.
+MOST_ALLOWED = 0.05
+"""Greatest allowed error with a verdict, unless an engine declares more. Where the
+condition and terms that cancel raise it further, two correct programs may differ in the
+second digit.
 """
+NOTHING_TO_TELL = MOST_ALLOWED / K
+"""Greatest eps/condition with a verdict of a row that has no terms to cancel."""
 WELL_CONDITIONED = 0.1
 """Positions whose condition is at least this set the scale of a quantity."""
 IN_PARTS_OF_EPS = 1e-12

@@ -180,7 +180,7 @@ def compare_with_reference(
     formulas = solve(scene, "force", at=command)
     worst = {}
     for name in ("torque", *PIN_FORCES):
-        sizes = scale_of(name, scene, formulas, getattr(formulas, name))
+        sizes = scale_of(name, scene, formulas, getattr(formulas, name)).size
         errors = []
         for ours, exact, size in zip(
             quantities[name],

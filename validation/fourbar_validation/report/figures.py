@@ -266,7 +266,7 @@ def _draw_errors(
         else:
             formulas = solve(scene, at=answer.at)
         mine = getattr(formulas, quantity)
-        size = scale_of(quantity, scene, formulas, mine)
+        size = scale_of(quantity, scene, formulas, mine).size
         error = find_error(quantity, mine, answer.quantities[quantity], size)
         places = find_worst_of_segments(error, turn / len(answers))
         if not len(places):

@@ -23,7 +23,7 @@ from fourbar_validation.compare.tolerance import (
     EPS,
     EQUIVALENCE,
     IDENTITY,
-    NOTHING_TO_TELL,
+    MOST_ALLOWED,
     SIMULATED,
     ErrorBound,
     K,
@@ -104,10 +104,13 @@ _FAILURES_KEPT = 1000
 """Lines of a table at the most; everything is in results.csv."""
 _TIMED = 1000
 STATEMENT = (
-    f"K = {K:g} for every exact comparison; where eps/condition > {NOTHING_TO_TELL:g}"
-    " the row is undecided. Errors are relative to the largest magnitude over the"
-    " positions whose condition is at least 0.1; below that to the position's own"
-    " magnitude; angles modulo 2 pi, in rad."
+    "Errors are relative to the largest magnitude over the positions whose condition is"
+    " at least 0.1, below that to the position's own; angles modulo 2 pi, in rad."
+    f" Allowed is the tolerance times max(1, N/K), K = {K:g}, N the largest sum of"
+    " absolute terms over the largest magnitude. Size and N are those of the formulas"
+    " or of the answer, whichever pair of error and allowed error is stricter. Where"
+    f" condition and N raise it above {MOST_ALLOWED:g} and above what the engine"
+    " declares, the position is undecided."
 )
 
 

@@ -152,7 +152,7 @@ class _Few:
         linkage = self.scene.linkage
         conditions = find_conditions(self.quantities, linkage, self.solution)
         return _QuantitySizes(
-            sizes.scales(self.quantities, self.numbers),
+            sizes.scales(self.quantities, self.numbers).of_terms,
             np.minimum(conditions, 1.0),
             sizes.sum_terms_of(self.quantities),
         )

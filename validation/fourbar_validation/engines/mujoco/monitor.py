@@ -56,6 +56,8 @@ RESIDUAL_LIMITS = {
     ),
 }
 """Residuals of motion and forces that `ResidualMonitor` measures."""
+_OF_FORCES = ("power_gap", "force_gap")
+"""Residuals relative to forces, whose terms may cancel."""
 _EXCUSED = 1e-3
 """A solver's residual excuses an error of this part of a force, not more."""
 _OF_THE_DATA = {
@@ -74,18 +76,25 @@ _OF_THE_DATA = {
 """Limits of the residuals that the data of the simulation state directly."""
 
 
-def list_alarms(evidence: dict[str, float], size: float) -> list[str]:
+def list_alarms(
+    evidence: dict[str, float], size: float, factor: float = 1.0
+) -> list[str]:
     """Say what is wrong with a run.
 
-    `evidence`: the worst of each residual over the run.
-    `size`: sum of the lengths, m.
+    Parameters
+    ----------
+    evidence : the worst of each residual over the run.
+    size : sum of the lengths, m.
+    factor : max(1, N/K) of the drive's torque or force, by which residuals of forces
+        may be larger where its terms cancel.
     """
     seen = {**evidence, "closure_gap": evidence["closure_gap_m"] / size}
-    return [
-        f"{name} = {seen[name]:.1e} > {limit.value:g}: {limit.reason}"
-        for name, limit in {**_OF_THE_DATA, **RESIDUAL_LIMITS}.items()
-        if name in seen and not seen[name] <= limit.value
-    ]
+    alarms = []
+    for name, limit in {**_OF_THE_DATA, **RESIDUAL_LIMITS}.items():
+        most = limit.value * factor if name in _OF_FORCES else limit.value
+        if name in seen and not seen[name] <= most:
+            alarms.append(f"{name} = {seen[name]:.1e} > {most:g}: {limit.reason}")
+    return alarms
 
 
 @dataclass(slots=True)

@@ -20,6 +20,7 @@ from fourbar.scene import Command, Scene
 from fourbar.scene.motion import COMMAND_NAMES, Motion
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.pins import state_from_pins
+from fourbar_validation.compare.scales import find_scale_of_answer, make_reference
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.description import (
     list_speeds,
@@ -300,16 +301,29 @@ class _Simulation:
             name: x for name, x in self.out.items() if bar != 2 or name not in MADE
         }
         setting = f"{self.settings.integrator} {self.steps_per_revolution:.0f}/rev"
-        return Answer(
+        answer = Answer(
             "mujoco-simulated",
             setting,
             motion,
             closes,
             values,
             predicted=self.predicted,
-            alarms=list_alarms(self.evidence, sum(self.scene.linkage.lengths)),
             evidence=self.evidence,
         )
+        size = sum(linkage.lengths)
+        answer.alarms += list_alarms(self.evidence, size, self._find_factor(answer))
+        return answer
+
+    def _find_factor(self, answer: Answer) -> float:
+        """Find max(1, N/K) of the drive's torque or force, by the answer itself."""
+        solution = make_reference(self.scene, answer)
+        if solution is None or answer.at is None or answer.at.speed is None:
+            return 1.0
+        drive = name_driving(self.scene)
+        scale = find_scale_of_answer([drive], self.scene, solution)
+        if scale is None or not np.isfinite(scale.factor).any():
+            return 1.0
+        return float(np.nanmin(scale.factor))
 
     def _choose_motion(self, segment: list[int]) -> MotionSegment:
         """Choose how the input moves through a segment."""
