@@ -21,15 +21,20 @@ from fourbar_validation.compare.tolerance import (
     OF_THE_INPUT,
     TIMES_PREDICTED,
     TOUCHING_MARGIN,
+    compute_difference,
+    magnitude,
     mark_touching,
     sum_lengths,
 )
+from fourbar_validation.engines.exact import BallArithmetic
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import _bound_touching, predict_from_data
-from fourbar_validation.engines.registry import Engine
+from fourbar_validation.engines.registry import ENGINES, Engine, make_prediction
+from fourbar_validation.engines.tree import solve_closed, solve_multipliers
 from fourbar_validation.run.answers import compare_answer
 from fourbar_validation.run.judge import make_question
 from fourbar_validation.run.question import Question
+from tests.support.scenes import ON_COUPLER, crank_rocker
 
 pytest.importorskip("flint")
 ROCKER = uniform(0.3, 0.25, 0.1, 0.22)
@@ -119,3 +124,62 @@ def test_the_bound_of_the_angles_is_that_of_the_triangle(
         ctx.prec = bits
     assert math.isinf(_bound_touching(linkage, psi, "omega_3"))
     assert TIMES_PREDICTED * _bound_touching(linkage, psi, "sin_mu") < 1.0
+
+
+@pytest.mark.parametrize("name", ("pinocchio-inverse", "mujoco-inverse"))
+def test_an_open_tree_of_uneven_bars_keeps_to_its_prediction(name: str) -> None:
+    """All bars turn alike, and their accelerations are what is left of the speeds.
+
+    Cramer's rule alone leaves them wrong by a hundred times what is predicted.
+    """
+    pytest.importorskip(name.split("-", maxsplit=1)[0])
+    linkage = uniform(2.9e-3, 24.0, 1.0e5, 1.0e5)
+    scene = Scene(linkage, Motion(np.linspace(0.1, 6.0, 7), 2.2), 4)
+    command = fourbar.command(scene)
+    engine = next(engine for engine in ENGINES if engine.name == name)
+    answer = engine.start().answer(scene, command)
+    exact = BallArithmetic().answer(scene, command)
+    predict = make_prediction(engine, scene, command, answer)
+    assert predict is not None and answer.assembled is not None
+    closed = answer.assembled
+    assert closed.any()
+    for quantity in ("omega_3", "alpha_3", "alpha_4", "F12", "F43", "torque"):
+        right = exact.quantities[quantity]
+        error = compute_difference(quantity, answer.quantities[quantity], right)
+        predicted = predict(quantity, closed)
+        assert np.all(error[closed] <= TIMES_PREDICTED * predicted[closed]), quantity
+        assert np.all(predicted[closed] < 1e-3 * magnitude(right)[closed]), quantity
+
+
+def test_a_step_of_refinement_leaves_the_residual_of_a_rounding() -> None:
+    """Bars almost in line: the determinant has lost nine digits."""
+    jacobian = np.array([[0.3, 1.0, -1.0], [0.2, 0.7, -0.7 + 1e-9]])
+    turn = np.array([0.0, 1.0, 0.5])
+    rates = solve_closed(jacobian, 2.0, turn, 0.3, -0.4)
+    terms = np.abs(jacobian) @ np.abs(rates)
+    assert np.all(np.abs(jacobian @ rates + [0.3, -0.4]) <= 4.0 * EPS * terms)
+    multipliers = np.array(solve_multipliers(jacobian, turn, [0.3, -0.4, 0.7]))
+    columns = np.vstack([jacobian, turn]).T
+    rest = columns @ multipliers - [0.3, -0.4, 0.7]
+    assert np.all(np.abs(rest) <= 4.0 * EPS * (np.abs(columns) @ np.abs(multipliers)))
+
+
+def test_a_drive_that_exerts_a_force_is_predicted_and_moves_no_bar() -> None:
+    driven = crank_rocker(drive=ON_COUPLER)
+    turned = crank_rocker()
+    command = fourbar.command(driven)
+    solution = fourbar.solve(driven, "force")
+    mask = np.arange(len(command.theta_2)) == 20
+    assert solution.drive_condition is not None and solution.drive_condition[20] > 0.1
+    for quantity in ("theta_3", "omega_4", "a_G3"):
+        predicted = predict_from_data(driven, command, quantity, mask)
+        np.testing.assert_array_equal(
+            predicted, predict_from_data(turned, command, quantity, mask)
+        )
+    for quantity in ("drive_force", "F12", "stroke_speed"):
+        size = magnitude(getattr(solution, quantity))[20]
+        predicted = predict_from_data(driven, command, quantity, mask)[20]
+        assert 4.0 * EPS * size < predicted < 1e3 * EPS * size, quantity
+    engine = next(engine for engine in ENGINES if engine.name == "free-body")
+    answer = FreeBody().answer(driven, command)
+    assert make_prediction(engine, driven, command, answer) is not None

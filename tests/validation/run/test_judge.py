@@ -312,7 +312,7 @@ def test_an_answer_that_the_formulas_withhold_is_not_compared() -> None:
                 assert (row.verdict, row.reason) == expected
             else:
                 said = EQUIVALENCE.explain(row.condition)
-                assert (row.verdict, row.reason) == (AGREES, said)
+                assert row.verdict == AGREES and row.reason.startswith(said)
 
 
 def test_positions_without_a_value_are_counted_next_to_those_that_were_compared() -> (

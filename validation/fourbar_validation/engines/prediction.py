@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.quantities import PIN_FORCES, STAGE_OF, VECTORS, Array
+from fourbar.quantities import COUPLE, LINE, PIN_FORCES, STAGE_OF, VECTORS, Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.pins import find_centre, find_mass
 from fourbar_validation.compare.tolerance import (
@@ -38,16 +38,23 @@ from fourbar_validation.compare.tolerance import (
     mark_touching,
     sum_lengths,
 )
-from fourbar_validation.engines.description import list_speeds
+from fourbar_validation.engines.description import find_unknown, list_speeds
 
 if TYPE_CHECKING:
     from fourbar_validation.engines.balls import Ball, BallValues
 
+DRIVING = (COUPLE.value, LINE.value)
+"""Quantities of a drive, of which a scene has one."""
 LARGEST_FIRST_ORDER = 0.1
 """Limit of first-order prediction. Angles uncertain by this part of the sine that
 everything divides by leave speeds, forces and the torque undetermined; the torque's own
 first order can cancel.
 """
+
+
+def find_unpredicted(scene: Scene) -> str:
+    """Give the reason why no error is predicted in a scene, if any."""
+    return find_unknown(scene, lambda effect: effect.in_balls, forces=True)
 
 
 def predict_from_data(
@@ -164,12 +171,13 @@ def _predict_error(
             continue
         first = moved.first_order(quantity, reach, carried=carried)
         errors[i] = min(first, bound)
-        if quantity == "torque":
+        if quantity in DRIVING:
             turned = max(moved.first_order(f"theta_{bar}", reach) for bar in (3, 4))
             pulled = max(
                 moved.first_order(force, reach, carried=carried) for force in PIN_FORCES
             )
-            errors[i] += pulled * turned * sum_lengths(scene.linkage)
+            lever = sum_lengths(scene.linkage) if quantity == COUPLE.value else 1.0
+            errors[i] += pulled * turned * lever
     return errors
 
 
@@ -295,12 +303,14 @@ def _compute_sensitivity(
         for name, most in (("slip", fastest), ("jerk", hardest)):
             for direction in (acb(1), acb(0, 1)):
                 _add_response(loop, base, move(**{name: most * step * direction}))
-    if "torque" in base:
+    drive = next((name for name in DRIVING if name in base), None)
+    if drive is not None:
         strongest = max(
             abs(base[name + axis]) for name in PIN_FORCES for axis in ("_x", "_y")
         )
-        # the couple on a bar is rounded too
-        strongest += abs(base["torque"]) / sum_lengths(scene.linkage)
+        # the couple on a bar, or the force that drives, is rounded too
+        lever = sum_lengths(scene.linkage) if drive == COUPLE.value else 1.0
+        strongest += abs(base[drive]) / lever
         heaviest = max(find_mass(scene.linkage.bar(bar)) for bar in MOVING_BARS)
         for bar in MOVING_BARS:
             rounded = move(**{f"couple_{bar}": strongest * step})

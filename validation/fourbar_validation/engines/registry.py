@@ -36,10 +36,11 @@ from fourbar_validation.compare.tolerance import (
 )
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.description import list_speeds
-from fourbar_validation.engines.exact import BallArithmetic, find_refusal, shift_to
+from fourbar_validation.engines.exact import BallArithmetic, shift_to
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.loop import make_blank
 from fourbar_validation.engines.prediction import (
+    find_unpredicted,
     predict_about_mass_centre,
     predict_for_any_method,
     predict_from_data,
@@ -374,7 +375,8 @@ def make_prediction(
     if command.bar != 2 or command.stroke is not None:
         return None  # the prediction knows the command of bar 2 alone
     if predict is None or (
-        engine.tolerance.conditioned and (find_missing("flint") or find_refusal(scene))
+        engine.tolerance.conditioned
+        and (find_missing("flint") or find_unpredicted(scene))
     ):
         return None  # the law in the condition stands alone
     return lambda quantity, mask: predict(scene, command, quantity, mask)

@@ -33,6 +33,8 @@ from fourbar_validation.engines.loaded import (
 
 if TYPE_CHECKING:
     from fourbar.effects.place import Place
+
+Components3 = tuple[float, float, float]
 _OPEN_AT_B = [(name, point) for name, point in PART_POINTS.items() if name != "A2"]
 """Names of points where bars 2 and 3 share pin A, and of the points of the bars."""
 _ACCELERATIONS = [f"a_{name}" for name in ON_BARS]
@@ -308,7 +310,9 @@ def solve_closed(
     """Solve J rates + (x, y) = 0, turn . rates = rate.
 
     The rates are those of the coordinates; LinAlgError at a toggle. By Cramer's rule:
-    for bar 2 the determinant is that of `newton` to the last digit.
+    for bar 2 the determinant is that of `newton` to the last digit. Beside a toggle
+    the rule alone leaves a residual of eps/s of its terms, and accelerations differ by
+    that over s once more; a step of refinement leaves eps.
     """
     (e, a, b), (f, c, d) = jacobian.tolist()
     p, q, r = turn.tolist()
@@ -318,21 +322,29 @@ def solve_closed(
     det = p * u + q * v + r * w
     if det == 0.0:
         raise np.linalg.LinAlgError("the bars are in one line")
-    return np.array(
-        [
+
+    def solve(rate: float, x: float, y: float) -> Components3:
+        return (
             (rate * u - x * (c * r - d * q) - y * (b * q - a * r)) / det,
             (rate * v - x * (d * p - f * r) - y * (e * r - b * p)) / det,
             (rate * w - x * (f * q - c * p) - y * (a * p - e * q)) / det,
-        ]
+        )
+
+    i, j, k = solve(rate, x, y)
+    di, dj, dk = solve(
+        rate - (p * i + q * j + r * k),
+        x + (e * i + a * j + b * k),
+        y + (f * i + c * j + d * k),
     )
+    return np.array([i + di, j + dj, k + dk])
 
 
 def solve_multipliers(
     jacobian: Array,
     turn: Array,
     needed: Sequence[float],
-) -> tuple[float, float, float]:
-    """Solve [J^T turn] [lambda; T] = tau.
+) -> Components3:
+    """Solve [J^T turn] [lambda; T] = tau, with a step of refinement.
 
     Raises LinAlgError if no torque on that bar balances tau. By Cramer's rule: of bar 2
     the determinant is that of `solve_closed` to the last digit: there are forces
@@ -341,13 +353,23 @@ def solve_multipliers(
     """
     (a, b, c), (d, e, f) = jacobian.tolist()
     p, q, r = turn.tolist()
-    x, y, z = needed
     u = b * f - c * e
     v = c * d - a * f
     w = a * e - b * d
     det = p * u + q * v + r * w
     if det == 0.0:
         raise np.linalg.LinAlgError("the torque is at a pole")
-    force_x = x * (e * r - f * q) + y * (f * p - d * r) + z * (d * q - e * p)
-    force_y = x * (q * c - r * b) + y * (r * a - p * c) + z * (p * b - q * a)
-    return force_x / det, force_y / det, (x * u + y * v + z * w) / det
+
+    def solve(x: float, y: float, z: float) -> Components3:
+        force_x = x * (e * r - f * q) + y * (f * p - d * r) + z * (d * q - e * p)
+        force_y = x * (q * c - r * b) + y * (r * a - p * c) + z * (p * b - q * a)
+        return force_x / det, force_y / det, (x * u + y * v + z * w) / det
+
+    x, y, z = needed
+    i, j, k = solve(x, y, z)
+    di, dj, dk = solve(
+        x - (a * i + d * j + p * k),
+        y - (b * i + e * j + q * k),
+        z - (c * i + f * j + r * k),
+    )
+    return i + di, j + dj, k + dk

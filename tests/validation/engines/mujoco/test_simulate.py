@@ -14,7 +14,7 @@ from fourbar.mjcf import RECIPE, WindowMotion
 from fourbar.quantities import UNKNOWNS
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison, Demands
-from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, Row
+from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor
@@ -111,7 +111,8 @@ def test_within_1e_5_of_the_scale(name: str) -> None:
 def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
     """One pass of Newton's method is all they get.
 
-    Under loads the closure must be the stiffer for it.
+    Under loads the closure must be the stiffer for it. A pin force of which 1e7 times
+    as much cancels has no digit at 1e-5.
     """
     drawn = draw_random_scene(7, index, tuple(DrawnType))
     slow = replace(
@@ -123,7 +124,9 @@ def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
     posed = slow if loaded else replace(slow, loads=(), effects=())
     answer = MujocoSimulated().answer(posed, fourbar.command(posed))
     rows = compared(posed, answer)
-    assert all(row.passed for row in rows), [row for row in rows if not row.passed]
+    undecided = {row.quantity for row in rows if row.verdict == UNDECIDED}
+    assert undecided <= ({"F32"} if loaded else set())
+    assert not any(row.failed for row in rows), [row for row in rows if row.failed]
 
 
 def test_an_input_that_speeds_up_covers_the_end_of_its_window_in_as_many_steps() -> (
