@@ -165,6 +165,8 @@ def pin_forces(
     which closes the triangle of bars 3 and 4, so that a couple between them keeps its
     digits:
         F43 = ((M3 - C) D - (M3 + M4) b u3)/(b c sin(theta_4 - theta_3)).
+    Where c is much shorter than b, D is nearly b u3 and M3 would cancel; there
+        F43 = -(M3 c u4 + M4 b u3 + C D)/(b c sin(theta_4 - theta_3)).
 
     Parameters
     ----------
@@ -228,6 +230,10 @@ def pin_forces(
     else:
         k = 1.0 / (c * sine)
         F43 = (of_3 * k * (1.0 / b)) * position.diagonal - ((M3 + M4) * k) * position.u3
+        small = 2.0 * c < b
+        if is_any(small):
+            of_bars = M3 * (c / b) * position.u4 + M4 * position.u3
+            F43 = select(small, -k * (of_bars + (C / b) * position.diagonal), F43)
         F32 = R3 + F43 + mass_at_A * position.u2
         short = d < a
         # the bars turn together; the sum loses the small component across bar 2

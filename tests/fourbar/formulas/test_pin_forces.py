@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.arithmetic import cross
-from fourbar.formulas.pin_forces import solve_between
+from fourbar.formulas.pin_forces import Wrenches, pin_forces, solve_between
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar_lab.contenders import make_example
 from fourbar_validation.published.thirteen import EquationTerms, solve_thirteen
@@ -354,3 +355,27 @@ def test_a_force_beside_B_has_its_moment_there(beside: float) -> None:
     arm = (b + beside) - b  # exact: as the doubles have it
     exact = arm * math.sin(direction) / (b * np.abs(np.sin(s.theta_3 - s.theta_2)))
     assert np.hypot(*s.F32.T) == pytest.approx(exact, rel=GROWN)
+
+
+@pytest.mark.parametrize("ratio", [1e-5, 1e-3, 0.49, 0.51, 3.0, 1e3])
+@pytest.mark.parametrize("couple", [0.0, 0.4, 1e6])
+def test_the_moments_of_bars_of_any_ratio_balance(ratio: float, couple: float) -> None:
+    """Each moment equation holds to a rounding of its own terms, however short bar 4.
+
+    Bar 4 is commanded: a long input says little of the angle of a short bar.
+    """
+    b, c = 1.0, ratio
+    case = fourbar.Scene(fourbar.uniform(1.5 + c, 1.2, b, c))
+    theta_4 = np.array([math.pi - 0.3 / max(1.0, c)])
+    zero = np.zeros(1)
+    command = fourbar.scene.Command(theta_4, np.ones(1), zero + 2.0, zero, bar=4)
+    state = compute_shown_state(case, command)
+    assert abs(state.position.sin_mu) > 0.1
+    position, lengths = state.position, state.lengths
+    w = Wrenches(R3=0.7 - 0.2j, M3=0.9, M4=0.3 * c, C=couple)
+    forces = pin_forces(lengths, position, 2, position.sin_mu, w, 0j, 0.0)
+    size = abs(forces.F43)
+    of_3 = b * cross(position.u3, forces.F43) + w.M3 - couple
+    of_4 = -c * cross(position.u4, forces.F43) + w.M4 + couple
+    assert np.all(abs(of_3) <= 16.0 * EPS * (b * size + w.M3 + couple))
+    assert np.all(abs(of_4) <= 16.0 * EPS * (c * size + w.M4 + couple))

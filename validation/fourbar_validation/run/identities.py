@@ -33,6 +33,8 @@ from fourbar.quantities import (
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.compare import CLOSURE, NOT_DEMANDED
+from fourbar_validation.compare.effects import find_size
+from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.rows import FAILS, FORMULAS, Row
 from fourbar_validation.compare.tolerance import (
     EPS,
@@ -229,8 +231,14 @@ def _check_sums(question: Question) -> Iterator[Row]:
         )
     # the forces of the bars that are not driven are solved apart, and the torque is
     # that of virtual work
+    placed = state_from_pins(scene)
+    acts = sum(
+        find_size(term, scene.linkage, solution)
+        for term in (*placed.loads, *placed.effects)
+        if term.key in ("load", "springs")
+    )  # a force at a place far from its bar's pins is balanced by as large a couple
     with np.errstate(divide="ignore", invalid="ignore"):
-        force_size = balance.forces / (
+        force_size = (balance.forces + acts) / (
             find_lever(scene.linkage) * solution.drive_condition
         )
         moment_size = balance.moments / find_condition(drive, scene.linkage, solution)
