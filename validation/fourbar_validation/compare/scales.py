@@ -429,7 +429,7 @@ def _find_velocities(
     return velocities
 
 
-def _find_accelerations(linkage: FourBar, answered: Solution) -> dict[str, Array]:
+def _find_accelerations(linkage: FourBar, answered: Solution) -> dict[str, Any]:
     """Find the accelerations of the mass centres, m/s^2, from an answer's own rates."""
 
     def swing(bar: int, distance: float, angle: float) -> NDArray[np.complex128]:
@@ -439,7 +439,7 @@ def _find_accelerations(linkage: FourBar, answered: Solution) -> dict[str, Array
         return np.asarray(swung)
 
     of_A = swing(2, linkage.input.length, 0.0)
-    accelerations = {}
+    accelerations: dict[str, Any] = {}
     for number, bar in zip(MOVING_BARS, linkage.moving, strict=True):
         centre = swing(number, *find_centre(bar))
         if number == 3:
@@ -480,7 +480,7 @@ def find_scale_of_answer(
             return None
         if answered.a_G2 is None or answered.a_G3 is None or answered.a_G4 is None:
             accelerations = _find_accelerations(scene.linkage, answered)
-            answered = replace(answered, **accelerations)  # type: ignore[arg-type]
+            answered = replace(answered, **accelerations)
     values = [getattr(answered, quantity) for quantity in quantities]
     rows = [i for i, numbers in enumerate(values) if numbers is not None]
     shape = len(values), len(answered)
