@@ -169,7 +169,7 @@ def test_every_command_prints_what_is_shown(
     [
         ("docs/theory.md", 2),
         ("docs/guide-designer.md", 1),
-        ("docs/guide-roboticist.md", 3),
+        ("docs/guide-roboticist.md", 4),
     ],
 )
 def test_the_programs_print_what_is_shown(name: str, count: int) -> None:

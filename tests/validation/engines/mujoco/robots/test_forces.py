@@ -1,9 +1,12 @@
 """Forces of MuJoCo's arrays where bodies are held against gravity."""
 
+import contextlib
+import io
 import math
 import re
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -14,10 +17,15 @@ from fourbar.mjcf import write_mjcf
 from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco.robots.ancestry import list_lifted_masses
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
+from fourbar_validation.engines.mujoco.robots.forces import (
+    BearerForces,
+    read_equality_force,
+)
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.engines.mujoco.theirs import FILE_AT_ONE_STATE
 from tests.support.robots import answer_of, examine_text
+from tests.whole.test_docs import blocks, read
 from tests.whole.test_imports import ROOT
 
 FLAGS = ("gravity", "spring", "damper", "constraint", "actuation")
@@ -67,3 +75,53 @@ def test_pin_forces_are_those_of_the_free_body(scene: Scene, flags: str) -> None
     rows = {round(math.degrees(row.theta_2)) % 360: row for row in loop.states.rows}
     assert rows[90].soft.forces["F14"][1] == right
     assert rows[90].rigid.forces["F14"][1] == right
+
+
+SOLVED = 1e-6
+"""Parts of the weight: MuJoCo's solver stops at a tolerance of 1e-8."""
+
+
+def test_the_listing_of_the_guide_reads_what_the_harness_reads(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(ROOT)
+    names: dict[str, Any] = {}
+    with contextlib.redirect_stdout(io.StringIO()):
+        exec(blocks("python", read("docs/guide-roboticist.md"))[0], names)
+    model, data = names["model"], names["data"]
+    number = model.body("right_follower").id
+    np.testing.assert_array_equal(names["force"], read_equality_force(data, 0))
+    np.testing.assert_array_equal(names["pin"], BearerForces(model).read(data, number))
+    # Newton's law of the follower, which the pin bears and the connect pulls
+    acceleration = np.zeros(6)
+    body = mujoco.mjtObj.mjOBJ_BODY
+    mujoco.mj_objectAcceleration(model, data, body, number, acceleration, 0)
+    inertia = model.body_mass[number] * acceleration[3:]  # less gravity
+    np.testing.assert_allclose(
+        names["pin"] - names["force"], inertia, atol=SOLVED * np.abs(inertia).max()
+    )
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.3])
+def test_a_weld_exerts_force_and_moment_as_the_guide_has_them(scale: float) -> None:
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option gravity="0 0 0" tolerance="0"/><worldbody>
+        <body name="one" pos=".1 0 0"><freejoint/><geom size=".1"/></body>
+        <body name="two" pos=".3 .2 .1" euler="20 40 60"><geom size=".1"/></body>
+        </worldbody><equality><weld body1="one" body2="two" torquescale="{scale}"
+        solimp="0.9999 0.9999 .001 .5 2" solref=".01 1"/></equality></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    force, moment = np.array([1.0, 2.0, 3.0]), np.array([0.3, -0.5, 0.2])
+    data.xfrc_applied[1] = [*force, *moment]
+    mujoco.mj_forward(model, data)
+    turned = data.xmat[2].reshape(3, 3)
+    exerted = 0.5 * scale * turned @ data.efc_force[3:6]
+    about = np.cross(data.xpos[2] - data.xpos[1], data.efc_force[:3])
+    # Newton and Euler for a ball at rest: what its acceleration does not take
+    left = model.body_mass[1] * data.qacc[:3] - force
+    left_moment = model.body_inertia[1] * data.qacc[3:] - moment
+    np.testing.assert_allclose(data.efc_force[:3], left, atol=SOLVED)
+    np.testing.assert_allclose(exerted + about, left_moment, atol=SOLVED)
+    assert np.abs(exerted).max() > 0.05
