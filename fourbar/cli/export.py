@@ -18,6 +18,7 @@ from fourbar.errors import (
 )
 from fourbar.scene import Scene
 from fourbar.solution import Conversion
+from fourbar.writing import STANDARD_STREAM
 
 if TYPE_CHECKING:
     from fourbar.mjcf.document import Drive
@@ -88,7 +89,6 @@ def _open_or_make_scene(
         return
     from fourbar.mjcf import list_defaults, make_scene
     from fourbar.show.units import units_of_length
-    from fourbar.writing import STANDARD_STREAM
 
     assert lengths is not None
     speed = {}
@@ -167,6 +167,13 @@ def plot(
             units=given.suit_file_units() if units is None else units,
             dimensions=dimensions,
         )
+    _say_written(out)
+
+
+def _say_written(out: Path, frames: int = 0) -> None:
+    """Say what was written, unless it went to standard output."""
+    if out != STANDARD_STREAM:
+        click.echo(f"wrote {out}" + (f": {frames} frames" if frames else ""))
 
 
 def _find_place(scene: Scene, text: str) -> float:
@@ -221,7 +228,7 @@ def animate(
             raise InputError("--picture", entry, "must be like coupler=FILE")
         attached[bar] = file
     with given.open_scene(scene) as described, given.show_waiting(described):
-        write_animation(
+        frames = write_animation(
             described,
             out,
             pictures=attached,
@@ -229,6 +236,7 @@ def animate(
             units=given.suit_file_units() if units is None else units,
             vectors=vectors,
         )
+    _say_written(out, frames)
 
 
 @click.command()

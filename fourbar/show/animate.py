@@ -383,8 +383,8 @@ def write_animation(
     seconds: float | None = None,
     units: Conversion = SI,
     vectors: bool = False,
-) -> None:
-    """Write a moving scene to a file, atomically.
+) -> int:
+    """Write a moving scene to a file, atomically; return the frames of a film, or 0.
 
     Parameters
     ----------
@@ -409,14 +409,14 @@ def write_animation(
     kind = format_of(path, ANIMATION_FORMATS)
     if kind == "html":
         write_text(target, write_page(scene, pictures or {}, units, vectors))
-        return
+        return 0
     if pictures:
         raise InputError(
             "picture",
             sorted(pictures),
             "pictures are shown in an .html page only",
         )
-    write_film(scene, target, kind, seconds, units, moving=vectors)
+    return write_film(scene, target, kind, seconds, units, moving=vectors)
 
 
 def write_page(

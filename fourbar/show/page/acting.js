@@ -42,14 +42,16 @@ const ring = (at, radius, from, turn, count) => Array.from({ length: count }, (_
 
 function headed(points, kind, group = parts.acting) {   // a line with an arrow head at its end
   make(group, "path", { class: `act act-${kind}`, d: pathOf(points) });
+  keepOff(points.filter((_, n) => n % 4 === 0 || n === points.length - 1), 2);
   const [x, y] = points[points.length - 1], [u, v] = points[points.length - 2], long = Math.hypot(x - u, y - v) || 1;
   const [a, b] = [(x - u) / long, (y - v) / long];
   make(group, "path", { class: `act-head act-${kind}`, d: `M${x + 7 * a} ${y + 7 * b}L${x - 4 * b} ${y + 4 * a}L${x + 4 * b} ${y - 4 * a}Z` });
 }
 
-function named(text, x, y, group = parts.acting) {
-  const free = freeSpot(Math.min(view.width - 20, Math.max(20, x)), Math.min(view.height - 11, Math.max(11, y)), text.length);
-  if (free) make(group, "text", { class: "act-name", x: free[0], y: free[1] }).textContent = text;
+function named(text, at, away, clear, group = parts.acting) {
+  const element = make(group, "text", { class: "act-name" });
+  element.textContent = text;
+  want(element, at, away, clear);
 }
 
 function drawActing(p, i) {
@@ -69,38 +71,41 @@ function drawActing(p, i) {
     if (one.kind === "gravity") {
       const size = Math.hypot(...one.vector), [x, y] = [one.vector[0] / size, -one.vector[1] / size], at = [view.width - 34, 34];
       headed([[at[0] - 12 * x, at[1] - 12 * y], [at[0] + 12 * x, at[1] + 12 * y]], "gravity");
-      named("g", at[0] - 14, at[1]);
+      named("g", at, [-1, 0], 6);
     } else if (one.kind === "spring") {
       const a = toScreen(framed(p, one.bar, one.at)), b = toScreen(framed(p, ...one.end)), along = [b[0] - a[0], b[1] - a[1]], long = Math.hypot(...along) || 1;
       const on = (share, out) => [a[0] + share * along[0] - out * along[1] / long, a[1] + share * along[1] + out * along[0] / long];
       const teeth = Array.from({ length: COILS }, (_, n) => on(0.15 + 0.7 * (n + 0.5) / COILS, (n % 2 ? -0.6 : 0.6) * S));
       make(parts.under, "path", { class: "act act-spring", d: pathOf([a, on(0.15, 0), ...teeth, on(0.85, 0), b]) });
+      keepOff([a, b], 0.6 * S);
       for (const [x, y] of [a, b]) make(parts.acting, "circle", { class: "act-head act-spring", cx: x, cy: y, r: 3 });
     } else if (one.kind === "cylinder") {
       const a = toScreen(framed(p, one.bar, one.at)), b = toScreen(framed(p, ...one.end)), on = share => [0, 1].map(j => a[j] + share * (b[j] - a[j]));
       const barrel = Math.min(0.95, BARREL * view.k * Math.min(...table().stroke.filter(s => s !== null)) / Math.hypot(b[0] - a[0], b[1] - a[1]));
       make(parts.acting, "path", { class: "act act-drive", d: pathOf([a, b]) });
       make(parts.acting, "path", { class: "act act-drive barrel", d: pathOf([on(0.1 * barrel), on(barrel)]) });
-      const [x, y] = on(0.5 * barrel), away = 12 / Math.hypot(b[0] - a[0], b[1] - a[1]);
-      named(one.name, x + away * (b[1] - a[1]), y - away * (b[0] - a[0]));
+      keepOff([a, b], 3);
+      named(one.name, on(0.5 * barrel), [b[1] - a[1], a[0] - b[0]], 4);
       for (const [x, y] of [a, b]) make(parts.acting, "circle", { class: "act-head act-drive", cx: x, cy: y, r: 3 });
     } else if (one.kind === "force" || one.kind === "push") {
       const foot = forceFoot(p, one), angle = one.turns ? { 2: p.theta2, 3: p.theta3, 4: p.theta4 }[one.bar] : 0;
       const direction = Math.atan2(one.vector[1], one.vector[0]) + angle + (factor < 0 ? Math.PI : 0), [x, y] = toScreen(foot);
       const [u, v] = [Math.cos(direction), -Math.sin(direction)];
       headed([[x, y], [x + 5 * S * u, y + 5 * S * v]], one.kind === "push" ? "drive" : "force");
-      named(one.name, x + 7.5 * S * u, y + 7.5 * S * v);
+      named(one.name, [x + 5 * S * u, y + 5 * S * v], [u, v], 7);
     } else if (one.kind === "moment" || one.kind === "drive") {
       const turn = Math.sign(one.kind === "moment" ? one.moment * factor : torque ?? 1);
       const middle = one.bar === 3 ? [0, 1].map(j => 0.5 * (p.A[j] + p.B[j])) : p[one.pin];
       const at = toScreen(one.kind === "moment" ? forceFoot(p, one) : middle), radius = (one.kind === "moment" ? 2.2 : 2.9) * S;
       if (turn) headed(ring(at, radius, -35 / DEG * turn, turn * OPENING, 30), one.kind);
-      if (turn) named(one.name, at[0], at[1] - turn * (radius + 9));
+      if (turn) named(one.name, at, [0, -turn], radius);
     } else if (one.kind === "torsion") {
       const at = toScreen(p[one.pin]);
+      keepOff(ring(at, 2.1 * S, 0, TURN, 9));
       make(parts.under, "path", { class: "act act-spring", d: pathOf(Array.from({ length: 80 }, (_, n) => ring(at, S * (0.6 + 1.5 * n / 79), n / 79 * 2.5 * TURN, 0, 2)[0])) });
     } else {
       const at = toScreen(p[one.pin]);
+      keepOff(ring(at, (RINGS[one.kind] ?? 2.1) * S, 0, TURN, 9));
       make(parts.under, "circle", { class: `act act-${one.kind === "flywheel" ? "flywheel" : "pin"}`, cx: at[0], cy: at[1], r: (RINGS[one.kind] ?? 2.1) * S });
     }
   }
@@ -131,6 +136,7 @@ function drawPoints(p) {
   for (const point of data.points) {
     const [x, y] = toScreen(framed(p, point.bar, point.at));
     make(parts.points, "path", { class: "own-point", d: `M${x - 5} ${y}L${x} ${y - 5}L${x + 5} ${y}L${x} ${y + 5}Z` });
-    if (byId("show-labels").checked) named(point.name, x + 12, y - 9, parts.points);
+    mark([x, y], 6);
+    if (byId("show-labels").checked) named(point.name, [x, y], [1, -0.7], 6, parts.points);
   }
 }

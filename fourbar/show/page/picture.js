@@ -29,6 +29,7 @@ for (const k of [2, 3, 4]) {
   make(mark, "path", { class: "centre-fill", d: "M0 0H7A7 7 0 0 0 0 -7ZM0 0H-7A7 7 0 0 0 0 7Z" });
 }
 parts.labels = make(picture, "g", { id: "labels" });
+parts.leaders = make(parts.labels, "path", { class: "axis" });
 parts.label = {};
 for (const name of ["O2", "A", "B", "O4", "1", "2", "3", "4", "G2", "G3", "G4", ...FORCES]) {
   const element = make(parts.labels, "text", { class: "label" + (FORCES.includes(name) ? ` f-${name}` : "") });
@@ -55,14 +56,6 @@ function barPoint(p, k, r) {
   const angle = { 2: p.theta2, 3: p.theta3, 4: p.theta4 }[k], foot = p[FIRST_PIN[k]];
   const c = Math.cos(angle), s = Math.sin(angle);
   return [foot[0] + r[0] * c - r[1] * s, foot[1] + r[0] * s + r[1] * c];
-}
-
-// The name of a bar stands beside its middle, to one side. One with a length is long: its box clears the bar at any angle.
-function nameBeside(k, p1, p2, side) {
-  const long = Math.hypot(p2[0] - p1[0], p2[1] - p1[1]) || 1, normal = [(p1[1] - p2[1]) / long, (p2[0] - p1[0]) / long];
-  const box = [7.5 * parts.label[k].textContent.length, 15], sign = normal[0] * side[0] + normal[1] * side[1] < 0 ? -1 : 1;
-  const away = sign * Math.max(15, 7 + 0.5 * (Math.abs(normal[0]) * box[0] + Math.abs(normal[1]) * box[1]));
-  set(parts.label[k], { x: 0.5 * (p1[0] + p2[0]) + away * normal[0], y: 0.5 * (p1[1] + p2[1]) + away * normal[1] });
 }
 
 const coupler = p => barPoint(p, 3, data.centres[3] ?? [0.5 * lengths[2], 0]);
@@ -189,17 +182,12 @@ function insideTip(i, s, top) {
   return length;
 }
 
-function place(name, point, from, distance) {
-  const dx = point[0] - from[0], dy = point[1] - from[1], size = Math.hypot(dx, dy) || 1;
-  set(parts.label[name], { x: point[0] + distance * dx / size, y: point[1] + distance * dy / size });
-}
-
 function drawLinkage(p, i) {
   const show = id => byId(id).checked;
   parts.curve.style.display = parts.traces.style.display = show("show-curve") ? "" : "none";
   parts.labels.style.display = show("show-labels") ? "" : "none";
   for (const element of Object.values(parts.label)) element.style.display = "none";
-  const visible = (name, on) => { parts.label[name].style.display = on ? "" : "none"; };
+  clearLabels();
   const O4 = [lengths[0] * Math.cos(data.theta_1), lengths[0] * Math.sin(data.theta_1)], fixed = { O2: [0, 0], O4 };
   const known = p ?? (grid[i] === null ? fixed : { ...fixed, theta2: grid[i], A: [lengths[1] * Math.cos(grid[i]), lengths[1] * Math.sin(grid[i])] });
   const s = Object.fromEntries(["O2", "A", "B", "O4"].filter(name => known[name]).map(name => [name, toScreen(known[name])]));
@@ -207,16 +195,14 @@ function drawLinkage(p, i) {
   for (const name of ["O2", "A", "B", "O4"]) {
     parts.pins[name].style.display = s[name] ? "" : "none";
     if (!s[name]) continue;
-    set(parts.pins[name], { cx: s[name][0], cy: s[name][1] });
-    visible(name, true);
-    if (name[0] === "O") set(parts.label[name], { x: s[name][0] + (s[name][0] < middle[0] ? -24 : 24), y: s[name][1] + 8 });
-    else place(name, s[name], middle, 18);
+    const [x, y] = s[name], fixed = name[0] === "O";
+    set(parts.pins[name], { cx: x, cy: y });
+    mark(s[name], 7);
+    if (fixed) mark([x, y + 14], 19, 14);
+    want(parts.label[name], s[name], fixed ? [x < middle[0] ? -1 : 1, 0.3] : [x - middle[0], y - middle[1]], 7);
   }
-  if (show("show-dimensions")) {
-    visible("1", true);
-    nameBeside("1", s.O2, s.O4, [0, 1]);
-  }
-  barLines = [2, 3, 4].map(k => [s[FIRST_PIN[k]], s[LAST_PIN[k]]]).filter(([p1, p2]) => p1 && p2);
+  keepOff([s.O2, s.O4]);
+  if (show("show-dimensions")) want(parts.label[1], middleOf(s.O2, s.O4), [0, 1], 2);
   for (const k of [2, 3, 4]) {
     const p1 = s[FIRST_PIN[k]], p2 = s[LAST_PIN[k]], drawn = Boolean(p1 && p2);
     parts.bars[k].style.display = drawn ? "" : "none";
@@ -224,12 +210,11 @@ function drawLinkage(p, i) {
     parts.centre[k].style.display = drawn && data.centres[k] && show("show-centres") ? "" : "none";
     if (!drawn) continue;
     set(parts.bars[k], { x1: p1[0], y1: p1[1], x2: p2[0], y2: p2[1] });
-    visible(String(k), true);
-    const mid = [0.5 * (p1[0] + p2[0]), 0.5 * (p1[1] + p2[1])], long = Math.hypot(p2[0] - p1[0], p2[1] - p1[1]) || 1;
-    const normal = [-(p2[1] - p1[1]) / long, (p2[0] - p1[0]) / long];
-    let side = (mid[0] - middle[0]) * normal[0] + (mid[1] - middle[1]) * normal[1] >= 0 ? 15 : -15;
-    if (data.centres[k] && Math.abs(data.centres[k][1]) * view.k > 10) side = data.centres[k][1] > 0 ? 15 : -15;   // off the bar, G has the other side
-    nameBeside(k, p1, p2, normal.map(x => side * x));
+    const [u, v] = [p2[0] - p1[0], p2[1] - p1[1]], mid = middleOf(p1, p2), long = Math.hypot(u, v) || 1;
+    let side = (mid[1] - middle[1]) * u - (mid[0] - middle[0]) * v >= 0 ? 1 : -1;
+    if (data.centres[k] && Math.abs(data.centres[k][1]) * view.k > 10) side = Math.sign(data.centres[k][1]);   // off the bar, G has the other side
+    keepOff([p1, p2], 4.5);
+    want(parts.label[k], mid, [-side * v, side * u], 5);
     if (data.pictures[k]) {
       const height = long * (parts.image[k].ratio ?? 0.3), angle = Math.atan2(p2[1] - p1[1], p2[0] - p1[0]) * DEG;
       set(parts.image[k], { x: 0, y: -0.5 * height, width: long, height, transform: `translate(${p1[0]} ${p1[1]}) rotate(${angle})` });
@@ -238,8 +223,10 @@ function drawLinkage(p, i) {
     if (data.centres[k]) {
       const g = toScreen(barPoint(known, k, data.centres[k]));
       parts.centre[k].setAttribute("transform", `translate(${g[0]} ${g[1]})`);
-      visible(`G${k}`, show("show-centres"));
-      set(parts.label[`G${k}`], { x: g[0] - 1.2 * side * normal[0], y: g[1] - 1.2 * side * normal[1] });
+      if (show("show-centres")) {
+        mark(g, 8);
+        want(parts.label[`G${k}`], g, [side * v, -side * u], 8);
+      }
     }
   }
   const forces = dynamic() && show("show-forces");
@@ -248,49 +235,75 @@ function drawLinkage(p, i) {
     forceScale = { top, cut: false, pixels: top > 0 ? Math.max(0.5 * view.arrow, Math.min(view.arrow, insideTip(i, s, top))) / top : 0 };
     if (top > 0) forceLegend(); else parts.legend.replaceChildren();
   }
+  if (parts.legend.childElementCount) {
+    const box = parts.legend.getBBox();
+    mark([box.x + 0.5 * box.width, box.y + 0.5 * box.height], 0.5 * box.width, 0.5 * box.height);
+  }
   for (const name of FORCES) {
     const arrow = parts.arrow[name], f = forces && p ? table()[name][i] : [null, null];
     const size = f[0] === null ? 0 : Math.hypot(f[0], f[1]), cut = size > forceScale.top;
     const long = Math.min(size, forceScale.top) * forceScale.pixels, drawn = long > 2;
     for (const element of Object.values(arrow)) element.style.display = drawn ? "" : "none";
-    visible(name, long > 10);   // next to a shorter arrow its name would stand on the pin's
     if (!drawn) continue;
     const [x, y] = s[FORCE_PIN[name]], ux = f[0] / size, uy = -f[1] / size, head = Math.min(11, long);
     const tip = [x + long * ux, y + long * uy], neck = [tip[0] - head * ux, tip[1] - head * uy];
     set(arrow.shaft, { x1: x, y1: y, x2: neck[0], y2: neck[1] });
     arrow.shaft.classList.toggle("cut", cut);
     arrow.head.setAttribute("d", `M${tip[0]} ${tip[1]}L${neck[0] - 0.45 * head * uy} ${neck[1] + 0.45 * head * ux}L${neck[0] + 0.45 * head * uy} ${neck[1] - 0.45 * head * ux}Z`);
-    set(parts.label[name], { x: tip[0] + 15 * ux, y: tip[1] + 13 * uy });
+    keepOff([[x, y], tip], 2);
+    mark(middleOf(neck, tip), 6);
+    if (long > 10) want(parts.label[name], tip, [ux, uy], 2);   // next to a shorter arrow its name would stand on the pin's
   }
-  separateLabels();
   drawPoints(p);
   drawActing(p, i);
   drawMotion(p, i);
+  placeLabels();
 }
+const middleOf = (p, q) => [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];
 
-// Labels that would cover each other move aside, the less important one first; one without a free spot is left out.
-let kept = [], barLines = [];   // x, y and width of those that stand; ends of the bars drawn
-function freeSpot(x, y, letters) {
-  const wide = 6 + 6 * letters, free = SHIFTS.map(([dx, dy]) => [x + dx, y + dy]).filter(([u, v]) =>
-    u > 10 && v > 10 && u < view.width - 10 && v < view.height - 10
-    && kept.every(([s, t, w]) => Math.abs(u - s) > 0.5 * (wide + w) || Math.abs(v - t) > 15));
-  const offBars = ([u, v]) => [-1, 0, 1].every(side => barLines.every(ends => awayFrom(ends, u + side * (0.5 * wide - 3), v) > 9));
-  const spot = free.find(offBars) ?? free[0];
-  if (spot) kept.push([...spot, wide]);
-  return spot;
-}
-function awayFrom([p, q], u, v) {   // of a point from a line between two others
-  const [x, y] = [q[0] - p[0], q[1] - p[1]], share = Math.max(0, Math.min(1, ((u - p[0]) * x + (v - p[1]) * y) / (x * x + y * y || 1)));
-  return Math.hypot(u - p[0] - share * x, v - p[1] - share * y);
-}
-function separateLabels() {
-  kept = [];
-  for (const name of ["O2", "A", "B", "O4", ...FORCES, "1", "2", "3", "4", "G2", "G3", "G4"]) {
-    const label = parts.label[name];
-    if (label.style.display === "none") continue;
-    const free = freeSpot(Number(label.getAttribute("x")), Number(label.getAttribute("y")), label.childElementCount ? name.length : label.textContent.length);
-    if (free) set(label, { x: free[0], y: free[1] });
-    else label.style.display = "none";
+
+// ---- labels: each takes the free place nearest to what it names; one without any is left out ------------
+let wanted = [], boxes = [], strokes = [];   // labels to be placed; what none may cover; lines that few should
+const GAPS = [3, 8, 14, 22, 32, 44, 58], TURNS = 16, LED = 20, COVERED = 100, halves = new Map();
+const mark = ([x, y], half, high = half) => boxes.push([x, y, half, high]);
+const keepOff = (points, half = 1) => points.slice(1).forEach((q, n) => strokes.push([...points[n], ...q, half]));
+// A label beside a point, first in the direction away; `clear`: radius of the mark there.
+const want = (element, at, away, clear) => wanted.push({ element, at, away: Math.atan2(away[1], away[0]), clear });
+function clearLabels() { wanted = []; boxes = []; strokes = []; }
+
+// Half the width and height of a label, as it is written at this size of the picture.
+function halfOf(element) {
+  const key = `${element.textContent}|${element.getAttribute("class")}|${picture.classList}`;
+  if (!halves.has(key)) {
+    const box = element.getBBox();
+    halves.set(key, [0.5 * box.width + 1, 0.5 * box.height - 1]);
   }
+  return halves.get(key);
 }
-const SHIFTS = [[0, 0], ...[1, 2].flatMap(n => [[0, -15 * n], [0, 15 * n], [17 * n, 0], [-17 * n, 0], [17 * n, -15 * n], [-17 * n, -15 * n], [17 * n, 15 * n], [-17 * n, 15 * n]])];
+function crosses(x, y, w, h, [x1, y1, x2, y2, half]) {   // whether a line meets a box
+  const u = x2 - x1, v = y2 - y1, reach = w + half, high = h + half;
+  if (Math.abs(u) < 1e-9 && Math.abs(x1 - x) > reach || Math.abs(v) < 1e-9 && Math.abs(y1 - y) > high) return false;
+  const [a, b] = u ? [(x - reach - x1) / u, (x + reach - x1) / u] : [-Infinity, Infinity], [c, d] = v ? [(y - high - y1) / v, (y + high - y1) / v] : [-Infinity, Infinity];
+  return Math.max(0, Math.min(a, b), Math.min(c, d)) < Math.min(1, Math.max(a, b), Math.max(c, d));
+}
+function placeLabels() {
+  let leaders = "";
+  for (const { element, at: [px, py], away, clear } of wanted) {
+    element.style.display = "";
+    const [w, h] = halfOf(element), inside = (x, y) => x > w + 2 && y > h + 2 && x < view.width - w - 2 && y < view.height - h - 2;
+    let best = null, least = COVERED;
+    for (let n = 0; n < GAPS.length * TURNS && n / TURNS < least; n++) {
+      const gap = clear + GAPS[Math.floor(n / TURNS)], k = n % TURNS, angle = away + (k % 2 ? 1 : -1) * Math.ceil(k / 2) * TURN / TURNS;
+      const x = px + Math.cos(angle) * (gap + w), y = py + Math.sin(angle) * (gap + h);
+      if (!inside(x, y) || boxes.some(box => Math.abs(x - box[0]) < w + box[2] && Math.abs(y - box[1]) < h + box[3])) continue;
+      const cost = n / TURNS + 4 * strokes.filter(stroke => crosses(x, y, w, h, stroke)).length;
+      if (cost < least) { least = cost; best = [x, y, gap]; }
+    }
+    if (!best) { element.style.display = "none"; continue; }
+    const [x, y, gap] = best;
+    set(element, { x, y });
+    boxes.push([x, y, w, h]);
+    if (gap - clear > LED) leaders += `M${px} ${py}L${Math.max(x - w, Math.min(x + w, px))} ${Math.max(y - h, Math.min(y + h, py))}`;
+  }
+  parts.leaders.setAttribute("d", leaders);
+}

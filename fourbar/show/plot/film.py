@@ -4,6 +4,10 @@ import math
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +31,7 @@ from fourbar.writing import write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from PIL.Image import Image
 
 FRAMES_PER_SECOND = 25
 _MAX_FRAMES = 1500
@@ -34,7 +39,7 @@ FILM_SIZE = (6.4, 5.6)
 FILM_DPI = 100
 SWEEP_SECONDS = 6.0
 """Duration of a film of a sweep if no other is stated, s."""
-WINDOW_POSITIONS = 24
+WINDOW_POSITIONS = 12
 """Positions whose symbols the window is made to hold."""
 SHORTEST_FILM = 1.0
 """A motion through time shorter than this, s, is slowed down to be seen."""
@@ -63,10 +68,10 @@ def write_film(
     units: Conversion = SI,
     *,
     moving: bool = False,
-) -> None:
+) -> int:
     """Film one sweep, there and back if the input does not turn fully.
 
-    A motion through time is shown as it is.
+    A motion through time is shown as it is. Return the number of frames.
 
     Raises DependencyError where matplotlib or, for MP4, ffmpeg with its H.264 encoder
     is missing.
@@ -80,11 +85,9 @@ def write_film(
             f"must be more than 0 and at most {_MAX_FRAMES // FRAMES_PER_SECOND}",
         )
     with apply_style():
-        import matplotlib as mpl
-        from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
-
+        write = _write_gif
         if kind == "mp4":
-            mpl.rcParams["animation.ffmpeg_path"] = _find_ffmpeg()
+            write = partial(_write_mp4, program=_find_ffmpeg())
         shown = make_view(scene)
         shown.units = units
         if seconds is None:
@@ -95,43 +98,88 @@ def write_film(
                     max(duration, SHORTEST_FILM),
                     _MAX_FRAMES / FRAMES_PER_SECOND,
                 )
-        figure, move = _make_stage(shown, moving)
         order = choose_frames(shown, max(2, round(seconds * FRAMES_PER_SECOND)))
-        writer: Any = PillowWriter(fps=FRAMES_PER_SECOND)
-        if kind == "mp4":
-            # yuv420p needs even pixel numbers and is what browsers and slides play
-            writer = FFMpegWriter(
-                fps=FRAMES_PER_SECOND,
-                codec="h264",
-                extra_args=["-pix_fmt", "yuv420p"],
-            )
-        with tempfile.TemporaryDirectory() as folder:
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            show_running(f"{len(order)} frames are drawn") as progress,
+        ):
             draft = Path(folder) / f"film.{kind}"
-            try:
-                with show_running(f"{len(order)} frames are drawn") as progress:
-                    told = (
-                        None
-                        if progress is None
-                        else lambda done, count: progress(done / count)
-                    )
-                    film = FuncAnimation(
-                        figure,
-                        move,
-                        frames=order,
-                        cache_frame_data=False,
-                    )
-                    film.save(
-                        str(draft),
-                        writer=writer,
-                        dpi=FILM_DPI,
-                        progress_callback=told,
-                    )
-            except (subprocess.CalledProcessError, BrokenPipeError):
-                raise DependencyError(
-                    "this ffmpeg cannot encode H.264 (libx264); .gif and .html need"
-                    " none"
-                ) from None
+            write(draft, _draw_frames(shown, order, moving, progress))
             write_bytes(path, draft.read_bytes())
+    return len(order)
+
+
+def _draw_frames(
+    shown: View,
+    order: list[int],
+    moving: bool,
+    progress: Callable[[float], object] | None,
+) -> "Iterator[Image]":
+    """Draw what moves, frame by frame, over a picture of what stands still."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from PIL import Image
+
+    figure, move = _make_stage(shown, moving)
+    (axes,) = figure.axes
+    canvas = FigureCanvasAgg(figure)
+    for artist in move(order[0]):
+        artist.set_visible(False)
+    canvas.draw()  # type: ignore[no-untyped-call]
+    still = canvas.copy_from_bbox(figure.bbox)  # type: ignore[no-untyped-call]
+    for number, index in enumerate(order, 1):
+        canvas.restore_region(still)  # type: ignore[no-untyped-call]
+        for artist in sorted(move(index), key=lambda artist: artist.get_zorder()):
+            artist.set_visible(True)
+            axes.draw_artist(artist)
+        if progress is not None:
+            progress(number / len(order))
+        pixels = canvas.buffer_rgba()  # type: ignore[no-untyped-call]
+        yield Image.fromarray(np.asarray(pixels)).convert("RGB")
+
+
+def _write_gif(path: Path, frames: "Iterator[Image]") -> None:
+    from PIL.Image import Dither
+
+    frame = next(frames)
+    first = frame.quantize()
+    others = [frame.quantize(palette=first, dither=Dither.NONE) for frame in frames]
+    first.save(
+        path,
+        save_all=True,
+        append_images=others,
+        duration=1000 // FRAMES_PER_SECOND,
+        loop=0,
+    )
+
+
+def _write_mp4(path: Path, frames: "Iterator[Image]", program: str) -> None:
+    """Encode frames by ffmpeg; yuv420p is what browsers and slides play."""
+    first = next(frames)
+    command = [program, "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"]
+    command += ["-s", f"{first.width}x{first.height}", "-r", str(FRAMES_PER_SECOND)]
+    command += ["-i", "-", "-c:v", "h264", "-pix_fmt", "yuv420p", "-y", str(path)]
+    with tempfile.TemporaryFile() as errors:
+        encoder = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=errors,
+            stderr=errors,
+        )
+        assert encoder.stdin is not None
+        try:
+            for frame in chain([first], frames):
+                encoder.stdin.write(frame.tobytes())
+            encoder.stdin.close()
+        except BrokenPipeError:
+            encoder.kill()
+        finally:
+            with suppress(BrokenPipeError):
+                encoder.stdin.close()
+            status = encoder.wait()
+    if status != 0:
+        raise DependencyError(
+            "this ffmpeg cannot encode H.264 (libx264); .gif and .html need none"
+        )
 
 
 def choose_frames(shown: View, count: int) -> list[int]:
@@ -163,7 +211,10 @@ def choose_frames(shown: View, count: int) -> list[int]:
 
 
 def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
-    """Make the figure, and the function that moves it to a position of the sweep."""
+    """Make the figure, and the function that moves it to a position of the sweep.
+
+    The function returns what it has moved.
+    """
     from matplotlib.figure import Figure
 
     sweep = shown.sweep
@@ -200,17 +251,17 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
     axes.set_autoscale_on(False)  # nothing jumps from frame to frame
     figure.set_layout_engine(None)
 
-    def move(index: int) -> None:
+    def move(index: int) -> list[Any]:
         put(index)
-        if move_vectors is not None:
-            move_vectors(index)
         axis = shown.axis
         places = sweep.at.places
         theta = f"{axis.factor * places[index]:.1f}".replace("-", "−")
-        caption = rf"{axis.label} = {theta}{axis.unit}"
+        caption = f"{axis.symbol} = {theta}{axis.unit}"
         if shown.time is not None:
             theta = f"{math.degrees(sweep.theta_2[index]):.1f}".replace("-", "−")
-            caption = rf"$t$ = {shown.time[index]:.2f} s, $\theta_2$ = {theta}°"
-        axes.set_title(f"{caption}, {shown.branch_name} branch", pad=pad)
+            caption = f"t = {shown.time[index]:.2f} s, θ₂ = {theta}°"
+        title = axes.set_title(f"{caption}, {shown.branch_name} branch", pad=pad)
+        arrows = [] if move_vectors is None else move_vectors(index)
+        return [*passing, *arrows, title]
 
     return figure, move

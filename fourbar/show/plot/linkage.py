@@ -40,6 +40,8 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 
+_NAMED_AT = 0.35
+"""Part of a bar's length at which its name stands: a mass centre is often mid-bar."""
 _ON_BAR = 1e-3
 """Part of a bar's length below which a point seems to lie on the bar's line."""
 
@@ -107,6 +109,7 @@ def draw_mechanism(
     for number in MOVING_BARS:
         start, stop = ENDS[number]
         x, y = zip(pins[start], pins[stop], strict=True)
+        x_name, y_name = (a + _NAMED_AT * (b - a) for a, b in (x, y))
         colour = BAR_COLOURS[number]
         drawn += axes.plot(x, y, color=colour, lw=4.5, solid_capstyle="round", zorder=4)
         labels.keep_off(axes, pins[start], pins[stop], width=4.5)
@@ -114,22 +117,16 @@ def draw_mechanism(
             Label(
                 axes,
                 _write_bar_name(view, number),
-                (0.5 * sum(x), 0.5 * sum(y)),
+                (x_name, y_name),
                 middle,
                 colour,
                 9.0,
                 2.0,
             )
         )
+    x, y = zip(*pins.values(), strict=True)
+    drawn += axes.plot(x, y, "o", ms=6.0, mew=1.2, zorder=6, **RING_MARK)
     for name, point in pins.items():
-        drawn += axes.plot(
-            *[[v] for v in point],
-            "o",
-            ms=6.0,
-            mew=1.2,
-            zorder=6,
-            **RING_MARK,
-        )
         labels.add(Label(axes, pin_name(name), point, middle, INK, 9.0, 2.5))
     for name, path in solution.points.items():
         here = split_complex(factor * complex(*path[index]))
@@ -244,18 +241,11 @@ def draw_mass_centre(
     from matplotlib.path import Path
 
     x, y = point
-    marks = axes.plot([x], [y], "o", ms=ms, mfc="white", mec=INK, mew=0.8, zorder=7)
-    for quarter in ((0, 90), (180, 270)):
-        marks += axes.plot(
-            [x],
-            [y],
-            marker=Path.wedge(*quarter),
-            ms=ms,
-            mfc=INK,
-            mec="none",
-            zorder=7,
-        )
-    return marks
+    quarters = Path.make_compound_path(Path.wedge(0, 90), Path.wedge(180, 270))
+    return [
+        *axes.plot([x], [y], "o", ms=ms, mfc="white", mec=INK, mew=0.8, zorder=7),
+        *axes.plot([x], [y], marker=quarters, ms=ms, mfc=INK, mec="none", zorder=7),
+    ]
 
 
 def draw_support(axes: "Axes", pin: DrawnPoint, size: float, labels: Labels) -> None:

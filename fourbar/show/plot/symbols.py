@@ -532,12 +532,12 @@ def draw_vectors(
     solution: Solution,
     factor: float,
     size: float,
-) -> Callable[[int], None]:
+) -> Callable[[int], list[Any]]:
     """Draw the arrows of a solution's first position.
 
     Each kind has one scale for the sweep.
 
-    Returns the function that moves them to another position.
+    Returns the function that moves them to another position, and returns them.
     """
     drawn = []
     for letter, (colour, label) in _ARROWS.items():
@@ -579,12 +579,13 @@ def draw_vectors(
             )
         )
 
-    def move(index: int) -> None:
+    def move(index: int) -> list[Any]:
         for arrows, feet, shafts in drawn:
             arrows.set_offsets(factor * np.array([foot[index] for foot in feet]))
             arrows.set_UVC(
                 *np.nan_to_num(np.array([shaft[index] for shaft in shafts])).T
             )
+        return [arrows for arrows, _, _ in drawn]
 
     move(0)
     return move

@@ -745,12 +745,16 @@ def test_plot_and_animate_write_what_their_ending_says(
     drawn = tmp_path / "a.svg"
     assert run("plot", file, "-o", drawn, "--figure", "linkage", "--at", "30 deg") == (
         HOLDS,
-        "",
+        f"wrote {drawn}\n",
         "",
     )
     assert "<svg" in drawn.read_text()
-    assert run("animate", file, "-o", tmp_path / "a.html") == (HOLDS, "", "")
-    assert "<html" in (tmp_path / "a.html").read_text()
+    page = tmp_path / "a.html"
+    assert run("animate", file, "-o", page) == (HOLDS, f"wrote {page}\n", "")
+    assert "<html" in page.read_text()
+    film = tmp_path / "a.gif"
+    said = (HOLDS, f"wrote {film}: 3 frames\n", "")
+    assert run("animate", file, "-o", film, "--seconds", "0.12") == said
     code, _, err = run("plot", file, "-o", tmp_path / "a.doc")
     assert code == 2 and err.count("\n") == 1 and not (tmp_path / "a.doc").exists()
 

@@ -26,6 +26,7 @@ from fourbar.scene.pictures import LARGEST_PICTURE
 from fourbar.show import animate
 from fourbar.show.plot import film as films
 from fourbar.show.plot.film import choose_frames
+from fourbar.show.plot.style import apply_style
 from fourbar.show.plot.view import make_view
 from tests.support.scenes import crank_rocker, thesis
 
@@ -299,6 +300,38 @@ def test_a_film_of_a_free_motion_runs_forward_and_as_long_as_it_does(
     animate.write_animation(RELEASED, tmp_path / "a.gif")
     with Image.open(tmp_path / "a.gif") as film:
         assert film.n_frames == 9
+
+
+OTHER_ORDER = 2e-3
+"""Part of the pixels that differ where a plate's thin edge is drawn over a path and not
+under it.
+"""
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_a_frame_is_the_whole_figure_though_what_stands_still_is_drawn_once(
+    monkeypatch: pytest.MonkeyPatch,
+    moving: bool,
+) -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    drawn = []
+    draw = FigureCanvasAgg.draw
+    monkeypatch.setattr(
+        FigureCanvasAgg, "draw", lambda canvas: (drawn.append(1), draw(canvas))
+    )
+    with apply_style():
+        shown = make_view(crank_rocker())
+        frames = [*films._draw_frames(shown, [0, 20, 45], moving, None)]
+        assert len(drawn) <= 3  # the stage by its layout, and then once
+        figure, move = films._make_stage(shown, moving)
+        canvas = FigureCanvasAgg(figure)
+        for index, frame in zip([0, 20, 45], frames, strict=True):
+            move(index)
+            canvas.draw()
+            whole = np.asarray(canvas.buffer_rgba())[:, :, :3].astype(int)
+            differs = np.abs(whole - np.asarray(frame)).max(axis=2) > 40
+            assert differs.mean() < OTHER_ORDER, index
 
 
 def test_instant_centres_are_no_curves_of_the_page() -> None:

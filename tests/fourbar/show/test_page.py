@@ -28,6 +28,7 @@ pytest.importorskip(
 
 PRINTED = 6e-5
 """Numbers are shown with five significant digits."""
+ROOT = Path(__file__).parents[3]
 PRINTED_DEG = 6e-4
 """Angles are shown with three decimals of a degree."""
 SPREAD_PRINTED = 6e-3
@@ -679,27 +680,40 @@ def contrast(first: str, second: str) -> float:
     return (high + 0.05) / (low + 0.05)
 
 
-def test_labels_of_the_picture_do_not_cover_each_other(browse) -> None:
-    driver = browse(animate.write_page(thesis()), 360)
-    script = """
-        return [...document.querySelectorAll("#labels text")]
-          .filter(e => e.style.display !== "none")
-          .map(e => e.getBBox())
-          .map(b => [b.x, b.y, b.x + b.width, b.y + b.height]);
-    """
-    for row in (90, 136, 200, 300):
-        driver.execute_script("go(arguments[0])", row)
-        boxes = driver.execute_script(script)
-        assert len(boxes) >= 8
-        for k, a in enumerate(boxes):
-            for b in boxes[k + 1 :]:
-                wide, high = (
-                    min(a[2], b[2]) - max(a[0], b[0]),
-                    min(a[3], b[3]) - max(a[1], b[1]),
-                )
-                assert (
-                    wide < 3 or high < 6
-                )  # a box leaves space for accents and descenders around the ink
+COVERED = """
+const marks = '.pin, .centre-disc, .own-point, .head, .support';
+const boxes = kind => [...picture.querySelectorAll(kind)]
+  .map(e => [e.textContent || e.getAttribute('class'), e.getBoundingClientRect()])
+  .filter(([, box]) => box.width);
+const labels = boxes('text').filter(([words]) => words.trim());
+return labels.flatMap(([a, p], n) => [...labels.slice(n + 1), ...boxes(marks)]
+  .filter(([, q]) => Math.min(p.right, q.right) - Math.max(p.left, q.left) > 1.5
+    && Math.min(p.bottom - 1.5, q.bottom) - Math.max(p.top + 2.5, q.top) > 1.5)
+  .map(([b]) => `${a} on ${b}`));
+"""
+"""Labels that stand on another one, or on a pin or mark, by more than the space around
+letters, px.
+"""
+GALLERY = sorted((ROOT / "models" / "gallery").glob("*.toml"))
+CROWDED = (ROOT / "models" / "thesis.toml", ROOT / "models" / "crank_rocker.toml")
+
+
+@pytest.mark.parametrize("width", [400, 1024, 1440])
+def test_no_label_of_the_gallery_covers_another_one_or_a_symbol(
+    browse,
+    width: int,
+) -> None:
+    for path in (*GALLERY, *CROWDED):
+        driver = browse(animate.write_page(fourbar.load(path), vectors=True), width)
+        driver.execute_script("byId('show-dimensions').click()")
+        for sixth in range(6):
+            driver.execute_script(f"go(Math.floor({sixth} * grid.length / 6))")
+            assert driver.execute_script(COVERED) == [], (path.stem, sixth)
+            shown = driver.execute_script(
+                "return wanted.map(one => one.element.style.display)"
+            )
+            assert len(shown) > 10, (path.stem, sixth)
+            assert "none" not in shown, (path.stem, sixth)
 
 
 def test_hostile_titles_do_nothing_but_appear(browse) -> None:
