@@ -45,6 +45,7 @@ from .scene.motion import FromLimit as FromLimit
 from .scene.motion import Law as Law
 from .scene.motion import Motion as Motion
 from .scene.motion import Rise as Rise
+from .scene.motion import Sine as Sine
 from .scene.motion import Sweep as Sweep
 from .scene.numbers import Point as Point
 from .scene.numbers import Tolerance as Tolerance

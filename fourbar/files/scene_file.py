@@ -54,7 +54,8 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import (
     COMMAND_NAMES,
     DEFAULT_STEPS,
-    RISE_LAWS,
+    LAW_KINDS,
+    SINE_LAW,
     SPLINES,
     STROKE_COMMAND,
     Free,
@@ -62,6 +63,7 @@ from fourbar.scene.motion import (
     Law,
     Motion,
     Rise,
+    Sine,
     Sweep,
 )
 from fourbar.scene.numbers import Point, Tolerance
@@ -486,28 +488,43 @@ def _read_steps(read: Reader, key: str, entry: Mapping[str, Any]) -> int:
     )
 
 
-def _read_law(read: Reader, value: object) -> Law | Rise:
+def _read_law(read: Reader, value: object) -> Law | Rise | Sine:
     key = "motion.law"
     if isinstance(value, dict) and "kind" in value:
-        return _read_rise(read, key, value)
+        return _read_standard_law(read, key, value)
+    columns = [name for names in COMMAND_NAMES.values() for name in names]
+    entry = read.table(key, value, ("time", *columns, "steps", "ends"))
     angles = [names[0] for names in COMMAND_NAMES.values()]
-    entry = read.table(key, value, ("time", *angles, "steps", "ends"))
     stated = [name for name in angles if name in entry] or angles[:1]
+    numbers: dict[str, Any] = {}
+    for name in stated:
+        numbers[name] = read.quantities(f"{key}.{name}", entry.get(name), "rad")
+    for rate, unit in (("omega", "rad/s"), ("alpha", "rad/s^2")):
+        for name in [name for name in columns if name.startswith(rate)]:
+            if name not in entry:
+                continue
+            if name[-1] != stated[0][-1]:
+                allowed = f"{stated[0]} commands bar {stated[0][-1]}; one bar is"
+                raise read.refuse(f"{key}.{name}", entry[name], allowed)
+            numbers[rate] = read.quantities(f"{key}.{name}", entry[name], unit)
+    if "omega" in numbers and "ends" in entry:
+        allowed = "must be left out: the speeds state what the ends do"
+        raise read.refuse(f"{key}.ends", entry["ends"], allowed)
     times = read.quantities(f"{key}.time", entry.get("time"), "s")
     steps = _read_steps(read, key, entry)
     ends = read.choice(f"{key}.ends", entry.get("ends", "free"), SPLINES)
-    positions = {}
-    for name in stated:
-        positions[name] = read.quantities(f"{key}.{name}", entry.get(name), "rad")
-    return Law(times, steps=steps, ends=ends, **positions)
+    return Law(times, steps=steps, ends=ends, **numbers)
 
 
-def _read_rise(read: Reader, key: str, value: object) -> Rise:
-    """Read a rise, a dwell, a fall and a rest by a standard law."""
-    entry = read.table(key, value, ("kind", *Rise.numbers, "steps"))
-    kind = read.choice(f"{key}.kind", entry["kind"], RISE_LAWS)
+def _read_standard_law(read: Reader, key: str, value: Mapping[str, Any]) -> Rise | Sine:
+    """Read a sine, or a rise, a dwell, a fall and a rest by a standard law."""
+    kind = read.choice(f"{key}.kind", value["kind"], LAW_KINDS)
+    law: Any = Sine if kind == SINE_LAW else Rise
+    entry = read.table(key, value, ("kind", *law.numbers, "steps"))
     steps = _read_steps(read, key, entry)
-    numbers = read.numbers(key, entry, Rise.numbers)
+    numbers = read.numbers(key, entry, law.numbers)
+    if law is Sine:
+        return Sine(steps=steps, **numbers)
     return Rise(kind, steps=steps, **numbers)
 
 

@@ -39,7 +39,15 @@ from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, POSITIVE, Bar, FourBar
 from fourbar.quantities.units import IMPERIAL, find_unit, to_si
 from fourbar.scene import Scene
 from fourbar.scene.drawing import DrawnPins
-from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Law, Motion, Rise, Sweep
+from fourbar.scene.motion import (
+    BRANCH_NAMES,
+    FromLimit,
+    Law,
+    Motion,
+    Rise,
+    Sine,
+    Sweep,
+)
 from fourbar.studies.keys import find_misfit, list_entries
 from fourbar.writing import write_text
 
@@ -250,19 +258,22 @@ def _write_motion(motion: Motion) -> dict[str, Any]:
     return {key: value for key, value in entry.items() if value is not None}
 
 
-def _write_law(law: Law | Rise) -> dict[str, Any]:
-    if isinstance(law, Rise):
+def _write_law(law: Law | Rise | Sine) -> dict[str, Any]:
+    if not isinstance(law, Law):
         return {"kind": law.kind, **write_numbers(law), "steps": law.steps}
-    times, angles = (
-        [write_quantity(x, unit) for x in numbers]
-        for numbers, unit in ((law.time, "s"), (law.angle, "rad"))
-    )
-    return {
-        "time": times,
-        f"theta_{law.bar}": angles,
-        "steps": law.steps,
-        "ends": law.ends,
+    columns = {
+        "time": (law.time, "s"),
+        f"theta_{law.bar}": (law.angle, "rad"),
+        f"omega_{law.bar}": (law.omega, "rad/s"),
+        f"alpha_{law.bar}": (law.alpha, "rad/s^2"),
     }
+    entry: dict[str, Any] = {
+        name: [write_quantity(x, unit) for x in numbers]
+        for name, (numbers, unit) in columns.items()
+        if numbers is not None
+    }
+    ends = {"ends": law.ends} if law.omega is None else {}
+    return {**entry, "steps": law.steps, **ends}
 
 
 def _load_entry(load: Load) -> dict[str, Any]:

@@ -65,6 +65,9 @@ _FEWEST_POINTS = {"free": 4, "rest": 2, "periodic": 3}
 MOST_LISTED_POSITIONS = 100_000
 RISE_LAWS = ("cycloidal", "345")
 """Standard laws of a rise."""
+SINE_LAW = "sine"
+LAW_KINDS = (*RISE_LAWS, SINE_LAW)
+"""Kinds of a law that is no table."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +182,9 @@ class _OverTime:
 class Law(_OverTime):
     """theta_2(t) through the points of a table.
 
-    It is piecewise cubic, and its acceleration is continuous.
+    Of angles alone it is piecewise cubic, with a continuous acceleration. Speeds at the
+    points make each piece the cubic between its ends, and accelerations beside them the
+    quintic.
 
     Parameters
     ----------
@@ -189,7 +194,9 @@ class Law(_OverTime):
     steps : the law is evaluated at the ends of so many equal intervals of time.
     ends : "free", "rest" (speed 0 at both ends) or "periodic" (the speed and
         acceleration at the end are those at the start; the angle may have gained whole
-        turns).
+        turns). It is of angles alone.
+    omega, alpha : one speed and one acceleration of the commanded bar for each time,
+        rad/s and rad/s^2; alpha needs omega.
     """
 
     time: tuple[float, ...]
@@ -198,6 +205,8 @@ class Law(_OverTime):
     ends: str = "free"
     theta_3: tuple[float, ...] | None = None
     theta_4: tuple[float, ...] | None = None
+    omega: tuple[float, ...] | None = None
+    alpha: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         key = "motion.law"
@@ -212,7 +221,8 @@ class Law(_OverTime):
         stated_angles = getattr(self, theta)
         time = require_numbers(f"{key}.time", self.time, unit="s").ravel()
         angles = require_numbers(f"{key}.{theta}", stated_angles, unit="rad").ravel()
-        fewest = _FEWEST_POINTS[self.ends]
+        self._require_rates(len(time))
+        fewest = _FEWEST_POINTS[self.ends] if self.omega is None else 2
         may_be = range(fewest, MOST_LISTED_POSITIONS + 1)
         if len(time) != len(angles) or len(time) not in may_be:
             allowed = (
@@ -225,6 +235,30 @@ class Law(_OverTime):
         self._require_steps()
         object.__setattr__(self, "time", tuple(time.tolist()))
         object.__setattr__(self, theta, tuple(angles.tolist()))
+
+    def _require_rates(self, count: int) -> None:
+        """Check speeds and accelerations at so many points."""
+        key = "motion.law"
+        if self.alpha is not None and self.omega is None:
+            allowed = f"needs the speeds omega_{self.bar} beside it"
+            raise InputError(f"{key}.alpha_{self.bar}", None, allowed)
+        if self.omega is not None and self.ends != "free":
+            allowed = "must be left out: the speeds state what the ends do"
+            raise InputError(f"{key}.ends", self.ends, allowed)
+        for name, unit in (("omega", "rad/s"), ("alpha", "rad/s^2")):
+            stated = getattr(self, name)
+            if stated is None:
+                continue
+            of_bar = f"{key}.{name}_{self.bar}"
+            rates = require_numbers(of_bar, stated, unit=unit).ravel()
+            if len(rates) != count:
+                raise InputError(of_bar, len(rates), f"needs {count}, one for a time")
+            object.__setattr__(self, name, tuple(rates.tolist()))
+
+    @property
+    def is_linear_in_acceleration(self) -> bool:
+        """True if the acceleration is continuous and linear from point to point."""
+        return self.omega is None
 
     @property
     def angle(self) -> tuple[float, ...]:
@@ -240,7 +274,7 @@ class Law(_OverTime):
         Raises DependencyError where SciPy is not installed.
         """
         try:
-            from scipy.interpolate import CubicSpline
+            from scipy.interpolate import BPoly, CubicSpline
         except ModuleNotFoundError:
             raise DependencyError(
                 f"SciPy is needed for a motion law: {say_install('studies')}"
@@ -248,6 +282,14 @@ class Law(_OverTime):
         time = require_numbers("time", time)
         t = np.array(self.time)
         angle = np.array(self.angle)
+        if self.omega is not None:
+            rates = [self.omega] if self.alpha is None else [self.omega, self.alpha]
+            pieces = BPoly.from_derivatives(t, np.stack([angle, *rates], axis=1))
+            return (
+                np.asarray(pieces(time)),
+                np.asarray(pieces.derivative(1)(time)),
+                np.asarray(pieces.derivative(2)(time)),
+            )
         mean = 0.0
         if self.ends == "periodic":
             # what is periodic is the departure from the mean speed
@@ -364,6 +406,56 @@ class Rise(_OverTime):
         return first + angle * place, angle * speed, angle * acceleration
 
 
+@dataclass(frozen=True, slots=True)
+class Sine(_OverTime):
+    """theta_2 = mean + amplitude sin(frequency t + phase), from t = 0 on.
+
+    Parameters
+    ----------
+    mean, amplitude : rad.
+    frequency : rad/s, > 0.
+    duration : s.
+    phase : rad.
+    steps : the law is evaluated at the ends of so many equal intervals of time.
+
+    >>> swing = Sine("1 rad", "30 deg", "0.5 rev/s", "4 s")
+    >>> [round(float(x[0]), 6) for x in swing.at([0.5])]
+    [1.523599, 0.0, -5.167713]
+    """
+
+    mean: float
+    amplitude: float
+    frequency: float
+    duration: float
+    phase: float = 0.0
+    steps: int = 360
+    kind: ClassVar[str] = SINE_LAW
+    bar: ClassVar[int] = 2
+    numbers: ClassVar[dict[str, Declared]] = {
+        "mean": Declared("rad"),
+        "amplitude": Declared("rad"),
+        "frequency": Declared("rad/s", POSITIVE),
+        "duration": Declared("s", POSITIVE),
+        "phase": Declared("rad", left_out=0.0),
+    }
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "motion.law")
+        self._require_steps()
+
+    @property
+    def time(self) -> tuple[float, float]:
+        """Times at which it begins and ends, s."""
+        return 0.0, self.duration
+
+    def at(self, time: Array) -> tuple[Array, Array, Array]:
+        """Compute angle, speed and acceleration of the law's bar, each (n,)."""
+        phase = self.frequency * require_numbers("time", time) + self.phase
+        swing = self.amplitude * np.sin(phase)
+        omega = self.amplitude * self.frequency * np.cos(phase)
+        return self.mean + swing, omega, -(self.frequency**2) * swing
+
+
 def _part(kind: str, time: Array, duration: float) -> tuple[Array, Array, Array]:
     """Compute a law from 0 to 1 over a duration, and its rates by time.
 
@@ -412,7 +504,7 @@ class Motion:
         is, it is sin(theta_3 - theta_2), for 180 deg < theta_4 - theta_1 < 360 deg.
     free : released motion instead of a prescribed one.
     law : an angle over time instead of theta_2, omega_2 and alpha_2: a Law through
-        points, or a Rise.
+        points, a Rise, or a Sine.
     theta_3, omega_3, alpha_3, theta_4, omega_4, alpha_4 : of the coupler or the output
         instead.
     stroke, stroke_speed, stroke_acceleration : of the scene's cylinder between the
@@ -438,7 +530,7 @@ class Motion:
     branch: int
     """Assembly, +1 open or -1 crossed."""
     free: Free | None
-    law: Law | Rise | None
+    law: Law | Rise | Sine | None
     side: str | None
     numbers: ClassVar[dict[str, Declared]] = {
         name: Declared(f"{unit}{per}")
@@ -466,7 +558,7 @@ class Motion:
         alpha_2: float = 0.0,
         branch: int = OPEN,
         free: Free | None = None,
-        law: Law | Rise | None = None,
+        law: Law | Rise | Sine | None = None,
         theta_3: float | Array | Sweep | FromLimit | None = None,
         omega_3: float | None = None,
         alpha_3: float = 0.0,
@@ -478,7 +570,7 @@ class Motion:
         stroke_acceleration: float = 0.0,
         side: str | None = None,
     ) -> None:
-        expect("motion.law", law, Law, Rise, type(None))
+        expect("motion.law", law, Law, Rise, Sine, type(None))
         angles = {
             2: (theta_2, omega_2, alpha_2),
             3: (theta_3, omega_3, alpha_3),
@@ -652,7 +744,7 @@ def require_steps(motion: Motion, most: int, place: str, file: str) -> None:
         ("law", motion.law),
         ("free", motion.free),
     ):
-        if isinstance(stated, (Sweep, Law, Rise, Free)) and stated.steps >= most:
+        if isinstance(stated, (Sweep, _OverTime, Free)) and stated.steps >= most:
             raise InputError(
                 f"motion.{name}.steps",
                 stated.steps,

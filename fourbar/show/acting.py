@@ -1,5 +1,7 @@
 """Remarks on what acts: couples without a place, and springs that go on too far."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,10 +10,15 @@ from fourbar.evaluation.case import compute_shown_state
 from fourbar.linkage import FIRST_PIN
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command_at
+from fourbar.scene.motion import Law
 from fourbar.show.units import write_short
 from fourbar.solution import Conversion, Solution
 from fourbar.studies.equilibrium import bisect
 
+_INSTANTS_OF_AN_END = 33
+"""Instants of an interval of a table at which two choices of its ends are compared. The
+difference of two cubics has one maximum in it.
+"""
 AT_END_OF_STROKE = 1e-6
 """Part of a gas spring's length within which it is at its end. A scene that states the
 end as a place has fewer digits than that.
@@ -30,6 +37,43 @@ def list_couple_notes(scene: Scene) -> list[str]:
         return []
     return [
         f"  a moment alone: {', '.join(entries)}; its from_pin states another place"
+    ]
+
+
+def list_arm_notes(scene: Scene) -> list[str]:
+    """Say from where the arm of a load counts on a bar whose centre is not stated."""
+    return [
+        f"load {number}: arm counts from G of bar {load.bar}, taken to be mid-bar;"
+        " from_pin counts from the bar's pin"
+        for number, load in enumerate(scene.loads, 1)
+        if load.arm is not None
+        and scene.linkage.bar(load.bar).mass == 0.0
+        and scene.linkage.bar(load.bar).centre is None
+    ]
+
+
+def list_law_notes(scene: Scene, units: Conversion) -> list[str]:
+    """Say what the ends of a table of angles assume, and what the other choice changes.
+
+    A periodic table leaves no choice, nor does one with speeds.
+    """
+    law = scene.motion.law
+    if not isinstance(law, Law) or law.omega is not None or law.ends == "periodic":
+        return []
+    other = {"free": "rest", "rest": "free"}[law.ends]
+    t = np.array(law.time)
+    ends = np.linspace(t[[0, -2]], t[[1, -1]], _INSTANTS_OF_AN_END).ravel()
+    pairs = zip(law.at(ends), replace(law, ends=other).at(ends), strict=True)
+    angle, _, acceleration = (float(np.abs(one - two).max()) for one, two in pairs)
+    by = " and ".join(
+        write_short(size, unit, units)
+        for size, unit in ((angle, "rad"), (acceleration, "rad/s^2"))
+    )
+    assumed = "as the next intervals bend" if law.ends == "free" else "at rest"
+    return [
+        f'the law begins and ends {assumed} (ends = "{law.ends}"); "{other}" changes'
+        f" angle and acceleration of its first and last intervals by up to {by};"
+        f" omega_{law.bar} beside theta_{law.bar} states the speeds"
     ]
 
 

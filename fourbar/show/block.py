@@ -26,7 +26,12 @@ from fourbar.linkage import BAR_NAMES, PIN_FORCE
 from fourbar.quantities import LINE, OK, PIN_FORCES, Array
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
-from fourbar.show.acting import list_couple_notes, list_spring_notes
+from fourbar.show.acting import (
+    list_arm_notes,
+    list_couple_notes,
+    list_law_notes,
+    list_spring_notes,
+)
 from fourbar.show.change_point import has_growing_forces
 from fourbar.show.duty import DUTY_UNITS, MotorDuty, bearing_load, describe_drive
 from fourbar.show.position import PositionSheet
@@ -885,6 +890,8 @@ class _SceneBlock:
                 f"dry friction reverses, and the pin forces jump, at {name} = {places}"
             )
         lines += self._warn()
+        lines += list_arm_notes(facts.scene)
+        lines += list_law_notes(facts.scene, self.units)
         lines += list_spring_notes(facts.scene, facts.solution, self.units)
         if facts.drive is not None and self._is_balanced():
             lines.append(f"the {facts.drive.name} is zero within rounding")

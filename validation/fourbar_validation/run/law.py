@@ -4,11 +4,13 @@ Engines are handed the angles of a law, so that none of them would notice.
 """
 
 from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from fourbar.quantities import Array
-from fourbar.scene.motion import Rise
+from fourbar.scene.motion import Law, Rise, Sine
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import IDENTITY, find_worst
 from fourbar_validation.run.question import Question
@@ -30,6 +32,9 @@ def check_law(question: Question) -> Iterator[Row]:
     assert isinstance(command.speed, np.ndarray)
     if isinstance(law, Rise):
         yield _check_rise(question, law)
+        return
+    if isinstance(law, Sine) or law.omega is not None:
+        yield _check_stated(question, law)
         return
     t = np.array(law.time)
     angle = np.array(law.angle)
@@ -114,6 +119,70 @@ def _check_rise(question: Question, law: Rise) -> Row:
         along.append(apart * shortest**order / (size * late))
     reason = f"the {law.kind} law in another form"
     return question.row("law", np.max(along, axis=0), IDENTITY.factor, reason)
+
+
+def _check_stated(question: Question, law: Law | Sine) -> Row:
+    """Check a sine, or a table with speeds, by another form of its formula."""
+    command = question.at
+    time = command.time
+    assert time is not None
+    rates: Any
+    if isinstance(law, Sine):
+        rates = _add_angles(law, time)
+        shortest = 1.0 / law.frequency
+        size = abs(law.mean) + abs(law.amplitude) * (1.0 + law.frequency * time[-1])
+        reason = "the sine of a sum of angles"
+    else:
+        rates = _solve_pieces(law, time)
+        shortest = float(np.diff(law.time).min())
+        stated = [law.angle, law.omega or (0.0,), law.alpha or (0.0,)]
+        longest = float(np.diff(law.time).max())
+        size = sum(
+            longest**order * float(np.abs(column).max())
+            for order, column in enumerate(stated)
+        )
+        size *= law.time[-1] / shortest
+        reason = "the polynomial through angles and rates, solved for piece by piece"
+    along = []
+    for order, value in enumerate([command.angle, command.speed, command.acceleration]):
+        apart = np.abs(rates[order] - np.asarray(value))
+        along.append(apart * shortest**order / size)
+    return question.row("law", np.max(along, axis=0), IDENTITY.factor, reason)
+
+
+def _add_angles(law: Sine, time: Array) -> tuple[Array, Array, Array]:
+    """Compute a sine and its rates from those of frequency times time and phase."""
+    w = law.frequency
+    turned = np.exp(1j * w * time) * np.exp(1j * law.phase) * law.amplitude
+    return law.mean + turned.imag, w * turned.real, -w * w * turned.imag
+
+
+def _solve_pieces(law: Law, time: Array) -> Array:
+    """Solve for the polynomial of each piece; angle and rates at times, (3, n)."""
+    stated = [law.angle, law.omega, law.alpha][: 2 if law.alpha is None else 3]
+    columns = np.array(stated, dtype=float)
+    count = 2 * len(columns)
+    powers = np.arange(count)
+    rates = np.zeros((3, len(time)))
+    for piece, (start, stop) in enumerate(pairwise(law.time)):
+        h = stop - start
+        here = (time >= start) & (time <= stop)
+
+        def derive(u: Any, order: int) -> Any:
+            """Return the derivatives of the powers of u, one a column."""
+            factor = np.ones(count)
+            for step in range(order):
+                factor = factor * (powers - step)
+            return factor * np.power.outer(u, np.maximum(powers - order, 0))
+
+        orders = range(len(columns))
+        left = [derive(u, order) for u in (0.0, 1.0) for order in orders]
+        right = [columns[k, n] * h**k for n in (piece, piece + 1) for k in orders]
+        coefficients = np.linalg.solve(np.array(left), np.array(right))
+        u = (time[here] - start) / h
+        for order in range(3):
+            rates[order, here] = derive(u, order) @ coefficients / h**order
+    return rates
 
 
 def _restate_law(kind: str, u: Array) -> tuple[Array, Array, Array]:

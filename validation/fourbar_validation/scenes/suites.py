@@ -16,7 +16,7 @@ from fourbar import writing
 from fourbar.errors import InputError, state_messages_in
 from fourbar.files import parse_tables, read_scene_text, read_tables
 from fourbar.scene import Scene
-from fourbar.scene.motion import Free, Law, Rise, Sweep, require_steps
+from fourbar.scene.motion import Free, Law, Rise, Sine, Sweep, require_steps
 from fourbar.scene.scene import default_places
 from fourbar.show.units import units_of_scene
 from fourbar_validation.compare.rows import escape_controls
@@ -176,7 +176,7 @@ def _count_positions(scene: Scene, file: Path) -> int:
     """
     require_steps(scene.motion, MOST_POSITIONS_OF_A_SCENE, "in a run", str(file))
     for stated in (scene.motion.angle, scene.motion.law, scene.motion.free):
-        if isinstance(stated, (Sweep, Law, Rise, Free)):
+        if isinstance(stated, (Sweep, Law, Rise, Sine, Free)):
             if isinstance(stated, Free):
                 seconds = stated.duration
             else:

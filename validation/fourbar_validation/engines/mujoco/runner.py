@@ -32,7 +32,7 @@ from fourbar.mjcf.document import FULL_TURN
 from fourbar.mjcf.model import unwind
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
-from fourbar.scene.motion import Law, Motion, Rise
+from fourbar.scene.motion import Law, Motion, Rise, Sine
 from fourbar_validation.engines.effects import look_up
 from fourbar_validation.engines.free_body_closure import find_angle
 from fourbar_validation.engines.limits import compute_least_sine
@@ -107,7 +107,7 @@ class LawSegment:
 
     def __init__(
         self,
-        law: Law | Rise,
+        law: Law | Rise | Sine,
         command: Command,
         segment: Sequence[int],
     ) -> None:
@@ -155,10 +155,10 @@ class LawSegment:
     def alpha(self, seconds: float) -> float:
         """Interpolate linearly, as the second derivative of cubic pieces is.
 
-        That of a rise is its own.
+        That of any other law is its own.
         """
         instant = self.began + seconds
-        if isinstance(self.law, Rise):
+        if not (isinstance(self.law, Law) and self.law.is_linear_in_acceleration):
             _, _, alpha = self.law.at(np.array([instant]))
             return float(alpha[0])
         times = self.knots
@@ -174,7 +174,7 @@ class LawSegment:
 MotionSegment = SteadySegment | LawSegment
 
 
-def find_extremes(law: Law | Rise) -> tuple[float, float]:
+def find_extremes(law: Law | Rise | Sine) -> tuple[float, float]:
     """Find the greatest |omega_2| and |alpha_2| of a law.
 
     Flywheel and closure are laid out for them.

@@ -1,0 +1,153 @@
+"""Laws that are stated by a formula or by rates: exact polynomials, a sine, energy."""
+
+import math
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.errors import InputError
+from fourbar.files import dump, loads
+from fourbar.scene.motion import Law
+
+EXACT = 1e-13
+"""Relative to the largest term: some ten roundings of a polynomial of degree 5."""
+DIFFERENCES = 1e-6
+"""Relative: central differences over 1e-4 s, of positions with 16 digits."""
+SWING = """
+[lengths]
+ground = "139.7 mm"
+input = "50.8 mm"
+coupler = "152.4 mm"
+output = "76.2 mm"
+[bars]
+input = { mass = "0.089408 kg" }
+coupler = { mass = "0.268224 kg", inertia = "5.19142188e-4 kg m^2", centre = CENTRE }
+output = { mass = "0.041148 kg" }
+[motion]
+law = LAW
+"""
+CENTRE = '{ x = "76.2 mm", y = "10.2362 mm" }'
+SINE = (
+    '{ kind = "sine", mean = "1 rad", amplitude = "1 rad", frequency = "0.5 rad/s",'
+    ' duration = "10 s" }'
+)
+
+
+def make_swing(law: str) -> fourbar.Scene:
+    return loads(SWING.replace("CENTRE", CENTRE).replace("LAW", law))
+
+
+def kinetic_energy(time: float) -> float:
+    """Return the energy of the bars by differences of positions, J."""
+    step = 1e-4
+
+    def move(t: float) -> tuple[complex, complex, complex, float]:
+        A = 0.0508 * np.exp(1j * (1.0 + math.sin(0.5 * t)))
+        to_O4 = 0.1397 - A
+        d = abs(to_O4)
+        along = (0.1524**2 - 0.0762**2 + d * d) / (2.0 * d)
+        B = A + (along + 1j * math.sqrt(0.1524**2 - along**2)) * to_O4 / d
+        line = (B - A) / 0.1524
+        return A, A + (0.0762 + 0.0102362j) * line, B, float(np.angle(line))
+
+    before, after = move(time - step), move(time + step)
+    A, G, B, turn = ((b - a) / (2.0 * step) for a, b in zip(before, after, strict=True))
+    slender = 0.089408 * abs(A) ** 2 / 6.0 + 0.041148 * abs(B) ** 2 / 6.0
+    return slender + 0.268224 * abs(G) ** 2 / 2.0 + 5.19142188e-4 * turn**2 / 2.0
+
+
+def test_the_torque_of_a_sine_is_the_power_of_its_energy() -> None:
+    scene = make_swing(SINE)
+    assert loads(dump(scene)) == scene
+    s = fourbar.solve(scene)
+    for row in (0, 100, 250, 360):
+        t = s.time[row]
+        power = (kinetic_energy(t + 1e-3) - kinetic_energy(t - 1e-3)) / 2e-3
+        scale = np.abs(s.power).max()
+        assert power == pytest.approx(s.power[row], abs=DIFFERENCES * scale)
+    assert s.torque[-1] == pytest.approx(7.6736e-5, rel=1e-5)
+    assert s.theta_2[100] == pytest.approx(1.0 + math.sin(0.5 * s.time[100]))
+
+
+@pytest.mark.parametrize("bar", [2, 3, 4])
+@pytest.mark.parametrize("degree", [3, 5])
+def test_a_polynomial_comes_back_from_a_table_of_its_rates(
+    degree: int, bar: int
+) -> None:
+    """Speeds make each piece a cubic, accelerations beside them a quintic."""
+    wanted = np.polynomial.Polynomial([1.0, 0.3, -0.2, 0.07, 0.02, -0.01][: degree + 1])
+    t = np.array([0.0, 0.3, 1.1, 1.5])
+    columns = {f"theta_{bar}": wanted(t), "omega": wanted.deriv(1)(t)}
+    if degree == 5:
+        columns["alpha"] = wanted.deriv(2)(t)
+    law = Law(tuple(t), **{name: tuple(column) for name, column in columns.items()})
+    between = np.linspace(0.0, 1.5, 50)
+    for order, computed in enumerate(law.at(between)):
+        right = wanted.deriv(order)(between) if order else wanted(between)
+        np.testing.assert_allclose(computed, right, atol=100.0 * EXACT)
+    motion = fourbar.Motion(law=law)
+    scene = fourbar.Scene(fourbar.uniform(0.2, 0.3, 0.25, 0.28), motion)
+    assert loads(dump(scene)).motion == motion
+    assert f"omega_{bar} = [" in dump(scene) and "ends" not in dump(scene)
+
+
+TABLE = 'time = ["0 s", "1 s"], theta_2 = ["0 deg", "60 deg"]'
+RATES = 'omega_2 = ["0 rad/s", "1 rad/s"]'
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        (f'{TABLE}, alpha_2 = ["0 rad/s^2", "1 rad/s^2"]', ("alpha_2", "omega_2")),
+        (f'{TABLE}, {RATES}, ends = "rest"', ("law.ends", "left out")),
+        (f'{TABLE}, {RATES}, ends = "free"', ("law.ends", "left out")),
+        (f'{TABLE}, omega_3 = ["0 rad/s", "1 rad/s"]', ("omega_3", "commands bar 2")),
+        (f'{TABLE}, omega_2 = ["0 rad/s"]', ("omega_2", "needs 2")),
+        (SINE[2:-2].replace("0.5 rad/s", "0.5 Hz"), ("frequency", "0.5 rev/s")),
+        (SINE[2:-2].replace("0.5 rad/s", "0 rad/s"), ("frequency", "> 0")),
+        (SINE[2:-2].replace('mean = "1 rad",', ""), ("law.mean", "missing")),
+        (SINE[2:-2].replace("sine", "cosine"), ("law.kind", '"sine"')),
+    ],
+)
+def test_a_law_that_states_too_much_or_too_little_is_refused(
+    law: str, words: tuple[str, ...]
+) -> None:
+    with pytest.raises(InputError) as refused:
+        make_swing(f"{{ {law} }}")
+    assert all(word in str(refused.value) for word in words), refused.value
+
+
+@pytest.mark.parametrize(("ends", "other"), [("free", "rest"), ("rest", "free")])
+def test_a_table_of_angles_says_what_its_ends_assume(ends: str, other: str) -> None:
+    """The change is that of the two laws on a dense grid of the end intervals."""
+    times, angles = (0.0, 0.2, 0.5, 0.7, 1.0), (0.0, 0.5, 1.5, 1.9, 2.0)
+    law, changed = (Law(times, angles, ends=name) for name in (ends, other))
+    at_ends = np.array([*np.linspace(0.0, 0.2, 2001), *np.linspace(0.7, 1.0, 2001)])
+    bare = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+    scene = fourbar.Scene(bare, fourbar.Motion(law=law), effects=(fourbar.Gravity(),))
+    printed = write_note(scene)
+    assert f'ends = "{ends}"' in printed and f'"{other}" changes' in printed
+    rates = (one.at(at_ends) for one in (law, changed))
+    changes = [np.abs(a - b).max() for a, b in zip(*rates, strict=True)]
+    said = printed.partition("by up to ")[2].split()
+    assert float(said[0]) == pytest.approx(math.degrees(changes[0]), rel=2e-3)
+    assert float(said[3]) == pytest.approx(changes[2], rel=2e-3)
+
+
+def write_note(scene: fourbar.Scene) -> str:
+    from fourbar.show.block import write_block
+
+    return " ".join(" ".join(write_block(scene, fourbar.solve(scene, "error"))).split())
+
+
+def test_what_leaves_no_choice_says_nothing_of_its_ends() -> None:
+    periodic = Law(
+        (0.0, 0.3, 0.7, 1.0), (0.0, 2.0, 4.0, 2.0 * math.pi), ends="periodic"
+    )
+    rates = Law((0.0, 1.0), (0.0, 1.0), omega=(0.0, 0.0))
+    for law in (periodic, rates):
+        scene = fourbar.Scene(
+            fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(law=law)
+        )
+        assert "ends" not in write_note(scene)
