@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 LONGEST_VALUE = 160
 """Characters of a value that an error repeats."""
+LONGEST_MESSAGE = 400
+"""Characters of the line that a command prints of an error."""
 
 
 _MESSAGE_UNITS = ContextVar[Mapping[str, tuple[str, float]]]("units of messages")
@@ -63,6 +65,19 @@ def write_in_units(
     name, factor = _MESSAGE_UNITS.get({}).get(unit, (unit, 1.0))
     numbers = between.join(f"{factor * value:.{digits}g}" for value in values)
     return f"{numbers} {name}".rstrip()
+
+
+def shorten(text: str, longest: int) -> str:
+    """Return a text of at most `longest` characters: its beginning and its end.
+
+    >>> shorten("a name that goes on and on", 13)
+    'a nam...nd on'
+    """
+    if len(text) <= longest:
+        return text
+    kept = longest - len("...")
+    end = kept // 2
+    return f"{text[: kept - end]}...{text[-end:]}"
 
 
 class FourBarError(Exception):
@@ -107,10 +122,7 @@ class InputError(FourBarError):
             else:
                 numbers = (value,)
             shown = write_in_units(unit, *map(float, numbers))
-        if len(shown) > LONGEST_VALUE:  # of a long path the end says which
-            shown = (
-                f"{shown[: LONGEST_VALUE // 2 - 3]}...{shown[-LONGEST_VALUE // 2 :]}"
-            )
+        shown = shorten(shown, LONGEST_VALUE)  # of a long path the end says which
         prefix = f"{file}: " if file else ""
         super().__init__(
             f"{prefix}{key}{'' if value is None else f' = {shown}'}: {allowed}"
@@ -313,7 +325,8 @@ def _flush() -> None:
 def _print_error(message: str, status: int) -> int:
     import click
 
-    click.echo("error: " + clean_line(message), err=True)
+    line = shorten(f"error: {clean_line(message)}", LONGEST_MESSAGE)
+    click.echo(line, err=True)
     return status
 
 

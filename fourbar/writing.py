@@ -55,6 +55,8 @@ def read_bytes(
         return InputError(key, str(path) if shown is None else shown, allowed)
 
     if pipes and Path(path) == STANDARD_STREAM:
+        if sys.stdin is None:
+            raise refuse("standard input is closed")
         source = sys.stdin.fileno()
     else:
         source = path

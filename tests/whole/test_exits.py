@@ -25,6 +25,7 @@ from fourbar.errors import (
     FAILED,
     HOLDS,
     INTERRUPTED,
+    LONGEST_MESSAGE,
     DependencyError,
     InputError,
     run,
@@ -519,3 +520,45 @@ def test_a_module_that_the_harness_lacks_is_in_the_extra_of_the_harness(
         'filelock is not installed: pip install ".[validation]"'
         in capsys.readouterr().err
     )
+
+
+@pytest.mark.parametrize(
+    ("header", "row"),
+    [
+        ("theta_2,torque," + "x" * 20_000, "1,2,3"),
+        ("theta_2,torque" + ",unknown" * 20_000, "1,2" + ",3" * 20_000),
+    ],
+    ids=["a long heading", "many headings"],
+)
+def test_no_line_is_longer_than_a_screen_can_show(
+    header: str,
+    row: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    table = tmp_path / "table.csv"
+    table.write_text(f"{header}\n{row}\n")
+    scene = ROOT / "models" / "crank_rocker.toml"
+    fourbar_validation.cli.status(["check", str(scene), str(table)])
+    unit = tmp_path / "unit.toml"
+    unit.write_text(f'[lengths]\nground = "1 {"m" * 12_000}"\n')
+    assert fourbar.cli.status(["analyze", str(unit)]) == BAD_INPUT
+    columns = ["--columns", "x" * 20_000]
+    assert fourbar.cli.status(["analyze", str(scene), *columns]) == BAD_INPUT
+    printed = capsys.readouterr()
+    assert max(map(len, printed.err.splitlines())) <= LONGEST_MESSAGE
+    assert len(printed.out) < 4 * LONGEST_MESSAGE
+
+
+@pytest.mark.posix
+def test_a_closed_standard_input_is_one_line() -> None:
+    done = subprocess.run(
+        f"{sys.executable} -m fourbar analyze - <&-",
+        shell=True,
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (BAD_INPUT, "")
+    assert done.stderr == "error: scene file = '-': standard input is closed\n"

@@ -1168,7 +1168,7 @@ BAD_TABLES = [
         "kg",
     ),
     ("of dry friction", "theta_2,torque_low\n1,2\n", "no dry friction"),
-    ("unknown column", "theta_2,wheel\n1,2\n", "known are theta_2"),
+    ("unknown column", "theta_2,wheel\n1,2\n", "known are the columns of"),
     ("unit of another kind", "theta_2,torque [kg]\n1,2\n", "kg"),
     ("twice", "theta_2,torque,torque\n1,2,3\n", "are both torque"),
     ("word", "theta_2,torque\n1,much\n", "line 2"),

@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 import numpy as np
 
-from fourbar.errors import FAILED, HOLDS, InputError
+from fourbar.errors import FAILED, HOLDS, LONGEST_MESSAGE, InputError, shorten
 from fourbar.files import load
 from fourbar.scene import Scene
 from fourbar.writing import require_file, write_text
@@ -391,7 +391,7 @@ def show_judgement(
         headings = ", ".join(
             heading for heading, reason in table.left_out.items() if reason == why
         )
-        print_sentence(f"left out ({why}): {headings}")
+        print_sentence(shorten(f"left out ({why}): {headings}", LONGEST_MESSAGE))
     differing = judgement.differing
     if differing:
         title = (

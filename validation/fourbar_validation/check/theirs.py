@@ -289,7 +289,7 @@ def read_table(path: Path, commanded: str = "theta_2") -> TheirTable:
             "header",
             headings,
             f"needs a result, such as {examples}{_list_renamings(renamings)}; "
-            f"known are {_find_known()}",
+            "known are the columns of fourbar analyze SCENE --csv",
             str(path),
         )
     return table
@@ -578,12 +578,6 @@ def _read_unit(
             f"{text}: {error.allowed}",
             str(path),
         ) from None
-
-
-def _find_known() -> str:
-    return ", ".join(
-        f"{q}_x, {q}_y" if q in VECTORS else q for q in UNITS if q not in NOT_JUDGED
-    )
 
 
 def _read_cell(
