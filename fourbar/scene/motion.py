@@ -6,7 +6,8 @@ It is angles, a sweep, a limit position, a law over time, or release.
 import math
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import Any, ClassVar
 
@@ -74,17 +75,23 @@ LAW_KINDS = (*RISE_LAWS, SINE_LAW)
 class Sweep:
     """The commanded angle from `start` to `stop` (rad) in `steps` equal intervals.
 
-    Both ends are included.
+    Both ends are included. Of a commanded stroke they are lengths, m.
     """
 
     start: float
     stop: float
     steps: int
+    unit: str | None = field(default=None, init=False, compare=False, repr=False)
+    """SI unit of ends that were texts: "rad" or "m"; None: numbers have none."""
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__  # the class is frozen; this is its constructor
-        set_field(self, "start", require("motion.theta_2.from", self.start, "rad"))
-        set_field(self, "stop", require("motion.theta_2.to", self.stop, "rad"))
+        start, stop = self.start, self.stop
+        if isinstance(start, str) or isinstance(stop, str):
+            set_field(self, "unit", "m" if is_length(start, stop) else "rad")
+        unit = self.unit or "rad"
+        set_field(self, "start", require("motion.theta_2.from", start, unit))
+        set_field(self, "stop", require("motion.theta_2.to", stop, unit))
         if not math.isfinite(self.stop - self.start):
             allowed = f"must be within the range of doubles from {self.start!r}"
             raise InputError("motion.theta_2.to", self.stop, allowed)
@@ -687,6 +694,23 @@ class Motion:
         return COMMAND_NAMES[self.bar]
 
 
+def is_length(*values: object) -> bool:
+    """Return True if a text among the values states a length."""
+    for value in values:
+        if isinstance(value, str):
+            with suppress(InputError):
+                require("motion.stroke", value, "m")
+                return True
+    return False
+
+
+def _require_unit(name: str, angle: Any, unit: str) -> None:
+    """Raise InputError for a sweep whose ends were stated in another unit."""
+    if isinstance(angle, Sweep) and angle.unit not in (None, unit):
+        stated = f"from {angle.start:g} to {angle.stop:g} {angle.unit}"
+        raise InputError(f"motion.{name}", stated, f"must be in {unit}")
+
+
 def _require_strokes(stroke: Any) -> Any:
     """Return the strokes, checked; InputError for what is no length above zero."""
     if not isinstance(stroke, Sweep):
@@ -711,6 +735,7 @@ def _require_command(
     (theta, unit), (omega, per_second), (alpha, growth) = (
         (name, Motion.numbers[name].unit) for name in names
     )
+    _require_unit(theta, angle, unit)
     if angle is not None and not isinstance(angle, (Sweep, FromLimit)):
         angles = require_numbers(
             f"motion.{theta}",

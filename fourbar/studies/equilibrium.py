@@ -30,7 +30,7 @@ from fourbar.formulas.mobility import (
 )
 from fourbar.formulas.motion import Coefficients
 from fourbar.formulas.torque import inertia
-from fourbar.quantities import JAMMED, NOT_ASSEMBLED, SINGULAR, Array
+from fourbar.quantities import JAMMED, NOT_ASSEMBLED, SINGULAR, WOUND, Array
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import DEFAULT_STEPS, Motion
 from fourbar.scene.scene import default_places
@@ -159,6 +159,7 @@ def equilibrium(scene: Scene) -> Equilibria:
         samples = curve.samples()
         zeros = _find_zeros(curve, samples)
         order = curve.order(zeros.points)
+        order = order[~_mark_wound(curve, zeros.points[order])]
         points = zeros.points[order]
         sizes = zeros.size[order]
         held: list[_CircuitRange] = []
@@ -177,7 +178,7 @@ def equilibrium(scene: Scene) -> Equilibria:
             curve,
             np.stack([psi, positions.branch * transmission(curve.ratios, psi)], axis=1),
         )
-        sense[np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR))] = 0
+        sense[np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR, WOUND))] = 0
         flat, ends = (
             tuple(part.ends for part in ranges if _is_reached(curve, part))
             for ranges in (level, held)
@@ -185,6 +186,27 @@ def equilibrium(scene: Scene) -> Equilibria:
         return Equilibria(
             tuple(equilibria), flat, len(samples), singular, ends, positions, sense
         )
+
+
+def _mark_wound(curve: CircuitCurve, points: Array) -> NDArray[np.bool_]:
+    """Mark points at which a torsion spring is wound beyond half a turn from its rest.
+
+    The spring is followed from the first position of the sweep that assembles, to the
+    points that the sweep passes.
+    """
+    wound = np.zeros(len(points), dtype=bool)
+    scene = curve.scene
+    if curve.sweep is None or not scene.counts_turns:
+        return wound
+    stated = curve.commanded
+    assembled = solve(scene, "position", at=stated).assembled
+    first = stated.theta_2[assembled][:1]
+    for row in np.flatnonzero(curve.reached(points)):
+        theta_2 = np.array([*first, curve.place(points[row]).theta_2])
+        branch = np.full(2, stated.branch[0], dtype=np.int8)
+        followed = solve(scene, "force", at=Command(theta_2, branch, 0.0, 0.0))
+        wound[row] = followed.status_code[1] == WOUND
+    return wound
 
 
 def _solve_at_rest(scene: Scene, circuit: Circuit) -> Solution:

@@ -310,3 +310,23 @@ def test_tolerances_at_a_stroke_spread_as_first_order_says() -> None:
         wanted = 1e-5 * np.abs(slopes.of(name, drawn.key))
         np.testing.assert_allclose(spread.spreads[name].deviation, wanted, rtol=SAMPLED)
     assert not spread.without.any()
+
+
+@pytest.mark.parametrize(
+    ("keywords", "words"),
+    [
+        ({"theta_2": fourbar.Sweep("10 cm", "20 cm", 4)}, "motion.theta_2"),
+        (
+            {"stroke": fourbar.Sweep("10 deg", "20 deg", 4), "side": "left"},
+            "motion.stroke",
+        ),
+    ],
+)
+def test_a_sweep_of_texts_is_read_by_the_unit_that_they_state(
+    keywords: dict[str, Any], words: str
+) -> None:
+    sweep = fourbar.Sweep("10 cm", "0.2 m", 4)
+    motion = fourbar.Motion(stroke=sweep, side="left")
+    assert motion.angle == fourbar.Sweep(0.1, 0.2, 4)
+    with pytest.raises(InputError, match=words):
+        fourbar.Motion(**keywords)

@@ -31,6 +31,7 @@ from fourbar import (
 )
 from fourbar.cli import status
 from fourbar.effects import Place
+from fourbar.files import loads
 from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import Free
 from fourbar.show.tables import BLOCK_WIDTH
@@ -487,6 +488,60 @@ def test_a_load_on_a_bar_that_rests_is_indifferent_in_one_way_of_moving_alone() 
     assert not equilibrium(scene).indifferent
     equilibria = equilibrium(crossed)
     assert equilibria.indifferent and not equilibria.found
+
+
+ROBOT = """
+[lengths]
+ground = "6 m"
+input = "4 m"
+coupler = "5 m"
+output = "3 m"
+ground_angle = "180 deg"
+[motion]
+theta_2 = { from = "START", to = "170 deg", steps = 110 }
+branch = "crossed"
+[effects.torsion]
+A = { stiffness = "10 N m/rad", rest = "90 deg" }
+B = { stiffness = "10 N m/rad", rest = "-90 deg" }
+"""
+
+
+@pytest.mark.parametrize(("start", "count"), [("60 deg", 0), ("160 deg", 1)])
+def test_a_torsion_spring_is_followed_from_the_start_of_the_sweep(
+    start: str, count: int
+) -> None:
+    """Two circles close the loop at 5000 angles, along which the pins are followed.
+
+    From the first that closes the spring at B is wound by 254.5 deg where the work of
+    both would vanish; a sweep that begins beside it has it within half a turn.
+    """
+    scene = loads(ROBOT.replace("START", start))
+    theta = np.radians(np.linspace(float(start.split(maxsplit=1)[0]), 170.0, 5000))
+    to_O4 = -6.0 - 4.0 * np.exp(1j * theta)
+    d = np.abs(to_O4)
+    closes = d < 8.0
+    along = (5.0**2 - 3.0**2 + d**2) / (2.0 * d)
+    across = np.sqrt(5.0**2 - np.where(closes, along, 0.0) ** 2)
+    coupler = ((along + 1j * across) * to_O4 / d)[closes]
+    output = coupler - to_O4[closes]
+    theta = theta[closes]
+    theta_3 = np.unwrap(np.angle(coupler))
+    at_A = theta_3 - theta
+    at_B = np.unwrap(np.angle(output)) - theta_3
+    from_rest = []
+    for turned, rest in ((at_A, math.pi / 2), (at_B, -math.pi / 2)):
+        turns = np.rint((turned[0] - rest) / math.tau)
+        from_rest.append(turned - rest - turns * math.tau)
+    near = np.argmin(np.abs(theta - math.radians(167.7867)))
+    wound = float(np.degrees(np.abs(from_rest[1][near])))
+    assert wound == pytest.approx(254.5 if count == 0 else 105.5, abs=0.05)
+    found = [one for one in fourbar.equilibrium(scene).found if one.reached]
+    assert len(found) == count
+    if count:
+        assert math.degrees(found[0].place.theta_2) == pytest.approx(167.7867, abs=1e-4)
+    within = np.all(np.abs(from_rest) < math.pi, axis=0)
+    energy = sum(5.0 * angle**2 for angle in from_rest)
+    assert np.any(np.diff(np.sign(np.diff(energy[within])))) == bool(count)
 
 
 def test_the_half_turn_of_a_torsion_spring_is_no_equilibrium() -> None:

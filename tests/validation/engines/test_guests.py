@@ -418,6 +418,20 @@ def test_a_guest_is_asked_for_what_its_hello_names(tmp_path: Path) -> None:
     )
 
 
+def test_a_guest_of_protocol_3_is_not_asked_for_springs_that_act_one_way() -> None:
+    """Its hello names springs alone: those that act both ways it is asked as before."""
+    program = guests.Program(("none",))
+    hello = guests.Hello("sprung", effects=("springs",))
+    client = guests.GuestClient("sprung", program, hello)
+    ends = Place(1, (0.1, 0.5)), Place(2, (0.1, 0.0))
+    said = []
+    for acts in (None, "push"):
+        spring = fourbar.Spring(*ends, 200.0, 0.05, acts=acts)
+        scene = crank_rocker(loads=(), effects=(fourbar.Springs((spring,)),))
+        said.append(client._explain_refusal(guests._find_needs(scene)))
+    assert said == ["", "the engine's hello does not list one_sided in effects"]
+
+
 @pytest.mark.slow
 def test_a_guest_that_integrates_is_asked_for_released_motions(
     monkeypatch: pytest.MonkeyPatch,
