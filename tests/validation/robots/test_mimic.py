@@ -248,3 +248,73 @@ def test_a_joint_that_follows_none_is_refused(tmp_path: Path) -> None:
         measure_mimic(write(tmp_path), "c", KNEE)
     with pytest.raises(InputError, match="no such joint"):
         measure_mimic(write(tmp_path), "knee", KNEE)
+
+
+COUPLER = """<mujoco><worldbody><body name="crank"><joint name="j2" axis="0 0 1"/>
+<geom type="capsule" fromto="0 0 0 .057 0 0" size=".003"/>
+<body name="tip" pos=".057 0 0"><joint name="j3" axis="0 0 1"/>
+<geom type="capsule" fromto="0 0 0 .022 0 0" size=".003"/></body></body>
+</worldbody><equality><joint joint1="j3" joint2="j2" polycoef="0 -1 0 0 0"/></equality>
+</mujoco>"""
+
+
+def test_a_follower_on_the_crank_turns_the_coupler(tmp_path: Path) -> None:
+    """Its angle is theta_3 - theta_2, here from the two circles of the loop."""
+    path = tmp_path / "coupler.xml"
+    path.write_text(COUPLER)
+    swing = np.radians(np.linspace(30.0, 90.0, 61))
+    scene = Scene(
+        FourBar(0.02, Bar(0.057, 0.1), Bar(0.022, 0.1), Bar(0.055, 0.1)),
+        fourbar.Motion(swing, 1.0),
+    )
+    report = measure_mimic(path, "j3", scene)
+    assert report.equality.bars == (3, 2)
+    pin_a = 0.057 * np.exp(1j * swing)
+    to_a = pin_a - 0.02
+    apart = np.abs(to_a)
+    cosine = (apart**2 + 0.055**2 - 0.022**2) / (2.0 * apart * 0.055)
+    errors = []
+    for side in (1.0, -1.0):
+        pin_b = 0.02 + 0.055 * to_a / apart * np.exp(1j * side * np.arccos(cosine))
+        turned = np.unwrap(np.angle((pin_b - pin_a) / pin_a))
+        slope, constant = np.polyfit(swing, turned, 1)
+        left = -swing - turned
+        errors.append(
+            (
+                slope,
+                np.abs(slope * swing + constant - turned).max(),
+                np.ptp(left) / 2.0,
+            )
+        )
+    slope, error, centred = min(errors, key=lambda one: abs(one[0] + 0.81582))
+    assert slope == pytest.approx(-0.81582, abs=5e-6)
+    assert report.squares[0].coefficients[1] == pytest.approx(slope, abs=1e-9)
+    assert report.squares[0].angle == pytest.approx(error, rel=1e-3)
+    assert report.centred == pytest.approx(centred, rel=1e-3)
+    assert math.degrees(report.shifted) == pytest.approx(7.418, abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("tree", "bars"),
+    [
+        ("(L)(F)", (4, 1)),
+        ("(L(F))", (3, 2)),
+        ("(L(C(F)))", (4, 3)),
+        ("(L)(C(F))", (3, 4)),
+    ],
+)
+def test_the_tree_tells_which_bars_a_follower_joins(
+    tmp_path: Path,
+    tree: str,
+    bars: tuple[int, int],
+) -> None:
+    body = '<body pos=".1 0 0"><joint name="{}" axis="0 0 1"/><geom size=".01"/>'
+    bodies = tree.replace("(", "<").replace(")", "</body>")
+    for name in "LCF":
+        bodies = bodies.replace(f"<{name}", body.format(name))
+    path = tmp_path / "tree.xml"
+    path.write_text(
+        f"<mujoco><worldbody>{bodies}</worldbody><equality>"
+        '<joint joint1="F" joint2="L"/></equality></mujoco>'
+    )
+    assert measure_mimic(path, "F", GRIPPER).equality.bars == bars

@@ -29,18 +29,17 @@ NOT_THERE = (
 )
 _HINGES = 3
 """Joints of a four-bar whose fourth pin is an equality."""
-_REACHING_OUT = (
-    "extension",
-    "plugin",
-    "attach",
-    "model",
-    "composite",
-    "flexcomp",
-    "flex",
+_REACHING_OUT = ("attach", "model")
+"""Elements that load other models, in which a loop may be."""
+_FOR_THE_EYE = ("texture", "skin", "layer", "sensor")
+"""Elements that are dropped without a word; so is every attribute `texture`."""
+_LEFT_OUT = (
+    *("extension", "plugin"),
+    *("composite", "flexcomp", "flex", "deformable"),
+    *("flexvert", "flexstrain"),
+    *("hfield",),
 )
-"""Elements that load plugins or models, or make deformable bodies."""
-_FOR_THE_EYE = ("texture", "skin", "layer")
-"""Elements that are dropped; so is every attribute `texture`."""
+"""Elements that are dropped and named: plugins, deformable bodies and height fields."""
 FOLDER_ATTRIBUTES = ("assetdir", "meshdir", "texturedir")
 """Attributes of <compiler> that name folders of assets; the later ones go first."""
 FILE_ATTRIBUTES = ("file", "directory", "content_type")
@@ -83,6 +82,17 @@ def is_four_bar_alone(file: RobotFile) -> bool:
         if element.tag in ("joint", "freejoint")
     ]
     return len(joints) <= _HINGES
+
+
+def mend_text(text: str) -> str:
+    """Return a text as XML where MuJoCo's reader asks for less.
+
+    Comments are dropped, since two hyphens may stand in them; attributes get a blank
+    between them; an ampersand that begins no entity is one.
+    """
+    text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
+    text = re.sub(r"""(=\s*(?:"[^"]*"|'[^']*'))(?=[A-Za-z_])""", r"\1 ", text)
+    return re.sub(r"&(?!#?\w+;)", "&amp;", text)
 
 
 @dataclass
@@ -185,17 +195,26 @@ class _RobotReading:
                 raise self._refuse(
                     word, "is not allowed: an MJCF needs no document type"
                 )
+        try:
+            return self._parse_text(text, path)
+        except (ET.ParseError, ValueError) as caught:
+            error = str(caught)
+        try:
+            root = self._parse_text(mend_text(text), path)
+        except (ET.ParseError, ValueError):
+            raise self._refuse(path.name, f"is no XML: {error}") from None
+        self.notes.append(f"{path.name} is no XML ({error}), but read as MuJoCo does")
+        return root
+
+    def _parse_text(self, text: str, path: Path) -> ET.Element:
         parsed = ET.iterparse(io.StringIO(text), ("start", "end"))
         depth = 0
-        try:
-            for event, _ in parsed:
-                depth += 1 if event == "start" else -1
-                if depth > _DEEPEST:
-                    raise self._refuse(
-                        path.name, f"nests its elements deeper than {_DEEPEST}"
-                    )
-        except (ET.ParseError, ValueError) as error:
-            raise self._refuse(path.name, f"is no XML: {error}") from None
+        for event, _ in parsed:
+            depth += 1 if event == "start" else -1
+            if depth > _DEEPEST:
+                raise self._refuse(
+                    path.name, f"nests its elements deeper than {_DEEPEST}"
+                )
         root: ET.Element = parsed.root  # type: ignore[attr-defined]
         return root
 
@@ -273,6 +292,8 @@ class _RobotReading:
         total = 0
         for number, mesh in enumerate(root.iter("mesh")):
             file = mesh.attrib.pop("file", None)
+            if file is None and mesh.find("plugin") is not None:
+                file = f"{mesh.get('name', 'mesh')} of a plugin"
             if file is None:
                 continue
             mesh.attrib.pop("content_type", None)
@@ -294,28 +315,32 @@ class _RobotReading:
             self.contents[plain] = path.read_bytes()
 
     def _drop_pictures(self, root: ET.Element) -> None:
-        """Drop what only draws, and height fields.
+        """Drop what only draws or measures, and what no loop of rigid bars is made of.
 
-        Nothing of a robot hangs on these.
+        A mesh or a geom that a plugin shapes counts as a mesh that is missing.
         """
-        dropped = False
+        left_out = set[str]()
         for parent in root.iter():
             for child in list(parent):
-                field_of_heights = child.tag == "hfield" or "hfield" in child.attrib
-                if child.tag in _FOR_THE_EYE or field_of_heights:
-                    parent.remove(child)
-                    dropped = dropped or field_of_heights
+                if child.tag in _LEFT_OUT or "hfield" in child.attrib:
+                    left_out.add("hfield" if "hfield" in child.attrib else child.tag)
+                elif child.tag not in _FOR_THE_EYE:
+                    continue
+                parent.remove(child)
             parent.attrib.pop("texture", None)
-        if dropped:
-            self.notes.append("height fields are left out")
+            if parent.tag == "geom" and parent.get("type") == "sdf":
+                parent.set("type", "mesh")
+        if left_out:
+            names = ", ".join(f"<{tag}>" for tag in sorted(left_out))
+            self.notes.append(f"left out, as no part of a loop: {names}")
 
     def _screen(self, element: ET.Element) -> None:
         """Refuse what reaches beyond the files that were read, or may never end."""
         if element.tag in _REACHING_OUT:
             raise self._refuse(
                 f"<{element.tag}>",
-                "is not read here: save the model as MuJoCo compiles it "
-                "(mj_saveLastXML) and give that file",
+                "is not read here: save the model as MuJoCo compiles it, with what it"
+                " attaches in it (mj_saveLastXML), and give that file",
             )
         for name in element.attrib:
             if element.tag == "option" and name in _COUNTS:

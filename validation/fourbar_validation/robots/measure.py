@@ -25,7 +25,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     LoopMeasurement,
     MeasureOptions,
     RobotMeasurement,
-    find_median_part,
+    divide,
     measure_sizes,
 )
 from fourbar_validation.robots.files import read_robot
@@ -40,6 +40,9 @@ STATES = "single states"
 MEASURED_THROUGH_TIME = "through time"
 _DECIMALS_OF_A_POSE = 9
 """Decimals of a position in degrees; those beyond are rounding."""
+_LEAST_PERCENT = 1e-3
+_MOST_PERCENT = 1e6
+"""Percentages between these have no exponent."""
 _SLIP = 1e-9
 """Part of the speeds below which a pin with dry friction is at rest. It may then rub
 either way.
@@ -63,18 +66,14 @@ class InsideError:
     theta_2: float
     """Angle of bar 2 there in the axes of the scene, rad."""
     median: float
-    """Median over the states of the error over the scale of its state; infinite
-    without an answer.
+    """Median of the errors over the states, over the same scale; infinite without an
+    answer.
     """
 
     @property
     def part(self) -> float:
         """The error over its scale; infinite without an answer."""
-        if not math.isfinite(self.error):
-            return math.inf
-        if self.scale:
-            return self.error / self.scale
-        return 0.0
+        return divide(self.error, self.scale)
 
     def cells(self) -> tuple[str, ...]:
         """Return method, quantity, error, relative size, place and median, as text."""
@@ -83,10 +82,19 @@ class InsideError:
             self.method,
             self.quantity,
             f"{self.error:.3g} {unit}",
-            f"{100.0 * self.part:.3g} %",
+            write_percent(self.part),
             f"{write_degrees(self.joint)} deg",
-            f"{100.0 * self.median:.2g} %",
+            write_percent(self.median),
         )
+
+
+def write_percent(part: float) -> str:
+    """Write a part of a whole in percent with three significant digits."""
+    percent = 100.0 * part
+    if not _LEAST_PERCENT <= percent < _MOST_PERCENT:
+        return f"{percent:.3g} %"
+    decimals = max(2 - math.floor(math.log10(percent)), 0)
+    return f"{round(percent, decimals):.{decimals}f} %"
 
 
 def write_degrees(joint: float) -> str:
@@ -153,14 +161,14 @@ def _compare(
         errors = _subtract_formulas(rows, formulas, loop.turned)
     else:
         errors = answer.errors()
-    largest = answer.sizes()
-    scales = answer.scales(max(loop.scene.linkage.lengths[1:]))
+    largest = loop.states.sizes()
     for name in FORCE_QUANTITIES:
         sizes = np.where(np.isfinite(errors[name]), errors[name], math.inf)
         sizes = np.where(reversing, 0.0, sizes)
         worst = int(np.argmax(sizes))
         error = float(sizes[worst])
-        median = find_median_part(sizes, scales[name])
+        scale = loop.scales[name]
+        median = divide(float(np.median(sizes)), scale)
         if answer.lost:
             error = math.inf
             median = math.inf
@@ -168,8 +176,8 @@ def _compare(
             method,
             name,
             error,
-            float(scales[name].max()),
-            bool(np.any(scales[name] != largest[name])),
+            scale,
+            scale != float(largest[name].max()),
             rows[worst].joint,
             float(theta_2[worst]),
             median,

@@ -46,7 +46,7 @@ class _MimicError:
     angle: float
     """rad."""
     ratio: float
-    """Largest error of omega_4/omega_2."""
+    """Largest error of the follower's speed over omega_2."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,8 @@ def measure_mimic(
     """Hold the polynomial of a joint against the loop of a scene over its motion.
 
     The leader's zero is the theta_2 at which the file has the input, and the follower's
-    is theta_4 there. Where the file does not tell, the leader's position is theta_2.
+    is the angle between its two bars there. Where the file does not tell,
+    the leader's position is theta_2.
 
     Parameters
     ----------
@@ -107,11 +108,11 @@ def measure_mimic(
     zero = _find_zero(equality, 0.5 * (low + high))
     theta_2 = np.union1d(np.linspace(low, high, POSITIONS_FITTED), positions)
     through_zero = np.union1d(theta_2, zero)
-    theta_4, ratio = _follow(scene, through_zero, branch)
-    origin = theta_4[np.searchsorted(through_zero, zero)]
+    angle, ratio = _follow(scene, through_zero, branch, equality.bars)
+    origin = angle[np.searchsorted(through_zero, zero)]
     inside = np.searchsorted(through_zero, theta_2)
     # both joints from their zeros, each in its own sense
-    turned = equality.side * equality.sense * (theta_4 - origin)[inside]
+    turned = equality.side * equality.sense * (angle - origin)[inside]
     ratio = equality.sense * ratio[inside]
     x = equality.side * (theta_2 - zero)
     own = _measure_polynomial(equality.coefficients, x, turned, ratio)
@@ -149,8 +150,12 @@ def _follow(
     scene: Scene,
     theta_2: Array,
     branch: int,
+    bars: tuple[int, int],
 ) -> tuple[Array, Array]:
-    """Return theta_4, continuous, and omega_4/omega_2 at angles of bar 2."""
+    """Return the angle of a bar against another, rad, and its speed over omega_2.
+
+    They are at angles of bar 2; the angle is continuous.
+    """
     moving = replace(scene, motion=scene.motion.replace(speed=1.0, acceleration=0.0))
     branches = np.full(len(theta_2), branch, dtype=np.int8)
     solution = solve(moving, "velocity", at=Command(theta_2, branches, 1.0, 0.0))
@@ -167,8 +172,12 @@ def _follow(
                 " motion nor the zero of the file's joints may be there"
             )
         raise InputError("motion.theta_2", f"{angle:.6g} deg", reason)
-    assert solution.omega_4 is not None
-    return np.unwrap(solution.theta_4), np.asarray(solution.omega_4)
+    assert solution.omega_3 is not None and solution.omega_4 is not None
+    theta = {1: 0.0, 2: theta_2, 3: solution.theta_3, 4: solution.theta_4}
+    omega = {1: 0.0, 2: 1.0, 3: solution.omega_3, 4: solution.omega_4}
+    turned, bearer = bars
+    angle = np.unwrap(theta[turned] - theta[bearer])
+    return angle, np.asarray(omega[turned] - omega[bearer])
 
 
 def _measure_polynomial(
@@ -244,7 +253,8 @@ def show_mimic(report: _MimicReport) -> None:
     own = report.file
     low, high = (f"{math.degrees(angle):.6g}" for angle in report.swing)
     _print_sentence(
-        f"{equality.follower} follows {equality.leader} by polycoef"
+        f"{equality.follower} ({_write_angle('theta', equality)}) follows"
+        f" {equality.leader} by polycoef"
         f" {_write_coefficients(equality.coefficients)};"
         f" theta_2 is {_write_theta_2(equality)}, from {low} to {high} deg"
     )
@@ -252,7 +262,7 @@ def show_mimic(report: _MimicReport) -> None:
         f"largest error of the angle: {_deg(own.angle)} deg through the zero of the "
         f"file; {_deg(report.shifted)} deg with the constant of least squares, "
         f"{_deg(report.centred)} deg with the best one; "
-        f"of the ratio omega_4/omega_2: {own.ratio:.4g}"
+        f"of the ratio {_write_ratio(equality)}: {own.ratio:.4g}"
     )
     _print_sentence(ROW.format(*FIT_HEADINGS))
     for degree, *errors in zip(
@@ -268,6 +278,17 @@ def show_mimic(report: _MimicReport) -> None:
             _print_sentence(
                 ROW.format(str(degree), fit, _deg(error.angle), ratio, polycoef)
             )
+
+
+def _write_angle(symbol: str, equality: JointEquality) -> str:
+    """Write the follower's angle or speed: that of its bar less that of its bearer."""
+    turned, bearer = equality.bars
+    return f"{symbol}_{turned}" + (f" - {symbol}_{bearer}" if bearer > 1 else "")
+
+
+def _write_ratio(equality: JointEquality) -> str:
+    speed = _write_angle("omega", equality)
+    return f"({speed})/omega_2" if " " in speed else f"{speed}/omega_2"
 
 
 def _write_theta_2(equality: JointEquality) -> str:

@@ -138,6 +138,13 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[ReportBlock]:
     elif loop.through_time.lost:
         yield f"through time: {loop.through_time.lost}"
     else:
+        if loop.through_time.other_assembly is not None:
+            place = write_degrees(loop.through_time.other_assembly)
+            yield (
+                "through time MuJoCo goes over to the other assembly beside a change"
+                f" point, seen at {loop.joint} = {place} deg: no state from there on is"
+                " in a percentage"
+            )
         worst = max(loop.through_time.rows, key=lambda row: row.gap)
         yield (
             f"gap through time: {1e3 * worst.gap:.3g} mm at {loop.joint} = "
@@ -161,10 +168,8 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[ReportBlock]:
 def _write_held(loop: LoopMeasurement) -> str:
     """Write what holds the other joints, what keeps the speed, and what is off."""
     if loop.held:
-        text = (
-            f"{loop.held} other degrees of freedom are held: at single states by"
-            " generalized forces"
-        )
+        are = "degree of freedom is" if loop.held == 1 else "degrees of freedom are"
+        text = f"{loop.held} other {are} held: at single states by generalized forces"
     else:
         text = "no other degree of freedom is held"
     if loop.influence is not None:

@@ -174,7 +174,7 @@ def test_the_start_of_a_simulation_is_not_judged() -> None:
     errors, scales = through.errors(), through.scales(inside.loop.longest)
     single = inside.answer_states(angles[5:], 1.0, 0.0)
     for quantity in FORCE_QUANTITIES:
-        scale = scales[quantity].max()
+        scale = scales[quantity]
         settled = errors[quantity].max() / scale
         assert settled < 0.02
         assert single.errors()[quantity].max() / scale > 10.0 * settled

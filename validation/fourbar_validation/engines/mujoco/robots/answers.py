@@ -55,27 +55,16 @@ def measure_sizes(values: Any) -> Array:
     return np.asarray(np.abs(numbers) if numbers.ndim == 1 else np.hypot(*numbers.T))
 
 
-def find_median_part(errors: Array, scales: Array) -> float:
-    """Return the median of errors, each over the scale of its state.
-
-    Where the scale is zero an error is infinite; no error is zero.
-    """
-    with np.errstate(divide="ignore", invalid="ignore"):
-        parts = np.where(errors > 0.0, errors / scales, 0.0)
-    return float(np.median(parts))
-
-
 def find_scales(
     sizes: Mapping[str, Array],
     conditions: Array,
     longest: float,
-) -> dict[str, Array]:
-    """Return what the errors of torque and pin forces are judged by, N m and N.
+) -> dict[str, float]:
+    """Return what the errors of torque and pin forces are divided by, N m and N.
 
-    It is the size of each. One that is the round-off of its terms at every
-    well-conditioned state is a sum that cancels: its errors are judged by the terms,
-    which are the largest pin force of the state, for the torque times the longest
-    moving bar.
+    The scale of each is its largest size. One that is the round-off of its terms at
+    every well-conditioned state is a sum that cancels: its scale is that of the terms,
+    the largest pin force, for the torque times the longest moving bar.
 
     Parameters
     ----------
@@ -92,8 +81,16 @@ def find_scales(
             terms = force * longest
         cancels = sizes[name] <= ROUND_OFF_OF_A_FILE * terms
         vanishes = well.any() and cancels[well].all()
-        scales[name] = terms if vanishes else sizes[name]
+        scale = terms if vanishes else sizes[name]
+        scales[name] = float(scale.max())
     return scales
+
+
+def divide(error: float, scale: float) -> float:
+    """Return an error over its scale; without a scale it is infinite, or zero."""
+    if scale and math.isfinite(error):
+        return error / scale
+    return math.inf if error else 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +127,10 @@ class InsideAnswer:
     """
     lost: str = ""
     """Why the run ended early; empty where it did not."""
+    other_assembly: float | None = None
+    """Position of the driven joint from which on the simulated loop is in the other
+    assembly, rad: no state counts from there on.
+    """
     seconds_per_step: float = math.nan
     """Processor time of a step of the whole robot, s."""
 
@@ -154,15 +155,23 @@ class InsideAnswer:
             for name in FORCE_QUANTITIES
         }
 
-    def scales(self, longest: float) -> dict[str, Array]:
-        """Return what the errors are judged by at each state, as `find_scales` does.
-
-        The torque and the pin forces are those of rigid pins, (n,), N m and N.
+    def scales(self, longest: float) -> dict[str, float]:
+        """Return what errors are divided by, from rigid pins, N m and N.
 
         `longest`: longest moving bar, m.
         """
         conditions = np.array([row.condition for row in self.rows])
         return find_scales(self.sizes(), conditions, longest)
+
+    def find_worst(self, scales: Mapping[str, float]) -> float:
+        """Return the worst error of torque and pin forces, each over its scale.
+
+        It is infinite without an answer.
+        """
+        if self.lost or not self.rows:
+            return math.inf
+        errors = self.errors().items()
+        return max(divide(float(error.max()), scales[name]) for name, error in errors)
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,11 +179,11 @@ class Influence:
     """Largest changes of the errors of torque and pin forces, relative."""
 
     worst: float
-    """Change at the worst state, over the largest of the quantity. Infinite without an
+    """Change at the worst state, over the scale of the quantity. Infinite without an
     answer.
     """
     median: float
-    """Median over the states, each over the size of the quantity there."""
+    """Median of the changes over the states, over the same scale."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -300,6 +309,8 @@ class LoopMeasurement:
     switched_off: tuple[str, ...]
     """Equalities between its moving bars and joints that are held."""
     states: InsideAnswer
+    scales: dict[str, float]
+    """Scale of the errors of torque and of each pin force, N m and N."""
     through_time: InsideAnswer | None
     refusal: str
     """Why it was not simulated; empty where it was."""

@@ -96,6 +96,10 @@ the motion.
 """
 _REACHED = 1.0 - 1e-6
 """Part of its couple at which dry friction acts in full."""
+_SINE_OF_AN_ASSEMBLY = 0.1
+"""|sin(theta_4 - theta_3)| from which a loop that has yielded is in one assembly. A gap
+of a thousandth of the bars turns them by its root beside a change point.
+"""
 MOST_TIMESTEPS = 60_000
 """Steps of one run; at 0.1 ms a step of a humanoid these are six seconds."""
 
@@ -150,6 +154,8 @@ class LoopInside:
         rubs = not self.model.opt.disableflags & without_friction
         self._friction = self.model.dof_frictionloss * rubs
         self.bearers = BearerForces(self.model)
+        self._doubtful: list[InsideRow] = []
+        """Last rows of a simulation that may be in the other assembly."""
 
     def angle(self, qpos: Array) -> float:
         """Return theta_2 of a pose, rad."""
@@ -230,9 +236,14 @@ class LoopInside:
 
     def _measure_condition(self, qpos: Array) -> float:
         """Return |sin(theta_4 - theta_3)| in a pose."""
+        return abs(self._measure_sine(qpos))
+
+    def _measure_sine(self, qpos: Array) -> float:
+        """Return sin(theta_4 - theta_3) in a pose."""
         self._evaluate_closure(qpos)
         coupler, output = (self._find_line(bar) for bar in (3, 4))
-        return float(np.linalg.norm(np.cross(coupler, output)))
+        ground = self.closing.xmat[self.loop.bodies[1][0]].reshape(3, 3)
+        return float(np.cross(coupler, output) @ ground @ self.loop.axis)
 
     def _find_line(self, bar: int) -> Array:
         """Return the unit vector from the first pin of a bar to its second, (3,).
@@ -583,6 +594,7 @@ class LoopInside:
                 " another speed"
             )
         spent = 0.0
+        self._doubtful.clear()
         # the loop starts exactly closed, and takes some time constants to yield as far
         # as it does
         settled = settling_time(self.find_constant(), duration)
@@ -600,8 +612,35 @@ class LoopInside:
             row = self.ask(data.qpos, data.qvel, acceleration)
             answer.rows.append(row)
             drive(row)
+            if self._left_assembly(answer, data.qpos):
+                break
+        if answer.other_assembly is not None and not answer.rows:
+            raise LimitError(
+                "MuJoCo goes over to the other assembly before the loop has settled;"
+                " --pose states another start"
+            )
         answer.seconds_per_step = spent / max(stepper.done, 1)
         return answer
+
+    def _left_assembly(self, answer: InsideAnswer, qpos: Array) -> bool:
+        """Tell whether the last row is in the other assembly, and drop such rows.
+
+        Beside a change point, where a loop that has yielded is in neither, the rows
+        before tell.
+        """
+        row = answer.rows[-1]
+        closed = self.close(row.theta_2)
+        assert closed is not None  # the row was evaluated there
+        now, due = (self._measure_sine(pose) for pose in (qpos, closed))
+        if now * due > 0.0:
+            self._doubtful.clear()
+            return False
+        self._doubtful.append(row)
+        if min(abs(now), abs(due)) <= _SINE_OF_AN_ASSEMBLY:
+            return False
+        answer.other_assembly = self._doubtful[0].joint
+        del answer.rows[-len(self._doubtful) :]
+        return True
 
     def find_constant(self) -> float:
         """Return the time constant of the closure, s."""

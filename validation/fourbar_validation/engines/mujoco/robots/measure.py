@@ -4,6 +4,7 @@
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import mujoco
@@ -19,7 +20,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     MeasureOptions,
     RobotMeasurement,
     TornState,
-    find_median_part,
+    divide,
     measure_sizes,
 )
 from fourbar_validation.engines.mujoco.robots.closures import (
@@ -132,6 +133,7 @@ def _measure_loop(
             f"{loop.name} closes at none of the positions of the scene; its lengths "
             f"are {loop.describe_lengths()}"
         )
+    scales = states.scales(loop.longest)
     closing = motion._replace(theta_2=tuple(row.theta_2 for row in states.rows))
     through: InsideAnswer | None = None
     refusal = ""
@@ -141,7 +143,7 @@ def _measure_loop(
             raise LimitError("nothing moves: a sweep at a speed is needed")
         through = inside.answer_through_time(*closing)
         lighter = inside.answer_through_time(*closing, HEAVY * _LIGHTER)
-        influence = _compare_at_same_angles(through, lighter, loop.longest)
+        influence = _compare_at_same_angles(through, lighter, scales)
     except LimitError as error:
         refusal = str(error)
     torn: tuple[TornState, ...] = ()
@@ -164,6 +166,7 @@ def _measure_loop(
         len(inside.held),
         tuple(describe_equality(model, number) for number in loop.other_equalities),
         states,
+        scales,
         through,
         refusal,
         influence,
@@ -184,31 +187,26 @@ def _choose_motion(scene: Scene, turned: float) -> LoopMotion:
 def _compare_at_same_angles(
     one: InsideAnswer,
     other: InsideAnswer,
-    longest: float,
+    scales: Mapping[str, float],
 ) -> Influence:
     """Return by how much the errors of two runs differ at the same angles.
 
     Each is the error at its own state: the motions differ too, and near a limit
-    position the forces with them.
-
-    `longest`: longest moving bar, m.
+    position the forces with them. `scales`: those of the errors, N m and N.
     """
     if one.lost or other.lost:
         return Influence(math.inf, math.inf)
     worst = 0.0
     median = 0.0
-    for name, scales in one.scales(longest).items():
+    pairs = [*zip(one.rows, other.rows, strict=False)]
+    for name, scale in scales.items():
         first, second = (
             np.array(
-                [
-                    row.soft.values()[name] - row.rigid.values()[name]
-                    for row in answer.rows
-                ]
+                [row.soft.values()[name] - row.rigid.values()[name] for row in rows]
             )
-            for answer in (one, other)
+            for rows in zip(*pairs, strict=True)
         )
         changes = measure_sizes(first - second)
-        if scales.any():
-            worst = max(worst, float(changes.max() / scales.max()))
-            median = max(median, find_median_part(changes, scales))
+        worst = max(worst, divide(float(changes.max()), scale))
+        median = max(median, divide(float(np.median(changes)), scale))
     return Influence(worst, median)

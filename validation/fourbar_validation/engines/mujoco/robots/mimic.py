@@ -12,6 +12,8 @@ from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     Follower,
+    find_parent,
+    find_roots,
     list_followers,
     name_joint,
 )
@@ -48,6 +50,8 @@ class JointEquality:
     """
     side: float
     """+1 if theta_2 grows with the leader, -1 if it falls."""
+    bars: tuple[int, int]
+    """Bar that the follower turns, and the one that it turns against: 1 to 4."""
 
 
 def read_joint_equality(
@@ -57,8 +61,8 @@ def read_joint_equality(
 ) -> JointEquality:
     """Read the equality by which a joint follows another, in the loop of a scene.
 
-    The leader turns the input and the follower the output. Where the input points in
-    the rest pose is read from what the file has at its end.
+    The leader turns the input. The tree of bodies tells which bars the follower joins.
+    Where the input points in the rest pose is read from what the file has at its end.
 
     Raises
     ------
@@ -104,7 +108,23 @@ def _describe_follower(
         math.copysign(1.0, along),
         theta_2,
         side,
+        _find_bars(model, leader, follower),
     )
+
+
+def _find_bars(model: mujoco.MjModel, leader: int, follower: int) -> tuple[int, int]:
+    """Return the bar that a follower turns, and the bar that bears it."""
+    roots = find_roots(model, set())
+    turned, crank = (int(model.jnt_bodyid[joint]) for joint in (follower, leader))
+    ground = roots[find_parent(model, crank)]
+    bearer = roots[find_parent(model, turned)]
+    if bearer == crank:
+        return 3, 2
+    if bearer == ground:
+        return 4, 1
+    if roots[find_parent(model, bearer)] == crank:
+        return 4, 3
+    return 3, 4
 
 
 def _measure_input(

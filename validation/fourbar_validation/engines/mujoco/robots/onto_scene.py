@@ -215,8 +215,19 @@ def miss_lengths(scene: Scene, loop: RobotLoop) -> tuple[float, float]:
 def find_turn(scene: Scene, loop: RobotLoop) -> float:
     """Return the angle from a scene's axes to those of the loop's plane, rad.
 
-    Whole turns bring it near the pose.
+    Whole turns bring it near the pose. With one change point a turn leads to the other
+    assembly: of two turns the one counts after which the scene has that of the pose.
     """
-    turned = loop.angles[0] - scene.linkage.ground_angle
+    theta_1, theta_2, _, theta_4 = loop.angles
+    turned = theta_1 - scene.linkage.ground_angle
     middle = float(np.mean(command(scene).theta_2)) + turned
-    return turned - math.tau * round((middle - loop.angles[1]) / math.tau)
+    away = (middle - theta_2) / math.tau
+
+    def rank(turns: int) -> tuple[bool, float]:
+        in_scene = theta_2 + math.tau * turns
+        missed = miss_output(scene, theta_1, in_scene, theta_4)
+        return missed > FLAT, abs(turns - away)
+
+    nearest = round(away)
+    turns = min((nearest, nearest - 1, nearest + 1), key=rank)
+    return turned - math.tau * turns

@@ -15,11 +15,9 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 import mujoco
-import numpy as np
 
 from fourbar.errors import LimitError
 from fourbar_validation.engines.mujoco.robots.answers import (
-    InsideAnswer,
     LoopMotion,
     RobotSettings,
     SettingsAdvice,
@@ -147,11 +145,11 @@ class SettingsSearch:
         motion = self.motion
         states = through = gap = seconds = math.inf
         try:
-            states = _find_worst_force_error(
-                inside.answer_states(*motion), self.loop.longest
-            )
+            at_states = inside.answer_states(*motion)
+            scales = at_states.scales(self.loop.longest)
+            states = at_states.find_worst(scales)
             answer = inside.answer_through_time(*motion)
-            through = _find_worst_force_error(answer, self.loop.longest)
+            through = answer.find_worst(scales)
             seconds = answer.seconds_per_step
             gap = max((row.gap for row in answer.rows), default=math.inf)
         except LimitError:
@@ -242,27 +240,6 @@ class SettingsSearch:
         evaluations = _EVALUATIONS.get(settings.integrator, 1.0) / settings.timestep
         changes = settings.list_changes(self.own)
         return evaluations, len(changes), -settings.solref[0]
-
-
-def _find_worst_force_error(answer: InsideAnswer, longest: float) -> float:
-    """Return the worst error of torque and pin forces over the scale of each.
-
-    It is infinite without an answer.
-
-    `longest`: longest moving bar, m.
-    """
-    if answer.lost or not answer.rows:
-        return math.inf
-    scales = answer.scales(longest)
-    worst = 0.0
-    for name, errors in answer.errors().items():
-        largest = float(np.max(errors))
-        if not math.isfinite(largest):
-            return math.inf
-        scale = float(scales[name].max())
-        if scale:
-            worst = max(worst, largest / scale)
-    return worst
 
 
 def _write_elements(
