@@ -139,6 +139,6 @@ def test_what_the_digits_of_a_file_leave_open_is_said(tmp_path: Path) -> None:
     said = join_lines(checked)
     assert "what the scene leaves out and the lengths that it reads as equal;" in said
     assert "in line within the digits of the file (motor = 68.75 deg)" in said
-    assert "note: rod: lengths read as equal within the digits of the file: " in said
+    assert "note: lengths read as equal within the digits of the file: " in said
     assert "3.2 deg from a change point" in said
     assert "zero" not in said

@@ -55,7 +55,7 @@ def test_the_states_are_those_that_were_asked_at() -> None:
     assert len(rows) == len(loop.states.rows) + len(loop.through_time.rows)
     assert tuple(rows[0]) == STATES_FILE
     first, row = rows[0], loop.states.rows[0]
-    assert float(first["torque [N m]"]) == row.soft.torque
+    assert float(first["drive [N m or N]"]) == row.soft.torque
     assert float(first["gap [mm]"]) == 1e3 * row.gap
     size = sum(part**2 for part in row.rigid.forces["F43"]) ** 0.5
     assert float(first["F43 of rigid pins [N]"]) == pytest.approx(size, rel=1e-15)

@@ -44,6 +44,8 @@ def _write_closure(closure: RobotClosure) -> str:
         parts.append(f"ground {closure.ground}")
     if closure.hinges:
         parts.append(f"hinges {', '.join(closure.hinges)}")
+    if closure.other_joints:
+        parts.append(f"other joints {', '.join(closure.other_joints)}")
     if closure.loop is not None:
         parts.append(closure.loop.describe_lengths())
     if closure.misaligned is not None:

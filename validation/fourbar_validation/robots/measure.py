@@ -13,11 +13,12 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.linkage import require
-from fourbar.quantities import OK, UNITS, Array
+from fourbar.quantities import COUPLE, OK, UNITS, Array
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.compare.reversals import mark_reversing
+from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.mujoco.robots.answers import (
     FORCE_QUANTITIES,
     InsideAnswer,
@@ -158,11 +159,12 @@ def _compare(
     formulas = solve(loop.scene, "force", at=commanded)
     reversing = mark_reversing(loop.scene, formulas, _SLIP)
     if method == RIGID:
-        errors = _subtract_formulas(rows, formulas, loop.turned)
+        errors = _subtract_formulas(rows, formulas, loop)
     else:
         errors = answer.errors()
     largest = loop.states.sizes()
     for name in FORCE_QUANTITIES:
+        quantity = name_driving(loop.scene) if name == COUPLE.value else name
         sizes = np.where(np.isfinite(errors[name]), errors[name], math.inf)
         sizes = np.where(reversing, 0.0, sizes)
         worst = int(np.argmax(sizes))
@@ -174,7 +176,7 @@ def _compare(
             median = math.inf
         yield InsideError(
             method,
-            name,
+            quantity,
             error,
             scale,
             scale != float(largest[name].max()),
@@ -187,20 +189,21 @@ def _compare(
 def _subtract_formulas(
     rows: Sequence[InsideRow],
     formulas: Solution,
-    turned: float,
+    loop: LoopMeasurement,
 ) -> dict[str, Array]:
     """Return by how much torque and pin forces of rigid pins differ from the formulas.
 
     They are sizes at each state, (n,), N m and N; infinite where the formulas have no
-    value. `turned`: angle of the scene's axes in the plane of the loop, rad.
+    value.
     """
     judged = formulas.status_code == OK
     differences = {}
     for name in FORCE_QUANTITIES:
         rigid = np.array([row.rigid.values()[name] for row in rows])
         if rigid.ndim == 2:
-            rigid = _turn_vectors(rigid, -turned)
-        sizes = measure_sizes(rigid - np.asarray(getattr(formulas, name)))
+            rigid = _turn_vectors(rigid, -loop.turned)
+        quantity = name_driving(loop.scene) if name == COUPLE.value else name
+        sizes = measure_sizes(rigid - np.asarray(getattr(formulas, quantity)))
         differences[name] = np.where(judged, sizes, math.inf)
     return differences
 

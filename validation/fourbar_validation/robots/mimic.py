@@ -173,11 +173,13 @@ def _follow(
             )
         raise InputError("motion.theta_2", f"{angle:.6g} deg", reason)
     assert solution.omega_3 is not None and solution.omega_4 is not None
-    theta = {1: 0.0, 2: theta_2, 3: solution.theta_3, 4: solution.theta_4}
-    omega = {1: 0.0, 2: 1.0, 3: solution.omega_3, 4: solution.omega_4}
-    turned, bearer = bars
-    angle = np.unwrap(theta[turned] - theta[bearer])
-    return angle, np.asarray(omega[turned] - omega[bearer])
+    still = np.zeros_like(theta_2)
+    theta = [still, theta_2, solution.theta_3, solution.theta_4]
+    omega = [still, still + 1.0, solution.omega_3, solution.omega_4]
+    turned, bearer = (bar - 1 for bar in bars)
+    turn = np.asarray(theta[turned]) - np.asarray(theta[bearer])
+    ratio = np.asarray(omega[turned]) - np.asarray(omega[bearer])
+    return np.unwrap(turn), ratio
 
 
 def _measure_polynomial(

@@ -54,7 +54,7 @@ position.
 """
 STATES_FILE = (
     *("loop", "method", "joint [deg]", "omega_2 [rad/s]", "alpha_2 [rad/s^2]"),
-    *("torque [N m]", "torque of rigid pins [N m]"),
+    *("drive [N m or N]", "drive of rigid pins [N m or N]"),
     *(f"{name} [N]" for name in PIN_FORCES),
     *(f"{name} of rigid pins [N]" for name in PIN_FORCES),
     "gap [mm]",
@@ -155,14 +155,14 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[ReportBlock]:
     for name in sorted(sticking):
         count = sum(name in row.sticking for row in loop.states.rows)
         yield (
-            f"note: {loop.name}: at {count} of {len(loop.states.rows)} states the dry"
+            f"note: at {count} of {len(loop.states.rows)} states the dry"
             f" friction of {name} is less than its couple: it turns too slowly there"
             " for MuJoCo's soft friction (solreffriction and solimpfriction of the"
             " joint)"
         )
     yield from _describe_torn(loop)
     for remark in loop.remarks:
-        yield f"note: {loop.name}: {remark}"
+        yield f"note: {remark}"
 
 
 def _write_held(loop: LoopMeasurement) -> str:
@@ -242,8 +242,9 @@ def _describe_torn(loop: LoopMeasurement) -> Iterator[ReportBlock]:
         f"{name} {math.hypot(*force):.4g} N" for name, force in worst.forces.items()
     )
     yield (
-        f"under the torque: gap at most {1e3 * worst.gap:.3g} mm, at {loop.joint} = "
-        f"{write_degrees(worst.joint)} deg with {forces}"
+        f"under the torque, let go at {len(loop.torn)} positions: gap at most"
+        f" {1e3 * worst.gap:.3g} mm, when {loop.joint} has come to"
+        f" {write_degrees(worst.joint)} deg with {forces}"
     )
 
 

@@ -377,3 +377,74 @@ def test_our_robots_have_the_loops_that_they_were_made_with() -> None:
             math.hypot(0.064, 0.006),
         )
     )
+
+
+TWO_LOOPS = """
+<mujoco><worldbody>
+<body name="a"><joint name="m1" axis="0 0 1"/><geom size="0.01"/>
+ <body name="b" pos=".1 .1 0"><joint name="b" axis="0 0 1"/><geom size="0.01"/>
+  <body name="e" pos=".1 .1 0"><joint name="e" axis="0 0 1"/><geom size="0.01"/>
+   <site name="e1" pos=".1 -.1 0"/>
+   <body name="f" pos=".1 .1 0"><joint name="f" axis="0 0 1"/><geom size="0.01"/>
+    <site name="f1" pos=".1 -.1 0"/></body></body></body></body>
+<body name="g" pos=".2 0 0"><joint name="m2" axis="0 0 1"/><geom size="0.01"/>
+ <site name="g1" pos=".1 .1 0"/>
+ <body name="h" pos=".15 .1 0"><joint name="h" axis="0 0 1"/><geom size="0.01"/>
+  <site name="h1" pos=".05 .1 0"/></body></body>
+</worldbody><equality><connect name="loop1" site1="e1" site2="g1"/>
+<connect name="loop2" site1="f1" site2="h1"/></equality>
+<actuator><motor joint="m1"/><motor joint="m2"/></actuator></mujoco>
+"""
+"""Gruebler: 7 bars, 6 hinges and 2 pins leave 3 (7 - 1) - 2 (6 + 2) = 2 freedoms."""
+
+
+@pytest.mark.parametrize(
+    ("held", "counts", "ground"),
+    [
+        ((), "6 hinges, 2 loops and two freedoms: a six-bar once one of its", "g"),
+        (("m2",), "5 hinges, 2 loops and one freedom: a six-bar (", "world"),
+    ],
+)
+def test_loops_that_share_bars_are_counted_together(
+    held: tuple[str, ...],
+    counts: str,
+    ground: str,
+) -> None:
+    *_, second = report_of(TWO_LOOPS, held=held).closures
+    assert second.loop is None
+    assert f"with loop1, which moves its bars too, {counts}" in second.reason
+    inner = f"e, f, h on {ground} (50.00, 200.0, 141.4, 111.8 mm) are a four-bar"
+    assert f"{inner}, but e belongs to another loop too" in second.reason
+    assert "--hold" not in second.reason and "motors" not in second.reason
+
+
+def test_no_hold_is_offered_for_bars_of_another_loop() -> None:
+    first, _ = report_of(TWO_LOOPS).closures
+    assert "--hold" not in first.reason and "on g" not in first.reason
+
+
+def test_two_fingers_on_one_base_stay_apart() -> None:
+    finger = (
+        '<body name="{0}a" pos="{1} 0 0"><joint name="{0}a" axis="0 1 0"/>'
+        '<geom size=".01"/><body name="{0}b" pos="0 0 .1"><joint name="{0}b"'
+        ' axis="0 1 0"/><geom size=".01"/><body name="{0}c" pos=".1 0 .05">'
+        '<joint name="{0}c" axis="0 1 0"/><geom size=".01"/>'
+        '<site name="{0}1" pos="0 0 -.1"/></body></body></body>'
+        '<body name="{0}d" pos="{2} 0 0"><joint name="{0}d" axis="0 1 0"/>'
+        '<geom size=".01"/><site name="{0}2" pos="0 0 .05"/></body>'
+    )
+    text = (
+        "<mujoco><worldbody>"
+        + finger.format("l", 0.0, 0.1)
+        + finger.format("r", 0.5, 0.6)
+        + '</worldbody><equality><connect name="l" site1="l1" site2="l2"/>'
+        '<connect name="r" site1="r1" site2="r2"/></equality></mujoco>'
+    )
+    for closure in report_of(text).closures:
+        assert closure.reason.startswith("five hinges and two freedoms; --hold ")
+
+
+def test_a_slide_is_no_hinge() -> None:
+    *_, piston = report_of(EXCAVATOR).closures
+    assert "stroke" not in piston.hinges
+    assert piston.other_joints == ("stroke (slide)",)

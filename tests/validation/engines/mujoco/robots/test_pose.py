@@ -173,3 +173,9 @@ def test_what_a_motor_holds_stays_where_the_passive_joints_close_the_loop() -> N
     )
     free = pose_robot(compiled(BOOM.format(actuator="")), PoseOptions())
     assert "boom by" in free.notes[0]
+
+
+def test_zero_needs_no_unit() -> None:
+    model = compiled(FOOT.read_text())
+    posed = pose_robot(model, PoseOptions(joints={"crank": "0"}))
+    assert posed.data.qpos[model.joint("crank").qposadr[0]] == 0.0

@@ -39,9 +39,10 @@ class LoopMotion(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PinsAndTorque:
-    """Torque on bar 2, N m, and pin forces in the axes of the plane, (2,) each, N."""
+    """Drive of a state, and its pin forces in the axes of the plane, (2,) each, N."""
 
     torque: float
+    """Couple of the drive, N m, or its force, N."""
     forces: dict[str, Array]
 
     def values(self) -> dict[str, Any]:
@@ -58,7 +59,7 @@ def measure_sizes(values: Any) -> Array:
 def find_scales(
     sizes: Mapping[str, Array],
     conditions: Array,
-    longest: float,
+    lever: float,
 ) -> dict[str, float]:
     """Return what the errors of torque and pin forces are divided by, N m and N.
 
@@ -70,7 +71,7 @@ def find_scales(
     ----------
     sizes : size of the torque and of each pin force at each state, (n,), N m and N.
     conditions : |sin(theta_4 - theta_3)| at each state, (n,).
-    longest : longest moving bar, m.
+    lever : longest moving bar, m; 1 where the drive is a force.
     """
     force = np.max([sizes[name] for name in PIN_FORCES], axis=0)
     well = conditions >= WELL_CONDITIONED
@@ -78,7 +79,7 @@ def find_scales(
     for name in FORCE_QUANTITIES:
         terms = force
         if name == "torque":
-            terms = force * longest
+            terms = force * lever
         cancels = sizes[name] <= ROUND_OFF_OF_A_FILE * terms
         vanishes = well.any() and cancels[well].all()
         scale = terms if vanishes else sizes[name]
@@ -155,13 +156,10 @@ class InsideAnswer:
             for name in FORCE_QUANTITIES
         }
 
-    def scales(self, longest: float) -> dict[str, float]:
-        """Return what errors are divided by, from rigid pins, N m and N.
-
-        `longest`: longest moving bar, m.
-        """
+    def scales(self, lever: float) -> dict[str, float]:
+        """Return what errors are divided by, from rigid pins, as `find_scales` does."""
         conditions = np.array([row.condition for row in self.rows])
-        return find_scales(self.sizes(), conditions, longest)
+        return find_scales(self.sizes(), conditions, lever)
 
     def find_worst(self, scales: Mapping[str, float]) -> float:
         """Return the worst error of torque and pin forces, each over its scale.

@@ -7,7 +7,7 @@ no joint parts, or a held one, are one bar.
 
 import math
 from collections.abc import Sequence
-from itertools import combinations
+from itertools import combinations, pairwise, permutations
 
 import mujoco
 import numpy as np
@@ -63,6 +63,11 @@ EQUALITY_KINDS = {
     int(getattr(mujoco.mjtEq, f"mjEQ_{name.upper()}")): name
     for name in ("connect", "weld", "joint", "tendon")
 }
+JOINT_WORDS = {FREE_JOINT: "free", BALL: "ball", SLIDE: "slide"}
+HOW_MANY = {1: "one", 2: "two", 3: "three"}
+NAMES_OF_LINKAGES = {6: "a six-bar", 8: "an eight-bar"}
+_MOST_HOLDS = 5
+"""Further choices of joints to hold that are printed."""
 HINGES_IN_WORDS = {
     1: "one hinge",
     2: "two hinges",
@@ -272,7 +277,13 @@ class _Finder:
             gap = _measure_gap(find_ends(self.model, self.before, number), normal)
             left = _measure_gap(ends, normal)
         chain = _Chain(self, ends[0].body, ends[1].body)
-        hinges = tuple(name_joint(model, j) for j in chain.joints)
+        hinges = []
+        others = []
+        for joint, joint_kind in zip(chain.joints, chain.kinds, strict=True):
+            if joint_kind == HINGE_JOINT:
+                hinges.append(name_joint(model, joint))
+            else:
+                others.append(f"{name_joint(model, joint)} ({JOINT_WORDS[joint_kind]})")
         loop, reason = self._recognise(number, name, chain)
         return RobotClosure(
             name,
@@ -280,7 +291,8 @@ class _Finder:
             loop,
             reason,
             chain.ground_name,
-            hinges,
+            tuple(hinges),
+            tuple(others),
             self._measure_axes(chain)[0],
             gap,
             left,
@@ -445,28 +457,144 @@ class _Finder:
             closer = "" if is_pin else "a weld that leaves no freedom: "
             return f"{closer}{count} in a plane cannot move"
         motors = self._list_motors(chain.joints)
-        by = ""
+        coupled = self._find_coupled(number, chain)
+        holds = self._list_holds(chain, motors, coupled, freedoms - 1)
+        if not holds:
+            return self._explain_coupling(number, chain, coupled)
+        text = f"{count} and {HOW_MANY.get(freedoms, freedoms)} freedoms"
         if len(motors) > 1:
             motor_names = ", ".join(self._name_motor(*motor) for motor in motors)
-            by = f", driven by {len(motors)} motors ({motor_names})"
-        candidates = self._list_holdable(chain, motors)
-        shared = self._list_shared(chain, number)
-        also = f"; {shared}" if shared else ""
-        if freedoms == 2:
-            which = f"--hold {candidates[0]}"
-            others = ", ".join(candidates[1:])
-            which += f" (or {others})" if others else ""
-            return f"{count} and two freedoms{by}; {which} makes it a four-bar{also}"
-        return (
-            f"{count} and {freedoms} freedoms{by}; {freedoms - 1} of "
-            f"{', '.join(candidates)} held (--hold) make it a four-bar{also}"
+            text += f", driven by {len(motors)} motors ({motor_names})"
+        first, *others = (",".join(hold) for hold in holds)
+        text += f"; --hold {first}"
+        if others:
+            text += f" (or {', '.join(others[:_MOST_HOLDS])})"
+        return f"{text} makes it a four-bar"
+
+    def _find_coupled(self, number: int, chain: _Chain) -> dict[int, _Chain]:
+        """Return the other closures whose loops move the same bars, with their chains.
+
+        Loops that share bars with such a loop are among them.
+        """
+        chains = {number: chain}
+        for other in range(self.model.neq):
+            kind = EQUALITY_KINDS.get(int(self.model.eq_type[other]))
+            if not self.model.eq_active0[other] or kind not in ("connect", "weld"):
+                continue
+            chains[other] = _Chain(self, *find_tied_bodies(self.model, other))
+        joints = {*chain.joints}
+        coupled = {number}
+        grows = True
+        while grows:
+            more = {n for n in chains if joints & {*chains[n].joints}} - coupled
+            joints.update(*(chains[n].joints for n in more))
+            coupled |= more
+            grows = bool(more)
+        return {n: chains[n] for n in sorted(coupled - {number})}
+
+    def _list_holds(
+        self,
+        chain: _Chain,
+        motors: list[tuple[int, int]],
+        coupled: dict[int, _Chain],
+        count: int,
+    ) -> list[tuple[str, ...]]:
+        """List the joints to hold that leave a four-bar apart from other loops."""
+        holdable = self._list_holdable(chain, motors)
+        if len(holdable) < count:
+            holdable = [*chain.joints]
+        holds = []
+        for held in combinations(holdable, count):
+            moving = {*chain.joints} - {*held}
+            if not any(moving & {*other.joints} for other in coupled.values()):
+                holds.append(tuple(name_joint(self.model, joint) for joint in held))
+        return holds
+
+    def _explain_coupling(
+        self,
+        number: int,
+        chain: _Chain,
+        coupled: dict[int, _Chain],
+    ) -> str:
+        """Say which linkage loops with common bars make."""
+        joints = {*chain.joints}.union(*(other.joints for other in coupled.values()))
+        kinds = self.model.jnt_type[[*joints]]
+        names = ", ".join(self._name(other) for other in coupled)
+        if not coupled or not np.all(kinds == HINGE_JOINT):
+            return f"{names} moves its bars too: no hold makes it a four-bar"
+        taken = sum(2 if self._is_pin(n) else 3 for n in (number, *coupled))
+        freedoms = len(joints) - taken
+        bars = len(joints) + 1 - max(freedoms - 1, 0)
+        which = NAMES_OF_LINKAGES.get(bars, f"a linkage of {bars} bars")
+        if freedoms > 1:
+            held = HOW_MANY.get(freedoms - 1, freedoms - 1)
+            which += f" once {held} of its freedoms is held"
+        text = (
+            f"with {names}, which moves its bars too, {len(joints)} hinges,"
+            f" {len(coupled) + 1} loops and {HOW_MANY.get(freedoms, freedoms)}"
+            f" {'freedom' if freedoms == 1 else 'freedoms'}: {which} (MuJoCo or Drake"
+            " serve it, PMKS+ for a sketch)"
         )
+        return text + self._describe_inner_four_bar(number, coupled, joints)
+
+    def _describe_inner_four_bar(
+        self,
+        number: int,
+        coupled: dict[int, _Chain],
+        joints: set[int],
+    ) -> str:
+        """Describe the four bars that a closure and three pins of others join, if any.
+
+        The pins may be those of other closures.
+        """
+        model = self.model
+        pins = dict[frozenset[int], Array]()
+        for joint in joints:
+            body = int(model.jnt_bodyid[joint])
+            pair = (self.root[body], self.root[find_parent(model, body)])
+            pins[frozenset(pair)] = self.data.xanchor[joint]
+        for other in coupled:
+            ends = find_ends(model, self.data, other)
+            pins[frozenset(self.root[end.body] for end in ends)] = ends[0].place
+        ends = find_ends(model, self.data, number)
+        first, last = (self.root[end.body] for end in ends)
+        pins[frozenset((first, last))] = ends[0].place
+        bars = {bar for pair in pins for bar in pair}
+        for inner in permutations(bars - {first, last}, 2):
+            cycle = [first, *inner, last]
+            pairs = [frozenset(pair) for pair in pairwise([*cycle, first])]
+            if not all(pair in pins for pair in pairs):
+                continue
+            places = [pins[pair] for pair in pairs]  # before and after each bar
+            sizes = {
+                bar: float(np.linalg.norm(places[i] - places[i - 1]))
+                for i, bar in enumerate(cycle)
+            }
+            ground = cycle.index(min(cycle, key=lambda bar: len(climb(model, bar))))
+            cycle = cycle[ground:] + cycle[:ground]
+            if cycle[1] > cycle[3]:
+                cycle[1:] = reversed(cycle[1:])
+            of_others = {
+                self.root[int(model.jnt_bodyid[joint])]
+                for chain in coupled.values()
+                for joint in chain.joints
+            }
+            shared = [name_body(model, bar) for bar in cycle[1:] if bar in of_others]
+            if len(shared) == len(cycle) - 1:  # it is the four-bar of another closure
+                continue
+            moving = ", ".join(name_body(model, bar) for bar in cycle[1:])
+            lengths = ", ".join(write_length(sizes[bar]) for bar in cycle)
+            return (
+                f"; {moving} on {name_body(model, cycle[0])} ({lengths} mm) are a"
+                f" four-bar, but {', '.join(shared)} belongs to another loop too"
+            )
+        return ""
 
     def _list_holdable(
         self,
         chain: _Chain,
         motors: list[tuple[int, int]],
-    ) -> list[str]:
+    ) -> list[int]:
         """List the joints of a chain that may be held, the likeliest first.
 
         Those are joints without a motor. Several motors hold: one of them is held while
@@ -479,32 +607,12 @@ class _Finder:
         def has_no_spring(joint: int) -> bool:
             return not self.model.jnt_stiffness[joint]
 
-        holdable = sorted(joints or chain.joints, key=has_no_spring)
-        return [name_joint(self.model, joint) for joint in holdable]
+        return sorted(joints or chain.joints, key=has_no_spring)
 
     def _name_motor(self, joint: int, actuator: int) -> str:
         """Name an actuator: as the file does, or by the joint that it acts on."""
         name = self.model.actuator(actuator).name
         return name or f"on {name_joint(self.model, joint)}"
-
-    def _list_shared(self, chain: _Chain, number: int) -> str:
-        """Name other closures that tie bodies of the chain.
-
-        Together they may be a six-bar.
-        """
-        bars = {bar for bar in chain.bars if bar is not None} - {chain.ground}
-        names = []
-        for other in range(self.model.neq):
-            kind = EQUALITY_KINDS.get(int(self.model.eq_type[other]))
-            if other == number or kind not in ("connect", "weld"):
-                continue
-            ends = find_ends(self.model, self.data, other)
-            carried = {self._find_bar(end.body, bars) for end in ends}
-            if len(carried - {None}) and len(carried) > 1:
-                names.append(self._name(other))
-        if names:
-            return f"{', '.join(names)} ties its bars too"
-        return ""
 
     def _find_bar(self, body: int, bars: set[int]) -> int | None:
         """Return the bar that carries a body, however far down.

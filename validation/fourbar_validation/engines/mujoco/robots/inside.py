@@ -48,6 +48,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     PinsAndTorque,
     TornState,
 )
+from fourbar_validation.engines.mujoco.robots.drive import LoopDrive
 from fourbar_validation.engines.mujoco.robots.forces import (
     BearerForces,
     read_equality_force,
@@ -119,8 +120,15 @@ class LoopInside:
     Every other joint of the robot is held.
     """
 
-    def __init__(self, model: mujoco.MjModel, loop: RobotLoop) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        loop: RobotLoop,
+        drive: LoopDrive | None = None,
+    ) -> None:
+        """Take a loop; `drive`: what moves it; None: a couple on bar 2."""
         self.loop = loop
+        self.acting = None if drive is None or drive.acts_on_crank else drive
         self.model = copy(model)
         self.flags = int(model.opt.disableflags)
         for name in ("CONTACT", "LIMIT"):
@@ -340,14 +348,19 @@ class LoopInside:
         data.qvel[:] = qvel
         data.qfrc_applied[self.held] = held
 
+        mujoco.mj_kinematics(model, data)
+
         def acceleration(couple: float) -> float:
-            data.qfrc_applied[self.drive] = self.sense * couple
+            if self.acting is None:
+                data.qfrc_applied[self.drive] = self.sense * couple
+            else:
+                self.acting.exert(data, couple)
             mujoco.mj_forward(model, data)
             return float(self.sense * data.qacc[self.drive])
 
         couple = find_couple(model, data, acceleration, alpha_2)
         if couple is None:
-            raise LimitError(f"a couple on {self.name} does not move it in this robot")
+            raise LimitError(f"its drive does not move {self.name} in this robot")
         mujoco.mj_rnePostConstraint(model, data)
         return InsideRow(
             theta_2=theta_2,
@@ -387,6 +400,13 @@ class LoopInside:
         return float(np.linalg.norm(residual[:3]))
 
     @property
+    def lever(self) -> float:
+        """What pin forces are multiplied by to be of the drive's kind, m or 1."""
+        if self.acting is not None and self.acting.drive is not None:
+            return 1.0
+        return self.loop.longest
+
+    @property
     def name(self) -> str:
         """Name of the driven joint."""
         return name_joint(self.model, self.loop.joint)
@@ -407,23 +427,45 @@ class LoopInside:
         mujoco.mj_forward(model, data)
         rows = data.efc_J.reshape(-1, model.nv)[: data.nefc]
         free = rows[:, self.passive]
-        driven = rows[:, self.drive]
         drift = _measure_drift(data, rows @ state.qvel)
         accelerations = np.zeros(model.nv)
         accelerations[self.drive] = self.sense * alpha_2
-        due = drift - driven * accelerations[self.drive]
+        due = drift - rows[:, self.drive] * accelerations[self.drive]
         accelerations[self.passive] = _solve_least_squares(free, due)
         needed = np.zeros(model.nv)
         mujoco.mj_mulM(model, data, needed, accelerations)
         needed += data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator
         needed += self._friction * np.sign(state.qvel)
-        multipliers = _solve_least_squares(free.T, needed[self.passive])
-        couple = needed[self.drive] - driven @ multipliers
+        couple, multipliers = self._solve_drive(rows, needed)
         data.qacc[:] = accelerations
         data.efc_force[: data.nefc] = multipliers
+        if self.acting is not None:
+            self.acting.exert(data, couple)
         mujoco.mj_rnePostConstraint(model, data)
+        data.xfrc_applied[:] = 0.0
         forces = self._read_forces(data)
-        return PinsAndTorque(float(self.sense * couple), forces), accelerations
+        return PinsAndTorque(couple, forces), accelerations
+
+    def _solve_drive(self, rows: Array, needed: Array) -> tuple[float, Array]:
+        """Solve for the drive, N m or N, and the multipliers of rigid pins, (m,), N.
+
+        `rows`: derivative of the closures, (m, nv); `needed`: generalized forces of the
+        motion, (nv,).
+        """
+        if self.acting is None:
+            free = rows[:, self.passive]
+            multipliers = _solve_least_squares(free.T, needed[self.passive])
+            couple = needed[self.drive] - rows[:, self.drive] @ multipliers
+            return float(self.sense * couple), multipliers
+        moving = [self.drive, *self.passive]
+        pull = self.acting.find_pull(self.closing)[moving]
+        # without the pull the closures bear what is across it
+        level = pull / np.linalg.norm(pull)
+        away = np.eye(len(moving)) - np.outer(level, level)
+        columns = rows[:, moving].T
+        multipliers = _solve_least_squares(away @ columns, away @ needed[moving])
+        left = needed[moving] - columns @ multipliers
+        return float(left @ level / np.linalg.norm(pull)), multipliers
 
     def _balance(self, start: Array) -> Array:
         """Return the joint forces that leave the other hinges alone, (nv,).
@@ -577,9 +619,10 @@ class LoopInside:
         data.qvel[:] = state.qvel
 
         def drive(row: InsideRow) -> None:
-            couple = armature * alpha_2 + row.soft.torque
+            couple = armature * alpha_2 + self._find_crank_couple(row, data)
             data.qfrc_applied[self.drive] = self.sense * couple
 
+        mujoco.mj_forward(self.model, data)
         drive(self.ask(state.qpos, state.qvel, alpha_2))
         stepper = Stepper(model, data, timestep)
         instants = [
@@ -621,6 +664,12 @@ class LoopInside:
             )
         answer.seconds_per_step = spent / max(stepper.done, 1)
         return answer
+
+    def _find_crank_couple(self, row: InsideRow, data: mujoco.MjData) -> float:
+        """Return the couple on bar 2 with the power of a row's drive, N m."""
+        if self.acting is None:
+            return row.soft.torque
+        return row.soft.torque * self.acting.find_speed(data) / row.omega_2
 
     def _left_assembly(self, answer: InsideAnswer, qpos: Array) -> bool:
         """Tell whether the last row is in the other assembly, and drop such rows.

@@ -153,7 +153,9 @@ class RobotClosure:
     """Why it is no planar four-bar; empty where it is one."""
     ground: str = ""
     hinges: tuple[str, ...] = ()
-    """Joints of the loop by name, from the first body of the equality to the second."""
+    """Hinges of the loop by name, from the first body of the equality to the second."""
+    other_joints: tuple[str, ...] = ()
+    """Other joints of the loop, each with its kind."""
     misaligned: float | None = None
     """Largest angle between two of its hinges' axes, rad; None: fewer than two."""
     gap: float | None = None

@@ -29,6 +29,7 @@ from fourbar_validation.engines.mujoco.robots.closures import (
     find_closures,
 )
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
+from fourbar_validation.engines.mujoco.robots.drive import LoopDrive
 from fourbar_validation.engines.mujoco.robots.inside import HEAVY, LoopInside
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile, RobotLoop
 from fourbar_validation.engines.mujoco.robots.onto_scene import (
@@ -101,7 +102,8 @@ def measure_loops(
             share = 1.0 / len(loops)
             loop = made.loop
             measurement = _measure_loop(posed.model, loop, stated, options, file, share)
-            measured.append(replace(measurement, remarks=(*remarks,)))
+            solver = _describe_noslip(posed.model)
+            measured.append(replace(measurement, remarks=(*remarks, *solver)))
     notes = [*compiled.notes, *posed.notes]
     notes += [f"MuJoCo warns: {warning}" for warning in warnings]
     return RobotMeasurement(tuple(measured), tuple(notes))
@@ -118,8 +120,8 @@ def _measure_loop(
     """Measure one loop; `share`: part of the time in which settings are looked for."""
     if options.speed is not None:
         scene = replace(scene, motion=scene.motion.replace(speed=options.speed))
-    inside = LoopInside(model, loop)
     turned = find_turn(scene, loop)
+    inside = LoopInside(model, loop, LoopDrive(model, loop, scene, turned))
     motion = _choose_motion(scene, turned).thin_out(POSITIONS_OF_A_LOOP)
     states = inside.answer_states(*motion)
     if not states.rows and states.in_line:
@@ -133,7 +135,7 @@ def _measure_loop(
             f"{loop.name} closes at none of the positions of the scene; its lengths "
             f"are {loop.describe_lengths()}"
         )
-    scales = states.scales(loop.longest)
+    scales = states.scales(inside.lever)
     closing = motion._replace(theta_2=tuple(row.theta_2 for row in states.rows))
     through: InsideAnswer | None = None
     refusal = ""
@@ -153,7 +155,7 @@ def _measure_loop(
         torn = tuple(inside.answer_under_torque(starts, options.torque, seconds))
     advice = None
     if options.error is not None:
-        search = SettingsSearch(model, loop, closing, share)
+        search = SettingsSearch(model, loop, closing, inside.acting, share)
         advice = search.advise(options.error, file)
     return LoopMeasurement(
         loop.name,
@@ -173,6 +175,18 @@ def _measure_loop(
         torn,
         advice,
     )
+
+
+def _describe_noslip(model: mujoco.MjModel) -> list[str]:
+    """Say what a second solver of dry friction changes, if the file has one."""
+    if not model.opt.noslip_iterations or not model.dof_frictionloss.any():
+        return []
+    return [
+        "torque and pin forces are those of mj_forward with the file's"
+        f" noslip_iterations of {model.opt.noslip_iterations}, which dry friction is"
+        " solved by again; the forces that hold other joints are those of mj_inverse,"
+        " which knows nothing of it"
+    ]
 
 
 def _choose_motion(scene: Scene, turned: float) -> LoopMotion:

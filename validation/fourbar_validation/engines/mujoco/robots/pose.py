@@ -224,9 +224,11 @@ def _read_joint_position(
     unit: str,
 ) -> float:
     try:
-        float(text)
+        number = float(text)
     except ValueError:
         return require(f"--pose {name}", text, unit)
+    if number == 0.0:
+        return number
     likely = "deg" if unit == "rad" else "mm"
     raise InputError(
         f"--pose {name}",

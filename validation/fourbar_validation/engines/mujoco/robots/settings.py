@@ -23,6 +23,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     SettingsAdvice,
     TriedSettings,
 )
+from fourbar_validation.engines.mujoco.robots.drive import LoopDrive
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile, RobotLoop
 
@@ -111,9 +112,11 @@ class SettingsSearch:
         model: mujoco.MjModel,
         loop: RobotLoop,
         motion: LoopMotion,
+        drive: LoopDrive | None = None,
         share: float = 1.0,
     ) -> None:
         self.model = model
+        self.drive = drive
         self.loop = loop
         self.motion = motion.thin_out(POSITIONS_OF_A_TRIAL)
         self.own = read_settings(model, loop)
@@ -141,12 +144,13 @@ class SettingsSearch:
         """Measure what settings reach."""
         if settings in self.tried:
             return self.tried[settings]
-        inside = LoopInside(_set_settings(self.model, self.loop, settings), self.loop)
+        changed = _set_settings(self.model, self.loop, settings)
+        inside = LoopInside(changed, self.loop, self.drive)
         motion = self.motion
         states = through = gap = seconds = math.inf
         try:
             at_states = inside.answer_states(*motion)
-            scales = at_states.scales(self.loop.longest)
+            scales = at_states.scales(inside.lever)
             states = at_states.find_worst(scales)
             answer = inside.answer_through_time(*motion)
             through = answer.find_worst(scales)

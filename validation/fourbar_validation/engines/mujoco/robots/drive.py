@@ -1,0 +1,119 @@
+"""The drive of a scene, as what it exerts on the bodies of a loop."""
+
+import cmath
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from fourbar.effects import LinearDrive, PointDrive
+from fourbar.effects.place import Place
+from fourbar.linkage import ENDS
+from fourbar.quantities import Array
+from fourbar.scene import Scene
+from fourbar_validation.engines.mujoco.robots.loop import RobotLoop
+
+
+class _Wrench(NamedTuple):
+    """Force at a point of a body, N, and couple, N m, world axes, (3,) each."""
+
+    body: int
+    force: Array
+    couple: Array
+    point: Array
+
+
+class LoopDrive:
+    """Wrenches of a scene's drive on the bars of a loop, per N m or N that it exerts.
+
+    The ground bears the opposite of each.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        loop: RobotLoop,
+        scene: Scene,
+        turned: float,
+    ) -> None:
+        """Take a scene whose axes are turned by an angle in the loop's plane, rad."""
+        self.model = model
+        self.loop = loop
+        self.drive = scene.drive
+        self.bar = scene.drive_bar
+        self.turned = turned
+        self.acts_on_crank = scene.drive is None and scene.drive_bar == 2
+
+    def _find_axes(self, data: mujoco.MjData) -> tuple[Array, Array, Array]:
+        """Return x, y and the normal of the plane in world axes."""
+        ground = data.xmat[self.loop.bodies[1][0]].reshape(3, 3)
+        normal = ground @ self.loop.axis
+        along = ground @ self.loop.along
+        return along, np.cross(normal, along), normal
+
+    def _locate(self, data: mujoco.MjData, bar: int, pin: str) -> Array:
+        body = self.loop.bodies[bar][0]
+        turn = data.xmat[body].reshape(3, 3)
+        return np.asarray(data.xpos[body] + turn @ self.loop.points[bar, pin])
+
+    def _find_place(self, data: mujoco.MjData, place: Place) -> tuple[Array, complex]:
+        """Return a place in world axes, (3,), m, and its bar's direction."""
+        along, across, normal = self._find_axes(data)
+        pins = [self._locate(data, place.bar, pin) for pin in ENDS[place.bar]]
+        line = pins[1] - pins[0]
+        line = line - (line @ normal) * normal
+        unit = line / np.linalg.norm(line)
+        arm: Any = complex(place.in_bar)
+        world = pins[0] + arm.real * unit + arm.imag * np.cross(normal, unit)
+        return world, complex(unit @ along, unit @ across)
+
+    def _list_wrenches(self, data: mujoco.MjData) -> list[_Wrench]:
+        along, across, normal = self._find_axes(data)
+        none = np.zeros(3)
+        if isinstance(self.drive, PointDrive):
+            place, unit = self._find_place(data, self.drive.place)
+            angle = self.drive.direction
+            if self.drive.frame == "bar":
+                angle += cmath.phase(unit)
+            else:
+                angle += self.turned
+            force = np.cos(angle) * along + np.sin(angle) * across
+            pushed = [(self.drive.place.bar, force, place), (1, -force, place)]
+        elif isinstance(self.drive, LinearDrive):
+            start, _ = self._find_place(data, self.drive.start)
+            end, _ = self._find_place(data, self.drive.end)
+            line = end - start
+            line = line - (line @ normal) * normal
+            force = line / np.linalg.norm(line)
+            pushed = [
+                (self.drive.start.bar, -force, start),
+                (self.drive.end.bar, force, end),
+            ]
+        else:
+            assert self.bar is not None
+            bodies = self.loop.bodies
+            first = _Wrench(bodies[self.bar][0], none, normal, none)
+            return [first, _Wrench(bodies[1][0], none, -normal, none)]
+        return [
+            _Wrench(self.loop.bodies[bar][0], force, none, point)
+            for bar, force, point in pushed
+        ]
+
+    def exert(self, data: mujoco.MjData, size: float) -> None:
+        """Apply the drive with a size, N m or N, in the state that is placed."""
+        data.xfrc_applied[:] = 0.0
+        for body, force, couple, point in self._list_wrenches(data):
+            arm = point - data.xipos[body]
+            data.xfrc_applied[body, :3] += size * force
+            data.xfrc_applied[body, 3:] += size * (couple + np.cross(arm, force))
+
+    def find_pull(self, data: mujoco.MjData) -> Array:
+        """Return the generalized forces per N m or N, (nv,), in the state placed."""
+        pull = np.zeros(self.model.nv)
+        for body, force, couple, point in self._list_wrenches(data):
+            mujoco.mj_applyFT(self.model, data, force, couple, point, body, pull)
+        return pull
+
+    def find_speed(self, data: mujoco.MjData) -> float:
+        """Return the speed that the drive's N m or N does work at, rad/s or m/s."""
+        return float(self.find_pull(data) @ data.qvel)
