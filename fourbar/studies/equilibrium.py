@@ -29,6 +29,7 @@ from fourbar.formulas.mobility import (
     turns_fully,
 )
 from fourbar.formulas.motion import Coefficients
+from fourbar.formulas.position import Loop
 from fourbar.formulas.torque import inertia
 from fourbar.quantities import JAMMED, NOT_ASSEMBLED, SINGULAR, WOUND, Array
 from fourbar.scene import Command, Scene
@@ -52,9 +53,9 @@ STANDING_BAR = 1e-3
 """Ratio of the turns of bars 2 and 4 below which bar 2 stands at a limit. theta_4 then
 takes the place of theta_2.
 """
-ROUNDING_OF_A_TURN = 1e-6
-"""Part of the fastest bar's turn below which the turn of a bar is rounding: where the
-input stands at a limit, an angle of 16 digits leaves its turn some 1e-8.
+ROUNDING_OF_A_SINE = 50.0 * 2.0**-52
+"""Sine between two bars, times that between bars 3 and 4, below which it is rounding.
+An angle of the input has 16 digits, and bars 3 and 4 lose what this sine is small by.
 """
 _A_RANGE = 3
 """Samples in a row where Q is nothing: fewer may be a zero that falls on one."""
@@ -252,7 +253,7 @@ def _describe_equilibrium(
         bar = 2
     square = float(state.k[bar - 2][0]) ** 2
     along_curve = float(curve.slope(point[None])[0])
-    moving = _drop_standing_bar(state.k)
+    moving = _drop_standing_bar(curve.lengths, state.k)
     inertias = inertia(curve.lengths.a, curve.case.bodies, state.position, moving)
     slope = along_curve / square
     J = float(np.sum(inertias)) / square
@@ -272,13 +273,16 @@ def _describe_equilibrium(
     )
 
 
-def _drop_standing_bar(k: Coefficients) -> Coefficients:
+def _drop_standing_bar(lengths: Loop, k: Coefficients) -> Coefficients:
     """Return the coefficients with zero for a bar that stands at a limit.
 
-    The square of what rounding leaves there is no inertia.
+    The square of what rounding leaves there is no inertia. Each coefficient is the sine
+    between the other two bars, over the length of its own bar.
     """
     h = np.array([k.h2, k.h3, k.h4])
-    h[np.abs(h) < ROUNDING_OF_A_TURN * np.abs(h).max(axis=0)] = 0.0
+    ratios = np.array([1.0, lengths.b / lengths.a, lengths.c / lengths.a])
+    sines = np.abs(h * ratios[:, np.newaxis])
+    h[sines * sines[0] < ROUNDING_OF_A_SINE] = 0.0
     return k._replace(h2=h[0], h3=h[1], h4=h[2])
 
 

@@ -53,14 +53,6 @@ PRINTED = ErrorBound(
     conditioned=False,
 )
 """Tolerance of what `analyze` prints and its JSON holds."""
-INTEGRATED = ErrorBound(
-    "summary, integrals",
-    "3e-6 of the value: cubic splines through 1441 positions leave out the fourth power"
-    " of a step, and at the bend of a motion law its square",
-    3e-6,
-    conditioned=False,
-)
-"""Tolerance of means and energies over a motion. Four digits of them are printed."""
 LOCATED_ROUGHLY = ErrorBound(
     "summary, bending",
     "1e-6 of the moment: three calls of 40 cuts leave a place to 1e-4 of a step, a"
@@ -76,14 +68,3 @@ PRINTED_TO_FOUR_DIGITS = ErrorBound(
     conditioned=False,
 )
 """Tolerance of what is printed alone."""
-DERIVED_BOUNDS = (
-    DIFFERENCES,
-    SPREAD,
-    REST,
-    CUT,
-    PRINTED,
-    INTEGRATED,
-    LOCATED_ROUGHLY,
-    PRINTED_TO_FOUR_DIGITS,
-)
-"""All of them."""

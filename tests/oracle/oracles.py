@@ -58,11 +58,11 @@ def ask(oracle: Oracle, question: Question) -> Iterator[Row]:
 
     Raises NotAskedError where the scene has nothing that it could compare.
     """
-    if question.at.speed is None and oracle is not statements:
+    if question.at.speed is None and oracle not in (statements, equilibria):
         raise NotAskedError("the scene has no speed")
     if oracle in AT_THETA_2 and question.at.commanded != "theta_2":
         raise NotAskedError(f"{question.at.commanded} is commanded")
-    if oracle in OF_FORCES:
+    if oracle in OF_FORCES and oracle is not equilibria:
         answer = question.free_body
         if answer is None or answer.refusal is not None:
             raise NotAskedError("the free bodies have no forces for this scene")

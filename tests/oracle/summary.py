@@ -8,14 +8,14 @@ forces.
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from numpy.polynomial import Legendre
+from numpy.polynomial.legendre import leggauss
 
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import OK, Array
@@ -40,7 +40,6 @@ from fourbar_validation.engines.description import name_driving
 from fourbar_validation.run.question import NotAskedError, Question
 from tests.oracle.bounds import (
     CUT,
-    INTEGRATED,
     LOCATED_ROUGHLY,
     PRINTED,
     PRINTED_TO_FOUR_DIGITS,
@@ -82,6 +81,17 @@ _LEAST_KNOWN_CONDITION = K * EPS / PRINTED.factor
 """Condition below which the rounding of the free bodies, K eps over it, is more than a
 row allows.
 """
+FIRST_PANELS = 12
+"""Panels of the motion before any is halved."""
+MOST_HALVINGS = 14
+"""Rounds of halving, after which a panel is 5e-6 of the motion. Beside a change point
+free bodies lose the square of the condition, and smaller panels would be noise.
+"""
+MOST_OPEN = 200
+"""Panels that are halved at once. Curves that need more are rounding there."""
+SETTLED = 1e-12
+"""Part of the mean square of a curve by which halving a panel may change it."""
+_NODES, _WEIGHTS = leggauss(8)
 BALANCED_SHARE = 1e-13
 """Part of the largest pin force, at the longest bar of a torque, below which a load is
 its rounding: a balanced linkage needs no torque.
@@ -95,7 +105,6 @@ _PRESSURE = 1e6
 ROW_TOLERANCES = {
     "bore": PRINTED_TO_FOUR_DIGITS,
     "bending": LOCATED_ROUGHLY,
-    "integrals": INTEGRATED,
 }
 
 
@@ -136,9 +145,7 @@ class _SummaryJudge:
         """Return many places between the scene's own."""
         own = self.solution.at.places
         places = np.linspace(own[0], own[-1], PEAK_INTERVALS + 1)
-        if len(self.bends):
-            places = np.union1d(places, self.bends)
-        return places
+        return np.union1d(places, self.bends) if len(self.bends) else places
 
     def integrates(self, name: str) -> bool:
         """Return whether a quantity is integrated over the motion, and not summed.
@@ -190,6 +197,31 @@ class _SummaryJudge:
                 if abs(rate[-1] - rate[0]) > _REPEATS * np.abs(rate).max():
                     return False
         return True
+
+    @cached_property
+    def loaded_pins(self) -> set[str]:
+        """Return the pins whose load is more than the rounding of the largest."""
+        return {pin for pin, load in self._loads.items() if load > self._rounding}
+
+    @cached_property
+    def drives(self) -> bool:
+        """Return whether the drive exerts more than the rounding of pin forces."""
+        values, _ = _find_work(self, self.own)
+        lever = 1.0 if self.facts.linear else max(self.scene.linkage.lengths)
+        return bool(np.abs(values).max() > self._rounding * lever)
+
+    @cached_property
+    def _loads(self) -> dict[str, float]:
+        """Return the largest load of each pin, N."""
+        quantities = self.own.quantities
+        return {
+            pin: float(magnitude(quantities[name]).max())
+            for pin, name in PIN_FORCE.items()
+        }
+
+    @property
+    def _rounding(self) -> float:
+        return BALANCED_SHARE * max(self._loads.values())
 
     @property
     def counted(self) -> slice:
@@ -246,6 +278,7 @@ def summary(question: Question) -> list[Row]:
     _judge_ranges(judged)
     _judge_drive(judged)
     _judge_pins(judged)
+    _judge_integrals(judged)
     _judge_bending(judged)
     _judge_growth(judged)
     rows = []
@@ -297,12 +330,14 @@ def _judge_ranges(judged: _SummaryJudge) -> None:
         judged.add_excess("ranges", fine.max() - high.value, low.value - fine.min())
     least = judged.facts.transmission
     answers = judged.ask(least.place), judged.fine
-    sines = [
-        np.abs(np.sin(of.quantities["theta_4"] - of.quantities["theta_3"]))
+    # at a change point the sine is the root of a rounding, and its square has digits
+    squares = [
+        np.sin(of.quantities["theta_4"] - of.quantities["theta_3"]) ** 2
         for of in answers
     ]
-    judged.add("ranges", np.abs(sines[0] - math.sin(least.value)))
-    judged.add_excess("ranges", math.sin(least.value) - sines[1].min())
+    square = math.sin(least.value) ** 2
+    judged.add("ranges", np.abs(squares[0] - square))
+    judged.add_excess("ranges", square - squares[1].min())
 
 
 def _find_work(judged: _SummaryJudge, answer: Answer) -> tuple[Array, Array]:
@@ -321,10 +356,9 @@ def _judge_drive(judged: _SummaryJudge) -> None:
     facts = judged.facts
     entry = judged.motor
     assert facts.peak is not None and facts.duty is not None
-    values, speed = _find_work(judged, judged.own)
-    lever = 1.0 if facts.linear else max(judged.scene.linkage.lengths)
-    if np.abs(values).max() <= BALANCED_SHARE * _find_largest_load(judged) * lever:
+    if not judged.drives:
         return
+    values, speed = _find_work(judged, judged.own)
     power = values * speed
     name = name_driving(judged.scene)
     fine_values, fine_speed = _find_work(judged, judged.fine)
@@ -349,14 +383,7 @@ def _judge_drive(judged: _SummaryJudge) -> None:
                 "peaks", entry[key] / most - 1.0 - EXCESS_BETWEEN_POSITIONS
             )
     _judge_energy(judged, power)
-    _judge_integrals(judged, fine_values, fine_values * fine_speed)
     _judge_bore(judged, fine_values)
-
-
-def _find_largest_load(judged: _SummaryJudge) -> float:
-    """Find the largest pin force of the free bodies, N."""
-    sizes = [magnitude(judged.own.quantities[name]) for name in PIN_FORCE.values()]
-    return float(np.max(sizes))
 
 
 def _judge_energy(judged: _SummaryJudge, power: Array) -> None:
@@ -407,73 +434,120 @@ def _find_turned(judged: _SummaryJudge) -> float:
     return float(sense * abs(at.angle[-1] - at.angle[0]))
 
 
-class _Curve(NamedTuple):
-    """A curve over the motion, as splines between the bends of a law."""
+class _Panels(NamedTuple):
+    """Curves of the free bodies at the Gauss nodes of panels that follow each other."""
 
-    splines: list[CubicSpline]
-    length: float
-    """Angle, stroke or time over which it goes."""
+    low: Array
+    high: Array
+    values: Array
+    """(panels, nodes, curves)."""
 
-    @classmethod
-    def through(cls, judged: _SummaryJudge, values: Array) -> "_Curve":
-        """Lay splines through values at the many positions."""
-        places = judged.fine_places
-        length = abs(float(places[-1] - places[0]))
-        if places[0] > places[-1]:
-            places = places[::-1]
-            values = values[::-1]
-        bends = np.searchsorted(places, judged.bends)
-        edges = [0, *bends.tolist(), len(places) - 1]
-        splines = []
-        for first, last in pairwise(edges):
-            of_piece = slice(first, last + 1)
-            splines.append(CubicSpline(places[of_piece], values[of_piece]))
-        return cls(splines, length)
+    def mean_square(self, curves: slice) -> float:
+        """Return the mean of the square of some curves together."""
+        width = self.high - self.low
+        squares = width @ _average_squares(self.values[:, :, curves]).sum(axis=1)
+        return float(squares / width.sum())
 
-    def integrate(self) -> float:
-        """Return the integral over the motion."""
-        return float(sum(one.integrate(one.x[0], one.x[-1]) for one in self.splines))
-
-    def accumulate(self) -> Array:
-        """Return the integral up to each position and to each zero, in order."""
+    def accumulate(self, curve: int, less: float = 0.0) -> Array:
+        """Return the integral of a curve, less a number, up to each edge and zero."""
         totals = [np.zeros(1)]
-        for one in self.splines:
-            zeros = one.roots(discontinuity=False, extrapolate=False)
-            # a piece that vanishes throughout is marked by a NaN
-            places = np.sort(np.concatenate([one.x, zeros[np.isfinite(zeros)]]))
-            totals.append(totals[-1][-1] + one.antiderivative()(places))
+        for low, high, values in zip(
+            self.low, self.high, self.values[:, :, curve] - less, strict=True
+        ):
+            polynomial = Legendre.fit(_NODES, values, len(_NODES) - 1, [-1.0, 1.0])
+            zeros = polynomial.roots()
+            zeros = np.sort(zeros[np.isreal(zeros) & (np.abs(zeros) < 1.0)].real)
+            area = 0.5 * (high - low) * polynomial.integ(lbnd=-1.0)
+            totals.append(totals[-1][-1] + area(np.append(zeros, 1.0)))
         return np.concatenate(totals)
 
 
-def _find_rms(judged: _SummaryJudge, *components: Array) -> float:
-    """Return the root of the mean square of a vector over the motion."""
-    squares = np.sum([np.square(component) for component in components], axis=0)
-    curve = _Curve.through(judged, squares)
-    return math.sqrt(curve.integrate() / curve.length)
+def _average_squares(values: Array) -> Array:
+    """Return the mean square of each curve on each panel."""
+    mean: Array = np.einsum("n,pnk->pk", 0.5 * _WEIGHTS, np.square(values))
+    return mean
 
 
-def _judge_integrals(judged: _SummaryJudge, values: Array, power: Array) -> None:
-    """Judge RMS, energies, swing and mean torque of the drive over the motion.
+def _lay_panels(sample: Callable[[Array], Array], edges: Array) -> _Panels:
+    """Halve the panels between edges until every mean square settles."""
+
+    def at_nodes(low: Array, high: Array) -> Array:
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        places = middle[:, np.newaxis] + half[:, np.newaxis] * _NODES
+        return sample(places.ravel()).reshape(*places.shape, -1)
+
+    low, high = edges[:-1], edges[1:]
+    values = at_nodes(low, high)
+    allowed = SETTLED * (edges[-1] - edges[0]) * _average_squares(values).mean(axis=0)
+    settled = []
+    for halving in range(MOST_HALVINGS):
+        middle = 0.5 * (low + high)
+        first, last = (
+            np.stack(ends, axis=1).ravel() for ends in ((low, middle), (middle, high))
+        )
+        halves = at_nodes(first, last)
+        finer = _average_squares(halves).reshape(len(low), 2, -1).mean(axis=1)
+        apart = (high - low)[:, np.newaxis] * np.abs(_average_squares(values) - finer)
+        still = (apart > allowed).any(axis=1) & (halving < MOST_HALVINGS - 1)
+        still &= np.count_nonzero(still) < MOST_OPEN
+        done = ~np.repeat(still, 2)
+        settled.append(_Panels(first[done], last[done], halves[done]))
+        low, high, values = first[~done], last[~done], halves[~done]
+        if not len(low):
+            break
+    together = [np.concatenate(parts) for parts in zip(*settled, strict=True)]
+    order = np.argsort(together[0])
+    return _Panels(*(part[order] for part in together))
+
+
+def _judge_integrals(judged: _SummaryJudge) -> None:
+    """Judge RMS, energies, swing and mean torque over the motion.
 
     Nothing may be a sum over the positions far from every pole.
     """
+    conditions = _find_conditions(judged.scene, judged.fine)[0]
+    if conditions.min() <= np.abs(np.diff(conditions)).max():
+        return  # a change point, beside which free bodies have no digits
     entry = judged.motor
-    kind = "force" if judged.facts.linear else "torque"
-    for key, name, of_motion in (
-        (f"rms_{kind}", name_driving(judged.scene), values),
-        ("rms_power", "power", power),
-    ):
-        if judged.integrates(name) and np.abs(of_motion).max() != 0.0:
-            rms = _find_rms(judged, of_motion)
-            judged.add_value("integrals", entry[key], rms)
-    if not judged.integrates("power"):
+    drive = name_driving(judged.scene)
+    names = [drive, "power", *PIN_FORCE.values()]
+    integrable = [judged.integrates(name) for name in names]
+    columns = {name: slice(2 * i - 2, 2 * i) for i, name in enumerate(names)}
+    columns |= {drive: slice(0, 1), "power": slice(1, 2)}
+
+    def sample(places: Array) -> Array:
+        answer = judged.ask(places)
+        values, speed = _find_work(judged, answer)
+        pins = [answer.quantities[name] for name in PIN_FORCE.values()]
+        curves = [values[:, np.newaxis], (values * speed)[:, np.newaxis], *pins]
+        known = [
+            curve if integral else 0.0 * curve
+            for curve, integral in zip(curves, integrable, strict=True)
+        ]
+        return np.concatenate(known, axis=1)
+
+    ends = judged.solution.at.places[[0, -1]]
+    first = np.linspace(ends.min(), ends.max(), FIRST_PANELS + 1)
+    panels = _lay_panels(sample, np.union1d(first, judged.bends))
+
+    def judge_mean(ours: float | None, name: str) -> None:
+        rms = math.sqrt(panels.mean_square(columns[name]))
+        if judged.integrates(name) and rms != 0.0:
+            judged.add_value("integrals", ours, rms)
+
+    for pin, name in PIN_FORCE.items():
+        if pin in judged.loaded_pins:
+            judge_mean(judged.facts.pins[pin].rms, name)
+            judge_mean(entry["pins"][pin]["rms"], name)
+    if not judged.drives:
         return
+    judge_mean(entry[f"rms_{'force' if judged.facts.linear else 'torque'}"], drive)
+    judge_mean(entry["rms_power"], "power")
     motion = judged.scene.motion
     second = 1.0 if motion.law is not None else abs(motion.speed or 0.0)
-    if second == 0.0:
+    if not judged.integrates("power") or second == 0.0:
         return
-    curve = _Curve.through(judged, power)
-    work = np.diff(curve.accumulate()) / second
+    work = np.diff(panels.accumulate(1)) / second
     sums = (float(work[work > 0.0].sum()), float(-work[work < 0.0].sum()))
     most = max(sums)
     for key, total in zip(("energy_in", "energy_out"), sums, strict=True):
@@ -481,13 +555,12 @@ def _judge_integrals(judged: _SummaryJudge, values: Array, power: Array) -> None
     if not entry["closed"]:
         judged.add("integrals", 0.0 if entry["energy_swing"] is None else np.inf)
         return
-    mean_power = curve.integrate() / curve.length
-    surplus = _Curve.through(judged, power - mean_power).accumulate() / second
+    given = sums[0] - sums[1]
+    surplus = panels.accumulate(1, given * second / np.ptp(ends)) / second
     swing = abs(entry["energy_swing"] - np.ptp(surplus))
     judged.add("integrals", divide(swing, most))
     at = judged.solution.at
     if judged.scene.drive is None and judged.scene.drive_bar == at.bar:
-        given = sums[0] - sums[1]
         of_mean = given - entry["mean_torque"] * _find_turned(judged)
         judged.add("integrals", divide(abs(of_mean), most))
 
@@ -519,15 +592,11 @@ def _judge_pins(judged: _SummaryJudge) -> None:
     facts = judged.facts
     for pin, name in PIN_FORCE.items():
         load = facts.pins[pin]
-        own = magnitude(judged.own.quantities[name])
-        if own.max() <= BALANCED_SHARE * _find_largest_load(judged):
+        if pin not in judged.loaded_pins:
             continue
+        own = magnitude(judged.own.quantities[name])
         mean = math.sqrt(np.square(own[judged.counted]).mean())
         judged.add_value("pins", bearing_load(judged.solution, pin).rms, mean)
-        if judged.integrates(name):
-            rms = _find_rms(judged, *judged.fine.quantities[name].T)
-            judged.add_value("integrals", load.rms, rms)
-            judged.add_value("integrals", judged.motor["pins"][pin]["rms"], rms)
         if name in facts.between.growing:
             continue
         there = judged.ask(load.peak.place)

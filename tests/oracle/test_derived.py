@@ -281,6 +281,18 @@ def test_right_equilibria_hold_where_they_are_hard_to_judge(name: str) -> None:
     assert not [row for row in rows if row.failed]
 
 
+def test_a_heavy_output_that_turns_slowly_keeps_its_inertia() -> None:
+    """Its turn is 6e-7 of the fastest bar's, to all digits, beside a dead centre."""
+    crank, coupler, output = (
+        fourbar.Bar(length, mass)
+        for length, mass in ((0.1, 0.2), (0.25, 0.5), (0.22, 4e5))
+    )
+    linkage = fourbar.FourBar(0.3, crank, coupler, output)
+    rows = judge_by(Scene(linkage, effects=(fourbar.Gravity(),)), "equilibria")
+    assert {"inertia", "frequency"} <= {row.quantity for row in rows if row.compared}
+    assert not failing(rows)
+
+
 @pytest.mark.parametrize("engine", ["equilibria", "study", "sensitivity"])
 def test_where_nothing_assembles_nothing_is_asked(engine: str) -> None:
     scene = FAULT_SCENES["limited"]
