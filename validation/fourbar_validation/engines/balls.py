@@ -11,7 +11,7 @@ import math
 from bisect import bisect
 from typing import Any, NamedTuple, TypeAlias
 
-from flint import acb, arb, arb_mat, ctx
+from flint import acb, arb, arb_mat, ctx, fmpq
 
 from fourbar.effects import (
     Effect,
@@ -27,9 +27,10 @@ from fourbar.effects import (
     Torsion,
     Viscous,
 )
-from fourbar.linkage import MOVING_BARS, PINS
+from fourbar.linkage import MOVING_BARS, PINS, FourBar
 from fourbar.scene import Scene
 from fourbar_validation.compare.pins import find_centre, find_inertia, find_mass
+from fourbar_validation.engines.description import find_stated_lengths
 
 Ball: TypeAlias = Any
 ComplexBall: TypeAlias = Any
@@ -219,6 +220,15 @@ def _place_from_pin(
     return centre[stated.bar] + arm
 
 
+def state_lengths(linkage: FourBar) -> BallValues:
+    """Return the lengths d, a, b, c as they were stated, as balls."""
+    lengths = find_stated_lengths(linkage.lengths)
+    return {
+        name: arb(fmpq(*length.as_integer_ratio()))
+        for name, length in zip("dabc", lengths, strict=True)
+    }
+
+
 def make_balls(scene: Scene, angle: float, **motion: float) -> BallValues:
     """Give the inputs as balls of no radius, and set the working precision.
 
@@ -226,7 +236,8 @@ def make_balls(scene: Scene, angle: float, **motion: float) -> BallValues:
     """
     ctx.prec = BITS
     stored = collect_inputs(scene, angle) | motion
-    return {name: arb(value) for name, value in stored.items()}
+    balls = {name: arb(value) for name, value in stored.items()}
+    return balls | state_lengths(scene.linkage)
 
 
 def compute_directions(

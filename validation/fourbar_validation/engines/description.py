@@ -7,6 +7,8 @@ bar; the bars as a tree that is open at pin B.
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from fractions import Fraction
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -217,6 +219,27 @@ def list_unknowns(scene: Scene, names: Iterable[str] = UNKNOWNS) -> list[str]:
 def declares(effect: Effect, method: str) -> bool:
     """Return True if an effect defines a method that the base class leaves open."""
     return getattr(type(effect), method) is not getattr(Effect, method)
+
+
+_UNITS_OF_LENGTH = (Fraction(1), Fraction("0.0254"), Fraction("0.3048"))
+"""Metre, inch and foot, m; the other units of a length differ by powers of ten."""
+
+
+@lru_cache(maxsize=256)
+def find_stated_lengths(lengths: tuple[float, ...]) -> list[Fraction]:
+    """Return d, a, b, c as they were stated, m.
+
+    Decimals of 15 digits at most of which two pairs have one sum make a change point,
+    which their doubles miss by a rounding: 80, 100, 120 and 60 mm do. Other lengths are
+    their doubles.
+    """
+    for unit in _UNITS_OF_LENGTH:
+        d, a, b, c = stated = [
+            Fraction(f"{length / float(unit):.15g}") * unit for length in lengths
+        ]
+        if 0 in (d + a - b - c, d + b - a - c, d + c - a - b):
+            return stated
+    return [Fraction(length) for length in lengths]
 
 
 def find_unknown(

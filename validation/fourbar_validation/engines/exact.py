@@ -87,16 +87,19 @@ class BallArithmetic:
 def compute_exact_sines(linkage: FourBar, command: Command) -> Array:
     """Compute sin(theta_4 - theta_3) of each position in many digits, (n,).
 
-    NaN where the loop does not close.
+    The lengths are those that were stated. NaN where the loop does not close.
     """
     from flint import arb, ctx
 
-    from fourbar_validation.engines.balls import BITS, compute_directions, wedge
+    from fourbar_validation.engines.balls import (
+        BITS,
+        compute_directions,
+        state_lengths,
+        wedge,
+    )
 
     ctx.prec = BITS
-    x = {
-        name: arb(length) for name, length in zip("dabc", linkage.lengths, strict=True)
-    }
+    x = state_lengths(linkage)
     x["theta_1"] = arb(linkage.ground_angle)
     sines = np.full(len(command.theta_2), np.nan)
     for i, (theta_2, branch) in enumerate(
