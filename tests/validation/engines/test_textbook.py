@@ -1,0 +1,70 @@
+"""A right program as a textbook has it agrees, and a slip of 1e-9 in it does not."""
+
+from dataclasses import replace
+
+import pytest
+
+import fourbar
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.engines.prediction import predict_for_any_method
+from fourbar_validation.engines.registry import Engine
+from fourbar_validation.run.answers import compare_answer
+from fourbar_validation.run.judge import make_question
+from fourbar_validation.run.question import Question
+from fourbar_validation.scenes.random import DrawnType, draw_random_scene
+from tests.support.scenes import balance
+from tests.support.textbook import Textbook
+from tests.whole.test_imports import ROOT
+
+ENGINE = Engine(
+    Textbook.name,
+    Textbook,
+    EQUIVALENCE,
+    Textbook.quantities,
+    predictor=predict_for_any_method,
+)
+UNPREDICTED = replace(ENGINE, predictor=None)
+MODELS = sorted(path.stem for path in (ROOT / "models").glob("*.toml"))
+SLIPPED = ("torque", "F12", "alpha_4")
+
+
+def ask(scene: fourbar.Scene) -> tuple[Question, Answer]:
+    question = make_question("scene", scene, (ENGINE,))
+    return question, question.answer(ENGINE)
+
+
+def check(scene: fourbar.Scene) -> bool:
+    """Judge the textbook right, and with a slip wrong; tell whether it answers."""
+    question, answer = ask(scene)
+    if answer.refusal is not None:
+        return False
+    failed = [row for row in compare_answer(question, ENGINE, answer) if row.failed]
+    assert not failed, failed
+    for name in SLIPPED:
+        slipped = answer.quantities | {name: answer.quantities[name] * (1.0 + 1e-9)}
+        wrong = replace(answer, quantities=slipped)
+        rows = compare_answer(question, UNPREDICTED, wrong)
+        assert {row.quantity for row in rows if row.failed} == {name}
+    return True
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_it_agrees_on_every_model(name: str) -> None:
+    assert check(fourbar.load(ROOT / "models" / f"{name}.toml"))
+
+
+@pytest.mark.parametrize("left", (1e-1, 1e-2, 1e-4))
+def test_it_agrees_on_a_balanced_crank(left: float) -> None:
+    assert check(balance(left))
+
+
+def test_it_agrees_on_random_scenes() -> None:
+    drawn = (draw_random_scene(991, i, tuple(DrawnType)) for i in range(10))
+    assert sum(map(check, drawn)) >= 5
+
+
+@pytest.mark.slow
+def test_it_agrees_on_three_hundred_random_scenes() -> None:
+    drawn = (draw_random_scene(993, i, tuple(DrawnType)) for i in range(300))
+    assert sum(map(check, drawn)) >= 200
