@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
     from fourbar.effects import ForceDrive
 
-ANALYZE_SCHEMA = "fourbar-analyze/1"
+ANALYZE_SCHEMA = "fourbar-analyze/2"
 Conversion = Mapping[str, tuple[str, float]]
 """Units to show: for an SI unit another unit and the factor to it. A unit that is left
 out stays.

@@ -338,10 +338,12 @@ def _write_summary(
     """
     from fourbar.show.block import write_block
     from fourbar.show.located import list_positions
+    from fourbar.show.paths import write_paths
     from fourbar.solving import find_last_stage, solve
 
     if not asked:
-        return "\n".join([*write_block(scene, solution, units, pressure=pressure), ""])
+        block = write_block(scene, solution, units, pressure=pressure)
+        return "\n".join([*block, *write_paths(scene, units), ""])
     lines: list[str] = []
     headed = True
     for text, at in asked.items():
@@ -368,6 +370,7 @@ def _write_positions(
     from fourbar.show.acting import list_spring_notes
     from fourbar.show.block import write_motor
     from fourbar.show.columns import choose_columns
+    from fourbar.show.paths import collect_paths
     from fourbar.show.tables import print_positions
     from fourbar.solution import write_csv, write_json
 
@@ -380,7 +383,8 @@ def _write_positions(
     if form == "json":
         motor = write_motor(scene, solution, units)
         notes = list_spring_notes(scene, solution, units)
-        return write_json(solution, units, motor=motor, notes=notes)
+        paths = collect_paths(scene, units)
+        return write_json(solution, units, motor=motor, notes=notes, paths=paths)
     if form == "csv":
         if columns:
             chosen = _list_chosen(columns, units)

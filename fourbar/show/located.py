@@ -6,28 +6,18 @@ jump does not have the value.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import InputError, NotAssembledError, name_unit, write_in_units
 from fourbar.linkage import require
 from fourbar.quantities import Array
 from fourbar.quantities.units import NUMBER_TEXT
-from fourbar.scene import Command, Scene, command, command_at
-from fourbar.scene.motion import Sweep
-from fourbar.scene.scene import default_places
+from fourbar.scene import Command, Scene
 from fourbar.show.columns import Column, read_column
 from fourbar.show.units import drop_rounding
-from fourbar.solution import Solution
-from fourbar.solving import find_last_stage, solve
-from fourbar.studies.equilibrium import bisect
+from fourbar.solving import find_last_stage
+from fourbar.studies.course import Course
 from fourbar.studies.passing import SAME_POSITION, is_same_position
 
-INTERVALS = 2000
-"""Least number of intervals of a motion in which a value is looked for."""
-LADDER = 0.5 ** np.arange(1, 50)
-"""Parts of the interval in which the linkage ceases to assemble: a column may grow
-there as the root of what is commanded.
-"""
 JUMP = 1e-3
 """Part of its change over an interval by which a column jumps at one place in it."""
 TOUCHES = 1e-9
@@ -73,69 +63,18 @@ class _Search:
         self.scene = scene
         self.name = name
         if find_last_stage(scene) == "position":
-            self.stage = "position"
+            stage = "position"
         elif name.endswith("_error"):
-            self.stage = "error"
+            stage = "error"
         else:
-            self.stage = "force"
-        self.places = self._list_places()
-        solution = self._solve(self.places)
-        self.commanded = solution.commanded if solution.time is None else "time"
-        assembled = solution.assembled
-        edges = np.flatnonzero(assembled[1:] != assembled[:-1])
-        if edges.size:
-            self.places = self._refine_edges(edges, assembled)
-            solution = self._solve(self.places)
-        span = float(np.ptp(self.places))
-        self._located = {"xatol": LOCATED * span, "xrtol": 0.0}
-        column = read_column(scene, solution, name)
+            stage = "force"
+        self.course = Course(scene, stage)
+        self.places = self.course.places
+        self.commanded = self.course.commanded
+        self._located = {"xatol": LOCATED * self.course.span, "xrtol": 0.0}
+        column = read_column(scene, self.course.solution, name)
         self.unit = _find_unit(column)
         self.values = column.values
-
-    def _list_places(self) -> Array:
-        """List the places of the motion, with others between them."""
-        motion = self.scene.motion
-        stated = self._command(None).places
-        over_time = motion.free is not None or motion.law is not None
-        if not over_time and not isinstance(motion.angle, Sweep | None):
-            first = float(command(self.scene).angle[0])
-            stated = default_places(self.scene, first)
-        steps = len(stated) - 1
-        parts = -(-INTERVALS // max(steps, 1))
-        rows = np.linspace(0.0, steps, parts * steps + 1)
-        return np.interp(rows, np.arange(steps + 1), stated)
-
-    def _command(self, places: Array | None) -> Command:
-        """Return the command at some places of the motion, or at its own."""
-        if self.scene.motion.free is None:
-            if places is None:
-                return command(self.scene)
-            return command_at(self.scene, places)
-        from fourbar.evaluation.free_motion import release, release_at
-
-        if places is None:
-            return release(self.scene).command
-        times, rows = np.unique(np.append(0.0, places), return_inverse=True)
-        return release_at(self.scene, times).command.part(rows[1:])
-
-    def _solve(self, places: Array) -> Solution:
-        return solve(self.scene, self.stage, at=self._command(places))
-
-    def _refine_edges(
-        self, rows: NDArray[np.intp], assembled: NDArray[np.bool_]
-    ) -> Array:
-        """Return the places with more of them where the linkage ceases to assemble."""
-        before = assembled[rows]
-        inside = np.where(before, self.places[rows], self.places[rows + 1])
-        outside = np.where(before, self.places[rows + 1], self.places[rows])
-        edge, _ = bisect(
-            lambda places: self._solve(places).assembled,
-            inside,
-            outside,
-        )
-        more = edge[:, None] + (inside - edge)[:, None] * LADDER
-        places = np.unique(np.concatenate([self.places, more.ravel(), edge]))
-        return places if self.places[0] <= self.places[-1] else places[::-1]
 
     def _measure_gaps(self, values: Array) -> Array:
         """Return how far values lie from the one sought, of angles modulo a turn."""
@@ -146,7 +85,7 @@ class _Search:
 
     def _read(self, places: Array) -> Array:
         """Return the column at places in an array of any shape."""
-        solution = self._solve(np.ravel(places))
+        solution = self.course.solve(np.ravel(places))
         values = read_column(self.scene, solution, self.name).values
         return values.reshape(np.shape(places))
 
@@ -174,7 +113,7 @@ class _Search:
         passed, jumps = self._find_crossings(gaps, brackets)
         found = np.concatenate([self.places[zeros], touches, passed])
         if not found.size and jumps.size:
-            places = drop_rounding(np.sort(jumps), np.ptp(self.places)).tolist()
+            places = drop_rounding(np.sort(jumps), self.course.span).tolist()
             where = ", ".join(write_place(self.commanded, place) for place in places)
             raise self._refuse(
                 text,
@@ -186,7 +125,7 @@ class _Search:
         order = np.argsort(found)
         if self.places[0] > self.places[-1]:
             order = order[::-1]
-        return self._command(self._drop_repeated(found[order]))
+        return self.course.command(self._drop_repeated(found[order]))
 
     def _read_value(self, text: str) -> float:
         """Read the value that is sought; InputError where its unit is missing."""
@@ -263,7 +202,7 @@ class _Search:
         """Drop the positions that are an earlier one after whole turns."""
         if self.commanded not in ("theta_2", "theta_3", "theta_4"):
             return places
-        pins = self._solve(places).B
+        pins = self.course.solve(places).B
         room = SAME_POSITION * max(self.scene.linkage.lengths)
         kept: list[int] = []
         for row, place in enumerate(places.tolist()):

@@ -34,6 +34,7 @@ from fourbar.show.plot.symbols import (
 from fourbar.show.plot.view import View
 from fourbar.show.units import choose_unit
 from fourbar.solution import Solution
+from fourbar.studies.paths import measure_paths
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -357,6 +358,8 @@ def draw_linkage(
     factor, unit, size = choose_drawing_scale(view)
     pins = locate_pins(view, factor)
     draw_paths(axes, view, labels)
+    if not moving:
+        _mark_paths(axes, view)
     if view.dimensions:
         middle = tuple(
             0.5 * (a + b) for a, b in zip(pins["O2"], pins["O4"], strict=True)
@@ -381,6 +384,15 @@ def draw_linkage(
     axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
     _show_drawing_coordinates(axes, view, factor)
     write_path_legend(axes)
+
+
+def _mark_paths(axes: "Axes", view: View) -> None:
+    """Draw stroke and straightness of the points' paths as rectangles about them."""
+    factor, _, _ = choose_drawing_scale(view)
+    for path in measure_paths(view.scene).values():
+        corners = factor * (path.corners - view.scene.origin)
+        x, y = np.append(corners, corners[:1], axis=0).T
+        axes.plot(x, y, color=POINT, lw=0.6, zorder=2)
 
 
 def draw_paths(axes: "Axes", view: View, labels: Labels) -> None:

@@ -1,0 +1,100 @@
+"""Places of a scene's motion, close to each other, and what is solved between them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.quantities import Array
+from fourbar.scene import Command, Scene, command, command_at
+from fourbar.scene.motion import Sweep
+from fourbar.scene.scene import default_places
+from fourbar.solution import Solution
+from fourbar.solving import solve
+from fourbar.studies.equilibrium import bisect
+
+INTERVALS = 2000
+"""Least number of intervals of a motion."""
+LADDER = 0.5 ** np.arange(1, 50)
+"""Parts of the interval in which the linkage ceases to assemble: quantities may grow
+there as the root of what is commanded.
+"""
+
+
+class Course:
+    """Motion of a scene, of which any place can be solved.
+
+    A scene that states single positions has the range that holds the first of them.
+    """
+
+    def __init__(self, scene: Scene, stage: str) -> None:
+        self.scene = scene
+        self.stage = stage
+        self.places = self._list_places()
+        """Commanded angles or strokes, or times, in the order of the motion, (n,)."""
+        self.solution = self.solve(self.places)
+        """Solution at the places."""
+        assembled = self.solution.assembled
+        edges = np.flatnonzero(assembled[1:] != assembled[:-1])
+        if edges.size:
+            self.places = self._refine_edges(edges, assembled)
+            self.solution = self.solve(self.places)
+
+    @property
+    def commanded(self) -> str:
+        """Name of the places: an angle, "stroke" or "time"."""
+        if self.solution.time is None:
+            return self.solution.commanded
+        return "time"
+
+    @property
+    def span(self) -> float:
+        """Distance of the first place from the last one."""
+        return float(np.ptp(self.places))
+
+    def command(self, places: Array) -> Command:
+        """Return the command at some places of the motion."""
+        if self.scene.motion.free is None:
+            return command_at(self.scene, places)
+        from fourbar.evaluation.free_motion import release_at
+
+        times, rows = np.unique(np.append(0.0, places), return_inverse=True)
+        return release_at(self.scene, times).command.part(rows[1:])
+
+    def solve(self, places: Array) -> Solution:
+        """Solve some places of the motion."""
+        return solve(self.scene, self.stage, at=self.command(places))
+
+    def _list_places(self) -> Array:
+        """List the places that the scene states, with others between them."""
+        motion = self.scene.motion
+        if motion.free is not None:
+            from fourbar.evaluation.free_motion import release
+
+            stated = release(self.scene).command.places
+        else:
+            stated = command(self.scene).places
+        over_time = motion.free is not None or motion.law is not None
+        if not over_time and not isinstance(motion.angle, Sweep | None):
+            first = float(command(self.scene).angle[0])
+            stated = default_places(self.scene, first)
+        steps = len(stated) - 1
+        parts = -(-INTERVALS // max(steps, 1))
+        rows = np.linspace(0.0, steps, parts * steps + 1)
+        return np.interp(rows, np.arange(steps + 1), stated)
+
+    def _refine_edges(
+        self,
+        rows: NDArray[np.intp],
+        assembled: NDArray[np.bool_],
+    ) -> Array:
+        """Return the places with more of them where the linkage ceases to assemble."""
+        before = assembled[rows]
+        inside = np.where(before, self.places[rows], self.places[rows + 1])
+        outside = np.where(before, self.places[rows + 1], self.places[rows])
+        edge, _ = bisect(
+            lambda places: self.solve(places).assembled,
+            inside,
+            outside,
+        )
+        more = edge[:, None] + (inside - edge)[:, None] * LADDER
+        places = np.unique(np.concatenate([self.places, more.ravel(), edge]))
+        return places if self.places[0] <= self.places[-1] else places[::-1]

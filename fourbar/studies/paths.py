@@ -1,0 +1,196 @@
+"""Extent, straightness and stroke of the paths of points, located between positions."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.formulas.mobility import TURN
+from fourbar.quantities import Array
+from fourbar.scene import Scene
+from fourbar.scene.motion import Sweep
+from fourbar.solution import shift_to_drawing
+from fourbar.studies.course import Course
+
+ROUNDS = 6
+"""Rounds in which the steps beside an extreme are divided."""
+PARTS = 16
+"""Parts into which a step is divided in a round: with n places at first an extreme is
+missed by the square of 1/(n PARTS^ROUNDS), which is round-off.
+"""
+NEAREST = 1e-4
+"""Part of the path by which the places of a course may miss an extreme. It falls as
+the square of the steps.
+"""
+MOST_LINES = 300
+"""Directions of nearest lines that are told apart. A circle has more of them."""
+MOST_PLACES = 50_000
+"""Places from which on the steps are not divided: they are short all around."""
+
+
+class Path(NamedTuple):
+    """Extent of the path of a point, m, in the coordinates that places are shown in."""
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    straightness: float
+    """Least distance of two parallel lines that hold the path, as in ISO 1101."""
+    stroke: float
+    """Extent of the path along these lines."""
+    direction: float
+    """Angle of the lines, rad, in (-pi/2, pi/2]."""
+    ends: tuple[float, float]
+    """Commanded angles or strokes, or times, at the ends of the stroke, in order."""
+    corners: Array
+    """Corners of the rectangle of stroke and straightness, (4, 2)."""
+
+
+def measure_paths(scene: Scene) -> dict[str, Path]:
+    """Measure the path of each point over the scene's motion.
+
+    Nothing is measured of a scene that states single positions.
+    """
+    motion = scene.motion
+    moves = motion.law is not None or motion.free is not None
+    if not scene.points or not (moves or isinstance(motion.angle, Sweep | None)):
+        return {}
+    course = Course(scene, "position")
+    if not course.solution.assembled.any():
+        return {}
+    return {point.name: _measure_path(course, point.name) for point in scene.points}
+
+
+def _measure_path(course: Course, name: str) -> Path:
+    """Measure a path, dividing the steps beside its extremes round by round."""
+    places = course.places
+    points = _locate_point(course, name, places)
+    for number in range(ROUNDS):
+        if len(places) > MOST_PLACES:
+            break
+        missed = NEAREST * PARTS ** (-2.0 * number)
+        extremes = _list_extremes(points, missed)
+        steps = np.unique([extremes - 1, extremes])
+        steps = steps[(steps >= 0) & (steps < len(places) - 1)]
+        first, last = places[steps], places[steps + 1]
+        inside = np.arange(1, PARTS) / PARTS
+        between = (first[:, None] + (last - first)[:, None] * inside).ravel()
+        kept = np.unique([steps, steps + 1])
+        places = np.concatenate([places[kept], between])
+        points = np.concatenate([points[kept], _locate_point(course, name, between)])
+        order = np.argsort(places)
+        places, points = places[order], points[order]
+    return _measure_points(places, points)
+
+
+def _locate_point(course: Course, name: str, places: Array) -> Array:
+    """Return a point at places of the motion, (n, 2)."""
+    solution = course.solve(places)
+    return shift_to_drawing(solution, solution.points[name])
+
+
+def _list_extremes(points: Array, missed: float) -> NDArray[np.intp]:
+    """List the rows of the points that decide the extents of a path.
+
+    `missed`: part of the path by which the points may miss an extreme.
+    """
+    direction, lines = _find_direction(points, missed)
+    ends = _list_ends(points @ direction)
+    sides = [np.nanargmin(points, axis=0), np.nanargmax(points, axis=0)]
+    return np.unique([*lines, *ends, *np.ravel(sides)])
+
+
+def _list_ends(heights: Array) -> list[int]:
+    """List the rows of the least and the greatest height."""
+    return [int(np.nanargmin(heights)), int(np.nanargmax(heights))]
+
+
+def _find_direction(points: Array, missed: float = 0.0) -> tuple[Array, list[int]]:
+    """Return the unit vector along the two nearest lines that hold the points.
+
+    One of the lines goes through two neighbouring corners of their convex hull, the
+    other through the corner that is farthest from it. The rows of the points follow
+    that lie on the lines, and on others that are hardly farther apart.
+    """
+    hull = np.array(_list_hull(points))
+    if len(hull) < 3:
+        across = points[hull[-1]] - points[hull[0]]
+        length = np.hypot(*across)
+        along = across / length if length > 0.0 else np.array([1.0, 0.0])
+        return along, hull.tolist()
+    corners = points[hull]
+    sides = np.roll(corners, -1, axis=0) - corners
+    along = sides / np.hypot(*sides.T)[:, None]
+    normals = np.stack([-along[:, 1], along[:, 0]])
+    bases = np.sum(corners.T * normals, axis=0)
+    # the farthest corner is where the sides have turned by half a turn
+    angles = np.unwrap(np.arctan2(sides[:, 1], sides[:, 0]))
+    farthest = np.searchsorted(np.append(angles, angles + TURN), angles + 0.5 * TURN)
+    opposite = corners[farthest % len(hull)]
+    widths = np.sum(opposite.T * normals, axis=0) - bases
+    direction = along[np.argmin(widths)]
+    room = missed * np.hypot(*np.ptp(corners, axis=0))
+    near = np.flatnonzero(widths <= widths.min() + room)
+    if len(near) > MOST_LINES:
+        return direction, hull.tolist()
+    # what is no corner between these places may be one between closer ones
+    heights = points @ normals[:, near] - bases[near]
+    with np.errstate(invalid="ignore"):
+        touching = (heights <= room) | (heights >= widths[near] - room)
+    return direction, np.flatnonzero(touching.any(axis=1)).tolist()
+
+
+def _list_hull(points: Array) -> list[int]:
+    """List the rows of the corners of the convex hull, counter-clockwise.
+
+    Andrew's monotone chain: the points from left to right turn to the left below, and
+    back from right to left above.
+    """
+    x, y = points.T.tolist()
+    finite = np.flatnonzero(np.isfinite(points).all(axis=1))
+    order = finite[np.lexsort(points[finite].T[::-1])].tolist()
+    halves = []
+    for rows in (order, order[::-1]):
+        chain: list[int] = []
+        for row in rows:
+            while len(chain) > 1:
+                first, second = chain[-2:]
+                across = (x[second] - x[first]) * (y[row] - y[first])
+                if across - (y[second] - y[first]) * (x[row] - x[first]) > 0.0:
+                    break
+                chain.pop()
+            chain.append(row)
+        halves.append(chain[:-1])
+    corners = halves[0] + halves[1]
+    return corners or order[:1]
+
+
+def _measure_points(places: Array, points: Array) -> Path:
+    """Measure the points of a path, at these places of the motion."""
+    along, _ = _find_direction(points)
+    if along[0] < 0.0 or (along[0] == 0.0 and along[1] < 0.0):
+        along = -along
+    across = np.array([-along[1], along[0]])
+    ends = _list_ends(points @ along)
+    lengths = (points @ along)[ends]
+    heights = (points @ across)[_list_ends(points @ across)]
+    (x_low, y_low), (x_high, y_high) = (
+        np.nanmin(points, axis=0),
+        np.nanmax(points, axis=0),
+    )
+    low, high = sorted(places[ends].tolist())
+    return Path(
+        (float(x_low), float(x_high)),
+        (float(y_low), float(y_high)),
+        float(heights[1] - heights[0]),
+        float(lengths[1] - lengths[0]),
+        float(np.arctan2(along[1], along[0])),
+        (low, high),
+        np.array(
+            [
+                length * along + height * across
+                for length, height in zip(
+                    lengths[[0, 1, 1, 0]], heights[[0, 0, 1, 1]], strict=True
+                )
+            ]
+        ),
+    )

@@ -1,0 +1,135 @@
+"""Extents of paths, against closed forms and a scan of directions."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fourbar.files import loads
+from fourbar.show.paths import write_paths
+from fourbar.show.units import units
+from fourbar.studies.paths import measure_paths
+
+LENGTHS = (22.114772314, 4.188803, 12.010892, 18.925111)
+"""mm: a Stirling engine's drive, whose piston goes 10 mm within 0.1 mm."""
+PISTON = complex(12.08631, 7.475779)
+DRIVE = """\
+[lengths]
+ground = "22.114772314 mm"
+input = "4.188803 mm"
+coupler = "12.010892 mm"
+output = "18.925111 mm"
+ground_angle = "{angle} deg"
+[motion]
+{motion}
+[points]
+piston = {{ bar = 3, from_pin = {{ x = "12.08631 mm", y = "7.475779 mm" }} }}
+"""
+ANGLE = 32.31614688136
+SCANNED = 2e-9
+"""mm: the scan misses an extreme by the square of its step."""
+AT_REST = 1e-5
+"""s: at its ends a 3-4-5 law stands still to round-off for as long."""
+
+
+def scan(directions: np.ndarray, steps: int = 200_000) -> tuple[float, float, float]:
+    """Return width, length and direction of the narrowest strip, mm, by closure.
+
+    A, and from the triangle A B O4 by its cosine rule the direction of the coupler.
+    """
+    d, a, b, c = LENGTHS
+    A = a * np.exp(1j * np.linspace(0.0, 2.0 * np.pi, steps + 1))
+    to_O4 = d * np.exp(1j * math.radians(ANGLE)) - A
+    side = np.abs(to_O4)
+    at_A = np.arccos((b * b + side * side - c * c) / (2.0 * b * side))
+    path = A + PISTON * to_O4 / side * np.exp(1j * at_A)
+    turned = path[:, None] * np.exp(-1j * directions)
+    widths = np.ptp(turned.imag, axis=0)
+    least = int(np.argmin(widths))
+    return widths[least], np.ptp(turned.real[:, least]), directions[least]
+
+
+@pytest.mark.parametrize("turned", [0.0, 20.0])
+@pytest.mark.parametrize("steps", [36, 360])
+def test_straightness_is_the_distance_of_the_nearest_two_lines(
+    turned: float,
+    steps: int,
+) -> None:
+    """Whatever the ground's angle, and however coarse the steps are."""
+    sweep = f'theta_2 = {{ from = "0 deg", to = "360 deg", steps = {steps} }}'
+    scene = loads(DRIVE.format(angle=ANGLE + turned, motion=sweep))
+    (path,) = measure_paths(scene).values()
+    assert 1e3 * path.stroke == pytest.approx(10.0, abs=1e-6)
+    assert 1e3 * path.straightness == pytest.approx(0.1, abs=1e-7)
+    width, length, direction = scan(np.linspace(0.0, np.pi, 181), 2000)
+    for step in 0.02 * 0.1 ** np.arange(9):
+        width, length, direction = scan(direction + np.linspace(-step, step, 21))
+    assert 1e3 * path.straightness == pytest.approx(width, abs=SCANNED)
+    assert 1e3 * path.stroke == pytest.approx(length, abs=SCANNED)
+    away = path.direction - math.radians(turned) - direction
+    assert math.remainder(away, math.pi) == pytest.approx(0.0, abs=1e-7)
+
+
+CRANK = """\
+[lengths]
+ground = "300 mm"
+input = "100 mm"
+coupler = "250 mm"
+output = "220 mm"
+[points]
+P = { bar = 2, from_pin = ["80 mm", "0 deg"] }
+[motion]
+"""
+
+
+@pytest.mark.parametrize(
+    ("motion", "ends"),
+    [
+        ('theta_2 = { from = "20 deg", to = "100 deg", steps = 3 }', (20, 100)),
+        ('theta_2 = { from = "100 deg", to = "20 deg", steps = 3 }', (20, 100)),
+        (
+            'law = { kind = "345", theta_2 = "20 deg", rise = ["80 deg", "1 s"] }',
+            None,
+        ),
+    ],
+)
+def test_the_arc_of_a_crank_has_its_chord_and_its_sagitta(
+    motion: str,
+    ends: tuple[float, float] | None,
+) -> None:
+    """Over 80 deg: chord 2 r sin 40 deg, sagitta r (1 - cos 40 deg), y to 80 mm."""
+    (path,) = measure_paths(loads(CRANK + motion)).values()
+    half = math.radians(40.0)
+    assert path.stroke == pytest.approx(0.16 * math.sin(half), abs=1e-12)
+    assert path.straightness == pytest.approx(0.08 * (1.0 - math.cos(half)), abs=1e-12)
+    assert path.direction == pytest.approx(math.radians(60.0 - 90.0), abs=1e-9)
+    low, high = math.cos(math.radians(100.0)), math.cos(math.radians(20.0))
+    assert path.x == pytest.approx((0.08 * low, 0.08 * high), abs=1e-12)
+    assert path.y == pytest.approx((0.08 * math.sin(math.radians(20.0)), 0.08))
+    if ends is None:
+        assert path.ends == pytest.approx((0.0, 1.0), abs=AT_REST)
+    else:
+        assert np.degrees(path.ends) == pytest.approx(ends)
+
+
+def test_a_circle_is_as_wide_in_every_direction() -> None:
+    """The polygon of the steps would be narrower by 1e-6 of it."""
+    (path,) = measure_paths(loads(CRANK + 'omega_2 = "1 rad/s"\n')).values()
+    extents = [path.straightness, path.stroke, np.ptp(path.x), np.ptp(path.y)]
+    assert extents == pytest.approx([0.16] * 4, rel=1e-8)
+
+
+def test_paths_are_printed_and_none_of_single_positions() -> None:
+    (first, *more) = write_paths(
+        loads(CRANK + 'theta_2 = { from = "20 deg", to = "100 deg", steps = 3 }'),
+        units("mm deg"),
+    )
+    assert (
+        first
+        == "path of P: x from -13.8919 to 75.1754 mm, y from 27.3616 to 80.0000 mm"
+    )
+    assert more == [
+        "    straightness 18.7164 mm, stroke 102.846 mm along -30 deg,",
+        "    from theta_2 = 20 to 100 deg",
+    ]
+    assert measure_paths(loads(CRANK + 'theta_2 = ["20 deg", "100 deg"]')) == {}
