@@ -224,7 +224,7 @@ def _choose_output(table: bool, as_json: bool, as_csv: bool, out: Path | None) -
     "--csv",
     "decimal",
     flag_value=".",
-    help="Print one line per position in SI units.",
+    help="Print one line per position; every heading names its unit.",
 )
 @click.option(
     "--csv-comma",
@@ -235,9 +235,9 @@ def _choose_output(table: bool, as_json: bool, as_csv: bool, out: Path | None) -
 @click.option(
     "--degrees/--radians",
     default=None,
-    help="Unit of the angles (default: degrees; rad in JSON and CSV).",
+    help="Unit of the angles (default: degrees; rad in JSON).",
 )
-@given.units_option("those of the file; SI in CSV and JSON")
+@given.units_option("those of the file; SI in JSON")
 @click.option(
     "--pressure",
     metavar="P",
@@ -311,13 +311,18 @@ def _choose_units(
 ) -> Conversion:
     """Choose the units of the output.
 
-    They are those asked for, otherwise those of the file; JSON and CSV are in SI.
+    They are those asked for, otherwise those of the file; JSON is in SI. Angles are in
+    degrees if not asked for, in CSV only if the file does not command them in rad.
     """
-    for_reading = form in ("summary", "table")
-    if units is None:
-        shown = dict(given.suit_file_units() if for_reading else SI)
+    in_degrees = form in ("summary", "table")
+    if units is not None:
+        shown = {**(DEGREES if in_degrees else SI), **units}
+    elif form == "json":
+        shown = dict(SI)
     else:
-        shown = {**(DEGREES if for_reading else SI), **units}
+        shown = dict(given.suit_file_units())
+        if form == "csv" and given.commands_radians():
+            shown.pop("rad", None)
     if degrees:
         shown |= DEGREES
     elif degrees is False:

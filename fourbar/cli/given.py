@@ -15,6 +15,8 @@ from fourbar.solution import Conversion
 
 _FILE_UNITS = "fourbar.file_units"
 """Key of the units that suit the scene file in the context of a command."""
+_FILE_RADIANS = "fourbar.file_radians"
+"""Key of whether the scene file commands an angle in rad, in the same context."""
 MOST_PRINTED = 1_000_000
 """Positions that `analyze` prints: about a gigabyte of text."""
 FILE_PATH = click.Path(path_type=Path)
@@ -138,13 +140,14 @@ def open_scene(path: Path) -> Iterator[Scene]:
     """
     from fourbar.files import parse_tables, read_scene_text, read_tables
     from fourbar.scene.motion import require_steps
-    from fourbar.show.units import units_of_scene
+    from fourbar.show.units import states_radians, units_of_scene
     from fourbar.writing import require_file
 
     context = click.get_current_context()
     tables = parse_tables(read_scene_text(path), str(path))
     units = units_of_scene(tables)
     context.meta[_FILE_UNITS] = units
+    context.meta[_FILE_RADIANS] = states_radians(tables)
     with state_messages_in(units):
         scene = read_tables(tables, str(path))
         out = context.params.get("out")
@@ -187,6 +190,12 @@ def suit_file_units() -> Conversion:
     """Return the units that suit the file of `open_scene`."""
     units: Conversion = click.get_current_context().meta[_FILE_UNITS]
     return units
+
+
+def commands_radians() -> bool:
+    """Return True if the file of `open_scene` commands an angle in rad."""
+    stated: bool = click.get_current_context().meta[_FILE_RADIANS]
+    return stated
 
 
 def is_bare(text: str) -> bool:

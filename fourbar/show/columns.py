@@ -6,6 +6,7 @@ place with two coordinates, `omega_4/omega_2` a ratio, `theta_3-theta_2` a diffe
 `F_jaw/F_handle` the ratio of the forces along the paths of two points.
 """
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from difflib import get_close_matches
@@ -30,6 +31,8 @@ from fourbar.solution import (
 from fourbar.solving import solve
 
 COLUMN_AXES = {"_x": 0, "_y": 1}
+_HEADING_MARKS = re.compile(r"\s*\[[^\]]*\]$|\|")
+"""What a heading of the CSV has besides the name: the unit, and bars around a size."""
 _ALONG = "F_"
 """Begins the name of a force along the path of a point."""
 
@@ -68,11 +71,14 @@ class Column(NamedTuple):
 def choose_columns(scene: Scene, solution: Solution, names: str) -> list[Column]:
     """Read the columns of a list like "theta_2,torque,F12,omega_4/omega_2".
 
+    Headings of the CSV may stand for the names: "torque [N m]", "|F12|".
+
     Raises InputError for a name that no quantity has, and for one that was not
     evaluated.
     """
     columns: list[Column] = []
-    for name in (word.strip() for word in names.split(",")):
+    for word in names.split(","):
+        name = _HEADING_MARKS.sub("", word.strip())
         if _is_place(solution, name):
             columns += [
                 read_column(scene, solution, f"{name}{axis}") for axis in COLUMN_AXES

@@ -4,6 +4,7 @@ They are a list like "mm N N.mm deg", those of a scene file, or SI with prefixes
 """
 
 import math
+import re
 from collections.abc import Mapping
 from functools import cache
 from typing import Any
@@ -157,6 +158,17 @@ def units_of_scene(document: Mapping[str, Any]) -> Conversion:
     except (LookupError, TypeError, AttributeError):
         return COMMON
     return _suit_texts(length, rates)
+
+
+def states_radians(document: Mapping[str, Any]) -> bool:
+    """Return True if the tables of a scene file command an angle in rad."""
+    motion = document.get("motion")
+    if not isinstance(motion, Mapping):
+        return False
+    law = motion.get("law", {})
+    tables = [motion, *([law] if isinstance(law, Mapping) else [])]
+    stated = [table.get(f"theta_{bar}") for table in tables for bar in MOVING_BARS]
+    return any(re.search(r"\d\s*rad'", repr(value)) for value in stated)
 
 
 @cache

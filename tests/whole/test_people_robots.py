@@ -183,7 +183,7 @@ def test_torques_of_the_open_tree_are_named(ask: Steps, columns: int) -> None:
     first, *_ = re.findall("looks like: (.*?)\\)", told)
     assert "torque of the open tree" in first and "mj_inverse" in first
     assert "explains everything that differs: torque" in first
-    ask("fourbar analyze statics.toml --csv -o right.csv")
+    ask("fourbar analyze statics.toml --csv --units SI -o right.csv")
     with Path("right.csv").open(encoding="utf-8", newline="") as table:
         torques = [float(row["torque"]) for row in csv.DictReader(table)]
     assert torques == pytest.approx([0.3933019, 0.1897882, -0.0532205], abs=5e-8)

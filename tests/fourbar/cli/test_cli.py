@@ -162,7 +162,7 @@ def test_positions_only(tmp_path: Path, run: Fourbar) -> None:
     rows = list(
         csv.DictReader(io.StringIO(run("analyze", tmp_path / "scene.toml", "--csv")[1]))
     )
-    assert rows[0]["torque"] == "" and rows[0]["theta_2"] == "1.0"
+    assert rows[0]["torque [N m]"] == "" and rows[0]["theta_2 [rad]"] == "1.0"
 
 
 def test_a_free_motion_has_time_and_no_drive(tmp_path: Path, run: Fourbar) -> None:
@@ -276,7 +276,7 @@ def test_what_rests_at_every_angle_is_no_range_of_one(
 
 def test_csv_has_the_same_numbers(run: Fourbar) -> None:
     file = MODELS / "crank_rocker.toml"
-    code, out, err = run("analyze", file, "--csv")
+    code, out, err = run("analyze", file, "--csv", "--units", "SI")
     rows, solution = list(csv.DictReader(io.StringIO(out))), fourbar.solve(load(file))
     assert (code, err, len(rows)) == (HOLDS, "", 361)
     for quantity in solution.evaluated():
@@ -308,7 +308,8 @@ def test_a_heading_of_csv_is_a_word_and_no_formula(
         crank_rocker(points=(fourbar.Point("P", 3, (0.1, 0.7)),)),
         tmp_path / "scene.toml",
     )
-    header = run("analyze", tmp_path / "scene.toml", "--csv")[1].splitlines()[0]
+    printed = run("analyze", tmp_path / "scene.toml", "--csv", "--units", "SI")[1]
+    header = printed.splitlines()[0]
     assert "P_x" in header and all(
         cell.strip("|").replace("/", "_").isidentifier() for cell in header.split(",")
     )
@@ -338,7 +339,9 @@ def test_degrees_are_of_angles_alone_and_named(run: Fourbar) -> None:
         else:
             assert turned[key] == plain[key], key
     rows = list(
-        csv.DictReader(io.StringIO(run("analyze", file, "--csv", "--degrees")[1]))
+        csv.DictReader(
+            io.StringIO(run("analyze", file, "--csv", "--units", "SI", "--degrees")[1])
+        )
     )
     assert (
         float(rows[90]["theta_2 [deg]"]) == pytest.approx(90.0, rel=1e-15)

@@ -14,6 +14,7 @@ import pytest
 
 import fourbar
 import fourbar.cli
+from fourbar.cli import status as fourbar_status
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
 from fourbar.quantities import LINE_QUANTITIES, OK, UNITS, VECTORS
 from fourbar.scene import Command, Scene, command
@@ -1723,3 +1724,69 @@ def test_a_factor_is_not_fitted_to_a_single_number(tmp_path: Path) -> None:
     path = write(tmp_path / "theirs.csv", numbers, ("torque", "omega_4"))
     judgement = judged(SCENES["crank_rocker"], path)
     assert len(judgement.differing) == 1 and not judgement.explanations
+
+
+UNLOADED = """\
+[lengths]
+ground = "5 in"
+input = "1.75 in"
+coupler = "4.75 in"
+output = "1.75 in"
+ground_angle = "-90 deg"
+[motion]
+theta_2 = ["5 deg", "10 deg", "15 deg", "22 deg", "28 deg", "34 deg"]
+omega_2 = "1 rad/s"
+[drive]
+from = { bar = 1, from_pin = ["13 in", "180 deg"] }
+to = { bar = 4, from_pin = ["8 in", "0 deg"] }
+[[effects.springs]]
+from = { bar = 1, from_pin = ["13 in", "180 deg"] }
+to = { bar = 4, from_pin = ["8 in", "0 deg"] }
+stiffness = "600 lbf/in"
+length = "18 in"
+"""
+"""The cylinder holds the spring: no pin has a load but rounding."""
+
+
+@pytest.mark.parametrize("options", [[], ["--degrees"], ["--radians"], ["--csv-comma"]])
+@pytest.mark.parametrize("name", ["thesis", "gallery/pump_jack", "unloaded", "saved"])
+def test_the_default_csv_returns_to_the_last_digit(
+    name: str,
+    options: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """As many numbers agree, without a tolerance, as of the file in SI units."""
+    if name == "unloaded":
+        scene = tmp_path / "scene.toml"
+        scene.write_text(UNLOADED)
+    else:
+        scene = MODELS / f"{name}.toml"
+    if name == "saved":
+        scene = tmp_path / "scene.toml"
+        fourbar.save(fourbar.load(MODELS / "crank_rocker.toml"), scene)
+    table = tmp_path / "table.csv"
+    counts = []
+    form = options if "--csv-comma" in options else [*options, "--csv"]
+    for units in ([], ["--units", "SI"]):
+        assert (
+            fourbar_status(["analyze", str(scene), *form, *units, "-o", str(table)])
+            == 0
+        )
+        heading = table.read_text().splitlines()[0]
+        assert ("theta_2," in heading.replace(";", ",")) == (
+            units == ["--units", "SI"] and options != ["--degrees"]
+        )
+        assert ("theta_2 [rad]" in heading) == (
+            not units
+            and (
+                options == ["--radians"]
+                or (name == "saved" and "--degrees" not in form)
+            )
+        )
+        capsys.readouterr()
+        assert status(["check", str(scene), str(table)]) == HOLDS
+        told = " ".join(capsys.readouterr().out.split())
+        (count,) = re.findall(r"\d+ of \d+ numbers agree", told)
+        counts.append(count)
+    assert counts[0] == counts[1]

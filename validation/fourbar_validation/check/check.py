@@ -19,6 +19,7 @@ from fourbar_validation.check.mistakes import NEARER, Explanation, explain
 from fourbar_validation.check.problem import check_problem
 from fourbar_validation.check.theirs import TheirTable, name_quantity, read_table
 from fourbar_validation.compare.rows import escape_controls
+from fourbar_validation.compare.scales import VANISHING
 from fourbar_validation.compare.tolerance import EPS, magnitude
 from fourbar_validation.report.junit import JunitCase, write_document
 from fourbar_validation.report.terminal import make_words_table, print_sentence
@@ -143,7 +144,8 @@ def _require_information(judge: Judge) -> None:
             largest = float(magnitude(judge.ours(key))[mask].max())
         rounding = float(judge.table.rounding[key][mask].min())
         theirs = magnitude(np.nan_to_num(judge.table.values[key]))[mask]
-        if 0.0 < largest <= rounding and float(theirs.max()) <= rounding:
+        least = VANISHING * float(judge.size(key)[mask].max())
+        if least < largest <= rounding and float(theirs.max()) <= rounding:
             raise InputError(
                 f"column {judge.table.label(key)} [{unit.text}]",
                 None,
