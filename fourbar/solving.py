@@ -21,6 +21,7 @@ from fourbar.evaluation.evaluate import (
     evaluate_released,
     withhold_infinite,
 )
+from fourbar.formulas.mobility import TURN
 from fourbar.linkage import A_BRANCH, require, require_bar, require_whole
 from fourbar.quantities import (
     ANGLES,
@@ -477,6 +478,8 @@ def make_solution(
             name: array for name, array in quantities_by_name.items() if name in UNITS
         }
     theta_2 = commanded.angle
+    if commanded.stroke is not None:
+        theta_2 = _turn_first(theta_2, commanded, quantities_by_name)
     if commanded.bar != 2:
         theta_2 = quantities["theta_2"]
         quantities = {
@@ -526,6 +529,21 @@ def _unwrap_angles(arrays: Mapping[str, Array], bar: int) -> None:
     for name in ("theta_2", *ANGLES):
         if name in arrays and name != commanded:
             unwrap(arrays[name])
+
+
+def _turn_first(angle: Array, at: Command, arrays: dict[str, Array]) -> Array:
+    """Turn the angle that follows from a stroke to (-pi, pi] at the first position.
+
+    `arrays`: those of a solution, in which that of bar 3 or 4 is turned.
+    """
+    finite = angle[np.isfinite(angle)]
+    if not finite.size:
+        return angle
+    turned = angle - TURN * np.ceil((finite.flat[0] - np.pi) / TURN)
+    name = COMMAND_NAMES[at.bar][0]
+    if name in arrays:
+        arrays[name][...] = turned + 0.0 * arrays[name]
+    return np.asarray(turned)
 
 
 def _list_foreign(scene: Scene) -> tuple[str, ...]:

@@ -286,6 +286,7 @@ def analyze(  # noqa: PLR0913 - one for each option
         _print_sensitivity(scene, form == "json", out)
         return
     from fourbar.solving import find_last_stage, solve
+    from fourbar.studies.course import follow
     from fourbar.studies.passing import join_commands
 
     with given.open_scene(scene) as described, given.show_waiting(described):
@@ -294,6 +295,8 @@ def analyze(  # noqa: PLR0913 - one for each option
         asked = {text: given.find_positions(described, text) for text in at}
         positions = join_commands([*asked.values()]) if asked else None
         solution = solve(described, find_last_stage(described), at=positions)
+        if asked:
+            follow(described, solution)
     if not solution.assembled.any():
         raise _assembles_nowhere(scene, described)
     if form == "summary":
@@ -345,6 +348,7 @@ def _write_summary(
     from fourbar.show.located import list_positions
     from fourbar.show.paths import write_paths
     from fourbar.solving import find_last_stage, solve
+    from fourbar.studies.course import follow
 
     if not asked:
         block = write_block(scene, solution, units, pressure=pressure)
@@ -356,6 +360,7 @@ def _write_summary(
             lines += [*list_positions(text, at), ""]
             continue
         one = solve(scene, find_last_stage(scene), at=at)
+        follow(scene, one)
         block = write_block(scene, one, units, pressure=pressure, headed=headed)
         headed = False
         lines += [*block, ""]

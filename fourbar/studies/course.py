@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.quantities import Array
+from fourbar.formulas.mobility import TURN
+from fourbar.quantities import ANGLES, Array
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.motion import Sweep
 from fourbar.scene.scene import default_places
@@ -17,6 +18,27 @@ LADDER = 0.5 ** np.arange(1, 50)
 """Parts of the interval in which the linkage ceases to assemble: quantities may grow
 there as the root of what is commanded.
 """
+
+
+def follow(scene: Scene, solution: Solution) -> None:
+    """Turn angles that follow, in place, to where the motion of the scene has them.
+
+    They are in (-pi, pi] at the first position of the motion and continuous from there,
+    whichever positions of it are solved. Single positions have no motion.
+    """
+    motion = scene.motion
+    moves = motion.law is not None or motion.free is not None
+    if not moves and not isinstance(motion.angle, Sweep | None):
+        return
+    course = Course(scene, "position")
+    order = np.argsort(course.places)
+    between = np.searchsorted(course.places[order], solution.at.places)
+    nearest = order[np.clip(between, 0, len(order) - 1)]
+    for name in ("theta_2", *ANGLES):
+        if name != solution.at.commanded:
+            angles = getattr(solution, name)
+            turns = np.rint((getattr(course.solution, name)[nearest] - angles) / TURN)
+            angles += TURN * np.nan_to_num(turns)
 
 
 class Course:
