@@ -15,8 +15,7 @@ how wrong it is against them stays a finding.
 """
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import mujoco
@@ -109,21 +108,6 @@ def describe_settings(settings: Settings, steps_per_revolution: float) -> str:
         f"flywheel {settings.flywheel:g}",
     ]
     return ", ".join(parts)
-
-
-@contextmanager
-def _silence() -> Iterator[None]:
-    """Silence MuJoCo.
-
-    A setting that fails is a result here, neither printed nor logged in the working
-    folder.
-    """
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda _: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 @dataclass(slots=True, eq=False)
@@ -296,21 +280,20 @@ class TrialSetup:
         out = make_blank(len(samples), names)
         trial = Trial(self.command)
         first = 0
-        with _silence():
-            for segment in self.segments:
-                before = trial.steps
-                rows = slice(first, first + len(segment))
-                self._run(
-                    segment,
-                    settings,
-                    (closure, drive),
-                    {name: x[rows] for name, x in out.items()},
-                    trial,
-                )
-                trial.segments += ((rows, trial.steps - before),)
-                first = rows.stop
-                if trial.broken:
-                    break
+        for segment in self.segments:
+            before = trial.steps
+            rows = slice(first, first + len(segment))
+            self._run(
+                segment,
+                settings,
+                (closure, drive),
+                {name: x[rows] for name, x in out.items()},
+                trial,
+            )
+            trial.segments += ((rows, trial.steps - before),)
+            first = rows.stop
+            if trial.broken:
+                break
         trial.at, trial.quantities = split_answer(out, self.command.branch[samples])
         return trial
 
@@ -381,26 +364,24 @@ class TrialSetup:
 
         def time_steps(count: int) -> float:
             loop.set_state(start, self.omega)
-            with _silence():
-                began = time.process_time()
-                mujoco.mj_step(loop.model, loop.data, count)
-                return time.process_time() - began
+            began = time.process_time()
+            mujoco.mj_step(loop.model, loop.data, count)
+            return time.process_time() - began
 
         def time_readings(count: int) -> float:
             loop.set_state(start, self.omega)
-            with _silence():
-                mujoco.mj_step(loop.model, loop.data)
-                began = time.process_time()
-                for row in range(count):
-                    loop.forward()
-                    if light is not None:
-                        run.read()
-                        continue
-                    # kept as they are: arithmetic on whole arrays later takes no time
-                    forces[row] = data.cfrc_int
-                    closing[row] = data.efc_force[:2]
-                    accelerations[row] = data.qacc[O2]
-                return time.process_time() - began
+            mujoco.mj_step(loop.model, loop.data)
+            began = time.process_time()
+            for row in range(count):
+                loop.forward()
+                if light is not None:
+                    run.read()
+                    continue
+                # kept as they are: arithmetic on whole arrays later takes no time
+                forces[row] = data.cfrc_int
+                closing[row] = data.efc_force[:2]
+                accelerations[row] = data.qacc[O2]
+            return time.process_time() - began
 
         return time_steps, time_readings
 
