@@ -46,6 +46,7 @@ from fourbar_validation.robots.measure import (
 from fourbar_validation.robots.options import (
     loop_option,
     pose_options,
+    range_option,
     speed_option,
 )
 from fourbar_validation.robots.report import describe_advice, show_block
@@ -481,7 +482,7 @@ def _advise_robot(
     for measured in measurement.loops:
         print_sentence(f"{measured.name}, driven by {measured.joint}")
         assert measured.advice is not None
-        for block in describe_advice(measured.advice):
+        for block in describe_advice(measured, measured.advice):
             show_block(block)
         for remark in measured.remarks:
             print_sentence(f"note: {measured.name}: {remark}")
@@ -502,6 +503,7 @@ def _advise_robot(
 @loop_option
 @pose_options
 @speed_option
+@range_option
 @click.option(
     "--error",
     "wanted",

@@ -230,6 +230,19 @@ def _read_torque(text: str | None) -> float | None:
         return require("--torque", text, "N m")
 
 
+def _read_span(text: str | None) -> tuple[float, float] | None:
+    """Read the value of `range_option`, rad."""
+    if text is None:
+        return None
+    ends = text.split(",")
+    if len(ends) != 2:
+        raise InputError("--range", text, "must be two angles, like -40deg,30deg")
+    low, high = (require("--range", end.strip(), "rad") for end in ends)
+    if low >= high:
+        raise InputError("--range", text, "must begin below its end")
+    return low, high
+
+
 def read_measure_options(
     loop: str | None,
     wanted: float | None,
@@ -255,4 +268,5 @@ def read_measure_options(
         read_speed(robot["speed"]),
         _read_torque(robot.get("torque")),
         wanted,
+        _read_span(robot.get("span")),
     )

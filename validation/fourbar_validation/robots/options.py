@@ -71,6 +71,12 @@ speed_option = click.option(
     help='Speed of the driven bar, rad/s or with a unit like "60 rpm".',
 )
 
+range_option = click.option(
+    "--range",
+    "span",
+    metavar="LOW,HIGH",
+    help="Range of the driven joint, like -40deg,30deg (default: all that it has).",
+)
 torque_option = click.option(
     "--torque",
     metavar="T",

@@ -86,7 +86,7 @@ def describe_measurement(measurement: RobotMeasurement) -> Iterator[ReportBlock]
     for loop in sorted(measurement.loops, key=find_worst_of_loop, reverse=True):
         yield from _describe_loop(loop)
         if loop.advice is not None:
-            yield from describe_advice(loop.advice)
+            yield from describe_advice(loop, loop.advice)
     for note in measurement.notes:
         yield f"note: {note}"
 
@@ -191,29 +191,37 @@ def _describe_worst_near_limits(
     loop: LoopMeasurement,
     errors: Sequence[InsideError],
 ) -> Iterator[ReportBlock]:
-    """Say where errors are worst because forces grow there without bound.
+    """Say where errors are worst because forces grow there without bound."""
+    joints = {error.joint: error.theta_2 for error in errors}
+    for joint, theta_2 in joints.items():
+        near = _describe_limit(loop, theta_2)
+        if near:
+            yield (
+                f"{write_degrees(joint)} deg is {near}: the median tells of the rest of"
+                " the motion"
+            )
+            return
 
-    That is near a limit position or a change point of the driven bar.
+
+def _describe_limit(loop: LoopMeasurement, theta_2: float) -> str:
+    """Say how near an angle of the scene's bar 2 is to a limit or a change point.
+
+    The text is empty beyond NEAR_A_LIMIT. `theta_2`: rad.
     """
     linkage = loop.scene.linkage
     places = [(angle, "a change point") for angle in change_points(linkage, 2)]
     if not turns_fully(linkage):
         limits = [end for ends in find_intervals(linkage) for end in ends]
         places += [(limit, "a limit position") for limit in limits]
-    joints = {error.joint: error.theta_2 for error in errors}
-    for joint, theta_2 in joints.items():
-        near = [
-            (abs(math.remainder(theta_2 - angle, math.tau)), kind)
-            for angle, kind in places
-        ]
-        distance, kind = min(near, default=(math.inf, ""))
-        if distance <= NEAR_A_LIMIT:
-            yield (
-                f"{write_degrees(joint)} deg is {math.degrees(distance):.2g} deg from"
-                f" {kind}, where forces grow without bound: the median tells of the"
-                " rest of the motion"
-            )
-            return
+    near = [
+        (abs(math.remainder(theta_2 - angle, math.tau)), kind) for angle, kind in places
+    ]
+    distance, kind = min(near, default=(math.inf, ""))
+    if distance > NEAR_A_LIMIT:
+        return ""
+    return (
+        f"{math.degrees(distance):.2g} deg from {kind}, where forces grow without bound"
+    )
 
 
 def _describe_vanishing(errors: Sequence[InsideError]) -> Iterator[ReportBlock]:
@@ -248,7 +256,9 @@ def _describe_torn(loop: LoopMeasurement) -> Iterator[ReportBlock]:
     )
 
 
-def describe_advice(advice: SettingsAdvice) -> Iterator[ReportBlock]:
+def describe_advice(
+    loop: LoopMeasurement, advice: SettingsAdvice
+) -> Iterator[ReportBlock]:
     """Describe what to type, what it reaches, and what each setting does alone."""
     before = advice.before
     best = advice.best
@@ -275,8 +285,31 @@ def describe_advice(advice: SettingsAdvice) -> Iterator[ReportBlock]:
             f"-> {1e3 * best.gap:.2g} mm, {1e6 * before.seconds_per_step:.3g} -> "
             f"{1e6 * best.seconds_per_step:.3g} us a step"
         )
+    yield from _describe_deciding(loop, advice)
     rows = [_write_tried(one) for one in (before, *advice.alone)]
     yield TextTable(_SETTINGS, rows)
+
+
+def _describe_deciding(
+    loop: LoopMeasurement, advice: SettingsAdvice
+) -> Iterator[ReportBlock]:
+    """Say which state decides the error, and in which range it is within the wanted."""
+    state = advice.deciding
+    if state is not None:
+        method = MEASURED_THROUGH_TIME if state.through_time else f"at {STATES}"
+        near = _describe_limit(loop, state.theta_2 - loop.turned)
+        yield (
+            f"{state.quantity} {method} decides, at {loop.joint} ="
+            f" {write_degrees(state.joint)} deg{', ' if near else ''}{near}"
+        )
+    if advice.within is not None:
+        ends = [f"{write_degrees(end)}deg" for end in advice.within]
+        yield (
+            f"The best is within {advice.wanted:g} from {ends[0]} to {ends[1]}:"
+            f" --range {','.join(ends)} looks for the cheapest there"
+        )
+    elif not advice.reached:
+        yield "No part of the range was found in which it is within the wanted error."
 
 
 def _write_tried(tried: TriedSettings) -> tuple[str, ...]:

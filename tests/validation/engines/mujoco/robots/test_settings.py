@@ -1,17 +1,31 @@
 """What to type into a robot's file: typed, it does what was measured."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from fourbar_validation.engines.mujoco.robots.answers import LoopMotion, SettingsAdvice
+from fourbar.errors import InputError
+from fourbar_validation.engines.mujoco.robots.answers import (
+    LoopMotion,
+    MeasureOptions,
+    SettingsAdvice,
+)
 from fourbar_validation.engines.mujoco.robots.closures import find_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
-from fourbar_validation.engines.mujoco.robots.settings import SettingsSearch
+from fourbar_validation.engines.mujoco.robots.settings import (
+    STIFFEST_IMPEDANCE,
+    SettingsSearch,
+)
 from fourbar_validation.robots.files import read_robot
+from fourbar_validation.robots.measure import (
+    list_errors_by_method,
+    read_measure_options,
+)
 
 FOOT = Path(__file__).parents[5] / "models" / "robots" / "biped_foot.xml"
 LIGHT_LOAD = 0.3
@@ -75,3 +89,100 @@ def test_an_error_that_nothing_reaches_is_not_reached(
     assert advice.best.error == min(
         one.error for one in (advice.before, *advice.alone, advice.best)
     )
+
+
+LIMIT = math.acos((0.2**2 + 0.3**2 - (0.12 + 0.15) ** 2) / (2.0 * 0.2 * 0.3))
+"""rad; coupler and output are stretched there."""
+NEAR = math.radians(1.0)
+ONE_STEP = 2e-3
+"""rad; a simulation is read at its own steps, of 1 ms at 1 rad/s."""
+
+
+def bend(angle: float) -> tuple[complex, complex]:
+    """Return pins A and B of the leg at an angle of its crank, m."""
+    pin = 0.2 * complex(math.cos(angle), math.sin(angle))
+    line = 0.3 - pin
+    along = (0.12**2 - 0.15**2 + abs(line) ** 2) / (2.0 * abs(line))
+    turn = complex(along, math.sqrt(0.12**2 - along**2)) / abs(line)
+    return pin, pin + line * turn
+
+
+def write_leg(sense: int) -> RobotFile:
+    """Write a leg that is drawn at 10 deg and whose knee stops beside its limit."""
+    start = math.radians(10.0)
+    pin, knee = bend(start)
+    stop = LIMIT - NEAR - start
+    ends = (0.0, stop) if sense > 0 else (-stop, 0.0)
+
+    def place(point: complex) -> str:
+        return f"{point.real!r} 0 {point.imag!r}"
+
+    return RobotFile(
+        Path("leg.xml"),
+        f"""<mujoco><compiler angle="radian"/><option integrator="RK4" timestep=".001"/>
+        <default><geom type="capsule" size="0.008" density="2700"/></default>
+        <worldbody><body name="thigh"><geom fromto="0 0 0 0.3 0 0"/>
+        <body name="crank"><joint name="knee" axis="0 {-sense} 0" limited="true"
+        range="{ends[0]!r} {ends[1]!r}"/><geom fromto="0 0 0 {place(pin)}"/>
+        <body name="rod" pos="{place(pin)}"><joint name="rod" axis="0 -1 0"/>
+        <geom fromto="0 0 0 {place(knee - pin)}"/></body></body>
+        <body name="shank" pos="0.3 0 0"><joint name="shank" axis="0 -1 0"/>
+        <geom fromto="0 0 0 {place(knee - 0.3)}"/></body></body></worldbody>
+        <equality><connect body1="rod" body2="shank" anchor="{place(knee - pin)}"/>
+        </equality></mujoco>""",
+    )
+
+
+def test_states_beside_a_limit_decide_and_the_range_without_them_is_named() -> None:
+    """The range is measured again, and the whole motion is not within the error."""
+    wanted = 1e-4
+    posed = pose_robot(compile_robot(write_leg(1)).model, PoseOptions())
+    (loop,) = (one.loop for one in find_closures(posed, PoseOptions()))
+    assert loop is not None
+    first, last = loop.angles[1], loop.angles[1] + LIMIT - NEAR - math.radians(10.0)
+    angles = [first + (last - first) * step / 8 for step in range(9)]
+
+    def search(low: int, high: int) -> SettingsSearch:
+        motion = LoopMotion(tuple(angles[low : high + 1]), 2.0, 0.0)
+        return SettingsSearch(posed.model, loop, motion)
+
+    whole = search(0, 8)
+    stiff = replace(whole.own, solimp=STIFFEST_IMPEDANCE)
+    error = whole.measure(stiff).error
+    assert error > 2.0 * wanted
+    deciding = whole.find_deciding(stiff)
+    assert deciding is not None
+    assert deciding.error == pytest.approx(error, rel=1e-9)
+    assert deciding.theta_2 == pytest.approx(last, abs=1e-2)
+    within = whole.find_range(stiff, wanted)
+    assert within is not None
+    count = min(range(9), key=lambda step: abs(angles[step] - first - within[1]))
+    assert within[0] == pytest.approx(0.0, abs=1e-9) and 4 < count < 8
+    assert search(0, count).measure(stiff).error <= wanted
+    assert search(0, 8).find_range(stiff, 1e-12) is None
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_a_range_is_that_of_the_driven_joint(sense: int) -> None:
+    span = (0.2, 0.6) if sense > 0 else (-0.6, -0.2)
+    options = MeasureOptions(PoseOptions(), span=span)
+    measurement = measure_loops(write_leg(sense), options, None)
+    joints = [row.joint for row in measurement.loops[0].states.rows]
+    assert (min(joints), max(joints)) == pytest.approx(span, abs=1e-9)
+    far = [error.joint for error in list_errors_by_method(measurement.loops[0])]
+    low, high = (span[0] - ONE_STEP, span[1] + ONE_STEP)
+    assert all(low <= joint <= high for joint in far)
+    with pytest.raises(InputError, match="must overlap the motion of knee, "):
+        measure_loops(write_leg(sense), replace(options, span=(2.0, 3.0)), None)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [("-40deg", "two angles"), ("30deg,-40deg", "begin below"), ("1deg,2m", "--range")],
+)
+def test_a_range_is_two_angles(text: str, message: str) -> None:
+    robot = {"pose": (), "key": None, "hold": (), "drive": None, "speed": None}
+    read = read_measure_options(None, None, {**robot, "span": "-40deg, 0.5 rad"})
+    assert read.span == pytest.approx((math.radians(-40.0), 0.5))
+    with pytest.raises(InputError, match=message):
+        read_measure_options(None, None, {**robot, "span": text})

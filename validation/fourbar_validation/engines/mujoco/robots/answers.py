@@ -251,6 +251,21 @@ class TriedSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class DecidingState:
+    """State at which settings have their worst error."""
+
+    through_time: bool
+    """True for a state of a simulation, False for a single state."""
+    quantity: str
+    joint: float
+    """Position of the driven joint, rad."""
+    theta_2: float
+    """Angle of bar 2 in the plane of the loop, rad."""
+    error: float
+    """Error over the scale of the quantity."""
+
+
+@dataclass(frozen=True, slots=True)
 class SettingsAdvice:
     """Settings and errors of one loop, for one wanted error."""
 
@@ -266,6 +281,12 @@ class SettingsAdvice:
     tried: int
     typed: tuple[str, ...]
     """The best combination as elements of MJCF."""
+    deciding: DecidingState | None
+    """Worst state of the best combination; None if it has no answer."""
+    within: tuple[float, float] | None
+    """Widest range of the driven joint found, rad, in which the best combination is
+    within the wanted error. None where it is so everywhere, or in no range tried.
+    """
 
 
 @dataclass(frozen=True, slots=True)
@@ -283,6 +304,8 @@ class MeasureOptions:
     """
     error: float | None = None
     """Error for which settings are looked for; None: none are."""
+    span: tuple[float, float] | None = None
+    """Range of the driven joint, rad; None: that of the scene."""
 
 
 @dataclass(frozen=True, slots=True)

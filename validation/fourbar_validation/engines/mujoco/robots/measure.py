@@ -122,7 +122,10 @@ def _measure_loop(
         scene = replace(scene, motion=scene.motion.replace(speed=options.speed))
     turned = find_turn(scene, loop)
     inside = LoopInside(model, loop, LoopDrive(model, loop, scene, turned))
-    motion = _choose_motion(scene, turned).thin_out(POSITIONS_OF_A_LOOP)
+    motion = _choose_motion(scene, turned)
+    if options.span is not None:
+        motion = _take_span(motion, inside, options.span)
+    motion = motion.thin_out(POSITIONS_OF_A_LOOP)
     states = inside.answer_states(*motion)
     if not states.rows and states.in_line:
         raise LimitError(
@@ -196,6 +199,33 @@ def _choose_motion(scene: Scene, turned: float) -> LoopMotion:
     acceleration = float(np.max(commanded.alpha_2))
     angles = np.unique(commanded.theta_2) + turned
     return LoopMotion(tuple(angles.tolist()), speed, acceleration)
+
+
+def _take_span(
+    motion: LoopMotion, inside: LoopInside, span: tuple[float, float]
+) -> LoopMotion:
+    """Return a motion evenly over a range of the driven joint, rad, as far as it goes.
+
+    Raises
+    ------
+    InputError : a range that the motion does not reach.
+    """
+    joints = [inside.position(angle) for angle in motion.theta_2]
+    low, high = max(span[0], min(joints)), min(span[1], max(joints))
+    if low >= high:
+        moved, wanted = (
+            " to ".join(f"{math.degrees(end):.6g}" for end in ends)
+            for ends in ((min(joints), max(joints)), span)
+        )
+        raise InputError(
+            "--range",
+            f"{wanted} deg",
+            f"must overlap the motion of {inside.name}, {moved} deg",
+        )
+    sense = inside.position(motion.theta_2[0] + 1.0) - joints[0]
+    places = np.linspace(low, high, POSITIONS_OF_A_LOOP) - joints[0]
+    angles = np.sort(motion.theta_2[0] + sense * places)
+    return motion._replace(theta_2=tuple(angles.tolist()))
 
 
 def _compare_at_same_angles(

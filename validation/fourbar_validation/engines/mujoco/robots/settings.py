@@ -8,9 +8,10 @@ first, until one keeps the torque and the pin forces within the wanted error.
 import math
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from copy import copy
 from dataclasses import replace
-from itertools import product
+from itertools import combinations, product
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -18,10 +19,13 @@ import mujoco
 
 from fourbar.errors import LimitError
 from fourbar_validation.engines.mujoco.robots.answers import (
+    DecidingState,
+    InsideAnswer,
     LoopMotion,
     RobotSettings,
     SettingsAdvice,
     TriedSettings,
+    divide,
 )
 from fourbar_validation.engines.mujoco.robots.drive import LoopDrive
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
@@ -48,6 +52,10 @@ one.
 """
 SOLVER = ("Newton", 100, 1e-10)
 """Solver, iterations and tolerance at which the solver leaves nothing."""
+RANGES_TRIED = 4
+"""Ranges of the driven joint in which a combination is measured that is not within the
+wanted error everywhere.
+"""
 _FIRST_CONSTANT = 0.02
 """MuJoCo's own time constant, s. It is tried if the file states a stiffness in its
 place.
@@ -118,6 +126,8 @@ class SettingsSearch:
         self.model = model
         self.drive = drive
         self.loop = loop
+        self.lever = LoopInside(model, loop, drive).lever
+        self.whole = motion
         self.motion = motion.thin_out(POSITIONS_OF_A_TRIAL)
         self.own = read_settings(model, loop)
         self.tried: dict[RobotSettings, TriedSettings] = {}
@@ -129,6 +139,7 @@ class SettingsSearch:
         alone = sorted(map(self.measure, self._list_alone()), key=lambda one: one.error)
         best, reached = self._find_cheapest(wanted)
         typed = _write_elements(file, self.loop, best)
+        within = None if reached else self.find_range(best.settings, wanted)
         return SettingsAdvice(
             wanted,
             len(self.motion.theta_2),
@@ -138,26 +149,96 @@ class SettingsSearch:
             reached,
             len(self.tried),
             typed,
+            self.find_deciding(best.settings),
+            within,
         )
+
+    def _answer(
+        self, settings: RobotSettings, motion: LoopMotion
+    ) -> list[InsideAnswer]:
+        """Return the answer at single states, then through time, as far as there are.
+
+        There is none where a run takes too many steps or the settings tear the loop.
+        """
+        changed = _set_settings(self.model, self.loop, settings)
+        inside = LoopInside(changed, self.loop, self.drive)
+        answers = []
+        with suppress(LimitError):
+            answers.append(inside.answer_states(*motion))
+            answers.append(inside.answer_through_time(*motion))
+        return answers
+
+    def find_deciding(self, settings: RobotSettings) -> DecidingState | None:
+        """Return the state of the worst error, or None without an answer."""
+        answers = self._answer(settings, self.motion)
+        if len(answers) < 2 or answers[1].lost:
+            return None
+        scales = answers[0].scales(self.lever)
+        states = [
+            DecidingState(
+                answer is answers[1],
+                name,
+                row.joint,
+                row.theta_2,
+                divide(float(error), scales[name]),
+            )
+            for answer in answers
+            for name, errors in answer.errors().items()
+            for row, error in zip(answer.rows, errors, strict=True)
+        ]
+        return max(states, key=lambda state: state.error)
+
+    def find_range(
+        self, settings: RobotSettings, wanted: float
+    ) -> tuple[float, float] | None:
+        """Return the widest range of the driven joint found within an error, rad.
+
+        Ranges are proposed by the states of the whole motion, each error over the
+        scale of its range, and then measured by themselves.
+        """
+        answers = self._answer(settings, self.whole)
+        if len(answers) < 2 or answers[1].lost:
+            return None
+        states, through = ({row.theta_2: row for row in one.rows} for one in answers)
+        places = sorted(states)
+        ranges = combinations(range(len(places)), 2)
+        tried = 0
+        for first, last in sorted(ranges, key=lambda ends: ends[0] - ends[1]):
+            low, high = places[first], places[last]
+            parts = [
+                InsideAnswer(
+                    [row for angle, row in rows.items() if low <= angle <= high]
+                )
+                for rows in (states, through)
+            ]
+            if last - first < 2 or tried == RANGES_TRIED:
+                return None
+            scales = parts[0].scales(self.lever)
+            if max(part.find_worst(scales) for part in parts) > wanted:
+                continue
+            tried += 1
+            inside = tuple(places[first : last + 1])
+            motion = self.whole._replace(theta_2=inside)
+            search = SettingsSearch(self.model, self.loop, motion, self.drive)
+            if search.measure(settings).error <= wanted:
+                ends = [states[place].joint for place in (low, high)]
+                return min(ends), max(ends)
+        return None
 
     def measure(self, settings: RobotSettings) -> TriedSettings:
         """Measure what settings reach."""
         if settings in self.tried:
             return self.tried[settings]
-        changed = _set_settings(self.model, self.loop, settings)
-        inside = LoopInside(changed, self.loop, self.drive)
-        motion = self.motion
         states = through = gap = seconds = math.inf
-        try:
-            at_states = inside.answer_states(*motion)
-            scales = at_states.scales(inside.lever)
-            states = at_states.find_worst(scales)
-            answer = inside.answer_through_time(*motion)
+        answers = self._answer(settings, self.motion)
+        if answers:
+            scales = answers[0].scales(self.lever)
+            states = answers[0].find_worst(scales)
+        if len(answers) == 2:
+            answer = answers[1]
             through = answer.find_worst(scales)
             seconds = answer.seconds_per_step
             gap = max((row.gap for row in answer.rows), default=math.inf)
-        except LimitError:
-            pass  # too many steps, or a loop that the settings tear
         changes = settings.list_changes(self.own)
         measured = TriedSettings(settings, changes, states, through, gap, seconds)
         self.tried[settings] = measured
