@@ -19,12 +19,13 @@ import fourbar
 from fourbar.scene import Command
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.advise import advise, matters
+from fourbar_validation.advise.judged_setup import JudgedSetup
 from fourbar_validation.advise.worst_errors import compute_errors
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.engines.guests import Guest, adjust_engines
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
-from fourbar_validation.engines.mujoco.trial import TrialSetup, compute_expected_error
+from fourbar_validation.engines.mujoco.trial import compute_expected_error
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.suites import MODELS
@@ -57,7 +58,7 @@ def test_figures_of_the_crank_rocker(omega: float, required: float, most: int) -
 def test_the_solver_is_searched_too() -> None:
     """A solver that stops by itself takes a third of a step less, at the same error."""
     scene, required = turning(10.0, 72), 1e-4
-    setup = TrialSetup(scene, advise.choose_positions(scene))
+    setup = JudgedSetup(scene)
     advice = advise.advise(scene, required, setup)
     settings = advice.best.settings
     assert settings != replace(settings, tolerance=0.0, iterations=10)
@@ -76,7 +77,7 @@ def test_a_drive_elsewhere_is_judged_between_the_steps_too() -> None:
     They miss 9 % between.
     """
     scene = fourbar.load(MODELS / "drag_link.toml")
-    setup = TrialSetup(scene, advise.choose_positions(scene))
+    setup = JudgedSetup(scene)
     trial = setup.try_out(advise.make_settings(14.0, 3.0))
     at_steps = compute_errors(scene, trial.at, trial.quantities).worst
     assert at_steps < 0.01
@@ -86,7 +87,7 @@ def test_a_drive_elsewhere_is_judged_between_the_steps_too() -> None:
 def test_no_curve_is_drawn_through_a_pole() -> None:
     """On the crank-rocker the torque of bar 4 has poles where the rocker reverses."""
     scene = replace(turning(), drive_bar=4)
-    setup = TrialSetup(scene, advise.choose_positions(scene))
+    setup = JudgedSetup(scene)
     trial = setup.try_out(advise.make_settings(160.0, 20.0))
     stretches = matters.split_at_poles(scene, trial.at)
     assert len(stretches) == 3
@@ -151,7 +152,7 @@ def test_what_lies_between_two_steps_is_judged_too() -> None:
     They miss what the pin forces do between.
     """
     scene = replace(turning(), motion=fourbar.Motion(fourbar.Sweep(0.0, 1.0, 36), 10.0))
-    setup = TrialSetup(scene, advise.choose_positions(scene))
+    setup = JudgedSetup(scene)
     trial = setup.try_out(advise.make_settings(12.0, 6.0))
     assert (
         trial.steps == 2
@@ -281,7 +282,7 @@ def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason() -> No
         (hood, "the stiffness by pads", "lighter of coupler and output"),
         (turning(10.0, 36), "the timestep", "the steps themselves"),
     ):
-        setup = TrialSetup(scene, advise.choose_positions(scene))
+        setup = JudgedSetup(scene)
         first, *others = influences = matters.measure_influences(
             scene, setup, advise.make_settings(40.0, 12.0)
         )
@@ -302,7 +303,7 @@ def test_the_time_of_the_settings_is_told() -> None:
     fifty of its steps and readings alone take longer than one.
     """
     scene = turning(10.0, 36)
-    setup = TrialSetup(scene, advise.choose_positions(scene))
+    setup = JudgedSetup(scene)
     best = advise.advise(scene, 1e-4, setup).best
     words = advise._describe_time(setup, best)
     found = re.fullmatch(
@@ -324,7 +325,7 @@ def test_the_time_of_the_settings_is_told() -> None:
 
 
 def test_the_time_of_an_attempt_is_that_of_its_steps_and_readings() -> None:
-    setup = TrialSetup(turning(10.0, 36), fourbar.command(turning(10.0, 36)))
+    setup = JudgedSetup(turning(10.0, 36))
     attempt = advise.advise(turning(10.0, 36), 1e-2, setup).best
     clocks = (lambda count: 2e-6 * count), (lambda count: 3e-5 * count)
     with pytest.MonkeyPatch.context() as patch:

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.interpolate import make_interp_spline
 
 import fourbar
 from fourbar.mjcf import Settings
@@ -22,6 +23,8 @@ from fourbar.scene import command
 from fourbar.show.plot.style import apply_style
 from fourbar_lab.contenders import CONTENDED_LINKAGE
 from fourbar_lab.fault_scenes import FAULT_SCENES
+from fourbar_validation.advise.judged_setup import JudgedSetup
+from fourbar_validation.advise.matters import judge_trial
 from fourbar_validation.advise.worst_errors import (
     ERROR_NAMES,
     INFINITE_ERRORS,
@@ -30,12 +33,13 @@ from fourbar_validation.advise.worst_errors import (
 )
 from fourbar_validation.cost import conclusion, formulas, laws, pictures, study
 from fourbar_validation.cost.cost import cost, list_front
-from fourbar_validation.cost.series import BEST
+from fourbar_validation.cost.series import BEST, Spot
 from fourbar_validation.engines.mujoco import drives
 from fourbar_validation.engines.mujoco.forward import MujocoOneState
 from fourbar_validation.engines.mujoco.trial import Build, TrialSetup
+from fourbar_validation.scenes.suites import MODELS
 from tests.support.costs import point
-from tests.support.scenes import crank_rocker, thesis
+from tests.support.scenes import CYLINDER, crank_rocker, thesis
 
 
 def turning(omega: float = 10.0, positions: int = 36) -> fourbar.Scene:
@@ -604,3 +608,85 @@ def test_names_in_a_picture_cover_no_other_and_are_not_cut() -> None:
         box.overlaps(next_box) for box, next_box in combinations(boxes, 2)
     )
     assert all(figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1 for box in boxes)
+
+
+def drive_by(drive: int | str) -> fourbar.Scene:
+    """Return the turning crank-rocker driven on a bar, or by a cylinder."""
+    if isinstance(drive, int):
+        return replace(turning(), drive_bar=drive)
+    return replace(turning(), drive=CYLINDER, drive_bar=None)
+
+
+@pytest.mark.parametrize("drive", [2, 3, 4, "cylinder"])
+def test_cost_measures_what_advise_measures(
+    drive: int | str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """More steps than positions of the scene are judged between the steps as well."""
+    step, reading = 2e-6, 3e-5
+    monkeypatch.setattr(
+        JudgedSetup,
+        "make_clocks",
+        lambda *_: (lambda count: step * count, lambda count: reading * count),
+    )
+    scene = drive_by(drive)
+    settings = replace(BEST, steps_per_revolution=200.0)
+    made = study.CostStudy("s", scene, tmp_path)
+    (cost_point,) = made._try_spots("c", (Spot("s", settings),), made.setup())
+    trial = JudgedSetup(scene).try_out(settings)
+    assert cost_point.errors == judge_trial(scene, trial)
+    assert cost_point.at_steps == compute_errors(scene, trial.at, trial.quantities)
+    # a torque with poles bends where 200 steps a turn see it too seldom
+    ratio = cost_point.errors.worst / cost_point.at_steps.worst
+    assert (ratio > 10.0) == (drive != 2)
+    assert trial.readings == trial.steps + 1
+    seconds = step * trial.steps + reading * trial.readings
+    assert cost_point.seconds_per_revolution == pytest.approx(seconds, rel=1e-12)
+
+
+def test_a_settled_curve_is_judged_between_the_steps_of_its_last_turn(
+    tmp_path: Path,
+) -> None:
+    made = study.CostStudy("s", replace(turning(), drive_bar=4), tmp_path)
+    settings = replace(BEST, steps_per_revolution=200.0)
+    spots = (Spot("s", settings),)
+    settled, fresh = (
+        made._try_spots("c", spots, made.setup(settled=after), after)[0]
+        for after in (True, False)
+    )
+    assert settled.steps == 2 * fresh.steps
+    assert settled.errors.worst == pytest.approx(fresh.errors.worst, rel=0.1)
+
+
+@pytest.mark.parametrize(("drive", "column"), [(2, 1), (4, 3)])
+def test_the_page_tells_what_a_curve_through_samples_misses(
+    drive: int, column: int
+) -> None:
+    page = (MODELS.parent / "docs" / "cost.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (120|360|720) \|(.*)\|$", page, re.MULTILINE)
+    assert len(rows) == 3
+    scene = replace(fourbar.load(MODELS / "crank_rocker.toml"), drive_bar=drive)
+    for count, cells in rows:
+        printed = [float(cell) for cell in cells.split("|")][column - 1 : column + 1]
+        missed = [miss_between(scene, int(count), degree) for degree in (3, 7)]
+        # the least of them is the rounding of the torque
+        assert missed == pytest.approx(printed, rel=0.05, abs=2e-13)
+
+
+def miss_between(scene: fourbar.Scene, count: int, degree: int) -> float:
+    """Return the worst error between samples where the driven bar is far from rest."""
+    fine = np.linspace(0.0, 2.0 * math.pi, 4 * count + 1)
+    command_of_fine = command(scene)._replace(
+        angle=fine, branch=np.ones(fine.shape, np.int8)
+    )
+    exact = fourbar.solve(scene, at=command_of_fine)
+    speed = np.abs(exact.omega_4 if scene.drive_bar == 4 else np.ones(fine.shape))
+    far = speed > 0.1 * speed.max()
+    sampled = np.flatnonzero(far[::4])
+    worst = 0.0
+    for stretch in np.split(sampled, np.flatnonzero(np.diff(sampled) > 1) + 1):
+        rows = np.arange(4 * stretch[0], 4 * stretch[-1] + 1)
+        curve = make_interp_spline(
+            fine[::4][stretch], exact.torque[::4][stretch], degree
+        )
+        worst = max(worst, float(np.abs(curve(fine[rows]) - exact.torque[rows]).max()))
+    return worst / float(np.abs(exact.torque[far]).max())

@@ -16,10 +16,11 @@ import numpy as np
 
 from fourbar.errors import InputError, LimitError
 from fourbar.mjcf import Settings, write_mjcf
-from fourbar.scene import Command, Scene
-from fourbar.scene import command as command_of
+from fourbar.scene import Scene
 from fourbar.writing import require_file, write_text
+from fourbar_validation.advise.judged_setup import JudgedSetup
 from fourbar_validation.advise.matters import (
+    DEGREE_BETWEEN,
     MATTERS,
     judge_trial,
     measure_influences,
@@ -59,8 +60,6 @@ _CLOSE_ENOUGH = 1.15
 """Ratio at which the search stops. It is that of the least steps that serve to the most
 that do not.
 """
-INTERVALS_READ = 180
-"""Intervals of the sweep at which a run is read at least."""
 _MOST_TRIALS = 24
 MOST_STEPS_OF_A_RUN = 16_000
 """Most steps of one run, a fifth of a second. An error that needs more steps counts as
@@ -169,7 +168,8 @@ class _Advice:
         """Write the attempt in one line for the reader."""
         e = self.best.errors
         errors = (
-            f"Errors at the steps and between them: torque {e.torque:.1e}, "
+            f"Errors at the steps and between them, by a curve of degree "
+            f"{DEGREE_BETWEEN} through the steps: torque {e.torque:.1e}, "
             f"worst pin force {e.force:.1e}"
         )
         setting = (
@@ -208,28 +208,8 @@ def advise(
     return _CheapestSearch(
         scene,
         error,
-        setup or TrialSetup(scene, choose_positions(scene)),
+        setup or JudgedSetup(scene),
     ).advice()
-
-
-def choose_positions(scene: Scene) -> Command:
-    """Take the scene's positions and others between them.
-
-    The error has its peaks there, most near a pole of T3, T4.
-    """
-    command = command_of(scene)
-    if np.ptp(command.branch) != 0:
-        return command
-    between = np.linspace(
-        command.theta_2.min(),
-        command.theta_2.max(),
-        INTERVALS_READ + 1,
-    )
-    theta_2 = np.union1d(command.theta_2, between)
-    return command._replace(
-        angle=theta_2,
-        branch=np.full(theta_2.shape, command.branch[0], dtype=np.int8),
-    )
 
 
 def _time_attempt(setup: TrialSetup, attempt: SearchRun) -> float:
@@ -553,7 +533,7 @@ def advise_command(
     reached = True
     for file, scene in loaded:
         try:
-            setup = TrialSetup(scene, choose_positions(scene))
+            setup = JudgedSetup(scene)
             advice = advise(scene, wanted, setup)
         except LimitError as error:
             reason = (

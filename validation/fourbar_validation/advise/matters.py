@@ -35,7 +35,7 @@ MATTERS = 2.0
 """Growth of the error below which a setting does not matter. The setting is changed by
 a factor of two, or lost.
 """
-_SPLINE = 7
+DEGREE_BETWEEN = 7
 """Degree of the curve through what was read at the steps. Its error falls faster with
 the steps than that of RK4.
 """
@@ -161,7 +161,7 @@ def _compute_stretch(
     """Compute errors at some places of the splines through what was read."""
     from scipy.interpolate import make_interp_spline
 
-    degree = min(_SPLINE, len(theta_2) - 1)
+    degree = min(DEGREE_BETWEEN, len(theta_2) - 1)
     curves = {
         name: make_interp_spline(theta_2, values, degree)(places)
         for name, values in read.items()

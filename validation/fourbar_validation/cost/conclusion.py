@@ -6,7 +6,11 @@ It says what digits cost, what the defaults pay, and what matters.
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-from fourbar_validation.advise.matters import SettingInfluence, write_sentence
+from fourbar_validation.advise.matters import (
+    DEGREE_BETWEEN,
+    SettingInfluence,
+    write_sentence,
+)
 from fourbar_validation.cost.laws import ErrorLaw, find_floor
 from fourbar_validation.cost.study import (
     EXACT_MOTION,
@@ -81,7 +85,9 @@ def conclude(
 ) -> list[str]:
     """Write the conclusion, at most ten lines."""
     return [
-        "CPU time of a simulated second, with the reading of torque and pin forces:",
+        "CPU time of a simulated second, with the reading of torque and pin forces; "
+        "errors at the steps and between them, by a curve of degree "
+        f"{DEGREE_BETWEEN} through the steps:",
         *_write_cheapest_settings(curves),
         *_write_defaults(curves),
         write_sentence(influences),

@@ -8,8 +8,8 @@ import click
 
 from fourbar.errors import FAILED, HOLDS
 from fourbar.scene import Scene
-from fourbar.scene import command as command_of
 from fourbar.writing import write_text
+from fourbar_validation.advise.judged_setup import JudgedSetup
 from fourbar_validation.advise.matters import MATTERS, measure_influences
 from fourbar_validation.compare.rows import write_csv_rows
 from fourbar_validation.cost.conclusion import conclude, find_cheapest, list_stepped
@@ -22,7 +22,6 @@ from fourbar_validation.cost.laws import (
 )
 from fourbar_validation.cost.series import BEST
 from fourbar_validation.cost.study import COST_COLUMNS, CostPoint, CostStudy, list_cells
-from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.places import MODELS
 from fourbar_validation.report.machine import describe_setup
 from fourbar_validation.report.templating import render
@@ -69,7 +68,7 @@ def cost(
     for index in range(len(files)):
         name = files.name(index)
         scene = files.scene(index)
-        setup = TrialSetup(scene, command_of(scene))
+        setup = JudgedSetup(scene)
         study = CostStudy(name, scene, out / name)
         curves = dict(
             track(

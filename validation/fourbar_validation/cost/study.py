@@ -20,6 +20,7 @@ from fourbar.formulas.mobility import turns_fully
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar_validation.advise.advise import advise
+from fourbar_validation.advise.judged_setup import JudgedSetup
 from fourbar_validation.advise.matters import judge_trial
 from fourbar_validation.advise.worst_errors import (
     ERROR_NAMES,
@@ -30,7 +31,7 @@ from fourbar_validation.advise.worst_errors import (
 from fourbar_validation.cost import formulas
 from fourbar_validation.cost.series import SLOW, Curve, Spot, design_curves
 from fourbar_validation.engines.asking import ask_at
-from fourbar_validation.engines.mujoco.trial import Trial, TrialSetup
+from fourbar_validation.engines.mujoco.trial import Trial
 from fourbar_validation.engines.plain_loop import PlainLoop
 from fourbar_validation.report.machine import list_versions
 from fourbar_validation.run.store import Store
@@ -46,7 +47,7 @@ TIMED_READINGS = 50
 ERRORS_ADVISED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
 """Errors for which the advice is drawn."""
 IMPEDANCES_AT_ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
-STUDY_VERSION = 8
+STUDY_VERSION = 9
 """Version of what is tried; parts made with another version are made again."""
 EXACT_MOTION = "exact"
 STEPPED_MOTION = "stepped"
@@ -132,7 +133,7 @@ class CostStudy:
         self.folder = folder
         self.command = command_of(scene)
         self.left_out: list[str] = []
-        self._rigs: dict[tuple[bool, bool, bool], TrialSetup] = {}
+        self._rigs: dict[tuple[bool, bool, bool], JudgedSetup] = {}
         self.units: dict[str, Callable[[], list[CostPoint]]] = {
             "formulas": self._time_formulas,
             "inverse": self._time_inverse,
@@ -177,7 +178,7 @@ class CostStudy:
         slow: bool = False,
         bare: bool = False,
         settled: bool = False,
-    ) -> TrialSetup:
+    ) -> JudgedSetup:
         """Assemble the scene for trials.
 
         It runs at its own speed or slow, as it is or bare, after a turn or not.
@@ -192,18 +193,12 @@ class CostStudy:
                 )
             if bare:
                 scene = replace(scene, loads=(), effects=())
-            command = command_of(scene)
+            before = None
             if settled:
-                before = float(
-                    command.theta_2.min()
-                    if command.omega_2 > 0.0  # type: ignore[operator]
-                    else command.theta_2.max()
-                )
-                before -= math.copysign(2.0 * math.pi, command.omega_2)  # type: ignore[arg-type]
-                angle = np.append(command.theta_2, before)
-                branch = np.append(command.branch, command.branch[0])
-                command = command._replace(angle=angle, branch=branch)
-            self._rigs[slow, bare, settled] = TrialSetup(scene, command)
+                angles = command_of(scene).theta_2
+                turn = math.copysign(2.0 * math.pi, scene.motion.omega_2 or 1.0)
+                before = float(angles.min() if turn > 0.0 else angles.max()) - turn
+            self._rigs[slow, bare, settled] = JudgedSetup(scene, before=before)
         return self._rigs[slow, bare, settled]
 
     def _try_curve(self, curve: Curve) -> list[CostPoint]:
@@ -219,7 +214,7 @@ class CostStudy:
         self,
         name: str,
         spots: tuple[Spot, ...],
-        setup: TrialSetup,
+        setup: JudgedSetup,
         settled: bool = False,
     ) -> list[CostPoint]:
         """Try each spot: its errors, and CPU time of steps and readings.
@@ -368,10 +363,11 @@ class CostStudy:
             MUJOCO_INVERSE: MujocoInverseLoop,
         }
         points = []
-        rows = sorted(row for segment in self.setup().segments for row in segment)
-        command = self.command._replace(
-            angle=self.command.theta_2[rows],
-            branch=self.command.branch[rows],
+        setup = self.setup()
+        rows = sorted(row for segment in setup.segments for row in segment)
+        command = setup.command._replace(
+            angle=setup.command.theta_2[rows],
+            branch=setup.command.branch[rows],
         )
         for label, make in loops.items():
             try:
@@ -445,6 +441,9 @@ def _leave_out_first(trial: Trial) -> None:
         command.alpha_2[1:],  # type: ignore[index]
     )
     trial.quantities = {name: values[1:] for name, values in trial.quantities.items()}
+    ((rows, steps),) = trial.segments
+    part = np.ptp(trial.at.theta_2) / np.ptp(command.theta_2)
+    trial.segments = ((slice(rows.start, rows.stop - 1), round(steps * part)),)
 
 
 def summarise_timings(times: Sequence[float]) -> tuple[float, float]:
