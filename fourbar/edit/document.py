@@ -15,6 +15,7 @@ from tomlkit.items import AoT, InlineTable, Item, Table, Whitespace
 
 from fourbar.effects import Load, list_kinds
 from fourbar.effects.load import FRAMES
+from fourbar.effects.spring import SENSES
 from fourbar.errors import InputError
 from fourbar.files.scene_text import BRANCH_OF_NAME
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, REQUIRED_NUMBER, Bar
@@ -29,6 +30,7 @@ WORDS_OF_ENTRIES = {
         "ends": [*SPLINES],
     },
     "frame": [*FRAMES],
+    "acts": [*SENSES],
 }
 """Entries that are one of a few words."""
 EXAMPLES = {

@@ -61,7 +61,7 @@ ALLOWED_STEPS = (
 """Allowed numbers of intervals of any motion, and how an error says so."""
 SPLINES = {"free": "not-a-knot", "rest": "clamped", "periodic": "periodic"}
 """End conditions of a law's spline: none, at rest, or one period of a motion."""
-_FEWEST_POINTS = {"free": 4, "rest": 2, "periodic": 3}
+FEWEST_POINTS = {"free": 4, "rest": 2, "periodic": 3}
 """Number of points that determine the cubic pieces."""
 MOST_LISTED_POSITIONS = 100_000
 RISE_LAWS = ("cycloidal", "345")
@@ -229,7 +229,7 @@ class Law(_OverTime):
         time = require_numbers(f"{key}.time", self.time, unit="s").ravel()
         angles = require_numbers(f"{key}.{theta}", stated_angles, unit="rad").ravel()
         self._require_rates(len(time))
-        fewest = _FEWEST_POINTS[self.ends] if self.omega is None else 2
+        fewest = FEWEST_POINTS[self.ends] if self.omega is None else 2
         may_be = range(fewest, MOST_LISTED_POSITIONS + 1)
         if len(time) != len(angles) or len(time) not in may_be:
             allowed = (

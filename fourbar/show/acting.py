@@ -10,7 +10,7 @@ from fourbar.evaluation.case import compute_shown_state
 from fourbar.linkage import FIRST_PIN
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command_at
-from fourbar.scene.motion import Law
+from fourbar.scene.motion import FEWEST_POINTS, Law
 from fourbar.show.units import write_short
 from fourbar.solution import Conversion, Solution
 from fourbar.studies.equilibrium import bisect
@@ -55,13 +55,15 @@ def list_arm_notes(scene: Scene) -> list[str]:
 def list_law_notes(scene: Scene, units: Conversion) -> list[str]:
     """Say what the ends of a table of angles assume, and what the other choice changes.
 
-    A periodic table leaves no choice, nor does one with speeds.
+    A periodic table leaves no choice, nor does one with speeds or with three points.
     """
     law = scene.motion.law
     if not isinstance(law, Law) or law.omega is not None or law.ends == "periodic":
         return []
     other = {"free": "rest", "rest": "free"}[law.ends]
     t = np.array(law.time)
+    if len(t) < FEWEST_POINTS["free"]:
+        return []
     ends = np.linspace(t[[0, -2]], t[[1, -1]], _INSTANTS_OF_AN_END).ravel()
     pairs = zip(law.at(ends), replace(law, ends=other).at(ends), strict=True)
     angle, _, acceleration = (float(np.abs(one - two).max()) for one, two in pairs)

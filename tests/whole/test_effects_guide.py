@@ -220,7 +220,7 @@ def test_every_effect_of_the_package_has_a_row_in_each_table() -> None:
 
 
 def test_the_scene_of_the_reference_names_everything_and_is_agreed_on() -> None:
-    scene = loads(SCENE.partition("[motion]")[0] + block("toml", REFERENCE, 3))
+    scene = loads(SCENE.partition("[motion]")[0] + block("toml", REFERENCE, 5))
     assert [effect.key for effect in scene.effects] == list(effects.list_kinds())
     assert scene.motion.law is not None and scene.loads[0].table is not None
     again = loads(dump(scene))

@@ -146,7 +146,8 @@ def test_what_leaves_no_choice_says_nothing_of_its_ends() -> None:
         (0.0, 0.3, 0.7, 1.0), (0.0, 2.0, 4.0, 2.0 * math.pi), ends="periodic"
     )
     rates = Law((0.0, 1.0), (0.0, 1.0), omega=(0.0, 0.0))
-    for law in (periodic, rates):
+    three = Law((0.0, 0.5, 1.0), (0.0, 1.0, 1.5), ends="rest")
+    for law in (periodic, rates, three):
         scene = fourbar.Scene(
             fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(law=law)
         )

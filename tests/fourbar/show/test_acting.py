@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 import fourbar
 from fourbar.cli import status
+from fourbar.show.block import write_block
 
 HATCH = """
 [lengths]
@@ -145,3 +147,41 @@ def test_between_the_positions_of_a_list_nothing_is_located(
     assert status(["analyze", str(file)]) == 0
     printed = " ".join(capsys.readouterr().out.split())
     assert "from theta_2 = 80 deg to theta_2 = 12 deg and from theta_2 = 50" in printed
+
+
+def told(text: str) -> str:
+    """Return the block of a scene in one line."""
+    scene = fourbar.files.loads(text)
+    return " ".join(" ".join(write_block(scene, fourbar.solve(scene))).split())
+
+
+@pytest.mark.parametrize("length", ["400 mm", "600 mm"])
+def test_a_spring_that_changes_its_sense_is_told_where(length: str) -> None:
+    """It pulls from where its ends are farther apart than its length."""
+    spring = f'stiffness = "500 N/m"\nlength = "{length}"'
+    text = re.sub(r"gas = .*", spring, HATCH)
+    said = f"spring 1 pulls from theta_2 = {reach(0.4)} on and pushes elsewhere"
+    assert (said in told(text)) == (length == "400 mm")
+    assert "elsewhere" not in told(f'{text}acts = "push"\n')
+
+
+@pytest.mark.parametrize(
+    ("load", "said"),
+    [
+        ('bar = 4\nmoment = "1 N m"', "load 1 enters bar 4 at O4"),
+        ('bar = 3\nmoment = "1 N m"', "load 1 enters bar 3 at G"),
+        ('bar = 4\nmoment = "1 N m"\nfrom_pin = ["1 mm", "0 deg"]', ""),
+        ('bar = 4\nmoment = "1 N m"\nforce = ["1 N", "0 deg"]', ""),
+        (
+            'bar = 4\nforce = ["1 N", "0 deg"]\narm = ["1 mm", "0 deg"]',
+            "load 1: arm counts from G of bar 4, taken to be mid-bar",
+        ),
+        ('bar = 2\nforce = ["1 N", "0 deg"]\narm = ["1 mm", "0 deg"]', ""),
+    ],
+)
+def test_a_place_that_is_taken_is_named(load: str, said: str) -> None:
+    """Bar 2 has a mass, whose centre the arm counts from."""
+    block = told(f"{HATCH.partition('[effects]')[0]}[[loads]]\n{load}\n")
+    assert said in block
+    if not said:
+        assert "enters bar" not in block and "arm counts" not in block
