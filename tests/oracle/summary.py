@@ -274,7 +274,7 @@ def summary(question: Question) -> list[Row]:
 
     Shaking force, bending and bore are judged too.
     """
-    judged = _SummaryJudge(question, _summarize_scene(question))
+    judged = _SummaryJudge(question, summarize_scene(question))
     _judge_ranges(judged)
     _judge_drive(judged)
     _judge_pins(judged)
@@ -296,7 +296,7 @@ def summary(question: Question) -> list[Row]:
     return rows
 
 
-def _summarize_scene(question: Question) -> Facts:
+def summarize_scene(question: Question) -> Facts:
     """Summarize the scene.
 
     Raises NotAskedError if its motion has nothing between its positions, or poles.

@@ -209,7 +209,7 @@ def test_what_grows_between_positions_is_believed(turns: int) -> None:
     sweep = fourbar.Sweep(0.12, 0.12 + 2 * np.pi * turns, 40 * turns)
     scene = crank_rocker(motion=fourbar.Motion(sweep, 9.0), drive_bar=4)
     question = make_question("scene", scene, ())
-    assert module._summarize_scene(question).between.growing
+    assert module.summarize_scene(question).between.growing
     assert not judge(scene)["peaks"].failed
 
 
