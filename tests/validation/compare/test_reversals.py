@@ -4,6 +4,7 @@ Found where geometry says, jumping by what statics says, judged on both sides of
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,11 @@ from fourbar.effects import Friction
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.solving import solve
-from fourbar_validation.compare.reversals import break_curve, find_reversals
+from fourbar_validation.compare.reversals import (
+    break_curve,
+    find_reversals,
+    mark_reversing,
+)
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 
@@ -115,3 +120,21 @@ def test_a_curve_is_not_drawn_across_the_jump() -> None:
         assert x[gap - 1] == x[gap + 1] == reversal.theta_2
         assert abs(y[gap + 1] - y[gap - 1]) > 0.1
     assert (np.diff(x) >= 0).all()
+
+
+def test_only_a_pin_that_hardly_slips_reverses() -> None:
+    """Bars 2 and 3 turn at 2 and 2 + x: the mask is x <= slip (2 + 2 + x + 2)."""
+    slip = 1e-6
+    x = np.array([0.0, 5.9e-6, 6.1e-6, 1e-3, 1.0])
+    effects = (Friction((("A", FRICTION),)),)
+    dry = Scene(LINKAGE, Motion(Sweep(0.1, 0.5, 4), 2.0), effects=effects)
+    ones = np.ones(5)
+    speeds = {"omega_2": 2.0 * ones, "omega_3": 2.0 + x, "omega_4": ones}
+    solution = replace(solve(dry), condition=ones, **speeds)
+    reversing = mark_reversing(dry, solution, slip)
+    assert reversing.tolist() == [True, True, False, False, False]
+    slow = np.array([1.0, 1.1e-6, 0.9e-6, 1e-3, 0.5])
+    speeds = {"omega_2": slow, "omega_3": 2.0 * slow, "omega_4": slow}
+    solution = replace(solve(dry), condition=ones, **speeds)
+    at_rest = mark_reversing(dry, solution, slip, in_time=True)
+    assert at_rest.tolist() == [False, False, True, False, False]

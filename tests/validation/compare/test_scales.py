@@ -14,7 +14,11 @@ from fourbar.linkage import uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.solving import solve
-from fourbar_validation.compare.scales import find_scale_of_answer, scale_of
+from fourbar_validation.compare.scales import (
+    Scale,
+    find_scale_of_answer,
+    scale_of,
+)
 from fourbar_validation.compare.tolerance import WELL_CONDITIONED
 from tests.support.scenes import balance
 
@@ -142,3 +146,16 @@ def test_an_answer_has_a_scale_of_its_own_from_its_rates_alone() -> None:
     assert expected is not None and scale is not None
     np.testing.assert_allclose(scale.cancellation, expected.cancellation, rtol=1e-12)
     assert find_scale_of_answer(names, scene, replace(bare, alpha_4=None)) is None
+
+
+def test_the_pair_that_allows_less_of_an_error_is_taken_whole() -> None:
+    """Allowed are size times max(1, N/50): 4 and 3, 2 and 6, nothing known and 1."""
+    no = np.zeros(3, dtype=bool)
+    ours = Scale(np.array([2.0, 2.0, np.nan]), np.array([100.0, 1.0, np.nan]), no)
+    theirs = Scale(np.array([3.0, 1.0, 1.0]), np.array([1.0, 300.0, 1.0]), ~no)
+    taken = ours.take_strictest(theirs)
+    assert taken.size.tolist() == [3.0, 2.0, 1.0]
+    assert taken.cancellation.tolist() == [1.0, 1.0, 1.0]
+    assert taken.vanishes.tolist() == [True, False, True]
+    again = theirs.take_strictest(ours)
+    assert again.size.tolist() == taken.size.tolist()

@@ -21,6 +21,7 @@ from fourbar_validation.compare.rows import (
     FAILS,
     REFUSES,
     UNDECIDED,
+    Counts,
     Row,
     write_results,
     write_rows,
@@ -424,3 +425,19 @@ def test_a_check_that_raises_costs_its_own_rows_alone(
         FAILS,
     )
     assert len(all_rows) > 3
+
+
+@pytest.mark.parametrize("compares", [False, True])
+def test_a_check_says_itself_whether_it_is_a_comparison(
+    compares: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A name of its own makes no comparison of it, and an empty run does not pass."""
+
+    def check_something(question: Question) -> list[Row]:
+        return [Row.judged((question.name, "mine", "exact"), "torque", 0.0, 1.0, "")]
+
+    checks = (judging.Check(check_something, compares=compares),)
+    monkeypatch.setattr(judging, "CHECKS", checks)
+    rows = judging.judge("s", crank_rocker(), ()).rows
+    assert Counts(rows).nothing == (not compares)
+    assert Counts(rows).status == (0 if compares else 1)

@@ -32,15 +32,34 @@ from fourbar_validation.run.transformed import check_transformed
 
 
 class Check(NamedTuple):
-    """A check, and when it is made."""
+    """A check: what makes its rows, whether they count, and when it is left out."""
 
     make_rows: Callable[[Question], Iterable[Row]]
+    compares: bool = False
+    """True if its rows compare an answer of an engine. Rows of the other checks are the
+    formulas' own and never count as comparisons, whatever engine they name.
+    """
     free: bool = False
     """True if it checks a free motion, False for a prescribed one."""
     what: str = ""
     """Words for what is checked, where it may be left out."""
     needs_theta_2: str = ""
     """Reason to leave it out where theta_2 is not commanded; empty for any command."""
+
+    def left_out(self, question: Question) -> str:
+        """Say why it is left out of a scene; empty if it is made."""
+        if self.needs_theta_2 and question.at.commanded != "theta_2":
+            return f"{self.needs_theta_2}; {question.at.commanded} is commanded"
+        return ""
+
+    def rows(self, question: Question) -> Iterator[Row]:
+        """Make its rows; what it raises is a row that fails."""
+        make_rows = partial(self.make_rows, question)
+        for row in question.attempt(make_rows, FORMULAS, self.make_rows.__name__):
+            if self.compares or row.engine == FORMULAS:
+                yield row
+            else:
+                yield replace(row, engine=FORMULAS)
 
 
 CHECKS = (
@@ -53,11 +72,17 @@ CHECKS = (
         what="reversals of dry friction",
         needs_theta_2="they are drawn over theta_2",
     ),
-    Check(compare_answers),
-    Check(check_mjcf, what="MJCF as shipped", needs_theta_2="it drives bar 2"),
-    Check(compare_inertia),
+    Check(compare_answers, compares=True),
+    Check(
+        check_mjcf,
+        compares=True,
+        what="MJCF as shipped",
+        needs_theta_2="it drives bar 2",
+    ),
+    Check(compare_inertia, compares=True),
     Check(
         check_released,
+        compares=True,
         free=True,
         what="released motions",
         needs_theta_2="engines begin at theta_2",
@@ -120,12 +145,10 @@ def judge(
     for check in CHECKS:
         if check.free != free:
             continue
-        if check.needs_theta_2 and question.at.commanded != "theta_2":
-            reason = f"{check.needs_theta_2}; {question.at.commanded} is commanded"
+        if reason := check.left_out(question):
             question.leave_out(check.what, reason)
             continue
-        make_rows = partial(check.make_rows, question)
-        rows += question.attempt(make_rows, FORMULAS, check.make_rows.__name__)
+        rows += check.rows(question)
     return question.record(rows, seconds)
 
 
