@@ -15,15 +15,16 @@ from fourbar.quantities.units import UNIT_MISSING, UnitError, find_unit, to_si
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
 LONGEST_FIELD = 60
-_FOREIGN = (
-    *("crank", "slider", "rod", "piston", "rail", "cam", "gear", "offset"),
-    *("link5", "bar5", "dyad", "precision_points"),
+_FOREIGN = re.compile(
+    r"crank|slider|(connecting_?)?rod|piston|rail|cam|gear|offset|dyad"
+    r"|precision_points|bell_?crank"
+    r"|(bell_?crank|link|bar|rod|arm|crank|rocker|coupler|input|output|slider)_?[0-9]+"
 )
 """Keys of mechanisms that are no four-bar linkage, and of their synthesis."""
 ELSEWHERE = (
     "this is a planar four-bar linkage with pins alone: synthesis is in pylinkage and "
-    "MotionGen, sliders and several loops in PMKS+, any mechanism in MuJoCo, Drake or "
-    "Exudyn; "
+    "MotionGen, sliders and several loops (six bars) in PMKS+, any mechanism in "
+    "MuJoCo, Drake or Exudyn; "
 )
 """Address for people with another mechanism."""
 DIRECTION_WORDS = {
@@ -36,6 +37,7 @@ DIRECTION_WORDS = {
 _MEANT = {
     **{"weight": "mass", "torque": "moment", "couple": "moment"},
     **{"rate": "stiffness", "k": "stiffness", "material": "density"},
+    **{"crank": "input", "rocker": "output", "follower": "output", "frame": "ground"},
     **{"x": "from_pin", "y": "from_pin", "speed": "omega_2", "rpm": "omega_2"},
 }
 """Words that are no keys, and the keys that may be meant by them."""
@@ -91,7 +93,7 @@ class Reader:
             )
         for name, entry in value.items():
             if name not in names:
-                if name in _FOREIGN:
+                if _is_elsewhere(key, value, names):
                     hint = ELSEWHERE
                 else:
                     hint = _suggest_word(name, names)
@@ -354,6 +356,19 @@ def write_pair(
 ) -> list[str]:
     """Write a pair, mostly [magnitude, angle], likewise."""
     return [write_quantity(first, unit), write_quantity(second, of_second)]
+
+
+def _is_elsewhere(key: str, table: dict[str, Any], names: list[str]) -> bool:
+    """Return True if a table has a key of another mechanism, or more than four pins.
+
+    A key that may mean one of those allowed is none.
+    """
+    unknown = [name for name in table if name not in names]
+    if key == "pins" and len(table) > len(names):
+        return True
+    return any(
+        _FOREIGN.fullmatch(name) and _MEANT.get(name) not in names for name in unknown
+    )
 
 
 def _suggest_word(word: object, names: list[str]) -> str:

@@ -1056,3 +1056,83 @@ def test_points_in_the_table_have_the_coordinates_of_the_drawing(
     row = lines[-1]
     assert code == 0
     assert [row[heading.index(name)] for name in ("P_x", "P_y")] == ["150", "80"]
+
+
+SIX_BARS = """\
+[lengths]
+ground = "900 mm"
+input = "400 mm"
+coupler = "700 mm"
+output = "380 mm"
+"""
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        *('bellcrank2 = "350 mm"', 'link2 = "600 mm"', 'slider = "1 mm"'),
+        '[bars.link5]\nmass = "1 kg"',
+    ],
+)
+def test_a_part_of_another_mechanism_points_on(
+    more: str,
+    tmp_path: Path,
+    run: Fourbar,
+) -> None:
+    (tmp_path / "scene.toml").write_text(SIX_BARS + more + "\n")
+    code, _, err = run("analyze", tmp_path / "scene.toml")
+    assert code == BAD_INPUT and err.count("\n") == 1
+    assert "several loops (six bars) in PMKS+" in err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("classify", "1", "2", "3", "4", "5", "6"),
+        ("new", "f.toml", "--lengths", "1m", "2m", "3m", "4m", "5m", "6m"),
+        ("new", "f.toml", "--pins", "0,0 0,1 1,2 3,3 4,4 5,5", "--unit", "mm"),
+    ],
+)
+def test_six_bars_on_the_command_line_point_on(
+    arguments: tuple[str, ...],
+    run: Fourbar,
+) -> None:
+    code, _, err = run(*arguments)
+    assert code == BAD_INPUT and "several loops (six bars) in PMKS+" in err
+
+
+@pytest.mark.parametrize(
+    ("word", "key"),
+    [
+        *(("crank", "input"), ("rocker", "output")),
+        *(("follower", "output"), ("frame", "ground")),
+    ],
+)
+def test_other_words_for_the_bars_are_asked_back(
+    word: str,
+    key: str,
+    tmp_path: Path,
+    run: Fourbar,
+) -> None:
+    (tmp_path / "scene.toml").write_text(SIX_BARS.replace(key, word))
+    code, _, err = run("analyze", tmp_path / "scene.toml")
+    assert code == BAD_INPUT and f'did you mean "{key}"' in err
+
+
+def test_one_position_has_the_angles_that_the_sweep_has_there(
+    tmp_path: Path,
+    run: Fourbar,
+) -> None:
+    """Beyond half a turn of the output of a drag-link, and whatever else is asked."""
+    scene = load(MODELS / "drag_link.toml")
+    save(scene, tmp_path / "scene.toml")
+    sweep = fourbar.solve(scene)
+    rows = [120, 10, 300]
+    at = [f"--at={sweep.theta_2[row]!r} rad".replace("np.float64(", "") for row in rows]
+    at = [text.replace(")", "") for text in at]
+    table = run("analyze", tmp_path / "scene.toml", "--json", *at)[1]
+    for name in ("theta_3", "theta_4"):
+        assert strict(table)[name] == pytest.approx(getattr(sweep, name)[rows]), name
+    block = run("analyze", tmp_path / "scene.toml", at[2])[1]
+    assert f"{math.degrees(sweep.theta_4[300]):.4f}" in block
+    assert abs(sweep.theta_4[300]) > math.pi

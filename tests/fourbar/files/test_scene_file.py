@@ -715,12 +715,6 @@ gravity = { x = "1.5 m/s^2", y = "-9.81 m/s^2" }
     assert loads(written).loads == scene.loads
 
 
-@pytest.mark.parametrize("key", ["crank", "slider"])
-def test_another_mechanism_is_told_where_to_go(key: str) -> None:
-    with pytest.raises(InputError, match="sliders and several loops in PMKS"):
-        loads(f'[lengths]\n{key} = "1 m"\n')
-
-
 IN_OTHER_UNITS = """\
 [lengths]
 ground = "48 in"

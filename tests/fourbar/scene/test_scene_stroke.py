@@ -6,6 +6,7 @@ refused.
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,8 @@ from fourbar.studies.keys import read_place, replace_numbers
 from fourbar_validation.engines.prediction import compute_reference
 from tests.support.balls import answer_in_balls
 from tests.support.scenes import crank_rocker
+
+MODELS = Path(__file__).parents[3] / "models"
 
 ROUND_OFF = 1e-11
 """Relative: eps over the conditions of these sweeps, 1e-4 at least."""
@@ -330,3 +333,25 @@ def test_a_sweep_of_texts_is_read_by_the_unit_that_they_state(
     assert motion.angle == fourbar.Sweep(0.1, 0.2, 4)
     with pytest.raises(InputError, match=words):
         fourbar.Motion(**keywords)
+
+
+@pytest.mark.parametrize("name", ["stroke_input", "stroke_output"])
+@pytest.mark.parametrize("turned", [0.0, 100.0, -160.0])
+def test_a_bar_that_follows_a_stroke_begins_within_half_a_turn(
+    name: str,
+    turned: float,
+) -> None:
+    """Whatever the ground's angle: the same directions, continuous from the first."""
+    scene = fourbar.load(MODELS / "capabilities" / f"{name}.toml")
+    linkage = replace(scene.linkage, ground_angle=math.radians(turned))
+    scene = replace(scene, linkage=linkage, loads=(), effects=(), tolerances=())
+    solution = fourbar.solve(scene, "position")
+    for angles, pin, foot in (
+        (solution.theta_2, solution.A, 0.0),
+        (solution.theta_4, solution.B, linkage.ground),
+    ):
+        assert -math.pi < angles[0] <= math.pi
+        assert np.abs(np.diff(angles)).max() < math.pi
+        away = foot * np.exp(1j * linkage.ground_angle)
+        direction = pin[:, 0] + 1j * pin[:, 1] - away
+        assert np.exp(1j * angles) == pytest.approx(direction / np.abs(direction))
