@@ -1790,3 +1790,37 @@ def test_the_default_csv_returns_to_the_last_digit(
         (count,) = re.findall(r"\d+ of \d+ numbers agree", told)
         counts.append(count)
     assert counts[0] == counts[1]
+
+
+@pytest.mark.parametrize(("digits", "power"), [(8, -7), (5, -4)])
+def test_a_right_table_of_fewer_digits_than_it_prints_is_told_the_tolerance(
+    digits: int,
+    power: int,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Rounded to so many digits, printed with 15; the option that is named agrees.
+
+    A number that is off by 1 % has no such line.
+    """
+    scene = MODELS / "thesis.toml"
+    numbers = fourbar.solve(fourbar.load(scene))
+    rows = [
+        f"{angle!r},{float(f'{torque:.{digits - 1}e}'):.14e}"
+        for angle, torque in zip(
+            numbers.theta_2.tolist(), numbers.torque.tolist(), strict=True
+        )
+    ]
+    table = tmp_path / "theirs.csv"
+    table.write_text("\n".join(["theta_2,torque", *rows]))
+    assert status(["check", str(scene), str(table)]) == FAILED
+    told = " ".join(capsys.readouterr().out.split())
+    assert f"all agree within 1e{power}: --rtol 1e{power + 1} judges so" in told
+    rtol = f"1e{power + 1}"
+    assert status(["check", str(scene), str(table), "--rtol", rtol]) == HOLDS
+    angle, torque = rows[7].split(",")
+    rows[7] = f"{angle},{1.01 * float(torque):.14e}"
+    table.write_text("\n".join(["theta_2,torque", *rows]))
+    capsys.readouterr()
+    assert status(["check", str(scene), str(table)]) == FAILED
+    assert "all agree within" not in capsys.readouterr().out

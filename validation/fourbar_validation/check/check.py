@@ -67,6 +67,24 @@ class Judgement:
         return len(self.findings) - self.not_judged
 
     @property
+    def agreed_power(self) -> int | None:
+        """Power of ten within which all numbers agree, as a part of each.
+
+        None if a tolerance was stated, or if one of them is off by more than any table
+        that is right in the digits it has.
+        """
+        if self.tolerance is not None or not self.differing or self.not_assembled:
+            return None
+        sizes = [math.hypot(*finding.ours) for finding in self.differing]
+        if not all(sizes):
+            return None
+        worst = max(
+            finding.difference / size
+            for finding, size in zip(self.differing, sizes, strict=True)
+        )
+        return math.ceil(math.log10(worst)) if worst <= FEWEST_DIGITS else None
+
+    @property
     def status(self) -> int:
         """Exit status; nothing compared is no success."""
         if self.differing or self.not_assembled or not self.compared:
@@ -275,6 +293,10 @@ def _list_cases_of_table(judgement: Judgement, name: str) -> Iterator[JunitCase]
 
 
 MOST_SHOWN_OF_EACH = 3
+FEWEST_DIGITS = 1e-4
+"""Part of each number by which a table may be off that is right, in fewer digits than
+it prints.
+"""
 
 
 def _write_extent(explanation: Explanation) -> str:
@@ -448,6 +470,11 @@ def show_judgement(
         else:
             together = "no single known mistake explains it"
         print_sentence(together)
+    power = judgement.agreed_power
+    if power is not None:
+        print_sentence(
+            f"all agree within 1e{power}: --rtol 1e{power + 1} judges so",
+        )
     print_sentence(judgement.sentence())
 
 
