@@ -36,7 +36,7 @@ from fourbar.studies.passing import say_nowhere
 from fourbar.writing import write_text
 
 _ENDINGS = {
-    **{kind: kind for kind in ("svg", "png", "pdf", "csv")},
+    **{kind: kind for kind in ("svg", "png", "pdf", "csv", "gif")},
     "mjcf": "xml",
     "page": "html",
 }
@@ -77,6 +77,17 @@ def evaluate_scene(
         "pictures": {},
         "toml": None,
     }
+    data["traced"] = None
+    if scene.picture is not None:
+        picture = scene.picture
+        data["traced"] = {
+            "file": picture.name,
+            "origin": picture.origin,
+            "scale": picture.scale,
+            "angle": picture.angle,
+            "opacity": picture.opacity,
+            "shift": scene.origin,
+        }
     data["handles"] = [handle.drawn() for handle in list_handles(scene)]
     shown_units = {**COMMON, **units}
     facts = None
@@ -135,7 +146,7 @@ class Exports:
             write_text(path, write_csv(solve(scene, find_last_stage(scene)), units))
         elif name == "mjcf":  # which has units of its own
             write_text(path, write_mjcf_for(scene))
-        elif name == "page":
+        elif name in ("page", "gif"):
             write_animation(scene, path, units=units)
         else:
             draw(scene, path, units=units)

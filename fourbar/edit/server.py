@@ -424,6 +424,24 @@ class Report(_Guarded):
         self.finish(self.bench.check.report.read_bytes())
 
 
+class TracedPictureFile(_Guarded):
+    """The picture under the drawing: an image alone, whatever an SVG holds."""
+
+    def get(self, token: str) -> None:
+        """Write the file; 404 where there is none that can be read."""
+        picture = self.bench.session.now.scene.picture
+        if picture is None:
+            raise HTTPError(404)
+        try:
+            content, kind = picture.read()
+        except InputError:
+            raise HTTPError(404) from None
+        self.set_header("Content-Type", kind)
+        policy = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
+        self.set_header("Content-Security-Policy", policy)
+        self.finish(content)
+
+
 class _PageLine(WebSocketHandler, _Guarded):
     """The line between a page and the session."""
 
@@ -494,7 +512,12 @@ def _make_application(bench: Workbench, port: int) -> Application:
         "bench": bench,
         "hosts": frozenset(f"{name}:{port}" for name in (_LOOPBACK, "localhost")),
     }
-    routes = {"": Page, "report": Report, "live": _PageLine}
+    routes: dict[str, type[_Guarded]] = {
+        "": Page,
+        "report": Report,
+        "live": _PageLine,
+        "picture": TracedPictureFile,
+    }
     return Application(
         [
             (rf"/(?P<token>[A-Za-z0-9_-]+)/{place}", handler, served)

@@ -1,5 +1,6 @@
 """One scene that is being changed: its text, its history and its kept states."""
 
+import base64
 import hashlib
 import json
 import os
@@ -7,8 +8,9 @@ import re
 import secrets
 import tomllib
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
-from itertools import chain, pairwise, product
+from itertools import chain, count, pairwise, product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,6 +30,7 @@ from fourbar.quantities.units import UnitError, find_unit, to_si
 from fourbar.scene import Scene
 from fourbar.scene.drawing import DRAWN_WORD
 from fourbar.scene.motion import COMMAND_NAMES, SIDES, STROKE_COMMAND, require_steps
+from fourbar.scene.pictures import TracedPicture
 from fourbar.show.summary import summarize
 from fourbar.show.units import find_length, units, units_of_scene
 from fourbar.solution import Conversion, Solution, find_unit_in
@@ -621,6 +624,39 @@ def _restate(session: Session, asked: dict[str, Any]) -> None:
     )
 
 
+_ENDING_OF_PICTURE = {
+    "data:image/png": "png",
+    "data:image/jpeg": "jpg",
+    "data:image/svg+xml": "svg",
+}
+
+
+def _take_picture(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
+    """Keep a picture beside the scene, never over a file, and lay it under the drawing.
+
+    `data`: its data URI.
+    """
+    kind, _, text = str(asked["data"]).partition(";base64,")
+    if kind not in _ENDING_OF_PICTURE:
+        raise InputError("picture", kind[:40], "must be a PNG, JPEG or SVG picture")
+    content = base64.b64decode(text, validate=True)
+    folder = session.path.parent
+    for number in count(1):
+        mark = "" if number == 1 else f"-{number}"
+        name = f"{session.path.stem}{mark}.{_ENDING_OF_PICTURE[kind]}"
+        picture = TracedPicture(name, folder=str(folder))
+        with suppress(FileExistsError), open(folder / name, "xb") as file:
+            file.write(content)
+            break
+    try:
+        picture.read()
+    except InputError:
+        (folder / name).unlink()
+        raise
+    session.change(lambda document: document.put(["picture"], {"file": name}))
+    return {"note": f"the picture is {name}"}
+
+
 def _draw_pins(session: Session, asked: dict[str, Any]) -> None:
     """State four pins in the plane, given in a unit, in place of those of the file."""
     unit = str(asked["unit"])
@@ -698,6 +734,7 @@ _ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] 
     "command": _command_other,
     "restate": _restate,
     "draw": _draw_pins,
+    "picture": _take_picture,
     "save": _save_file,
     "export": _export,
     "bodies": lambda session, asked: {

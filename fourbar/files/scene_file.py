@@ -67,7 +67,7 @@ from fourbar.scene.motion import (
     Sweep,
 )
 from fourbar.scene.numbers import Point, Tolerance
-from fourbar.scene.pictures import Picture
+from fourbar.scene.pictures import Picture, TracedPicture
 from fourbar.studies.keys import (
     COMMAND_KEYS,
     find_misfit,
@@ -99,6 +99,7 @@ SCENE_TABLES = (
     "loads",
     "effects",
     "tolerances",
+    "picture",
 )
 _A_LINE = "a drive along a line has from and to alone"
 _A_POINT = "a force acts at a place: state point, from_pin or from_centre"
@@ -266,6 +267,7 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
         points,
         drive=drive,
         drawing=drawing,
+        picture=_read_traced(read, top.get("picture"), folder),
     )
     if drawing is not None:
         scene = choose_assembly(scene, drawing)
@@ -340,6 +342,34 @@ def _read_pictures(
         )
         for name, number in BAR_NUMBERS.items()
         if "picture" in bars.get(name, {})
+    )
+
+
+def _read_traced(read: Reader, value: object, folder: str) -> TracedPicture | None:
+    """Read the picture under the drawing; its file is read when it is shown."""
+    if value is None:
+        return None
+    stated = ("file", "origin", "scale", "angle", "opacity")
+    entry = read.table("picture", value, stated)
+    origin = entry.get("origin")
+    if origin is not None:
+        if not isinstance(origin, list) or len(origin) != 2:
+            raise read.refuse("picture.origin", origin, "must be a pixel [x, y]")
+        x, y = (read.number("picture.origin", number) for number in origin)
+        origin = (x, y)
+    scale = entry.get("scale")
+    if scale is not None:
+        scale = read.quantity("picture.scale", scale, "m", POSITIVE)
+    opacity = read.number("picture.opacity", entry.get("opacity", 0.5))
+    if not 0.0 <= opacity <= 1.0:
+        raise read.refuse("picture.opacity", opacity, "must be from 0 to 1")
+    return TracedPicture(
+        read.text("picture.file", entry.get("file")),
+        origin,
+        scale,
+        read.quantity("picture.angle", entry.get("angle"), "rad", default=0.0),
+        opacity,
+        folder,
     )
 
 

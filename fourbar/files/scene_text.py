@@ -48,6 +48,7 @@ from fourbar.scene.motion import (
     Sine,
     Sweep,
 )
+from fourbar.scene.pictures import TracedPicture
 from fourbar.studies.keys import find_misfit, list_entries
 from fourbar.writing import write_text
 
@@ -66,7 +67,8 @@ def save(scene: Scene, path: str | Path) -> None:
     expect("scene", scene, Scene)
     expect("path", path, str, Path)
     pictures = tuple(picture.moved(Path(path).parent) for picture in scene.pictures)
-    write_text(path, dump(replace(scene, pictures=pictures)))
+    traced = scene.picture and scene.picture.moved(Path(path).parent)
+    write_text(path, dump(replace(scene, pictures=pictures, picture=traced)))
 
 
 def dump(scene: Scene) -> str:
@@ -112,10 +114,24 @@ def dump(scene: Scene) -> str:
         *loads,
         ("effects", described["effects"]),
         ("tolerances", _write_tolerances(read_back)),
+        ("picture", _write_traced(scene.picture)),
     ]
     return "\n".join(
         _write_toml_table(name, entries) for name, entries in tables if entries
     )
+
+
+def _write_traced(picture: TracedPicture | None) -> dict[str, Any]:
+    """Write the picture under the drawing."""
+    if picture is None:
+        return {}
+    entries: dict[str, Any] = {"file": picture.name}
+    if picture.origin is not None:
+        entries["origin"] = [*picture.origin]
+    if picture.scale is not None:
+        entries["scale"] = write_quantity(picture.scale, "m")
+    angle = write_quantity(picture.angle, "rad")
+    return entries | {"angle": angle, "opacity": picture.opacity}
 
 
 def _add_strokes(effects: dict[str, Any], scene: Scene) -> None:

@@ -1,12 +1,14 @@
-"""Pictures of the bars: named in a scene file, laid along the bar by `fourbar animate`.
+"""Pictures that a scene file names: of bars, and one under the drawing.
 
-A scene file may be a stranger's: it can name a file in its own folder or below, no
-other, and what is read there must be a PNG or JPEG of moderate size.
+`fourbar animate` lays a picture along its bar; the workbench shows the other one to
+trace a linkage. A scene file may be a stranger's: it can name a file in its own folder
+or below, no other, and what is read there must be a picture of moderate size.
 """
 
 import base64
+import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from fourbar.errors import InputError, expect
@@ -16,6 +18,8 @@ from fourbar.writing import read_bytes
 LARGEST_PICTURE = 2_000_000
 """Bytes of one picture: a page with three of them still opens quickly."""
 LONGEST_FILE_NAME = 200
+LONGEST_SVG_HEAD = 2000
+"""Bytes within which an SVG file has its first tag."""
 _RASTER = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 """First bytes of the formats that may be attached. SVG may not, because it can carry
 scripts.
@@ -24,6 +28,98 @@ ALLOWED_PICTURE = (
     "must be the name of a PNG or JPEG file next to the scene file or below its folder,"
     ' like "coupler.png"'
 )
+
+
+def _require_name(key: str, name: object) -> None:
+    """Refuse a name that leads out of the scene's folder."""
+    parts = name.split("/") if isinstance(name, str) else []
+    plain = all(
+        part not in ("", ".", "..") and not set(part) & set('\\:*?"<>|')
+        for part in parts
+    )
+    if (
+        not isinstance(name, str)
+        or not plain
+        or not name.isprintable()
+        or len(name) > LONGEST_FILE_NAME
+    ):
+        raise InputError(key, name, ALLOWED_PICTURE)
+
+
+def _find_file(key: str, folder: str, name: str) -> Path:
+    """Return the path of a picture; InputError where a link leads out of the folder."""
+    root = Path(folder).resolve()
+    file = (root / name).resolve()
+    if not file.is_relative_to(root):
+        raise InputError(
+            key,
+            name,
+            f"leads out of the scene's folder; {ALLOWED_PICTURE}",
+        )
+    return file
+
+
+def _name_from(key: str, folder: str, name: str, target: Path) -> str:
+    """Return the name that a scene file in another folder has for a picture."""
+    file = Path(folder).resolve() / name
+    if not file.is_relative_to(target.resolve()):
+        raise InputError(
+            key,
+            os.fspath(file),
+            f"does not lie in {os.fspath(target.resolve())}: copy it there first",
+        )
+    return PurePosixPath(file.relative_to(target.resolve())).as_posix()
+
+
+@dataclass(frozen=True, slots=True)
+class TracedPicture:
+    """The picture that lies under the drawing in the workbench.
+
+    Parameters
+    ----------
+    name : as that of `Picture`; a PNG, JPEG or SVG file.
+    origin : pixel (x, y), from the upper left, that lies in the drawing's origin; left
+        out: the middle of the picture.
+    scale : length of a pixel, m; left out: the picture is as wide as the drawing.
+    angle : by which it is turned counter-clockwise, rad.
+    opacity : 0 to 1.
+    folder : where the scene file is.
+    """
+
+    name: str
+    origin: tuple[float, float] | None = None
+    scale: float | None = None
+    angle: float = 0.0
+    opacity: float = 0.5
+    folder: str = "."
+
+    def __post_init__(self) -> None:
+        _require_name("picture.file", self.name)
+        expect("picture.folder", self.folder, str, Path)
+        numbers = (*(self.origin or ()), self.scale or 1.0, self.angle, self.opacity)
+        if not all(map(math.isfinite, numbers)):
+            raise InputError("picture", numbers, "must be finite numbers")
+        if self.scale is not None and self.scale <= 0.0:
+            raise InputError("picture.scale", self.scale, "must be positive", unit="m")
+        if not 0.0 <= self.opacity <= 1.0:
+            raise InputError("picture.opacity", self.opacity, "must be from 0 to 1")
+
+    def read(self) -> tuple[bytes, str]:
+        """Return the content of the file and its type, as a browser names it."""
+        key = "picture.file"
+        file = _find_file(key, self.folder, self.name)
+        content = read_bytes(file, key, LARGEST_PICTURE, shown=self.name)
+        kind = find_kind(content)
+        if kind is None and b"<svg" in content[:LONGEST_SVG_HEAD]:
+            kind = "image/svg+xml"
+        if kind is None:
+            raise InputError(key, self.name, "must be a PNG, JPEG or SVG picture")
+        return content, kind
+
+    def moved(self, folder: Path) -> "TracedPicture":
+        """Return the same file as a scene file in another folder names it."""
+        name = _name_from("picture.file", self.folder, self.name, folder)
+        return replace(self, name=name, folder=os.fspath(folder))
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,21 +143,7 @@ class Picture:
     def __post_init__(self) -> None:
         object.__setattr__(self, "bar", require_bar("picture.bar", self.bar))
         expect("picture.folder", self.folder, str, Path)
-        if isinstance(self.name, str):
-            parts = self.name.split("/")
-        else:
-            parts = []
-        plain = all(
-            part not in ("", ".", "..") and not set(part) & set('\\:*?"<>|')
-            for part in parts
-        )
-        if (
-            not parts
-            or not plain
-            or not self.name.isprintable()
-            or len(self.name) > LONGEST_FILE_NAME
-        ):
-            raise InputError(self.key, self.name, ALLOWED_PICTURE)
+        _require_name(self.key, self.name)
 
     @property
     def key(self) -> str:
@@ -74,14 +156,7 @@ class Picture:
         Raises InputError where a link leads out of the folder, and as `encode_picture`
         does.
         """
-        folder = Path(self.folder).resolve()
-        file = (folder / self.name).resolve()
-        if not file.is_relative_to(folder):
-            raise InputError(
-                self.key,
-                self.name,
-                f"leads out of the scene's folder; {ALLOWED_PICTURE}",
-            )
+        file = _find_file(self.key, self.folder, self.name)
         return encode_picture(self.key, file, self.name)
 
     def moved(self, folder: Path) -> "Picture":
@@ -89,19 +164,16 @@ class Picture:
 
         Raises InputError where it does not lie in that folder.
         """
-        file = Path(self.folder).resolve() / self.name
-        target = folder.resolve()
-        if not file.is_relative_to(target):
-            raise InputError(
-                self.key,
-                os.fspath(file),
-                f"does not lie in {os.fspath(target)}: copy it there first",
-            )
-        return Picture(
-            self.bar,
-            PurePosixPath(file.relative_to(target)).as_posix(),
-            os.fspath(folder),
-        )
+        name = _name_from(self.key, self.folder, self.name, folder)
+        return Picture(self.bar, name, os.fspath(folder))
+
+
+def find_kind(content: bytes) -> str | None:
+    """Return the type of a PNG or JPEG by its first bytes; None for any other."""
+    for magic, kind in _RASTER.items():
+        if content.startswith(magic):
+            return kind
+    return None
 
 
 def encode_picture(key: str, path: str | Path, shown: str | None = None) -> str:
@@ -112,10 +184,7 @@ def encode_picture(key: str, path: str | Path, shown: str | None = None) -> str:
     """
     name = str(path) if shown is None else shown
     content = read_bytes(path, key, LARGEST_PICTURE, shown=name)
-    kind = next(
-        (kind for magic, kind in _RASTER.items() if content.startswith(magic)),
-        None,
-    )
+    kind = find_kind(content)
     if kind is None:
         raise InputError(key, name, "must be a PNG or JPEG picture")
     return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"

@@ -44,7 +44,7 @@ from fourbar.scene.motion import (
     Sweep,
 )
 from fourbar.scene.numbers import Point, Tolerance
-from fourbar.scene.pictures import Picture
+from fourbar.scene.pictures import Picture, TracedPicture
 
 if TYPE_CHECKING:
     from fourbar.effects import ForceDrive, LinearDrive, Load, Place
@@ -83,6 +83,7 @@ class Scene:
         coordinates.
     coordinates : keys of the places that a scene file states by x and y, with these, m;
         a file is written likewise.
+    picture : that lies under the drawing in the workbench.
     met_lengths : lengths that a scene file states and those that are read for them, m,
         if these have an equality that the stated ones miss by rounding.
     """
@@ -100,6 +101,7 @@ class Scene:
     tolerances: tuple[Tolerance, ...] = ()
     drive: "ForceDrive | None" = None
     drawing: DrawnPins | None = None
+    picture: TracedPicture | None = None
     coordinates: tuple[tuple[str, tuple[float, float]], ...] = field(
         default=(),
         repr=False,
@@ -114,6 +116,7 @@ class Scene:
     def __post_init__(self) -> None:
         one = {"linkage": FourBar, "motion": Motion, "title": str, "source": str}
         expect("drawing", self.drawing, DrawnPins, type(None))
+        expect("picture", self.picture, TracedPicture, type(None))
         for name, kind in one.items():
             expect(name, getattr(self, name), kind)
         many = {

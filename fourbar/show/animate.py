@@ -451,6 +451,7 @@ def write_page(
         style_hash=_hash_content(style),
         script=script,
         script_hash=_hash_content(script),
+        images=f" http://{live.split('/')[2]}" if live else "",
         connect=f"connect-src ws://{live.split('/')[2]}; " if live else "",
         panel=asset("edit.html") if live else "",
         strip=_STRIP if live else "",

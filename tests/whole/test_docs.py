@@ -230,9 +230,10 @@ def test_the_engine_of_the_guide_agrees(
 
 def test_the_scene_file_is_one(checkout: Path) -> None:
     # a scene; a bar by its material; pins in place of the lengths; an example of each
-    # effect
-    text, material, pins, _ = blocks("toml", read("docs/scene-file.md"))
+    # effect; a picture
+    text, material, pins, _, picture = blocks("toml", read("docs/scene-file.md"))
     fourbar.files.loads(pins)
+    assert fourbar.files.loads(pins + picture).picture.scale == 0.5e-3
     lengths = text[text.index("[lengths]") : text.index("[bars.input]")]
     steel = fourbar.files.loads(lengths + material).linkage.coupler
     assert steel.mass == pytest.approx(7850.0 * 0.02 * 0.005 * steel.length)

@@ -70,6 +70,71 @@ function dragged(place) {
   ask(asked, null, holding.what === "A" ? Math.atan2(to[1], to[0]) : null);
 }
 
+// ---- a picture to trace: it lies under the drawing, in the drawing's coordinates ----------------------
+const traced = make(picture, "image", { id: "traced", preserveAspectRatio: "none" }), LARGEST = 1.4e6;   // bytes that a request can take
+picture.insertBefore(traced, parts.ground);
+let tracedSize = null, measured = null;   // pixels of the picture; the points between which a length is known
+const tracedScale = () => data.traced.scale ?? 1.2 * Math.max(...lengths) / tracedSize[0];
+function ofPixel([x, y]) {   // the place of a pixel, from O2
+  const { origin, angle, shift } = data.traced, k = tracedScale(), [u, v] = origin ?? tracedSize.map(n => 0.5 * n), c = Math.cos(angle), s = Math.sin(angle);
+  return [k * (c * (x - u) + s * (y - v)) - shift[0], k * (s * (x - u) - c * (y - v)) - shift[1]];
+}
+tracedCorners = () => data.traced && tracedSize ? [[0, 0], [tracedSize[0], 0], tracedSize, [0, tracedSize[1]]].map(ofPixel) : [];
+function drawTraced() {
+  traced.style.display = data.traced ? "" : "none";
+  if (!data.traced) return;
+  const source = `picture?${encodeURIComponent(data.traced.file)}`;
+  if (traced.getAttribute("href") !== source) {
+    traced.setAttribute("href", source);
+    tracedSize = null;
+    const probe = new Image();
+    probe.onload = () => { tracedSize = [probe.naturalWidth, probe.naturalHeight]; refresh(); if (sketch && !sketch.pins.length) beginSketch(); };
+    probe.onerror = () => say(`${data.traced.file}: the picture cannot be read`, true);
+    probe.src = source;
+  }
+  if (!tracedSize) return;
+  const [x, y] = toScreen(ofPixel([0, 0]));
+  set(traced, { width: tracedSize[0], height: tracedSize[1], opacity: data.traced.opacity, transform: `translate(${x} ${y}) rotate(${-data.traced.angle * DEG}) scale(${tracedScale() * view.k})` });
+}
+async function takePicture(file) {
+  if (!/^image\/(png|jpeg|svg\+xml)$/.test(file?.type)) { say("A picture is a PNG, JPEG or SVG file.", true); return; }
+  let blob = file;
+  if (file.type !== "image/svg+xml") {
+    const bitmap = await createImageBitmap(file), canvas = element("canvas");   // turned as its EXIF says
+    for (let share = 1; blob === file || blob.size > LARGEST; share *= 0.8) {
+      Object.assign(canvas, { width: Math.round(share * bitmap.width), height: Math.round(share * bitmap.height) });
+      canvas.getContext("2d").drawImage(bitmap, 0, 0, canvas.width, canvas.height);
+      blob = await new Promise(done => canvas.toBlob(done, file.type, 0.9));
+    }
+  } else if (blob.size > LARGEST) { say(`An SVG picture has ${LARGEST} bytes at most.`, true); return; }
+  const reader = new FileReader();
+  reader.onload = () => ask({ do: "picture", data: reader.result });
+  reader.readAsDataURL(blob);
+}
+byId("picture-file").addEventListener("change", event => { takePicture(event.target.files[0]); event.target.value = ""; });
+document.addEventListener("paste", event => { const [file] = event.clipboardData.files; if (file) takePicture(file); });
+document.addEventListener("dragover", event => event.preventDefault());
+document.addEventListener("drop", event => { event.preventDefault(); const [file] = event.dataTransfer.files; if (file) takePicture(file); });
+byId("measure").addEventListener("click", () => {
+  if (sketch) endSketch();
+  measured = [];
+  document.body.classList.add("measuring");
+  say("Click two points of the picture between which you know the length.");
+});
+picture.addEventListener("click", event => {
+  if (!measured) return;
+  const [x, y] = placeOf(event);
+  measured.push([x, y]);
+  make(sketched, "path", { class: "cross", d: `M${x - 9} ${y}H${x + 9}M${x} ${y - 9}V${y + 9}` });
+  if (measured.length < 2) return;
+  const [p, q] = measured, pixels = Math.hypot(q[0] - p[0], q[1] - p[1]) / view.k / tracedScale(), stated = window.prompt("Length between the two points", `100 ${unit.name}`);
+  measured = null;
+  sketched.replaceChildren();
+  document.body.classList.remove("measuring");
+  const [, long, of] = /^\s*([\d.]+)\s*(.+)$/.exec(stated ?? "") ?? [];
+  if (long > 0 && pixels > 0) ask({ do: "set", path: ["picture", "scale"], value: `${Number((long / pixels).toPrecision(6))} ${of}` }, ["picture", "scale"]);
+});
+
 // ---- a linkage drawn by four clicks ----------------------------------------------------------------
 const PINS_IN_TURN = ["O2", "A", "B", "O4"], JOINED = { O2: "the input to the ground", A: "the coupler to the input", B: "the output to the coupler", O4: "the output to the ground" };
 const sketched = make(picture, "g", { id: "sketched" });
@@ -82,7 +147,10 @@ picture.before(sketchBar);
 let sketch = null;   // pins placed so far, and where the next one would be
 function beginSketch() {
   if (playing) play(false);
-  const origin = [0.35 * view.width, 0.6 * view.height];   // of what is typed
+  const origin = data.traced ? toScreen(data.traced.shift.map(x => -x)) : [0.35 * view.width, 0.6 * view.height];   // of what is typed
+  const wide = view.width / view.k * unit.factor, decade = 10 ** Math.floor(Math.log10(wide));
+  byId("sketch-width").value = `${data.traced ? wide : Math.round(wide / decade) * decade} ${unit.name}`;
+  byId("sketch-width").parentElement.hidden = Boolean(data.traced);
   sketch = { pins: [], origin, here: [...origin], typed: false };
   document.body.classList.add("sketching");
   sketchBar.hidden = false;
@@ -99,8 +167,14 @@ function drawSketch() {
   const next = PINS_IN_TURN[sketch.pins.length];
   byId("next-pin").textContent = `Click where pin ${next} joins ${JOINED[next]}; or move the cross with the arrow keys and press Enter.`;
   sketched.replaceChildren();
-  for (let x = 0.1; x < 1; x += 0.1) make(sketched, "line", { class: "grid", x1: x * view.width, x2: x * view.width, y1: 0, y2: view.height });
-  for (let y = 0.1 * view.width; y < view.height; y += 0.1 * view.width) make(sketched, "line", { class: "grid", x1: 0, x2: view.width, y1: y, y2: y });
+  const grid = gridOf();
+  [view.width, view.height].forEach((size, j) => {
+    for (let n = Math.ceil(-sketch.origin[j] / grid.pixels); sketch.origin[j] + n * grid.pixels < size; n++) {
+      const at = sketch.origin[j] + n * grid.pixels, number = String(Number(((j ? -n : n) * grid.step).toPrecision(6)));
+      make(sketched, "line", { class: "grid", ...j ? { x1: 0, x2: view.width, y1: at, y2: at } : { x1: at, x2: at, y1: 0, y2: view.height } });
+      if (n % 2 === 0) make(sketched, "text", { class: "small", ...j ? { x: 3, y: at - 3 } : { x: at + 3, y: view.height - 4 } }).textContent = number;
+    }
+  });
   const chain = [...sketch.pins, sketch.here];
   chain.slice(1).forEach((q, n) => make(sketched, "line", { class: `bar b${n + 2}`, x1: chain[n][0], y1: chain[n][1], x2: q[0], y2: q[1] }));
   sketch.pins.forEach(([x, y], n) => {
@@ -114,6 +188,16 @@ const sketchWidth = () => {
   const [, wide, unit] = /^\s*([\d.]+)\s*(.*)$/.exec(byId("sketch-width").value) ?? [null, "500", "mm"];
   return [Number(wide), unit];
 };
+// The grid: a round step of which some twenty fill the width, in the unit of the drawing.
+function gridOf() {
+  const [wide] = sketchWidth(), rough = wide / 20, decade = 10 ** Math.floor(Math.log10(rough)), step = [1, 2, 5, 10].find(m => m * decade >= rough) * decade;
+  return { step, pixels: step * view.width / wide };
+}
+// A place on the grid; Shift frees it, and so does a picture that is traced.
+function snapped(event) {
+  const place = placeOf(event), { pixels } = gridOf();
+  return event.shiftKey || data.traced ? place : place.map((x, j) => sketch.origin[j] + Math.round((x - sketch.origin[j]) / pixels) * pixels);
+}
 function putPin() {
   if (sketch.pins.push([...sketch.here]) < PINS_IN_TURN.length) { drawSketch(); return; }
   const [wide, unit] = sketchWidth(), grain = wide / view.width, [x0, y0] = sketch.origin;
@@ -125,8 +209,8 @@ const placeOf = event => {
   const box = picture.getBoundingClientRect();
   return [(event.clientX - box.left) * view.width / box.width, (event.clientY - box.top) * view.height / box.height];
 };
-picture.addEventListener("pointermove", event => { if (sketch) { sketch.here = placeOf(event); drawSketch(); } });
-picture.addEventListener("click", event => { if (sketch) { sketch.here = placeOf(event); putPin(); } });
+picture.addEventListener("pointermove", event => { if (sketch) { sketch.here = snapped(event); drawSketch(); } });
+picture.addEventListener("click", event => { if (sketch) { sketch.here = snapped(event); putPin(); } });
 picture.addEventListener("keydown", event => {
   if (!sketch || event.target !== picture || event.ctrlKey || event.metaKey) return;
   const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key], far = event.shiftKey ? 1 : 10;

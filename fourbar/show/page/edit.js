@@ -74,6 +74,7 @@ function take(about) {
   if (about.data && !about.compared && !(about.settled && (inFlight || waiting.length))) show(about, own);
   if (about.tolerances && data.summary) { data.tolerances = about.tolerances; furnishTolerances(); drawBands(); showSpreads(row); }
   if (about.note) say(about.note);
+  byId("exported").textContent = own?.request.do === "export" ? about.note ?? about.refused : "";
   if (about.bodies) { byId("bodies-picture").src = about.bodies; byId("bodies-picture").hidden = false; }
   if (own && about.data) {
     const spent = performance.now() - own.since;
@@ -113,6 +114,7 @@ function show(about, own) {
   byId("reference").replaceChildren(...about.kept.map(name => new Option(name, name, false, name === about.reference)));
   document.querySelector("h1").textContent = document.title = about.plain.title || "Four-bar linkage";
   document.querySelector(".source").textContent = about.plain.source ?? "";
+  byId("measure").hidden = !data.traced;
   byId("computing").hidden = "summary" in about.data;
   showStrip();
   if (about.data.summary) byId("summary").replaceChildren(...about.data.summary.map(lineOf));
@@ -213,5 +215,5 @@ document.addEventListener("keydown", event => {
   ask({ do: key === "s" ? "save" : key === "y" || event.shiftKey ? "redo" : "undo" });
 });
 const drawn = draw;
-draw = position => { drawn(position); drawHandles(); markPosition(); };
+draw = position => { drawn(position); drawTraced(); drawHandles(); markPosition(); };
 connect();

@@ -1,5 +1,5 @@
 // ---- the fields of a scene, made from its file ---------------------------------------------------
-const ORDER = ["title", "source", "lengths", "pins", "bars", "motion", "drive", "points", "loads", "effects", "tolerances"];
+const ORDER = ["title", "source", "lengths", "pins", "bars", "motion", "drive", "points", "loads", "effects", "tolerances", "picture"];
 let offers = null, plain = {}, shape = "", typing = 0;
 const fieldId = path => `field:${path.join("/")}`;
 const entryAt = (node, path) => path.reduce((inner, step) => inner?.[step], node);
@@ -28,7 +28,7 @@ function commanded() {
 const without = (table, left) => Object.fromEntries(Object.entries(table).filter(([key]) => key !== left));
 // The empty fields of a table: those that apply beside what is stated.
 function fieldsAt(path, example) {
-  if (!path.length && plain.pins) return without(example, "lengths");   // the pins state lengths and assembly
+  if (!path.length) return without(without(example, plain.pins ? "lengths" : ""), plain.picture ? "" : "picture");   // the pins state lengths and assembly
   if (path.length !== 1) return example;
   if (path[0] === "drive" && plain.drive?.from) return {};
   if (path[0] !== "motion") return example;
@@ -101,6 +101,7 @@ function refuse(path, words) {
   if (input) input.setAttribute("aria-invalid", String(words !== ""));
   place.textContent = words;
   place.hidden = words === "";
+  if (words) byId("undo").disabled = false;   // it takes the entry back
 }
 
 // Whether what a field says is no state yet: it was refused, or the answer is on its way.
@@ -133,14 +134,23 @@ function group(path, node, example) {
     box.append(other);
   }
   if ((path.length > 1 || path[0] === "drive" && node?.from) && entryAt(plain, path) !== undefined && !(["bars", "pins"].includes(path[0]) && path.length === 2) && !["from", "to"].includes(path[path.length - 1])) {
-    const take = element("button", { type: "button", className: "take", textContent: `Remove ${labelOf(path)}` });
+    const take = element("button", { type: "button", className: "take", textContent: `Remove ${path.slice(path.length > 2 ? -2 : -1).map((_, n, last) => labelOf(path.slice(0, path.length - last.length + n + 1))).join(", ")}` });
     take.addEventListener("click", () => ask({ do: "remove", path }));
     box.append(take);
   }
   return box;
 }
 
-const branchOf = (path, node, model) => element("fieldset", { className: "group" }, element("legend", {}, labelOf(path)), group(path, node, scalar(model) ? {} : model));
+// A table of the file: its name opens and closes it, which is the index of entries where the page is narrow.
+function branchOf(path, node, model) {
+  const inner = group(path, node, scalar(model) ? {} : model);
+  if (path.length > 1) return element("fieldset", { className: "group" }, element("legend", {}, labelOf(path)), inner);
+  const made = element("details", { className: "table" }, element("summary", {}, labelOf(path)), inner);
+  made.open = opened[path[0]] ?? (window.innerWidth > 860 || path[0] === "lengths");
+  made.addEventListener("toggle", () => { opened[path[0]] = made.open; });
+  return made;
+}
+const opened = {};   // tables that were opened or closed by hand
 
 // Buttons for what can be added here.
 function partsAt(path) {

@@ -60,12 +60,14 @@ function barPoint(p, k, r) {
 
 const coupler = p => barPoint(p, 3, data.centres[3] ?? [0.5 * lengths[2], 0]);
 
+let tracedCorners = () => [];   // of a picture that is traced
 let held = false;   // while something is dragged the scale stays
 // Everything the sweep reaches fits into the picture, so that the scale does not change while it moves.
 function fit() {
   view.width = Math.max(280, picture.parentElement.clientWidth);
   const small = view.width < 480;
-  view.height = Math.round(small ? view.width : Math.min(560, 0.68 * view.width));
+  const most = lineAddress ? Math.max(240, window.innerHeight - 455) : 560;   // in the workbench curve and controls are seen too
+  view.height = Math.round(Math.min(most, 560, (small ? 1 : 0.68) * view.width));
   picture.classList.toggle("small", small);
   set(picture, { viewBox: `0 0 ${view.width} ${view.height}` });
   const points = [[0, 0]], tips = [], curve = [], traces = [];
@@ -81,6 +83,7 @@ function fit() {
     curve.push([broken ? "M" : "L", g]);
     broken = false;
   }
+  points.push(...tracedCorners());
   if (!held) Object.assign(view, fitted(points, tips, small ? 30 : 58));
   parts.curve.setAttribute("d", curve.map(([step, g]) => step + toScreen(g).map(v => v.toFixed(2)).join(" ")).join(""));
   parts.traces.replaceChildren();   // in metres: the group carries the scale

@@ -495,6 +495,25 @@ def test_the_line_of_a_page_that_does_not_read_is_dropped(
     assert not caplog.records
 
 
+def test_the_picture_is_served_as_an_image_alone(bench, path: Path) -> None:
+    """An SVG opened by its address runs no script and reaches nothing here."""
+
+    async def ask(made: Workbench, address: str) -> None:
+        assert await status(address + "picture") == 404
+        path.write_text(path.read_text() + '[picture]\nfile = "a.svg"\n')
+        line = await page(address)
+        await told(line, {"do": "text", "text": path.read_text()})
+        assert await status(address + "picture") == 404
+        path.with_name("a.svg").write_text("<svg><script/></svg>")
+        answer = await AsyncHTTPClient(force_instance=True).fetch(address + "picture")
+        assert answer.body == b"<svg><script/></svg>"
+        assert answer.headers["Content-Type"] == "image/svg+xml"
+        policy = answer.headers["Content-Security-Policy"]
+        assert "default-src 'none'" in policy and policy.endswith("sandbox")
+
+    bench(ask)
+
+
 def half_open(address: str, number: int) -> list[socket.socket]:
     """Connections that begin a request and say no more."""
     made = []

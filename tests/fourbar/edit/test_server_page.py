@@ -97,9 +97,10 @@ def click_pins(driver, width: str, *pixels: tuple[float, float]) -> None:
     picture = driver.find_element("id", "picture")
     middle = picture.size["width"] / 2, picture.size["height"] / 2
     for x, y in pixels:
-        ActionChains(driver).move_to_element_with_offset(
+        off_the_grid = ActionChains(driver).key_down(Keys.SHIFT)
+        off_the_grid.move_to_element_with_offset(
             picture, x - middle[0], y - middle[1]
-        ).click().perform()
+        ).click().key_up(Keys.SHIFT).perform()
 
 
 def save(driver) -> None:
@@ -285,6 +286,12 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(
     assert not driver.find_element("id", "strip").is_displayed()
     said = driver.find_element("id", "next-pin").text
     assert said.startswith("Click where pin O2 joins the input to the ground; or")
+    on_grid = (
+        "const {pixels} = gridOf(), [x, y] = snapped({clientX: 300, clientY: 300})"
+    )
+    off = f"{on_grid}; return [x - sketch.origin[0], y - sketch.origin[1], pixels]"
+    x, y, pixel = driver.execute_script(off)
+    assert abs(math.remainder(x, pixel)) + abs(math.remainder(y, pixel)) < 1e-6
     pixels = {"O2": (120, 300), "A": (170, 220), "B": (400, 120), "O4": (380, 330)}
     click_pins(driver, "50 in", *pixels.values())
     scale = 50.0 / driver.find_element("id", "picture").size["width"]
@@ -466,7 +473,7 @@ def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(
         )
         if driver.execute_script(
             "return document.activeElement === document.querySelector('.editor"
-            " summary')"
+            " > details > summary')"
         ):
             break
     missing = driver.execute_script(
@@ -762,3 +769,90 @@ def test_a_change_beyond_ten_times_is_no_percentage(
         " changeOf(1e-17, 1), changeOf(0, 1)]"
     )
     assert said == [" (8.84e3 times)", " (+50\u00a0%)", " (\u22125.0\u00a0%)", "", ""]
+
+
+PHOTO = {"O2": (800, 1500), "A": (1000, 1150), "B": (1900, 900), "O4": (2200, 1500)}
+"""Pixels of the pins in a photo whose pixels are 0.25 mm."""
+CLICKS = 1.5e-3
+"""m: pins are clicked to half a pixel of the page, which is 1.7 mm in this photo."""
+
+
+@pytest.mark.slow
+def test_a_photo_is_traced_to_a_scene(chromium, opened, tmp_path: Path) -> None:
+    from PIL import Image
+
+    driver = chromium
+    noise = Image.effect_noise((3000, 2000), 60.0).convert("RGB")
+    noise.save(tmp_path / "photo.jpg", quality=97)  # larger than a request
+    driver.get(opened(tmp_path / "mine.toml"))
+    wait_for(driver, "offers && sketch")
+    driver.find_element("id", "picture-file").send_keys(str(tmp_path / "photo.jpg"))
+    wait_for(driver, "data.traced && tracedSize && sketch")
+    share = driver.execute_script("return tracedSize[0]") / 3000.0
+    picture = driver.find_element("id", "picture")
+
+    def click(pin: str) -> None:
+        pixel = [share * x for x in PHOTO[pin]]
+        x, y = driver.execute_script("return toScreen(ofPixel(arguments[0]))", pixel)
+        from_middle = x - picture.size["width"] / 2, y - picture.size["height"] / 2
+        chain = ActionChains(driver)
+        chain.move_to_element_with_offset(picture, *from_middle).click().perform()
+
+    driver.find_element("id", "measure").click()
+    click("O2")
+    click("O4")
+    driver.switch_to.alert.send_keys("350 mm")
+    driver.switch_to.alert.accept()
+    wait_for(driver, "data.traced.scale")
+    scale = driver.execute_script("return data.traced.scale") * share
+    assert scale == pytest.approx(0.25e-3, rel=0.01)
+    driver.find_element("id", "sketch").click()
+    for pin in PHOTO:
+        click(pin)
+    wait_for(driver, "plain.pins && at(row)")
+    lengths = driver.execute_script("return data.lengths")
+    for length, (one, other) in zip(
+        lengths, (("O2", "O4"), ("O2", "A"), ("A", "B"), ("B", "O4")), strict=True
+    ):
+        true = 0.25e-3 * math.dist(PHOTO[one], PHOTO[other])
+        assert length == pytest.approx(true, abs=2.0 * CLICKS), (one, other)
+    for pin, (x, y) in PHOTO.items():  # the linkage lies on the picture
+        off = driver.execute_script(
+            "const p = toScreen(at(row)[arguments[0]]), q ="
+            " toScreen(ofPixel(arguments[1])); return Math.hypot(p[0] - q[0], p[1] -"
+            " q[1])",
+            pin,
+            [share * x, share * y],
+        )
+        assert off < PIXELS, pin
+    save(driver)
+    scene = fourbar.load(tmp_path / "mine.toml")
+    assert scene.picture is not None and scene.picture.name == "mine.jpg"
+
+
+@pytest.mark.slow
+def test_what_one_drags_for_is_seen_without_a_scroll(
+    chromium,
+    opened,
+    tmp_path: Path,
+) -> None:
+    driver = chromium
+    path = tmp_path / "mine.toml"
+    path.write_text((MODELS / "crank_rocker.toml").read_text())
+    size = {"width": 1024, "height": 700, "deviceScaleFactor": 1, "mobile": False}
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    driver.get(opened(path))
+    wait_for(driver, AT_REST)
+    for name in ("picture", "chart", "forces", "torque", "strip"):
+        bottom = f"document.getElementById('{name}').getBoundingClientRect().bottom"
+        assert driver.execute_script(f"return {bottom}") <= 700, name
+    size |= {"width": 400, "height": 800}
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    driver.get(driver.current_url)
+    wait_for(driver, AT_REST)
+    driver.execute_script("scrollTo(0, document.documentElement.scrollHeight)")
+    for name in ("undo", "save"):
+        box = driver.find_element("id", name).rect
+        top = box["y"] - driver.execute_script("return scrollY")
+        assert 0 <= top <= 800 - box["height"], name
+    assert driver.execute_script("return document.documentElement.scrollHeight") < 6500

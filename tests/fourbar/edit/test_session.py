@@ -3,6 +3,7 @@
 Its text, its history, its answers and what is kept on the disk.
 """
 
+import base64
 import cmath
 import json
 import math
@@ -852,3 +853,47 @@ def test_new_entries_and_limits_have_the_units_of_the_scene(tmp_path: Path) -> N
     assert "s + l = 16 in < p + q = 19.1235 in" in data["summary"]
     # a mass that nobody weighed has no twelve digits, which its field would cut off
     assert stated["bars"]["coupler"]["mass"] == "0.5062 lb"
+
+
+@pytest.mark.parametrize(
+    ("kind", "content", "name"),
+    [
+        ("png", b"\x89PNG\r\n\x1a\n...", "scene.png"),
+        ("jpeg", b"\xff\xd8\xff...", "scene-2.jpg"),
+        ("svg+xml", b"<svg/>", "scene.svg"),
+    ],
+)
+def test_a_picture_is_kept_beside_the_scene_and_over_no_file(
+    session: Session,
+    kind: str,
+    content: bytes,
+    name: str,
+) -> None:
+    taken = session.path.with_name("scene.jpg")
+    taken.write_bytes(b"somebody's")
+    data = base64.b64encode(content).decode()
+    answer = session.do({"do": "picture", "data": f"data:image/{kind};base64,{data}"})
+    assert answer["plain"]["picture"] == {"file": name}
+    assert session.path.with_name(name).read_bytes() == content
+    assert taken.read_bytes() == b"somebody's"
+    answer = session.do({"do": "set", "path": ["picture", "scale"], "value": "0.25 mm"})
+    assert answer["data"]["traced"]["scale"] == 2.5e-4
+    session.do({"do": "draw", "pins": PINS_DRAWN, "unit": "in", "grain": 0.01})
+    traced = session.answer()["data"]["traced"]
+    assert traced["file"] == name
+    assert traced["shift"] == pytest.approx((0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    "data",
+    ["data:text/html;base64,PHN2Zz4=", "data:image/png;base64,PGh0bWw+", "photo.png"],
+)
+def test_what_is_no_picture_is_refused_and_leaves_no_file(
+    session: Session,
+    data: str,
+) -> None:
+    before = {*session.path.parent.iterdir()}
+    answer = session.do({"do": "picture", "data": data})
+    assert "must be a PNG, JPEG or SVG picture" in answer["refused"]
+    assert {*session.path.parent.iterdir()} == before
+    assert session.now.scene.picture is None

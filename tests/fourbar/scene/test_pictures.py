@@ -13,7 +13,7 @@ import fourbar
 from fourbar.cli import status
 from fourbar.errors import InputError
 from fourbar.files import dump, load, loads, save
-from fourbar.scene.pictures import LARGEST_PICTURE, Picture
+from fourbar.scene.pictures import LARGEST_PICTURE, Picture, TracedPicture
 from fourbar.show import animate
 from tests.fourbar.show.test_animate import PNG, embedded
 from tests.support.scenes import crank_rocker
@@ -158,3 +158,70 @@ def test_a_bar_has_one_picture_and_the_ground_none() -> None:
         replace(crank_rocker(), pictures=[Picture(3, "a.png"), Picture(3, "b.png")])
     with pytest.raises(InputError, match="2, 3 or 4"):
         Picture(1, "a.png")
+
+
+TRACED = (
+    '[picture]\nfile = "photo.jpg"\norigin = [120, 80.5]\nscale = "0.5 mm"\n'
+    'angle = "-3 deg"\nopacity = 0.25\n'
+)
+
+
+def test_the_picture_under_the_drawing_is_read_and_written_and_need_not_be_there(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "scene.toml"
+    file.write_text(LENGTHS + TRACED)
+    scene = load(file)
+    picture = scene.picture
+    assert picture is not None
+    assert (picture.origin, picture.scale) == ((120.0, 80.5), 5e-4)
+    assert (picture.angle, picture.opacity) == (pytest.approx(-0.0523598776), 0.25)
+    assert loads(dump(scene), str(file)).picture == picture
+    assert status(["analyze", str(file), "-o", str(tmp_path / "a.csv")]) == 0
+    file.write_text(LENGTHS + '[picture]\nfile = "photo.jpg"\n')
+    bare = load(file)
+    assert loads(dump(bare), str(file)).picture == bare.picture
+    assert bare.linkage == scene.linkage
+    (tmp_path / "inner").mkdir()
+    with pytest.raises(InputError, match="copy it there first"):
+        save(scene, tmp_path / "inner" / "scene.toml")
+
+
+@pytest.mark.parametrize(
+    ("stated", "words"),
+    [
+        ('file = "../photo.jpg"', "picture.file .*next to the scene file"),
+        ('file = "photo.jpg"\nscale = "0 mm"', "picture.scale .*> 0 with a unit"),
+        ('file = "photo.jpg"\nscale = "2 kg"', "picture.scale "),
+        ('file = "photo.jpg"\norigin = [1]', r"picture.origin .*pixel \[x, y\]"),
+        ('file = "photo.jpg"\nopacity = 1.5', "picture.opacity .*0 to 1"),
+        ('file = "photo.jpg"\ncolour = "red"', "picture.colour"),
+        ('scale = "1 mm"', "picture.file"),
+    ],
+)
+def test_a_wrong_entry_of_the_picture_is_refused(stated: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        loads(f"{LENGTHS}[picture]\n{stated}\n")
+
+
+@pytest.mark.parametrize(
+    ("content", "kind"),
+    [
+        (PNG, "image/png"),
+        (b"\xff\xd8\xff\xe0", "image/jpeg"),
+        (b"<?xml version='1.0'?>\n<svg/>", "image/svg+xml"),
+        (b"<html>", None),
+    ],
+)
+def test_what_is_traced_is_a_picture(
+    tmp_path: Path,
+    content: bytes,
+    kind: str | None,
+) -> None:
+    (tmp_path / "photo").write_bytes(content)
+    picture = TracedPicture("photo", folder=str(tmp_path))
+    if kind is None:
+        with pytest.raises(InputError, match="must be a PNG, JPEG or SVG picture"):
+            picture.read()
+    else:
+        assert picture.read() == (content, kind)
