@@ -653,7 +653,8 @@ def _take_picture(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     except InputError:
         (folder / name).unlink()
         raise
-    session.change(lambda document: document.put(["picture"], {"file": name}))
+    entries = {"file": name, "angle": "0 deg", "opacity": 0.5}
+    session.change(lambda document: document.put(["picture"], entries))
     return {"note": f"the picture is {name}"}
 
 

@@ -57,7 +57,7 @@ function chartFrame(chart, low, high) {
 // The curves of the data shown, as they stay when other data are.
 function captured(name) {
   const values = Object.fromEntries(QUANTITIES.filter(q => q[0] in table() || /^[va]_/.test(q[0]) && "omega_3" in table()).map(q => [q[0], column(q[0])]));
-  return { name, over: axis().values, axis: axis().name, values };
+  return { name, over: axis().values, axis: axis().name, values, paths: couplerPaths() };
 }
 const peakOf = values => values.reduce((most, v) => Math.abs(v) > Math.abs(most) ? v : most, 0);
 let unchanged = false;   // whether the scene is the one it is compared with

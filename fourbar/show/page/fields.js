@@ -28,7 +28,7 @@ function commanded() {
 const without = (table, left) => Object.fromEntries(Object.entries(table).filter(([key]) => key !== left));
 // The empty fields of a table: those that apply beside what is stated.
 function fieldsAt(path, example) {
-  if (!path.length) return without(without(example, plain.pins ? "lengths" : ""), plain.picture ? "" : "picture");   // the pins state lengths and assembly
+  if (!path.length) return without(example, plain.pins ? "lengths" : "");   // the pins state lengths and assembly
   if (path.length !== 1) return example;
   if (path[0] === "drive" && plain.drive?.from) return {};
   if (path[0] !== "motion") return example;

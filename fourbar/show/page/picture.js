@@ -60,6 +60,8 @@ function barPoint(p, k, r) {
 
 const coupler = p => barPoint(p, 3, data.centres[3] ?? [0.5 * lengths[2], 0]);
 
+// Paths of the coupler's mass centre and of the scene's points, in metres: those of a state that is kept are a target.
+const couplerPaths = () => [coupler, ...data.points.map(point => p => framed(p, point.bar, point.at))].map(place => grid.map((_, i) => at(i) && `${i && at(i - 1) ? "L" : "M"}${place(at(i)).join(" ")}`).filter(Boolean).join(""));
 let tracedCorners = () => [];   // of a picture that is traced
 let held = false;   // while something is dragged the scale stays
 // Everything the sweep reaches fits into the picture, so that the scale does not change while it moves.
@@ -89,6 +91,7 @@ function fit() {
   parts.traces.replaceChildren();   // in metres: the group carries the scale
   parts.traces.setAttribute("transform", `translate(${view.x} ${view.y}) scale(${view.k} ${-view.k})`);
   const of = [...[2, 4].filter(k => data.centres[k]).map(k => `trace b${k}`), ...data.points.map(() => "trace")];
+  if (!unchanged) for (const d of reference?.paths ?? []) make(parts.traces, "path", { class: "trace behind", d, "vector-effect": "non-scaling-stroke" });
   traces.forEach((d, n) => make(parts.traces, "path", { class: of[n], d, "vector-effect": "non-scaling-stroke" }));
   drawGround();
   scaleForces();

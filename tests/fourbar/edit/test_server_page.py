@@ -773,8 +773,8 @@ def test_a_change_beyond_ten_times_is_no_percentage(
 
 PHOTO = {"O2": (800, 1500), "A": (1000, 1150), "B": (1900, 900), "O4": (2200, 1500)}
 """Pixels of the pins in a photo whose pixels are 0.25 mm."""
-CLICKS = 1.5e-3
-"""m: pins are clicked to half a pixel of the page, which is 1.7 mm in this photo."""
+CLICKS = 2.0
+"""px between two clicks: each is off by one, as the driver points at whole ones."""
 
 
 @pytest.mark.slow
@@ -798,6 +798,7 @@ def test_a_photo_is_traced_to_a_scene(chromium, opened, tmp_path: Path) -> None:
         chain = ActionChains(driver)
         chain.move_to_element_with_offset(picture, *from_middle).click().perform()
 
+    apart = 1400.0 * share * driver.execute_script("return view.k * tracedScale()")
     driver.find_element("id", "measure").click()
     click("O2")
     click("O4")
@@ -805,7 +806,7 @@ def test_a_photo_is_traced_to_a_scene(chromium, opened, tmp_path: Path) -> None:
     driver.switch_to.alert.accept()
     wait_for(driver, "data.traced.scale")
     scale = driver.execute_script("return data.traced.scale") * share
-    assert scale == pytest.approx(0.25e-3, rel=0.01)
+    assert scale == pytest.approx(0.25e-3, rel=CLICKS / apart)
     driver.find_element("id", "sketch").click()
     for pin in PHOTO:
         click(pin)
@@ -815,7 +816,10 @@ def test_a_photo_is_traced_to_a_scene(chromium, opened, tmp_path: Path) -> None:
         lengths, (("O2", "O4"), ("O2", "A"), ("A", "B"), ("B", "O4")), strict=True
     ):
         true = 0.25e-3 * math.dist(PHOTO[one], PHOTO[other])
-        assert length == pytest.approx(true, abs=2.0 * CLICKS), (one, other)
+        off = (
+            CLICKS * driver.execute_script("return 1 / view.k") + true * CLICKS / apart
+        )
+        assert length == pytest.approx(true, abs=off), (one, other)
     for pin, (x, y) in PHOTO.items():  # the linkage lies on the picture
         off = driver.execute_script(
             "const p = toScreen(at(row)[arguments[0]]), q ="

@@ -873,7 +873,7 @@ def test_a_picture_is_kept_beside_the_scene_and_over_no_file(
     taken.write_bytes(b"somebody's")
     data = base64.b64encode(content).decode()
     answer = session.do({"do": "picture", "data": f"data:image/{kind};base64,{data}"})
-    assert answer["plain"]["picture"] == {"file": name}
+    assert answer["plain"]["picture"]["file"] == name
     assert session.path.with_name(name).read_bytes() == content
     assert taken.read_bytes() == b"somebody's"
     answer = session.do({"do": "set", "path": ["picture", "scale"], "value": "0.25 mm"})
