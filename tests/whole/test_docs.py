@@ -231,7 +231,7 @@ def test_the_engine_of_the_guide_agrees(
 def test_the_scene_file_is_one(checkout: Path) -> None:
     # a scene; a bar by its material; pins in place of the lengths; an example of each
     # effect; a picture
-    text, material, pins, _, picture = blocks("toml", read("docs/scene-file.md"))
+    text, material, pins, *_, picture = blocks("toml", read("docs/scene-file.md"))
     fourbar.files.loads(pins)
     assert fourbar.files.loads(pins + picture).picture.scale == 0.5e-3
     lengths = text[text.index("[lengths]") : text.index("[bars.input]")]
