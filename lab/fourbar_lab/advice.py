@@ -1,6 +1,7 @@
-"""Judge the advice on linkages it has never seen.
+"""Judge the advice of `advise` on random linkages.
 
-It is judged whether it is met, and how near it is to the cheapest of a search.
+Each advice must reach the error asked for and cost little more than the cheapest
+settings that a search finds.
 """
 
 import math
@@ -271,9 +272,9 @@ def measure_cases(
     count: int,
     out: Path,
 ) -> Iterator[AdviceCase]:
-    """Yield the cases, each kept as it comes.
+    """Yield the measured cases in order, and store each one as soon as it is measured.
 
-    Those that an interrupted run left are read.
+    Cases stored by an interrupted run are read and not measured again.
     """
     with Store(out, {"seed": seed, **name_code(LAB_FOLDER)}).held() as store:
         done = store.done()

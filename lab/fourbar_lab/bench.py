@@ -1,6 +1,6 @@
-"""Speed side by side in one process, and ratios that hold.
+"""Measure speed as ratios of times that are taken in turns in one process.
 
-It is that of stages, the 13x13 system, C, and a judged scene.
+Timed are the stages of `solve`, the 13x13 system, C, and the check of a scene.
 """
 
 import os
@@ -96,9 +96,9 @@ _PLAIN_LOOPS = {
 
 
 class _SpeedLimit(NamedTuple):
-    """Limit of a row of the table, and why.
+    """Limit of a row of the table, and the reason for it.
 
-    It is a ratio, which holds with and without AVX-512.
+    A limit is on a ratio of times, which is the same with and without AVX-512.
     """
 
     sign: str
@@ -215,9 +215,9 @@ class Measured(NamedTuple):
 
 
 def import_cost() -> float:
-    """Compare the CPU time of `import fourbar` with that of `import numpy`.
+    """Return the CPU time of `import fourbar` beyond NumPy's, relative to NumPy's.
 
-    It is the median over fresh interpreters.
+    The median over seven fresh interpreters.
     """
     clock = "time.process_time()"
     code = (
@@ -256,9 +256,9 @@ def _measure_memory(n: int) -> float:
 
 
 def _make_floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
-    """Make what no formula for two angles does without, by blocks.
+    """Return a call that computes one tangent, one root and two arctangents per angle.
 
-    It is a tangent, a square root and two arctangents.
+    No closed formula of two angles does with less; blocks are those of `solve`.
     """
 
     def action() -> None:
@@ -451,9 +451,9 @@ def measure_speed(
 
 
 def _compare_adapters(rounds: int) -> dict[str, float]:
-    """Divide the time of each adapter by that of a plain loop.
+    """Return the time of each adapter over that of a plain loop of the same library.
 
-    Both read the same quantities.
+    Adapter and loop read the same quantities.
     """
     scene = make_example()
     command = command_positions(_ASKED)
@@ -473,9 +473,9 @@ def _compare_adapters(rounds: int) -> dict[str, float]:
 
 
 def _read_plainly(loop: PlainLoop, command: Command) -> list[object]:
-    """Answer by a plain loop, and read more of each position.
+    """Run a plain loop, and return what is read of its library at each position.
 
-    It reads the places, angles, rates and accelerations.
+    Read are places, angles, speeds and accelerations, as the adapter reads them.
     """
     tree = loop.tree
     inverse = loop.inverse
@@ -504,10 +504,7 @@ def _read_plainly(loop: PlainLoop, command: Command) -> list[object]:
 
 
 def _time_judging(engines: list[Engine], scenes: int) -> float:
-    """Time the check of a random scene as `run` does it, nothing drawn.
-
-    It is the median CPU time in s.
-    """
+    """Return the median CPU time in s of checking a random scene without pictures."""
     suite = Random(scenes + 1, 0, tuple(DrawnType))
     judgings = (
         partial(judge_for_report, suite.name(i), suite.scene(i), engines, draw=False)

@@ -1,6 +1,6 @@
-"""`python -m fourbar_lab benchmark`: every engine is asked every problem.
+"""`python -m fourbar_lab benchmark`: ask every engine every problem of models/problems.
 
-It writes a table, and a page with letters.
+The answers make a table (CSV) and a page with a letter for each engine and problem.
 """
 
 import json
@@ -90,7 +90,7 @@ class BenchmarkRun(NamedTuple):
 
 
 class TimedWork(NamedTuple):
-    """What a run through time cost, and how exact it was."""
+    """Cost of a run through time, and its error."""
 
     seconds: float
     """Processor time, s."""
@@ -356,9 +356,9 @@ class Benchmark:
         cell.order = _find_order(cell.runs)
 
     def _explain(self, label: str) -> str:
-        """Find the sentence for a row's letters.
+        """Return the reason for a row's letters, "" if none is stated.
 
-        It is that of the longest name that the row begins with.
+        Of several names with which the row's label begins, the longest counts.
         """
         names = [name for name in self.reasons if label.startswith(name)]
         if names:
@@ -366,9 +366,9 @@ class Benchmark:
         return ""
 
     def list_rows(self) -> list[list[Any]]:
-        """List the rows of the table, problem by problem.
+        """Return the rows of the table as lists of cells, problem by problem.
 
-        Those of coarser timesteps have no level.
+        A run at a coarser timestep than the finest has no level.
         """
         table: list[list[Any]] = []
         for problem in self.problems:
@@ -622,9 +622,9 @@ def compare_slopes(
 
 
 def _find_order(runs: list[BenchmarkRun]) -> float | None:
-    """Return the order of the torque's error in the timestep.
+    """Return the order in the timestep of the torque's error, from the last two runs.
 
-    It is from the last two runs; None if there is none.
+    None: fewer than two runs with a positive error and different timesteps.
     """
     if len(runs) < 2:
         return None
@@ -679,9 +679,9 @@ def benchmark_command(
 ) -> None:
     """Ask every engine every problem of models/problems.
 
-    It writes benchmark.csv and one page. Each engine runs in its environment, which pip
-    makes once. An engine that runs through time is asked at each of its numbers of
-    steps. What was answered before is not asked again.
+    Each engine runs in an environment that pip makes once. An engine that runs through
+    time is asked at each of its numbers of steps. What was answered before is not asked
+    again. The results are written to benchmark.csv and one page.
     """
     find_checkout("benchmark")
     for name in problems:

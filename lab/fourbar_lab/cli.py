@@ -1,7 +1,4 @@
-"""Commands of the lab.
-
-Each lives in its own module and is imported when it is called.
-"""
+"""Commands of the lab, each imported from its own module when it is called."""
 
 import sys
 

@@ -1,6 +1,6 @@
 """Time the libraries that evaluate positions, and draw the times.
 
-They are positions of one linkage, and linkages of one position.
+Timed are many positions of one linkage, and many linkages at one position.
 """
 
 import ctypes
@@ -72,10 +72,9 @@ def make_example(
     linkage: FourBar = CONTENDED_LINKAGE,
     theta_2: float | None = 0.0,
 ) -> Scene:
-    """Build the scene that is timed.
+    """Return the scene that is timed: a crank at 10 rad/s, driven, with gravity.
 
-    It is a crank at 10 rad/s with gravity and the drive on the input; theta_2 None: its
-    full range.
+    With theta_2 None the scene covers its full range.
     """
     return Scene(linkage, Motion(theta_2, 10.0), 2, (), (Gravity(),))
 
@@ -95,9 +94,9 @@ def command_positions(
 
 
 def allocate(names: Iterable[str], command: Command) -> dict[str, Array]:
-    """Allocate arrays as `solve` lays them out.
+    """Return arrays by name, of the layout of `solve` for this command.
 
-    They are touched, so that no page is faulted in while the clock runs.
+    Each is written once, so that no page is faulted in while the clock runs.
     """
     first = solve(make_example(), at=command)
     return {name: getattr(first, name) for name in names}
@@ -108,9 +107,9 @@ def time_interleaved(
     rounds: int,
     calls: int = 1,
 ) -> dict[str, float]:
-    """Time a call of each action in turn, in CPU seconds.
+    """Return the median CPU time in s of a call of each action, called in turns.
 
-    It is the median; the first round does not count.
+    The first of the rounds does not count.
     """
     clocks = {
         name: partial(time_call, action, calls) for name, action in actions.items()
@@ -122,9 +121,9 @@ def time_interleaved(
 
 
 def collect_loops() -> _Peers:
-    """Collect the closed formulas by several hands.
+    """Return the implementations of the closed formulas that write into given arrays.
 
-    Each writes into arrays that exist.
+    An implementation that cannot be made here is named with the reason.
     """
     loops: dict[str, TimedLoop | str] = {
         "NumPy": _make_solve_loop(),
@@ -202,9 +201,9 @@ def time_positions(
     largest: int,
     rounds: int,
 ) -> Times:
-    """Time a position, in ns, for 1000, 10 000, ... of them.
+    """Return the time per position in ns, for 1000, 10 000, ... positions.
 
-    They are written into arrays that exist.
+    Results are written into arrays that exist.
     """
     times: Times = {name: {} for name in peers}
     for n in [10**k for k in range(3, 9) if 10**k <= largest]:
@@ -223,9 +222,9 @@ def time_positions(
 
 
 def time_linkages(largest: int, rounds: int) -> Times:
-    """Time a linkage at one position, in ns, for 1, 10, ... of them.
+    """Return the time per linkage in ns at one position, for 1, 10, ... linkages.
 
-    They are solved as a study, and one after the other.
+    Linkages are solved as one study, and one after the other.
     """
     scene = make_example(theta_2=1.0)
     times: Times = {STUDY: {}, ONE_LINKAGE: {}, _LOOPED: {}}

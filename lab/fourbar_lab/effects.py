@@ -167,9 +167,9 @@ WORKLOADS: dict[str, Callable[[str], Callable[[int], Any]]] = {
 
 
 class EffectCost(NamedTuple):
-    """Time of one effect, or one flag, in one engine by that of the bare scene.
+    """Time with one effect or flag in one engine, as a ratio to that of the bare scene.
 
-    It is that of pairs of neighbouring runs.
+    Ratios are of neighbouring runs: the median and the quartiles.
     """
 
     engine: str
@@ -187,9 +187,9 @@ def measure_effect(
     effect: str,
     rounds: int = PAIRS_OF_RUNS,
 ) -> EffectCost:
-    """Time neighbouring runs with and without an effect.
+    """Time neighbouring runs with and without an effect, and return their ratio.
 
-    Both meet the same disturbances.
+    Other work on the machine slows both runs of a pair alike.
     """
     amount = _AMOUNTS[engine]
     works = {

@@ -1,6 +1,6 @@
-"""Families of hard positions.
+"""Families of hard positions: each sample is one position of a random scene.
 
-Each is one position of a random scene, drawn from a random generator alone.
+A sample depends on its random generator alone.
 """
 
 import cmath
@@ -93,9 +93,10 @@ within the rounding.
 
 
 def _draw_near_change_point(rng: np.random.Generator) -> DrawnLinkage:
-    """Draw within 1e-8..1 rad of a change point.
+    """Draw a linkage 1e-8 to 1 rad from a change point, at that position.
 
-    It is that of parallelograms, kites, any s + l = p + q, some off by as little.
+    Parallelograms, kites and any s + l = p + q are drawn; some lengths miss the change
+    point by as little.
     """
     x, y = rng.uniform(0.1, 1.0, 2)
     kind = rng.integers(0, 4)
@@ -228,7 +229,7 @@ def _draw_place(
 def springs(rng: np.random.Generator) -> Scene:
     """Draw a spring near the length at which its force is zero.
 
-    It has a preload in every other scene.
+    Every other spring on average has a preload.
     """
     scene = massless(rng)
     first, second = (
@@ -261,9 +262,9 @@ def springs(rng: np.random.Generator) -> Scene:
 def torsion(rng: np.random.Generator) -> Scene:
     """Draw a torsion spring near the angle at which its couple is zero.
 
-    Its rest is some turns away, or none. Not at O2: its angle, given in doubles, comes
-    back from the directions to the last digit more often than not, and an error that is
-    zero by chance says nothing of the bar.
+    The rest angle is often whole turns away. No spring is at O2: the angle there is
+    given in doubles and comes back from the directions to the last digit more often
+    than not, and an error that is zero by chance says nothing of the bar.
     """
     scene = massless(rng)
     solution = solve(scene, "position")
@@ -352,7 +353,7 @@ def drives(rng: np.random.Generator) -> Scene:
 def strokes(rng: np.random.Generator) -> Scene:
     """Command the stroke of a cylinder from the ground to bar 2 or 4.
 
-    It is the stroke that results where the input is.
+    The stroke (m) and its speed are those of a random scene at its input's position.
     """
     bar = int(rng.choice([2, 4]))
     scene = _put_cylinder(ANYWHERE.draw(rng), rng, 1, bar)
@@ -394,10 +395,7 @@ def _put_cylinder(
 
 
 def pushes(rng: np.random.Generator) -> Scene:
-    """Draw a force at a point of a moving bar that drives.
-
-    It acts along a fixed or turning line.
-    """
+    """Draw a driving force at a point of a bar, along a fixed or turning line."""
     bar = int(rng.choice(MOVING_BARS))
     frame = str(rng.choice(FRAMES))
     place = _draw_place(bar, rng, 0.05)

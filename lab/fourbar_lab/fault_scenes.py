@@ -1,6 +1,6 @@
 """Scenes on which injected faults are tried.
 
-Each effect, drive, branch and kind of motion is in one of them.
+Together they have each effect, drive, branch and kind of motion.
 """
 
 import math

@@ -138,9 +138,9 @@ FUZZED_FAMILIES = {
 
 
 def _draw_fuzzed_lengths(rng: np.random.Generator, hard: bool) -> Any:
-    """Draw (ground, input, coupler, output), some of them special.
+    """Draw the lengths (ground, input, coupler, output) in m.
 
-    They are equal, in extreme ratios, or near s + l = p + q.
+    Some hard ones are equal, in extreme ratios, or near s + l = p + q.
     """
     choice = rng.random() if hard else 1.0
     x = rng.uniform(0.1, 1.0, 4)
@@ -174,9 +174,9 @@ def _draw_fuzzed_angles(
     hard: bool,
     lengths: tuple[float, ...],
 ) -> Any:
-    """Draw theta_2 - theta_1, anywhere or at a special place.
+    """Draw angles theta_2 - theta_1 of one scene, rad.
 
-    It may be near a limit position, a change point, or many turns away.
+    Some hard ones are near a limit position or a change point, or many turns away.
     """
     psi = rng.uniform(-3.2, 3.2, POSITIONS_OF_A_SCENE)
     if not hard:
@@ -287,10 +287,7 @@ def list_findings(scene: Scene) -> list[str]:
 
 
 def _check_file(scene: Scene) -> list[str]:
-    """Write a scene file and read it again.
-
-    It must be the same scene to the last digit.
-    """
+    """Return a problem if a scene that is written and read again differs in a digit."""
     again = dump(loads(dump(scene)))
     if again == dump(scene):
         return []
@@ -302,10 +299,9 @@ def _check_assembly(
     commanded: Command,
     solution: Solution,
 ) -> list[str]:
-    """Compare the assembly by ball arithmetic.
+    """Return positions where `assembled` or the angles contradict ball arithmetic.
 
-    There is no position where the loop does not close, and none is missing where it
-    does.
+    A position that is on the limit within `TOUCHING_MARGIN` may be either.
     """
     from fourbar_validation.engines.balls import compute_directions, make_balls
 

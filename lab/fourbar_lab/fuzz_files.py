@@ -1,4 +1,4 @@
-"""`python -m fourbar_lab fuzz-files`: mutated scene files.
+"""`python -m fourbar_lab fuzz-files`: read mutated scene files.
 
 Each must end in a scene or in one clear line.
 """

@@ -1,9 +1,10 @@
-"""Derivatives of every output by every number of a scene.
+"""Derivatives of every output by every number of a scene, checked by ball arithmetic.
 
-Those of `sensitivity` are held against those of balls.
+The derivatives by `sensitivity` are compared with those of balls. The error allowed of
+a derivative s_i = dy/dx_i is
 
-The error allowed of a derivative s_i = dy/dx_i is
     8 eps (|s_i| + sum |x_j ds_i/dx_j| + sum |x_j s_j| / |x_i|):
+
 that of a value, and of what all numbers do to y, or to the vector, together: what
 cancels leaves a last digit of that.
 """
@@ -45,10 +46,10 @@ def list_numbers_by_key(scene: Scene) -> dict[str, float]:
 
 
 def _compute_exact_slopes(scene: Scene) -> tuple[BallValues, Slopes]:
-    """Return every output, and its derivatives and theirs by every number.
+    """Return every output, and its first and second derivatives by every number.
 
-    They are differences in balls. No output where the loop does not close, no
-    derivative where the drive has no torque.
+    Derivatives are differences in balls. Outputs are empty where the loop does not
+    close, derivatives where the drive has no torque.
     """
     numbers = list_numbers_by_key(scene)
     angle = command_key(scene)

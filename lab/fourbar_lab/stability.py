@@ -1,6 +1,6 @@
-"""The command: forward error of every output of `solve`, per family.
+"""The command `stability`: forward error of every output of `solve`, per hard family.
 
-It is against ball arithmetic; the families are those of hard cases.
+The reference is ball arithmetic.
 """
 
 import math
@@ -133,9 +133,9 @@ def judge_samples(
     *,
     derivatives: bool = False,
 ) -> Tally:
-    """Judge some samples of a family.
+    """Return the tally of some samples of a family.
 
-    Each depends on the family, the seed and its number alone.
+    A sample depends on the family, the seed and its number alone.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ def stability(
 ) -> int:
     """Measure the error of every output against 50-digit arithmetic.
 
-    It tells too whether the error bars hold.
+    The table tells too whether the error bars hold.
     """
     from rich.console import Console
     from rich.progress import track

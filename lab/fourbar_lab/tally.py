@@ -1,9 +1,8 @@
-"""Count what samples showed.
+"""Collect the largest errors over what is allowed, and whether error bars hold.
 
-These are the largest errors over what is allowed, and whether error bars hold. The
-error allowed is 8 eps (|y| + sum |x_i dy/dx_i|) with y the value (1 rad for angles) and
-x_i the stored inputs: what a change of the inputs in their last digits does to y, and
-nothing more.
+The error allowed is 8 eps (|y| + sum |x_i dy/dx_i|) with y the value (1 rad for angles)
+and x_i the stored inputs: what a change of the inputs in their last digits does to y,
+and nothing more.
 """
 
 import math
@@ -102,10 +101,7 @@ def is_by_chance(count: int, samples: int) -> bool:
 
 
 def list_components(name: str) -> list[tuple[str, Any]]:
-    """List the names that an output has in the reference.
-
-    Their index in its array is listed too.
-    """
+    """Return an output's components as (name in the reference, index in the array)."""
     if name in VECTORS:
         return [(f"{name}_x", 0), (f"{name}_y", 1)]
     return [(name, 0)]
@@ -117,9 +113,9 @@ def error_over_allowed(
     value: Any,
     sensitivity: float,
 ) -> tuple[float, float]:
-    """Compute an error over what is allowed, and the error.
+    """Return an error as a part of the allowed one, and the error itself.
 
-    It is 0 where the balls cannot tell it from the truth.
+    Both are 0 where the reference's ball contains the value.
     """
     is_angle = name.startswith("theta")
     error = math.inf
@@ -134,10 +130,7 @@ def error_over_allowed(
 
 
 def is_untold(sine: Any, sensitivity: float) -> bool:
-    """Return whether few digits of sin mu are known.
-
-    There may be no derivatives then.
-    """
+    """Return whether sin mu has so few digits that derivatives may be missing."""
     size = abs(float(sine.mid()))
     return _compute_allowed(size, sensitivity) > _UNTOLD * size
 

@@ -1,6 +1,6 @@
 """`python -m fourbar_lab write`: write the MJCF of every scene in models/.
 
-It is written next to the scene.
+Each MJCF file lies next to its scene.
 """
 
 import math
@@ -24,9 +24,9 @@ processor's sine may end it in another digit.
 
 
 def find_stale(files: Iterable[Path]) -> list[Path]:
-    """Find the scene files whose MJCF is missing or differs.
+    """Return the scene files whose MJCF is missing or differs from the generated one.
 
-    It differs from what they generate now, round-off apart.
+    Numbers that differ by round-off alone are equal.
     """
     stale = []
     for file in files:

@@ -1,6 +1,6 @@
 """Engines that join a run where they are installed: Exudyn, OpenSim and Drake.
 
-Each is imported by its adapter alone.
+A library is imported only by its adapter.
 """
 
 import hashlib

@@ -108,12 +108,12 @@ class _DrakeTree(Tree):
         )
 
     def rotation(self, bar: int) -> Array:
-        """Return that of the body."""
+        """Return the body's rotation matrix."""
         pose = self.plant.EvalBodyPoseInWorld(self.context, self.body[bar])
         return np.asarray(pose.rotation().matrix()[:2, :2])
 
     def point_jacobian(self, name: str) -> Array:
-        """Return that of the translational velocity."""
+        """Return the Jacobian of the point's velocity by the joints' speeds."""
         arguments = (*self.local[name], self.world, self.world)
         return np.asarray(
             self.plant.CalcJacobianTranslationalVelocity(
@@ -176,9 +176,10 @@ class _DrakeTree(Tree):
         return torques
 
     def carried(self) -> dict[int, Components]:
-        """Read the reaction port, which finds the accelerations once more.
+        """Return the force at each bar's first pin from Drake's reaction port, N.
 
-        It uses what acts and what the motion needs.
+        Drake finds the accelerations once more for it, from the applied wrenches and
+        the generalized forces that the motion needs.
         """
         applied = []
         for bar, wrench in self.wrenches.items():

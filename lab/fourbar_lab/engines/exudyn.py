@@ -1,11 +1,10 @@
-"""Exudyn: nine absolute coordinates and the multipliers of pins and drive.
+"""Exudyn: nine absolute coordinates, and multipliers of the four pins and the drive.
 
-There are four pins; springs and dampers are Exudyn's own.
-
-A bar is `ObjectRigidBody2D` with coordinates (x, y of its first pin, direction). The
-nine constraints g = 0 are two of each pin, and the drive: a bar's direction, or the
-distance of a cylinder's ends. With J = dg/dq, J_c the pins' rows above that of the
-commanded bar's direction, M the mass matrix and f what acts,
+Springs and dampers are Exudyn's own. A bar is `ObjectRigidBody2D` with coordinates (x,
+y of its first pin, direction). The nine constraints g = 0 are two of each pin, and the
+drive: a bar's direction, or the distance of a cylinder's ends. With J = dg/dq, J_c the
+pins' rows above that of the commanded bar's direction, M the mass matrix and f what
+acts,
 
     J_c v = e omega,
     J_c a = e alpha - (dJ_c/dt) v,
@@ -220,11 +219,11 @@ class ExudynBars(Loaded):
         return self._read_output(exu.OutputVariableType.Position, name)
 
     def acceleration(self, name: str) -> Array:
-        """Return that of a point of a body, (2,), m/s^2."""
+        """Return the acceleration of a point of a body, (2,), m/s^2."""
         return self._read_output(exu.OutputVariableType.Acceleration, name)
 
     def rotation(self, bar: int) -> Array:
-        """Return that of the body."""
+        """Return the body's rotation matrix, (2, 2)."""
         matrix = self.mbs.GetObjectOutputBody(
             self.body[bar],
             exu.OutputVariableType.RotationMatrix,
@@ -233,13 +232,13 @@ class ExudynBars(Loaded):
         return np.reshape(matrix, (3, 3))[:2, :2]
 
     def velocity(self, bar: int) -> float:
-        """Read that of its coordinate; the ground has none."""
+        """Return a bar's angular velocity in rad/s; the ground has none."""
         if bar == 1:
             return 0.0
         return float(self.v[self.turn[bar]])
 
     def alpha(self, bar: int) -> float:
-        """Read that of its coordinate."""
+        """Return a bar's angular acceleration in rad/s^2."""
         return float(self.a[self.turn[bar]])
 
     def positions(self) -> dict[str, Array]:

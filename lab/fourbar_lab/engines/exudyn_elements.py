@@ -1,8 +1,8 @@
 """Bodies of a linkage in Exudyn, and its own springs and dampers upon them.
 
-They are what no other engine gives: the force laws of somebody else's program, to
-round-off. MuJoCo's own hold to the error of its steps; every other engine is given the
-wrenches of `effects.TERM_OF`, as Exudyn is of all the rest.
+No other engine brings force laws of its own that hold to round-off. MuJoCo's hold to
+the error of its steps; every other engine is given the wrenches of `effects.TERM_OF`,
+as Exudyn is of all the rest.
 """
 
 import math
@@ -76,10 +76,7 @@ class ExudynBodies:
         )
 
     def axes(self, bar: int, turn: float = 0.0) -> Any:
-        """Mark axes fixed in a bar at its first pin.
-
-        They are rotated by an angle from its line.
-        """
+        """Return a marker of axes at a bar's first pin, turned from its line (rad)."""
         cos = math.cos(turn)
         sin = math.sin(turn)
         frame = [
@@ -108,7 +105,7 @@ def _add_viscous(effect: Any, bodies: ExudynBodies) -> None:
 def _add_torsion(effect: Any, bodies: ExudynBodies) -> None:
     """Add a `TorsionalSpringDamper` between axes that coincide at rest.
 
-    It measures within half a turn of rest.
+    Exudyn measures the angle within half a turn of rest.
     """
     for pin, stiffness, rest, preload in effect.springs:
         first, second = PINS[pin]

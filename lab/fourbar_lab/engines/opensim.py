@@ -1,10 +1,9 @@
-"""OpenSim (Simbody): bars 2 and 4 on the ground, bar 3 on bar 4.
+"""OpenSim (Simbody): bars 2 and 4 on the ground, bar 3 on bar 4, closed at pin A.
 
-Its own constraint and solve close the loop at pin A. Coordinates are the direction of
-bar 2, that of bar 4, and that of bar 3 against bar 4. The closing force, the joint
-reactions, the accelerations and the couple that moves bar 2 or 4 as commanded come from
-Simbody's constrained dynamics. No coordinate is the direction of bar 3, whose command
-is refused.
+Simbody's constraint and solver close the loop. Coordinates are the direction of bar 2,
+that of bar 4, and that of bar 3 against bar 4. The closing force, the joint reactions,
+the accelerations and the couple that moves bar 2 or 4 as commanded come from Simbody's
+constrained dynamics. No coordinate is the direction of bar 3, whose command is refused.
 """
 
 import math
@@ -183,9 +182,9 @@ class _OpenSimBars(Loaded):
         return joint
 
     def _add_at_first_pin(self, bar: int) -> list[Any]:
-        """Add a wrench on a bar at its first pin, to be set at each position.
+        """Add a wrench on a bar at its first pin; return its x, y and moment.
 
-        Its components are x, y, moment.
+        The three are OpenSim constants, which are set at each position.
         """
         element = osim.PrescribedForce(f"wrench{bar}", self.body[bar])
         element.setForceIsInGlobalFrame(True)
@@ -229,9 +228,9 @@ class _OpenSimBars(Loaded):
         return x, y
 
     def jacobian(self) -> Array:
-        """Return the derivative of the gap by three angles.
+        """Return the Jacobian of the gap at pin A, (2, 3), in m/rad.
 
-        They are those of bar 2, of bar 3 against bar 2, and of bar 4.
+        Columns are the angles of bar 2, of bar 3 against bar 2, and of bar 4.
         """
         by_own = self._compute_station_jacobian(
             "end2"
@@ -252,7 +251,7 @@ class _OpenSimBars(Loaded):
         return np.array(matrix.to_numpy())[:2]
 
     def rotation(self, bar: int) -> Array:
-        """Return that of the body."""
+        """Return the body's rotation matrix, (2, 2)."""
         matrix = self.body[bar].getTransformInGround(self.state).R()
         return np.array([[matrix.get(i, j) for j in (0, 1)] for i in (0, 1)])
 
@@ -309,9 +308,9 @@ class _OpenSimBars(Loaded):
         return np.asarray(self.line()[1] @ rate)
 
     def _set_motion(self, speed: float, acceleration: float) -> tuple[Array, Array]:
-        """Solve the constraint equations for the coordinates' speeds.
+        """Set the commanded speed; return the coordinates' speeds and accelerations.
 
-        They are per speed commanded; the accelerations are solved for too.
+        Speeds (3,) are per unit of the commanded speed, accelerations (3,) in rad/s^2.
         """
         equations = self._differentiate_constraints()
         turns = solve_refined(equations, np.eye(3)[0])
@@ -392,22 +391,19 @@ class _OpenSimBars(Loaded):
         return {**reactions, "F32": closing, self.driving: drive}
 
     def _differentiate_constraints(self) -> Array:
-        """Differentiate the constraints by the coordinates.
-
-        They are the commanded motion, and pin A along two axes.
-        """
+        """Return the constraints' Jacobian (3, 3): of the command, and of pin A."""
         matrix = osim.Matrix()
         self.matter.calcG(self.state, matrix)
         return np.array(matrix.to_numpy())[:3]
 
     def velocity(self, bar: int) -> float:
-        """Read that of a body; the ground has none."""
+        """Return a bar's angular velocity in rad/s; the ground has none."""
         if bar == 1:
             return 0.0
         return float(self.body[bar].getAngularVelocityInGround(self.state).get(2))
 
     def alpha(self, bar: int) -> float:
-        """Read it from the accelerations of the coordinates."""
+        """Return a bar's angular acceleration in rad/s^2."""
         return float(_PER_COORDINATE[bar] @ self.a)
 
     def _read_reaction(self, pin: str) -> Array:
@@ -427,9 +423,9 @@ class _OpenSimBars(Loaded):
         )
 
     def _compute_closing_force(self) -> Array:
-        """Compute the force of bar 3 on bar 2 from the multipliers.
+        """Return the force of bar 3 on bar 2 in N, from the constraint's multipliers.
 
-        They are the constraint's; on bodies the force is -G^T lambda.
+        Simbody's constraint acts on the bodies with -G^T lambda.
         """
         on_bodies = osim.VectorOfSpatialVec()
         on_mobilities = osim.Vector()
@@ -471,8 +467,5 @@ def make_simbody_vector(values: Iterable[float]) -> Any:
 
 
 def _make_constants() -> list[Any]:
-    """Make three functions of time that are zero.
-
-    They may be given another value later.
-    """
+    """Return three OpenSim functions of time that are zero until they are set."""
     return [osim.Constant(value) for value in ZERO_VECTOR]

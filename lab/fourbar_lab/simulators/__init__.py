@@ -1,4 +1,4 @@
-"""Simulators under test.
+"""Simulators under test, each run in an environment of its own.
 
-Each is compared with the formulas in an environment of its own.
+The formulas check what they answer.
 """

@@ -1,6 +1,6 @@
-"""Drake's own simulation of the SDF file.
+"""Drake's own simulation of the SDF file: a discrete plant with the SAP solver.
 
-It is a discrete plant with its SAP solver, the loop closed in two ways.
+The loop is closed in two ways.
 """
 
 from importlib.metadata import version

@@ -1,6 +1,6 @@
 """Exudyn's own simulation by its implicit solvers.
 
-It has nine absolute coordinates, and multipliers of all four pins and the drive.
+Unknowns are nine absolute coordinates, and multipliers of all four pins and the drive.
 """
 
 import time

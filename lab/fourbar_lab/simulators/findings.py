@@ -101,9 +101,9 @@ def find_interpreter(finding: Reproduction) -> tuple[str, str] | None:
 
 
 def _list_interpreters(name: str) -> Iterator[str]:
-    """List this interpreter, and those of the engines that require a package.
+    """Return this interpreter, and those of the engines that require a package.
 
-    pip installs it for the first of these.
+    The package is installed by pip for the first of these.
     """
     yield sys.executable
     for entry in read_engines([]).values():
@@ -155,9 +155,9 @@ def _run_findings(
     help="Seconds for each script.",
 )
 def findings_command(scripts: tuple[Path, ...], time_limit: float) -> None:
-    """Run the scripts of docs/findings where their simulators are.
+    """Run the scripts of docs/findings where their simulators are installed.
 
-    They run here, or in environments of engines.toml.
+    A simulator is installed here or in its environment of engines.toml.
     """
     chosen = [read_docstring(script) for script in scripts] or read_findings()
     for finding in chosen:

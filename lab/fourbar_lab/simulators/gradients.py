@@ -38,9 +38,9 @@ def compile_and_assemble(
     theta_2: float,
     reader: str,
 ) -> ClosedState:
-    """Compile a scene for a simulator, and assemble it at theta_2 (rad).
+    """Return a scene's compiled model and state, assembled at theta_2 (rad).
 
-    It has the speed there.
+    The state has the scene's speed.
     """
     written = text(scene, STEPS_OF_A_TURN, reader)
     loop = ClosedLoop(written)
@@ -99,9 +99,9 @@ def collect_answer(
     state: tuple[Any, Any, Any, Any],
     by: dict[str, Any],
 ) -> dict[str, Any]:
-    """Collect theta_2, omega_2, alpha_2 and torque of a state, and derivatives.
+    """Return theta_2, omega_2, alpha_2 and torque of a state, as floats by name.
 
-    They are plain numbers; the derivatives are those of the torque.
+    `by` holds the derivatives of the torque by each key, and `how` names the method.
     """
     names = (*scene.motion.names, "torque")
     return {"how": how, "by": {key: float(x) for key, x in by.items()}} | {

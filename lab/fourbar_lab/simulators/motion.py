@@ -114,8 +114,8 @@ class Worlds(NamedTuple):
 class Simulator:
     """Base of the simulators.
 
-    It chooses a setting, asks for a run or for single states, and states the motion
-    made.
+    A simulator chooses a setting, runs or evaluates single states, and states the
+    motion made.
     """
 
     name: str
@@ -330,10 +330,10 @@ def run_through(
 
 
 def start(scene: Scene) -> Start:
-    """Assemble the first position that closes, in the direction of motion.
+    """Return the state at the first position that closes, in the sense of motion.
 
-    Its speeds are those of the free body. No simulator starts from what the formulas
-    computed.
+    Angles and speeds are of the free bodies' engine: no simulator starts from what the
+    formulas computed.
     """
     commanded = with_signs(scene.linkage, command(scene))
     omega_2 = scene.motion.omega_2 or 0.0
@@ -375,9 +375,9 @@ def gravity_field(scene: Scene) -> tuple[float, float, float]:
 
 @contextmanager
 def write_temp(text: str, name: str) -> Iterator[str]:
-    """Write a file that lasts as long as the context.
+    """Write text to a temporary file, and yield its path to a simulator.
 
-    It is for simulators that read no text.
+    The file lasts as long as the context.
     """
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / name

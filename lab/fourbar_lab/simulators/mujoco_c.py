@@ -1,6 +1,6 @@
-"""MuJoCo itself (the C library), by the generated file.
+"""MuJoCo itself (the C library), which simulates the generated MJCF file.
 
-It runs with the file's settings and with its own defaults.
+Runs are made with the file's settings and with MuJoCo's defaults.
 """
 
 from dataclasses import replace
@@ -37,10 +37,13 @@ _BY_DEFAULT = {
 
 
 def text(scene: Scene, steps: int, simulator: str | None, **settings: Any) -> str:
-    """Write the MJCF, opening in the simulators' common start.
+    """Return the MJCF of a scene that opens at the simulators' common start.
 
-    It has so many steps a turn. Without a simulator's name all that the solver is set
-    to goes; `settings`: others than those of the simulator.
+    Parameters
+    ----------
+    steps : timesteps in a turn.
+    simulator : whose settings are written; None for MuJoCo's defaults.
+    settings : values in place of the simulator's.
     """
     reader = simulator or "warp"  # without pads
     changed = replace(
@@ -85,9 +88,9 @@ def find_bars(model: Any) -> list[int]:
 
 
 def states_of(written: str, scene: Scene) -> list[tuple[Array, Array]]:
-    """Assemble the scene's positions by MuJoCo's own kinematics.
+    """Return (qpos, qvel) at the scene's positions, assembled by MuJoCo's kinematics.
 
-    It is Newton on the gap, and speeds by its Jacobian.
+    Newton's method closes the gap, and speeds are by the gap's Jacobian.
     """
     loop = ClosedLoop(written)
     states = []

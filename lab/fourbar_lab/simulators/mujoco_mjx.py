@@ -145,9 +145,9 @@ class MujocoMjx(Simulator):
         return Worlds(evaluate, exchange, partial(read_last, scene, model))
 
     def slopes(self, scene: Scene) -> list[dict[str, Any]]:
-        """Differentiate the driving torque forwards and backwards.
+        """Differentiate the driving torque by JAX, forwards and backwards.
 
-        It is at a set state and through a quarter turn.
+        Forwards at a set state and through a quarter turn, backwards at the set state.
         """
         begin, end = gradients.choose_quarter(scene)
         ways = [

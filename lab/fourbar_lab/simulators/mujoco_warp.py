@@ -132,9 +132,9 @@ class MujocoWarp(Simulator):
         return Worlds(evaluate, exchange, partial(read_last, scene, model))
 
     def slopes(self, scene: Scene) -> list[dict[str, Any]]:
-        """Differentiate the driving torque at a set state.
+        """Differentiate the driving torque at a set state, backwards by Warp's tape.
 
-        It is backwards, by the tape, then along each change.
+        The gradients by model and state are then multiplied by each parameter's change.
         """
         _, theta_2 = gradients.choose_quarter(scene)
         model, data, q, v = gradients.compile_and_assemble(scene, theta_2, "warp")

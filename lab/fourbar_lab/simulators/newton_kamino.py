@@ -1,6 +1,6 @@
 """Newton's Kamino solver, from the USD file.
 
-It is a beta in single precision, with maximal coordinates.
+Kamino is a beta in single precision, with maximal coordinates.
 """
 
 from dataclasses import replace

@@ -1,6 +1,6 @@
-"""Pinocchio's forward dynamics of the closed loop.
+"""Pinocchio's forward dynamics of the closed loop, integrated by RK4.
 
-Its acceleration solvers are under RK4; it has the impulse solvers of 4.1 too.
+The impulse solvers of Pinocchio 4.1 are tried too.
 """
 
 from typing import Any, ClassVar
@@ -41,7 +41,7 @@ example's 1e-6.
 class _LoopConstrained(ClosedTree):
     """The same closure solved by lcaba.
 
-    It is the loop-constrained articulated body algorithm.
+    The name is short for loop-constrained articulated body algorithm.
     """
 
     def __init__(self, tree: PinocchioTree, time_constant: float) -> None:
@@ -292,9 +292,9 @@ def _read_joint_forces(
     a: Array,
     loop_force: Array,
 ) -> Instant:
-    """Read what Pinocchio's recursive Newton-Euler says the joints carry.
+    """Return pin forces (N) and torque (N m) of a state, by Pinocchio's RNEA.
 
-    It is under Pinocchio's own closing force.
+    The closing force is the one that Pinocchio found.
     """
     tree.model.armature = np.zeros(3)
     tree.place(q.tolist())

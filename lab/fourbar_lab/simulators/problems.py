@@ -43,10 +43,7 @@ _PROMISED_FOR = 5.0
 
 
 def collect_problem(name: str) -> dict[str, Any]:
-    """Collect what is stated and what is to be answered.
-
-    Each value has an error bar.
-    """
+    """Return a problem as JSON: the question, the answers and their error bars."""
     if name in slider_crank.SLIDER_CRANKS:
         return {"schema": PROBLEM_SCHEMA, **slider_crank.make_problem(name)}
     scene = fourbar.load(PROBLEMS / f"{name}.toml")
@@ -92,9 +89,10 @@ def list_problems() -> list[str]:
 
 
 def _answer_released(solution: Solution) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Answer a released motion.
+    """Return the answers of a released motion, and the error bar of each.
 
-    It errs as a time that is off; angle, speed and forces err with it.
+    All errors follow from an error in time: angle, speed and forces change by their
+    rates times that delay.
     """
     time = solution.time
     omega = solution.omega_2

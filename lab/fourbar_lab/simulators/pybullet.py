@@ -27,9 +27,9 @@ _STRONG = 1e9
 
 
 def _write_urdf(scene: Scene) -> str:
-    """Build the tree: bars 2 and 3 in series, bar 4 on the ground.
+    """Return the URDF of the tree: bars 2 and 3 in series, bar 4 on the ground.
 
-    Each link's frame lies in its mass centre.
+    The frame of each link lies in its mass centre.
     """
     links = ['<robot name="four_bar"><link name="ground"/>']
     for part in list_moving_parts(scene.linkage):

@@ -47,27 +47,28 @@ class SliderBar(NamedTuple):
 
 
 class _CutLoop(Protocol):
-    """Interface of an engine to the tree.
+    """Interface of an engine to the slider-crank's tree, cut at the rod's end.
 
-    Its joints turn the crank and the rod and move the slider.
+    Three joints turn the crank and the rod and move the slider.
     """
 
     def set(self, q: Array, v: Array) -> None:
         """Set joint positions and speeds."""
 
     def gap(self) -> tuple[Array, Array, Array]:
-        """Return the rod's end less the slider (2,), and its derivatives.
+        """Return the rod's end less the slider (2,), its Jacobian and its drift.
 
-        These are its Jacobian (2, 3), and its acceleration at none of q (2,).
+        The Jacobian is (2, 3); the drift (2,) is the acceleration while all of q have
+        none.
         """
 
     def inverse(self, a: Array) -> Array:
         """Return the joint forces of accelerations a, without the closing force."""
 
     def borne(self, a: Array, closing: Array) -> tuple[Array, Array, Array]:
-        """Return what each body bears on the next, (2,) each.
+        """Return the force of each body on the next, (2,) each, in N.
 
-        It is that of ground on the crank, the crank on the rod, and the guide on the
+        Forces are of ground on the crank, the crank on the rod, and the guide on the
         slider.
         """
 
@@ -75,9 +76,9 @@ class _CutLoop(Protocol):
 def describe_bodies(
     scene: dict[str, Any],
 ) -> tuple[list[SliderBar], tuple[float, float, float], Array, Array]:
-    """Return the bodies, (crank, rod, offset), and what acts.
+    """Return the bodies, (crank, rod, offset) in m, gravity and the slider's force.
 
-    That is the field of gravity and the force on the slider.
+    Gravity (2,) is in m/s^2 and the force (2,) in N.
     """
     lengths = scene["lengths"]
     bodies = []

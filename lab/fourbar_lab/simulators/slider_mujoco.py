@@ -60,10 +60,7 @@ class MujocoSlider:
         mujoco.mj_fwdVelocity(self.model, self.data)
 
     def gap(self) -> tuple[Array, Array, Array]:
-        """Return the rod's end less the slider, and its derivatives.
-
-        These are its Jacobian, and its acceleration at none of q.
-        """
+        """Return the rod's end less the slider (2,), its Jacobian and its drift."""
         slopes = np.zeros((2, 3, 3))
         rates = np.zeros((2, 3, 3))
         for slope, rate, site in zip(slopes, rates, self.sites, strict=True):
@@ -93,11 +90,7 @@ class MujocoSlider:
         return np.array(self.data.qfrc_inverse) - slope[:2].T @ self.push
 
     def borne(self, a: Array, closing: Array) -> tuple[Array, Array, Array]:
-        """Return what each body bears on the next.
-
-        It is that of ground on the crank, the crank on the rod, and the guide on the
-        slider.
-        """
+        """Return the force on crank, rod and slider by the body before, (2,), N."""
         for body, force, site in zip(
             self.bodies[1:],
             (closing, self.push - closing),

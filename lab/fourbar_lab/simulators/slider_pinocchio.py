@@ -54,10 +54,7 @@ class PinocchioSlider:
         pin.updateFramePlacements(self.model, self.data)
 
     def gap(self) -> tuple[Array, Array, Array]:
-        """Return the rod's end less the slider, and its derivatives.
-
-        These are its Jacobian, and its acceleration at none of q.
-        """
+        """Return the rod's end less the slider (2,), its Jacobian and its drift."""
         end, end_slope, end_drift = self._follow(self.frames[0])
         slider, slider_slope, slider_drift = self._follow(self.frames[1])
         return end - slider, end_slope - slider_slope, end_drift - slider_drift
@@ -80,11 +77,7 @@ class PinocchioSlider:
         return np.asarray(self._solve(a, np.zeros(2)))
 
     def borne(self, a: Array, closing: Array) -> tuple[Array, Array, Array]:
-        """Return what each body bears on the next.
-
-        It is that of ground on the crank, the crank on the rod, and the guide on the
-        slider.
-        """
+        """Return the force on crank, rod and slider by the body before, (2,), N."""
         self._solve(a, closing)
         forces = []
         for joint in (1, 2, 3):
@@ -93,9 +86,10 @@ class PinocchioSlider:
         return forces[0], forces[1], forces[2]
 
     def _solve(self, a: Array, closing: Array) -> Array:
-        """Solve the inverse dynamics with the force on the rod's end.
+        """Return the generalized forces (3,) for the acceleration a, by RNEA.
 
-        Its opposite and the load act on the slider.
+        The closing force acts on the rod's end, its opposite and the load on the
+        slider.
         """
         outside = [pin.Force.Zero() for _ in range(4)]
         for joint, force, frame in (
