@@ -314,9 +314,10 @@ class _CheapestSearch:
                 self._bisect(tc, n / _CLOSE_ENOUGH, serves=n, kind=kind, cost=cost)
 
     def _time_kinds(self, settings: Settings) -> dict[str, float]:
-        """Time a step of each kind, and a reading, in steps of the settings.
+        """Return the time of a step of each kind, in steps of the settings.
 
-        Each time is the least of interleaved rounds.
+        A reading's time is kept as `reading_cost`. Each time is the least of
+        interleaved rounds.
         """
         variants = {
             "": settings,
@@ -505,11 +506,11 @@ def advise_command(
 ) -> int:
     """Find the cheapest MuJoCo settings.
 
-    They keep torque and pin forces of each SCENE within an error. The command says
-    which of the settings matters, and why; for several scenes it prints a table at the
-    end. It exits with status 1 if it finds no settings for one of them. For a robot's
-    FILE.xml, with or without SCENE before it, it tries settings in the file itself and
-    prints what to type.
+    The settings keep torque and pin forces of each SCENE within an error. The command
+    says which of the settings matters, and why; for several scenes it prints a table at
+    the end. The exit status is 1 if there are no settings for one of them. For a
+    robot's FILE.xml, with or without SCENE before it, the command tries settings in the
+    file itself and prints what to type.
     """
     if scenes[-1].suffix.lower() in ROBOTS:
         if output is not None or len(scenes) > 2:

@@ -1,6 +1,6 @@
 """Find the MuJoCo settings that matter for a scene, and why.
 
-Each is changed by itself, and the error measured.
+The error is measured with one setting changed at a time.
 """
 
 import math
@@ -76,9 +76,9 @@ class SettingInfluence:
 
 
 def judge_trial(scene: Scene, trial: Trial) -> WorstErrors:
-    """Compute the errors of a trial, at its steps and between them.
+    """Return the worst errors of a trial, at its steps and between them.
 
-    There are none if MuJoCo lost the motion.
+    Errors are infinite if MuJoCo lost the motion.
     """
     if trial.broken:
         return INFINITE_ERRORS
@@ -96,10 +96,10 @@ def _compute_errors_between(
 ) -> Iterator[WorstErrors]:
     """Compute errors between the steps of a segment, by a spline.
 
-    It is used where the steps are fewer than the positions. A largest force that lies
-    between two steps is not seen at either of them. A drive on bar 3 or 4, and a
-    cylinder, has poles, through which no curve can be drawn: each stretch between them
-    has a spline of its own.
+    A largest force that lies between two steps is not seen at either of them. Nothing
+    is computed where every position has a step. A drive on bar 3 or 4, and a cylinder,
+    has poles, through which no curve can be drawn: each stretch between them has a
+    spline of its own.
     """
     theta_2, first = np.unique(trial.at.theta_2[samples], return_index=True)
     n = samples.stop - samples.start

@@ -1,6 +1,6 @@
 """Compute the worst errors of an answer against the formulas.
 
-They are those of the torque and of each pin force, each on its scale.
+Errors are of the torque and of each pin force, each on its scale.
 """
 
 import math
@@ -111,9 +111,6 @@ def _take_positions(command: Command, rows: NDArray[np.bool_]) -> Command:
 
 
 def find_greatest(errors: Array | Sequence[float]) -> float:
-    """Return the greatest of some errors.
-
-    It is inf if one is NaN, if the greatest is not finite, or if there are none.
-    """
+    """Return the greatest error; inf if one is not finite, or if there are none."""
     value = float(np.max(errors, initial=-math.inf))
     return value if math.isfinite(value) else math.inf

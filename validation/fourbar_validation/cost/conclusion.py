@@ -1,7 +1,4 @@
-"""Say in a few lines what a study of cost found.
-
-It says what digits cost, what the defaults pay, and what matters.
-"""
+"""Say in a few lines what digits cost, what the defaults pay, and what matters."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence

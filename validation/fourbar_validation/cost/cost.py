@@ -122,7 +122,7 @@ def _print_details(
 ) -> None:
     """Print the cheapest settings of every error, the laws, and warnings.
 
-    It prints too what was left out.
+    The last lines name what was left out.
     """
     from rich.console import Console
 

@@ -1,6 +1,6 @@
-"""The formulas' side of the study.
+"""The formulas' side of the study: their cost and error in each arithmetic.
 
-It has double and single precision, the thirteen equations, and fifty digits.
+Compared are double and single precision, the thirteen equations, and fifty digits.
 """
 
 import math

@@ -1,6 +1,6 @@
 """Laws behind the points, of each quantity by itself.
 
-These are exponents with their uncertainty, floors and jumps.
+A law is an exponent with its uncertainty; floors and jumps are found too.
 """
 
 import math
@@ -72,18 +72,12 @@ class ErrorLaw:
 
     @property
     def decided(self) -> bool:
-        """Return whether enough points are left for a fit with an uncertainty.
-
-        It is decided too if a jump rules the law out.
-        """
+        """Return whether there are enough points for a fit, or a jump rules it out."""
         return (self.points >= FEWEST_FITTED and not self.mixed) or bool(self.jumps)
 
     @property
     def holds(self) -> bool:
-        """Return whether the exponent is the expected one throughout.
-
-        It is False if that is not decided.
-        """
+        """Return whether the exponent is as expected throughout; False if undecided."""
         return (
             self.decided
             and not self.jumps
@@ -178,7 +172,7 @@ def _list_by_steps(points: Sequence[CostPoint]) -> list[CostPoint]:
 def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
     """Return the points where an error jumps up as steps get finer.
 
-    They count once the motion is the scene's.
+    A point counts once the motion is the scene's.
     """
     jumps = []
     for i, point in enumerate(points[1:], 1):
@@ -302,9 +296,9 @@ def _measure_leap(
 
 
 def _fit_sag(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw:
-    """Fit the sag over the time constant.
+    """Fit the law of the sag over the time constant.
 
-    It is of second order where softness by itself is small next to it.
+    The sag is of second order where the error of softness alone is small next to it.
     """
     points = curves["sag tc, slow"]
     law = _fit_law("sag at 0.1 rad/s in tc", quantity, points, 2.0)
@@ -400,9 +394,9 @@ def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
 
 
 def _describe_floor(ladder: Sequence[CostPoint], quantity: str) -> str:
-    """Say where more steps no longer lessen an error.
+    """Say from how many steps on more steps do not lessen an error.
 
-    It says too where the error was less on the way.
+    An error that was less on the way is told too: two errors cancel there.
     """
     floor = find_floor(ladder, quantity)
     first = _find_steps_at_floor(ladder, quantity)

@@ -226,9 +226,9 @@ def draw_work_precision(
     quantity: str,
     title: str,
 ) -> Any:
-    """Draw the error over the time of a simulated second.
+    """Draw the error of torque or of the worst pin force over the cost.
 
-    It is that of the torque, or of the worst pin force.
+    Cost is the time of a simulated second.
     """
     height = 6.0
     figure = make_figure(height, write_statement(curves, quantity), title)
@@ -350,10 +350,10 @@ SHORT = {
 
 
 def write_statement(curves: Curves, quantity: str) -> str:
-    """Say what the picture means, by the criterion of its front.
+    """Say what the picture means: the cost of six digits, the error of the defaults.
 
-    It is the error at the steps and between them. The digits are six, or four where no
-    setting reaches six.
+    The error is the greatest at the steps and between them, as in the front. Where no
+    setting reaches six digits, the cost is that of four.
     """
     digits, cheapest = _find_price(curves, quantity)
     default = find_default(curves)
@@ -556,10 +556,7 @@ def _draw_over_timestep(
     curves: Curves,
     quantity: str,
 ) -> None:
-    """Draw one quantity's error over the timestep, by integrator.
-
-    Its jumps are ringed.
-    """
+    """Draw one quantity's error over the timestep, by integrator; ring the jumps."""
     for label, look in INTEGRATOR_LOOKS.items():
         row = sorted(curves.get(look.curve, ()), key=lambda point: point.setting_value)
         errors = {

@@ -1,6 +1,6 @@
-"""List what the study tries: one setting at a time.
+"""List what the study tries: one setting at a time is changed.
 
-It is changed around the recommended settings and MuJoCo's defaults.
+The other settings are the recommended ones or MuJoCo's defaults.
 """
 
 import math

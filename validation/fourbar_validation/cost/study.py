@@ -1,7 +1,4 @@
-"""The work-precision study of one scene.
-
-It goes curve after curve, each kept once it is done.
-"""
+"""The work-precision study of one scene: curve after curve, each stored once done."""
 
 import math
 import time
@@ -179,9 +176,13 @@ class CostStudy:
         bare: bool = False,
         settled: bool = False,
     ) -> JudgedSetup:
-        """Assemble the scene for trials.
+        """Return the scene set up for trials; a second call returns the same object.
 
-        It runs at its own speed or slow, as it is or bare, after a turn or not.
+        Parameters
+        ----------
+        slow : run at 0.1 rad/s instead of the scene's speed.
+        bare : without loads and effects.
+        settled : begin a turn before the scene.
         """
         if (slow, bare, settled) not in self._rigs:
             scene = self.scene
@@ -393,9 +394,9 @@ class CostStudy:
         return points
 
     def _try_one_state(self) -> list[CostPoint]:
-        """Try MuJoCo at single states by several impedances.
+        """Return points of MuJoCo at single states, by several impedances.
 
-        Their order counts; no time is measured.
+        Errors are measured, and no time.
         """
         from fourbar_validation.engines.mujoco.forward import MujocoOneState
 

@@ -156,9 +156,9 @@ ERRATA_HEADINGS = (
 def list_ladder_rows() -> list[tuple[str, ...]]:
     """List the rows from our answer to the two published ones, error by error.
 
-    Each of the published ones has its printed figures. The first row is right:
-    309.309 N cm and (7.033, -2.121) N. The last two are what the manual and section 5.7
-    print: 308.804 N cm and (161.418, -156.506) N.
+    The first row is right: 309.309 N cm and (7.033, -2.121) N. The last two are what
+    the manual and section 5.7 print: 308.804 N cm and (161.418, -156.506) N. After each
+    of these answers stand the figures as printed.
     """
     source = read_printed()["published"]
     tables = {

@@ -48,10 +48,7 @@ class PublishedFigure(NamedTuple):
     """Round-off of whoever printed 15 digits or more, in the unit printed."""
 
     def verdict(self) -> str:
-        """Say how ours compares with the published digits.
-
-        It is rounded, truncated or differs.
-        """
+        """Return "rounded", "truncated" or "differs": ours against the printed."""
         return compare_figure(self.printed, self.ours, self.noise)
 
     def reproduced(self) -> bool:
@@ -67,10 +64,7 @@ def compare_figure(
     value: float,
     noise: float = 0.0,
 ) -> str:
-    """Compare `value` to the published number of decimals.
-
-    It is rounded, truncated, or it differs.
-    """
+    """Return "rounded", "truncated" or "differs", at the printed decimals."""
     theirs = Decimal(printed)
     ours = Decimal(value)
     unit = Decimal(1).scaleb(int(theirs.as_tuple().exponent))

@@ -1,6 +1,6 @@
-"""The thesis's own program: its 13 unknowns and its units.
+"""The thesis's own program: its 13 unknowns, its units, and its errors.
 
-Each of its errors is behind a switch.
+A switch turns each error on.
 
 Source: I. Linares Mendoza, "Analisis cinematico y dinamico asistido por computadora de
 mecanismos de cuatro barras", UNAM FES Cuautitlan, sections 4.12 and 5.7 and the
@@ -142,9 +142,9 @@ def compute_right_unknowns() -> dict[str, float]:
 
 
 def compute_inertia(bar: int, about_long_axis: bool = False) -> float:
-    """Compute I_G of bar 3 or 4, kg cm^2.
+    """Return I_G of bar 3 or 4, kg cm^2.
 
-    It is m (L^2 + w^2)/12, or m w^2/12 as the thesis has it.
+    I_G is m (L^2 + w^2)/12, or m w^2/12 as the thesis has it.
     """
     if about_long_axis:
         across = 0.0
@@ -156,7 +156,7 @@ def compute_inertia(bar: int, about_long_axis: bool = False) -> float:
 class Kinematics:
     """Motion at theta_2 = 135 deg by our formulas, and the arms of the pin forces.
 
-    It is in cm and the thesis's angles.
+    Lengths are in cm, angles as the thesis counts them.
     """
 
     def __init__(self) -> None:

@@ -1,9 +1,9 @@
 """The thesis's printed figures against ours.
 
-They are angles and limit positions, then motion, constants and unknowns. Sections 2.4,
-4.12 and 5.7, table 3.2 and the tables of the manual. Ours come from `fourbar.solve` and
-`fourbar.formulas.mobility`, or from the thesis's formula for a constant that nobody
-else defines. Units as printed: cm, deg, rad/s, cm/s^2, N, N cm.
+Compared are angles and limit positions, then motion, constants and unknowns: sections
+2.4, 4.12 and 5.7, table 3.2 and the tables of the manual. Ours come from
+`fourbar.solve` and `fourbar.formulas.mobility`, or from the thesis's formula for a
+constant that nobody else defines. Units as printed: cm, deg, rad/s, cm/s^2, N, N cm.
 """
 
 import csv
@@ -221,10 +221,7 @@ def truncate(value: float, decimals: int) -> float:
 
 
 def _compute_cut_arm(k: Kinematics, decimals: int) -> float:
-    """Compute y of R23 with theta_3 cut to some decimals of a degree.
-
-    It is erratum 12.
-    """
+    """Return y of R23 in cm, theta_3 cut to some decimals of a degree (erratum 12)."""
     return -CENTRE[3] * math.sin(
         math.radians(truncate(to_degrees(k.theta_3), decimals))
     )
@@ -324,10 +321,7 @@ def list_printed_kinematics(k: Kinematics) -> Iterator[PublishedFigure]:
 
 
 def _list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
-    """List section 5.7: inertias, right sides and moment arms.
-
-    They belong to the 13 equations; the matrix is as printed.
-    """
+    """Yield the constants of section 5.7: inertias, right sides, arms, the matrix."""
     source = read_printed()
     yield from _list_inertias(source["inputs"]["inertia_kg_cm2_printed"])
     ours = _compute_our_constants(k)

@@ -1,8 +1,8 @@
 """The thesis's method for the forces: thirteen equations per position.
 
-They are assembled and solved as a batch. The measure of speed for the eliminated form.
-Moments are taken about the mass centres, unknowns in the order F12, F32, F23, F43, F14,
-F34 (x, y each), T, as in the thesis (section 5.7).
+The equations are assembled and solved as a batch, against which the speed of the
+eliminated form is measured. Moments are taken about the mass centres, unknowns in the
+order F12, F32, F23, F43, F14, F34 (x, y each), T, as in the thesis (section 5.7).
 """
 
 from typing import NamedTuple

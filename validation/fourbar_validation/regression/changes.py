@@ -1,6 +1,6 @@
-"""Two runs held against each other, scene by scene.
+"""Compare two runs scene by scene.
 
-Both tables are sorted, and neither is ever whole in memory.
+Both tables are sorted and read in step, so that neither is ever whole in memory.
 """
 
 from collections import Counter
@@ -182,26 +182,20 @@ class Differences:
 
     @property
     def grown(self) -> list[str]:
-        """Rows that are allowed more than NOTABLE times what they were.
-
-        They are no regression.
-        """
+        """Rows whose allowed error grew by a factor above NOTABLE: no regression."""
         return [*self._grown]
 
     @property
     def not_run(self) -> list[str]:
         """Scenes and engines of the old run that the new one was not run for.
 
-        Each has its number of rows.
+        A line names one and its number of rows.
         """
         return [*self._scenes_not_run, *self._engines_not_run]
 
     @property
     def not_compared(self) -> list[str]:
-        """Rows that both runs have as answers to different questions.
-
-        They are listed by scene, engine and setting.
-        """
+        """Scene, engine and setting of rows that answer different questions."""
         return [*self._not_compared]
 
     @property

@@ -103,7 +103,7 @@ class Fault:
     def groups(self, kinds: Iterable[KindOfChange]) -> list[Group]:
         """Return the groups of some kinds, the worst first.
 
-        Each has the number of its engine's scenes.
+        In each the number of its engine's scenes is set.
         """
         wanted = set(kinds)
         groups = [group for group in self._groups.values() if group.kind in wanted]

@@ -1,6 +1,6 @@
 """A recorded run: its tables, and record.json with what it was made with.
 
-That is versions, machine, settings and scenes. The record of one scene is in
+Recorded are versions, machine, settings and scenes. The record of one scene is in
 `report/record.py`.
 """
 
@@ -105,10 +105,9 @@ def describe_run(
 
 
 def _find_commit() -> str:
-    """Return the commit of the harness's folder.
+    """Return the commit of the harness's folder, "-dirty" if it has changes.
 
-    It is marked if it has uncommitted changes; the statement of a CI service goes
-    first.
+    The commit that a CI service states in the environment goes first.
     """
     if stated := os.environ.get("GITHUB_SHA") or os.environ.get("CI_COMMIT_SHA"):
         return stated[:12]
@@ -132,7 +131,7 @@ def _find_commit() -> str:
 def write_about(record: About, folder: Path) -> None:
     """Write record.json next to the results.
 
-    It has rows and SHA-256 of each table, and of itself.
+    The file states the rows and SHA-256 of each table, and its own SHA-256.
     """
     present = [path for name in RECORD_FILES if (path := folder / name).is_file()]
     tables = {
@@ -161,9 +160,9 @@ def _require_undamaged(
     read: str,
     key: str,
 ) -> None:
-    """Raise an InputError that names the first damaged table of a folder.
+    """Raise an InputError that names the first table that its record does not describe.
 
-    Such a table is not what its record says.
+    A damaged table is missing or unnamed, or has another SHA-256.
     """
     present = {name for name in RECORD_FILES if (folder / name).is_file()}
     for name in sorted({*tables, *present, read}):
@@ -193,9 +192,9 @@ NOTHING_KNOWN = About({}, "unknown machine", {})
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """A run as it is kept in a folder.
+    """A recorded run, read from its folder.
 
-    Its table is read as it is needed, and never whole.
+    Rows of its table are read one scene at a time: the table may not fit in memory.
     """
 
     about: About
@@ -238,9 +237,9 @@ class Recorded:
         yield from self._read(read_words(self.table, column))
 
     def times(self) -> Iterator[tuple[str, list[tuple[str, float]]]]:
-        """Return each engine's time over that of the formulas, scene by scene.
+        """Yield each scene, and (engine, its time over that of the formulas).
 
-        It is empty if they were not kept.
+        Nothing is yielded if no times were kept.
         """
         table = self.table.parent / TIMINGS_FILE
         if not table.is_file():

@@ -1,6 +1,6 @@
 """The pictures of one scene.
 
-These are the linkage, every engine's answer over the formulas, and the errors beneath.
+Drawn are the linkage, every engine's answer over the formulas, and the errors beneath.
 """
 
 from itertools import pairwise
@@ -135,9 +135,9 @@ def _draw_answers(record: Record, solution: Solution) -> str:
 
 
 def _choose_force(record: Record, solution: Solution) -> str:
-    """Name the pin force that a reader wants to see.
+    """Return the name of the pin force to draw.
 
-    It is the one that fails most, or else the largest over the positions that have a
+    Drawn is the one that fails most, or else the largest at positions that have a
     value.
     """
     failing = [row for row in record.rows if row.failed and row.quantity in PIN_FORCES]
@@ -358,9 +358,9 @@ def _label(quantity: str, solution: Solution) -> str:
 
 
 def _choose_base(solution: Solution, command: Command | None) -> Array:
-    """Choose what a curve is drawn over.
+    """Return what a curve is drawn over: theta_2 in degrees.
 
-    It is the time of a free motion, else theta_2 in degrees.
+    The time in s takes its place where the motion is free.
     """
     angle = (solution.at if command is None else command).angle
     if solution.time is not None and len(solution.time) == len(angle):

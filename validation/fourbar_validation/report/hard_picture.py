@@ -1,6 +1,6 @@
-"""The picture of the hard cases, per engine.
+"""The picture of the hard cases: error against distance to the singular position.
 
-It is error against distance to the singular position.
+Each engine has a panel.
 """
 
 import math

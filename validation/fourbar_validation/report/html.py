@@ -71,8 +71,7 @@ class _Cell(NamedTuple):
 class SectionFigure(NamedTuple):
     """A picture of a section.
 
-    It is an SVG drawn by our own code, which stands in the page, or an image as a data
-    URI.
+    The picture is an inline SVG drawn by our own code, or an image as a data URI.
     """
 
     alt: str
@@ -83,9 +82,9 @@ class SectionFigure(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A part of the report that another module provides.
+    """A part of the report that another module provides: text, pictures and a table.
 
-    It has pictures and a table, cells of plain text.
+    Cells of the table are plain text.
     """
 
     key: str

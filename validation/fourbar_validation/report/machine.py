@@ -1,6 +1,6 @@
 """Describe where and with what a run was made.
 
-These are versions, machine, this code, and the build of each engine.
+Stated are versions, machine, this code, and the build of each engine.
 """
 
 import ctypes

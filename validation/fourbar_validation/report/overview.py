@@ -1,6 +1,6 @@
 """The first screen of a report.
 
-It says what agrees, how closely, and which engine is at fault if not.
+A few lines say what agrees, how closely, and which engine is at fault if not.
 """
 
 import math
@@ -212,10 +212,7 @@ class Overview:
             line.columns[group].add(row, float(find_used(row.error, row.allowed)))
 
     def _add_agreement(self, rows: Sequence[Row]) -> None:
-        """Count a scene on which two engines agree.
-
-        They compared its torque and pin forces.
-        """
+        """Count a scene of which two engines confirm the torque and all pin forces."""
         asked: dict[str, dict[str, bool]] = {}
         for row in rows:
             if row.quantity in DRIVES:
@@ -311,9 +308,9 @@ class Overview:
 
     @property
     def silent(self) -> list[str]:
-        """Return the engines with nothing to compare.
+        """Return a line for each engine with nothing to compare, with the reason.
 
-        Each has its commonest reason.
+        Of several reasons the commonest is stated.
         """
         lines = []
         for line in sorted(self._lines.values(), key=lambda one: one.engine):

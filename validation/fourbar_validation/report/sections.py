@@ -1,7 +1,4 @@
-"""Parts of report.html from elsewhere.
-
-They are how each family of the hard cases came out, and the study of cost.
-"""
+"""Parts of report.html from elsewhere: the hard cases by family, and the cost."""
 
 import base64
 from collections.abc import Iterable

@@ -41,9 +41,9 @@ _ALLOWANCE = attrgetter("allowed")
 
 @dataclass(frozen=True, slots=True)
 class Worst:
-    """The row of one scene and engine that uses most of its allowance.
+    """The row of one scene and engine with the largest error/allowed.
 
-    It may lie beyond it.
+    A failing row has a ratio beyond 1.
     """
 
     row: Row
@@ -55,10 +55,7 @@ class Worst:
 
 @dataclass(slots=True)
 class _EngineLine:
-    """All that one independent engine, or our own consistency, answered.
-
-    It has its counts and its worst row.
-    """
+    """Counts of one independent engine, or of our own consistency; its worst row."""
 
     name: str
     version: str = ""
@@ -302,7 +299,7 @@ class Summary:
     def loosest(self) -> str:
         """Say how many quantities no engine judges tighter than degraded.
 
-        They are degraded as predicted; the worst is named.
+        Examples are the rows that allow most.
         """
         if not self.loose:
             return ""
@@ -381,7 +378,7 @@ class Summary:
     def orders(self) -> list[tuple[str, dict[str, float]]]:
         """Return (scene, errors at 4h and 2h and observed order) of simulations.
 
-        They are at most _ORDERS_SHOWN, lowest first.
+        At most _ORDERS_SHOWN are returned, the lowest orders first.
         """
         few = len(self._orders) <= _ORDERS_SHOWN
         if few:
@@ -392,7 +389,7 @@ class Summary:
     def shown(self) -> list[Record]:
         """Return the scenes shown, by name, at most SCENES_SHOWN.
 
-        They are those that fail, then those that used most.
+        Scenes that fail come before those that used most of what is allowed.
         """
         return sorted(self._find_most_used(SCENES_SHOWN), key=lambda scene: scene.name)
 
@@ -408,16 +405,16 @@ class Summary:
     def sketched(self) -> list[Record]:
         """Return the scenes with small pictures.
 
-        They are those that fail, then the nearest to it.
+        Scenes that fail come first, then those nearest to it.
         """
         scenes = self._find_most_used(SCENES_SHOWN)
         return [scene for scene in scenes if scene.thumbnail][:SKETCHED]
 
     @property
     def first(self) -> Record | None:
-        """Return the scene of the large figure.
+        """Return the scene of the large figure, None if no scene has one.
 
-        It is the one asked for, else the first that fails.
+        A scene that fails goes before the first of those shown.
         """
         drawn = [scene for scene in self.shown if scene.figure]
         failing = [scene for scene in self._failing if scene.figure]
@@ -440,9 +437,10 @@ def _list_left_out(scene: Record) -> set[tuple[str, str]]:
 
 
 def compute_shares(rows: Sequence[Row]) -> list[float]:
-    """Return error/allowed.
+    """Return error/allowed of each row.
 
-    It is infinite without an answer, 0 if the error is 0 or nothing was compared.
+    The ratio is infinite without an answer, 0 if the error is 0 or nothing was
+    compared.
     """
     of_all = find_used(
         np.array([row.error for row in rows]), np.array([row.allowed for row in rows])
@@ -454,9 +452,10 @@ def compute_shares(rows: Sequence[Row]) -> list[float]:
 
 
 def _count_compared(rows: Sequence[Row]) -> tuple[int, list[Row]]:
-    """Count the quantities compared, and return the tightest degraded rows.
+    """Return the number of quantities compared, and the tightest degraded rows.
 
-    Each is that which allows least of a quantity that every row calls degraded.
+    There is one such row for each quantity that every row calls degraded: the one that
+    allows least.
     """
     by_quantity: dict[str, list[Row]] = {}
     for row in rows:

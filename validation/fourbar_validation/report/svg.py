@@ -1,9 +1,8 @@
-"""A matplotlib figure as inline SVG.
+"""A matplotlib figure as inline SVG, small and with ids of its own.
 
-It is small, with ids of its own, its text as text, in the colours of the page.
-Matplotlib draws with the light colours of page.css; in the page each is the custom
-property that it came from, which has a value for dark pages too (Okabe-Ito hues,
-darkened or lightened until every one has a contrast of 3:1 or more).
+Text stays text. Matplotlib draws with the light colours of page.css; in the page each
+is the custom property that it came from, which has a value for dark pages too
+(Okabe-Ito hues, darkened or lightened until every one has a contrast of 3:1 or more).
 """
 
 import hashlib
@@ -120,9 +119,9 @@ def write_svg(figure: Any, salt: str) -> str:
 
 
 def write_alone(figure: Any, salt: str) -> str:
-    """Draw the figure as a file of its own.
+    """Return the figure as the SVG of a file of its own.
 
-    Its paper is light or dark as the reader's pages are.
+    The paper is light or dark as the reader's pages are.
     """
     svg = _shrink_svg(_draw_svg(figure, salt, transparent=False))
     light, dark = (

@@ -1,7 +1,4 @@
-"""Small pictures of a scene, without words.
-
-They are the linkage, and the torque over the motion.
-"""
+"""Small pictures of a scene, without words: linkage, and torque over the motion."""
 
 from collections.abc import Callable
 

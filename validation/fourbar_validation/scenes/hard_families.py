@@ -1,6 +1,6 @@
 """The hard cases: families of scenes that lie near singular positions.
 
-Each family is a generator with named parameters and seeds, and one line on what must
+A family is a generator with named parameters and seeds, and one line on what must
 happen.
 """
 
@@ -57,9 +57,9 @@ def draw_lengths_of_type(kind: DrawnType, seed: int) -> Lengths:
 
 
 def dress(lengths: Lengths, seed: int = 0) -> Scene:
-    """Make a scene on these lengths with loads, 3 rad/s and 2 rad/s^2.
+    """Return a scene on these lengths that moves at 3 rad/s and 2 rad/s^2 under loads.
 
-    It has offset mass centres, gravity, a force and a couple.
+    The mass centres are offset; gravity, a force and a couple act.
     """
     rng = np.random.default_rng([seed, 4])
     d, *moving = lengths
@@ -109,9 +109,9 @@ def _compute_corners(
     second_side: float,
     opposite: float,
 ) -> list[float]:
-    """Compute the angles between two sides of a triangle by its third side.
+    """Return both signs of the angle between two sides of a triangle; [] if none.
 
-    They are of either sign, if it closes.
+    `opposite` is the third side.
     """
     if not second_side:
         return []
@@ -126,7 +126,7 @@ def _compute_corners(
 def find_collinear_3_4(lengths: Lengths) -> list[tuple[float, bool]]:
     """Find psi in (0, pi) with bars 3, 4 stretched (True) or folded.
 
-    There a^2 + d^2 - 2 a d cos psi = (b +- c)^2.
+    At these angles a^2 + d^2 - 2 a d cos psi = (b +- c)^2.
     """
     d, a, b, c = lengths
     places = []
@@ -139,7 +139,7 @@ def find_collinear_3_4(lengths: Lengths) -> list[tuple[float, bool]]:
 def find_collinear_2_3(lengths: Lengths) -> list[tuple[float, int]]:
     """Find (psi, branch) where bars 2, 3 are collinear, so omega_4 = 0.
 
-    They follow from the triangle O2, B, O4 with O2 B = |a +- b|.
+    The triangle O2, B, O4 with O2 B = |a +- b| gives psi.
     """
     d, a, b, c = lengths
     places = []
@@ -154,7 +154,7 @@ def find_collinear_2_3(lengths: Lengths) -> list[tuple[float, int]]:
 def _find_parallel_2_4(lengths: Lengths) -> list[tuple[float, int]]:
     """Find (psi, branch) where bars 2, 4 are parallel, so omega_3 = 0.
 
-    There (a - c) e^{i psi} + b e^{i psi_3} = d, or a + c.
+    Loop closure is then (a -+ c) e^{i psi} + b e^{i psi_3} = d.
     """
     d, a, b, c = lengths
     places = []
@@ -203,10 +203,7 @@ def _approach_poles(
     distances: tuple[float, ...] = _POLE,
     seeds: range = range(2),
 ) -> Scenes:
-    """Approach the position where the driven bar 3 or 4 stands still.
-
-    It is approached from both sides.
-    """
+    """Approach from both sides positions where the driven bar 3 or 4 stands still."""
     offsets = _list_both_sides(distances)
     for seed in seeds:
         lengths = draw_lengths_of_type(TYPES_WITH_A_CRANK, seed)
@@ -393,7 +390,7 @@ def _sweep_out_and_back(
 def _drive_thesis_to_limits(*, steps: int = 120) -> Scenes:
     """Drive the thesis's double rocker from one limit position to the other.
 
-    Its bars are 20, 48, 55 and 20 cm.
+    Bars are 20, 48, 55 and 20 cm long.
     """
     linkage = FourBar(
         0.20,
@@ -416,7 +413,8 @@ def released(
 ) -> Scenes:
     """Release IFToMM benchmark A02 with one window.
 
-    It has 1 m, 1 kg links, upright, the first pin at 1 m/s, gravity 9.81.
+    The links are of 1 m and 1 kg; upright, the first pin moves at 1 m/s; gravity is
+    9.81.
     """
     bar = Bar(1.0, 1.0)
     linkage = FourBar(1.0, bar, bar, bar)

@@ -250,7 +250,7 @@ def _draw_springs(
 ) -> list[Any]:
     """Draw springs, torsion springs and flywheels.
 
-    They carry the weights about as they are loaded.
+    Springs are about as strong as the loads.
     """
     effects: list[Any] = []
     size = weight * abs(ranges.load(rng))
@@ -404,10 +404,7 @@ MACHINES = Ranges(
 
 
 def _draw_machine_place(kind: DrawnType, rng: np.random.Generator) -> DrawnLinkage:
-    """Draw a linkage of a type, with POSITIONS_OF_A_SWEEP angles over its range.
-
-    It can move over that range.
-    """
+    """Draw a linkage of a type, and POSITIONS_OF_A_SWEEP angles over its range."""
     size = 10.0 ** rng.uniform(-1.5, 1.0)
     lengths = [size * x for x in draw_lengths(rng, kind)]
     return lengths, lambda _, linkage: Sweep(

@@ -1,6 +1,6 @@
 """Collect the scenes that a run judges.
 
-They are the mechanisms of `models/`, the files given, or random linkages.
+Scenes are the mechanisms of `models/`, the files given, or random linkages.
 """
 
 import hashlib
@@ -38,7 +38,7 @@ AS_LONG_AS = 100
 class Suite(Protocol):
     """An ordered set of named scenes.
 
-    Each is made where it is judged, so a long suite takes no memory.
+    A scene is made where it is judged, so a long suite takes no memory.
     """
 
     def __len__(self) -> int: ...
@@ -131,7 +131,7 @@ def read_default_suite() -> Files:
 def read_scene_files(paths: Iterable[Path]) -> Files:
     """Read and check scene files.
 
-    Each is named by its stem, or by its path if two stems are alike. What does not
+    A scene's name is its file's stem, or its path if two stems are alike. What does not
     print in a name is written as its escape. Raises InputError for a file that is bad,
     and for two of one name, at once: a long run does not start on bad input.
     """
