@@ -1,6 +1,6 @@
 """Errors with one root, and the exit status and the line with which a command ends.
 
-There is one class for each kind of mistake.
+Each kind of mistake has a class.
 """
 
 import io

@@ -90,9 +90,9 @@ def require_whole(key: str, value: object, among: Container[int], allowed: str) 
 
 
 def _read_quantity(value: object) -> object:
-    """Return a `pint.Quantity` as text with its unit, in a list if it is an array.
+    """Return a `pint.Quantity` as text with its unit, any other value as it is.
 
-    Other values are returned as they are.
+    An array gives a list of texts.
     """
     if not hasattr(value, "magnitude") or not hasattr(value, "units"):
         return value
@@ -189,10 +189,7 @@ def require_pair(key: str, value: Any, by: Declared) -> tuple[float, float]:
 
 
 def check_numbers(description: Any, key: str) -> None:
-    """Check the numbers that a frozen description declares in `numbers`.
-
-    Those with units are converted.
-    """
+    """Check the numbers that a frozen description declares, and convert their units."""
     for name, stated in description.numbers.items():
         value = getattr(description, name)
         if value is None and stated.left_out is None:
@@ -239,7 +236,7 @@ def list_fields(kind: type) -> tuple[str, ...]:
 class Bar:
     """A moving bar; massless unless stated otherwise.
 
-    Each number may be a text with a unit instead, like "48 cm".
+    Numbers may be texts with units instead, like "48 cm".
 
     Parameters
     ----------

@@ -202,9 +202,9 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
         return np.array(STATUS_NAMES)[self.status_code].tolist()
 
     def evaluated(self) -> list[str]:
-        """List the names of the quantities that were evaluated, theta_2 first.
+        """List the names of the evaluated quantities, theta_2 first.
 
-        Those of the scene's points are left out.
+        Quantities of the scene's points are left out.
         """
         return [name for name in UNITS if getattr(self, name) is not None]
 
@@ -556,10 +556,9 @@ def find_unit_of_quantity(name: str) -> str:
 
 
 def find_values(solution: Solution, name: str, units: Conversion = SI) -> Any:
-    """Return a quantity by its name, those of the scene's points too.
+    """Return a quantity, or a point's, by its name; None if it was not evaluated.
 
-    It is None if it was not evaluated. Places are those in the coordinates of the
-    scene's drawing.
+    Places are in the coordinates of the scene's drawing.
     """
     values = _find_si(solution, name)
     unit = find_unit_of_quantity(name)
@@ -572,10 +571,7 @@ def find_values(solution: Solution, name: str, units: Conversion = SI) -> Any:
 
 
 def _find_si(solution: Solution, name: str) -> Array | None:
-    """Return a quantity, or a point's, in SI units and from O2.
-
-    It is None if it was not evaluated.
-    """
+    """Return a quantity, or a point's, in SI units and from O2; None if absent."""
     values: Array | None
     if name in UNITS:
         values = getattr(solution, name)

@@ -1,6 +1,6 @@
-"""Solver of a scene, as far as it is asked.
+"""Solver of a scene: block by block over the positions, stage by stage.
 
-It goes block by block over the positions, stage by stage.
+The evaluation ends after the stage that is asked for.
 """
 
 import cmath
@@ -204,10 +204,7 @@ def _make_case(
     request: _Requested,
     side: int,
 ) -> Case:
-    """Make the case of one linkage.
-
-    Its effects count turns from where the motion begins.
-    """
+    """Make the case of one linkage, with effects that count turns from its start."""
     case = Case.of(scene, commanded.bar, side)
     if not request.asks_forces or not scene.counts_turns:
         return case
@@ -352,7 +349,8 @@ def _require_rate(name: str, value: Any, n: int) -> None:
 def find_last_stage(scene: Scene) -> str:
     """Return the last stage for which a scene states enough.
 
-    It is that of the error bars, or the positions alone.
+    A scene without speed, law or release has positions alone; all others have every
+    stage.
     """
     motion = scene.motion
     if motion.speed is None and motion.law is None and motion.free is None:
@@ -510,10 +508,10 @@ def make_solution(
 
 
 def _find_signs(scene: Scene, commanded: Command, sine: Array | None) -> Any:
-    """Find the sign of sin(theta_4 - theta_3) at each position.
+    """Return the sign of sin(theta_4 - theta_3) at each position.
 
-    It is the branch where the sine is zero or NaN. `sine`: None if it was not
-    evaluated.
+    The branch replaces the sign where the sine is zero or NaN. `sine`: None if it was
+    not evaluated.
     """
     if sine is None:
         return with_signs(scene.linkage, commanded).branch
@@ -556,10 +554,10 @@ def _list_foreign(scene: Scene) -> tuple[str, ...]:
 
 
 def _list_absent(scene: Scene) -> tuple[str, ...]:
-    """List the quantities that a solution lacks.
+    """List the quantities that a solution of the scene lacks.
 
-    These are those of the other kind of drive, and those of dry or load-dependent
-    friction if there is none.
+    Quantities of the other kind of drive are always absent, and those of dry or
+    load-dependent friction if the scene has none.
     """
     absent = _list_foreign(scene)
     if not any(effect.dry for effect in scene.effects):

@@ -119,10 +119,10 @@ def name_file(path: Path) -> Iterator[None]:
 
 
 def require_file(target: Path, *read: Path) -> None:
-    """Raise InputError for what can name no output.
+    """Raise InputError for a path that cannot be written to.
 
-    That is a folder, a file in a missing folder, or one that is read. `-` names
-    standard output.
+    Such a path is a folder, a file in a missing folder, or a file that is read. `-`
+    names standard output.
     """
     if target == STANDARD_STREAM:
         return

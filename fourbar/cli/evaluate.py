@@ -330,10 +330,10 @@ def _choose_units(
     units: Conversion | None,
     degrees: bool | None,
 ) -> Conversion:
-    """Choose the units of the output.
+    """Choose the units of the output: those asked for, else the file's; JSON is in SI.
 
-    They are those asked for, otherwise those of the file; JSON is in SI. Angles are in
-    degrees if not asked for, in CSV only if the file does not command them in rad.
+    Angles are in degrees if not asked for, in CSV only if the file does not command
+    them in rad.
     """
     in_degrees = form in ("summary", "table")
     if units is not None:
@@ -360,7 +360,7 @@ def _write_summary(
 ) -> str:
     """Write the block of a scene, or what `--at` asked for.
 
-    That is a block if one position answers it, otherwise a line for each.
+    One position that answers `--at` has a block, several have a line each.
     """
     from fourbar.show.block import write_block
     from fourbar.show.located import list_positions

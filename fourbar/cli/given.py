@@ -242,9 +242,9 @@ def find_positions(scene: Scene, text: str) -> Command:
 
 
 def read_three(key: str, text: str, unit: str = "m") -> tuple[float, float, float]:
-    """Read a vector of the command line.
+    """Read a vector of the command line: three numbers between spaces or commas.
 
-    It is three numbers, bare or with units, between spaces or commas.
+    Numbers are bare or with units.
     """
     parts = text.replace(",", " ").split()
     if len(parts) != 3:

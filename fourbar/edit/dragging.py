@@ -59,7 +59,7 @@ class _Handle(NamedTuple):
 def list_handles(scene: Scene) -> list[_Handle]:
     """List everything that can be dragged.
 
-    These are mass centres, points, loads, and the ends of what acts on a line.
+    Mass centres, points, loads, and the ends of what acts on a line can be dragged.
     """
     handles = []
     for number in MOVING_BARS:

@@ -1,9 +1,9 @@
 """A private page next to the scene file that leads a browser to the workbench.
 
-It leads a second `fourbar edit` to the first one too. The address of the workbench
-holds its token. A browser gets the name of this page instead, for the arguments of a
-program are seen by every user of the machine. The page is locked while its server runs:
-two servers on one file would share its state file and lose work.
+A second `fourbar edit` finds the first one by this page too. The address of the
+workbench holds its token. A browser gets the name of this page instead, for the
+arguments of a program are seen by every user of the machine. The page is locked while
+its server runs: two servers on one file would share its state file and lose work.
 """
 
 import os

@@ -1,6 +1,6 @@
 """The server of the workbench.
 
-It listens on the loopback address alone, for pages that know its token.
+The server listens on the loopback address alone, for pages that know its token.
 """
 
 import asyncio
@@ -413,7 +413,7 @@ class Page(_Guarded):
 class Report(_Guarded):
     """The report of the harness, in a sandbox without an origin.
 
-    It reaches nothing here.
+    A page in this sandbox reaches nothing of the server.
     """
 
     def get(self, token: str) -> None:

@@ -174,9 +174,9 @@ class Session:
         write_bytes(self.state_file, data, private=True)
 
     def end(self, *, gone: bool) -> None:
-        """Remove the state file if everything is saved and no page is left.
+        """Remove the state file if all is saved or nothing was changed; else write it.
 
-        It is removed too if nothing was changed. `gone`: no page is left.
+        `gone`: no page is left. The state file is kept while one is.
         """
         if gone and (self.saved or len(self.texts) == 1):
             self.state_file.unlink(missing_ok=True)
@@ -592,9 +592,9 @@ def _find_shown(theta_2: Any, asked: dict[str, Any]) -> int | None:
 
 
 def _find_monotone(values: Any, shown: int | None) -> tuple[int, int]:
-    """Return the ends of the run in which numbers exist and rise, or fall, throughout.
+    """Return the ends of a run in which numbers exist and rise, or fall, throughout.
 
-    It is the one with the position shown, or else the longest.
+    The run with the position shown is chosen, or else the longest.
     """
     signs = np.nan_to_num(np.sign(np.diff(values)))
     turns = np.flatnonzero(np.diff(signs)) + 1

@@ -129,7 +129,7 @@ class Actions:
     def pin_couple(self, pin: str, couple: Number) -> None:
         """Add a couple on the second of the two bars at a pin, N m.
 
-        Its opposite acts on the first bar.
+        The first bar gets the opposite couple.
         """
         _add_to(self.couples, pin, couple)
 
@@ -213,7 +213,7 @@ class Actions:
     def about_B(self) -> Number:
         """Compute the moment on the coupler about pin B, N m.
 
-        It is small where forces act near B.
+        Forces that act near B give a small moment, which keeps its digits.
         """
         total = self.couples.get("A", 0.0) - self.couples.get("B", 0.0)
         for force, point, beyond, moment in self.on_coupler:
@@ -347,7 +347,7 @@ class Effect:
     def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
         """Return the couple that it may ask of the drive at a speed (rad/s), N m.
 
-        It lays out the flywheel of an MJCF.
+        The flywheel of an MJCF is laid out for this couple.
         """
         return 0.0
 
@@ -358,7 +358,7 @@ class Effect:
     def act_on_engine(self, bars: Any) -> None:
         """Apply the effect to an engine's bars, from the engine's own motion.
 
-        It is a second derivation and uses nothing of `act`.
+        The code is a second derivation and uses nothing of `act`.
 
         `bars`: of `engines.loaded.Loaded`, with `push`, `couple`, `angle`, `velocity`,
         `alpha`, `rotate`, `point`, `first_pin`, `pin_loads`.
@@ -373,11 +373,11 @@ class Effect:
         raise NotImplementedError
 
     def size(self, linkage: FourBar, solution: Any) -> Any:
-        """Return the size of its forces, N, one number or (n,).
+        """Return the size at which forces of the effect count as zero, N.
 
-        It is the scale by which a force counts as zero. The harness asks it of effects
-        that are not part of the package, and needs it for every comparison. Effects of
-        the package leave it out: the harness states their sizes itself, in
+        One number or (n,) is returned. The harness asks for it before every comparison,
+        of effects that are not part of the package. Effects of the package leave it
+        out: the harness states their sizes itself, in
         `fourbar_validation/compare/effects.py`.
         """
         raise NotImplementedError
@@ -412,7 +412,7 @@ class Effect:
     ) -> SolvedFriction:
         """Solve for what depends on the pin forces, and add it to the actions.
 
-        It is asked of effects with `loaded_pins`.
+        Only effects with `loaded_pins` are asked.
 
         `pins`: pin forces under the actions, without it. `solve_pin_forces`: solves for
         those under some actions, and under inertia if `with_inertia`.
@@ -430,9 +430,9 @@ class Effect:
 
         Each function passes smoothly through zero there, as the slip of a pin with dry
         friction does, or the length of a spring less the length at which it goes slack.
-        What is said of a motion as a whole (peaks, means, energies) is found on panels
-        that end at the zeros. A slip has the name of its pin; other names tell one
-        function from another, within all effects.
+        Peaks, means and energies of a motion are found on panels that end at the zeros.
+        A slip has the name of its pin; other names tell one function from another,
+        within all effects.
         """
         return {pin: state.slip(pin) * state.speed for pin in self.dry_pins}
 

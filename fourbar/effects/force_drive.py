@@ -70,10 +70,7 @@ class ForceDrive(ABC):
         """Return the status of positions at which there is no force; None: nowhere."""
 
     def gain(self, state: State) -> Number:
-        """Compute ds/dq, m.
-
-        It is the work of 1 N over the change of the independent angle.
-        """
+        """Compute ds/dq, m: the work of 1 N per change of the independent angle."""
         gain, _ = self.per_newton(Actions(state, MASSLESS)).generalized_forces()
         return gain
 

@@ -66,7 +66,7 @@ class LinearDrive(ForceDrive):
     def require_motion(self, linkage: FourBar) -> None:
         """Raise InputError if no motion changes the distance of the ends.
 
-        One bar may hold both, for instance.
+        An example is a drive with both ends on one bar.
         """
         if common := _list_bars(linkage, self.start) & _list_bars(linkage, self.end):
             allowed = (
@@ -113,10 +113,7 @@ class LinearDrive(ForceDrive):
 
 
 def _list_bars(linkage: FourBar, point: Place) -> set[int]:
-    """List the bars that hold a point.
-
-    These are its bar and, at a pin of it, the other bar.
-    """
+    """List the bars that hold a point: its own, and at a pin the other bar there."""
     length = linkage.lengths[point.bar - 1]
     nothing = COINCIDENT_POINTS * length
     first_pin, second_pin = ENDS[point.bar]

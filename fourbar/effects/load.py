@@ -1,6 +1,6 @@
 """External loads: a force at a point of a bar, or a couple on it.
 
-It is constant or a table over theta_2.
+A load is constant or a table over theta_2.
 """
 
 import math
@@ -140,11 +140,10 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Load(Effect):
-    """A force and a couple on a moving bar.
+    """A force and a couple on a moving bar, at a place that turns with the bar.
 
-    Both act at a place that turns with the bar. The force keeps its direction in the
-    world's axes or turns with the bar too. Only the bending of the bar depends on where
-    the couple acts.
+    The force keeps its direction in the world's axes or turns with the bar too. Only
+    the bending of the bar depends on where the couple acts.
 
     Parameters
     ----------

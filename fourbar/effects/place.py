@@ -71,9 +71,9 @@ class Place(NamedTuple):
         return Place(self.bar, self.polar_from_pin())
 
     def vector(self) -> Any:
-        """Compute the vector from the bar's first pin to a settled place.
+        """Compute the vector to a settled place, complex, m, in the bar's frame.
 
-        It is complex, m, in the bar's frame.
+        The vector starts at the bar's first pin.
         """
         assert self.from_pin is not None
         z = polar(*self.from_pin)
@@ -82,10 +82,7 @@ class Place(NamedTuple):
         return z + polar(*self.from_centre)
 
     def polar_from_pin(self) -> tuple[Any, Any]:
-        """Return distance (m) and angle (rad) of a settled place.
-
-        They are from the bar's first pin.
-        """
+        """Return distance (m) and angle (rad) of a settled place from the first pin."""
         assert self.from_pin is not None
         if self.from_centre is None:
             return self.from_pin
@@ -106,9 +103,9 @@ class Place(NamedTuple):
 
     @property
     def in_bar(self) -> Any:
-        """Vector in the bar's frame, along + i across its line, m.
+        """Vector from the first pin in the bar's frame, along + i across its line, m.
 
-        It is an array, so that products round alike.
+        Its type is always an array, so that products round alike.
         """
         z = self.vector()
         if isinstance(z, complex):
@@ -116,9 +113,9 @@ class Place(NamedTuple):
         return z
 
     def arm_from(self, pin: str, state: State) -> tuple[Any, Any]:
-        """Return the vector from a pin of the bar, and the square of its length.
+        """Return the vector from a pin, and the square of its length, m^2.
 
-        It is complex, m, in the bar's frame.
+        The vector is complex, m, in the bar's frame.
         """
         arm = self.in_bar
         at_second = pin == SECOND_PIN[self.bar]

@@ -140,9 +140,9 @@ class Torsion(PinRows):
         return q2, q3, q4
 
     def _follow_angles(self, state: State, branch: Number) -> list[Array]:
-        """Compute theta_j - theta_i of each sprung pin.
+        """Compute theta_j - theta_i of each sprung pin, rad.
 
-        They are continuous in the commanded angle on one branch.
+        On one branch the angles are continuous in the commanded angle.
         """
         angles = _remove_jumps(state, branch)
         relative = []

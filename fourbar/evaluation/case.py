@@ -60,9 +60,9 @@ def _needs_many_digits(factor: Any, constant: Any, size: Any) -> Any:
 
 
 def condense_branch(branch: NDArray[np.int8]) -> Any:
-    """Return the branch of the positions as one number if all have the same.
+    """Return the branch as one number if all positions share it, else as an array.
 
-    It stays an array if they have not. Formulas are quicker with one number.
+    The formulas are quicker with one number.
     """
     if branch.ndim == 0 or (branch.size and branch.min() == branch.max()):
         if branch.ndim:
@@ -74,7 +74,7 @@ def condense_branch(branch: NDArray[np.int8]) -> Any:
 def find_margin(commanded: Command) -> float:
     """Return the sine at or below which a commanded position is singular.
 
-    It is 0 where the angle is known in many digits.
+    The margin is 0 where the angle is known in many digits.
     """
     if commanded.remainder is None:
         return NO_DIGIT_LEFT
@@ -195,10 +195,7 @@ class Case(NamedTuple):
         return {bar: self.path.drive_sine(position, bar) for bar in MOVING_BARS}
 
     def drive_speed(self, state: State) -> Any:
-        """Compute the speed of the drive.
-
-        It is that of the driven bar, rad/s, or that of the stroke, m/s.
-        """
+        """Compute the speed of the driven bar, rad/s, or of the stroke, m/s."""
         if self.drive is None:
             return state.omega(self.drive_bar)
         return self.drive.gain(state) * state.speed
@@ -286,9 +283,9 @@ class Case(NamedTuple):
 
     @classmethod
     def of_released(cls, scene: Scene, bar: int, side: Any) -> "Case":
-        """Collect the numbers of a released linkage, which no couple drives.
+        """Collect the numbers of a released linkage, read in the angle of bar 2 or 4.
 
-        It is read in the angle of bar 2 or 4.
+        No couple drives a released linkage.
         """
         return cls.of(scene, bar, side)._replace(drive_bar=bar, drive=None)
 
@@ -303,9 +300,10 @@ class Case(NamedTuple):
         )
 
     def begin_with(self, motion: Command) -> "Case":
-        """Let the effects begin where the linkage first assembles in a motion.
+        """Return a copy whose effects begin where a motion first assembles.
 
-        They do if that keeps its branch.
+        The case is returned as it is if the motion assembles nowhere or changes its
+        branch.
         """
         half, _ = self.half_angle(motion.angle, motion.remainder)
         assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
@@ -439,11 +437,11 @@ class Case(NamedTuple):
     ) -> tuple[Any, Any, Any]:
         """Compute the least and greatest torque or force of the drive.
 
-        They are equal unless dry friction holds a pin at rest. The third is where one
-        of them is NaN because friction jams the motion that would begin; None: nowhere.
-        The ends are those at which the linkage would begin to move forwards or
-        backwards, or, where only a pin comes to rest while the linkage moves, those
-        just before and after its reversal.
+        Both are equal unless dry friction holds a pin at rest. The third value marks
+        where one of them is NaN because friction jams the motion that would begin;
+        None: nowhere. The ends are those at which the linkage would begin to move
+        forwards or backwards, or, where only a pin comes to rest while the linkage
+        moves, those just before and after its reversal.
         """
         actions = Actions(state, self.bodies)
         dry_pins = {pin for term in self.terms for pin in term.dry_pins}

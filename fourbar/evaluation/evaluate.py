@@ -269,9 +269,10 @@ def _compute_error_bars(
     dynamics: Dynamics,
     refined_rows: NDArray[np.intp],
 ) -> dict[str, Any]:
-    """Compute the error bars of the drive and of the pin forces, by name, (n,).
+    """Compute the error bars of the drive (N m or N) and of the pin forces (N), (n,).
 
-    They are N m or N; that of the pin forces is the worst of the four.
+    The error bar of the pin forces is the worst of the four. The result is keyed by
+    name.
 
     Parameters
     ----------
@@ -385,8 +386,8 @@ def _compute_unresolved(
 def _compute_error_bar(gap: Any, size: Any) -> Any:
     """Compute the error bar from the distance to the longer number.
 
-    It is at least U times the value. Where the longer number is not finite as a double
-    it is the value itself: no digit is left.
+    The error bar is at least U times the value, and equals the value where the longer
+    number is not finite as a double: no digit is left.
 
     `size`: of the value.
     """
@@ -397,7 +398,7 @@ def _compute_error_bar(gap: Any, size: Any) -> Any:
 def is_finite(values: Mapping[str, Any]) -> bool:
     """Return True if the sum of the squares of all quantities is finite.
 
-    It is False too if a square overflows, or the sum.
+    An overflow of a square, or of the sum, gives False.
     """
     total: Any = 0.0
     for value in values.values():

@@ -593,9 +593,10 @@ class _IntegrationRun:
             self.rows.append(self._make_row(dense(float(time))))
 
     def _make_row(self, y: Array) -> tuple[float, ...]:
-        """Return theta_2, omega_2, alpha_2, branch and the independent angle's numbers.
+        """Return one instant as a row of numbers.
 
-        They belong to one instant.
+        The row holds theta_2, omega_2, alpha_2, the branch, and the angle, speed and
+        acceleration of the independent angle.
         """
         q = float(y[0])
         rate = float(y[1])
@@ -643,9 +644,9 @@ def _find_root(
     low: float,
     high: float,
 ) -> float:
-    """Find the time at which f of the motion is zero.
+    """Find the time in a step at which f of the motion is zero.
 
-    It is the start of the step if f is zero there.
+    The start of the step is returned if f is zero there.
     """
     from scipy.optimize import brentq
 

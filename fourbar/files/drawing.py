@@ -107,7 +107,7 @@ def state_lengths(
 def meet_lengths(drawing: DrawnPins, pins: dict[str, Any]) -> tuple[float, ...]:
     """Return the lengths of a drawing.
 
-    Those of a parallelogram or a kite come without the rounding of its coordinates.
+    Lengths of a parallelogram or a kite come without the rounding of its coordinates.
 
     `pins`: x and y of each pin as they are written.
     """

@@ -206,7 +206,7 @@ class Reader:
     def _find_likely_unit(self, key: str, unit: str) -> str:
         """Return the unit in which a number without one was probably meant.
 
-        It is that of the nearest number of this kind: in the entry's own table, then in
+        The nearest number of its kind decides, first in the entry's own table, then in
         those around it.
         """
         around: list[Any] = [self.document]

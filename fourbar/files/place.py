@@ -1,6 +1,6 @@
 """Places of bars in scene files: `from_pin`, `from_centre` or `point`.
 
-They are polar or by x and y.
+A place is stated in polar form or by x and y.
 """
 
 from collections.abc import Iterable, Mapping

@@ -135,9 +135,9 @@ def _write_traced(picture: TracedPicture | None) -> dict[str, Any]:
 
 
 def _add_strokes(effects: dict[str, Any], scene: Scene) -> None:
-    """Add the strokes of gas springs.
+    """Add the strokes of gas springs, which a guest's scene leaves out.
 
-    They change no force, and a guest is told of forces alone.
+    A guest is told of forces alone, and strokes change no force.
     """
     for effect in scene.effects:
         if not isinstance(effect, Springs):
@@ -442,7 +442,7 @@ def _write_tolerances(scene: Scene) -> dict[str, Any]:
 def write_new_scene(lengths: tuple[str, ...] | list[str]) -> str:
     """Write a scene file for four lengths (ground, input, coupler, output).
 
-    Each is written with its unit, as it was given.
+    Lengths keep the units in which they were given.
 
     Raises InputError for what is no length, and for bars that cannot close.
     """

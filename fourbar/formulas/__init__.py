@@ -1,4 +1,4 @@
-"""The closed formulas of the planar four-bar linkage.
+"""The closed formulas of the planar four-bar linkage: a file has one step.
 
-Each file states one step and its source.
+Every file names the source of its step.
 """

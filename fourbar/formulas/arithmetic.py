@@ -162,10 +162,7 @@ def power_of_two(x: Number) -> Number:
 
 
 def sine(u: Number, v: Number) -> Number:
-    """Return the sine of the angle between two directions.
-
-    It is exactly zero if they are equal.
-    """
+    """Return the sine between two unit vectors, exactly zero if they are equal."""
     return u.real * v.imag - u.imag * v.real
 
 

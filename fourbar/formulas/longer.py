@@ -1,9 +1,8 @@
 """Numbers with more digits than doubles have, in which the formulas run as they stand.
 
-They are the long doubles of the C library where these are longer, as on Linux, and
-pairs of doubles where they are not, as on Windows and on Apple's processors. A pair is
-a sum that is not evaluated, some 32 digits:
-    x = high + low.
+Long doubles of the C library are taken where these are longer than doubles, as on
+Linux, and pairs of doubles elsewhere, as on Windows and on Apple's processors. A pair
+is a sum that is not evaluated, some 32 digits:
 
 Source: T. J. Dekker, A floating-point technique for extending the available precision,
 Numerische Mathematik 18 (1971).

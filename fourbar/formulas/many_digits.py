@@ -35,7 +35,7 @@ def exact_half_angle(
 ) -> HalfAngle:
     """Compute the half angle of `formulas.position.half_angle` in numbers of mpmath.
 
-    Its `root_sign` is left at 1, as doubles can tell it.
+    The field `root_sign` is left at 1: doubles decide it.
 
     Parameters
     ----------
@@ -92,9 +92,9 @@ def decide_half_angles(
     bar: int = 2,
     lost: Any = 0.0,
 ) -> HalfAngle:
-    """Replace the half angles of some positions (an index).
+    """Return the half angles with those at an index recomputed in many digits.
 
-    Each number is rounded once to its own kind.
+    Each number is rounded once, to the kind of number that it replaces.
 
     `lost`: what a theta_2 that was computed leaves out as a double, rad; for the others
     see `exact_half_angle`.

@@ -87,7 +87,7 @@ class Reach(NamedTuple):
     def triangle(self, stretched: bool) -> tuple[float, float]:
         """Compute the angles of the triangle d, l, e at both ends of the ground, rad.
 
-        They come from its Heron factors:
+        Heron's factors give the angle between d and l,
 
             tan^2(psi/2) = (e + l - d)(e + d - l)/((d + l - e)(d + l + e)),
 
@@ -132,10 +132,10 @@ def _wrap(angle: float) -> float:
 
 
 def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]:
-    """Find the positions in which a bar reverses, all mirror solutions included.
+    """Find the positions in which a bar reverses, counter-clockwise from theta_1.
 
-    They are ordered counter-clockwise in theta_2 from theta_1. With psi the angle
-    between the ground and the bar,
+    All mirror solutions are included. With psi the angle between the ground and the
+    bar,
 
         cos psi = (d^2 + l^2 - (x +- y)^2)/(2 d l).
 
@@ -263,7 +263,7 @@ def find_limit_angles(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
 def change_points(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
     """Find the angles of a bar at which all bars are collinear and branches cross, rad.
 
-    They are those of bar 2 unless another bar is named:
+    Bar 2, which is the default, has its change points at
 
         theta_1 where |a - d| = |b - c|,   theta_1 + pi where a + d = b + c,
 
@@ -280,10 +280,7 @@ def change_points(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
 
 
 def swing(linkage: FourBar, bar: int = 4) -> float:
-    """Compute the angle through which a bar swings between its limits, rad.
-
-    It is 2 pi for a bar that turns fully.
-    """
+    """Compute the angle through which a bar swings, rad; 2 pi for a full turn."""
     start, stop = find_intervals(linkage, bar)[0]
     return stop - start
 
@@ -291,7 +288,7 @@ def swing(linkage: FourBar, bar: int = 4) -> float:
 def time_ratio(linkage: FourBar) -> float | None:
     """Compute the quick return of a crank-rocker at constant omega_2.
 
-    It is the time of the slower stroke over that of the faster:
+    The time of the slower stroke over that of the faster is
 
         (2 pi - delta)/delta,
 
@@ -347,9 +344,7 @@ def find_circuit(
     theta_2: Array,
     branch: int | NDArray[np.int8],
 ) -> NDArray[np.int8]:
-    """Find the circuit (index into `circuits`) of each position, (n,).
-
-    It is -1 where the linkage does not assemble.
+    """Return the index in `circuits` of each position, (n,); -1 if not assembled.
 
     `theta_2`: (n,), rad. `branch`: +1 or -1, or one of them for each position (n,).
     """
@@ -542,10 +537,10 @@ def list_met_equalities(
     stated: tuple[float, ...],
     met: tuple[float, ...],
 ) -> list[tuple[str, str, float]]:
-    """List what is equal in the lengths that `meet_change_points` returns alone.
+    """List what is equal only in the lengths that `meet_change_points` returns.
 
-    Each has the names of both sides and how far they differ as stated, m. They are
-    bars, or sums of two where no bar is as long as another.
+    An entry has the names of both sides (bars, or sums of two bars if no two bars are
+    equal) and the difference of the lengths as stated, m.
     """
     touching = TOUCHING * math.fsum(met)
     bars = tuple(BAR_NAMES.values())

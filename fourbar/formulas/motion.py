@@ -43,7 +43,7 @@ class Coefficients(NamedTuple):
 def coefficients(lengths: Loop, position: Position) -> Coefficients:
     """Compute the coefficients by theta_2 from the triangle A, B, O4.
 
-    Its side e turns by t, and the angle at B opens by 2 g:
+    The side e of this triangle turns by t, and its angle at B opens by 2 g:
 
         h3 = n - g,   h4 = n + g,   n = t + (x/e^2) g = 1/2 + w,
         t = (a (a - d) + 2 a d sin^2 h)/e^2,
@@ -101,9 +101,9 @@ def _may_turn_fast(lengths: Loop) -> Number:
 
 
 def _find_fast_turns(lengths: Loop, position: Position) -> Number:
-    """Mark where t and x g/e^2 are large and cancel.
+    """Mark positions where t and x g/e^2 are large and cancel.
 
-    There |d^2 - a^2| > TURNS_FAST e^2, and x S and y root have the same sign.
+    The condition is |d^2 - a^2| > TURNS_FAST e^2, with x S and y root of the same sign.
     """
     d, a, b, c, _, _ = lengths
     y = (d - a) * (d + a)
@@ -214,10 +214,7 @@ class Frame(NamedTuple):
         return self.v_pin + self.i_omega * r
 
     def acceleration(self, r: Number) -> Number:
-        """Compute the acceleration of the end of an arm r, m/s^2.
-
-        It is a_pin + (i alpha - omega^2) r.
-        """
+        """Compute a_pin + (i alpha - omega^2) r of the end of an arm r, m/s^2."""
         return self.a_pin + self.turn * r
 
 
@@ -263,10 +260,7 @@ class State(NamedTuple):
         return 0.0 if bar == 1 else self.moving[bar + 1]
 
     def foot(self, bar: int) -> Number:
-        """Return the first pin of a bar, complex, m.
-
-        It is O2 of bars 1 and 2, A of bar 3, O4 of bar 4.
-        """
+        """Return the first pin of a bar (1, 2: O2; 3: A; 4: O4), complex, m."""
         if bar == 3:
             return self.lengths.a * self.position.u2
         if bar == 4:
@@ -274,10 +268,7 @@ class State(NamedTuple):
         return 0.0
 
     def frame(self, bar: int) -> Frame:
-        """Return the frame of bar 1, 2, 3 or 4.
-
-        Its pin is at rest at O2 and O4; the coupler's pin moves with bar 2.
-        """
+        """Return the frame of bar 1, 2, 3 or 4, with the motion of its first pin."""
         pin = self.foot(bar)
         v_pin = 0.0
         a_pin = 0.0

@@ -293,9 +293,9 @@ def prepare_path(
 
 
 def count_turns(lengths: tuple[Number, Number, Number, Number], bar: int) -> Number:
-    """Count the turns of a bar after which an assembly repeats.
+    """Count the turns of a bar after which an assembly repeats: 2 or 1.
 
-    They are two with a single change point, otherwise one.
+    Two turns are needed by a linkage with a single change point.
     """
     passing = find_passing(loop(*reorder_lengths(bar, lengths)))
     return np.where(passing.outer ^ passing.inner, 2, 1)
@@ -315,9 +315,9 @@ def compute_state(
 ) -> State:
     """Compute positions and motion for a motion of the input.
 
-    They are NaN where the loop does not close, and speeds also where they are 0/0. With
-    omega_2 and alpha_2 left out speeds are first coefficients and accelerations second
-    ones.
+    Positions are NaN where the loop does not close, speeds also where they are 0/0. If
+    omega_2 and alpha_2 are left out, speeds are first and accelerations second
+    kinematic coefficients.
     """
     with np.errstate(all="ignore"):
         lengths = loop(*linkage.lengths)
@@ -338,8 +338,8 @@ def compute_state(
 def drive_sine(position: Position, drive_bar: int) -> Number:
     """Compute the sine between the two bars that are not driven.
 
-    It is sin(theta_4 - theta_3), sin(theta_4 - theta_2), sin(theta_3 - theta_2) for the
-    drive on bar 2, 3, 4.
+    A drive on bar 2, 3 or 4 has sin(theta_4 - theta_3), sin(theta_4 - theta_2) or
+    sin(theta_3 - theta_2).
     """
     if drive_bar == 2:
         return position.sin_mu

@@ -119,7 +119,7 @@ def coupler_about_B(
 ) -> Number:
     """Compute d'Alembert's moment of the coupler about B, small where G lies near B.
 
-    It is -I alpha_3 - m (G - B) x a_G.
+    The moment is -I alpha_3 - m (G - B) x a_G, N m.
 
     `sine`: of theta_3 - theta_2.
     """
@@ -157,9 +157,9 @@ def pin_forces(
     mass_at_A: Number,
     moment_of_F32: Number,
 ) -> PinForces:
-    """Compute the four pin forces.
+    """Compute the four pin forces, complex, N.
 
-    They are inf or NaN where the two bars that are not driven are collinear.
+    Forces are inf or NaN where the two bars that are not driven are collinear.
 
     With the drive on bar 2 the force at B is written with the diagonal D from A to O4,
     which closes the triangle of bars 3 and 4, so that a couple between them keeps its

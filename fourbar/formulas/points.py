@@ -69,7 +69,7 @@ def point_coefficients(
 class Centre(NamedTuple):
     """Instant centre in homogeneous coordinates: the point (x, y)/w.
 
-    It lies at infinity in the direction (x, y) if w = 0.
+    A centre with w = 0 lies at infinity in the direction (x, y).
     """
 
     x: Array
@@ -118,10 +118,7 @@ def locate_centres(
     u3: Number,
     u4: Number,
 ) -> dict[tuple[int, int], Centre]:
-    """Locate the six instant centres, complex.
-
-    They follow from the pins and the directions of the bars.
-    """
+    """Locate the six instant centres, complex, from the pins and the bars' lines."""
     one = np.ones(np.shape(A))
     pins = {(1, 2): 0.0 * A, (2, 3): A, (3, 4): B, (1, 4): O4}
     centres = {bars: Centre(pin.real, pin.imag, one) for bars, pin in pins.items()}
@@ -156,12 +153,12 @@ def coupler_curve(
     branch: int = 1,
     steps: int = 360,
 ) -> CouplerCurve:
-    """Trace the closed coupler curve of one circuit.
+    """Trace the closed coupler curve of one circuit, through limits and change points.
 
-    It runs smoothly through limits and change points. Where the input turns fully
-    theta_2 is spaced evenly, over two turns if the linkage has a single change point;
-    else it goes from limit to limit on one branch and back on the other, spaced by the
-    cosine, so that the curve's points do not thin out at the limits.
+    Where the input turns fully theta_2 is spaced evenly, over two turns if the linkage
+    has a single change point; else the curve goes from limit to limit on one branch and
+    back on the other, spaced by the cosine, so that its points do not thin out at the
+    limits.
 
     Parameters
     ----------
@@ -208,10 +205,10 @@ def list_circuit(
     branch: int,
     steps: int,
 ) -> tuple[Array, NDArray[np.int64], int]:
-    """List the positions of a circuit, (steps,).
+    """Return theta_2 and branch of a circuit's positions, (steps,), and its turns.
 
-    They are theta_2, its assembly, and the turns that theta_2 gains. For the parameters
-    see `coupler_curve`.
+    The turns are those that theta_2 gains over the circuit, an integer. For the
+    parameters see `coupler_curve`.
     """
     (start, stop), branches = circuits(linkage)[circuit]
     branch = branch if branch in branches else branches[0]

@@ -68,7 +68,7 @@ class Loop(NamedTuple):
 class HalfAngle(NamedTuple):
     """sin^2 h, cos^2 h, sin h cos h and the two factors of Heron's formula.
 
-    These alone may need more digits than doubles have.
+    No other numbers of a position may need more digits than doubles have.
     """
 
     ss: Number
@@ -166,10 +166,7 @@ def _are_equal(length: Number, other: Number) -> Number:
 
 
 def _replace(length: Number, other: Number, mask: Number) -> Number:
-    """Return a length, with the value of another one where a mask holds.
-
-    Its slopes stay.
-    """
+    """Return a length, where a mask holds with another's value but its own slopes."""
     return length - select(mask, without_slopes(length - other), 0.0)
 
 
@@ -246,9 +243,9 @@ def half_angle(
 
 
 def find_root_sign(psi: Number, passing: Passing, *, opposite: bool) -> Number:
-    """Find the sign that the roots together have at psi (rad, not reduced).
+    """Return the sign of the roots' product at psi (rad, not reduced).
 
-    It is 1 unless a root passes through zero. `opposite`: as in `half_angle`.
+    The sign is 1 unless a root passes through zero. `opposite`: as in `half_angle`.
     """
     if not is_any(passing.outer | passing.inner):
         return 1.0
@@ -260,9 +257,9 @@ def find_root_sign(psi: Number, passing: Passing, *, opposite: bool) -> Number:
 
 
 def signed_root(half: HalfAngle, branch: Number) -> Number:
-    """Compute sigma sqrt(outer) sqrt(inner), each root with its sign.
+    """Compute sigma sqrt(outer) sqrt(inner), NaN where the loop does not close.
 
-    It is NaN where the loop does not close.
+    Each root has its sign at a change point.
 
     `branch`: sigma, +1 or -1, the assembly.
     """
@@ -341,7 +338,7 @@ def close_loop(
 def find_parallel_pairs(lengths: Loop, branch: Number) -> tuple[Number, Number]:
     """Mark assemblies in which two pairs of bars stay parallel.
 
-    There E1 = E2 = 0 and root = +- 4 a d sin h cos h.
+    Parallel pairs have E1 = E2 = 0 and root = +- 4 a d sin h cos h.
 
     First: the coupler keeps the ground's direction and bars 2, 4 turn together
     (a = c, b = d).

@@ -25,7 +25,7 @@ def inertia(
 ) -> tuple[Number, Number]:
     """Compute the equivalent inertia J = sum of m |dG/dq|^2 + I h_k^2, kg m^2.
 
-    It is returned for bar 2, and for bars 3 and 4.
+    The first part returned is that of bar 2, the second that of bars 3 and 4.
 
     `a`: length of the input, m.
     """

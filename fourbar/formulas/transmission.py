@@ -26,7 +26,7 @@ from fourbar.linkage import FourBar
 def transmission_angle(state: State) -> Array:
     """Compute mu, the acute angle between coupler and output, rad, in [0, pi/2], (n,).
 
-    It is NaN where the linkage does not assemble.
+    Positions that do not assemble have NaN. The tangent is
 
         tan mu = |sin(theta_4 - theta_3)| / |cos(theta_4 - theta_3)|,
 
@@ -44,10 +44,7 @@ def transmission_angle(state: State) -> Array:
 
 
 class TransmissionExtremes(NamedTuple):
-    """Extremes of the angle A-B-O4 between coupler and output.
-
-    They are taken over all positions that assemble.
-    """
+    """Extremes of the angle A-B-O4 over all positions that assemble, rad."""
 
     least: float
     """rad, in [0, pi]; 0 where bars 3, 4 fold."""
@@ -69,7 +66,7 @@ class TransmissionExtremes(NamedTuple):
 def transmission_extremes(linkage: FourBar) -> TransmissionExtremes:
     """Find the extremes of the angle at B, which are the same on both branches.
 
-    They lie where bars 1, 2 are collinear, or at a limit of the input:
+    Extremes lie where bars 1, 2 are collinear, or at a limit of the input:
 
         tan^2(mu/2) = (e + b - c)(e - b + c)/((b + c - e)(b + c + e))
 
@@ -92,9 +89,9 @@ def transmission_extremes(linkage: FourBar) -> TransmissionExtremes:
 
 
 def _angle_at_B(reach: Reach, d: int, a: int) -> float:
-    """Compute the angle between the sides b, c of the triangle b, c, e, signed.
+    """Compute the signed angle between b and c in the triangle b, c, e, rad.
 
-    Its third side is e = d (ground) + own (input).
+    The third side is e = d (ground) + own (input).
     """
     opposite = (
         max(reach.sum(d, a, 1, -1), 0.0) ** 0.5
@@ -109,7 +106,7 @@ def _angle_at_B(reach: Reach, d: int, a: int) -> float:
 def speed_ratio(state: State) -> Array:
     """Return omega_4/omega_2, (n,); NaN at singular positions.
 
-    It is a sin(theta_2 - theta_3)/(c sin(theta_4 - theta_3)).
+    The ratio is a sin(theta_2 - theta_3)/(c sin(theta_4 - theta_3)).
     """
     return np.asarray(state.k.h4)
 
@@ -143,11 +140,11 @@ def distance_to_singular(
 ) -> Array:
     """Compute the angle of the input to the nearest singular position, rad, (n,).
 
-    It lies in [0, pi], and is inf if there is no such position. Singular are the limits
-    of theta_2 and the change points (speeds are 0/0), and for a drive on bar 3 or 4 its
-    dead centres, where no torque on it holds the linkage. Error at most about eps
-    (|theta_2| + |theta_1| + 2 pi). Not counted is the kite whose input and coupler
-    coincide: there a drive on bar 4 is dead at every position of that motion.
+    The angle lies in [0, pi], and is inf if there is no such position. Singular are the
+    limits of theta_2 and the change points (speeds are 0/0), and for a drive on bar 3
+    or 4 its dead centres, where no torque on it holds the linkage. The error is at most
+    about eps (|theta_2| + |theta_1| + 2 pi). A kite whose input and coupler coincide is
+    not counted: there a drive on bar 4 is dead at every position of that motion.
 
     Parameters
     ----------

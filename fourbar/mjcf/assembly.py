@@ -145,7 +145,7 @@ def write_sdf(
 ) -> str:
     """Write the SDF 1.9 text of a scene.
 
-    It holds a world with gravity, four links, and the pins as joints.
+    The text has a world with gravity, four links, and the pins as joints.
 
     Parameters
     ----------
@@ -298,8 +298,8 @@ def write_usd(
 ) -> str:
     """Write the USD text (.usda) of a scene.
 
-    It holds three rigid bodies and four revolute joints, the fourth of which closes the
-    loop.
+    The text has three rigid bodies and four revolute joints, the fourth of which closes
+    the loop.
 
     Parameters and errors as of `write_sdf`; of the effects it has gravity and flywheel.
 

@@ -296,9 +296,9 @@ def _list_note_keys(scene: Scene, drive: Drive) -> list[str]:
 
 
 def _list_left_out_by_genesis(scene: Scene) -> list[str]:
-    """List what Genesis leaves out.
+    """List the loads and effects that Genesis leaves out.
 
-    These are loads, springs, effects at B, and the rest angles of torsion springs.
+    Examples are springs, effects at B, and the rest angles of torsion springs.
     """
     names = ["loads"] if scene.loads else []
     for effect in scene.effects:
@@ -317,18 +317,19 @@ def _list_left_out_by_genesis(scene: Scene) -> list[str]:
 def size_flywheel(scene: Scene, settings: Settings = RECIPE) -> float:
     """Compute the armature of pin O2, kg m^2.
 
-    It is `settings.flywheel` times the sum of m L^2 + I + (m g L + F L + M)/q. L is the
-    longest lever arm, and q the greater of omega_2^2 and |alpha_2|. The work of weights
-    and loads in a revolution is then a small part of the flywheel's energy.
+    The armature is `settings.flywheel` times the sum of m L^2 + I + (m g L + F L +
+    M)/q. L is the longest lever arm, and q the greater of omega_2^2 and |alpha_2|. The
+    work of weights and loads in a revolution is then a small part of the flywheel's
+    energy.
     """
     inertia = _sum_inertia(scene.linkage) + _sum_load_inertia(scene)
     return float(f"{settings.flywheel * inertia:.3g}")
 
 
 def compute_load_ratio(scene: Scene) -> float:
-    """Return (m g L + F L + M)/(q (m L^2 + I)).
+    """Return loads and weights over inertia, (m g L + F L + M)/(q (m L^2 + I)).
 
-    It relates loads and weights to the inertia of the bars.
+    Symbols are those of `size_flywheel`.
     """
     inertia = _sum_inertia(scene.linkage)
     if inertia:
@@ -357,11 +358,10 @@ def _leave_out_flywheel(scene: Scene, settings: Settings) -> Settings:
 
 
 def fit_pad(scene: Scene) -> float:
-    """Choose the pad that leaves the closure stiff enough for the loads.
+    """Choose the pad: stiff enough for the loads, soft enough for one iteration.
 
-    It is soft enough for one iteration. The sag of the closure grows as pad^2 times the
-    loads, the rounding of one iteration of MuJoCo's Newton solver as 1/(pad^2 times the
-    loads).
+    The sag of the closure grows as pad^2 times the loads, the rounding of one iteration
+    of MuJoCo's Newton solver as 1/(pad^2 times the loads).
     """
     _, a, b, c = scene.linkage.lengths
     least_sag = _SOFT_PAD / math.sqrt(
@@ -376,9 +376,9 @@ def fit_pad(scene: Scene) -> float:
 
 
 def compute_mass_ratio(linkage: FourBar) -> float:
-    """Return the ratio of (I + m r^2)/L^2 of coupler and output, at least 1.
+    """Return the larger over the smaller (I + m r^2)/L^2 of coupler and output.
 
-    It is 1 if one of them has no mass.
+    The ratio is 1 if one of them has no mass.
     """
     masses = [
         (bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) / bar.length**2
@@ -416,7 +416,7 @@ def _sum_inertia(linkage: FourBar) -> float:
 def _sum_load_inertia(scene: Scene) -> float:
     """Sum the couples of loads and effects on the drive, as an inertia, kg m^2.
 
-    They are divided by the acceleration scale.
+    The sum is divided by the acceleration scale.
     """
     scene = scene.settled()
     acceleration = _compute_acceleration_scale(scene)
@@ -475,9 +475,10 @@ class WindowMotion:
         )
 
     def timestep(self, settings: Settings = RECIPE, at_least: int = 0) -> float:
-        """Choose a timestep that divides the turn, s.
+        """Return a timestep that divides the turn, s.
 
-        There are at least so many steps per revolution, per window and in all.
+        The settings state the least number of steps per revolution and per window, and
+        `at_least` the least number in all.
         """
         if settings.timestep is not None:
             return settings.timestep * settings.timestep_scale
@@ -508,7 +509,7 @@ class Start(NamedTuple):
 def choose_run(theta_2: Array, omega: float, alpha: float) -> WindowMotion:
     """Choose the motion through positions.
 
-    It is counter-clockwise from the least, or clockwise from the greatest.
+    The motion is counter-clockwise from the least, or clockwise from the greatest.
     """
     least = float(np.min(theta_2))
     most = float(np.max(theta_2))
@@ -592,7 +593,7 @@ def write_mjcf_for(
 ) -> str:
     """Write the MJCF text of a scene for one simulator.
 
-    Its comments name where torque and pin force are read.
+    Comments in the text name where torque and pin force are read.
 
     Raises InputError for no such simulator, or a motor for one that does not take it,
     and as `write_mjcf` does.

@@ -221,9 +221,9 @@ def _make_passive(force: float) -> dict[str, str]:
 
 
 def make_constant_motor(force: float) -> dict[str, str]:
-    """Make the drive a motor on pin O2 that ignores its control.
+    """Return attributes of a motor on pin O2 that ignores its control.
 
-    There is none if the force is 0.
+    A force of 0 has no motor, and an empty dict.
     """
     if force:
         return {
@@ -302,9 +302,9 @@ def require_carriable(linkage: FourBar) -> None:
 
 
 class Model:
-    """Content of the model to which loads and effects add.
+    """Content of the model: options, attributes of the pins, and loads.
 
-    It is options, attributes of the pins, and loads.
+    Loads and effects add to this content.
     """
 
     def __init__(self, linkage: FourBar, settings: Settings, timestep: float) -> None:
@@ -518,7 +518,7 @@ class Model:
     def add_tendons(self, root: ET.Element) -> None:
         """Add a tendon theta_4 - theta_3 for what acts at the cut pin B.
 
-        Each spring has a tendon between two sites.
+        Springs have a tendon each, between two sites.
         """
         if not self.pin["B"] and not self.springs and self.cylinder is None:
             return
@@ -592,7 +592,7 @@ class Model:
     ) -> None:
         """Add actuators: the drive, if it has attributes; loads; and some springs.
 
-        Those of loads and springs ignore their controls.
+        Actuators of loads and springs ignore their controls.
 
         `passive`: these have no controls.
         """

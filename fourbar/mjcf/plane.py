@@ -1,6 +1,6 @@
 """The plane of the linkage in the world of a model file.
 
-It is tilted about an axis and moved to an origin.
+The plane is tilted about an axis and moved to an origin.
 """
 
 import math
@@ -90,10 +90,7 @@ class Plane:
 
     @property
     def roll_pitch_yaw(self) -> Vector:
-        """Return the angles about x, y and z, rad.
-
-        They are applied in this order about fixed axes.
-        """
+        """Return the angles about x, y and z, rad, in this order about fixed axes."""
         (xx, _, _), (yx, _, _), (zx, zy, zz) = self.rotation
         pitch = math.atan2(-zx, math.hypot(xx, yx))
         roll = math.atan2(zy, zz)

@@ -1,8 +1,8 @@
 """Quantities as text, "48 cm" or "0.01 N m s/rad", to SI numbers.
 
-They are converted exactly and rounded once. The units are a short list rather than all
-that the units library knows, because the angle is a dimension here: rad/s is not 1/s,
-so neither Hz nor a forgotten "deg" slips through.
+Conversions are exact and rounded once. The units are a short list rather than all that
+the units library knows, because the angle is a dimension here: rad/s is not 1/s, so
+neither Hz nor a forgotten "deg" slips through.
 """
 
 import difflib
@@ -92,7 +92,7 @@ UNIT_MISSING = "the unit is missing"
 class UnitError(ValueError):
     """A text that is not a quantity, or is one of another dimension.
 
-    It says why in one phrase.
+    The message says why in one phrase.
     """
 
 
@@ -192,7 +192,7 @@ def find_unit(text: object, otherwise: str) -> str:
 def half_unit_of_text(text: object, unit: str) -> float:
     """Return half a unit of the last decimal of the number in a text, in `unit`.
 
-    It is 0 for a number without decimals.
+    A number without decimals gives 0.
     """
     last = _FEET.sub("", str(text).strip())
     if _FRACTION.match(last):

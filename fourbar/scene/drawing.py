@@ -94,9 +94,9 @@ class DrawnPins:
         )
 
     def into_bar(self, bar: int, place: PlanePoint) -> complex:
-        """Return a place of the drawing in the frame of a bar, m.
+        """Return a place of the drawing in a bar's frame: along + i across, m.
 
-        It is from the first pin, along + i across.
+        The frame's origin is the bar's first pin.
         """
         x, y = place
         pin_x, pin_y = self.place(FIRST_PIN[bar])

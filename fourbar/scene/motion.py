@@ -1,6 +1,6 @@
 """The command to one moving bar.
 
-It is angles, a sweep, a limit position, a law over time, or release.
+A command is one of angles, a sweep, a limit position, a law over time, and release.
 """
 
 import math
@@ -75,7 +75,7 @@ LAW_KINDS = (*RISE_LAWS, SINE_LAW)
 class Sweep:
     """The commanded angle from `start` to `stop` (rad) in `steps` equal intervals.
 
-    Both ends are included. Of a commanded stroke they are lengths, m.
+    Both ends are included. A sweep of the stroke has lengths in place of angles, m.
     """
 
     start: float
@@ -476,7 +476,7 @@ def _part(kind: str, time: Array, duration: float) -> tuple[Array, Array, Array]
 def _make_number_property(name: str, place: int) -> Any:
     """Make the property that reads a number of the command by its name.
 
-    It is None (an acceleration: 0) if the command has another name.
+    The number is None (an acceleration: 0) if the command has another name.
     """
     field = ("angle", "speed", "acceleration")[place]
     otherwise = 0.0 if place == 2 else None
@@ -496,7 +496,7 @@ def _make_number_property(name: str, place: int) -> Any:
 class Motion:
     """The command to one moving bar, the input unless numbers of bar 3 or 4 are stated.
 
-    Each number may be a text with a unit instead, like "60 rpm".
+    Numbers may be texts with units instead, like "60 rpm".
 
     Parameters
     ----------
@@ -635,8 +635,8 @@ class Motion:
     def replace(self, **changes: Any) -> "Motion":
         """Return a copy with other values of fields.
 
-        These are angle, speed, acceleration, branch, free, law and side. angle, speed
-        and acceleration are those of what this motion commands, a bar or a stroke.
+        Fields are angle, speed, acceleration, branch, free, law and side. The first
+        three are those of what this motion commands, a bar or a stroke.
         """
         keywords = dict(
             zip(("angle", "speed", "acceleration"), self.names, strict=True)
@@ -687,7 +687,7 @@ class Motion:
     def names(self) -> tuple[str, str, str]:
         """Names of the commanded position, speed and acceleration.
 
-        They are those of bar 2, 3 or 4, or of the stroke.
+        A motion commands bar 2, 3 or 4, or the stroke.
         """
         if self.commanded == "stroke":
             return STROKE_COMMAND

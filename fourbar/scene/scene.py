@@ -56,7 +56,8 @@ _A_DRIVE = "a drive is a couple on a bar or a force: state drive_bar or drive"
 def load_show(module: str) -> Any:
     """Import a module of `fourbar.show`.
 
-    It lies above this layer: scenes and solutions display themselves when asked to.
+    Scenes and solutions display themselves when asked to, though `fourbar.show` lies
+    above this layer.
     """
     return import_module(f"fourbar.show.{module}")
 
@@ -280,7 +281,7 @@ class Scene:
 class Independent(NamedTuple):
     """The angle in which a released motion is read at each of n instants.
 
-    It is that of bar 2 or 4, whichever does not stop. At a limit of theta_2 bar 4's
+    Bar 2 or 4 has this angle, whichever does not stop. At a limit of theta_2 bar 4's
     alone holds the forces, and dry friction at a standstill has a side of its own.
     """
 
@@ -302,7 +303,7 @@ class Independent(NamedTuple):
     def commands(self) -> "list[tuple[NDArray[np.intp], Command, Array]]":
         """List the commands of bars 2 and 4 that the motion is made of.
 
-        Each has its instants and their side.
+        An entry has the indices of its instants, the command and their side.
         """
         commands: list[tuple[NDArray[np.intp], Command, Array]] = []
         for bar in (2, 4):
@@ -320,10 +321,7 @@ class Independent(NamedTuple):
 
 
 class Command(NamedTuple):
-    """Command of one bar at each of n independent positions.
-
-    It is the input unless another bar is named.
-    """
+    """Command of one bar, by default the input, at each of n independent positions."""
 
     angle: Array
     """(n,), rad."""
@@ -366,10 +364,7 @@ class Command(NamedTuple):
 
     @property
     def places(self) -> Array:
-        """Commanded angles or strokes at each position.
-
-        They are times if a law commands them.
-        """
+        """Commanded angles, strokes, or times of a law, at each position."""
         if self.stroke is None:
             places = self.angle
         else:
@@ -651,10 +646,7 @@ def find_stroke_range(scene: Scene) -> tuple[float, float]:
 
 
 def command_at(scene: Scene, places: Array) -> Command:
-    """Command what the scene's motion commands at other places.
-
-    They are angles, strokes, or the times of a law.
-    """
+    """Return the command of the scene's motion at other angles, strokes or times."""
     motion, bar = scene.motion, scene.motion.bar
     if motion.stroke is not None:
         least, most = find_stroke_range(scene)

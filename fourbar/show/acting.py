@@ -176,8 +176,8 @@ def _locate_crossings(
 ) -> Array:
     """Find where a spring reaches a length in the steps that begin at rows.
 
-    It is the later position of a step in which nothing lies between the two: of a
-    release, of a list, and where the loop does not close.
+    A step in which nothing lies between the two positions gives the later one: steps of
+    a release or a list, and those where the loop does not close.
     """
     at = solution.at
     places = np.array(at.places[rows + 1], dtype=float)

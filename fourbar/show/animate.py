@@ -234,9 +234,9 @@ def _over(
     values: Array,
     speed: float | None = None,
 ) -> dict[str, Any]:
-    """Say what curves and slider run over: "time" or what is commanded.
+    """Return what curves and slider run over: "time" or what is commanded.
 
-    Its numbers are given where it is not theta_2.
+    Values are included where they are not those of theta_2.
     """
     if name == "theta_2":
         shown = None
@@ -291,9 +291,9 @@ def thin_out(positions: Command) -> Command:
 
 
 def _choose_rate(duration: float) -> float:
-    """Return the seconds of a motion shown in one second.
+    """Return the seconds of a motion shown in one second: 1, or a power of ten.
 
-    It is 1, or a power of ten if that were too short or too long.
+    A motion has another rate than 1 if that were too short or too long to watch.
     """
     if duration <= 0.0:
         return 1.0
@@ -306,10 +306,7 @@ def _choose_rate(duration: float) -> float:
 
 
 def _describe_pace(motion: Solution, rate: float, shown: int) -> str:
-    """Say what speed 1 means, and when the linkage stops before its time.
-
-    It says too whether instants were left out.
-    """
+    """Say what speed 1 means, which instants are shown, and what change points mean."""
     words = "At speed 1× it moves in real time"
     if rate < 1.0:
         words = (

@@ -176,7 +176,7 @@ class _SceneBlock:
     def _write_rates(self) -> list[str]:
         """Write the largest speed and acceleration of the bars that follow.
 
-        They stand side by side.
+        Bars are columns of one table.
         """
         rates = self.facts.rates
         rows = [("rates", [f"bar {bar} ({BAR_NAMES[bar]})" for bar in rates])]
@@ -326,9 +326,10 @@ class _SceneBlock:
         ]
 
     def _find_beside_change_points(self) -> Array:
-        """Find how far positions lie from the change point that is meant, rad, (n,).
+        """Return the distances of positions evaluated beside a change point, rad, (n,).
 
-        They are evaluated beside it, for the rounding of the angle.
+        The rounding of the angle keeps such a position from the change point that is
+        meant.
         """
         solution = self.facts.solution
         angle = solution.at.angle[solution.status_code == OK]
@@ -774,10 +775,7 @@ class _SceneBlock:
         return lines
 
     def _write_bending(self) -> list[str]:
-        """Write the largest bending moment of each bar.
-
-        It says where along the bar, and where in the motion.
-        """
+        """Write the largest bending moment of each bar, with its place and position."""
         facts, bending = self.facts, self.facts.bending.values()
         if not any(bar.peak.value for bar in bending):
             return []
@@ -818,7 +816,7 @@ class _SceneBlock:
     def _cells(self, values: list[float], unit: str) -> list[str]:
         """Write quantities of one kind with the prefix of the largest.
 
-        Each has its own prefix if they lie far apart.
+        Quantities that lie far apart have a prefix each.
         """
         sizes = [abs(value) for value in values if value]
         largest = max(sizes, default=0.0)
@@ -847,7 +845,7 @@ class _SceneBlock:
     def _write_remarks(self) -> list[str]:
         """Write what grows between the positions, and where pin forces jump.
 
-        It writes what rounding does too.
+        Further lines say what rounding does.
         """
         facts = self.facts
         lines = list[str]()
@@ -946,7 +944,7 @@ class _SceneBlock:
     def _warn(self) -> list[str]:
         """Write where the drive's torque or force has few digits left.
 
-        It names the collinear bars that cost them.
+        The warning names the collinear bars that cost the digits.
         """
         solution = self.facts.solution
         drive = self.facts.drive
@@ -1023,9 +1021,9 @@ def write_motor(
     solution: Solution,
     units: Conversion,
 ) -> dict[str, Any] | None:
-    """Write the duty and the loads of the pins as the JSON has them.
+    """Return the duty and the loads of the pins as the JSON has them.
 
-    They have the units of the output, and the keys of `motor_duty`.
+    Numbers have the units of the output, and the keys are those of `motor_duty`.
     """
     between = locate_between(scene, solution)
     panels = fit_motion(scene, between)

@@ -37,8 +37,8 @@ class NoSideError(Exception):
 def find_limits(scene: Scene, solution: Solution) -> Solution | None:
     """Return the solution of one position with the limits of its pin forces.
 
-    They are those from both sides of a change point; a force without one keeps NaN.
-    None elsewhere, and without forces.
+    Limits are those from both sides of a change point; a force without a limit keeps
+    NaN. None is returned for other positions, and without forces.
 
     Raises NoSideError where a side cannot be asked: where a law or a release begins or
     ends, or stands still, and where a cylinder is at an end of its range.
@@ -54,10 +54,10 @@ def find_limits(scene: Scene, solution: Solution) -> Solution | None:
 
 
 def has_growing_forces(scene: Scene, solution: Solution) -> bool:
-    """Return True if a release meets a change point where pin forces have no limit.
+    """Return True if pin forces grow without bound at a change point of a release.
 
-    They grow without bound there. A change point at which the motion begins or ends has
-    one side alone, and is not asked.
+    A change point at which the motion begins or ends has one side alone, and is not
+    asked.
 
     `solution`: of the release, over time.
     """

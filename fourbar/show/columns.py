@@ -1,6 +1,6 @@
 """Quantities by the names that the command line takes.
 
-These are sizes, components, and ratios and differences of any two. `torque` and
+Sizes, components, and ratios and differences of any two have names. `torque` and
 `omega_4` are numbers, `F12` and `v_B` the sizes of vectors, `F12_x` a component, `A` a
 place with two coordinates, `omega_4/omega_2` a ratio, `theta_3-theta_2` a difference,
 `F_jaw/F_handle` the ratio of the forces along the paths of two points.
@@ -134,7 +134,8 @@ def _split_difference(solution: Solution, name: str) -> Iterator[tuple[str, str]
 def _subtract(name: str, first: Column, second: Column) -> Column:
     """Return the difference of two columns of one unit.
 
-    That of two angles is in (-pi, pi] at the first position, and continuous from there.
+    A difference of angles is in (-pi, pi] at the first position, and continuous from
+    there.
     """
     if (first.unit, first.divisor) != (second.unit, second.divisor):
         raise InputError(

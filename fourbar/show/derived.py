@@ -1,7 +1,8 @@
 """Quantities that follow from those of a solution.
 
-These are shaking, ratios of speeds, instant centres, and lengths and forces of springs.
-Tables, CSV, plots and the workbench show what `fourbar.quantities` declares of them.
+Shaking, ratios of speeds, instant centres, and lengths and forces of springs are
+computed here. Tables, CSV, plots and the workbench show what `fourbar.quantities`
+declares of them.
 """
 
 from collections.abc import Callable
@@ -30,10 +31,10 @@ from fourbar.studies.points import instant_centres
 
 
 def derive(solution: Solution, name: str) -> Array | None:
-    """Compute a quantity of `DERIVED`, (n,) or (n, 2).
+    """Compute a quantity of `DERIVED`, (n,) or (n, 2); None without its stage.
 
-    It is None if its stage was not evaluated. NaN marks a position where it has no
-    value: a ratio at a dead centre of bar 2, a centre at infinity.
+    NaN marks a position where the quantity has no value: a ratio at a dead centre of
+    bar 2, a centre at infinity.
     """
     quantity = find_derived(name)
     assert quantity is not None
@@ -74,9 +75,9 @@ def _measure_spring(solution: Solution, number: int, kind: str) -> Array:
 
 
 def _compute_transmission(solution: Solution) -> Array:
-    """Return the acute angle between coupler and output.
+    """Return the acute angle between coupler and output, rad.
 
-    Both its sine and its cosine keep their digits.
+    Sine and cosine of the angle both keep their digits.
     """
     cosine = np.cos(solution.theta_4 - solution.theta_3)
     return np.asarray(np.arctan2(np.abs(solution.sin_mu), np.abs(cosine)))
@@ -105,10 +106,7 @@ def _compute_ratio(solution: Solution, bar: int) -> Array:
 
 
 def _locate_centre(solution: Solution, bars: tuple[int, int]) -> Array:
-    """Return an instant centre.
-
-    It is NaN where its two lines are parallel within rounding.
-    """
+    """Return an instant centre; NaN where its lines are parallel within rounding."""
     centre = instant_centres(solution)[bars]
     point = shift_to_drawing(solution, np.stack(centre.point, axis=-1))
     parallel = np.abs(centre.w) <= NO_DIGIT_LEFT

@@ -100,8 +100,8 @@ m/s.
 def shaking_force(solution: Solution) -> Array:
     """Return the force of the bars on the frame, N, (n, 2), of a study (m, n, 2).
 
-    It is F21 + F41 = -(F12 + F14). A linear drive with an end on the ground adds its
-    own; a spring pulls there besides.
+    The force is F21 + F41 = -(F12 + F14), and that of a linear drive or a spring with
+    an end on the ground besides.
     """
     F12 = _require_quantity(solution, "F12")
     F14 = _require_quantity(solution, "F14")
@@ -109,10 +109,10 @@ def shaking_force(solution: Solution) -> Array:
 
 
 def shaking_moment(solution: Solution) -> Array:
-    """Return the moment of bars and drive on the frame about O2, N m, (n,).
+    """Return the moment of bars and drive on the frame about O2, N m, (n,) or (m, n).
 
-    It is -T - O4 x F14; of a study it is (m, n). The moment of a linear drive with an
-    end on the ground takes the place of -T.
+    The moment is -T - O4 x F14. A linear drive with an end on the ground has its moment
+    in place of -T.
 
     Couples that effects exert between the bars and ground (pin damping or friction at
     O2, O4) are not part of it.
@@ -226,7 +226,7 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
 def is_once_round(solution: Solution) -> Any:
     """Return True if a motion covers whole turns; for a study (m,).
 
-    Its last position then repeats the first. An assembly with a single change point
+    The last position then repeats the first. An assembly with a single change point
     repeats after two turns. Speed and acceleration must repeat too: a motion law may
     end at another speed than it begins with.
     """

@@ -139,7 +139,7 @@ class InUnits:
 def in_units(shown: "Scene | Solution", units: str) -> InUnits:
     """Return a scene or a solution that a notebook shows in other units.
 
-    They are "imperial", or a list like "mm N.mm".
+    `units` is "imperial", or a list like "mm N.mm".
 
     Raises InputError for a word that is no unit of a result, and for two units of one
     dimension.

@@ -70,10 +70,10 @@ class Panels(NamedTuple):
         return float(of_panels.sum())
 
     def accumulate(self, name: str, level: float = 0.0) -> Array:
-        """Integrate a curve less a level up to where it may turn back.
+        """Integrate a curve less a level up to where the integral may turn back.
 
-        These are the ends of the panels, and the zeros of the difference within them.
-        The first integral is 0.
+        Such places are the ends of the panels, and the zeros of the difference within
+        them. The first integral is 0.
         """
         values = self.values[name][..., 0] - level
         series = values @ _TO_SERIES.T
@@ -118,7 +118,7 @@ def fit_panels(
 ) -> Panels:
     """Halve panels until each curve is settled; leave out the curves that never are.
 
-    They have a pole, positions without a value, or are noise.
+    A curve that never settles has a pole or positions without a value, or is noise.
 
     Parameters
     ----------

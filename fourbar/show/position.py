@@ -1,6 +1,6 @@
 """Everything about one position, in aligned rows.
 
-These are bars, points, pin forces, ratios and instant centres.
+Rows state bars, points, pin forces, ratios and instant centres.
 """
 
 from collections.abc import Iterable
@@ -191,7 +191,7 @@ class PositionSheet:
     def _write_force_ratios(self) -> list[str]:
         """Write the ratio of forces along the paths of two points.
 
-        One is of the input, the other of the output.
+        Every point of the input is paired with every point of the output.
         """
         rows = []
         points = self.scene.points

@@ -1,6 +1,6 @@
 """Output of `classify`, `analyze --sensitivity` and `equilibrium`.
 
-It is text, or one JSON object in SI units and radians.
+Output is text, or one JSON object in SI units and radians.
 """
 
 import math
@@ -54,7 +54,7 @@ def write_type(
 ) -> Iterator[str]:
     """Write the type of a linkage and the condition that decides it.
 
-    It says too what turns, how far, and between which limits.
+    Further lines say which bars turn, how far, and between which limits.
 
     `units`: of the lengths; None where they are ratios. `everything`: the limits of all
     bars, not of the output alone.
@@ -225,10 +225,7 @@ def list_shown(derivatives: Sensitivity) -> list[str]:
 
 
 def find_largest(derivatives: Sensitivity, quantity: str) -> float:
-    """Find the largest magnitude of a quantity over the positions.
-
-    It is NaN if no position has one.
-    """
+    """Return the largest magnitude of a quantity; NaN if no position has a value."""
     value = derivatives.value(quantity)
     if value.ndim == 1:
         size = np.abs(value)
@@ -390,7 +387,8 @@ def _write_resting(
 def _find_inertia_unit(units: Conversion) -> tuple[str, float]:
     """Return the unit of a moment of inertia and its factor from kg m^2.
 
-    It is that of pounds and inches where both are asked for, otherwise kg m^2.
+    Units of mass and length that are both asked for make this unit, as lb and in make
+    lb in^2; otherwise kg m^2 is returned.
     """
     if "kg" not in units or "m" not in units:
         return "kg m^2", 1.0

@@ -1,9 +1,8 @@
-"""Summary of a solved scene: ranges, peaks and their places, and more.
+"""Summary of a solved scene: ranges, peaks and their places, drive and ends of motion.
 
-It has the needs of the drive and the ends of the motion. `locate_between` finds what
-the steps of a sweep pass over: reversals of dry friction, and the largest torque and
-pin forces; `locate_bending` the largest bending moments. `summarize` computes the
-facts; `fourbar.show.block` prints them.
+`locate_between` finds what the steps of a sweep pass over: reversals of dry friction,
+and the largest torque and pin forces; `locate_bending` the largest bending moments.
+`summarize` computes the facts; `fourbar.show.block` prints them.
 """
 
 import math
@@ -156,9 +155,9 @@ class Between(NamedTuple):
     """
 
     def bounded(self, *names: str) -> Solution:
-        """Return the solution to take the peaks of magnitudes from.
+        """Return the solution that gives the peaks of magnitudes.
 
-        It is the sweep alone if one grows without bound.
+        The sweep alone is returned if one of them grows without bound.
         """
         if self.growing.intersection(names):
             return self.sweep
@@ -166,9 +165,9 @@ class Between(NamedTuple):
 
 
 def list_sizes(solution: Solution) -> dict[str, Array]:
-    """List the magnitudes whose largest values are located.
+    """Return the magnitudes whose largest values are located, by name, (n,).
 
-    These are torque, power and speed of the drive, and pin forces.
+    Torque (or force), power and speed of the drive, and pin forces are included.
     """
     drive = read_drive_demand(solution)
     torque = drive.keys.value
@@ -201,9 +200,9 @@ def _compute_pin_loads(solution: Solution) -> dict[str, Array]:
 def find_drive_rounding(solution: Solution) -> float:
     """Return the rounding of the torques (forces) that the drive sums, N m or N.
 
-    They are inertial ones, and usual pin forces at the longest bar. At a change
-    point an error bar is less, and where springs balance weights, as far as their
-    numbers are rounded.
+    Inertial forces and usual pin forces are taken at the longest bar. At a change point
+    an error bar is less, and where springs balance weights, as far as their numbers are
+    rounded.
     """
     assert solution.scene is not None
     inertial = 0.0
@@ -221,7 +220,7 @@ def find_drive_rounding(solution: Solution) -> float:
 def _find_lever(solution: Solution) -> float:
     """Return the arm at which pin forces load the drive: the longest bar, m.
 
-    It is 1 for a drive that exerts a force itself.
+    A drive that exerts a force itself has the arm 1.
     """
     if solution.drive is None and solution.scene is not None:
         return max(solution.scene.linkage.lengths)
@@ -279,7 +278,7 @@ def fit_motion(scene: Scene, between: Between) -> Panels | None:
 def _list_edges(scene: Scene, between: Between) -> Array:
     """List where the first panels of a motion end, in rising order.
 
-    They are positions of the sweep and places found between them, where friction may
+    Edges are positions of the sweep and places found between them, where friction may
     reverse, and the times at which one part of a law follows on another.
     """
     places = between.sweep.at.places
@@ -381,9 +380,9 @@ def _list_stresses(
     scene: Scene,
     bending: dict[int, _BarBending],
 ) -> dict[int, float | None]:
-    """List the largest bending stresses.
+    """Return the largest bending stress of each bar, Pa; None without a cross-section.
 
-    Each is the bending moment over the section modulus.
+    The stress is the bending moment over the section modulus.
     """
     stresses = dict[int, float | None]()
     for bar, largest in bending.items():
@@ -443,7 +442,8 @@ def _slip_of_pin(solution: Solution, pin: str) -> Array:
 def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array, Array]:
     """List the steps in which the slip of a pin with dry friction changes sign.
 
-    Each has the pin and its ends. They are one position where a turn begins and ends.
+    Pins and both ends of their steps are returned. The ends are one position where a
+    turn begins and ends.
     """
     dry_pins = {pin for effect in scene.effects for pin in effect.dry_pins}
     pins = []
@@ -804,10 +804,7 @@ def _find_drive_peak(between: Between, drive: Driving | None) -> Peak | None:
 
 
 def _find_rates(solution: Solution, *, smooth: bool) -> dict[int, tuple[Peak, Peak]]:
-    """Find the largest speed and acceleration of the bars that follow.
-
-    They follow what is commanded.
-    """
+    """Find the largest speed and acceleration of the bars that follow the command."""
     rates = dict[int, tuple[Peak, Peak]]()
     if solution.omega_4 is None or len(solution) == 1:
         return rates
@@ -846,10 +843,7 @@ def _find_kind(scene: Scene, solution: Solution) -> str:
 
 
 def _list_commanded(solution: Solution) -> Array:
-    """List the commanded angle or stroke at each position.
-
-    It is the time for a motion over time.
-    """
+    """Return the commanded angle or stroke, or the time, at each position."""
     if solution.time is None:
         return solution.at.places
     return solution.time
@@ -982,9 +976,9 @@ def find_duty(
 ) -> MotorDuty | None:
     """Return the duty of the drive over the motion, whatever its steps.
 
-    Each peak is located between the positions; one without a bound is that of the
-    positions. Means and energies are integrals over the panels. What has no panels is
-    summed over the positions.
+    Peaks are located between the positions; one without a bound is that of the
+    positions. Means and energies are integrals over the panels, or sums over the
+    positions where there are no panels.
     """
     duty = motor_duty(between.sweep)
     drive = read_drive_demand(between.sweep)

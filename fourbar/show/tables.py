@@ -222,7 +222,7 @@ def list_columns(
 def _list_motion(solution: Solution) -> Iterator[tuple[str, str, Array]]:
     """List the points' coordinates, and angles and rates of the bars.
 
-    Each has its name, SI unit and values.
+    An entry has name, SI unit and values.
     """
     for name, place in solution.points.items():
         x, y = shift_to_drawing(solution, place).T

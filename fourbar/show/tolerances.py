@@ -156,7 +156,7 @@ def _make_table(
 def _describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[str]:
     """Say what was tried and what of it has no answer.
 
-    It says too where first order and samples part.
+    The last lines say where first order and samples part.
     """
     n = len(spreads.theta_2)
     count = f"{len(spreads.scene.tolerances)} tolerance" + (
@@ -235,9 +235,9 @@ def collect_tolerances(
 ) -> dict[str, Any]:
     """Collect what a page shows of tolerances at places of its axis.
 
-    These are deviations from the nominal and shares of the variance. A scene that has
-    none of this (a free motion, SciPy not installed) gives the sentence that says so.
-    `progress` is that of `tolerances`; left out, a line in the terminal.
+    Deviations from the nominal and shares of the variance are collected. A scene that
+    has none of this (a free motion, SciPy not installed) gives the sentence that says
+    so. `progress` is that of `tolerances`; left out, a line in the terminal.
     """
     positions = scene
     if not scene.motion.law:

@@ -1,6 +1,6 @@
 """The units in which results are shown.
 
-They are a list like "mm N N.mm deg", those of a scene file, or SI with prefixes.
+Units are a list like "mm N N.mm deg", those of a scene file, or SI with prefixes.
 """
 
 import math
@@ -119,7 +119,7 @@ def _explain_unit(name: str, unit: str) -> str:
 def suit_units(length: str) -> Conversion:
     """Return the units that suit a length as it was typed.
 
-    They are imperial for inches and feet, otherwise `COMMON`: a result has the prefix
+    Inches and feet give imperial units, other lengths `COMMON`: a result has the prefix
     that suits its size, where a message repeats the unit that was typed.
     """
     from fourbar.quantities.units import IMPERIAL, find_unit
@@ -132,7 +132,7 @@ def suit_units(length: str) -> Conversion:
 def units_of_length(length: str) -> Conversion:
     """Return the units of messages on a length as it was typed.
 
-    They are imperial for inches and feet; other lengths keep their unit.
+    Inches and feet give imperial units; other lengths keep their unit.
     """
     return _suit_texts(length, ())
 
@@ -140,10 +140,10 @@ def units_of_length(length: str) -> Conversion:
 def units_of_scene(document: Mapping[str, Any]) -> Conversion:
     """Return the units that suit the tables of a scene file.
 
-    They are imperial where the lengths are in inches or feet; otherwise lengths have
-    the unit of lengths.ground, and speeds and accelerations of bars those that the
-    motion is stated in, or rad/s if it is a released one. They are `COMMON` if the
-    tables are no scene: the reader says what is wrong with them.
+    Lengths in inches or feet give imperial units; otherwise lengths have the unit of
+    lengths.ground, and speeds and accelerations of bars those that the motion is stated
+    in, or rad/s if it is a released one. Tables that are no scene give `COMMON`: the
+    reader says what is wrong with them.
     """
     try:
         length = str(find_length(document))
@@ -206,10 +206,7 @@ def _suit_rotation(stated: str, unit: str) -> Conversion:
 
 
 def find_length(document: Mapping[str, Any]) -> object:
-    """Return the first length of a scene as it is written.
-
-    It is lengths.ground, or a coordinate of a pin.
-    """
+    """Return lengths.ground, or the first coordinate of a pin, as it is written."""
     if "pins" in document:
         return document["pins"]["A"][0]
     return document["lengths"]["ground"]
@@ -254,10 +251,7 @@ def write_cell(number: float, form: str) -> str:
 
 
 def write_digits(value: float, digits: int = SHOWN_DIGITS) -> str:
-    """Write a number with some significant digits.
-
-    There is no exponent up to a million.
-    """
+    """Write a number with some significant digits, up to a million without exponent."""
     return f"{float(f'{value:.{digits}g}'):.6g}"
 
 

@@ -66,10 +66,7 @@ def _compute_generalized_force(
     terms: tuple[Any, ...],
     state: State,
 ) -> Any:
-    """Compute Q of loads and effects.
-
-    It is by the parameter of the state's coefficients.
-    """
+    """Compute Q of loads and effects by the parameter of the state's coefficients."""
     return (
         Actions(state, list_bodies(scene.linkage, terms))
         .add(terms)
@@ -297,7 +294,7 @@ class CircuitCurve:
     def ends(self) -> Array:
         """Return the ends of the sweep on each branch, (n, 2).
 
-        There are none without a sweep, or if it is a whole row.
+        The array is empty without a sweep, or if the sweep is a whole row.
         """
         if self.sweep is None or self.sweep[1] - self.sweep[0] >= self.period:
             return np.empty((0, 2))
@@ -403,9 +400,9 @@ def _measure_apart(psi: Array, middle: float, period: float) -> Array:
 
 
 def closure(lengths: Loop, psi: Number, mu: Number) -> Number:
-    """Compute how far the loop is from closing: zero where it closes, m^2.
+    """Compute the residual of the loop closure, m^2: zero where the loop closes.
 
-    It is a d cos psi - b c cos mu - (a^2 + d^2 - b^2 - c^2)/2.
+    The residual is a d cos psi - b c cos mu - (a^2 + d^2 - b^2 - c^2)/2.
     """
     d, a, b, c = lengths[:4]
     return (
@@ -414,9 +411,7 @@ def closure(lengths: Loop, psi: Number, mu: Number) -> Number:
 
 
 def on_curve(lengths: Loop, theta_1: Number, psi: Number, mu: Number) -> State:
-    """Compute the position at rest, with derivatives by s.
-
-    They replace those by an angle.
+    """Compute the position at rest, with derivatives by s in place of an angle.
 
         u3 = (d u1 - a u2)/(b - c e^{i mu}),   u4 = u3 e^{i mu}.
 

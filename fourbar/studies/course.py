@@ -23,8 +23,9 @@ there as the root of what is commanded.
 def follow(scene: Scene, solution: Solution) -> None:
     """Turn angles that follow, in place, to where the motion of the scene has them.
 
-    They are in (-pi, pi] at the first position of the motion and continuous from there,
-    whichever positions of it are solved. Single positions have no motion.
+    An angle that follows is in (-pi, pi] at the first position of the motion and
+    continuous from there, whichever positions of it are solved. Single positions have
+    no motion.
     """
     motion = scene.motion
     moves = motion.law is not None or motion.free is not None

@@ -1,6 +1,6 @@
 """Sensitivities: the derivative of every quantity by every number of a scene.
 
-They come from the formulas as they stand.
+The formulas run as they stand, on numbers that carry their slopes.
 """
 
 import math
@@ -146,7 +146,7 @@ class Sensitivity:
     def to_pandas(self) -> "DataFrame":
         """Make a table, a row for each number and position.
 
-        Its columns are key, theta_2, status and d(quantity)/d(key), SI units and rad.
+        Columns are key, theta_2, status and d(quantity)/d(key), SI units and rad.
 
         Raises DependencyError where pandas is not installed.
         """
@@ -435,7 +435,7 @@ def _compute_derivatives(
 ) -> tuple[dict[str, Any], dict[str, NDArray[np.bool_]]]:
     """Compute the quantities at some positions, with their slopes.
 
-    It returns too the marks, by status, of positions where forces have no slopes.
+    The second result marks, by status, the positions where forces have no slopes.
     """
     place = {key: number for number, key in enumerate(keys)}
 

@@ -133,16 +133,16 @@ class Equilibria(NamedTuple):
 
 
 def equilibrium(scene: Scene) -> Equilibria:
-    """Find the positions in which a linkage stays by itself.
+    """Find the positions in which a linkage stays by itself, and their stability.
 
-    It tells whether they are stable, and what holds the others. The search covers the
-    circuit of the scene's first position that assembles, on both branches where the
-    circuit has both. If the scene states a sweep (of theta_2, of another bar or of a
-    stroke) or a motion law, the search stays within the angles theta_2 of it, and
-    `reached` tells apart what the sweep itself passes. Speed, acceleration and drive
-    of the scene play no part, nor does viscous damping. Zeros of the generalized force
-    Q are sought between the positions of a grid (3600 a turn, and the ends of the
-    sweep): where Q changes its sign, and where its size is least.
+    The result also says what holds the linkage elsewhere. The search covers the circuit
+    of the scene's first position that assembles, on both branches where the circuit has
+    both. If the scene states a sweep (of theta_2, of another bar or of a stroke) or a
+    motion law, the search stays within the angles theta_2 of it, and `reached` tells
+    apart what the sweep itself passes. Speed, acceleration and drive of the scene play
+    no part, nor does viscous damping. Zeros of the generalized force Q are sought
+    between the positions of a grid (3600 a turn, and the ends of the sweep): where Q
+    changes its sign, and where its size is least.
 
     Raises
     ------
@@ -317,10 +317,7 @@ class _Grid(NamedTuple):
 
 
 def _make_grid(curve: CircuitCurve, points: Array) -> _Grid:
-    """Pair the neighbours in their order along the rows.
-
-    There is no pair across what lies outside the sweep.
-    """
+    """Pair neighbouring points along the rows, but not across a gap of the sweep."""
     tau, row = curve.tau(points)
     first = np.lexsort((tau, row))
     second = np.empty_like(first)
@@ -422,7 +419,7 @@ def _find_sign_changes(curve: CircuitCurve, grid: _Grid) -> _Zeros:
 def _add_friction(curve: CircuitCurve, points: Array, side: int) -> Array:
     """Compute Q with the friction that opposes impending motion to one side.
 
-    It is infinite where friction jams.
+    Positions where friction jams have an infinite Q.
     """
     state = curve.state(points)
     force = np.empty(len(points))
@@ -451,10 +448,7 @@ def _holds(curve: CircuitCurve, points: Array) -> NDArray[np.bool_]:
 
 
 def _moves(curve: CircuitCurve, points: Array) -> NDArray[np.int8]:
-    """Find the direction in which positions start to move.
-
-    It is the sign of the change of theta_2, 0 where they stay.
-    """
+    """Return the sign of the change of theta_2 at each released position, 0 at rest."""
     state = curve.state(points)
     ahead = _add_friction(curve, points, 1)
     back = _add_friction(curve, points, -1)
@@ -468,9 +462,9 @@ def _list_ranges(
     holds: Callable[[Array], NDArray[np.bool_]],
     points_held: Array,
 ) -> list[_CircuitRange]:
-    """List the ranges within the sweep in which something holds, row by row.
+    """List the ranges within the sweep in which a condition holds, row by row.
 
-    It is known to hold at some points.
+    `points_held`: points at which the condition is known to hold.
     """
     ranges = []
     own_tau, own_row = curve.tau(points_held)
@@ -563,9 +557,9 @@ def bisect(
     low: Array,
     high: Array,
 ) -> tuple[Array, Array]:
-    """Narrow each interval to the two neighbours between which something ends.
+    """Narrow each interval to two neighbours between which a condition ends.
 
-    It holds at the lower end of the interval alone.
+    The condition holds at the lower end of each interval alone.
     """
     for _ in range(HALVINGS_OF_A_STEP):
         middle = 0.5 * (low + high)

@@ -1,7 +1,7 @@
 """Internal forces of a bar along the line between its two pins.
 
-They are normal force, shear force and bending moment. With x from the first pin (O2, A,
-O4) towards the second and y to the left of it, over all that acts at or before x,
+Normal force, shear force and bending moment are meant. With x from the first pin (O2,
+A, O4) towards the second and y to the left of it, over all that acts at or before x,
 inertia (d'Alembert) and weight included:
 
     N(x) = -sum F_x  (tension > 0),
@@ -102,9 +102,9 @@ def internal_forces(
 
 
 class _Beam(NamedTuple):
-    """Everything that acts on a bar, by its foot on the line, (n, f).
+    """Forces and couples on a bar, by their feet on its line, (n, f).
 
-    It holds too what is spread over the line.
+    The load that inertia and weight of a uniform bar spread over the line is included.
     """
 
     length: float
@@ -155,10 +155,7 @@ class _Beam(NamedTuple):
         return N, V, M
 
     def find_largest(self) -> Bending:
-        """Find the largest |M|.
-
-        It lies at a foot, on either side of it, or where V = 0 between two.
-        """
+        """Find the largest |M|: at a foot, on either side of it, or where V = 0."""
         n = len(self.foot)
         ends = np.broadcast_to([0.0, self.length], (n, 2))
         feet = np.sort(np.concatenate([self.foot, ends], axis=1), axis=1)
@@ -371,8 +368,8 @@ def _support(
 ) -> list[_Item]:
     """Return the forces at both pins of a bar.
 
-    Their parts along the bar are those of the solution. Those across it are the
-    reactions of a beam on two supports, by the moments of all else about the other pin:
+    Along the bar the pin forces of the solution are taken. Across it the reactions are
+    those of a beam on two supports, by the moments of all else about the other pin:
 
         F_y (x - x_other) = -sum(moments about the other pin).
 

@@ -176,9 +176,9 @@ def _list_place(stated: Any, key: str, place: NumberPath) -> dict[str, SceneNumb
 
 
 def _list_bar(bar: Bar, number: int) -> dict[str, SceneNumber]:
-    """List the entries of a moving bar.
+    """List the entries of a moving bar as it is stated.
 
-    Its cross-section is as it is stated; with a density there is no mass.
+    A bar with a density has no entry for its mass.
     """
     entries = _list_entries(Bar, "", ("linkage", BAR_NAMES[number]))
     absent = {name for name in _BY_MATERIAL if getattr(bar, name) is None}
@@ -408,7 +408,7 @@ def _is_left_out(scene: Scene, entry: SceneNumber) -> bool:
 def find_misfit(scene: Scene, entry: SceneNumber, tolerance: Tolerance) -> str | None:
     """Say why a number of a scene cannot have a tolerance; None: it can.
 
-    Its file and its samples need one.
+    The reader of scene files and the samples of a study both need the answer.
     """
     if _is_left_out(scene, entry):
         return LEFT_OUT
@@ -469,7 +469,7 @@ def replace_number(scene: Scene, entry: SceneNumber, values: Any) -> Scene:
 def _find_drawn_frame(scene: Scene, bar: int) -> tuple[tuple[Any, Any], Any]:
     """Return the first pin of a bar in the drawing, m, and the bar's direction, rad.
 
-    They carry no slopes: a place moves against its bar as the bar was drawn.
+    Slopes are left out: a place moves against its bar as the bar was drawn.
     """
     assert scene.drawing is not None
     x, y = scene.drawing.place(FIRST_PIN[bar])
@@ -478,10 +478,7 @@ def _find_drawn_frame(scene: Scene, bar: int) -> tuple[tuple[Any, Any], Any]:
 
 
 def _find_stated_place(scene: Scene, holder: NumberPath) -> Place:
-    """Return the place that a point, a load, an end of a line or a bar states.
-
-    That of a bar is its mass centre.
-    """
+    """Return the place of a point, a load, an end of a line or a bar's mass centre."""
     stated = read_place(scene, holder)
     if isinstance(stated, Place):
         return stated

@@ -157,7 +157,7 @@ def say_range(scene: Scene) -> str:
 def _find_assembled_strokes(scene: Scene) -> list[tuple[float, float]]:
     """Find the ranges of the stroke in which the linkage assembles, m.
 
-    They are bisected between the places of a grid.
+    Ends of a range are bisected between the points of a grid.
     """
     grid = np.linspace(*find_stroke_range(scene), DEFAULT_STEPS + 1)
 
@@ -178,7 +178,7 @@ def _find_assembled_strokes(scene: Scene) -> list[tuple[float, float]]:
 
 
 def _list_candidates(scene: Scene, name: str, value: float) -> list[float]:
-    """List what is commanded where a named quantity has a value.
+    """List the commanded angles or strokes at which a named quantity has a value.
 
     Both assemblies and a second turn are searched.
     """

@@ -105,11 +105,11 @@ def _list_ends(heights: Array) -> list[int]:
 
 
 def _find_direction(points: Array, missed: float = 0.0) -> tuple[Array, list[int]]:
-    """Return the unit vector along the two nearest lines that hold the points.
+    """Return a unit vector along the two nearest parallel lines that hold the points.
 
     One of the lines goes through two neighbouring corners of their convex hull, the
-    other through the corner that is farthest from it. The rows of the points follow
-    that lie on the lines, and on others that are hardly farther apart.
+    other through the corner that is farthest from it. The second result has the rows of
+    the points on these lines, and on others that are hardly farther apart.
     """
     hull = np.array(_list_hull(points))
     if len(hull) < 3:

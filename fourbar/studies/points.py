@@ -75,12 +75,12 @@ def coupler_curve(
     branch: int | None = None,
     steps: int = 360,
 ) -> CouplerCurve:
-    """Trace the closed coupler curve of one circuit.
+    """Trace the closed coupler curve of one circuit, through limits and change points.
 
-    It runs smoothly through limits and change points. Where the input turns fully
-    theta_2 is spaced evenly, over two turns if one turn ends on the other branch; else
-    it goes from limit to limit on one branch and back on the other, spaced by the
-    cosine, so that the curve's points do not thin out at the limits.
+    Where the input turns fully theta_2 is spaced evenly, over two turns if one turn
+    ends on the other branch; else the curve goes from limit to limit on one branch and
+    back on the other, spaced by the cosine, so that its points do not thin out at the
+    limits.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Spread of a scene's quantities due to its tolerances.
 
-It follows from samples, and to first order from the sensitivities.
+Samples give the spread, and the sensitivities give it to first order.
 """
 
 from collections.abc import Callable, Iterator
@@ -77,7 +77,7 @@ class Spread(NamedTuple):
     def parted(self) -> NDArray[np.bool_]:
         """Mark where first order and samples differ by more than `PARTED`.
 
-        It marks also where only samples have a value.
+        Positions at which only samples have a value are marked too.
         """
         larger = np.fmax(self.deviation, self.first_order)
         size = np.nanmax(np.abs(self.nominal), initial=0.0)
@@ -196,9 +196,9 @@ def tolerances(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> Tolerances:
-    """Compute the spread of every quantity at each position.
+    """Compute the spread of every quantity at each position, due to the tolerances.
 
-    It is estimated from quasi-random samples of the toleranced numbers.
+    Quasi-random samples of the toleranced numbers give the estimate.
 
     With the samples come first-order figures, from s_i = d(quantity)/d(number i): the
     worst case sum |s_i| t_i and the shares (s_i sigma_i)^2 of the variance.
@@ -340,7 +340,7 @@ def _list_blocks(
 def _compute_first_order(slopes_of: Sensitivity, part: str) -> Spread:
     """Compute the nominal and the first-order figures of a part of a quantity.
 
-    Those of the samples are still to come.
+    Figures of the samples are NaN until `_fill` puts them in.
     """
     scene = slopes_of.scene
     nominal = slopes_of.value(part)
@@ -370,7 +370,7 @@ def _compute_first_order(slopes_of: Sensitivity, part: str) -> Spread:
 def _fill(spread: Spread, columns: slice, sampled: Array) -> None:
     """Fill in the samples' figures at some positions.
 
-    If not all members have a value, they are those of the others.
+    Samples without a value are left out.
     """
     if np.isfinite(sampled).all():
         # standard deviation of differences: a mean of equal numbers is rounded

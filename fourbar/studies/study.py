@@ -176,9 +176,9 @@ def _take_members(commanded: Command, rows: slice, columns: slice) -> Command:
 
 
 def _find_pin_turns(effects: Iterable[Effect]) -> dict[int, Any]:
-    """Find the whole turns of each pin by the index of the effect.
+    """Return the whole turns of pins by index of the effect that counts them.
 
-    They are for effects that depend on where the motion begins.
+    Only effects that depend on where the motion begins count turns.
     """
     turns_of = {
         index: getattr(effect, "turns", None) for index, effect in enumerate(effects)
@@ -286,9 +286,9 @@ def _list_commands(
     angles: Array,
     m: int,
 ) -> Command:
-    """Return the command of each member, (m, n).
+    """Return the commands of all members, (m, n), from angles or strokes and numbers.
 
-    It is from the angles or strokes and the numbers that vary.
+    Numbers that vary take the place of the scene's speed and acceleration.
     """
     if scene.motion.law is None:
         motion: Any = scene.motion

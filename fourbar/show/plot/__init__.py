@@ -1,6 +1,6 @@
 """Drawings of a scene in publication quality.
 
-These are linkage, curves over theta_2, forces and free bodies. Needs matplotlib (the
+Linkage, curves over theta_2, forces and free bodies can be drawn. Needs matplotlib (the
 extra ``plot``), which is loaded when something is drawn.
 """
 

@@ -1,6 +1,6 @@
 """Curves over what is commanded or over time, and hodographs.
 
-They show angles and rates, points, torque, energy and transmission angle.
+Angles and rates, points, torque, energy and transmission angle are drawn.
 """
 
 import math
@@ -116,7 +116,7 @@ def note(view: View, text: str) -> None:
 def find_poles(view: View) -> _Indices:
     """Find where the determinant of the drive changes sign.
 
-    Each index i stands for positions i and i + 1.
+    An index i stands for positions i and i + 1.
     """
     sweep = view.sweep
     if view.scene.motion.free is not None:  # no drive, no pole
@@ -158,10 +158,7 @@ def plot_between_poles(
 
 
 def choose_limit(values: list[Array]) -> float | None:
-    """Choose the end of a clipped axis.
-
-    It is None if no value stands far outside the rest.
-    """
+    """Choose the end of a clipped axis; None if no value stands far out."""
     every = np.concatenate(values)
     sizes = np.abs(every[np.isfinite(every)])
     if sizes.size == 0:
@@ -254,10 +251,7 @@ def _draw_rates(
     title: str,
     what: str,
 ) -> None:
-    """Draw the rates of the commanded bar and of the other two bars.
-
-    Those of the commanded bar are left out if they are zero.
-    """
+    """Draw the rates of the bars; those of the commanded bar are left out if zero."""
     over = draw_axes(axes, view)
     driven = view.sweep.at.bar
     name = {"omega": "ω", "alpha": "α"}[letter]
@@ -600,9 +594,9 @@ def draw_transmission(axes: "Axes", view: View) -> None:
 
 
 def find_free_place(mu: Array) -> float:
-    """Find the place along the axis where the curve is furthest from a remark.
+    """Return where the curve is furthest from a remark, as a part of the axis's length.
 
-    It is a part of the axis's length; the remark stands at 40 deg.
+    The remark stands at 40 deg.
     """
     half = _REMARK / 2.0
     best = 1.0 - half
@@ -622,7 +616,7 @@ def find_free_place(mu: Array) -> float:
 def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
     """List limits of the commanded bar and dead centres, on the axis.
 
-    Each is place, mu (degrees), mark and name.
+    An entry has place, mu (degrees), mark and name.
     """
     if view.time is not None:
         return []
@@ -758,10 +752,7 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
 
 
 def _choose_spacing(view: View) -> tuple[float, str]:
-    """Choose the distance of the dots along the axis, and say it in words.
-
-    It is in the axis's unit.
-    """
+    """Return the distance of the dots in the axis's unit, and the same in words."""
     axis = view.axis
     if axis.unit == "°":
         return EVERY, f"{EVERY:g}° of {axis.symbol}"

@@ -1,6 +1,6 @@
 """Curves of what follows from a solution.
 
-These are shaking force and moment, ratios, and paths of instant centres.
+Shaking force and moment, ratios, and paths of instant centres are drawn.
 """
 
 from itertools import chain

@@ -185,7 +185,7 @@ def _write_mp4(path: Path, frames: "Iterator[Image]", program: str) -> None:
 def choose_frames(shown: View, count: int) -> list[int]:
     """Choose the positions shown one after the other, by index.
 
-    They are the segment that assembles around the drawn position.
+    Frames cover the segment that assembles around the drawn position.
     """
     assembled = shown.sweep.assembled
     positions = shown.sweep.at

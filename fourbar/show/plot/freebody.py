@@ -166,9 +166,9 @@ class _ActionRecorder(Actions):
         )
 
     def pin_couple(self, pin: str, couple: Number) -> None:
-        """Add a couple on the second of the two bars at a pin.
+        """Add a couple on the second of the two bars at a pin, N m.
 
-        Its opposite acts on the first bar.
+        The first bar gets the opposite couple.
         """
         first, second = PINS[pin]
         self.couple(second, couple)

@@ -97,10 +97,7 @@ class Labels:
         return written
 
     def settle(self, figure: "Figure") -> None:
-        """Place every label once the layout is final.
-
-        Each takes its nearest free spot.
-        """
+        """Place every label at its nearest free spot once the layout is final."""
         from matplotlib.axes import Axes
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 

@@ -181,7 +181,8 @@ def draw_mechanism(
 def _list_off_bars(view: View, place: Pose) -> Iterator[tuple[int, complex]]:
     """List what may lie off its bar.
 
-    These are points, mass centres, and where forces, moments and springs act.
+    Points, mass centres, and the places where forces, moments and springs act may do
+    so.
     """
     for point in view.scene.settled().points:
         yield point.bar, place.point(point.bar, point.place.vector())
@@ -298,7 +299,7 @@ def _write_bar_name(view: View, number: int) -> str:
 def choose_drawing_scale(view: View) -> tuple[float, str, float]:
     """Choose the factor to the unit of length, that unit, and a support's size.
 
-    Both branches have the same.
+    Drawings of both branches have the same scale.
     """
     most = max(
         largest_magnitude(
@@ -434,8 +435,8 @@ def write_path_legend(axes: "Axes") -> float:
 def _list_paths(view: View) -> list[tuple[Array, str, Any, str]]:
     """List paths of A, B, mass centres and the scene's points.
 
-    Each is (n, 2) in m, colour, dash, name; the coupler's mid-point stands for a mass
-    centre.
+    An entry has the path, (n, 2) in m, its colour, dash and name; the mid-point of a
+    massless coupler stands for its mass centre.
     """
     traced = trace(view)
     sweep = traced.solution

@@ -93,10 +93,7 @@ def _measure_chords(points: Array) -> tuple[Array, float]:
 
 
 def _longest_chord(points: Array) -> float:
-    """Return the longest chord between positions that assemble.
-
-    It is a part of the path's extent.
-    """
+    """Return the longest chord of positions that assemble, over the path's extent."""
     chords, extent = _measure_chords(points)
     if extent:
         return float(np.nanmax(chords, initial=0.0)) / extent

@@ -1,6 +1,6 @@
 """The look of the drawings, and how they reach a file.
 
-They use matplotlib's object interface and leave no global state behind.
+Drawings use matplotlib's object interface and leave no global state behind.
 """
 
 import io
@@ -250,9 +250,9 @@ def set_degree_ticks(axis: Any, span: float) -> None:
 
 
 def place_legend(axes: "Axes", columns: int = 4) -> None:
-    """Place the legend between title and panel, where it covers no curve.
+    """Place the legend, if a curve has a value, between title and panel.
 
-    There is none if no curve has a value.
+    No curve is covered there.
     """
     if not axes.get_legend_handles_labels()[1]:
         return

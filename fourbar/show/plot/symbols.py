@@ -1,8 +1,8 @@
 """Symbols of everything that acts in a scene.
 
-These are springs, loads, gravity, drive, flywheel, and effects in the pins. Each symbol
-knows its bar and its points in that bar's frame: plot, film and page place it at any
-position. Here they are drawn with matplotlib, and so are arrows of velocity and
+Springs, loads, gravity, drive, flywheel, and effects in the pins have symbols. Each
+symbol knows its bar and its points in that bar's frame: plot, film and page place it at
+any position. Here they are drawn with matplotlib, and so are arrows of velocity and
 acceleration at points.
 """
 
@@ -241,7 +241,7 @@ class Pose(NamedTuple):
     def small(self, pin: str, size: float) -> float:
         """Shrink the size of what stands around a pin of a short bar.
 
-        It would hide the bar.
+        At full size the symbol would hide the bar.
         """
         loop = list(self.pins.values())  # in the order of the loop
         here = self.pins[pin]
@@ -535,7 +535,7 @@ def draw_vectors(
 ) -> Callable[[int], list[Any]]:
     """Draw the arrows of a solution's first position.
 
-    Each kind has one scale for the sweep.
+    Velocities have one scale for the sweep, and so have accelerations.
 
     Returns the function that moves them to another position, and returns them.
     """

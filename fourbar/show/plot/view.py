@@ -1,6 +1,6 @@
-"""Content of a drawing: the sweep of a scene on one branch.
+"""Content of a drawing: the sweep of a scene on one branch, and one position.
 
-One position of it is shown in detail.
+The position is shown in detail.
 """
 
 import math
@@ -152,7 +152,7 @@ def collect_point_vectors(
 ) -> dict[str, Array]:
     """Collect velocities ("v") or accelerations ("a") of points.
 
-    They are A, B, mass centres of bars that have mass, and the scene's points.
+    The points are A, B, mass centres of bars that have mass, and the scene's own.
     """
     drawn = (
         "A",
@@ -192,9 +192,9 @@ def list_sweep(scene: Scene) -> Command:
 
 
 def find_drawn_place(scene: Scene) -> float | None:
-    """Return the commanded angle that is drawn, within the default range.
+    """Return the commanded angle that is drawn, within the default range, rad.
 
-    It is None if another range is stated.
+    None is returned if another range is stated.
     """
     if scene.drawing is None or scene.motion.angle is not None:
         return None
@@ -207,7 +207,7 @@ def find_drawn_place(scene: Scene) -> float | None:
 def choose_common_position(scenes: "list[Scene]") -> float | None:
     """Choose a position that shows each of several scenes over the same range.
 
-    It is None if each has its own range.
+    None is returned if each has its own range.
     """
     if (
         any(is_over_time(scene) for scene in scenes)
@@ -222,10 +222,7 @@ def choose_common_position(scenes: "list[Scene]") -> float | None:
 
 
 def describe_change_points(motion: Solution) -> str:
-    """Say when a free motion passed change points.
-
-    It could have gone on otherwise there.
-    """
+    """Say when a free motion passed change points, where another motion is possible."""
     times = " and ".join(f"{time:.4g} s" for time in motion.change_points or ())
     return (
         f"At t = {times} all bars are in line, a change point: "
@@ -309,7 +306,7 @@ def _view_motion(scene: Scene, position: float | None) -> View:
 def _choose_position(sweeps: "list[Solution]") -> float:
     """Choose a position that shows the bars apart, the same for all sweeps.
 
-    It is a well-conditioned one if there is any.
+    Well-conditioned positions are preferred.
     """
     first_sweep = sweeps[0]
     assembled = np.concatenate([[False], first_sweep.assembled, [False]])
