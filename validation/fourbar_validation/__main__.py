@@ -1,6 +1,6 @@
 """`python -m fourbar_validation`: the command line of the harness.
 
-It works wherever the package is installed.
+The package may be installed anywhere.
 """
 
 from fourbar_validation.cli import main

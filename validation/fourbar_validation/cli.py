@@ -1,7 +1,4 @@
-"""Commands of the harness.
-
-Each lives in its own module and is imported when it is called.
-"""
+"""Commands of the harness, each imported from its own module when it is called."""
 
 import sys
 from collections.abc import Mapping

@@ -1,6 +1,6 @@
 """`python -m fourbar_validation.engine NAME | MODULE:CLASS`: serve an engine.
 
-It is served by the protocol, one line a question. NAME is one of our adapters.
+The engine answers by the protocol, one line a question. NAME is one of our adapters.
 docs/protocol.md states what a class has.
 """
 

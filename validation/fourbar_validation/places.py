@@ -1,6 +1,6 @@
 """Locate this package, the models, and the checkout that contains both.
 
-There may be none.
+CHECKOUT is None where the package is installed without one.
 """
 
 import os
@@ -24,9 +24,9 @@ MODELS = PACKAGE / "models" if CHECKOUT is None else CHECKOUT / "models"
 
 
 def find_program(started: str) -> str:
-    """Return the command that starts the harness.
+    """Return the command that starts the harness, for messages.
 
-    It follows from the file that was started (`sys.argv[0]`).
+    The file that was started (`sys.argv[0]`) tells which of the two it is.
     """
     if Path(started).parts[-2:] == ("validation", "__main__.py"):
         return "python -m validation"
@@ -51,9 +51,9 @@ def find_checkout(what: str) -> Path:
 
 @contextmanager
 def import_path() -> Iterator[str]:
-    """Return PYTHONPATH for another interpreter.
+    """Yield a PYTHONPATH by which another interpreter finds this code.
 
-    It finds this code there, and no library of this environment.
+    No library of this environment is on it.
     """
     rest = filter(None, [os.environ.get("PYTHONPATH")])
     if CHECKOUT is not None:

@@ -112,10 +112,11 @@ class _BarWrenches(NamedTuple):
         }
 
     def cut(self, pin: str) -> MistakenNumbers:
-        """Solve the tree that a cut at a pin leaves: no force is passed there.
+        """Return forces and torque of the tree that a cut at a pin leaves.
 
-        Its torque is that of the joint by which the driven bar hangs on the ground or
-        on the bar before it in its chain; the joint carries the bar and all behind it.
+        No force is passed at the cut. The torque is that of the joint by which the
+        driven bar hangs on the ground or on the bar before it in its chain; the joint
+        carries the bar and all behind it.
         """
         none = np.zeros_like(self.p[2])
         if pin == "A":
@@ -431,10 +432,7 @@ def _state_with_forces(
     moved: MistakenNumbers,
     wrenches: _BarWrenches,
 ) -> Iterator[Mistake]:
-    """State a mistake in accelerations.
-
-    These and the forces are wrong, or the forces alone.
-    """
+    """Yield a mistake in accelerations: with its wrong forces, and these alone."""
     forces = wrenches.solve()
     yield _state(text, {**moved, **forces})
     yield _state(f"{text}, from which the forces follow", forces)
@@ -513,10 +511,7 @@ def _find_late(judge: Judge) -> Iterator[Mistake]:
 
 
 def _find_other_branch(judge: Judge) -> Iterator[Mistake]:
-    """Follow the other branch from the position at which the numbers change.
-
-    There they leave the branch of the scene.
-    """
+    """Yield the mistake of the other branch from where the numbers change."""
     key = next(
         (
             key

@@ -111,9 +111,9 @@ class Judgement:
 
     @property
     def digits(self) -> str:
-        """Write to how many digits each quantity was compared.
+        """Say to how many digits each quantity was compared.
 
-        They are the fewest of its numbers.
+        Of the numbers of a quantity the one with the fewest digits counts.
         """
         fewest: dict[int, list[str]] = {}
         for quantity in dict.fromkeys(finding.quantity for finding in self.findings):
@@ -210,7 +210,7 @@ def judge_table(
 def write_judgement_json(judgement: Judgement, table: TheirTable) -> str:
     """Return one object in SI units: counts, and every number that differs.
 
-    Each has theirs and ours, and what explains it.
+    A number that differs is stated as theirs and ours, with what explains it.
     """
     tolerance = judgement.tolerance
     document = {
@@ -238,9 +238,9 @@ def write_judgement_json(judgement: Judgement, table: TheirTable) -> str:
 
 
 def write_junit(judgement: Judgement, name: str) -> str:
-    """Return one JUnit case per quantity.
+    """Return a JUnit document of one case per quantity.
 
-    It is a failure if a number differs, and skipped if none could be judged.
+    A case is a failure if a number differs, and skipped if none could be judged.
     """
     return write_document(judgement.sentence(), _list_cases_of_table(judgement, name))
 
@@ -493,7 +493,7 @@ def _choose_worst(differing: list[Discrepancy]) -> list[Discrepancy]:
 def _write_in_their_unit(finding: Discrepancy, table: TheirTable) -> tuple[str, ...]:
     """Write the quantity with the unit of their column, and both numbers in it.
 
-    They have the digits that set them apart.
+    As many digits are written as set the numbers apart.
     """
     unit = table.units[
         next(key for key in table.values if table.label(key) == finding.quantity)

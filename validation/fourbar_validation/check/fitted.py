@@ -70,9 +70,9 @@ def find_fitted(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
 
 
 def _find_ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
-    """Find columns that are a number times ours.
+    """Yield columns that are ours times a number.
 
-    It is a unit by name if a pair of units has that ratio.
+    The number is named as two units if a pair of them has that ratio.
     """
     by_ratio: dict[tuple[str, float], set[str]] = {}
     for key in differing:
@@ -403,10 +403,7 @@ def _compute_residuals(
 
 
 def _try_order(judge: Judge) -> Iterator[Mistake]:
-    """Try the right numbers in other rows.
-
-    Each row of theirs goes to the nearest of ours.
-    """
+    """Yield the right numbers in other rows: each row of theirs goes to our nearest."""
     table = judge.table
     n = len(judge.at.angle)
     keys = []

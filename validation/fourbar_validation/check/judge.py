@@ -1,6 +1,6 @@
 """A table judged number by number.
 
-Each number has its error, what it is allowed, and what may explain it.
+A number gets its error, the allowed error, and what may explain the difference.
 """
 
 import math
@@ -207,10 +207,7 @@ class Judge:
         )
 
     def permitted(self, key: str, ours: Array) -> Array | None:
-        """Compute the difference that the given tolerance allows, (n,).
-
-        It is in the quantity's unit.
-        """
+        """Return the difference that the given tolerance allows, (n,), in our unit."""
         if self.tolerance is None:
             return None
         return np.asarray(

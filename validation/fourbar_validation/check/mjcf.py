@@ -1,7 +1,7 @@
-"""`python -m validation check-mjcf`: what differs from the generated MJCF.
+"""`python -m validation check-mjcf`: what differs from the generated MJCF, and why.
 
-It says what each difference costs in accuracy. The file is somebody's: it is compiled
-and run in a process of its own, with a limit on time and memory.
+Each difference has a cost: what it does to the accuracy. The file is somebody's: it is
+compiled and run in a process of its own, with a limit on time and memory.
 """
 
 import math
@@ -272,10 +272,10 @@ def _price_differences(
     tolerance: ErrorBound,
     examined: Callable[..., Any],
 ) -> list[Difference]:
-    """Price differences.
+    """Return the differences, each with its cost in accuracy.
 
-    Those of the mechanism are put into the generated file; settings and what it cannot
-    hold into theirs.
+    Differences of the mechanism are put one at a time into the generated file;
+    settings, and what the generated file cannot hold, are corrected in theirs.
     """
     of_mechanism = [one for one in differences if not is_setting(one.key)]
     answered = examined(
@@ -465,7 +465,7 @@ def check_mjcf_command(
 ) -> int:
     """Compare your own MJCF with a scene.
 
-    It prints the errors of torque and pin forces, and their causes.
+    Printed are the errors of torque and pin forces, and their causes.
 
     A four-bar alone is compared with the generated MJCF of SCENE, entry by entry. With
     --loop, without SCENE, or where FILE.xml has more joints, loops are measured inside
@@ -512,9 +512,9 @@ def _is_robot(
     assets: Path | None,
     robot: Mapping[str, Any],
 ) -> bool:
-    """Tell whether a file is to be measured as a robot.
+    """Return whether a file is to be measured as a robot.
 
-    Its options say so, or it has more joints than a four-bar.
+    A robot has options of its own, or more joints than a four-bar.
     """
     return any(robot.values()) or (
         not names and not is_four_bar_alone(read_robot(mjcf, assets))

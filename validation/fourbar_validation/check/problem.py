@@ -1,7 +1,6 @@
-"""Problems of models/problems and their results.
+"""Problems of models/problems and their results: errors of quantities, and levels.
 
-They say how far each quantity is off, and which level that reaches. A problem is a
-question of the protocol with its answer, each value with an error bar;
+A problem is a question of the protocol with its answer, each value with an error bar;
 docs/benchmark.md has the format.
 """
 
@@ -155,9 +154,9 @@ def _answer_at(
 
 
 def collect_answers(solution: Solution) -> tuple[dict[str, Array], dict[str, Array]]:
-    """Return angles, torque or force of the drive, and pin forces.
+    """Return angles, torque or force of the drive, and pin forces; and error bars.
 
-    They have their error bars.
+    Both are arrays by the quantity's name.
     """
     if solution.drive_force is None:
         drive = "torque"

@@ -35,9 +35,9 @@ class RowCommands(NamedTuple):
 
 
 def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
-    """Find what is commanded at each row of the table.
+    """Return what is commanded at each row of the table.
 
-    It is the scene's command if that has the same positions. Where the scene states no
+    The scene's command serves if it has the same positions. Where the scene states no
     speed it is that of the row, as in the log of a simulator or a test stand.
 
     Raises InputError for a motion whose rows are not found by an angle, and for an

@@ -585,9 +585,9 @@ def _read_cell(
     place: str,
     cell: str,
 ) -> tuple[float, float]:
-    """Read the number in a cell and half a unit of its last printed digit.
+    """Return the number in a cell, and half a unit of its last printed digit.
 
-    It is NaN for a blank.
+    Both are NaN for a blank.
     """
     text = cell.strip().replace("\N{MINUS SIGN}", "-")
     if _THOUSANDS.fullmatch(text):

@@ -78,10 +78,7 @@ SKIPPED = ("visual", "asset", "sensor", "keyframe", "custom")
 
 
 def list_unread(text: str) -> list[str]:
-    """List what a screened MJCF states and the check does not look at.
-
-    Each is "element attribute".
-    """
+    """Return "element attribute" of what a screened MJCF states and no check reads."""
 
     def walk(element: ET.Element) -> Iterator[str]:
         looked_at = READ_ATTRIBUTES.get(element.tag)

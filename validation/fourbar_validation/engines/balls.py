@@ -346,10 +346,7 @@ def compute_outputs(
 
 
 class _BallBars(NamedTuple):
-    """Bars 2, 3 and 4 in motion at one position.
-
-    They have directions, rates, and vectors of the plane.
-    """
+    """Bars 2, 3 and 4 in motion at one position: directions, rates and vectors."""
 
     w: dict[int, ComplexBall]
     """Unit vectors along the bars."""

@@ -57,9 +57,9 @@ Value = float | str | tuple[float, ...]
 
 
 class ModelEntry(NamedTuple):
-    """One entry of a model file.
+    """One entry of a model file, with its value as compiled.
 
-    It has its value as compiled, and the element and attribute that state it.
+    `element` and `attribute` of the file state it.
     """
 
     value: Value
@@ -178,9 +178,9 @@ def list_moving_parts(linkage: FourBar) -> list[MovingPart]:
 
 
 def place(point: Any, ground_angle: float) -> tuple[float, float]:
-    """Locate an end of a spring from the first pin of its bar, m.
+    """Return (along, across) of a spring's end from the first pin of its bar, m.
 
-    It is along and across the bar's line; on the ground it is in world axes.
+    On the ground the two are in world axes.
     """
     offset = resolve(point.distance, point.angle)
     if point.bar == 1:

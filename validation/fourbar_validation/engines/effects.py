@@ -1,7 +1,7 @@
 """Apply each load and effect to an engine's bars, from the engine's numbers.
 
 Each kind is one row of a table. No engine is named here, and nothing of the formulas'
-`act` is used: this is the second derivation.
+`act` is used, so that this is a second derivation.
 """
 
 import bisect
@@ -148,7 +148,7 @@ def _carry_load(load: "Load", bars: Loaded) -> None:
 def look_up(table: "Table", theta_2: float) -> float:
     """Interpolate a table at one angle, by the chord of its two neighbours.
 
-    It is apart from the formulas' `at`.
+    The formulas' `at` is not used: this is a second derivation.
     """
     angles = table.theta_2
     turned = math.fmod(theta_2 - angles[0], math.tau)

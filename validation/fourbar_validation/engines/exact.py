@@ -120,11 +120,11 @@ def shift_to(
     theta_2: float,
     sin_mu: float,
 ) -> Any:
-    """Compute what to add to theta_2 for sin(theta_4 - theta_3) to be +-sin_mu.
+    """Return the shift of theta_2 in rad at which sin(theta_4 - theta_3) is +-sin_mu.
 
-    It is in rad (mpmath); None if beyond rounding.
+    The shift is a number of mpmath, None if it is beyond rounding. The diagonal e from
+    A to O4 has
 
-    The diagonal e from A to O4 has
         e^2 = d^2 + a^2 - 2 a d cos(theta_2 - theta_1) = b^2 + c^2 -+ 2 b c cos(mu).
     """
     from mpmath import mp, mpf

@@ -307,9 +307,9 @@ def speeds_and_accelerations(
 
 
 def balance(scene: Scene, motion: BodyMotion) -> tuple[Array, float, Array | float]:
-    """Solve for the thirteen unknowns (n, 13), N and N m.
+    """Return the thirteen unknowns (n, 13) in N and N m, their residual and jamming.
 
-    Their residual, and the distance of friction from jamming, are returned too.
+    The last is the distance of friction from jamming.
     """
     unknowns, loads, arms, residual = _solve_unit_couples(scene, motion)
     total: Array = unknowns[..., 0]
@@ -422,7 +422,7 @@ def _add_inertia(motion: BodyMotion, wrenches: BodyWrenches) -> None:
 def _make_matrix(scene: Scene, motion: BodyMotion) -> Array:
     """Make the matrix of the equations, (n, 13, 13).
 
-    They are forces and moments of bars 2, 3, 4, and the reactions at A and B. Moments
+    Rows are forces and moments of bars 2, 3, 4, and the reactions at A and B. Moments
     are divided by the bar's length, so that every entry is 0, 1 or a component of a
     unit vector. The last column is that of the torque, or the effect of 1 N of the
     drive on the bars that it pushes.

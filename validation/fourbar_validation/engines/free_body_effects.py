@@ -293,10 +293,10 @@ def _interpolate_table(table: Any, theta_2: Array) -> Array:
 
 
 def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
-    """Find where a torsion spring is wound by more than half a turn from its rest.
+    """Return where a torsion spring is wound more than half a turn from its rest.
 
-    It is followed from the motion's start, in its assembly. None where no spring counts
-    turns.
+    The spring's turns are followed from the motion's start, in its assembly. None where
+    no spring counts turns.
     """
     springs = [
         spring

@@ -1,7 +1,6 @@
-"""Engines outside the judge's process.
+"""Engines outside the judge's process: programs that exchange lines of JSON.
 
-They are programs that read lines of JSON and answer with lines of JSON. The judge
-imports nothing of a guest. docs/protocol.md is the contract.
+The judge imports nothing of a guest. docs/protocol.md is the contract.
 """
 
 import hashlib
@@ -116,9 +115,9 @@ def name_guests(
     entries: Sequence[tuple[str, str, Program]],
     known: Iterable[str],
 ) -> tuple[Guest, ...]:
-    """Read the hello of programs, and name them apart.
+    """Read the hello of programs, and return the guests, each of another name.
 
-    Each has its entry and the name that it is given.
+    An entry has the text of the user, the name that it is given, and the program.
     """
     names = {FORMULAS, *known}
     guests = list[Guest]()
@@ -225,7 +224,8 @@ def serve_adapter(
 def _name_program(entry: str, program: Program) -> str:
     """Name a guest whose hello is not read.
 
-    It is its class, or the first argument that is a file, else the program.
+    The name is that of its class, or of the first argument that is a file, else of the
+    program.
     """
     if CLASS_OF_THE_USER.fullmatch(entry):
         return entry.partition(":")[2]
@@ -352,7 +352,7 @@ def _find_needs(scene: Scene) -> list[str]:
 class GuestClient:
     """Client of a guest's program, which runs on from scene to scene.
 
-    It is started again after a failure.
+    A program that failed is started again.
     """
 
     def __init__(

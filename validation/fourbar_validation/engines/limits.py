@@ -93,9 +93,9 @@ BOUNDARIES = (
 
 
 def find_exceeded(scene: Scene, speed: float) -> str | None:
-    """Name the limit that a scene passes, if any; speed in rad/s.
+    """Return the reason of the limit that a scene exceeds, None if it exceeds none.
 
-    It is one of speed, load or place of a centre.
+    Limits are on speed (rad/s), on loads and on the place of a mass centre.
     """
     if speed > FASTEST.boundary:
         return FASTEST.reason

@@ -76,7 +76,7 @@ class Assembled(Protocol):
 class EngineBars(Assembled, Protocol):
     """An engine that holds the bars of a scene and moves.
 
-    It has their mass centres, G2, G3, G4, among the points.
+    Its points include the mass centres G2, G3, G4.
     """
 
     own: str
@@ -113,10 +113,9 @@ class EngineBars(Assembled, Protocol):
 
 
 class Loaded(EngineBars, Protocol):
-    """Bars on which loads and effects act.
+    """Bars on which loads and effects act, each by its row of `effects.TERM_OF`.
 
-    Each acts by its row of the table `effects.TERM_OF`. The ground (bar 1) does not
-    move; its line points from O2 to O4.
+    The ground (bar 1) does not move; its line points from O2 to O4.
     """
 
     drive_bar: int
@@ -204,7 +203,10 @@ class Loaded(EngineBars, Protocol):
         return x + along, y + across
 
     def cylinder(self, bar: int) -> tuple[complex, complex]:
-        """Measure it with the bars laid down along +x."""
+        """Return the cylinder's ends on the bar and the ground as complex numbers, m.
+
+        Both are from the bar's first pin, with all bars laid down along +x.
+        """
         assert self.force_drive is not None
         self.place((0.0, 0.0, 0.0))
         ends = [end for _, end in self.force_drive.ends]
@@ -355,5 +357,5 @@ def _is_settled(
 
 
 def make_no_wrenches() -> dict[int, list[float]]:
-    """Return those of bars on which nothing acts."""
+    """Return the wrenches of bars on which nothing acts: zeros by the bar's number."""
     return {bar: [0.0, 0.0, 0.0] for bar in MOVING_BARS}

@@ -1,6 +1,6 @@
 """A four-bar assembled position by position, by the engine that moves its bars.
 
-It is what an exact engine answers.
+Every exact engine answers in this way.
 """
 
 import cmath
@@ -231,7 +231,7 @@ def _close_gap(
 def _find_slopes(tree: Assembled, bar: int) -> tuple[float, float, float, float]:
     """Return the derivatives of the gap by the angles of the bars that close the loop.
 
-    They are those of its x by one and the other, then those of its y.
+    In order: of x by the first and the second angle, then of y.
     """
     (e, a, b), (f, c, d) = tree.jacobian().tolist()
     if bar == 3:

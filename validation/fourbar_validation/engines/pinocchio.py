@@ -109,7 +109,7 @@ class PinocchioTree(KeptTree):
         pin.updateFramePlacements(self.model, self.data)
 
     def point_jacobian(self, name: str) -> Array:
-        """Return that of a frame."""
+        """Return the Jacobian of a frame's origin, (2, 3)."""
         jacobian: Array = pin.getFrameJacobian(
             self.model, self.data, self.frame[name], WORLD
         )
@@ -136,7 +136,7 @@ class PinocchioTree(KeptTree):
         pin.forwardKinematics(self.model, self.data, self.q, v, a)
 
     def accelerations(self, names: Iterable[str]) -> list[list[float]]:
-        """Return those of frames."""
+        """Return the accelerations of frames, [x, y] of each, m/s^2."""
         model = self.model
         data = self.data
         frame = self.frame

@@ -1,6 +1,6 @@
 """Ask an engine as a user would, in a plain loop over its own calls.
 
-It is asked for torque and pin forces alone.
+Asked for are torque and pin forces alone.
 
 Each position is assembled from the one before. With the gap g(q) at pin B and its
 derivative J = dg/dq, one position takes Newton's steps on g, the speeds and

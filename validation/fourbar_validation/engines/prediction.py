@@ -186,9 +186,7 @@ def _bound_touching(
     theta_2: float,
     quantity: str,
 ) -> float:
-    """Bound an error where rounding decides whether the loop closes.
-
-    It is infinite without a bound.
+    """Bound an error where rounding decides whether the loop closes; inf if unbounded.
 
     The diagonal e from A to O4 and bars 3 and 4 are a triangle that misses a line by h:
     e = b + c - h, or |b - c| + h. Bar 3 is off the diagonal by phi_3,
@@ -246,9 +244,9 @@ class Sensitivities(NamedTuple):
         *,
         carried: bool = False,
     ) -> float:
-        """Predict the error of an output, vectors by their norm.
+        """Return the predicted error of an output; of a vector, the norm.
 
-        It is infinite if it has none.
+        The error is infinite if the output has no prediction.
         """
         parts = []
         name = "sin_mu" if name == "condition" else name
@@ -321,9 +319,10 @@ def _compute_sensitivity(
 
 
 def _weigh_inputs(stored: dict[str, float]) -> dict[str, float]:
-    """Weigh each input by one rounding.
+    """Return the size of each stored input, of which one rounding is a part of EPS.
 
-    It is relative, but a chain of bars meets O4 as its longest bar is rounded.
+    A chain of bars meets O4 as its longest bar is rounded, whatever the ground's
+    length.
     """
     longest = max(stored[name] for name in ("d", "a", "b", "c"))
     weights = {name: abs(value) for name, value in stored.items() if value != 0.0}
@@ -401,7 +400,7 @@ def _add_response(
 ) -> None:
     """Add how far each output moves, in parts of 2^-STEP_BITS.
 
-    It is infinitely far if the output has become singular.
+    An output that has become singular moves infinitely far.
     """
     from flint import arb
 

@@ -218,7 +218,7 @@ def _print_kept(data: bytes) -> None:
 def _take_printed() -> str:
     """Take what was printed since the last call, as plain text.
 
-    It is empty if this process does not keep it.
+    The text is empty if this process does not keep what it prints.
     """
     if not _file:
         return ""
@@ -452,9 +452,9 @@ class Running:
                 return
 
     def _take_errors(self) -> bytes:
-        """Take what it wrote to its standard error.
+        """Take what the process wrote to its standard error.
 
-        It is kept as what this process prints.
+        The text is kept too, as what this process prints.
         """
         if self._errors is None:
             text = b""

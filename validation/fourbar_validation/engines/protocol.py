@@ -283,9 +283,9 @@ def _read_branch(value: Any, n: int) -> Any:
 
 
 def _read_digits(value: Any, n: int) -> Any:
-    """Read what the angle as a double leaves out.
+    """Return the part of the angle that its double leaves out, as `Command.remainder`.
 
-    It is one number, as `Command.remainder` is.
+    All positions of a question have the same.
     """
     if value is None:
         return None

@@ -94,9 +94,9 @@ class Engine:
     """Module that its adapter imports. Empty: it needs no more than the formulas."""
 
     def fingerprint(self) -> str:
-        """Name everything that its answers and verdicts depend on.
+        """Return everything on which the engine's answers and verdicts depend.
 
-        It is alike in every process.
+        The text is the same in every process.
         """
         values = (getattr(self, part.name) for part in fields(self))
         return ", ".join(

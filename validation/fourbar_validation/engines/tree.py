@@ -62,7 +62,7 @@ class Tree(Loaded, Protocol):
     turns: Mapping[int, Array] = {}
     """Derivatives of the bars' rotations by the coordinates.
 
-    They are constant in the plane, whatever the bars: a tree is asked for them once.
+    In the plane these are constant, whatever the bars: a tree is asked for them once.
     """
     rows: Array
     """Derivatives of the rotations of bars 2, 3, 4 as rows, (3, 3)."""
@@ -92,7 +92,10 @@ class Tree(Loaded, Protocol):
         """Set speeds and accelerations of the coordinates."""
 
     def accelerations(self, names: Iterable[str]) -> list[list[float]]:
-        """Return those of points at the motion last set, [x, y] of each, m/s^2."""
+        """Return the accelerations of points, [x, y] of each, m/s^2.
+
+        The motion is the one last set.
+        """
 
     def needed(
         self,
@@ -107,7 +110,7 @@ class Tree(Loaded, Protocol):
     def carried(self) -> dict[int, Components]:
         """Return the force on each moving bar at its first pin, N.
 
-        It is at the motion and wrenches last asked for.
+        Motion and wrenches are those last asked for.
         """
 
     # methods that follow from these
@@ -161,9 +164,10 @@ class Tree(Loaded, Protocol):
         return np.asarray(along @ rate)
 
     def end_jacobian(self, point: "Place") -> Array:
-        """Return the derivative of an end of the drive, (2, 3), m.
+        """Return the derivative of an end of the drive by the coordinates, (2, 3), m.
 
-        It is that of its bar's first pin, and the arm turned across.
+        The rotation of the bar adds the arm turned across to the first pin's
+        derivative.
         """
         if point.bar == 1:
             return np.zeros((2, 3))
@@ -285,10 +289,9 @@ def carry(on: dict[int, Components], bar: int, x: float, y: float) -> None:
 
 
 def put_back(on: dict[int, Components], x: float, y: float) -> dict[str, Components]:
-    """Return F12, F32, F14, N.
+    """Return the pin forces F12, F32, F14, N, with the loop closed again.
 
-    They are what the pins of an open tree carry, with the force (x, y) of bar 4 on bar
-    3.
+    `on` is what the pins of the open tree carry, (x, y) the force of bar 4 on bar 3.
     """
     carry(on, 3, x, y)
     carry(on, 4, -x, -y)

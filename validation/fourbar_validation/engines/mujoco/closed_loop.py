@@ -1,6 +1,6 @@
 """A compiled MJCF as a closed loop.
 
-It has MuJoCo's own kinematics, assembly, velocities and pin forces.
+MuJoCo's own kinematics gives its assembly, velocities and pin forces.
 """
 
 from collections.abc import Callable, Sequence
@@ -87,9 +87,9 @@ def open_model(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 
 def make_stepper(text: str) -> Callable[[int], None]:
-    """Make a function that steps a text on from its first keyframe.
+    """Return a function that takes steps of a model from its first keyframe.
 
-    It may be called as often as wanted.
+    Each call steps on from where the last one ended.
     """
     return partial(mujoco.mj_step, *open_model(text))
 
@@ -148,11 +148,11 @@ class ClosedLoop(Assembled):
         return positions
 
     def branch(self, bar: int = 2) -> int:
-        """Return the branch of the state that was last forwarded.
+        """Return the branch (+1 or -1, 0 at a toggle) of a command of a bar.
 
-        It is that of a command of a bar.
+        The state is the one last forwarded. The null vector of the gap's derivative
+        turns bars 2, 3 and 4 in proportion to
 
-        The null vector of the gap's derivative turns bars 2, 3 and 4 in proportion to
             -b c sin(theta_4 - theta_3),
             a c sin(theta_4 - theta_2),
             a b sin(theta_3 - theta_2).
@@ -197,9 +197,9 @@ class ClosedLoop(Assembled):
         }
 
     def carried(self) -> dict[str, Array]:
-        """Read the force of the parent on each bar, world axes, N.
+        """Return the force of the parent on each bar in world axes, N.
 
-        It includes all that the bar carries. That is cfrc_int without the forces of
+        Read is cfrc_int, which includes all that the bar carries, without the forces of
         actuators on sites, which MuJoCo counts into it, unlike those of tendons.
         """
         on = {name: force.copy() for name, force in self._carried.items()}
@@ -222,10 +222,7 @@ class ClosedLoop(Assembled):
         return float(motor / self.model.dof_armature[O2])
 
     def crank_torque(self) -> float:
-        """Return T2, N m.
-
-        It is what the flywheel gives the crank, and the motor next to it.
-        """
+        """Return T2 of the flywheel and of the motor next to it, N m."""
         flywheel = -self.model.dof_armature[O2] * self.data.qacc[O2]
         motor = 0.0
         if self.drive is not None:
@@ -260,9 +257,10 @@ class ClosedLoop(Assembled):
         return float(np.hypot(*self.line()))
 
     def drive_drift(self, drive_bar: int | None) -> float:
-        """Return the second derivative of what `drive_column` is of.
+        """Return the second derivative of the drive at the present speeds.
 
-        It is at the present speeds, with nothing accelerating.
+        Nothing accelerates. The first derivative is `drive_column`; that of a
+        cylinder's stroke gives m/s^2.
         """
         if drive_bar is not None:
             return 0.0
@@ -351,9 +349,9 @@ class ClosedLoop(Assembled):
         return size
 
     def bad(self) -> int:
-        """Count warnings of a bad position, velocity or acceleration.
+        """Return the number of warnings of a bad position, velocity or acceleration.
 
-        Each resets the data.
+        MuJoCo resets the data at each of them.
         """
         return sum(self.data.warning[kind].number for kind in WARNINGS)
 

@@ -1,6 +1,6 @@
 """The entries of a four-bar's MJCF that decide its motion and forces.
 
-They are read from a compiled model, and set in the generated one. Each entry stands
+Entries are read from a compiled model, and set in the generated one. Each entry stands
 under a name by which two files can be compared, whatever the tree of their bodies,
 their axes and their names. What an entry costs is seen by setting it, alone, in the
 generated file.
@@ -381,11 +381,10 @@ def _describe_loads(topology: Topology) -> Described:
 
 
 def _read_bias(model: mujoco.MjModel, actuator: int) -> Array:
-    """Read what an actuator exerts without a control, (3,).
+    """Return the force of an actuator without control, and its slopes, (3,).
 
-    It is its force, and its force per length and per speed. Of direct-current motors
-    that have no control, those are read whose force is constant: a cogging without a
-    period.
+    The slopes are by length and by speed. Of direct-current motors that have no
+    control, those are read whose force is constant: a cogging without a period.
     """
     bias = model.actuator_biasprm[actuator, :3]
     kinds = mujoco.mjtBias
@@ -423,9 +422,9 @@ def _name_tendon(topology: Topology, number: int) -> str:
 
 
 def _describe_tendons(topology: Topology) -> Described:
-    """Describe every tendon: its path, and what it does.
+    """Describe every tendon by its path, and what it does.
 
-    Their paths tell several between the same bars apart.
+    The path tells several tendons between the same bars apart.
     """
     model = topology.model
     data = topology.data

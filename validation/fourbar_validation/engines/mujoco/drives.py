@@ -1,7 +1,7 @@
 """Drive the generated MJCF by other means, for the study of their cost.
 
-Each builds a loop from the generated text; the flywheel of the text is taken out where
-another drive takes its place, and the torque is read where that drive exerts it.
+A drive builds a loop from the generated text; the flywheel of the text is taken out
+where another drive takes its place, and the torque is read where that drive exerts it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -64,10 +64,9 @@ class Driven(ClosedLoop):
 
 
 class _Actuated(Driven):
-    """An actuator on O2.
+    """An actuator on O2: of speed alone, or a servo of position.
 
-    It is of speed alone, or a position servo whose target turns at omega, as that of
-    `intvelocity` does.
+    The target of the servo turns at omega, as that of `intvelocity` does.
 
     `position`: kp per (inertia omega^2); none: kv (omega - omega_2), without a control
     input, by the affine bias. `velocity`: kv per (inertia omega).
@@ -134,9 +133,9 @@ class WheelEquality(Driven):
         omega: float,
         softness: float = 1.0,
     ) -> None:
-        """Set `softness`, a factor on dof_invweight0.
+        """Multiply dof_invweight0 by `softness`; at 1 the model is plain MJCF.
 
-        It is edited after the compilation; 1: plain MJCF.
+        MJCF cannot state that field: the compiled model is edited.
         """
         super().__init__(mjcf, omega)
         self.model.dof_invweight0[:] *= softness
@@ -183,9 +182,9 @@ class WheelEquality(Driven):
         self.data.qvel[3] = speed
 
     def crank_torque(self) -> float:
-        """Read the multiplier of the joint equality.
+        """Return the multiplier of the joint equality, N m.
 
-        Its row of the Jacobian is 1 at the crank.
+        The row of the equality's Jacobian is 1 at the crank.
         """
         return float(self.data.efc_force[self.row])
 
@@ -211,9 +210,9 @@ def remove_attributes(mjcf: str, attributes: Mapping[str, Sequence[str]]) -> str
 
 
 def restore_defaults(mjcf: str, _: float = 0.0) -> ClosedLoop:
-    """Leave solref, solimp and the solver to MuJoCo.
+    """Return the loop with solref, solimp and the solver left to MuJoCo.
 
-    These are 0.02 s, impedance 0.9 to 0.95, and Newton to 1e-8.
+    MuJoCo's defaults are 0.02 s, impedance 0.9 to 0.95, and Newton to 1e-8.
     """
     return ClosedLoop(
         remove_attributes(

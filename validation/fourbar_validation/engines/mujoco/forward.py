@@ -1,6 +1,6 @@
 """MuJoCo's forward dynamics of the generated MJCF without its flywheel.
 
-It is that of a released linkage, and at one state.
+Run are a released linkage through time, and single states.
 
 At one state the torque is that with which the closed loop accelerates as commanded. At
 an exactly closed state the only error is the closure's softness, in proportion to
@@ -108,7 +108,7 @@ class MujocoForward:
 class _WorkOnBars:
     """Work of loads, damping and dry friction on the bars, J.
 
-    It follows from MuJoCo's own powers at the ends of each step.
+    MuJoCo's own powers at the ends of each step are summed up.
     """
 
     def __init__(
@@ -153,7 +153,7 @@ _RUNGS = (0.9999, 0.9998, 0.9996, 0.9992)
 class MujocoOneState:
     """Forward dynamics at each position by itself.
 
-    It is at one impedance, or extrapolated from several.
+    The impedance is one, or the answer is extrapolated from several.
     """
 
     impedances: tuple[float, ...] = _RUNGS
@@ -194,10 +194,7 @@ def extrapolate(
     impedances: tuple[float, ...],
     rungs: list[dict[str, Array]],
 ) -> dict[str, Array]:
-    """Extrapolate to x = 0 the polynomial through the rungs (Lagrange).
-
-    It is in x = (1-d)/d.
-    """
+    """Extrapolate to x = (1-d)/d = 0 the polynomial through the rungs (Lagrange)."""
     x = np.array([(1.0 - d) / d for d in impedances])
     weights = []
     for i, xi in enumerate(x):

@@ -153,7 +153,7 @@ class MujocoTree(KeptTree):
         mujoco.mj_comPos(self.model, self.data)
 
     def point_jacobian(self, name: str) -> Array:
-        """Return that of a site."""
+        """Return the Jacobian of a site."""
         mujoco.mj_jacSite(self.model, self.data, self._jac, None, self.site[name])
         return self._jac[:2].copy()
 
@@ -178,7 +178,7 @@ class MujocoTree(KeptTree):
         mujoco.mj_comVel(self.model, self.data)
 
     def accelerations(self, names: Iterable[str]) -> list[list[float]]:
-        """Return those of sites, in world axes."""
+        """Return the accelerations of sites in world axes, m/s^2."""
         model = self.model
         data = self.data
         # MuJoCo counts gravity as an acceleration of the world
@@ -198,10 +198,7 @@ class MujocoTree(KeptTree):
         field: tuple[float, float],
         wrenches: dict[int, list[float]],
     ) -> list[float]:
-        """Return the result of mj_inverse less what loads and effects do.
-
-        It is on the coordinates.
-        """
+        """Return the coordinates' forces by mj_inverse, less loads and effects."""
         self.model_gravity[:2] = field
         mujoco.mj_inverse(self.model, self.data)
         applied = np.zeros(3)

@@ -1,9 +1,9 @@
 """Monitor a simulation's own error.
 
-It is judged by the loop's residuals, the power balance, and what both do to the answer.
-A small closure gap proves little: an explicit step with a closure stiffer than it can
-follow holds the gap at micrometres while accelerations and forces are anything. At
-every sample this asks
+The error is judged by the loop's residuals, the power balance, and what both do to the
+answer. A small closure gap proves little: an explicit step with a closure stiffer than
+it can follow holds the gap at micrometres while accelerations and forces are anything.
+At every sample this asks
 
 - how far the loop is open in position, in velocity (J v) and in acceleration
   (J a + J' v),
@@ -193,10 +193,7 @@ class ResidualMonitor:
         self._most[name] = max(self._most[name], size)
 
     def evidence(self) -> dict[str, float]:
-        """Return the worst of each residual.
-
-        It is over the largest term that it is a residual of.
-        """
+        """Return the worst of each residual, relative to its largest term."""
         relative = {}
         for name, worst in self.worst.items():
             most = self._most[name]
@@ -245,10 +242,7 @@ class ResidualMonitor:
         )
 
     def _compute_pins(self, loop_force: Array, drive: float) -> dict[str, Array]:
-        """Compute F12, F32, F14.
-
-        They are what carries the bars on the open tree, with the loop force put back.
-        """
+        """Return F12, F32, F14 in N, from the open tree and the closing force."""
         bars, d = self.bars, self.bars.data
         if self.drive_bar is None:  # its line crosses the pins, a couple does not
             d.ctrl[bars.ram] = drive
@@ -267,9 +261,9 @@ class ResidualMonitor:
         a: Array,
         seen: _MonitoredMotion,
     ) -> _MonitoredMotion:
-        """Close the loop at the same theta_2, omega_2, alpha_2.
+        """Return the motion with the loop closed at the same theta_2, omega_2, alpha_2.
 
-        It is closed in position, velocity and acceleration.
+        One Newton step closes each of position, velocity and acceleration.
         """
         q = q.copy()
         v = v.copy()

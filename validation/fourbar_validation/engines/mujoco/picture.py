@@ -1,7 +1,7 @@
 """Draw off-screen pictures of MJCF texts by MuJoCo's own renderer.
 
-It runs in a separate process. A missing or broken OpenGL may end the process that asks
-for it, so `render_pictures` asks from outside: ``python -m
+Pictures are drawn in a separate process, because a missing or broken OpenGL may end the
+process that asks for it. `render_pictures` asks from outside: ``python -m
 fourbar_validation.engines.mujoco.picture`` reads {name: MJCF} and answers {name: base64
 of a PNG}.
 """

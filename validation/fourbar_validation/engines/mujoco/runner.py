@@ -1,8 +1,7 @@
-"""Run a model through a motion.
+"""Run a model through a motion: segments, steps, and forces that MJCF cannot express.
 
-It has its segments, its steps, and the forces that MJCF cannot express. MuJoCo is
-supplied with loads over theta_2 and the acceleration of a law at each stage of a step,
-from the description alone, at its own angle and time.
+MuJoCo is supplied with loads over theta_2 and the acceleration of a law at each stage
+of a step, from the description alone, at its own angle and time.
 
 Where another bar or the cylinder is commanded the input is led so that it moves as
 told. With J the derivative of the gap by the joint angles and c that of the commanded
@@ -76,9 +75,10 @@ class SteadySegment:
         self.turning = self.fastest
 
     def timestep(self, settings: Settings) -> float:
-        """Choose the timestep for this segment, s.
+        """Return the timestep for this segment, s.
 
-        There are at least as many steps as positions; any where there is but one.
+        The segment has at least as many steps as positions; one alone takes any
+        timestep.
         """
         if self.width:
             return self.run.timestep(settings, at_least=self.width)
@@ -143,19 +143,20 @@ class LawSegment:
         return timestep * settings.timestep_scale
 
     def seconds(self, index: int) -> float:
-        """Return it as the law was sampled."""
+        """Return the time of a position since the segment began, s."""
         return float(self.time[index]) - self.began
 
     def speed(self, turned: float, seconds: float) -> float:
-        """Return it by the time."""
+        """Return |omega_2| at a time from the segment's begin, rad/s."""
         instant = np.array([self.began + seconds])
         _, speed, _ = self.law.at(instant)
         return float(abs(speed[0]))
 
     def alpha(self, seconds: float) -> float:
-        """Interpolate linearly, as the second derivative of cubic pieces is.
+        """Return the law's angular acceleration at a time, rad/s^2.
 
-        That of any other law is its own.
+        A law of cubic pieces is linear between knots in acceleration, and is
+        interpolated; another law is evaluated.
         """
         instant = self.began + seconds
         if not (isinstance(self.law, Law) and self.law.is_linear_in_acceleration):
@@ -246,9 +247,9 @@ class Stepper:
         return self.done * self.timestep
 
     def lost(self) -> bool:
-        """Tell whether MuJoCo reset the data.
+        """Return whether MuJoCo reset the data.
 
-        That starts time again, and clears the warnings.
+        A reset starts time again, and clears the warnings.
         """
         return bool(self.data.time < self.time * (1.0 - 1e-6))
 
@@ -316,9 +317,9 @@ def find_assembled(
     command: Command,
     order: Iterable[int],
 ) -> list[Found]:
-    """Find the joint angles of every commanded position, one after the other.
+    """Return the joint angles of every commanded position, None where none closes.
 
-    They are found in an order.
+    Positions are assembled in the order given, each from the one before.
     """
     assembled: list[Found] = [None] * len(command.angle)
     for index in order:
@@ -335,7 +336,7 @@ def split_segments(
 ) -> list[list[int]]:
     """Split the positions, in order of time, into segments.
 
-    They end where the loop does not close, or two neighbours are not joined.
+    A segment ends where the loop does not close, or two neighbours are not joined.
     """
     segments: list[list[int]] = [[]]
     for index in order:
@@ -439,10 +440,7 @@ class Lead:
         return float(accelerations[O2])
 
     def least_sine(self) -> float:
-        """Compute the least |sin(theta_4 - theta_3)| on the way.
-
-        It is 0 if the sine changes its sign.
-        """
+        """Return the least |sin(theta_4 - theta_3)| on the way; 0 if signs differ."""
         command = self.of_input
         if np.ptp(command.branch):
             return 0.0
@@ -515,9 +513,9 @@ def _find_peak_of_table(table: Table) -> float:
 
 
 def evaluate_loads(scene: Scene) -> dict[str, ActuatorForce]:
-    """Evaluate each load over theta_2, by the actuator's name.
+    """Return functions that evaluate each load's table, by the actuator's name.
 
-    It is the factor at MuJoCo's own theta_2, over the largest.
+    The value is the factor at MuJoCo's own theta_2, over the largest.
     """
     forces = {}
     for number, load in enumerate(scene.loads, 1):
@@ -579,9 +577,9 @@ def receive_forces(loop: ClosedLoop, supplied: dict[str, ActuatorForce]) -> Clos
 
 @contextmanager
 def supply_forces(supplied: dict[str, ActuatorForce]) -> Iterator[None]:
-    """Supply forces to MuJoCo as long as this lasts.
+    """Supply forces to MuJoCo as long as the context lasts.
 
-    Its callbacks are of the whole process.
+    MuJoCo's callbacks are of the whole process.
     """
     if not supplied:
         yield

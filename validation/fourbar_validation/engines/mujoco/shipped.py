@@ -1,6 +1,7 @@
 """The generated MJCF as it is shipped.
 
-It opens closed, its keyframe moves at omega_2, and its drive brings it there.
+Checked is that the file opens closed, that its keyframe moves at omega_2, and that its
+drive brings it there.
 """
 
 import math
@@ -166,10 +167,10 @@ def _find_commanded(
     theta_2: float,
     omega_2: float,
 ) -> Command:
-    """Find the commanded position at an angle of bar 2, whatever turn it is of.
+    """Return the command at an angle of bar 2, whatever turn it is of.
 
-    It is the nearest; of several turns the first in the direction of motion, where the
-    file begins.
+    The nearest position counts; of several turns the first in the direction of motion,
+    where the file begins.
     """
     apart = np.abs(wrap_difference(command.theta_2 - theta_2))
     rounding = K * EPS * np.maximum(1.0, np.abs(command.theta_2))

@@ -1,7 +1,4 @@
-"""MuJoCo simulates the closed loop of the generated MJCF.
-
-It is driven at omega_2 through the sweep.
-"""
+"""MuJoCo simulates the closed loop of the generated MJCF, driven through the sweep."""
 
 import math
 import time
@@ -161,9 +158,9 @@ def _require_run(scene: Scene, command: Command) -> None:
 
 
 def _passes_change_point(scene: Scene, command: Command) -> bool:
-    """Tell whether all four bars become collinear within the sweep.
+    """Return whether all four bars become collinear within the sweep.
 
-    They do if +-a +-b +-c = d.
+    At such a position +-a +-b +-c = d.
     """
     d, a, b, c = scene.linkage.lengths
     theta_1 = scene.linkage.ground_angle

@@ -127,7 +127,7 @@ class Examined:
 def collect_warnings() -> Iterator[list[str]]:
     """Collect the warnings of MuJoCo, each once.
 
-    They are neither printed nor logged.
+    MuJoCo then neither prints nor logs them.
     """
     heard: list[str] = []
 
@@ -155,8 +155,9 @@ def _compile_topology(
 def orient(topology: Topology, scene: Scene) -> Topology:
     """Return a four-bar in the axes of a scene.
 
-    It stays as it is if gravity has another direction there. A linkage that is turned
-    in its plane together with gravity, or seen from the other side, is the same one.
+    A file in which gravity has another direction there is left as it is. A linkage that
+    is turned in its plane together with gravity, or seen from the other side, is the
+    same one.
     """
     model = topology.model
     if not np.all(np.isfinite(topology.rest_angles)):
@@ -272,9 +273,9 @@ def examine_mended(
     names: Mapping[str, str],
     changes: Sequence[tuple[str, Value | None]],
 ) -> list[list[Answer] | None]:
-    """Answer with a file whose one entry is that of the generated one.
+    """Return the answers of a file with one entry at a time as in the generated one.
 
-    None if it cannot be.
+    An answer is None if the entry cannot be set, or if time is up.
     """
     start = time.perf_counter()
     answered = list[list[Answer] | None]()
@@ -295,12 +296,12 @@ def predict_softness(
     file: RobotFile,
     names: Mapping[str, str],
 ) -> dict[str, float]:
-    """Predict what MuJoCo's stiffest constraint leaves in a file, N m and N.
+    """Predict the error of torque (N m) and pin forces (N) by MuJoCo's soft closure.
 
-    It is that of the torque and the pin forces. The error of a soft constraint goes as
-    (1 - d)/d in its impedance d. Between STIFFEST and an impedance of twice that yield
-    it grows by itself, so the error is measured without anything to compare the file
-    with. Empty where no connect or weld closes the loop.
+    The error of a soft constraint goes as (1 - d)/d in its impedance d. Between
+    STIFFEST and an impedance of twice that yield it grows by itself, so the error is
+    measured without anything to compare the file with. Empty where no connect or weld
+    closes the loop.
     """
     answers = []
     seen = _compile_topology(file, names, scene)
@@ -395,7 +396,7 @@ def _answer_or_refuse(
 class _UserLoop(Assembled):
     """Somebody's model with its drive taken off.
 
-    Its coordinates are x = (theta_2, theta_3 - theta_2, theta_4).
+    Coordinates are x = (theta_2, theta_3 - theta_2, theta_4).
     """
 
     def __init__(self, topology: Topology, scene: Scene) -> None:
@@ -446,7 +447,7 @@ class _UserLoop(Assembled):
     def find_carrier(self) -> float:
         """Return the armature of pin O2 that keeps the speed through time, kg m^2.
 
-        It is the file's own flywheel, or what holds the joints of a robot: MuJoCo's
+        The file's own flywheel serves, or what holds the joints of a robot: MuJoCo's
         solver loses the light bars beside more at the tolerance of a file.
         """
         if self.flywheel:
@@ -583,10 +584,7 @@ class _UserLoop(Assembled):
         return np.asarray(rows[0] - rows[1])
 
     def positions(self) -> dict[str, Array]:
-        """Locate A, B, O4, and the end of bar 4, (2,), m.
-
-        They are laid off bar by bar from O2.
-        """
+        """Return A, B, O4, and the end of bar 4 from O2, laid off by bars, (2,), m."""
         line = {bar: self.topology.line(self.data, bar) for bar in (1, 2, 3, 4)}
         return {
             "A": line[2],

@@ -1,6 +1,5 @@
-"""The four-bar in somebody's compiled MJCF.
+"""The four-bar in somebody's compiled MJCF: its bars, its pins, and its closure.
 
-It tells which body is which bar, where its pins are, and what holds the loop closed.
 Any cut is understood: three of the pins are hinges, the fourth is an equality (connect,
 weld) or two sites by name. The plane may be any.
 """
@@ -156,7 +155,7 @@ class Topology:
     def stops(self, pin: str) -> tuple[float, float] | None:
         """Return the range of a pin, rad, or None without stops.
 
-        It is from the line of its bearer to its bar's.
+        Angles are from the line of the pin's bearer to its bar's.
         """
         model = self.model
         joint = self.hinge[pin]
@@ -327,10 +326,7 @@ class Topology:
         return np.asarray(data.xpos[body] + rotation @ self.point[bar, pin])
 
     def line(self, data: mujoco.MjData, bar: int) -> Array:
-        """Return a bar's line from its first pin to its second, (2,), m.
-
-        It is in the plane.
-        """
+        """Return a bar's line in the plane, first pin to second, (2,), m."""
         first, second = (self.world(data, bar, pin) for pin in ENDS[bar])
         return self.in_plane(second - first)
 
@@ -369,18 +365,16 @@ class Topology:
         return Topology(copy(self.model), self.names, self.axes)
 
     def rest_angle(self, pin: str) -> float:
-        """Measure a hinge in the rest state.
+        """Return the angle of a hinge in the rest state, rad.
 
-        It is from the line of its bearer to that of the bar that hangs on it.
+        Angles are from the line of the pin's bearer to that of the bar that hangs on
+        it.
         """
         child, parent = self.turning(pin)
         return self._line[child] - self._line[parent]
 
     def along_bar(self, bar: int, world: Array) -> tuple[float, float]:
-        """Locate a point from a bar's first pin in the rest state, m.
-
-        It is along the bar's line and to its left.
-        """
+        """Return (along, to the left) of a point from a bar's first pin at rest, m."""
         first_pin = self.world(self.data, bar, ENDS[bar][0])
         return self.turned_back(bar, world - first_pin)
 

@@ -130,10 +130,7 @@ class Trial:
 
     @property
     def readings(self) -> int:
-        """Number of states that are read.
-
-        It is one a position, or one a step if the steps are fewer.
-        """
+        """Number of states read: one a position, or one a step if these are fewer."""
         count = 0
         for rows, steps in self.segments:
             positions = len(np.unique(self.at.theta_2[rows]))
@@ -268,7 +265,7 @@ class TrialSetup:
     ) -> Trial:
         """Run through every segment that assembles.
 
-        It reads at the step nearest to each position.
+        The state read for a position is that of the nearest step.
 
         Parameters
         ----------
@@ -347,7 +344,7 @@ class TrialSetup:
         closure: Build | None = None,
         drive: Build | None = None,
     ) -> tuple[Callable[[int], float], Callable[[int], float]]:
-        """Make clocks of so many steps, and of reading a state so often, CPU seconds.
+        """Return two functions of a count: CPU time in s of steps, and of readings.
 
         Each call of the first starts again at the start of the longest segment.
         """
@@ -406,9 +403,9 @@ class SimulatedToError:
     name: str = "mujoco-simulated"
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Simulate with as many steps as the laws ask for.
+        """Simulate with the laws' number of steps, then with more if need be.
 
-        There are more while its own residuals say so.
+        A run is repeated with more while its own residuals predict too large an error.
         """
         steps, tc = guess(self.error)
         spent = 0.0
@@ -440,9 +437,9 @@ class SimulatedToError:
 
 
 def compute_expected_error(scene: Scene, answer: Answer) -> float:
-    """Compute the worst error that the engine predicts.
+    """Return the worst error that the engine predicts.
 
-    It is relative to a quantity's largest magnitude (angles: 1 rad).
+    An error is relative to a quantity's largest magnitude (angles: 1 rad).
     """
     worst = 0.0
     for name, predicted in answer.predicted.items():
