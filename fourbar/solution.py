@@ -197,7 +197,7 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
     def status(self) -> Any:
         """Status of each position, one of `STATUS_NAMES`, as a list.
 
-        Of a study it is a list of such lists.
+        A study has a list for each member.
         """
         return np.array(STATUS_NAMES)[self.status_code].tolist()
 
@@ -386,7 +386,7 @@ def write_csv(
 def _list_leading(solution: Solution) -> dict[str, list[Any]]:
     """List the first columns of a table, one entry for each position.
 
-    Of a study the number of the member is one.
+    The table of a study begins with the number of the member.
     """
     size = solution.theta_2.size
     first = {
@@ -403,21 +403,21 @@ def _list_leading(solution: Solution) -> dict[str, list[Any]]:
 
 
 class _ScalarColumn(NamedTuple):
-    """One column of numbers: a quantity, or a component or the size of one."""
+    """Column of numbers: a quantity, or a component or the size of one."""
 
     heading: str
     """`F12_x`, or `F12_x [lbf]`."""
     unit: str
     """Unit of the values."""
     values: Array | None
-    """One for each position; None for what was not evaluated."""
+    """Value at each position; None for what was not evaluated."""
 
 
 def _list_scalars(solution: Solution, units: Conversion = SI) -> list[_ScalarColumn]:
     """List every quantity as columns of numbers, vectors as `A_x`, `A_y`.
 
-    Of a pin force the magnitude too, and where it is known the time. In other units
-    than SI every heading names its own.
+    Magnitudes of pin forces are included, and the time where it is known. In other
+    units than SI every heading names its own.
     """
     quantities = {
         name: find_values(solution, name, units) for name in _list_quantities(solution)
@@ -546,7 +546,7 @@ def _list_quantities(solution: "Solution") -> list[str]:
 def find_unit_of_quantity(name: str) -> str:
     """Return the SI unit of a quantity or of a point of the scene.
 
-    Of a point it is that of its path, velocity or acceleration.
+    Names of a point stand for its place, its velocity or its acceleration.
     """
     derived = find_derived(name)
     if derived is not None:

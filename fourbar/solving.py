@@ -171,9 +171,9 @@ class Results:
         """True if sin(theta_4 - theta_3) may have another sign than the branch."""
 
     def store(self, case: Case, evaluated: Evaluated, index: PositionIndex) -> None:
-        """Write what was evaluated.
+        """Store what was evaluated at some positions.
 
-        What is no number has the status that says so.
+        Values that are no number have the status that says so.
         """
         withhold_infinite(case, evaluated)
         self.sign_may_differ = self.sign_may_differ or _may_sign_differ(case)
@@ -276,12 +276,12 @@ def _solve_released(
 
 
 def split(size: int, most: int) -> Iterator[slice]:
-    """Split so many into slices of as many at most."""
+    """Return slices of at most `most` that cover `size` entries."""
     return (slice(start, min(start + most, size)) for start in range(0, size, most))
 
 
 def _require_study(study: object, at: Command | None) -> ManyScenes:
-    """Return a study; InputError for what is none, or where a command is given too."""
+    """Return the study; InputError for another type, or if a command is given too."""
     if not hasattr(study, "solve"):
         raise InputError("scene", study, "must be a Scene, or a Study of `vary`")
     if at is not None:
@@ -294,7 +294,7 @@ def _require_study(study: object, at: Command | None) -> ManyScenes:
 
 
 def _require_command_at(commanded: Command) -> None:
-    """Raise an InputError where a command is none."""
+    """Raise an InputError unless a command is well formed."""
     expect("at", commanded, Command)
     require_bar("at.bar", commanded.bar)
     angle, speed, acceleration = COMMAND_NAMES[commanded.bar]
@@ -335,7 +335,7 @@ def _require_command_at(commanded: Command) -> None:
 
 
 def _require_rate(name: str, value: Any, n: int) -> None:
-    """Raise an InputError where a speed or acceleration of n positions is none."""
+    """Raise an InputError unless a rate is a number, or one for each of n positions."""
     if isinstance(value, float):
         return
     if not isinstance(value, np.ndarray):

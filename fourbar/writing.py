@@ -1,6 +1,6 @@
 """Read files within a bound and write them atomically.
 
-What a result says of itself is written too.
+Representations of results are written here too.
 """
 
 import json
@@ -102,7 +102,7 @@ def read_text(path: str | Path, key: str, largest: int, *, pipes: bool = False) 
 
 @contextmanager
 def name_file(path: Path) -> Iterator[None]:
-    """Name the file in what goes wrong while it is open (a full disk).
+    """Put the name of the file into an OSError while it is open, as of a full disk.
 
     No reader knows the temporary file.
     """

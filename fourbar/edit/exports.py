@@ -180,7 +180,7 @@ def find_harness() -> list[str]:
 
 
 class HarnessRun:
-    """One run of the harness at a time, with its progress."""
+    """Run of the harness, with its progress; only one goes on at a time."""
 
     def __init__(self, folder: Path, tell: Callable[[dict[str, Any]], None]) -> None:
         self.folder = folder

@@ -1,4 +1,4 @@
-"""One scene that is being changed: its text, its history and its kept states."""
+"""A scene that is being changed: its text, its history and its kept states."""
 
 import base64
 import hashlib

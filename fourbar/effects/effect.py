@@ -81,9 +81,9 @@ class Actions:
         """
 
     def add(self, terms: Iterable[Any]) -> Self:
-        """Add what loads and effects do; return these sums.
+        """Add what loads and effects do, less what depends on the pin forces.
 
-        What depends on the pin forces is left out.
+        These sums themselves are returned.
         """
         for term in terms:
             term.act(self, self.state)
@@ -170,7 +170,7 @@ class Actions:
     def plus(self, unit: "Actions", size: Number) -> "Actions":
         """Return the sum of these actions and those of a drive.
 
-        `unit`: what the drive does per newton.
+        `unit`: actions of 1 N of the drive.
         """
         total = Actions(self.state, self.bodies, self.side)
         for name in ("forces", "moments", "couples", "through"):
@@ -303,12 +303,7 @@ class SolvedFriction(NamedTuple):
 
 
 class Effect:
-    """One effect in one file: what it does to the bars, and where it has no value.
-
-    A subclass is a frozen dataclass. What it leaves at the default it does not have: an
-    engine without a model of the effect refuses the scene, and without a size nothing
-    is compared.
-    """
+    """Base class of an effect: what it does to the bars, and where it has no value."""
 
     __slots__ = ()
     key: ClassVar[str]
@@ -336,18 +331,18 @@ class Effect:
         return None
 
     def add_to_mjcf(self, model: Any) -> None:
-        """Add it to an MJCF; LimitError where it has no counterpart."""
+        """Add the effect to an MJCF; LimitError where it has no counterpart."""
         raise LimitError(f"the effect {self.key!r} has no counterpart in MJCF")
 
     @classmethod
     def has_mjcf(cls) -> bool:
-        """Return True if it has a counterpart in MJCF."""
+        """Return True if the effect has a counterpart in MJCF."""
         return cls.add_to_mjcf is not Effect.add_to_mjcf
 
     def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
-        """Return the couple that it may ask of the drive at a speed (rad/s), N m.
+        """Return the couple that the effect may ask of the drive at a speed, N m.
 
-        The flywheel of an MJCF is laid out for this couple.
+        The flywheel of an MJCF is laid out for this couple. `speed`: rad/s.
         """
         return 0.0
 
@@ -402,7 +397,7 @@ class Effect:
         return self
 
     def act(self, actions: Actions, state: State) -> None:
-        """Add its forces and couples on the bars; its places are settled."""
+        """Add forces and couples of the effect on the bars; its places are settled."""
 
     def solve_friction(
         self,
@@ -464,7 +459,7 @@ class PinRows(Effect):
     def at(cls, **values: Any) -> Self:
         """Make the effect from the numbers of each pin.
 
-        As ``Viscous.at(O2=0.01)`` or ``PinFriction.at(A=(mu, radius))``.
+        Examples are ``Viscous.at(O2=0.01)`` and ``PinFriction.at(A=(mu, radius))``.
         """
         rows = []
         for pin, value in values.items():

@@ -75,16 +75,16 @@ class ForceDrive(ABC):
         return gain
 
     def per_newton(self, actions: Actions) -> Actions:
-        """Make what 1 N of it does to the bars."""
+        """Return what 1 N of the drive does to the bars."""
         single = Actions(actions.state, actions.bodies)
         self.act(single, 1.0)
         return single
 
     def leverage(self, state: State, sines: dict[int, Number]) -> tuple[Number, Number]:
-        """Compute P and the largest value that it could have.
+        """Compute P and L, the largest value that P could have.
 
-        The latter is L, the sum of what each end could move, m. That is r on bar 2, a +
-        r a/b on bar 3, r a/c on bar 4, r its distance from the bar's first pin.
+        L is the sum of what each end could move, m: r on bar 2, a + r a/b on bar 3, r
+        a/c on bar 4, with r the end's distance from the bar's first pin.
 
         `sines`: of theta_4 - theta_3, theta_4 - theta_2, theta_3 - theta_2, as of a
         drive on bar 2, 3, 4.

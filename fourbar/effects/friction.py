@@ -37,10 +37,7 @@ class Friction(PinRows):
             actions.pin_couple(pin, -f * actions.sense(pin))
 
     def add_to_mjcf(self, model: Any) -> None:
-        """Set the attribute ``frictionloss`` of the hinge.
-
-        At the cut pin B it is that of a tendon.
-        """
+        """Set ``frictionloss`` of the hinge, or of a tendon at the cut pin B."""
         for pin, f in self.torques:
             model.add_dry_friction(pin, f)
 

@@ -31,8 +31,9 @@ class Gravity(Effect):
     def field(self) -> Any:
         """g_x + i g_y, m/s^2; a component lost in the rounding of the angle is zero.
 
-        Lost is what does not change 1. A component in longer numbers does, and so does
-        one with a slope: error bars and derivatives need the small ones.
+        A component counts as lost if adding it to 1 changes nothing. Components in
+        longer numbers, or with slopes, are kept: error bars and derivatives need the
+        small ones.
         """
         u = polar(1.0, self.angle)
         along = u.real * (1.0 + abs(u.real) != 1.0)

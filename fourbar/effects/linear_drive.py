@@ -1,9 +1,4 @@
-"""A drive along the line between two points of two bars, such as a cylinder.
-
-A spindle or a linear actuator is one too. Per newton that it pushes its ends apart the
-bars get the unit vector of the line at one end, its opposite at the other; s is the
-stroke, the distance of the ends.
-"""
+"""A drive along the line between two points of two bars, such as a cylinder."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -89,7 +84,7 @@ class LinearDrive(ForceDrive):
         return stroke, across / stroke
 
     def act(self, actions: Actions, force: Number) -> None:
-        """Push its ends apart."""
+        """Push the ends of the drive apart."""
         _, direction = self.line(actions.state)
         actions.pull(self.end, self.start, force * direction)
 

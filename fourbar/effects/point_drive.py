@@ -83,7 +83,7 @@ class PointDrive(ForceDrive):
         return None, unit + 0.0 * state.direction(self.place.bar)
 
     def act(self, actions: Actions, force: Number) -> None:
-        """Push its point."""
+        """Push the point of the drive."""
         _, direction = self.line(actions.state)
         actions.force(self.place.bar, force * direction, self.place.in_bar)
 

@@ -175,7 +175,7 @@ class Spring:
         return self.preload - self.stiffness * self.length
 
     def pull(self, distance: Any) -> Any:
-        """Compute the force with which it pulls at a distance of its ends, N."""
+        """Compute the pull of the spring at a distance of its ends, N."""
         tension = self.preload + self.stiffness * (distance - self.length)
         if self.acts == "push":
             return np.minimum(tension, 0.0)

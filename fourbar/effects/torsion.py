@@ -54,7 +54,7 @@ class Torsion(PinRows):
 
     @property
     def greatest_couple(self) -> float:
-        """No less than the sum of the couples, N m."""
+        """Upper bound of the sum of the couples, N m."""
         return sum(abs(preload) + k * math.pi for _, k, _, preload in self.springs)
 
     def act(self, actions: Actions, state: State) -> None:
@@ -96,9 +96,9 @@ class Torsion(PinRows):
         return np.where(wound, WOUND, OK).astype(np.uint8)
 
     def add_to_mjcf(self, model: Any) -> None:
-        """Write the ``stiffness`` of the hinge, its rest shifted by the preload.
+        """Write the ``stiffness`` of the hinge, or of a tendon at the cut pin B.
 
-        At the cut pin B it is that of a tendon.
+        The rest angle written is shifted by the preload.
         """
         for pin, k, rest, preload in self.springs:
             turned = model.linkage.ground_angle if pin in ("O2", "O4") else 0.0
@@ -108,7 +108,7 @@ class Torsion(PinRows):
             model.pin[pin][rest_of_hinge] = rest + turned - preload / k
 
     def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
-        """Return no less than the sum of the couples."""
+        """Return an upper bound of the sum of the couples, N m."""
         return self.greatest_couple
 
     def unwind(self, linkage: FourBar, q: Joints) -> Joints:

@@ -86,7 +86,7 @@ class Dynamics(NamedTuple):
 
     pins: PinForces
     from_jamming: Any
-    """As `residual` and `status` from `SolvedFriction`."""
+    """Field of the same name of `SolvedFriction`, as `residual` and `status` are."""
     residual: Any
     status: Any
     effort: Any

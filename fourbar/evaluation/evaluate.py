@@ -348,7 +348,7 @@ def _compute_unresolved(
     state: State,
     dynamics: Dynamics,
 ) -> tuple[Any, Any]:
-    """Compute what long doubles do not resolve of the pin forces and of the drive.
+    """Return the part of pin forces and drive that long doubles do not resolve.
 
     The units are N, and N m or N.
 

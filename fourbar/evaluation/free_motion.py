@@ -172,10 +172,7 @@ def release_at(scene: Scene, times: Array) -> Released:
 
 
 def _convert_to_floats(numbers: Any) -> Any:
-    """Convert numbers to those of Python.
-
-    With these a formula of one position is several times quicker.
-    """
+    """Return numbers as those of Python, with which one position is quicker."""
     converted = []
     for number in numbers:
         of_numpy = isinstance(number, np.generic | np.ndarray)
@@ -241,8 +238,8 @@ def integrate(
 ) -> Released:
     """Integrate the motion from theta_2 with omega_2, without a driving torque.
 
-    To 1e-9 rad over 5 s wherever the motion itself does not amplify errors by more than
-    1000.
+    The error is 1e-9 rad over 5 s wherever the motion itself does not amplify errors by
+    more than 1000.
 
     Parameters
     ----------
@@ -272,7 +269,7 @@ def integrate(
 
 
 class _IntegrationRun:
-    """One integration: its angle, and what has been reported so far."""
+    """State of an integration: its angle, and what has been reported so far."""
 
     def __init__(
         self,

@@ -85,7 +85,7 @@ dotted key's parts.
 LONGEST_SHOWN_LINE = 60
 """Characters shown of a line that cannot be read."""
 _MOST_LOADS = 1000
-"""Each load is a term at every position."""
+"""Limit of the loads, each of which is a term at every position."""
 _MOST_SPRINGS = 1000
 SCENE_TABLES = (
     "title",
@@ -104,7 +104,7 @@ SCENE_TABLES = (
 _A_LINE = "a drive along a line has from and to alone"
 _A_POINT = "a force acts at a place: state point, from_pin or from_centre"
 MOST_POINTS_OF_A_SCENE = 1000
-"""Each is three columns of every table."""
+"""Limit of the points, each of which is three columns of every table."""
 
 
 def load(path: str | Path | IO[str] | IO[bytes]) -> Scene:

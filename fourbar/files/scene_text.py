@@ -501,7 +501,7 @@ _METRIC_EXAMPLES = {
     "gravity": "9.81 m/s^2",
     "damping": "0.01 N m s/rad",
 }
-"""What the comments of a new file show, and its gravity."""
+"""Quantities that the comments of a new file show, and its gravity."""
 _EXAMPLES_IN_UNITS = {
     unit: {**_METRIC_EXAMPLES, "centre": centre, "place": place, "moment": moment}
     for unit, centre, place, moment in (

@@ -139,9 +139,9 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
 
         cos psi = (d^2 + l^2 - (x +- y)^2)/(2 d l).
 
-    They are the limits of the input for bar 2 (bars 3, 4 collinear) and of the output
-    for bar 4 (bars 2, 3 collinear), and the dead centres of a drive on that bar. A
-    change point is none.
+    Bar 2 gives the limits of the input (bars 3, 4 collinear), bar 4 those of the output
+    (bars 2, 3 collinear), and every bar the dead centres of a drive on it. A change
+    point is none.
 
     Parameters
     ----------

@@ -201,9 +201,9 @@ class Frame(NamedTuple):
     pin: Number
     """Place of the first pin, complex, m."""
     v_pin: Number
-    """Its velocity, m/s."""
+    """Velocity of the first pin, complex, m/s."""
     a_pin: Number
-    """Its acceleration, m/s^2."""
+    """Acceleration of the first pin, complex, m/s^2."""
     i_omega: Number
     """1/s."""
     turn: Number
@@ -219,7 +219,7 @@ class Frame(NamedTuple):
 
 
 class State(NamedTuple):
-    """One position of a linkage, or many that broadcast, and its motion.
+    """Position of a linkage, or many that broadcast, and its motion.
 
     Loads and effects act on it.
     """

@@ -227,7 +227,7 @@ def _is_passive(drive: Drive, reader: str) -> bool:
 def _size_control(scene: Scene) -> float:
     """Return twice the largest couple (N m) or push (N) of the scene's drive.
 
-    If there is no drive, it is the scale of one.
+    A scene without a drive gets the scale of one.
     """
     motion = scene.motion.replace(speed=scene.motion.speed or 0.0)
     solution = solve(replace(scene, motion=motion), "force")

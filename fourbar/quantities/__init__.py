@@ -16,7 +16,7 @@ ComplexArray = NDArray[np.complex128]
 
 
 class Quantity(NamedTuple):
-    """One array of a solution, as its line below has it."""
+    """Declaration of one array of a solution."""
 
     name: str
     kind: str

@@ -189,9 +189,9 @@ class _OverTime:
 class Law(_OverTime):
     """theta_2(t) through the points of a table.
 
-    Of angles alone it is piecewise cubic, with a continuous acceleration. Speeds at the
-    points make each piece the cubic between its ends, and accelerations beside them the
-    quintic.
+    A law of angles alone is piecewise cubic, with a continuous acceleration. Speeds at
+    the points make each piece the cubic between its ends, and accelerations beside them
+    the quintic.
 
     Parameters
     ----------
@@ -452,7 +452,7 @@ class Sine(_OverTime):
 
     @property
     def time(self) -> tuple[float, float]:
-        """Times at which it begins and ends, s."""
+        """Times at which the law begins and ends, s."""
         return 0.0, self.duration
 
     def at(self, time: Array) -> tuple[Array, Array, Array]:
@@ -466,7 +466,7 @@ class Sine(_OverTime):
 def _part(kind: str, time: Array, duration: float) -> tuple[Array, Array, Array]:
     """Compute a law from 0 to 1 over a duration, and its rates by time.
 
-    Before and after it the law stands still.
+    The value is constant before and after the duration.
     """
     u = np.clip(time / duration, 0.0, 1.0)
     place, speed, acceleration = _compute_law(kind, u)
@@ -762,7 +762,7 @@ def _require_command(
 def require_steps(motion: Motion, most: int, place: str, file: str) -> None:
     """Raise InputError for as many steps or more.
 
-    Of a sweep, a law or a release each is a position in the memory.
+    Every step of a sweep, a law or a release is a position in the memory.
     """
     for name, stated in (
         (motion.commanded, motion.angle),

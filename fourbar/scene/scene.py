@@ -419,7 +419,7 @@ class Command(NamedTuple):
 def require_input(scene: Scene, what: str) -> None:
     """Raise a LimitError if another bar than the input is commanded.
 
-    What is asked for takes a command of the input alone.
+    `what`: what takes a command of the input alone.
     """
     if scene.motion.commanded != "theta_2":
         raise LimitError(

@@ -466,10 +466,7 @@ def write_page(
 
 
 def _hash_content(text: str) -> str:
-    """Hash an inline script or style.
-
-    By this name the page's security policy allows it.
-    """
+    """Return the hash by which the page's security policy allows a script or style."""
     return "sha256-" + base64.b64encode(
         hashlib.sha256(text.encode("utf-8")).digest()
     ).decode("ascii")

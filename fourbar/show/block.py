@@ -98,9 +98,7 @@ def write_block(
     pressure: float | None = None,
     headed: bool = True,
 ) -> list[str]:
-    """Write the summary of a solved scene, line by line.
-
-    Of one position it writes everything.
+    """Write the summary of a solved scene line by line; of one position, everything.
 
     Parameters
     ----------
@@ -210,7 +208,7 @@ class _SceneBlock:
     def _write_place(self) -> str:
         """Write what is commanded at the position.
 
-        Of a motion over time it writes the time too.
+        A motion over time has its time written too.
         """
         one = self.facts.solution
         name = one.commanded
@@ -225,9 +223,9 @@ class _SceneBlock:
         return f"{text}, t = {self._value(float(one.time[0]), 's', 1.0)}"
 
     def _value(self, value: float, unit: str, largest: float | None = None) -> str:
-        """Write a quantity of an SI unit, with the prefix that suits it.
+        """Write a quantity of an SI unit, with a prefix that suits it.
 
-        Or with that of the largest of its kind.
+        `largest`: of its kind, which then chooses the prefix; None: the quantity does.
         """
         text = write_short(value, unit, self.units, largest, self.digits)
         return text.replace(" ", _TIED)

@@ -23,7 +23,7 @@ _ONE_SIDE = np.array([1.0, 2.0, 3.0, 2.0, 4.0, 6.0])
 """Multiples of the step at which two parabolas, three each, meet the forces of a side.
 """
 MULTIPLES = np.concatenate([-_ONE_SIDE, _ONE_SIDE])
-"""Those of both sides, by side, parabola and place."""
+"""Multiples of the step on both sides, by side, parabola and place."""
 SAME_LIMIT = 1e-6
 """Part of the forces within which four extrapolations are one limit: as is shown."""
 ZERO_LIMIT = 1e-9

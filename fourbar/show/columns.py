@@ -32,13 +32,13 @@ from fourbar.solving import solve
 
 COLUMN_AXES = {"_x": 0, "_y": 1}
 _HEADING_MARKS = re.compile(r"\s*\[[^\]]*\]$|\|")
-"""What a heading of the CSV has besides the name: the unit, and bars around a size."""
+"""Marks of a heading of the CSV besides the name: its unit, and bars of a size."""
 _ALONG = "F_"
 """Begins the name of a force along the path of a point."""
 
 
 class Column(NamedTuple):
-    """One column of a table: its name, SI unit and values."""
+    """Column of a table: its name, SI unit and values."""
 
     name: str
     unit: str

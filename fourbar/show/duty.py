@@ -1,6 +1,6 @@
 """Loads of frame and pins over a motion, and the duty of the drive.
 
-With these one chooses bearings and a motor.
+Bearings and a motor are chosen by them.
 """
 
 import warnings
@@ -25,10 +25,7 @@ rounding is that of its coefficients.
 
 
 class BearingLoad(NamedTuple):
-    """Load of one pin over the positions of a solution.
-
-    Of a study each number is an array (m,).
-    """
+    """Load of one pin over the positions of a solution; of a study, arrays (m,)."""
 
     largest: float
     """N."""
@@ -152,7 +149,7 @@ def _find_push(solution: Solution) -> Array:
 def bearing_load(solution: Solution, pin: str) -> BearingLoad:
     """Return largest and RMS load of pin "O2", "A", "B" or "O4", and the place.
 
-    Of a study they are arrays (m,). Positions without a value are left out.
+    A study gives arrays (m,). Positions without a value are left out.
     """
     if not isinstance(pin, str) or pin not in PIN_FORCE:
         raise InputError("pin", pin, "must be one of " + ", ".join(PIN_FORCE))

@@ -143,7 +143,8 @@ class _Search:
     def _find_touches(self, gaps: Array, extent: float) -> tuple[Array, list[Array]]:
         """Find where the column turns round at the value, or beyond it.
 
-        The latter are returned as two intervals on each of which it passes the value.
+        A place beyond it is returned as two intervals, on each of which the column
+        passes the value.
         """
         from scipy.optimize.elementwise import find_minimum
 

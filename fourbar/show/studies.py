@@ -237,9 +237,9 @@ def find_largest(derivatives: Sensitivity, quantity: str) -> float:
 
 
 def write_sensitivity(derivatives: Sensitivity) -> str:
-    """Write the table of the numbers that matter most.
+    """Write the numbers that matter most, as lines and a table.
 
-    Above it stands what each quantity depends on most.
+    The lines above the table say what each quantity depends on most.
     """
     names = list_shown(derivatives)
     influences = {name: derivatives.influences(name) for name in names}

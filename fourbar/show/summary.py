@@ -126,10 +126,10 @@ class HeldRange(NamedTuple):
 
 
 class Sums(NamedTuple):
-    """What is summed over the positions, for want of an integral."""
+    """Quantities that are summed over the positions, for want of an integral."""
 
     names: list[str]
-    """Of torque, power, drive force and pin forces."""
+    """Names among torque, power, drive force and pin forces."""
     change: float
     """Largest change of a mean or energy by leaving out every second position, over
     its value. NaN where so few are left that none is known.
@@ -252,8 +252,9 @@ def locate_between(scene: Scene, solution: Solution) -> Between:
 def fit_motion(scene: Scene, between: Between) -> Panels | None:
     """Fit panels to drive, power and pin forces over a sweep or motion law.
 
-    What grows without bound has no integral, and is left out. None where the linkage
-    does not assemble throughout, or nothing stands between the positions.
+    Curves that grow without bound have no integral, and are left out. None is returned
+    where the linkage does not assemble throughout, or nothing stands between the
+    positions.
     """
     sweep = between.sweep
     if not _has_between(scene, sweep) or not sweep.assembled.all():
@@ -303,7 +304,7 @@ def _locate_reversals(
 ) -> tuple[list[str], Array, Array]:
     """Locate where the slip of a pin with dry friction changes sign.
 
-    Returned are the pin of each reversal and the places just before and after it.
+    The pin of each reversal and the places just before and after it are returned.
     """
     pins, low, high = _find_reversing(scene, solution)
     if not pins:
@@ -852,7 +853,8 @@ def _list_commanded(solution: Solution) -> Array:
 def _find_extreme(values: Array, places: Array, sign: int, smooth: bool) -> Peak:
     """Find the largest of signed values.
 
-    Of a smooth curve it is the top of the parabola through it and its neighbours.
+    On a smooth curve the top of the parabola through this value and its neighbours is
+    taken.
     """
     i = int(np.nanargmax(values))
     value = float(values[i])
@@ -953,9 +955,9 @@ def _join_stretches(solution: Solution, fine: Solution, bar: int) -> Array:
 
 
 def _find_turns(start: float, stop: float, low: float, high: float) -> int:
-    """Return the whole turns by which an interval of angles is moved.
+    """Return the whole turns that bring an interval of angles closest to another.
 
-    With them it covers least together with another.
+    Both intervals together then cover the least range.
     """
     distance = 0.5 * (low + high) - 0.5 * (start + stop)
     nearest = round(distance / TURN)
@@ -1021,7 +1023,7 @@ def _integrate_energies(
 ) -> MotorDuty:
     """Integrate the power over time, from each of its zeros to the next.
 
-    Of a closed motion the swing of the energy goes between zeros of the power less its
+    The swing of the energy of a closed motion goes between zeros of the power less its
     mean.
     """
     if scene.motion.law is not None:
@@ -1153,9 +1155,9 @@ def _list_sums(solution: Solution, names: list[str]) -> list[Array]:
 
 
 def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]:
-    """Find the least and the greatest stroke of the commanded bar's angles.
+    """Find the least and the greatest stroke over all angles of the commanded bar.
 
-    The angles are all that it reaches on its branch.
+    The angles are those that the bar reaches on its branch.
     """
     at = solution.at
     first = int(np.argmax(solution.assembled))

@@ -1,6 +1,6 @@
 """Output of `fourbar tolerance`: a table and one JSON object.
 
-The table is of the place where the spread is largest.
+Every row of the table is of the place where the spread is largest.
 """
 
 import math
@@ -79,7 +79,7 @@ def find_part_unit(part: str) -> str:
 def write_spreads(spreads: Tolerances, units: Conversion = DEGREES) -> str:
     """Write one row for each quantity.
 
-    Above stands what was tried and what the variance of each is due to.
+    The lines above say what was tried and what the variance of each is due to.
     """
     lines = [
         *_describe_counts(spreads, units),

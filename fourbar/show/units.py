@@ -60,7 +60,7 @@ PREFIXES = (
 def units(text: str) -> Conversion:
     """Read the units of a list, or of "SI" or "imperial".
 
-    The latter are in, lbf, lbf in, lb, deg, rpm and hp. A product is joined by dots
+    Imperial units are in, lbf, lbf in, lb, deg, rpm and hp. A product is joined by dots
     ("N.mm"). What the list leaves out stays SI, but for speeds and accelerations of
     points, which follow the length, and the energy, which follows the torque.
 

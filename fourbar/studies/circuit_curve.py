@@ -346,7 +346,7 @@ class CircuitCurve:
         return np.zeros(len(points))
 
     def size(self, points: Array) -> Array:
-        """Sum of the absolute terms of Q."""
+        """Return the sum of the absolute terms of Q."""
         actions = _Sizes(self.state(points), self.case.bodies).add(self.case.terms)
         return np.broadcast_to(actions.size, len(points))
 

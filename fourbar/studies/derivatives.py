@@ -114,7 +114,7 @@ class Sensitivity:
     def of(self, quantity: str, key: str) -> Array:
         """Return d(quantity)/d(key), (n,) or (n, 2).
 
-        Of a component F12_x or a magnitude |F12| it is (n,).
+        A component F12_x or a magnitude |F12| gives (n,).
 
         Raises InputError for a quantity or a key that is not known here.
         """

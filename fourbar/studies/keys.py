@@ -68,7 +68,7 @@ NumberPath = tuple[str | int, ...]
 
 
 class SceneNumber(NamedTuple):
-    """One number of a scene."""
+    """Number of a scene that a study varies."""
 
     place: NumberPath
     unit: str
@@ -519,7 +519,7 @@ def read_place(value: Any, place: NumberPath) -> Any:
 def read_numbers(scene: Scene) -> dict[str, Any]:
     """Read the numbers that the scene states, by key.
 
-    What it leaves to a uniform bar is left out.
+    Numbers that are left to a uniform bar are left out.
     """
     return {
         key: read_number(scene, entry)

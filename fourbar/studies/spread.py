@@ -53,7 +53,7 @@ nothing then.
 
 
 class Spread(NamedTuple):
-    """One quantity, or a component or magnitude of it, over n positions; SI, rad."""
+    """Spread of a quantity, a component or a magnitude at n positions; SI, rad."""
 
     nominal: Array
     deviation: Array

@@ -40,7 +40,7 @@ class Study:
     values: dict[str, Array]
     """Varied numbers by key, pins and lengths first, (m,).
 
-    They are NaN in a member that a scene would refuse.
+    A member that a scene would refuse has NaN.
     """
     invalid: NDArray[np.bool_]
     """The members that a scene would refuse, (m,)."""

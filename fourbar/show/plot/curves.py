@@ -107,7 +107,7 @@ def draw_axes(axes: "Axes", view: View) -> Array:
 
 
 def note(view: View, text: str) -> None:
-    """Say it once in the caption; a number stays on one line with its name and unit."""
+    """Add a note to the caption, once; its numbers stay on one line with units."""
     text = _BINDING.sub("\u00a0", text)
     if text not in view.notes:
         view.notes.append(text)

@@ -77,10 +77,7 @@ def _show_drawing_coordinates(axes: "Axes", view: View, factor: float) -> None:
 
 
 def locate_pins(view: View, factor: float = 1.0) -> dict[str, DrawnPoint]:
-    """Locate the pins at the drawn position, in the order O2, A, B, O4, m.
-
-    Or in the unit that the factor makes of it.
-    """
+    """Locate the pins O2, A, B, O4 at the drawn position, in m times the factor."""
     place = place_of(view.scene.linkage, view.here, 0, factor)
     return {name: split_complex(pin) for name, pin in place.pins.items()}
 
@@ -206,7 +203,7 @@ def draw_plate(
 ) -> list[Any]:
     """Join a point to its bar, from pin to point to pin, as a plate.
 
-    A point on the bar has none.
+    Nothing is drawn for a point that lies on the bar.
     """
     from matplotlib.colors import to_rgba
     from matplotlib.patches import Polygon

@@ -95,7 +95,7 @@ OPENING = math.radians(250.0)
 
 
 class Symbol(NamedTuple):
-    """One thing that acts."""
+    """Symbol of one thing that acts."""
 
     kind: str
     """spring, force, moment, drive, cylinder, flywheel, gravity, or an effect in a pin.
@@ -223,7 +223,7 @@ def _join_ends(kind: str, name: str, line: LinearDrive | Spring) -> Symbol:
 
 
 class Pose(NamedTuple):
-    """One position of the linkage in the units of a drawing."""
+    """Position of the linkage in the units of a drawing."""
 
     foot: dict[int, complex]
     """First pin of each bar, 1 to 4."""
