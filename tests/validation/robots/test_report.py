@@ -43,7 +43,8 @@ def test_what_was_switched_off_and_left_out_is_said() -> None:
         in text
     )
     assert "contacts, joint limits and motors are off" in text
-    assert "under the torque: gap at most" in text
+    let_go = len(measured().loops[0].torn)
+    assert f"under the torque, let go at {let_go} positions: gap at most" in text
     assert "with rigid pins the robot differs from the formulas by" in text
 
 
