@@ -422,7 +422,7 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
 
 
 class _Weighed(NamedTuple):
-    """What a mistake accounts for, quantities by their labels."""
+    """Labels of the quantities that a mistake explains or brings nearer."""
 
     explained: list[str]
     nearer: list[str]

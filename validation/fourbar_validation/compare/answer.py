@@ -1,6 +1,6 @@
-"""Define an engine's answer.
+"""Define an engine's answer: its numbers at the motion it really made.
 
-It is the engine's numbers at the motion it really made, or the reason for none.
+A refusal in their place has a reason.
 """
 
 from dataclasses import dataclass, field
@@ -18,7 +18,7 @@ from fourbar.scene import Command, Scene
 class Answer:
     """Quantities of one engine on one scene, in SI units and radians.
 
-    They have the names of `fourbar.Solution`.
+    The names are those of `fourbar.Solution`.
     """
 
     engine: str
@@ -68,16 +68,16 @@ class Adapter(Protocol):
         """Return the engine's name as it stands in the results."""
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Answer a scene, given the description and the command.
+        """Answer a scene, given the description and the command alone.
 
-        It is never given a result of the formulas.
+        No result of the formulas reaches an engine.
         """
 
 
 def explain_refusal(engine: Adapter, command: Command) -> str:
-    """Say why an engine cannot be asked.
+    """Return why an engine does not take what is commanded, "" if it does.
 
-    It does not declare that it takes what is commanded; empty if it does.
+    Engines declare what they take.
     """
     takes = getattr(engine, "commands", ("theta_2",))
     if command.commanded in takes:

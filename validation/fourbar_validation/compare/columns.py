@@ -1,7 +1,7 @@
 """The results of a run as results.csv and, for pandas and DuckDB, results.parquet.
 
-Both hold the columns of `fourbar_validation.compare.rows.Row`, sorted by scene, engine,
-setting and quantity; both are written as the tasks are read.
+The columns are those of `fourbar_validation.compare.rows.Row`, sorted by scene, engine,
+setting and quantity; both files are written as the tasks are read.
 """
 
 import math
@@ -36,7 +36,7 @@ CSV_ROWS = 1_000_000
 class ResultsWriter:
     """Writer of both files, which are complete at the end of a `with`.
 
-    They do not exist if it fails.
+    Neither file exists if the writer fails.
     """
 
     def __init__(self, out: Path) -> None:

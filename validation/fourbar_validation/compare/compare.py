@@ -1,6 +1,6 @@
-"""An engine's answer against the formulas.
+"""An engine's answer against the formulas: a row for each quantity.
 
-It has one row per quantity, at the position where it is worst.
+The row states the position where the quantity is worst.
 """
 
 import math
@@ -293,12 +293,12 @@ class Comparison:
 
     @property
     def _may_jam(self) -> bool:
-        """Whether friction depends on the loads of pins."""
+        """True if friction depends on the loads of pins."""
         return any(effect.loaded_pins for effect in self.scene.effects)
 
     @property
     def _tells_of_jams(self) -> bool:
-        """Whether the answer tells how near a jam is, where there may be one.
+        """True if the answer tells how near a jam is, where there may be one.
 
         An engine without loads and friction cannot tell.
         """
@@ -336,7 +336,7 @@ class Comparison:
     def _compare(self, quantities: Sequence[str]) -> _Judged:
         """Compare all quantities of the answer at once.
 
-        Those that neither side has are left out.
+        A quantity that neither side has is left out.
         """
         judged = _Judged()
         pairs: list[_Pair] = []
@@ -485,7 +485,7 @@ class Comparison:
     def _scale(self, quantities: Sequence[str]) -> tuple[Scale, Array]:
         """Return scale and condition of quantities at each position, (q, n).
 
-        Each is the stricter of formulas and another derivation.
+        Of formulas and another derivation the stricter one counts.
         """
         missing = [name for name in quantities if name not in self.scales]
         formulas = self.formulas
@@ -576,9 +576,9 @@ class Errors(NamedTuple):
         return why
 
     def write_notes(self, undecided: int) -> str:
-        """Write how many positions were not judged, or were asked again.
+        """Return the end of a reason: how many positions have no verdict.
 
-        It is the end of a reason.
+        Positions that were asked again count as well.
         """
         notes = ""
         if undecided:
@@ -720,9 +720,9 @@ def _mark_moving_drive(scene: Scene, formulas: Solution) -> Mask:
 
 
 def mark_turning(speed: Array) -> Mask:
-    """Mark where the driven bar is fast enough, (n,).
+    """Return where the driven bar is fast enough to compare torque and forces, (n,).
 
-    Its torque and the pin forces are not near a pole there.
+    Near a pole, where the bar stands still, torque and pin forces grow without bound.
     """
     fast = np.abs(np.nan_to_num(speed))
     return np.asarray(fast > _SLOW_DRIVE * fast.max())

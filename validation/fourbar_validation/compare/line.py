@@ -1,6 +1,6 @@
-"""The line of a drive that exerts a force, from the angles of the bars alone.
+"""The line of a drive that exerts a force: its stroke, speed and leverage.
 
-It has stroke, speed and leverage.
+All follow from the angles of the bars alone.
 """
 
 from typing import TYPE_CHECKING, NamedTuple
@@ -41,9 +41,9 @@ class DriveLine(NamedTuple):
             return self.across / self.stroke
 
     def speed(self, omega: dict[int, Array]) -> Array:
-        """Compute the rate of the stroke at angular velocities of bars 1 to 4, m/s.
+        """Return the rate of the stroke at angular velocities of bars 1 to 4, m/s.
 
-        Each arm swings across itself.
+        The velocity of an arm's end is across the arm.
         """
         rate: ComplexArray | float = 0.0
         for (sense, point), arm in zip(self.drive.ends, self.arms, strict=True):
@@ -75,10 +75,7 @@ class DriveLine(NamedTuple):
 
     @property
     def most(self) -> float:
-        """Return the greatest possible movement of its ends, m.
-
-        It is counted as in `condition`.
-        """
+        """Return the greatest possible movement of its ends, m, as in `condition`."""
         _, a, b, c = self.linkage.lengths
         reach = {1: (0.0, 0.0), 2: (0.0, 1.0), 3: (a, a / b), 4: (0.0, a / c)}
         return float(

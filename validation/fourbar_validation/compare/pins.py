@@ -18,7 +18,7 @@ def resolve(size: float, angle: float) -> tuple[float, float]:
 def find_centre(bar: Bar) -> tuple[float, float]:
     """Return distance (m) and angle (rad) of G from pin and line.
 
-    They are as stated, or mid-bar.
+    A bar that states none has G at its middle.
     """
     if bar.centre is not None:
         return bar.centre
@@ -40,7 +40,7 @@ def find_mass(bar: Bar) -> float:
 def find_inertia(bar: Bar) -> float:
     """Return the moment of inertia about G, kg m^2.
 
-    It is as stated, or that of a uniform slender bar, m L^2/12.
+    A bar that states none is uniform and slender: m L^2/12.
     """
     if bar.inertia is not None:
         return bar.inertia

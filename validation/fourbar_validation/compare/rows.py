@@ -1,6 +1,6 @@
 """The flat sorted table that joins run and report.
 
-It has one row per scene, engine, setting and quantity.
+A row is of one scene, engine, setting and quantity.
 """
 
 import csv
@@ -80,9 +80,9 @@ class Row:
         verdict: str,
         reason: str,
     ) -> "Row":
-        """Make a verdict without numbers.
+        """Return a row with a verdict and no numbers.
 
-        It is a refusal, a breakdown, or an answer that is missing.
+        The verdict is a refusal, a breakdown, or an answer that is missing.
         """
         nan = math.nan
         return cls(
@@ -151,9 +151,9 @@ class Row:
 
     @property
     def failed(self) -> bool:
-        """Return whether it was compared and does not hold.
+        """Return whether the quantity does not hold.
 
-        It fails too if an answer that was due is missing.
+        An answer that was due and is missing fails too.
         """
         return self.verdict == FAILS
 
@@ -171,9 +171,9 @@ def make_breakdown(
     error: BaseException,
     setting: str = "",
 ) -> Row:
-    """Make the row of an engine that broke down.
+    """Return the row of an engine that broke down.
 
-    It raised, took its process with it, or never came back.
+    An engine breaks down if it raises, takes its process with it, or never comes back.
 
     `setting`: of the row; names what it broke down in, where it is no answer.
     """

@@ -88,10 +88,7 @@ class Scale(NamedTuple):
 
 
 class TermSizes:
-    """Sizes of the quantities of one solution of a scene.
-
-    Each sum of terms is computed once.
-    """
+    """Sizes of the quantities of one solution of a scene, each sum computed once."""
 
     def __init__(self, scene: Scene, solution: Solution) -> None:
         self.scene = state_from_pins(scene)
@@ -324,9 +321,9 @@ def has_angles(answer: Answer) -> bool:
 
 
 def make_reference(scene: Scene, answer: Answer) -> Solution | None:
-    """Make a solution of an answer.
+    """Return an answer as a solution; None if it has no angles.
 
-    Its conditions follow from the sines between its own angles; None without angles.
+    Conditions follow from the sines between the answer's own angles.
     """
     if answer.at is None or not has_angles(answer):
         return None
@@ -383,9 +380,9 @@ def _find_line_of_drive(
     theta: dict[int, Array],
     known: dict[str, Any],
 ) -> dict[str, Array]:
-    """Find stroke, direction, speed and leverage of a force that drives.
+    """Return stroke, direction, speed and leverage of a force that drives.
 
-    They follow from the answer's own angles and speeds.
+    All follow from the answer's own angles and speeds.
     """
     line = place_line(linkage, drive, theta)
     quantities = {"drive_line": join_components(line.unit.real, line.unit.imag)}
@@ -405,9 +402,9 @@ def _find_velocities(
     theta: dict[int, Array],
     known: dict[str, Any],
 ) -> dict[str, Array]:
-    """Find the speeds of A, B and the mass centres, m/s.
+    """Return the velocities of A, B and the mass centres, (n, 2), m/s.
 
-    They follow from the answer's own angles and speeds.
+    All follow from the answer's own angles and speeds.
     """
 
     def swung(bar: int, distance: float, angle: float) -> Array:
@@ -454,9 +451,9 @@ def take_strictest_conditions(
     formulas: Solution,
     reference: Solution | None,
 ) -> Array:
-    """Take the stricter of two conditions of each quantity at each position, (q, n).
+    """Return the stricter of two conditions of each quantity at each position, (q, n).
 
-    That is the larger one, which allows the smaller error.
+    The larger condition is the stricter one: the allowed error is smaller.
     """
     ours = find_conditions(quantities, linkage, formulas)
     if reference is None:

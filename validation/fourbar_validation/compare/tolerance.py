@@ -1,6 +1,6 @@
 """Compute errors and allowed errors, with the reason for each.
 
-There are four classes of tolerance, each a named object.
+Tolerances are of four classes, each a named object.
 
 `condition` lies in (0, 1], 1 is best; an exact comparison is allowed K eps / condition.
 The motion condition is s = |sin(theta_4 - theta_3)|, the drive condition the sine
@@ -180,9 +180,9 @@ def find_conditions(
     linkage: FourBar,
     formulas: Solution,
 ) -> Array:
-    """Compute the conditions of several quantities at each position, (q, n).
+    """Return the conditions of several quantities at each position, (q, n).
 
-    They are s for positions and s^2 for what follows, times lever and drive.
+    Positions have s and what follows s^2, times lever and drive.
     """
     bar = formulas.at.bar
     units = [UNITS[quantity] for quantity in quantities]
@@ -251,9 +251,9 @@ def sum_lengths(linkage: FourBar) -> float:
 
 
 def compute_closing_margin(linkage: FourBar, theta: Array, bar: int = 2) -> Array:
-    """Compute by what the loop closes (> 0) or misses (< 0) at a bar's angle.
+    """Return by what the loop closes (> 0) or misses (< 0) at a bar's angle, (n,).
 
-    It is a part of the sum of the lengths.
+    The margin is relative to the sum of the lengths.
     """
     lengths = linkage.lengths
     held = lengths[bar - 1] * (-1.0 if bar == 4 else 1.0)
@@ -265,9 +265,9 @@ def compute_closing_margin(linkage: FourBar, theta: Array, bar: int = 2) -> Arra
 
 
 def find_gap(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array) -> Array:
-    """Compute by what three angles miss the closure of the loop, (n,).
+    """Return by what three angles miss the closure of the loop, (n,).
 
-    It is a part of the sum of the lengths.
+    The gap is relative to the sum of the lengths.
     """
     d, a, b, c = linkage.lengths
     ground = d * np.exp(1j * linkage.ground_angle)
@@ -308,7 +308,7 @@ def join_components(x: Array, y: Array) -> Array:
 
 
 def magnitudes(values: Sequence[Array] | Array) -> Array:
-    """Return those of several quantities, (q, n)."""
+    """Return the magnitudes of several quantities, (q, n)."""
     sizes = np.empty((len(values), len(values[0])))
     for axes in (1, 2):
         if rows := [i for i in range(len(values)) if values[i].ndim == axes]:
@@ -325,10 +325,9 @@ def compute_differences(
     ours: Sequence[Array],
     theirs: Sequence[Array],
 ) -> Array:
-    """Compute the differences of several quantities, (q, n).
+    """Return the differences of several quantities, (q, n).
 
-    Those of angles are modulo 2 pi, of vectors by Euclidean norm; NaN where the shapes
-    differ.
+    Angles differ modulo 2 pi, vectors by Euclidean norm; NaN where the shapes differ.
     """
     apart = np.full((len(quantities), len(ours[0])), np.nan)
     alike = [i for i in range(len(ours)) if theirs[i].shape == ours[i].shape]
@@ -371,7 +370,7 @@ def replace_zero_size(size: Array) -> Array:
 def find_used(error: Array | float, allowed: Array | float) -> Array:
     """Return error/allowed, the used part of the allowed error.
 
-    It is infinite if the error is not finite, and 0 if the error is 0.
+    The ratio is infinite if the error is not finite, and 0 if the error is 0.
     """
     error = np.asarray(error, dtype=float)
     allowed = np.asarray(allowed, dtype=float)

@@ -238,7 +238,7 @@ class Summary:
 
     @property
     def verdict(self) -> str:
-        """Say it in one sentence."""
+        """Return the verdict of the run as one sentence."""
         if self.missing:
             not_run = f"; not run: {', '.join(engine for engine, _ in self.missing)}"
         else:

@@ -81,9 +81,9 @@ def _show_report(report: RobotReport) -> None:
 
 
 def _write_scene(made: LoopScene) -> str:
-    """Write a scene file from a loop.
+    """Return the scene file of a loop.
 
-    Its comments say where it is from and what it leaves out.
+    Comments say where it is from and what it leaves out.
     """
     lines = [*made.parts, *made.remarks, *made.notes]
     comments = "".join(f"# {escape_controls(line)}\n" for line in lines)

@@ -266,9 +266,9 @@ class _RobotReading:
         return None
 
     def _may_read(self, resolved: Path) -> bool:
-        """Tell whether a file lies in a folder that may be read.
+        """Return whether a file lies in a folder that may be read.
 
-        It is that of the robot's file, one beside it, or that of --assets.
+        Such a folder is that of the robot's file, one beside it, or that of --assets.
         """
         home = self.path.resolve().parent
         if resolved.is_relative_to(home):

@@ -119,8 +119,9 @@ def measure_robot(
 def list_errors_by_method(loop: LoopMeasurement) -> list[InsideError]:
     """List the worst errors of torque and pin forces, by method.
 
-    Those of rigid pins are against the formulas: what the scene leaves out. MuJoCo's
-    are against rigid pins at the same states: what its soft constraint costs.
+    Rigid pins are compared with the formulas: the difference is what the scene leaves
+    out. MuJoCo is compared with rigid pins at the same states: the difference is what
+    its soft constraint costs.
     """
     errors = list(_compare(RIGID, loop, loop.states))
     errors += _compare(STATES, loop, loop.states)
@@ -132,7 +133,7 @@ def list_errors_by_method(loop: LoopMeasurement) -> list[InsideError]:
 def find_left_out(loop: LoopMeasurement) -> float:
     """Return what the scene leaves out of the robot, relative.
 
-    It is the worst difference of rigid pins from the formulas.
+    The part is the worst difference of rigid pins from the formulas.
     """
     return max(error.part for error in _compare(RIGID, loop, loop.states))
 
@@ -191,9 +192,9 @@ def _subtract_formulas(
     formulas: Solution,
     loop: LoopMeasurement,
 ) -> dict[str, Array]:
-    """Return by how much torque and pin forces of rigid pins differ from the formulas.
+    """Return how far torque and pin forces of rigid pins are from the formulas, (n,).
 
-    They are sizes at each state, (n,), N m and N; infinite where the formulas have no
+    Differences are sizes at each state, N m and N; infinite where the formulas have no
     value.
     """
     judged = formulas.status_code == OK
@@ -248,9 +249,7 @@ def read_measure_options(
     wanted: float | None,
     robot: Mapping[str, Any],
 ) -> MeasureOptions:
-    """Read --loop, --error, and the values of the other options of a robot.
-
-    They are keyed by their names.
+    """Read --loop, --error, and the other options of a robot, keyed by their names.
 
     Raises
     ------

@@ -154,7 +154,7 @@ def _follow(
 ) -> tuple[Array, Array]:
     """Return the angle of a bar against another, rad, and its speed over omega_2.
 
-    They are at angles of bar 2; the angle is continuous.
+    Both are at given angles of bar 2; the angle is continuous.
     """
     moving = replace(scene, motion=scene.motion.replace(speed=1.0, acceleration=0.0))
     branches = np.full(len(theta_2), branch, dtype=np.int8)

@@ -1,6 +1,6 @@
 """Measurements of a robot's loops, as sentences and tables.
 
-They are for the terminal, in Markdown, and as CSV.
+Forms are for the terminal, in Markdown, and as CSV.
 """
 
 import math

@@ -536,7 +536,7 @@ class _Conversion:
         ET.SubElement(body, "inertial", {"pos": place, "mass": repr(mass), **stated})
 
     def _add_collisions(self, body: ET.Element, link: _Link, density: str) -> None:
-        """Add the collisions of a link as the geoms that its inertia is that of."""
+        """Add a link's collisions as geoms, from which MuJoCo computes its inertia."""
         inside = np.linalg.inv(link.scope.locate(link.name))
         for collision in link.element.findall("collision"):
             shape = collision.find("geometry/*")

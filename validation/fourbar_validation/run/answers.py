@@ -1,7 +1,6 @@
 """Judge each engine's answer.
 
-It is judged over the scene's motion, on the linkage, and by the inertial part of its
-torque.
+Rows are on the scene's motion, on the linkage, and on the inertial part of the torque.
 """
 
 import math

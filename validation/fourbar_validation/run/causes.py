@@ -56,10 +56,10 @@ def find_causes(
 
 
 def make_answer_table(answer: Answer, tolerance: ErrorBound) -> TheirTable:
-    """Make a table of an engine's numbers, as if they had been read from a file.
+    """Return a table of an engine's numbers, as if they had been read from a file.
 
-    Each is taken to be rounded to what the engine is held to, so that a mistake need
-    not explain more of it.
+    Numbers are taken to be rounded to what the engine is held to, so that a mistake
+    need not explain more of it.
     """
     assert answer.at is not None and answer.assembled is not None
     rows = slice(MOST_POSITIONS_SEARCHED)

@@ -99,9 +99,9 @@ def check_identities(question: Question) -> Iterator[Row]:
 def _check_sweep(question: Question) -> Row:
     """Check a sweep that the scene leaves open.
 
-    It is a whole turn, or one degree short of where the loop just closes. At the end of
-    an interval narrower than four degrees it leaves out a quarter of that, which is
-    half of the sweep.
+    Such a sweep is a whole turn, or ends one degree short of where the loop just
+    closes. At the end of an interval narrower than four degrees it leaves out a quarter
+    of that, which is half of the sweep.
     """
     command = question.at
     linkage = question.scene.linkage

@@ -1,6 +1,6 @@
-"""One scene through every check.
+"""Check one scene in every way.
 
-It gives its rows, its timings, and what was left out and why.
+Results are its rows, its timings, and what was left out and why.
 """
 
 import time

@@ -19,11 +19,11 @@ from fourbar_validation.run.question import Question
 def check_law(question: Question) -> Iterator[Row]:
     """Check a motion law by its own table.
 
-    It is the piecewise cubic through its points whose acceleration is continuous. Each
-    piece is the cubic of Hermite through the table's angles with the speeds at its
+    A law is the piecewise cubic through its points whose acceleration is continuous.
+    Each piece is the cubic of Hermite through the table's angles with the speeds at its
     ends; that it is the law's is decided by the accelerations of neighbouring pieces
     and by the ends alone. Angle, speed and acceleration of every position, and the
-    conditions on the pieces, by the worst of them.
+    conditions on the pieces, are judged by the worst of them.
     """
     law = question.scene.motion.law
     command = question.at
@@ -89,7 +89,7 @@ def check_law(question: Question) -> Iterator[Row]:
 def _check_rise(question: Question, law: Rise) -> Row:
     """Check a rise, its dwell and its fall, part by part.
 
-    They are checked by other forms of the standard laws:
+    Other forms of the standard laws serve:
 
         cycloidal, with x = pi u:  u - sin x cos x/pi,  2 sin^2 x,  4 pi sin x cos x;
         345: the polynomial of Bernstein with the coefficients 0, 0, 0, 1, 1, 1.
@@ -209,9 +209,9 @@ def _interpolate_hermite(
     last: Array,
     h: Array,
 ) -> tuple[Array, Array, Array]:
-    """Compute angle, speed and acceleration a time s into a piece.
+    """Return angle, speed and acceleration a time s into a piece, (n,) each.
 
-    They follow from its acceleration at both ends.
+    The piece has the accelerations `first` and `last` at its ends and lasts h.
     """
     jerk = (last - first) / h
     return (

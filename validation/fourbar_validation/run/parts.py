@@ -98,7 +98,7 @@ def collect_parts(
 ) -> Summary:
     """Write tables and report of a run into `out` from its parts' folders.
 
-    These stay as they are.
+    The folders stay as they are.
     """
     if any((out / "parts").glob("*")):
         raise InputError(
@@ -136,8 +136,9 @@ def collect_command(
 ) -> int:
     """Put together the parts of a run.
 
-    It writes tables and report from the folders in which `run --part` judged the parts.
-    Parts of different runs are refused. If parts are missing, the command names them.
+    Tables and report are written from the folders in which `run --part` judged the
+    parts. Parts of different runs are refused. If parts are missing, the command names
+    them.
     """
     from fourbar_validation.report.terminal import print_table
 

@@ -58,7 +58,7 @@ class Progress:
         """Hear why a task of an earlier run is judged again."""
 
     def advance(self, stage: str, scenes: int) -> None:
-        """Hear that a stage has done so many scenes more."""
+        """Note that a stage has done so many scenes more."""
 
 
 UNHEARD = Progress()
@@ -67,7 +67,7 @@ UNHEARD = Progress()
 class RunPart(NamedTuple):
     """The share of a run that one machine judges.
 
-    It is every `of`-th task, from task `number` on.
+    A share is every `of`-th task, from task `number` on.
     """
 
     number: int = 1

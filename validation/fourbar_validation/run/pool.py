@@ -20,7 +20,8 @@ from fourbar_validation.scenes.suites import Files, Suite
 class Job:
     """One scene of a task, for a worker.
 
-    It has its place in a suite, its engines, and what is made of it.
+    The scene is a number in a suite; beside it stand its engines, and what is made of
+    it.
     """
 
     suite: Suite
@@ -80,7 +81,7 @@ def _judge_by_engine(
 ) -> Record:
     """Judge a scene that broke down one engine at a time.
 
-    Those at fault have a row that says of what.
+    An engine at fault gets a row that says what broke down.
     """
     record: Record | None = None
     breakdowns = []

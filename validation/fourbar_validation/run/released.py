@@ -90,9 +90,9 @@ class _Pendulum(NamedTuple):
     omega_0: float
 
     def motion(self, times: Array) -> tuple[Array, Array]:
-        """Compute phi and phi' (rad, rad/s) of a pendulum that turns over.
+        """Return phi and phi' (rad, rad/s) of a pendulum that turns over.
 
-        They follow by Jacobi's elliptic functions.
+        Jacobi's elliptic functions give both.
         """
         from scipy.special import ellipj, ellipk, ellipkinc
 
@@ -117,10 +117,7 @@ class _Pendulum(NamedTuple):
 
 
 def make_pendulum(scene: Scene) -> _Pendulum | None:
-    """Give the pendulum that the scene is, or None.
-
-    It must turn over.
-    """
+    """Return the pendulum that the scene is, None unless it is one that turns over."""
     d, a, b, c = scene.linkage.lengths
     effects = scene.effects
     if not (
@@ -336,12 +333,12 @@ def _prescribe(
     scene: Scene,
     command: Command,
 ) -> Iterator[tuple[Scene, NDArray[np.intp]]]:
-    """Prescribe the instants at which the linkage moves.
+    """Yield scenes that prescribe the motion, and their positions' numbers.
 
-    Each standstill is prescribed with the couples of dry friction there. An engine has
-    no friction at rest. A standstill that lasts is held: every pin takes the same part
-    of its torque, and no more than all of it; one that ends begins to move against the
-    whole torque.
+    A standstill is prescribed with the couples of dry friction there, because an engine
+    has no friction at rest. A standstill that lasts is held: every pin takes the same
+    part of its torque, and no more than all of it; one that ends begins to move against
+    the whole torque.
     """
     assert command.omega_2 is not None
     friction: Friction | None = None

@@ -245,10 +245,10 @@ def _redraw(
     summary: Summary,
     engines: Sequence[Engine],
 ) -> pool.Job:
-    """Make the job of judging a scene once more, now with its pictures.
+    """Return the job of judging a scene once more, now with its pictures.
 
-    Its answers were not kept. An engine that broke down, or hung, in the scene is not
-    started in it again.
+    The scene's answers were not kept. An engine that broke down, or hung, in the scene
+    is not started in it again.
     """
     name = escape_controls(suite.name(scene))
     rows = next(record.rows for record in summary.pictured if record.name == name)
@@ -282,7 +282,7 @@ def _picture_models(suite: Suite, scenes: Iterable[int]) -> tuple[dict[str, str]
 def _draft_file(path: Path) -> Iterator[TextIO]:
     """Draft a text file line by line.
 
-    It is in place once it is complete, and removed if it is empty.
+    The file is in place once it is complete, and removed if it is empty.
     """
     draft = path.with_name(f".{path.name}.part")
     with name_file(path):
@@ -296,9 +296,9 @@ def _draft_file(path: Path) -> Iterator[TextIO]:
 
 
 def _list_timings(record: Record) -> Iterator[list[str]]:
-    """Give the seconds per answer, and their ratio to the formulas'.
+    """Yield the cells of each timing: seconds per answer and ratio to the formulas.
 
-    Both are on the same scene in the same process.
+    The ratio is of answers to the same scene in the same process.
     """
     for timing in record.timings:
         ratio = timing.seconds / record.timings[0].seconds

@@ -1,9 +1,8 @@
-"""The same linkage stated otherwise.
+"""The same linkage mirrored, turned, scaled, read from its other end, and in parts.
 
-It is mirrored, turned, scaled, read from its other end, and in parts. A symmetry of
-mechanics takes the formulas' numbers of one scene into those of another, which other
-branches of the code compute; it needs no reference. Scaling by powers of two changes no
-digit at all.
+A symmetry of mechanics takes the formulas' numbers of one scene into those of another,
+which other branches of the code compute; no reference is needed. Scaling by powers of
+two changes no digit at all.
 """
 
 import cmath
@@ -107,10 +106,7 @@ class _QuantitySizes(NamedTuple):
 
 @dataclass(frozen=True)
 class _Few:
-    """A scene at a few positions that are well-conditioned.
-
-    It holds what the formulas say of them.
-    """
+    """A scene at a few well-conditioned positions, with the formulas' solution."""
 
     scene: Scene
     command: Command
@@ -398,7 +394,7 @@ class _SceneConversion:
 
 
 def _from_other_end(length: float, pair: tuple[float, float]) -> tuple[float, float]:
-    """Return a place of a bar as it is read from its second pin."""
+    """Return a place of a bar, (distance, angle), seen from its second pin."""
     return cmath.polar(length - cmath.rect(*pair))
 
 

@@ -98,9 +98,9 @@ class MujocoSimulated:
         return replace(self, settings=settings)
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Run the sweep through in time, and read every quantity.
+        """Run the sweep through in time, and return every quantity along it.
 
-        It is read at the crank's own angle, speed and acceleration.
+        Quantities are those at the crank's own angle, speed and acceleration.
         """
         scene = state_from_pins(scene)
         if isinstance(scene.drive, PointDrive):

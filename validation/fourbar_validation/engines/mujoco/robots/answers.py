@@ -28,9 +28,9 @@ class LoopMotion(NamedTuple):
     alpha_2: float
 
     def thin_out(self, most: int) -> "LoopMotion":
-        """Return the motion with at most so many of the angles.
+        """Return the motion with at most so many of the angles, both ends among them.
 
-        They are spread evenly, both ends among them.
+        The angles are spread evenly.
         """
         count = min(len(self.theta_2), most)
         keep = np.linspace(0, len(self.theta_2) - 1, count).round().astype(int)
@@ -46,7 +46,7 @@ class PinsAndTorque:
     forces: dict[str, Array]
 
     def values(self) -> dict[str, Any]:
-        """Return them under one set of names."""
+        """Return the drive as "torque", and the pin forces, by their names."""
         return {"torque": self.torque, **self.forces}
 
 
@@ -136,10 +136,7 @@ class InsideAnswer:
     """Processor time of a step of the whole robot, s."""
 
     def errors(self) -> dict[str, Array]:
-        """Return the errors of the torque and of each pin force, (n,).
-
-        They are sizes at each state, N m and N.
-        """
+        """Return the size of the error of torque and pin forces, (n,), N m and N."""
         sizes = {}
         for name in FORCE_QUANTITIES:
             soft, rigid = (
@@ -164,7 +161,7 @@ class InsideAnswer:
     def find_worst(self, scales: Mapping[str, float]) -> float:
         """Return the worst error of torque and pin forces, each over its scale.
 
-        It is infinite without an answer.
+        The error is infinite without an answer.
         """
         if self.lost or not self.rows:
             return math.inf
@@ -197,10 +194,7 @@ class TornState:
 
 @dataclass(frozen=True, slots=True)
 class RobotSettings:
-    """Settings of the closures of one loop and of the stepping of its robot.
-
-    They have MJCF's names.
-    """
+    """Settings, by MJCF's names, of one loop's closures and of its robot's stepping."""
 
     solref: tuple[float, ...]
     solimp: tuple[float, ...]

@@ -180,7 +180,7 @@ def _measure_gap(
 class _Chain:
     """Joints from one end of a closure to the other, and the bars between them.
 
-    They lead over the common ancestor.
+    The chain leads over the common ancestor of both ends.
     """
 
     def __init__(
@@ -213,9 +213,9 @@ class _Chain:
         end: int,
         common: int,
     ) -> list[tuple[int, int | None]]:
-        """List the moving joints from an end up to the common ancestor.
+        """List (moving joint, its bearer) from an end up to the common ancestor.
 
-        Each has the bar that bears it, or None if that is another joint.
+        The bearer is a bar, or None if another joint bears this one.
         """
         up = climb(self.model, end)
         side: list[tuple[int, int | None]] = []
@@ -366,8 +366,8 @@ class _Finder:
     def _find_ball_in_a_plane(self, chain: _Chain, *, is_pin: bool) -> str:
         """Say what to type for one ball among hinges with parallel axes.
 
-        Both ends of the bar that it carries stay in their planes, so that a hinge moves
-        as the ball does. Empty where the loop is another.
+        Both ends of the bar that the ball carries stay in their planes, so that a hinge
+        moves as the ball does. Empty where the loop is another.
         """
         hinges = []
         others = []
@@ -447,10 +447,7 @@ class _Finder:
         *,
         is_pin: bool,
     ) -> str:
-        """Say what another number of hinges makes.
-
-        It says too what would make it a four-bar.
-        """
+        """Say what another number of hinges makes, and what makes it a four-bar."""
         freedoms = hinges - 3
         count = HINGES_IN_WORDS.get(hinges, f"{hinges} hinges")
         if freedoms <= 0:
@@ -597,8 +594,8 @@ class _Finder:
     ) -> list[int]:
         """List the joints of a chain that may be held, the likeliest first.
 
-        Those are joints without a motor. Several motors hold: one of them is held while
-        another moves. A spring holds its joint best.
+        Joints without a motor may be held. Several motors hold: one of them is held
+        while another moves. A spring holds its joint best.
         """
         driven = {joint for joint, _ in motors}
         several = len(driven) > 1
@@ -710,9 +707,9 @@ class _Finder:
         motors: list[tuple[int, int]],
         number: int,
     ) -> tuple[int, list[str]]:
-        """Choose the driven hinge among those of the ground.
+        """Return the driven hinge among those of the ground, and remarks.
 
-        It says so if no motor decides it.
+        A remark says so if no motor decides.
         """
         model = self.model
         at_ground = [joint for joint in (first, last) if joint is not None]
@@ -745,7 +742,7 @@ class _Finder:
     def _find_pushed(self, at_ground: list[int], number: int) -> tuple[int | None, str]:
         """Return the one hinge of the ground whose bar another closure moves.
 
-        That closure's name is returned too.
+        The closure's name follows; (None, "") if there is not exactly one such hinge.
         """
         pushed: dict[int, str] = {}
         hinge_of = {self.root[int(self.model.jnt_bodyid[j])]: j for j in at_ground}
@@ -921,9 +918,9 @@ class _Layout:
         return next(bar for bar in PINS[cut] if root in self.bodies[bar])
 
     def _choose_along(self) -> Array:
-        """Return x of the plane in world axes.
+        """Return the unit vector x of the plane in world axes, (3,).
 
-        It is across gravity unless the plane is level, else from O2 to O4.
+        The direction is across gravity unless the plane is level, else from O2 to O4.
         """
         gravity = self.model.opt.gravity
         in_plane = gravity - (gravity @ self.normal) * self.normal

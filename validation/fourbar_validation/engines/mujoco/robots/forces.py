@@ -54,7 +54,7 @@ class BearerForces:
 def read_equality_force(data: mujoco.MjData, equality: int) -> Array:
     """Return the force of a connect or a weld on its first body, world axes, (3,), N.
 
-    It is NaN where the equality has no rows, since it is switched off.
+    An equality that is switched off has no rows: its force is NaN.
     """
     kinds = data.efc_type[: data.nefc]
     of_equalities = kinds == mujoco.mjtConstraint.mjCNSTR_EQUALITY

@@ -178,8 +178,8 @@ class LoopInside:
     def close(self, theta_2: float) -> Array | None:
         """Return the pose at an angle of bar 2, or None if the loop is open.
 
-        It is reached from the last one in small strides. Each begins as the one before
-        it went on, so that the motion passes a change point smoothly.
+        The loop is followed from the last pose in small strides. A stride begins as the
+        one before it went on, so that the motion passes a change point smoothly.
         """
         start = self.angle(self._last)
         strides = max(math.ceil(abs(theta_2 - start) / _STRIDE), 1)
@@ -200,9 +200,9 @@ class LoopInside:
         return qpos
 
     def _find_rates(self, qpos: Array) -> Array:
-        """Return the turn of the hinges that are not driven by that of the driven one.
+        """Return the turn of the other hinges by that of the driven one, (k,).
 
-        It is that of the closed loop in a pose, (number of these hinges,).
+        The loop is closed in a pose; k is the number of hinges that are not driven.
         """
         _, jacobian = self._evaluate_closure(qpos)
         return _solve_least_squares(
@@ -234,9 +234,10 @@ class LoopInside:
         return least <= allowed
 
     def measure_transmission(self, qpos: Array) -> float:
-        """Return how well the hinges that are not driven close the gap in a pose, m.
+        """Return the least movement of the gap by the other hinges in a pose, m/rad.
 
-        It is zero where the bars of pin B are in line.
+        At zero the bars of pin B are in line, and hinges that are not driven cannot
+        close a gap in one direction.
         """
         _, jacobian = self._evaluate_closure(qpos)
         sizes = np.linalg.svd(jacobian[:, self.passive], compute_uv=False)
@@ -256,7 +257,7 @@ class LoopInside:
     def _find_line(self, bar: int) -> Array:
         """Return the unit vector from the first pin of a bar to its second, (3,).
 
-        It is in world axes, in the pose in which the closure was evaluated last.
+        World axes, in the pose in which the closure was evaluated last.
         """
         body = self.loop.bodies[bar][0]
         first, second = (self.loop.points[bar, pin] for pin in ENDS[bar])
@@ -286,7 +287,7 @@ class LoopInside:
     def _evaluate_closure(self, qpos: Array) -> tuple[Array, Array]:
         """Return the closure's residual in the plane and its derivative.
 
-        Their shapes are (m,) and (m, nv).
+        The shapes are (m,) and (m, nv).
         """
         data = self.closing
         data.qpos[:] = qpos
@@ -377,7 +378,7 @@ class LoopInside:
     def _list_sticking(self) -> tuple[str, ...]:
         """List the hinges of the loop that turn and stick.
 
-        Their dry friction has not reached its couple.
+        A hinge sticks if its dry friction has not reached its couple.
         """
         model = self.model
         data = self.data
@@ -401,7 +402,7 @@ class LoopInside:
 
     @property
     def lever(self) -> float:
-        """What pin forces are multiplied by to be of the drive's kind, m or 1."""
+        """Factor of pin forces that makes them of the drive's kind, m or 1."""
         if self.acting is not None and self.acting.drive is not None:
             return 1.0
         return self.loop.longest
@@ -517,10 +518,7 @@ class LoopInside:
         return np.asarray(residual)
 
     def _read_forces(self, data: mujoco.MjData) -> dict[str, Array]:
-        """Read the pin forces of a state that was evaluated, (2,) each, N.
-
-        They are in the axes of the plane.
-        """
+        """Return the pin forces of an evaluated state in the plane's axes, (2,), N."""
         ground_body = self.loop.bodies[1][0]
         ground = data.xmat[ground_body].reshape(3, 3)
         across = np.cross(self.loop.axis, self.loop.along)

@@ -1,6 +1,6 @@
 """Questions to a robot's file, and facts on its closed loops.
 
-They are plain data, without MuJoCo.
+Everything here is plain data, without MuJoCo.
 """
 
 import math

@@ -235,7 +235,7 @@ def _compare_at_same_angles(
 ) -> Influence:
     """Return by how much the errors of two runs differ at the same angles.
 
-    Each is the error at its own state: the motions differ too, and near a limit
+    An error is that at its run's own state: the motions differ too, and near a limit
     position the forces with them. `scales`: those of the errors, N m and N.
     """
     if one.lost or other.lost:

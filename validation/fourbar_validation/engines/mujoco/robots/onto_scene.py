@@ -50,7 +50,7 @@ def close_onto(
 ) -> tuple[RobotLoop, PosedRobot]:
     """Return the loop as a scene has it, and the robot in a pose of that assembly.
 
-    Its input is driven, and its plane is seen from the same side.
+    The scene's input is driven, and the plane is seen from the scene's side.
 
     Raises
     ------
@@ -171,9 +171,9 @@ def _fits_gravity(
     posed: PosedRobot,
     loop: RobotLoop,
 ) -> bool:
-    """Tell whether gravity has the direction that it has in a scene.
+    """Return whether gravity has the direction that it has in a scene.
 
-    Its size is for the comparison; where one of them has none, no side fits.
+    Sizes are compared elsewhere; without gravity in one of the two, no side fits.
     """
     model = posed.model
     wanted = np.zeros(2)

@@ -1,10 +1,10 @@
-"""The pose in which a robot is looked at.
+"""The pose in which a robot is measured: the file's or the stated one, closed again.
 
-It is that of the file, or the stated one, closed again by least squares. The residuals
-are those of MuJoCo's own active equalities, the unknowns the joints that they depend
-on. A step of Gauss and Newton is a linear least-squares problem within the joints'
-ranges; damping keeps the pose near the one that was stated. Joints that a motor holds
-move only where the others cannot close the loops.
+Least squares closes the pose. The residuals are those of MuJoCo's own active
+equalities, the unknowns the joints that they depend on. A step of Gauss and Newton is a
+linear least-squares problem within the joints' ranges; damping keeps the pose near the
+one that was stated. Joints that a motor holds move only where the others cannot close
+the loops.
 """
 
 import math
@@ -238,10 +238,7 @@ def _read_joint_position(
 
 
 def _list_bounds(model: mujoco.MjModel) -> tuple[Array, Array]:
-    """Return the range of each degree of freedom, (nv,) each.
-
-    It is infinite if it has none.
-    """
+    """Return the range of each degree of freedom, (nv,) each; infinite if unlimited."""
     low = np.full(model.nv, -np.inf)
     high = np.full(model.nv, np.inf)
     for joint in range(model.njnt):
@@ -294,10 +291,7 @@ class _Closing:
         self.dofs = [dof for joint in self.joints for dof in list_dofs(model, joint)]
 
     def _residuals(self) -> tuple[Array, Array]:
-        """Return residuals of the equalities and their derivatives.
-
-        They are (m,) and (m, nv).
-        """
+        """Return the equalities' residuals, (m,), and their Jacobian, (m, nv)."""
         data = self.data
         if not data.nefc:
             return np.zeros(0), np.zeros((0, self.model.nv))
@@ -321,10 +315,7 @@ class _Closing:
         return float(np.abs(residuals).max(initial=0.0))
 
     def close(self, start: Array) -> Array:
-        """Return the pose within the ranges with the least residuals, (nq,).
-
-        It is near `start`.
-        """
+        """Return the pose near `start` of least residuals in the ranges, (nq,)."""
         from scipy.optimize import lsq_linear
 
         qpos = self._bring_inside(start)

@@ -1,8 +1,7 @@
-"""A scene from a loop of a robot.
+"""A scene from a loop of a robot: lengths, masses, effects and range, in the pose.
 
-It has lengths, masses, effects and range, in the pose, with everything else held. What
-hangs on a bar by other joints is held as it stands and counts with its mass. What a
-scene cannot hold is named with its size.
+Everything else is held. What hangs on a bar by other joints is held as it stands and
+counts with its mass. What a scene cannot hold is named with its size.
 """
 
 import cmath
@@ -142,9 +141,9 @@ def make_loop_scene(
 
 
 def _list_carried(model: mujoco.MjModel, loop: RobotLoop) -> dict[int, list[int]]:
-    """List the bodies that move with each moving bar.
+    """Return the bodies that move with each moving bar, by the bar's number.
 
-    Those that hang on it by held joints are included.
+    Bodies that hang on the bar by held joints are included.
     """
     bar_of = {body: bar for bar, bodies in loop.bodies.items() for body in bodies}
     carried: dict[int, list[int]] = {bar: [] for bar in MOVING_BARS}
@@ -158,18 +157,12 @@ def _list_carried(model: mujoco.MjModel, loop: RobotLoop) -> dict[int, list[int]
 
 
 def _reflect_armature(model: mujoco.MjModel, joint: int) -> float:
-    """Return the armature of a hinge, kg m^2.
-
-    That of its motors behind their gears is included.
-    """
+    """Return the armature of a hinge and of its geared motors, kg m^2."""
     return _sum_over_motors(model, joint, model.dof_armature, "actuator_armature")
 
 
 def _reflect_damping(model: mujoco.MjModel, joint: int) -> float:
-    """Return the damping of a hinge, N m s/rad.
-
-    That of its motors behind their gears is included.
-    """
+    """Return the damping of a hinge and of its geared motors, N m s/rad."""
     damping = model.dof_damping * is_enabled(model, "damper", "passive")
     return _sum_over_motors(model, joint, damping, "actuator_damping")
 
@@ -213,7 +206,7 @@ def round_off(number: float) -> float:
 def _round_angle(angle: float) -> float:
     """Round an angle to the digits that a compiled model has, rad; -0.0 becomes 0.0.
 
-    It is rounded in degrees, so that a right angle stays one to its last digit.
+    Degrees are rounded, so that a right angle stays one to its last digit.
     """
     return math.radians(round(math.degrees(angle), _DECIMALS_OF_A_DEGREE) + 0.0)
 
@@ -501,9 +494,9 @@ class _SceneOfLoop:
             )
 
     def _list_loads(self) -> Iterator[Load]:
-        """List the forces by which bodies are held against gravity (gravcomp).
+        """Yield the forces by which bodies are held against gravity (gravcomp).
 
-        They act where the bodies have them.
+        The point of action of each is where the bodies have it.
         """
         data = self.data
         lifted_masses = list_lifted_masses(self.model)
@@ -522,7 +515,7 @@ class _SceneOfLoop:
     def _find_sweep(self, linkage: FourBar) -> "_MotionOverRange":
         """Follow the loop over the range of the driven hinge.
 
-        It ends where the loop does not assemble or another hinge stops it.
+        The range ends where the loop does not assemble or another hinge stops it.
         """
         theta_2 = self.loop.angles[1]
         low, high = self._find_range("O2", theta_2)
@@ -571,9 +564,9 @@ class _SceneOfLoop:
         )
 
     def _find_range(self, pin: str, beta: float) -> tuple[float, float]:
-        """Return the angles between the bars of a pin at which its hinge stops.
+        """Return the angles between the bars of a pin at which its hinge stops, rad.
 
-        They are in rad. `beta`: that in the pose.
+        `beta`: the angle in the pose.
         """
         model = self.model
         loop = self.loop
@@ -590,10 +583,7 @@ class _SceneOfLoop:
         angles: Array,
         in_pose: int,
     ) -> dict[str, Array]:
-        """Return the angle between the bars of each pin along theta_2, rad.
-
-        It is continuous.
-        """
+        """Return the continuous angle between each pin's bars along theta_2, rad."""
         branch = self._find_branch(linkage, self.loop.angles[1])
         motion = Motion(angles, branch=branch)
         solution = solve(Scene(linkage, motion), "position")
@@ -745,9 +735,9 @@ def _find_run(free: NDArray[np.bool_], near: int) -> NDArray[np.intp]:
 
 
 def _find_assembling(linkage: FourBar, theta_2: float) -> tuple[float, float]:
-    """Return the range of theta_2 in which the loop assembles.
+    """Return the range of theta_2 around a position in which the loop assembles.
 
-    It is around a position, and a little less than the whole.
+    The ends are a little inside the limit positions.
     """
     if turns_fully(linkage):
         return -math.inf, math.inf

@@ -1,8 +1,8 @@
 """Settings to type into a robot's file.
 
-Each setting of a loop's softness and of the stepping is measured in the file itself. A
-setting is changed alone first. Then combinations are tried, those that cost least time
-first, until one keeps the torque and the pin forces within the wanted error.
+Softness of a loop and stepping are measured in the file itself, first with one setting
+changed alone. Then combinations are tried, those that cost least time first, until one
+keeps the torque and the pin forces within the wanted error.
 """
 
 import math
@@ -156,9 +156,10 @@ class SettingsSearch:
     def _answer(
         self, settings: RobotSettings, motion: LoopMotion
     ) -> list[InsideAnswer]:
-        """Return the answer at single states, then through time, as far as there are.
+        """Return the answers at single states and through time.
 
-        There is none where a run takes too many steps or the settings tear the loop.
+        One that takes too many steps is left out, as are those after it, and so are all
+        where the settings tear the loop.
         """
         changed = _set_settings(self.model, self.loop, settings)
         inside = LoopInside(changed, self.loop, self.drive)
@@ -259,10 +260,7 @@ class SettingsSearch:
             yield replace(own, tolerance=tolerance)
 
     def _list_values(self) -> dict[str, list[Any]]:
-        """List the values of each setting that combinations are made of.
-
-        Those of the file come first.
-        """
+        """Return the values of each setting that are combined, the file's own first."""
         own = self.own
         if own.solref[0] > 0.0:
             constant = own.solref[0]
@@ -289,9 +287,10 @@ class SettingsSearch:
         }
 
     def _find_cheapest(self, wanted: float) -> tuple[TriedSettings, bool]:
-        """Try combinations until one serves.
+        """Try combinations until one serves, and return it and True.
 
-        They are ordered by their cost and the number of changes.
+        The cheapest with the fewest changes is tried first. If none serves in time, the
+        most accurate one and False are returned.
         """
         values = self._list_values()
         solvers: list[dict[str, Any]] = [{}]
@@ -318,9 +317,9 @@ class SettingsSearch:
         return min(self.tried.values(), key=lambda one: one.error), False
 
     def _rank(self, settings: RobotSettings) -> tuple[float, int, float]:
-        """Return the order of combinations.
+        """Return the key by which combinations are sorted.
 
-        It is by evaluations of a simulated second, changes, stiffness.
+        Its parts are evaluations per simulated second, changes, and stiffness.
         """
         evaluations = _EVALUATIONS.get(settings.integrator, 1.0) / settings.timestep
         changes = settings.list_changes(self.own)
@@ -332,10 +331,7 @@ def _write_elements(
     loop: RobotLoop,
     tried: TriedSettings,
 ) -> tuple[str, ...]:
-    """Write the elements of the file that are to be changed.
-
-    They are written as they are to stand there.
-    """
+    """Return the elements of the file that are to be changed, with their new values."""
     written = []
     option = {
         name: value
