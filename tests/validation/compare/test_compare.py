@@ -59,7 +59,7 @@ def test_an_error_beyond_the_allowed_one_is_held_to_its_prediction(
     expected = None if predicted is None else np.array([0.0, predicted, 0.0])
     worst = judge_errors(make_errors(1e-15, 1e-12, 0.0), expected)
     assert (worst.position, worst.verdict) == (1, verdict)
-    assert worst.allowed == pytest.approx(allowed)
+    assert worst.allowed == pytest.approx(allowed, abs=0)
 
 
 def test_within_what_is_allowed_no_prediction_is_needed() -> None:
