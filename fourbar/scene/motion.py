@@ -8,6 +8,7 @@ import sys
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import accumulate
 from typing import Any, ClassVar
 
@@ -281,22 +282,22 @@ class Law(_OverTime):
         Raises DependencyError where SciPy is not installed.
         """
         try:
-            from scipy.interpolate import BPoly, CubicSpline
+            from scipy.interpolate import CubicSpline
         except ModuleNotFoundError:
             raise DependencyError(
                 f"SciPy is needed for a motion law: {say_install('studies')}"
             ) from None
         time = require_numbers("time", time)
-        t = np.array(self.time)
-        angle = np.array(self.angle)
         if self.omega is not None:
             rates = [self.omega] if self.alpha is None else [self.omega, self.alpha]
-            pieces = BPoly.from_derivatives(t, np.stack([angle, *rates], axis=1))
+            theta, omega, alpha = _fit_rates(self.time, self.angle, *rates)
             return (
-                np.asarray(pieces(time)),
-                np.asarray(pieces.derivative(1)(time)),
-                np.asarray(pieces.derivative(2)(time)),
+                np.asarray(theta(time)),
+                np.asarray(omega(time)),
+                np.asarray(alpha(time)),
             )
+        t = np.array(self.time)
+        angle = np.array(self.angle)
         mean = 0.0
         if self.ends == "periodic":
             # what is periodic is the departure from the mean speed
@@ -461,6 +462,19 @@ class Sine(_OverTime):
         swing = self.amplitude * np.sin(phase)
         omega = self.amplitude * self.frequency * np.cos(phase)
         return self.mean + swing, omega, -(self.frequency**2) * swing
+
+
+@lru_cache(maxsize=16)
+def _fit_rates(time: tuple[float, ...], *values: tuple[float, ...]) -> tuple[Any, ...]:
+    """Fit the polynomials through angles and their rates at the times of a table.
+
+    Return the functions of the angle, the speed and the acceleration by time. An
+    engine asks for them at each of its steps.
+    """
+    from scipy.interpolate import BPoly
+
+    pieces = BPoly.from_derivatives(np.array(time), np.stack(values, axis=1))
+    return pieces, pieces.derivative(1), pieces.derivative(2)
 
 
 def _part(kind: str, time: Array, duration: float) -> tuple[Array, Array, Array]:
