@@ -171,7 +171,6 @@ def plot(
 
 
 def _say_written(out: Path, frames: int = 0) -> None:
-    """Say what was written, unless it went to standard output."""
     if out != STANDARD_STREAM:
         click.echo(f"wrote {out}" + (f": {frames} frames" if frames else ""))
 

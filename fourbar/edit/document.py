@@ -141,11 +141,11 @@ class SceneDocument:
             raise InputError("TOML", text[:60], f"cannot be read: {error}") from None
 
     def become(self, text: str) -> None:
-        """Hold another file."""
+        """Replace the tables by those of another text."""
         self.tree = SceneDocument(text).tree
 
     def text(self) -> str:
-        """Write the file."""
+        """Return the text of the file."""
         return tomlkit.dumps(self.tree)
 
     def at(self, path: KeyPath) -> Any:

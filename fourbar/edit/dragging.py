@@ -48,7 +48,7 @@ class _Handle(NamedTuple):
     """True if the force's direction turns with the bar."""
 
     def drawn(self) -> dict[str, Any]:
-        """Write it for the page."""
+        """Return the handle as the page has it, complex places as pairs."""
         plain = {
             name: [z.real, z.imag]
             for name, z in (("at", self.at), ("beyond", self.beyond))
@@ -106,7 +106,6 @@ def _hold_drive(drive: ForceDrive, scene: Scene) -> list[_Handle]:
 
 
 def _hold_ends(name: str, path: KeyPath, line: Any, scene: Scene) -> list[_Handle]:
-    """List the handles of both ends of a line between two bars."""
     return [
         _hold_place(f"{end} of {name}", (*path, end), place, scene)
         for end, place in (("from", line.start), ("to", line.end))

@@ -84,7 +84,7 @@ class Redirect:
         return True
 
     def write(self, address: str) -> None:
-        """Lead to an address."""
+        """Make the page lead to an address."""
         assert self.handle is not None
         os.write(self.handle, REDIRECT_PAGE.format(address=address).encode())
 

@@ -86,12 +86,12 @@ class Workbench:
             self.timers.pop(name).cancel()
 
     def join(self, line: "_PageLine") -> None:
-        """Welcome a page."""
+        """Add a page, and cancel the end of a server without pages."""
         self.pages.add(line)
         self.cancel_timer("gone")
 
     def leave(self, line: "_PageLine") -> None:
-        """Forget a page; some time after the last one the server ends."""
+        """Remove a page; some time after the last one the server ends."""
         self.pages.discard(line)
         if not self.pages:
             self.set_timer("gone", GONE, self.ended.set)
@@ -346,7 +346,7 @@ class _Guarded(RequestHandler):
     """Answers only requests for this address, with the token."""
 
     def initialize(self, bench: Workbench, hosts: frozenset[str]) -> None:
-        """Know the workbench and the names of this address."""
+        """Store the workbench and the names of this address."""
         self.bench = bench
         self.hosts = hosts
 
@@ -381,7 +381,7 @@ class _Guarded(RequestHandler):
             self.set_header(name, value)
 
     def write_error(self, status_code: int, **details: Any) -> None:
-        """Say no more than the status."""
+        """Write the status alone."""
         self.finish(f"{status_code}\n")
 
     def log_exception(self, kind: Any, error: Any, traceback: Any) -> None:
@@ -458,7 +458,7 @@ class _PageLine(WebSocketHandler, _Guarded):
         return True
 
     def open(self, *args: str, **kwargs: str) -> None:
-        """Welcome the page."""
+        """Add the page to the workbench, and keep its connection open."""
         self.set_nodelay(True)
         self.unread = 0
         self.stream = getattr(self.ws_connection, "stream", None)
@@ -502,7 +502,7 @@ class _PageLine(WebSocketHandler, _Guarded):
             self.close(1003, "no JSON object")
 
     def on_close(self) -> None:
-        """Forget the page."""
+        """Remove the page from the workbench."""
         self.bench.leave(self)
 
 
@@ -531,10 +531,10 @@ def _make_application(bench: Workbench, port: int) -> Application:
 
 
 class Nothing(RequestHandler):
-    """Any other address."""
+    """Reply to any other address."""
 
     def prepare(self) -> None:
-        """Refuse it, and say nothing."""
+        """Refuse the request with the status 404 alone."""
         self.set_header("Server", "fourbar")
         self.set_status(404)
         self.finish("404\n")

@@ -346,7 +346,6 @@ _cached_units = cache(units)
 
 
 def _require_readable_units(name: str) -> None:
-    """Raise InputError for units that cannot be read."""
     if name != _AS_THE_FILE:
         _cached_units(name)
 

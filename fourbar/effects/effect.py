@@ -81,9 +81,9 @@ class Actions:
         """
 
     def add(self, terms: Iterable[Any]) -> Self:
-        """Add what loads and effects do, less what depends on the pin forces.
+        """Add what loads and effects do, and return these sums.
 
-        These sums themselves are returned.
+        Couples that depend on the pin forces are left out.
         """
         for term in terms:
             term.act(self, self.state)
@@ -284,7 +284,6 @@ class Actions:
 
 @cache
 def _find_common_pin(first: int, second: int) -> str | None:
-    """Return the pin at which two bars meet, or None if they have none in common."""
     for pin, bars in PINS.items():
         if {first, second} == {*bars}:
             return pin
@@ -361,9 +360,10 @@ class Effect:
         raise NotImplementedError
 
     def act_on_free_bodies(self, motion: Any, wrenches: Any) -> None:
-        """Apply it to the free bodies, from their own motion: a second derivation too.
+        """Apply the effect to the free bodies, from their own motion.
 
-        `motion`, `wrenches`: of `engines.free_body_effects`.
+        The code is a second derivation. `motion`, `wrenches`: of
+        `engines.free_body_effects`.
         """
         raise NotImplementedError
 
@@ -379,7 +379,7 @@ class Effect:
 
     @property
     def loaded_pins(self) -> tuple[str, ...]:
-        """Pins whose forces it depends on itself."""
+        """Pins on whose forces the effect itself depends."""
         return ()
 
     @property
@@ -389,7 +389,7 @@ class Effect:
 
     @property
     def dry_pins(self) -> tuple[str, ...]:
-        """Pins at which its couples jump."""
+        """Pins at which couples of the effect jump."""
         return ()
 
     def with_places(self, change: Callable[[Any], Any]) -> Self:
@@ -417,7 +417,7 @@ class Effect:
     def act_known(self, actions: Actions, forces: Mapping[str, Array]) -> None:
         """Add what `act` leaves to the solution of the pin forces.
 
-        `forces`: by name, (n, 2), N; they are known by now.
+        `forces`: solved pin forces by name, (n, 2), N.
         """
 
     def breaks(self, state: State) -> dict[str, Number]:

@@ -28,7 +28,7 @@ class Friction(PinRows):
 
     @property
     def dry_pins(self) -> tuple[str, ...]:
-        """The pins at which it acts."""
+        """Pins with friction."""
         return tuple(pin for pin, f in self.torques if is_any(f != 0.0))
 
     def act(self, actions: Actions, state: State) -> None:

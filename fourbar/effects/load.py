@@ -90,11 +90,10 @@ class Table:
         return math.isclose(self.theta_2[-1] - self.theta_2[0], TURN, rel_tol=1e-12)
 
     def at(self, theta_2: Any) -> Any:
-        """Interpolate the factor.
+        """Interpolate the factor; InputError for a position outside the table.
 
-        Raises InputError for a position that the table does not cover. What the angle
-        is beyond the table's last point before it is theta_2 less the point and whole
-        turns, of which nothing is rounded but the result.
+        An angle beyond the table's last point before it is theta_2 less the point and
+        whole turns, of which nothing is rounded but the result.
         """
         first = self.theta_2[0]
         wrapped = shorten(angle(polar(1.0, theta_2)))

@@ -80,12 +80,12 @@ class PinFriction(PinRows):
 
     @property
     def loaded_pins(self) -> tuple[str, ...]:
-        """The pins whose forces it depends on."""
+        """Pins with friction, on whose forces the couples depend."""
         return tuple(pin for pin, mu, r in self.pins if is_any(mu * r != 0.0))
 
     @property
     def dry_pins(self) -> tuple[str, ...]:
-        """The pins at which it acts."""
+        """Pins with friction."""
         return self.loaded_pins
 
     def per_unit(
@@ -239,7 +239,7 @@ class _Sliding(NamedTuple):
 
 
 def solve_sliding(F: Array, C: Array, k: Array) -> _Sliding:
-    """Solve n problems in p unknowns.
+    """Solve n problems in p unknowns x_p = k_p |F_p + sum over q of C_pq x_q|.
 
     F (n, p, 2) is in N, C (n, p, p, 2) in 1/m, k (n, p) in m.
     """

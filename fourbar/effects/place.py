@@ -105,7 +105,7 @@ class Place(NamedTuple):
     def in_bar(self) -> Any:
         """Vector from the first pin in the bar's frame, along + i across its line, m.
 
-        Its type is always an array, so that products round alike.
+        An array is returned even for one place, so that products round alike.
         """
         z = self.vector()
         if isinstance(z, complex):

@@ -189,7 +189,6 @@ def read_tables(document: dict[str, Any], name: str = "scene") -> Scene:
 
 
 def _write_name(name: str) -> str:
-    """Write the name of a file for an error."""
     return name if name.isprintable() else repr(name)
 
 

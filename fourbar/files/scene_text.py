@@ -350,7 +350,6 @@ def _write_effect(effect: Effect) -> Any:
 
 
 def _write_ends(line: Any) -> dict[str, Any]:
-    """Write the entries `from` and `to` of a line between two bars."""
     return {
         "from": {"bar": line.start.bar, **_write_place(line.start)},
         "to": {"bar": line.end.bar, **_write_place(line.end)},
@@ -381,7 +380,6 @@ def _write_place(place: Place) -> dict[str, Any]:
 
 
 def _write_toml_table(name: str, entries: dict[str, Any]) -> str:
-    """Write one TOML table."""
     heading = f"[{name}]\n" if name else ""
     return heading + "".join(
         f"{key} = {_write_toml_value(key, value)}\n" for key, value in entries.items()

@@ -142,14 +142,12 @@ class Pair(NDArrayOperatorsMixin):
 
 
 def _as_pair(number: Any) -> Pair:
-    """Return a pair as it is, doubles as pairs."""
     if isinstance(number, Pair):
         return number
     return Pair(np.asarray(number), 0.0)
 
 
 def _choose(mask: Any, x: Any, y: Any) -> Any:
-    """Return x where a mask holds, y elsewhere."""
     x = _as_pair(x)
     y = _as_pair(y)
     high = np.where(mask, x.high, y.high)
@@ -201,7 +199,6 @@ def _multiply(x: Any, y: Any) -> Any:
 
 
 def _join_parts(x: Any, y: Any) -> Any:
-    """Make complex numbers of their parts."""
     return Pair(x.high + 1j * y.high, x.low + 1j * y.low)
 
 

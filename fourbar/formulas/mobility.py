@@ -126,7 +126,6 @@ def reach_of(linkage: FourBar, bar: int = 2) -> Reach:
 
 
 def _wrap(angle: float) -> float:
-    """Wrap the angle into (-pi, pi]."""
     rest = math.remainder(angle, TURN)
     return math.pi if rest <= -math.pi else rest
 

@@ -403,7 +403,7 @@ def _compute_acceleration_scale(scene: Scene) -> float:
 
 
 def _sum_inertia(linkage: FourBar) -> float:
-    """Sum of m L^2 + I, kg m^2."""
+    """Return the sum of m L^2 + I of the moving bars, kg m^2."""
     longest = max(linkage.lengths)
     inertia = 0.0
     for number in MOVING_BARS:

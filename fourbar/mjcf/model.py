@@ -195,7 +195,6 @@ def write_exactly(*numbers: float) -> str:
 
 
 def _find_body(root: ET.Element, bar: int) -> ET.Element:
-    """Find the body of a bar."""
     body = root.find(f".//body[@name='{BAR_NAMES[bar]}']")
     assert body is not None
     return body

@@ -372,7 +372,7 @@ class Command(NamedTuple):
         return places if self.time is None else self.time
 
     def part(self, index: Any) -> "Command":
-        """Take some of the positions."""
+        """Return the command at some of the positions."""
         rows: list[Any] = [
             value[index] if isinstance(value, np.ndarray) and value.ndim else value
             for value in self

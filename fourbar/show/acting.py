@@ -215,7 +215,6 @@ def _command_between(scene: Scene, at: Command, places: Array) -> Command:
 def _write_stretches(
     solution: Solution, stretches: list[_Stretch], units: Conversion
 ) -> str:
-    """Write stretches, joined by "and"."""
     return " and ".join(_write_stretch(solution, one, units) for one in stretches)
 
 

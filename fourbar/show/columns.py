@@ -229,7 +229,6 @@ def _list_column_quantities(solution: Solution) -> list[str]:
 
 
 def _is_place(solution: Solution, name: str) -> bool:
-    """Return True for a point or an instant centre."""
     known = name in _list_column_quantities(solution)
     return known and not is_scalar(name) and find_unit_of_quantity(name) == "m"
 

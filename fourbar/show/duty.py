@@ -395,7 +395,7 @@ def read_drive_demand(solution: Solution) -> Driving:
 
 
 def describe_drive(scene: Scene) -> str:
-    """Say what is driven."""
+    """Return the words for what the drive acts on."""
     if scene.drive is not None:
         start, *others = (place.bar for _, place in scene.drive.ends)
         if not others:

@@ -302,7 +302,7 @@ def rank_numbers(derivatives: Sensitivity, names: list[str]) -> list[str]:
 
 
 def write_sensitivity_json(derivatives: Sensitivity) -> str:
-    """Write one object in SI units and rad: d(quantity)/d(key) over the positions.
+    """Write d(quantity)/d(key) over the positions as one JSON object, SI and rad.
 
     Vectors are [x, y]; null stands for no value.
     """
@@ -332,9 +332,9 @@ _MOVES = {0: "stays", 1: "theta_2 grows", -1: "theta_2 falls"}
 
 
 def write_equilibria(title: str, rest: Equilibria, units: Conversion = COMMON) -> str:
-    """Write both tables as text.
+    """Write the tables of equilibria and of what holds the positions as text.
 
-    The branch that they name is the assembly, as a scene states it with the position.
+    A branch in the tables is the assembly, as a scene states it with the position.
 
     `units`: units of the numbers; one that is left out is the SI unit.
     """
@@ -537,7 +537,7 @@ def _write_degrees(angle: float) -> str:
 
 
 def write_equilibria_json(title: str, rest: Equilibria) -> str:
-    """Write one object, SI and rad."""
+    """Write equilibria as one JSON object, SI and rad."""
     positions, keys = rest.positions, read_drive_demand(rest.positions).keys
     return write_object(
         _EQUILIBRIUM_SCHEMA,

@@ -591,7 +591,6 @@ def _find_change_points(solution: Solution) -> list[int]:
 
 
 def _list_sign_changes(values: Array) -> list[int]:
-    """List the steps within which values change their sign."""
     steps: list[int] = np.flatnonzero(values[:-1] * values[1:] < 0.0).tolist()
     return steps
 
@@ -779,7 +778,6 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
 
 
 def _count_statuses(solution: Solution) -> dict[str, int]:
-    """Count the positions of each status."""
     counts = {}
     codes, numbers = np.unique(solution.status_code, return_counts=True)
     for code, number in zip(codes, numbers, strict=True):

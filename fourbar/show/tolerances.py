@@ -286,7 +286,7 @@ def collect_tolerances(
 
 
 def write_spreads_json(spreads: Tolerances) -> str:
-    """Write one object in SI units and rad.
+    """Write the spreads as one JSON object, SI and rad.
 
     Arrays are over the positions, null where there is no value.
     """

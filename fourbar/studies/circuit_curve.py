@@ -333,7 +333,7 @@ class CircuitCurve:
         )
 
     def slope(self, points: Array) -> Array:
-        """Compute dQ/ds."""
+        """Compute dQ/ds along the curve."""
         k = self.state(points).k
         psi, mu = (
             Sloped(x, h[None]) for x, h in zip(points.T, (k.h2, k.h43), strict=True)
@@ -357,7 +357,7 @@ class CircuitCurve:
         )
 
     def in_rows(self, tau: Array, branch: Array) -> Array:
-        """Compute points of several rows."""
+        """Return points of several rows as psi and mu, (n, 2)."""
         points = np.empty((len(tau), 2))
         for row in self.rows:
             points[branch == row] = self.point(tau[branch == row], row)

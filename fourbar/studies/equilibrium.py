@@ -441,7 +441,6 @@ def _add_friction(curve: CircuitCurve, points: Array, side: int) -> Array:
 
 
 def _holds(curve: CircuitCurve, points: Array) -> NDArray[np.bool_]:
-    """Mark the points where friction holds."""
     return (_add_friction(curve, points, 1) <= 0.0) & (
         _add_friction(curve, points, -1) >= 0.0
     )
@@ -526,7 +525,6 @@ def _list_ranges(
 
 
 def _is_inside(curve: CircuitCurve, point: Array, part: _CircuitRange) -> bool:
-    """Return True if a point lies in a range."""
     tau, row = curve.tau(point[None])
     beyond = np.remainder(tau[0] - part.low, curve.period)
     return bool(row[0] == part.row and beyond <= part.width)

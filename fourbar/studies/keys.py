@@ -148,7 +148,6 @@ def _list_effect(effect: Any, key: str, place: NumberPath) -> dict[str, SceneNum
 
 
 def _list_ends(line: Any, key: str, place: NumberPath) -> dict[str, SceneNumber]:
-    """List the entries of both ends of a line between two bars."""
     entries = dict[str, SceneNumber]()
     for name, end in (("from", "start"), ("to", "end")):
         entries |= _list_place(getattr(line, end), f"{key}.{name}", (*place, end))
@@ -156,7 +155,6 @@ def _list_ends(line: Any, key: str, place: NumberPath) -> dict[str, SceneNumber]
 
 
 def _list_drive(drive: Any) -> dict[str, SceneNumber]:
-    """List the entries of a drive that exerts a force."""
     if drive.has_stroke:
         return _list_ends(drive, "drive", ("drive",))
     place = _list_place(drive.place, "drive", ("drive", "place"))
@@ -190,7 +188,6 @@ def _list_bar(bar: Bar, number: int) -> dict[str, SceneNumber]:
 
 
 def _list_pins() -> dict[str, SceneNumber]:
-    """List the coordinates of the drawn pins."""
     return {
         f"pins.{pin}.{axis}": SceneNumber(("drawing", pin, axis), PIN_COORDINATE.unit)
         for pin in PINS

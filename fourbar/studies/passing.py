@@ -363,7 +363,7 @@ def _take_last(motion: Command, time: float) -> Command:
 
 
 def join_commands(commands: list[Command]) -> Command:
-    """Join positions of one motion."""
+    """Join commands of one motion into one command."""
     fields = (_join_field(values) for values in zip(*commands, strict=True))
     return Command(*fields)
 

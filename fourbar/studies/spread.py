@@ -289,7 +289,7 @@ def tolerances(
 
 
 def _make_members(scene: Scene, samples: int, seed: int | np.random.Generator) -> Study:
-    """Make the linkages of the samples."""
+    """Make the study of the samples, one member each."""
     try:
         from scipy.stats import norm, qmc
     except ImportError:

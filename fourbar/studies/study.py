@@ -349,7 +349,6 @@ def _read_members(key: str, value: Any, keys: list[str]) -> Array:
 
 
 def _shorten_for_line(value: Any) -> object:
-    """Shorten a value to what one line shows."""
     if isinstance(value, np.ndarray):
         return f"{type(value).__name__} of shape {value.shape}"
     return value

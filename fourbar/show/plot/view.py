@@ -116,7 +116,7 @@ class Axis(NamedTuple):
     """Values of the sweep, in the unit."""
 
     def words(self, place: float, digits: int = 4) -> str:
-        """Say a place, which is in SI."""
+        """Write a place, which is in SI, with its symbol and unit."""
         return f"{self.symbol} = {self.factor * place:.{digits}g}{self.unit}".replace(
             "-",
             "−",
@@ -277,7 +277,7 @@ def _require_drawable(sweep: Solution) -> None:
 
 
 def _view_motion(scene: Scene, position: float | None) -> View:
-    """Evaluate a motion.
+    """Return the view of a motion through time.
 
     The drawn instant is the first that assembles, or that whose theta_2 comes nearest
     to the position.
