@@ -33,8 +33,8 @@ from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 
 COARSE, STEP_RATIOS = 2.0, 2.0 ** (1.0 / 3.0)
-"""Ratios of the ladder of steps. They are factors of two first, then thirds of an
-octave below what serves.
+"""Ratios of the ladder of steps: factors of two first, then thirds of an octave below
+what serves.
 """
 TIME_CONSTANTS_TRIED = (3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0, 120.0, 300.0)
 STEPPED_INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete")

@@ -123,8 +123,8 @@ class _MatrixRow:
     hello: dict[str, Any] = field(default_factory=dict)
     cells: dict[str, _MatrixCell] = field(default_factory=dict)
     slopes: list[tuple[str, dict[str, str]]] = field(default_factory=list)
-    """Ways of differentiation with their relative errors. They are those of the torque
-    and of each of its derivatives.
+    """Ways of differentiation with the relative errors of the torque and of each of its
+    derivatives.
     """
     changed: str = ""
     """Changes to the engine's input or defaults that its adapter states."""

@@ -26,8 +26,8 @@ TEST_SECONDS = 10.0
 FAULTS_OF_A_PROCESS = 8
 """Faults of one process, which loads the engines once."""
 FAULT_SECONDS = 300
-"""Time after which a run with a fault is ended, s. That counts as a failure; a run
-takes some three seconds.
+"""Time after which a run with a fault is ended and counts as failed, s; a run takes
+some three seconds.
 """
 _Failing = dict[str, list[str]]
 """Rows that fail, by test scene."""
@@ -78,7 +78,7 @@ def try_tests(number: int) -> str | None:
 def explain_survival(entry: dict[str, Any], failing: _Failing | str) -> str | None:
     """Say why an entry does not count as caught on each of its test scenes.
 
-    None if it does.
+    The answer is None if the entry is caught on all of them.
     """
     if isinstance(failing, str):
         return f"it raises, which is no physical fault: {failing}"
@@ -97,7 +97,7 @@ def explain_survival(entry: dict[str, Any], failing: _Failing | str) -> str | No
 def try_in_turn(numbers: Sequence[int]) -> list[_Failing | str]:
     """Try faults in one process, which loads the engines once.
 
-    If it ends early, each is tried in a process of its own.
+    A process that ends early is replaced by one for each fault.
     """
     together = try_faults(numbers)
     if not isinstance(together, str):

@@ -99,8 +99,7 @@ SCENES_OF_A_TASK = 200
 """Scenes per task: some seconds, which is what an interruption costs."""
 FAILURES_PRINTED = 20
 WORKER_LOST = "worker:"
-"""Beginning of the discrepancy of a scene that killed its worker. It is that of one
-that never came back too.
+"""Beginning of the discrepancy of a scene that killed its worker, or never came back.
 """
 
 

@@ -76,8 +76,8 @@ _PIECES = (
         "steps = 99999999999999999999",
     ),
 )
-"""Text that is put into files. It is the syntax itself, numbers at the edge, and text
-that other formats would run.
+"""Text that is put into files: the syntax itself, numbers at the edge, and text that
+other formats would run.
 """
 
 

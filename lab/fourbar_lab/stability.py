@@ -163,7 +163,7 @@ def find_command_sign(scene: Scene) -> int:
 def _feed_back(scene: Scene, bar: int) -> Scene | None:
     """Command bar 2, 3 or 4 to move as it does under the scene's command.
 
-    None if that has no motion.
+    The scene is None if that command has no motion.
     """
     if bar == 2:
         return scene

@@ -18,8 +18,8 @@ from fourbar_validation.scenes.suites import list_model_files
 
 NUMBER_IN_AN_MJCF = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 STATE_ROUND_OFF = 1e-12
-"""Part by which the assembled state may differ. It is computed, and another
-processor's sine may end it in another digit.
+"""Part by which the assembled state may differ: another processor's sine may end it in
+another digit.
 """
 
 

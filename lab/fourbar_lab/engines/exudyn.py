@@ -54,8 +54,8 @@ from fourbar_validation.engines.loop import Exact
 EXUDYN_SIZE = 9
 """Coordinates, and constraints."""
 _B_ROWS, _OTHER_ROWS = [4, 5], [0, 1, 2, 3, 6, 7]
-"""Rows of pin B and of the others among the constraints. They are in the order of
-`JOINTS`, the drive last.
+"""Rows of pin B and of the others among the constraints, in the order of `JOINTS`, the
+drive last.
 """
 JOINTS = {"O2": (1, 2), "A": (3, 2), "B": (4, 3), "O4": (1, 4)}
 """Bars of each pin; the pin's force is that on the second bar: F12, F32, F43, F14."""
@@ -73,8 +73,8 @@ class ExudynBars(Loaded):
     behind: Any = None
     """Marker of the end on the ground, where a force at a point drives."""
     reach: float
-    """Distance of that end, m. It has the size of the coordinates, so that the
-    direction keeps its digits.
+    """Distance of that end, m, of the size of the coordinates, so that the direction
+    keeps its digits.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -251,10 +251,7 @@ class ExudynBars(Loaded):
         speed: float,
         acceleration: float,
     ) -> BarValues:
-        """Return speeds, accelerations and multipliers.
-
-        Empty where a toggle leaves them 0/0.
-        """
+        """Return speeds, accelerations and forces by name; {} at a toggle's 0/0."""
         if self.behind is not None:
             self._move_behind()
         of_drive = self._read_constraint_jacobian()

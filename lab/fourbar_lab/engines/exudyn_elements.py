@@ -60,7 +60,7 @@ class ExudynBodies:
     ) -> Any:
         """Mark a point of a bar, along and across its line from its first pin.
 
-        Of the ground it is in world axes.
+        A point of the ground is given in world axes.
         """
         return self.mbs.AddMarker(
             MarkerBodyPosition(bodyNumber=self.body[bar], localPosition=[x, y, 0.0])

@@ -147,8 +147,8 @@ class _OpenSimBars(Loaded):
         self.pin_a.setIsEnforced(self.state, True)
         self.matter = model.getMatterSubsystem()
         self.least_conditioned = 1.0
-        """Least ratio of singular values of the multipliers' matrix G M^-1 G^T. It is
-        that over the positions moved so far.
+        """Least ratio of singular values of the multipliers' matrix G M^-1 G^T over the
+        positions moved so far.
         """
 
     def refusal(self) -> str:
@@ -265,10 +265,7 @@ class _OpenSimBars(Loaded):
         speed: float,
         acceleration: float,
     ) -> BarValues:
-        """Compute speeds and accelerations, pin forces and torque.
-
-        Empty where a toggle leaves them 0/0.
-        """
+        """Return speeds, accelerations and forces by name; {} at a toggle's 0/0."""
         if bar != self.commanded:
             self.commanded, q = bar, self.state.getQ().to_numpy()
             for moving, pin in DIRECTION_JOINTS.items():

@@ -127,10 +127,7 @@ def _measure_period(
     omega: Array,
     alpha: Array,
 ) -> float | None:
-    """Measure the time between upward passages through mid-swing, s.
-
-    None if it does not swing.
-    """
+    """Return the period between upward passages through mid-swing, s, or None."""
     from scipy.interpolate import BPoly
 
     level = 0.5 * (theta.max() + theta.min())

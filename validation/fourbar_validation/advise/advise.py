@@ -57,8 +57,8 @@ PART_OF_THE_ERROR = 0.7
 larger.
 """
 _CLOSE_ENOUGH = 1.15
-"""Ratio at which the search stops. It is that of the least steps that serve to the most
-that do not.
+"""Ratio, of the least steps that serve to the most that do not, at which the search
+stops.
 """
 _MOST_TRIALS = 24
 MOST_STEPS_OF_A_RUN = 16_000
@@ -143,7 +143,7 @@ class _Advice:
 
     required: float
     best: SearchRun
-    """Cheapest attempt that reaches the required error. It is the most accurate one if
+    """Cheapest attempt that reaches the required error, or the most accurate one if
     none does.
     """
     attempts: tuple[SearchRun, ...]
@@ -255,10 +255,10 @@ class _CheapestSearch:
         """CPU time of a reading, in steps as those of `SearchRun.step_cost`."""
 
     def advice(self) -> _Advice:
-        """Find the cheapest that serves.
+        """Find the cheapest settings that reach the error.
 
-        By bisection in steps, then with shorter and longer time constants, then by
-        cheaper kinds of step.
+        Steps are bisected, then shorter and longer time constants and cheaper kinds of
+        step are tried.
         """
         first, tc = guess(self.error)
         self._bisect(tc, first)
@@ -289,7 +289,7 @@ class _CheapestSearch:
     def _try_kinds(self) -> None:
         """Try each kind of step with as many steps as would be cheaper.
 
-        If they serve, fewer are tried.
+        Where so many serve, fewer are tried.
         """
         start = min(self._list_served(), key=lambda attempt: attempt.steps)
         settings = start.settings

@@ -42,8 +42,8 @@ are left, each from the ground on.
 ENOUGH_POSITIONS = 3
 """Columns or positions that a hypothesis with a number in it needs."""
 SOFT_TORQUE = 1e-6
-"""Part of the torque that a soft constraint still carries at rest. It is that of
-MuJoCo's inverse dynamics of a loop; 2e-8 was seen.
+"""Part of the torque that a soft constraint still carries at rest in MuJoCo's inverse
+dynamics of a loop; 2e-8 was seen.
 """
 
 

@@ -70,8 +70,8 @@ class Judgement:
     def agreed_power(self) -> int | None:
         """Power of ten within which all numbers agree, as a part of each.
 
-        None if a tolerance was stated, or if one of them is off by more than any table
-        that is right in the digits it has.
+        The power is None if a tolerance was stated, or if one of them is off by more
+        than any table that is right in the digits it has.
         """
         if self.tolerance is not None or not self.differing or self.not_assembled:
             return None

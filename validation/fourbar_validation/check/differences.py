@@ -89,7 +89,7 @@ def find_differences(
     generated: Mapping[str, ModelEntry],
     theirs: Mapping[str, ModelEntry],
 ) -> list[Difference]:
-    """Find what differs, in the order of their description."""
+    """Return what differs, in the order of the description."""
     length = max(
         float(entry.value)  # type: ignore[arg-type]
         for key, entry in generated.items()

@@ -310,10 +310,7 @@ class Mistake:
         return self.times > 1.0
 
     def prediction(self, key: str, right: Solution) -> Array | None:
-        """Return the numbers that this mistake predicts for a key of the table.
-
-        None if it predicts none.
-        """
+        """Return the numbers that this mistake predicts for a column, or None."""
         predicted = self.predict(name_quantity(key), right)
         if predicted is not None and key.startswith("|"):
             return magnitude(predicted)

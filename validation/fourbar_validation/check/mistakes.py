@@ -156,10 +156,7 @@ def _list_other_problems(
     scene: Scene,
     command: Command,
 ) -> Iterator[tuple[str, Scene, Command]]:
-    """List scenes and commands that mistakes amount to.
-
-    The same formulas answer them.
-    """
+    """List scenes and commands that mistakes amount to; the formulas answer them."""
     for text, other_command in _list_other_commands(command):
         yield text, scene, other_command
     for text, changed in chain(

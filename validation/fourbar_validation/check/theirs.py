@@ -60,8 +60,8 @@ _OTHER_NAMES = {
     **dict.fromkeys(("koppelwinkel", "couplerangle"), "theta_3"),
     "zeit": "time",
 }
-"""Names that other programs and languages use, in small letters. They have no spaces
-and underscores.
+"""Names that other programs and languages use, in small letters, without spaces and
+underscores.
 """
 _MAY_MEAN = (
     ("theta", "theta_2"),

@@ -38,16 +38,16 @@ class Answer:
     is set then.
     """
     predicted: dict[str, Array] = field(default_factory=dict)
-    """Errors that the engine must expect by its own residuals, (n,). They are in the
-    unit of the quantity.
+    """Errors that the engine must expect by its own residuals, (n,), in the quantity's
+    unit.
     """
     alarms: list[str] = field(default_factory=list)
     """Faults that the engine's monitoring of itself found, in words. Each fails the
     run.
     """
     evidence: dict[str, float] = field(default_factory=dict)
-    """Figures that the engine reports of itself. These are closure gap (m), speed
-    error, resets and residuals.
+    """Figures that the engine reports of itself: closure gap (m), speed error, resets
+    and residuals.
     """
     shared: str = ""
     """Inputs that the engine takes from the formulas' side."""

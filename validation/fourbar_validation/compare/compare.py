@@ -86,14 +86,13 @@ _OF_THE_FORMULAS = (
     "force_error",
     "power",
 )
-"""Quantities with checks of their own. These are the range in which dry friction holds,
-its residual, error bars, a product.
+"""Quantities with checks of their own: the range in which dry friction holds, its
+residual, error bars, a product.
 """
 COMPARED_QUANTITIES = tuple(
     name for name in STAGE_OF if name not in (*_OF_THE_FORMULAS, *LINE_QUANTITIES)
 )
-"""Quantities that are compared with an exact engine. These are all that is printed of a
-position.
+"""Quantities that are compared with an exact engine: all that is printed of a position.
 """
 _OF_THE_LINE = {
     "stroke": "sin_mu",
@@ -183,8 +182,8 @@ class Comparison:
     stands in for that of an answer which has too few quantities for one.
     """
     scales: Scales = field(default_factory=dict)
-    """Scales of `formulas`, conditions of it and `reference`. They are kept if an
-    earlier answer was compared with them.
+    """Scales of `formulas`, conditions of it and `reference`, kept from an earlier
+    answer that was compared with them.
     """
 
     def __post_init__(self) -> None:

@@ -370,9 +370,9 @@ class Counts:
 
     @property
     def headline(self) -> str:
-        """Give the verdict alone, for what does not fail.
+        """Return the verdict alone, for what does not fail.
 
-        If nothing was compared, it says what was done instead.
+        Where nothing was compared, the text says what was done instead.
         """
         if self.nothing:
             return self.sentence()

@@ -55,7 +55,7 @@ class Scale(NamedTuple):
 
     size: Array
     """Divisor of the errors, in the unit of the quantity: its largest magnitude, or the
-    sum of its terms where it vanishes. It is 0 where they vanish too.
+    sum of its terms where it vanishes; 0 where both vanish.
     """
     cancellation: Array
     """N, the sum of the terms over the size; 1 for angles, pure numbers and a quantity

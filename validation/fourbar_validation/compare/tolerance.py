@@ -35,7 +35,7 @@ comparisons.
 """
 RANDOM_WALK = 8.0
 """Last digits by which a chain of some fifty roundings moves a result, as a random
-walk. It is sqrt(50) = 7.
+walk: sqrt(50) = 7.
 """
 MOST_ALLOWED = 0.05
 """Greatest allowed error with a verdict, unless an engine declares more. Where the
@@ -63,8 +63,8 @@ class ErrorBound:
     conditioned: bool
     """True if the allowed error is divided by the condition."""
     in_time: bool = False
-    """True for an engine that runs through the motion in time. It has no convention at
-    rest.
+    """True for an engine that runs through the motion in time, which has no convention
+    at rest.
     """
     cause: str = ""
     """Cause of the error, in a few words."""
@@ -142,7 +142,7 @@ so by the rounding of the data, and the engines may differ on whether it closes.
 
 
 def hold_simulated(error: float, why: str) -> ErrorBound:
-    """Hold what runs through time to a wanted error."""
+    """Return the tolerance of an engine that runs through time, for a wanted error."""
     if not 0.0 < error < 1.0:
         raise InputError(
             "--error", error, "must be a relative error, above 0 and below 1"

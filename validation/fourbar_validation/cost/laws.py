@@ -134,10 +134,7 @@ def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
 
 
 def find_floor(points: Sequence[CostPoint], quantity: str) -> float | None:
-    """Find the error that more steps no longer lessen.
-
-    None if it still falls at the end of the ladder.
-    """
+    """Return the error that more steps no longer lessen, None if it still falls."""
     errors = [_error_at_steps(point, quantity) for point in _list_by_steps(points)]
     if (
         len(errors) < 2

@@ -63,8 +63,8 @@ class CostPoint:
     """ "stepped" through time, "exact" at each position, or "formulas"."""
     setting: str
     setting_value: float
-    """Value of the curve's setting. It is steps per revolution, 1-d, tc in steps,
-    tolerance, ...
+    """Value of the curve's setting: steps per revolution, 1-d, tc in steps, tolerance,
+    ...
     """
     steps: int
     """Steps of one run through the scene; positions if nothing is stepped."""
@@ -76,7 +76,7 @@ class CostPoint:
     there.
     """
     seconds_per_second: float
-    """CPU seconds of torque and pin forces in a simulated second. They are read at the
+    """CPU seconds of a simulated second, in which torque and pin forces are read at the
     scene's positions.
     """
     seconds_per_revolution: float

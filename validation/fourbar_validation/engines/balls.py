@@ -509,7 +509,7 @@ class _Acting(NamedTuple):
     def add_couple(self, pin: str, couple: Ball) -> None:
         """Add a couple to bar j of a pin (i, j), its opposite to bar i.
 
-        On the ground it does nothing.
+        Couples on the ground have no effect.
         """
         i, j = PINS[pin]
         for bar, value in ((j, couple), (i, -couple)):

@@ -136,7 +136,7 @@ class MovingPart(NamedTuple):
     """About the mass centre, kg m^2."""
     length: float
     points: dict[str, tuple[float, float]]
-    """first_pin, G and end, each with the bar's number, m. They are its first pin, mass
+    """Positions of first_pin, G and end, each with the bar's number, m: first pin, mass
     centre and second pin.
     """
 
@@ -248,9 +248,9 @@ def find_unknown(
     *,
     forces: bool = False,
 ) -> str:
-    """Give the reason to refuse a scene with an unknown effect.
+    """Return the reason to refuse a scene with an unknown effect.
 
-    Empty if the engine knows them all.
+    The reason is empty if the engine knows all effects.
 
     `forces`: True if the engine knows drives that exert a force.
     """

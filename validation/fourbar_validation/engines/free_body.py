@@ -60,8 +60,8 @@ next.
 _FRICTION_STEPS = 60
 """Newton's steps in a stage; where it converges it needs a tenth of them."""
 _FRICTION_SETTLED = 8.0 * 2.0**-52
-"""Residual of a friction couple's equation that counts as rounding. It is over the sum
-of its terms.
+"""Residual of a friction couple's equation, over the sum of its terms, that counts as
+rounding.
 """
 _FRICTION_STARTS = 100
 """Starts from which other solutions are sought, over six decades of couples."""

@@ -38,8 +38,8 @@ digit from any start.
 NEARLY_IN_LINE = 2.0**-26
 """rad; so far from a line the gap is as small as rounding."""
 ROUNDING_OF_FOUR_BARS = 16.0 * 2.0**-52
-"""Gap that the roundings of a sum of four bars can leave. It is relative to the sum of
-the lengths.
+"""Gap that the roundings of a sum of four bars can leave, relative to the sum of the
+lengths.
 """
 
 

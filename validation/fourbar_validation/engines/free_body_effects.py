@@ -19,8 +19,8 @@ from fourbar_validation.engines.description import declares
 from fourbar_validation.engines.free_body_closure import close, cross_products
 
 GREATEST_WINDING = math.pi * (1.0 - 1e-12)
-"""Greatest winding of a spring from rest, rad. It is half a turn less the rounding of
-an angle of several turns.
+"""Greatest winding of a spring from rest, rad: half a turn less the rounding of an
+angle of several turns.
 """
 
 
@@ -90,7 +90,7 @@ class BodyWrenches:
     def push(self, bar: int, force: Any, arm: Any) -> None:
         """Add a force, at `arm` from the bar's first pin.
 
-        On the ground it does nothing.
+        Forces on the ground have no effect.
         """
         if bar in self.force:
             self.force[bar] = self.force[bar] + force

@@ -87,7 +87,7 @@ class Guest(Engine):
     def at_setting(self, **setting: Any) -> "Guest":
         """Return the guest that is asked with this setting.
 
-        Without `name` it keeps its named setting.
+        Without `name` the named setting stays.
         """
         name = setting.pop("name", self.setting)
         if name:

@@ -38,8 +38,8 @@ NUDGE = 1e-6
 REPEATED = 2.0 * 2.0**-52
 """Change of a pin load, relative, that is rounding."""
 ROUNDED = 1e-11
-"""Relative change that is rounding once it no longer falls. It holds near a pole of the
-torque too.
+"""Relative change that is rounding once it no longer falls, even near a pole of the
+torque.
 """
 _DIVERGED = 1e100
 """Load, N, that only passes running away from each other reach."""
@@ -82,7 +82,7 @@ class EngineBars(Assembled, Protocol):
     own: str
     """Results that the engine finds alone, in words for the report."""
     alone: bool = False
-    """True if it also answers `torque_inertia`. It is the torque that the bars take
+    """True if the engine also answers `torque_inertia`, the torque that the bars take
     without loads and effects.
     """
     ground_angle: float
@@ -132,8 +132,8 @@ class Loaded(EngineBars, Protocol):
     first.
     """
     wrenches: dict[int, list[float]]
-    """Sum of what acts on each moving bar, (x, y, moment), N and N m. It is a force at
-    its first pin and a couple.
+    """Sum of what acts on each moving bar as a force at its first pin and a couple, (x,
+    y, moment), N and N m.
     """
     terms: list[Act]
 
@@ -251,7 +251,7 @@ class Loaded(EngineBars, Protocol):
     ) -> None:
         """Add a force (N, world axes) at a point (m, world axes).
 
-        On the ground it does nothing.
+        Forces on the ground have no effect.
         """
         if bar != 1:
             x, y = point

@@ -59,12 +59,12 @@ NOT_ANSWERED = frozenset(
         *("v_A", "v_B", "v_G2", "v_G3", "v_G4"),
     )
 )
-"""Quantities that no exact engine answers. They are commanded, follow from others that
-are answered, or exist in the formulas alone.
+"""Quantities that no exact engine answers: commanded ones, those that follow from
+others, and those of the formulas alone.
 """
 ROUNDING_OF_THREE_BARS = 16.0 * 2.0**-52
-"""Gap that the roundings of a chain of three bars can leave. It is relative to the sum
-of the lengths.
+"""Gap that the roundings of a chain of three bars can leave, relative to the sum of the
+lengths.
 """
 JointAngles = tuple[float, float, float]
 """Turns of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4, rad."""
@@ -100,9 +100,9 @@ class Assembler:
         self.closed = ROUNDING_OF_THREE_BARS * sum(lengths)
 
     def find(self, theta: float, branch: int) -> JointAngles | None:
-        """Assemble on the branch and place the tree there.
+        """Return the joint angles on the branch, rad, None if the loop does not close.
 
-        None if the loop does not close.
+        The tree is placed at these angles.
         """
         bar = self.bar
         near = self.near
@@ -323,8 +323,8 @@ def _unwrap_angles(values: dict[str, Array], assembled: NDArray[np.bool_]) -> No
 
 
 Read = Callable[[JointAngles, float, float], dict[str, Any]]
-"""Function from the bars' angles to values by name. It has speed and acceleration of
-the commanded bar.
+"""Function of the bars' angles, and of speed and acceleration of the commanded bar,
+that returns values by name.
 """
 
 

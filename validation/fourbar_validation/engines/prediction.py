@@ -226,8 +226,8 @@ class Sensitivities(NamedTuple):
     1 m, and by couples on the bars of the strongest pin force times 1 m.
     """
     carried: dict[str, float]
-    """Change by couples on the bars. They are the heaviest bar's inertial force at 1 m
-    of the fastest bar, times 1 m.
+    """Change by couples on the bars: the heaviest bar's inertial force at 1 m of the
+    fastest bar, times 1 m.
     """
 
     def states(self, name: str) -> bool:
@@ -340,9 +340,9 @@ def compute_reference(
     branch: int,
     angle: float,
 ) -> "tuple[BallValues, dict[str, float]] | None":
-    """Compute values at one position as balls, and sum |x_i dy/dx_i| of each.
+    """Return values at one position as balls, and sum |x_i dy/dx_i| of each.
 
-    None if the loop does not close.
+    The answer is None if the loop does not close.
     """
     from flint import arb
 

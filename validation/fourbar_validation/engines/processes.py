@@ -255,7 +255,7 @@ def _take_printed() -> str:
 def _take_written(file: IO[bytes]) -> bytes:
     """Empty a file, and return what it held.
 
-    Of more than is kept it is its beginning and its end.
+    Beyond the size that is kept, the middle is left out.
     """
     size = file.seek(0, os.SEEK_END)
     file.seek(0)
@@ -271,8 +271,8 @@ def _take_written(file: IO[bytes]) -> bytes:
 
 
 ANSWER_SECONDS, SECONDS_PER_POSITION = 60.0, 0.03
-"""Time for a question and for each of its positions if no limit is stated, s. It is ten
-times what a position takes with all engines.
+"""Time for a question and for each of its positions if no limit is stated, s: ten times
+what a position takes with all engines.
 """
 LONGEST_ANSWER, _BYTES_PER_POSITION = 10**6, 10**4
 """Bytes of an answer: ten times as many as all quantities take."""

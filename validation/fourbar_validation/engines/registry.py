@@ -124,10 +124,7 @@ _PACKAGE_OF = {"pydrake": "drake"}
 
 
 def find_missing(library: str) -> str | None:
-    """Give the reason why a module cannot be found, or does not load.
-
-    None if it does.
-    """
+    """Return the reason why a module is not found or does not load, or None."""
     try:
         import_module(library)
     except ModuleNotFoundError as error:

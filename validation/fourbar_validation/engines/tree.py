@@ -191,10 +191,7 @@ class Tree(Loaded, Protocol):
         return put_back(on, *loop_force)
 
     def move(self, bar: int, speed: float, acceleration: float) -> BarValues:
-        """Return velocities, accelerations and forces where the tree is placed.
-
-        Empty where they are 0/0.
-        """
+        """Return speeds, accelerations and forces by name; {} where they are 0/0."""
         jacobian, commanded = self.jacobian(), self.turns[bar]
         try:
             v = solve_closed(jacobian, speed, commanded)
@@ -263,7 +260,7 @@ class KeptTree(Tree, Protocol):
 
 
 _KEPT: dict[type[KeptTree], KeptTree] = {}
-"""The one tree of its kind in this process. It holds the scene of the last answer."""
+"""The one tree of its kind in this process, with the scene of the last answer."""
 
 
 def keep_tree(kind: type[KeptTree], scene: Scene) -> KeptTree:

@@ -25,7 +25,9 @@ if TYPE_CHECKING:
 SCENE_SECONDS = 60.0
 """A scene takes 0.05 to 3 s; what takes longer than this hangs."""
 _IN_FLIGHT = 4
-"""Tasks submitted per worker. It is always busy then, and the memory stays bounded."""
+"""Tasks submitted per worker: enough that it is always busy, few enough that the memory
+stays bounded.
+"""
 _LOCKED = 10.0
 """Seconds for which a worker waits for the pipe that all workers share.
 
@@ -109,7 +111,7 @@ class _PoolOfItems:
     ) -> list[Any]:
         """Return the results of items in order.
 
-        Of those that failed it is what stands instead.
+        An item that failed has its replacement in the result's place.
         """
         results = []
         for item, future in zip(items, futures, strict=True):

@@ -42,9 +42,9 @@ def list_figures() -> Iterator[PublishedFigure]:
 
 
 def is_explained(figure: PublishedFigure) -> bool:
-    """Tell whether a difference has errata that give the published digits.
+    """Return whether a difference has errata that give the published digits.
 
-    A misprint that none can give is explained too.
+    A misprint that no erratum can give is explained too.
     """
     if not figure.errata or not set(figure.errata) <= set(ERRATA):
         return False

@@ -39,8 +39,8 @@ class PublishedFigure(NamedTuple):
     printed: str
     ours: float
     errata: tuple[str, ...] = ()
-    """Ids of the errata that lead from ours to what is printed. They are in the order
-    in which they are made.
+    """Ids of the errata that lead from ours to what is printed, in the order in which
+    they are made.
     """
     made: float | None = None
     """Ours after these errata; None where they cannot be computed."""

@@ -173,8 +173,8 @@ class Kinematics:
             self.a_G[bar] = 100.0 * getattr(s, f"a_G{bar}")[0]
         self.a_A = 100.0 * s.a_A[0]
         self.slip = 2.0 * CENTRE[3] * self.alpha[3] * math.sin(self.theta_3)
-        """Amount that erratum 4 adds to the x component of A_G3/A. It is -(L w^2
-        cos - L alpha sin) for -(... + ...), eq 4.20.
+        """Amount that erratum 4 adds to the x component of A_G3/A: -(L w^2 cos - L
+        alpha sin) for -(... + ...), eq 4.20.
         """
         self.arms = {  # from G; R14 points along B to O4, the thesis's theta_4
             "R12": split_components(-CENTRE[2], THETA_2),
@@ -269,8 +269,8 @@ def bound_round_off(
 
 _PRINTED_INERTIAS = (0.2924725333, 0.1075266667)
 _TYPED_INERTIAS = (0.292472, 0.107526)
-"""I_G3, I_G4 of the manual's table and of section 5.7, kg cm^2. They are solved back
-from the printed unknowns.
+"""I_G3, I_G4 of the manual's table and of section 5.7, kg cm^2, solved back from the
+printed unknowns.
 """
 ERRATA_IN_ORDER: tuple[tuple[str, ProgramErrors, tuple[float, float] | None], ...] = (
     ("", ProgramErrors(), None),

@@ -286,7 +286,7 @@ class Recorded:
 def open_run(path: Path, key: str = "RESULTS") -> Recorded:
     """Open a run by its folder, or by a results.csv only.
 
-    Of the latter it is not known how it was made.
+    A lone results.csv does not tell how the run was made.
 
     Raises InputError where there is no readable table, an empty or a damaged one, or
     that of an unfinished run.

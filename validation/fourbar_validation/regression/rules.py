@@ -147,10 +147,7 @@ def _number(text: str) -> float:
 
 
 def find_class(row: Row) -> str:
-    """Return the class of tolerance that a row's reason begins with.
-
-    Empty if there is none.
-    """
+    """Return the class of tolerance that a row's reason begins with, or ""."""
     words = row.reason.partition(":")[0]
     return words if words in CLASSES else ""
 

@@ -66,9 +66,9 @@ _SUBSCRIPT = str.maketrans("234", "₂₃₄")
 
 
 def draw_scene_figure(record: Record) -> str | None:
-    """Draw the linkage and, for a sweep, the answers as SVGs.
+    """Return the linkage and, for a sweep, the answers as SVGs.
 
-    None if nothing assembles.
+    The text is None if nothing assembles.
     """
     solution = record.solution
     if (

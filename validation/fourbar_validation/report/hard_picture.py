@@ -91,9 +91,9 @@ def list_errors(
     quantity: str,
     engine: Engine,
 ) -> tuple[Array, Array] | None:
-    """Return (theta_2, error relative to the value itself) of one engine.
+    """Return theta_2 (rad) and the relative errors of one engine.
 
-    None if it refuses.
+    An engine that refuses has None.
     """
     command = command_of(scene)
     if engine.through_time:

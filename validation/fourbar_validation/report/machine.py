@@ -78,9 +78,9 @@ def _find_processor() -> str:
 
 
 def find_kernels() -> dict[str, str]:
-    """Find the BLAS kernel and vector instructions that NumPy took.
+    """Return the BLAS kernel and vector instructions that NumPy uses, by name.
 
-    With others the last digits differ.
+    Other kernels give other last digits.
     """
     import numpy as np
 
@@ -94,10 +94,7 @@ def find_kernels() -> dict[str, str]:
 
 
 def find_blas() -> str:
-    """Find the kernel of NumPy's OpenBLAS, such as "openblas SkylakeX".
-
-    Empty for another BLAS.
-    """
+    """Return the kernel of NumPy's OpenBLAS, such as "openblas SkylakeX", or ""."""
     import numpy as np
 
     folder = (

@@ -47,8 +47,8 @@ OTHER_CAUSES = "other causes"
 NO_ANSWER_PREFIX = "no answer: "
 """Beginning of the cause of an engine that broke down."""
 ERROR_OF_MISSING_DIGITS = 1e-5
-"""Largest relative error of an engine that lacks digits, not an equation. It is over a
-quantity's scale.
+"""Largest error, relative to a quantity's scale, of an engine that lacks digits and not
+an equation.
 """
 AT_A_LIMIT, _NO_VALUE, NO_DIGITS, _DOES_NOT_APPLY = (
     "at declared limits of an engine",
@@ -375,7 +375,7 @@ def _name_causes(
 ) -> list[str]:
     """Name the mistakes that explain the failing rows of an engine in a scene.
 
-    If there are none, say what fails.
+    Without such a mistake the text says what fails.
     """
     whole = [row for row in rows if row.quantity == "all"]
     if whole:

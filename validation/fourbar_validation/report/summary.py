@@ -138,7 +138,7 @@ class Summary:
         self.judged = 0
         """Pairs of scene and engine of which `worst` shows the worst."""
         self.measured_k: dict[str, float] = {}
-        """Largest error*condition/eps of each exact engine. It is the K that would have
+        """Largest error*condition/eps of each exact engine: the K that would have
         sufficed.
         """
         self.independence: dict[str, tuple[str, str]] = {}
@@ -154,8 +154,8 @@ class Summary:
         self._first_reason: dict[tuple[str, str], str] = {}
         self._worst: list[Worst] = []
         self._times: dict[str, list[tuple[float, float]]] = {}
-        """Microseconds per position, and the ratio to the formulas. They are of at most
-        _TIMED scenes of each engine.
+        """Microseconds per position, and the ratio to the formulas, of at most _TIMED
+        scenes of each engine.
         """
         self._orders: list[tuple[str, dict[str, float]]] = []
         self._failing: list[Record] = []
@@ -351,9 +351,9 @@ class Summary:
 
     @property
     def worst(self) -> list[Worst]:
-        """Return the worst by scene and engine.
+        """Return the worst rows by scene and engine.
 
-        Of more than _WORST_SHOWN they are those that used most, in that order.
+        More than _WORST_SHOWN are reduced to those that used most, in that order.
         """
         if self.judged > _WORST_SHOWN:
             return nlargest(_WORST_SHOWN, self._worst, key=lambda w: w.used)

@@ -75,8 +75,8 @@ _MARK_SHAPES = (("P", "✚"), ("X", "✖"), ("*", "★"), ("p", "⬟"))
 OTHER_STYLES = tuple(Style(f"--e{9 + n % 3}", *_MARK_SHAPES[n % 4]) for n in range(12))
 """Styles of engines that are not named above, one after the other."""
 STYLE_NUMBERS: dict[str, int] = {}
-"""Number of each engine's style among them. It is as a run numbers its engines,
-otherwise in the order of drawing.
+"""Number of each engine's style, as a run numbers its engines, otherwise in the order
+of drawing.
 """
 LEAST_DRAWN_ERROR = EPS / 16.0
 """Errors below this, zero among them, are drawn here."""

@@ -27,8 +27,8 @@ POSITIONS_FITTED = 1001
 by some 1e-6 of it.
 """
 FEWEST_POSITIONS = 6
-"""Least positions of the scene from which a polynomial of degree 4 is fitted. It is
-fitted by least squares with an error to tell.
+"""Least positions of the scene from which a polynomial of degree 4 is fitted by least
+squares with an error to tell.
 """
 FIT_HEADINGS = ("degree", "fit", "angle, deg", "ratio", "polycoef")
 _FITS = ("least squares", "smallest largest error")

@@ -40,8 +40,8 @@ from fourbar_validation.robots.measure import (
 ERROR_HEADINGS = ("method", "quantity", "error", "of largest", "at", "median")
 _SETTINGS = ("changed alone", "single states", "through time", "cost")
 SCENE_ROUND_OFF = 1e-8
-"""Difference of two exact answers that the digits of the scene make. It is over the
-largest torque and pin forces.
+"""Difference of two exact answers, over the largest torque and pin forces, that the
+digits of the scene make.
 """
 LEAST_LEFT_OUT = 1e-4
 """Part of the largest that a scene leaves out, below which the table has no rows of

@@ -165,10 +165,7 @@ def _take_inertia(answer: Answer, drive: str) -> Answer:
 
 
 def check_mjcf(question: Question) -> Iterator[Row]:
-    """Check the generated MJCF as it is shipped, if one is.
-
-    The engine that runs it checks it.
-    """
+    """Check the generated MJCF as it is shipped, if the engine that runs it is in."""
     for engine in question.engines:
         if engine.generated:
             from fourbar_validation.engines.mujoco.shipped import compare_shipped

@@ -186,10 +186,7 @@ class _Balance:
 
 
 def _check_sums(question: Question) -> Iterator[Row]:
-    """Check that F12 + F14 + loads = sum of m a_G, and the power.
-
-    Likewise the moments of the same about O2 with the torque.
-    """
+    """Check that F12 + F14 + loads = sum of m a_G, the moments about O2, the power."""
     scene = question.scene
     solution = question.solution
     assert (
@@ -327,10 +324,7 @@ def _compute_cross(u: Array, v: Array) -> Array:
 
 
 def check_status(question: Question) -> Iterator[Row]:
-    """Check that the formulas have no value exactly where they should not.
-
-    Another derivation has none there.
-    """
+    """Check that the formulas lack a value exactly where another derivation does."""
     reference = question.reference
     free_body = question.free_body
     if reference is not None and question.at.speed is not None:

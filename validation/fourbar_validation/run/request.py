@@ -58,7 +58,7 @@ OPTIONS_OF_A_PART = (
 class Request:
     """Everything that the command line of a run states, by its options' names.
 
-    None where it states nothing.
+    An option that is not stated is None.
     """
 
     scenes: tuple[Path, ...] = ()

@@ -98,10 +98,7 @@ class Store:
             write_text(marker, self._identity)
 
     def _name_difference(self, marker: Path) -> str:
-        """Name what the earlier run differs in from this one.
-
-        Empty if they are the same run.
-        """
+        """Return what the earlier run differs in from this one, or ""."""
         try:
             before = json.loads(marker.read_text(encoding="utf-8"))
             now = json.loads(self._identity)
@@ -142,7 +139,7 @@ class Store:
     def examine(self) -> Iterator[tuple[Path, str]]:
         """Yield the file of each task with what is wrong with it.
 
-        Empty if it is complete and of this run.
+        The text is empty if the file is complete and of this run.
         """
         for path in sorted(self.parts.iterdir()):
             try:

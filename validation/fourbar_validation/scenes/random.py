@@ -305,8 +305,8 @@ UNEVEN_TYPE = "uneven"
 """Name that stands for the family `_UNEVEN_FAMILY` in place of types."""
 POSITIONS_OF_A_SWEEP = 37
 _CLEARANCE = 0.02
-"""Distance of a random linkage from the equality of change points. It is this part of
-its longest bar, from s + l = p + q.
+"""Distance of a random linkage from a change point: the least |s + l - p - q| as a part
+of the longest bar.
 """
 
 

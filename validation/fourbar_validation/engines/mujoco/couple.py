@@ -16,8 +16,8 @@ from fourbar_validation.engines.mujoco.closed_loop import solve_couple
 _REFINEMENTS = 3
 """Secant steps after the first: each gains the digits that the one before has."""
 LEAST_ACCELERATION = 1e-6
-"""Acceleration of the driven joint that is not told from none. It is over that of the
-open tree's joints.
+"""Acceleration of the driven joint, over that of the open tree's joints, that is not
+told from none.
 """
 _MISSED = 1e-9
 """Part of the acceleration sought that a linear solve may leave. Its rounding is 1e-12,

@@ -35,8 +35,8 @@ PIN_PROPERTIES = {
 it off.
 """
 FRICTION_COMPLIANCE = {"dof_solref": "solreffriction", "dof_solimp": "solimpfriction"}
-"""Fields of MjModel and attributes by which dry friction yields. They are compared if
-there is any.
+"""Fields of MjModel and attributes by which dry friction yields, compared if there is
+any friction.
 """
 _TENDON = {
     "stiffness": "stiffness",
@@ -399,10 +399,7 @@ def _read_bias(model: mujoco.MjModel, actuator: int) -> Array:
 
 
 def _name_tendon(topology: Topology, number: int) -> str:
-    """Name a tendon by the pins that it runs over.
-
-    Otherwise it is named by the bars that it runs between.
-    """
+    """Return a tendon's name: its pins, or else the bars that it runs between."""
     model = topology.model
     joints = {joint: pin for pin, joint in topology.hinge.items()}
     parts = []

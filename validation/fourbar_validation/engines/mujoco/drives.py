@@ -12,7 +12,7 @@ from fourbar.mjcf.model import write_exactly as numbers
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 
 WHEEL = 1e8
-"""Armature of the kinematic wheel that a joint equality follows. It is relative to the
+"""Armature of the kinematic wheel that a joint equality follows, relative to the
 crank's dof inertia.
 """
 _POSITION_GAIN, _VELOCITY_GAIN = 1e6, 1e4

@@ -478,8 +478,8 @@ class LedSegment(SteadySegment):
 
 
 OVERRUN = 1e-7
-"""Angle by which a simulated crank may turn too far, rad. It is 1e-9 in healthy runs,
-and 1e-5 is what it is judged by.
+"""Angle by which a simulated crank may turn too far, rad; 1e-9 was seen in healthy
+runs, and the angle is judged to 1e-5.
 """
 ActuatorForce = Callable[[mujoco.MjModel, mujoco.MjData], float]
 """The force of an actuator, in units of its gear."""

@@ -33,8 +33,8 @@ SERVO_STEPS = 200
 time constant is two steps.
 """
 SPEED_ERROR = 100.0 * SIMULATED.factor
-"""Allowed error of the speed, from loads and the closure in as many steps. It is ten
-times what was measured.
+"""Allowed error of the speed, from loads and the closure in as many steps: ten times
+what was measured.
 """
 
 

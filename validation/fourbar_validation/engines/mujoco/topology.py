@@ -183,10 +183,7 @@ class Topology:
         return actuators
 
     def bar(self, body: int) -> int | None:
-        """Find the bar that a body belongs to.
-
-        None if it is no part of the four-bar.
-        """
+        """Return the bar that a body belongs to, None if it belongs to none."""
         return self.bar_of_root.get(int(self.model.body_weldid[body]))
 
     def _find_plane(self) -> None:

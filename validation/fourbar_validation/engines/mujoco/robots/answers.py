@@ -106,8 +106,7 @@ class InsideRow:
     soft: PinsAndTorque
     """Torque and pin forces as MuJoCo has them."""
     rigid: PinsAndTorque
-    """Values with rigid pins. They are at the closed state of the same theta_2,
-    omega_2, alpha_2.
+    """Values with rigid pins at the closed state of the same theta_2, omega_2, alpha_2.
     """
     gap: float
     """Distance of the ends of the closure, m."""
@@ -221,12 +220,12 @@ class TriedSettings:
     changes: dict[str, str]
     """Attributes that differ from the file's."""
     states: float
-    """Worst error of torque and pin forces at single states. It is over the largest of
-    each; infinite without an answer.
+    """Worst error of torque and pin forces at single states, over the largest of each;
+    infinite without an answer.
     """
     through_time: float
-    """Worst error at the states of a simulation. It is over the largest of each;
-    infinite without an answer.
+    """Worst error at the states of a simulation, over the largest of each; infinite
+    without an answer.
     """
     gap: float
     """Largest gap of the simulation, m."""

@@ -139,10 +139,7 @@ def choose_loop(closures: Sequence[RobotClosure], name: str) -> RobotLoop:
 
 
 def describe_equality(model: mujoco.MjModel, number: int) -> str:
-    """Name an equality as the file does.
-
-    Otherwise it is named by the two bodies or joints that it ties.
-    """
+    """Return an equality's name, or the two bodies or joints that it ties."""
     if model.equality(number).name:
         return str(model.equality(number).name)
     kind = EQUALITY_KINDS.get(int(model.eq_type[number]))
@@ -612,10 +609,7 @@ class _Finder:
         return name or f"on {name_joint(self.model, joint)}"
 
     def _find_bar(self, body: int, bars: set[int]) -> int | None:
-        """Return the bar that carries a body, however far down.
-
-        None if no bar does.
-        """
+        """Return the bar that carries a body, however far down, or None."""
         while body:
             if self.root[body] in bars:
                 return self.root[body]

@@ -92,8 +92,8 @@ loses the light bars beside it: at 1e6 the gap was three times too large.
 """
 LIMITS_OFF = int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
 SETTLING_TIME = 5.0
-"""Time constants after which the loop has yielded but for 1 %. They are at most half of
-the motion.
+"""Time constants after which the loop has yielded but for 1 %, at most half of the
+motion.
 """
 _REACHED = 1.0 - 1e-6
 """Part of its couple at which dry friction acts in full."""
@@ -301,9 +301,9 @@ class LoopInside:
         )
 
     def state(self, theta_2: float, omega_2: float) -> _RobotState | None:
-        """Return the closed state at an angle and a speed of bar 2.
+        """Return the closed state at an angle and a speed of bar 2, or None.
 
-        None if the loop does not close.
+        The answer is None if the loop does not close.
         """
         qpos = self.close(theta_2)
         if qpos is None:

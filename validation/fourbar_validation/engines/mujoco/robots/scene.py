@@ -715,8 +715,7 @@ class _MotionOverRange:
     start: float
     stop: float
     betas: dict[str, tuple[float, float]]
-    """Angle between the bars of each pin in the pose, rad. It is also that where the
-    path starts.
+    """Angle between the bars of each pin, rad, in the pose and where the path starts.
     """
 
 

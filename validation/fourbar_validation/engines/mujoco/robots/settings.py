@@ -57,9 +57,7 @@ RANGES_TRIED = 4
 wanted error everywhere.
 """
 _FIRST_CONSTANT = 0.02
-"""MuJoCo's own time constant, s. It is tried if the file states a stiffness in its
-place.
-"""
+"""MuJoCo's own time constant, s, tried if the file states a stiffness in its place."""
 
 
 def read_settings(model: mujoco.MjModel, loop: RobotLoop) -> RobotSettings:
