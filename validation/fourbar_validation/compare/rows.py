@@ -58,10 +58,7 @@ class Row:
     condition: float
 
     def __post_init__(self) -> None:
-        """Raise ValueError for a verdict that is not defined.
-
-        Likewise for one that holds without a number.
-        """
+        """Raise ValueError if the verdict is unknown, or holds without a number."""
         if self.verdict not in VERDICTS or (
             self.verdict in HOLDING_VERDICTS and math.isnan(self.error)
         ):

@@ -76,7 +76,7 @@ class Assembled(Protocol):
 class EngineBars(Assembled, Protocol):
     """An engine that holds the bars of a scene and moves.
 
-    Its points include the mass centres G2, G3, G4.
+    The mass centres G2, G3, G4 are among the points.
     """
 
     own: str

@@ -454,8 +454,8 @@ def compute_shares(rows: Sequence[Row]) -> list[float]:
 def _count_compared(rows: Sequence[Row]) -> tuple[int, list[Row]]:
     """Return the number of quantities compared, and the tightest degraded rows.
 
-    There is one such row for each quantity that every row calls degraded: the one that
-    allows least.
+    Each quantity that every row calls degraded has one such row: the one that allows
+    least.
     """
     by_quantity: dict[str, list[Row]] = {}
     for row in rows:

@@ -317,7 +317,7 @@ class SettingsSearch:
     def _rank(self, settings: RobotSettings) -> tuple[float, int, float]:
         """Return the key by which combinations are sorted.
 
-        Its parts are evaluations per simulated second, changes, and stiffness.
+        Evaluations per simulated second come first, then changes, then stiffness.
         """
         evaluations = _EVALUATIONS.get(settings.integrator, 1.0) / settings.timestep
         changes = settings.list_changes(self.own)
