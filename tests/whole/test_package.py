@@ -36,6 +36,7 @@ PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 MODELS = "fourbar_validation.models"
 MODULE_OF = {
     "python-flint": "flint",
+    "pillow": "PIL",
     "pin": "pinocchio",
     "imageio-ffmpeg": "imageio_ffmpeg",
     "lazy-loader": "lazy_loader",
@@ -102,9 +103,11 @@ def test_the_harness_lists_a_command_whose_library_is_missing(
     def without_flint(_: str) -> None:
         raise ModuleNotFoundError("No module named 'flint'", name="flint")
 
+    with monkeypatch.context() as context:
+        context.setattr("fourbar_validation.cli.find_spec", lambda _: None)
+        assert harness(["--help"]) == HOLDS
+    assert "mujoco is not installed" in capsys.readouterr().out
     monkeypatch.setattr("fourbar_validation.cli.resolve_name", without_flint)
-    assert harness(["--help"]) == HOLDS
-    assert "flint is not installed" in capsys.readouterr().out
     assert harness(["run", "scene.toml", "--out", "results"]) == BROKEN
     complained = capsys.readouterr().err
     assert (

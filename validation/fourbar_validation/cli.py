@@ -49,7 +49,7 @@ COMMANDS = {
     ),
     "loops": Listed(
         "fourbar_validation.robots.command:robot_command",
-        "List the closed loops of a robot's MJCF.",
+        "List the closed loops of a robot's MJCF or SDF.",
     ),
     "check-mjcf": Listed(
         "fourbar_validation.check.mjcf:check_mjcf_command",

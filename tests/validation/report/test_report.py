@@ -394,15 +394,12 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
         1.0,
     )
     share = replace(row, quantity="undecided", error=0.4, allowed=0.5, theta_2=math.nan)
-    colours = [
-        replace(row, engine=engine, quantity="torque", error=error)
-        for engine, error in (("study", 1e-6), ("formulas", 0.0))
-    ]
+    identity = replace(row, engine="formulas", quantity="torque", error=0.0)
     pages = [
         replace(
             demo(draw=False),
             name="first",
-            rows=[row, share, *colours],
+            rows=[row, share, identity],
             left_out=["equilibria: too near"],
         )
     ]

@@ -38,7 +38,6 @@ _KEPT_FIELDS = (
     "predictor",
     "residuals",
     "answers_nearby",
-    "stated",
 )
 """Fields of an engine that an adapter of ours keeps in every environment."""
 _DONE = "installed"

