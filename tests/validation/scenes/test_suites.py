@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from fourbar.scene import Scene
-from fourbar.scene.motion import Law, Rise
+from fourbar.scene.motion import Law, Rise, Sine
 from fourbar_validation.engines.effects import TERM_OF
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import FREE_BODY
@@ -46,6 +46,8 @@ def uses(scene: Scene) -> Iterator[Any]:
     ):
         yield "released with a flywheel"
     for effect in scene.effects:
+        if effect.key == "springs":
+            yield from (f"spring with {s.acts}" for s in effect.springs)  # type: ignore[attr-defined]
         if effect.key == "torsion":
             yield from (("torsion", pin) for pin, *_ in effect.springs)  # type: ignore[attr-defined]
     if scene.tolerances:
@@ -58,9 +60,13 @@ def uses(scene: Scene) -> Iterator[Any]:
         yield "tolerance of a coordinate"
 
 
-def uses_of_law(law: Law | Rise) -> Iterator[str]:
-    if isinstance(law, Rise):
+def uses_of_law(law: Law | Rise | Sine) -> Iterator[str]:
+    if not isinstance(law, Law):
         yield f"{law.kind} law"
+        return
+    if law.alpha is not None:
+        yield "law with speeds and accelerations"
+    if law.omega is not None:
         return
     yield f"law with ends {law.ends}"
     if law.ends == "periodic" and law.time[0] != 0.0:
@@ -91,8 +97,12 @@ def test_the_default_suite_uses_every_capability() -> None:
     wanted |= {
         "law with ends rest",
         "cycloidal law",
+        "sine law",
+        "law with speeds and accelerations",
         "periodic law that begins late",
         "released with a flywheel",
+        "spring with push",
+        "spring with pull",
     }
     assert wanted <= used
 
