@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import fourbar.formulas.mobility
+import fourbar
 from fourbar.files import loads
 from fourbar_lab import LAB_FOLDER
 from fourbar_lab import fuzz as examine
@@ -95,24 +95,6 @@ def test_an_error_of_a_billionth_is_found_and_shrunk(
     assert len(small.loads) + len(small.effects) < 3 and examine.list_findings(small)
     kept = keep_counterexample(small, "billionth", tmp_path)
     assert examine.list_findings(loads(kept.read_text(encoding="utf-8")))
-
-
-def test_a_limit_off_by_a_billionth_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = replace(
-        crank_rocker(),
-        motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0),
-    )
-    assert examine.list_findings(scene) == []
-    true = fourbar.formulas.mobility.limit_positions
-    monkeypatch.setattr(
-        fourbar.formulas.mobility,
-        "limit_positions",
-        lambda *arguments: tuple(
-            limit._replace(theta_4=limit.theta_4 + 1e-9) for limit in true(*arguments)
-        ),
-    )
-    kinds = {finding.split(":")[0] for finding in examine.list_findings(scene)}
-    assert kinds == {"pinocchio-inverse range", "pinocchio-inverse limit_positions"}
 
 
 @pytest.mark.parametrize(("times", "found"), [(9.0, False), (11.0, True)])

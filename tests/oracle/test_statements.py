@@ -162,6 +162,16 @@ FAULTS = {
         "limit_positions",
         changed("limit_positions", lambda limits: moved(limits, "theta_3")),
     ),
+    "theta_4 of a dead centre": (
+        ROCKER,
+        "limit_positions",
+        changed("limit_positions", lambda limits: moved(limits, "theta_4")),
+    ),
+    "an end of the output's range": (
+        ROCKER,
+        "range",
+        changed("limit_positions", lambda limits: moved(limits, "theta_4")),
+    ),
     "branch of a dead centre": (
         ROCKER,
         "limit_positions",
