@@ -14,7 +14,14 @@ from fourbar.mjcf import RECIPE, WindowMotion
 from fourbar.quantities import UNKNOWNS
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison, Demands
-from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row
+from fourbar_validation.compare.rows import (
+    AGREES,
+    DEGRADED,
+    FAILS,
+    REFUSES,
+    UNDECIDED,
+    Row,
+)
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor
@@ -111,8 +118,8 @@ def test_within_1e_5_of_the_scale(name: str) -> None:
 def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
     """One pass of Newton's method is all they get.
 
-    Under loads the closure must be the stiffer for it. A pin force of which 1e7 times
-    as much cancels has no digit at 1e-5, as at index 1.
+    Under loads the closure must be the stiffer for it. Pin forces of which 1e7 times
+    as much cancels, as beyond bar 2 of the first scene, have no digit at 1e-5.
     """
     drawn = draw_random_scene(7, index, tuple(DrawnType))
     slow = replace(
@@ -125,7 +132,8 @@ def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
     answer = MujocoSimulated().answer(posed, fourbar.command(posed))
     rows = compared(posed, answer)
     undecided = {row.quantity for row in rows if row.verdict == UNDECIDED}
-    assert undecided <= ({"F32", "F43", "F14"} if loaded and index == 1 else set())
+    cancel = loaded and index == 1
+    assert undecided == ({"F32", "F43", "F14"} if cancel else set())
     assert not any(row.failed for row in rows), [row for row in rows if row.failed]
 
 
@@ -284,16 +292,20 @@ SIMULATION = [
 ]
 
 
-@pytest.mark.parametrize("links", [1e-2, 1e-8])
+@pytest.mark.parametrize(("links", "excused"), [(1e-2, set()), (1e-8, {"F12", "F32"})])
 def test_the_closure_is_as_stiff_as_the_lightest_bar_that_it_joins_needs(
-    links: float,
+    links: float, excused: set[str]
 ) -> None:
     """With pads for bars of one size the inertial torque was wrong.
 
-    It was off by 3e-5 at 10 g, by 3e-3 at 1 g.
+    It was off by 3e-5 at 10 g, by 3e-3 at 1 g. At 1e-8 of a kilogram the last digit of
+    the first speeds decides whether pin forces are off by 1e-8 or, as MuJoCo's own
+    residual tells, by 1e-5.
     """
     record = judge("hood", hood(links), SIMULATION)
-    assert {row.verdict for row in record.rows} == {AGREES}
+    less = {row.quantity: row.verdict for row in record.rows if row.verdict != AGREES}
+    assert set(less) <= excused
+    assert set(less.values()) <= {DEGRADED}
     assert record.answers[0].evidence["mass_ratio"] > 1e5
     (inertia,) = (row for row in record.rows if row.quantity == "torque_inertia")
     assert inertia.error < 1e-6
