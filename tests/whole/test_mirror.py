@@ -40,8 +40,9 @@ JUDGED_BY = {
     "fourbar/studies/test_equilibrium.py": (
         "fourbar/studies: circuit_curve; fourbar/show: studies"
     ),
-    "fourbar/test_solving.py": "fourbar/scene: motion; fourbar/evaluation: case",
-    "fourbar/studies/test_study.py": "fourbar/scene: motion",
+    "fourbar/test_solving.py": "fourbar/evaluation: case",
+    "fourbar/show/test_located.py": "fourbar/studies: course",
+    "fourbar/studies/test_paths.py": "fourbar/show: paths",
     # parts of one document or picture
     "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: document model",
     "fourbar/show/test_animate.py": "fourbar/show/plot: film",
@@ -69,9 +70,7 @@ JUDGED_BY = {
     "validation/engines/test_free_body.py": (
         "validation/engines: free_body_closure free_body_effects"
     ),
-    "validation/scenes/test_hard_families.py": (
-        "validation/engines: exact; validation/engines/mujoco: shipped"
-    ),
+    "validation/scenes/test_hard_families.py": ("validation/engines/mujoco: shipped"),
     "validation/report/test_sections.py": "validation/report: hard_picture",
     "validation/engines/mujoco/test_simulate.py": (
         "validation/engines/mujoco: drives monitor"
@@ -104,7 +103,7 @@ JUDGED_BY = {
     "lab/test_stability.py": "lab: families slopes tally",
     "lab/test_faults.py": "lab: fault_scenes injection",
     "validation/cost/test_cost.py": "validation/cost: series formulas pictures study",
-    "validation/advise/test_advise.py": "validation/advise: matters",
+    "validation/advise/test_advise.py": "validation/advise: judged_setup matters",
     "lab/test_benchmark.py": (
         "lab/simulators: slider_engines slider_mujoco slider_pinocchio"
     ),

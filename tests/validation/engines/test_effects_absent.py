@@ -108,7 +108,7 @@ def test_the_bare_model_has_the_closed_loop_and_nothing_else() -> None:
             "springs",
             {"spring"},
             0,
-            5,
+            7,
             3,
         ),  # a constant force, and one that pulls at every length, is an actuator
         ("flywheel", set(), 0, 0, 1),
