@@ -536,7 +536,6 @@ def find_start(scene: Scene) -> Start:
         )
     theta_2 = commanded.theta_2[usable]
     first = int(usable[np.argmin(theta_2) if speed >= 0.0 else np.argmax(theta_2)])
-    assert solution.omega_3 is not None and solution.omega_4 is not None
     theta = (
         float(commanded.theta_2[first]),
         float(solution.theta_3[first]),

@@ -433,7 +433,6 @@ def compute_energies(scene: Scene, motion: Solution) -> _Energies:
         raise DependencyError(
             f"SciPy is needed for free motion: {say_install('studies')}"
         ) from None
-    assert motion.time is not None and motion.omega_2 is not None
     scene = scene.settled()
     of_input = Command(motion.theta_2, motion.branch, motion.omega_2, 0.0)
     state = compute_shown_state(scene, with_signs(scene.linkage, of_input))

@@ -408,7 +408,6 @@ def _record_drive(recorder: _Recorder, scene: Scene, solution: Solution) -> None
     if scene.motion.free is not None:
         return
     if scene.drive is not None:
-        assert solution.drive_force is not None
         assert solution.drive is not None
         solution.drive.act(recorder, solution.drive_force)
     elif scene.drive_bar == recorder.bar:

@@ -269,7 +269,6 @@ def torsion(rng: np.random.Generator) -> Scene:
     scene = massless(rng)
     solution = solve(scene, "position")
     pin = str(rng.choice(["A", "B", "O4"]))
-    assert solution.theta_3 is not None and solution.theta_4 is not None
     theta = (
         scene.linkage.ground_angle,
         solution.theta_2[0],
@@ -358,12 +357,6 @@ def strokes(rng: np.random.Generator) -> Scene:
     bar = int(rng.choice([2, 4]))
     scene = _put_cylinder(ANYWHERE.draw(rng), rng, 1, bar)
     solution = solve(scene, "acceleration")
-    assert solution.stroke is not None and solution.stroke_speed is not None
-    assert (
-        solution.theta_3 is not None
-        and solution.theta_4 is not None
-        and solution.omega_4 is not None
-    )
     first, second = (
         (solution.theta_3, solution.theta_4)
         if bar == 2

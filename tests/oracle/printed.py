@@ -344,7 +344,6 @@ def _compute_pulls(
 
     They follow from free bodies, N and N m together.
     """
-    assert solution.theta_3 is not None and solution.theta_4 is not None
     motion = speeds_and_accelerations(
         scene.linkage,
         command.theta_2,
@@ -384,7 +383,6 @@ def friction_residual(question: Question) -> Iterator[Row]:
     terms = np.zeros(len(solution))
     if question.at.speed is None or residual is None:
         return
-    assert solution.drive_condition is not None
     for effect in scene.effects:
         for pin, mu, r in getattr(effect, "pins", ()):
             terms = np.fmax(

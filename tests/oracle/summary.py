@@ -308,7 +308,6 @@ def summarize_scene(question: Question) -> Facts:
         raise NotAskedError("no sweep or motion law that has a summary")
     if any(effect.dry for effect in scene.effects):
         raise NotAskedError("dry friction, whose forces jump between the positions")
-    assert solution.drive_condition is not None
     worst = min(solution.condition.min(), solution.drive_condition.min())
     if (solution.status_code != OK).any() or not worst > _LEAST_CONDITION:
         raise NotAskedError("the motion has no forces somewhere, or nearly none")

@@ -53,7 +53,6 @@ class Textbook:
             for name in self.quantities
         }
         assembled = np.zeros(n, dtype=bool)
-        assert command.omega_2 is not None
         omega = np.broadcast_to(command.omega_2, n)
         alpha = np.broadcast_to(command.alpha_2, n)
         for i in range(n):

@@ -315,7 +315,6 @@ def test_a_torque_off_in_its_twelfth_digit_is_status_1(
 
     def off(*arguments: object, **options: object) -> fourbar.Solution:
         solution = true(*arguments, **options)  # type: ignore[arg-type]
-        assert solution.torque is not None
         return replace(solution, torque=solution.torque * (1.0 + 1e-12))
 
     judge_here(monkeypatch)

@@ -489,7 +489,6 @@ def tables_text(scene: fourbar.Scene, width: int) -> str:
 
 def test_the_digits_of_the_torque() -> None:
     solution = fourbar.solve(crank_rocker(), "error")
-    assert solution.torque is not None and solution.torque_error is not None
     column = next(
         cells
         for name, cells in tables.list_columns(solution).items()

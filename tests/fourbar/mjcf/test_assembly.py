@@ -57,7 +57,6 @@ def errors(
         ours(scene, q, v, a),
         fourbar.solve(replace(scene, drive_bar=2), "force"),
     )
-    assert turn.torque is not None and turn.F43 is not None
     return (
         abs(torque - expected.torque[0]) / np.abs(turn.torque).max(),
         float(np.hypot(*(force - expected.F43[0])) / np.hypot(*turn.F43.T).max()),

@@ -97,7 +97,6 @@ def test_a_new_parallelogram_is_one_at_every_angle(tmp_path: Path) -> None:
         for share, bar in zip((0.5, 1.0, 0.5), scene.linkage.moving, strict=True)
     )
     right = weight * 9.81 * 0.1 * np.cos(solution.theta_2)
-    assert solution.torque is not None
     assert np.abs(solution.torque - right).max() < 1e-14
     on_change_points = np.isclose(np.sin(solution.theta_2), 0.0)
     assert solution.F12 is not None and on_change_points.sum() == 3
@@ -116,7 +115,6 @@ def test_five_newton_metres_at_60_degrees() -> None:
 
 def test_a_hanging_platform(tmp_path: Path) -> None:
     solution = fourbar.solve(read(tmp_path, HANGING))
-    assert solution.torque is not None and solution.F12 is not None
     assert np.abs(solution.torque).max() == pytest.approx(9.81, rel=1e-12)
     forces = [np.hypot(*getattr(solution, f).T) for f in ("F12", "F32", "F43", "F14")]
     assert np.max(forces) == pytest.approx(56.6, abs=0.05)
@@ -134,7 +132,6 @@ def test_a_given_couple_lifts_a_bar_on_two_links(tmp_path: Path) -> None:
     assert np.abs(omega - exact).max() < 1e-8
     motion = fourbar.Motion(math.radians(30.0), 2.9957, 9.151)
     at_30 = fourbar.solve(fourbar.Scene(scene.linkage, motion, effects=scene.effects))
-    assert at_30.F43 is not None and at_30.torque is not None
     assert np.hypot(*at_30.F43[0]) == pytest.approx(2139.0, abs=1.0)
     assert at_30.torque[0] == pytest.approx(5000.0, abs=0.5)
 

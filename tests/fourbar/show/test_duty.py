@@ -41,7 +41,6 @@ def test_shaking_is_the_momentum_that_the_bars_lose() -> None:
 
 def test_the_power_is_the_same_whichever_bar_is_driven() -> None:
     one, *others = (fourbar.solve(crank_rocker(drive_bar=bar)) for bar in (2, 3, 4))
-    assert one.power is not None
     for solution in others:
         assert (
             np.abs(solution.power - one.power).max()
@@ -266,7 +265,6 @@ def test_a_study_of_a_motion_law_keeps_its_time() -> None:
     )
     study = fourbar.solve(fourbar.vary(scene, {"bars.input.mass": [0.1, 0.1]}))
     alone, duty = fourbar.solve(scene), motor_duty(study)
-    assert study.time is not None and alone.time is not None
     assert np.array_equal(study.time, [alone.time, alone.time])
     assert duty is not None
     assert np.round(duty.energy_in, 4).tolist() == [0.4655, 0.4655]

@@ -289,7 +289,6 @@ def test_half_a_turn_from_the_ground_the_first_derivative_is_the_ratio_of_the_sp
     link = replace(LINK, ground_angle=ground_angle)
     slopes = sensitivity(Scene(link, Motion(theta_2, 10.0, 3.0), effects=(Gravity(),)))
     solution = slopes.solution
-    assert solution.omega_3 is not None and solution.alpha_3 is not None
     np.testing.assert_allclose(
         slopes.of("theta_3", "motion.theta_2"),
         solution.omega_3 / 10.0,
@@ -316,7 +315,6 @@ def test_a_kite_whose_halves_meet_has_derivatives() -> None:
     It is a constant.
     """
     slopes = sensitivity(Scene(fourbar.uniform(0.3, 0.3, 0.2, 0.2), Motion(1.0, 10.0)))
-    assert slopes.solution.omega_3 is not None
     np.testing.assert_allclose(
         slopes.of("theta_3", "motion.theta_2"),
         slopes.solution.omega_3 / 10.0,

@@ -105,7 +105,6 @@ def test_a_release_is_met_when_it_first_passes() -> None:
     )
     value = float(fine.theta_2[3001])
     found = find_positions(DROPPED, [("theta_2", value)])
-    assert found.time is not None
     assert found.angle[0] == pytest.approx(value, abs=1e-9)
     first = np.flatnonzero(
         (fine.theta_2[:-1] - value) * (fine.theta_2[1:] - value) <= 0.0

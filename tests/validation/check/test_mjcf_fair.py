@@ -209,7 +209,6 @@ def test_friction_that_is_too_large_is_seen_at_one_state_and_through_time(
     for how in (FILE_AT_ONE_STATE, FILE_THROUGH_TIME):
         answer = answer_of(examined, how)
         ours = solve(DRY, "force", at=answer.at)
-        assert ours.torque is not None and ours.omega_3 is not None
         slip = (
             1.0 if pin == "O2" else np.abs(ours.omega_3 - ours.omega_2) / ours.omega_2
         )

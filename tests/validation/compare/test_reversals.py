@@ -110,7 +110,6 @@ def test_a_curve_is_not_drawn_across_the_jump() -> None:
     posed = scene("O4")
     solution = solve(posed)
     reversals = find_reversals(posed, command(posed), solution)
-    assert solution.F43 is not None
     x, y = break_curve(
         solution.theta_2, solution.F43[:, 0], reversals, lambda side: side.F43[:, 0]
     )  # type: ignore[index]

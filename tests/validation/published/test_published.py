@@ -388,7 +388,6 @@ def test_answers_that_sympy_leaves_to_be_solved() -> None:
 
 def test_quantities_of_an_answer() -> None:
     s = fourbar.solve(scenes.thesis())
-    assert s.F14 is not None and s.omega_2 is not None and s.omega_3 is not None
     assert compute_value(s, "-F14_y", 0) == -s.F14[0, 1]
     assert compute_value(s, "omega_3 - omega_2", 0) == s.omega_3[0] - s.omega_2[0]
     assert compute_value(s, "v_A_x", 0) == pytest.approx(

@@ -163,7 +163,6 @@ def collect_answers(solution: Solution) -> tuple[dict[str, Array], dict[str, Arr
     else:
         drive = "drive_force"
     angle = K * EPS / solution.condition
-    assert solution.force_error is not None
     bars = {
         "theta_3": angle,
         "theta_4": angle,

@@ -114,7 +114,6 @@ class TermSizes:
             if units[i] in ("N m", "W") or quantities[i] == LINE.value
         ]
         if driven:
-            assert solution.drive_condition is not None
             well[driven] &= solution.drive_condition >= WELL_CONDITIONED
         largest = np.where(well, size, 0.0).max(axis=1, keepdims=True)
         most = np.where(well, terms, 0.0).max(axis=1, keepdims=True)
@@ -174,7 +173,6 @@ def _sum_length_terms(_: str, sizes: TermSizes) -> Array:
 def _sum_speeds(quantity: str, sizes: TermSizes) -> Array:
     formulas = sizes.solution
     _, a, b, c = sizes.scene.linkage.lengths
-    assert formulas.omega_2 is not None
     omega_2 = np.abs(formulas.omega_2)
     if quantity == "omega_2":
         return omega_2
@@ -232,7 +230,6 @@ def _sum_accelerations(quantity: str, sizes: TermSizes) -> Array:
 def _sum_forces(_: str, sizes: TermSizes) -> Array:
     scene = sizes.scene
     formulas = sizes.solution
-    assert formulas.drive_condition is not None
     gain = 1.0
     if scene.drive is not None:  # a short lever makes the force as many times larger
         short = place_line(

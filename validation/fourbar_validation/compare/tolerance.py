@@ -197,7 +197,6 @@ def find_conditions(
         longest = max(linkage.lengths)
         conditions[directed] *= np.minimum(formulas.stroke / longest, 1.0)
     if any(of_forces):
-        assert formulas.drive_condition is not None
         conditions[of_forces] *= formulas.drive_condition
     if bar == 2:
         decided = OF_THE_INPUT

@@ -124,7 +124,6 @@ def compute_motion(theta_2: Array, branch: int = 1) -> fourbar.Solution:
 def compute_right_unknowns() -> dict[str, float]:
     """Compute the 13 unknowns by our formulas at theta_2 = 135 deg, N and N cm."""
     s = fourbar.solve(make_model_scene(THETA_2))
-    assert s.F32 is not None and s.F43 is not None and s.torque is not None
     pins: dict[str, Any] = {
         "F12": s.F12,
         "F32": s.F32,
@@ -161,7 +160,6 @@ class Kinematics:
 
     def __init__(self) -> None:
         s = compute_motion(np.array([THETA_2]))
-        assert s.a_A is not None
         self.theta_3 = float(s.theta_3[0])
         self.theta_4 = to_ours(float(s.theta_4[0]))
         self.omega: dict[int, float] = {}

@@ -82,7 +82,6 @@ def compute_value(
     )
     values: Any
     if name == "v_A":
-        assert solution.omega_2 is not None
         values = solution.omega_2[:, None] * np.stack(
             [-solution.A[:, 1], solution.A[:, 0]],
             axis=1,

@@ -172,7 +172,6 @@ def _follow(
                 " motion nor the zero of the file's joints may be there"
             )
         raise InputError("motion.theta_2", f"{angle:.6g} deg", reason)
-    assert solution.omega_3 is not None and solution.omega_4 is not None
     still = np.zeros_like(theta_2)
     theta = [still, theta_2, solution.theta_3, solution.theta_4]
     omega = [still, still + 1.0, solution.omega_3, solution.omega_4]

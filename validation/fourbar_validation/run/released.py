@@ -340,7 +340,6 @@ def _prescribe(
     part of its torque, and no more than all of it; one that ends begins to move against
     the whole torque.
     """
-    assert command.omega_2 is not None
     friction: Friction | None = None
     others = []
     for effect in scene.effects:

@@ -255,7 +255,6 @@ def _take_plain_positions(question: Question) -> _Few:
     in_line = scene.linkage.ground_angle + np.array([0.0, math.pi])
     if scene.counts_turns and mark_touching(scene.linkage, in_line).any():
         raise NotAskedError("rounding decides how far its torsion springs are wound")
-    assert solution.drive_condition is not None
     placed = state_from_pins(scene)
     fit = (
         (solution.status_code == OK)

@@ -187,7 +187,6 @@ def compare(text: str, made: LoopScene, speed: float = 3.0) -> None:
     They are compared over the sweep.
     """
     robot = WholeRobot(text, made)
-    assert made.scene.motion.theta_2 is not None
     solution = fourbar.solve(made.scene)
     driven = made.loop.hinges["O2"]
     address = robot.model.jnt_qposadr[driven]
