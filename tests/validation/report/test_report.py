@@ -326,7 +326,7 @@ def test_many_scenes_give_a_short_report_of_the_worst(
     assert summary.orders[0][0] == "scene-000"
     assert (
         f"the 80 of {summary.judged} scenes and engines" in write_summary_page(summary)
-        and summary.judged > 1000
+        and summary.judged == 400
     )
     assert write_summary_page(summary).count("\n") < 160
     # 20 scenes, each with 30 kB of compressed rows; the table of all of them is
@@ -417,7 +417,9 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
     assert re.search(row_of_table, words), words
     # the numbers say what they are
     assert "error of allowed torque pin forces motion compared" in words
-    assert "without an engine: 2 statements" in words and "all hold" in words
+    assert (
+        "without an engine: 1 identity of the formulas" in words and "all hold" in words
+    )
     assert "study" not in words, "what is no engine's stands in no row"
     assert "1 not compared: 1 where a check does not apply" in words
     assert words.startswith(summary.headline)

@@ -328,9 +328,12 @@ class Overview:
             held = "all hold"
             if self.statements_failed:
                 held = f"{self.statements_failed} FAIL"
+            if self.statements == 1:
+                identities = "1 identity"
+            else:
+                identities = f"{self.statements} identities"
             notes.append(
-                f"also checked, without an engine: {self.statements} identities of"
-                f" the formulas; {held}"
+                f"also checked, without an engine: {identities} of the formulas; {held}"
             )
         if self.with_forces:
             notes.append(
