@@ -240,6 +240,10 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
             lambda *x: moving(fourbar.Motion(law=fourbar.Rise(*x))),
             ("345", (0.1, 0.2), 0.3, 0.1, 0.2, 0.1, 8),
         ),
+        "Sine": (
+            lambda *x: moving(fourbar.Motion(law=fourbar.Sine(*x))),
+            (1.0, 0.5, 2.0, 3.0, 0.1, 8),
+        ),
         "Point": (
             lambda *x: fourbar.solve(fourbar.Scene(link, points=(fourbar.Point(*x),))),
             ("P", 3, (0.1, 0.2)),
