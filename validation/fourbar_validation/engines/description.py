@@ -229,15 +229,20 @@ _UNITS_OF_LENGTH = (Fraction(1), Fraction("0.0254"), Fraction("0.3048"))
 def find_stated_lengths(lengths: tuple[float, ...]) -> list[Fraction]:
     """Return d, a, b, c as they were stated, m.
 
-    Decimals of 15 digits at most of which two pairs have one sum make a change point,
-    which their doubles miss by a rounding: 80, 100, 120 and 60 mm do. Other lengths are
-    their doubles.
+    Decimals of 12 digits at most of which two pairs have one sum make a change point,
+    which their doubles miss by a rounding: 80, 100, 120 and 60 mm do. The double of a
+    stated length is at most one unit in the last place off, as the product of a number
+    and a unit is. Other lengths are their doubles.
     """
     for unit in _UNITS_OF_LENGTH:
         d, a, b, c = stated = [
-            Fraction(f"{length / float(unit):.15g}") * unit for length in lengths
+            Fraction(f"{length / float(unit):.12g}") * unit for length in lengths
         ]
-        if 0 in (d + a - b - c, d + b - a - c, d + c - a - b):
+        were_stated = all(
+            abs(float(decimal) - length) <= math.ulp(length)
+            for decimal, length in zip(stated, lengths, strict=True)
+        )
+        if were_stated and 0 in (d + a - b - c, d + b - a - c, d + c - a - b):
             return stated
     return [Fraction(length) for length in lengths]
 
