@@ -274,7 +274,7 @@ def test_moments_about_far_centres_are_right_to_full_accuracy() -> None:
     assert far
     answers = ("theta_3", "theta_4", "F12", "F32", "F43", "F14", "torque")
     right, wrong = (
-        hold_fully(Engine(one.name, one, EQUIVALENCE, answers, stated=False))
+        hold_fully(Engine(one.name, one, EQUIVALENCE, answers))
         for one in (AboutCentres, AMillionthOff)
     )
     reasons = ""
