@@ -57,6 +57,8 @@ ROUNDING_OF_A_SINE = 50.0 * 2.0**-52
 """Sine between two bars, times that between bars 3 and 4, below which it is rounding.
 An angle of the input has 16 digits, and bars 3 and 4 lose what this sine is small by.
 """
+SINE_AT_A_LIMIT = 2.0**-26
+"""Sine between bars 3 and 4 that a rounded angle of the input leaves at a limit."""
 _A_RANGE = 3
 """Samples in a row where Q is nothing: fewer may be a zero that falls on one."""
 _AT_CHANGE_POINT = 1e-4
@@ -282,7 +284,8 @@ def _drop_standing_bar(lengths: Loop, k: Coefficients) -> Coefficients:
     h = np.array([k.h2, k.h3, k.h4])
     ratios = np.array([1.0, lengths.b / lengths.a, lengths.c / lengths.a])
     sines = np.abs(h * ratios[:, np.newaxis])
-    h[sines * sines[0] < ROUNDING_OF_A_SINE] = 0.0
+    lost_by = np.maximum(sines[0], SINE_AT_A_LIMIT)
+    h[sines * lost_by < ROUNDING_OF_A_SINE] = 0.0
     return k._replace(h2=h[0], h3=h[1], h4=h[2])
 
 
