@@ -162,8 +162,9 @@ def test_nothing_is_fetched_and_hostile_text_stays_text() -> None:
     assert "img" not in [name for name, _ in tags]
     for _, attributes in tags:
         assert not {"src", "onerror", "onclick", "style"} & set(attributes)
+        href = attributes.get("href", "#")
         # an icon of no bytes keeps browsers from asking for one
-        assert attributes.get("href", "#").startswith(("#", "data:,"))
+        assert href.startswith("#") or href == "data:,"
     assert not re.search(r"(?:https?:)?//(?!www\.w3\.org/2000/svg)[a-z]+\.[a-z]", page)
     assert "\x00" not in page
     assert "$style" in page  # a stranger's text is no template

@@ -95,13 +95,16 @@ def test_no_curve_is_drawn_through_a_pole() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["double_rocker", "triple_rocker", "thesis"])
-def test_figures_of_rockers_and_the_thesis(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "most"),
+    # of the thesis errors between the steps decide
+    [("double_rocker", 1000), ("triple_rocker", 1000), ("thesis", 1600)],
+)
+def test_figures_of_rockers_and_the_thesis(name: str, most: int) -> None:
     advice = advise.advise(fourbar.load(MODELS / f"{name}.toml"), 1e-5)
     assert advice.reached, advice.reason
-    # each step is read, and errors between steps count
-    assert advice.best.steps <= 1600
-    assert advice.best.steps_per_revolution <= 1600
+    assert advice.best.steps <= most
+    assert advice.best.steps_per_revolution <= most
 
 
 def test_the_file_alone_keeps_the_error(tmp_path: Path) -> None:
