@@ -11,6 +11,10 @@ from tests.oracle.scenes import take_scene
 SHIPPED = read_default_suite()
 RANDOM_SCENES = 200
 SEED = 68
+SHORT_PEAK = 121
+"""Scene whose largest bending moment of the coupler is printed 0.4 % short: the dense
+cuts of the free bodies exceed it.
+"""
 SAMPLE = {
     "slender": ORACLES.keys()
     - {"blocks", "error_bars", "friction_residual", "statements"},
@@ -57,10 +61,20 @@ def test_every_shipped_scene_holds(number: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", range(RANDOM_SCENES))
+@pytest.mark.parametrize("number", sorted(set(range(RANDOM_SCENES)) - {SHORT_PEAK}))
 def test_random_scenes_hold(number: int) -> None:
     scene = draw_random_scene(SEED, number, tuple(DrawnType))
-    failing = find_failing(judge_by(scene))
-    if failing and all(" bending" in row for row in failing):
-        pytest.xfail(f"the cut of the bending moment is not settled: {failing}")
-    assert not failing
+    assert not find_failing(judge_by(scene))
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(strict=True, reason="a maximum between sampled positions is missed")
+def test_the_bending_moment_between_positions_is_found() -> None:
+    scene = draw_random_scene(SEED, SHORT_PEAK, tuple(DrawnType))
+    assert not find_failing(judge_by(scene, "summary"))
+
+
+@pytest.mark.slow
+def test_all_else_of_the_scene_with_a_short_peak_holds() -> None:
+    scene = draw_random_scene(SEED, SHORT_PEAK, tuple(DrawnType))
+    assert {row.quantity for row in judge_by(scene) if row.failed} == {"bending"}
