@@ -9,7 +9,6 @@ import math
 import numpy as np
 
 from fourbar.linkage import PIN_FORCE
-from fourbar.show.duty import bearing_load
 from fourbar.show.summary import Facts, find_drive_rounding
 from fourbar.show.units import write_short
 from fourbar.solution import Conversion, Solution
@@ -68,9 +67,11 @@ def list_peaks(
     peaks = dict[str, float | None]()
     searched = facts is not None and facts.kind in _SEARCHED
     if solution.F12 is not None:
-        for pin, force in PIN_FORCE.items():
-            if np.isfinite(getattr(solution, force)).any():
-                peaks[force] = bearing_load(solution, pin).largest
+        for name in PIN_FORCE.values():
+            force = getattr(solution, name)
+            sizes = np.hypot(force[..., 0], force[..., 1])
+            if np.isfinite(sizes).any():
+                peaks[name] = float(sizes[np.isfinite(sizes)].max())
     if facts is not None:
         peaks |= {PIN_FORCE[pin]: load.peak.value for pin, load in facts.pins.items()}
     for name in _DRIVE:
