@@ -15,7 +15,7 @@ from fourbar.scene import Command, Scene
 from fourbar.show.columns import Column, read_column
 from fourbar.show.units import drop_rounding
 from fourbar.solving import find_last_stage
-from fourbar.studies.course import Course
+from fourbar.studies.course import MotionCourse
 from fourbar.studies.passing import SAME_POSITION, is_same_position
 
 JUMP = 1e-3
@@ -49,14 +49,14 @@ def locate(scene: Scene, name: str, text: str) -> Command:
     NotAssembledError : no position has the value; the message says the range.
     """
     try:
-        return _Search(scene, name).locate(text)
+        return _LocatedSearch(scene, name).locate(text)
     except InputError as error:
         if error.key not in ("--columns", "value"):
             raise
         raise error.moved_to("--at", None) from None
 
 
-class _Search:
+class _LocatedSearch:
     """A column over the motion of a scene."""
 
     def __init__(self, scene: Scene, name: str) -> None:
@@ -68,7 +68,7 @@ class _Search:
             stage = "error"
         else:
             stage = "force"
-        self.course = Course(scene, stage)
+        self.course = MotionCourse(scene, stage)
         self.places = self.course.places
         self.commanded = self.course.commanded
         self._located = {"xatol": LOCATED * self.course.span, "xrtol": 0.0}

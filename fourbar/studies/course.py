@@ -31,7 +31,7 @@ def follow(scene: Scene, solution: Solution) -> None:
     moves = motion.law is not None or motion.free is not None
     if not moves and not isinstance(motion.angle, Sweep | None):
         return
-    course = Course(scene, "position")
+    course = MotionCourse(scene, "position")
     order = np.argsort(course.places)
     between = np.searchsorted(course.places[order], solution.at.places)
     nearest = order[np.clip(between, 0, len(order) - 1)]
@@ -42,7 +42,7 @@ def follow(scene: Scene, solution: Solution) -> None:
             angles += TURN * np.nan_to_num(turns)
 
 
-class Course:
+class MotionCourse:
     """Motion of a scene, of which any place can be solved.
 
     A scene that states single positions has the range that holds the first of them.

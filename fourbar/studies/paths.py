@@ -10,7 +10,7 @@ from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar.scene.motion import Sweep
 from fourbar.solution import shift_to_drawing
-from fourbar.studies.course import Course
+from fourbar.studies.course import MotionCourse
 
 ROUNDS = 6
 """Rounds in which the steps beside an extreme are divided."""
@@ -54,13 +54,13 @@ def measure_paths(scene: Scene) -> dict[str, Path]:
     moves = motion.law is not None or motion.free is not None
     if not scene.points or not (moves or isinstance(motion.angle, Sweep | None)):
         return {}
-    course = Course(scene, "position")
+    course = MotionCourse(scene, "position")
     if not course.solution.assembled.any():
         return {}
     return {point.name: _measure_path(course, point.name) for point in scene.points}
 
 
-def _measure_path(course: Course, name: str) -> Path:
+def _measure_path(course: MotionCourse, name: str) -> Path:
     """Measure a path, dividing the steps beside its extremes round by round."""
     places = course.places
     points = _locate_point(course, name, places)
@@ -82,7 +82,7 @@ def _measure_path(course: Course, name: str) -> Path:
     return _measure_points(places, points)
 
 
-def _locate_point(course: Course, name: str, places: Array) -> Array:
+def _locate_point(course: MotionCourse, name: str, places: Array) -> Array:
     """Return a point at places of the motion, (n, 2)."""
     solution = course.solve(places)
     return shift_to_drawing(solution, solution.points[name])

@@ -21,6 +21,7 @@ from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion, Sweep
 from fourbar_lab import LAB_FOLDER
 from fourbar_validation.advise.advise import MOST_STEPS_OF_A_RUN, advise
+from fourbar_validation.advise.judged_setup import JudgedSetup
 from fourbar_validation.advise.matters import judge_trial
 from fourbar_validation.cost.study import time_in_turns
 from fourbar_validation.engines.mujoco.trial import (
@@ -232,7 +233,7 @@ def measure_case(
         dense, TrialSetup(dense, command(dense)).try_out(advice.best.settings)
     ).worst
     cheapest = try_all_settings(
-        TrialSetup(searched, command(searched)),
+        JudgedSetup(searched),
         required,
         costs,
     )

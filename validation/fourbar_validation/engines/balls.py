@@ -221,7 +221,12 @@ def _place_from_pin(
 
 
 def state_lengths(linkage: FourBar) -> BallValues:
-    """Return the lengths d, a, b, c as they were stated, as balls."""
+    """Return the lengths d, a, b, c as they were stated, as balls.
+
+    Lengths that are balls already, as those of a study of slopes, stay.
+    """
+    if any(isinstance(length, arb) for length in linkage.lengths):
+        return dict(zip("dabc", map(arb, linkage.lengths), strict=True))
     lengths = find_stated_lengths(linkage.lengths)
     return {
         name: arb(fmpq(*length.as_integer_ratio()))

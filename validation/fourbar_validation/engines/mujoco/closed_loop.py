@@ -14,6 +14,10 @@ from fourbar.quantities import Array
 from fourbar_validation.engines.loaded import Assembled
 from fourbar_validation.engines.tree import solve_closed
 
+# MuJoCo would write warnings to standard error and to a file of a fixed name in the
+# working folder; the monitor reads them from its data
+mujoco.set_mju_user_warning(lambda _: None)
+
 _CARRIED_BY = {
     "input": ("input",),
     "coupler": ("coupler", "input"),
