@@ -48,7 +48,7 @@ LAB_COMMANDS = {
     ),
     "findings": Listed(
         "fourbar_lab.simulators.findings:findings_command",
-        "Run the scripts of docs/findings where their simulators are.",
+        "Run the scripts of docs/findings where their simulators are installed.",
     ),
     "write": Listed(
         "fourbar_lab.write:write_command",
