@@ -72,11 +72,14 @@ def evaluate_scene(
     solution = solve(scene, stage)
     if not solution.assembled.any():
         raise NotAssembledError(say_nowhere(scene))
-    data = collect_live_data(scene, units, stage=stage, midway=True) | {
-        "tolerances": None,
-        "pictures": {},
-        "toml": None,
-    }
+    data = collect_live_data(
+        scene,
+        units,
+        stage=stage,
+        midway=True,
+        solved=solution,
+    )
+    data |= {"tolerances": None, "pictures": {}, "toml": None}
     data["traced"] = None
     if scene.picture is not None:
         picture = scene.picture

@@ -10,7 +10,7 @@ import math
 import re
 import tomllib
 from fractions import Fraction
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 from typing import Any
 
@@ -96,6 +96,8 @@ class UnitError(ValueError):
     """
 
 
+# a drag reads the whole scene again at each step, and one of its texts has changed
+@lru_cache(maxsize=1024)
 def to_si(text: str, unit: str) -> float:
     """Convert the number in `text` to `unit`, as the nearest double.
 

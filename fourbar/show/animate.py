@@ -115,20 +115,22 @@ def collect_live_data(
     signs: tuple[int, ...] = (),
     stage: str | None = None,
     midway: bool = False,
+    solved: Solution | None = None,
 ) -> dict[str, Any]:
     """Collect what the page's script draws, columns as arrays.
 
     Tolerances, pictures and the file are left out.
 
     `signs`: the branches of a sweep; left out: the scene's. `stage`: the last one
-    evaluated; left out: as of `solve`.
+    evaluated; left out: as of `solve`. `solved`: the scene's solution at that stage,
+    so that a sweep which is shown as it stands is not solved twice.
     """
     linkage = scene.linkage
     motion = scene.motion
     if is_over_time(scene):
         shown = _collect_motion(scene, stage)
     else:
-        shown = _collect_sweep(scene, signs or (motion.branch,), stage)
+        shown = _collect_sweep(scene, signs or (motion.branch,), stage, solved)
     closes = np.isfinite(shown["branches"][str(motion.branch)]["theta_3"])
     if not closes.any():
         raise NotAssembledError(
@@ -192,6 +194,7 @@ def _collect_sweep(
     scene: Scene,
     signs: tuple[int, ...],
     stage: str | None,
+    solved: Solution | None,
 ) -> dict[str, Any]:
     """Collect both branches over theta_2, or over another commanded quantity."""
     motion = scene.motion
@@ -212,7 +215,15 @@ def _collect_sweep(
     branches = {}
     for sign in signs if name == "theta_2" else (motion.branch,):
         one = set_branch(scene, sign)
-        solution = solve(one, stage, at=command_at(one, thinned.places))
+        shown = command_at(one, thinned.places)
+        if (
+            solved is not None
+            and sign == motion.branch
+            and np.array_equal(shown.places, solved.at.places)
+        ):
+            solution = solved
+        else:
+            solution = solve(one, stage, at=shown)
         branches[str(sign)], theta_2 = _collect_columns(solution), solution.theta_2
     if name != "theta_2":
         branches[str(motion.branch)]["theta_2"] = theta_2
