@@ -35,7 +35,6 @@ from fourbar.formulas.many_digits import (
 from fourbar.formulas.mobility import limit_positions
 from fourbar.formulas.motion import Coefficients, Rates, State, rates
 from fourbar.formulas.path import (
-    compute_state,
     drive_sine,
     drive_sine_of_triangle,
     prepare_path,
@@ -780,28 +779,6 @@ def test_the_sine_of_the_drive_by_the_triangle_is_that_of_the_directions(
         exact,
         rel=16.0 * U,
     )
-
-
-def test_a_state_holds_what_it_was_made_from() -> None:
-    bars, theta_2 = (
-        FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22), 0.4),
-        np.array([0.5, 1.0]),
-    )
-    unit, moving = (
-        compute_state(bars, theta_2, 1),
-        compute_state(bars, theta_2, 1, 3.0, -2.0),
-    )
-    assert unit.theta_1 == 0.4 and np.array_equal(unit.theta_2, theta_2)
-    assert (unit.speed, unit.moving.omega_2, unit.moving.alpha_2) == (1.0, 1.0, 0.0)
-    assert (moving.speed, moving.moving.omega_2, moving.moving.alpha_2) == (
-        3.0,
-        3.0,
-        -2.0,
-    )
-    assert np.array_equal(unit.moving.omega_4, unit.k.h4) and np.array_equal(
-        unit.moving.alpha_4, unit.k.dh4
-    )
-    assert [prepare_path(unit.lengths[:4], 0.4, bar).bar for bar in (2, 4)] == [2, 4]
 
 
 def test_the_factor_that_changes_less_gives_the_other_its_digits() -> None:

@@ -281,7 +281,7 @@ def nearly_special(seed: int, count: int) -> list[FourBar]:
 def test_limits_keep_their_digits_near_special_linkages() -> None:
     checked = 0
     with mp.workdps(50):
-        for bars in nearly_special(3, 300) + random_linkages(4, 100):
+        for bars in nearly_special(3, 100) + random_linkages(4, 30):
             theta_1 = bars.ground_angle
             for bar in (2, 3, 4):
                 for limit in limit_positions(bars, bar):
@@ -308,7 +308,7 @@ def test_limits_keep_their_digits_near_special_linkages() -> None:
                         float(error),
                     )
                     checked += 1
-    assert checked > 1000
+    assert checked > 300
 
 
 def _mod(angle: mp.mpf) -> mp.mpf:
@@ -316,7 +316,7 @@ def _mod(angle: mp.mpf) -> mp.mpf:
 
 
 def test_limits_close_the_loop_with_two_bars_collinear() -> None:
-    for bars in random_linkages(5, 300):
+    for bars in random_linkages(5, 100):
         d, a, b, c = bars.lengths
         for bar, pair in ((2, (3, 4)), (3, (2, 4)), (4, (2, 3))):
             limits = limit_positions(bars, bar)
@@ -367,7 +367,7 @@ def test_swing_is_what_a_scan_of_the_output_finds() -> None:
 
 
 def test_ranges_of_coupler_and_output_hold_every_position_and_no_more() -> None:
-    for bars in random_linkages(8, 60):
+    for bars in random_linkages(8, 24):
         theta_2 = bars.ground_angle + (np.arange(GRID) + 0.5) * (2 * math.pi / GRID)
         theta_2 = theta_2[closes(bars, theta_2) > 0.0]
         for bar in (3, 4):

@@ -15,7 +15,6 @@ from fourbar.formulas.mobility import circuits, find_intervals, turns_fully
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import compute_state
 from fourbar.formulas.points import (
-    Centre,
     coupler_curve,
     instant_centres,
     point_coefficients,
@@ -28,11 +27,6 @@ FIRST, SECOND = 32.0, 128.0
 """Roundings in a first and a second coefficient; each is magnified by 1/sin^2 mu and
 1/sin^4 mu at most:
 one power of 1/sin^2 mu from the angles, one from the division by the root of the area.
-"""
-COLLINEAR = 64.0 * EPS
-"""Rounding of the determinant of three instant centres, relative to the product of
-their magnitudes and
-magnified by 1/|sin mu|.
 """
 
 
@@ -124,7 +118,7 @@ def special_positions() -> list[Drawn]:
 
 @pytest.mark.parametrize(
     "positions",
-    [random_positions(11, 60), special_positions()],
+    [random_positions(11, 20), special_positions()],
     ids=["random", "special"],
 )
 def test_directions_and_bar_coefficients_are_those_of_the_loop(
@@ -169,7 +163,7 @@ def _near(angle: mp.mpf, about: mp.mpf) -> mp.mpf:
 
 def test_point_coefficients_are_derivatives() -> None:
     with mp.workdps(50):
-        for drawn in random_positions(12, 40):
+        for drawn in random_positions(12, 15):
             exact, theta_2, sine = (
                 Exact(drawn),
                 mp.mpf(float(drawn.theta_2[0])),
@@ -188,23 +182,8 @@ def test_point_coefficients_are_derivatives() -> None:
                 assert error <= roundings * EPS * size ** (n + 1) / sine ** (2 * n)
 
 
-def determinant(*centres: Centre) -> tuple[float, float]:
-    """Determinant of three homogeneous points and the product of their magnitudes."""
-    rows = np.array([[float(x[0]) for x in centre] for centre in centres])
-    return float(np.linalg.det(rows)), float(np.prod(np.linalg.norm(rows, axis=1)))
-
-
-def test_three_centres_of_three_bars_are_collinear() -> None:
-    for drawn in random_positions(15, 300):
-        centres = instant_centres(*drawn)
-        assert sorted(centres) == [(1, 2), (1, 3), (1, 4), (2, 3), (2, 4), (3, 4)]
-        for i, j, k in ((1, 2, 3), (1, 2, 4), (1, 3, 4), (2, 3, 4)):
-            gap, size = determinant(centres[i, j], centres[j, k], centres[i, k])
-            assert abs(gap) <= COLLINEAR * size / drawn.sine
-
-
 def test_the_coupler_turns_about_I13_and_bars_2_and_4_share_I24() -> None:
-    for drawn in random_positions(16, 200):
+    for drawn in random_positions(16, 60):
         moving, sine = drawn.moving(), drawn.sine
         O4 = drawn.bars.ground * moving.position.u1
         x, y = instant_centres(*drawn)[1, 3].point

@@ -12,7 +12,6 @@ from fourbar.formulas.arithmetic import cross, dot
 from fourbar.formulas.motion import (
     State,
     coefficients,
-    put_parallel_speeds,
     rates,
     take_sines_of_rates,
 )
@@ -21,7 +20,6 @@ from fourbar.formulas.pin_forces import Body, Wrenches, coupler_about_B, pin_for
 from fourbar.formulas.position import (
     close_loop,
     direction,
-    find_parallel_pairs,
     half_angle,
     loop,
 )
@@ -155,37 +153,6 @@ def test_moment_of_the_coupler_about_B_is_that_of_its_inertia_at_the_mass_centre
         s.lengths, three, s.position, s.moving, drive_sine(s.position, 4)
     )
     assert np.allclose(moment, expected, rtol=0.0, atol=64 * FEW_ROUNDINGS)
-
-
-@pytest.mark.parametrize(
-    ("lengths", "branch"), [((3.0, 1.0, 3.0, 1.0), 1), ((3.0, 1.0, 1.0, 3.0), -1)]
-)
-def test_bars_that_stay_parallel_turn_as_one(
-    lengths: tuple[float, ...],
-    branch: int,
-) -> None:
-    bars, theta_2 = loop(*lengths), np.array([1e-12, 0.7, -0.7, 2.0])
-    half = half_angle(bars, theta_2)
-    position = close_loop(bars, 1.0 + 0.0j, direction(theta_2), half, branch)
-    first, second = find_parallel_pairs(bars, branch)
-    assert first != second
-    assert find_parallel_pairs(bars, -branch) == (False, False)
-    k = coefficients(bars, position)
-    exact = put_parallel_speeds(k, first, second)
-    assert np.all(exact.h23 == (1.0 if first else 0.0))  # however near the change point
-    assert np.all(exact.h43 == (1.0 if first else -1.0))
-    for name in (
-        "h3",
-        "h4",
-        "h23",
-        "h43",
-    ):  # the formulas themselves, away from the change point, up to rounding
-        assert np.allclose(
-            getattr(k, name)[1:],
-            getattr(exact, name)[1:],
-            rtol=0.0,
-            atol=64 * FEW_ROUNDINGS,
-        )
 
 
 def two_readings() -> tuple[State, State]:
