@@ -322,7 +322,7 @@ class Effect:
     """Elements of an SDF joint that state its number, by reader ("gazebo", "drake")."""
 
     @classmethod
-    def draw(cls, rng: np.random.Generator, couple: float) -> Self | None:
+    def draw(cls, rng: "np.random.Generator", couple: float) -> Self | None:
         """Draw an effect for a random scene, about as strong as a couple, N m.
 
         None: random scenes have none.

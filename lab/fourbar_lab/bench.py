@@ -37,6 +37,7 @@ from fourbar_lab.contenders import (
     time_linkages,
     time_positions,
 )
+from fourbar_lab.starts import measure_starts
 from fourbar_validation.cost.formulas import make_bodies
 from fourbar_validation.cost.study import time_call
 from fourbar_validation.engines.description import ON_BARS
@@ -44,7 +45,7 @@ from fourbar_validation.engines.plain_loop import PlainLoop
 from fourbar_validation.engines.registry import ENGINES, Engine, Later
 from fourbar_validation.published.thirteen import solve_thirteen
 from fourbar_validation.report.machine import name_machine
-from fourbar_validation.report.terminal import make_words_table
+from fourbar_validation.report.sentences import make_words_table
 from fourbar_validation.run.judge import judge_for_report
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
@@ -201,6 +202,19 @@ SPEED_LIMITS = {
         1.0,
         "it loads numpy alone, and less than that of its own",
     ),
+    **{
+        f"{command} / import numpy": _SpeedLimit(
+            "<=",
+            3.0,
+            "a command loads what it uses alone",
+        )
+        for command in (
+            "fourbar --help",
+            "fourbar-validation --help",
+            "analyze",
+            "check",
+        )
+    },
 }
 """Limits by the name of the row."""
 
@@ -446,6 +460,7 @@ def measure_speed(
         "growth from 1000 positions on": max(cost.values()) / cost[min(cost)],
         "memory beyond the result, MB": _measure_memory(min(positions, 1_000_000)),
         "import fourbar / import numpy": import_cost(),
+        **measure_starts(),
     }
     return Measured(rows, by_positions, by_linkages, peers.not_run)
 

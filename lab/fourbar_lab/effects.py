@@ -26,8 +26,8 @@ from fourbar_validation.cost.study import time_call, time_in_turns
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.report.machine import describe_setup
+from fourbar_validation.report.sentences import make_words_table
 from fourbar_validation.report.templating import render
-from fourbar_validation.report.terminal import make_words_table
 
 LENGTHS_TEXT = 'ground = "30 cm"\ninput = "10 cm"\ncoupler = "25 cm"\noutput = "22 cm"'
 EFFECTS: dict[str, kinds.Effect | None] = {

@@ -32,7 +32,7 @@ from fourbar_validation.compare.tolerance import find_used
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.prediction import compute_reference
 from fourbar_validation.engines.workers import apply_each
-from fourbar_validation.report.terminal import make_words_table
+from fourbar_validation.report.sentences import make_words_table
 
 SAMPLES_OF_A_FAMILY = 10_000
 """Samples per family of the full set."""

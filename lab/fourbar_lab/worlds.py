@@ -26,8 +26,8 @@ from fourbar_validation.check.problem import judge_answers, read_problem
 from fourbar_validation.compare.rows import write_one_line
 from fourbar_validation.engines import protocol
 from fourbar_validation.report.machine import describe_setup
+from fourbar_validation.report.sentences import make_words_table
 from fourbar_validation.report.templating import render
-from fourbar_validation.report.terminal import make_words_table
 
 _PROBLEM = "crank_rocker"
 """Problem whose positions are repeated over the worlds."""

@@ -15,6 +15,7 @@ from fourbar.quantities import UNKNOWNS
 from fourbar.solving import solve
 from fourbar_lab import bench, contenders
 from fourbar_lab.contenders import command_positions, make_example
+from fourbar_lab.starts import measure_starts
 
 ROUNDING = 1e-11
 """Relative to the largest of each unknown: a few hundred roundings."""
@@ -24,6 +25,7 @@ ROUNDING = 1e-11
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Counts at which the times mean nothing, but everything runs."""
     monkeypatch.setattr(bench, "import_cost", lambda: 0.5)
+    monkeypatch.setattr(bench, "measure_starts", lambda: measure_starts(1))
     for name, count in (("LEAST_POSITIONS", 1), ("MOST_LOOPED", 10)):
         monkeypatch.setattr(contenders, name, count)
 
@@ -51,6 +53,18 @@ def test_every_limit_is_of_a_row_that_is_measured(tmp_path: Path) -> None:
     )
     picture = (tmp_path / "bench.svg").read_text()
     assert picture.count('<g id="axes_') == 2 and picture.count('<g id="line2d_') > 15
+
+
+@pytest.mark.slow
+@pytest.mark.posix
+def test_commands_start_within_their_limits() -> None:
+    """Two processes that follow one another share what else the machine does."""
+    beyond = {
+        what: ratio
+        for what, ratio in measure_starts().items()
+        if not bench.SPEED_LIMITS[what].holds(ratio)
+    }
+    assert not beyond
 
 
 @pytest.mark.slow

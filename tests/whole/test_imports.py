@@ -11,7 +11,6 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 HEAVY = (
-    "pint",
     "click",
     "rich",
     "jinja2",

@@ -39,7 +39,7 @@ from fourbar_validation.engines.mujoco.trial import (
     guess,
     make_settings,
 )
-from fourbar_validation.report.terminal import make_words_table, print_sentence
+from fourbar_validation.report.sentences import make_words_table, print_sentence
 from fourbar_validation.robots.measure import (
     measure_robot,
     read_measure_options,

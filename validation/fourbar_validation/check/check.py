@@ -5,6 +5,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 
 import click
@@ -16,16 +17,15 @@ from fourbar.scene import Scene
 from fourbar.writing import require_file, write_text
 from fourbar_validation.check.judge import Allowance, Discrepancy, Judge
 from fourbar_validation.check.mistakes import NEARER, Explanation, explain
-from fourbar_validation.check.problem import check_problem
 from fourbar_validation.check.theirs import TheirTable, name_quantity, read_table
 from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.compare.scales import VANISHING
 from fourbar_validation.compare.tolerance import EPS, magnitude
 from fourbar_validation.report.junit import JunitCase, write_document
-from fourbar_validation.report.terminal import make_words_table, print_sentence
+from fourbar_validation.report.sentences import make_words_table, print_sentence
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Judgement:
     """All findings, and the known mistakes that would explain them."""
 
@@ -37,7 +37,7 @@ class Judgement:
     explanations: list[Explanation]
     tolerance: Allowance | None = None
 
-    @property
+    @cached_property
     def differing(self) -> list[Discrepancy]:
         """Return the findings that do not agree, though digits are left to judge by."""
         return [
@@ -56,7 +56,7 @@ class Judgement:
         """Return how many numbers agree to round-off and their printed digits."""
         return sum(finding.exact for finding in self.findings)
 
-    @property
+    @cached_property
     def not_judged(self) -> int:
         """Return how many numbers have no digit left to judge by."""
         return sum(not finding.judged for finding in self.findings)
@@ -115,16 +115,14 @@ class Judgement:
 
         Of the numbers of a quantity the one with the fewest digits counts.
         """
+        allowed: dict[str, float] = {}
+        for finding in self.findings:
+            if finding.judged:
+                so_far = allowed.get(finding.quantity, 0.0)
+                allowed[finding.quantity] = max(so_far, finding.allowed)
         fewest: dict[int, list[str]] = {}
-        for quantity in dict.fromkeys(finding.quantity for finding in self.findings):
-            allowed = [
-                finding.allowed
-                for finding in self.findings
-                if finding.quantity == quantity and finding.judged
-            ]
-            if allowed:
-                digits = _count_compared_digits(max(allowed))
-                fewest.setdefault(digits, []).append(quantity)
+        for quantity, most in allowed.items():
+            fewest.setdefault(_count_compared_digits(most), []).append(quantity)
         if len(fewest) == 1:
             (digits,) = fewest
             return f"{digits} digit{'s' if digits != 1 else ''}"
@@ -377,6 +375,8 @@ def check_command(
                     str(value),
                     "is of a table: a problem has its own levels",
                 )
+        from fourbar_validation.check.problem import check_problem
+
         return check_problem(scene, theirs)
     stated = load(scene)
     table = read_table(theirs, stated.motion.commanded)
@@ -406,9 +406,6 @@ def show_judgement(
     name: str,
 ) -> None:
     """Print what differs, what explains it, and the count."""
-    from rich.console import Console
-    from rich.markup import escape
-
     for note in table.notes:
         print_sentence(note)
     for why in dict.fromkeys(table.left_out.values()):
@@ -418,6 +415,9 @@ def show_judgement(
         print_sentence(shorten(f"left out ({why}): {headings}", LONGEST_MESSAGE))
     differing = judgement.differing
     if differing:
+        from rich.console import Console
+        from rich.markup import escape
+
         title = (
             f"{escape(escape_controls(name))}: what differs,"
             f" the {MOST_SHOWN_OF_EACH} worst of each quantity"

@@ -24,7 +24,7 @@ from fourbar.solving import solve
 from fourbar_validation.check.judge import Judge, Mistake
 from fourbar_validation.check.theirs import OTHER_UNITS, name_quantity
 from fourbar_validation.compare.tolerance import compute_difference, replace_zero_size
-from fourbar_validation.scenes.hard_families import replace_bars
+from fourbar_validation.scenes.bars import replace_bars
 
 ENOUGH_NUMBERS = 3
 """Numbers that a fitted one must explain: fewer are explained by chance."""

@@ -243,12 +243,16 @@ class Judge:
             label = self.table.label(key)
             error, allowed, apart = self.judged(key, ours)
             permitted = self.permitted(key, ours)
+            their_rows, our_rows = (
+                numbers.reshape(len(numbers), -1).tolist() for numbers in (theirs, ours)
+            )
             for i in np.flatnonzero(self.where(key)).tolist():
-                stated = np.isfinite(np.atleast_1d(theirs[i]))
-                yours, mine = (
-                    tuple(np.atleast_1d(values[i])[stated].tolist())
-                    for values in (theirs, ours)
-                )
+                stated = [
+                    both
+                    for both in zip(their_rows[i], our_rows[i], strict=True)
+                    if math.isfinite(both[0])
+                ]
+                yours, mine = zip(*stated, strict=True)
                 numbers = (float(error[i]), float(allowed[i]), float(apart[i]))
                 if permitted is None:
                     most = None

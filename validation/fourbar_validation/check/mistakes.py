@@ -22,7 +22,7 @@ from fourbar.solving import solve
 from fourbar_validation.check.calculated import find_miscalculated
 from fourbar_validation.check.fitted import ENOUGH_NUMBERS, find_fitted
 from fourbar_validation.check.judge import Judge, Mistake
-from fourbar_validation.scenes.hard_families import list_moving, replace_bars
+from fourbar_validation.scenes.bars import list_moving, replace_bars
 
 RPM = np.pi / 30.0
 """rad/s of one rev/min."""

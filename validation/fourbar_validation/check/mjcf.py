@@ -45,8 +45,8 @@ from fourbar_validation.compare.tolerance import (
     hold_simulated,
 )
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
+from fourbar_validation.report.sentences import make_words_table
 from fourbar_validation.report.templating import render, write_error
-from fourbar_validation.report.terminal import make_words_table
 from fourbar_validation.robots.files import is_four_bar_alone, read_robot
 from fourbar_validation.robots.guard import examine_guarded
 from fourbar_validation.robots.measure import (

@@ -237,7 +237,7 @@ def check_problem(problem_file: Path, result_file: Path) -> int:
     from rich.console import Console
     from rich.markup import escape
 
-    from fourbar_validation.report.terminal import make_words_table
+    from fourbar_validation.report.sentences import make_words_table
 
     problem = read_problem(problem_file)
     answered = read_result(result_file, problem)

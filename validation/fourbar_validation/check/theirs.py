@@ -231,25 +231,18 @@ def read_table(path: Path, commanded: str = "theta_2") -> TheirTable:
     numbers = {name: np.empty(len(rows)) for name in names}
     halves = {name: np.empty(len(rows)) for name in names}
     for row, (line, cells) in enumerate(rows):
-        if len(cells) < len(headings) or any(
-            cell.strip() for cell in cells[len(headings) :]
-        ):
-            if len(cells) > len(headings):
-                beside = "; with decimal commas, semicolons between them"
-            else:
-                beside = ""
-            raise InputError(
-                f"line {line}",
-                cells,
-                f"needs {len(headings)} cells{beside}",
-                str(path),
-            )
+        _require_cells(path, headings, line, cells)
         for index, (name, unit) in columns.items():
-            value, half = _read_cell(
-                path,
-                f"line {line}, {headings[index].strip()}",
-                cells[index],
-            )
+            try:
+                value, half = _read_cell(cells[index])
+            except InputError as error:
+                place = f"line {line}, {headings[index].strip()}"
+                raise InputError(
+                    place,
+                    cells[index],
+                    error.allowed,
+                    str(path),
+                ) from None
             numbers[name][row], halves[name][row] = (
                 value * unit.factor,
                 half * unit.factor,
@@ -293,6 +286,28 @@ def read_table(path: Path, commanded: str = "theta_2") -> TheirTable:
             str(path),
         )
     return table
+
+
+def _require_cells(
+    path: Path,
+    headings: list[str],
+    line: int,
+    cells: list[str],
+) -> None:
+    """Refuse a row that has not one cell for each heading; blank ones may follow."""
+    if len(cells) < len(headings) or any(
+        cell.strip() for cell in cells[len(headings) :]
+    ):
+        if len(cells) > len(headings):
+            beside = "; with decimal commas, semicolons between them"
+        else:
+            beside = ""
+        raise InputError(
+            f"line {line}",
+            cells,
+            f"needs {len(headings)} cells{beside}",
+            str(path),
+        )
 
 
 def _list_renamings(renamings: dict[str, str]) -> str:
@@ -580,44 +595,25 @@ def _read_unit(
         ) from None
 
 
-def _read_cell(
-    path: Path,
-    place: str,
-    cell: str,
-) -> tuple[float, float]:
+def _read_cell(cell: str) -> tuple[float, float]:
     """Return the number in a cell, and half a unit of its last printed digit.
 
     Both are NaN for a blank.
     """
     text = cell.strip().replace("\N{MINUS SIGN}", "-")
-    if _THOUSANDS.fullmatch(text):
-        text = re.sub(r"[ ,'\u2019\u00a0\u202f]", "", text)
     if not text:
         return math.nan, math.nan
     try:
+        if _THOUSANDS.fullmatch(text):
+            text = re.sub(r"[ ,'\u2019\u00a0\u202f]", "", text)
         exact = Decimal(text)
     except InvalidOperation:
-        raise InputError(
-            place,
-            cell,
-            "must be a number",
-            str(path),
-        ) from None
+        raise InputError("cell", cell, "must be a number") from None
     if not exact.is_finite():
-        raise InputError(
-            place,
-            cell,
-            "must be a finite number",
-            str(path),
-        )
+        raise InputError("cell", cell, "must be a finite number")
     exponent = exact.as_tuple().exponent
     assert isinstance(exponent, int)
     value = float(exact)
     if not math.isfinite(value):
-        raise InputError(
-            place,
-            cell,
-            "is larger than a double can hold",
-            str(path),
-        )
+        raise InputError("cell", cell, "is larger than a double can hold")
     return value, 0.5 * 10.0**exponent

@@ -24,8 +24,8 @@ from fourbar_validation.cost.series import BEST
 from fourbar_validation.cost.study import COST_COLUMNS, CostPoint, CostStudy, list_cells
 from fourbar_validation.places import MODELS
 from fourbar_validation.report.machine import describe_setup
+from fourbar_validation.report.sentences import make_words_table
 from fourbar_validation.report.templating import render
-from fourbar_validation.report.terminal import make_words_table
 from fourbar_validation.scenes.suites import read_scene_files
 
 _DEFAULT_SCENES = (MODELS / "crank_rocker.toml",)

@@ -25,8 +25,8 @@ from fourbar_validation.published.program import (
 )
 from fourbar_validation.published.textbook import compare_maple, compare_textbooks
 from fourbar_validation.published.thesis import list_thesis_figures
+from fourbar_validation.report.sentences import make_words_table
 from fourbar_validation.report.templating import render
-from fourbar_validation.report.terminal import make_words_table
 
 PAGE_WIDTH = 78
 

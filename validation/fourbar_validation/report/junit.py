@@ -1,6 +1,5 @@
 """JUnit XML, for the test page of a continuous-integration system."""
 
-import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
@@ -72,6 +71,8 @@ def count_beyond(rows: int) -> Iterator[JunitCase]:
 
 def write_document(title: str, cases: Iterable[JunitCase]) -> str:
     """Write the cases as JUnit XML, suite by suite."""
+    import xml.etree.ElementTree as ET
+
     report = ET.Element("testsuites", name=title)
     suites: dict[str, ET.Element] = {}
     counts: Counter[tuple[str, str]] = Counter()

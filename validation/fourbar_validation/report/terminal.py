@@ -1,15 +1,15 @@
 """The table at the end of a run."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fourbar.errors import clean_line
-from fourbar.show.tables import wrap_line
-from fourbar_validation.compare.rows import FAILS, escape_controls
+from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.report.overview import OVERVIEW_GROUPS
+from fourbar_validation.report.sentences import write_two_digits
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.report.templating import write_error
 
@@ -24,14 +24,6 @@ MOST_CAUSES_PRINTED = 18
 """Causes of failures that are printed, one line each; the report has all."""
 _MOST_NOTES = 10
 """Lines beneath the table."""
-
-
-def print_sentence(text: str) -> None:
-    """Print a sentence, broken where it is wider than a block."""
-    import click
-
-    for line in wrap_line(escape_controls(text)):
-        click.echo(line)
 
 
 def print_table(
@@ -174,34 +166,3 @@ def _make_bare_table(
             no_wrap=True,
         )
     return shown
-
-
-def make_words_table(
-    headings: Sequence[str],
-    rows: Iterable[Sequence[str]],
-    words: int = 1,
-    **options: Any,
-) -> "Table":
-    """Make a table whose first columns are words and whose others are numbers."""
-    from rich.box import SIMPLE_HEAD
-    from rich.markup import escape
-    from rich.table import Table
-
-    settings: dict[str, Any] = {"box": SIMPLE_HEAD, "pad_edge": False}
-    shown = Table(**(settings | options))
-    for index, heading in enumerate(headings):
-        shown.add_column(
-            heading,
-            justify="left" if index < words else "right",
-            overflow="fold",
-        )
-    for row in rows:
-        shown.add_row(*(escape(clean_line(cell)) for cell in row))
-    return shown
-
-
-def write_two_digits(value: float) -> str:
-    """Write two digits: the table fits 80 columns, and results.csv has them all."""
-    if math.isnan(value):
-        return "-"
-    return f"{value:.1e}"

@@ -17,7 +17,7 @@ from fourbar_validation.engines.mujoco.robots.loop import (
     RobotReport,
     write_length,
 )
-from fourbar_validation.report.terminal import print_sentence
+from fourbar_validation.report.sentences import print_sentence
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.guard import examine_guarded
 from fourbar_validation.robots.options import (

@@ -24,8 +24,8 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     SettingsAdvice,
     TriedSettings,
 )
+from fourbar_validation.report.sentences import make_words_table, print_sentence
 from fourbar_validation.report.templating import escape_cell
-from fourbar_validation.report.terminal import make_words_table, print_sentence
 from fourbar_validation.robots.measure import (
     MEASURED_THROUGH_TIME,
     RIGID,

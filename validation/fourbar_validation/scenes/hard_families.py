@@ -14,10 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from fourbar.effects import Gravity, Load
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
+from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES, Free, Motion, Sweep
+from fourbar_validation.scenes.bars import list_moving, replace_bars
 from fourbar_validation.scenes.random import (
     DrawnType,
     Ranges,
@@ -92,16 +93,6 @@ def set_angles(scene: Scene, psi: object, branch: int = 1, **changes: object) ->
     theta_2 = scene.linkage.ground_angle + np.atleast_1d(np.asarray(psi, dtype=float))
     motion = scene.motion.replace(angle=theta_2, branch=branch)
     return replace(scene, motion=motion, **changes)  # type: ignore[arg-type]
-
-
-def list_moving(scene: Scene) -> list[tuple[str, Bar]]:
-    """Return the moving bars by their names."""
-    return [(BAR_NAMES[number], scene.linkage.bar(number)) for number in MOVING_BARS]
-
-
-def replace_bars(scene: Scene, **bars: Bar) -> Scene:
-    """Give the scene other bars."""
-    return replace(scene, linkage=replace(scene.linkage, **bars))  # type: ignore[arg-type]
 
 
 def _compute_corners(

@@ -1,0 +1,51 @@
+"""Sentences and small tables that commands print."""
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from fourbar.errors import clean_line
+from fourbar.show.tables import wrap_line
+from fourbar_validation.compare.rows import escape_controls
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+def print_sentence(text: str) -> None:
+    """Print a sentence, broken where it is wider than a block."""
+    import click
+
+    for line in wrap_line(escape_controls(text)):
+        click.echo(line)
+
+
+def make_words_table(
+    headings: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    words: int = 1,
+    **options: Any,
+) -> "Table":
+    """Make a table whose first columns are words and whose others are numbers."""
+    from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
+    from rich.table import Table
+
+    settings: dict[str, Any] = {"box": SIMPLE_HEAD, "pad_edge": False}
+    shown = Table(**(settings | options))
+    for index, heading in enumerate(headings):
+        shown.add_column(
+            heading,
+            justify="left" if index < words else "right",
+            overflow="fold",
+        )
+    for row in rows:
+        shown.add_row(*(escape(clean_line(cell)) for cell in row))
+    return shown
+
+
+def write_two_digits(value: float) -> str:
+    """Write two digits: the table fits 80 columns, and results.csv has them all."""
+    if math.isnan(value):
+        return "-"
+    return f"{value:.1e}"
