@@ -147,7 +147,7 @@ def release_at(scene: Scene, times: Array) -> Released:
         scene.linkage,
         (*placed.loads, *placed.effects),
         float(start.angle[0]),
-        scene.motion.speed or 0.0,
+        float(scene.motion.speed or 0.0),
         int(start.branch[0]),
         times,
         bar=start.bar,

@@ -482,14 +482,11 @@ def _read_motion(read: Reader, value: object) -> Motion:
             entry.get(place),
             unit,
         )
-    if speed in entry:
-        arguments[speed] = read.quantity(f"motion.{speed}", entry[speed], f"{unit}/s")
-    arguments[acceleration] = read.quantity(
-        f"motion.{acceleration}",
-        entry.get(acceleration),
-        f"{unit}/s^2",
-        default=0.0,
-    )
+    for name, per in ((speed, "s"), (acceleration, "s^2")):
+        if name in entry:
+            is_list = isinstance(entry[name], list)
+            reading: Any = read.quantities if is_list else read.quantity
+            arguments[name] = reading(f"motion.{name}", entry[name], f"{unit}/{per}")
     if "free" in entry:
         released = read.table("motion.free", entry["free"], ("duration", "steps"))
         duration = read.quantity(

@@ -36,6 +36,7 @@ from fourbar.files.fields import (
     write_quantity,
 )
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, POSITIVE, Bar, FourBar
+from fourbar.quantities import Array
 from fourbar.quantities.units import IMPERIAL, find_unit, to_si
 from fourbar.scene import Scene
 from fourbar.scene.drawing import DrawnPins
@@ -250,17 +251,16 @@ def _write_motion(motion: Motion) -> dict[str, Any]:
         angles = {**ends, "steps": stated.steps}
     elif isinstance(stated, FromLimit):
         angles = {"limit": stated.limit, "offset": write_quantity(stated.offset, "rad")}
-    elif isinstance(stated, np.ndarray):
-        angles = [write_quantity(angle, unit) for angle in stated.tolist()]
     elif stated is not None:
-        angles = write_quantity(stated, unit)
+        angles = _write_quantities(stated, unit)
+    speed = motion.speed
     entry = {
         theta: angles,
-        omega: (
-            None if motion.speed is None else write_quantity(motion.speed, f"{unit}/s")
-        ),
+        omega: None if speed is None else _write_quantities(speed, f"{unit}/s"),
         alpha: (
-            write_quantity(motion.acceleration, f"{unit}/s^2") if law is None else None
+            _write_quantities(motion.acceleration, f"{unit}/s^2")
+            if law is None
+            else None
         ),
         "law": None if law is None else _write_law(law),
         "branch": BRANCH_NAMES[motion.branch],
@@ -272,6 +272,13 @@ def _write_motion(motion: Motion) -> dict[str, Any]:
         ),
     }
     return {key: value for key, value in entry.items() if value is not None}
+
+
+def _write_quantities(numbers: float | Array, unit: str) -> Any:
+    """Write a number with its unit, or a list of them."""
+    if isinstance(numbers, np.ndarray):
+        return [write_quantity(float(number), unit) for number in numbers]
+    return write_quantity(float(numbers), unit)
 
 
 def _write_law(law: Law | Rise | Sine) -> dict[str, Any]:

@@ -516,8 +516,9 @@ class Motion:
     ----------
     theta_2 : one angle, an array of them (n,), a Sweep, a FromLimit, or None (the
         default range), rad.
-    omega_2 : rad/s; None: positions only.
-    alpha_2 : rad/s^2.
+    omega_2 : rad/s, one for all angles or, with an array of these, one for each (n,);
+        None: positions only.
+    alpha_2 : rad/s^2, likewise.
     branch : "open" or +1, "crossed" or -1: the assembly. Open has
         sin(theta_4 - theta_3) > 0 for 0 < theta_2 - theta_1 < 180 deg, and at every
         other angle that it reaches smoothly from there, through change points too.
@@ -544,10 +545,10 @@ class Motion:
     """
     angle: float | Array | Sweep | FromLimit | None
     """Commanded angle, rad, or stroke, m, as it is stated."""
-    speed: float | None
-    """Commanded speed, rad/s, or m/s of a stroke."""
-    acceleration: float
-    """Commanded acceleration, rad/s^2, or m/s^2 of a stroke."""
+    speed: float | Array | None
+    """Commanded speed, rad/s, or m/s of a stroke; (n,) if each angle has its own."""
+    acceleration: float | Array
+    """Commanded acceleration, rad/s^2, or m/s^2 of a stroke; likewise."""
     branch: int
     """Assembly, +1 open or -1 crossed."""
     free: Free | None
@@ -575,17 +576,17 @@ class Motion:
     def __init__(  # noqa: PLR0913 - the keywords of a command, of any bar
         self,
         theta_2: float | Array | Sweep | FromLimit | None = None,
-        omega_2: float | None = None,
-        alpha_2: float = 0.0,
+        omega_2: float | Array | None = None,
+        alpha_2: float | Array = 0.0,
         branch: int = OPEN,
         free: Free | None = None,
         law: Law | Rise | Sine | None = None,
         theta_3: float | Array | Sweep | FromLimit | None = None,
-        omega_3: float | None = None,
-        alpha_3: float = 0.0,
+        omega_3: float | Array | None = None,
+        alpha_3: float | Array = 0.0,
         theta_4: float | Array | Sweep | FromLimit | None = None,
-        omega_4: float | None = None,
-        alpha_4: float = 0.0,
+        omega_4: float | Array | None = None,
+        alpha_4: float | Array = 0.0,
         stroke: float | Array | Sweep | None = None,
         stroke_speed: float | None = None,
         stroke_acceleration: float = 0.0,
@@ -671,31 +672,53 @@ class Motion:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Motion):
             return NotImplemented
-        angles = self.angle, other.angle
-        same = (
-            np.array_equal(*angles)  # type: ignore[arg-type]
-            if any(isinstance(x, np.ndarray) for x in angles)
-            else angles[0] == angles[1]
-        )
-        return bool(same) and self._list_without_angle() == other._list_without_angle()
+        return self._list_fields() == other._list_fields()
 
     def __hash__(self) -> int:
-        return hash(self._list_without_angle())
+        return hash(self._list_fields())
 
-    def _list_without_angle(self) -> tuple[object, ...]:
-        """List what a hash can be made of: everything but the angle.
-
-        The bar of a stroke belongs to the scene.
-        """
+    def _list_fields(self) -> tuple[object, ...]:
+        """List the fields, arrays as tuples; the bar of a stroke is the scene's."""
+        numbers = (self.angle, self.speed, self.acceleration)
         return (
             self.names,
+            *(tuple(x) if isinstance(x, np.ndarray) else x for x in numbers),
             self.side,
-            self.speed,
-            self.acceleration,
             self.branch,
             self.free,
             self.law,
         )
+
+    @property
+    def has_rate_of_each(self) -> bool:
+        """True if each angle has a speed or an acceleration of its own."""
+        rates = self.speed, self.acceleration
+        return any(isinstance(rate, np.ndarray) for rate in rates)
+
+    def find_rates(self, places: Array) -> tuple[float | Array | None, float | Array]:
+        """Return speed and acceleration at commanded places (n,): one each, or (n,).
+
+        Raises InputError for a place without rates, where each angle has its own.
+        """
+        rates = self.speed, self.acceleration
+        if not self.has_rate_of_each or np.array_equal(places, self.angle):  # type: ignore[arg-type]
+            return rates
+        angles: Any = self.angle
+        order = np.argsort(angles)
+        found = np.searchsorted(angles, places, sorter=order)
+        index = order[np.minimum(found, len(angles) - 1)]
+        same = angles[index] == places
+        if not same.all():
+            _, omega, alpha = self.names
+            raise InputError(
+                f"motion.{omega if isinstance(self.speed, np.ndarray) else alpha}",
+                f"{len(angles)} numbers",
+                "are those of the stated angles: no other position has one",
+            )
+        speed, acceleration = (
+            rate[index] if isinstance(rate, np.ndarray) else rate for rate in rates
+        )
+        return speed, 0.0 if acceleration is None else acceleration
 
     @property
     def names(self) -> tuple[str, str, str]:
@@ -744,7 +767,7 @@ def _require_command(
     angle: Any,
     speed: Any,
     acceleration: Any,
-) -> tuple[Any, Any, float]:
+) -> tuple[Any, Any, Any]:
     """Return angle, speed and acceleration of the command of these names, checked."""
     (theta, unit), (omega, per_second), (alpha, growth) = (
         (name, Motion.numbers[name].unit) for name in names
@@ -765,12 +788,28 @@ def _require_command(
         else:
             angle = angles
     if speed is not None:
-        speed = require(f"motion.{omega}", speed, per_second)
-        if not math.isfinite(speed * speed):
+        speed = _require_rates(f"motion.{omega}", speed, per_second, angle)
+        highest = float(np.max(np.abs(speed)))
+        if not math.isfinite(highest * highest):
             fastest = write_in_units(per_second, LARGEST_SPEED)
             allowed = f"must be below {fastest}: every acceleration has its square"
-            raise InputError(f"motion.{omega}", speed, allowed, unit=per_second)
-    return angle, speed, require(f"motion.{alpha}", acceleration, growth)
+            raise InputError(f"motion.{omega}", highest, allowed, unit=per_second)
+    return angle, speed, _require_rates(f"motion.{alpha}", acceleration, growth, angle)
+
+
+def _require_rates(key: str, rates: Any, unit: str, angle: Any) -> float | Array:
+    """Return one rate, or an array of one for each angle, checked."""
+    if np.ndim(rates) == 0:
+        return require(key, rates, unit)
+    array = require_numbers(key, rates, unit=unit)
+    if unit.startswith("m") or not isinstance(angle, np.ndarray):
+        allowed = "must be one number, unless angles are stated one by one"
+        raise InputError(key, f"{len(array)} numbers", allowed)
+    if len(array) != len(angle):
+        allowed = f"must be one number, or {len(angle)}: one for each angle"
+        raise InputError(key, f"{len(array)} numbers", allowed)
+    array.flags.writeable = False
+    return array
 
 
 def require_steps(motion: Motion, most: int, place: str, file: str) -> None:

@@ -421,10 +421,13 @@ def require_input(scene: Scene, what: str) -> None:
 
     `what`: what takes a command of the input alone.
     """
-    if scene.motion.commanded != "theta_2":
+    motion = scene.motion
+    if motion.commanded != "theta_2":
         raise LimitError(
-            f"motion.{scene.motion.commanded}: {what} takes a command of theta_2 alone"
+            f"motion.{motion.commanded}: {what} takes a command of theta_2 alone"
         )
+    if motion.has_rate_of_each:
+        raise LimitError(f"motion.omega_2: {what} takes one speed and acceleration")
 
 
 class _Triangle(NamedTuple):
@@ -663,7 +666,7 @@ def command_at(scene: Scene, places: Array) -> Command:
         return command_stroke(scene, places, motion.speed, motion.acceleration)
     branch = np.full(places.shape, motion.branch, dtype=np.int8)
     if motion.law is None:
-        return Command(places, branch, motion.speed, motion.acceleration, bar=bar)
+        return Command(places, branch, *motion.find_rates(places), bar=bar)
     angle, speed, acceleration = motion.law.at(places)
     return Command(angle, branch, speed, acceleration, time=places, bar=bar)
 

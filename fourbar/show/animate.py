@@ -243,17 +243,22 @@ def _over(
     name: str,
     commanded: str,
     values: Array,
-    speed: float | None = None,
+    speed: float | Array | None = None,
 ) -> dict[str, Any]:
     """Return what curves and slider run over: "time" or what is commanded.
 
-    Values are included where they are not those of theta_2.
+    Values are included where they are not those of theta_2, a speed where it is one.
     """
     if name == "theta_2":
         shown = None
     else:
         shown = values.tolist()
-    return {"name": name, "commanded": commanded, "values": shown, "speed": speed}
+    return {
+        "name": name,
+        "commanded": commanded,
+        "values": shown,
+        "speed": None if isinstance(speed, np.ndarray) else speed,
+    }
 
 
 def _collect_motion(scene: Scene, stage: str | None) -> dict[str, Any]:

@@ -52,6 +52,7 @@ from fourbar.show.units import (
     choose_unit,
     drop_rounding,
     write_digits,
+    write_ends,
     write_short,
 )
 from fourbar.solution import Conversion, Solution, find_unit_in
@@ -682,19 +683,18 @@ class _SceneBlock:
         drives = motion.stroke is not None or (
             scene.drive is None and scene.drive_bar == motion.bar
         )
-        if motion.speed == 0.0:
-            speed = "at rest"
+        if np.any(motion.speed):
+            speed = write_ends(motion.speed, lambda x: self._value(x, si))
         else:
-            speed = self._value(motion.speed, si)
+            speed = "at rest"
         if not drives:
-            speed = (
-                f"the {BAR_NAMES[motion.bar]}"
-                f" {'' if motion.speed == 0.0 else 'at '}{speed}"
+            at = "at " if np.any(motion.speed) else ""
+            speed = f"the {BAR_NAMES[motion.bar]} {at}{speed}"
+        if np.any(motion.acceleration):
+            growth = write_ends(
+                motion.acceleration, lambda x: self._value(x, f"{si}^2")
             )
-        if motion.acceleration:
-            speed += (
-                f", {motion.names[2]} = {self._value(motion.acceleration, f'{si}^2')}"
-            )
+            speed += f", {motion.names[2]} = {growth}"
         return f"{head}, {speed}"
 
     def _write_stroke(self) -> list[str]:

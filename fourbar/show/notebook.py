@@ -12,6 +12,7 @@ from fourbar.show.duty import describe_drive
 from fourbar.show.plot import draw_figure
 from fourbar.show.tables import list_columns, write_with_unit
 from fourbar.show.units import units as read_units
+from fourbar.show.units import write_ends
 from fourbar.solution import DEGREES, SI, Conversion, Solution
 from fourbar.writing import describe_extent
 
@@ -65,8 +66,10 @@ def _list_facts(scene: Scene, units: Conversion) -> list[tuple[str, str]]:
         )
     speed = "positions only"
     if motion.speed is not None:
-        omega = write_with_unit(motion.speed, "rad/s", units)
-        alpha = write_with_unit(motion.acceleration, "rad/s^2", units)
+        omega = write_ends(motion.speed, lambda x: write_with_unit(x, "rad/s", units))
+        alpha = write_ends(
+            motion.acceleration, lambda x: write_with_unit(x, "rad/s^2", units)
+        )
         speed = f"ω{motion.bar} = {omega}, α{motion.bar} = {alpha}"
     acting = [f"load on bar {load.bar}" for load in scene.loads] + [
         effect.key for effect in scene.effects

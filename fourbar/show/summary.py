@@ -1028,7 +1028,7 @@ def _integrate_energies(
         second = 1.0  # a law is integrated over its time
     else:
         assert scene.motion.speed is not None
-        second = abs(scene.motion.speed)
+        second = abs(float(scene.motion.speed))
     work = np.diff(panels.accumulate("power")) / second
     duty = duty._replace(
         energy_in=float(work[work > 0.0].sum()),

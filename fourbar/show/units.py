@@ -5,7 +5,7 @@ Units are a list like "mm N N.mm deg", those of a scene file, or SI with prefixe
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
@@ -36,6 +36,7 @@ FOLLOWING_UNITS = {"m/s": ("m", "{}/s"), "m/s^2": ("m", "{}/s^2"), "J": ("N m", 
 """Units that follow another one if not stated. Energy follows the unit of torque,
 speeds that of length.
 """
+_RATES = ("omega", "alpha")
 _POUNDS = ("lb", "lbs", "pound", "pounds", "lbm")
 """Names of the pound, a mass; a list that names no force may mean pounds-force."""
 _METRIC = ("mm", "cm", "dm", "m")
@@ -149,7 +150,7 @@ def units_of_scene(document: Mapping[str, Any]) -> Conversion:
         length = str(find_length(document))
         motion = document.get("motion", {})
         rates = tuple(
-            (str(motion.get(f"omega_{bar}", "")), str(motion.get(f"alpha_{bar}", "")))
+            tuple(_first_text(motion.get(f"{rate}_{bar}", "")) for rate in _RATES)
             for bar in MOVING_BARS
         )
         if "free" in motion:
@@ -158,6 +159,11 @@ def units_of_scene(document: Mapping[str, Any]) -> Conversion:
     except (LookupError, TypeError, AttributeError):
         return COMMON
     return _suit_texts(length, rates)
+
+
+def _first_text(stated: Any) -> str:
+    """Return a text, or the first of a list."""
+    return str(stated[0]) if isinstance(stated, list) and stated else str(stated)
 
 
 def states_radians(document: Mapping[str, Any]) -> bool:
@@ -253,6 +259,12 @@ def write_cell(number: float, form: str) -> str:
 def write_digits(value: float, digits: int = SHOWN_DIGITS) -> str:
     """Write a number with some significant digits, up to a million without exponent."""
     return f"{float(f'{value:.{digits}g}'):.6g}"
+
+
+def write_ends(values: float | Array, write: Callable[[float], str]) -> str:
+    """Write a number, or the least and the largest of several as "1 to 2"."""
+    least, largest = (write(float(end)) for end in (np.min(values), np.max(values)))
+    return least if least == largest else f"{least} to {largest}"
 
 
 def write_short(

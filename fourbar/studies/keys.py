@@ -251,6 +251,8 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
             scene.motion.names[1:],
             strict=True,
         ):
+            if np.ndim(getattr(scene.motion, field)):
+                continue  # each angle has its own
             entries[f"motion.{name}"] = SceneNumber(
                 ("motion", field), scene.motion.numbers[name].unit
             )

@@ -290,28 +290,20 @@ def _list_commands(
 
     Numbers that vary take the place of the scene's speed and acceleration.
     """
-    if scene.motion.law is None:
-        motion: Any = scene.motion
-    else:
-        motion = command(scene)
     angle = np.broadcast_to(angles, (m, angles.shape[1]))
+    time = None
+    if scene.motion.law is None:
+        rates: Any = scene.motion.find_rates(angle)
+    else:
+        law: Any = command(scene)
+        columns = law.speed, law.acceleration, law.time
+        *rates, time = (np.broadcast_to(column, angle.shape) for column in columns)
     speed, acceleration = (
         numbers[f"motion.{name}"][:, None] if f"motion.{name}" in numbers else number
-        for name, number in zip(
-            scene.motion.names[1:],
-            (motion.speed, motion.acceleration),
-            strict=True,
-        )
+        for name, number in zip(scene.motion.names[1:], rates, strict=True)
     )
-    if scene.motion.law is not None:
-        speed, acceleration = (
-            np.broadcast_to(value, angle.shape) for value in (speed, acceleration)
-        )
     if scene.motion.stroke is None:
         branch = np.full(angle.shape, scene.motion.branch, dtype=np.int8)
-        time = None
-        if scene.motion.law is not None:
-            time = np.broadcast_to(motion.time, angle.shape)
         return Command(
             angle,
             branch,

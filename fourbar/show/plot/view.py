@@ -91,7 +91,11 @@ class View:
         """Return True if each position is one at rest: nothing has a speed or power."""
         motion = self.scene.motion
         commanded = motion.law is None and motion.free is None
-        return commanded and motion.speed == 0.0 and motion.acceleration == 0.0
+        return (
+            commanded
+            and self.moves
+            and not (np.any(motion.speed) or np.any(motion.acceleration))
+        )
 
     @property
     def branch_name(self) -> str:

@@ -31,7 +31,7 @@ from fourbar.errors import InputError, LimitError
 from fourbar.formulas.mobility import find_limit_angles, limit_positions
 from fourbar.linkage import MOVING_BARS
 from fourbar.mjcf import write_mjcf
-from fourbar.scene import Command, with_signs
+from fourbar.scene import Command, command_at, with_signs
 from fourbar.solution import Solution
 from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.engines.free_body import FreeBody
@@ -445,6 +445,58 @@ def test_a_motion_reads_by_the_name_of_what_it_commands() -> None:
     )
 
 
+def make_motion_of_a_law(law: Law) -> Motion:
+    """State the positions of a law one by one, each with its speed and growth."""
+    angle, speed, acceleration = law.at(law.times())
+    names = fourbar.Motion(**{f"theta_{law.bar}": 0.0}).names
+    return Motion(**dict(zip(names, (angle, speed, acceleration), strict=True)))
+
+
+@pytest.mark.parametrize("bar", [2, 3, 4])
+def test_angles_with_rates_of_their_own_are_the_positions_of_a_law(bar: int) -> None:
+    points = solve(
+        LOADED,
+        "position",
+        at=fourbar.command(replace(LOADED, motion=Motion(np.linspace(0.5, 1.5, 5)))),
+    )
+    angles = tuple(getattr(points, f"theta_{bar}"))
+    law = Law((0.0, 0.1, 0.3, 0.4, 0.5), **{f"theta_{bar}": angles}, steps=12)
+    of_law = replace(LOADED, motion=Motion(law=law))
+    of_each = replace(LOADED, motion=make_motion_of_a_law(law))
+    assert np.array_equal(solve(of_each).torque, solve(of_law).torque)
+    assert np.array_equal(solve(of_each).F12, solve(of_law).F12)
+    again = fourbar.files.loads(fourbar.dump(of_each))
+    assert again.motion == of_each.motion != of_law.motion
+    assert hash(again.motion) == hash(of_each.motion)
+    lightened = vary(of_each, {"bars.output.mass": [0.4, 0.2]})
+    assert np.array_equal(solve(lightened).torque[0], solve(of_law).torque)
+    # positions keep their rates where some are asked for, and no other has any
+    some = solve(of_each, at=command_at(of_each, of_each.motion.angle[8:2:-2]))
+    assert np.array_equal(some.torque, solve(of_law).torque[8:2:-2])
+    with pytest.raises(InputError, match="no other position has one"):
+        command_at(of_each, np.array([0.123]))
+
+
+@pytest.mark.parametrize(
+    ("motion", "said"),
+    [
+        ({"theta_2": [1.0, 2.0], "omega_2": [1.0]}, "2: one for each angle"),
+        ({"theta_2": [1.0, 2.0], "alpha_2": [1.0] * 3}, "2: one for each angle"),
+        ({"theta_2": 1.0, "omega_2": [1.0]}, "unless angles are stated one by one"),
+        ({"theta_4": Sweep(1, 2, 1), "omega_4": [1, 2]}, "stated one by one"),
+        ({"theta_2": [1.0, 2.0], "omega_2": [1.0, 1e200]}, "must be below"),
+        ({"theta_2": [1.0, 2.0], "omega_2": [1.0, math.nan]}, "must be finite"),
+        (
+            {"stroke": [1.0, 2.0], "stroke_speed": [1.0, 1.0], "side": "left"},
+            "must be one number",
+        ),
+    ],
+)
+def test_rates_that_belong_to_no_angle_are_refused(motion: Any, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        Motion(**motion)
+
+
 @pytest.mark.parametrize(
     ("lines", "said"),
     [
@@ -508,6 +560,9 @@ def test_what_takes_theta_2_alone_refuses_in_one_line() -> None:
         match=r"theta_4'?: is commanded, and theta_2 is not",
     ):
         _ = fourbar.command(scene).theta_2
+    listed = replace(LOADED, motion=Motion([1.0, 2.0], [1.0, 2.0]), loads=())
+    with pytest.raises(LimitError, match=r"takes one speed and acceleration$"):
+        write_mjcf(listed)
 
 
 @pytest.mark.slow

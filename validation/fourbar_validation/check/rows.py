@@ -88,13 +88,14 @@ def list_stated_rates(scene: Scene, table: TheirTable) -> tuple[str, ...]:
 
 
 def _refuse_law(scene: Scene) -> None:
-    """Raise InputError for a law, whose speed at other positions is not known."""
-    if scene.motion.law is not None:
+    """Raise InputError for a law or a list, whose speed elsewhere is not known."""
+    if scene.motion.law is not None or scene.motion.has_rate_of_each:
         allowed = (
-            "a table is judged along a law at the scene's own positions, all of them in"
-            " its order"
+            "a table is judged along a law or speeds of each angle at the scene's own"
+            " positions, all of them in its order"
         )
-        raise InputError("motion.law", scene.title, allowed)
+        key = scene.motion.names[1] if scene.motion.law is None else "law"
+        raise InputError(f"motion.{key}", scene.title, allowed)
 
 
 def _command_each(base: Command, angle: Array, scene: Scene) -> Command:

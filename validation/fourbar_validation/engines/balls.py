@@ -121,10 +121,11 @@ def _collect_motion(scene: Scene, angle: float) -> dict[str, float]:
     """Collect what is commanded: a position, its speed and its acceleration."""
     motion = scene.motion
     position, speed, acceleration = motion.names
+    omega, alpha = motion.find_rates(np.array([angle]))
     return {
         position: angle,
-        speed: motion.speed or 0.0,
-        acceleration: motion.acceleration,
+        speed: float(np.max(omega or 0.0)),
+        acceleration: float(np.max(alpha)),
     }
 
 

@@ -48,7 +48,7 @@ def compare_shipped(
     Give the worst; None if nothing moves.
     """
     omega = scene.motion.omega_2
-    if not omega or scene.motion.law is not None:
+    if scene.motion.has_rate_of_each or not omega or scene.motion.law is not None:
         return None
     try:
         loop = ClosedLoop(write_mjcf(scene))

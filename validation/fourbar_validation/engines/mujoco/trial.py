@@ -150,6 +150,11 @@ class TrialSetup:
                 "settings are tried along a sweep of theta_2, not of another bar or of "
                 "a stroke"
             )
+        if scene.motion.law is not None or scene.motion.has_rate_of_each:
+            raise LimitError(
+                "settings are tried at a constant alpha_2, not along a motion law or"
+                " speeds of each angle"
+            )
         if (
             scene.motion.free is not None
             or not np.any(command.omega_2)
@@ -158,10 +163,6 @@ class TrialSetup:
             raise LimitError(
                 "nothing to run through in time: a sweep of theta_2 at omega_2 is"
                 " needed"
-            )
-        if scene.motion.law is not None:
-            raise LimitError(
-                "settings are tried at a constant alpha_2, not along a motion law"
             )
         self.omega, self.alpha = (
             float(np.max(command.omega_2)),  # type: ignore[arg-type]
