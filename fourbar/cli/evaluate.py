@@ -106,18 +106,29 @@ def classify_command(
     metavar="UNIT",
     help="Unit of lengths and coordinates that are given without one, like mm.",
 )
+@click.option(
+    "--positions-only",
+    is_flag=True,
+    help="Leave out masses, gravity, speed and drive.",
+)
 def new(
     file: Path | None,
     out: Path | None,
     lengths: tuple[str, ...] | None,
     pins: str | None,
     unit: str | None,
+    positions_only: bool,
 ) -> None:
     """Write a new scene file with these lengths or pins; comments explain the rest.
 
     Each number has a unit, like 300mm; or --unit mm is the unit of all.
     """
-    from fourbar.files.scene_text import write_drawn_scene, write_new_scene
+    from fourbar.files.scene_text import (
+        NEW_POSITIONS,
+        NEW_SCENE,
+        write_drawn_scene,
+        write_new_scene,
+    )
     from fourbar.show.units import units_of_length
     from fourbar.writing import STANDARD_STREAM, write_text
 
@@ -134,15 +145,16 @@ def new(
             str(file),
             "file exists; give the new scene another name",
         )
+    template = NEW_POSITIONS if positions_only else NEW_SCENE
     if lengths is not None:
         texts = [_add_unit("--lengths", text, unit) for text in lengths]
         with state_messages_in(units_of_length(texts[0])):
-            scene = write_new_scene(texts)
+            scene = write_new_scene(texts, template)
         write_text(file, scene)
     elif pins is not None:
         places = _read_pins(pins, unit)
         with state_messages_in(units_of_length(places["A"][0])):
-            scene = write_drawn_scene(places)
+            scene = write_drawn_scene(places, template)
         write_text(file, scene)
     if file == STANDARD_STREAM:
         return
@@ -315,8 +327,8 @@ def analyze(  # noqa: PLR0913 - one for each option
         solution = solve(described, find_last_stage(described), at=positions)
         if asked:
             follow(described, solution)
-    if not solution.assembled.any():
-        raise _assembles_nowhere(scene, described)
+        if not solution.assembled.any():
+            raise _assembles_nowhere(scene, described)
     if form == "summary":
         with state_messages_in(shown):
             text = _write_summary(described, solution, shown, bore, asked)

@@ -444,7 +444,13 @@ def _write_tolerances(scene: Scene) -> dict[str, Any]:
     return rows
 
 
-def write_new_scene(lengths: tuple[str, ...] | list[str]) -> str:
+NEW_SCENE, NEW_POSITIONS = "new.toml", "new_positions.toml"
+"""Templates of a new scene file, and of one that asks for positions only."""
+
+
+def write_new_scene(
+    lengths: tuple[str, ...] | list[str], template: str = NEW_SCENE
+) -> str:
     """Write a scene file for four lengths (ground, input, coupler, output).
 
     Lengths keep the units in which they were given.
@@ -463,14 +469,16 @@ def write_new_scene(lengths: tuple[str, ...] | list[str]) -> str:
     d, a, b, c = numbers
     FourBar(d, Bar(a), Bar(b), Bar(c))
     unit = find_unit(texts[0], "m")
-    return _fill_in("\n".join(rows), (a, b, c), _BRANCH_LINE, unit)
+    return _fill_in("\n".join(rows), (a, b, c), _BRANCH_LINE, unit, template)
 
 
 _BRANCH_LINE = '# branch = "crossed"  # left out: open\n'
 """Comment on the branch, which pins state."""
 
 
-def write_drawn_scene(pins: dict[str, tuple[str, str]]) -> str:
+def write_drawn_scene(
+    pins: dict[str, tuple[str, str]], template: str = NEW_SCENE
+) -> str:
     """Write a scene file for four pins, x and y each with its unit.
 
     Raises InputError as `DrawnPins` does.
@@ -485,7 +493,7 @@ def write_drawn_scene(pins: dict[str, tuple[str, str]]) -> str:
     a, b, c = (drawing.length(bar) for bar in MOVING_BARS)
     x_of_A, _ = pins["A"]
     unit = find_unit(x_of_A, "m")
-    return _fill_in("\n".join(rows), (a, b, c), "", unit)
+    return _fill_in("\n".join(rows), (a, b, c), "", unit, template)
 
 
 def _quote(text: str) -> str:
@@ -536,6 +544,7 @@ def _fill_in(
     lengths: tuple[float, float, float],
     branch: str,
     unit: str,
+    template: str,
 ) -> str:
     """Fill in the template of a new scene file; each bar weighs 1 kg/m or 0.05 lb/in.
 
@@ -548,7 +557,7 @@ def _fill_in(
     per_metre = float(examples["per_length"]) / length
     masses = (f"{float(f'{per_metre * x:.4g}')!r}" for x in lengths)
     moving = zip(("input", "coupler", "output"), masses, strict=True)
-    text = files("fourbar.files").joinpath("new.toml").read_text(encoding="utf-8")
+    text = files("fourbar.files").joinpath(template).read_text(encoding="utf-8")
     return Template(text).substitute(
         linkage=lines,
         branch=branch,

@@ -3,6 +3,7 @@
 `Command` lists the positions that a motion names; `command` makes it of a scene.
 """
 
+import math
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field
@@ -26,7 +27,9 @@ from fourbar.formulas.arithmetic import (
 from fourbar.formulas.longer import change_numbers, lengthen, shorten
 from fourbar.formulas.mobility import (
     ANGLE_FROM_LIMITS,
+    TURN,
     choose_range,
+    find_intervals,
     find_limit_angles,
     turns_fully,
 )
@@ -449,6 +452,17 @@ class _Triangle(NamedTuple):
     angle: Number
     """theta of the bar where both ends are in one direction from the pivot, rad."""
 
+    def find_strokes(self, first: float, last: float) -> tuple[float, float]:
+        """Return the strokes at two values of beta between 0 and pi, m."""
+        fold = abs(self.length - self.reach)
+        twice_mean = 2.0 * math.sqrt(self.length * self.reach)
+        strokes = (
+            math.hypot(fold, twice_mean * math.sin(0.5 * beta))
+            for beta in (first, last)
+        )
+        least, most = strokes
+        return least, most
+
     def turn_bar(
         self,
         stroke: Any,
@@ -551,12 +565,9 @@ def default_places(scene: Scene, holding: float | None = None) -> Array:
     steps = DEFAULT_STEPS
     if scene.motion.stroke is not None:
         triangle = _find_triangle(scene.linkage, scene.settled_drive())
-        half = 0.5 * np.array([ANGLE_FROM_LIMITS, np.pi - ANGLE_FROM_LIMITS])
-        twice_mean = 2.0 * np.sqrt(triangle.length * triangle.reach)
-        first, last = np.hypot(
-            triangle.length - triangle.reach,
-            twice_mean * np.sin(half),
-        ).tolist()
+        first, last = triangle.find_strokes(
+            ANGLE_FROM_LIMITS, np.pi - ANGLE_FROM_LIMITS
+        )
     else:
         linkage = scene.linkage
         bar = scene.motion.bar
@@ -639,28 +650,48 @@ def command_stroke(
     )
 
 
-def find_stroke_range(scene: Scene) -> tuple[float, float]:
-    """Find the least and the most stroke of a cylinder, both collinear with its bar, m.
+def find_stroke_ranges(scene: Scene) -> list[tuple[float, float]]:
+    """Find the ranges of a cylinder's stroke in which the linkage assembles, m.
 
-    The linkage need not assemble at all between them.
+    In each the loop of the bars closes, and the triangle of the cylinder on its side.
     """
     triangle = _find_triangle(scene.linkage, scene.settled_drive())
-    return abs(triangle.length - triangle.reach), triangle.length + triangle.reach
+    assert scene.motion.side is not None
+    sign = SIDES[scene.motion.side]
+    ranges: list[tuple[float, float]] = []
+    for interval in find_intervals(scene.linkage, triangle.bar):
+        if interval[1] - interval[0] >= TURN:
+            return [triangle.find_strokes(0.0, math.pi)]
+        low, high = sorted(sign * (end - triangle.angle) for end in interval)
+        turn = TURN * math.floor(low / TURN)
+        for start in (turn, turn + TURN):
+            first, last = max(low - start, 0.0), min(high - start, math.pi)
+            if first < last:
+                ranges.append(triangle.find_strokes(first, last))
+    return sorted(ranges)
+
+
+def write_stroke_ranges(scene: Scene) -> str:
+    """Write the ranges of `find_stroke_ranges`, or that there is none."""
+    ranges = find_stroke_ranges(scene)
+    if not ranges:
+        return f"none with motion.side = {scene.motion.side}"
+    return " and ".join(write_in_units("m", *ends, between=" to ") for ends in ranges)
 
 
 def command_at(scene: Scene, places: Array) -> Command:
     """Return the command of the scene's motion at other angles, strokes or times."""
     motion, bar = scene.motion, scene.motion.bar
     if motion.stroke is not None:
-        least, most = find_stroke_range(scene)
+        triangle = _find_triangle(scene.linkage, scene.settled_drive())
+        least = abs(triangle.length - triangle.reach)
+        most = triangle.length + triangle.reach
         inside = (places >= least) & (places <= most)
         if not inside.all():
-            stroke = float(places[np.argmin(inside)])
-            extent = write_in_units("m", least, most, between=" to ")
             raise InputError(
                 "motion.stroke",
-                stroke,
-                f"this cylinder can have {extent}",
+                float(places[np.argmin(inside)]),
+                f"this cylinder can have {write_stroke_ranges(scene)}",
                 unit="m",
             )
         return command_stroke(scene, places, motion.speed, motion.acceleration)

@@ -759,13 +759,15 @@ class _SceneBlock:
             self._place(load.peak.place, named=False) if size else "-"
             for load, size in zip(loads, sizes, strict=True)
         ]
-        means = self._cells(self._without_small([load.rms for load in loads]), "N")
+        means = [
+            load.rms if size else 0.0 for load, size in zip(loads, sizes, strict=True)
+        ]
         lines = _align(
             [
                 ("pins", list(facts.pins)),
                 ("  peak", peaks),
                 ("  at", places),
-                ("  RMS", means),
+                ("  RMS", self._cells(means, "N")),
             ]
         )
         if facts.kind == "list":

@@ -23,7 +23,15 @@ from fourbar.formulas.mobility import (
 )
 from fourbar.formulas.transmission import transmission_extremes
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar
-from fourbar.quantities import COUPLE, LINE, NOT_ASSEMBLED, PIN_FORCES, SINGULAR
+from fourbar.quantities import (
+    COUPLE,
+    LINE,
+    NO_DIRECTION,
+    NOT_ASSEMBLED,
+    PIN_FORCES,
+    SINGULAR,
+    WOUND,
+)
 from fourbar.scene import find_signs
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.acting import list_spring_notes
@@ -328,6 +336,8 @@ def write_sensitivity_json(derivatives: Sensitivity) -> str:
 
 
 _EQUILIBRIUM_SCHEMA = "fourbar-equilibrium/1"
+_WITHOUT_MOVE = (NOT_ASSEMBLED, SINGULAR, NO_DIRECTION, WOUND)
+"""Statuses at which no force says how a released linkage moves."""
 _MOVES = {0: "stays", 1: "theta_2 grows", -1: "theta_2 falls"}
 
 
@@ -479,10 +489,10 @@ def _write_holding(rest: Equilibria, units: Conversion) -> tuple[list[str], Any]
         columns[f"from ({unit})"] = write_cells(factor * low)
         columns[f"to ({unit})"] = write_cells(factor * high)
     columns["released"] = []
-    still = np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR))
-    moves = zip(positions.status, still, rest.moves, strict=True)
-    for status, stays, move in moves:
-        columns["released"].append(status if stays else _MOVES[move])
+    undecided = np.isin(positions.status_code, _WITHOUT_MOVE)
+    moves = zip(positions.status, undecided, rest.moves, strict=True)
+    for status, is_undecided, move in moves:
+        columns["released"].append(status if is_undecided else _MOVES[move])
     rows = list(zip(*columns.values(), strict=True))
     every = math.ceil(len(positions) / MOST_ROWS_PRINTED)
 

@@ -189,11 +189,15 @@ def list_sizes(solution: Solution) -> dict[str, Array]:
 
 
 def _compute_pin_loads(solution: Solution) -> dict[str, Array]:
-    """Compute the magnitudes of the pin forces, N, by name."""
+    """Compute the magnitudes of the pin forces, N, by name.
+
+    What a cylinder leaves of the load that it holds end to end is rounding, and zero.
+    """
     loads = {}
+    held = 0.0 if solution.drive_force is None else np.abs(solution.drive_force)
     for name in PIN_FORCES:
         force = getattr(solution, name)
-        loads[name] = np.hypot(force[:, 0], force[:, 1])
+        loads[name] = drop_rounding(np.hypot(force[:, 0], force[:, 1]), held)
     return loads
 
 
@@ -364,8 +368,10 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, _BarBending]:
 
 def _compute_bending(scene: Scene, solution: Solution) -> dict[int, Bending]:
     """Compute the largest bending moment of each bar at each position."""
-    loads = _compute_pin_loads(solution)
-    size = max(scene.linkage.lengths) * np.max([*loads.values()], axis=0)
+    forces = [*_compute_pin_loads(solution).values()]
+    if solution.drive_force is not None:
+        forces.append(np.abs(solution.drive_force))
+    size = max(scene.linkage.lengths) * np.max(forces, axis=0)
     round_off = _NO_BENDING * size
     bending = {}
     for bar in MOVING_BARS:

@@ -17,12 +17,11 @@ from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.motion import (
     COMMAND_NAMES,
-    DEFAULT_STEPS,
     SIDES,
     STROKE_COMMAND,
     Motion,
 )
-from fourbar.scene.scene import Independent, default_places, find_stroke_range
+from fourbar.scene.scene import Independent, default_places, write_stroke_ranges
 from fourbar.solution import compute_times
 from fourbar.solving import solve
 
@@ -142,39 +141,12 @@ def say_range(scene: Scene) -> str:
     """Say between which angles the commanded bar can be, or between which strokes."""
     motion = scene.motion
     if motion.stroke is not None:
-        strokes = _find_assembled_strokes(scene)
-        if not strokes:
-            return f"no {STROKE_COMMAND[0]} with motion.side = {motion.side} does"
-        ranges = [write_in_units("m", *ends, between=" to ") for ends in strokes]
-        return f"{STROKE_COMMAND[0]} goes from {' and from '.join(ranges)}"
+        return f"this cylinder can have {write_stroke_ranges(scene)}"
     ranges = [
         f"{math.degrees(low):.6g} to {math.degrees(high):.6g} deg"
         for low, high in find_intervals(scene.linkage, motion.bar)
     ]
     return f"theta_{motion.bar} goes from {' and from '.join(ranges)}"
-
-
-def _find_assembled_strokes(scene: Scene) -> list[tuple[float, float]]:
-    """Find the ranges of the stroke in which the linkage assembles, m.
-
-    Ends of a range are bisected between the points of a grid.
-    """
-    grid = np.linspace(*find_stroke_range(scene), DEFAULT_STEPS + 1)
-
-    def mark(strokes: Array) -> Array:
-        here = solve(scene, "position", at=command_at(scene, strokes))
-        return np.where(here.assembled, 1.0, -1.0)
-
-    def gap(stroke: float) -> float:
-        return float(mark(np.array([stroke]))[0])
-
-    marks = mark(grid)
-    ends = [float(grid[0])] if marks[0] > 0.0 else []
-    for row in np.flatnonzero(np.diff(marks)):
-        ends.append(_bisect_gap(gap, *grid[row : row + 2].tolist()))
-    if marks[-1] > 0.0:
-        ends.append(float(grid[-1]))
-    return list(zip(ends[::2], ends[1::2], strict=True))
 
 
 def _list_candidates(scene: Scene, name: str, value: float) -> list[float]:

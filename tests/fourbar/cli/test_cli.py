@@ -679,6 +679,25 @@ def test_the_command_that_new_names_can_be_copied(tmp_path: Path, run: Fourbar) 
 
 
 @pytest.mark.parametrize(
+    "bars",
+    [
+        ("--lengths", "300mm", "100mm", "250mm", "220mm"),
+        ("--pins", "0,0 0,100 175,50 250,50", "--unit", "mm"),
+    ],
+    ids=lambda bars: bars[0],
+)
+def test_who_asks_for_positions_only_is_told_no_force(
+    bars: tuple[str, ...], tmp_path: Path, run: Fourbar
+) -> None:
+    path = tmp_path / "positions.toml"
+    assert run("new", path, *bars, "--positions-only")[0] == HOLDS
+    assert load(path).motion.speed is None and load(path).effects == ()
+    code, out, _ = run("analyze", path)
+    assert code == HOLDS and "transmission angle: at least" in out
+    assert not re.search("motor|torque|drive|mass|force", out + path.read_text())
+
+
+@pytest.mark.parametrize(
     "texts",
     [
         ('12"', '4"', '10"', '9"'),

@@ -562,3 +562,21 @@ def test_a_range_that_is_left_out_is_printed_with_the_limits(
     assert line in plain(block(scene))
     motion = scene.motion.replace(angle=stated)
     assert "inside its limits" not in plain(block(replace(scene, motion=motion)))
+
+
+def test_a_spring_that_the_cylinder_holds_end_to_end_loads_no_pin() -> None:
+    """Massless bars, and both ends in common: what is left at the pins is rounding."""
+    spring = fourbar.effects.Spring(CYLINDER.start, CYLINDER.end, 1e5, 0.5)
+    at = fourbar.Motion([0.1, 0.4, 0.7], 1.0)
+    scene = fourbar.Scene(
+        fourbar.FourBar(0.3, *(fourbar.Bar(x) for x in (0.1, 0.25, 0.22))),
+        motion=at,
+        drive=CYLINDER,
+        effects=(fourbar.effects.Springs((spring,)),),
+    )
+    force = fourbar.solve(scene).drive_force
+    stroke = fourbar.solve(scene).stroke
+    assert force == pytest.approx(1e5 * (stroke - 0.5), rel=1e-12)
+    text = block(scene)
+    assert text.count("0 N ") > 4 and "e-1" not in text.split("rounding")[0]
+    assert "bending" not in text and "rounding changes none" in text

@@ -31,6 +31,7 @@ from fourbar.cli import status
 from fourbar.effects import Place
 from fourbar.files import loads
 from fourbar.scene.motion import Free
+from fourbar.show.studies import write_equilibria
 from fourbar.show.tables import BLOCK_WIDTH
 from fourbar.studies.circuit_curve import POSITIONS_OF_A_BRANCH, CircuitCurve
 from fourbar.studies.equilibrium import Equilibria, Equilibrium, equilibrium
@@ -400,6 +401,17 @@ def test_a_torsion_spring_is_followed_from_the_start_of_the_sweep(
     near = np.argmin(np.abs(theta - math.radians(167.7867)))
     wound = float(np.degrees(np.abs(from_rest[1][near])))
     assert wound == pytest.approx(254.5 if count == 0 else 105.5, abs=0.05)
+    rows = write_equilibria("robot", equilibrium(scene)).splitlines()
+    half_a_turn = theta[np.argmax(np.abs(from_rest[1]) >= math.pi)]
+    has_word = {
+        float(row.split()[0]): row.endswith("wound")
+        for row in rows
+        if row.endswith(("wound", "falls", "grows", "stays"))
+    }
+    assert all(
+        word == (count == 0 and degrees >= math.degrees(half_a_turn))
+        for degrees, word in has_word.items()
+    )
     found = [one for one in fourbar.equilibrium(scene).found if one.reached]
     assert len(found) == count
     if count:

@@ -184,7 +184,7 @@ def test_strokes_that_assemble_are_named_where_none_requested_does() -> None:
     assert not fourbar.solve(scene).assembled.any()
     said = (
         "motion.stroke: the linkage assembles at none of the positions requested;"
-        f" stroke goes from 2 to {first:.6g} in and from {last:.6g} to 4 in"
+        f" this cylinder can have 2 to {first:.6g} in and {last:.6g} to 4 in"
     )
     with state_messages_in(units("imperial")):
         assert say_nowhere(scene) == said
@@ -192,7 +192,7 @@ def test_strokes_that_assemble_are_named_where_none_requested_does() -> None:
             fourbar.equilibrium(scene)
         assert str(raised.value) == said
     other = replace(scene, motion=scene.motion.replace(side="left"))
-    assert say_range(other) == "stroke goes from 0.0508 to 0.1016 m"
+    assert say_range(other) == "this cylinder can have 0.0508 to 0.1016 m"
     narrow = ROCKER_WITH_RAM.replace('"7 in"', '"10.3 in"').replace("-60 deg", "90 deg")
     none = loads(narrow.replace('"right"', '"left"'))
-    assert say_range(none) == "no stroke with motion.side = left does"
+    assert say_range(none) == "this cylinder can have none with motion.side = left"

@@ -11,6 +11,7 @@ import math
 from bisect import bisect
 from typing import Any, NamedTuple, TypeAlias
 
+import numpy as np
 from flint import acb, arb, arb_mat, ctx, fmpq
 
 from fourbar.effects import (
