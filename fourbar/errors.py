@@ -24,6 +24,24 @@ LONGEST_VALUE = 160
 """Characters of a value that an error repeats."""
 LONGEST_MESSAGE = 400
 """Characters of the line that a command prints of an error."""
+ELSEWHERE = (
+    "this is a planar four-bar linkage with pins alone: synthesis is in pylinkage and "
+    "MotionGen, sliders and several loops (six bars) in PMKS+, any mechanism in "
+    "MuJoCo, Drake or Exudyn"
+)
+"""Address for people with another mechanism."""
+_OF_OTHER_MECHANISM = re.compile(
+    r"crank|slider|(connecting_?)?rod|piston|rail|cam|gear|offset|dyad"
+    r"|precision_points|bell_?crank|(fif|six|seven|eigh)th"
+    r"|(bell_?crank|link|bar|rod|arm|crank|rocker|coupler|input|output|slider)_?[0-9]+"
+    r"|(v_|a_)?(theta|omega|alpha|G)_?([5-9]|1[0-9])|F([5-9][1-9]|[1-9][5-9])"
+)
+"""Names of parts, quantities and problems of mechanisms that are no four-bar."""
+
+
+def names_other_mechanism(name: str) -> bool:
+    """Return True if a name is that of a part or quantity of another mechanism."""
+    return _OF_OTHER_MECHANISM.fullmatch(name) is not None
 
 
 _MESSAGE_UNITS = ContextVar[Mapping[str, tuple[str, float]]]("units of messages")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from fourbar.cli import given
-from fourbar.errors import InputError, NotAssembledError, state_messages_in
+from fourbar.errors import ELSEWHERE, InputError, NotAssembledError, state_messages_in
 from fourbar.linkage import POSITIVE
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
@@ -18,23 +18,7 @@ if TYPE_CHECKING:
     from fourbar.show.columns import Column
 
 
-class LengthsCommand(click.Command):
-    """A command of four lengths, which says who serves more."""
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Read the arguments."""
-        try:
-            return super().parse_args(ctx, args)
-        except click.UsageError as error:
-            if "unexpected extra argument" in error.message:
-                from fourbar.files.fields import ELSEWHERE
-
-                message = f"{error.message}: {ELSEWHERE.rstrip('; ')}"
-                raise click.UsageError(message, ctx) from None
-            raise
-
-
-@click.command("classify", cls=LengthsCommand)
+@click.command("classify", cls=given.LengthsCommand)
 @click.argument("lengths", nargs=4, metavar="D A B C")
 @click.option(
     "--all",
@@ -81,7 +65,7 @@ def classify_command(
     )
 
 
-@click.command(cls=LengthsCommand)
+@click.command(cls=given.LengthsCommand)
 @click.argument("file", type=given.FILE_PATH, required=False)
 @click.option(
     "-o",
@@ -185,7 +169,6 @@ def _add_unit(option: str, text: str, unit: str | None) -> str:
 
 def _read_pins(text: str, unit: str | None) -> dict[str, tuple[str, str]]:
     """Read four pairs like "0,0 0,100 175,50 250,50" as x and y of the pins."""
-    from fourbar.files.fields import ELSEWHERE
     from fourbar.linkage import PINS
 
     pairs = [pair.split(",") for pair in text.split()]
@@ -193,8 +176,8 @@ def _read_pins(text: str, unit: str | None) -> dict[str, tuple[str, str]]:
         raise InputError(
             "--pins",
             text,
-            f"{ELSEWHERE if len(pairs) > len(PINS) else ''}must be x,y of O2, A, B, O4,"
-            ' like "0,0 0,100 175,50 250,50"',
+            'must be x,y of O2, A, B, O4, like "0,0 0,100 175,50 250,50"'
+            f"{f': {ELSEWHERE}' if len(pairs) > len(PINS) else ''}",
         )
     return {
         pin: (_add_unit("--pins", x, unit), _add_unit("--pins", y, unit))

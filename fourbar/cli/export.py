@@ -1,5 +1,6 @@
 """The commands that write files: pictures, models for simulators; and the workbench."""
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
@@ -11,6 +12,7 @@ import click
 
 from fourbar.cli import given
 from fourbar.errors import (
+    ELSEWHERE,
     DependencyError,
     InputError,
     say_install,
@@ -49,6 +51,10 @@ def _plane_options(command: Callable[..., None]) -> Callable[..., None]:
     return placed
 
 
+_A_LENGTH = re.compile(r"[\d.]+\w*")
+"""Name of a scene that is a fifth length."""
+
+
 def _scene_or_lengths(command: Callable[..., None]) -> Callable[..., None]:
     """Add SCENE, --lengths and --omega, one of the first two to be given."""
     for add in (
@@ -77,6 +83,8 @@ def _open_or_make_scene(
     out: Path,
 ) -> Iterator[Scene]:
     """Open the scene, or make one of the lengths; its defaults are told at the end."""
+    if lengths is not None and _A_LENGTH.fullmatch(str(scene)):
+        raise click.UsageError(f"--lengths are four: {ELSEWHERE}")
     if (scene is None) == (lengths is None):
         raise click.UsageError("give a scene file or --lengths D A B C, one of the two")
     if scene is not None:
@@ -238,7 +246,7 @@ def animate(
     _say_written(out, frames)
 
 
-@click.command()
+@click.command(cls=given.LengthsCommand)
 @_scene_or_lengths
 @click.option(
     "--for",
@@ -277,7 +285,7 @@ def mjcf(
         given.print_to(text, out)
 
 
-@click.command("sdf")
+@click.command("sdf", cls=given.LengthsCommand)
 @_scene_or_lengths
 @click.option(
     "--for",
@@ -307,7 +315,7 @@ def sdf_command(
         given.print_to(text, out)
 
 
-@click.command("usd")
+@click.command("usd", cls=given.LengthsCommand)
 @_scene_or_lengths
 @_without_loads_option
 @_plane_options

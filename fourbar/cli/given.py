@@ -1,5 +1,6 @@
 """Readers of the commands' arguments: scenes, numbers with units, output files."""
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
@@ -8,7 +9,7 @@ from typing import Any
 
 import click
 
-from fourbar.errors import InputError, state_messages_in
+from fourbar.errors import ELSEWHERE, InputError, state_messages_in
 from fourbar.linkage import ANY_NUMBER, POSITIVE, require
 from fourbar.scene import Command, Scene
 from fourbar.solution import Conversion
@@ -128,6 +129,20 @@ def json_option(command: Callable[..., None]) -> Callable[..., None]:
 def ends_in(out: Path | None, suffix: str) -> bool:
     """Return True if there is a file to write to and its name has this ending."""
     return out is not None and out.suffix.lower() == suffix
+
+
+class LengthsCommand(click.Command):
+    """A command of four lengths, which says who serves more."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Read the arguments."""
+        try:
+            return super().parse_args(ctx, args)
+        except click.UsageError as error:
+            if re.search(r"unexpected extra arguments? \([\d.]", error.message):
+                message = f"{error.message}: {ELSEWHERE}"
+                raise click.UsageError(message, ctx) from None
+            raise
 
 
 @contextmanager

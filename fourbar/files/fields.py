@@ -9,24 +9,20 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from fourbar.errors import InputError, name_unit
-from fourbar.linkage import ANY_NUMBER, BAR_NAMES, REQUIRED_NUMBER, Declared, is_within
+from fourbar.errors import ELSEWHERE, InputError, name_unit, names_other_mechanism
+from fourbar.linkage import (
+    ANY_NUMBER,
+    BAR_NAMES,
+    PINS,
+    REQUIRED_NUMBER,
+    Declared,
+    is_within,
+)
 from fourbar.quantities.units import UNIT_MISSING, UnitError, find_unit, to_si
+from fourbar.scene.motion import is_length
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
 LONGEST_FIELD = 60
-_FOREIGN = re.compile(
-    r"crank|slider|(connecting_?)?rod|piston|rail|cam|gear|offset|dyad"
-    r"|precision_points|bell_?crank"
-    r"|(bell_?crank|link|bar|rod|arm|crank|rocker|coupler|input|output|slider)_?[0-9]+"
-)
-"""Keys of mechanisms that are no four-bar linkage, and of their synthesis."""
-ELSEWHERE = (
-    "this is a planar four-bar linkage with pins alone: synthesis is in pylinkage and "
-    "MotionGen, sliders and several loops (six bars) in PMKS+, any mechanism in "
-    "MuJoCo, Drake or Exudyn; "
-)
-"""Address for people with another mechanism."""
 DIRECTION_WORDS = {
     "up": "90 deg",
     "down": "-90 deg",
@@ -34,6 +30,8 @@ DIRECTION_WORDS = {
     "right": "0 deg",
 }
 """Words for directions, as the suggestions of an error know them."""
+_OTHER_PIN = re.compile(r"[C-F]|O_?[5-9]")
+"""Pins of more than four bars, as they are usually named."""
 _MEANT = {
     **{"weight": "mass", "torque": "moment", "couple": "moment"},
     **{"rate": "stiffness", "k": "stiffness", "material": "density"},
@@ -93,12 +91,9 @@ class Reader:
             )
         for name, entry in value.items():
             if name not in names:
-                if _is_elsewhere(key, value, names):
-                    hint = ELSEWHERE
-                else:
-                    hint = _suggest_word(name, names)
-                allowed = f"unknown key; {hint}allowed: {', '.join(names)}"
-                raise self.refuse(_join_key(key, name), entry, allowed)
+                known = f"{_suggest_word(name, names)}allowed: {', '.join(names)}"
+                hint = ELSEWHERE if _is_elsewhere(key, value, names) else known
+                raise self.refuse(_join_key(key, name), entry, f"unknown key; {hint}")
         return value
 
     def text(self, key: str, value: object) -> str:
@@ -142,6 +137,8 @@ class Reader:
         ):
             numbers = [f"{bar} ({BAR_NAMES[bar]})" for bar in range(least, 5)]
             allowed = f"must be {', '.join(numbers[:-1])} or {numbers[-1]}"
+            if isinstance(value, int) and value > len(BAR_NAMES):
+                allowed = f"{allowed}: {ELSEWHERE}"
             raise self.refuse(key, value, allowed)
         return value
 
@@ -359,15 +356,21 @@ def write_pair(
 
 
 def _is_elsewhere(key: str, table: dict[str, Any], names: list[str]) -> bool:
-    """Return True if a table has a key of another mechanism, or more than four pins.
+    """Return True if a table has a key of another mechanism, or too many bars or pins.
 
     A key that may mean one of those allowed is none.
     """
     unknown = [name for name in table if name not in names]
     if key == "pins" and len(table) > len(names):
         return True
-    return any(
-        _FOREIGN.fullmatch(name) and _MEANT.get(name) not in names for name in unknown
+    if key == "lengths" and table.keys() >= set(BAR_NAMES.values()):
+        for name in unknown:
+            if is_length(table[name]) and not _suggest_word(name, names):
+                return True
+    of_pins = names == [*PINS] and any(_OTHER_PIN.fullmatch(name) for name in unknown)
+    return of_pins or any(
+        names_other_mechanism(name) and _MEANT.get(name) not in names
+        for name in unknown
     )
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.errors import InputError
+from fourbar.errors import ELSEWHERE, InputError, names_other_mechanism
 from fourbar.quantities import STAGE_OF, Array, find_derived
 from fourbar.scene import Command, Scene, command_at, with_signs
 from fourbar.show.derived import derive, list_derived_names
@@ -170,6 +170,8 @@ def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
     quantities = _list_column_quantities(solution)
     if not _is_number(solution, name):
         close = get_close_matches(name, ["time", *quantities], 1)
+        if names_other_mechanism(stem):
+            raise InputError("--columns", name, f"unknown; {ELSEWHERE}")
         if close:
             hint = f'did you mean "{close[0]}"? '
         else:

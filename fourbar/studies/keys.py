@@ -9,7 +9,13 @@ import numpy as np
 from fourbar.effects import Gravity, Springs
 from fourbar.effects.effect import PinRows
 from fourbar.effects.place import STATED_PLACES, Place
-from fourbar.errors import InputError, expect, write_in_units
+from fourbar.errors import (
+    ELSEWHERE,
+    InputError,
+    expect,
+    names_other_mechanism,
+    write_in_units,
+)
 from fourbar.formulas.arithmetic import (
     angle,
     dot,
@@ -300,6 +306,8 @@ def refuse_key(key: str, value: object, keys: list[str]) -> InputError:
             "is the same for every member of a study: only numbers vary, theta_2 as"
             " angles",
         )
+    if any(map(names_other_mechanism, key.split("."))):
+        return InputError(key, value, f"unknown key; {ELSEWHERE}")
     return InputError(key, value, f"unknown key; {_suggest(key, keys)}")
 
 

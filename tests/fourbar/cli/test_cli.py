@@ -1089,7 +1089,15 @@ output = "380 mm"
     "more",
     [
         *('bellcrank2 = "350 mm"', 'link2 = "600 mm"', 'slider = "1 mm"'),
-        '[bars.link5]\nmass = "1 kg"',
+        *('sixth = "1 mm"', 'fixed = "1 mm"', '[bars.link5]\nmass = "1 kg"'),
+        *('[link2]\nlength = "1 mm"', '[motion]\ntheta_5 = "1 rad"'),
+        '[motion]\nlaw = { time = ["0 s", "1 s"], theta_6 = ["0 rad", "1 rad"] }',
+        "[drive]\nbar = 6",
+        '[[loads]]\nbar = 5\nmoment = "1 N m"',
+        '[points]\nP = { bar = 5, from_pin = ["1 mm", "0 deg"] }',
+        '[effects]\nviscous = { C = "1 N m s" }',
+        '[effects]\nfriction = { O6 = "1 N m" }',
+        '[tolerances]\n"lengths.link5" = "1 mm"',
     ],
 )
 def test_a_part_of_another_mechanism_points_on(
@@ -1109,6 +1117,11 @@ def test_a_part_of_another_mechanism_points_on(
         ("classify", "1", "2", "3", "4", "5", "6"),
         ("new", "f.toml", "--lengths", "1m", "2m", "3m", "4m", "5m", "6m"),
         ("new", "f.toml", "--pins", "0,0 0,1 1,2 3,3 4,4 5,5", "--unit", "mm"),
+        ("mjcf", "--lengths", "1", "2", "3", "4", "5", "6", "-o", "f.xml"),
+        ("sdf", "--lengths", "1", "2", "3", "4", "5", "-o", "f.sdf"),
+        ("analyze", MODELS / "crank_rocker.toml", "--at", "theta_5=30 deg"),
+        ("analyze", MODELS / "crank_rocker.toml", "--columns", "omega_6/omega_2"),
+        ("analyze", MODELS / "crank_rocker.toml", "--columns", "F56_x"),
     ],
 )
 def test_six_bars_on_the_command_line_point_on(
@@ -1135,6 +1148,21 @@ def test_other_words_for_the_bars_are_asked_back(
     (tmp_path / "scene.toml").write_text(SIX_BARS.replace(key, word))
     code, _, err = run("analyze", tmp_path / "scene.toml")
     assert code == BAD_INPUT and f'did you mean "{key}"' in err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("mjcf", "a.toml", "b.toml", "-o", "f.xml"),
+        ("mjcf", "a.toml", "--lengths", "3", "1", "2.5", "2.2", "-o", "f.xml"),
+        ("analyze", MODELS / "crank_rocker.toml", "--columns", "theta_44"),
+    ],
+)
+def test_what_is_no_other_mechanism_does_not_point_on(
+    arguments: tuple[str, ...], run: Fourbar
+) -> None:
+    code, _, err = run(*arguments)
+    assert code == BAD_INPUT and "PMKS+" not in err
 
 
 def test_one_position_has_the_angles_that_the_sweep_has_there(
