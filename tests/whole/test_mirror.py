@@ -45,7 +45,7 @@ JUDGED_BY = {
     "fourbar/studies/test_paths.py": "fourbar/show: paths",
     # parts of one document or picture
     "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: document model",
-    "fourbar/show/test_animate.py": "fourbar/show/plot: film",
+    "fourbar/show/test_animate.py": "fourbar/show/plot: film frames",
     "fourbar/show/test_page.py": "fourbar/show: tolerances",
     "fourbar/show/plot/test_plot.py": (
         "fourbar/show/plot: curves figures freebody labels linkage studies style view"

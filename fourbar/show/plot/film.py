@@ -9,7 +9,7 @@ from contextlib import suppress
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 FRAMES_PER_SECOND = 25
 _MAX_FRAMES = 1500
 FILM_SIZE = (6.4, 5.6)
-FILM_DPI = 100
 SWEEP_SECONDS = 6.0
 """Duration of a film of a sweep if no other is stated, s."""
 WINDOW_POSITIONS = 12
@@ -215,7 +214,11 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
 
     The function returns what it has moved.
     """
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.text import Annotation
+
+    from fourbar.show.plot.frames import FILM_DPI, Stage
 
     sweep = shown.sweep
     factor, unit, size = choose_drawing_scale(shown)
@@ -227,21 +230,21 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
         move_vectors = symbols.draw_vectors(axes, shown, sweep, factor, size)
     else:
         move_vectors = None
-    passing: list[Any] = []
+    stage = Stage(axes)
+    as_axes = cast(Axes, stage)  # it has the methods that are called
 
-    def put(index: int) -> Labels:
+    def put(index: int) -> tuple[Labels, list[Any]]:
         """Draw the mechanism at a position, in place of what stood there."""
-        while passing:
-            passing.pop().remove()
+        stage.clear()
         labels = Labels()
-        passing.extend(draw_mechanism(axes, shown, sweep, index, labels))
-        passing.extend(labels.beside())
-        return labels
+        drawn = draw_mechanism(as_axes, shown, sweep, index, labels)
+        drawn += [stage.add_label(label) for label in labels.wanted]
+        return labels, drawn
 
     closes = np.flatnonzero(sweep.assembled)
     # the window holds what acts at every position
     for index in closes[:: max(1, len(closes) // WINDOW_POSITIONS)]:
-        for _, line, _ in put(int(index)).lines:
+        for _, line, _ in put(int(index))[0].lines:
             axes.update_datalim(line)
     axes.autoscale_view()
     axes.set_aspect("equal", adjustable="datalim")
@@ -252,7 +255,8 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
     figure.set_layout_engine(None)
 
     def move(index: int) -> list[Any]:
-        put(index)
+        _, drawn = put(index)
+        passing = [one for one in drawn if not isinstance(one, Annotation)]
         axis = shown.axis
         places = sweep.at.places
         theta = f"{axis.factor * places[index]:.1f}".replace("-", "−")

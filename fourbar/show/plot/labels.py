@@ -12,7 +12,6 @@ from fourbar.show.plot.style import INK
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.text import Annotation
 
 DrawnPoint = tuple[float, float]
 _Box = tuple[float, float, float, float]
@@ -60,41 +59,6 @@ class Labels:
         covered.
         """
         self.lines.append((axes, list(points), width))
-
-    def beside(self) -> "list[Annotation]":
-        """Write every label at once, each outwards from its point.
-
-        No free spot is searched for a film: a bright edge keeps the text clear of a bar
-        of its own colour.
-        """
-        from matplotlib.patheffects import AbstractPathEffect, withStroke
-
-        edge: list[AbstractPathEffect] = [withStroke(linewidth=2.5, foreground="white")]
-        written = []
-        for label in self.wanted:
-            dx, dy = (p - q for p, q in zip(label.at, label.shun, strict=True))
-            away = max(math.hypot(dx, dy), 1e-300)
-            if abs(dx) < 0.5 * away:
-                side = "center"
-            elif dx > 0.0:
-                side = "left"
-            else:
-                side = "right"
-            text = label.axes.annotate(
-                label.text,
-                label.at,
-                (8.0 * dx / away, 11.0 * dy / away),
-                textcoords="offset points",
-                ha=side,
-                va="center",
-                size=label.size,
-                color=label.colour,
-                zorder=9,
-                annotation_clip=False,
-            )
-            text.set_path_effects(edge)
-            written.append(text)
-        return written
 
     def settle(self, figure: "Figure") -> None:
         """Place every label at its nearest free spot once the layout is final."""

@@ -5,6 +5,7 @@ Plots and films draw it alike.
 
 import math
 from collections.abc import Iterator
+from functools import cache
 from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
@@ -39,6 +40,7 @@ from fourbar.studies.paths import measure_paths
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
+    from matplotlib.path import Path
 
 
 _NAMED_AT = 0.35
@@ -237,14 +239,19 @@ def draw_mass_centre(
     ms: float = 7.0,
 ) -> "list[Line2D]":
     """Draw the quartered circle that marks a mass centre."""
-    from matplotlib.path import Path
-
     x, y = point
-    quarters = Path.make_compound_path(Path.wedge(0, 90), Path.wedge(180, 270))
+    quarters = _make_quarters()
     return [
         *axes.plot([x], [y], "o", ms=ms, mfc="white", mec=INK, mew=0.8, zorder=7),
         *axes.plot([x], [y], marker=quarters, ms=ms, mfc=INK, mec="none", zorder=7),
     ]
+
+
+@cache
+def _make_quarters() -> "Path":
+    from matplotlib.path import Path
+
+    return Path.make_compound_path(Path.wedge(0, 90), Path.wedge(180, 270))
 
 
 def draw_support(axes: "Axes", pin: DrawnPoint, size: float, labels: Labels) -> None:

@@ -16,6 +16,7 @@ import fourbar
 from fourbar.effects import Load, list_kinds
 from fourbar.effects.load import Table
 from fourbar.files import loads
+from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar.show import animate
 from fourbar.show.animate import collect_page_data
@@ -230,11 +231,17 @@ def test_a_film_names_and_moves_what_the_plot_does(everything: Scene) -> None:
     scene = replace(everything, points=(fourbar.Point("P", 3, (0.15, 0.7)),))
     with apply_style():
         figure, move = _make_stage(make_view(scene), moving=True)
+        move(3)
         move(7)
         figure.draw_without_rendering()
     (axes,) = figure.axes
-    texts = {text.get_text() for text in axes.texts}
-    assert texts >= {
+    solution = fourbar.solve(scene)
+    bars = [line for line in axes.lines if line.get_lw() == 4.5 and line.get_visible()]
+    at_7 = [getattr(solution, name)[7] for name in ("A", "B")]
+    ratios = np.transpose(bars[1].get_data()) / at_7
+    assert len(bars) == len(MOVING_BARS) and np.allclose(ratios, ratios[0, 0])
+    names = {artist.get_label() for artist in axes.artists if artist.get_visible()}
+    assert names >= {
         "$O_2$",
         "$A$",
         "2",
@@ -249,7 +256,6 @@ def test_a_film_names_and_moves_what_the_plot_does(everything: Scene) -> None:
         "pin friction",
     }
     assert axes.title.get_window_extent().y0 > axes.get_legend().get_window_extent().y1
-    solution = fourbar.solve(scene)
     for arrows, name, of_points in zip(
         axes.collections[-2:],
         ("v_A", "a_A"),
