@@ -18,7 +18,13 @@ from fourbar.linkage import (
     Declared,
     is_within,
 )
-from fourbar.quantities.units import UNIT_MISSING, UnitError, find_unit, to_si
+from fourbar.quantities.units import (
+    UNIT_MISSING,
+    UnitError,
+    converts,
+    find_unit,
+    to_si,
+)
 from fourbar.scene.motion import is_length
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
@@ -218,7 +224,7 @@ class Reader:
         for holder in reversed(around):
             for text in _list_texts(holder):
                 stated = find_unit(text, "")
-                if stated and _converts(stated, unit):
+                if stated and converts(stated, unit):
                     return stated
         return name_unit(unit, _LIKELY.get(unit))
 
@@ -297,15 +303,6 @@ def _list_texts(holder: Any) -> Iterator[str]:
     elif isinstance(holder, list):
         for entry in holder:
             yield from _list_texts(entry)
-
-
-def _converts(stated: str, unit: str) -> bool:
-    """Return whether numbers with a stated unit are of the kind of another unit."""
-    try:
-        to_si(f"1 {stated}", unit)
-    except UnitError:
-        return False
-    return True
 
 
 def convert_to_polar(x: float, y: float) -> tuple[float, float]:

@@ -1,28 +1,28 @@
 """Quantities as text, "48 cm" or "0.01 N m s/rad", to SI numbers.
 
-Conversions are exact and rounded once. The angle is a dimension, as it is in no library
-of units: rad/s is not 1/s, so neither Hz nor a forgotten "deg" slips through.
+Conversions are exact and rounded once. The units are a short list rather than all that
+the units library knows, because the angle is a dimension here: rad/s is not 1/s, so
+neither Hz nor a forgotten "deg" slips through.
 """
 
 import difflib
 import math
 import re
 import tomllib
-from collections import Counter
 from fractions import Fraction
 from functools import cache, lru_cache
-from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from fourbar.errors import InputError
 
-DEFINITIONS: str = tomllib.loads(
-    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-)["definitions"]
-"""Units, a line each: a name, what it means, and other names."""
+_TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+DEFINITIONS: str = _TABLES["definitions"]
+"""Unit definitions in the form of the units library."""
+COMMON: dict[str, str] = _TABLES["common"]
+"""What the library makes of the commonest texts. Loading it takes longer than NumPy."""
 _JOINED = re.compile(r"(?<=[A-Za-z])[.-](?=[A-Za-z])")
 """N.mm, lbf-in: a product."""
 _SWAPS = (
@@ -86,25 +86,6 @@ fit is refused in one pass.
 """
 IMPERIAL = ("in", "inch", "inches", "ft", "foot", "feet")
 """Units of a length with which a scene is shown in imperial units."""
-_POWERS_IN_WORDS = tuple(
-    (re.compile(pattern), signs)
-    for pattern, signs in (
-        (r"\s+per\s+", "/"),
-        (r"\b(?:square|sq)\s+([A-Za-z_]+)", r"\1²"),
-        (r"\bcubic\s+([A-Za-z_]+)", r"\1³"),
-        (r"\s+squared\b", "²"),
-        (r"\s+cubed\b", "³"),
-        ("²", "^2"),
-        ("³", "^3"),
-        ("°", "deg"),
-    )
-)
-"""Words and signs of a power, of a quotient and of a degree: "meters per second"."""
-_PART = re.compile(
-    r"(?P<name>[A-Za-zµμ_]+(?:0[A-Za-zµμ_]*)?)(?:\s*(?:\^|\*\*)\s*(?P<power>-?[0-9]))?"
-    r"|(?P<number>[0-9.]+(?:e-?[0-9]+)?)|(?P<operator>[·*/()])"
-)
-"""A part of a product of units, which in `DEFINITIONS` may be a number."""
 _LONGEST_UNIT = 60
 UNIT_MISSING = "the unit is missing"
 """Reason of the error for a number alone."""
@@ -131,10 +112,7 @@ def to_si(text: str, unit: str) -> float:
     number_text = _FRACTION.match(text) or NUMBER_TEXT.match(text)
     if number_text is None:
         raise UnitError("there is no finite number")
-    name = RAISED_TEXT.sub(
-        lambda power: f"^{power[0].translate(SUPERSCRIPT_DIGITS)}",
-        text[number_text.end() :].translate(_SIGNS),
-    ).strip()
+    name = _spell(text[number_text.end() :])
     if name.startswith(","):
         hint = (
             f'; did you mean "{number_text[0]}.{name[1:]}"?'
@@ -154,12 +132,12 @@ def to_si(text: str, unit: str) -> float:
             f'the sign says how it turns, counter-clockwise is positive: "{plain}"'
         )
     name = _GLUED.sub(r"\1 \2", name)
-    wanted = _find_factor(unit)
+    wanted, wanted_dimension = _find_factor(unit)
     try:
-        given = _find_factor(name)
+        factor, dimension = _find_factor(name)
     except UnitError as error:
         raise UnitError(f"{error}{_suggest(number_text[0], name, unit)}") from None
-    if given.powers != wanted.powers:
+    if dimension != wanted_dimension:
         raise UnitError(
             f'"{name}" does not convert to {unit}{_suggest(number_text[0], name, unit)}'
         )
@@ -168,7 +146,7 @@ def to_si(text: str, unit: str) -> float:
         if feet:
             inches = 12 * int(feet[2]) + number
             number = -inches if feet[1] == "-" else inches
-        value = float(number * given.number / wanted.number)
+        value = float(number * factor / wanted)
     except OverflowError:
         value = math.inf
     if not math.isfinite(value):
@@ -243,6 +221,23 @@ def find_factor(unit: str, given: str) -> float:
         raise InputError("unit", given, f"{error}; must convert to {unit}") from None
 
 
+def _spell(name: str) -> str:
+    """Return the name of a unit with the signs and powers that the library knows."""
+    return RAISED_TEXT.sub(
+        lambda power: f"^{power[0].translate(SUPERSCRIPT_DIGITS)}",
+        name.translate(_SIGNS),
+    ).strip()
+
+
+def converts(name: str, unit: str) -> bool:
+    """Return True if a name is a unit of the dimension of another unit."""
+    name = _GLUED.sub(r"\1 \2", _spell(name))
+    try:
+        return _find_factor(name)[1] == _find_factor(unit)[1]
+    except UnitError:
+        return False
+
+
 def _suggest(number: str, name: str, unit: str) -> str:
     """Suggest the unit that may have been meant.
 
@@ -281,111 +276,46 @@ def _suggest(number: str, name: str, unit: str) -> str:
         re.sub(r"(?<=[A-Za-z])([23])(?![0-9])", r"^\1", name),
     ]
     for candidate in candidates:
-        try:
-            if (
-                candidate != name
-                and _find_factor(candidate).powers == _find_factor(unit).powers
-            ):
-                return f'; did you mean "{number} {candidate}"?'
-        except UnitError:
-            continue
+        if candidate != name and converts(candidate, unit):
+            return f'; did you mean "{number} {candidate}"?'
     return ""
 
 
-class _Unit(NamedTuple):
-    """A number times powers of base units."""
+@cache
+def _load_registry() -> Any:
+    import pint
 
-    number: Fraction
-    powers: Counter[str]
-    """Power of each base unit."""
-
-    def times(self, other: "_Unit", power: int) -> "_Unit":
-        """Multiply by a power of another unit."""
-        powers = Counter(self.powers)
-        for base, exponent in other.powers.items():
-            powers[base] += power * exponent
-        return _Unit(self.number * other.number**power, powers)
+    registry: Any = pint.UnitRegistry(None, non_int_type=Fraction)
+    registry.load_definitions(DEFINITIONS.splitlines())
+    return registry
 
 
 @cache
-def _find_factor(name: str) -> _Unit:
-    """Return what one of the unit is in base units."""
+def _find_factor(name: str) -> tuple[Fraction, dict[str, Fraction]]:
+    """Return what one of the unit is in base units, and its dimension."""
+    if name in COMMON:
+        number, *powers = COMMON[name].split()
+        bases = (power.partition("^") for power in powers)
+        return Fraction(number), {
+            f"[{base}]": Fraction(power or 1) for base, _, power in bases
+        }
+    return ask_library(name)
+
+
+def ask_library(name: str) -> tuple[Fraction, dict[str, Fraction]]:
+    """Return what the library makes of a unit: its number in base units, its dimension.
+
+    Raises UnitError for what is no unit.
+    """
     name = _JOINED.sub(" ", name.rstrip("."))
     if len(name) > _LONGEST_UNIT or not UNIT_TEXT.fullmatch(name):
         raise UnitError("the unit cannot be read")
+    registry = _load_registry()
     if angle := _PREFIXED_ANGLE.search(name):
         raise UnitError(f'the unit "{angle[0]}" is not known')
-    for words, signs in _POWERS_IN_WORDS:
-        name = words.sub(signs, name)
     try:
-        return _read_product(name)
-    except UnitError:
+        one = registry.Quantity(Fraction(1), registry.parse_units(name)).to_root_units()
+    # the parser of the library raises whatever its tokenizer and evaluator do
+    except Exception:
         raise UnitError(f'the unit "{name}" is not known') from None
-
-
-def _read_product(text: str) -> _Unit:
-    """Read a product of units and numbers.
-
-    What stands side by side is multiplied, from left to right. Raises UnitError for a
-    name that is no unit, and for an operator that lacks a side.
-    """
-    unit = _Unit(Fraction(1), Counter())
-    senses = [1]  # -1 below a line; of each parenthesis that is open
-    sense = 1
-    complete = False
-    for part in _PART.finditer(text):
-        operator = part["operator"]
-        if operator == "(":
-            senses.append(senses[-1] * sense)
-        elif operator and not complete:
-            raise UnitError
-        elif operator == ")":
-            senses.pop()
-        elif part["number"]:
-            number = _Unit(Fraction(part["number"]), Counter())
-            unit = unit.times(number, senses[-1] * sense)
-        elif part["name"]:
-            power = int(part["power"] or 1)
-            unit = unit.times(_find_unit(part["name"]), senses[-1] * sense * power)
-        if not senses:
-            raise UnitError
-        complete = operator in (None, ")")
-        sense = -1 if operator == "/" else 1
-    if not complete or len(senses) > 1:
-        raise UnitError
-    return unit
-
-
-@cache
-def _find_unit(name: str) -> _Unit:
-    """Return what one of a name is in base units; it may have a prefix, and an s."""
-    meanings, prefixes = _read_definitions()
-    for ending, prefix in product(("", "s"), prefixes):
-        word = name[len(prefix) : len(name) - len(ending)]
-        # one letter has no plural: ms is a thousandth of a second
-        if (
-            f"{prefix}{word}{ending}" != name
-            or word not in meanings
-            or len(word) <= len(ending)
-        ):
-            continue
-        meaning = meanings[word]
-        if meaning.startswith("["):
-            unit = _Unit(Fraction(1), Counter([meaning]))
-        else:
-            unit = _read_product(meaning)
-        return unit._replace(number=unit.number * prefixes[prefix])
-    raise UnitError
-
-
-@cache
-def _read_definitions() -> tuple[dict[str, str], dict[str, Fraction]]:
-    """Return what each name of a unit means, and each prefix, which may be empty."""
-    meanings: dict[str, str] = {}
-    for line in DEFINITIONS.strip().splitlines():
-        name, meaning, *others = line.split(" = ")
-        meanings |= dict.fromkeys((name, *others), meaning)
-    prefixes = {"": Fraction(1)}
-    for name in [name for name in meanings if name.endswith("-")]:
-        prefixes[name.removesuffix("-")] = Fraction(meanings.pop(name))
-    return meanings, prefixes
+    return Fraction(one.magnitude), dict(one.dimensionality)

@@ -69,25 +69,16 @@ def units(text: str) -> Conversion:
     """
     if not isinstance(text, str):
         raise InputError("units", text, ALLOWED_UNITS)
-    from fourbar.quantities.units import to_si
+    from fourbar.quantities.units import converts, to_si
 
     stated: dict[str, str] = {}
     for name in _PRESETS.get(text.casefold(), text).replace(",", " ").split():
-        why = {unit: _explain_unit(name, unit) for unit in STATABLE_UNITS}
-        unit = next((unit for unit in STATABLE_UNITS if not why[unit]), None)
-        if unit is None or unit in stated:
-            hint = next(
-                (
-                    f"; {word}"
-                    for reason in why.values()
-                    if (word := reason.partition("; ")[2])
-                ),
-                "",
-            )
-            if unit is None:
-                reason = f"is no unit of a result{hint}"
-            else:
-                reason = f"is the second unit for {unit}"
+        unit = next((unit for unit in STATABLE_UNITS if converts(name, unit)), None)
+        if unit is None:
+            reason = f"is no unit of a result{_suggest_unit(name)}"
+            raise InputError("units", name, f"{reason}; {ALLOWED_UNITS}")
+        if unit in stated:
+            reason = f"is the second unit for {unit}"
             raise InputError("units", name, f"{reason}; {ALLOWED_UNITS}")
         stated[unit] = name.replace(".", " ")
     mass = stated.get("kg", "")
@@ -106,14 +97,17 @@ def units(text: str) -> Conversion:
     } or SI
 
 
-def _explain_unit(name: str, unit: str) -> str:
-    """Explain why a name is no unit for another one; empty where it is."""
+def _suggest_unit(name: str) -> str:
+    """Suggest the unit that a name may stand for; empty if none is near."""
     from fourbar.quantities.units import UnitError, to_si
 
-    try:
-        to_si(f"1 {name}", unit)
-    except UnitError as error:
-        return str(error).replace('"1 ', '"')
+    for unit in STATABLE_UNITS:
+        try:
+            to_si(f"1 {name}", unit)
+        except UnitError as error:
+            hint = str(error).replace('"1 ', '"').partition("; ")[2]
+            if hint:
+                return f"; {hint}"
     return ""
 
 

@@ -1,7 +1,7 @@
 """A command in a process that has loaded the libraries and nothing of the project.
 
 It is forked from one like that. What a command must import by itself shows as in a
-process of its own, without the time that numpy takes.
+process of its own, without the second that numpy and pint take.
 """
 
 import os
@@ -10,7 +10,7 @@ import sys
 from multiprocessing import get_context
 from pathlib import Path
 
-LIBRARIES = ["numpy", "click", "rich.table", "mpmath", "pyarrow.parquet"]
+LIBRARIES = ["numpy", "click", "rich.table", "pint", "mpmath", "pyarrow.parquet"]
 TIME = 60.0
 """s; a command that takes longer has failed."""
 CLEAN = get_context("forkserver")

@@ -455,7 +455,7 @@ def test_the_help_says_of_each_command_what_the_command_says(group: LazyGroup) -
 
 def test_the_help_of_the_harness_imports_no_engine() -> None:
     code = "import sys; from fourbar_validation.cli import status; status(['--help']); "
-    code += "sys.exit(bool({'scipy', 'mujoco', 'rich'} & set(sys.modules)))"
+    code += "sys.exit(bool({'scipy', 'mujoco', 'pint', 'rich'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False)
     assert done.returncode == HOLDS
 
