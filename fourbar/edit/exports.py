@@ -24,6 +24,8 @@ import numpy as np
 from fourbar.edit.dragging import list_handles
 from fourbar.edit.headline import list_peaks, write_headline
 from fourbar.errors import DependencyError, InputError, NotAssembledError, say_install
+from fourbar.formulas.mobility import limit_positions
+from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar.show.animate import collect_live_data
 from fourbar.show.block import write_facts
@@ -91,6 +93,8 @@ def evaluate_scene(
             "opacity": picture.opacity,
             "shift": scene.origin,
         }
+    data["drawn"] = None if scene.drawing is None else scene.drawing.angle(2)
+    data["turns"] = _list_turns(scene)
     data["handles"] = [handle.drawn() for handle in list_handles(scene)]
     shown_units = {**COMMON, **units}
     facts = None
@@ -103,6 +107,18 @@ def evaluate_scene(
             data["peaks"] = list_peaks(solution, facts)
     data["headline"] = write_headline(solution, shown_units, facts)
     return data
+
+
+def _list_turns(scene: Scene) -> list[tuple[str, float, float, float]]:
+    """List limits of the commanded bar and dead centres, in words, with the angles."""
+    turns = []
+    for bar in {2, 4, scene.motion.bar}:
+        word = "limit" if bar == scene.motion.bar else "dead centre"
+        one, other = (number for number in MOVING_BARS if number != bar)
+        words = f"{word}: bars {one}, {other} in line"
+        for limit in limit_positions(scene.linkage, bar):
+            turns.append((words, limit.theta_2, limit.theta_3, limit.theta_4))
+    return turns
 
 
 def pack_frame(about: dict[str, Any]) -> bytes:

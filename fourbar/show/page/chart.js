@@ -57,7 +57,7 @@ function chartFrame(chart, low, high) {
 // The curves of the data shown, as they stay when other data are.
 function captured(name) {
   const values = Object.fromEntries(QUANTITIES.filter(q => q[0] in table() || /^[va]_/.test(q[0]) && "omega_3" in table()).map(q => [q[0], column(q[0])]));
-  return { name, over: axis().values, axis: axis().name, values, paths: couplerPaths() };
+  return { name, over: axis().values, axis: axis().name, values, paths: couplerPaths(), marks: couplerMarks() };
 }
 const peakOf = values => values.reduce((most, v) => Math.abs(v) > Math.abs(most) ? v : most, 0);
 let unchanged = false;   // whether the scene is the one it is compared with
@@ -92,7 +92,8 @@ function drawChart() {
   if (limit.cut) { low = Math.max(low, -limit.top); high = Math.min(high, limit.top); }
   if (!wanted.startsWith("theta")) { low = Math.min(low, 0); high = Math.max(high, 0); }
   if (high - low < 1e-300) { high += 1; low -= 1; }
-  byId("chart-note").textContent = limit.cut ? cutNote("curve", limit.top, told(wanted, values, data.peaks).words) : "";
+  const peak = told(wanted, values, data.peaks).words;
+  byId("chart-note").textContent = limit.cut ? cutNote("curve", limit.top, peak) : peak.startsWith("grows") ? `Between the positions it ${peak}.` : "";
   plotted = { ...chartFrame(chart, low, high), values, low, high };
   const { over, x, y, width, height, bottom } = plotted;
   const curve = (values, over, kind) => {

@@ -1,13 +1,14 @@
 // ---- dragging in the drawing -----------------------------------------------------------------------
 parts.handles = make(picture, "g", { id: "handles" });
 let holding = null, drags = 0;
-const toPlane = ([x, y]) => [(x - view.x) / view.k, (view.y - y) / view.k];
+const toPlane = ([x, y], from = view) => [(x - from.x) / from.k, (from.y - y) / from.k];
+const moved = (from, [x, y]) => ({ x: from.x + from.k * x, y: from.y - from.k * y });
 const turned = (p, bar) => ({ 1: data.theta_1, 2: p.theta2, 3: p.theta3, 4: p.theta4 })[bar];
 const arrowLength = () => 5 * sizeOf();
 
 // Where the things that can be dragged are drawn: name, what the server calls it, place in the picture.
 function placesOf(p) {
-  const found = ["A", "B", "O4"].map(pin => [`pin ${pin}`, pin, toScreen(p[pin])]);
+  const found = [...plain.pins ? ["O2"] : [], "A", "B", "O4"].map(pin => [`pin ${pin}`, pin, toScreen(p[pin])]);
   for (const handle of data.handles ?? []) {
     const own = handle.turns ? turned(p, handle.bar) : 0, c = Math.cos(own), s = Math.sin(own), [x, y] = handle.beyond;
     const foot = framed(p, handle.bar, handle.at), place = toScreen([foot[0] + x * c - y * s, foot[1] + x * s + y * c]);
@@ -32,6 +33,7 @@ function drawHandles() {
     circle.setAttribute("aria-label", `${name}: drag it, or move it by the arrow keys`);
     set(circle, { cx: place[0], cy: place[1] });
   });
+  offerPlaces(places);
 }
 
 function handleOf() {
@@ -41,7 +43,7 @@ function handleOf() {
     circle.focus();
     circle.setPointerCapture(event.pointerId);
     circle.classList.add("held");
-    holding = { ...circle.given, gesture: `drag:${++drags}` };
+    holding = { ...circle.given, gesture: `drag:${++drags}`, from: { ...view } };
     held = true;
   });
   circle.addEventListener("pointermove", event => { if (holding) dragged(placeOf(event)); });
@@ -57,7 +59,7 @@ function handleOf() {
     if (!way) return;
     event.preventDefault(); event.stopPropagation();
     const far = event.shiftKey ? 10 : 2;
-    holding = { ...circle.given, gesture: `keys:${++drags}` };
+    holding = { ...circle.given, gesture: `keys:${++drags}`, from: { ...view } };
     dragged([circle.given.place[0] + far * way[0], circle.given.place[1] + far * way[1]]);
     holding = null;
   });
@@ -65,10 +67,38 @@ function handleOf() {
 }
 
 function dragged(place) {
-  const to = toPlane(place), asked = { do: "drag", what: holding.what, to, grain: 1 / view.k, theta_2: holding.theta ??= grid[row], branch: table().sign[row], gesture: holding.gesture };
+  const to = toPlane(place, holding.from), asked = { do: "drag", what: holding.what, to, grain: 1 / view.k, theta_2: holding.theta ??= grid[row], branch: table().sign[row], gesture: holding.gesture };
   if (holding.foot) asked.stretch = Math.max(0.02, Math.hypot(place[0] - holding.foot[0], place[1] - holding.foot[1]) / arrowLength());
   ask(asked, null, holding.what === "A" ? Math.atan2(to[1], to[0]) : null);
 }
+
+// ---- a click in place of a drag: what is chosen is put where the picture is clicked --------------------
+let aimed = null;   // what the next click places
+const NEW_POINT = "a new point of the coupler";
+function offerPlaces(places) {
+  const names = ["", ...places.map(([name]) => name).filter(name => !name.startsWith("arrow")), NEW_POINT], select = byId("place");
+  if (names.join() !== [...select.options].map(option => option.value).join()) select.replaceChildren(...names.map(name => new Option(name || "choose", name)));
+}
+function aim(name) {
+  aimed = name || null;
+  byId("place").value = name;
+  document.body.classList.toggle("measuring", Boolean(name));
+  say(name ? `Click where ${name} is; Escape leaves it.` : "");
+}
+byId("place").addEventListener("change", event => aim(event.target.value));
+picture.addEventListener("click", event => {
+  if (!aimed) return;
+  if (aimed === NEW_POINT) {
+    const name = nextPoint();
+    ask({ do: "add", part: offers.parts.findIndex(({ at }) => at[0] === "points"), name });
+    holding = { what: ["points", name, "from_pin"] };
+  } else holding = { ...byId("handles").children[placesOf(at(row)).findIndex(([name]) => name === aimed)].given };
+  Object.assign(holding, { gesture: `click:${++drags}`, from: { ...view } });
+  dragged(placeOf(event));
+  holding = null;
+  aim("");
+});
+document.addEventListener("keydown", event => { if (event.key === "Escape" && aimed) aim(""); });
 
 // ---- a picture to trace: it lies under the drawing, in the drawing's coordinates ----------------------
 const traced = make(picture, "image", { id: "traced", preserveAspectRatio: "none" }), LARGEST = 1.4e6;   // bytes that a request can take

@@ -94,11 +94,13 @@ function compareAnew() {
 }
 
 function show(about, own) {
-  const theta = own?.theta ?? grid[row], same = about.data.theta_2.length === grid.length && about.data.theta_2[0] === grid[0] && about.data.theta_2[grid.length - 1] === grid[grid.length - 1];
+  const ofPins = about.data.drawn !== null && own && (own.request.do === "draw" || typeof own.request.what === "string");   // they are dragged at the position that is drawn
+  const theta = ofPins ? about.data.drawn : own?.theta ?? grid[row], same = about.data.theta_2.length === grid.length && about.data.theta_2[0] === grid[0] && about.data.theta_2[grid.length - 1] === grid[grid.length - 1];
   const keep = row;
   adopt(about.data);
+  if (holding?.what === "O2" && own?.request.what === "O2") Object.assign(view, moved(holding.from, own.request.to));   // the others stay
   unchanged = !about.changed;
-  row = same && own?.theta == null ? keep : single() && own?.request.do !== "command" ? Math.min(keep, grid.length - 1) : nearest(theta);
+  row = same && own?.theta == null && !ofPins ? keep : single() && own?.request.do !== "command" ? Math.min(keep, grid.length - 1) : nearest(theta);
   if (!playing) phase = row;
   furnish();
   refresh();
@@ -114,7 +116,7 @@ function show(about, own) {
   byId("reference").replaceChildren(...about.kept.map(name => new Option(name, name, false, name === about.reference)));
   document.querySelector("h1").textContent = document.title = about.plain.title || "Four-bar linkage";
   document.querySelector(".source").textContent = about.plain.source ?? "";
-  byId("measure").hidden = !data.traced;
+  byId("measure").hidden = byId("place").parentElement.hidden = !data.traced;
   byId("computing").hidden = "summary" in about.data;
   showStrip();
   if (about.data.summary) byId("summary").replaceChildren(...about.data.summary.map(lineOf));
@@ -214,6 +216,7 @@ document.addEventListener("keydown", event => {
   event.preventDefault();
   ask({ do: key === "s" ? "save" : key === "y" || event.shiftKey ? "redo" : "undo" });
 });
+byId("table-of").open = window.innerWidth > 860;
 const drawn = draw;
 draw = position => { drawn(position); drawTraced(); drawHandles(); markPosition(); };
 connect();

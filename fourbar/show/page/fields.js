@@ -152,6 +152,7 @@ function branchOf(path, node, model) {
 }
 const opened = {};   // tables that were opened or closed by hand
 
+const nextPoint = () => ["P", "Q", "R", "S"].find(letter => !(letter in (plain.points ?? {}))) ?? "T";
 // Buttons for what can be added here.
 function partsAt(path) {
   const rows = offers.parts.map((part, n) => [part, n]).filter(([{ at }]) => at.length === path.length + 1 && path.every((step, k) => at[k] === step));
@@ -167,7 +168,7 @@ function partsAt(path) {
     const last = at[at.length - 1], button = element("button", { type: "button", textContent: `+ ${label ?? nameOfKey(last)}` });
     let name = null;
     if (last === "") {
-      name = path[0] === "tolerances" ? element("select", { className: "tolerated" }, ...tolerated()) : element("input", { value: ["P", "Q", "R", "S"].find(letter => !(letter in (plain.points ?? {}))) ?? "T", spellcheck: false });
+      name = path[0] === "tolerances" ? element("select", { className: "tolerated" }, ...tolerated()) : element("input", { value: nextPoint(), spellcheck: false });
       made.append(element("label", { className: "field" }, path[0] === "tolerances" ? "number" : "name", name));
     }
     button.addEventListener("click", () => ask({ do: "add", part: n, name: name?.value ?? "" }));

@@ -10,6 +10,7 @@ const set = (element, attributes) => { for (const key in attributes) element.set
 const picture = byId("picture");
 const parts = { ground: make(picture, "g", {}), images: make(picture, "g", { id: "images" }), curve: make(picture, "path", { class: "path", id: "curve" }) };
 parts.traces = make(picture, "g", { id: "traces" });
+parts.marks = make(picture, "g", { id: "marks" });
 parts.bars = {}; parts.image = {};
 for (const k of [2, 3, 4]) {
   parts.image[k] = make(parts.images, "image", { preserveAspectRatio: "none", id: `picture-${k}` });
@@ -61,7 +62,23 @@ function barPoint(p, k, r) {
 const coupler = p => barPoint(p, 3, data.centres[3] ?? [0.5 * lengths[2], 0]);
 
 // Paths of the coupler's mass centre and of the scene's points, in metres: those of a state that is kept are a target.
-const couplerPaths = () => [coupler, ...data.points.map(point => p => framed(p, point.bar, point.at))].map(place => grid.map((_, i) => at(i) && `${i && at(i - 1) ? "L" : "M"}${place(at(i)).join(" ")}`).filter(Boolean).join(""));
+const couplerPlaces = () => [coupler, ...data.points.map(point => p => framed(p, point.bar, point.at))];
+const couplerPaths = () => couplerPlaces().map(place => grid.map((_, i) => at(i) && `${i && at(i - 1) ? "L" : "M"}${place(at(i)).join(" ")}`).filter(Boolean).join(""));
+// Dead centres and limits that the motion reaches: what each is, and its place on every path.
+function couplerMarks() {
+  const away = (a, b) => Math.abs(Math.atan2(Math.sin(a - b), Math.cos(a - b))), step = 1.5 * Math.abs(grid[1] - grid[0]);
+  const reached = ([, theta2, theta3]) => grid.some((theta, i) => at(i) && away(theta, theta2) < step && away(table().theta_3[i], theta3) < OTHER_BRANCH);
+  return (data.turns ?? []).filter(reached).flatMap(([words, ...angles]) => couplerPlaces().map(place => [words, place(posed(...angles))]));
+}
+function drawMarks() {
+  const own = couplerMarks(), kept = unchanged ? [] : reference?.marks ?? [];
+  parts.marks.replaceChildren();
+  byId("turns").hidden = !own.length;
+  for (const [more, marks] of [[" behind", kept], ["", own]]) for (const [words, place] of marks) {
+    const [x, y] = toScreen(place), d = words.startsWith("limit") ? "m-5 -5l10 10m-10 0l10 -10" : "m-5 0l5 -5l5 5l-5 5z";
+    make(make(parts.marks, "path", { class: `mark${more}`, d: `M${x} ${y}${d}` }), "title", {}).textContent = words;
+  }
+}
 let tracedCorners = () => [];   // of a picture that is traced
 let held = false;   // while something is dragged the scale stays
 // Everything the sweep reaches fits into the picture, so that the scale does not change while it moves.
@@ -93,6 +110,7 @@ function fit() {
   const of = [...[2, 4].filter(k => data.centres[k]).map(k => `trace b${k}`), ...data.points.map(() => "trace")];
   if (!unchanged) for (const d of reference?.paths ?? []) make(parts.traces, "path", { class: "trace behind", d, "vector-effect": "non-scaling-stroke" });
   traces.forEach((d, n) => make(parts.traces, "path", { class: of[n], d, "vector-effect": "non-scaling-stroke" }));
+  drawMarks();
   drawGround();
   scaleForces();
   motionScales = null;
@@ -190,7 +208,7 @@ function insideTip(i, s, top) {
 
 function drawLinkage(p, i) {
   const show = id => byId(id).checked;
-  parts.curve.style.display = parts.traces.style.display = show("show-curve") ? "" : "none";
+  parts.curve.style.display = parts.traces.style.display = parts.marks.style.display = show("show-curve") ? "" : "none";
   parts.labels.style.display = show("show-labels") ? "" : "none";
   for (const element of Object.values(parts.label)) element.style.display = "none";
   clearLabels();

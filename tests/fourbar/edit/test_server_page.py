@@ -29,6 +29,7 @@ pytest.importorskip(
 )
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import Select
 
 from fourbar.files import loads
 from tests.fourbar.edit.test_server import start
@@ -773,6 +774,8 @@ def test_a_change_beyond_ten_times_is_no_percentage(
 
 PHOTO = {"O2": (800, 1500), "A": (1000, 1150), "B": (1900, 900), "O4": (2200, 1500)}
 """Pixels of the pins in a photo whose pixels are 0.25 mm."""
+MORE = {"P": (1300, 700), "Q": (1940, 940)}
+"""Pixels of a point of the coupler, and of a place where B lies rather."""
 CLICKS = 2.0
 """px between two clicks: each is off by one, as the driver points at whole ones."""
 
@@ -792,11 +795,16 @@ def test_a_photo_is_traced_to_a_scene(chromium, opened, tmp_path: Path) -> None:
     picture = driver.find_element("id", "picture")
 
     def click(pin: str) -> None:
-        pixel = [share * x for x in PHOTO[pin]]
+        pixel = [share * x for x in (PHOTO | MORE)[pin]]
         x, y = driver.execute_script("return toScreen(ofPixel(arguments[0]))", pixel)
         from_middle = x - picture.size["width"] / 2, y - picture.size["height"] / 2
         chain = ActionChains(driver)
         chain.move_to_element_with_offset(picture, *from_middle).click().perform()
+
+    def place(what: str, pixel: str) -> None:
+        Select(driver.find_element("id", "place")).select_by_value(what)
+        click(pixel)
+        wait_for(driver, "!aimed && !inFlight && !waiting.length")
 
     apart = 1400.0 * share * driver.execute_script("return view.k * tracedScale()")
     driver.find_element("id", "measure").click()
@@ -820,7 +828,16 @@ def test_a_photo_is_traced_to_a_scene(chromium, opened, tmp_path: Path) -> None:
             CLICKS * driver.execute_script("return 1 / view.k") + true * CLICKS / apart
         )
         assert length == pytest.approx(true, abs=off), (one, other)
-    for pin, (x, y) in PHOTO.items():  # the linkage lies on the picture
+    place("a new point of the coupler", "P")
+    off = driver.execute_script(
+        "const {bar, at: place} = data.points[0], p = toScreen(framed(at(row), bar,"
+        " place)), q = toScreen(ofPixel(arguments[0])); return Math.hypot(p[0] - q[0],"
+        " p[1] - q[1])",
+        [share * x for x in MORE["P"]],
+    )
+    assert off < PIXELS
+    place("pin B", "Q")
+    for pin, (x, y) in (PHOTO | {"B": MORE["Q"]}).items():  # it lies on the picture
         off = driver.execute_script(
             "const p = toScreen(at(row)[arguments[0]]), q ="
             " toScreen(ofPixel(arguments[1])); return Math.hypot(p[0] - q[0], p[1] -"
@@ -859,4 +876,44 @@ def test_what_one_drags_for_is_seen_without_a_scroll(
         box = driver.find_element("id", name).rect
         top = box["y"] - driver.execute_script("return scrollY")
         assert 0 <= top <= 800 - box["height"], name
-    assert driver.execute_script("return document.documentElement.scrollHeight") < 6500
+    assert driver.execute_script("return document.documentElement.scrollHeight") < 4000
+
+
+@pytest.mark.slow
+def test_a_path_stays_as_a_target_with_the_dead_centres_of_both(
+    chromium,
+    opened,
+    tmp_path: Path,
+) -> None:
+    driver = chromium
+    lengths = {"ground": 300, "input": 100, "coupler": 250, "output": 220}
+    rows = "\n".join(f'{name} = "{value} mm"' for name, value in lengths.items())
+    (tmp_path / "a.toml").write_text(f"[lengths]\n{rows}\n")
+    driver.get(opened(tmp_path / "a.toml"))
+    wait_for(driver, "offers && document.getElementById('field:lengths/input')")
+
+    def list_marks(kind: str) -> list[list[float]]:
+        return driver.execute_script(
+            "return [...document.querySelectorAll(arguments[0])].map(e => ["
+            "(e.getBBox().x + e.getBBox().width / 2 - view.x) / view.k,"
+            " (view.y - e.getBBox().y - e.getBBox().height / 2) / view.k])",
+            kind,
+        )
+
+    def find_dead_centres() -> list[tuple[float, float]]:
+        """Middles of the coupler where it lies in line with the input."""
+        d, a, b, c = driver.execute_script("return data.lengths")
+        middles = []
+        for reach, along in ((b + a, a + 0.5 * b), (b - a, 0.5 * b - a)):
+            angle = math.acos((d * d + reach * reach - c * c) / (2.0 * d * reach))
+            middles.append((along * math.cos(angle), along * math.sin(angle)))
+        return sorted(middles)
+
+    before = find_dead_centres()
+    pixel = 1.0 / driver.execute_script("return view.k")
+    np.testing.assert_allclose(sorted(list_marks(".mark")), before, atol=pixel)
+    type_into(driver, "field:lengths/output", "235 mm")
+    wait_for(driver, "data.lengths[3] === 0.235 && !inFlight && !waiting.length")
+    kept, shown = list_marks(".mark.behind"), list_marks(".mark:not(.behind)")
+    np.testing.assert_allclose(sorted(kept), before, atol=pixel)
+    np.testing.assert_allclose(sorted(shown), find_dead_centres(), atol=pixel)

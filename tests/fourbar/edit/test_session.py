@@ -498,6 +498,11 @@ def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(
         1j * scene.linkage.ground_angle
     ) == pytest.approx(O4, abs=1e-6)
     assert fourbar.solve(scene).assembled.any()
+    before = session.now.plain["pins"]
+    theta_2 = {"theta_2": float(np.angle(A))}
+    dragged(session, "O2", 0.0254 * (0.5 + 0.25j), grain=1e-6, **theta_2)
+    assert session.now.plain["pins"] == before | {"O2": ["0.5 in", "0.25 in"]}
+    session.do({"do": "undo"})
     session.do({"do": "set", "path": ["bars", "coupler", "mass"], "value": "3 lb"})
     session.do(
         {
