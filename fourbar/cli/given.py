@@ -132,15 +132,21 @@ def ends_in(out: Path | None, suffix: str) -> bool:
 
 
 class LengthsCommand(click.Command):
-    """A command of four lengths, which says who serves more."""
+    """A command of four lengths, which says who serves more, and who a scene file."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Read the arguments."""
+        words = [*args]  # click takes from the list what it reads
         try:
             return super().parse_args(ctx, args)
         except click.UsageError as error:
             if re.search(r"unexpected extra arguments? \([\d.]", error.message):
                 message = f"{error.message}: {ELSEWHERE}"
+                raise click.UsageError(message, ctx) from None
+            scenes = [word for word in words if word.endswith(".toml")]
+            if scenes and error.message.endswith("takes 4 values."):
+                instead = f"for a scene file: fourbar analyze {scenes[0]}"
+                message = f"{error.message.removesuffix('.')}; {instead}"
                 raise click.UsageError(message, ctx) from None
             raise
 

@@ -1132,6 +1132,14 @@ def test_six_bars_on_the_command_line_point_on(
     assert code == BAD_INPUT and "several loops (six bars) in PMKS+" in err
 
 
+def test_classify_says_who_reads_a_scene_file(run: Fourbar) -> None:
+    code, _, err = run("classify", "scene.toml")
+    assert code == BAD_INPUT
+    assert err.endswith(
+        "takes 4 values; for a scene file: fourbar analyze scene.toml\n"
+    )
+
+
 @pytest.mark.parametrize(
     ("word", "key"),
     [
