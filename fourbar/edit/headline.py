@@ -9,12 +9,11 @@ import math
 import numpy as np
 
 from fourbar.linkage import PIN_FORCE
-from fourbar.show.summary import Facts, find_drive_rounding
+from fourbar.show.motion_curves import compute_pin_loads, find_drive_rounding
+from fourbar.show.summary import Facts
 from fourbar.show.units import write_short
 from fourbar.solution import Conversion, Solution
 
-_SEARCHED = ("sweep", "turn", "law")
-"""Kinds of motion whose peaks are located between the positions."""
 _DRIVE = {"torque": "N m", "drive_force": "N"}
 
 
@@ -65,15 +64,13 @@ def list_peaks(
     `facts`: where they are located between the positions.
     """
     peaks = dict[str, float | None]()
-    searched = facts is not None and facts.kind in _SEARCHED
     if solution.F12 is not None:
-        for name in PIN_FORCE.values():
-            force = getattr(solution, name)
-            sizes = np.hypot(force[..., 0], force[..., 1])
+        for force, sizes in compute_pin_loads(solution).items():
             if np.isfinite(sizes).any():
-                peaks[name] = float(sizes[np.isfinite(sizes)].max())
+                peaks[force] = float(np.nanmax(sizes))
     if facts is not None:
-        peaks |= {PIN_FORCE[pin]: load.peak.value for pin, load in facts.pins.items()}
+        for pin, load in facts.pins.items():
+            peaks[PIN_FORCE[pin]] = None if load.peak is None else load.peak.value
     for name in _DRIVE:
         values = getattr(solution, name)
         is_driven = solution.scene is None or solution.scene.motion.free is None
@@ -82,6 +79,6 @@ def list_peaks(
             if facts is not None and facts.peak is not None:
                 peak = abs(facts.peak.value)
             peaks[name] = 0.0 if peak <= find_drive_rounding(solution) else peak
-    if facts is not None and searched:
-        peaks |= dict.fromkeys(facts.between.growing & peaks.keys())
+    if facts is not None:
+        peaks |= dict.fromkeys(facts.motion.panels.growing & peaks.keys())
     return peaks

@@ -33,17 +33,12 @@ from fourbar.show.acting import (
     list_spring_notes,
 )
 from fourbar.show.change_point import has_growing_forces
-from fourbar.show.duty import DUTY_UNITS, MotorDuty, bearing_load, describe_drive
+from fourbar.show.driving import describe_drive
+from fourbar.show.duty import DUTY_UNITS, MotorDuty, bearing_load, motor_duty
+from fourbar.show.motion_curves import acts, find_drive_rounding
+from fourbar.show.panels import Peak
 from fourbar.show.position import PositionSheet
-from fourbar.show.summary import (
-    Facts,
-    find_drive_rounding,
-    find_duty,
-    find_pin_rms,
-    fit_motion,
-    locate_between,
-    summarize,
-)
+from fourbar.show.summary import Facts, summarize
 from fourbar.show.tables import BLOCK_WIDTH, wrap_line
 from fourbar.show.units import (
     COMMON,
@@ -57,6 +52,8 @@ from fourbar.show.units import (
 )
 from fourbar.solution import Conversion, Solution, find_unit_in
 
+_UNBOUNDED = "unbounded"
+"""Stands in place of a largest value that there is none of."""
 _TIED = "\u00a0"
 """Stands between a number and its unit until the lines are broken."""
 LEAST_COLUMN = 12
@@ -79,6 +76,8 @@ _BESIDE_CHANGE_POINT = 1e-9
 """rad; an angle nearer to a change point is rounded from it: files state angles with
 nine decimals and more.
 """
+_MOST_POLES = 4
+"""Number of places at which a quantity grows without bound that are listed."""
 _MOST_HELD = 4
 """Number of places at which dry friction holds a pin that are listed."""
 LOCATED = 1e-6
@@ -163,7 +162,7 @@ class _SceneBlock:
 
         If nothing acts, it writes the rates.
         """
-        if not self._is_acted_on() and self.facts.rates:
+        if not acts(self.facts.scene) and self.facts.rates:
             return self._write_rates()
         return [
             *self._write_drive(pressure),
@@ -181,10 +180,9 @@ class _SceneBlock:
         rows = [("rates", [f"bar {bar} ({BAR_NAMES[bar]})" for bar in rates])]
         for label, unit, index in (("omega", "rad/s", 0), ("alpha", "rad/s^2", 1)):
             peaks = [pair[index] for pair in rates.values()]
-            values = self._cells([peak.value for peak in peaks], unit)
-            places = [self._place(peak.place, named=False) for peak in peaks]
-            rows.append((f"  {label}", values))
-            rows.append(("  at", places))
+            rows.append((f"  {label}", self._cells_of_peaks(peaks, unit)))
+            names = [f"{label}_{bar}" for bar in rates]
+            rows.append(("  at", self._places_of_peaks(peaks, names)))
         return [*_align(rows), "no mass, load or effect: nothing loads pins and drive"]
 
     def _write_position(
@@ -198,7 +196,7 @@ class _SceneBlock:
         yield [*head, self._write_place(), *self._write_statuses()]
         yield sheet.write_bars()
         yield sheet.write_points()
-        if facts.solution.F12 is not None and self._is_acted_on():
+        if facts.solution.F12 is not None and acts(self.facts.scene):
             yield [*self._write_drive(pressure), *sheet.write_pin_forces()]
             yield self._write_bending()
         elif facts.stroke_range is not None:
@@ -339,19 +337,10 @@ class _SceneBlock:
         away = np.abs(away - TURN * np.rint(away / TURN)).min(axis=1)
         return np.asarray(away[away <= _BESIDE_CHANGE_POINT])
 
-    def _is_acted_on(self) -> bool:
-        """Return True if anything acts, or a bar has mass.
-
-        Forces are then of interest.
-        """
-        scene = self.facts.scene
-        has_mass = any(bar.mass > 0.0 for bar in scene.linkage.moving)
-        return bool(scene.loads or scene.effects or has_mass)
-
     def _write_static_hint(self) -> list[str]:
         """Say what asks for forces, if a scene with loads states positions alone."""
         scene = self.facts.scene
-        if self.facts.solution.F12 is not None or not self._is_acted_on():
+        if self.facts.solution.F12 is not None or not acts(self.facts.scene):
             return []
         return [
             f"positions only, since {scene.motion.names[1]} is left out:",
@@ -499,12 +488,9 @@ class _SceneBlock:
         )
 
     def _write_stretches(self) -> list[str]:
-        """Write where the assembly ends, and what grows without bound there."""
-        facts = self.facts
-        if not facts.stretches:
-            return []
+        """Write where the assembly ends."""
         parts = []
-        for low, high in facts.stretches:
+        for low, high in self.facts.motion.stretches:
             if low is None:
                 start = ""
             else:
@@ -514,15 +500,7 @@ class _SceneBlock:
             else:
                 stop = f"up to {self._place(high, named=self.unit != 'm')}"
             parts.append(f"{start} {stop}".strip())
-        grows = ""
-        if facts.drive is not None and facts.drive.keys.value in facts.between.growing:
-            grows = (
-                f"; the {facts.drive.name.removeprefix('drive ')} grows without bound"
-                " there"
-            )
-        elif facts.between.growing.intersection(PIN_FORCES) and facts.pins:
-            grows = "; pin forces grow without bound there"
-        return [f"assembles {', and '.join(parts)}{grows}"]
+        return [f"assembles {', and '.join(parts)}"] if parts else []
 
     def _write_drive(self, pressure: float | None) -> list[str]:
         """Write what drives: peak and mean, power and energy, and its needs.
@@ -530,25 +508,11 @@ class _SceneBlock:
         The needs are those of a motor or a cylinder.
         """
         facts = self.facts
-        if facts.drive is None or facts.peak is None:
+        if facts.drive is None:
             return []
         drive = facts.drive
-        duty = facts.duty
-        lines = [self._write_drive_head()]
         word = "force" if facts.linear else "torque"
-        row = self._value(self._without_rounding(facts.peak.value), drive.unit)
-        if duty is not None:
-            if facts.linear:
-                rms = duty.rms_force
-            else:
-                rms = duty.rms_torque
-            rms = self._without_rounding(rms or 0.0)
-            beyond = "" if self._is_balanced() else self._beyond(drive.keys.value)
-            row = (
-                f"peak {row} at {self._place(facts.peak.place)}{beyond}, RMS"
-                f" {self._value(rms, drive.unit)}"
-            )
-        lines.append(self._row(word, row))
+        lines = [self._write_drive_head(), self._row(word, self._write_peak())]
         if facts.held:
             lines.append(self._row("at rest", self._write_held(drive.unit)))
         if facts.stroke_range is not None:
@@ -557,6 +521,36 @@ class _SceneBlock:
         if pressure is not None and facts.stroke_range is not None:
             lines += self._write_bore(pressure)
         return lines
+
+    def _write_peak(self) -> str:
+        """Write the largest and the RMS value of the drive's torque or force."""
+        facts = self.facts
+        drive = facts.drive
+        assert drive is not None
+        if facts.peak is None:
+            return self._write_growth(drive.keys.value)
+        peak = self._value(self._without_rounding(facts.peak.value), drive.unit)
+        if facts.duty is None:
+            return peak
+        row = f"peak {peak} at {self._place(facts.peak.place)}{self._of_positions}"
+        rms = facts.duty.rms_force if facts.linear else facts.duty.rms_torque
+        if rms is None:
+            return row
+        return f"{row}, RMS {self._value(self._without_rounding(rms), drive.unit)}"
+
+    def _write_growth(self, name: str) -> str:
+        """Write where a quantity grows without bound."""
+        poles = self.facts.motion.panels.list_poles(name)
+        places = [self._place(pole, named=False) for pole in poles[:_MOST_POLES]]
+        if len(poles) > _MOST_POLES:
+            places.append(f"{len(poles) - _MOST_POLES} more places")
+        places[0] = self._place(poles[0])
+        return f"grows without bound at {' and '.join(places)}"
+
+    @property
+    def _of_positions(self) -> str:
+        """Say that a peak is that of the positions, between which nothing stands."""
+        return " (of these positions)" if self.facts.kind == "list" else ""
 
     def _write_held(self, unit: str) -> str:
         """Write between which torques or forces dry friction holds, and where."""
@@ -599,7 +593,10 @@ class _SceneBlock:
     def _is_balanced(self) -> bool:
         """Tell whether the drive has nothing to do: its peak is rounding alone."""
         peak = self.facts.peak
-        if peak is None or not peak.value:
+        drive = self.facts.drive
+        if peak is None or drive is None or drive.values is None:
+            return False
+        if not np.nan_to_num(drive.values).any():
             return False
         return not self._without_rounding(peak.value)
 
@@ -616,10 +613,12 @@ class _SceneBlock:
             if one:
                 return [self._row("power", self._value(one, "W"))]
             return []
-        if not duty.peak_power > 0.0 or self._is_balanced():
+        if duty.peak_power == 0.0 or self._is_balanced():
             return []
-        peak = self._value(duty.peak_power, "W")
-        row = f"peak {peak}{self._beyond('power')}"
+        if duty.peak_power is None:
+            row = self._write_growth("power")
+        else:
+            row = f"peak {self._value(duty.peak_power, 'W')}{self._of_positions}"
         if (
             facts.kind != "list"
             and duty.energy_in is not None
@@ -645,16 +644,22 @@ class _SceneBlock:
             row += f"; {forward} {over} given, {back} taken back"
         lines = [self._row("power", row), *self._write_cycle(duty)]
         if not facts.linear:
-            numbers = (
-                (duty.peak_torque, "N m"),
-                (duty.peak_speed, "rad/s"),
-                (duty.rms_torque, "N m"),
-            )
-            torque, speed, mean = (
-                self._value(number or 0.0, unit) for number, unit in numbers
-            )
-            lines.append(f"motor: at least {torque} at {speed} (RMS {mean}), {peak}")
+            lines.append(f"motor: {self._write_motor_needs(duty)}")
         return lines
+
+    def _write_motor_needs(self, duty: MotorDuty) -> str:
+        """Write the torque, speed and power that a motor must have."""
+        if duty.peak_torque is None or duty.peak_speed is None:
+            word = "speed" if duty.peak_speed is None else "torque"
+            return f"none is enough, as the {word} grows without bound"
+        assert duty.peak_power is not None
+        torque = self._value(duty.peak_torque, "N m")
+        speed = self._value(duty.peak_speed, "rad/s")
+        mean = ""
+        if duty.rms_torque is not None:
+            mean = f" (RMS {self._value(duty.rms_torque, 'N m')})"
+        power = self._value(duty.peak_power, "W")
+        return f"at least {torque} at {speed}{mean}, {power}"
 
     def _write_cycle(self, duty: MotorDuty) -> list[str]:
         """Write the mean torque of a closed sweep, and what a flywheel must store."""
@@ -722,18 +727,22 @@ class _SceneBlock:
             largest = float(np.nanmax(np.abs(speed)))
             if facts.duty is None:
                 row = self._value(largest, "m/s")
+            elif facts.duty.peak_speed is None:
+                row = self._write_growth("speed")
             else:
                 peak = self._value(facts.duty.peak_speed, "m/s")
-                row = f"peak {peak}{self._beyond('speed')}"
+                row = f"peak {peak}{self._of_positions}"
             lines.append(self._row("speed", row))
         return lines
 
     def _write_bore(self, pressure: float) -> list[str]:
         """Write the bore that pushes, and the area that pulls, at a pressure."""
-        values = self.facts.between.bounded(LINE.value).drive_force
-        assert values is not None
-        push = max(0.0, float(np.nanmax(values)))
-        pull = max(0.0, -float(np.nanmin(values)))
+        if self.facts.peak is None:
+            none = "none is enough, as the force grows without bound"
+            return [self._row("bore", none)]
+        panels = self.facts.motion.panels
+        push = max(0.0, panels.find_peak(LINE.value, 1).value)
+        pull = max(0.0, -panels.find_peak(LINE.value, -1).value)
         parts = []
         if push:
             bore = math.sqrt(4.0 * push / (math.pi * pressure))
@@ -753,46 +762,46 @@ class _SceneBlock:
         facts, loads = self.facts, self.facts.pins.values()
         if not loads:
             return []
-        sizes = self._without_small([load.peak.value for load in loads])
-        peaks = self._cells(sizes, "N")
-        places = [
-            self._place(load.peak.place, named=False) if size else "-"
-            for load, size in zip(loads, sizes, strict=True)
+        peaks = [load.peak for load in loads]
+        rows = [
+            ("pins", list(facts.pins)),
+            ("  peak", self._cells_of_peaks(peaks, "N")),
+            ("  at", self._places_of_peaks(peaks, [*PIN_FORCES])),
         ]
-        means = [
-            load.rms if size else 0.0 for load, size in zip(loads, sizes, strict=True)
-        ]
-        lines = _align(
-            [
-                ("pins", list(facts.pins)),
-                ("  peak", peaks),
-                ("  at", places),
-                ("  RMS", self._cells(means, "N")),
+        means = [load.rms for load in loads]
+        if any(mean is not None for mean in means):
+            sizes = self._without_small([mean or 0.0 for mean in means])
+            cells = [
+                "-" if mean is None else cell
+                for cell, mean in zip(self._cells(sizes, "N"), means, strict=True)
             ]
-        )
-        if facts.kind == "list":
+            rows.append(("  RMS", cells))
+        lines = _align(rows)
+        if facts.kind in ("list", "released"):
             return [*lines, "  peak and RMS are those of these positions"]
         return lines
 
     def _write_bending(self) -> list[str]:
         """Write the largest bending moment of each bar, with its place and position."""
-        facts, bending = self.facts, self.facts.bending.values()
-        if not any(bar.peak.value for bar in bending):
+        facts = self.facts
+        peaks = [bar.peak for bar in facts.bending.values()]
+        if all(peak is not None and peak.value == 0.0 for peak in peaks):
             return []
-        places = []
-        for bar in bending:
-            place = self._value(bar.x, "m", self.longest)
-            if facts.kind != "position":
-                place += f", {self._place(bar.peak.place, named=False)}"
-            places.append(place if bar.peak.value else "-")
-        moments = self._cells([bar.peak.value for bar in bending], "N m")
+        names = [f"bending_{bar}" for bar in facts.bending]
+        places = self._places_of_peaks(peaks, names)
+        for index, bar in enumerate(facts.bending.values()):
+            if bar.peak is not None and bar.peak.value:
+                along = self._value(bar.x, "m", self.longest)
+                in_motion = "" if facts.kind == "position" else f", {places[index]}"
+                places[index] = f"{along}{in_motion}"
         rows = [
             ("bending", [f"bar {bar}" for bar in facts.bending]),
-            ("  moment", moments),
+            ("  moment", self._cells_of_peaks(peaks, "N m")),
             ("  at x", places),
         ]
-        if any(facts.stresses.values()):
-            rows.append(("  stress", self._write_stresses()))
+        stresses = self._write_stresses()
+        if any(stress != "-" for stress in stresses):
+            rows.append(("  stress", stresses))
         return [*_align(rows), *list_couple_notes(facts.scene)]
 
     def _write_stresses(self) -> list[str]:
@@ -800,10 +809,18 @@ class _SceneBlock:
 
         A bar without a cross-section has a dash.
         """
-        stresses = self.facts.stresses
-        stated = [value for value in stresses.values() if value is not None]
-        cells = iter(self._cells(stated, "Pa"))
-        return ["-" if value is None else next(cells) for value in stresses.values()]
+        stresses = list[float | None]()
+        for bar, bending in self.facts.bending.items():
+            modulus = self.facts.scene.linkage.bar(bar).section_modulus
+            if bending.peak is None or modulus is None:
+                stresses.append(None)
+            else:
+                stresses.append(bending.peak.value / modulus)
+        cells = self._cells([stress or 0.0 for stress in stresses], "Pa")
+        return [
+            "-" if stress is None else cell
+            for cell, stress in zip(cells, stresses, strict=True)
+        ]
 
     @staticmethod
     def _without_small(values: list[float]) -> list[float]:
@@ -812,6 +829,31 @@ class _SceneBlock:
         largest = np.nanmax(np.abs(numbers), initial=0.0)
         cleaned: list[float] = drop_rounding(numbers, largest).tolist()
         return cleaned
+
+    def _cells_of_peaks(self, peaks: list[Peak | None], unit: str) -> list[str]:
+        """Write largest values of one kind, and which have no bound."""
+        sizes = self._without_small([peak.value if peak else 0.0 for peak in peaks])
+        cells = self._cells(sizes, unit)
+        return [
+            _UNBOUNDED if peak is None else cell
+            for cell, peak in zip(cells, peaks, strict=True)
+        ]
+
+    def _places_of_peaks(
+        self,
+        peaks: list[Peak | None],
+        names: list[str],
+    ) -> list[str]:
+        """Write where largest values of one kind are taken, or grow without bound."""
+        sizes = self._without_small([peak.value if peak else 0.0 for peak in peaks])
+        panels = self.facts.motion.panels
+        places = []
+        for peak, size, name in zip(peaks, sizes, names, strict=True):
+            if peak is None:
+                places.append(self._place(panels.list_poles(name)[0], named=False))
+            else:
+                places.append(self._place(peak.place, named=False) if size else "-")
+        return places
 
     def _cells(self, values: list[float], unit: str) -> list[str]:
         """Write quantities of one kind with the prefix of the largest.
@@ -826,46 +868,10 @@ class _SceneBlock:
             for value in values
         ]
 
-    def _beyond(self, name: str) -> str:
-        """Write that a peak is that of the positions, where it is."""
-        if self._is_rough(name):
-            return " (of these positions)"
-        return ""
-
-    def _is_rough(self, name: str) -> bool:
-        """Tell whether a peak is that of the positions alone.
-
-        Between them it grows, or nothing was looked for.
-        """
-        return (
-            self.facts.kind not in ("position", "released")
-            and name in self.facts.between.growing
-        )
-
     def _write_remarks(self) -> list[str]:
-        """Write what grows between the positions, and where pin forces jump.
-
-        Further lines say what rounding does.
-        """
+        """Write where pin forces jump, and what rounding does."""
         facts = self.facts
         lines = list[str]()
-        sizes = self._without_small([load.peak.value for load in facts.pins.values()])
-        pins = [
-            pin
-            for pin, name, size in zip(facts.pins, PIN_FORCES, sizes, strict=False)
-            if size and self._is_rough(name)
-        ]
-        bars = [
-            f"bar {bar}"
-            for bar, bending in facts.bending.items()
-            if bending.grows and bending.peak.value
-        ]
-        if facts.kind not in ("position", "list", "released") and (pins or bars):
-            parts = [("the loads of ", pins), ("the bending of ", bars)]
-            grow = " and ".join(
-                head + ", ".join(names) for head, names in parts if names
-            )
-            lines.append(f"growing without bound between these positions: {grow}")
         if (
             facts.solution.change_points
             and facts.pins
@@ -875,13 +881,16 @@ class _SceneBlock:
                 "at a change point pin forces grow without bound: the peaks are those "
                 "of these instants"
             )
-        lines += self._write_sums()
-        if facts.between.reversals:
+        if facts.pins and not facts.motion.is_steady:
+            lines.append(
+                "the positions are passed at no one speed: no RMS values, no energies"
+            )
+        if facts.motion.reversals:
             unit = "rad" if facts.solution.at.stroke is None else "m"
             places = ", ".join(  # of a motion law too by its angle, not by its time
                 f"{self._value(place, unit, self.longest if unit == 'm' else None)}"
                 f" ({pin})"
-                for place, pin in facts.between.reversals
+                for place, pin in facts.motion.reversals
             )
             name = facts.solution.commanded
             lines.append(
@@ -907,34 +916,6 @@ class _SceneBlock:
                 " value)"
             )
         return lines
-
-    def _write_sums(self) -> list[str]:
-        """Write which means and energies depend on the positions, and by how much."""
-        facts = self.facts
-        sums = facts.sums
-        if sums is None or sums.change < self._changes_a_digit:
-            return []
-        sizes = self._without_small([load.peak.value for load in facts.pins.values()])
-        means = [
-            pin
-            for pin, size in zip(facts.pins, sizes, strict=True)
-            if size and PIN_FORCE[pin] in sums.names
-        ]
-        energies = []
-        if facts.drive and facts.duty and not self._is_balanced():
-            if facts.drive.keys.value in sums.names:
-                means.insert(0, facts.drive.name.removeprefix("drive "))
-            if "power" in sums.names and facts.duty.energy_in is not None:
-                energies = ["energies"]
-        parts = [f"RMS of {', '.join(means)}"] if means else []
-        parts += energies
-        if not parts:
-            return []
-        line = f"{' and '.join(parts)}: sums over these {len(facts.solution)} positions"
-        if math.isfinite(sums.change):
-            percent = write_digits(100.0 * sums.change, 2)
-            line += f", which change by up to {percent} % over half of them"
-        return [line]
 
     @property
     def _changes_a_digit(self) -> float:
@@ -1025,9 +1006,7 @@ def write_motor(
 
     Numbers have the units of the output, and the keys are those of `motor_duty`.
     """
-    between = locate_between(scene, solution)
-    panels = fit_motion(scene, between)
-    duty = find_duty(scene, between, panels)
+    duty = motor_duty(solution)
     if duty is None:
         return None
     if solution.drive is None:
@@ -1035,25 +1014,23 @@ def write_motor(
     else:
         si = {**DUTY_UNITS, "peak_speed": "m/s"}
     shown = {name: find_unit_in(unit, units) for name, unit in si.items()}
-    numbers = {name: getattr(duty, name) for name in si}
     force = find_unit_in("N", units)[1]
     angle = find_unit_in("rad", units)[1]
-    loads = {
-        pin: bearing_load(between.bounded(name), pin) for pin, name in PIN_FORCE.items()
-    }
+
+    def convert(number: float | None, factor: float) -> float | None:
+        return None if number is None else number * factor
+
+    loads = {pin: bearing_load(solution, pin) for pin in PIN_FORCE}
     return {
         "closed": duty.closed,
-        **{
-            name: None if number is None else number * shown[name][1]
-            for name, number in numbers.items()
-        },
+        **{name: convert(getattr(duty, name), shown[name][1]) for name in si},
         "pins": {
             pin: {
-                "peak": peak.largest * force,
-                "rms": find_pin_rms(solution, panels, pin) * force,
-                "theta_2": peak.where * angle,
+                "peak": convert(load.largest, force),
+                "rms": convert(load.rms, force),
+                "theta_2": convert(load.where, angle),
             }
-            for pin, peak in loads.items()
+            for pin, load in loads.items()
         },
         "units": {name: unit for name, (unit, _) in shown.items()},
     }

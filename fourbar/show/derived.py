@@ -19,7 +19,8 @@ from fourbar.quantities import (
     find_derived,
 )
 from fourbar.show.acting import list_springs, measure_end_distance
-from fourbar.show.duty import read_drive_demand, shaking_force, shaking_moment
+from fourbar.show.driving import read_drive_demand
+from fourbar.show.duty import shaking_force, shaking_moment
 from fourbar.solution import (
     Conversion,
     Solution,

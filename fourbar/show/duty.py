@@ -12,48 +12,47 @@ from fourbar.effects.effect import Actions, list_bodies
 from fourbar.errors import DependencyError, InputError, expect, say_install
 from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.arithmetic import dot
-from fourbar.formulas.path import count_turns
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, PIN_FORCE
-from fourbar.quantities import COUPLE, LINE, UNITS, Array, DriveNames
+from fourbar.linkage import MOVING_BARS, PIN_FORCE
+from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, with_signs
+from fourbar.show.driving import Driving, is_once_round, read_drive_demand
+from fourbar.show.motion_curves import describe_motion
 from fourbar.solution import Solution
-
-_SAME_RATE = 1e-9
-"""Difference of two rates of a spline that is round-off, over its largest value. The
-rounding is that of its coefficients.
-"""
 
 
 class BearingLoad(NamedTuple):
-    """Load of one pin over the positions of a solution; of a study, arrays (m,)."""
+    """Load of one pin over a motion.
 
-    largest: float
+    Of a study each number is an array (m,). None: the load grows without bound.
+    """
+
+    largest: float | None
     """N."""
-    rms: float
-    """Root mean square over the positions, N. A closed sweep counts its two equal ends
+    rms: float | None
+    """Root mean square, N. A list of positions that closes counts its two equal ends
     once.
     """
-    where: float
+    where: float | None
     """theta_2 of the largest load, rad."""
 
 
 class MotorDuty(NamedTuple):
-    """Peak and root mean square over the positions, and the energy.
+    """Peak and root mean square over a motion, and the energy.
 
-    A closed sweep counts its two equal ends once. Of a study each is an array (m,).
+    Of a study each is an array (m,). None: it grows without bound, or is not defined.
     """
 
     peak_torque: float | None
     """Largest size, N m; None where the drive exerts a force."""
     rms_torque: float | None
     """N m."""
-    peak_speed: float
+    peak_speed: float | None
     """Largest size of the speed of the drive. It is omega of the driven bar, rad/s, or
     the speed of the stroke or of the driven point, m/s.
     """
-    peak_power: float
+    peak_power: float | None
     """Largest size of T_k omega_k, or of force times speed, W."""
-    rms_power: float
+    rms_power: float | None
     """W."""
     energy_in: float | None
     """Energy from the drive to the linkage over the sweep, J. None: it does not move
@@ -149,36 +148,46 @@ def _find_push(solution: Solution) -> Array:
 def bearing_load(solution: Solution, pin: str) -> BearingLoad:
     """Return largest and RMS load of pin "O2", "A", "B" or "O4", and the place.
 
-    A study gives arrays (m,). Positions without a value are left out.
+    Of a sweep or a motion law of one scene they are those of the whole motion, whatever
+    its steps, and None where the load grows without bound. Of a list, a released motion
+    or a study they are those of the positions that have a value, of a study arrays
+    (m,).
     """
     if not isinstance(pin, str) or pin not in PIN_FORCE:
         raise InputError("pin", pin, "must be one of " + ", ".join(PIN_FORCE))
-    force = _require_quantity(solution, PIN_FORCE[pin])
-    load = np.hypot(force[..., 0], force[..., 1])
-    load = np.where(np.isfinite(load), load, np.nan)
-    worst = np.argmax(np.nan_to_num(load, nan=-1.0), axis=-1)[..., None]
-    theta_2 = np.where(np.isfinite(load), solution.theta_2, np.nan)
-    place = np.take_along_axis(theta_2, worst, axis=-1)[..., 0]
-    return BearingLoad(
-        _find_peak_value(load),
-        _find_rms(solution, load),
-        _reduce_to_number(place),
-    )
+    name = PIN_FORCE[pin]
+    force = _require_quantity(solution, name)
+    if not _is_one_scene(solution):
+        load = np.hypot(force[..., 0], force[..., 1])
+        load = np.where(np.isfinite(load), load, np.nan)
+        worst = np.argmax(np.nan_to_num(load, nan=-1.0), axis=-1)[..., None]
+        theta_2 = np.where(np.isfinite(load), solution.theta_2, np.nan)
+        place = _reduce_to_number(np.take_along_axis(theta_2, worst, axis=-1)[..., 0])
+        return BearingLoad(_find_peak_value(load), _find_rms(solution, load), place)
+    motion = describe_motion(solution)
+    if not motion.panels.has_value(name):
+        return BearingLoad(None, None, None)
+    peak = motion.panels.find_peak(name)
+    where = motion.find_theta_2(peak.place)
+    return BearingLoad(peak.value, motion.find_rms(name), where)
 
 
 def motor_duty(solution: Solution) -> MotorDuty | None:
     """Return peak and RMS torque and power, peak speed, and the energy in and out.
 
-    The energy is computed by the trapezoidal rule.
-
     E = integral of P dt, dt = d theta/omega of the commanded bar, or ds/speed of the
-    stroke, in a sweep; E_in of the positive part of P, E_out of the negative. Positions
-    without a value are left out, and so are the steps from and to them.
+    stroke, in a sweep; E_in of the positive part of P, E_out of the negative.
 
     Over a closed sweep of the angle theta the mean torque is (E_in - E_out)/theta, with
     the sense of the rotation. A flywheel of inertia I on a bar that turns at about
     omega takes up the swing of the energy dE = max - min of integral (P - mean P) dt
     with a change of speed of omega dE/(I omega^2).
+
+    Of a sweep or a motion law of one scene all are those of the whole motion, whatever
+    its steps. Of a list or a study they are those of the positions that have a value,
+    the energies by the trapezoidal rule. What grows without bound is None, and so are
+    means and energies of a sweep with an acceleration, which passes its positions at no
+    one speed.
 
     Returns None where no position has a torque or force of the drive: a released
     linkage, or positions alone.
@@ -192,18 +201,81 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
     drive = read_drive_demand(solution)
     if drive.values is None or not np.isfinite(drive.values).any():
         return None
+    _require_quantity(solution, "power")
+    if _is_one_scene(solution) and describe_motion(solution).panels.located:
+        return _integrate_duty(solution, drive)
+    return _sum_duty(solution, drive)
+
+
+def _is_one_scene(solution: Solution) -> bool:
+    """Return True if the solution is one of a scene, with all that it needs."""
+    quantities = (solution.sin_mu, solution.a_G4, solution.power, solution.F12)
+    complete = all(values is not None for values in quantities)
+    return complete and solution.scene is not None and solution.theta_2.ndim == 1
+
+
+def _integrate_duty(solution: Solution, drive: Driving) -> MotorDuty:
+    """Find the duty over a motion from its curves."""
+    motion = describe_motion(solution)
+    panels = motion.panels
+    name = drive.keys.value
+    linear = solution.drive is not None
+
+    def find_largest(curve: str) -> float | None:
+        if not panels.has_value(curve):
+            return None
+        return abs(panels.find_peak(curve).value)
+
+    peak = find_largest(name)
+    rms = motion.find_rms(name)
+    duty = MotorDuty(
+        peak_torque=None if linear else peak,
+        rms_torque=None if linear else rms,
+        peak_speed=find_largest("speed"),
+        peak_power=find_largest("power"),
+        rms_power=motion.find_rms("power"),
+        energy_in=None,
+        energy_out=None,
+        closed=bool(is_once_round(solution)) and not motion.stretches,
+        peak_force=peak if linear else None,
+        rms_force=rms if linear else None,
+    )
+    second = motion.places_of_second
+    if not second or not panels.has_value("power"):
+        return duty
+    work = np.diff(panels.accumulate("power")) / second
+    duty = duty._replace(
+        energy_in=float(work[work > 0.0].sum()),
+        energy_out=float(-work[work < 0.0].sum()),
+    )
+    if not duty.closed:
+        return duty
+    given = panels.integrate("power")
+    surplus = panels.accumulate("power", given / panels.length)
+    mean_torque = None
+    if not linear and solution.drive_bar == solution.at.bar:
+        mean_torque = _find_mean_torque(solution, given / second)
+    return duty._replace(
+        energy_swing=float(np.ptp(surplus)) / second,
+        mean_torque=mean_torque,
+    )
+
+
+def _sum_duty(solution: Solution, drive: Driving) -> MotorDuty:
+    """Sum up the duty over the positions of a list, or of each member of a study."""
+    values = getattr(solution, drive.keys.value)
     power = _require_quantity(solution, "power")
     closed = is_once_round(solution)
     linear = solution.drive is not None
-    peak = _find_peak_value(_require_quantity(solution, drive.keys.value))
-    rms = _find_rms(solution, drive.values)
+    peak = _find_peak_value(values)
+    rms = _find_rms(solution, values)
     spans = _compute_spans(solution, power)
     energy_in, energy_out = _integrate_power(spans, power)
     mean_power, swing = _find_swing(spans, power, closed)
     mean_torque = None
     if mean_power is not None and not linear and solution.drive_bar == solution.at.bar:
         work = np.asarray(mean_power) * spans.sum(axis=-1)
-        mean_torque = find_mean_torque(solution, work)
+        mean_torque = _find_mean_torque(solution, work)
     return MotorDuty(
         peak_torque=None if linear else peak,
         rms_torque=None if linear else rms,
@@ -218,37 +290,6 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
         mean_torque=mean_torque,
         energy_swing=swing,
     )
-
-
-def is_once_round(solution: Solution) -> Any:
-    """Return True if a motion covers whole turns; for a study (m,).
-
-    The last position then repeats the first. An assembly with a single change point
-    repeats after two turns. Speed and acceleration must repeat too: a motion law may
-    end at another speed than it begins with.
-    """
-    angle = solution.at.angle
-    bar = solution.at.bar
-    if angle.shape[-1] == 1:
-        return np.zeros(angle.shape[:-1], dtype=bool)
-    assert solution.lengths is not None
-    period = count_turns(solution.lengths, bar)
-    if period.ndim > 1:  # of a study, a column
-        period = period[:, 0]
-    covered = np.abs(angle[..., -1] - angle[..., 0])
-    turns = covered / (2.0 * np.pi * period)
-    is_whole = np.isclose(turns, np.round(turns), rtol=1e-12, atol=0.0)
-    once_round = (turns > 0.5) & is_whole
-    for rate in (solution.at.speed, solution.at.acceleration):
-        if rate is not None and np.shape(rate)[-1:] == angle.shape[-1:]:
-            once_round = once_round & _repeats(np.asarray(rate))
-    return once_round
-
-
-def _repeats(rate: Array) -> Any:
-    """Return True if a speed or an acceleration ends as it begins."""
-    gap = np.abs(rate[..., -1] - rate[..., 0])
-    return gap <= _SAME_RATE * np.max(np.abs(rate), axis=-1)
 
 
 def _require_quantity(solution: Solution, name: str) -> Array:
@@ -319,7 +360,7 @@ def _find_swing(
     return _reduce_to_number(mean), _reduce_to_number(swing)
 
 
-def find_mean_torque(solution: Solution, work: Any) -> Any:
+def _find_mean_torque(solution: Solution, work: Any) -> Any:
     """Find the mean torque over the angle that the driven bar turns; NaN for no angle.
 
     `work`: of the drive over the motion, J, of a study (m,). The angle is the commanded
@@ -361,51 +402,6 @@ def _reduce_to_number(value: Any) -> Any:
     if np.ndim(value) == 0:
         return float(value)
     return value
-
-
-class Driving(NamedTuple):
-    """Torque or force of the drive, as it is shown."""
-
-    name: str
-    symbol: str
-    unit: str
-    values: Array | None
-    """(n,); None where only positions are known."""
-    error: Array | None
-    keys: DriveNames
-    """Names of its torque or force among the quantities."""
-    speed_key: str
-    """Name of the speed of the driven bar, or of the stroke."""
-
-
-def read_drive_demand(solution: Solution) -> Driving:
-    """Return torque or force of the drive, with its error bar."""
-    names = COUPLE
-    symbol = f"T{solution.drive_bar}"
-    word = "torque"
-    speed = f"omega_{solution.drive_bar}"
-    if solution.drive is not None:
-        names = LINE
-        symbol = "F"
-        word = "drive force"
-        speed = "stroke_speed"
-    values = getattr(solution, names.value)
-    error = getattr(solution, names.error)
-    return Driving(word, symbol, UNITS[names.value], values, error, names, speed)
-
-
-def describe_drive(scene: Scene) -> str:
-    """Return the words for what the drive acts on."""
-    if scene.drive is not None:
-        start, *others = (place.bar for _, place in scene.drive.ends)
-        if not others:
-            return f"at a point of bar {start} ({BAR_NAMES[start]})"
-        end = others[0]
-        return (
-            f"along a line from bar {start} ({BAR_NAMES[start]}) to bar {end}"
-            f" ({BAR_NAMES[end]})"
-        )
-    return f"bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
 
 
 class _Energies(NamedTuple):

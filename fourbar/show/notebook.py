@@ -8,7 +8,7 @@ from fourbar.formulas.mobility import classify
 from fourbar.linkage import BAR_NAMES
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
-from fourbar.show.duty import describe_drive
+from fourbar.show.driving import describe_drive
 from fourbar.show.plot import draw_figure
 from fourbar.show.tables import list_columns, write_with_unit
 from fourbar.show.units import units as read_units

@@ -1,15 +1,21 @@
-"""Curves over a motion as polynomials on panels, for integrals without its steps.
+"""Curves over a motion as polynomials on panels: peaks, zeros, means and integrals.
 
 A panel is halved until the polynomial through the nodes of Gauss-Legendre quadrature
-represents each curve, and integrals of squares of the polynomials are then exact.
+represents each curve; integrals of squares of the polynomials are then exact. Beside a
+jump or a corner that is no end of a panel the halving goes on until the panel is too
+narrow to matter. Towards a pole the values grow with each halving: such a curve has no
+largest value and no integral.
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import Legendre
 from numpy.polynomial.legendre import leggauss, legvander
+from numpy.typing import NDArray
 
 from fourbar.quantities import Array
 
@@ -18,56 +24,211 @@ NODES = 10
 exact up to 19.
 """
 SETTLED = 1e-10
-"""Error of one panel below which it is not halved. It is the part of the motion that
-the panel is, times the last terms of the polynomial over the size of the curve.
+"""Error of one panel below which it is not halved for the integrals. It is the part of
+the motion that the panel is, times the last terms of the polynomial over the size of
+the curve.
+"""
+LOCATED = 1e-9
+"""Error of a panel that may hold an extreme value below which it is not halved, over
+the largest value.
+"""
+ZERO = 1e-12
+"""Error of a panel that may hold a zero below which it is not halved, over the largest
+value. Forces jump at a zero, so that it must not lie beside a node.
 """
 HELD = 1e-6
-"""Sum of the errors of all panels, over the size of the curve, up to which its
-integrals are given: the four digits that are shown hold.
+"""Error of a panel, over the largest value, above which its polynomial is not used for
+an extreme value: the values themselves are. The six digits that are shown hold.
 """
-_MOST_HALVINGS = 40
-"""Rounds of halving. A jump is then within 1e-12 of the first panels."""
+TIED = 1e-9
+"""Part of the largest value by which another one counts as equal: it is the error of
+both.
+"""
+DEEP, SHALLOW = 38, 26
+"""Rounds of halving. The end of an assembly is then within 4e-12 of the first panels,
+and an angle there, which changes by the root, within 2e-6; a jump or a pole of forces
+within 1.5e-8.
+"""
+_NOISE = 3e-14
+"""Rounding of a curve, over its own values in a panel, in the first panels. At a
+distance x from a pole or a limit a value is rounded by some eps/x.
+"""
 _MOST_OPEN = 2000
-"""Panels that are halved at once. A curve that needs more is noise, or has a pole."""
-
+"""Panels that are halved at once. A curve that needs more is noise."""
+_GROWTH = 1.25
+"""Growth of a curve over the last panels of 1, 1/2, 1/4 and 1/8 of a width from which
+on it has no bound. A root of 1/x grows by 2.8 there, and what has a bound by nothing.
+"""
+_PANELS_BESIDE = 3
 _BESIDE_END = 1e-6
 """Part of a panel by which its polynomial is checked inside both ends. A jump between
 the last node and the end is seen there, and what happens on the end itself is not.
 """
-
-_PLACES, _WEIGHTS = leggauss(NODES)
-_TO_SERIES = np.linalg.inv(legvander(_PLACES, NODES - 1))
+_INSIDE = 1e-8
+"""Part of half a panel by which the place of an extreme value stays inside the ends.
+Evaluated there, a curve that jumps at the end has the value of this side.
+"""
+_FLAT = 1e-13
+"""Part of the largest value by which values of one polynomial differ by rounding."""
+_PARTS, _ROUNDS = 64, 4
+"""Parts in which a panel is cut where an extreme value is searched, and how often. The
+place is then within 2e-6 of a panel, and the value within the square of that.
+"""
+_X, _WEIGHTS = leggauss(NODES)
+_TO_SERIES = np.linalg.inv(legvander(_X, NODES - 1))
 """Matrix from the values at the nodes to the terms of the Legendre series."""
 _CHECKED = np.array([-1.0, 1.0]) * (1.0 - 2.0 * _BESIDE_END)
 _TO_CHECKED = legvander(_CHECKED, NODES - 1) @ _TO_SERIES
 """Matrix from the values at the nodes to the polynomial where it is checked."""
+_GRID = np.linspace(-1.0, 1.0, 33)
+_TO_GRID = legvander(_GRID, NODES - 1)
+"""Matrix from the terms of a series to values at which changes of sign are seen."""
+_EVALUATED = np.concatenate((_CHECKED[:1], _X, _CHECKED[1:]))
 
 ComputeCurves = Callable[[Array], dict[str, Array]]
-"""Compute curves at places (n,), by name, each (n, k): k components of one vector."""
+"""Compute curves at places (n,), by name, each (n,) or (n, k): k components."""
 
 
-class Panels(NamedTuple):
-    """Curves over a motion, on panels that follow each other."""
+class Peak(NamedTuple):
+    """Largest or smallest value of a quantity, and where it is taken."""
 
-    low: Array
-    """Where each panel begins, (p,), rising: the commanded place, or the time."""
-    high: Array
-    values: dict[str, Array]
-    """Values of each curve that settled, at the nodes, (p, NODES, k)."""
+    value: float
+    place: float
+    """Commanded angle or stroke at the peak, rad or m. For a motion over time it is the
+    time, s.
+    """
 
-    def find_mean_square(self, name: str) -> float:
-        """Return the mean of the square of a curve over the motion."""
-        squares = np.square(self.values[name]).sum(axis=-1)
-        widths = self.high - self.low
-        # the weights of the rule are for a panel of width 2
-        of_panels = 0.5 * widths * (squares @ _WEIGHTS)
-        return float(of_panels.sum() / widths.sum())
+
+class Wanted(NamedTuple):
+    """What is asked of a curve, and how far it settles."""
+
+    rounding: float = 0.0
+    """Size of its rounding, which does not settle."""
+    integrated: bool = False
+    """True if its integrals are wanted besides its largest size."""
+    ranged: bool = False
+    """True if both ends of its range are wanted."""
+    zeros: bool = False
+    """True if its zeros are wanted, and nothing else."""
+
+
+@dataclass
+class Curve:
+    """One curve on the panels of a motion, p of them in the order of the motion."""
+
+    values: Array
+    """Values at the nodes, (p, N, k); NaN where it has none."""
+    error: Array
+    """Estimate of the error of each polynomial, (p,)."""
+    poles: list[int]
+    """Panels at which the curve grows without bound."""
+
+    @property
+    def sizes(self) -> Array:
+        """Return the values of a scalar, or the sizes of vectors, (p, N)."""
+        if self.values.shape[-1] == 1:
+            return self.values[..., 0]
+        return np.asarray(np.linalg.norm(self.values, axis=-1))
+
+    @cached_property
+    def series(self) -> Array:
+        """Return the terms of the Legendre series of each panel, (p, N, k)."""
+        if self.values.shape[1] == 1:
+            return self.values
+        return np.asarray(np.einsum("ij,pjk->pik", _TO_SERIES, self.values))
+
+
+@dataclass
+class Panels:
+    """Curves over a motion, on panels that follow each other.
+
+    Single positions, with nothing between them, are panels of one node.
+    """
+
+    start: Array
+    """Where each panel begins, (p,), in the order of the motion: the commanded place,
+    or the time.
+    """
+    stop: Array
+    share: Array
+    """Part of the motion that each panel is, (p,)."""
+    curves: dict[str, Curve]
+    located: bool = True
+    """False if the panels are single positions."""
+
+    @classmethod
+    def of_positions(
+        cls,
+        places: Array,
+        curves: Mapping[str, Array],
+        share: Array,
+    ) -> "Panels":
+        """Take positions for panels of one node each, with curves (n,) or (n, k)."""
+        n = len(places)
+        single = {}
+        for name, values in curves.items():
+            single[name] = Curve(values.reshape(n, 1, -1), np.full(n, np.inf), [])
+        return cls(places, places, share, single, located=False)
+
+    def with_points(self, places: Array, curves: Mapping[str, Array]) -> "Panels":
+        """Return the panels with points between them, panels of no width.
+
+        At the end of a panel a curve that jumps there may have a value of its own.
+        """
+        start = np.concatenate([places, self.start])
+        rises = self.stop[0] > self.start[0]
+        order = np.argsort(start if rises else -start, kind="stable")
+        added = {}
+        for name, curve in self.curves.items():
+            points = curves[name].reshape(len(places), 1, -1)
+            values = np.repeat(points, curve.values.shape[1], axis=1)
+            error = np.concatenate([np.full(len(places), np.inf), curve.error])
+            poles = [panel + len(places) for panel in curve.poles]
+            added[name] = Curve(
+                np.concatenate([values, curve.values])[order],
+                error[order],
+                np.flatnonzero(np.isin(order, poles)).tolist(),
+            )
+        stop = np.concatenate([places, self.stop])[order]
+        share = np.concatenate([0.0 * places, self.share])[order]
+        return Panels(start[order], stop, share, added)
+
+    @property
+    def length(self) -> float:
+        """Return the angle, stroke or time over which the motion goes."""
+        return float(abs(self.stop[-1] - self.start[0]))
+
+    @property
+    def growing(self) -> set[str]:
+        """Return the names of the curves that grow without bound."""
+        return {name for name, curve in self.curves.items() if curve.poles}
+
+    def has_value(self, name: str) -> bool:
+        """Return True if a curve has a value anywhere, and a bound."""
+        curve = self.curves.get(name)
+        if curve is None or curve.poles:
+            return False
+        return bool(np.isfinite(curve.values).any())
+
+    def list_poles(self, name: str) -> list[float]:
+        """List the places at which a curve grows without bound."""
+        return [float(self.start[panel]) for panel in self.curves[name].poles]
+
+    def _average(self, name: str, power: int) -> float:
+        """Return the mean over the motion, where a curve has values."""
+        of_nodes = np.power(self.curves[name].values, power).sum(axis=-1)
+        weights = 0.5 * _WEIGHTS if self.located else np.ones(1)
+        means = of_nodes @ weights
+        known = np.isfinite(means)
+        return float(means[known] @ self.share[known] / self.share[known].sum())
+
+    def find_rms(self, name: str) -> float:
+        """Return the root of the mean square of a curve over the motion."""
+        return float(np.sqrt(self._average(name, 2)))
 
     def integrate(self, name: str) -> float:
         """Return the integral of a curve over the motion."""
-        widths = self.high - self.low
-        of_panels = 0.5 * widths * (self.values[name][..., 0] @ _WEIGHTS)
-        return float(of_panels.sum())
+        return self._average(name, 1) * self.length
 
     def accumulate(self, name: str, level: float = 0.0) -> Array:
         """Integrate a curve less a level up to where the integral may turn back.
@@ -75,134 +236,296 @@ class Panels(NamedTuple):
         Such places are the ends of the panels, and the zeros of the difference within
         them. The first integral is 0.
         """
-        values = self.values[name][..., 0] - level
-        series = values @ _TO_SERIES.T
-        # a Legendre polynomial is 1 at the end and 1 or -1 at the start of a panel
-        starts = series @ (-1.0) ** np.arange(NODES)
-        stops = series.sum(axis=-1)
-        signs = np.sign(np.column_stack((starts, values, stops)))
-        crosses = signs.min(axis=-1) < signs.max(axis=-1)
-        totals = np.cumsum(0.5 * (self.high - self.low) * (values @ _WEIGHTS))
+        series = np.nan_to_num(self.curves[name].series[..., 0])
+        series[:, 0] -= level
+        widths = self.share * self.length
+        totals = np.cumsum(widths * series[:, 0])
         integrals = [np.zeros(1)]
         for panel in range(len(totals)):
-            if crosses[panel]:
-                curve = Legendre(series[panel], [self.low[panel], self.high[panel]])
-                until = curve.integ(lbnd=self.low[panel])
-                begin = totals[panel - 1] if panel else 0.0
-                integrals.append(begin + until(_find_zeros(curve)))
+            if (zeros := _find_zeros(series[panel])).size:
+                until = Legendre(series[panel]).integ(lbnd=-1.0)(zeros)
+                begin = totals[panel] - widths[panel] * series[panel, 0]
+                integrals.append(begin + 0.5 * widths[panel] * until)
             integrals.append(totals[panel : panel + 1])
         return np.concatenate(integrals)
 
+    def find_zeros(self, name: str) -> Array:
+        """Find the places at which a curve changes its sign, in order.
+
+        Where it is zero for a while it is the first end of a panel there.
+        """
+        series = self.curves[name].series[..., 0]
+        values = (series @ _TO_GRID.T).ravel()
+        least = TIED * np.nanmax(np.abs(values), initial=0.0)
+        rows = np.flatnonzero(np.abs(values) > least)
+        changes = np.flatnonzero(values[rows[1:]] * values[rows[:-1]] < 0.0)
+        zeros = []
+        for before, after in zip(rows[changes], rows[changes + 1], strict=True):
+            if np.isnan(values[before:after]).any():
+                continue
+            panel, point = divmod(before + 1, len(_GRID))
+            if after == before + 1 and point > 0:
+                roots = _find_zeros(series[panel])
+                root = roots[np.searchsorted(roots, _GRID[point - 1])]
+                zeros.append(self._place(panel, root))
+                continue
+            vanishing = np.arange(before + 1, after + 1)
+            edges = vanishing[vanishing % len(_GRID) == 0]
+            panel, point = divmod(edges[0] if len(edges) else before + 1, len(_GRID))
+            zeros.append(self._place(panel, _GRID[point]))
+        return np.array(zeros)
+
+    def list_nodes(self) -> Array:
+        """List the places of the nodes, (p, N)."""
+        half = 0.5 * (self.stop - self.start)
+        return np.asarray((self.start + half)[:, None] + half[:, None] * _X)
+
+    def _place(self, panel: int, x: Array) -> Array:
+        """Convert places within a panel, from -1 to 1, to those of the motion."""
+        middle = 0.5 * (self.start[panel] + self.stop[panel])
+        half = 0.5 * (self.stop[panel] - self.start[panel])
+        return np.asarray(middle + half * x)
+
+    def find_peak(self, name: str, sense: int = 0) -> Peak:
+        """Find the largest value of a curve (1), the least (-1), or largest size (0).
+
+        Of equal ones it is the first. A signed curve keeps the sign of its value.
+        """
+        curve = self.curves[name]
+        sizes = curve.sizes
+
+        def rank(values: Array) -> Array:
+            return np.abs(values) if sense == 0 else sense * values
+
+        at_nodes = np.where(np.isfinite(sizes), rank(sizes), -np.inf)
+        scale = np.nanmax(np.abs(sizes))
+        best = at_nodes.max(axis=1)
+        smooth = curve.error <= HELD * scale
+        terms = np.linalg.norm(curve.series[:, 1:], axis=-1).sum(axis=1)
+        node = np.argmax(at_nodes >= (best - TIED * scale)[:, None], axis=1)
+        rows = np.arange(len(best))
+        x = (_X if self.located else np.zeros(1))[node]
+        values = sizes[rows, node]
+        may_exceed = smooth & (best + 2.0 * terms >= best.max())
+        for panel in np.flatnonzero(may_exceed).tolist():
+            x[panel], values[panel] = _search(curve.series[panel], rank)
+        ranks = np.where(np.isfinite(values), rank(values), -np.inf)
+        first = int(np.argmax(ranks >= ranks.max() - TIED * scale))
+        after = min(first + 1, len(ranks) - 1)
+        is_point = self.start[after] == self.stop[after]
+        # the point at which a panel ends has the value that it rises to
+        if is_point and x[first] == 1.0 - _INSIDE and ranks[after] >= ranks[first]:
+            first = after
+        return Peak(float(values[first]), float(self._place(first, x[first])))
+
+
+def _evaluate(series: Array, x: Array) -> Array:
+    """Return the polynomial of a panel, or the size of a vector of them, at places."""
+    values = legvander(x, NODES - 1) @ series
+    if values.shape[-1] == 1:
+        return np.asarray(values[..., 0])
+    return np.asarray(np.linalg.norm(values, axis=-1))
+
+
+def _search(series: Array, rank: Callable[[Array], Array]) -> tuple[float, float]:
+    """Find the first place at which a polynomial ranks highest, and its value."""
+    low = -1.0 + _INSIDE
+    high = 1.0 - _INSIDE
+    for _ in range(_ROUNDS):
+        x = np.linspace(low, high, _PARTS + 1)
+        values = _evaluate(series, x)
+        ranks = rank(values)
+        slack = _FLAT * np.abs(values).max()
+        best = int(np.argmax(ranks >= ranks.max() - slack))
+        low = x[max(best - 1, 0)]
+        high = x[min(best + 1, _PARTS)]
+    return float(x[best]), float(values[best])
+
+
+def _find_zeros(series: Array) -> Array:
+    """Find where in its panel, from -1 to 1 in order, a polynomial is zero."""
+    if abs(series[0]) > np.abs(series[1:]).sum():
+        return np.zeros(0)
+    roots = Legendre(series).roots()
+    zeros = np.sort(roots[np.isreal(roots)].real)
+    return np.asarray(zeros[(zeros > -1.0) & (zeros < 1.0)])
+
 
 class _Fit(NamedTuple):
-    """The polynomials of some panels for one curve."""
+    """Polynomials of some panels for one curve."""
 
     values: Array
     """Values at the nodes, (p, NODES, k)."""
     error: Array
-    """Estimate of the error of each, (p,)."""
-
-
-def _find_zeros(curve: Legendre) -> Array:
-    """Find the places in its panel, in order, at which a polynomial is zero."""
-    roots = curve.roots()
-    zeros = np.sort(roots[np.isreal(roots)].real)
-    low, high = curve.domain
-    return np.asarray(zeros[(zeros > low) & (zeros < high)])
+    """Estimate of the error of each, (p,); infinite where some values are missing, zero
+    where all are.
+    """
+    most: Array
+    """Largest value, or size of a vector, (p,); -inf where all are missing."""
+    least: Array
+    """Least value of a scalar, (p,); inf where all are missing, and of a vector."""
+    size: Array
+    """Largest size, (p,); 0 where all are missing."""
 
 
 def fit_panels(
     compute: ComputeCurves,
     edges: Array,
-    rounding: Mapping[str, float],
+    wanted: Mapping[str, Wanted],
+    most_halvings: int = DEEP,
 ) -> Panels:
-    """Halve panels until each curve is settled; leave out the curves that never are.
-
-    A curve that never settles has a pole or positions without a value, or is noise.
+    """Halve panels until each curve is settled.
 
     Parameters
     ----------
     compute : curves to represent.
-    edges : ends of the first panels, (p + 1,), rising.
-    rounding : by name of a curve the size of its rounding, which does not settle.
+    edges : ends of the first panels, (p + 1,), in the order of the motion.
+    wanted : by name of a curve, what is asked of it.
+    most_halvings : number of rounds after which a curve is taken as it is.
     """
+    start = edges[:-1]
+    stop = edges[1:]
     length = edges[-1] - edges[0]
-    low = edges[:-1]
-    high = edges[1:]
-    fits = _fit(compute, low, high)
-    sizes = {}
-    for name, first in fits.items():
-        if np.isfinite(first.error).all():
-            whole = Panels(low, high, {name: first.values})
-            sizes[name] = float(np.sqrt(whole.find_mean_square(name)))
-    ends = [np.stack((low, high))]
-    fitted = {name: [fits[name]] for name in sizes}
+    fits = _fit(compute, start, stop)
+    usual = {name: _find_usual_size(first.values) for name, first in fits.items()}
+    settled = dict.fromkeys(fits, (-np.inf, np.inf))
+    ends: list[tuple[Array, Array]] = []
+    fitted: dict[str, list[_Fit]] = {name: [] for name in fits}
     kept = []
-    for halvings in range(_MOST_HALVINGS + 1):
-        part = (high - low) / length
-        is_open = np.zeros(len(low), dtype=bool)
-        for name, size in sizes.items():
-            error = part * fitted[name][-1].error
-            is_open |= ~(error <= SETTLED * size + rounding[name])
-        if halvings == _MOST_HALVINGS or is_open.sum() > _MOST_OPEN:
-            is_open[:] = False  # as they are; the sum of their errors tells
-        kept.append(~is_open)
-        if not is_open.any():
+    for halvings in range(most_halvings + 1):
+        ends.append((start, stop))
+        opens = {}
+        for name, fit in fits.items():
+            fitted[name].append(fit)
+            # a node that a halving leaves out may have been next to a pole
+            most = max(settled[name][0], fit.most.max())
+            least = min(settled[name][1], fit.least.min())
+            share = (stop - start) / length
+            is_open = _find_open(fit, share, usual[name], (most, least), wanted[name])
+            noise = _NOISE * 2.0**halvings
+            opens[name] = is_open & ~(fit.error <= noise * fit.size)
+        is_open = np.any([*opens.values()], axis=0)
+        is_last = halvings == most_halvings or is_open.sum() > _MOST_OPEN
+        kept.append(~is_open | is_last)
+        if is_last or not is_open.any():
             break
-        middle = 0.5 * (low[is_open] + high[is_open])
-        low, high = (
-            np.concatenate((low[is_open], middle)),
-            np.concatenate((middle, high[is_open])),
+        for name, fit in fits.items():
+            most = max(settled[name][0], fit.most[~is_open].max(initial=-np.inf))
+            least = min(settled[name][1], fit.least[~is_open].min(initial=np.inf))
+            settled[name] = most, least
+        middle = 0.5 * (start[is_open] + stop[is_open])
+        start, stop = (
+            np.concatenate((start[is_open], middle)),
+            np.concatenate((middle, stop[is_open])),
         )
-        fits = _fit(compute, low, high)
-        ends.append(np.stack((low, high)))
-        for name, rounds in fitted.items():
-            rounds.append(fits[name])
-    return _join(ends, fitted, kept, sizes, rounding)
+        fits = _fit(compute, start, stop)
+    return _join(ends, fitted, kept, opens)
+
+
+def _find_usual_size(values: Array) -> float:
+    """Return the size of a curve, which a node next to a pole does not change."""
+    medians = np.median(np.nan_to_num(np.linalg.norm(values, axis=-1)), axis=1)
+    return float(np.sqrt(np.square(medians).mean()))
+
+
+def _find_open(
+    fit: _Fit,
+    share: Array,
+    usual: float,
+    extremes: tuple[float, float],
+    wanted: Wanted,
+) -> NDArray[np.bool_]:
+    """Mark the panels that are halved: for an extreme value, or for the integrals."""
+    most, least = extremes
+    scale = max(abs(most), abs(least)) if np.isfinite(least) else abs(most)
+    highest = fit.most + fit.error
+    with np.errstate(invalid="ignore"):
+        lowest = fit.least - fit.error
+    if wanted.zeros:
+        return (lowest <= 0.0) & (highest >= 0.0) & ~(fit.error <= ZERO * scale)
+    may_exceed = highest >= most
+    if wanted.ranged:
+        may_exceed |= lowest <= least
+    else:
+        may_exceed |= -lowest >= scale
+    is_open = may_exceed & ~(fit.error <= LOCATED * scale + wanted.rounding)
+    if wanted.integrated:
+        is_open |= ~(share * fit.error <= SETTLED * usual + wanted.rounding)
+    return is_open
 
 
 def _join(
-    ends: list[Array],
+    ends: list[tuple[Array, Array]],
     fitted: dict[str, list[_Fit]],
-    kept: list[Array],
-    sizes: dict[str, float],
-    rounding: Mapping[str, float],
+    kept: list[NDArray[np.bool_]],
+    unsettled: dict[str, NDArray[np.bool_]],
 ) -> Panels:
-    """Join the kept panels of all rounds in order, with the curves that settled."""
-    low, high = np.concatenate(
-        [of_round[:, keep] for of_round, keep in zip(ends, kept, strict=True)],
-        axis=1,
+    """Join the kept panels of all rounds in the order of the motion."""
+    start, stop = (
+        np.concatenate([side[keep] for side, keep in zip(sides, kept, strict=True)])
+        for sides in zip(*ends, strict=True)
     )
-    order = np.argsort(low)
-    low = low[order]
-    high = high[order]
-    part = (high - low) / (high - low).sum()
-    settled = {}
+    order = np.argsort(start if stop[0] > start[0] else -start)
+    start = start[order]
+    stop = stop[order]
+    curves = {}
     for name, rounds in fitted.items():
-        errors = [one.error[keep] for one, keep in zip(rounds, kept, strict=True)]
-        error = float(part @ np.concatenate(errors)[order])
-        if error <= HELD * sizes[name] + rounding[name]:
-            values = [one.values[keep] for one, keep in zip(rounds, kept, strict=True)]
-            settled[name] = np.concatenate(values)[order]
-    return Panels(low, high, settled)
+        pairs = [*zip(rounds, kept, strict=True)]
+        values = np.concatenate([one.values[keep] for one, keep in pairs])[order]
+        error = np.concatenate([one.error[keep] for one, keep in pairs])[order]
+        late = np.zeros(len(order), dtype=bool)
+        late[-kept[-1].sum() :] = unsettled[name][kept[-1]]
+        curve = Curve(values, error, [])
+        curve.poles = _find_poles(curve, late[order])
+        curves[name] = curve
+    share = (stop - start) / (stop - start).sum()
+    return Panels(start, stop, share, curves)
 
 
-def _fit(compute: ComputeCurves, low: Array, high: Array) -> dict[str, _Fit]:
+def _find_poles(curve: Curve, unsettled: NDArray[np.bool_]) -> list[int]:
+    """Find the panels that no halving settles and towards which a curve grows.
+
+    The panels beside them have two, four and eight times their width. At a jump and in
+    noise the values are as large there.
+    """
+    sizes = np.nan_to_num(np.abs(curve.sizes), nan=0.0).max(axis=1)
+    poles = []
+    rows = np.flatnonzero(unsettled)
+    for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1):
+        if not len(run):
+            continue
+        beside = [run[0] - _PANELS_BESIDE, run[-1] + _PANELS_BESIDE]
+        away = [sizes[panel] for panel in beside if 0 <= panel < len(sizes)]
+        if away and sizes[run].max() > _GROWTH * max(away):
+            poles.append(int(run[np.argmax(sizes[run])]))
+    return poles
+
+
+def _fit(compute: ComputeCurves, start: Array, stop: Array) -> dict[str, _Fit]:
     """Fit the polynomials of panels to curves, and estimate their errors.
 
     An error is that of the last two terms, of which one is even and the other odd, or
     that beside the ends.
     """
-    middle = 0.5 * (low + high)
-    half = 0.5 * (high - low)
-    places = middle[:, None] + half[:, None] * np.concatenate((_PLACES, _CHECKED))
+    middle = 0.5 * (start + stop)
+    half = 0.5 * (stop - start)
+    places = middle[:, None] + half[:, None] * _EVALUATED
     fits = {}
     for name, of_curve in compute(places.ravel()).items():
         curve = of_curve.reshape(*places.shape, -1)
-        values = curve[:, :NODES]
+        missing = np.asarray(~np.isfinite(curve).all(axis=-1))
+        values = curve[:, 1:-1]
         last = np.einsum("ij,pjk->pik", _TO_SERIES[-2:], values)
         checked = np.einsum("ij,pjk->pik", _TO_CHECKED, values)
         terms = np.abs(last).sum(axis=1)
-        beside = np.abs(checked - curve[:, NODES:]).max(axis=1)
-        fits[name] = _Fit(values, np.maximum(terms, beside).max(axis=-1))
+        beside = np.abs(checked - curve[:, [0, -1]]).max(axis=1)
+        error = np.maximum(terms, beside).max(axis=-1)
+        error = np.where(missing.any(axis=1), np.inf, error)
+        error[missing.all(axis=1)] = 0.0
+        single = curve.shape[-1] == 1
+        sizes = curve[..., 0] if single else np.linalg.norm(curve, axis=-1)
+        most = np.where(missing, -np.inf, sizes).max(axis=1)
+        least = np.where(missing | (not single), np.inf, sizes).min(axis=1)
+        size = np.where(missing, 0.0, np.abs(sizes)).max(axis=1)
+        fits[name] = _Fit(values, error, most, least, size)
     return fits

@@ -35,7 +35,7 @@ from fourbar.quantities import (
 from fourbar.scene import find_signs
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.acting import list_spring_notes
-from fourbar.show.duty import read_drive_demand
+from fourbar.show.driving import read_drive_demand
 from fourbar.show.tables import (
     MOST_ROWS_PRINTED,
     make_plain_table,

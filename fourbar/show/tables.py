@@ -16,7 +16,7 @@ from fourbar.errors import clean_line
 from fourbar.quantities import ANGLES, OK, PIN_FORCES, UNITS, Array
 from fourbar.show.columns import Column
 from fourbar.show.derived import derive, list_derived_names
-from fourbar.show.duty import read_drive_demand
+from fourbar.show.driving import read_drive_demand
 from fourbar.show.units import drop_rounding, write_cell
 from fourbar.solution import (
     DEGREES,

@@ -101,6 +101,11 @@ def internal_forces(
     return InternalForces(x, *beam.at(rows), beam.uniform, beam.find_largest())
 
 
+def largest_bending(scene: Scene, solution: Solution, bar: int) -> Bending:
+    """Compute the largest bending moment of a moving bar at each position."""
+    return _collect_acting(scene, solution, bar).find_largest()
+
+
 class _Beam(NamedTuple):
     """Forces and couples on a bar, by their feet on its line, (n, f).
 

@@ -2,7 +2,7 @@
 
 Free bodies at many positions and plain sums judge it. Each peak and each end of a range
 is taken at the place that is printed with it, and none of many positions between the
-scene's own may exceed it. Means and energies are summed anew from the free bodies'
+scene's own may exceed it. RMS and energies are integrated anew over the free bodies'
 forces.
 """
 
@@ -22,7 +22,7 @@ from fourbar.quantities import OK, Array
 from fourbar.scene import Scene, command_at
 from fourbar.scene.motion import FromLimit
 from fourbar.show.block import write_block, write_motor
-from fourbar.show.duty import MotorDuty, bearing_load, motor_duty, shaking_force
+from fourbar.show.duty import shaking_force
 from fourbar.show.summary import Facts, Peak, summarize
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
@@ -55,7 +55,6 @@ from tests.oracle.variants import ask_free_bodies, make_row
 ROW_NAMES = (
     "ranges",
     "peaks",
-    "means",
     "integrals",
     "pins",
     "frame_force",
@@ -148,13 +147,17 @@ class _SummaryJudge:
         return np.union1d(places, self.bends) if len(self.bends) else places
 
     def integrates(self, name: str) -> bool:
-        """Return whether a quantity is integrated over the motion, and not summed.
+        """Return whether a quantity has an integral over the motion.
 
         The free bodies must know it at all of the many positions.
         """
-        sums = self.facts.sums
         known = len(self.fine.quantities["theta_2"]) == len(self.fine_places)
-        return known and (sums is None or name not in sums.names)
+        return known and self.facts.motion.is_steady and name not in self.growing
+
+    @property
+    def growing(self) -> set[str]:
+        """Return the names of what is said to grow without bound."""
+        return self.facts.motion.panels.growing
 
     @cached_property
     def fine(self) -> Answer:
@@ -167,13 +170,6 @@ class _SummaryJudge:
         least = _find_conditions(self.scene, answer).min(axis=0)
         known = least > _LEAST_KNOWN_CONDITION
         return answer if known.all() else self.ask(places[known])
-
-    @cached_property
-    def duty(self) -> MotorDuty:
-        """Return the sums over the scene's own positions."""
-        duty = motor_duty(self.solution)
-        assert duty is not None
-        return duty
 
     @cached_property
     def motor(self) -> dict[str, Any]:
@@ -223,16 +219,6 @@ class _SummaryJudge:
     def _rounding(self) -> float:
         return BALANCED_SHARE * max(self._loads.values())
 
-    @property
-    def counted(self) -> slice:
-        """Select the positions of a mean.
-
-        The last position of a closed motion is its first.
-        """
-        if self.closed:
-            return slice(None, -1)
-        return slice(None)
-
     def ask(self, places: Any) -> Answer:
         """Ask the free bodies at other positions of the motion."""
         return ask_free_bodies(self.scene, command_at(self.scene, np.ravel(places)))
@@ -270,7 +256,7 @@ def _find_conditions(scene: Scene, answer: Answer) -> Array:
 
 
 def summary(question: Question) -> list[Row]:
-    """Judge ranges, peaks, means, energies, pin loads and more.
+    """Judge ranges, peaks, RMS, energies, pin loads and more.
 
     Shaking force, bending and bore are judged too.
     """
@@ -351,79 +337,32 @@ def _find_work(judged: _SummaryJudge, answer: Answer) -> tuple[Array, Array]:
 
 
 def _judge_drive(judged: _SummaryJudge) -> None:
-    """Judge peak, mean, power and energies of the drive, as printed and in the JSON."""
+    """Judge the peaks of the drive and its bore, as printed and in the JSON."""
     facts = judged.facts
     entry = judged.motor
-    assert facts.peak is not None and facts.duty is not None
+    assert facts.duty is not None
     if not judged.drives:
         return
-    values, speed = _find_work(judged, judged.own)
-    power = values * speed
     name = name_driving(judged.scene)
     fine_values, fine_speed = _find_work(judged, judged.fine)
     kind = "force" if facts.linear else "torque"
-    if name not in facts.between.growing:
+    if name not in judged.growing:
+        assert facts.peak is not None
         at_peak, _ = _find_work(judged, judged.ask(facts.peak.place))
         judged.add_peak("peaks", facts.peak, at_peak, fine_values)
         judged.add_value("peaks", entry[f"peak_{kind}"], abs(facts.peak.value))
-    judged.add("means", float(entry["closed"] != judged.closed))
-    for key, of_own in ((f"rms_{kind}", values), ("rms_power", power)):
-        if np.abs(of_own).max() != 0.0:
-            mean = math.sqrt(np.square(of_own[judged.counted]).mean())
-            judged.add_value("means", getattr(judged.duty, key), mean)
+    judged.add("integrals", float(entry["closed"] != judged.closed))
     for key, fine in (
         ("peak_speed", fine_speed),
         ("peak_power", fine_values * fine_speed),
     ):
         most = float(np.abs(fine).max())
-        if key.removeprefix("peak_") not in facts.between.growing and most != 0.0:
+        if key.removeprefix("peak_") not in judged.growing and most != 0.0:
             judged.add_excess("peaks", (most - entry[key]) / most)
             judged.add_excess(
                 "peaks", entry[key] / most - 1.0 - EXCESS_BETWEEN_POSITIONS
             )
-    _judge_energy(judged, power)
     _judge_bore(judged, fine_values)
-
-
-def _judge_energy(judged: _SummaryJudge, power: Array) -> None:
-    """Judge energies, their swing and the mean torque by the trapezoidal rule.
-
-    It is over the times at which the positions are passed.
-    """
-    at = judged.solution.at
-    if at.time is not None:
-        spans = np.diff(at.time)
-    else:
-        if at.stroke is None:
-            speed = at.speed
-        else:
-            speed = at.stroke_speed
-        speeds = np.broadcast_to(np.asarray(speed, float), power.shape)[:-1]
-        if not np.all(speeds):
-            return
-        spans = np.abs(np.diff(at.places) / speeds)
-    sums = []
-    for part in (np.maximum(power, 0.0), np.maximum(-power, 0.0)):
-        sums.append(float((spans * 0.5 * (part[:-1] + part[1:])).sum()))
-    duty = judged.duty
-    for energy, total in zip((duty.energy_in, duty.energy_out), sums, strict=True):
-        error = math.nan if energy is None else abs(energy - total)
-        judged.add("means", divide(error, np.max(sums)))
-    swing = duty.energy_swing
-    if not duty.closed:
-        judged.add("means", 0.0 if swing is None else np.inf)
-        return
-    # the mean power is a straight line from the first to the last instant
-    time = np.concatenate([[0.0], np.cumsum(spans)])
-    steps = spans * 0.5 * (power[:-1] + power[1:])
-    given = np.concatenate([[0.0], np.cumsum(steps)])
-    about_mean = given - given[-1] * time / time[-1]
-    off = math.nan if swing is None else abs(swing - np.ptp(about_mean))
-    judged.add("means", divide(off, np.max(sums)))
-    if judged.scene.drive is None and judged.scene.drive_bar == at.bar:
-        mean = math.nan if duty.mean_torque is None else duty.mean_torque
-        of_mean = given[-1] - mean * _find_turned(judged)
-        judged.add("means", divide(abs(of_mean), np.max(sums)))
 
 
 def _find_turned(judged: _SummaryJudge) -> float:
@@ -500,10 +439,7 @@ def _lay_panels(sample: Callable[[Array], Array], edges: Array) -> _Panels:
 
 
 def _judge_integrals(judged: _SummaryJudge) -> None:
-    """Judge RMS, energies, swing and mean torque over the motion.
-
-    Nothing may be a sum over the positions far from every pole.
-    """
+    """Judge RMS, energies, swing and mean torque over the motion."""
     conditions = _find_conditions(judged.scene, judged.fine)[0]
     if conditions.min() <= np.abs(np.diff(conditions)).max():
         return  # a change point, beside which free bodies have no digits
@@ -566,7 +502,7 @@ def _judge_integrals(judged: _SummaryJudge) -> None:
 
 def _judge_bore(judged: _SummaryJudge, fine: Array) -> None:
     """Judge the bores that are printed for a cylinder that pushes, and that pulls."""
-    if not judged.facts.linear or judged.facts.between.growing:
+    if not judged.facts.linear or judged.growing:
         return
     if judged.scene.drive is None or not judged.scene.drive.has_stroke:
         return
@@ -584,7 +520,7 @@ def _judge_bore(judged: _SummaryJudge, fine: Array) -> None:
 
 
 def _judge_pins(judged: _SummaryJudge) -> None:
-    """Judge peak, place and mean of each pin's load, printed and in the JSON.
+    """Judge peak and place of each pin's load, printed and in the JSON.
 
     The force on the frame is judged too.
     """
@@ -593,10 +529,7 @@ def _judge_pins(judged: _SummaryJudge) -> None:
         load = facts.pins[pin]
         if pin not in judged.loaded_pins:
             continue
-        own = magnitude(judged.own.quantities[name])
-        mean = math.sqrt(np.square(own[judged.counted]).mean())
-        judged.add_value("pins", bearing_load(judged.solution, pin).rms, mean)
-        if name in facts.between.growing:
+        if name in judged.growing:
             continue
         there = judged.ask(load.peak.place)
         at_peak = magnitude(there.quantities[name])
@@ -625,7 +558,7 @@ def _judge_bending(judged: _SummaryJudge) -> None:
     fine_motion = move_bars(judged.scene, commanded, judged.fine)
     for bar in MOVING_BARS:
         largest = judged.facts.bending[bar]
-        if largest.grows:
+        if largest.peak is None:
             continue
         there = judged.ask(largest.peak.place)
         motion = move_bars(judged.scene, commanded, there)
@@ -664,17 +597,15 @@ def _exceed_rounding(pieces: Sequence[Piece]) -> float:
 def _judge_growth(judged: _SummaryJudge) -> None:
     """Fail what is said to grow without bound far from every pole.
 
-    The bars are far from poles throughout the motion. What grows has no peak that could
-    be judged, and what is summed no integral, so none of it is believed.
+    The bars are far from poles throughout the motion. What grows has neither a peak nor
+    an integral that could be judged, so none of it is believed.
     """
-    facts = judged.facts
-    grows = any(bending.grows for bending in facts.bending.values())
-    unbounded = facts.between.growing or grows
-    if not unbounded and facts.sums is None:
+    bending = judged.facts.bending.values()
+    if not judged.growing and all(largest.peak is not None for largest in bending):
         return
     conditions = _find_conditions(judged.scene, judged.fine)
     # a sine that passes through zero between two positions is no further from it there
     # than it changes in a step
     least = conditions.min() - np.abs(np.diff(conditions)).max()
     if least > _LEAST_CONDITION:
-        judged.add("peaks" if unbounded else "integrals", math.inf)
+        judged.add("peaks", math.inf)

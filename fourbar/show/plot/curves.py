@@ -19,7 +19,8 @@ from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import with_signs
 from fourbar.show.derived import derive
-from fourbar.show.duty import compute_energies, read_drive_demand
+from fourbar.show.driving import read_drive_demand
+from fourbar.show.duty import compute_energies
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     BAR_DASHES,

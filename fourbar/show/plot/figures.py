@@ -12,6 +12,7 @@ from fourbar.linkage import require
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene
 from fourbar.show.block import explain_static
+from fourbar.show.motion_curves import describe_motion
 from fourbar.show.plot import curves, derived, freebody, linkage, studies
 from fourbar.show.plot.curves import draw_transmission
 from fourbar.show.plot.labels import Labels
@@ -30,7 +31,6 @@ from fourbar.show.plot.view import (
     make_view,
     set_branch,
 )
-from fourbar.show.summary import locate_between
 from fourbar.solution import SI, Conversion, require_units
 
 if TYPE_CHECKING:
@@ -269,13 +269,13 @@ def _look_between(shown: View) -> None:
 
     Jumps are drawn where they are, peaks to their height.
     """
-    between = locate_between(shown.scene, shown.sweep)
-    shown.sweep = between.solution
-    if between.reversals:
+    motion = describe_motion(shown.sweep)
+    shown.sweep = motion.solve_with_peaks()
+    if motion.reversals:
         axis = shown.axis
         places = ", ".join(
             f"{axis.factor * place:.4g}{axis.unit} ({pin})"
-            for place, pin in between.reversals
+            for place, pin in motion.reversals
         )
         shown.notes.append(
             f"Dry friction reverses, and the pin forces jump, at {axis.symbol} ="

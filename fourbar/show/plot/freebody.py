@@ -14,6 +14,7 @@ from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
 from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, MOVING_BARS, PIN_FORCE, PINS
 from fourbar.scene import Scene
+from fourbar.show.motion_curves import describe_motion
 from fourbar.show.plot.curves import note
 from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.linkage import draw_mass_centre, draw_plate, pin_name
@@ -30,7 +31,7 @@ from fourbar.show.plot.style import (
 )
 from fourbar.show.plot.symbols import place_of, split_complex
 from fourbar.show.plot.view import View, where_in_words
-from fourbar.show.summary import locate_bending, locate_between
+from fourbar.show.summary import locate_bending
 from fourbar.show.units import choose_unit
 from fourbar.solution import Conversion
 from fourbar.studies.internal_forces import internal_forces
@@ -262,9 +263,9 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
     The position is that of the bar's largest bending moment.
     """
     panels = figure.subplots(3, 3, sharex="col")
-    bending = locate_bending(view.scene, locate_between(view.scene, view.sweep))
-    if not bending:
+    if view.sweep.F12 is None or not np.isfinite(view.sweep.F12).any():
         raise InputError("figure", "bars", f"needs forces, and {WITHOUT_VALUES}")
+    bending = locate_bending(describe_motion(view.sweep))
     for column, (bar, worst) in zip(panels.T, bending.items(), strict=True):
         x = np.linspace(0.0, view.scene.linkage.bar(bar).length, STATIONS_DRAWN)
         forces = internal_forces(view.scene, worst.solution, bar, x)
@@ -287,13 +288,16 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
         first_pin = pin_name(FIRST_PIN[bar]).strip("$")
         column[0].set_title(f"Bar {bar} ({BAR_NAMES[bar]})\n{place}")
         column[2].set_xlabel(f"$x$ from ${first_pin}$ ({unit})")
-        largest = write_labelled_quantity(worst.peak.value, "N m", view.units)
+        largest = "grows without bound; drawn is the largest of these positions,"
+        if worst.peak is not None:
+            moment = write_labelled_quantity(worst.peak.value, "N m", view.units)
+            largest = f"= {moment}"
         foot = write_labelled_quantity(worst.x, "m", view.units)
         if forces.uniform:
             spread = "weight and inertia as a uniform bar's"
         else:
             spread = "weight and inertia at G"
-        note(view, f"Bar {bar}: largest |M| = {largest} at x = {foot}, {spread}.")
+        note(view, f"Bar {bar}: largest |M| {largest} at x = {foot}, {spread}.")
     note(
         view,
         "x runs along the line between the pins, y to its left; N > 0 is tension.",

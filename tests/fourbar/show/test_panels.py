@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fourbar.quantities import Array
-from fourbar.show.panels import Panels, fit_panels
+from fourbar.show.panels import Panels, Wanted, fit_panels
 
 EDGES = np.linspace(0.0, 2.0, 6)
 SETTLED = 1e-9
@@ -17,7 +17,7 @@ def fit(curve: Array | object, edges: Array = EDGES, rounding: float = 0.0) -> P
     def compute(places: Array) -> dict[str, Array]:
         return {"curve": curve(places)}  # type: ignore[operator]
 
-    return fit_panels(compute, edges, {"curve": rounding})
+    return fit_panels(compute, edges, {"curve": Wanted(rounding, integrated=True)})
 
 
 def test_the_mean_square_of_a_smooth_curve_is_that_of_its_antiderivative() -> None:
@@ -31,14 +31,14 @@ def test_the_mean_square_of_a_smooth_curve_is_that_of_its_antiderivative() -> No
         return float(slow + fast)
 
     right = 0.5 * (primitive(2.0) - primitive(0.0))
-    assert panels.find_mean_square("curve") == pytest.approx(right, rel=SETTLED)
+    assert panels.find_rms("curve") ** 2 == pytest.approx(right, rel=SETTLED)
 
 
 def test_a_vector_has_the_sum_of_its_components() -> None:
     panels = fit(lambda x: np.stack((3.0 * np.cos(x), 4.0 * np.sin(x)), axis=-1))
     # 9 cos^2 + 16 sin^2 = 12.5 - 3.5 cos 2x
     right = 12.5 - 3.5 * math.sin(4.0) / 4.0
-    assert panels.find_mean_square("curve") == pytest.approx(right, rel=SETTLED)
+    assert panels.find_rms("curve") ** 2 == pytest.approx(right, rel=SETTLED)
 
 
 @pytest.mark.parametrize("place", (0.4, 1.0 / 3.0, 1.999))
@@ -73,25 +73,80 @@ def draw_noise(places: Array) -> Array:
     return np.random.default_rng(len(places)).normal(size=len(places))
 
 
-@pytest.mark.parametrize(
-    "curve",
-    [
-        lambda x: 1.0 / (x - math.sqrt(0.5)),
-        lambda x: np.where(x < 0.7, np.nan, 1.0),
-        draw_noise,
-    ],
-    ids=("pole", "gap", "noise"),
-)
-def test_what_has_no_integral_is_left_out(curve: object) -> None:
-    def compute(places: Array) -> dict[str, Array]:
-        return {"curve": curve(places), "other": np.exp(places)}  # type: ignore[operator]
+POLE = math.sqrt(0.5)
 
-    panels = fit_panels(compute, EDGES, {"curve": 0.0, "other": 0.0})
-    assert panels.values.keys() == {"other"}
+
+@pytest.mark.parametrize("power", (1.0, 2.0, 0.5))
+def test_what_grows_without_bound_is_said_to_and_where(power: float) -> None:
+    def compute(places: Array) -> dict[str, Array]:
+        curve = np.abs(places - POLE) ** -power
+        return {"curve": curve, "other": np.exp(places)}
+
+    wanted = dict.fromkeys(("curve", "other"), Wanted(integrated=True))
+    panels = fit_panels(compute, EDGES, wanted)
+    assert panels.growing == {"curve"} and not panels.has_value("curve")
+    assert panels.list_poles("curve") == [pytest.approx(POLE, abs=1e-7)]
     right = math.exp(2.0) - 1.0
     assert panels.integrate("other") == pytest.approx(right, rel=SETTLED)
 
 
+@pytest.mark.parametrize(
+    ("curve", "peak", "place"),
+    [
+        (lambda x: np.where(x < 0.7, np.nan, -x), 2.0, 2.0),
+        (lambda x: np.where(x < 0.7, 1.0 + x, 0.3), 1.7, 0.7),
+        (lambda x: 2.0 - np.abs(x - POLE), 2.0, POLE),
+        (lambda x: 3.0 + np.sqrt(2.0 - x), 3.0 + math.sqrt(2.0), 0.0),
+        (lambda x: 1.0 / (np.square(x - POLE) + 1e-10), 1e10, POLE),
+        (lambda x: np.sin(7.0 * x), 1.0, 0.5 * math.pi / 7.0),
+        (lambda x: 0.0 * x - 4.0, 4.0, 0.0),
+    ],
+    ids=("gap", "jump", "corner", "root", "spike", "waves", "constant"),
+)
+def test_the_largest_size_is_the_first_of_equal_ones(
+    curve: object,
+    peak: float,
+    place: float,
+) -> None:
+    """Of four equal waves the first is named, of a constant its beginning."""
+    panels = fit(curve)
+    assert not panels.growing
+    found = panels.find_peak("curve")
+    assert abs(found.value) == pytest.approx(peak, rel=1e-7)
+    assert found.place == pytest.approx(place, abs=2e-6)
+
+
+def test_both_ends_of_a_range_are_found_and_the_way_back_begins_at_its_end() -> None:
+    forwards, backwards = (fit(np.sin, edges) for edges in (EDGES, EDGES[::-1]))
+    for panels in (forwards, backwards):
+        assert panels.find_peak("curve", 1).place == pytest.approx(
+            0.5 * math.pi, abs=1e-5
+        )
+        assert panels.find_peak("curve", -1).value == pytest.approx(0.0, abs=1e-8)
+    level = [fit(lambda x: 1.0 + 0.0 * x, edges) for edges in (EDGES, EDGES[::-1])]
+    places = [panels.find_peak("curve").place for panels in level]
+    assert places == pytest.approx([0.0, 2.0], abs=1e-8)
+
+
+def test_zeros_are_changes_of_sign_on_and_off_the_ends_of_panels() -> None:
+    right = [0.3, 0.8, 1.7]
+
+    def curve(x: Array) -> Array:
+        return np.prod([x - zero for zero in right], axis=0)
+
+    def touch(x: Array) -> Array:
+        return np.square(x - 0.8) * (x - 1.1)
+
+    for edges in (EDGES, np.array([0.0, 0.31, 2.0])):
+        for of, zeros in ((curve, right), (touch, [1.1])):
+
+            def compute(x: Array, of: object = of) -> dict[str, Array]:
+                return {"curve": of(x)}  # type: ignore[operator]
+
+            panels = fit_panels(compute, edges, {"curve": Wanted(zeros=True)})
+            assert panels.find_zeros("curve") == pytest.approx(zeros, abs=1e-9)
+
+
 def test_rounding_need_not_settle() -> None:
     panels = fit(lambda x: 1e-13 * draw_noise(x), rounding=1e-12)
-    assert math.sqrt(panels.find_mean_square("curve")) < 1e-12
+    assert panels.find_rms("curve") < 1e-12

@@ -14,9 +14,12 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.scene import Command
+from fourbar.files import loads
+from fourbar.quantities import PIN_FORCES
+from fourbar.scene import Command, command_at
 from fourbar.scene.motion import Law
-from fourbar.show.summary import list_sizes, locate_between
+from fourbar.show.motion_curves import MotionCurves, describe_motion
+from fourbar.show.summary import summarize
 from tests.support.scenes import CYLINDER, crank_rocker, thesis
 
 LOCATED = 1e-7
@@ -26,6 +29,24 @@ with room.
 PEAK = 1e-6
 """Relative, of a largest value against that of steps of 0.01 degrees: (0.01 deg)^2
 times its curvature.
+"""
+SIX_DIGITS = 5e-6
+"""Relative, half a unit of the last of six digits."""
+EXACT = 1e-12
+"""Relative, of one position that is solved twice."""
+BARS = """
+[lengths]
+ground = "300 mm"
+input = "100 mm"
+coupler = "250 mm"
+output = "220 mm"
+[bars.input]
+mass = "0.2 kg"
+[bars.coupler]
+mass = "0.5 kg"
+[bars.output]
+mass = "0.4 kg"
+inertia = "20 kg cm^2"
 """
 WIPER = fourbar.load(Path(__file__).parents[3] / "models" / "gallery" / "wiper.toml")
 BUCKET = """
@@ -53,6 +74,18 @@ gravity = ["1 g_0", "-90 deg"]
 PIN = '{ coefficient = 0.15, radius = "2 in" }'
 FRICTION = f"pin_friction = {{ O2 = {PIN}, A = {PIN}, B = {PIN} }}\n"
 FINE = fourbar.Sweep(0.0, math.tau, 36000)
+
+
+def list_sizes(solution: fourbar.Solution) -> dict[str, np.ndarray]:
+    """Sizes of drive, power and pin forces at the positions."""
+    drive = "torque" if solution.drive is None else "drive_force"
+    sizes = {name: np.abs(getattr(solution, name)) for name in (drive, "power")}
+    forces = {name: np.hypot(*getattr(solution, name).T) for name in PIN_FORCES}
+    return sizes | forces
+
+
+def locate_between(_: fourbar.Scene, solution: fourbar.Solution) -> MotionCurves:
+    return describe_motion(solution)
 
 
 def swept(scene: fourbar.Scene, steps: int) -> fourbar.Scene:
@@ -85,7 +118,7 @@ def test_dry_friction_reverses_at_the_dead_centres_whatever_the_steps(
         ).max()
         < LOCATED
     )
-    located = list_sizes(between.solution)
+    located = list_sizes(between.solve_with_peaks())
     for name in (
         "F12",
         "F32",
@@ -114,14 +147,90 @@ def _beside(scene: fourbar.Scene, theta_2: float, step: int) -> dict[str, float]
 def test_the_largest_of_coarse_steps_is_that_of_fine_ones() -> None:
     coarse = swept(crank_rocker(), 24)
     between = locate_between(coarse, fourbar.solve(coarse))
-    assert not between.growing and not between.reversals
+    assert not between.panels.growing and not between.reversals
     fine = list_sizes(
         fourbar.solve(replace(coarse, motion=coarse.motion.replace(angle=FINE)))
     )
-    for name, size in list_sizes(between.solution).items():
+    for name, size in list_sizes(between.solve_with_peaks()).items():
         assert size.max() == pytest.approx(fine[name].max(), rel=PEAK), name
-    of_coarse = np.isin(between.solution.theta_2, fourbar.solve(coarse).theta_2)
-    assert of_coarse.sum() == 25 and np.all(np.diff(between.solution.theta_2) > 0.0)
+        peak = between.panels.find_peak(name)
+        assert abs(peak.value) == pytest.approx(fine[name].max(), rel=PEAK), name
+    of_coarse = np.isin(
+        between.solve_with_peaks().theta_2, fourbar.solve(coarse).theta_2
+    )
+    assert of_coarse.sum() == 25 and np.all(
+        np.diff(between.solve_with_peaks().theta_2) > 0.0
+    )
+
+
+def read_cam(fall: str, steps: int) -> fourbar.Scene:
+    return loads(
+        f"""{BARS}
+        [motion.law]
+        kind = "cycloidal"
+        theta_2 = "20 deg"
+        rise = ["60 deg", "0.5 s"]
+        dwell = "0.2 s"
+        fall = "{fall}"
+        rest = "0.1 s"
+        steps = {steps}
+        """
+    )
+
+
+@pytest.mark.parametrize(
+    ("fall", "steps", "torque", "time", "power"),
+    [
+        ("5 ms", 360, -1299.52, 0.701065, 281811.0),
+        ("5 ms", 12, -1299.52, 0.701065, 281811.0),
+        ("100 ms", 22, -3.24880, 0.721295, 35.2264),
+        ("100 ms", 28, -3.24880, 0.721295, 35.2264),
+    ],
+)
+def test_the_peak_of_a_short_fall_does_not_depend_on_the_steps(
+    fall: str,
+    steps: int,
+    torque: float,
+    time: float,
+    power: float,
+) -> None:
+    """Right are the free bodies at 20 000 instants of each piece of the law."""
+    scene = read_cam(fall, steps)
+    facts = summarize(scene, fourbar.solve(scene))
+    assert facts.peak is not None and facts.duty is not None
+    assert facts.peak.value == pytest.approx(torque, rel=SIX_DIGITS)
+    assert facts.peak.place == pytest.approx(time, rel=SIX_DIGITS)
+    assert facts.duty.peak_power == pytest.approx(power, rel=SIX_DIGITS)
+
+
+@pytest.mark.parametrize("steps", (7, 36, 361))
+def test_a_corner_of_a_load_between_two_positions_is_a_peak(steps: int) -> None:
+    """The load is fifty times larger at 101.3 degrees than at any position."""
+    scene = loads(
+        f"""{BARS}
+        [motion]
+        theta_2 = {{ from = "5 deg", to = "365 deg", steps = {steps} }}
+        omega_2 = "10 rad/s"
+        alpha_2 = "5 rad/s^2"
+        [[loads]]
+        bar = 2
+        moment = "-0.05 N m"
+        force = ["-1 N", "17 deg"]
+        arm = ["2 cm", "-40 deg"]
+        [loads.table]
+        theta_2 = ["0 deg", "98.3 deg", "101.3 deg", "104.3 deg", "360 deg"]
+        factor = [0.5, 0.5, 50.0, 0.5, 0.5]
+        """
+    )
+    corner = math.radians(101.3)
+    facts = summarize(scene, fourbar.solve(scene))
+    at_corner = fourbar.solve(scene, at=command_at(scene, np.array([corner])))
+    assert facts.peak is not None and facts.pins["O2"].peak is not None
+    assert at_corner.torque is not None and at_corner.F12 is not None
+    assert facts.peak.place == pytest.approx(corner, rel=SIX_DIGITS)
+    assert facts.peak.value == pytest.approx(at_corner.torque[0], rel=EXACT)
+    load = float(np.hypot(*at_corner.F12[0]))
+    assert facts.pins["O2"].peak.value == pytest.approx(load, rel=EXACT)
 
 
 def test_towards_a_limit_within_the_last_step_it_grows_too() -> None:
@@ -139,17 +248,15 @@ def test_towards_a_limit_within_the_last_step_it_grows_too() -> None:
         assert 0 < solution.assembled.sum() < steps + 1
         assert {"speed", "power", "F12", "F32", "F43"} <= locate_between(
             swept, solution
-        ).growing
+        ).panels.growing
 
 
 def test_towards_a_pole_no_largest_value_is_made_up() -> None:
     scene = swept(thesis(), 360)
     solution = fourbar.solve(scene)
     between = locate_between(scene, solution)
-    assert "torque" in between.growing
-    assert np.nanmax(np.abs(between.solution.torque)) == np.nanmax(
-        np.abs(solution.torque)
-    )
+    assert "torque" in between.panels.growing
+    assert summarize(scene, solution).peak is None
 
 
 def test_a_motion_law_is_looked_at_between_its_instants_and_listed_angles_are_not() -> (
@@ -167,14 +274,15 @@ def test_a_motion_law_is_looked_at_between_its_instants_and_listed_angles_are_no
         )
     )
     assert [pin for _, pin in between.reversals] == ["O2"]
-    assert np.max(list_sizes(between.solution)["power"]) == pytest.approx(
+    assert np.max(list_sizes(between.solve_with_peaks())["power"]) == pytest.approx(
         fine["power"].max(),
         rel=PEAK,
     )
-    assert np.all(np.diff(between.solution.time) > 0.0)
+    assert np.all(np.diff(between.solve_with_peaks().time) > 0.0)
     listed = crank_rocker(motion=fourbar.Motion(np.linspace(0.0, 6.0, 9), 10.0))
     assert (
-        locate_between(listed, solution := fourbar.solve(listed)).solution is solution
+        describe_motion(solution := fourbar.solve(listed)).solve_with_peaks()
+        is solution
     )
 
 
@@ -193,12 +301,12 @@ def test_the_largest_force_of_a_stroke_is_that_of_fine_steps() -> None:
 
     between = locate_between(of(20), fourbar.solve(of(20)))
     assert (
-        between.solution.at.stroke is not None
-        and (np.diff(between.solution.at.stroke) < 0.0).all()
+        between.solve_with_peaks().at.stroke is not None
+        and (np.diff(between.solve_with_peaks().at.stroke) < 0.0).all()
     )
     fine = fourbar.solve(of(20000))
     for name, size in list_sizes(fine).items():
-        assert list_sizes(between.solution)[name].max() == pytest.approx(
+        assert list_sizes(between.solve_with_peaks())[name].max() == pytest.approx(
             size.max(),
             rel=PEAK,
         ), name

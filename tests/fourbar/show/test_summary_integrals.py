@@ -13,7 +13,6 @@ import pytest
 import fourbar
 from fourbar.scene.motion import Rise
 from fourbar.show.block import write_block, write_motor
-from fourbar.show.summary import summarize
 
 MASS, CRANK, G = 2.0, 0.1, 9.81
 LINKAGE = fourbar.FourBar(
@@ -145,9 +144,7 @@ def test_the_printed_energies_of_a_law_do_not_depend_on_its_steps(steps: int) ->
     assert "sums over" not in text
 
 
-def test_sums_over_positions_are_said_to_be_sums_with_what_half_of_them_change() -> (
-    None
-):
+def test_what_has_a_pole_has_no_mean_and_its_power_has_one() -> None:
     """Beside a pole no integral of the torque's square exists."""
     turn = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 36), 10.0)
     bars = fourbar.Bar(0.1), fourbar.Bar(0.25, 1.0), fourbar.Bar(0.22)
@@ -157,35 +154,31 @@ def test_sums_over_positions_are_said_to_be_sums_with_what_half_of_them_change()
         drive_bar=4,
         effects=(fourbar.Gravity(G),),
     )
-    solution = fourbar.solve(scene)
-    facts = summarize(scene, solution)
-    assert facts.sums is not None and "torque" in facts.sums.names
+    duty = fourbar.motor_duty(fourbar.solve(scene))
+    of_input = fourbar.motor_duty(fourbar.solve(replace(scene, drive_bar=2)))
+    assert duty is not None and of_input is not None
+    assert duty.rms_torque is None and duty.peak_torque is None
     # the power is that of the input, which has no pole
-    assert "power" not in facts.sums.names
-    torque = solution.torque[:-1]
-    change = 1.0 - math.sqrt(np.square(torque[::2]).mean() / np.square(torque).mean())
-    assert facts.sums.change >= abs(change)
-    text = " ".join(line.strip() for line in write_block(scene, solution))
-    assert "RMS of torque" in text
-    assert "sums over these 37 positions, which change by up to" in text
-    of_input = replace(scene, drive_bar=2)
-    assert "sums over" not in " ".join(write_block(of_input, fourbar.solve(of_input)))
+    for name in ("peak_power", "rms_power", "energy_in", "energy_out"):
+        right = getattr(of_input, name)
+        assert getattr(duty, name) == pytest.approx(right, rel=1e-7), name
+    text = " ".join(write_block(scene, fourbar.solve(scene)))
+    assert "motor: none is enough, as the torque grows without bound" in text
 
 
-@pytest.mark.slow
-def test_the_mean_loads_of_a_released_motion_are_sums_over_its_instants() -> None:
-    """With many instants half of them change no digit that is shown."""
-    texts = []
-    for steps in (20, 20_000):
-        free = fourbar.Free(0.7, steps)
-        scene = fourbar.Scene(
-            LINKAGE,
-            fourbar.Motion(0.3, 0.0, free=free),
-            effects=(fourbar.Gravity(G),),
-        )
-        texts.append(" ".join(write_block(scene, fourbar.solve(scene))))
-    assert "RMS of O2: sums over these 21 positions, which change by up to" in texts[0]
-    assert "sums over" not in texts[1]
+def test_an_accelerated_sweep_has_no_means_and_no_energies() -> None:
+    """Its positions are passed at no one speed."""
+    turn = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 36), 10.0, 5.0)
+    scene = fourbar.Scene(LINKAGE, turn, effects=(fourbar.Gravity(G),))
+    solution = fourbar.solve(scene)
+    duty = fourbar.motor_duty(solution)
+    assert duty is not None and duty.peak_torque is not None
+    for name in ("rms_torque", "rms_power", "energy_in", "energy_out", "energy_swing"):
+        assert getattr(duty, name) is None, name
+    assert fourbar.bearing_load(solution, "A").rms is None
+    text = " ".join(" ".join(write_block(scene, solution)).split())
+    assert "positions are passed at no one speed: no RMS values, no energies" in text
+    assert "RMS " not in text.replace("no RMS values", "")
 
 
 def test_a_list_of_positions_has_its_own_means() -> None:

@@ -12,7 +12,8 @@ import pytest
 import fourbar
 from fourbar.effects import Place, PointDrive
 from fourbar.show.block import write_block, write_motor
-from fourbar.show.summary import Facts, locate_between, summarize
+from fourbar.show.motion_curves import describe_motion
+from fourbar.show.summary import Facts, summarize
 from tests.support.scenes import CYLINDER, crank_rocker
 
 LEVER = 0.09
@@ -50,24 +51,29 @@ def write(scene: fourbar.Scene, **options: object) -> str:
     return " ".join(" ".join(lines).split())
 
 
-@pytest.mark.parametrize("steps", (20, 37))
-def test_beside_a_pole_of_a_cylinder_force_and_bore_are_of_the_positions(
-    steps: int,
-) -> None:
+@pytest.mark.parametrize("steps", (20, 37, 72, 360))
+def test_a_force_with_a_pole_is_no_number_anywhere(steps: int) -> None:
+    """A cylinder that passes its dead points, where it has no lever."""
     motion = fourbar.Motion(fourbar.Sweep(0.1, 0.1 + math.tau, steps), 10.0)
     scene = crank_rocker(motion=motion, drive=CYLINDER)
-    solution = fourbar.solve(scene)
-    push, pull = solution.drive_force.max(), -solution.drive_force.min()
-    assert find_facts(scene).peak is not None
+    facts = find_facts(scene)
+    assert facts.peak is None and facts.pins["O2"].peak is None
     text = write(scene, pressure=1e6)
-    signed = push if push > pull else -pull
-    assert f"force peak {signed:.4g} N at" in text
-    assert "deg (of these positions), RMS" in text
-    bores = [1e3 * math.sqrt(4.0 * force / (math.pi * 1e6)) for force in (push, pull)]
-    assert f"bore at least {bores[0]:.4g} mm to push {push:.4g} N" in text
-    assert (
-        f"; {bores[1]:.4g} mm, and the rod's area besides, to pull {pull:.4g} N" in text
-    )
+    dead = [
+        math.degrees(pole) for pole in facts.motion.panels.list_poles("drive_force")
+    ]
+    places = " deg and ".join(f"{angle:.4g}" for angle in dead)
+    assert len(dead) == 2
+    assert f"force grows without bound at theta_2 = {places} deg" in text
+    assert "bore none is enough, as the force grows without bound" in text
+    entry = write_motor(scene, facts.solution, {})
+    assert entry is not None and entry["pins"]["O2"]["peak"] is None
+    for key in ("peak_force", "rms_force"):
+        assert entry[key] is None
+    speeds = fourbar.solve(
+        scene, at=describe_motion(facts.solution).solve_at(np.radians(dead)).at
+    ).stroke_speed
+    assert np.abs(speeds).max() < 1e-6
 
 
 def test_speed_and_power_beside_a_pole_of_the_force_are_located() -> None:
@@ -102,7 +108,7 @@ def test_pin_forces_at_a_change_point_grow_and_the_torque_has_its_largest_value(
     """
     scene = sweep((0.3, 0.1, 0.3, 0.1), start, start + 360.0, steps)
     facts = find_facts(scene)
-    assert facts.between.growing == {"F12", "F32", "F43", "F14"}
+    assert facts.motion.panels.growing == {"F12", "F32", "F43", "F14"}
     assert facts.duty is not None and facts.peak is not None
     weight = 0.4 * 9.81 * 0.1
     assert facts.duty.peak_torque == pytest.approx(weight, rel=PEAK)
@@ -121,8 +127,8 @@ def test_a_search_that_hits_a_pole_still_finds_that_it_grows() -> None:
         fourbar.Motion(theta_4=angle, omega_4=0.0),
         effects=(fourbar.Gravity(),),
     )
-    between = locate_between(scene, fourbar.solve(scene))
-    assert between.growing == {"F12", "F32", "F43", "F14"}
+    between = describe_motion(fourbar.solve(scene))
+    assert between.panels.growing == {"F12", "F32", "F43", "F14"}
 
 
 @pytest.mark.parametrize(
@@ -192,7 +198,7 @@ def test_a_pole_between_two_positions_that_rise_past_it_is_found(speed: float) -
         )
         size = np.abs(np.asarray(fourbar.solve(scene).torque))
         hidden += int(size[0] < size[1] < size[2] or size[0] > size[1] > size[2])
-        assert "torque" in find_facts(scene).between.growing
+        assert "torque" in find_facts(scene).motion.panels.growing
     assert hidden > 3
 
 
@@ -216,8 +222,8 @@ def test_a_pole_just_beyond_the_last_position_is_none_between(
     drive = PointDrive(pad, 0.0)
     scene = replace(scene, motion=motion, loads=loads, drive=drive, drive_bar=None)
     facts = find_facts(scene)
-    assert facts.bending[4].grows == grows
-    assert ("drive_force" in facts.between.growing) == grows
+    assert (facts.bending[4].peak is None) == grows
+    assert ("drive_force" in facts.motion.panels.growing) == grows
     said = "without bound" in write(scene)
     assert said == grows
 
@@ -240,8 +246,8 @@ def test_a_jump_where_pin_friction_reverses_is_no_pole(
         loads=(fourbar.Load(4, moment=-20.0),),
         effects=(friction,),
     )
-    between = locate_between(scene, fourbar.solve(scene))
-    assert not between.growing
+    between = describe_motion(fourbar.solve(scene))
+    assert not between.panels.growing
     at_B = [
         math.remainder(place, math.tau)
         for place, pin in between.reversals
@@ -255,5 +261,5 @@ def test_a_jump_where_pin_friction_reverses_is_no_pole(
     everywhere = fourbar.solve(replace(scene, motion=fourbar.Motion(fine, math.tau)))
     for name in ("F12", "F14"):
         most = np.hypot(*getattr(everywhere, name).T).max()
-        located = np.hypot(*getattr(between.solution, name).T).max()
+        located = np.hypot(*getattr(between.solve_with_peaks(), name).T).max()
         assert located == pytest.approx(most, rel=1e-5)

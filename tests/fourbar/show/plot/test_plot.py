@@ -35,6 +35,7 @@ from fourbar.formulas.torque import inertia
 from fourbar.scene.motion import Law
 from fourbar.show import plot
 from fourbar.show.duty import compute_energies
+from fourbar.show.motion_curves import describe_motion
 from fourbar.show.plot.curves import (
     break_at_poles,
     choose_limit,
@@ -48,7 +49,6 @@ from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.linkage import draw_mechanism
 from fourbar.show.plot.style import INK, shorten_text, write_number
 from fourbar.show.plot.view import CLEAR, choose_common_position, make_view, set_branch
-from fourbar.show.summary import locate_between
 from fourbar.show.units import choose_unit
 from tests.support.scenes import crank_rocker, thesis
 
@@ -199,7 +199,7 @@ def test_positions_at_rest_have_no_panel_of_zeros(figure: str, panels: int) -> N
 
 def solved(scene: fourbar.Scene) -> fourbar.Solution:
     """At the positions of a scene, and those that a figure shows between them."""
-    return locate_between(scene, fourbar.solve(scene)).solution
+    return describe_motion(fourbar.solve(scene)).solve_with_peaks()
 
 
 @pytest.mark.slow

@@ -20,6 +20,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar.show import animate
 from fourbar.show.animate import collect_page_data
+from fourbar.show.motion_curves import describe_motion
 from fourbar.show.plot import symbols
 from fourbar.show.plot.figures import draw_figure
 from fourbar.show.plot.film import _make_stage
@@ -28,7 +29,6 @@ from fourbar.show.plot.linkage import choose_drawing_scale, draw_mechanism
 from fourbar.show.plot.style import apply_style
 from fourbar.show.plot.symbols import list_acting
 from fourbar.show.plot.view import make_view
-from fourbar.show.summary import locate_between
 from tests.fourbar.show.plot.test_plot import clashes, composed
 from tests.fourbar.show.test_animate import embedded
 from tests.support.scenes import crank_rocker
@@ -174,7 +174,7 @@ def test_the_page_is_given_the_same_symbols(everything: Scene) -> None:
 def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
     """Path, speed and mark in the plot, place and columns in the page."""
     scene = crank_rocker(points=(fourbar.Point("P", 3, (0.15, 0.7)),))
-    solution = locate_between(scene, fourbar.solve(scene)).solution
+    solution = describe_motion(fourbar.solve(scene)).solve_with_peaks()
     panels = (
         draw_figure(scene, "points", units=fourbar.units("m m/s m/s^2"))
         .figure.subfigs[0]

@@ -1,0 +1,92 @@
+"""What drives a linkage, and whether its motion closes."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fourbar.formulas.path import count_turns
+from fourbar.linkage import BAR_NAMES
+from fourbar.quantities import COUPLE, LINE, UNITS, Array, DriveNames
+from fourbar.scene import Scene
+from fourbar.solution import Solution
+
+_SAME_RATE = 1e-9
+"""Difference of two rates of a spline that is round-off, over its largest value. The
+rounding is that of its coefficients.
+"""
+
+
+class Driving(NamedTuple):
+    """Torque or force of the drive, as it is shown."""
+
+    name: str
+    symbol: str
+    unit: str
+    values: Array | None
+    """(n,); None where only positions are known."""
+    error: Array | None
+    keys: DriveNames
+    """Names of its torque or force among the quantities."""
+    speed_key: str
+    """Name of the speed of the driven bar, or of the stroke."""
+
+
+def read_drive_demand(solution: Solution) -> Driving:
+    """Return torque or force of the drive, with its error bar."""
+    names = COUPLE
+    symbol = f"T{solution.drive_bar}"
+    word = "torque"
+    speed = f"omega_{solution.drive_bar}"
+    if solution.drive is not None:
+        names = LINE
+        symbol = "F"
+        word = "drive force"
+        speed = "stroke_speed"
+    values = getattr(solution, names.value)
+    error = getattr(solution, names.error)
+    return Driving(word, symbol, UNITS[names.value], values, error, names, speed)
+
+
+def describe_drive(scene: Scene) -> str:
+    """Say what is driven."""
+    if scene.drive is not None:
+        start, *others = (place.bar for _, place in scene.drive.ends)
+        if not others:
+            return f"at a point of bar {start} ({BAR_NAMES[start]})"
+        end = others[0]
+        return (
+            f"along a line from bar {start} ({BAR_NAMES[start]}) to bar {end}"
+            f" ({BAR_NAMES[end]})"
+        )
+    return f"bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
+
+
+def is_once_round(solution: Solution) -> Any:
+    """Return True if a motion covers whole turns; for a study (m,).
+
+    Its last position then repeats the first. An assembly with a single change point
+    repeats after two turns. Speed and acceleration must repeat too: a motion law may
+    end at another speed than it begins with.
+    """
+    angle = solution.at.angle
+    bar = solution.at.bar
+    if angle.shape[-1] == 1:
+        return np.zeros(angle.shape[:-1], dtype=bool)
+    assert solution.lengths is not None
+    period = count_turns(solution.lengths, bar)
+    if period.ndim > 1:  # of a study, a column
+        period = period[:, 0]
+    covered = np.abs(angle[..., -1] - angle[..., 0])
+    turns = covered / (2.0 * np.pi * period)
+    is_whole = np.isclose(turns, np.round(turns), rtol=1e-12, atol=0.0)
+    once_round = (turns > 0.5) & is_whole
+    for rate in (solution.at.speed, solution.at.acceleration):
+        if rate is not None and np.shape(rate)[-1:] == angle.shape[-1:]:
+            once_round = once_round & _repeats(np.asarray(rate))
+    return once_round
+
+
+def _repeats(rate: Array) -> Any:
+    """Return True if a speed or an acceleration ends as it begins."""
+    gap = np.abs(rate[..., -1] - rate[..., 0])
+    return gap <= _SAME_RATE * np.max(np.abs(rate), axis=-1)

@@ -1,0 +1,464 @@
+"""Curves of a scene over its whole motion: what peaks, ranges and means are taken from.
+
+A sweep or a motion law is described by polynomials on panels, whatever its steps. The
+panels end where effects say that forces jump or bend, and where one part of a law
+follows on another. Listed positions and the instants of a released motion are all there
+is: nothing is searched between them.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fourbar.evaluation.case import compute_shown_state
+from fourbar.formulas.mobility import TURN
+from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
+from fourbar.quantities import PIN_FORCES, Array
+from fourbar.scene import Scene, command_at
+from fourbar.show.driving import is_once_round, read_drive_demand
+from fourbar.show.panels import SHALLOW, Panels, Wanted, fit_panels
+from fourbar.show.units import SHOWN_AS_ZERO, drop_rounding
+from fourbar.solution import Solution
+from fourbar.solving import solve
+from fourbar.studies.internal_forces import Bending, largest_bending
+
+_PANELS_OF_A_TURN, _MOST_FIRST_PANELS = 48, 960
+"""Panels that a motion is cut to before they are halved, for each turn of what is
+commanded.
+"""
+_SAME_EDGE = 1e-9
+"""Part of the motion within which two ends of panels are one."""
+_ANGLES = ("theta_2", "theta_3", "theta_4", "sin_mu")
+_NO_BENDING = 1e-13
+"""Bending moment that is round-off, over the pin forces times the longest bar."""
+_AS_WIDE = 1e-6
+"""Difference below which ranges of angles are equally wide, rad. An end in its last
+digits leaves some 1e-8.
+"""
+
+
+@dataclass
+class MotionCurves:
+    """Curves of a solved scene over its motion."""
+
+    scene: Scene
+    solution: Solution
+    """Solution from which the motion is known."""
+    positions: Panels
+    """Angles, "sin_mu" and "stroke", by name."""
+    panels: Panels
+    """Torque or force of the drive, "power", its "speed", pin forces and largest
+    bending moments; where nothing acts, speeds and accelerations of the bars.
+    """
+    reversals: list[tuple[float, str]]
+    """Place, and the pin at which dry friction reverses, in the order of the motion.
+    Pin forces jump there; of a motion law the place is its angle.
+    """
+    breaks: Array
+    """Places at which forces jump or bend."""
+
+    def solve_at(self, places: Array, stage: str = "force") -> Solution:
+        """Solve at commanded angles or strokes, or at the times of a motion law."""
+        return solve(self.scene, stage, at=command_at(self.scene, places))
+
+    def solve_with_peaks(self) -> Solution:
+        """Solve at the positions of the sweep and at what its steps pass over.
+
+        These are the largest of each magnitude, and both sides of each jump.
+        """
+        panels = self.panels
+        if not panels.located or self.solution.F12 is None:
+            return self.solution
+        drive = read_drive_demand(self.solution)
+        names = [drive.keys.value, "power", "speed", *PIN_FORCES]
+        peaks = [
+            panels.find_peak(name).place for name in names if panels.has_value(name)
+        ]
+        away = _SAME_EDGE * panels.length
+        found = [peaks, self.breaks - away, self.breaks + away]
+        places = np.unique(np.concatenate([self.solution.at.places, *found]))
+        ends = np.sort(self.solution.at.places[[0, -1]])
+        places = places[(places >= ends[0]) & (places <= ends[1])]
+        if panels.start[0] > panels.stop[-1]:
+            places = places[::-1]
+        return self.solve_at(places)
+
+    @property
+    def is_steady(self) -> bool:
+        """Return False for a sweep that passes its positions at no one speed."""
+        motion = self.scene.motion
+        is_over_time = motion.law is not None or motion.free is not None
+        return is_over_time or not self.panels.located or motion.acceleration == 0.0
+
+    @property
+    def places_of_second(self) -> float | None:
+        """What is passed in a second, rad, m or s; None at rest or at no one speed."""
+        motion = self.scene.motion
+        if motion.law is not None:
+            return 1.0
+        if not self.is_steady or motion.has_rate_of_each:
+            return None
+        return abs(float(motion.speed or 0.0))
+
+    def find_rms(self, name: str) -> float | None:
+        """Return the RMS value of a curve; None if it has none."""
+        if not self.is_steady or not self.panels.has_value(name):
+            return None
+        return self.panels.find_rms(name)
+
+    def find_theta_2(self, place: float) -> float:
+        """Return theta_2 at a place, rad."""
+        solution = self.solution
+        if self.panels.located:
+            solution = self.solve_at(np.array([place]), "position")
+        places = solution.at.places if solution.time is None else solution.time
+        return float(solution.theta_2[np.argmin(np.abs(places - place))])
+
+    @cached_property
+    def stretches(self) -> list[tuple[float | None, float | None]]:
+        """Places from and up to which the linkage assembles, in rising order.
+
+        None at the ends of the motion; empty if it always assembles.
+        """
+        positions = self.positions
+        if not positions.located:
+            return []
+        places = positions.list_nodes()
+        assembles = np.isfinite(positions.curves["sin_mu"].values[..., 0]).ravel()
+        places = places.ravel()
+        if places[0] > places[-1]:
+            places = places[::-1]
+            assembles = assembles[::-1]
+        changes = np.flatnonzero(assembles[1:] != assembles[:-1])
+        ends = list[float | None]()
+        if assembles[0]:
+            ends.append(None)
+        ends += [float(places[i] if assembles[i] else places[i + 1]) for i in changes]
+        if assembles[-1]:
+            ends.append(None)
+        return list(zip(ends[::2], ends[1::2], strict=True)) if changes.size else []
+
+
+def describe_motion(solution: Solution) -> MotionCurves:
+    """Describe the motion of a solved scene by its curves, which the solution keeps.
+
+    `solution`: of the scene's positions, or of its sweep in rising order.
+    """
+    kept = vars(solution)
+    if "_motion_curves" not in kept:
+        kept["_motion_curves"] = _fit_curves(solution)
+    curves: MotionCurves = kept["_motion_curves"]
+    return curves
+
+
+def _fit_curves(solution: Solution) -> MotionCurves:
+    """Fit the curves of a motion, or take those of its positions."""
+    scene = solution.scene
+    assert scene is not None
+    if not _goes_on_between(scene, solution):
+        share = np.ones(len(solution))
+        if is_once_round(solution):
+            share[-1] = 0.0  # the first position again
+        places = solution.at.places if solution.time is None else solution.time
+        positions, panels = (
+            Panels.of_positions(places, list_curves(scene, solution), share)
+            for list_curves in (_list_positions, _list_curves)
+        )
+        return MotionCurves(scene, solution, positions, panels, [], np.zeros(0))
+    exact, even = _cut(scene, solution)
+    located = _locate_breaks(scene, solution, _join_edges(exact, even))
+    breaks = np.array([place for place, _ in located])
+    exact = np.unique(np.concatenate([exact, breaks]))
+    edges = _join_edges(exact, even)
+    stage = "acceleration" if solution.F12 is None else "force"
+
+    def compute_positions(places: Array) -> dict[str, Array]:
+        there = solve(scene, "position", at=command_at(scene, places))
+        return _list_positions(scene, there)
+
+    def compute(places: Array) -> dict[str, Array]:
+        return _list_curves(scene, solve(scene, stage, at=command_at(scene, places)))
+
+    wanted = _list_wanted(scene, solution)
+    positions = fit_panels(compute_positions, edges, wanted)
+    positions = positions.with_points(exact, compute_positions(exact))
+    for bar in MOVING_BARS:
+        _join_turns(positions, solution, bar)
+    panels = positions
+    if solution.omega_4 is not None:
+        panels = fit_panels(compute, edges, wanted, SHALLOW)
+        panels = panels.with_points(exact, compute(exact))
+    reversals = [(place, name) for place, name in located if name in PINS]
+    if scene.motion.law is not None:
+        angles, *_ = scene.motion.law.at(np.array([place for place, _ in reversals]))
+        names = [name for _, name in reversals]
+        reversals = list(zip(angles.tolist(), names, strict=True))
+    return MotionCurves(scene, solution, positions, panels, reversals, breaks)
+
+
+def _goes_on_between(scene: Scene, solution: Solution) -> bool:
+    """Return True if the scene says what happens between the positions."""
+    at = solution.at
+    motion = scene.motion
+    listed = isinstance(motion.angle, np.ndarray)
+    if motion.free is not None or listed or len(solution) < 2:
+        return False
+    steps = np.diff(at.places)
+    if not (np.all(steps > 0.0) or np.all(steps < 0.0)):
+        return False
+    stated = command_at(scene, at.places)
+    names = ["angle", "acceleration", "branch"]
+    if at.speed is not None:
+        names.append("speed")
+    return all(
+        np.array_equal(getattr(at, name), getattr(stated, name), equal_nan=True)
+        for name in names
+    )
+
+
+def _cut(scene: Scene, solution: Solution) -> tuple[Array, Array]:
+    """Return the ends of the parts of a motion, and of the first panels besides.
+
+    The parts are those of a law; the latter are in the order of the motion.
+    """
+    places = solution.at.places
+    turned = np.nansum(np.abs(np.diff(solution.at.angle))) / TURN
+    count = np.clip(np.ceil(turned), 1, _MOST_FIRST_PANELS // _PANELS_OF_A_TURN)
+    even = np.linspace(places[0], places[-1], int(count) * _PANELS_OF_A_TURN + 1)
+    ends = even[[0, -1]]
+    if scene.motion.law is None:
+        return ends, even
+    times = np.array(scene.motion.law.time)
+    inside = (times > ends[0]) & (times < ends[1])
+    return np.concatenate([ends, times[inside]]), even
+
+
+def _join_edges(exact: Array, others: Array) -> Array:
+    """Join ends of panels; those beside an exact one give way to it."""
+    width = _SAME_EDGE * abs(others[-1] - others[0])
+    away = np.abs(others[:, None] - exact).min(axis=1)
+    edges = np.unique(np.concatenate([exact, others[away > width]]))
+    return edges if others[-1] > others[0] else edges[::-1]
+
+
+def _locate_breaks(
+    scene: Scene,
+    solution: Solution,
+    edges: Array,
+) -> list[tuple[float, str]]:
+    """Locate where forces jump or bend, with the names of what breaks there."""
+    if solution.F12 is None:
+        return []
+    settled = scene.settled()
+
+    def compute(places: Array) -> dict[str, Array]:
+        state = compute_shown_state(settled, command_at(scene, places))
+        breaks = dict[str, Any]()
+        for term in (*settled.loads, *settled.effects):
+            breaks |= term.breaks(state)
+        return {name: values + np.zeros(len(places)) for name, values in breaks.items()}
+
+    names = compute(edges[:1])
+    if not names:
+        return []
+    panels = fit_panels(compute, edges, dict.fromkeys(names, Wanted(zeros=True)))
+    width = _SAME_EDGE * panels.length
+    breaks = []
+    for name in names:
+        zeros = panels.find_zeros(name)
+        away = np.abs(zeros[:, None] - edges[[0, -1]])
+        places = zeros[away.min(axis=1) > width].tolist()
+        first, last = panels.curves[name].values[[0, -1], [0, -1], 0]
+        # what lies at both ends of a turn is passed like any other position
+        if is_once_round(solution) and first * last < 0.0:
+            places.append(float(edges[0]))
+        breaks += [(place, name) for place in places]
+    return sorted(breaks, reverse=bool(edges[0] > edges[-1]))
+
+
+def _list_wanted(scene: Scene, solution: Solution) -> dict[str, Wanted]:
+    """List what is asked of each curve, with the size of its rounding."""
+    longest = max(scene.linkage.lengths)
+    roundings = dict.fromkeys(_ANGLES, SHOWN_AS_ZERO)
+    roundings["stroke"] = SHOWN_AS_ZERO * longest
+    wanted = {name: Wanted(size, ranged=True) for name, size in roundings.items()}
+    of_bars = (
+        f"{letter}_{bar}" for letter in ("omega", "alpha") for bar in MOVING_BARS
+    )
+    wanted |= dict.fromkeys(of_bars, Wanted())
+    if solution.F12 is None:
+        return wanted
+    drive = read_drive_demand(solution)
+    rounding = find_drive_rounding(solution)
+    speed = float(np.nanmax(np.abs(getattr(solution, drive.speed_key)), initial=0.0))
+    loads = compute_pin_loads(solution)
+    largest = max(float(np.nanmax(load, initial=0.0)) for load in loads.values())
+    bending = Wanted(SHOWN_AS_ZERO * largest * longest)
+    wanted |= {f"bending_{bar}": bending for bar in MOVING_BARS}
+    wanted["speed"] = Wanted(SHOWN_AS_ZERO * speed)
+    wanted |= dict.fromkeys(
+        PIN_FORCES, Wanted(SHOWN_AS_ZERO * largest, integrated=True)
+    )
+    wanted["power"] = Wanted(rounding * speed, integrated=True)
+    wanted[drive.keys.value] = Wanted(rounding, integrated=True)
+    return wanted
+
+
+def _list_positions(scene: Scene, solution: Solution) -> dict[str, Array]:
+    """List the curves of the positions alone, by name."""
+    curves = {name: getattr(solution, name) for name in _ANGLES}
+    if solution.stroke is not None:
+        curves["stroke"] = solution.stroke
+    return curves
+
+
+def _list_curves(scene: Scene, solution: Solution) -> dict[str, Array]:
+    """List the curves of loads, or where nothing acts of rates, by name."""
+    curves = {}
+    if solution.omega_4 is not None and not (acts(scene) and solution.F12 is not None):
+        for letter in ("omega", "alpha"):
+            for bar in MOVING_BARS:
+                curves[f"{letter}_{bar}"] = getattr(solution, f"{letter}_{bar}")
+    if solution.F12 is None:
+        return curves
+    loads = compute_pin_loads(solution)
+    largest = np.max([*loads.values()], axis=0)
+    for name, load in loads.items():
+        kept = drop_rounding(load, largest) != 0.0
+        curves[name] = np.where(kept[:, None], getattr(solution, name), 0.0)
+    for bar, bending in compute_bending(scene, solution).items():
+        curves[f"bending_{bar}"] = np.abs(bending.moment)
+    drive = read_drive_demand(solution)
+    if scene.motion.free is not None:
+        return curves
+    # what a balanced linkage leaves of a load is rounding, and has no peak
+    assert drive.values is not None
+    idle = np.abs(drive.values) <= SHOWN_AS_ZERO * largest * _find_lever(solution)
+    curves["speed"] = getattr(solution, drive.speed_key)
+    for name in (drive.keys.value, "power"):
+        curves[name] = np.where(idle, 0.0, getattr(solution, name))
+    return curves
+
+
+def acts(scene: Scene) -> bool:
+    """Return True if anything acts, or a bar has mass: forces are then of interest."""
+    has_mass = any(bar.mass > 0.0 for bar in scene.linkage.moving)
+    return bool(scene.loads or scene.effects or has_mass)
+
+
+def compute_pin_loads(solution: Solution) -> dict[str, Array]:
+    """Compute the magnitudes of the pin forces, N, by name.
+
+    What a cylinder leaves of the load that it holds end to end is rounding, and zero.
+    """
+    held = 0.0 if solution.drive_force is None else np.abs(solution.drive_force)
+    loads = {}
+    for name in PIN_FORCE.values():
+        size = np.linalg.norm(getattr(solution, name), axis=1)
+        loads[name] = drop_rounding(size, held)
+    return loads
+
+
+def compute_bending(scene: Scene, solution: Solution) -> dict[int, Bending]:
+    """Compute the largest bending moment of each bar at each position."""
+    forces = [*compute_pin_loads(solution).values()]
+    if solution.drive_force is not None:
+        forces.append(np.abs(solution.drive_force))
+    size = max(scene.linkage.lengths) * np.max(forces, axis=0)
+    bending = {}
+    for bar in MOVING_BARS:
+        largest = largest_bending(scene, solution, bar)
+        # a two-force bar has none
+        is_round_off = np.abs(largest.moment) <= _NO_BENDING * size
+        moment = np.where(is_round_off, 0.0, largest.moment)
+        bending[bar] = largest._replace(moment=moment)
+    return bending
+
+
+def find_drive_rounding(solution: Solution) -> float:
+    """Return the rounding of the torques (forces) that the drive sums, N m or N.
+
+    Summed are inertial ones, and usual pin forces at the longest bar. At a change
+    point an error bar is less, and where springs balance weights, as far as their
+    numbers are rounded.
+    """
+    assert solution.scene is not None
+    inertial = 0.0
+    for number, bar in zip(MOVING_BARS, solution.scene.linkage.moving, strict=True):
+        a_G = getattr(solution, f"a_G{number}")
+        accelerations = np.hypot(a_G[:, 0], a_G[:, 1])
+        inertial += bar.mass * float(np.nanmax(accelerations, initial=0.0))
+    usual = 0.0
+    for load in compute_pin_loads(solution).values():
+        if np.isfinite(load).any():
+            usual = max(usual, float(np.nanmedian(load)))
+    return SHOWN_AS_ZERO * max(inertial, usual) * _find_lever(solution)
+
+
+def _find_lever(solution: Solution) -> float:
+    """Return the arm at which pin forces load the drive: the longest bar, m.
+
+    The arm is 1 for a drive that exerts a force itself.
+    """
+    if solution.drive is None and solution.scene is not None:
+        return max(solution.scene.linkage.lengths)
+    return 1.0
+
+
+def _join_turns(panels: Panels, solution: Solution, bar: int) -> None:
+    """Add whole turns to an angle on the panels, so that they belong together.
+
+    The first stretch has the angles of the solution. The linkage does not pass from one
+    stretch to the next, so that no turn of a later one follows from the first: it has
+    the one with which all stretches together cover least.
+    """
+    if bar == solution.at.bar and solution.at.stroke is None:
+        return  # as it is commanded
+    curve = panels.curves[f"theta_{bar}"]
+    values = curve.values[..., 0]
+    # a panel in which the assembly ends has values on one side
+    known = np.flatnonzero(np.isfinite(values).any(axis=1))
+    assembles = np.isfinite(values[known])
+    gaps = (np.diff(known) > 1) | ~assembles[:-1, -1] | ~assembles[1:, 0]
+    rows = np.arange(len(known))
+    starts = values[known][rows, assembles.argmax(axis=1)]
+    stops = values[known][rows, -1 - assembles[:, ::-1].argmax(axis=1)]
+    turns = np.round((stops[:-1] - starts[1:]) / TURN)
+    turns = np.concatenate([[0.0], np.cumsum(np.where(gaps, 0.0, turns))])
+    values[known] += TURN * turns[:, None]
+    coarse = getattr(solution, f"theta_{bar}")
+    first = int(np.flatnonzero(np.isfinite(coarse))[0])
+    away = np.abs(panels.list_nodes()[known] - solution.at.places[first])
+    nearest = values[known].flat[np.argmin(np.where(assembles, away, np.inf))]
+    values += TURN * np.round((coarse[first] - nearest) / TURN)
+    low = np.inf
+    high = -np.inf
+    for stretch in np.split(known, np.flatnonzero(gaps) + 1):
+        start = np.nanmin(values[stretch])
+        stop = np.nanmax(values[stretch])
+        if low < high:
+            shift = TURN * _find_turns(start, stop, low, high)
+            values[stretch] += shift
+            start += shift
+            stop += shift
+        low = min(low, start)
+        high = max(high, stop)
+
+
+def _find_turns(start: float, stop: float, low: float, high: float) -> int:
+    """Return the whole turns by which an interval of angles is moved.
+
+    With them it covers least together with another.
+    """
+    distance = 0.5 * (low + high) - 0.5 * (start + stop)
+    nearest = round(distance / TURN)
+
+    def measure(turns: int) -> tuple[int, int]:
+        top = max(high, stop + TURN * turns)
+        bottom = min(low, start + TURN * turns)
+        width = top - bottom
+        return round(width / _AS_WIDE), abs(turns)
+
+    return min((nearest - 1, nearest, nearest + 1), key=measure)
