@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, SolvedFriction, list_bodies
 from fourbar.formulas.arithmetic import U, angle, is_any, select
-from fourbar.formulas.longer import change_numbers, lengthen
+from fourbar.formulas.longer import change_numbers, lengthen, take_doubles
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import NO_DIGIT_LEFT, LoopPath, prepare_path
 from fourbar.formulas.pin_forces import (
@@ -445,7 +445,11 @@ class Case(NamedTuple):
         """
         actions = Actions(state, self.bodies)
         dry_pins = {pin for term in self.terms for pin in term.dry_pins}
-        all_turn = all(np.all(actions.turning(pin)) for pin in dry_pins)
+        # where the loop does not close nothing rests
+        all_turn = all(
+            np.all(actions.turning(pin) | np.isnan(take_doubles(state.slip(pin))))
+            for pin in dry_pins
+        )
         if np.all(state.speed) and all_turn:
             return effort, effort, None
         ahead = self.dynamics(state, acceleration, 1)
