@@ -356,7 +356,7 @@ def compute_pin_loads(solution: Solution) -> dict[str, Array]:
     held = 0.0 if solution.drive_force is None else np.abs(solution.drive_force)
     loads = {}
     for name in PIN_FORCE.values():
-        size = np.linalg.norm(getattr(solution, name), axis=1)
+        size = np.hypot(*getattr(solution, name).T)
         loads[name] = drop_rounding(size, held)
     return loads
 

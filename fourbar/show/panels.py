@@ -126,9 +126,7 @@ class Curve:
     @property
     def sizes(self) -> Array:
         """Return the values of a scalar, or the sizes of vectors, (p, N)."""
-        if self.values.shape[-1] == 1:
-            return self.values[..., 0]
-        return np.asarray(np.linalg.norm(self.values, axis=-1))
+        return _measure(self.values)
 
     @cached_property
     def series(self) -> Array:
@@ -214,9 +212,8 @@ class Panels:
         """List the places at which a curve grows without bound."""
         return [float(self.start[panel]) for panel in self.curves[name].poles]
 
-    def _average(self, name: str, power: int) -> float:
-        """Return the mean over the motion, where a curve has values."""
-        of_nodes = np.power(self.curves[name].values, power).sum(axis=-1)
+    def _average(self, of_nodes: Array) -> float:
+        """Return the mean over the motion of values at the nodes, where there are."""
         weights = 0.5 * _WEIGHTS if self.located else np.ones(1)
         means = of_nodes @ weights
         known = np.isfinite(means)
@@ -224,11 +221,13 @@ class Panels:
 
     def find_rms(self, name: str) -> float:
         """Return the root of the mean square of a curve over the motion."""
-        return float(np.sqrt(self._average(name, 2)))
+        sizes = self.curves[name].sizes
+        scale = np.nanmax(np.abs(sizes)) or 1.0
+        return float(scale * np.sqrt(self._average(np.square(sizes / scale))))
 
     def integrate(self, name: str) -> float:
         """Return the integral of a curve over the motion."""
-        return self._average(name, 1) * self.length
+        return self._average(self.curves[name].sizes) * self.length
 
     def accumulate(self, name: str, level: float = 0.0) -> Array:
         """Integrate a curve less a level up to where the integral may turn back.
@@ -301,7 +300,7 @@ class Panels:
         scale = np.nanmax(np.abs(sizes))
         best = at_nodes.max(axis=1)
         smooth = curve.error <= HELD * scale
-        terms = np.linalg.norm(curve.series[:, 1:], axis=-1).sum(axis=1)
+        terms = np.hypot.reduce(np.abs(curve.series[:, 1:]), axis=-1).sum(axis=1)
         node = np.argmax(at_nodes >= (best - TIED * scale)[:, None], axis=1)
         rows = np.arange(len(best))
         x = (_X if self.located else np.zeros(1))[node]
@@ -319,12 +318,16 @@ class Panels:
         return Peak(float(values[first]), float(self._place(first, x[first])))
 
 
+def _measure(values: Array) -> Array:
+    """Return the values of a scalar, or the sizes of vectors, without the last axis."""
+    if values.shape[-1] == 1:
+        return values[..., 0]
+    return np.asarray(np.hypot.reduce(values, axis=-1))
+
+
 def _evaluate(series: Array, x: Array) -> Array:
     """Return the polynomial of a panel, or the size of a vector of them, at places."""
-    values = legvander(x, NODES - 1) @ series
-    if values.shape[-1] == 1:
-        return np.asarray(values[..., 0])
-    return np.asarray(np.linalg.norm(values, axis=-1))
+    return _measure(legvander(x, NODES - 1) @ series)
 
 
 def _search(series: Array, rank: Callable[[Array], Array]) -> tuple[float, float]:
@@ -424,8 +427,9 @@ def fit_panels(
 
 def _find_usual_size(values: Array) -> float:
     """Return the size of a curve, which a node next to a pole does not change."""
-    medians = np.median(np.nan_to_num(np.linalg.norm(values, axis=-1)), axis=1)
-    return float(np.sqrt(np.square(medians).mean()))
+    medians = np.median(np.nan_to_num(np.abs(_measure(values))), axis=1)
+    scale = medians.max() or 1.0
+    return float(scale * np.sqrt(np.square(medians / scale).mean()))
 
 
 def _find_open(
@@ -523,7 +527,7 @@ def _fit(compute: ComputeCurves, start: Array, stop: Array) -> dict[str, _Fit]:
         error = np.where(missing.any(axis=1), np.inf, error)
         error[missing.all(axis=1)] = 0.0
         single = curve.shape[-1] == 1
-        sizes = curve[..., 0] if single else np.linalg.norm(curve, axis=-1)
+        sizes = _measure(curve)
         most = np.where(missing, -np.inf, sizes).max(axis=1)
         least = np.where(missing | (not single), np.inf, sizes).min(axis=1)
         size = np.where(missing, 0.0, np.abs(sizes)).max(axis=1)

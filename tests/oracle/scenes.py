@@ -12,6 +12,8 @@ from fourbar_lab.fault_scenes import (
     WEIGHT,
 )
 
+STEADY_TURN = MOTION_OF_A_TURN.replace(acceleration=0.0)
+"""Motion with RMS values and energies: an accelerated sweep has none."""
 SLENDER = Scene(
     SLENDER_LINKAGE, MOTION_OF_A_TURN, effects=(WEIGHT,), points=POINTS_OF_BARS
 )
@@ -19,13 +21,13 @@ WRITTEN = {
     "slender": SLENDER,
     "loaded": Scene(
         SLENDER_LINKAGE,
-        MOTION_OF_A_TURN,
+        STEADY_TURN,
         2,
         (*LOADS, Load(3, moment=-0.3, from_pin=(0.2, 0.4)), Load(4, moment=0.2)),
         (WEIGHT,),
     ),
     "part of a turn": Scene(
-        SLENDER_LINKAGE, Motion(Sweep(0.1, 2.0, 8), 10.0, 5.0), effects=(WEIGHT,)
+        SLENDER_LINKAGE, Motion(Sweep(0.1, 2.0, 8), 10.0), effects=(WEIGHT,)
     ),
 }
 

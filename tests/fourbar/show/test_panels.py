@@ -49,6 +49,7 @@ def test_a_jump_costs_no_digits(place: float) -> None:
     assert panels.integrate("curve") == pytest.approx(right, abs=1e-8)
     turns = panels.accumulate("curve")
     assert turns.max() == pytest.approx(2.0 * place, rel=1e-8)
+    assert not panels.growing
 
 
 def test_a_curve_is_integrated_from_zero_to_zero() -> None:

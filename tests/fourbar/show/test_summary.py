@@ -233,6 +233,30 @@ def test_a_corner_of_a_load_between_two_positions_is_a_peak(steps: int) -> None:
     assert facts.pins["O2"].peak.value == pytest.approx(load, rel=EXACT)
 
 
+def test_forces_whose_squares_overflow_have_the_peaks_and_means_of_smaller_ones() -> (
+    None
+):
+    """Nothing acts but one force, so that everything is in proportion to it."""
+    motion = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 12), 10.0)
+    facts = []
+    for force in (1.0, 1e300):
+        loads = (fourbar.Load(3, (force, 0.4), from_pin=(0.05, 0.0)),)
+        bars = map(fourbar.Bar, (0.1, 0.25, 0.22))
+        scene = fourbar.Scene(fourbar.FourBar(0.3, *bars), motion, 2, loads)
+        facts.append(summarize(scene, fourbar.solve(scene)))
+    small, huge = facts
+    assert small.peak is not None and huge.peak is not None
+    assert huge.peak.value / 1e300 == pytest.approx(small.peak.value, rel=EXACT)
+    assert small.duty is not None and huge.duty is not None
+    for name in ("rms_torque", "peak_power", "rms_power", "energy_in"):
+        ratio = getattr(huge.duty, name) / 1e300
+        assert ratio == pytest.approx(getattr(small.duty, name), rel=EXACT)
+    for pin, load in small.pins.items():
+        rms = huge.pins[pin].rms
+        assert load.rms is not None and rms is not None
+        assert rms / 1e300 == pytest.approx(load.rms, rel=EXACT)
+
+
 def test_towards_a_limit_within_the_last_step_it_grows_too() -> None:
     """A sweep that ends where the loop no longer closes.
 
