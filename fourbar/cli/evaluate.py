@@ -211,6 +211,14 @@ def _choose_output(table: bool, as_json: bool, as_csv: bool, out: Path | None) -
 @click.command()
 @given.scene_argument
 @given.at_option
+@click.option(
+    "--positions",
+    metavar="SCENE:ANGLE",
+    help=(
+        "Command the motion of another scene's bar, like"
+        ' "first.toml:theta_4 + 30 deg".'
+    ),
+)
 @click.option("--table", is_flag=True, help="Print the positions one by one.")
 @click.option(
     "--columns",
@@ -268,6 +276,7 @@ def _choose_output(table: bool, as_json: bool, as_csv: bool, out: Path | None) -
 def analyze(  # noqa: PLR0913 - one for each option
     scene: Path,
     at: tuple[str, ...],
+    positions: str | None,
     table: bool,
     columns: str | None,
     every: int | None,
@@ -290,11 +299,11 @@ def analyze(  # noqa: PLR0913 - one for each option
     if columns is not None and form == "summary":
         form = "table"
     if sensitivity:
-        if form in ("csv", "table") or degrees or units or at:
+        if form in ("csv", "table") or degrees or units or at or positions:
             raise click.UsageError(
-                "--sensitivity cannot be combined with --at, --units, --degrees,"
-                " --columns, --table, --every, --all and --csv: it prints a table in SI"
-                " units; --json prints every position"
+                "--sensitivity cannot be combined with --at, --positions, --units,"
+                " --degrees, --columns, --table, --every, --all and --csv: it prints a"
+                " table in SI units; --json prints every position"
             )
         _print_sensitivity(scene, form == "json", out)
         return
@@ -302,12 +311,16 @@ def analyze(  # noqa: PLR0913 - one for each option
     from fourbar.studies.course import follow
     from fourbar.studies.passing import join_commands
 
-    with given.open_scene(scene) as described, given.show_waiting(described):
+    with given.open_scene(scene) as stated, given.show_waiting(stated):
+        if positions is None:
+            described = stated
+        else:
+            described = given.take_motion(stated, positions)
         bore = _read_pressure(described, pressure)
         shown = _choose_units(form, units, degrees)
         asked = {text: given.find_positions(described, text) for text in at}
-        positions = join_commands([*asked.values()]) if asked else None
-        solution = solve(described, find_last_stage(described), at=positions)
+        wanted = join_commands([*asked.values()]) if asked else None
+        solution = solve(described, find_last_stage(described), at=wanted)
         if asked:
             follow(described, solution)
         if not solution.assembled.any():

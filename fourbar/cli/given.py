@@ -3,11 +3,13 @@
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 
 from fourbar.errors import ELSEWHERE, InputError, state_messages_in
 from fourbar.linkage import ANY_NUMBER, POSITIVE, require
@@ -260,6 +262,46 @@ def find_positions(scene: Scene, text: str) -> Command:
             f'the unit is missing; did you mean "{value} {likely}"?',
         )
     return find_stated(scene, [(name, read_number("--at", value, unit))])
+
+
+_ANGLE_OF_SCENE = re.compile(r"(.+):\s*(theta_[234])\s*(?:([+-])\s*(.+))?")
+
+
+def take_motion(scene: Scene, text: str) -> Scene:
+    """Return a scene that is moved by a bar of another one, like "a.toml:theta_4".
+
+    Angles, speeds and accelerations are those of the bar at the positions of the other
+    scene that have them; an angle that the text adds is where the two are joined.
+    """
+    from fourbar.files import load
+    from fourbar.solving import find_last_stage, solve
+
+    match = _ANGLE_OF_SCENE.fullmatch(text.strip())
+    if match is None:
+        allowed = 'must be a file and an angle, like "first.toml:theta_4 + 30 deg"'
+        raise InputError("--positions", text, allowed)
+    if scene.motion.stroke is not None or scene.motion.free is not None:
+        allowed = "needs a scene whose motion commands an angle"
+        raise InputError("--positions", text, allowed)
+    file, name, sign, added = match.groups()
+    offset = 0.0 if added is None else read_number("--positions", added, "rad")
+    first = load(file)
+    moved = solve(first, find_last_stage(first))
+    angle = getattr(moved, name) + (-offset if sign == "-" else offset)
+    speed, acceleration = (
+        getattr(moved, name.replace("theta", rate)) for rate in ("omega", "alpha")
+    )
+    states = [state for state in (angle, speed, acceleration) if state is not None]
+    moves = np.isfinite(states).all(axis=0)
+    if not moves.any():
+        raise InputError("--positions", text, "that scene has no such motion")
+    motion = scene.motion.replace(
+        angle=angle[moves],
+        speed=None if speed is None else speed[moves],
+        acceleration=0.0 if acceleration is None else acceleration[moves],
+        law=None,
+    )
+    return replace(scene, motion=motion)
 
 
 def read_three(key: str, text: str, unit: str = "m") -> tuple[float, float, float]:

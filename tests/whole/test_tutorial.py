@@ -1,4 +1,4 @@
-"""Tutorial and thesis page are run from top to bottom.
+"""Tutorial, thesis page and recipes are run from top to bottom.
 
 Files, commands, programs, and what they print. A line "..." stands for lines that the
 page leaves out.
@@ -20,7 +20,7 @@ SESSION = re.compile(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", ["tutorial", "thesis"])
+@pytest.mark.parametrize("page", ["tutorial", "thesis", "recipes"])
 def test_a_page_does_and_prints_what_it_says(
     page: str,
     tmp_path: Path,

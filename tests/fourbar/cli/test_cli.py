@@ -14,6 +14,7 @@ import stat
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -1138,6 +1139,37 @@ def test_classify_says_who_reads_a_scene_file(run: Fourbar) -> None:
     assert err.endswith(
         "takes 4 values; for a scene file: fourbar analyze scene.toml\n"
     )
+
+
+def test_a_linkage_moves_as_the_bar_of_another_does(
+    tmp_path: Path, run: Fourbar
+) -> None:
+    """By two commands the torque is that of the motion stated as three arrays."""
+    first, second = MODELS / "crank_rocker.toml", MODELS / "drag_link.toml"
+    moved = fourbar.solve(load(first))
+    motion = fourbar.Motion(moved.theta_4 - 0.7, moved.omega_4, moved.alpha_4)
+    expected = fourbar.solve(replace(load(second), motion=motion))
+    code, out, _ = run(
+        *("analyze", second, "--positions", f"{first}:theta_4-0.7 rad", "--json")
+    )
+    assert code == HOLDS and strict(out)["torque"] == expected.torque.tolist()
+    assert strict(out)["alpha_4"] == expected.alpha_4.tolist()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (f"{MODELS / 'crank_rocker.toml'}", "must be a file and an angle, like"),
+        (f"{MODELS / 'crank_rocker.toml'}:theta_5", "must be a file and an angle"),
+        (f"{MODELS / 'crank_rocker.toml'}:theta_4 + 3 mm", "does not convert to rad"),
+        ("none.toml:theta_4", "none.toml"),
+    ],
+)
+def test_a_motion_that_another_scene_does_not_have_is_refused(
+    text: str, said: str, run: Fourbar
+) -> None:
+    code, _, err = run("analyze", MODELS / "drag_link.toml", "--positions", text)
+    assert code == BAD_INPUT and err.count("\n") == 1 and said in err
 
 
 @pytest.mark.parametrize(
