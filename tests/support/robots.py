@@ -9,8 +9,20 @@ import numpy as np
 
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.engines.mujoco.robots.loop import RobotFile
-from fourbar_validation.engines.mujoco.theirs import Examined, examine_file
+from fourbar_validation.engines.description import Value
+from fourbar_validation.engines.mujoco.robots.answers import (
+    LoopMeasurement,
+    MeasureOptions,
+)
+from fourbar_validation.engines.mujoco.robots.examine import (
+    Examined,
+    examine_changed,
+    examine_file,
+    examine_mended,
+)
+from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
+from fourbar_validation.robots.files import read_robot
+from fourbar_validation.robots.judge import Judgement, judge_file, list_answers
 
 Point = tuple[float, float]
 TILT = (0.3, -0.2, 0.7, 0.5)
@@ -226,12 +238,49 @@ def examine_text(scene: Scene, text: str | None, names: Mapping[str, str]) -> Ex
     None: the file generated from the scene.
     """
     file = None if text is None else RobotFile(Path("theirs.xml"), text)
-    return examine_file(scene, file, names)
+    return examine_file(scene, file, MeasureOptions(PoseOptions(), names=names))
+
+
+def change(
+    scene: Scene, changes: Sequence[tuple[str, Value | None]]
+) -> list[list[Answer] | None]:
+    """Return the answers of the generated file, and with each entry changed."""
+    return list(map(_answers_or_none, examine_changed(scene, changes)))
+
+
+def mend(
+    scene: Scene,
+    file: RobotFile,
+    names: Mapping[str, str],
+    changes: Sequence[tuple[str, Value | None]],
+) -> list[list[Answer] | None]:
+    """Return the answers of a file with each entry as in the generated one."""
+    options = MeasureOptions(PoseOptions(), names=names)
+    return list(map(_answers_or_none, examine_mended(scene, file, options, changes)))
+
+
+def _answers_or_none(measured: LoopMeasurement | None) -> list[Answer] | None:
+    return None if measured is None else list_answers(measured)
+
+
+def judge_path(name: str, scene: Scene, path: Path) -> Judgement:
+    """Judge a file as `check-mjcf SCENE FILE` does."""
+    return judge_file(name, scene, read_robot(path), MeasureOptions(PoseOptions()))
+
+
+def notes_of(examined: Examined) -> list[str]:
+    """Return the notes on a file and on what was found in it."""
+    return [*examined.notes, *examined.measured.remarks]
+
+
+def answers_of(examined: Examined) -> list[Answer]:
+    """Return the answers of a file that was examined."""
+    return list_answers(examined.measured)
 
 
 def answer_of(examined: Examined, how: str) -> Answer:
     """Return the answer of one engine to a file; it has one."""
-    (answer,) = (answer for answer in examined.answers if answer.engine == how)
+    (answer,) = (one for one in answers_of(examined) if one.engine == how)
     assert answer.refusal is None, answer.refusal
     return answer
 

@@ -79,9 +79,10 @@ JUDGED_BY = {
     "validation/check/test_check.py": (
         "validation/check: calculated fitted judge mistakes theirs"
     ),
-    "validation/check/test_mjcf.py": (
-        "validation/check: differences; validation/robots: guard; "
-        "validation/engines/mujoco: describe theirs topology"
+    "validation/robots/test_check.py": (
+        "validation/robots: differences guard judge; "
+        "validation/engines/mujoco: describe; "
+        "validation/engines/mujoco/robots: examine seen"
     ),
     "validation/engines/mujoco/robots/test_closures.py": (
         "validation/engines/mujoco/robots: ancestry loop"

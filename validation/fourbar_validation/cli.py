@@ -52,7 +52,7 @@ COMMANDS = {
         "List the closed loops of a robot's MJCF or SDF.",
     ),
     "check-mjcf": Listed(
-        "fourbar_validation.check.mjcf:check_mjcf_command",
+        "fourbar_validation.robots.check:check_mjcf_command",
         "Compare your own MJCF with a scene.",
         "mujoco",
     ),

@@ -7,19 +7,23 @@ from pathlib import Path
 
 import pytest
 
+from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.rows import UNDECIDED
 from fourbar_validation.engines.mujoco.robots.answers import (
     MeasureOptions,
     RobotMeasurement,
 )
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
+from fourbar_validation.robots.measure import list_errors_by_method
 from fourbar_validation.robots.report import (
     STATES_FILE,
     TextTable,
     Typed,
     describe_measurement,
-    report_measurement,
+    list_measured_rows,
     write_markdown,
+    write_report,
     write_states,
 )
 from tests.support.robots import FINGER
@@ -39,8 +43,8 @@ def test_what_was_switched_off_and_left_out_is_said() -> None:
     ]
     text = "\n".join(said)
     assert (
-        "switched off, because it ties its bars to joints that are held: dip_loop"
-        in text
+        "switched off, because it ties its bars to joints that are held, or to each"
+        " other: dip_loop" in text
     )
     assert "contacts, joint limits and motors are off" in text
     let_go = len(measured().loops[0].torn)
@@ -50,7 +54,7 @@ def test_what_was_switched_off_and_left_out_is_said() -> None:
 
 @pytest.mark.slow
 def test_the_states_are_those_that_were_asked_at() -> None:
-    rows = list(csv.DictReader(io.StringIO(write_states(measured()))))
+    rows = list(csv.DictReader(io.StringIO(write_states(measured().loops))))
     (loop,) = measured().loops
     assert loop.through_time is not None
     assert len(rows) == len(loop.states.rows) + len(loop.through_time.rows)
@@ -80,10 +84,19 @@ def test_the_report_is_printed_and_written(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    report_measurement(measured(), Path("finger.xml"), tmp_path / "new")
+    blocks = list(describe_measurement(measured()))
+    rows = list_measured_rows(measured())
+    out = tmp_path / "new"
+    write_report(Path("finger.xml"), out, blocks, rows, measured().loops)
     printed = capsys.readouterr().out
     assert "single states" in printed and "written to" in printed
-    page = (tmp_path / "new" / "robot.md").read_text()
+    page = (out / "robot.md").read_text()
     assert page.startswith("# The loops of finger.xml in MuJoCo")
     assert "| single states | torque |" in page
-    assert (tmp_path / "new" / "robot.csv").read_text() == write_states(measured())
+    assert (out / "states.csv").read_text() == write_states(measured().loops)
+    written = read_columns(out / "results.csv")
+    torque = next(row for row in written if row.quantity == "torque")
+    errors = list_errors_by_method(measured().loops[0])
+    assert {row.engine for row in written} == {error.method for error in errors}
+    assert torque.verdict == UNDECIDED
+    assert torque.error in [error.part for error in errors]

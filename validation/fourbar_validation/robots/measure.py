@@ -125,7 +125,7 @@ def list_errors_by_method(loop: LoopMeasurement) -> list[InsideError]:
     """
     errors = list(_compare(RIGID, loop, loop.states))
     errors += _compare(STATES, loop, loop.states)
-    if loop.through_time is not None:
+    if loop.through_time is not None and loop.through_time.rows:
         errors += _compare(MEASURED_THROUGH_TIME, loop, loop.through_time)
     return errors
 
@@ -202,14 +202,14 @@ def _subtract_formulas(
     for name in FORCE_QUANTITIES:
         rigid = np.array([row.rigid.values()[name] for row in rows])
         if rigid.ndim == 2:
-            rigid = _turn_vectors(rigid, -loop.turned)
+            rigid = turn_vectors(rigid, -loop.turned)
         quantity = name_driving(loop.scene) if name == COUPLE.value else name
         sizes = measure_sizes(rigid - np.asarray(getattr(formulas, quantity)))
         differences[name] = np.where(judged, sizes, math.inf)
     return differences
 
 
-def _turn_vectors(vectors: Array, angle: float) -> Array:
+def turn_vectors(vectors: Array, angle: float) -> Array:
     """Turn vectors (n, 2) counter-clockwise."""
     cos = math.cos(angle)
     sin = math.sin(angle)
@@ -218,6 +218,8 @@ def _turn_vectors(vectors: Array, angle: float) -> Array:
 
 def find_worst_of_loop(loop: LoopMeasurement) -> float:
     """Return the worst error of torque and pin forces, over the scale of each."""
+    if loop.through_time is not None and loop.through_time.lost:
+        return math.inf
     return max(error.part for error in list_errors_by_method(loop))
 
 

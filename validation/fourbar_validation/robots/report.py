@@ -17,7 +17,13 @@ from fourbar.formulas.mobility import (
 )
 from fourbar.quantities import PIN_FORCES, UNITS
 from fourbar.writing import write_text
-from fourbar_validation.compare.rows import escape_controls, write_csv_rows
+from fourbar_validation.compare.rows import (
+    UNDECIDED,
+    Row,
+    escape_controls,
+    write_csv_rows,
+    write_results,
+)
 from fourbar_validation.engines.mujoco.robots.answers import (
     LoopMeasurement,
     RobotMeasurement,
@@ -26,6 +32,9 @@ from fourbar_validation.engines.mujoco.robots.answers import (
 )
 from fourbar_validation.report.sentences import make_words_table, print_sentence
 from fourbar_validation.report.templating import escape_cell
+from fourbar_validation.report.sentences import make_words_table, print_sentence
+from fourbar_validation.report.templating import escape_cell
+from fourbar_validation.robots.judge import Judgement
 from fourbar_validation.robots.measure import (
     MEASURED_THROUGH_TIME,
     RIGID,
@@ -38,6 +47,15 @@ from fourbar_validation.robots.measure import (
 )
 
 ERROR_HEADINGS = ("method", "quantity", "error", "of largest", "at", "median")
+JUDGED_HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
+_DIFFERENCES = ("cost", "what differs")
+_ABOUT_COSTS = (
+    "cost: what this one entry adds to the error of the file itself, if it is a"
+    " setting, a weld, contacts, a range or a motor; of the others what it adds, as in"
+    " the file, to the error of the generated one. Of torque and pin forces the one"
+    " that grows most. A dash: this entry cannot be set by itself, or the file holds"
+    " what it is held to"
+)
 _SETTINGS = ("changed alone", "single states", "through time", "cost")
 SCENE_ROUND_OFF = 1e-8
 """Difference of two exact answers, over the largest torque and pin forces, that the
@@ -68,6 +86,8 @@ class TextTable:
 
     headings: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
+    words: int = 1
+    """First columns that are words; the others are numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,19 +111,68 @@ def describe_measurement(measurement: RobotMeasurement) -> Iterator[ReportBlock]
         yield f"note: {note}"
 
 
-def _describe_loop(loop: LoopMeasurement) -> Iterator[ReportBlock]:
+def describe_judgement(judgement: Judgement, stated: str) -> Iterator[ReportBlock]:
+    """Describe a file that is judged against a scene.
+
+    `stated`: options that win over the scene, as they were typed; "" without any.
+    """
+    yield from _describe_loop(judgement.measured, judgement, stated)
+    for note in judgement.notes:
+        yield f"note: {note}"
+    yield from judgement.sentences()
+    yield (
+        f"{judgement.counts.sentence()}. It differs in {len(judgement.differences)}"
+        " entries"
+    )
+
+
+def _describe_differences(judgement: Judgement) -> Iterator[ReportBlock]:
+    """List what differs from the generated file, with its cost, and the errors."""
+    if not judgement.differences:
+        yield "It differs in nothing from the generated MJCF."
+    else:
+        order = "the dearest difference first"
+        if judgement.is_of_another_linkage:
+            order = f"the lengths of another linkage first, then {order}"
+        yield f"what differs from the generated MJCF, {order}"
+        yield _ABOUT_COSTS
+        rows = [(one.price, one.write()) for one in judgement.differences]
+        yield TextTable(_DIFFERENCES, rows, 2)
+    for method in judgement.methods():
+        yield f"what it costs, {method}:"
+        errors = [one.cells() for one in judgement.errors if one.method == method]
+        yield TextTable(JUDGED_HEADINGS, errors)
+
+
+def _write_heading(loop: LoopMeasurement, *, judged: bool, stated: str) -> str:
     joints = [row.joint for row in loop.states.rows]
     first, last = (write_degrees(end) for end in (min(joints), max(joints)))
     speed = loop.states.rows[0].omega_2
-    yield (
-        f"{loop.name}: {loop.joint} from {first} to {last} deg at "
-        f"{speed:.4g} rad/s, MuJoCo in the whole robot against rigid pins, and these"
-        " against the formulas"
+    how = "in the whole robot against rigid pins, and these against the formulas"
+    if judged:
+        how = "in the whole robot against the formulas"
+        if loop.as_it_is:
+            how = "with the file as it is against the formulas"
+    given = f" (not as in the scene: {stated})" if stated else ""
+    return (
+        f"{loop.name}: {loop.joint} from {first} to {last} deg at {speed:.4g}"
+        f" rad/s{given}, MuJoCo {how}"
     )
+
+
+def _describe_loop(
+    loop: LoopMeasurement,
+    judgement: Judgement | None = None,
+    stated: str = "",
+) -> Iterator[ReportBlock]:
+    yield _write_heading(loop, judged=judgement is not None, stated=stated)
     yield _write_held(loop)
     if loop.switched_off:
         names = ", ".join(loop.switched_off)
-        yield f"switched off, because it ties its bars to joints that are held: {names}"
+        yield (
+            "switched off, because it ties its bars to joints that are held, or to each"
+            f" other: {names}"
+        )
     left_out = find_left_out(loop)
     if left_out > SCENE_ROUND_OFF:
         size = f"{left_out:.1e}"
@@ -130,7 +199,10 @@ def _describe_loop(loop: LoopMeasurement) -> Iterator[ReportBlock]:
     errors = list_errors_by_method(loop)
     if left_out <= LEAST_LEFT_OUT:
         errors = [error for error in errors if error.method != RIGID]
-    yield TextTable(ERROR_HEADINGS, [error.cells() for error in errors])
+    if judgement is None:
+        yield TextTable(ERROR_HEADINGS, [error.cells() for error in errors])
+    else:
+        yield from _describe_differences(judgement)
     yield from _describe_vanishing(errors)
     yield from _describe_worst_near_limits(loop, errors)
     if loop.through_time is None:
@@ -184,6 +256,8 @@ def _write_held(loop: LoopMeasurement) -> str:
             f", a tenth of which changes the errors by {loop.influence.worst:.1g} of"
             f" the largest, {loop.influence.median:.1g} in the median"
         )
+    if loop.as_it_is:
+        return f"{text}; contacts, joint limits and other motors act as in the file"
     return f"{text}; contacts, joint limits and motors are off"
 
 
@@ -327,7 +401,9 @@ def show_block(block: ReportBlock) -> None:
     if isinstance(block, TextTable):
         from rich.console import Console
 
-        table = make_words_table(block.headings, block.rows, show_edge=False)
+        table = make_words_table(
+            block.headings, block.rows, block.words, show_edge=False
+        )
         Console().print(table)
     elif isinstance(block, Typed):
         click.echo(escape_controls(block.text))
@@ -354,13 +430,15 @@ def write_markdown(title: str, blocks: Sequence[ReportBlock]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def write_states(measurement: RobotMeasurement) -> str:
+def write_states(loops: Sequence[LoopMeasurement]) -> str:
     """Write every state that MuJoCo was asked at as CSV, under STATES_FILE."""
-    return write_csv_rows(STATES_FILE, _list_states(measurement))
+    return write_csv_rows(STATES_FILE, _list_states(loops))
 
 
-def _list_states(measurement: RobotMeasurement) -> Iterator[tuple[str | float, ...]]:
-    for loop in measurement.loops:
+def _list_states(
+    loops: Sequence[LoopMeasurement],
+) -> Iterator[tuple[str | float, ...]]:
+    for loop in loops:
         for method, answer in (
             (STATES, loop.states),
             (MEASURED_THROUGH_TIME, loop.through_time),
@@ -374,17 +452,39 @@ def _list_states(measurement: RobotMeasurement) -> Iterator[tuple[str | float, .
                 yield escape_controls(loop.name), method, *map(float, numbers)
 
 
-def report_measurement(
-    measurement: RobotMeasurement,
+def list_measured_rows(measurement: RobotMeasurement) -> list[Row]:
+    """List the errors of loops that nobody's scene judges, as rows of a run."""
+    return [
+        Row(
+            escape_controls(loop.name),
+            error.method,
+            "-",
+            error.quantity,
+            error.part,
+            math.nan,
+            UNDECIDED,
+            "measured, and not judged: no SCENE is given",
+            error.theta_2,
+            math.nan,
+        )
+        for loop in measurement.loops
+        for error in list_errors_by_method(loop)
+    ]
+
+
+def write_report(
     robot: Path,
     out: Path,
+    blocks: Sequence[ReportBlock],
+    rows: Sequence[Row],
+    loops: Sequence[LoopMeasurement],
 ) -> None:
-    """Print a measurement, and write robot.md and robot.csv into a folder."""
-    blocks = list(describe_measurement(measurement))
+    """Print a report, and write robot.md, results.csv and states.csv into a folder."""
     for block in blocks:
         show_block(block)
     out.mkdir(parents=True, exist_ok=True)
     title = f"The loops of {robot.name} in MuJoCo"
     write_text(out / "robot.md", write_markdown(title, blocks))
-    write_text(out / "robot.csv", write_states(measurement))
+    write_results(rows, out / "results.csv")
+    write_text(out / "states.csv", write_states(loops))
     click.echo(escape_controls(f"written to {out}"))

@@ -16,8 +16,11 @@ import numpy as np
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS
 from fourbar.quantities import Array
 from fourbar_validation.engines.description import ModelEntry, Value
-from fourbar_validation.engines.mujoco.robots.ancestry import is_enabled
-from fourbar_validation.engines.mujoco.topology import Topology
+from fourbar_validation.engines.mujoco.robots.ancestry import (
+    is_enabled,
+    list_lifted_masses,
+)
+from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
 
 Described = dict[str, ModelEntry]
 NONE_IN_WORDS = "none"
@@ -67,11 +70,13 @@ MJCF_WORDS = {
 """Integrators and solvers as MJCF spells them, where MuJoCo spells them otherwise."""
 _TORQUE_SCALE = 10
 """Place in eq_data of the factor on the rotation that a weld holds."""
+PARALLEL_AXES = 1e-9
+"""rad; axes that are nearer to each other are parallel but for rounding."""
 _SOFTEST, STIFFEST = 1e-4, 0.9999
 """Impedances between which MuJoCo keeps that of a constraint."""
 
 
-def describe_model(topology: Topology, flywheel: float = 0.0) -> Described:
+def describe_model(seen: SeenLoop, flywheel: float = 0.0) -> Described:
     """Describe lengths, masses, pins, gravity, closure, loads, and more, as compiled.
 
     Tendons and options are described too.
@@ -79,27 +84,28 @@ def describe_model(topology: Topology, flywheel: float = 0.0) -> Described:
     `flywheel`: the part of the armature of pin O2 that drives, kg m^2, and so is no
     inertia of the input.
     """
-    model = topology.model
-    described = {"plane": ModelEntry(topology.plane)}
-    for bar, name in BAR_NAMES.items():
-        described[f"lengths.{name}"] = ModelEntry(topology.length(bar))
-    described["lengths.ground_angle"] = ModelEntry(topology.ground_angle)
+    model = seen.model
+    skew = seen.loop.misaligned
+    described = {
+        "plane": ModelEntry(seen.plane),
+        "skew": ModelEntry(skew if skew > PARALLEL_AXES else 0.0),
+    }
+    for name, length in zip(BAR_NAMES.values(), seen.loop.lengths, strict=True):
+        described[f"lengths.{name}"] = ModelEntry(length)
     for bar in MOVING_BARS:
-        described |= _describe_bar(topology, bar, flywheel)
+        described |= _describe_bar(seen, bar, flywheel)
     gravity = model.opt.gravity * is_enabled(model, "gravity")
-    for axis, size in zip("xy", topology.in_plane(gravity), strict=True):
+    for axis, size in zip("xy", seen.in_plane(gravity), strict=True):
         described[f"gravity.{axis}"] = ModelEntry(float(size), "option", "gravity")
     described["gravity.across"] = ModelEntry(
-        float(gravity @ topology.normal),
+        float(gravity @ seen.normal),
         "option",
         "gravity",
     )
     for pin in PINS:
-        described |= _describe_pin(topology, pin)
+        described |= _describe_pin(seen, pin)
     described |= (
-        _describe_closure(topology)
-        | _describe_loads(topology)
-        | _describe_tendons(topology)
+        _describe_closure(seen) | _describe_loads(seen) | _describe_tendons(seen)
     )
     for name in COMPARED_OPTIONS:
         setting = getattr(model.opt, name)
@@ -115,9 +121,8 @@ def describe_model(topology: Topology, flywheel: float = 0.0) -> Described:
     touching = model.npair or (
         model.geom_contype.any() and model.geom_conaffinity.any()
     )
-    described["contacts"] = ModelEntry(
-        "possible" if touching and is_enabled(model, "contact") else "off"
-    )
+    touching = touching and seen.is_alone and is_enabled(model, "contact")
+    described["contacts"] = ModelEntry("possible" if touching else "off")
     return described
 
 
@@ -140,7 +145,7 @@ def _name_element(
 
 
 def _describe_bar(
-    topology: Topology,
+    seen: SeenLoop,
     bar: int,
     flywheel: float,
 ) -> Described:
@@ -149,31 +154,31 @@ def _describe_bar(
     The place is from the first pin; all that is welded to the bar is included. The
     armature of a hinge on the ground turns with the bar, and is inertia of it.
     """
-    model = topology.model
-    data = topology.data
-    parts = np.flatnonzero(model.body_weldid == topology.root[bar])
+    model = seen.model
+    data = seen.data
+    parts = seen.list_parts(bar)
     masses = model.body_mass[parts]
     mass = float(masses.sum())
-    places = np.array([topology.in_plane(data.xipos[part]) for part in parts])
+    places = np.array([seen.in_plane(data.xipos[part]) for part in parts])
     if mass:
         centre = masses @ places / mass
     else:
         centre = places[0]
     inertia = 0.0
     for part, part_mass, place in zip(parts, masses, places, strict=True):
-        across = data.ximat[part].reshape(3, 3).T @ topology.normal
+        across = data.ximat[part].reshape(3, 3).T @ seen.normal
         inertia += float(
             across**2 @ model.body_inertia[part]
             + part_mass * (place - centre) @ (place - centre)
         )
-    arm = centre - topology.in_plane(topology.world(data, bar, FIRST_PIN[bar]))
-    x, y = topology.line(data, bar)
+    arm = centre - seen.in_plane(seen.world(bar, FIRST_PIN[bar]))
+    x, y = seen.line(bar)
     angle = 0.0
     if arm.any():
         turned = math.atan2(arm[1], arm[0]) - math.atan2(y, x)
         angle = math.remainder(turned, math.tau)
     key = f"bars.{BAR_NAMES[bar]}"
-    element = f'body "{model.body(topology.root[bar]).name}"'
+    element = f'body "{model.body(seen.loop.bodies[bar][0]).name}"'
     values = {
         "mass": mass,
         "inertia": inertia,
@@ -184,33 +189,35 @@ def _describe_bar(
         f"{key}.{name}": ModelEntry(value, element, "inertial")
         for name, value in values.items()
     }
-    armature = _find_armature(topology, FIRST_PIN[bar])
+    armature = _find_armature(seen, FIRST_PIN[bar])
     if bar == 2:
         armature -= flywheel
     if FIRST_PIN[bar] in _GROUND_PINS and armature:
-        joint = topology.hinge[FIRST_PIN[bar]]
+        joint = seen.hinge[FIRST_PIN[bar]]
         hinge = _name_element("joint", model.joint(joint).name, joint)
         described[f"{key}.inertia"] = ModelEntry(
             inertia + armature,
             f"{element} inertial and {hinge}",
             "armature",
         )
+    lifted = float(list_lifted_masses(model)[parts].sum())
+    described[f"lift.{BAR_NAMES[bar]}"] = ModelEntry(lifted, element, "gravcomp")
     return described
 
 
-def _find_armature(topology: Topology, pin: str) -> float:
+def _find_armature(seen: SeenLoop, pin: str) -> float:
     """Find the armature of a pin's hinge, kg m^2; 0 where the loop is cut."""
-    if pin not in topology.hinge:
+    if pin not in seen.hinge:
         return 0.0
-    dof = topology.model.jnt_dofadr[topology.hinge[pin]]
-    return float(topology.model.dof_armature[dof])
+    dof = seen.model.jnt_dofadr[seen.hinge[pin]]
+    return float(seen.model.dof_armature[dof])
 
 
-def _describe_pin(topology: Topology, pin: str) -> Described:
+def _describe_pin(seen: SeenLoop, pin: str) -> Described:
     """Describe what acts at a pin; nothing acts where the loop is cut."""
-    model = topology.model
+    model = seen.model
     key = f"pins.{pin}"
-    joint = topology.hinge.get(pin)
+    joint = seen.hinge.get(pin)
     if joint is None:
         return {f"{key}.{name}": ModelEntry(0.0) for name in PIN_PROPERTIES} | {
             f"{key}.range": ModelEntry(UNLIMITED_RANGE)
@@ -236,53 +243,48 @@ def _describe_pin(topology: Topology, pin: str) -> Described:
                 attribute,
             )
     if described[f"{key}.stiffness"].value:
-        address = model.jnt_qposadr[joint]
-        turned = topology.sense[pin] * float(
-            model.qpos_spring[address] - model.qpos0[address]
-        )
         described[f"{key}.spring angle"] = ModelEntry(
-            topology.rest_angle(pin) + turned,
+            seen.spring_angle(pin),
             element,
             "springref",
         )
-    stops = topology.stops(pin)
+    stops = seen.stops(pin) if seen.is_alone else None
     described[f"{key}.range"] = ModelEntry(
         UNLIMITED_RANGE if stops is None else stops,
         element,
         "range",
     )
-    if topology.sense[pin] > 0:
+    if seen.sense[pin] > 0:
         sense = "counter-clockwise"
     else:
         sense = "clockwise"
     return described | {f"{key}.positive": ModelEntry(sense, element, "axis")}
 
 
-def _describe_closure(topology: Topology) -> Described:
-    model = topology.model
-    number = topology.closure
+def _describe_closure(seen: SeenLoop) -> Described:
+    model = seen.model
+    number = seen.closure
     described = {
-        "closure.pin": ModelEntry(topology.cut),
-        "closure.by": ModelEntry(topology.closed_by),
+        "closure.pin": ModelEntry(seen.loop.cut or "within a bar"),
+        "closure.by": ModelEntry(seen.closed_by),
+        "closure.out of plane": ModelEntry(seen.measure_offset()),
     }
-    ends = [
-        topology.world(topology.data, bar, topology.cut) for bar in PINS[topology.cut]
+    others = [
+        i
+        for i in range(model.neq)
+        if i not in seen.loop.closures and model.eq_active0[i]
     ]
-    described["closure.out of plane"] = ModelEntry(
-        abs(float((ends[0] - ends[1]) @ topology.normal))
-    )
-    others = [i for i in range(model.neq) if i != number and model.eq_active0[i]]
     names = [model.equality(i).name or f"(unnamed {i})" for i in others]
     described["other equalities"] = ModelEntry(", ".join(names) or NONE_IN_WORDS)
-    if number is None:
+    if not model.eq_active0[number]:
         return described
     element = _name_element(
-        topology.closed_by.partition(" ")[0],
+        seen.closed_by.partition(" ")[0],
         model.equality(number).name,
         number,
     )
     impedance = float(np.clip(model.eq_solimp[number, 0], _SOFTEST, STIFFEST))
-    softness = (1.0 - impedance) / impedance * _sum_inverse_weights(topology, number)
+    softness = (1.0 - impedance) / impedance * _sum_inverse_weights(seen, number)
     described["closure.solref"] = ModelEntry(
         _read_field(model.eq_solref[number]),
         element,
@@ -296,16 +298,16 @@ def _describe_closure(topology: Topology) -> Described:
     return described | {"closure.softness": ModelEntry(softness, element, "solimp")}
 
 
-def _sum_inverse_weights(topology: Topology, number: int) -> float:
+def _sum_inverse_weights(seen: SeenLoop, number: int) -> float:
     """Sum MuJoCo's inverse weights of the two bodies that an equality joins, 1/kg."""
-    model = topology.model
+    model = seen.model
     bodies = [int(model.eq_obj1id[number]), int(model.eq_obj2id[number])]
     if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
         bodies = [int(model.site_bodyid[site]) for site in bodies]
     return float(model.body_invweight0[bodies, 0].sum())
 
 
-def _describe_loads(topology: Topology) -> Described:
+def _describe_loads(seen: SeenLoop) -> Described:
     """Describe what actuators exert with a control of 0.
 
     At sites it is the sum on each bar, at hinges the couple. Forces that keep their
@@ -313,71 +315,92 @@ def _describe_loads(topology: Topology) -> Described:
     the bar's first pin, which tell where the force acts. The drive is taken off, and is
     no load.
     """
-    model = topology.model
-    data = topology.data
+    model = seen.model
     sums: dict[str, Array] = {}
     described: Described = {}
-    for i in sorted({*range(len(model.actuator_trntype))} - {*topology.drives()}):
+    pins = {joint: pin for pin, joint in seen.hinge.items()}
+    drives = seen.list_actuators(seen.loop.joint)
+    for i in range(len(model.actuator_trntype)):
+        if i in drives:
+            continue
         bias = _read_bias(model, i)
         if not bias.any():
             continue  # it exerts what it is told to, and it is told nothing
-        number, frame = (int(index) for index in model.actuator_trnid[i])
+        number = int(model.actuator_trnid[i, 0])
         gear = model.actuator_gear[i]
         kind = model.actuator_trntype[i]
         element = _name_element("actuator", model.actuator(i).name, i)
         bar = None
         if kind == mujoco.mjtTrn.mjTRN_SITE:
-            bar = topology.bar(model.site_bodyid[number])
+            bar = seen.bar(model.site_bodyid[number])
         if kind == mujoco.mjtTrn.mjTRN_JOINT:
-            pin = next(pin for pin, joint in topology.hinge.items() if joint == number)
-            described[f"pins.{pin}.motor"] = ModelEntry(
-                _read_field(topology.sense[pin] * gear[0] * bias), element
-            )
+            if number in pins and seen.is_alone:
+                pin = pins[number]
+                described[f"pins.{pin}.motor"] = ModelEntry(
+                    _read_field(seen.sense[pin] * gear[0] * bias), element
+                )
         elif kind == mujoco.mjtTrn.mjTRN_TENDON:
-            described[f"{_name_tendon(topology, number)}.tension"] = ModelEntry(
-                _read_field(gear[0] * bias), element
-            )
+            if seen.touches_tendon(number):
+                described[f"{_name_tendon(seen, number)}.tension"] = ModelEntry(
+                    _read_field(gear[0] * bias), element
+                )
         elif bar in MOVING_BARS:
-            axes_of = frame if frame >= 0 else number
-            bearer = topology.bar(model.site_bodyid[axes_of]) or 1
-            axes = data.site_xmat[axes_of].reshape(3, 3)
-            force = axes @ gear[:3] * bias[0]
-            couple = axes @ gear[3:] * bias[0]
-            if bearer in MOVING_BARS:
-                fx, fy = topology.turned_back(bearer, force)
-                directions = f"axes of the {BAR_NAMES[bearer]}"
-            else:
-                fx, fy = topology.in_plane(force)
-                directions = "world axes"
-            x, y = topology.along_bar(bar, data.site_xpos[number])
-            key = f"loads.{BAR_NAMES[bar]}, {directions}"
-            load = (
-                fx,
-                fy,
-                float(couple @ topology.normal),
-                x * fy - y * fx,
-                x * fx + y * fy,
-            )
+            key, load = _read_load(seen, i, bar, bias[0])
             sums[key] = sums.get(key, np.zeros(5)) + load
-        else:
+        elif seen.is_alone:
             described[f"actuators.{model.actuator(i).name or i}"] = ModelEntry(
                 "acts on no pin, bar or tendon", element
             )
-    for key, (fx, fy, couple, turning, along) in sums.items():
-        squared = fx * fx + fy * fy
-        if squared:
-            point = (
-                (fx * along + fy * turning) / squared,
-                (fy * along - fx * turning) / squared,
-            )
-        else:
-            point = (0.0, 0.0)
-        described[f"{key}.force"] = ModelEntry((float(fx), float(fy)))
-        described[f"{key}.point"] = ModelEntry((float(point[0]), float(point[1])))
-        described[f"{key}.couple"] = ModelEntry(
-            float(couple) if squared else float(couple + turning)
-        )
+    for key, total in sums.items():
+        described |= _describe_load(key, *total.tolist())
     return described
+
+
+def _describe_load(
+    key: str, fx: float, fy: float, couple: float, turning: float, along: float
+) -> Described:
+    """Describe the sum of loads on a bar: force, the point where it acts, couple."""
+    squared = fx * fx + fy * fy
+    point = (0.0, 0.0)
+    if squared:
+        point = (
+            (fx * along + fy * turning) / squared,
+            (fy * along - fx * turning) / squared,
+        )
+        turning = 0.0
+    return {
+        f"{key}.force": ModelEntry((fx, fy)),
+        f"{key}.point": ModelEntry(point),
+        f"{key}.couple": ModelEntry(couple + turning),
+    }
+
+
+def _read_load(
+    seen: SeenLoop, actuator: int, bar: int, size: float
+) -> tuple[str, tuple[float, ...]]:
+    """Return key and sums of what an actuator exerts at a site of a bar.
+
+    The sums are force, couple, r x F and r . F, in N and N m.
+    """
+    model = seen.model
+    data = seen.data
+    site, frame = (int(index) for index in model.actuator_trnid[actuator])
+    gear = model.actuator_gear[actuator]
+    axes_of = frame if frame >= 0 else site
+    bearer = seen.bar(model.site_bodyid[axes_of]) or 1
+    axes = data.site_xmat[axes_of].reshape(3, 3)
+    force = axes @ gear[:3] * size
+    couple = axes @ gear[3:] * size
+    if bearer in MOVING_BARS:
+        fx, fy = seen.turned_back(bearer, force)
+        directions = f"axes of the {BAR_NAMES[bearer]}"
+    else:
+        fx, fy = seen.in_plane(force)
+        directions = "world axes"
+    x, y = seen.along_bar(bar, data.site_xpos[site])
+    key = f"loads.{BAR_NAMES[bar]}, {directions}"
+    turning = x * fy - y * fx
+    return key, (fx, fy, float(couple @ seen.normal), turning, x * fx + y * fy)
 
 
 def _read_bias(model: mujoco.MjModel, actuator: int) -> Array:
@@ -398,10 +421,10 @@ def _read_bias(model: mujoco.MjModel, actuator: int) -> Array:
     return np.zeros(3)
 
 
-def _name_tendon(topology: Topology, number: int) -> str:
+def _name_tendon(seen: SeenLoop, number: int) -> str:
     """Return a tendon's name: its pins, or else the bars that it runs between."""
-    model = topology.model
-    joints = {joint: pin for pin, joint in topology.hinge.items()}
+    model = seen.model
+    joints = {joint: pin for pin, joint in seen.hinge.items()}
     parts = []
     for wrap in range(
         model.tendon_adr[number], model.tendon_adr[number] + model.tendon_num[number]
@@ -409,53 +432,54 @@ def _name_tendon(topology: Topology, number: int) -> str:
         kind = mujoco.mjtWrap(model.wrap_type[wrap])
         index = int(model.wrap_objid[wrap])
         if kind == mujoco.mjtWrap.mjWRAP_JOINT:
-            parts.append(joints[index])
+            parts.append(joints.get(index, "another joint"))
         elif kind == mujoco.mjtWrap.mjWRAP_SITE:
-            bar = topology.bar(model.site_bodyid[index])
+            bar = seen.bar(model.site_bodyid[index])
             parts.append("no bar" if bar is None else BAR_NAMES[bar])
         else:
             parts.append(kind.name.removeprefix("mjWRAP_").lower())
     return f"tendons.{' '.join(sorted(parts))}"
 
 
-def _describe_tendons(topology: Topology) -> Described:
+def _describe_tendons(seen: SeenLoop) -> Described:
     """Describe every tendon by its path, and what it does.
 
     The path tells several tendons between the same bars apart.
     """
-    model = topology.model
-    data = topology.data
+    model = seen.model
+    data = seen.data
+    pins = {joint: pin for pin, joint in seen.hinge.items()}
     tendons = list[tuple[str, tuple[float, ...], int]]()
     rest: dict[int, float] = {}
-    for i in range(model.ntendon):
+    for i in filter(seen.touches_tendon, range(model.ntendon)):
         path = []
         for wrap in range(
             model.tendon_adr[i], model.tendon_adr[i] + model.tendon_num[i]
         ):
             index = int(model.wrap_objid[wrap])
             if model.wrap_type[wrap] == mujoco.mjtWrap.mjWRAP_JOINT:
-                pin = next(
-                    pin for pin, joint in topology.hinge.items() if joint == index
-                )
-                coefficient = topology.sense[pin] * float(model.wrap_prm[wrap])
+                if index not in pins:
+                    continue
+                pin = pins[index]
+                coefficient = seen.sense[pin] * float(model.wrap_prm[wrap])
                 path.append((pin, coefficient))
                 rest[i] = rest.get(
                     i, -float(model.tendon_length0[i])
-                ) + coefficient * topology.rest_angle(pin)
+                ) + coefficient * seen.rest_angle(pin)
             elif model.wrap_type[wrap] == mujoco.mjtWrap.mjWRAP_SITE:
-                bar = topology.bar(model.site_bodyid[index])
+                bar = seen.bar(model.site_bodyid[index])
                 path.append(
                     (
                         str(bar),
                         *(
                             ()
                             if bar is None
-                            else topology.along_bar(bar, data.site_xpos[index])
+                            else seen.along_bar(bar, data.site_xpos[index])
                         ),
                     )
                 )
         numbers = tuple(number for _, *place in sorted(path) for number in place)
-        tendons.append((_name_tendon(topology, i), numbers, i))
+        tendons.append((_name_tendon(seen, i), numbers, i))
     described: Described = {}
     for name, numbers, i in sorted(tendons):
         key = next(
@@ -503,7 +527,7 @@ def set_entry(
     subject, _, rest = key.partition(".")
     try:
         if subject == "lengths":
-            _set_length(root, generated, rest, float(value))  # type: ignore[arg-type]
+            _set_length(root, rest, float(value))  # type: ignore[arg-type]
         elif subject == "bars":
             bar, _, name = rest.partition(".")
             _set_inertial(root, generated, bar, name, float(value))  # type: ignore[arg-type]
@@ -588,24 +612,17 @@ def _write_setting(value: Value) -> str:
     )
 
 
-def _set_length(
-    root: ET.Element,
-    generated: Mapping[str, ModelEntry],
-    bar: str,
-    value: float,
-) -> None:
+def _set_length(root: ET.Element, bar: str, value: float) -> None:
     """Move the pin at the end of a bar along its line.
 
     The pin of the ground is that of the output.
     """
-    if bar in ("ground", "ground_angle"):
-        length, angle = (
-            float(generated[f"lengths.{name}"].value)  # type: ignore[arg-type]
-            for name in ("ground", "ground_angle")
-        )
-        length, angle = (value, angle) if bar == "ground" else (length, value)
-        place = (length * math.cos(angle), length * math.sin(angle), 0.0)
-        _find(root, 'body "output"').set("pos", _write_setting(place))
+    if bar == "ground":
+        output = _find(root, 'body "output"')
+        stated = [float(number) for number in output.attrib["pos"].split()]
+        factor = value / math.hypot(*stated)
+        place = tuple(factor * number for number in stated)
+        output.set("pos", _write_setting(place))
     else:
         element = {
             "input": 'body "coupler"',
@@ -699,7 +716,7 @@ def _set_load(
 
 
 def mend_entry(
-    topology: Topology,
+    seen: SeenLoop,
     key: str,
     value: Value | None,
 ) -> bool:
@@ -709,18 +726,21 @@ def mend_entry(
     stop and the motors at a pin are removed, the loop is made as stiff as MuJoCo lets
     it be, and a setting gets its value.
     """
-    model = topology.model
+    model = seen.model
     subject, _, rest = key.partition(".")
     pin, _, what = rest.partition(".")
     if key == "contacts":
         model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-    elif key == "closure.by" and topology.closed_by.startswith("weld"):
-        model.eq_data[topology.closure, _TORQUE_SCALE] = 0.0
+    elif key == "closure.by" and seen.closed_by.startswith("weld"):
+        model.eq_data[seen.closure, _TORQUE_SCALE] = 0.0
+    elif subject == "lift":
+        (bar,) = (bar for bar, name in BAR_NAMES.items() if name == rest)
+        model.body_gravcomp[seen.list_parts(bar)] = 0.0
     elif subject == "pins" and what == "range":
-        model.jnt_limited[topology.hinge[pin]] = 0
+        model.jnt_limited[seen.hinge[pin]] = 0
     elif subject == "pins" and what == "motor":
-        joint = topology.hinge[pin]
-        for i in topology.list_actuators(joint):
+        joint = seen.hinge[pin]
+        for i in seen.list_actuators(joint):
             model.actuator_gainprm[i] = model.actuator_biasprm[i] = 0.0
     elif subject == "option" and rest in ENUMERATIONS:
         setattr(model.opt, rest, _number_of_word(rest, str(value)))
@@ -728,14 +748,14 @@ def mend_entry(
         was = getattr(model.opt, rest)
         setattr(model.opt, rest, np.asarray(value).astype(np.asarray(was).dtype))
     elif key == "closure.solref":
-        model.eq_solref[topology.closure] = value
+        model.eq_solref[seen.closure] = value
     elif key in ("closure.solimp", "closure.softness"):
-        model.eq_solimp[topology.closure, :2] = STIFFEST
+        model.eq_solimp[seen.closure, :2] = STIFFEST
     elif subject == "pins" and what in FRICTION_COMPLIANCE.values():
         (field,) = (
             one for one, attribute in FRICTION_COMPLIANCE.items() if attribute == what
         )
-        dof = model.jnt_dofadr[topology.hinge[pin]]
+        dof = model.jnt_dofadr[seen.hinge[pin]]
         getattr(model, field)[dof] = value
     else:
         return False

@@ -23,7 +23,7 @@ from fourbar_validation.engines.mujoco.robots.forces import (
 )
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
-from fourbar_validation.engines.mujoco.theirs import FILE_AT_ONE_STATE
+from fourbar_validation.robots.judge import FILE_AT_ONE_STATE
 from tests.support.robots import answer_of, examine_text
 from tests.whole.test_docs import blocks, read
 from tests.whole.test_imports import ROOT

@@ -3,32 +3,25 @@
 import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import fourbar
 from fourbar.errors import InputError
 from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import CROSSED, OPEN
-from fourbar.solving import solve
 from fourbar_validation.engines.mujoco.robots.answers import (
     MeasureOptions,
-    measure_sizes,
 )
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
-from fourbar_validation.engines.mujoco.theirs import (
-    FILE_THROUGH_TIME,
-)
+from fourbar_validation.robots.judge import FILE_THROUGH_TIME
 from fourbar_validation.robots.measure import (
-    MEASURED_THROUGH_TIME,
     find_left_out,
     find_worst_of_loop,
-    list_errors_by_method,
 )
 from fourbar_validation.robots.report import SCENE_ROUND_OFF
-from tests.support.robots import answer_of, examine_text
+from tests.support.robots import answer_of, examine_text, notes_of
 
 TEXT = """
 <mujoco><option timestep="0.001" integrator="implicitfast" gravity="0 0 -9.81"/>
@@ -129,38 +122,11 @@ def test_joints_that_are_held_are_the_reason_why_a_pose_stays_open() -> None:
     assert "ranges" not in note
 
 
-def test_a_four_bar_alone_is_simulated_as_it_is_in_a_robot() -> None:
-    """A flywheel of 1e8 of ours made the errors hundredfold at a tolerance of 1e-8."""
-    scene = make_scene("open")
-    (loop,) = measure_loops(FILE, MeasureOptions(PoseOptions()), scene).loops
-    inside = {
-        error.quantity: error.part
-        for error in list_errors_by_method(loop)
-        if error.method == MEASURED_THROUGH_TIME
-    }
-    examined = examine_text(scene, TEXT, {})
-    answer = answer_of(examined, FILE_THROUGH_TIME)
-    formulas = solve(scene, "force", at=answer.at)
-    for name in ("torque", "F12", "F32", "F43", "F14"):
-        ours = np.asarray(getattr(formulas, name))
-        errors = measure_sizes(answer.quantities[name] - ours)
-        alone = float(errors.max() / measure_sizes(ours).max())
-        # the last position of the one is the first of the other, and the like
-        assert alone == pytest.approx(inside[name], rel=0.2), name
-    (note,) = [note for note in examined.notes if "the speed is kept" in note]
-    assert "1.44e+03 kg m^2 on pin O2, which are not the file's" in note
-    (note,) = [note for note in examined.notes if "not judged" in note]
-    judged = len(answer.quantities["torque"])
-    positions = len(fourbar.command(scene).theta_2) - 1
-    assert f"({positions - judged} of {positions} positions after the start)" in note
-
-
 def test_what_is_not_judged_is_said_of_a_file_with_its_own_flywheel_too() -> None:
     scene = make_scene("open")
     examined = examine_text(scene, write_mjcf(scene), {})
-    assert not [note for note in examined.notes if "are not the file's" in note]
     judged = len(answer_of(examined, FILE_THROUGH_TIME).quantities["torque"])
     positions = len(fourbar.command(scene).theta_2) - 1
     assert judged < positions
-    (note,) = [note for note in examined.notes if "are not judged" in note]
+    (note,) = [note for note in notes_of(examined) if "are not judged" in note]
     assert f"({positions - judged} of {positions} positions" in note

@@ -173,6 +173,16 @@ def list_motors(model: mujoco.MjModel) -> list[tuple[int, int]]:
     return motors
 
 
+def list_actuators(model: mujoco.MjModel, joint: int) -> list[int]:
+    """List the actuators on a joint."""
+    kinds = mujoco.mjtTrn
+    on_joints = (kinds.mjTRN_JOINT, kinds.mjTRN_JOINTINPARENT)
+    of_joints = np.isin(model.actuator_trntype, [int(kind) for kind in on_joints])
+    on_this = model.actuator_trnid[:, 0] == joint
+    actuators: list[int] = np.flatnonzero(of_joints & on_this).tolist()
+    return actuators
+
+
 def takes_control(model: mujoco.MjModel, actuator: int) -> bool:
     """Tell a motor from a load, a spring or a damper that is written as an actuator."""
     return bool(model.actuator_gainprm[actuator].any())

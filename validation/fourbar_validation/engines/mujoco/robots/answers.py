@@ -94,6 +94,15 @@ def divide(error: float, scale: float) -> float:
     return math.inf if error else 0.0
 
 
+class BarMotion(NamedTuple):
+    """Angles (rad) and speeds (rad/s) of bars 3 and 4 in the plane of a loop."""
+
+    theta_3: float
+    theta_4: float
+    omega_3: float
+    omega_4: float
+
+
 @dataclass(frozen=True, slots=True)
 class InsideRow:
     """One state of a loop in its robot."""
@@ -110,6 +119,8 @@ class InsideRow:
     """
     gap: float
     """Distance of the ends of the closure, m."""
+    bars: BarMotion
+    """Motion of the state that MuJoCo evaluates."""
     condition: float
     """|sin(theta_4 - theta_3)| of the closed state of the same theta_2."""
     sticking: tuple[str, ...] = ()
@@ -125,6 +136,12 @@ class InsideAnswer:
     """Positions of the driven joint that are left out, because the bars of pin B are in
     line there, rad.
     """
+    open: list[float] = field(default_factory=list)
+    """Angles of bar 2 at which the loop does not close, rad."""
+    settling: float = 0.0
+    """Time after the start in which no state is judged, because the loop yields, s."""
+    skipped: int = 0
+    """Angles that the motion passes in this time."""
     lost: str = ""
     """Why the run ended early; empty where it did not."""
     other_assembly: float | None = None
@@ -299,6 +316,8 @@ class MeasureOptions:
     """Error for which settings are looked for; None: none are."""
     span: tuple[float, float] | None = None
     """Range of the driven joint, rad; None: that of the scene."""
+    names: Mapping[str, str] = field(default_factory=dict)
+    """Bodies of the bars and sites of pin B that are stated, by their roles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -334,6 +353,20 @@ class LoopMeasurement:
     """
     torn: tuple[TornState, ...]
     advice: SettingsAdvice | None
+    as_it_is: bool
+    """True if contacts, joint limits and other motors acted as in the file."""
+    flywheel: float
+    """Armature of the driven hinge that drives, kg m^2."""
+    unmet_stops: tuple[int, ...]
+    """Hinges of the loop whose stops ended no state."""
+    left_assembly: bool
+    """True if the simulation went over to the other assembly."""
+
+    @property
+    def moves(self) -> bool:
+        """Tell whether the scene names a motion and not a few states at rest."""
+        speeds = [row.omega_2 for row in self.states.rows]
+        return any(speeds) and len(speeds) + len(self.states.open) > 1
 
 
 @dataclass(frozen=True, slots=True)

@@ -138,6 +138,16 @@ def choose_loop(closures: Sequence[RobotClosure], name: str) -> RobotLoop:
     return closure.loop
 
 
+def require_loops(closures: Sequence[RobotClosure]) -> list[RobotLoop]:
+    """Return the four-bars among closures; an InputError says why there are none."""
+    loops = [one.loop for one in closures if one.loop is not None]
+    if not loops:
+        reasons = "; ".join(f"{one.name}: {one.reason}" for one in closures)
+        why = reasons or "the file has no equality that closes a loop"
+        raise InputError("MJCF", None, f"has no planar four-bar: {why}")
+    return loops
+
+
 def describe_equality(model: mujoco.MjModel, number: int) -> str:
     """Return an equality's name, or the two bodies or joints that it ties."""
     if model.equality(number).name:
@@ -448,8 +458,12 @@ class _Finder:
         freedoms = hinges - 3
         count = HINGES_IN_WORDS.get(hinges, f"{hinges} hinges")
         if freedoms <= 0:
-            closer = "" if is_pin else "a weld that leaves no freedom: "
-            return f"{closer}{count} in a plane cannot move"
+            if is_pin:
+                return f"{count} in a plane cannot move"
+            return (
+                f"a weld that leaves no freedom: {count} in a plane cannot move; a"
+                ' <connect> or torquescale="0" makes a pin of it'
+            )
         motors = self._list_motors(chain.joints)
         coupled = self._find_coupled(number, chain)
         holds = self._list_holds(chain, motors, coupled, freedoms - 1)

@@ -4,7 +4,8 @@ What is missing and moves nothing is left out.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import mujoco
@@ -34,6 +35,26 @@ class CompiledRobot:
     """Quaternion of each body whose orientation the file states by one, as it stands
     there: the compiled one is normalized, which hides its digits.
     """
+
+
+@contextmanager
+def collect_warnings() -> Iterator[list[str]]:
+    """Collect the warnings of MuJoCo, each once.
+
+    MuJoCo then neither prints nor logs them.
+    """
+    heard: list[str] = []
+
+    def hear(warning: str) -> None:
+        if warning not in heard:
+            heard.append(warning)
+
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(hear)
+    try:
+        yield heard
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def compile_robot(file: RobotFile) -> CompiledRobot:

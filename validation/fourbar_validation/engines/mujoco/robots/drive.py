@@ -23,6 +23,59 @@ class _Wrench(NamedTuple):
     point: Array
 
 
+class FileCylinder:
+    """Actuator of a file along a tendon that exerts what it is told to, N."""
+
+    acts_on_crank = False
+
+    def __init__(self, model: mujoco.MjModel, scene: Scene, actuator: int) -> None:
+        self.model = model
+        self.drive = scene.drive
+        self.actuator = actuator
+
+    def take_over(self, model: mujoco.MjModel) -> None:
+        """Make the actuator of a model exert its control, without any limit."""
+        i = self.actuator
+        model.actuator_gaintype[i] = mujoco.mjtGain.mjGAIN_FIXED
+        model.actuator_biastype[i] = mujoco.mjtBias.mjBIAS_NONE
+        model.actuator_dyntype[i] = mujoco.mjtDyn.mjDYN_NONE
+        model.actuator_gainprm[i] = 0.0
+        model.actuator_gainprm[i, 0] = 1.0 / model.actuator_gear[i, 0]
+        model.actuator_ctrllimited[i] = model.actuator_forcelimited[i] = False
+        self.model = model
+
+    def exert(self, data: mujoco.MjData, size: float) -> None:
+        """Apply a force, N, in the state that is placed."""
+        data.ctrl[self.actuator] = size
+
+    def find_pull(self, data: mujoco.MjData) -> Array:
+        """Return the generalized forces per N, (nv,), in the state that is placed."""
+        forces = []
+        for size in (0.0, 1.0):
+            data.ctrl[self.actuator] = size
+            mujoco.mj_fwdActuation(self.model, data)
+            forces.append(data.qfrc_actuator.copy())
+        data.ctrl[self.actuator] = 0.0
+        return np.asarray(forces[1] - forces[0])
+
+    def find_speed(self, data: mujoco.MjData) -> float:
+        """Return the speed of the tendon, m/s."""
+        gear = self.model.actuator_gear[self.actuator, 0]
+        return float(data.actuator_velocity[self.actuator] / gear)
+
+
+def find_cylinder(model: mujoco.MjModel, scene: Scene) -> FileCylinder | None:
+    """Return the file's own cylinder if it has one and the scene is driven by one."""
+    if not isinstance(scene.drive, LinearDrive):
+        return None
+    on_tendons = model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON
+    controlled = model.actuator_gainprm.any(axis=1)
+    cylinders = np.flatnonzero(on_tendons & controlled)
+    if len(cylinders) != 1:
+        return None
+    return FileCylinder(model, scene, int(cylinders[0]))
+
+
 class LoopDrive:
     """Wrenches of a scene's drive on the bars of a loop, per N m or N that it exerts.
 

@@ -4,7 +4,8 @@ MuJoCo gives its torque and pin forces there. No joint is removed, for that woul
 the softness that is measured: MuJoCo sizes a constraint's softness by the bodies of the
 whole model. The loop's driven hinge moves as commanded, the other joints of the robot
 stay where they are, contacts, joint limits and motors are off, and so are equalities
-between the moving bars and joints that stay.
+between the moving bars and joints that stay. A file that holds nothing but the loop may
+be taken as it is: only what drives the driven hinge is off then.
 
 At a state the joint forces follow from MuJoCo's own inverse dynamics of its soft
 constraints. The driven hinge has the acceleration alpha, a held joint none, and the
@@ -39,16 +40,19 @@ from fourbar_validation.engines.mujoco.couple import find_couple
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     climb,
     find_tied_bodies,
+    is_enabled,
+    list_actuators,
     name_joint,
     takes_control,
 )
 from fourbar_validation.engines.mujoco.robots.answers import (
+    BarMotion,
     InsideAnswer,
     InsideRow,
     PinsAndTorque,
     TornState,
 )
-from fourbar_validation.engines.mujoco.robots.drive import LoopDrive
+from fourbar_validation.engines.mujoco.robots.drive import FileCylinder, LoopDrive
 from fourbar_validation.engines.mujoco.robots.forces import (
     BearerForces,
     read_equality_force,
@@ -62,6 +66,11 @@ from fourbar_validation.engines.mujoco.runner import Stepper
 
 RESIDUAL_OF_A_CLOSED_STATE = 1e-12
 """m or rad; residual of the closure at which a state is closed."""
+OTHER_ASSEMBLY = (
+    "MuJoCo goes over to the other assembly before the loop has settled; --pose states"
+    " another start"
+)
+"""Why a motion has no state that counts."""
 _CLOSING_STEPS = 50
 RESIDUAL_OF_AN_OPEN_LOOP = 1e-6
 """Residual above which the loop does not close at a position, m or rad."""
@@ -95,6 +104,14 @@ SETTLING_TIME = 5.0
 """Time constants after which the loop has yielded but for 1 %, at most half of the
 motion.
 """
+_TOUCHED = 1e-9
+"""rad; a position that is no farther beyond a limit is at it: scenes state angles with
+twelve digits.
+"""
+_DRIVING = 1e3
+"""Armature over all other inertia from which it is a flywheel that drives. The speed
+then ripples by 1e-3.
+"""
 _REACHED = 1.0 - 1e-6
 """Part of its couple at which dry friction acts in full."""
 _SINE_OF_AN_ASSEMBLY = 0.1
@@ -124,19 +141,38 @@ class LoopInside:
         self,
         model: mujoco.MjModel,
         loop: RobotLoop,
-        drive: LoopDrive | None = None,
+        drive: LoopDrive | FileCylinder | None = None,
+        *,
+        as_it_is: bool = False,
     ) -> None:
-        """Take a loop; `drive`: what moves it; None: a couple on bar 2."""
+        """Take a loop.
+
+        Parameters
+        ----------
+        drive : what moves it; None: a couple on bar 2.
+        as_it_is : contacts, joint limits and other motors act as in the file.
+        """
         self.loop = loop
+        self.given = model
+        self.as_it_is = as_it_is
         self.acting = None if drive is None or drive.acts_on_crank else drive
         self.model = copy(model)
         self.flags = int(model.opt.disableflags)
-        for name in ("CONTACT", "LIMIT"):
-            flag = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
-            self.model.opt.disableflags |= flag
-        motors = [i for i in range(model.nu) if takes_control(model, i)]
-        self.model.actuator_gainprm[motors] = 0.0
-        self.model.actuator_biasprm[motors] = 0.0
+        self.taken_off = list_actuators(model, loop.joint)
+        """Actuators on the driven hinge."""
+        off = self.taken_off
+        if as_it_is:
+            # a sweep ends at the limits of a joint, to round-off on either side
+            self.model.jnt_margin[:] -= _TOUCHED
+        else:
+            for name in ("CONTACT", "LIMIT"):
+                flag = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
+                self.model.opt.disableflags |= flag
+            off = [*off, *(i for i in range(model.nu) if takes_control(model, i))]
+        self.model.actuator_gainprm[off] = 0.0
+        self.model.actuator_biasprm[off] = 0.0
+        if isinstance(self.acting, FileCylinder):
+            self.acting.take_over(self.model)
         # while joints are held, what ties them to the moving bars would only be torn
         self.model.eq_active0[list(loop.other_equalities)] = 0
         self.data = mujoco.MjData(self.model)
@@ -162,8 +198,35 @@ class LoopInside:
         rubs = not self.model.opt.disableflags & without_friction
         self._friction = self.model.dof_frictionloss * rubs
         self.bearers = BearerForces(self.model)
+        self.flywheel = 0.0
+        """Part of the armature of the driven hinge that keeps its speed, kg m^2. Its
+        torque is none of the drive's.
+        """
+        self.stopped = set[int]()
+        """Joints that were at a limit of their range in some state."""
+        self.contacts = 0
+        """Most contacts in a state."""
         self._doubtful: list[InsideRow] = []
         """Last rows of a simulation that may be in the other assembly."""
+
+    def find_flywheel(self, inertia: float) -> None:
+        """Take an armature of the driven hinge for a flywheel if it drives.
+
+        `inertia`: of the flywheels of the scene, kg m^2, which count as load.
+        """
+        armature = float(self.model.dof_armature[self.drive])
+        others = float(self.model.dof_M0.sum() - self.model.dof_armature.sum())
+        if armature > _DRIVING * (others + inertia):
+            self.flywheel = armature
+
+    def find_carrier(self, heavy: float) -> float:
+        """Return the armature that keeps speeds through time, kg m^2.
+
+        `heavy`: its size over the robot's largest inertia.
+        """
+        inertias = self.model.dof_M0.copy()
+        inertias[self.drive] -= self.flywheel
+        return heavy * float(inertias.max())
 
     def angle(self, qpos: Array) -> float:
         """Return theta_2 of a pose, rad."""
@@ -191,12 +254,34 @@ class LoopInside:
             turned = qpos[self.address] - before[self.address]
             qpos[self.passive_addresses] += rates * turned
             if not self.close_gap(qpos):
-                return None
+                return self._jump(theta_2)
             if turned:
                 moved = (qpos - before)[self.passive_addresses]
                 rates = moved / turned
         self._last = qpos.copy()
         self._rates = rates
+        return qpos
+
+    def _jump(self, theta_2: float) -> Array | None:
+        """Return the pose at an angle of bar 2 to which no motion leads.
+
+        The assembly is that of the loop's pose; None if the loop is open.
+        """
+        ground, crank, coupler, output = self.loop.lengths
+        theta_1, _, theta_3, theta_4 = self.loop.angles
+        line = cmath.rect(ground, theta_1) - cmath.rect(crank, theta_2)
+        size = abs(line)
+        if not abs(coupler - output) < size < coupler + output:
+            return None
+        side = math.copysign(1.0, math.sin(theta_4 - theta_3))
+        near = (size**2 + coupler**2 - output**2) / (2.0 * size * coupler)
+        theta_3 = cmath.phase(line) + side * math.acos(near)
+        theta_4 = cmath.phase(cmath.rect(coupler, theta_3) - line)
+        qpos = turn_hinges(self.model, self.loop, theta_2, theta_3, theta_4)
+        if not self.close_gap(qpos):
+            return None
+        self._last = qpos.copy()
+        self._rates = self._find_rates(qpos)
         return qpos
 
     def _find_rates(self, qpos: Array) -> Array:
@@ -340,20 +425,24 @@ class LoopInside:
         if closed is None:
             raise LimitError(f"the loop does not close at theta_2 = {theta_2:.6g} rad")
         rigid, accelerations = self._solve_rigid(closed, alpha_2)
-        mujoco.mj_resetData(model, data)
-        data.qpos[:] = qpos
-        data.qvel[:] = qvel
-        held = self._balance(accelerations)[self.held]
+        held = np.zeros(0)
+        if self.held:
+            mujoco.mj_resetData(model, data)
+            data.qpos[:] = qpos
+            data.qvel[:] = qvel
+            held = self._balance(accelerations)[self.held]
         mujoco.mj_resetData(model, data)
         data.qpos[:] = qpos
         data.qvel[:] = qvel
         data.qfrc_applied[self.held] = held
+        carried = self.flywheel * alpha_2
+        data.qfrc_applied[self.drive] = self.sense * carried
 
         mujoco.mj_kinematics(model, data)
 
         def acceleration(couple: float) -> float:
             if self.acting is None:
-                data.qfrc_applied[self.drive] = self.sense * couple
+                data.qfrc_applied[self.drive] = self.sense * (carried + couple)
             else:
                 self.acting.exert(data, couple)
             mujoco.mj_forward(model, data)
@@ -363,17 +452,55 @@ class LoopInside:
         if couple is None:
             raise LimitError(f"its drive does not move {self.name} in this robot")
         mujoco.mj_rnePostConstraint(model, data)
+        self._watch(data)
+        forces = self._read_forces(data)
+        if math.isnan(couple):
+            forces = {name: np.full(2, np.nan) for name in forces}
         return InsideRow(
             theta_2=theta_2,
             omega_2=omega_2,
             alpha_2=alpha_2,
             joint=float(qpos[self.address]),
-            soft=PinsAndTorque(couple, self._read_forces(data)),
+            soft=PinsAndTorque(couple, forces),
             rigid=rigid,
+            bars=self._read_bars(data),
             gap=self._measure_gap(qpos),
             condition=self._measure_condition(closed.qpos),
             sticking=self._list_sticking(),
         )
+
+    def list_unmet_stops(self) -> list[int]:
+        """List the hinges of the loop whose stops ended no state."""
+        limits = is_enabled(self.model, "limit", "constraint")
+        return [
+            joint
+            for joint in self.loop.hinges.values()
+            if limits and self.model.jnt_limited[joint] and joint not in self.stopped
+        ]
+
+    def _watch(self, data: mujoco.MjData) -> None:
+        """Take note of contacts, and of joints at a limit of their range."""
+        self.contacts = max(self.contacts, int(data.ncon))
+        kinds = data.efc_type[: data.nefc]
+        limits = kinds == mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT
+        self.stopped.update(data.efc_id[: data.nefc][limits].tolist())
+
+    def _read_bars(self, data: mujoco.MjData) -> BarMotion:
+        """Return angles and speeds of bars 3 and 4 in an evaluated state."""
+        ground = self.loop.bodies[1][0]
+        frame = data.xmat[ground].reshape(3, 3)
+        normal = frame @ self.loop.axis
+        along = frame @ self.loop.along
+        across = np.cross(normal, along)
+        self._evaluate_closure(data.qpos)
+        angles = []
+        speeds = []
+        for bar in (3, 4):
+            line = self._find_line(bar)
+            angles.append(math.atan2(float(line @ across), float(line @ along)))
+            turning = data.cvel[self.loop.bodies[bar][0]] - data.cvel[ground]
+            speeds.append(float(turning[:3] @ normal))
+        return BarMotion(*angles, *speeds)
 
     def _list_sticking(self) -> tuple[str, ...]:
         """List the hinges of the loop that turn and stick.
@@ -437,14 +564,16 @@ class LoopInside:
         mujoco.mj_mulM(model, data, needed, accelerations)
         needed += data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator
         needed += self._friction * np.sign(state.qvel)
+        needed[self.drive] -= self.sense * self.flywheel * alpha_2
         couple, multipliers = self._solve_drive(rows, needed)
         data.qacc[:] = accelerations
         data.efc_force[: data.nefc] = multipliers
         if self.acting is not None:
             self.acting.exert(data, couple)
         mujoco.mj_rnePostConstraint(model, data)
-        data.xfrc_applied[:] = 0.0
         forces = self._read_forces(data)
+        if self.acting is not None:
+            self.acting.exert(data, 0.0)
         return PinsAndTorque(couple, forces), accelerations
 
     def _solve_drive(self, rows: Array, needed: Array) -> tuple[float, Array]:
@@ -580,6 +709,7 @@ class LoopInside:
         for angle in theta_2:
             state = self.state(angle, omega_2)
             if state is None:
+                answer.open.append(angle)
                 continue
             if self._is_in_line(state.qpos):
                 in_line.append(float(state.qpos[self.address]))
@@ -607,9 +737,12 @@ class LoopInside:
         model = copy(self.model)
         data = mujoco.MjData(self.model)
         timestep = float(model.opt.timestep)
-        armature = heavy * float(model.dof_M0.max())
-        moved = [self.drive, *self.held]
-        model.dof_armature[moved] += armature
+        armature = self.find_carrier(heavy)
+        model.dof_armature[self.held] += armature
+        if self.flywheel:
+            armature = self.flywheel
+        else:
+            model.dof_armature[self.drive] += armature
         state = self.state(angles[0], omega_2)
         if state is None:
             raise LimitError("the loop does not close where the motion starts")
@@ -638,9 +771,10 @@ class LoopInside:
         self._doubtful.clear()
         # the loop starts exactly closed, and takes some time constants to yield as far
         # as it does
-        settled = settling_time(self.find_constant(), duration)
+        answer.settling = settling_time(self.find_constant(), duration)
         for instant in instants[1:]:
-            if instant < settled:
+            if instant < answer.settling:
+                answer.skipped += 1
                 continue
             began = time.process_time()
             stepper.to(instant)
@@ -656,15 +790,14 @@ class LoopInside:
             if self._left_assembly(answer, data.qpos):
                 break
         if answer.other_assembly is not None and not answer.rows:
-            raise LimitError(
-                "MuJoCo goes over to the other assembly before the loop has settled;"
-                " --pose states another start"
-            )
+            raise LimitError(OTHER_ASSEMBLY)
         answer.seconds_per_step = spent / max(stepper.done, 1)
         return answer
 
     def _find_crank_couple(self, row: InsideRow, data: mujoco.MjData) -> float:
         """Return the couple on bar 2 with the power of a row's drive, N m."""
+        if not math.isfinite(row.soft.torque):
+            return 0.0
         if self.acting is None:
             return row.soft.torque
         return row.soft.torque * self.acting.find_speed(data) / row.omega_2
@@ -707,7 +840,7 @@ class LoopInside:
         states = []
         model = copy(self.model)
         data = mujoco.MjData(self.model)
-        model.dof_armature[self.held] += HEAVY * float(model.dof_M0.max())
+        model.dof_armature[self.held] += self.find_carrier(HEAVY)
         # the motor may meet the stops of the file
         model.opt.disableflags &= ~(LIMITS_OFF & ~self.flags)
         steps = max(round(seconds / model.opt.timestep), 1)
@@ -780,6 +913,32 @@ def settling_time(constant: float, seconds: float) -> float:
     return min(SETTLING_TIME * constant, 0.5 * seconds)
 
 
+def turn_hinges(
+    model: mujoco.MjModel,
+    loop: RobotLoop,
+    theta_2: float,
+    theta_3: float,
+    theta_4: float,
+) -> Array:
+    """Return the pose in which the bars of a loop have these angles, (nq,).
+
+    Each hinge but the driven one turns by less than half a turn.
+    """
+    turned_2 = theta_2 - loop.angles[1]
+    turned_3 = theta_3 - loop.angles[2]
+    turned_4 = theta_4 - loop.angles[3]
+    turns = {
+        "O2": turned_2,
+        "A": math.remainder(turned_3 - turned_2, math.tau),
+        "B": math.remainder(turned_4 - turned_3, math.tau),
+        "O4": math.remainder(turned_4, math.tau),
+    }
+    qpos = loop.qpos.copy()
+    for pin, joint in loop.hinges.items():
+        qpos[model.jnt_qposadr[joint]] += loop.senses[pin] * turns[pin]
+    return qpos
+
+
 def reflect(model: mujoco.MjModel, loop: RobotLoop) -> Array | None:
     """Return the pose of the other assembly at the same angle of bar 2, (nq,).
 
@@ -790,18 +949,8 @@ def reflect(model: mujoco.MjModel, loop: RobotLoop) -> Array | None:
     theta_1, theta_2, theta_3, theta_4 = loop.angles
     line = cmath.rect(ground, theta_1) - cmath.rect(crank, theta_2)
     direction = cmath.phase(line)
-    turned_3 = math.remainder(2.0 * (direction - theta_3), math.tau)
-    turned_4 = math.remainder(2.0 * (direction - theta_4), math.tau)
-    turns = {
-        "A": turned_3,
-        "B": turned_4 - turned_3,
-        "O4": turned_4,
-    }
-    qpos = loop.qpos.copy()
-    for pin, turn in turns.items():
-        if pin in loop.hinges:
-            address = model.jnt_qposadr[loop.hinges[pin]]
-            qpos[address] += loop.senses[pin] * math.remainder(turn, math.tau)
+    reflected = (2.0 * direction - theta_3, 2.0 * direction - theta_4)
+    qpos = turn_hinges(model, loop, theta_2, *reflected)
     if not LoopInside(model, loop).close_gap(qpos):
         return None
     return qpos

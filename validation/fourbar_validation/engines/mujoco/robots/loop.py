@@ -8,10 +8,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from fourbar.linkage import BAR_NAMES
+from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Scene
 
+BAR_ROLES = {BAR_NAMES[bar]: bar for bar in MOVING_BARS}
+"""Number of each moving bar, by its name."""
+SITE_ROLES = ("B3", "B4")
+"""Roles of the sites of pin B on the coupler and on the output."""
 FLAT = 2e-3
 """rad; where the outputs of both assemblies are nearer the pose does not tell which it
 is: a loop that is closed to 1e-12 m leaves about half as much open where its bars are

@@ -4,14 +4,19 @@
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import mujoco
 import numpy as np
 
+from fourbar.effects import Flywheel
 from fourbar.errors import InputError, LimitError
 from fourbar.scene import Scene, command
+from fourbar_validation.engines.mujoco.robots.ancestry import (
+    describe_actuator,
+    name_joint,
+)
 from fourbar_validation.engines.mujoco.robots.answers import (
     Influence,
     InsideAnswer,
@@ -27,15 +32,27 @@ from fourbar_validation.engines.mujoco.robots.closures import (
     choose_loop,
     describe_equality,
     find_closures,
+    require_loops,
 )
-from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
-from fourbar_validation.engines.mujoco.robots.drive import LoopDrive
-from fourbar_validation.engines.mujoco.robots.inside import HEAVY, LoopInside
+from fourbar_validation.engines.mujoco.robots.compiled import (
+    collect_warnings,
+    compile_robot,
+)
+from fourbar_validation.engines.mujoco.robots.drive import (
+    FileCylinder,
+    LoopDrive,
+    find_cylinder,
+)
+from fourbar_validation.engines.mujoco.robots.inside import (
+    HEAVY,
+    OTHER_ASSEMBLY,
+    LoopInside,
+)
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile, RobotLoop
 from fourbar_validation.engines.mujoco.robots.onto_scene import (
-    close_onto,
+    LoopOfScene,
+    find_loop_of_scene,
     find_turn,
-    miss_lengths,
 )
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from fourbar_validation.engines.mujoco.robots.scene import make_loop_scene
@@ -43,7 +60,6 @@ from fourbar_validation.engines.mujoco.robots.settings import (
     SettingsSearch,
     read_settings,
 )
-from fourbar_validation.engines.mujoco.theirs import collect_warnings
 
 POSITIONS_OF_A_LOOP = 37
 """Positions at which a loop is looked at."""
@@ -74,55 +90,111 @@ def measure_loops(
     InputError : there is no four-bar of that name, or none at all.
     """
     with collect_warnings() as warnings:
-        compiled = compile_robot(file)
-        posed = pose_robot(compiled.model, options.pose)
-        closures = find_closures(posed, options.pose)
-        if options.loop is not None:
-            loops = [choose_loop(closures, options.loop)]
+        if scene is not None:
+            scene = state_speed(scene, options)
+            found = find_loop_of_scene(file, scene, options)
+            measured = [measure_on_scene(found, scene, options)]
+            notes = [*found.compiled.notes, *found.robot.notes]
         else:
-            loops = [one.loop for one in closures if one.loop is not None]
-        if not loops:
-            reasons = "; ".join(f"{one.name}: {one.reason}" for one in closures)
-            why = reasons or "the file has no equality that closes a loop"
-            raise InputError("MJCF", None, f"has no planar four-bar: {why}")
-        if scene is not None and options.loop is None:
-            loops = [min(loops, key=lambda one: min(miss_lengths(scene, one)))]
-        measured = []
-        for one in loops:
-            if scene is None:
-                loop, robot = one, posed
-            else:
-                loop, robot = close_onto(scene, posed, one, options.pose)
-            made = make_loop_scene(compiled, robot, loop, options.speed, loop.name)
-            stated = made.scene if scene is None else scene
-            if scene is None:
-                remarks = made.remarks
-            else:
-                remarks = loop.remarks
-            share = 1.0 / len(loops)
-            loop = made.loop
-            measurement = _measure_loop(posed.model, loop, stated, options, file, share)
-            solver = _describe_noslip(posed.model)
-            measured.append(replace(measurement, remarks=(*remarks, *solver)))
-    notes = [*compiled.notes, *posed.notes]
+            compiled = compile_robot(file)
+            posed = pose_robot(compiled.model, options.pose)
+            closures = find_closures(posed, options.pose)
+            loops = require_loops(closures)
+            if options.loop is not None:
+                loops = [choose_loop(closures, options.loop)]
+            measured = []
+            for loop in loops:
+                made = make_loop_scene(compiled, posed, loop, options.speed, loop.name)
+                turned = find_turn(made.scene, made.loop)
+                inside = _put_inside(posed.model, made.loop, made.scene, turned)
+                share = 1.0 / len(loops)
+                motion = _choose_motion(made.scene, turned)
+                one = _measure_loop(
+                    inside, motion, made.scene, turned, options, file, share
+                )
+                remarks = (*made.remarks, *one.remarks)
+                measured.append(replace(one, remarks=remarks))
+            notes = [*compiled.notes, *posed.notes]
     notes += [f"MuJoCo warns: {warning}" for warning in warnings]
     return RobotMeasurement(tuple(measured), tuple(notes))
 
 
-def _measure_loop(
+def state_speed(scene: Scene, options: MeasureOptions) -> Scene:
+    """Return a scene at the speed that the options state, if they state one."""
+    if options.speed is None:
+        return scene
+    return replace(scene, motion=scene.motion.replace(speed=options.speed))
+
+
+def measure_on_scene(
+    found: LoopOfScene,
+    scene: Scene,
+    options: MeasureOptions,
+    model: mujoco.MjModel | None = None,
+    *,
+    briefly: bool = False,
+) -> LoopMeasurement:
+    """Measure a loop at the motion of a scene.
+
+    A file that holds nothing but the loop is taken as it is.
+
+    Parameters
+    ----------
+    model : changed model of the file; None: the file's own.
+    briefly : nothing but torque, pin forces and motion is measured.
+    """
+    inside, motion = put_loop_inside(found, scene, model)
+    measured = _measure_loop(
+        inside, motion, scene, found.turned, options, found.file, briefly=briefly
+    )
+    remarks = (*found.loop.remarks, *measured.remarks)
+    return replace(measured, remarks=remarks)
+
+
+def put_loop_inside(
+    found: LoopOfScene, scene: Scene, model: mujoco.MjModel | None = None
+) -> tuple[LoopInside, LoopMotion]:
+    """Return a loop as a scene drives it, and the motion of the scene in it."""
+    inside = _put_inside(
+        found.robot.model if model is None else model,
+        found.loop,
+        scene,
+        found.turned,
+        as_it_is=not found.loop.held,
+    )
+    motion = _choose_motion(scene, found.turned).thin_out(POSITIONS_OF_A_LOOP)
+    return inside, motion
+
+
+def _put_inside(
     model: mujoco.MjModel,
     loop: RobotLoop,
     scene: Scene,
+    turned: float,
+    *,
+    as_it_is: bool = False,
+) -> LoopInside:
+    """Return a loop driven as a scene has it, by the file's own cylinder if it can."""
+    drive = find_cylinder(model, scene) or LoopDrive(model, loop, scene, turned)
+    inside = LoopInside(model, loop, drive, as_it_is=as_it_is)
+    flywheels = (one for one in scene.effects if isinstance(one, Flywheel))
+    inside.find_flywheel(sum(one.inertia for one in flywheels))
+    return inside
+
+
+def _measure_loop(
+    inside: LoopInside,
+    motion: LoopMotion,
+    scene: Scene,
+    turned: float,
     options: MeasureOptions,
     file: RobotFile,
-    share: float,
+    share: float = 1.0,
+    *,
+    briefly: bool = False,
 ) -> LoopMeasurement:
     """Measure one loop; `share`: part of the time in which settings are looked for."""
-    if options.speed is not None:
-        scene = replace(scene, motion=scene.motion.replace(speed=options.speed))
-    turned = find_turn(scene, loop)
-    inside = LoopInside(model, loop, LoopDrive(model, loop, scene, turned))
-    motion = _choose_motion(scene, turned)
+    loop = inside.loop
     if options.span is not None:
         motion = _take_span(motion, inside, options.span)
     motion = motion.thin_out(POSITIONS_OF_A_LOOP)
@@ -139,16 +211,17 @@ def _measure_loop(
             f"are {loop.describe_lengths()}"
         )
     scales = states.scales(inside.lever)
-    closing = motion._replace(theta_2=tuple(row.theta_2 for row in states.rows))
     through: InsideAnswer | None = None
     refusal = ""
     influence: Influence | None = None
+    closing = motion._replace(theta_2=_find_longest_run(states))
     try:
         if motion.omega_2 == 0.0 or len(closing.theta_2) < 2:
             raise LimitError("nothing moves: a sweep at a speed is needed")
         through = inside.answer_through_time(*closing)
-        lighter = inside.answer_through_time(*closing, HEAVY * _LIGHTER)
-        influence = _compare_at_same_angles(through, lighter, scales)
+        if not briefly and not inside.flywheel:
+            lighter = inside.answer_through_time(*closing, HEAVY * _LIGHTER)
+            influence = _compare_at_same_angles(through, lighter, scales)
     except LimitError as error:
         refusal = str(error)
     torn: tuple[TornState, ...] = ()
@@ -157,7 +230,8 @@ def _measure_loop(
         starts = closing.thin_out(_TORN_POSITIONS).theta_2
         torn = tuple(inside.answer_under_torque(starts, options.torque, seconds))
     advice = None
-    if options.error is not None:
+    if options.error is not None and not briefly:
+        model = inside.given
         search = SettingsSearch(model, loop, closing, inside.acting, share)
         advice = search.advise(options.error, file)
     return LoopMeasurement(
@@ -165,11 +239,13 @@ def _measure_loop(
         inside.name,
         scene,
         turned,
-        (),
-        read_settings(model, loop),
+        (*_describe_noslip(inside.model), *_describe_findings(inside, states, through)),
+        read_settings(inside.model, loop),
         loop.rounding,
         len(inside.held),
-        tuple(describe_equality(model, number) for number in loop.other_equalities),
+        tuple(
+            describe_equality(inside.model, number) for number in loop.other_equalities
+        ),
         states,
         scales,
         through,
@@ -177,7 +253,73 @@ def _measure_loop(
         influence,
         torn,
         advice,
+        inside.as_it_is,
+        inside.flywheel,
+        tuple(inside.list_unmet_stops()),
+        refusal == OTHER_ASSEMBLY
+        or (through is not None and through.other_assembly is not None),
     )
+
+
+def _find_longest_run(states: InsideAnswer) -> tuple[float, ...]:
+    """Return the most angles in a row at which the loop closes, in their order."""
+    runs: list[list[float]] = [[]]
+    closed = {row.theta_2 for row in states.rows}
+    for angle in sorted({*closed, *states.open}):
+        if angle in closed:
+            runs[-1].append(angle)
+        else:
+            runs.append([])
+    longest = max(len(run) for run in runs)
+    return next(tuple(run) for run in runs if len(run) == longest)
+
+
+def _describe_findings(
+    inside: LoopInside,
+    states: InsideAnswer,
+    through: InsideAnswer | None,
+) -> Iterator[str]:
+    """Say what was taken off, and what was met on the way."""
+    model = inside.given
+    if inside.flywheel:
+        yield (
+            f"its armature of {inside.flywheel:.3g} kg m^2 on pin O2 is taken for a"
+            " flywheel that drives: the torque on it is not counted"
+        )
+    for number in inside.taken_off:
+        yield (
+            f"its drive on pin O2, {describe_actuator(model, number)}, is taken off:"
+            " the torque is solved for"
+        )
+    if isinstance(inside.acting, FileCylinder):
+        name = model.actuator(inside.acting.actuator).name
+        yield f"its actuator {name!r} gives the cylinder's force that is solved for"
+    if inside.as_it_is and inside.contacts:
+        yield (
+            f"{inside.contacts} contacts at a position where nothing but pins should"
+            " touch"
+        )
+    if through is not None and through.skipped:
+        yield (
+            f"through time the first {through.settling:.3g} s ({through.skipped} of"
+            f" {len(states.rows) - 1} positions after the start) are not judged: the"
+            " loop yields in them"
+        )
+    for joint in inside.list_unmet_stops():
+        ends = " and ".join(
+            f"{math.degrees(end):.4g}" for end in model.jnt_range[joint]
+        )
+        name = name_joint(model, joint)
+        yield f"the stops of joint {name!r}, at {ends} deg, are not met"
+    rows = [*states.rows, *(through.rows if through is not None else ())]
+    unreached = [row for row in rows if math.isnan(row.soft.torque)]
+    if unreached:
+        places = dict.fromkeys(f"{math.degrees(row.joint):.4g}" for row in unreached)
+        what = "its cylinder" if inside.lever == 1.0 else "its drive"
+        yield (
+            f"nothing on {what} gives the commanded acceleration at {inside.name} ="
+            f" {', '.join(places)} deg"
+        )
 
 
 def _describe_noslip(model: mujoco.MjModel) -> list[str]:
@@ -195,7 +337,18 @@ def _describe_noslip(model: mujoco.MjModel) -> list[str]:
 def _choose_motion(scene: Scene, turned: float) -> LoopMotion:
     """Return the motion of a scene in the plane of the loop."""
     commanded = command(scene)
-    speed = float(np.max(commanded.omega_2 or 0.0))
+    if commanded.omega_2 is None:
+        raise InputError(
+            "motion.omega_2",
+            None,
+            "is needed: without a speed there is no torque to compare",
+        )
+    if np.ptp(commanded.omega_2) != 0.0 or np.ptp(commanded.alpha_2) != 0.0:
+        raise LimitError(
+            "omega_2 or alpha_2 differs from position to position: that is no one"
+            " motion through time"
+        )
+    speed = float(np.max(commanded.omega_2))
     acceleration = float(np.max(commanded.alpha_2))
     angles = np.unique(commanded.theta_2) + turned
     return LoopMotion(tuple(angles.tolist()), speed, acceleration)

@@ -7,8 +7,13 @@ closure is then closed onto the assembly of the scene.
 """
 
 import math
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from itertools import combinations
+from xml.etree import ElementTree as ET
 
+import mujoco
 import numpy as np
 
 from fourbar.effects import Gravity
@@ -17,23 +22,41 @@ from fourbar.quantities import Array
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar_validation.engines.mujoco.robots.ancestry import is_enabled, name_joint
+from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.closures import (
     choose_loop,
     find_closures,
+    name_body,
+    require_loops,
+)
+from fourbar_validation.engines.mujoco.robots.compiled import (
+    CompiledRobot,
+    compile_robot,
 )
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside, reflect
 from fourbar_validation.engines.mujoco.robots.loop import (
+    BAR_ROLES,
     FLAT,
+    SITE_ROLES,
     PoseOptions,
+    RobotFile,
     RobotLoop,
 )
-from fourbar_validation.engines.mujoco.robots.pose import PosedRobot, move_to
+from fourbar_validation.engines.mujoco.robots.pose import (
+    PosedRobot,
+    move_to,
+    pose_robot,
+)
 from fourbar_validation.engines.mujoco.robots.scene import (
     is_seen_from_behind,
+    make_loop_scene,
     miss_output,
     write_pose,
 )
+from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
 
+_MOST_SITES = 12
+"""Sites of which two are tried as the pin that closes a loop."""
 ALIKE = 1e-6
 """Difference of logarithms of lengths below which two ways round fit a scene alike."""
 _SAME_DIRECTION = 1e-6
@@ -42,25 +65,188 @@ angles of a pose have six digits.
 """
 
 
+@dataclass(frozen=True, slots=True)
+class LoopOfScene:
+    """A loop of a file that a scene is held against."""
+
+    file: RobotFile
+    compiled: CompiledRobot
+    robot: PosedRobot
+    """Robot in a pose of the assembly of the scene."""
+    loop: RobotLoop
+    """Loop as the scene has it: its input is driven, and seen from the same side."""
+    turned: float
+    """Angle of the scene's axes in the plane of the loop, rad."""
+    parts: tuple[str, ...]
+    """Sentences that say which joint is which pin, and which body which bar."""
+
+
+def find_loop_of_scene(
+    file: RobotFile,
+    scene: Scene,
+    options: MeasureOptions,
+) -> LoopOfScene:
+    """Find the loop whose lengths are nearest to those of a scene, as the scene has it.
+
+    Where nothing closes a loop two sites may be its fourth pin: those that are named,
+    those called B3 and B4, or the pair that fits best. Nothing is then exerted there.
+
+    Raises
+    ------
+    InputError : there is no such loop, or it stands in the other assembly.
+    """
+    fits: list[tuple[float, LoopOfScene]] = []
+    refused: list[InputError] = []
+    compiled = compile_robot(file)
+    for variant in _list_variants(file, compiled.model, options.names):
+        robot = compiled if variant is file else compile_robot(variant)
+        try:
+            fits.append(_fit(variant, robot, scene, options))
+        except InputError as error:
+            refused.append(error)
+    if not fits:
+        raise refused[0]
+    _, best = min(fits, key=lambda fit: fit[0])
+    if best.file is not file:
+        best.robot.model.eq_active0[best.loop.equality] = 0
+    return best
+
+
+def _list_variants(
+    file: RobotFile, model: mujoco.MjModel, names: Mapping[str, str]
+) -> Iterator[RobotFile]:
+    """Yield the file, or one for each pair of sites that may close a loop in it."""
+    closing = {int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)}
+    if closing & {*model.eq_type.tolist()}:
+        yield file
+        return
+    sites = [model.site(number).name for number in range(model.nsite)]
+    stated = [names.get(role, role) for role in SITE_ROLES]
+    pairs: Iterable[Sequence[str]] = [stated]
+    if not {*stated} <= {*sites}:
+        missing = [
+            f"{role}={names[role]}"
+            for role in SITE_ROLES
+            if role in names and names[role] not in sites
+        ]
+        if missing:
+            listed = ", ".join(filter(None, sites)) or "none"
+            raise InputError(
+                "--name", missing[0], f"no such site; the file has: {listed}"
+            )
+        named = [name for name in sites if name][:_MOST_SITES]
+        pairs = combinations(named, 2)
+    root = ET.fromstring(file.text)
+    tried = False
+    for first, second in pairs:
+        tried = True
+        closed = deepcopy(root)
+        equality = ET.SubElement(closed, "equality")
+        ET.SubElement(equality, "connect", name="B", site1=first, site2=second)
+        yield replace(file, text=ET.tostring(closed, encoding="unicode"))
+    if not tried:
+        raise InputError(
+            "MJCF",
+            None,
+            "has no equality that closes a loop; where something else does, say where"
+            " pin B is: --name B3=SITE on the coupler, --name B4=SITE on the output",
+        )
+
+
+def _fit(
+    file: RobotFile,
+    compiled: CompiledRobot,
+    scene: Scene,
+    options: MeasureOptions,
+) -> tuple[float, LoopOfScene]:
+    """Return by how much the lengths of the nearest loop miss a scene, and the loop."""
+    posed = pose_robot(compiled.model, options.pose)
+    closures = find_closures(posed, options.pose)
+    if options.loop is not None:
+        loops = [choose_loop(closures, options.loop)]
+    else:
+        loops = require_loops(closures)
+    ways = [way for loop in loops for way in _list_ways(posed, loop, options.pose)]
+    model = posed.model
+    wanted = {role: name for role, name in options.names.items() if role in BAR_ROLES}
+    bodies = {role: _find_body(model, name) for role, name in wanted.items()}
+    fitting = [way for way in ways if not _list_misnamed(model, way, bodies)]
+    if not fitting:
+        stated = ", ".join(f"{role}={name}" for role, name in wanted.items())
+        bars = "; ".join(_write_bars(model, way) for way in ways)
+        raise InputError("--name", stated, f"no four-bar has these bars: {bars}")
+    usual = {
+        role: mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, role)
+        for role in BAR_ROLES
+    }
+    usual = {role: body for role, body in usual.items() if body >= 0}
+
+    def rank(way: RobotLoop) -> tuple[float, int]:
+        missed = ALIKE * round(miss_lengths(scene, way) / ALIKE)
+        return missed, len(_list_misnamed(model, way, usual))
+
+    loop = min(fitting, key=rank)
+    pose = replace(options.pose, drive=name_joint(model, loop.joint))
+    loop, robot = close_onto(scene, posed, loop, pose)
+    made = make_loop_scene(compiled, robot, loop, options.speed, loop.name)
+    turned = find_turn(scene, made.loop)
+    found = LoopOfScene(file, compiled, robot, made.loop, turned, made.parts)
+    return miss_lengths(scene, loop), found
+
+
+def _list_ways(
+    posed: PosedRobot, loop: RobotLoop, pose: PoseOptions
+) -> list[RobotLoop]:
+    """List a loop as it is driven, and driven at its output if that is a hinge."""
+    output = loop.hinges.get("O4")
+    ways = [pose.drive or name_joint(posed.model, loop.joint)]
+    if output is not None and pose.drive is None:
+        ways.append(name_joint(posed.model, output))
+    return [
+        choose_loop(find_closures(posed, replace(pose, drive=way)), loop.name)
+        for way in ways
+    ]
+
+
+def _find_body(model: mujoco.MjModel, name: str) -> int:
+    """Find a body by its name; an InputError lists what the file has."""
+    number = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name))
+    if number < 0:
+        names = [name_body(model, body) for body in range(1, model.nbody)]
+        raise InputError(
+            "--name", name, f"no such body; the file has: {', '.join(names)}"
+        )
+    return number
+
+
+def _list_misnamed(
+    model: mujoco.MjModel, loop: RobotLoop, bodies: Mapping[str, int]
+) -> list[str]:
+    """List the roles whose body is no part of the bar of that role."""
+    seen = SeenLoop(model, loop, 0.0)
+    return [role for role, body in bodies.items() if seen.bar(body) != BAR_ROLES[role]]
+
+
+def _write_bars(model: mujoco.MjModel, loop: RobotLoop) -> str:
+    """Write the body of each moving bar."""
+    return ", ".join(
+        f"{role} {name_body(model, loop.bodies[bar][0])}"
+        for role, bar in BAR_ROLES.items()
+    )
+
+
 def close_onto(
     scene: Scene,
     posed: PosedRobot,
     loop: RobotLoop,
     pose: PoseOptions,
 ) -> tuple[RobotLoop, PosedRobot]:
-    """Return the loop as a scene has it, and the robot in a pose of that assembly.
-
-    The scene's input is driven, and the plane is seen from the scene's side.
+    """Return a loop seen from the scene's side, and the robot in that assembly.
 
     Raises
     ------
     InputError : gravity tells that the pose is of the other assembly.
     """
-    apart, turned = miss_lengths(scene, loop)
-    output = loop.hinges.get("O4")
-    if pose.drive is None and output is not None and turned < apart - ALIKE:
-        pose = replace(pose, drive=name_joint(posed.model, output))
-        loop = choose_loop(find_closures(posed, pose), loop.name)
     if loop.is_flat:
         behind = not _fits_gravity(scene, posed, loop) and _fits_gravity(
             scene,
@@ -198,18 +384,10 @@ def _fits_gravity(
     return bool(np.linalg.norm(difference) <= _SAME_DIRECTION)
 
 
-def miss_lengths(scene: Scene, loop: RobotLoop) -> tuple[float, float]:
-    """Return by how much a loop's lengths miss those of a scene.
-
-    The loop is as it is driven, and driven at its output.
-    """
-    ground, *moving = np.log(loop.lengths)
-    wanted = np.log(scene.linkage.lengths)
-    apart, turned = (
-        float(np.abs(wanted - lengths).sum())
-        for lengths in ([ground, *moving], [ground, *reversed(moving)])
-    )
-    return apart, turned
+def miss_lengths(scene: Scene, loop: RobotLoop) -> float:
+    """Return by how much a loop's lengths miss those of a scene: sum of |log ratio|."""
+    apart = np.log(scene.linkage.lengths) - np.log(loop.lengths)
+    return float(np.abs(apart).sum())
 
 
 def find_turn(scene: Scene, loop: RobotLoop) -> float:
@@ -226,8 +404,8 @@ def find_turn(scene: Scene, loop: RobotLoop) -> float:
     def rank(turns: int) -> tuple[bool, float]:
         in_scene = theta_2 + math.tau * turns
         missed = miss_output(scene, theta_1, in_scene, theta_4)
-        return missed > FLAT, abs(turns - away)
+        return missed > FLAT, round(abs(turns - away), 6)
 
-    nearest = round(away)
+    nearest = math.ceil(away - 0.5 - 1e-6)
     turns = min((nearest, nearest - 1, nearest + 1), key=rank)
     return turned - math.tau * turns

@@ -27,7 +27,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     TriedSettings,
     divide,
 )
-from fourbar_validation.engines.mujoco.robots.drive import LoopDrive
+from fourbar_validation.engines.mujoco.robots.drive import FileCylinder, LoopDrive
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile, RobotLoop
 
@@ -118,7 +118,7 @@ class SettingsSearch:
         model: mujoco.MjModel,
         loop: RobotLoop,
         motion: LoopMotion,
-        drive: LoopDrive | None = None,
+        drive: LoopDrive | FileCylinder | None = None,
         share: float = 1.0,
     ) -> None:
         self.model = model

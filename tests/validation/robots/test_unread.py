@@ -2,7 +2,7 @@
 
 import fourbar
 from fourbar.mjcf import write_mjcf
-from fourbar_validation.check.unread import list_unread
+from fourbar_validation.robots.unread import list_unread
 from tests.whole.test_imports import ROOT
 
 GENERATED = write_mjcf(fourbar.load(ROOT / "models" / "crank_rocker.toml"))

@@ -63,26 +63,15 @@ class Difference:
             return "-"
         return f"{self.cost:.1e} {self.quantity}".strip()
 
-    def line(self) -> str:
-        """Write the entry with both values."""
-        return (
+    def write(self) -> str:
+        """Write the entry with both values, where it is written, and what it does."""
+        text = (
             f"{self.key}: {write_value(self.theirs)}, generated"
             f" {write_value(self.generated)}"
         )
-
-    def cells(self) -> tuple[str, ...]:
-        """Return the cells of a row of the page."""
         if self.written:
-            key = f"{self.key} ({self.written})"
-        else:
-            key = self.key
-        return (
-            self.price,
-            key,
-            write_value(self.generated),
-            write_value(self.theirs),
-            self.remark,
-        )
+            text += f"; in the file: {self.written}"
+        return f"{text}; {self.remark}" if self.remark else text
 
 
 def find_differences(

@@ -49,7 +49,7 @@ READ_ATTRIBUTES = {
         " fwdinv"
     ),
     "statistic": "extent center meansize meanmass",
-    "body": "name childclass pos quat axisangle euler xyaxes zaxis",
+    "body": "name childclass pos quat axisangle euler xyaxes zaxis gravcomp",
     "joint": (
         HINGE_ATTRIBUTES
         + " solreffriction solimpfriction group user joint coef joint1 joint2 polycoef"

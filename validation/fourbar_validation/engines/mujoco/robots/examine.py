@@ -1,0 +1,189 @@
+"""Somebody's MJCF beside the one generated from a scene: its entries, and its answers.
+
+A loop is found, closed and driven in the file and in the generated one, and with one
+entry changed at a time.
+"""
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from fourbar.errors import FourBarError, InputError
+from fourbar.mjcf import write_mjcf
+from fourbar.scene import Scene
+from fourbar_validation.engines.description import Value
+from fourbar_validation.engines.mujoco.describe import (
+    STIFFEST,
+    UNLIMITED_RANGE,
+    Described,
+    describe_model,
+    mend_entry,
+    set_entry,
+)
+from fourbar_validation.engines.mujoco.robots.answers import (
+    FORCE_QUANTITIES,
+    LoopMeasurement,
+    MeasureOptions,
+    measure_sizes,
+)
+from fourbar_validation.engines.mujoco.robots.compiled import collect_warnings
+from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.measure import (
+    measure_on_scene,
+    put_loop_inside,
+)
+from fourbar_validation.engines.mujoco.robots.onto_scene import (
+    LoopOfScene,
+    find_loop_of_scene,
+)
+from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
+
+PRICING = 60.0
+"""Seconds in which differences are tried one by one; each takes two evaluations."""
+GENERATED = Path("generated.xml")
+"""Name of the file that is generated from a scene."""
+_PLAIN = MeasureOptions(PoseOptions())
+Changes = Sequence[tuple[str, Value | None]]
+"""Keys of entries, each with the value that it gets."""
+
+
+@dataclass(slots=True)
+class Examined:
+    """Results of examining one file."""
+
+    described: Described
+    measured: LoopMeasurement
+    notes: list[str]
+
+
+def _generate(scene: Scene, drive: str | None = None) -> RobotFile:
+    text = write_mjcf(scene) if drive is None else write_mjcf(scene, drive="none")
+    return RobotFile(GENERATED, text)
+
+
+def examine_file(
+    scene: Scene,
+    file: RobotFile | None,
+    options: MeasureOptions = _PLAIN,
+) -> Examined:
+    """Describe the loop of a file that is nearest to a scene, and measure it.
+
+    None: the file that is generated from the scene.
+    """
+    with collect_warnings() as warnings:
+        found = find_loop_of_scene(file or _generate(scene), scene, options)
+        measured = measure_on_scene(found, scene, options, briefly=True)
+        seen = SeenLoop(found.robot.model, found.loop, found.turned)
+        described = describe_model(seen, measured.flywheel)
+    for key, (value, *_) in described.items():
+        if key.startswith(("bars.", "lengths.")) and not np.isfinite(value):
+            raise InputError(
+                "MJCF", None, f"{key} is beyond the range of doubles: {value}"
+            )
+    for pin, joint in found.loop.hinges.items():
+        if joint in measured.unmet_stops:
+            key = f"pins.{pin}.range"
+            described[key] = described[key]._replace(value=UNLIMITED_RANGE)
+    notes = [*found.compiled.notes, *found.robot.notes, *found.parts]
+    notes += [f"MuJoCo warns: {warning}" for warning in warnings]
+    return Examined(described, measured, notes)
+
+
+def examine_changed(scene: Scene, changes: Changes) -> list[LoopMeasurement | None]:
+    """Measure the generated file, then it with each entry alone changed.
+
+    The file is without a drive, and first as it is. None stands for an entry that
+    cannot be set alone. After PRICING seconds the rest are not evaluated either.
+    """
+    file = _generate(scene, "none")
+    found = find_loop_of_scene(file, scene, _PLAIN)
+    generated = describe_model(SeenLoop(found.robot.model, found.loop, found.turned))
+    texts = (set_entry(file.text, generated, key, value) for key, value in changes)
+
+    def measure(text: str | None) -> LoopMeasurement | None:
+        if text is None:
+            return None
+        try:
+            changed = find_loop_of_scene(replace(file, text=text), scene, _PLAIN)
+            return measure_on_scene(changed, scene, _PLAIN, briefly=True)
+        except FourBarError:
+            # with this entry it is no four-bar, or does not compile
+            return None
+
+    return list(
+        _take_in_time(map(measure, chain([file.text], texts)), len(changes) + 1)
+    )
+
+
+def examine_mended(
+    scene: Scene, file: RobotFile, options: MeasureOptions, changes: Changes
+) -> list[LoopMeasurement | None]:
+    """Measure a file with one entry at a time as in the generated one.
+
+    None stands for an entry that cannot be set, or if time is up.
+    """
+    found = find_loop_of_scene(file, scene, options)
+
+    def measure(change: tuple[str, Value | None]) -> LoopMeasurement | None:
+        seen = SeenLoop(found.robot.model, found.loop, found.turned).with_model()
+        if not mend_entry(seen, *change):
+            return None
+        return measure_on_scene(found, scene, options, seen.model, briefly=True)
+
+    return list(_take_in_time(map(measure, changes), len(changes)))
+
+
+def _take_in_time(
+    answers: Iterator[LoopMeasurement | None], count: int
+) -> Iterator[LoopMeasurement | None]:
+    """Yield answers, None for each that is not begun within PRICING seconds."""
+    start = time.perf_counter()
+    for _ in range(count):
+        if time.perf_counter() - start >= PRICING:
+            yield None
+            continue
+        with collect_warnings():
+            answer = next(answers)
+        yield answer
+
+
+def predict_softness(
+    scene: Scene, file: RobotFile, options: MeasureOptions
+) -> dict[str, float]:
+    """Predict the error of torque (N m) and pin forces (N) by MuJoCo's soft closure.
+
+    The error of a soft constraint goes as (1 - d)/d in its impedance d. Between
+    STIFFEST and an impedance of twice that yield it grows by itself, so the error is
+    measured without anything to compare the file with. Empty where no connect or weld
+    closes the loop.
+    """
+    with collect_warnings():
+        found = find_loop_of_scene(file, scene, options)
+        if not found.robot.model.eq_active0[found.loop.equality]:
+            return {}
+        stiff, softer = (_answer_at_yield(found, scene, times) for times in (1.0, 2.0))
+    pairs = list(zip(stiff, softer, strict=False))
+    return {
+        name: float(
+            np.nanmax(
+                measure_sizes([one[name] - other[name] for one, other in pairs]),
+                initial=0.0,
+            )
+        )
+        for name in FORCE_QUANTITIES
+    }
+
+
+def _answer_at_yield(
+    found: LoopOfScene, scene: Scene, times: float
+) -> list[dict[str, np.ndarray]]:
+    """Return torque and pin forces of the states at a multiple of the least yield."""
+    seen = SeenLoop(found.robot.model, found.loop, found.turned).with_model()
+    impedance = 1.0 / (1.0 + times * (1.0 / STIFFEST - 1.0))
+    seen.model.eq_solimp[[*found.loop.closures], :2] = impedance
+    inside, motion = put_loop_inside(found, scene, seen.model)
+    return [row.soft.values() for row in inside.answer_states(*motion).rows]

@@ -1,0 +1,180 @@
+"""A loop of a compiled model in the axes of a scene, as its entries are described."""
+
+import math
+from copy import copy
+
+import mujoco
+import numpy as np
+
+from fourbar.linkage import ENDS, MOVING_BARS, PINS
+from fourbar.quantities import Array
+from fourbar_validation.engines.mujoco.robots.ancestry import (
+    find_roots,
+    is_enabled,
+    list_actuators,
+)
+from fourbar_validation.engines.mujoco.robots.closures import EQUALITY_KINDS
+from fourbar_validation.engines.mujoco.robots.loop import RobotLoop
+
+_PLANES = {2: "x-y", 1: "x-z", 0: "y-z"}
+"""Plane of the world by the axis that is normal to it."""
+_UPRIGHT = 1e-9
+"""Sine of the angle to an axis of the world from which a plane is named by its normal.
+"""
+
+
+class SeenLoop:
+    """Bars, pins and closure of a loop in its pose; everything else is held."""
+
+    def __init__(self, model: mujoco.MjModel, loop: RobotLoop, turned: float) -> None:
+        """Take a loop in whose plane the axes of the scene are turned, rad."""
+        self.model = model
+        self.loop = loop
+        self.turned = turned
+        self.data = mujoco.MjData(model)
+        self.data.qpos[:] = loop.qpos
+        mujoco.mj_kinematics(model, self.data)
+        mujoco.mj_comPos(model, self.data)
+        self.hinge = loop.hinges
+        self.sense = loop.senses
+        self.closure = loop.equality
+        held = set(range(model.njnt)) - {*loop.hinges.values()}
+        self._roots = find_roots(model, held)
+        self._bars = {
+            self._roots[body]: bar
+            for bar, bodies in loop.bodies.items()
+            for body in bodies
+        }
+        ground = self.data.xmat[loop.bodies[1][0]].reshape(3, 3)
+        self.normal = ground @ loop.axis
+        along = ground @ loop.along
+        across = np.cross(self.normal, along)
+        cos = math.cos(turned)
+        sin = math.sin(turned)
+        self.axes = np.array([cos * along + sin * across, cos * across - sin * along])
+
+    def with_model(self) -> "SeenLoop":
+        """Return the same loop in a model of its own, which may be changed."""
+        return SeenLoop(copy(self.model), self.loop, self.turned)
+
+    @property
+    def plane(self) -> str:
+        """Name of the plane: that of two axes of the world, or its normal."""
+        nearest = int(np.argmax(np.abs(self.normal)))
+        if np.abs(np.delete(self.normal, nearest)).max() <= _UPRIGHT:
+            return _PLANES[nearest]
+        normal = self.normal * np.sign(self.normal[nearest])
+        return "normal to " + " ".join(f"{part:.6g}" for part in normal)
+
+    @property
+    def closed_by(self) -> str:
+        """Kind of the closure and of its ends, or what closes the loop in its place."""
+        model = self.model
+        kinds = model.eq_type[model.eq_active0 != 0]
+        if not model.eq_active0[self.closure]:
+            tied = (kinds == mujoco.mjtEq.mjEQ_TENDON).any()
+            return "tendon" if tied else "nothing"
+        kind = EQUALITY_KINDS[int(model.eq_type[self.closure])]
+        by_sites = model.eq_objtype[self.closure] == mujoco.mjtObj.mjOBJ_SITE
+        return f"{kind} of {'sites' if by_sites else 'body anchors'}"
+
+    @property
+    def is_alone(self) -> bool:
+        """Tell whether the file holds nothing but the loop.
+
+        In a robot contacts, joint limits and motors are off, and so no entries.
+        """
+        return not self.loop.held
+
+    def touches_tendon(self, tendon: int) -> bool:
+        """Tell whether a tendon runs over a hinge or a moving bar of the loop."""
+        model = self.model
+        start = int(model.tendon_adr[tendon])
+        for wrap in range(start, start + int(model.tendon_num[tendon])):
+            kind = mujoco.mjtWrap(int(model.wrap_type[wrap]))
+            target = int(model.wrap_objid[wrap])
+            if kind == mujoco.mjtWrap.mjWRAP_JOINT and target in self.hinge.values():
+                return True
+            on_site = kind == mujoco.mjtWrap.mjWRAP_SITE
+            if on_site and self.bar(int(model.site_bodyid[target])) in MOVING_BARS:
+                return True
+        return False
+
+    def bar(self, body: int) -> int | None:
+        """Return the bar that a body belongs to, None if it belongs to none."""
+        return self._bars.get(self._roots[body])
+
+    def list_parts(self, bar: int) -> list[int]:
+        """List the bodies of a bar."""
+        return [body for body in range(self.model.nbody) if self.bar(body) == bar]
+
+    def list_actuators(self, joint: int) -> list[int]:
+        """List the actuators on a joint."""
+        return list_actuators(self.model, joint)
+
+    def stops(self, pin: str) -> tuple[float, float] | None:
+        """Return the range of a pin, rad, or None without stops.
+
+        Angles are from the line of the first bar of the pin to that of the second.
+        """
+        model = self.model
+        joint = self.hinge[pin]
+        if not model.jnt_limited[joint] or not is_enabled(model, "limit"):
+            return None
+        ends = [self._angle_at(pin, end) for end in model.jnt_range[joint]]
+        return min(ends), max(ends)
+
+    def _angle_at(self, pin: str, position: float) -> float:
+        """Return the angle between the bars of a pin at a position of its hinge."""
+        first, second = PINS[pin]
+        angles = self.loop.angles
+        now = self.loop.qpos[self.model.jnt_qposadr[self.hinge[pin]]]
+        turned = self.sense[pin] * (position - now)
+        return float(angles[second - 1] - angles[first - 1] + turned)
+
+    def rest_angle(self, pin: str) -> float:
+        """Return the angle between the bars of a pin in the rest state, rad."""
+        address = self.model.jnt_qposadr[self.hinge[pin]]
+        return self._angle_at(pin, self.model.qpos0[address])
+
+    def spring_angle(self, pin: str) -> float:
+        """Return the angle at which the spring of a hinge exerts nothing, rad."""
+        address = self.model.jnt_qposadr[self.hinge[pin]]
+        return self._angle_at(pin, self.model.qpos_spring[address])
+
+    def in_plane(self, vector: Array) -> Array:
+        """Project on the plane, in the axes of the scene, (2,)."""
+        return np.asarray(self.axes @ vector)
+
+    def world(self, bar: int, pin: str) -> Array:
+        """Locate a pin of a bar in world axes, (3,), m."""
+        body = self.loop.bodies[bar][0]
+        turn = self.data.xmat[body].reshape(3, 3)
+        return np.asarray(self.data.xpos[body] + turn @ self.loop.points[bar, pin])
+
+    def line(self, bar: int) -> Array:
+        """Return a bar's line in the plane, first pin to second, (2,), m."""
+        first, second = (self.world(bar, pin) for pin in ENDS[bar])
+        return self.in_plane(second - first)
+
+    def along_bar(self, bar: int, world: Array) -> tuple[float, float]:
+        """Return (along, to the left) of a point from a bar's first pin, m."""
+        return self.turned_back(bar, world - self.world(bar, ENDS[bar][0]))
+
+    def turned_back(self, bar: int, vector: Array) -> tuple[float, float]:
+        """Resolve a vector along a bar's line and to its left."""
+        x, y = self.in_plane(vector)
+        along, left = self.line(bar)
+        size = math.hypot(along, left)
+        return (
+            float(along * x + left * y) / size,
+            float(along * y - left * x) / size,
+        )
+
+    def measure_offset(self) -> float:
+        """Return how far the ends of the closure are apart along the axes, m."""
+        cut = self.loop.cut
+        if cut is None:
+            return 0.0
+        first, second = (self.world(bar, cut) for bar in PINS[cut])
+        return abs(float((first - second) @ self.normal))

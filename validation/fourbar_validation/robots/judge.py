@@ -1,0 +1,334 @@
+"""Somebody's MJCF judged against a scene: errors, what differs, and what that costs.
+
+Differences of the mechanism are put one at a time into the generated file; settings,
+and what the generated file cannot hold, are corrected in theirs.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fourbar.formulas.mobility import change_points
+from fourbar.quantities import COUPLE, FORCE_NAMES, PIN_FORCES, UNKNOWNS, Array
+from fourbar.scene import Command, Scene
+from fourbar.solving import solve
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.compare import Comparison, Demands
+from fourbar_validation.compare.rows import DEGRADED, FAILS, Counts, Row
+from fourbar_validation.compare.tolerance import (
+    SIMULATED,
+    TIMES_PREDICTED,
+    ErrorBound,
+    Mask,
+    hold_simulated,
+)
+from fourbar_validation.engines.description import name_driving
+from fourbar_validation.engines.mujoco.robots.answers import (
+    FORCE_QUANTITIES,
+    BarMotion,
+    InsideAnswer,
+    LoopMeasurement,
+    MeasureOptions,
+)
+from fourbar_validation.engines.mujoco.robots.loop import RobotFile
+from fourbar_validation.report.templating import write_error
+from fourbar_validation.robots.differences import (
+    Difference,
+    find_differences,
+    is_of_another_linkage,
+    is_setting,
+    order,
+    price,
+)
+from fourbar_validation.robots.guard import examine_guarded
+from fourbar_validation.robots.measure import MEASURE_SECONDS, turn_vectors
+from fourbar_validation.robots.unread import list_unread
+
+FILE_AT_ONE_STATE = "mjcf-one-state"
+FILE_THROUGH_TIME = "mjcf-simulated"
+JUDGED_QUANTITIES = tuple(
+    name for name in UNKNOWNS if name not in ("alpha_3", "alpha_4")
+)
+"""Quantities that a file is held to. A soft loop lets the bars accelerate by themselves
+for an instant; what that does to the torque and the pin forces is judged there.
+"""
+_EXAMINE = "fourbar_validation.engines.mujoco.robots.examine:examine_file"
+_CHANGED = "fourbar_validation.engines.mujoco.robots.examine:examine_changed"
+_MENDED = "fourbar_validation.engines.mujoco.robots.examine:examine_mended"
+_SOFTNESS = "fourbar_validation.engines.mujoco.robots.examine:predict_softness"
+_BY_STIFFEST = (
+    "as what MuJoCo's stiffest constraint (solimp 0.9999) leaves in this file"
+)
+"""Method by which the error of a file is predicted that nobody holds to another."""
+_ADVICE = (
+    "What to type into the file for an error E, if its settings are the cause: "
+    "fourbar-validation advise SCENE FILE.xml --error E"
+)
+_LENGTHS_FIRST = (
+    "Mend the lengths first: what contacts and settings cost here is a cost in another"
+    " linkage."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedError:
+    """One quantity by one method: the error of their file, and of the generated one."""
+
+    row: Row
+    generated: float
+
+    @property
+    def method(self) -> str:
+        """Engine and setting."""
+        return f"{self.row.engine} {self.row.setting}"
+
+    def cells(self) -> tuple[str, ...]:
+        """Return quantity, both errors, what is allowed and the verdict, as text.
+
+        A row without an error says why.
+        """
+        row = self.row
+        if not math.isnan(row.error):
+            verdict = row.verdict
+        else:
+            verdict = f"{row.verdict}: {row.reason}"
+        return (
+            row.quantity,
+            write_error(row.error),
+            write_error(self.generated),
+            write_error(row.allowed),
+            verdict,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """Report on the loop of a user's file that is nearest to a scene."""
+
+    measured: LoopMeasurement
+    differences: list[Difference]
+    """Differences, the dearest first."""
+    errors: list[JudgedError]
+    notes: list[str]
+
+    def methods(self) -> list[str]:
+        """List the methods by which their file was evaluated."""
+        return list(dict.fromkeys(error.method for error in self.errors))
+
+    def sentences(self) -> Iterator[str]:
+        """Yield a sentence for each method: the errors of torque and worst force."""
+        for method in self.methods():
+            errors = {
+                error.row.quantity: error.row.error
+                for error in self.errors
+                if error.method == method and error.row.quantity in FORCE_NAMES
+            }
+            if not errors or any(math.isnan(error) for error in errors.values()):
+                continue
+            driving = {
+                name: errors.pop(name) for name in [*errors] if name not in PIN_FORCES
+            }
+            parts = [
+                f"{name} is off by {write_error(error)}"
+                for name, error in driving.items()
+            ]
+            if errors:
+                worst = max(errors, key=lambda name: errors[name])
+                parts.append(
+                    f"the worst pin force, {worst}, by {write_error(errors[worst])}"
+                )
+            yield f"{method}: {', '.join(parts)}, of its largest value."
+        soft = [error.row for error in self.errors if error.row.verdict == DEGRADED]
+        if soft and not self.counts[FAILS]:
+            softest = max(soft, key=lambda row: row.error)
+            left = write_error(softest.allowed / TIMES_PREDICTED)
+            yield (
+                "The file is right as far as MuJoCo's constraints let it be: the "
+                f"stiffest (solimp 0.9999) leaves {left} of {softest.quantity} in it."
+            )
+        if self.is_of_another_linkage:
+            yield _LENGTHS_FIRST
+        elif self.counts[FAILS]:
+            yield _ADVICE
+
+    @property
+    def is_of_another_linkage(self) -> bool:
+        """Tell whether lengths make their file one of another linkage."""
+        return any(map(is_of_another_linkage, self.differences))
+
+    @property
+    def counts(self) -> Counts:
+        """Return the comparisons of their file by verdict."""
+        return Counts(error.row for error in self.errors)
+
+
+def judge_file(
+    name: str,
+    scene: Scene,
+    file: RobotFile,
+    options: MeasureOptions,
+) -> Judgement:
+    """Judge a file in a guarded process.
+
+    The error of the options is what it is held to; None: that of the generated file,
+    and where its torque or pin forces exceed this, what MuJoCo's stiffest constraint
+    leaves in it.
+    """
+    tolerance = SIMULATED
+    if options.error is not None:
+        tolerance = hold_simulated(options.error, "what this file may be wrong by")
+    held = replace(options, error=None)
+    if options.speed is not None:
+        scene = replace(scene, motion=scene.motion.replace(speed=options.speed))
+    with examine_guarded(file.path, MEASURE_SECONDS) as examined:
+        generated = examined(_EXAMINE, scene, None)
+        theirs = examined(_EXAMINE, scene, file, held)
+        ours = {
+            (row.engine, row.quantity): row.error
+            for row in list_rows(name, generated.measured, SIMULATED)
+        }
+        rows = list_rows(name, theirs.measured, tolerance)
+        if options.error is None and any(row.failed for row in rows):
+            softness = examined(_SOFTNESS, scene, file, held)
+            rows = list_rows(name, theirs.measured, tolerance, softness)
+        differences = find_differences(generated.described, theirs.described)
+        if any(row.failed for row in rows):
+            differences = _price(
+                differences,
+                lambda measured: list_rows(name, measured, tolerance),
+                rows,
+                lambda changes: examined(_CHANGED, scene, changes),
+                lambda changes: examined(_MENDED, scene, file, held, changes),
+            )
+    if parts := list_unread(file.text):
+        unread = [f"not looked at: {', '.join(parts)}"]
+    else:
+        unread = []
+    errors = [
+        JudgedError(row, ours.get((row.engine, row.quantity), math.nan)) for row in rows
+    ]
+    return Judgement(
+        theirs.measured, order(differences), errors, [*theirs.notes, *unread]
+    )
+
+
+Remeasure = Callable[[Sequence[Any]], list[LoopMeasurement | None]]
+"""Function that measures a file with each of some entries changed."""
+
+
+def _price(
+    differences: list[Difference],
+    judge: Callable[[LoopMeasurement], list[Row]],
+    rows: list[Row],
+    change: Remeasure,
+    mend: Remeasure,
+) -> list[Difference]:
+    """Return the differences, each with its cost in accuracy."""
+    of_mechanism = [one for one in differences if not is_setting(one.key)]
+    unchanged, *changed = (
+        [] if measured is None else judge(measured)
+        for measured in change([(one.key, one.theirs) for one in of_mechanism])
+    )
+    priced = {
+        one.key: price(one, its_rows, unchanged)
+        for one, its_rows in zip(of_mechanism, changed, strict=True)
+    }
+    for one in differences:
+        priced.setdefault(one.key, one)
+    left = [one for one in priced.values() if one.cost is None]
+    mended = mend([(one.key, one.generated) for one in left])
+    for one, measured in zip(left, mended, strict=True):
+        if measured is not None:
+            priced[one.key] = price(one, rows, judge(measured))
+    return [priced[one.key] for one in differences]
+
+
+def list_rows(
+    name: str,
+    measured: LoopMeasurement,
+    tolerance: ErrorBound,
+    softness: Mapping[str, float] | None = None,
+) -> list[Row]:
+    """Hold what a file answers to a tolerance, N m and N.
+
+    Where the softness of its loop is known, errors are held to what it leaves.
+    """
+    scene = measured.scene
+
+    def predicted(quantity: str, mask: Mask) -> Array:
+        name = COUPLE.value if quantity == name_driving(scene) else quantity
+        return np.full(len(mask), (softness or {}).get(name, 0.0))
+
+    held = Demands(tolerance, JUDGED_QUANTITIES)
+    if softness:
+        held = held._replace(predicted=predicted, method=f", {_BY_STIFFEST}")
+    rows = []
+    for answer in list_answers(measured):
+        formulas = solve(scene, "force", at=answer.at)
+        rows += Comparison(name, scene, answer, formulas, held).rows()
+    reason = "" if measured.through_time is None else measured.through_time.lost
+    if measured.left_assembly and not change_points(scene.linkage, 2):
+        reason = "the simulation goes over to the other assembly"
+    if reason:
+        who = (name, FILE_THROUGH_TIME, "-")
+        rows.append(Row.unmeasured(*who, "watch", FAILS, reason))
+    return rows
+
+
+def list_answers(measured: LoopMeasurement) -> list[Answer]:
+    """Return the answers at single states and through time, in the scene's axes."""
+    answers = [
+        _make_answer(measured, measured.states, FILE_AT_ONE_STATE, "as compiled")
+    ]
+    settings = measured.settings
+    setting = f"{settings.integrator} {settings.timestep:g} s"
+    through = measured.through_time
+    if through is not None:
+        if through.rows:
+            answers.append(_make_answer(measured, through, FILE_THROUGH_TIME, setting))
+    elif measured.moves:
+        answers.append(Answer(FILE_THROUGH_TIME, setting, refusal=measured.refusal))
+    return answers
+
+
+def _make_answer(
+    measured: LoopMeasurement, inside: InsideAnswer, engine: str, setting: str
+) -> Answer:
+    rows = inside.rows
+    count = len(rows)
+    opened = [angle - measured.turned for angle in inside.open]
+    angles = [row.theta_2 - measured.turned for row in rows]
+    speeds = [row.omega_2 for row in rows]
+    rates = [row.alpha_2 for row in rows]
+    at = Command(
+        np.array([*angles, *opened]),
+        np.full(count + len(opened), measured.scene.motion.branch, dtype=np.int8),
+        np.array([*speeds, *(speeds[:1] * len(opened))]),
+        np.array([*rates, *(rates[:1] * len(opened))]),
+    )
+    quantities = {}
+    for name in FORCE_QUANTITIES:
+        values = np.array([row.soft.values()[name] for row in rows], dtype=float)
+        if values.ndim == 2:
+            values = turn_vectors(values, -measured.turned)
+        quantity = name_driving(measured.scene) if name == COUPLE.value else name
+        quantities[quantity] = values
+    for name in BarMotion._fields:
+        values = np.array([getattr(row.bars, name) for row in rows])
+        if name.startswith("theta"):
+            values = values - measured.turned
+        quantities[name] = values
+    blank = len(opened)
+    for name, values in quantities.items():
+        missing = np.full((blank, *values.shape[1:]), np.nan)
+        quantities[name] = np.concatenate([values, missing])
+    return Answer(
+        engine,
+        setting,
+        at,
+        np.arange(count + blank) < count,
+        quantities,
+    )
