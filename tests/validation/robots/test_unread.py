@@ -12,7 +12,6 @@ UNREAD = [
         'joint name="O4" actuatorfrcrange="-1 1"',
         "joint actuatorfrcrange",
     ),
-    ('body name="coupler"', 'body name="coupler" gravcomp="1"', "body gravcomp"),
     ('island="disable"', 'island="disable" eulerdamp="disable"', "flag eulerdamp"),
     ("<statistic ", '<statistic meaninertia="2" ', "statistic meaninertia"),
     ("</worldbody>", "</worldbody><deformable/>", "deformable"),

@@ -27,6 +27,9 @@ ANOTHER_LINKAGE = 1e-3
 """Cost of a length above which torque and pin forces are those of another linkage. What
 the rounding of a length costs is below it.
 """
+_FINER_BELOW = ("option.timestep", "option.tolerance", "closure.softness")
+_FINER_ABOVE = ("option.iterations", "option.ls_iterations")
+"""Settings of which a smaller or a greater value has the smaller error."""
 ENTRIES_THAT_MAY_LACK = ("loads.", "tendons.", "actuators.")
 """Entries that a file may lack: what is missing on one side is a difference."""
 MISSING_LOAD: dict[str, Value] = {".force": (0.0, 0.0), ".couple": 0.0}
@@ -35,6 +38,10 @@ _REMARKS = tomllib.loads(
     Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
 )["remarks"]
 """Part of a key, and what a difference there does; the first that fits."""
+
+
+_Errors = dict[tuple[str, str], float]
+"""Errors by method and quantity."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +106,7 @@ def find_differences(
         mine, yours = (
             nothing if entry is None else entry.value for entry in (ours, yours_entry)
         )
-        if _is_same_value(key, mine, yours, length):
+        if _is_same_value(key, mine, yours, length) or _is_finer(key, mine, yours):
             continue
         if yours_entry is not None:
             written = f"{yours_entry.element} {yours_entry.attribute}".strip()
@@ -128,9 +135,14 @@ def price(
     same file without it.
     """
     before = _collect_errors(unchanged)
+    after = _collect_errors(rows)
+    if is_setting(difference.key):
+        # one that lowers some errors and raises others alike changes nothing
+        before = _keep_worst(before, after)
+        after = {key: error for key, error in after.items() if key in before}
     gains = [
         (error - before.get(key, 0.0), key[1])
-        for key, error in _collect_errors(rows).items()
+        for key, error in after.items()
         if math.isfinite(before.get(key, 0.0))
     ]
     if not gains:
@@ -139,7 +151,19 @@ def price(
     return replace(difference, cost=max(cost, 0.0), quantity=quantity)
 
 
-def _collect_errors(rows: Sequence[Row]) -> dict[tuple[str, str], float]:
+def _keep_worst(before: _Errors, after: _Errors) -> _Errors:
+    """Return the worst error before, by method, at the quantity that is worst after."""
+    worst = {}
+    for engine in {engine for engine, _ in after}:
+        quantities = [name for method, name in after if method == engine]
+        quantity = max(quantities, key=lambda name: after[engine, name])
+        errors = [error for key, error in before.items() if key[0] == engine]
+        if errors:
+            worst[engine, quantity] = max(errors)
+    return worst
+
+
+def _collect_errors(rows: Sequence[Row]) -> _Errors:
     """Collect the error of the torque and of each pin force, by method.
 
     An error is infinite if there is no answer.
@@ -186,6 +210,16 @@ def is_setting(key: str) -> bool:
 
 def _is_length(key: str) -> bool:
     return key.startswith("lengths.") and not key.endswith("angle")
+
+
+def _is_finer(key: str, ours: Value | None, theirs: Value | None) -> bool:
+    """Tell whether a setting costs time alone: it is finer than that of ours."""
+    if isinstance(ours, float) and isinstance(theirs, float):
+        if key in _FINER_BELOW:
+            return theirs < ours
+        if key in _FINER_ABOVE:
+            return theirs > ours
+    return False
 
 
 def _is_same_value(

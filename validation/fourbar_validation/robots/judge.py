@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from fourbar.formulas.mobility import change_points
-from fourbar.quantities import COUPLE, FORCE_NAMES, PIN_FORCES, UNKNOWNS, Array
+from fourbar.quantities import COUPLE, FORCE_NAMES, OK, PIN_FORCES, UNKNOWNS, Array
 from fourbar.scene import Command, Scene
+from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison, Demands
@@ -32,6 +33,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     InsideAnswer,
     LoopMeasurement,
     MeasureOptions,
+    measure_sizes,
 )
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 from fourbar_validation.report.templating import write_error
@@ -259,8 +261,8 @@ def list_rows(
     scene = measured.scene
 
     def predicted(quantity: str, mask: Mask) -> Array:
-        name = COUPLE.value if quantity == name_driving(scene) else quantity
-        return np.full(len(mask), (softness or {}).get(name, 0.0))
+        left = (softness or {}).get(_name_force(scene, quantity), 0.0)
+        return np.full(len(mask), left)
 
     held = Demands(tolerance, JUDGED_QUANTITIES)
     if softness:
@@ -268,7 +270,15 @@ def list_rows(
     rows = []
     for answer in list_answers(measured):
         formulas = solve(scene, "force", at=answer.at)
-        rows += Comparison(name, scene, answer, formulas, held).rows()
+        for row in Comparison(name, scene, answer, formulas, held).rows():
+            force = _name_force(scene, row.quantity)
+            scale = measured.find_vanishing(force)
+            if scale is None or answer.refusal is not None:
+                rows.append(row)
+                continue
+            left = TIMES_PREDICTED * (softness or {}).get(force, 0.0) / scale
+            allowed = max(tolerance.factor, left)
+            rows.append(_judge_vanishing(row, answer, formulas, scale, allowed))
     reason = "" if measured.through_time is None else measured.through_time.lost
     if measured.left_assembly and not change_points(scene.linkage, 2):
         reason = "the simulation goes over to the other assembly"
@@ -276,6 +286,28 @@ def list_rows(
         who = (name, FILE_THROUGH_TIME, "-")
         rows.append(Row.unmeasured(*who, "watch", FAILS, reason))
     return rows
+
+
+def _name_force(scene: Scene, quantity: str) -> str:
+    """Return the name of a quantity in a measurement: the drive is its torque."""
+    return COUPLE.value if quantity == name_driving(scene) else quantity
+
+
+def _judge_vanishing(
+    row: Row, answer: Answer, formulas: Solution, scale: float, allowed: float
+) -> Row:
+    """Judge a quantity that is the rounding of its terms by the scale of these."""
+    ours = np.asarray(getattr(formulas, row.quantity))
+    errors = measure_sizes(answer.quantities[row.quantity] - ours) / scale
+    return Row.judged(
+        (row.scene, row.engine, row.setting),
+        row.quantity,
+        errors,
+        allowed,
+        f"it vanishes but for rounding: over that of its terms, {scale:.4g}",
+        np.asarray(formulas.theta_2),
+        where=formulas.status_code == OK,
+    )
 
 
 def list_answers(measured: LoopMeasurement) -> list[Answer]:

@@ -32,8 +32,6 @@ from fourbar_validation.engines.mujoco.robots.answers import (
 )
 from fourbar_validation.report.sentences import make_words_table, print_sentence
 from fourbar_validation.report.templating import escape_cell
-from fourbar_validation.report.sentences import make_words_table, print_sentence
-from fourbar_validation.report.templating import escape_cell
 from fourbar_validation.robots.judge import Judgement
 from fourbar_validation.robots.measure import (
     MEASURED_THROUGH_TIME,

@@ -525,6 +525,8 @@ def set_entry(
     """
     root = ET.fromstring(text)
     subject, _, rest = key.partition(".")
+    if subject == "lift":  # its flags let nothing be lifted
+        return None
     try:
         if subject == "lengths":
             _set_length(root, rest, float(value))  # type: ignore[arg-type]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fourbar_validation.engines.mujoco.robots.answers import (
+    BarMotion,
     InsideAnswer,
     InsideRow,
     LoopMotion,
@@ -19,6 +20,7 @@ PINS = ("F12", "F32", "F43", "F14")
 OWN = RobotSettings(
     (0.02, 1.0), (0.9, 0.95, 0.001, 0.5, 2.0), 0.002, "Euler", "Newton", 100, 1e-8
 )
+AT_REST = BarMotion(0.0, 0.0, 0.0, 0.0)
 
 
 def make_row(torque: float, off: float, condition: float = 0.5) -> InsideRow:
@@ -26,7 +28,7 @@ def make_row(torque: float, off: float, condition: float = 0.5) -> InsideRow:
     soft = PinsAndTorque(
         torque + off, {name: np.array([3.0, 4.0 + off]) for name in PINS}
     )
-    return InsideRow(0.1, 1.0, 0.0, 0.2, soft, rigid, 1e-4, condition)
+    return InsideRow(0.1, 1.0, 0.0, 0.2, soft, rigid, 1e-4, AT_REST, condition)
 
 
 def test_errors_are_sizes_of_differences_and_scales_those_of_rigid_pins() -> None:

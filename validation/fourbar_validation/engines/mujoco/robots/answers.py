@@ -362,6 +362,14 @@ class LoopMeasurement:
     left_assembly: bool
     """True if the simulation went over to the other assembly."""
 
+    def find_vanishing(self, quantity: str) -> float | None:
+        """Return the scale of the terms of a quantity that is their rounding."""
+        sizes = self.states.sizes()
+        scale = self.scales.get(quantity)
+        if scale is None or scale == float(sizes[quantity].max()):
+            return None
+        return scale
+
     @property
     def moves(self) -> bool:
         """Tell whether the scene names a motion and not a few states at rest."""

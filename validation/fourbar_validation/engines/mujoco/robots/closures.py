@@ -66,6 +66,9 @@ EQUALITY_KINDS = {
 JOINT_WORDS = {FREE_JOINT: "free", BALL: "ball", SLIDE: "slide"}
 HOW_MANY = {1: "one", 2: "two", 3: "three"}
 NAMES_OF_LINKAGES = {6: "a six-bar", 8: "an eight-bar"}
+_SERVE_SPATIAL = "MuJoCo or Drake serve it, Pinocchio its inverse dynamics"
+_SERVE_PLANAR = "MuJoCo or Drake serve it, PMKS+ for a sketch"
+"""Tools for mechanisms that are no planar four-bar."""
 _MOST_HOLDS = 5
 """Further choices of joints to hold that are printed."""
 HINGES_IN_WORDS = {
@@ -409,8 +412,8 @@ class _Finder:
     def _find_other_joint(self, chain: _Chain) -> str:
         words = {
             FREE_JOINT: "floats freely",
-            BALL: "is a ball joint: the loop is spatial",
-            SLIDE: "is a slide: the loop is a slider-crank or of its kin",
+            BALL: f"is a ball joint: the loop is spatial ({_SERVE_SPATIAL})",
+            SLIDE: f"is a slide: a slider-crank or of its kin ({_SERVE_PLANAR})",
         }
         for joint, kind in zip(chain.joints, chain.kinds, strict=True):
             if kind != HINGE_JOINT:
@@ -443,7 +446,7 @@ class _Finder:
             return ""
         return (
             f"the axes of {names} are {math.degrees(angle):.3g} deg apart: "
-            "the loop is spatial"
+            f"the loop is spatial ({_SERVE_SPATIAL})"
         )
 
     def _explain_count(
@@ -540,8 +543,8 @@ class _Finder:
         text = (
             f"with {names}, which moves its bars too, {len(joints)} hinges,"
             f" {len(coupled) + 1} loops and {HOW_MANY.get(freedoms, freedoms)}"
-            f" {'freedom' if freedoms == 1 else 'freedoms'}: {which} (MuJoCo or Drake"
-            " serve it, PMKS+ for a sketch)"
+            f" {'freedom' if freedoms == 1 else 'freedoms'}: {which}"
+            f" ({_SERVE_PLANAR})"
         )
         return text + self._describe_inner_four_bar(number, coupled, joints)
 
