@@ -346,10 +346,6 @@ def test_a_file_that_is_turned_against_gravity_is_not_the_same() -> None:
     assert error_of(HEAVY, examined, FILE_AT_ONE_STATE, "torque") > 0.1
 
 
-def welded(text: str) -> str:
-    return text.replace("<connect ", "<weld ")
-
-
 def colliding(text: str) -> str:
     touching = re.sub('contype="0" conaffinity="0"', "", text)
     return touching.replace('contact="disable" ', "")
@@ -375,7 +371,7 @@ def report_of(spoil: Callable[[str], str], folder: Path) -> Judgement:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("spoil", "key"),
-    [(welded, "closure.by"), (colliding, "contacts"), (stopped, "pins.O4.range")],
+    [(colliding, "contacts"), (stopped, "pins.O4.range")],
 )
 def test_the_cause_that_explains_the_error_stands_first(
     spoil: Callable[[str], str],

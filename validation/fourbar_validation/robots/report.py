@@ -49,8 +49,8 @@ JUDGED_HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
 _DIFFERENCES = ("cost", "what differs")
 _ABOUT_COSTS = (
     "cost: what this one entry adds to the error of the file itself, if it is a"
-    " setting, a weld, contacts, a range or a motor; of the others what it adds, as in"
-    " the file, to the error of the generated one. Of torque and pin forces the one"
+    " setting, contacts, a range, a motor or gravcomp; of the others what it adds, as"
+    " in the file, to the error of the generated one. Of torque and pin forces the one"
     " that grows most. A dash: this entry cannot be set by itself, or the file holds"
     " what it is held to"
 )

@@ -68,8 +68,6 @@ MJCF_WORDS = {
     "NEWTON": "Newton",
 }
 """Integrators and solvers as MJCF spells them, where MuJoCo spells them otherwise."""
-_TORQUE_SCALE = 10
-"""Place in eq_data of the factor on the rotation that a weld holds."""
 PARALLEL_AXES = 1e-9
 """rad; axes that are nearer to each other are parallel but for rounding."""
 _SOFTEST, STIFFEST = 1e-4, 0.9999
@@ -724,7 +722,7 @@ def mend_entry(
 ) -> bool:
     """Make one entry of a compiled model that of the generated file.
 
-    False if that is not possible. A weld becomes a pin, contacts are switched off, a
+    False if that is not possible. Contacts are switched off, a
     stop and the motors at a pin are removed, the loop is made as stiff as MuJoCo lets
     it be, and a setting gets its value.
     """
@@ -733,8 +731,6 @@ def mend_entry(
     pin, _, what = rest.partition(".")
     if key == "contacts":
         model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-    elif key == "closure.by" and seen.closed_by.startswith("weld"):
-        model.eq_data[seen.closure, _TORQUE_SCALE] = 0.0
     elif subject == "lift":
         (bar,) = (bar for bar, name in BAR_NAMES.items() if name == rest)
         model.body_gravcomp[seen.list_parts(bar)] = 0.0
