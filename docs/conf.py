@@ -24,6 +24,8 @@ html_theme = "furo"
 html_title = f"fourbar {version}"
 html_static_path = ["style"]
 html_css_files = ["pages.css"]
+# what index.md names in a <picture>, which the builder does not read
+html_extra_path = ["crank_rocker.svg", "crank_rocker-linkage.svg"]
 html_math_renderer = "mathml"
 html_show_copyright = False
 exclude_patterns = ["ci"]

@@ -15,7 +15,7 @@ const REASONS = {   // why a position has no forces, or more than one set of the
 const FORCE_PIN = { F12: "O2", F32: "A", F43: "B", F14: "O4" };
 const SWEEP_SECONDS = 6;   // one sweep at speed 1
 const ORDINARY = 0.95, OUTLIER = 3, CLIPPED = 1.6;   // a scale ends at CLIPPED times the 95th percentile where values diverge
-const OTHER_BRANCH = 0.35;   // rad between the couplers of two branches
+const OTHER_BRANCH = 0.35, INSIDE = 0.02;   // rad: between the couplers of two branches; a little more than a range stays inside its limits
 const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 let unit, lengths, branch, grid, direction, POINTS, clock;   // of the data shown

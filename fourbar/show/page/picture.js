@@ -66,12 +66,14 @@ const couplerPlaces = () => [coupler, ...data.points.map(point => p => framed(p,
 const couplerPaths = () => couplerPlaces().map(place => grid.map((_, i) => at(i) && `${i && at(i - 1) ? "L" : "M"}${place(at(i)).join(" ")}`).filter(Boolean).join(""));
 // Dead centres and limits that the motion reaches: what each is, and its place on every path.
 function couplerMarks() {
-  const away = (a, b) => Math.abs(Math.atan2(Math.sin(a - b), Math.cos(a - b))), step = 1.5 * Math.abs(grid[1] - grid[0]);
+  const away = (a, b) => Math.abs(Math.atan2(Math.sin(a - b), Math.cos(a - b))), step = Math.max(INSIDE, 1.5 * Math.abs(grid[1] - grid[0]));
   const reached = ([, theta2, theta3]) => grid.some((theta, i) => at(i) && away(theta, theta2) < step && away(table().theta_3[i], theta3) < OTHER_BRANCH);
   return (data.turns ?? []).filter(reached).flatMap(([words, ...angles]) => couplerPlaces().map(place => [words, place(posed(...angles))]));
 }
+let shownMarks = [];
 function drawMarks() {
   const own = couplerMarks(), kept = unchanged ? [] : reference?.marks ?? [];
+  shownMarks = [...own, ...kept];
   parts.marks.replaceChildren();
   byId("turns").hidden = !own.length;
   for (const [more, marks] of [[" behind", kept], ["", own]]) for (const [words, place] of marks) {
@@ -212,6 +214,7 @@ function drawLinkage(p, i) {
   parts.labels.style.display = show("show-labels") ? "" : "none";
   for (const element of Object.values(parts.label)) element.style.display = "none";
   clearLabels();
+  for (const [, place] of shownMarks) mark(toScreen(place), 6);
   const O4 = [lengths[0] * Math.cos(data.theta_1), lengths[0] * Math.sin(data.theta_1)], fixed = { O2: [0, 0], O4 };
   const known = p ?? (grid[i] === null ? fixed : { ...fixed, theta2: grid[i], A: [lengths[1] * Math.cos(grid[i]), lengths[1] * Math.sin(grid[i])] });
   const s = Object.fromEntries(["O2", "A", "B", "O4"].filter(name => known[name]).map(name => [name, toScreen(known[name])]));

@@ -15,9 +15,11 @@ if TYPE_CHECKING:
 
 DrawnPoint = tuple[float, float]
 _Box = tuple[float, float, float, float]
-_REACH = (7.0, 11.0, 16.0, 23.0, 32.0, 44.0)
+_REACH = (7.0, 11.0, 16.0, 23.0, 32.0, 44.0, 60.0)
 """Distances from the point to the label's edge that are tried, typographic points."""
-LABEL_DIRECTIONS = 16
+LABEL_DIRECTIONS = 24
+_LEADER_WIDTH = 10.0
+"""Width that a leader counts as where a label would cover it, typographic points."""
 _LED = 15.0
 """Distance from which a label is led to its point by a thin line, points. The points
 are typographic.
@@ -70,21 +72,15 @@ class Labels:
         # labels must not move what they were measured against
         figure.set_layout_engine(None)
         per_point = figure.dpi / 72.0
-        texts = [
-            (axes, text)
+        rooms = {
+            axes: _Room(axes.get_window_extent().extents, per_point)
             for axes in figure.findobj(Axes)
-            for text in axes.texts
-            if text.get_text()
-        ]
-        taken: list[tuple[Axes, _Box]] = [
-            (axes, text.get_window_extent(renderer).extents) for axes, text in texts
-        ]
-        samples: dict[int, list[np.ndarray]] = {}
+        }
+        for axes, room in rooms.items():
+            texts = [text for text in axes.texts if text.get_text()]
+            room.boxes += [text.get_window_extent(renderer).extents for text in texts]
         for axes, points, width in self.lines:
-            dots = _sample_line(axes.transData.transform(points), per_point)
-            widths = np.full(len(dots), width)
-            with_widths = np.column_stack([dots, widths])
-            samples.setdefault(id(axes), []).append(with_widths)
+            rooms[axes].keep_off(axes.transData.transform(points), width)
         for label in self.wanted:
             axes = label.axes
             text = axes.text(
@@ -105,29 +101,17 @@ class Labels:
                 away = math.atan2(y - sy, x - sx)
             else:
                 away = math.pi / 2
-            if id(axes) in samples:
-                dots = np.concatenate(samples[id(axes)])
-            else:
-                dots = np.empty((0, 3))
-            boxes = [box for owner, box in taken if owner is axes]
-            panel = axes.get_window_extent().extents
-            centre = _choose_spot(
-                (x, y),
-                away,
-                half,
-                dots,
-                boxes,
-                per_point,
-                label.dots_clear,
-                panel,
-            )
+            room = rooms[axes]
+            centre = room.choose_spot((x, y), away, half, label.dots_clear)
             lower = (centre[0] - half[0], centre[1] - half[1])
             upper = (centre[0] + half[0], centre[1] + half[1])
-            taken.append((axes, (*lower, *upper)))
+            room.boxes.append((*lower, *upper))
             to_data = axes.transData.inverted().transform
             text.set_position(tuple(to_data(centre)))
             edge = np.clip((x, y), lower, upper)
             if math.dist(edge, (x, y)) > (_LED + label.dots_clear) * per_point:
+                room.leaders.append(((x, y), edge))
+                room.keep_off(np.array([(x, y), edge]), _LEADER_WIDTH)
                 # the limits stay, by which the labels were placed
                 keep_limits: dict[str, Any] = {"scalex": False, "scaley": False}
                 axes.plot(
@@ -137,6 +121,93 @@ class Labels:
                     zorder=8.5,
                     **keep_limits,
                 )
+
+
+@dataclass(slots=True)
+class _Room:
+    """Axes in pixels, with what is drawn and written there."""
+
+    inside: _Box
+    per_point: float
+    """Pixels of a typographic point."""
+    boxes: list[_Box] = field(default_factory=list)
+    """Boxes of texts."""
+    leaders: list[tuple[Any, Any]] = field(default_factory=list)
+    """Ends of the lines that lead labels to their points."""
+    dots: list[np.ndarray] = field(default_factory=lambda: [np.empty((0, 3))])
+    """Points of lines and marks, each with the width of its line."""
+
+    def keep_off(self, points: np.ndarray, width: float) -> None:
+        """Add a line or a mark that labels should not cover."""
+        dots = _sample_line(points, self.per_point)
+        self.dots.append(np.column_stack([dots, np.full(len(dots), width)]))
+
+    def choose_spot(
+        self,
+        point: DrawnPoint,
+        away: float,
+        half: DrawnPoint,
+        mark: float,
+    ) -> DrawnPoint:
+        """Choose the centre of a label: the candidate that covers least.
+
+        Among equal ones the nearest and most outward is taken. A leader crosses
+        neither a text nor another leader.
+        """
+        best = point
+        best_cost = math.inf
+        dots = np.concatenate(self.dots)
+        edge = 0.5 * self.per_point * dots[:, 2]
+        for reach in _REACH:
+            gap = (reach + mark) * self.per_point
+            for k in range(LABEL_DIRECTIONS):
+                # outwards first, then by turns to either side
+                side = 1 if k % 2 else -1
+                angle = away + (k + 1) // 2 * side * math.tau / LABEL_DIRECTIONS
+                x = point[0] + math.cos(angle) * (gap + half[0])
+                y = point[1] + math.sin(angle) * (gap + half[1])
+                hit_in_x = np.abs(dots[:, 0] - x) < half[0] + edge
+                hit_in_y = np.abs(dots[:, 1] - y) < half[1] + edge
+                covered = float((hit_in_x & hit_in_y) @ dots[:, 2])
+                clashes = sum(_overlaps((x, y), half, box) for box in self.boxes)
+                cost = 100.0 * clashes + 30.0 * self._leaves((x, y), half)
+                if reach > _LED:
+                    cost += 40.0 * self._count_crossed(point, (x, y), half)
+                cost += covered + 0.04 * reach + 0.05 * k
+                if cost < best_cost:
+                    best = (x, y)
+                    best_cost = cost
+        return best
+
+    def _leaves(self, centre: DrawnPoint, half: DrawnPoint) -> bool:
+        """Return True if a label does not lie inside the axes."""
+        left, bottom, right, top = self.inside
+        (x, y), (wide, high) = centre, half
+        in_x = left <= x - wide and x + wide <= right
+        return not (in_x and bottom <= y - high and y + high <= top)
+
+    def _count_crossed(
+        self,
+        point: DrawnPoint,
+        centre: DrawnPoint,
+        half: DrawnPoint,
+    ) -> int:
+        """Count the texts and leaders that the leader of a label would cross."""
+        end = np.clip(point, np.subtract(centre, half), np.add(centre, half))
+        crossed = sum(_cross(point, end, *leader) for leader in self.leaders)
+        for left, bottom, right, top in self.boxes:
+            one = _cross(point, end, (left, bottom), (right, top))
+            crossed += one or _cross(point, end, (left, top), (right, bottom))
+        return crossed
+
+
+def _cross(p: Any, q: Any, r: Any, s: Any) -> bool:
+    """Return True if the lines from p to q and from r to s cross."""
+
+    def is_left(a: Any, b: Any, c: Any) -> bool:
+        return bool((b[0] - a[0]) * (c[1] - a[1]) > (b[1] - a[1]) * (c[0] - a[0]))
+
+    return is_left(p, q, r) != is_left(p, q, s) and is_left(r, s, p) != is_left(r, s, q)
 
 
 POINT_DISTANCE, _MARK = 3.0, 4.5
@@ -173,41 +244,3 @@ def _overlaps(centre: DrawnPoint, half: DrawnPoint, box: _Box) -> bool:
     in_x = abs(centre[0] - 0.5 * (left + right)) < half[0] + 0.5 * (right - left)
     in_y = abs(centre[1] - 0.5 * (bottom + top)) < half[1] + 0.5 * (top - bottom)
     return bool(in_x and in_y)
-
-
-def _choose_spot(
-    point: DrawnPoint,
-    away: float,
-    half: DrawnPoint,
-    dots: np.ndarray,
-    boxes: list[_Box],
-    per_point: float,
-    mark: float,
-    inside: _Box,
-) -> DrawnPoint:
-    """Choose the centre of the label: the candidate that covers least.
-
-    Among equal ones the nearest and most outward is taken.
-    """
-    best = point
-    best_cost = math.inf
-    edge = 0.5 * per_point * dots[:, 2]
-    for reach in _REACH:
-        gap = (reach + mark) * per_point
-        for k in range(LABEL_DIRECTIONS):
-            # outwards first, then by turns to either side
-            side = 1 if k % 2 else -1
-            angle = away + (k + 1) // 2 * side * math.tau / LABEL_DIRECTIONS
-            x = point[0] + math.cos(angle) * (gap + half[0])
-            y = point[1] + math.sin(angle) * (gap + half[1])
-            hit_in_x = np.abs(dots[:, 0] - x) < half[0] + edge
-            hit_in_y = np.abs(dots[:, 1] - y) < half[1] + edge
-            covered = float((hit_in_x & hit_in_y) @ dots[:, 2])
-            clashes = sum(_overlaps((x, y), half, box) for box in boxes)
-            outside = x - half[0] < inside[0] or x + half[0] > inside[2]
-            outside = outside or y - half[1] < inside[1] or y + half[1] > inside[3]
-            cost = 100.0 * clashes + 30.0 * outside + covered + 0.04 * reach + 0.05 * k
-            if cost < best_cost:
-                best = (x, y)
-                best_cost = cost
-    return best

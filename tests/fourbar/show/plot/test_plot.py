@@ -9,6 +9,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -147,6 +148,23 @@ def test_every_figure_draws_both_branches_and_no_texts_overlap(name: str) -> Non
                 and box.y1 <= page.y1
             ), text
         assert not clashes(figure)
+
+
+@pytest.mark.parametrize("name", ["tailgate", "landing_gear"])
+def test_a_leader_crosses_neither_a_text_nor_another_leader(name: str) -> None:
+    gallery = Path(__file__).parents[4] / "models" / "gallery"
+    scene = fourbar.load(gallery / f"{name}.toml")
+    figure = draw_figure(scene, "linkage", dimensions=True).figure
+    (axes,) = figure.axes
+    leaders = [
+        line.get_path().transformed(axes.transData)
+        for line in axes.lines
+        if line.get_zorder() == 8.5
+    ]
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert len(leaders) > 1
+    assert not any(leader.intersects_bbox(box) for leader in leaders for box in boxes)
+    assert not any(one.intersects_path(two) for one, two in combinations(leaders, 2))
 
 
 def test_no_text_stands_on_a_bar() -> None:
