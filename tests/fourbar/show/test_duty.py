@@ -39,16 +39,6 @@ def test_shaking_is_the_momentum_that_the_bars_lose() -> None:
     assert np.abs(shaking_moment(s) - moment).max() < ROUND_OFF * np.abs(moment).max()
 
 
-def test_the_power_is_the_same_whichever_bar_is_driven() -> None:
-    one, *others = (fourbar.solve(crank_rocker(drive_bar=bar)) for bar in (2, 3, 4))
-    for solution in others:
-        assert (
-            np.abs(solution.power - one.power).max()
-            < ROUND_OFF * np.abs(one.power).max()
-        )
-    assert fourbar.solve(crank_rocker(), "acceleration").power is None
-
-
 def test_bearing_load() -> None:
     listed = fourbar.Motion(np.linspace(0.1, 0.1 + math.tau, 61), 10.0)
     s = fourbar.solve(crank_rocker(motion=listed))
@@ -60,46 +50,25 @@ def test_bearing_load() -> None:
     )
 
 
-def test_the_duty_of_a_motor() -> None:
-    """Over a turn the drive gives what the damping turns into heat and no more.
-
-    All else comes back.
-    """
+def test_what_damping_turns_into_heat_is_what_the_drive_gives_over_a_turn() -> None:
     pins = {"O2": 0.004, "B": 0.02}
     damped = (fourbar.Gravity(), fourbar.Viscous.at(**pins))
     sweep = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 360), 10.0)
     s = fourbar.solve(crank_rocker(motion=sweep, loads=(), effects=damped))
     duty = motor_duty(s)
-    assert (
-        duty is not None
-        and duty.energy_in is not None
-        and duty.energy_out is not None
-        and duty.closed
-    )
-    heat = (
-        (pins["O2"] * 10.0**2 + pins["B"] * (s.omega_3 - s.omega_4) ** 2)[:-1].mean()
-        * math.tau
-        / 10.0
-    )
-    assert (
-        abs(duty.energy_in - duty.energy_out - heat) < 1e-9 * duty.energy_in
-    )  # the rule is exact on periods
-    # the largest torque lies within half a degree of a position
-    assert duty.peak_torque == pytest.approx(np.abs(s.torque).max(), rel=1e-4)
-    assert duty.peak_speed == 10.0
-    rms = np.linalg.norm(s.torque[:-1]) / math.sqrt(360)
-    assert duty.rms_torque == pytest.approx(rms, rel=1e-9)
-    assert abs(duty.peak_power - 10.0 * duty.peak_torque) < ROUND_OFF * duty.peak_power
+    assert duty is not None and duty.closed
+    losses = pins["O2"] * 10.0**2 + pins["B"] * (s.omega_3 - s.omega_4) ** 2
+    heat = losses[:-1].mean() * math.tau / 10.0
+    # the rule is exact on periods
+    given = duty.energy_in - duty.energy_out
+    assert abs(given - heat) < 1e-9 * duty.energy_in
     assert duty.mean_torque == pytest.approx(heat / math.tau, rel=1e-9)
+
+
+def test_a_drive_at_rest_has_no_energies_and_positions_alone_have_no_duty() -> None:
     still = motor_duty(fourbar.solve(crank_rocker(motion=fourbar.Motion(1.0, 0.0))))
-    assert (
-        still is not None
-        and still.energy_in is None
-        and still.peak_power == 0.0
-        and not still.closed
-        and still.mean_torque is None
-        and still.energy_swing is None
-    )
+    assert still is not None and still.peak_power == 0.0 and not still.closed
+    assert still.energy_in is still.mean_torque is still.energy_swing is None
     assert motor_duty(fourbar.solve(crank_rocker(), "position")) is None
 
 
@@ -134,34 +103,6 @@ def test_the_mean_torque_of_a_law_is_the_work_over_the_angle() -> None:
     # the difference of the energies has the roundings of the larger one
     error = abs(duty.mean_torque * math.tau - work)
     assert error < ROUND_OFF * duty.energy_in
-
-
-def test_a_flywheel_of_the_swing_keeps_the_speed_within_what_was_allowed() -> None:
-    """A released crank with the mean torque and a flywheel, integrated over a turn.
-
-    The inertia is I = swing/(delta omega^2), delta = 0.01. The change of speed differs
-    by the inertia of the linkage itself, a few percent of the flywheel's.
-    """
-    delta, omega = 0.01, 10.0
-    turn = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 360), omega)
-    scene = crank_rocker(motion=turn)
-    duty = motor_duty(fourbar.solve(scene))
-    assert duty is not None and duty.mean_torque is not None
-    assert duty.energy_swing is not None
-    inertia = duty.energy_swing / (delta * omega**2)
-    driven = fourbar.Load(2, moment=duty.mean_torque)
-    released = fourbar.release(
-        replace(
-            scene,
-            motion=fourbar.Motion(
-                0.0, omega, free=fourbar.Free(1.02 * math.tau / omega, 400)
-            ),
-            loads=(*scene.loads, driven),
-            effects=(*scene.effects, fourbar.Flywheel(inertia, bar=2)),
-        )
-    )
-    speeds = released.omega_2
-    assert np.ptp(speeds) / omega == pytest.approx(delta, rel=0.05)
 
 
 def test_the_json_holds_the_duty() -> None:
