@@ -35,6 +35,9 @@ SCENES = {
     },
     "cylinder on the input": crank_rocker(loads=LOADS, drive=CYLINDER),
     "cylinder on the coupler": crank_rocker(loads=LOADS, drive=ON_COUPLER),
+    "cylinder against friction": crank_rocker(
+        drive=ON_COUPLER, effects=(fourbar.PinFriction.at(A=(0.15, 5e-3)),)
+    ),
     **{
         f"random {number}": draw_random_scene(68, number, tuple(DrawnType))
         for number in range(8)
