@@ -133,6 +133,23 @@ def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
         )  # of bars 3 and 4, so nearly in line, 1e-11 would be left
 
 
+@pytest.mark.parametrize(("bar", "pin"), [(2, "F12"), (4, "F14")])
+def test_from_the_ground_to_a_bar_only_the_pin_there_bears_the_push(
+    bar: int, pin: str
+) -> None:
+    torque, s = (
+        fourbar.solve(crank_rocker(drive_bar=bar)),
+        fourbar.solve(driven(1, bar)),
+    )
+    angle = getattr(s, f"theta_{bar}") + 0.7
+    arm = 0.09 * np.column_stack((np.cos(angle), np.sin(angle)))
+    lever = arm[:, 0] * s.drive_line[:, 1] - arm[:, 1] * s.drive_line[:, 0]
+    size = 1e-12 * np.abs(torque.torque).max()
+    assert np.abs(s.drive_force * lever - torque.torque).max() <= size
+    for name in {*PIN_FORCES} - {pin}:
+        assert np.array_equal(getattr(s, name), getattr(torque, name)), name
+
+
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
 def test_its_power_is_that_of_the_torque_and_its_line_has_no_sense(
     start_bar: int,
