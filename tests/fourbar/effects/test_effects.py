@@ -428,21 +428,6 @@ def test_a_rise_that_cannot_be_is_refused(stated: dict[str, object], key: str) -
         Rise(**stated)  # type: ignore[arg-type]
 
 
-def test_each_position_of_a_law_is_that_motion_alone() -> None:
-    law = Law((0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 2.5, 2 * math.pi), 12, "periodic")
-    along_law = solve(crank_rocker(motion=Motion(law=law)))
-    for i in (0, 5, 11):
-        here = Motion(
-            float(along_law.theta_2[i]),
-            float(along_law.omega_2[i]),
-            float(along_law.alpha_2[i]),
-        )
-        assert solve(crank_rocker(motion=here)).torque[0] == pytest.approx(
-            along_law.torque[i],
-            rel=1e-13,
-        )  # type: ignore[index]
-
-
 HERE = Place(2, (0.1, 0.0)), Place(4, (0.2, 0.0))
 
 
@@ -490,26 +475,3 @@ def test_a_table_says_in_degrees_what_it_covers_and_what_lies_outside() -> None:
         match="covers 0 to 90 deg; the position at 120 deg lies outside",
     ):
         table.at(np.radians([45.0, 120.0]))
-
-
-def test_a_base_that_accelerates_is_gravity_less_its_acceleration() -> None:
-    """By virtual work in the frame of the world.
-
-    The mass centres accelerate with the base too.
-    """
-    base, g = np.array([3.0, 1.5]), np.array([0.0, -9.81])
-    felt = g - base
-    gravity = fourbar.Gravity(
-        float(np.hypot(*felt)), float(np.arctan2(felt[1], felt[0]))
-    )
-    motion = fourbar.Motion(np.linspace(0.1, 6.0, 12), 5.0, 2.0)
-    scene = crank_rocker(motion=motion, effects=(gravity,), loads=())
-    s = fourbar.solve(scene)
-    power = np.zeros(len(s))
-    for bar in (2, 3, 4):
-        part = scene.linkage.bar(bar)
-        a_G, v_G = getattr(s, f"a_G{bar}") + base, getattr(s, f"v_G{bar}")
-        spin = getattr(s, f"alpha_{bar}") * getattr(s, f"omega_{bar}")
-        power += part.mass * np.sum((a_G - g) * v_G, axis=1)
-        power += part.moment_of_inertia * spin
-    assert s.torque * s.omega_2 == pytest.approx(power, rel=1e-12, abs=1e-12)
