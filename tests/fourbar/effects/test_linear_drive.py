@@ -369,7 +369,7 @@ def test_it_reads_back_as_it_was_written_and_is_carried_by_studies() -> None:
 
 
 def test_its_duty_has_a_peak_force_and_no_peak_torque() -> None:
-    scene = driven(1, 3)
+    scene = driven(1, 3, motion=fourbar.Motion(np.linspace(0.4, 2.0, 7), 10.0, 5.0))
     s = fourbar.solve(scene)
     duty, entry = motor_duty(s), write_motor(scene, s, {})
     assert duty.peak_force == np.abs(s.drive_force).max() and duty.peak_torque is None
