@@ -99,7 +99,7 @@ FACTS: dict[str, list[tuple[str, Callable[[Any], Any]]]] = {
         ("peak value", LOST),
         *(
             (f"motion panels curves {name} poles", become([0]))
-            for name in ("torque", "speed", "power", "F12", "F43")
+            for name in ("torque", "speed", "F43")
         ),
         ("bending 3 peak", become(None)),
     ],
@@ -126,10 +126,12 @@ PEAKS = ("peak_torque", "peak_speed", "peak_power")
 INTEGRALS = ("rms_torque", "rms_power", "energy_in", "energy_out", "energy_swing")
 MOTOR: dict[str, list[tuple[str, Callable[[Any], Any]]]] = {
     "peaks": [
-        (key, change) for key in PEAKS for change in (A_PART_LESS, A_PART_MORE, LOST)
+        *((key, change) for key in PEAKS for change in (A_PART_LESS, A_PART_MORE)),
+        ("peak_speed", LOST),
     ],
     "integrals": [
-        *((key, change) for key in INTEGRALS for change in (A_PART_MORE, LOST)),
+        *((key, A_PART_MORE) for key in INTEGRALS),
+        ("energy_in", LOST),
         ("mean_torque", plus(1e-4)),  # a turn without damping has none
         ("mean_torque", LOST),
     ],
