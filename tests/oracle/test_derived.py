@@ -484,6 +484,7 @@ def test_a_wrong_slope_by_a_coordinate_fails_in_the_rows_of_the_drawing(
     assert "points" in {row.quantity for row in failed}
 
 
+@pytest.mark.slow
 def test_tolerances_of_coordinates_are_judged() -> None:
     """A load acts at the point: it changes forces, and the pins the motion."""
     text = (

@@ -24,6 +24,8 @@ from tests.support.scenes import crank_rocker
 from tests.support.texts import LENGTHS
 
 MODELS = sorted((Path(__file__).parents[3] / "models").glob("*.toml"))
+
+
 def facts(scene: fourbar.Scene) -> tuple[object, ...]:
     """Every number of a scene, in a form that compares bit for bit.
 

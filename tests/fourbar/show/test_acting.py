@@ -47,6 +47,7 @@ def write(folder: Path, extended: str, stroke: str) -> str:
     return str(file)
 
 
+@pytest.mark.slow
 def test_a_gas_spring_beyond_its_stroke_is_told(tmp_path, capsys):
     for extended, stroke, expected in (
         (

@@ -310,6 +310,7 @@ under it.
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moving", [False, True])
 def test_a_frame_is_the_whole_figure_though_what_stands_still_is_drawn_once(
     monkeypatch: pytest.MonkeyPatch,

@@ -324,6 +324,7 @@ def test_rounding_is_written_as_zero() -> None:
     assert not re.search(r"e-[0-9]+ (?:deg|mm|m|N)\b", text)
 
 
+@pytest.mark.slow
 def test_the_peak_of_a_release_over_change_points_is_said_to_grow() -> None:
     pytest.importorskip("scipy")
     linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)

@@ -123,6 +123,7 @@ def test_a_law_has_a_value_at_times_and_none_while_it_dwells() -> None:
         locate(scene, "B_x", "0.8 m")
 
 
+@pytest.mark.slow
 def test_a_release_has_a_value_at_times() -> None:
     """A parallelogram of massless cranks swings its coupler as a point mass on one.
 
@@ -161,6 +162,7 @@ def test_what_no_position_has_is_refused_with_the_range(
         locate(parallelogram(), name, value)
 
 
+@pytest.mark.slow
 def test_a_column_that_jumps_over_a_value_does_not_have_it() -> None:
     """Dry friction alone: the torque is 2 N m up to 1 s and -2 N m from there."""
     scene = loads(
