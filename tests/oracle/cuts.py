@@ -100,9 +100,8 @@ def move_bars(scene: Scene, command: Command, answer: Answer) -> BodyMotion:
 
 @dataclass
 class Piece(BodyWrenches):
-    """The piece of a bar beyond a cut, with the forces in the bar's axes.
-
-    Their moment is about the cut, counter-clockwise.
+    """The piece of a bar beyond a cut, with its forces in the bar's axes and their
+    moment about the cut, counter-clockwise.
     """
 
     bar: int
@@ -119,9 +118,8 @@ class Piece(BodyWrenches):
         """Sums of the absolute terms of the whole bar, N and N m."""
 
     def push(self, bar: int, force: Any, arm: Any) -> None:
-        """Add a force, world axes, at an arm from the bar's first pin.
-
-        It acts on the piece on which its foot lies.
+        """Add a force, world axes, at an arm from the bar's first pin, on the piece
+        of its foot.
         """
         if bar != self.bar:
             return

@@ -1,6 +1,5 @@
-"""Judge equilibria by the linkage held at rest in 320-bit arithmetic.
-
-Its torque, the slope of that and its inertia are compared.
+"""Judge equilibria by the linkage held at rest in 320-bit arithmetic: torque, its
+slope and inertia.
 
 With T the torque that holds the independent bar and J the torque per unit of its
 acceleration,
@@ -68,9 +67,8 @@ class Derived(NamedTuple):
 
 
 def equilibria(question: Question) -> Iterator[Row]:
-    """Judge the torque, its slope and the frequency at every equilibrium.
-
-    There may be no other equilibria.
+    """Judge torque, slope and frequency at every equilibrium, and that none is
+    missed.
     """
     scene = _at_rest(question.scene)
     if missing := find_missing("flint"):
@@ -143,9 +141,8 @@ def _at_rest(scene: Scene) -> Scene:
 
 
 def _list_samples(question: Question) -> Array:
-    """List the input's angles at which it is held.
-
-    They are all that it reaches from the first one, of a sweep those in it.
+    """List the input's angles at which it is held, all that it reaches or its sweep
+    has.
     """
     solution = question.solution
     motion = question.scene.motion
@@ -245,10 +242,9 @@ def _judge_equilibrium(
     scene: Scene,
     equilibrium: Equilibrium,
 ) -> tuple[float, dict[str, float]]:
-    """Compare torque, slope, inertia and frequency.
-
-    It gives too by how much the equilibrium may be off, rad. No errors where nothing is
-    decided: that near to a singular position first order predicts nothing.
+    """Return by how much the equilibrium may be off, rad, and the errors of torque,
+    slope, inertia and frequency. No errors where nothing is decided: that near to a
+    singular position first order predicts nothing.
     """
     place = equilibrium.place
     bar = int(equilibrium.angle[-1])

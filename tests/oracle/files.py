@@ -112,10 +112,7 @@ def _judge_file(
 
 
 def _build_scene(held: Contents, scene: Scene) -> Scene:
-    """Build the scene that a file describes.
-
-    Its motion and drive are those of another scene.
-    """
+    """Build the scene that a file describes, with motion and drive of another scene."""
     bodies = held.bodies
     pins = held.pins
     span = pins["O4"] - pins["O2"]

@@ -210,9 +210,8 @@ def _compute_step_beyond(linkage: FourBar, theta_2: float) -> float:
 
 
 class _LimitTrial(NamedTuple):
-    """Scene and command that an engine is tried with for one bar.
-
-    It holds too what the formulas state of them.
+    """Scene and command that an engine is tried with for one bar, and what is
+    stated.
     """
 
     scene: Scene
@@ -355,9 +354,8 @@ def _list_limits(
 
 
 class _Passage(NamedTuple):
-    """An assembly through a change point, and the signs stated on either side.
-
-    They are those of sin(theta_4 - theta_3).
+    """An assembly through a change point, with the sign of sin(theta_4 - theta_3)
+    stated on either side.
     """
 
     point: float
@@ -391,10 +389,7 @@ def _list_passages(linkage: FourBar) -> Iterator[_Passage]:
 
 
 class StatedLimits(NamedTuple):
-    """Statements of the formulas on the limits of a linkage.
-
-    They are evaluated once for all engines.
-    """
+    """Statements of the formulas on the limits, evaluated once for all engines."""
 
     linkage: FourBar
     lever: float
@@ -502,9 +497,8 @@ def compare_limit_positions(stated: StatedLimits, seen: Seen) -> Iterator[Findin
 
 
 def _check_input(stated: StatedLimits, seen: Seen) -> Iterator[Finding]:
-    """Check bars 3 and 4 just inside each limit of bar 2.
-
-    They are off their common line by the same angles on both branches.
+    """Check that bars 3 and 4 just inside each limit of bar 2 are off their common
+    line by the same angles on both branches.
     """
     for limit, step, turned in stated.inside:
         open_, crossed = (

@@ -1,6 +1,5 @@
-"""Check what is printed and no engine answers.
-
-These are error bars, the residual of friction, the motion's law, long sweeps.
+"""Check error bars, the residual of friction, laws and long sweeps, which no engine
+answers.
 """
 
 from collections.abc import Iterator
@@ -93,9 +92,8 @@ def compare_points(
     reference: Solution,
     least: float = 0.0,
 ) -> Row:
-    """Compare places, velocities and accelerations of a scene's own points.
-
-    They follow from the angles of another derivation.
+    """Compare places, velocities and accelerations of a scene's own points with
+    those that follow from the angles of another derivation.
 
     `least`: the condition from which on they are judged.
     """
@@ -137,9 +135,8 @@ def compare_points(
 
 
 class PointMotion(NamedTuple):
-    """A point's place, velocity and acceleration, each as x + i y over the positions.
-
-    They are those of its bar's first pin, from O2, and its own against that pin.
+    """Motion of a point over the positions, as x + i y: place, velocity and
+    acceleration of the bar's first pin, from O2, and of the point against that pin.
     """
 
     arms: list[NDArray[np.complex128]]
@@ -340,9 +337,8 @@ def _compute_pulls(
     command: Command,
     solution: Solution,
 ) -> Iterator[Array]:
-    """Compute what springs, torsion springs and loads over a table do, (n,).
-
-    They follow from free bodies, N and N m together.
+    """Compute from free bodies what springs, torsion springs and loads over a table
+    do, N and N m, (n,).
     """
     motion = speeds_and_accelerations(
         scene.linkage,
@@ -373,9 +369,8 @@ def _compute_pulls(
 
 
 def friction_residual(question: Question) -> Iterator[Row]:
-    """Check that what remains of friction couples is rounding.
-
-    It may not be more, and somewhere not less.
+    """Check that what remains of friction couples is rounding, and somewhere not
+    less.
     """
     scene = question.scene
     solution = question.solution

@@ -1,6 +1,5 @@
-"""Studies, sensitivities and tolerances, by differences and cubature.
-
-These are of what free bodies say of changed linkages.
+"""Studies, sensitivities and tolerances by differences and cubature of what free
+bodies say of changed linkages.
 """
 
 import math
@@ -206,10 +205,8 @@ distribution; the nodes are in parts of the width.
 
 
 def sensitivity(question: Question) -> list[Row]:
-    """Judge the derivatives of the unknowns and of the scene's points.
-
-    They are along one direction in the numbers of a scene that is stated by lengths,
-    and along another one in the coordinates of a drawing.
+    """Judge the derivatives of unknowns and points along one direction in the
+    numbers of a scene, and along another one in the coordinates of its drawing.
     """
     scene = take_few(question)
     derivatives = fourbar.sensitivity(scene)
@@ -286,9 +283,8 @@ def _judge_slopes(
 
 
 def _place_points(scene: Scene, answer: Answer, origin: complex) -> dict[str, Array]:
-    """Place the scene's points, in the coordinates of a drawing, by an answer's angles.
-
-    Their velocities and accelerations are added.
+    """Return places, velocities and accelerations of the scene's points by an
+    answer's angles, in the coordinates of a drawing.
 
     `origin`: place of O2 in the drawing, m.
     """
@@ -305,10 +301,7 @@ def _place_points(scene: Scene, answer: Answer, origin: complex) -> dict[str, Ar
 
 
 def tolerances(question: Question) -> list[Row]:
-    """Judge the spread that a few tolerances make.
-
-    They are those of the scene, or those that the run gives it.
-    """
+    """Judge the spread that a few tolerances make, the scene's own or given ones."""
     scene = take_few(question)
     width = _GIVEN * min(scene.linkage.lengths)
     names = ("input", "coupler", "output")

@@ -14,10 +14,7 @@ from tests.oracle.limit_positions import look, make_worst_row
 
 
 class Statements(NamedTuple):
-    """Statements of the formulas on a linkage and over a motion.
-
-    They are evaluated once for all engines.
-    """
+    """Statements of the formulas over a motion, evaluated once for all engines."""
 
     limits: limit_positions.StatedLimits
     transmission: transmission.StatedTransmission

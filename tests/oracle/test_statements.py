@@ -1,6 +1,5 @@
-"""What the formulas state of a linkage, compared with engines.
-
-It holds on every type, and planted errors are seen.
+"""What the formulas state of a linkage holds by engines, and planted errors are
+seen.
 """
 
 import math

@@ -41,9 +41,8 @@ _RADII = (0.2, 0.3)
 
 
 class StatedTransmission(NamedTuple):
-    """Statements of the formulas on the angle at B and on the strokes.
-
-    They are evaluated once for all engines.
+    """Statements of the formulas on the angle at B and on the strokes, evaluated
+    once.
     """
 
     limits: StatedLimits
@@ -76,10 +75,7 @@ class StatedTransmission(NamedTuple):
 
 
 class StatedOver(NamedTuple):
-    """Statements of the formulas over a motion, each (n,).
-
-    They are evaluated once for all engines.
-    """
+    """Statements of the formulas over a motion, each (n,), evaluated once."""
 
     scene: Scene
     command: Command
@@ -125,9 +121,8 @@ class StatedOver(NamedTuple):
 
 
 def choose_places(stated: StatedTransmission) -> list[LimitPlace]:
-    """Return the places where an engine is evaluated.
-
-    They are the extremes that are no limits, and both strokes of bar 4.
+    """Return angles at which an engine is evaluated: extremes that are no limits,
+    and both strokes of bar 4.
     """
     places = [
         (theta_2, 1) for value, theta_2, collinear in stated.ends if value != collinear
@@ -155,9 +150,8 @@ def compare_transmission(
 
 
 class _Claim(NamedTuple):
-    """One statement over a motion: its error and the allowed one, (n,).
-
-    It says too at which positions the statement is demanded.
+    """One statement over a motion: its error, the allowed one, and where it is
+    demanded, (n,).
     """
 
     what: str
@@ -204,9 +198,8 @@ def _compare_over(
 
 
 def _list_claims(over: StatedOver, answer: Answer) -> Iterator[_Claim]:
-    """List what the formulas state at each position.
-
-    It is held against the engine's angles and speeds.
+    """List what the formulas state at each position, against the engine's angles and
+    speeds.
     """
     command = over.command
     drive = over.scene.drive_bar or 2
@@ -268,9 +261,8 @@ def _compare_distance(
     command: Command,
     limits: StatedLimits,
 ) -> Finding:
-    """Compare the distance to a singular position.
-
-    It is held against the limits and dead centres that are stated.
+    """Compare the distance to a singular position with stated limits and dead
+    centres.
     """
     drive = scene.drive_bar or 2
     ours = transmission.distance_to_singular(
@@ -363,10 +355,9 @@ def _compare_extremes(stated: StatedTransmission, seen: Seen) -> Iterator[Findin
 
 
 def _find_strokes(limits: StatedLimits) -> tuple[float, tuple[float, float]] | None:
-    """Find the turn of bar 2 while bar 4 goes between its limits, rad.
-
-    It is on one branch; theta_2 in the middle of it and of the rest follow. Bar 4 turns
-    in the other sense for the rest of the turn.
+    """Find the turn of bar 2 while bar 4 goes between its limits on one branch, rad,
+    and theta_2 in the middle of it and of the rest. Bar 4 turns in the other sense
+    for the rest of the turn.
     """
     dead = [limit.theta_2 for limit in limits.positions[4] if limit.branch == -1]
     if (

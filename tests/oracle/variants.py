@@ -1,6 +1,5 @@
-"""Provide what the checks of derived results share.
-
-These are scenes with other numbers, and the rows of a comparison.
+"""Scenes with other numbers, and rows of a comparison, for checks of derived
+results.
 """
 
 import json
@@ -125,10 +124,9 @@ class _FileNumber(NamedTuple):
 
 
 class SceneFile:
-    """The text of a scene's file, in which numbers are moved.
-
-    It states lengths and polar pairs, and what it leaves out follows the lengths. The
-    coordinates of a drawing move what it states.
+    """The text of a scene's file, in which numbers are moved: it states lengths and
+    polar pairs, and what it leaves out follows the lengths. The coordinates of a
+    drawing move what it states.
     """
 
     def __init__(self, scene: Scene) -> None:

@@ -177,10 +177,8 @@ def test_a_flywheel_is_inertia_of_the_bar(bar: int, name: str) -> None:
 
 
 def test_one_cone_has_one_none_or_two_solutions() -> None:
-    """x = k |F + C x| on a line: F = 1, C = c: x = k (1 + c x), x = k |1 - c x| ...
-
-    Its distance from jamming is the slope 1 - k e.C of x - k |F + C x|, e along F + C
-    x, and at most 1.
+    """On a line F = 1, C = c: x = k (1 + c x), x = k |1 - c x|. The distance from
+    jamming is the slope 1 - k e.C of x - k |F + C x|, e along F + C x, at most 1.
     """
     cases = {  # (F, C): solutions of x = |F + C x| with k = 1, and how far from jamming
         ((1.0, 0.0), (0.5, 0.0)): (ONE_SOLUTION, 2.0, 0.5),
@@ -205,10 +203,7 @@ def test_one_cone_has_one_none_or_two_solutions() -> None:
 
 
 def test_several_cones_one_of_which_is_known() -> None:
-    """Two pins that do not feel each other are two single ones.
-
-    They are so in every outcome, each position with its own arms.
-    """
+    """Two pins that do not feel each other are two single ones in every outcome."""
     for c1, c2, number in (
         (0.5, 0.3, ONE_SOLUTION),
         (2.0, 0.3, NO_SOLUTION),

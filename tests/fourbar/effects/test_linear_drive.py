@@ -110,9 +110,8 @@ def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
     start_bar: int,
     end_bar: int,
 ) -> None:
-    """At rest nothing grows without end there but for a line without lever.
-
-    It has none on bars 3 and 4, which are collinear, but on bar 2.
+    """At rest forces grow without end at a limit only where the line has no lever:
+    on bars 3 and 4, which are collinear, but not on bar 2.
     """
     link = fourbar.uniform(0.2, 0.48, 0.55, 0.2)
     near = fourbar.Motion(fourbar.FromLimit(1, 1e-10), 0.0)

@@ -26,10 +26,7 @@ ROUND_OFF = 1e-13
 
 
 def test_a_weight_hung_at_the_tip_of_the_rocker() -> None:
-    """Right values by virtual work with a circle intersection.
-
-    They are apart from this program.
-    """
+    """Right values by virtual work and circles that meet, apart from this program."""
     torque = fourbar.solve(loads(HUNG)).torque
     right = [0.441477, -0.417152, -0.621733, 0.532516]
     assert torque is not None

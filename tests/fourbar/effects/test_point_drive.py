@@ -1,7 +1,4 @@
-"""A force at a point as the drive.
-
-Its size by virtual work, its pin forces, and how a file states it.
-"""
+"""A force at a point as the drive: its size, its pin forces, how a file states it."""
 
 import math
 from dataclasses import replace

@@ -111,9 +111,8 @@ def test_a_torsion_spring_is_wound_where_the_continuous_angle_says_so(
     branch: int,
     pin: str,
 ) -> None:
-    """Followed position by position, and evaluated at each fiftieth.
-
-    These are evaluated by themselves and in another order.
+    """Followed position by position, each fiftieth is also evaluated in another
+    order.
     """
     link = replace(linkage(name), ground_angle=0.4)
     least, most = choose_range(link)
@@ -308,9 +307,8 @@ def test_turns_are_counted_where_the_output_is_a_crank(
     branch: int,
     theta_1: float,
 ) -> None:
-    """Angles that are continuous along two turns say where a pin is wound.
-
-    It is half a turn from where its spring rests.
+    """A pin is wound half a turn from where its spring rests, by angles over two
+    turns.
     """
     linkage = replace(fourbar.uniform(0.3, 0.22, 0.25, 0.1), ground_angle=theta_1)
     rest = 0.7

@@ -54,9 +54,8 @@ def write_pins(pins: Sequence[complex]) -> str:
 
 
 def find_gap(pins: list[complex]) -> float:
-    """Return how far the linkage of a drawing stands from it.
-
-    It is in eps of its longest bar and condition.
+    """Return how far a linkage stands from its drawing, eps of its bars and
+    condition.
     """
     O2, A, B, _ = pins
     scene = fourbar.from_pins(*((pin.real, pin.imag) for pin in pins))

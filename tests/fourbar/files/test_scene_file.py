@@ -1,7 +1,4 @@
-"""Bad input: exit status 2 and one line with file, key and value.
-
-There is no traceback, and nothing is written.
-"""
+"""Bad input: exit status 2, one line with file, key and value, and nothing written."""
 
 import io
 import os
@@ -521,10 +518,7 @@ def test_what_is_not_text(
 
 
 def rocker(theta_2: str) -> str:
-    """A linkage whose input does not turn fully.
-
-    It closes for theta_2 between 22.3 and 71.7 deg.
-    """
+    """A linkage that closes for theta_2 between 22.3 and 71.7 deg."""
     text = GOOD.replace('"0.1 m"', '"0.24 m"').replace('"0.25 m"', '"0.1 m"')
     return text.replace('"60 deg"', theta_2)
 

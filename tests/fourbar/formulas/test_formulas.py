@@ -97,9 +97,8 @@ class Carrying(float):
 
 
 def test_plain_numbers_stay_plain_and_arrays_broadcast() -> None:
-    """Python's own floats give Python's own results.
-
-    They take a third of the time of NumPy's.
+    """Python's own floats give Python's own results, in a third of the time of
+    NumPy's.
     """
     assert vector(1.0, 2.0) == 1.0 + 2.0j and type(vector(1.0, 2.0)) is complex
     for x, y in ((Carrying(1.0), 2.0), (1.0, Carrying(2.0))):
@@ -124,10 +123,7 @@ def test_plain_numbers_stay_plain_and_arrays_broadcast() -> None:
 
 
 def hard_doubles(seed: int, count: int) -> list[tuple[float, float, float, float]]:
-    """p, q, r, s > 0 with p + q and r + s equal, or nearly.
-
-    They are apart by a rounding or a few, of like or unlike sizes.
-    """
+    """p, q, r, s > 0 with p + q and r + s equal, or apart by a rounding or a few."""
     rng = np.random.default_rng(seed)
 
     def one() -> float:
@@ -559,9 +555,8 @@ def test_numbers_arrays_and_many_linkages_at_once_are_the_same_formulas(
 
 
 def five(bars: FourBar, psi: mp.mpf) -> list[mp.mpf]:
-    """sin^2 h, cos^2 h, sin h cos h and the factors.
-
-    They follow from A and O4 as points of the complex plane.
+    """sin^2 h, cos^2 h, sin h cos h and the factors, from A and O4 in the complex
+    plane.
     """
     d, a, b, c = map(mp.mpf, bars.lengths)
     e = abs(d - a * mp.expj(psi))
@@ -639,9 +634,8 @@ def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle() -> None:
 
 
 def exact_limit(bars: FourBar, stretched: bool) -> mp.mpf:
-    """theta_2 of a limit position from the Heron factors of a triangle.
-
-    Its sides are ground, input and e.
+    """theta_2 of a limit position by Heron's factors of the sides ground, input and
+    e.
     """
     d, a, b, c = map(mp.mpf, bars.lengths)
     e = b + c if stretched else abs(b - c)
@@ -709,10 +703,7 @@ def test_a_limit_position_itself_closes_in_many_digits() -> None:
 
 
 def test_bars_that_miss_by_the_rounding_of_their_lengths_touch() -> None:
-    """0.1 + 0.7 and 0.2 + 0.6 are the same sum of the lengths meant.
-
-    They are not of the doubles.
-    """
+    """0.1 + 0.7 = 0.2 + 0.6 of the lengths meant, and not of the doubles."""
     for lengths in ((0.6, 0.7, 0.1, 0.2), (0.7, 0.6, 0.2, 0.1)):
         d, a, b, c = lengths
         assert Fraction(d) + Fraction(c) != Fraction(a) + Fraction(b)

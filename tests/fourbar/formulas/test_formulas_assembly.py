@@ -1,7 +1,4 @@
-"""Assemblies through change points, against the intersections of two circles.
-
-These are followed from step to step.
-"""
+"""Assemblies through change points against circles that meet, followed step by step."""
 
 import itertools
 import math
@@ -90,10 +87,7 @@ def follow(places: np.ndarray, start: int) -> np.ndarray:
 
 
 def list_angles(linkage: fourbar.FourBar, bar: int) -> np.ndarray:
-    """Angles over three turns, both ways from the first quarter.
-
-    They fall between all change points.
-    """
+    """Angles over three turns from the first quarter, between all change points."""
     first = linkage.ground_angle + (math.pi if bar == 4 else 0.0) + math.radians(45.7)
     return first + STEP * np.arange(round(TURNS * 2 * math.pi / STEP))
 

@@ -1,7 +1,4 @@
-"""Limit positions, ranges, circuits and types.
-
-They are held against scans, 50 digits and published figures.
-"""
+"""Limits, ranges, circuits and types against scans, 50 digits and published figures."""
 
 import itertools
 import math
@@ -74,9 +71,8 @@ def random_linkages(seed: int, count: int) -> list[FourBar]:
 
 
 def closes(bars: FourBar, theta_2: np.ndarray) -> np.ndarray:
-    """How far the circles about A and O4 are from not meeting, m; >= 0: they meet.
-
-    Their radii are b and c.
+    """Return how far circles of radii b, c about A, O4 are from missing each other,
+    m.
     """
     d, a, b, c = bars.lengths
     distance = np.abs(a * np.exp(1j * theta_2) - d * np.exp(1j * bars.ground_angle))

@@ -223,9 +223,8 @@ def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(
     branch: int,
     theta_1: float,
 ) -> None:
-    """As theta_2 falls to theta_1 bars 3 and 4 come to lie on the ground's line.
-
-    Both have the same direction.
+    """As theta_2 falls to theta_1 bars 3 and 4 come to lie together on the ground's
+    line.
     """
     link = fourbar.FourBar(
         0.3, fourbar.Bar(0.3), fourbar.Bar(0.2), fourbar.Bar(0.2), theta_1

@@ -30,10 +30,7 @@ PRINTED = 5e-14
 
 
 def make_bodies(case: fourbar.Scene, command: fourbar.scene.Command) -> EquationTerms:
-    """The right-hand sides of the thirteen equations, under gravity alone.
-
-    They follow from the kinematics.
-    """
+    """Right-hand sides of the thirteen equations from the kinematics, gravity alone."""
     s = fourbar.solve(case, "acceleration", at=command)
     gravity = np.array(
         next(
@@ -189,10 +186,7 @@ def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
     pins: tuple[str, ...],
     drive_bar: int,
 ) -> None:
-    """With the couples mu r |F| of the forces the equations give these again.
-
-    They are the thirteen equations.
-    """
+    """With the couples mu r |F| the thirteen equations give these forces again."""
     case = fourbar.Scene(
         make_example().linkage,
         fourbar.Motion(0.0, 10.0),
@@ -319,9 +313,8 @@ def test_written_into_given_arrays() -> None:
 
 
 def test_the_forces_of_a_member_are_the_same_alone_and_beside_others() -> None:
-    """Where the ground is shorter than the input F32 has a form of its own.
-
-    It has it for that member alone.
+    """F32 has a form of its own for members whose ground is shorter than their
+    input.
     """
     case = replace(scene(2), motion=fourbar.Motion(1.0, -8.0, 20.0))
     ground, names = np.array([0.06, 0.3, 0.08]), ("F12", "F32", "F43", "F14", "torque")

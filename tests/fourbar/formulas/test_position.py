@@ -1,7 +1,4 @@
-"""Kinematic coefficients near change points.
-
-They are held against differences of the angles in many digits.
-"""
+"""Kinematic coefficients near change points, against differences in many digits."""
 
 import mpmath as mp
 import numpy as np
@@ -55,10 +52,7 @@ def find_assembly(psi: float, sign: int) -> int:
 
 
 def differences(lengths: tuple[float, ...], psi: float, branch: int) -> list[mpf]:
-    """h3, h4, h3', h4' from the directions of the triangle A, B, O4.
-
-    It is taken at psi and to either side of it.
-    """
+    """h3, h4, h3', h4' from the directions of the triangle A, B, O4 about psi."""
     d, a, b, c = map(mpf, lengths)
 
     def angles(theta: mpf) -> tuple[mpf, mpf]:

@@ -1,7 +1,4 @@
-"""The torque by virtual work against the equations of the free bodies.
-
-It is held against energy and outside answers too.
-"""
+"""The torque by virtual work against free bodies, energy and published figures."""
 
 import mpmath as mp
 import numpy as np
@@ -81,10 +78,7 @@ def some_of(command: Command, mask: np.ndarray) -> Command:
 def test_they_keep_their_digits_at_a_stated_distance_from_a_limit(
     offset: float,
 ) -> None:
-    """theta_2 = limit + offset.
-
-    It assembles on one side of the limit, with the torque of the free bodies in balls.
-    """
+    """On one side of a limit the linkage assembles, with the torque of balls."""
     for seed in range(2):
         rng = np.random.default_rng(seed)
         linkage, terms, _ = random_case(rng)
@@ -308,10 +302,7 @@ def test_what_touches_is_up_to_the_rounding_of_the_lengths() -> None:
 
 
 def test_a_bar_as_short_as_the_rounding_of_the_others_keeps_its_length() -> None:
-    """d - a = 1e-15 is no rounding of a ground of 3e-15.
-
-    It is one of a coupler of 1.
-    """
+    """d - a = 1e-15 is no rounding of a ground of 3e-15, but one of a coupler of 1."""
     assert loop(3e-15, 2e-15, 1.0, 1.0).E2 > 0.0
     # within the rounding of their own, and no further, lengths become equal
     assert loop(0.3, 0.3 * (1.0 + EPS), 0.2, 0.2).a == 0.3

@@ -1,7 +1,4 @@
-"""The model files of `fourbar mjcf --for` and `fourbar sdf`.
-
-They are loaded, stepped and read as their comments say.
-"""
+"""Files of `fourbar mjcf --for` and `fourbar sdf` are read as their comments say."""
 
 import cmath
 import importlib

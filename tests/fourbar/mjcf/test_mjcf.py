@@ -151,10 +151,9 @@ def test_the_file_opens_in_the_assembly_beyond_change_points(
     points: tuple[float, ...],
     branch: int,
 ) -> None:
-    """Pin B lies left of the diagonal from A to O4 in the open assembly's first half.
-
-    It changes its side at each change point that the input passes, and at no other
-    angle. The pins are read from MuJoCo's own points.
+    """Pin B lies left of the diagonal from A to O4 in the open assembly's first
+    half, and changes its side at each change point that the input passes, and
+    nowhere else.
     """
     linkage = replace(fourbar.uniform(*lengths), ground_angle=0.3)
     for psi in (-2.5, -0.5, 0.5, 2.5, 3.8, 6.0, 6.8):

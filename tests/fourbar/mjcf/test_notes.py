@@ -372,9 +372,8 @@ def holds_with_a_flywheel(file: Opened) -> None:
 
 
 def has_one_control_with_a_range(file: Opened) -> None:
-    """Gymnasium's MujocoEnv makes its box of actions of `actuator_ctrlrange`.
-
-    It has a row for each control.
+    """Gymnasium's MujocoEnv makes a row of its box of actions of each control's
+    range.
     """
     m, d, scene = file.model, file.data, file.scene
     assert m.nu == 1 and m.actuator_ctrlrange.shape == (1, 2)
@@ -405,9 +404,8 @@ def has_passive_motors(file: Opened) -> None:
 
 
 def was_wrong_before_3_7(file: Opened) -> None:
-    """Compare the two versions of the benchmark's matrix, which is generated.
-
-    They are compared at the worst of three timesteps.
+    """Compare two versions of the benchmark's matrix at the worst of three
+    timesteps.
     """
     errors: dict[str, dict[str, float]] = {"3.3.7": {}, "4.0.0": {}}
     with MATRIX.open(encoding="utf-8", newline="") as table:

@@ -1,7 +1,4 @@
-"""The summary of `analyze`.
-
-Its numbers by geometry and by much finer steps, and its words.
-"""
+"""The summary of `analyze`: its numbers by geometry and finer steps, and its words."""
 
 import math
 import re
@@ -210,10 +207,7 @@ def test_friction_at_rest_gives_the_range_that_it_holds() -> None:
 
 
 def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore() -> None:
-    """The cylinder can have the difference and the sum of its two distances.
-
-    They are from the pivot of the input.
-    """
+    """A cylinder can have difference and sum of its ends' distances from the pivot."""
     motion = fourbar.Motion(
         stroke=fourbar.Sweep(0.17, 0.33, 40),
         stroke_speed=0.2,
@@ -243,9 +237,8 @@ def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore() -> None:
 
 @pytest.mark.parametrize("bar", (2, 3))
 def test_a_cylinder_assembles_from_where_its_ends_meet(bar: int) -> None:
-    """On bar 2 they lie as far from O2. On bar 3 the end on the ground is on its path.
-
-    That end stands where the place of bar 3 is at theta_2 = 40 deg.
+    """The ends lie as far from O2, or the ground's end is on the path of the other,
+    which passes it at theta_2 = 40 deg.
     """
     linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
     motion = fourbar.Motion(fourbar.Sweep(1.0, 2.0, 10), 0.0)
@@ -333,10 +326,7 @@ def test_a_new_scene_has_weight_and_sixty_turns_a_minute(
 def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held() -> (
     None
 ):
-    """A friction couple of 0.5 N m at O2 holds the static torque.
-
-    It is less or more by as much, at each position.
-    """
+    """A friction couple of 0.5 N m at O2 holds the static torque within as much."""
     sweep = fourbar.Motion(fourbar.Sweep(0.2, 1.4, 6), 0.0)
     bare = crank_rocker(motion=sweep, effects=(fourbar.Gravity(),))
     static = fourbar.solve(bare).torque
@@ -440,9 +430,8 @@ def test_the_json_names_the_angle_of_the_peak_that_is_located() -> None:
 def test_the_largest_rates_of_following_bars_are_those_of_fine_steps(
     branch: int,
 ) -> None:
-    """Where nothing acts the summary has speeds and accelerations.
-
-    They are those of bars 3 and 4, signed, with their places.
+    """Where nothing acts the summary has the rates of bars 3 and 4 with their
+    places.
     """
     linkage = fourbar.FourBar(D, *(fourbar.Bar(x) for x in (A, B, C)))  # type: ignore[arg-type]
 

@@ -217,9 +217,8 @@ def test_a_study_of_a_motion_law_keeps_its_time() -> None:
 
 
 def test_a_law_over_one_turn_is_closed_where_speed_and_acceleration_repeat() -> None:
-    """Its last position counts once only if it is the first again.
-
-    Its angle alone does not tell that.
+    """The last position counts once only if its angle, speed and acceleration
+    repeat.
     """
     time, angle = (0.0, 0.3, 0.7, 1.0), (0.0, 1.5, 5.0, math.tau)
     linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)

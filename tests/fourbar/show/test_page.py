@@ -1,7 +1,4 @@
-"""The moving page in a real browser.
-
-Its picture and numbers are held against the formulas in Python.
-"""
+"""The moving page in a real browser, against the formulas in Python."""
 
 import base64
 import math

@@ -210,10 +210,7 @@ def test_half_a_turn_from_the_ground_the_first_derivative_is_the_ratio_of_the_sp
 
 
 def test_a_kite_whose_halves_meet_has_derivatives() -> None:
-    """With a = d and b = c the product in Heron's factor has no slope either.
-
-    It is a constant.
-    """
+    """With a = d and b = c the product in Heron's factor is a constant."""
     slopes = sensitivity(Scene(fourbar.uniform(0.3, 0.3, 0.2, 0.2), Motion(1.0, 10.0)))
     np.testing.assert_allclose(
         slopes.of("theta_3", "motion.theta_2"),

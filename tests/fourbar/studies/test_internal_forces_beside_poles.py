@@ -1,8 +1,6 @@
-"""Bending of bars that the drive does not act on, beside a pole of the drive.
-
-Their moments are bounded there, and the pin forces are not. The second derivation is in
-40 digits: circles that meet, their first and second derivatives, and the moments of one
-bar about its ground pin.
+"""Bending of bars that the drive does not act on is bounded beside a pole of the
+drive. The second derivation is in 40 digits: circles that meet, their first and
+second derivatives, and the moments of one bar about its ground pin.
 """
 
 from dataclasses import replace

@@ -132,10 +132,7 @@ def test_a_stroke_is_found_where_an_angle_is_commanded() -> None:
 
 
 def test_the_range_of_a_refusal_is_that_of_the_motion_and_not_the_other_one() -> None:
-    """Bar 2 has two ranges; the scene moves in the second.
-
-    There the extent of bar 4 is that of its positions.
-    """
+    """Bar 2 has two ranges; the extent of bar 4 is that of the second, which moves."""
     linkage = fourbar.FourBar(
         0.3, fourbar.Bar(0.2), fourbar.Bar(0.25), fourbar.Bar(0.1)
     )

@@ -108,10 +108,7 @@ def test_what_slopes_cannot_follow_raises(change: Any) -> None:
 
 @dataclass(frozen=True)
 class Drag(Effect):
-    """A couple on the input that grows with the square of its speed.
-
-    It is written in two ways.
-    """
+    """A couple on the input that grows with its speed squared, written in two ways."""
 
     strength: float
     form: str
