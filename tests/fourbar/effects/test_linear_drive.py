@@ -110,7 +110,7 @@ def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
     start_bar: int,
     end_bar: int,
 ) -> None:
-    """At rest forces grow without end only along a line on bar 2, without lever there."""
+    """At rest forces grow without end only for a line to bar 2, without lever there."""
     link = fourbar.uniform(0.2, 0.48, 0.55, 0.2)
     near = fourbar.Motion(fourbar.FromLimit(1, 1e-10), 0.0)
     scene = fourbar.Scene(

@@ -25,8 +25,6 @@ GROWN = 1e-13
 """Relative, divided by the drive's condition: two evaluations of some hundred roundings
 each.
 """
-PRINTED = 5e-14
-"""Relative: the thesis's case recomputed in doubles elsewhere, printed to 16 digits."""
 
 
 def make_bodies(case: fourbar.Scene, command: fourbar.scene.Command) -> EquationTerms:
@@ -82,52 +80,6 @@ def scene(drive_bar: int) -> fourbar.Scene:
         loads,
         effects,
     )
-
-
-CORRECT = {
-    # I_G3, I_G4: torque, F12, F32, F43, F14 of the thesis's model mechanism in SI units
-    (2.924725333333334e-05, 1.0752666666666668e-05): (
-        3.093307799397968,
-        (7.0338395650111, -2.1219312151085874),
-        (-15.481213051434557, 0.5693047015320454),
-        (-15.477291466013861, 0.5558579890407687),
-        (-15.477558824261218, 0.5526234623357096),
-    ),
-    (0.01374258058666667, 0.0006774193333333334): (
-        3.0930935923198564,
-        (7.03311775702161, -2.1212094071190957),
-        (-15.480491243445071, 0.5685828935425536),
-        (-15.476569658024376, 0.5551361810512767),
-        (-15.476837016271721, 0.5519016543462177),
-    ),
-}
-"""Linares Mendoza, UNAM FES Cuautitlan, section 5.7, with its errors of units
-corrected.
-"""
-
-
-@pytest.mark.parametrize("inertias", CORRECT)
-def test_the_model_mechanism_of_the_thesis(inertias: tuple[float, float]) -> None:
-    link = fourbar.FourBar(
-        0.2,
-        fourbar.Bar(0.48, 57, 11.119275, (0.765, 0)),
-        fourbar.Bar(0.55, 0.544, inertias[0]),
-        fourbar.Bar(0.2, 0.2, inertias[1]),
-        math.radians(45),
-    )
-    loads = [fourbar.Load(2, (10, 0), arm=(0.05, math.radians(265)))]
-    loads += [fourbar.Load(k, moment=-0.15) for k in (2, 3, 4)]
-    s = fourbar.solve(
-        fourbar.Scene(link, fourbar.Motion(math.radians(135), 0.2244), 4, tuple(loads))
-    )
-    torque, *forces = CORRECT[inertias]
-    assert s.torque[0] == pytest.approx(torque, rel=PRINTED)
-    for name, force in zip(("F12", "F32", "F43", "F14"), forces, strict=True):
-        assert getattr(s, name)[0] == pytest.approx(
-            force,
-            rel=0,
-            abs=PRINTED * math.hypot(*force),
-        )
 
 
 @pytest.mark.parametrize("drive_bar", [2, 3, 4])
