@@ -44,7 +44,6 @@ from fourbar.formulas.position import (
     HalfAngle,
     close_loop,
     direction,
-    find_parallel_pairs,
     half_angle,
     loop,
 )
@@ -228,19 +227,6 @@ def test_the_constants_of_the_loop_vanish_within_rounding_alone() -> None:
                     assert abs(Fraction(value) - exact) <= PRODUCTS * abs(exact)
     assert min(zeros) > 300
     assert judged > 12_000 and at_a_bound < 2000, (judged, at_a_bound)
-
-
-def test_pairs_stay_parallel_in_one_assembly_alone() -> None:
-    for lengths, together, folded in (
-        ((0.3, 0.1, 0.3, 0.1), True, False),
-        ((0.1, 0.3, 0.3, 0.1), False, True),
-        ((0.2, 0.2, 0.2, 0.2), True, True),
-        ((0.3, 0.3, 0.1, 0.1), False, False),
-        ((0.3, 0.1, 0.25, 0.22), False, False),
-    ):
-        bars = loop(*lengths)
-        assert find_parallel_pairs(bars, 1) == (together, False)
-        assert find_parallel_pairs(bars, -1) == (False, folded)
 
 
 def read_from_the_output(drawn: Drawn) -> tuple[State, Any, Any]:

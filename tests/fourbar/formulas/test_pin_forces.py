@@ -184,42 +184,6 @@ def test_a_force_between_two_bars_in_line_does_not_exist() -> None:
     ) == pytest.approx([3.0, 3.0])
 
 
-@pytest.mark.parametrize("drive_bar", [2, 3, 4])
-def test_dry_friction_at_rest_holds_as_much_as_its_work(drive_bar: int) -> None:
-    """Virtual work.
-
-    The torque may move by the friction couples times the turns of their pins, in either
-    sense.
-    """
-    couples = {"O2": 0.04, "A": 0.02, "B": 0.03, "O4": 0.01}
-    case = replace(
-        scene(drive_bar),
-        motion=fourbar.Motion(np.linspace(0.1, 6.0, 7), 0.0),
-    )
-    loads_and_gravity = replace(case, effects=case.effects[:1])
-    s = fourbar.solve(
-        replace(case, effects=(case.effects[0], fourbar.Friction.at(**couples)))
-    )
-    free = fourbar.solve(loads_and_gravity)
-    turning = fourbar.solve(
-        replace(loads_and_gravity, motion=case.motion.replace(speed=1.0))
-    )
-    rate = {1: 0.0, 2: 1.0, 3: turning.omega_3, 4: turning.omega_4}
-    pins = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
-    work = sum(
-        f * np.abs(rate[j] - rate[i])
-        for (i, j), f in ((pins[pin], f) for pin, f in couples.items())
-    )
-    half = work / np.abs(rate[drive_bar])
-    size = np.abs(free.torque) + half
-    for end, side in ((s.torque_high, 1.0), (s.torque_low, -1.0)):
-        assert np.all(np.abs(end - (free.torque + side * half)) <= SOLVED * size)
-    moving = fourbar.solve(replace(case, motion=case.motion.replace(speed=2.0)))
-    assert np.array_equal(moving.torque_low, moving.torque) and np.array_equal(
-        moving.torque_high, moving.torque
-    )
-
-
 def test_bars_without_mass_hold_a_load_where_the_input_turns_back() -> None:
     """Near a limit position what they hold tends to a limit.
 
