@@ -282,6 +282,15 @@ class Bar:
                 self.diameter,
                 "must be left out beside a section",
             )
+        modulus = self.section_modulus
+        if modulus is not None and not 0.0 < modulus < math.inf:
+            name = "diameter" if self.section is None else "section"
+            raise InputError(
+                name,
+                getattr(self, name),
+                "is no size of a bar: the cube of it must be a positive double",
+                unit="m",
+            )
         if self.density is None:
             return
         if self.area is None:
@@ -318,7 +327,8 @@ class Bar:
             height, thickness = self.section
             return thickness * (height * height) / 6.0
         if self.diameter is not None:
-            return math.pi / 32.0 * self.diameter**3
+            square = self.diameter * self.diameter
+            return math.pi / 32.0 * (square * self.diameter)
         return None
 
     def weigh(self) -> Any:

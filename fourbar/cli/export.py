@@ -38,7 +38,11 @@ def _plane_options(command: Callable[..., None]) -> Callable[..., None]:
         command(plane=Plane(direction, given.read_three("--origin", origin)), **others)
 
     for name, default, text in (
-        ("--origin", "0 0 0", "Place of pin O2 in the world, m or with units."),
+        (
+            "--origin",
+            "0 0 0",
+            "Place of pin O2 (of a drawing's origin) in the world, m or with units.",
+        ),
         ("--axis", "0 0 1", "Direction of the pins' axes in the world."),
     ):
         placed = click.option(

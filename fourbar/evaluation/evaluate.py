@@ -65,6 +65,8 @@ _LEAST_STEP = 2.0**-46
 """Step as a part of the angle, at least of 1 rad. A shorter step is rounded to less
 than two digits.
 """
+_FAR = 2.0**26
+"""Angle, rad, beyond which a step that is short against s^2 may be too short."""
 _WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)
 """Statuses of positions without forces, because an effect or the drive has no value."""
 
@@ -357,9 +359,12 @@ def _compute_unresolved(
     long double is no bound. What rounding does follows from the slope:
         dF = (dF/dq) max(|q|, 1) _LONG_EPS ROUNDINGS_IN_FULL,
     dF/dq by a step that is short against the distance to the limit, which is some s^2
-    (s the sine of the command). NaN where no double lies a step away.
+    (s the sine of the command). NaN where no double lies a step away. Beyond ten
+    million turns, where none may do so anywhere, doubles decide the step.
     """
-    step = SLOPE_STEP * (state.sine * state.sine)
+    size = np.fmax(np.abs(state.q), 1.0)
+    least = (size > _FAR) * 2.0 * _LEAST_STEP * size
+    step = np.fmax(SLOPE_STEP * (state.sine * state.sine), least)
     moved = state.q + step
     step = moved - state.q
     shifted = case.assemble(
@@ -375,7 +380,6 @@ def _compute_unresolved(
         there = case.dynamics(shifted, command.acceleration, case.side)
     except InputError:  # a load's table ends here
         return np.nan, np.nan
-    size = np.fmax(np.abs(state.q), 1.0)
     with np.errstate(all="ignore"):
         gap, drive_gap = _compute_gaps(dynamics, there)
         rounding = ROUNDINGS_IN_FULL * _LONG_EPS * size

@@ -323,7 +323,15 @@ def size_flywheel(scene: Scene, settings: Settings = RECIPE) -> float:
     energy.
     """
     inertia = _sum_inertia(scene.linkage) + _sum_load_inertia(scene)
-    return float(f"{settings.flywheel * inertia:.3g}")
+    armature = settings.flywheel * inertia
+    if not math.isfinite(armature):
+        raise InputError(
+            "flywheel",
+            armature,
+            "must be a double: forces, masses and lengths of the scene must be smaller",
+            unit="kg m^2",
+        )
+    return float(f"{armature:.3g}")
 
 
 def compute_load_ratio(scene: Scene) -> float:

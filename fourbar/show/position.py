@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from fourbar.formulas.mobility import TURN
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import DERIVED_NAMES, Array
 from fourbar.scene import Scene
@@ -60,6 +61,8 @@ class PositionSheet:
                 speeds = self._list_of_bars("omega")
                 assert speeds is not None
                 largest = max(largest, np.nanmax(np.square(speeds), initial=0.0))
+            if letter == "theta":
+                largest = min(largest, TURN)
             numbers = drop_rounding(numbers, largest)
             factor, name = choose_unit(0.0, unit, self.units)
             form = ".4f" if letter == "theta" else f".{POSITION_DIGITS}g"
@@ -289,5 +292,5 @@ def _write_cells_of(numbers: Array, form: str = f".{POSITION_DIGITS}g") -> list[
 
 
 def _write_row(label: str, cells: Iterable[str]) -> str:
-    row = "".join(f"{cell:<{_CELL}}" for cell in cells)
+    row = "".join(f"{cell:<{_CELL - 1}} " for cell in cells)
     return f"{label:<{LABEL_WIDTH}}{row}".rstrip()

@@ -135,6 +135,8 @@ class Sensitivity:
     def value(self, quantity: str) -> Array:
         """Return the quantity, or a component or magnitude of it.
 
+        Places are in the coordinates of the scene's drawing, like their derivatives.
+
         Raises InputError as `of` does.
         """
         name = self._find_whole(quantity)

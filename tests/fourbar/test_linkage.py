@@ -56,6 +56,9 @@ def test_the_section_modulus_is_that_of_the_second_moment_of_area() -> None:
         ({"density": STEEL, "diameter": 0.02, "section": (0.02, 0.01)}, "diameter"),
         ({"section": (0.02, 0.0)}, "section"),
         ({"section": "20 mm"}, "section"),
+        ({"section": (1e-150, 1e-150)}, "section"),
+        ({"diameter": 1e-150}, "diameter"),
+        ({"diameter": 1e150}, "diameter"),
         ({"density": "7850 kg/m^2", "diameter": 0.02}, "density"),
     ],
 )

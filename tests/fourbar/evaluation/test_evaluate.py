@@ -300,6 +300,17 @@ def test_an_error_bar_holds_what_long_doubles_do_not_resolve(
         assert error <= bar <= 2.0**11 * error, name  # what doubles do not resolve
 
 
+@pytest.mark.parametrize("power", range(24, 41, 2))
+def test_an_error_bar_grows_with_the_angle(power: int) -> None:
+    """A crank under its weight, m g r cos(theta), whose angle has 64 bits."""
+    linkage = fourbar.FourBar(0.3, Bar(0.1, 1.0), Bar(0.25), Bar(0.22))
+    angle = 2.0**power
+    scene = Scene(linkage, Motion(angle, 1.0), effects=(fourbar.Gravity(),))
+    error = fourbar.solve(scene, "error").torque_error[0]
+    slope = abs(9.80665 * 0.05 * np.sin(angle))
+    assert error >= 0.5 * angle * np.finfo(np.longdouble).eps * slope
+
+
 def test_an_error_bar_at_the_end_of_a_table_of_a_load() -> None:
     """The slope of the forces would be taken beyond the table."""
     table = fourbar.Table((0.5, 1.0), (1.0, 2.0))

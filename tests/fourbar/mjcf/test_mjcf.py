@@ -291,6 +291,12 @@ def test_massless_bar_is_refused_in_one_line(
         write_mjcf(crank_rocker(linkage=linkage))
 
 
+def test_a_force_whose_flywheel_is_no_double_is_refused_in_one_line() -> None:
+    scene = crank_rocker(loads=(fourbar.Load(3, (1e308, 0.4)),))
+    with pytest.raises(fourbar.InputError, match=r"^flywheel = inf kg m\^2: [^\n]*$"):
+        write_mjcf(scene)
+
+
 @pytest.mark.parametrize("omega", [None, 0.0])
 def test_at_rest_a_file_is_written_that_stays_at_rest(omega: float | None) -> None:
     scene = crank_rocker(motion=fourbar.Motion(1.0, omega), loads=(), effects=())

@@ -15,7 +15,7 @@ import fourbar
 from fourbar.effects import Place, Table
 from fourbar.errors import InputError
 from fourbar.files import loads
-from fourbar.quantities.units import DEFINITIONS, UnitError, to_si
+from fourbar.quantities.units import DEFINITIONS, UnitError, half_unit_of_text, to_si
 
 ENDS = Place(1, (0.1, 0.0)), Place(4, (0.2, np.pi))
 SAME: list[tuple[Callable[..., Any], tuple[Any, ...], tuple[Any, ...]]] = [
@@ -218,6 +218,22 @@ def test_every_unit_is_its_fraction(name: str) -> None:
 )
 def test_feet_and_inches_are_one_length(text: str, inches: Fraction | int) -> None:
     assert to_si(text, "m") == float(inches * FOOT / 12)
+
+
+@pytest.mark.parametrize(
+    ("text", "half"),
+    [
+        ("0.10 m", 5e-3),
+        ("12.5 mm", 5e-5),
+        ("1.00e-2 m", 5e-5),
+        ("1.5e+1 mm", 5e-4),
+        ("3 m", 0.0),
+        ("1e-2 m", 0.0),
+        ("1 1/2 in", 0.0),
+    ],
+)
+def test_half_a_unit_of_the_last_decimal(text: str, half: float) -> None:
+    assert half_unit_of_text(text, "m") == pytest.approx(half, rel=1e-15)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import pytest
 
 import fourbar
 from fourbar.cli import status
+from fourbar.scene import command_at
 from fourbar.scene.motion import Law
 from fourbar.show.block import write_block, write_motor
 from fourbar.show.summary import summarize
@@ -233,6 +234,24 @@ def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore() -> None:
         (0.16, 0.34),
         abs=1e-6,
     )
+
+
+def test_a_bore_is_that_of_the_motion_and_not_of_its_positions() -> None:
+    """The couple on the crank is largest at 101.3 deg, between two positions."""
+    corners = tuple(np.radians((0.0, 95.0, 101.3, 107.0, 360.0)))
+    table = fourbar.Table(corners, (1.0, 1.0, 50.0, 1.0, 1.0))
+    scene = crank_rocker(
+        motion=fourbar.Motion(fourbar.Sweep(1.0, 2.6, 8), 10.0),
+        loads=(fourbar.Load(2, moment=-1.0, table=table),),
+        effects=(),
+        drive=CYLINDER,
+    )
+    corner = command_at(scene, np.radians([101.3]))
+    (force,) = fourbar.solve(scene, at=corner).drive_force
+    word = "push" if force > 0.0 else "pull"
+    bore = 1e3 * math.sqrt(4.0 * abs(force) / (math.pi * 1e6))
+    text = plain(block(scene, pressure=1e6))
+    assert re.search(rf"{bore:.4g} mm\b[^;]* to {word} {abs(force):.4g} N", text)
 
 
 @pytest.mark.parametrize("bar", (2, 3))

@@ -19,6 +19,7 @@ from tests.fourbar.studies.test_study import ANGLES, DRIVEN, LINK, LOADS, RUBBIN
 from tests.oracle.oracles import judge_by
 from tests.oracle.test_derived import failing
 
+MODELS = Path(__file__).parents[3] / "models"
 TABLED = Load(
     4,
     (2.0, 0.1),
@@ -43,6 +44,21 @@ def test_every_effect_has_the_slopes_of_files_with_a_number_moved(
     rows = judge_by(case, "sensitivity")
     assert {"points", "torque", "F14"} <= {row.quantity for row in rows if row.compared}
     assert not failing(rows)
+
+
+def test_a_drawn_coordinate_counts_by_a_hundredth_of_the_longest_bar() -> None:
+    """Others count by a hundredth of themselves, angles by a degree."""
+    slopes = sensitivity(fourbar.load(MODELS / "capabilities" / "drawn.toml"))
+    longest = max(slopes.solution.scene.linkage.lengths)
+    numbers = dict(zip(slopes.keys, slopes.numbers, strict=True))
+    steps = {"pins.B.0": 0.01 * longest, "points.P.drawn.1": 0.01 * longest}
+    steps |= {key: 0.01 * numbers[key] for key in ("bars.input.mass", "motion.omega_2")}
+    for key, step in steps.items():
+        name = "P" if key.startswith("points") else "|F12|"
+        (change,) = (row.change for row in slopes.influences(name) if row.key == key)
+        slope = slopes.of(name, key)
+        size = np.abs(slope) if slope.ndim == 1 else np.hypot(*slope.T)
+        assert abs(change) == pytest.approx(step * np.nanmax(size), rel=EXACT)
 
 
 def test_where_there_is_no_derivative_a_status_says_why() -> None:

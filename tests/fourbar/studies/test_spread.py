@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 import fourbar.formulas.mobility
 from fourbar import Bar, FourBar, InputError, Motion, Scene, Sweep, Tolerance, uniform
@@ -69,6 +70,15 @@ def test_a_number_that_the_torque_is_proportional_to() -> None:
     np.testing.assert_allclose(torque.deviation, torque.first_order, rtol=QUASI)
     np.testing.assert_allclose(study.spreads["theta_4"].deviation, 0.0, atol=1e-14)
     assert not torque.parted.any() and study.apart == study.invalid == 0
+
+
+def test_a_normal_tolerance_is_drawn_as_far_out_as_the_samples_go() -> None:
+    """Of n numbers the k-th is the quantile (k + 1/2)/n, within one of n."""
+    study = spread(Tolerance("lengths.output", 2e-5, True))
+    theta = study.spreads["theta_4"]
+    for end in (theta.least, theta.greatest):
+        sigmas = np.abs(end - theta.nominal) / theta.first_order
+        assert (sigmas > norm.isf(1.0 / 2048)).all()
 
 
 def test_samples_agree_with_first_order_where_it_is_straight_and_so_do_the_shares() -> (
