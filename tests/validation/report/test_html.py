@@ -149,9 +149,14 @@ def test_the_table_of_orders_fits_a_phone(browse) -> None:
 
 
 @pytest.mark.slow
-def test_nothing_is_wider_than_a_phone(browse) -> None:
+def test_nothing_is_wider_than_a_phone_nor_left_out_there(browse) -> None:
     driver = browse(report(copies(2, failing=1))[1], 360)
     assert driver.execute_script("return document.documentElement.scrollWidth") <= 360
+    heads = driver.execute_script(
+        "return [...document.querySelectorAll('table.engines th')]"
+        ".map(e => [e.textContent, e.checkVisibility()])"
+    )
+    assert len(heads) > 10 and all(visible for _, visible in heads)
 
 
 @pytest.mark.slow
