@@ -94,7 +94,7 @@ def test_the_report_is_printed_and_written(
     assert page.startswith("# The loops of finger.xml in MuJoCo")
     assert "| single states | torque |" in page
     assert (out / "states.csv").read_text() == write_states(measured().loops)
-    written = read_columns(out / "results.csv")
+    written = list(read_columns(out / "results.csv"))
     torque = next(row for row in written if row.quantity == "torque")
     errors = list_errors_by_method(measured().loops[0])
     assert {row.engine for row in written} == {error.method for error in errors}

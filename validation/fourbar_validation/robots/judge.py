@@ -61,6 +61,8 @@ _EXAMINE = "fourbar_validation.engines.mujoco.robots.examine:examine_file"
 _CHANGED = "fourbar_validation.engines.mujoco.robots.examine:examine_changed"
 _MENDED = "fourbar_validation.engines.mujoco.robots.examine:examine_mended"
 _SOFTNESS = "fourbar_validation.engines.mujoco.robots.examine:predict_softness"
+_NOTHING = 1e-9
+"""Cost below which a difference is one of the digits of a scene, which has twelve."""
 _BY_STIFFEST = (
     "as what MuJoCo's stiffest constraint (solimp 0.9999) leaves in this file"
 )
@@ -228,7 +230,7 @@ def _price(
     change: Remeasure,
     mend: Remeasure,
 ) -> list[Difference]:
-    """Return the differences, each with its cost in accuracy."""
+    """Return the differences that change something, each with its cost in accuracy."""
     of_mechanism = [one for one in differences if not is_setting(one.key)]
     unchanged, *changed = (
         [] if measured is None else judge(measured)
@@ -245,7 +247,8 @@ def _price(
     for one, measured in zip(left, mended, strict=True):
         if measured is not None:
             priced[one.key] = price(one, rows, judge(measured))
-    return [priced[one.key] for one in differences]
+    kept = [priced[one.key] for one in differences]
+    return [one for one in kept if one.cost is None or one.cost > _NOTHING]
 
 
 def list_rows(

@@ -9,12 +9,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import mujoco
+import numpy as np
 
 from fourbar.errors import InputError
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 
 _MOST_KEYFRAMES = 100_000
 """A robot has a few; MuJoCo reserves as many as a file asks for, minutes long."""
+_LARGEST_NUMBER = 1e100
+"""m, kg or kg m^2 whose square is a double."""
 _STAND_IN = 0.01
 """m, radius of the sphere that stands where a mesh is missing and a mass unknown."""
 MASS_OF_THE_SPHERE = 1e-3
@@ -96,6 +99,10 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
             None,
             f"its timestep of {model.opt.timestep:g} s must be above 0",
         )
+    for name in ("body_mass", "body_inertia", "body_pos", "body_ipos", "site_pos"):
+        largest = float(np.abs(getattr(model, name)).max(initial=0.0))
+        if not largest < _LARGEST_NUMBER:
+            raise InputError("MJCF", None, f"{name} of {largest:g} is out of range")
     masses = tuple(
         number
         for number in range(model.nbody)

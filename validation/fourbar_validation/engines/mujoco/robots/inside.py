@@ -75,8 +75,10 @@ _CLOSING_STEPS = 50
 RESIDUAL_OF_AN_OPEN_LOOP = 1e-6
 """Residual above which the loop does not close at a position, m or rad."""
 _STRIDE = math.radians(2.0)
-"""Largest turn of the driven hinge from one closed state to the next. The assembly is
-kept so.
+_LONG_STRIDE = math.radians(12.0)
+_FAR_FROM_A_LINE = 0.5
+"""Largest turns of the driven hinge from one closed state to the next, the longer one
+where |sin(theta_4 - theta_3)| is at least this. The assembly is kept so.
 """
 LEAST_TRANSMISSION = 1e-5
 """Transmission over the longest bar below which the bars of pin B are in line. A closed
@@ -241,23 +243,37 @@ class LoopInside:
     def close(self, theta_2: float) -> Array | None:
         """Return the pose at an angle of bar 2, or None if the loop is open.
 
-        The loop is followed from the last pose in small strides. A stride begins as the
-        one before it went on, so that the motion passes a change point smoothly.
+        The loop is followed from the last pose in strides, which are small where bars 3
+        and 4 are near to a line. A stride begins as the one before it went on, so that
+        the motion passes a change point smoothly.
         """
-        start = self.angle(self._last)
-        strides = max(math.ceil(abs(theta_2 - start) / _STRIDE), 1)
         qpos = self._last.copy()
         rates = self._rates
-        for angle in np.linspace(start, theta_2, strides + 1)[1:]:
-            before = qpos.copy()
-            qpos[self.address] = self.position(float(angle))
-            turned = qpos[self.address] - before[self.address]
-            qpos[self.passive_addresses] += rates * turned
-            if not self.close_gap(qpos):
+        longest = _LONG_STRIDE
+        while True:
+            sine = self._measure_sine(qpos)
+            if abs(sine) < _FAR_FROM_A_LINE:
+                longest = _STRIDE
+            angle = self.angle(qpos)
+            strides = max(math.ceil(abs(theta_2 - angle) / longest), 1)
+            after = qpos.copy()
+            after[self.address] = self.position(angle + (theta_2 - angle) / strides)
+            turned = after[self.address] - qpos[self.address]
+            after[self.passive_addresses] += rates * turned
+            closed = self.close_gap(after)
+            if longest > _STRIDE and (
+                not closed or self._measure_sine(after) * sine < 0
+            ):
+                longest = _STRIDE
+                continue
+            if not closed:
                 return self._jump(theta_2)
             if turned:
-                moved = (qpos - before)[self.passive_addresses]
-                rates = moved / turned
+                rates = (after - qpos)[self.passive_addresses] / turned
+            qpos = after
+            longest = _LONG_STRIDE
+            if strides == 1:
+                break
         self._last = qpos.copy()
         self._rates = rates
         return qpos
