@@ -9,7 +9,7 @@ import pytest
 from fourbar_validation.engines import workers
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import Summary
-from fourbar_validation.run.run import Progress
+from fourbar_validation.run.plan import Progress
 
 
 class Heard(Progress):

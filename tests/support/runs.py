@@ -1,14 +1,15 @@
 """Recorded runs whose rows are all at hand."""
 
 from collections.abc import Iterable
-from itertools import groupby
 from pathlib import Path
 
-from fourbar_validation.compare.rows import Row, sort_rows, write_results
+from pandas import DataFrame
+
+from fourbar_validation.compare.rows import COLUMN_TYPES, Row, write_results
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import Engine
-from fourbar_validation.regression.changes import ROWS_LISTED, Differences, compare_runs
+from fourbar_validation.regression.changes import Differences, Kind, compare_runs
 from fourbar_validation.regression.record import (
     About,
     describe_run,
@@ -49,17 +50,18 @@ def read_run(path: Path) -> tuple[About, list[Row]]:
 def compare_rows(
     old: tuple[About, Iterable[Row]],
     new: tuple[About, Iterable[Row]],
-    kept: int = ROWS_LISTED,
 ) -> Differences:
-    """Two runs compared whose rows stand in any order."""
-    before, after = (sort_rows(run[1]) for run in (old, new))
-    by_scene = (
-        [(name, list(rows)) for name, rows in groupby(run, lambda row: row.scene)]
-        for run in (before, after)
+    """Two runs compared by their rows."""
+    before, after = (
+        DataFrame(
+            [[getattr(row, name) for name in COLUMN_TYPES] for row in rows],
+            columns=[*COLUMN_TYPES],
+        ).astype(COLUMN_TYPES)
+        for _, rows in (old, new)
     )
-    return compare_runs(
-        (old[0], next(by_scene)),
-        (new[0], next(by_scene)),
-        {row.engine for row in after},
-        kept,
-    )
+    return compare_runs((old[0], before), (new[0], after))
+
+
+def kinds(old: Iterable[Row], new: Iterable[Row]) -> list[Kind]:
+    """Kind of change of each line of two runs, in the order of the table."""
+    return [*compare_rows((HERE, old), (HERE, new)).table.kind]

@@ -33,7 +33,8 @@ from fourbar_validation.report.machine import CODE, build, hash_modules, name_co
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.run import pool
-from fourbar_validation.run.run import COLLECTING, RunOptions, run
+from fourbar_validation.run.plan import COLLECTING, Plan, RunOptions
+from fourbar_validation.run.run import run
 from fourbar_validation.run.store import RunningError, Store
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import (
@@ -86,13 +87,8 @@ def judge_all(
     workers: int = 2,
 ) -> Summary:
     heard = Heard()
-    summary = run(
-        suite,
-        out,
-        engines,
-        RunOptions(workers=workers, drawn=False),
-        progress=heard,
-    )
+    options = RunOptions(workers=workers, drawn=False)
+    summary = run(Plan(suite, engines, options), out, heard)
     assert heard.scenes[COLLECTING] == len(suite)
     return summary
 
@@ -652,11 +648,11 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     monkeypatch.setattr(fourbar_validation.run.run, "write_html", lambda *_, **__: "")
     blunders = Engine("blunders", Blunders, EQUIVALENCE)
     without = run(
-        Few(), tmp_path / "without", (*EXACT, blunders), RunOptions(drawn=False)
+        Plan(Few(), (*EXACT, blunders), RunOptions(drawn=False)), tmp_path / "without"
     )
     assert not drawn and not any(record.figure for record in without.shown)
     once = Blunders.titles.count("b")
-    last = run(Few(), tmp_path / "with", (*EXACT, blunders))
+    last = run(Plan(Few(), (*EXACT, blunders)), tmp_path / "with")
     assert len(drawn) == 3 and {"b", "c"} < set(drawn)
     assert {record.name for record in last.shown if record.figure} == set(drawn)
     assert Blunders.titles.count("b") == 2 * once

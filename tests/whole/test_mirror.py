@@ -93,7 +93,7 @@ JUDGED_BY = {
         "validation/published: comparison figures program textbook thesis thirteen"
     ),
     "validation/regression/test_regression.py": (
-        "validation/regression: accept changes fault record render rules scenes"
+        "validation/regression: accept engines history record render rules scenes"
     ),
     "validation/report/test_report.py": (
         "validation/report: figures machine overview record "

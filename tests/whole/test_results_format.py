@@ -30,11 +30,12 @@ from fourbar_validation.engines.registry import (
     load_further,
 )
 from fourbar_validation.engines.table import choose_engines
-from fourbar_validation.regression.change import WHOLE_ENGINE
+from fourbar_validation.regression.changes import WHOLE_ENGINE
 from fourbar_validation.regression.record import ACCEPTED, find_baseline
 from fourbar_validation.run.judge import judge
+from fourbar_validation.run.plan import Plan, RunOptions
 from fourbar_validation.run.released import FORWARD, RELEASED_ERRORS
-from fourbar_validation.run.run import RunOptions, run
+from fourbar_validation.run.run import run
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.here import judge_here
@@ -69,12 +70,8 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as monkeypatch:
         judge_here(monkeypatch)
         options = RunOptions(workers=1, drawn=False)
-        run(
-            Random(8, 1, tuple(DrawnType)),
-            folder / "results",
-            choose_engines("free-body"),
-            options,
-        )
+        suite = Random(8, 1, tuple(DrawnType))
+        run(Plan(suite, choose_engines("free-body"), options), folder / "results")
     return folder
 
 

@@ -436,7 +436,7 @@ def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before() -> N
         (
             rows(fail=1),
             rows(fail=1),
-            "No regression in 1 rows: 1 same. New run: FAILS: 1 of 1",
+            "No regression in 1 rows: 1 fails as before. New run: FAILS: 1 of 1",
             HOLDS,
         ),
         (

@@ -27,8 +27,9 @@ from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES
 from fourbar_validation.engines import guests, processes
 from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.run.judge import judge
+from fourbar_validation.run.plan import Plan, RunOptions
 from fourbar_validation.run.request import Request, select_engines
-from fourbar_validation.run.run import RunOptions, run
+from fourbar_validation.run.run import run
 from fourbar_validation.scenes.suites import read_scene_files
 from tests.support.guests import end_guests, list_processes, write_program
 from tests.support.here import Heard, judge_here
@@ -452,6 +453,37 @@ def test_a_guest_that_integrates_is_asked_for_released_motions(
     } == by_engine["mujoco-forward"]
 
 
+@pytest.mark.parametrize(
+    ("stated", "names"),
+    [
+        (["wg 1.2"], ["wg"]),
+        (["wg 1.2", "wg 1.3"], ["wg 1.2", "wg 1.3"]),
+        (["wg 1.2 released"], ["wg released"]),
+        (["wg 1.2", "wg 1.2"], ["wg 1.2", "wg 1.2-2"]),
+        (["free-body 2.0"], ["free-body 2.0"]),
+        (["1.2"], ["1.2"]),
+    ],
+)
+def test_a_version_stands_in_a_name_only_beside_another_one(
+    stated: list[str],
+    names: list[str],
+) -> None:
+    programs = [(one, "", guests.Program((one,))) for one in stated]
+    hellos = {guests.Program((one,)): one for one in stated}
+
+    def say_hello(program: guests.Program) -> guests.Hello:
+        name = hellos[program]
+        (version,) = (word for word in name.split() if "." in word)
+        return guests.Hello(name, version=version)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(guests, "ask_hello", say_hello)
+        made = guests.name_guests(programs, ["free-body"])
+    named = guests.name_by_versions(made, [*(one.name for one in made), "free-body"])
+    assert [guest.name for guest in named] == names
+    assert [guest.start().name for guest in named] == names
+
+
 @pytest.mark.slow
 def test_names_stand_apart() -> None:
     """Of another engine, of two guests, and of those whose hello fails.
@@ -574,7 +606,7 @@ def test_a_guest_that_kills_its_worker_turns_no_other_engine_red(
     save(SCENE, tmp_path / "scene.toml")
     suite = read_scene_files([tmp_path / "scene.toml"])
     engines = (*FREE_BODY, *guests.read_guests([kills, plain], ["free-body"]))
-    summary = run(suite, tmp_path / "out", engines, RunOptions(1, drawn=False))
+    summary = run(Plan(suite, engines, RunOptions(1, drawn=False)), tmp_path / "out")
     rows = list(read_columns(tmp_path / "out" / "results.csv"))
     (failing,) = [row for row in rows if row.verdict == FAILS]
     assert failing.engine == "kills its parent"
@@ -594,12 +626,8 @@ def test_a_report_shows_the_versions_that_guests_state(tmp_path: Path) -> None:
     ]
     save(SCENE, tmp_path / "scene.toml")
     suite = read_scene_files([tmp_path / "scene.toml"])
-    summary = run(
-        suite,
-        tmp_path / "out",
-        guests.read_guests(entries, ()),
-        RunOptions(drawn=False),
-    )
+    plan = Plan(suite, guests.read_guests(entries, ()), RunOptions(drawn=False))
+    summary = run(plan, tmp_path / "out")
     shown = {line.name: line.version for line in summary.engines if line.name in stated}
     assert shown == {"numpy-like": "", "own": "2.1", "own 3.0": ""}
     assert "| own 2.1 |" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
@@ -641,28 +669,23 @@ def test_parts_judged_by_another_code_are_made_again(
     def notes(entries: Sequence[str]) -> list[str]:
         heard, engines = Interrupting(), guests.read_guests(entries, ())
         with pytest.raises(KeyboardInterrupt):
-            run(
-                suite,
-                tmp_path / "out",
-                engines,
-                RunOptions(drawn=False),
-                progress=heard,
-            )
+            plan = Plan(suite, engines, RunOptions(drawn=False))
+            run(plan, tmp_path / "out", heard)
         return heard.lines
 
     program = write_program(tmp_path, "program")
-    for factor, expected in (("1.0", 0), ("1.0", 0), ("1.01", 1), ("1.01", 0)):
+    again = ["made again: the parts of another run (engines)"]
+    kept = [
+        "kept from an interrupted run: the answers of all engines on 1 of 1 scenes,"
+        " scene"
+    ]
+    for factor, said in (("1.0", []), ("1.0", kept), ("1.01", again), ("1.01", kept)):
         (tmp_path / "near.py").write_text(NEAR.replace("FACTOR", factor))
-        assert (
-            notes(["mine:Mine", program])
-            == ["made again: the parts of another run (engines)"] * expected
-        )
+        assert notes(["mine:Mine", program]) == said
     write_program(
         tmp_path, "program", (TORQUE, '"torque": 1.01 * (moments[0] - cross(r2, F32))')
     )
-    assert notes(["mine:Mine", program]) == [
-        "made again: the parts of another run (engines)"
-    ]
+    assert notes(["mine:Mine", program]) == again
 
 
 @pytest.mark.slow

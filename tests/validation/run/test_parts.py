@@ -6,7 +6,9 @@ run.
 
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,6 +17,7 @@ from fourbar_validation.cli import status
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.run import plan
 from fourbar_validation.run.plan import RunPart
+from fourbar_validation.run.store import Store
 from tests.support.here import judge_here
 
 OPTIONS = ["--random", "7", "--engines", "free-body", "--no-pictures"]
@@ -112,6 +115,48 @@ def test_parts_of_another_run_are_refused(
     marker.write_text(json.dumps(judged_with))
     said = refusal(["collect", *parts, *out], capsys)
     assert "it differs in code" in said
+
+
+def test_two_copies_of_a_part_are_one_only_if_their_rows_are_the_same(
+    parts: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    copy = str(tmp_path / "copy")
+    again = ["run", *OPTIONS, "--part", "2/3", "-o", copy]
+    assert status(again) == HOLDS  # in other times
+    out = ["-o", str(tmp_path / "all")]
+    assert status(["collect", *parts, copy, *out]) == HOLDS
+    shutil.rmtree(copy)
+    monkeypatch.setattr(Store, "put", worsen(Store.put))
+    assert status(again) == HOLDS
+    said = refusal(["collect", *parts, copy, *out], capsys)
+    assert f"DIR = '{copy}': holds another result than {parts[1]}: " in said
+    assert " of free-body in random-0-000000002" in said
+    assert status(["collect", parts[0], copy, parts[2], *out]) == HOLDS
+
+
+def worsen(put: Callable[..., None]) -> Callable[..., None]:
+    """A store that writes another error into one row of its results."""
+
+    def put_worse(store: Store, task: int, results: list[Any]) -> None:
+        row = next(row for row in results[0]["rows"] if row[1] == "free-body")
+        row[4] = 0.5
+        put(store, task, results)
+
+    return put_worse
+
+
+def test_a_resumed_run_says_which_answers_it_keeps(
+    parts: list[str],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    capsys.readouterr()
+    assert status(["run", *OPTIONS, "--part", "1/3", "-o", parts[0]]) == HOLDS
+    said = " ".join(capsys.readouterr().err.split())
+    assert "kept from an interrupted run: the answers of all engines on 3 of 7" in said
+    assert "scenes, random-0-000000000, random-0-000000001, random-0-000000006" in said
 
 
 def test_what_is_no_folder_of_a_part_is_refused(

@@ -19,7 +19,8 @@ from fourbar_validation.regression.record import (
     open_run,
 )
 from fourbar_validation.report.record import Record
-from fourbar_validation.run.run import RunOptions, find_since, run
+from fourbar_validation.run.plan import Plan, RunOptions
+from fourbar_validation.run.run import find_since, run
 from tests.support.here import judge_here
 from tests.support.runs import save_run
 from tests.support.unlucky import Few
@@ -74,7 +75,7 @@ def test_a_rule_that_is_weaker_than_before_stands_first(
     )
     options = RunOptions(drawn=False, against=before.table.parent)
     engine = Engine("mine", FreeBody, stated)
-    summary = run(Few(("a",)), tmp_path / "now", (engine,), options)
+    summary = run(Plan(Few(("a",)), (engine,), options), tmp_path / "now")
     assert summary.headline.startswith("WEAKER RULE: mine: factor 1.11")
     assert f"against {before.describe()}. All 1 comparison" in summary.headline
     assert not summary.good
@@ -110,7 +111,7 @@ def test_the_verdict_says_since_when_of_the_failure_that_it_names(
     )
     options = RunOptions(drawn=False, against=before.table.parent)
     engine = Engine("mine", FreeBody, EQUIVALENCE)
-    summary = run(Few(("a", "b", "c")), tmp_path / "now", (engine,), options)
+    summary = run(Plan(Few(("a", "b", "c")), (engine,), options), tmp_path / "now")
     assert "mine is wrong: F32 and F43 are exchanged" in summary.headline
     assert "worst F32 of c" in summary.headline
     assert summary.headline.endswith(f" It held in {before.describe()}.")

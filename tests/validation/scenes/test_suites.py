@@ -15,8 +15,9 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import Law, Rise, Sine
 from fourbar_validation.engines.effects import TERM_OF
 from fourbar_validation.run.judge import judge
+from fourbar_validation.run.plan import Plan, RunOptions
 from fourbar_validation.run.question import FREE_BODY
-from fourbar_validation.run.run import RunOptions, run
+from fourbar_validation.run.run import run
 from fourbar_validation.scenes.suites import Files, read_default_suite
 from tests.oracle.coordinates import is_coordinate
 
@@ -128,6 +129,6 @@ def test_pictures_change_nothing_that_is_judged(tmp_path: Path) -> None:
     tables = []
     for drawn in (True, False):
         options = RunOptions(workers=1, drawn=drawn)
-        run(suite, tmp_path / str(drawn), (FREE_BODY,), options)
+        run(Plan(suite, (FREE_BODY,), options), tmp_path / str(drawn))
         tables.append((tmp_path / str(drawn) / "results.csv").read_text())
     assert tables[0] == tables[1] and "free-body,exact,torque" in tables[0]

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fourbar.writing import name_file
 from fourbar_validation.compare.rows import (
@@ -22,6 +22,9 @@ from fourbar_validation.compare.rows import (
     read_cell_text,
     write_rows,
 )
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 GROUP_ROWS = 100_000
 """Rows of a row group of the Parquet file. Each group costs some kilobytes of footer,
@@ -137,13 +140,30 @@ def number_or_null(value: object) -> object:
 
 
 def read_columns(path: Path) -> Iterator[Row]:
-    """Read the rows of a results.parquet or results.csv, some thousands at a time.
+    """Read the rows of a results.parquet or results.csv, some thousands at a time."""
+    for columns in _read_cells(path):
+        yield from map(Row, *columns)
+
+
+def read_frame(path: Path) -> "DataFrame":
+    """Read a results.parquet or results.csv as a table of pandas."""
+    import pandas
+
+    parts = [
+        pandas.DataFrame(dict(zip(COLUMN_TYPES, columns, strict=True)))
+        for columns in _read_cells(path)
+    ]
+    return pandas.concat(parts, ignore_index=True)
+
+
+def _read_cells(path: Path) -> Iterator[list[list[Any]]]:
+    """Read the columns that make a row, some thousands of rows at a time.
 
     Words that recur are kept once.
     """
     for cells in _read_batches(path, list(COLUMN_TYPES)):
         words: dict[str, str] = {}
-        columns = [
+        yield [
             (
                 [math.nan if cell is None else cell for cell in column]
                 if kind is float
@@ -151,13 +171,6 @@ def read_columns(path: Path) -> Iterator[Row]:
             )
             for column, kind in zip(cells, COLUMN_TYPES.values(), strict=True)
         ]
-        yield from map(Row, *columns)
-
-
-def read_words(path: Path, column: str) -> Iterator[str]:
-    """Read the words in a column, each once in every batch."""
-    for (cells,) in _read_batches(path, [column]):
-        yield from dict.fromkeys(_read_words(cells, {}))
 
 
 def count_rows(path: Path) -> int:

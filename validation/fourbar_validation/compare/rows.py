@@ -7,7 +7,7 @@ import csv
 import io
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 
@@ -26,7 +26,7 @@ AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS = (
 VERDICTS = (AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS)
 """Verdicts from the best to the worst."""
 HOLDING_VERDICTS = (AGREES, DEGRADED)
-_COMPARED_VERDICTS = (*HOLDING_VERDICTS, FAILS)
+COMPARED_VERDICTS = (*HOLDING_VERDICTS, FAILS)
 """Verdicts of comparisons that took place. In the others no digit is left to decide by,
 the engine declared a limit, or the formulas state no value.
 """
@@ -144,7 +144,7 @@ class Row:
     @property
     def compared(self) -> bool:
         """Return whether anything was compared."""
-        return self.verdict in _COMPARED_VERDICTS
+        return self.verdict in COMPARED_VERDICTS
 
     @property
     def failed(self) -> bool:
@@ -325,9 +325,13 @@ class Counts:
 
     def add(self, rows: Iterable[Row]) -> None:
         """Take in rows."""
-        for row in rows:
-            of = self._identities if row.engine == FORMULAS else self._answers
-            of[row.verdict] += 1
+        self.add_counted(Counter((row.engine, row.verdict) for row in rows))
+
+    def add_counted(self, counts: Mapping[tuple[str, str], int]) -> None:
+        """Take in rows that are counted by engine and verdict."""
+        for (engine, verdict), count in counts.items():
+            of = self._identities if engine == FORMULAS else self._answers
+            of[verdict] += count
 
     def add_scene(self, rows: Iterable[Row]) -> None:
         """Take in all rows of one scene."""
@@ -344,7 +348,7 @@ class Counts:
     @property
     def compared(self) -> int:
         """Comparisons with an engine's answer that were made."""
-        return sum(self._answers[verdict] for verdict in _COMPARED_VERDICTS)
+        return sum(self._answers[verdict] for verdict in COMPARED_VERDICTS)
 
     @property
     def nothing(self) -> bool:
@@ -394,7 +398,7 @@ class Counts:
             verdict = f"Nothing was compared{self._write_where()}"
         else:
             verdict = f"All {self.compared} comparisons{self._write_where()} hold"
-        held = self._write_worded(_COMPARED_VERDICTS)
+        held = self._write_worded(COMPARED_VERDICTS)
         if self.nothing and (true := self._identities[AGREES]):
             held = [f"{true} of the formulas' own identities hold"]
         apart = self._write_worded((UNDECIDED, REFUSES))

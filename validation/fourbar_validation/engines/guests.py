@@ -9,6 +9,7 @@ import re
 import shlex
 import shutil
 import sys
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -68,6 +69,8 @@ class Guest(Engine):
     """Engine in a process outside."""
 
     version: str = ""
+    stated_name: str = ""
+    """Name without version, by which later runs find it."""
     number: int = 0
     """Number of the engine, so that it is drawn with the same mark in every process."""
     seconds: float | None = None
@@ -76,6 +79,14 @@ class Guest(Engine):
     """True if it integrates released motions."""
     setting: str = ""
     """Name of the setting with which it is asked, one of those that its hello lists."""
+
+    def renamed(self, name: str) -> "Guest":
+        """Return the guest under another name."""
+        assert isinstance(self.start, partial)
+        start = partial(
+            self.start.func, name, *self.start.args[1:], **self.start.keywords
+        )
+        return replace(self, name=name, start=start)
 
     def at_step(self, step: float) -> "GuestClient":
         """Return the engine that integrates with this step, s."""
@@ -150,11 +161,46 @@ def name_guests(
             ),
             code=hash_files(filter(os.path.isfile, program.command)),
             version=" on ".join(filter(None, (hello.version, hello.device))),
+            stated_name=_leave_out_version(chosen or hello.name, hello.version),
             seconds=program.seconds,
             releases="release" in hello.effects,
         )
         guests.append(guest)
     return tuple(guests)
+
+
+def _leave_out_version(name: str, version: str) -> str:
+    """Return a name without the version in it."""
+    words = [word for word in name.split() if word != version]
+    return " ".join(words) or name
+
+
+def name_by_versions(
+    engines: Sequence[Engine],
+    taken: Iterable[str],
+) -> tuple[Engine, ...]:
+    """Name the guests of a run without version, which no later version changes.
+
+    Two versions of one name are "name version" each; others of one name are counted.
+
+    `taken`: names of engines that need not be in the run.
+    """
+    guests = [engine for engine in engines if isinstance(engine, Guest)]
+    alone = Counter(guest.stated_name for guest in guests)
+    alone.update({*taken} - {guest.name for guest in guests})
+    versions = Counter((guest.stated_name, guest.version) for guest in guests)
+
+    def name(engine: Engine) -> Engine:
+        if not isinstance(engine, Guest):
+            return engine
+        stated, version = engine.stated_name, engine.version
+        if alone[stated] == 1:
+            return engine.renamed(stated)
+        if version and versions[stated, version] == 1:
+            return engine.renamed(f"{stated} {version}")
+        return engine
+
+    return tuple(map(name, engines))
 
 
 def adjust_engines(engines: Sequence[Engine], error: float) -> tuple[Engine, ...]:

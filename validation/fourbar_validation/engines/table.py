@@ -15,7 +15,11 @@ from fourbar_validation.engines.environments import (
     read_engines,
     start_engine,
 )
-from fourbar_validation.engines.guests import Guest, read_guests
+from fourbar_validation.engines.guests import (
+    Guest,
+    name_by_versions,
+    read_guests,
+)
 from fourbar_validation.engines.registry import BALLS, ENGINES, Engine, load_further
 
 HARNESS_ENGINES, LAB_ENGINES, ENGINES_TOML, GUEST = (
@@ -106,7 +110,7 @@ def choose_engines(
         if isinstance(engine, Guest):
             engine = replace(engine, number=len(chosen))
         chosen.append(engine)
-    return tuple(chosen)
+    return name_by_versions(chosen, table)
 
 
 def _read_names(text: str, table: dict[str, _Listed]) -> list[str]:

@@ -1,137 +1,32 @@
-"""`python -m validation compare` and `accept`.
+"""`python -m validation compare` and `accept`."""
 
-The latter keeps the rows of every accepted run in one table. The table is
-history.parquet, which pandas and DuckDB read: one line per row, and one per time
-(quantity "time": `times_formulas` is the engine's time over that of the formulas on the
-scene), with the run's date, commit, machine and versions in columns of their own
-(`version_mujoco`).
-"""
-
-import hashlib
-import json
-from collections.abc import Callable, Iterable, Mapping
-from itertools import chain
+from collections.abc import Callable
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from fourbar.errors import HOLDS, InputError
-from fourbar.writing import write_bytes, write_text
-from fourbar_validation.compare.columns import CSV_ROWS, number_or_null
-from fourbar_validation.compare.rows import COLUMN_TYPES, FAILS, Counts, Row, sort_rows
+from fourbar.writing import write_text
+from fourbar_validation.compare.columns import CSV_ROWS
+from fourbar_validation.compare.rows import FAILS, Counts
 from fourbar_validation.regression import render
 from fourbar_validation.regression.changes import Differences, compare_runs
+from fourbar_validation.regression.history import HISTORY, append
 from fourbar_validation.regression.record import (
     ABOUT_FILE,
     ACCEPTED,
     RECORD_FILES,
-    About,
     Recorded,
     accept,
     find_baseline,
     open_run,
 )
-from fourbar_validation.regression.rules import list_weakened
-from fourbar_validation.regression.scenes import find_renamed
 
-HISTORY = "history.parquet"
-TIME = "time"
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
 CommandFunction = Callable[..., Any]
-
-
-def append(
-    file: Path,
-    about: About,
-    rows: list[Row],
-    times: Mapping[tuple[str, str], float],
-) -> None:
-    """Append a run to the table, which is made if there is none.
-
-    A run with the same date and rows is appended once. InputError if the file is
-    damaged or no such table.
-    """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    table = _write_record_table(about, rows, times)
-    if file.exists():
-        try:
-            old = pq.read_table(
-                pa.BufferReader(file.read_bytes()),
-                page_checksum_verification=True,
-            )
-            if table["run"][0].as_py() in set(old["run"].to_pylist()):
-                return
-            table = pa.concat_tables([old, table], promote_options="default")
-        except (OSError, ValueError, KeyError, TypeError, pa.ArrowException):
-            raise InputError(
-                "--to",
-                str(file),
-                "is damaged, or no table written by `accept`",
-            ) from None
-    sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    write_bytes(file, sink.getvalue().to_pybytes())
-
-
-def _write_record_table(
-    about: About,
-    rows: list[Row],
-    times: Mapping[tuple[str, str], float],
-) -> Any:
-    """Write a run as columns; a text that recurs is kept once."""
-    import pyarrow as pa
-
-    nothing: dict[str, Any] = dict.fromkeys((*COLUMN_TYPES, "times_formulas"))
-    lines = [
-        nothing | {name: number_or_null(getattr(row, name)) for name in COLUMN_TYPES}
-        for row in sort_rows(rows)
-    ]
-    for (scene, engine), ratio in sorted(times.items()):
-        lines.append(
-            nothing
-            | {
-                "scene": scene,
-                "engine": engine,
-                "quantity": TIME,
-                "times_formulas": ratio,
-            }
-        )
-    name = hashlib.sha256(
-        repr((about.date, [tuple(line.values()) for line in lines])).encode()
-    ).hexdigest()[:16]
-    run = {
-        "run": name,
-        "date": about.date,
-        "commit": about.commit,
-        "machine": about.machine,
-    }
-    run |= {"settings": json.dumps(about.settings, sort_keys=True)}
-    run |= {f"version_{name}": version for name, version in about.versions.items()}
-    hashes = {
-        scene: (
-            hashlib.sha256(
-                json.dumps(dict(entries), sort_keys=True).encode()
-            ).hexdigest()[:16]
-        )
-        for scene, entries in about.scenes.items()
-    }
-    kinds = COLUMN_TYPES | {"times_formulas": float}
-    word = pa.dictionary(pa.int32(), pa.string())
-    number = pa.float64()
-    names = [*run, *COLUMN_TYPES, "scene_hash", "times_formulas"]
-    schema = pa.schema(
-        [(name, number if kinds.get(name) is float else word) for name in names]
-    )
-    return pa.Table.from_pylist(
-        [run | line | {"scene_hash": hashes.get(line["scene"], "")} for line in lines],
-        schema=schema,
-    )
-
-
 FORMS: dict[str, Callable[[Differences], str]] = {
     "markdown": render.write_pull_request_comment,
     "html": render.write_differences_page,
@@ -181,30 +76,13 @@ def report_differences(
 
     Return 1 on a regression, or if nothing was compared.
     """
-    from rich.console import Console
-    from rich.progress import track
-
     before = open_run(old, "OLD")
     after = open_run(new, "NEW")
-    names = find_renamed(before.about.scenes, after.about.scenes)
-    keep = _is_chosen(
-        chosen or {},
-        lambda column: chain(before.words(column), after.words(column)),
-        names,
-    )
-    engines = set(after.words("engine"))
-    console = Console(stderr=True)
-    scenes = track(
-        after.scenes(keep),
-        "comparing",
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    )
+    rows = before.frame(), after.frame()
     differences = compare_runs(
-        (before.about, before.scenes(keep)),
-        (after.about, scenes),
-        engines,
+        (before.about, rows[0]),
+        (after.about, rows[1]),
+        _read_choice(chosen or {}, rows),
     )
     differences.baseline = before.describe()
     unproven = [str(run.table) for run in (before, after) if not run.verified]
@@ -227,44 +105,26 @@ def report_differences(
     return differences.status
 
 
-def _is_chosen(
+def _read_choice(
     chosen: dict[str, str | None],
-    words: Callable[[str], Iterable[str]],
-    renamed: Mapping[str, str] = MappingProxyType({}),
-) -> Callable[[Row], bool]:
-    """Return a test for rows that the options name.
+    tables: tuple["DataFrame", "DataFrame"],
+) -> dict[str, set[str]]:
+    """Return the names that the options choose in each column.
 
     Raises InputError for a name that does not stand in its column.
-
-    `find_renamed`: of a scene with an old and a new name either means both.
     """
-    wanted: dict[str, set[str]] = {}
+    choice = {}
     for option, text in chosen.items():
         if text is None:
             continue
+        column = _CHOICES[option]
+        offered = {*tables[0][column], *tables[1][column]}
         names = {name.strip() for name in text.split(",") if name.strip()}
-        missing = set(names)
-        offered = set[str]()
-        for word in words(_CHOICES[option]):
-            missing.discard(word)
-            if len(offered) < MOST_NAMES_LISTED:
-                offered.add(word)
-        for name in sorted(missing) or ([] if names else [text]):
-            raise InputError(
-                f"--{option}",
-                name,
-                "must be among " + ", ".join(sorted(offered)),
-            )
-        if option == "only":
-            both = {
-                name for pair in renamed.items() if names & {*pair} for name in pair
-            }
-        else:
-            both = set()
-        wanted[_CHOICES[option]] = names | both
-    return lambda row: all(
-        getattr(row, column) in names for column, names in wanted.items()
-    )
+        for name in sorted(names - offered) or ([] if names else [text]):
+            listed = ", ".join(sorted(offered)[:MOST_NAMES_LISTED])
+            raise InputError(f"--{option}", name, f"must be among {listed}")
+        choice[column] = names
+    return choice
 
 
 @click.command("compare")
@@ -283,13 +143,7 @@ def compare_command(
     """Say what changed from OLD to NEW.
 
     OLD is a run's folder, its results.csv, or an accepted name. Scenes that changed
-    come first, entry by entry; their rows, and those with other settings or at other
-    positions, are named and not compared. What the new run was not asked for is "not
-    run", and no regression. Exit status 1 on a regression: a rule that is weaker than
-    it was (a wider tolerance, another class or reason, a limit that is met earlier), a
-    verdict that got worse, an error that grew beyond round-off and its allowance, a row
-    that was run for and is gone, a new row that fails; and where nothing was compared.
-    Exit status 2 where the runs share fewer than half of their rows.
+        Exit status 2 where the runs share fewer than half of their rows.
     """
     return report_differences(
         find_baseline(old),
@@ -300,22 +154,30 @@ def compare_command(
 
 
 def _require_as_strict(run: Recorded, target: Path) -> None:
-    """Refuse a run whose rules are weaker than those of the accepted one."""
+    """Refuse a run that is weaker than the accepted one.
+
+    Its rules are weaker, or it leaves out what the accepted run judged.
+    """
     if not (target / ABOUT_FILE).is_file():
         return
     accepted = open_run(target, "--to")
-    weakened = list_weakened(accepted.about.rules, run.about.rules)
-    if weakened:
-        if len(weakened) > 1:
-            more = f", and {len(weakened) - 1} more"
-        else:
-            more = ""
-        raise InputError(
-            "RESULTS",
-            str(run.table.parent),
-            f"is held to weaker rules than {accepted.describe()} ({weakened[0]}{more}):"
-            " say --allow-weaker if that is meant",
-        )
+    differences = compare_runs(
+        (accepted.about, accepted.frame()), (run.about, run.frame())
+    )
+    weakened = [*map(str, differences.weakened)]
+    left_out = [*differences.left_out, *differences.not_run]
+    for what, why in (
+        (weakened, "is held to weaker rules than"),
+        (left_out, "leaves out what was judged in"),
+    ):
+        if what:
+            more = f", and {len(what) - 1} more" * (len(what) > 1)
+            raise InputError(
+                "RESULTS",
+                str(run.table.parent),
+                f"{why} {accepted.describe()} ({what[0]}{more}): say --allow-weaker if"
+                " that is meant",
+            )
 
 
 @click.command(name="accept")
@@ -334,7 +196,7 @@ def _require_as_strict(run: Recorded, target: Path) -> None:
 @click.option(
     "--allow-weaker",
     is_flag=True,
-    help="Accept a run that is held to weaker rules than the accepted one.",
+    help="Accept a run with weaker rules, or fewer engines or scenes, than before.",
 )
 def accept_command(
     results: Path,
@@ -390,12 +252,7 @@ def accept_command(
         _require_as_strict(run, target)
     too_long = counts.total > CSV_ROWS
     if not too_long:  # first: if the table is damaged nothing is written
-        times = {
-            (scene, engine): time
-            for scene, some in run.times()
-            for engine, time in some
-        }
-        append(target / HISTORY, run.about, list(run.rows()), times)
+        append(target / HISTORY, run)
     accept(run, target)
     if too_long:
         history = f"too many for {HISTORY}"

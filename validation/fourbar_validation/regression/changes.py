@@ -1,220 +1,192 @@
-"""Compare two runs scene by scene.
-
-Both tables are sorted and read in step, so that neither is ever whole in memory.
-"""
+"""Compare two runs as one table, a line for each scene, engine, setting, quantity."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from heapq import merge, nlargest
-from itertools import groupby
-from typing import TypeVar
+from enum import StrEnum
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
-from fourbar.errors import FAILED, HOLDS, InputError
-from fourbar_validation.compare.rows import FORMULAS, VERDICTS, Counts, Row
-from fourbar_validation.regression.change import (
-    OTHER_QUESTION,
-    REGRESSIONS,
-    Change,
-    Key,
-    KindOfChange,
-    compare_row,
+import numpy as np
+
+from fourbar.errors import FAILED, HOLDS
+from fourbar_validation.compare.rows import (
+    COMPARED_VERDICTS,
+    FAILS,
+    FORMULAS,
+    HOLDING_VERDICTS,
+    REFUSES,
+    VERDICTS,
+    Counts,
 )
-from fourbar_validation.regression.fault import Fault
+from fourbar_validation.compare.tolerance import EPS, K
+from fourbar_validation.regression.engines import move_engines, pair_engines
 from fourbar_validation.regression.record import About
 from fourbar_validation.regression.rules import (
     Weakening,
-    find_weakened_row,
-    has_grown,
+    list_grown_rows,
     list_weakened,
+    list_weakened_rows,
 )
 from fourbar_validation.regression.scenes import (
     SceneChange,
     find_renamed,
     list_scene_changes,
 )
+from fourbar_validation.report.words import NUMBER_IN_A_REASON
 
-ROWS_LISTED = 10_000
-"""Rows of one kind that are listed, the worst of them; all are counted."""
-MOST_ENGINES_LISTED = 50
+if TYPE_CHECKING:
+    from pandas import DataFrame, Series
+
+FREE_ROUND_OFFS = K
+"""Errors of an exact comparison move freely by this many eps/condition: another
+compiler, another order of summation. A move beyond it is a change of the numbers
+themselves.
+"""
+_NOTICEABLE = 1.25
+"""An error that is not round-off has changed where it grew or shrank by this factor."""
+WHOLE_ENGINE = ("all", "watch")
+"""Rows of what went wrong with an engine as a whole. Once it is mended they are gone.
+"""
+KEY = ["scene", "engine", "setting", "quantity"]
+_WITHOUT_SETTING = ["scene", "engine", "quantity"]
+MOST_NAMED = 50
 """Scenes and engines listed by name that were not run or not compared. The others are
 counted.
 """
-KINDS_OF_ONE_RUN = (
-    *(KindOfChange.NOT_RUN, KindOfChange.GONE, KindOfChange.GONE_FAILURE),
-    *(KindOfChange.NEW, KindOfChange.NEW_FAILURE),
+EXACT_SETTING = "exact"
+"""Setting of an engine that is held to round-off, and sees what is wrong by more."""
+
+
+class Kind(StrEnum):
+    """What happened to a row; the value is the heading in the report."""
+
+    ENGINE_GONE = "gone with their engine"
+    SCENE_GONE = "gone with their scene"
+    REFUSED = "newly refused"
+    VERDICT_WORSE = "verdict got worse"
+    NEW_FAILURE = "new, and fails"
+    STILL_FAILS = "fails as before"
+    WORSE = "worse"
+    GREW = "grew within its allowance"
+    NEW = "new"
+    GONE = "gone"
+    VERDICT_BETTER = "verdict got better"
+    BETTER = "better"
+    GONE_FAILURE = "gone, and had failed"
+    NOT_COMPARED = "not compared"
+    NOT_RUN = "not run"
+    SAME = "same"
+
+
+WHOLE = (Kind.ENGINE_GONE, Kind.SCENE_GONE, Kind.REFUSED)
+"""Kinds of what is missing as a whole, which is named once and not row by row."""
+REGRESSIONS = (
+    *WHOLE,
+    *(Kind.VERDICT_WORSE, Kind.NEW_FAILURE, Kind.WORSE, Kind.GONE),
 )
-"""Kinds of rows that only one run has."""
-PerScene = TypeVar("PerScene")
-_ByScene = Iterable[tuple[str, Sequence[PerScene]]]
-"""Items of one scene after the other, in ascending order of the scenes' names."""
+_OF_ONE_RUN = (
+    *(Kind.ENGINE_GONE, Kind.SCENE_GONE, Kind.GONE, Kind.NOT_RUN),
+    *(Kind.GONE_FAILURE, Kind.NEW, Kind.NEW_FAILURE),
+)
 
 
-class Named:
-    """Rows by a name; of more than MOST_ENGINES_LISTED names the others are one."""
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Rows of one engine to which the same happened, for one cause."""
 
-    def __init__(self) -> None:
-        self._rows: Counter[str] = Counter()
-        self._others = 0
-        """Names beyond, each in turn: those of one scene come together."""
-        self._rows_of_others = 0
-        self._last = ""
+    kind: Kind
+    worst: Any
+    """The line of the table that is worst."""
+    rows: int
+    scenes: int
+    of_scenes: int
+    """Number of scenes in which the engine has rows."""
+    quantities: Counter[str]
 
-    def add(self, name: str) -> None:
-        """Add one more row of a name."""
-        if name in self._rows or len(self._rows) < MOST_ENGINES_LISTED:
-            self._rows[name] += 1
-        else:
-            self._others += name != self._last
-            self._rows_of_others += 1
-        self._last = name
-
-    def __iter__(self) -> Iterator[str]:
-        yield from (
-            f"{name} ({count} row{'s' if count > 1 else ''})"
-            for name, count in self._rows.items()
+    def __str__(self) -> str:
+        names = ", ".join(
+            name if n == 1 else f"{name} {n}"
+            for name, n in self.quantities.most_common(6)
         )
-        if self._others:
-            yield f"{self._others} more ({self._rows_of_others} rows)"
+        more = ", ..." if len(self.quantities) > 6 else ""
+        cause = f", {self.worst.cause}" if self.worst.cause else ""
+        return (
+            f"{self.worst.engine}, {self.scenes} of {self.of_scenes} scenes,"
+            f" {self.rows} rows ({names}{more}){cause}"
+        )
 
 
 @dataclass(slots=True)
 class Differences:
     """Everything that differs between two runs."""
 
+    table: "DataFrame"
+    """A line for each row of either run, in the order of KEY: the columns of both runs,
+    the kind of change, and `round_off`, the change of the error that has no meaning.
+    """
     surroundings: list[tuple[str, str, str]]
     """(what, old, new) of versions, machine and settings."""
-    scenes: list[SceneChange] = field(default_factory=list)
+    scenes: list[SceneChange]
     """Scenes that ask something else."""
-    weakened: list[Weakening] = field(default_factory=list)
+    weakened: list[Weakening]
     """Rules that are weaker than they were; reported first, and a regression."""
+    notes: list[str] = field(default_factory=list)
+    """Engines and scenes of another name, and what an older record cannot say."""
     baseline: str = ""
     """The old run in words: where it lies, of which date and commit."""
-    notes: list[str] = field(default_factory=list)
-    """Scenes of another name, and what an older record cannot say."""
-    kept: int = ROWS_LISTED
-    kinds: Counter[KindOfChange] = field(default_factory=Counter)
-    """Rows by what happened to them."""
-    counts: Counts = field(default_factory=Counts)
-    """The rows of the new run by verdict."""
-    fault: Fault = field(default_factory=Fault)
-    _changes: dict[KindOfChange, list[Change]] = field(default_factory=dict)
-    _compared: Counts = field(default_factory=Counts)
-    """The rows of the new run that have their counterpart in the old one."""
-    _scenes_not_run: Named = field(default_factory=Named)
-    _engines_not_run: Named = field(default_factory=Named)
-    _not_compared: Named = field(default_factory=Named)
-    _grown: Named = field(default_factory=Named)
 
-    def add(self, changes: Sequence[Change]) -> None:
-        """Add the rows of one more scene."""
-        self.kinds.update(change.kind for change in changes)
-        self.counts.add(change.new for change in changes if change.new is not None)
-        alike = (change for change in changes if change.kind not in OTHER_QUESTION)
-        self._compared.add(
-            change.new
-            for change in alike
-            if change.new is not None and change.old is not None
-        )
-        self.fault.add(changes)
-        scene_was_run = any(change.new is not None for change in changes)
-        for change in changes:
-            if change.kind is KindOfChange.NOT_RUN and scene_was_run:
-                self._engines_not_run.add(change.key[1])
-            elif change.kind is KindOfChange.NOT_RUN:
-                self._scenes_not_run.add(f"scene {change.key[0]}")
-            elif (
-                change.kind in OTHER_QUESTION
-                and change.old is not None
-                and change.new is not None
-            ):
-                self._not_compared.add(
-                    _say_why_not_compared(change, change.old, change.new)
-                )
-            elif change.old is not None and change.new is not None:
-                self._hold_rules(change.old, change.new)
-            same_kind = self._changes.setdefault(change.kind, [])
-            same_kind.append(change)
-            if len(same_kind) > 2 * self.kept:
-                self._changes[change.kind] = nlargest(
-                    self.kept,
-                    same_kind,
-                    key=lambda one: one.severity,
-                )
-
-    def _hold_rules(self, old: Row, new: Row) -> None:
-        """Note a row whose rule is another one, or that is allowed far more."""
-        weakening = find_weakened_row(old, new)
-        if weakening is not None:
-            known = {(one.name, one.what) for one in self.weakened}
-            if (weakening.name, weakening.what) not in known:
-                self.weakened.append(weakening)
-        elif has_grown(old, new):
-            growth = f"{old.allowed:.1e} -> {new.allowed:.1e}"
-            self._grown.add(f"{new.scene} / {new.engine} / {new.quantity}: {growth}")
-
-    def of(self, kind: KindOfChange) -> list[Change]:
-        """List the changes of one kind, the worst first; at most `kept` of them."""
-        return nlargest(
-            self.kept,
-            self._changes.get(kind, ()),
-            key=lambda one: one.severity,
+    def of(self, *kinds: Kind) -> "DataFrame":
+        """Return the lines of some kinds, the worst first."""
+        lines = self.table[self.table.kind.isin(kinds)]
+        return lines.sort_values(
+            ["fails", "grown"], ascending=False, kind="stable", na_position="first"
         )
 
     @property
-    def changes(self) -> list[Change]:
-        """Return the changes that are kept, by scene, engine, setting and quantity."""
-        return sorted(
-            (change for kind in KindOfChange for change in self.of(kind)),
-            key=lambda change: change.key,
-        )
+    def kinds(self) -> Counter[Kind]:
+        """Return how many rows there are of each kind."""
+        counts = self.table.kind.value_counts()
+        return Counter({kind: int(counts.get(kind, 0)) for kind in Kind})
 
     @property
     def rows(self) -> int:
         """Return how many rows there are."""
-        return self.kinds.total()
+        return len(self.table)
 
     @property
     def regressed(self) -> int:
         """Return how many rows and rules a run fails for."""
-        rows = sum(self.kinds[kind] for kind in REGRESSIONS)
-        return rows + len(self.weakened)
+        return len(self.of(*REGRESSIONS)) + len(self.weakened)
 
     @property
-    def grown(self) -> list[str]:
-        """Rows whose allowed error grew by a factor above NOTABLE: no regression."""
-        return [*self._grown]
+    def counts(self) -> Counts:
+        """Return the rows of the new run by verdict."""
+        return _count(self.table[self.table.verdict_new != ""])
 
     @property
-    def not_run(self) -> list[str]:
-        """Scenes and engines of the old run that the new one was not run for.
-
-        A line names one and its number of rows.
-        """
-        return [*self._scenes_not_run, *self._engines_not_run]
-
-    @property
-    def not_compared(self) -> list[str]:
-        """Scene, engine and setting of rows that answer different questions."""
-        return [*self._not_compared]
-
-    @property
-    def compared(self) -> int:
-        """Return how many rows of the new run have a counterpart in the old one."""
-        return self._compared.total
-
-    @property
-    def nothing(self) -> bool:
-        """Return whether no comparison of the new run has a counterpart.
-
-        The counterpart would be in the old run.
-        """
-        return self._compared.nothing
+    def _shared(self) -> "DataFrame":
+        return self.table[~self.table.kind.isin(_OF_ONE_RUN)]
 
     @property
     def shared(self) -> int:
         """Return how many rows stand in both runs, whatever question they answer."""
-        return self.rows - sum(self.kinds[kind] for kind in KINDS_OF_ONE_RUN)
+        return len(self._shared)
+
+    @property
+    def _counterparts(self) -> Counts:
+        answered = (self.table.verdict_old != "") & (self.table.verdict_new != "")
+        return _count(self.table[answered & (self.table.why == "")])
+
+    @property
+    def compared(self) -> int:
+        """Return how many rows of the new run have a counterpart in the old one."""
+        return self._counterparts.total
+
+    @property
+    def nothing(self) -> bool:
+        """Return whether no comparison of the new run has a counterpart."""
+        return self._counterparts.nothing
 
     @property
     def strange(self) -> bool:
@@ -229,190 +201,309 @@ class Differences:
         """Exit status: 1 on a regression, and where nothing was compared."""
         return FAILED if self.regressed or self.nothing else HOLDS
 
+    @property
+    def gone(self) -> list[str]:
+        """Name what is missing as a whole: engines, scenes, and scenes now refused."""
+        return self._name_whole(*WHOLE)
 
-def _say_why_not_compared(
-    change: Change,
-    old: Row,
-    new: Row,
-) -> str:
-    if change.kind is KindOfChange.OTHER_SETTING:
-        return f"{change.key[0]} / {change.key[1]}: {old.setting} -> {new.setting}"
-    other_scene = change.kind is KindOfChange.OTHER_SCENE
-    return (
-        f"scene {change.key[0]} {'changed' if other_scene else 'has other positions'}"
+    @property
+    def left_out(self) -> list[str]:
+        """Name the engines and scenes that the new run does not have."""
+        return self._name_whole(Kind.ENGINE_GONE, Kind.SCENE_GONE)
+
+    def _name_whole(self, *kinds: Kind) -> list[str]:
+        lines = self.of(*kinds)
+        names = np.select(
+            [lines.kind == Kind.ENGINE_GONE, lines.kind == Kind.SCENE_GONE],
+            [
+                "engine " + lines.engine + " is gone",
+                "scene " + lines.scene + " is gone",
+            ],
+            "scene " + lines.scene + " is newly refused by " + lines.engine,
+        )
+        return _name(lines.assign(name=names)["name"])
+
+    @property
+    def not_run(self) -> list[str]:
+        """Name the scenes and engines that the new run was not asked for."""
+        lines = self.of(Kind.NOT_RUN)
+        run = lines.scene.isin(self.table[self.table.verdict_new != ""].scene)
+        scenes = "scene " + lines.scene[~run]
+        return [*_name(scenes), *_name(lines.engine[run])]
+
+    @property
+    def not_compared(self) -> list[str]:
+        """Name the scenes and settings of rows that answer different questions."""
+        return _name(self.of(Kind.NOT_COMPARED).why)
+
+    @property
+    def grown(self) -> list[str]:
+        """Name the rows whose allowed error grew by a factor above NOTABLE."""
+        return list_grown_rows(self.table)
+
+    def groups(self, kinds: Iterable[Kind]) -> list[Group]:
+        """Return the rows of some kinds by engine and cause, the worst groups first."""
+        lines = self.of(*kinds)
+        in_scenes = (
+            self.table[self.table.kind != Kind.NOT_RUN]
+            .groupby("engine")
+            .scene.nunique()
+        )
+        same = lines.cause.str.replace(NUMBER_IN_A_REASON, "#", regex=True)
+        groups = [
+            Group(
+                Kind(some.kind.iloc[0]),
+                next(some.itertuples()),
+                len(some),
+                some.scene.nunique(),
+                int(in_scenes.get(engine, 0)),
+                Counter(some.sort_values("quantity").quantity),
+            )
+            for (engine, _, _), some in lines.groupby(
+                [lines.engine, lines.kind, same], sort=False
+            )
+        ]
+        order = list(Kind)
+        return sorted(groups, key=lambda group: order.index(group.kind))
+
+    @property
+    def sentences(self) -> list[str]:
+        """Say who disagrees, and in how many scenes; the most frequent first."""
+        lines = self.table
+        exact = (lines.setting == EXACT_SETTING) & (lines.engine != FORMULAS)
+        exact &= lines.verdict_old.isin(COMPARED_VERDICTS) | lines.verdict_new.isin(
+            COMPARED_VERDICTS
+        )
+        worse = lines[lines.kind.isin(REGRESSIONS)].groupby("scene").engine.agg(set)
+        of_scene = lines[exact].groupby("scene").engine.agg(set)
+        counts = Counter(
+            write_fault_sentence(engines, of_scene.get(scene, set()))
+            for scene, engines in worse.items()
+        )
+        total = lines[lines.verdict_new != ""].scene.nunique()
+        return [f"{text}, {n} of {total} scenes" for text, n in counts.most_common()]
+
+
+def _count(lines: "DataFrame") -> Counts:
+    """Count the rows of the new run among lines."""
+    counts = Counts()
+    counts.add_counted(lines.groupby(["engine", "verdict_new"]).size().to_dict())
+    return counts
+
+
+def _name(names: "Series[str]") -> list[str]:
+    """Count rows by name; of more than MOST_NAMED names the others are one."""
+    counts = names.value_counts(sort=False)
+    lines = [
+        f"{name} ({n} row{'s' if n > 1 else ''})"
+        for name, n in counts[:MOST_NAMED].items()
+    ]
+    more = counts[MOST_NAMED:]
+    return lines + [f"{len(more)} more ({more.sum()} rows)"] * bool(len(more))
+
+
+def write_fault_sentence(worse: set[str], exact: set[str]) -> str:
+    """Say which engine is at fault in a scene.
+
+    The rows of `worse` regressed; `exact`: engines held to round-off.
+    """
+    engines = worse - {FORMULAS}
+    if len(exact) > 1 and engines >= exact:
+        if FORMULAS in worse:
+            return "all engines and the identity disagree: the formulas"
+        return (
+            "all engines disagree, and the identities hold: the formulas, or what all"
+            " engines are given"
+        )
+    if not engines:
+        return "only the identities: the formulas, or what is stated of them"
+    return f"only {', '.join(sorted(engines))}" + (
+        " and an identity" if FORMULAS in worse else ""
     )
 
 
 def compare_runs(
-    old: tuple[About, _ByScene[Row]],
-    new: tuple[About, _ByScene[Row]],
-    engines: set[str],
-    kept: int = ROWS_LISTED,
+    old: tuple[About, "DataFrame"],
+    new: tuple[About, "DataFrame"],
+    chosen: Mapping[str, Iterable[str]] = MappingProxyType({}),
 ) -> Differences:
-    """Compare two runs by their scenes, in ascending order.
+    """Compare two runs, each by its record and the table of its rows.
 
     Rows are compared only if both answer the same question.
 
-    `engines`: those that have rows in the new run.
+    `chosen`: names, of either run, by the column that rows are chosen by.
     """
-    scenes = {
-        change.scene: change
-        for change in list_scene_changes(old[0].scenes, new[0].scenes)
-    }
-    names = find_renamed(old[0].scenes, new[0].scenes)
-    surroundings, older = _list_surroundings(old[0], new[0])
-    notes = [f"renamed: {before} -> {after}" for before, after in names.items()]
-    weakened = list_weakened(old[0].rules, new[0].rules)
-    differences = Differences(
-        surroundings,
-        list(scenes.values()),
-        weakened,
-        notes=notes,
-        kept=kept,
-    )
-    answering = {FORMULAS} | engines | (new[0].engines or set())
-    for scene, before, after in _merge_scenes(_rename_scenes(old[1], names), new[1]):
-        if new[0].scenes:
-            run_for = scene in new[0].scenes
-        else:
-            run_for = bool(after) or not engines
-        rows = _index_rows(scene, before), _index_rows(scene, after)
-        differences.add(
-            _compare_scene(
-                *rows,
-                answering if run_for else set(),
-                scenes.get(scene),
-            )
-        )
+    pairs, notes = pair_engines(old, new)
+    before = move_engines(old[0], pairs)
+    after = new[0]
+    names = find_renamed(before.scenes, after.scenes)
+    notes += [f"renamed: {first} -> {then}" for first, then in names.items()]
+    changed = list_scene_changes(before.scenes, after.scenes)
+    rows = old[1].replace({"engine": pairs, "scene": names}), new[1]
+    for column, wanted in chosen.items():
+        now = {pairs.get(name, names.get(name, name)) for name in wanted}
+        rows = rows[0][rows[0][column].isin(now)], rows[1][rows[1][column].isin(now)]
+    table = _join(*map(_keep_worst, rows))
+    table = _classify(table, changed, before, after)
+    surroundings, older = _list_surroundings(before, after)
+    known = list_weakened(before.rules, after.rules)
+    weakened = [*known, *list_weakened_rows(table, known)]
+    differences = Differences(table, surroundings, changed, weakened, notes)
     if older:
-        compared = (
+        notes.append(
             f"{differences.compared} of {differences.rows} rows are compared: the"
             " others are of one run alone"
         )
-        differences.notes += [compared, *older]
+        notes += older
     return differences
 
 
-def _rename_scenes(
-    scenes: _ByScene[PerScene],
-    names: Mapping[str, str],
-) -> _ByScene[PerScene]:
-    """Return the old run's scenes under the new run's names.
-
-    Nothing is held in memory if none differs.
-    """
-    if not names:
-        return scenes
-    return sorted(
-        ((names.get(name, name), rows) for name, rows in scenes),
-        key=lambda scene: scene[0],
+def _keep_worst(rows: "DataFrame") -> "DataFrame":
+    """Keep the worse of two rows of one name."""
+    by_verdict = rows.sort_values(
+        "verdict", key=lambda verdict: verdict.map(VERDICTS.index), kind="stable"
     )
+    return by_verdict.drop_duplicates(KEY, keep="last")
 
 
-def _merge_scenes(
-    old: _ByScene[PerScene],
-    new: _ByScene[PerScene],
-) -> Iterator[tuple[str, Sequence[PerScene], Sequence[PerScene]]]:
-    """Yield each scene that either run has, with what both have of it.
+def _join(old: "DataFrame", new: "DataFrame") -> "DataFrame":
+    """Join the rows of both runs by KEY.
 
-    Raises InputError if the scenes are not in order.
+    Rows that each run has with a single setting of its own are one line, with the new
+    setting as `setting_new`.
     """
-    both = merge(
-        _require_order("OLD", old),
-        _require_order("NEW", new),
-        key=lambda entry: entry[0],
-    )
-    for scene, entries in groupby(both, key=lambda entry: entry[0]):
-        by_run = {run: rows for _, run, rows in entries}
-        yield scene, by_run.get("OLD", ()), by_run.get("NEW", ())
-
-
-def _require_order(
-    run: str,
-    scenes: _ByScene[PerScene],
-) -> Iterator[tuple[str, str, Sequence[PerScene]]]:
-    last = None
-    for scene, rows in scenes:
-        if last is not None and scene <= last:
-            raise InputError(
-                run,
-                scene,
-                f"must stand before scene {last}: a table of `run` is sorted by scene",
-            )
-        last = scene
-        yield scene, run, rows
-
-
-def _index_rows(scene: str, rows: Iterable[Row]) -> dict[Key, Row]:
-    worst_last = sorted(
-        rows,
-        key=lambda row: VERDICTS.index(row.verdict),
-    )  # the worse of two rows of one name counts
-    return {(scene, row.engine, row.setting, row.quantity): row for row in worst_last}
-
-
-def _compare_scene(
-    before: Mapping[Key, Row],
-    after: Mapping[Key, Row],
-    engines: set[str],
-    change: SceneChange | None,
-) -> list[Change]:
-    """Tell what happened to each row of a scene, and what changed in it.
-
-    `engines`: those that were to answer.
-    """
-    renamed = _pair_settings(before, after)
-    changes = []
-    of_either = before.keys() | after.keys()
-    for key in sorted(of_either - set(renamed.values())):
-        differs = KindOfChange.OTHER_SETTING if key in renamed else None
-        if change is not None:
-            if change.positions_alone:
-                differs = KindOfChange.OTHER_POSITIONS
-            else:
-                differs = KindOfChange.OTHER_SCENE
-        new = after.get(renamed.get(key, key))
-        changes.append(
-            compare_row(
-                key,
-                before.get(key),
-                new,
-                asked=key[1] in engines,
-                differs=differs,
-            )
+    keys = old[KEY].merge(new[KEY], how="outer", indicator="runs")
+    single = {
+        run: keys.loc[(keys.runs == run) & (keys.setting != "-"), KEY].drop_duplicates(
+            _WITHOUT_SETTING, keep=False
         )
-    return changes
+        for run in ("left_only", "right_only")
+    }
+    moved = single["left_only"].merge(
+        single["right_only"], on=_WITHOUT_SETTING, suffixes=("_old", "_new")
+    )
+    new = new.merge(moved.assign(setting=moved.setting_new), how="left", on=KEY)
+    new["setting"] = new.pop("setting_old").fillna(new.setting)
+    table = old.merge(new, how="outer", on=KEY, suffixes=("_old", "_new"))
+    texts = [
+        f"{column}_{run}" for column in ("verdict", "reason") for run in ("old", "new")
+    ]
+    texts.append("setting_new")
+    table[texts] = table[texts].fillna("")
+    return table.sort_values(KEY, ignore_index=True)
 
 
-def _pair_settings(
-    before: Mapping[Key, Row],
-    after: Mapping[Key, Row],
-) -> dict[Key, Key]:
-    """Pair the rows that each run has with a single setting of its own.
+def _classify(
+    table: "DataFrame",
+    changed: list[SceneChange],
+    before: About,
+    after: About,
+) -> "DataFrame":
+    """Add `why` two rows are not compared, their kind, the cause and the severity."""
+    in_old = table.verdict_old != ""
+    in_new = table.verdict_new != ""
+    fails = table.verdict_new == FAILS
+    failed = table.verdict_old == FAILS
+    why = {
+        "has other positions": {one.scene for one in changed if one.positions_alone},
+        "changed": {one.scene for one in changed if not one.positions_alone},
+    }
+    table["why"] = np.select(
+        [table.scene.isin(scenes) for scenes in why.values()]
+        + [table.setting_new != ""],
+        [("scene " + table.scene + " " + words) for words in why]
+        + [
+            table.scene
+            + " / "
+            + table.engine
+            + ": "
+            + table.setting
+            + " -> "
+            + table.setting_new
+        ],
+        "",
+    )
+    conditions = table[["condition_old", "condition_new"]]
+    table["round_off"] = (
+        FREE_ROUND_OFFS
+        * EPS
+        / conditions.where(conditions > 0.0).min(axis=1).fillna(1.0)
+    ).where(in_old & in_new)
+    missing = _classify_missing(table, before, after)
+    refused = (
+        table[(table.quantity == "all") & (table.verdict_new == REFUSES) & ~in_old]
+        .set_index(["scene", "engine"])
+        .index
+    )
+    refused = table.set_index(["scene", "engine"]).index.isin(refused)
+    rank_old, rank_new = (
+        table[column].map({verdict: rank for rank, verdict in enumerate(VERDICTS)})
+        for column in ("verdict_old", "verdict_new")
+    )
+    old, new = table.error_old, table.error_new
+    alike = ~table.verdict_new.isin(COMPARED_VERDICTS) | (old == new)
+    alike |= (old.isna() & new.isna()) | ((new - old).abs() <= table.round_off)
+    larger = (new > _NOTICEABLE * old) | new.isna()
+    within = table.verdict_new.isin(HOLDING_VERDICTS)
+    within &= new <= _NOTICEABLE * table.allowed_old
+    same = np.where(fails, Kind.STILL_FAILS, Kind.SAME)
+    choices = [
+        (refused & (in_old != in_new), Kind.REFUSED),
+        (~in_new, missing),
+        (~in_old & fails, Kind.NEW_FAILURE),
+        (~in_old, Kind.NEW),
+        ((table.why != "") & fails & ~failed, Kind.NEW_FAILURE),
+        (table.why != "", Kind.NOT_COMPARED),
+        (rank_new > rank_old, Kind.VERDICT_WORSE),
+        (rank_new < rank_old, Kind.VERDICT_BETTER),
+        (alike, same),
+        (larger & within, Kind.GREW),
+        (larger, Kind.WORSE),
+        (old > _NOTICEABLE * new, Kind.BETTER),
+    ]
+    conditions_of, kinds = zip(*choices, strict=True)
+    table["kind"] = np.select(conditions_of, kinds, same)
+    other = in_old & (table.verdict_old != table.verdict_new)
+    came = (table.verdict_old + " -> ").where(other, "")
+    told = (Kind.VERDICT_WORSE, Kind.VERDICT_BETTER, Kind.NEW_FAILURE, Kind.STILL_FAILS)
+    table["cause"] = (came + table.verdict_new + ": " + table.reason_new).where(
+        table.kind.isin(told), ""
+    )
+    table["fails"] = fails
+    floor = np.fmax(old, table.round_off)
+    table["grown"] = (new / floor).where(in_old & in_new, 1.0)
+    return table
 
-    The pairs lead from old key to new key.
-    """
 
-    def index_single(keys: Iterable[Key]) -> dict[tuple[str, str, str], Key]:
-        groups: dict[tuple[str, str, str], list[Key]] = {}
-        for key in keys:
-            scene, engine, _, quantity = key
-            groups.setdefault((scene, engine, quantity), []).append(key)
-        single = {}
-        for name, group in groups.items():
-            if len(group) == 1:
-                single[name] = group[0]
-        return single
+def _classify_missing(
+    table: "DataFrame",
+    before: About,
+    after: About,
+) -> np.ndarray[Any, Any]:
+    """Return the kind of each line if only the old run has it."""
+    of_new = table[table.verdict_new != ""]
+    scenes = set(after.scenes or of_new.scene)
+    engines = {FORMULAS, *of_new.engine, *after.engines}
+    mended = (table.verdict_old == FAILS) & table.quantity.isin(WHOLE_ENGINE)
+    suite = after.settings.get("scenes of", "")
+    if suite and suite == before.settings.get("scenes of"):
+        without_scene = Kind.SCENE_GONE
+    else:
+        without_scene = Kind.NOT_RUN
+    optional = after.settings.get("chosen") != ""
+    unable = after.settings.get("missing", "").split(", ")
+    without_engine = np.where(
+        optional | table.engine.isin(unable), Kind.NOT_RUN, Kind.ENGINE_GONE
+    )
+    return np.select(
+        [~table.scene.isin(scenes), ~table.engine.isin(engines), mended],
+        [without_scene, without_engine, Kind.GONE_FAILURE],
+        Kind.GONE,
+    )
 
-    old = index_single(before.keys() - after.keys())
-    new = index_single(after.keys() - before.keys())
-    pairs = {}
-    for name in old.keys() & new.keys():
-        _, _, old_setting, _ = old[name]
-        _, _, new_setting, _ = new[name]
-        if "-" not in (old_setting, new_setting):
-            pairs[old[name]] = new[name]
-    return pairs
+
+_NOT_SURROUNDINGS = ("suite", "scenes of", "chosen", "missing", "guests")
+"""Settings that say what was asked for, and not with what."""
 
 
 def _list_surroundings(
@@ -430,7 +521,9 @@ def _list_surroundings(
     pairs += _take_both(old.versions, new.versions)
     pairs.append(("machine", old.machine, new.machine))
     pairs += [
-        pair for pair in _take_both(old.settings, new.settings) if pair[0] != "suite"
+        pair
+        for pair in _take_both(old.settings, new.settings)
+        if pair[0] not in _NOT_SURROUNDINGS
     ]
     suites = [about.settings.get("suite", "not recorded")[:12] for about in (old, new)]
     notes = []

@@ -10,16 +10,17 @@ import json
 import os
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from itertools import groupby
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from fourbar.errors import InputError
 from fourbar.writing import name_file, write_text
-from fourbar_validation.compare.columns import count_rows, read_columns, read_words
+from fourbar_validation.compare.columns import count_rows, read_columns, read_frame
 from fourbar_validation.compare.rows import Row, escape_controls, read_cell_text
 from fourbar_validation.compare.tolerance import SIMULATED, K
 from fourbar_validation.engines.guests import Guest
@@ -28,9 +29,11 @@ from fourbar_validation.places import CHECKOUT
 from fourbar_validation.regression.rules import Rules, list_rules
 from fourbar_validation.report.machine import find_kernels, list_versions, name_machine
 
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
 SHIPPED = Path(__file__).parent
 """Folder of the accepted state of this project's models."""
-AnyRow = TypeVar("AnyRow")
 ACCEPTED = "accepted"
 CSV_FILE = "results.csv"
 PARQUET_FILE = "results.parquet"
@@ -62,37 +65,46 @@ class About:
     """Tolerances, predictions and limits of the engines; empty in older records."""
 
     @property
-    def engines(self) -> set[str] | None:
-        """Return the engines that were run; None if the record does not say."""
-        names = self.settings.get("engines")
-        if names is None:
-            return None
-        return set(filter(None, names.split(", ")))
+    def engines(self) -> list[str]:
+        """Return the engines that were run, as far as the record says."""
+        return self._list("engines")
+
+    @property
+    def guests(self) -> list[str]:
+        """Return those that are no engines of the harness or the lab."""
+        return self._list("guests")
+
+    def _list(self, name: str) -> list[str]:
+        return [*filter(None, self.settings.get(name, "").split(", "))]
 
 
 def describe_run(
     engines: Sequence[Engine],
     suite: str,
     scenes: Mapping[str, Mapping[str, str]] | None = None,
+    asked: Mapping[str, str] | None = None,
 ) -> About:
-    """Describe a run made here and now."""
+    """Describe a run made here and now.
+
+    `asked`: settings that say which part of its engines and scenes was asked for
+    (`Plan.asked`).
+    """
+    guests = [engine for engine in engines if isinstance(engine, Guest)]
     simulated = next(
         (engine.tolerance.factor for engine in engines if engine.tolerance.in_time),
         SIMULATED.factor,
     )
     settings = {
         "engines": ", ".join(engine.name for engine in engines),
+        "guests": ", ".join(guest.name for guest in guests),
         "suite": suite,
         "K": repr(K),
         "simulated": repr(simulated),
     }
+    settings |= asked or {}
     described = {name: dict(entries) for name, entries in (scenes or {}).items()}
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    versions = {
-        guest.name: guest.version
-        for guest in engines
-        if isinstance(guest, Guest) and guest.version
-    }
+    versions = {guest.name: guest.version for guest in guests if guest.version}
     return About(
         list_versions() | find_kernels() | versions,
         name_machine(),
@@ -219,22 +231,13 @@ class Recorded:
 
     def rows(self) -> Iterator[Row]:
         """Yield the rows in their order; InputError if the table is damaged."""
-        yield from self._read(read_columns(self.table))
+        with self._name_damage():
+            yield from read_columns(self.table)
 
-    def scenes(
-        self,
-        keep: Callable[[Row], bool] = lambda _: True,
-    ) -> Iterator[tuple[str, list[Row]]]:
-        """Read the rows that are wanted, scene by scene."""
-        for scene, some in groupby(
-            filter(keep, self.rows()),
-            key=lambda row: row.scene,
-        ):
-            yield scene, list(some)
-
-    def words(self, column: str) -> Iterator[str]:
-        """Read what stands in a column of text, some of it more than once."""
-        yield from self._read(read_words(self.table, column))
+    def frame(self) -> "DataFrame":
+        """Return the rows as a table; InputError if it is damaged."""
+        with self._name_damage():
+            return read_frame(self.table)
 
     def times(self) -> Iterator[tuple[str, list[tuple[str, float]]]]:
         """Yield each scene, and (engine, its time over that of the formulas).
@@ -267,9 +270,10 @@ class Recorded:
                 "is not a table of times written by `run`",
             ) from None
 
-    def _read(self, entries: Iterator[AnyRow]) -> Iterator[AnyRow]:
+    @contextmanager
+    def _name_damage(self) -> Iterator[None]:
         try:
-            yield from entries
+            yield
         except (
             KeyError,
             TypeError,

@@ -1,29 +1,26 @@
-"""Differences as text, Markdown, HTML and JUnit XML."""
+"""Differences as text, Markdown, HTML and JUnit XML: what fails comes first."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
+from typing import Any
 
-from fourbar_validation.regression.change import OTHER_QUESTION, Change, KindOfChange
-from fourbar_validation.regression.changes import Differences
-from fourbar_validation.regression.fault import Group
-from fourbar_validation.report.junit import JunitCase, count_beyond, write_document
+from fourbar_validation.compare.rows import COMPARED_VERDICTS, FAILS
+from fourbar_validation.regression.changes import REGRESSIONS, WHOLE, Differences, Kind
+from fourbar_validation.report.junit import (
+    MOST_PASSING_CASES,
+    JunitCase,
+    count_beyond,
+    write_document,
+)
 from fourbar_validation.report.templating import render, write_error
 
-KINDS_SHOWN = tuple(
+KINDS_SHOWN: tuple[Kind, ...] = tuple(
     kind
-    for kind in KindOfChange
-    if kind
-    not in (
-        KindOfChange.SAME,
-        KindOfChange.ROUND_OFF,
-        KindOfChange.NOT_RUN,
-        *OTHER_QUESTION,
-    )
+    for kind in Kind
+    if kind not in (*WHOLE, Kind.NOT_COMPARED, Kind.NOT_RUN, Kind.SAME)
 )
-"""Kinds shown by engine and cause. Rows that were not run, or answer another question,
-are named together.
-"""
+"""Kinds shown by engine and cause. The others are named together, or counted."""
 MOST_GROUPS_LISTED = 50
-"""Engines and causes listed in text and Markdown."""
+"""Engines and causes listed of one kind."""
 CHANGE_HEADINGS = (
     "scene",
     "engine",
@@ -45,9 +42,7 @@ def write_verdict(diff: Differences) -> str:
 
     What else moved, and the counts of the new run, follow.
     """
-    counts = [
-        f"{diff.kinds[kind]} {kind.value}" for kind in KindOfChange if diff.kinds[kind]
-    ]
+    counts = [f"{count} {kind}" for kind, count in diff.kinds.items() if count]
     many = diff.regressed
     if diff.weakened:
         rules = len(diff.weakened)
@@ -73,168 +68,131 @@ def write_verdict(diff: Differences) -> str:
     return f"{head}{moved}. New run: {diff.counts.sentence()}"
 
 
-def _write_change_line(change: Change) -> str:
-    """Write one change in one line of text."""
-    name = " / ".join(part for part in change.key if part)
-    if change.old is None:
-        assert change.new is not None
-        error = write_error(change.new.error)
-        if not change.new.passed:
-            why = f": {change.new.reason}"
-        else:
-            why = ""
-        return f"{name}: {change.new.verdict}, error {error}{why}"
-    if change.new is None:
-        return (
-            f"{name}: was {change.old.verdict}, error {write_error(change.old.error)}"
-        )
-    old = change.old
-    new = change.new
-    words = f"{name}: error {write_error(old.error)} -> {write_error(new.error)}"
-    if old.verdict != new.verdict:
-        words += f", {old.verdict} -> {new.verdict} ({new.reason})"
-    elif new.failed:
-        words += f", {new.verdict} ({new.reason})"
-    return words + f"; round-off moves it by {write_error(change.round_off)}"
+def _write_change_line(row: Any) -> str:
+    """Write one line of the table of differences in one line of text."""
+    name = " / ".join(filter(None, (row.scene, row.engine, row.setting, row.quantity)))
+    old, new = write_error(row.error_old), write_error(row.error_new)
+    if not row.verdict_old:
+        words = f"{name}: {row.verdict_new}, error {new}"
+        return f"{words}: {row.reason_new}" if row.fails else words
+    if not row.verdict_new:
+        return f"{name}: was {row.verdict_old}, error {old}"
+    words = f"{name}: error {old} -> {new}"
+    if row.verdict_old != row.verdict_new:
+        words += f", {row.verdict_old} -> {row.verdict_new} ({row.reason_new})"
+    elif row.fails:
+        words += f", {row.verdict_new} ({row.reason_new})"
+    return f"{words}; round-off moves it by {write_error(row.round_off)}"
 
 
 def write_differences(diff: Differences) -> str:
-    """Write for a terminal: what is another question first.
-
-    What the runs were made with follows, then the rows.
-    """
-    lines = [f"Weaker rule: {weakening}" for weakening in diff.weakened]
+    """Write for a terminal: what regressed first, the verdict last."""
+    lines = []
+    for heading, texts in _list_regressions(diff):
+        lines += [f"{heading}: {text}" for text in texts]
+    for kind in KINDS_SHOWN:
+        texts = [*_list_groups(diff, kind), *_list_worst(diff, kind)]
+        lines += [f"{kind.capitalize()}: {text}" for text in texts]
     lines += [*map(str, diff.scenes), *diff.notes]
     lines += [f"{what}: {old} -> {new}" for what, old, new in diff.surroundings]
-    lines += [f"Not compared: {name}" for name in diff.not_compared]
-    lines += [f"Not run: {name}" for name in diff.not_run]
-    lines += [f"Allowed more: {name}" for name in diff.grown]
-    lines += [f"Disagreement: {sentence}" for sentence in diff.fault.sentences]
-    groups, more = _group_rows(diff)
-    lines += [f"{_capitalise(group.kind.value)}: {group}" for group in groups] + more
-    for kind in KINDS_SHOWN:
-        lines += [
-            f"{_capitalise(kind.value)}: {line}" for line in _list_worst(diff, kind)
-        ]
+    for heading, texts in _list_other_questions(diff):
+        lines += [f"{heading}: {text}" for text in texts]
     return "\n".join([*lines, f"{write_verdict(diff)}."]) + "\n"
 
 
-def _capitalise(text: str) -> str:
-    """Begin a line with a capital."""
-    return text[:1].upper() + text[1:]
-
-
-def _group_rows(diff: Differences) -> tuple[list[Group], list[str]]:
-    """Group the rows that changed by engine and cause, the worst first.
-
-    Say how many more there are.
-    """
-    groups = diff.fault.groups(KINDS_SHOWN)
+def _list_groups(diff: Differences, kind: Kind) -> list[str]:
+    """List the rows of a kind by engine and cause, the worst first."""
+    groups = [*map(str, diff.groups([kind]))]
     more = len(groups) - MOST_GROUPS_LISTED
-    return groups[:MOST_GROUPS_LISTED], [
-        f"and {more} more engines and causes"
-    ] if more > 0 else []
+    beyond = [f"and {more} more engines and causes"] if more > 0 else []
+    return groups[:MOST_GROUPS_LISTED] + beyond
 
 
-def _list_worst(diff: Differences, kind: KindOfChange) -> list[str]:
+def _list_worst(diff: Differences, kind: Kind) -> list[str]:
     """List the worst rows of a kind; say how many more there are."""
-    more = diff.kinds[kind] - MOST_ROWS_IN_TEXT
+    rows = diff.of(kind)
+    more = len(rows) - MOST_ROWS_IN_TEXT
     return [
-        _write_change_line(change) for change in diff.of(kind)[:MOST_ROWS_IN_TEXT]
-    ] + ([f"and {more} more"] if more > 0 else [])
+        *map(_write_change_line, rows[:MOST_ROWS_IN_TEXT].itertuples()),
+        *([f"and {more} more"] if more > 0 else []),
+    ]
+
+
+def _list_regressions(diff: Differences) -> list[tuple[str, list[str]]]:
+    """List what regressed and is no single row, under its headings."""
+    parts = {
+        "Gone": diff.gone,
+        "Weaker rule": [str(weakening) for weakening in diff.weakened],
+        "Disagreement": diff.sentences,
+    }
+    return [(heading, texts) for heading, texts in parts.items() if texts]
 
 
 def _list_other_questions(diff: Differences) -> list[tuple[str, list[str]]]:
-    """List what is another question or was not run, under its headings."""
+    """List what was not compared, under its headings."""
     parts = {
-        "Weaker rules": [str(weakening) for weakening in diff.weakened],
-        "The scenes changed": [*map(str, diff.scenes), *diff.notes],
         "Not compared": diff.not_compared,
         "Not run": diff.not_run,
-        "Allowed more than ten times as much": diff.grown,
-        "Who disagrees": diff.fault.sentences,
+        "Allowed more": diff.grown,
     }
     return [(heading, texts) for heading, texts in parts.items() if texts]
 
 
 def write_pull_request_comment(diff: Differences) -> str:
     """Write for a comment on a pull request."""
-    groups, more = _group_rows(diff)
-    return (
-        _render_differences(
-            "changes.md.j2",
-            diff,
-            groups,
-            lambda kind: _list_worst(diff, kind),
-            more,
-        ).rstrip("\n")
-        + "\n"
-    )
+    rows = {kind: _list_worst(diff, kind) for kind in KINDS_SHOWN}
+    return _render_differences("changes.md.j2", diff, rows).rstrip("\n") + "\n"
 
 
 def write_differences_page(diff: Differences) -> str:
     """Write a page of its own."""
-    return _render_differences(
-        "changes.html.j2",
-        diff,
-        diff.fault.groups(KINDS_SHOWN),
-        lambda kind: _write_change_cells(diff.of(kind)),
-        (),
+    rows = {
+        kind: [
+            *map(
+                _write_change_cells,
+                diff.of(kind)[:MOST_ROWS_ON_THE_PAGE].itertuples(),
+            )
+        ]
+        for kind in KINDS_SHOWN
+    }
+    return _render_differences("changes.html.j2", diff, rows)
+
+
+def _write_change_cells(row: Any) -> tuple[str, ...]:
+    """Write a line of the table of differences as the cells under CHANGE_HEADINGS."""
+    return (
+        row.scene,
+        f"{row.engine} {row.setting}",
+        row.quantity,
+        write_error(row.error_old) if row.verdict_old else "",
+        write_error(row.error_new) if row.verdict_new else "",
+        write_error(row.round_off),
+        row.verdict_old,
+        f"{row.verdict_new}: {row.reason_new}" if row.fails else row.verdict_new,
     )
 
 
-def _write_change_cells(changes: Sequence[Change]) -> list[tuple[str, ...]]:
-    """Write the changes as the cells under CHANGE_HEADINGS."""
-    cells: list[tuple[str, ...]] = []
-    for change in changes[:MOST_ROWS_ON_THE_PAGE]:
-        scene, engine, setting, quantity = change.key
-        old, new = (
-            (write_error(row.error), row.verdict) if row else ("", "")
-            for row in (change.old, change.new)
-        )
-        if change.new and not change.new.passed:
-            why = f": {change.new.reason}"
-        else:
-            why = ""
-        cells.append(
-            (
-                scene,
-                f"{engine} {setting}",
-                quantity,
-                old[0],
-                new[0],
-                write_error(change.round_off),
-                old[1],
-                new[1] + why,
-            )
-        )
-    return cells
-
-
-def _render_differences(
-    name: str,
-    diff: Differences,
-    groups: list[Group],
-    rows: Callable[[KindOfChange], Sequence[object]],
-    more: Sequence[str],
-) -> str:
-    kinds = [
-        (kind, [group for group in groups if group.kind is kind], rows(kind))
-        for kind in KINDS_SHOWN
-        if diff.kinds[kind]
-    ]
-    what = {
-        "verdict": write_verdict(diff),
-        "questions": _list_other_questions(diff),
-        "more": more,
-        "headings": CHANGE_HEADINGS,
-    }
+def _render_differences(name: str, diff: Differences, rows: dict[Kind, Any]) -> str:
     return render(
         "fourbar_validation.regression",
         name,
-        found=diff,
-        kinds=kinds,
-        **what,
+        diff=diff,
+        verdict=write_verdict(diff),
+        regressions=_list_regressions(diff),
+        kinds=[
+            (
+                f"{kind.capitalize()}: {diff.kinds[kind]}",
+                _list_groups(diff, kind),
+                cells,
+            )
+            for kind, cells in rows.items()
+            if cells
+        ],
+        questions=[
+            ("Scenes", [*map(str, diff.scenes), *diff.notes]),
+            *_list_other_questions(diff),
+        ],
+        headings=CHANGE_HEADINGS,
     )
 
 
@@ -248,42 +206,24 @@ def write_junit_of_changes(diff: Differences) -> str:
 
 
 def _list_cases_of_changes(diff: Differences) -> Iterator[JunitCase]:
-    for change in diff.changes:
-        scene, engine, setting, quantity = change.key
-        name = (scene, f"{scene}.{engine} {setting}", quantity)
-        kind = change.kind.value
-        if change.regression or (change.new is not None and change.new.failed):
-            yield JunitCase(
-                *name,
-                "failure",
-                kind,
-                _write_change_line(change),
-            )
-        elif change.new is None:
-            yield JunitCase(
-                *name,
-                "skipped",
-                kind,
-                _write_change_line(change),
-            )
-        elif not change.new.compared:
-            yield JunitCase(
-                *name,
-                "skipped",
-                kind,
-                f"{change.new.verdict}: {change.new.reason}",
-            )
+    bad = (*REGRESSIONS, Kind.STILL_FAILS)
+    failures = diff.of(*bad)[:MOST_PASSING_CASES]
+    others = diff.of(*(kind for kind in Kind if kind not in bad))[:MOST_PASSING_CASES]
+    for row in failures.itertuples():
+        yield JunitCase(*_name_case(row), "failure", row.kind, _write_change_line(row))
+    for row in others.itertuples():
+        if row.verdict_new in COMPARED_VERDICTS and row.verdict_new != FAILS:
+            yield JunitCase(*_name_case(row), "passed")
+        elif row.verdict_new:
+            why = f"{row.verdict_new}: {row.reason_new}"
+            yield JunitCase(*_name_case(row), "skipped", row.kind, why)
         else:
-            yield JunitCase(*name, "passed")
+            why = _write_change_line(row)
+            yield JunitCase(*_name_case(row), "skipped", row.kind, why)
     for weakening in diff.weakened:
         name = (weakening.name, weakening.name, f"rule: {weakening.what}")
-        yield JunitCase(
-            *name,
-            "failure",
-            "weaker rule",
-            str(weakening),
-        )
-    yield from count_beyond(diff.rows - len(diff.changes))
+        yield JunitCase(*name, "failure", "weaker rule", str(weakening))
+    yield from count_beyond(diff.rows - len(failures) - len(others))
     if diff.nothing:
         yield JunitCase(
             "all scenes",
@@ -293,3 +233,8 @@ def _list_cases_of_changes(diff: Differences) -> Iterator[JunitCase]:
             "nothing compared",
             write_verdict(diff),
         )
+
+
+def _name_case(row: Any) -> tuple[str, str, str]:
+    """Return suite, class and name of the case of a row."""
+    return row.scene, f"{row.scene}.{row.engine} {row.setting}", row.quantity

@@ -7,8 +7,9 @@ pass, so the rules themselves are kept with a run.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from fourbar_validation.compare.rows import AGREES, Row
+from fourbar_validation.compare.rows import AGREES, COMPARED_VERDICTS
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
     FULL_ACCURACY,
@@ -20,6 +21,9 @@ from fourbar_validation.compare.tolerance import (
 from fourbar_validation.engines.guests import STATED_BY_THE_ENGINE
 from fourbar_validation.engines.limits import BOUNDARIES
 from fourbar_validation.engines.registry import Engine
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 Rules = dict[str, dict[str, str]]
 """What stands under each name, as entries of text."""
@@ -146,28 +150,44 @@ def _number(text: str) -> float:
         return float("inf")
 
 
-def find_class(row: Row) -> str:
-    """Return the class of tolerance that a row's reason begins with, or ""."""
-    words = row.reason.partition(":")[0]
-    return words if words in CLASSES else ""
+def list_weakened_rows(
+    table: "DataFrame",
+    known: Iterable[Weakening],
+) -> list[Weakening]:
+    """List the classes of tolerance that are wider in rows that agree, once each.
 
-
-def find_weakened_row(old: Row, new: Row) -> Weakening | None:
-    """Tell where two rows that agree have tolerances of another class.
-
-    The later one is a wider class. It needs no record of the rules: a table says it by
-    itself.
+    No record of the rules is needed: a table of both runs says it by itself.
     """
-    if not old.verdict == new.verdict == AGREES or new.allowed <= old.allowed:
-        return None
-    before = find_class(old)
-    after = find_class(new)
-    if not before or not after or before == after:
-        return None
-    return Weakening(new.engine, CLASS_CHANGED, before, after)
+    rows = table[
+        (table.verdict_old == AGREES)
+        & (table.verdict_new == AGREES)
+        & (table.why == "")
+        & (table.allowed_new > table.allowed_old)
+    ]
+    before, after = (
+        rows[column].str.split(":", n=1).str[0]
+        for column in ("reason_old", "reason_new")
+    )
+    other = before.isin(CLASSES) & after.isin(CLASSES) & (before != after)
+    told = {(one.name, one.what) for one in known}
+    return [
+        Weakening(engine, CLASS_CHANGED, before[line], after[line])
+        for line, engine in rows.engine[other].drop_duplicates().items()
+        if (engine, CLASS_CHANGED) not in told
+    ]
 
 
-def has_grown(old: Row, new: Row) -> bool:
-    """Return whether what a row is allowed has grown so far that it is printed."""
-    both = old.compared and new.compared and old.allowed > 0.0
-    return both and new.allowed > NOTABLE * old.allowed
+def list_grown_rows(table: "DataFrame") -> list[str]:
+    """Name the rows whose allowed error has grown so far that it is printed."""
+    rows = table[
+        table.verdict_old.isin(COMPARED_VERDICTS)
+        & table.verdict_new.isin(COMPARED_VERDICTS)
+        & (table.why == "")
+        & (table.allowed_old > 0.0)
+        & (table.allowed_new > NOTABLE * table.allowed_old)
+    ]
+    return [
+        f"{row.scene} / {row.engine} / {row.quantity}:"
+        f" {row.allowed_old:.1e} -> {row.allowed_new:.1e}"
+        for row in rows.itertuples()
+    ]

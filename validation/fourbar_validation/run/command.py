@@ -136,14 +136,7 @@ def run_command(**stated: Any) -> int:
         plan.require_engines()
         return HOLDS
     with ShownProgress(len(plan.suite)) as progress:
-        summary = run(
-            plan.suite,
-            request.out,
-            plan.engines,
-            plan.options,
-            plan.missing,
-            progress,
-        )
+        summary = run(plan, request.out, progress)
     print_table(summary, request.out, verbose=request.verbose)
     worse = False
     if plan.options.against is not None:

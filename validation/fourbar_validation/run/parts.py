@@ -3,6 +3,7 @@
 A part has many tasks; `run/store.py` keeps the file of each.
 """
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -66,8 +67,11 @@ class _Gathered:
         for path, damage in store.examine():
             if damage:
                 self._damaged.append(f"{path} {damage}")
-            else:
-                self._stores.setdefault(int(path.name), store)
+                continue
+            task = int(path.name)
+            first = self._stores.setdefault(task, store)
+            if first is not store:
+                _require_alike(task, first, store)
 
     def _require_all(self) -> None:
         """Raise InputError that names the parts with missing or damaged tasks."""
@@ -87,6 +91,25 @@ class _Gathered:
     def read(self, task: int) -> list[Any]:
         """Read the results of a task."""
         return self._stores[task].read(task)
+
+
+def _require_alike(task: int, first: Store, second: Store) -> None:
+    """Raise InputError unless two copies of a task have the same rows.
+
+    Times and what engines printed may differ from machine to machine.
+    """
+    rows = [
+        {json.dumps(row) for kept in store.read(task) for row in kept["rows"]}
+        for store in (first, second)
+    ]
+    if differing := sorted(rows[0] ^ rows[1]):
+        scene, engine, _, quantity, *_ = json.loads(differing[0])
+        raise InputError(
+            "DIR",
+            str(second.folder),
+            f"holds another result than {first.folder}: {quantity} of {engine} in"
+            f" {scene}; name one of the two folders, or judge that part again",
+        )
 
 
 def collect_parts(

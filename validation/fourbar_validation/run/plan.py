@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from fourbar.errors import FAILED, DependencyError, InputError
-from fourbar_validation.compare.rows import FAILS, Counts
+from fourbar_validation.compare.rows import FAILS, Counts, escape_controls
 from fourbar_validation.compare.tolerance import IDENTITY
 from fourbar_validation.engines.guests import Guest
 from fourbar_validation.engines.registry import Engine
@@ -26,6 +26,8 @@ SCENES_OF_A_SLOW_TASK = 1
 """Scenes per task if something is simulated or drawn: a second each."""
 SCENES_OF_A_QUICK_TASK = 20
 """Scenes per task otherwise: a second together."""
+MOST_KEPT_NAMED = 5
+"""Scenes named whose answers a resumed run keeps; the others are counted."""
 _MOST_TASKS = 10_000
 """Each has a file while the run goes on. Of a million scenes a hundred stand in one."""
 JUDGING, COLLECTING, DRAWING = "judging", "collecting", "drawing"
@@ -103,6 +105,19 @@ class Plan:
     options: RunOptions = DEFAULTS
     missing: Sequence[tuple[str, str]] = ()
     """Engines that cannot answer here, each with the reason."""
+    chosen: str = ""
+    """Engines that were asked for by name; empty for all of ours."""
+    suite_name: str = ""
+    """Name of the suite; empty where scenes were chosen one by one."""
+
+    @property
+    def asked(self) -> dict[str, str]:
+        """Return what was asked for, as the record of a run keeps it."""
+        return {
+            "chosen": self.chosen,
+            "scenes of": self.suite_name,
+            "missing": ", ".join(name for name, _ in self.missing),
+        }
 
     @property
     def draw_at_once(self) -> bool:
@@ -166,13 +181,26 @@ class Plan:
         done = store.done()
         for line in store.notes:
             progress.note(line)
-        progress.advance(JUDGING, self.count_scenes(done.intersection(wanted)))
+        kept = [scene for task in wanted if task in done for scene in self.tasks[task]]
+        if kept:
+            progress.note(self._tell_kept(kept))
+        progress.advance(JUDGING, len(kept))
         jobs = self._make_jobs(task for task in wanted if task not in done)
         workers = self.options.workers
         limit = pool.find_time_limit(self.suite, self.engines)
         for task, records in pool.judge_tasks(jobs, limit, workers):
             store.put(task, [record.kept_all() for record in records])
             progress.advance(JUDGING, len(records))
+
+    def _tell_kept(self, scenes: Sequence[int]) -> str:
+        """Say which answers of an interrupted run are kept."""
+        names = [escape_controls(self.suite.name(i)) for i in scenes[:MOST_KEPT_NAMED]]
+        more = len(scenes) - len(names)
+        further = f" and {more} more" if more else ""
+        return (
+            f"kept from an interrupted run: the answers of all engines on"
+            f" {len(scenes)} of {len(self.suite)} scenes, {', '.join(names)}{further}"
+        )
 
     def _make_jobs(self, tasks: Iterable[int]) -> Iterator[tuple[int, list[pool.Job]]]:
         for task in tasks:

@@ -123,6 +123,15 @@ class Request:
             open_run(find_baseline(self.against), "--against")
 
     @property
+    def suite_name(self) -> str:
+        """Return the name of the suite; empty if its scenes are chosen one by one."""
+        if self.scenes or self.random is not None:
+            return ""
+        if self.suite in (None, HARD_SUITE):
+            return self.suite or "models"
+        return Path(str(self.suite)).name
+
+    @property
     def options(self) -> RunOptions:
         """Return the options of the run itself."""
         if self.against is None:
@@ -149,7 +158,14 @@ def make_plan(request: Request, files: Files | None = None) -> Plan:
         suite = files
     engines = select_engines(request)
     present, missing = _find_askable(engines, by_name=request.engines is not None)
-    return Plan(suite, present, request.options, missing)
+    return Plan(
+        suite,
+        present,
+        request.options,
+        missing,
+        request.engines or "",
+        request.suite_name,
+    )
 
 
 def keep_request(

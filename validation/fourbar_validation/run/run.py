@@ -43,13 +43,11 @@ from fourbar_validation.run import pool
 from fourbar_validation.run.judge import OUTPUT
 from fourbar_validation.run.plan import (
     COLLECTING,
-    DEFAULTS,
     DRAWING,
     UNHEARD,
     WHOLE_RUN,
     Plan,
     Progress,
-    RunOptions,
 )
 from fourbar_validation.run.request import forget_request
 from fourbar_validation.run.store import Store
@@ -78,22 +76,12 @@ passes for its own if it ends early.
 """
 
 
-def run(
-    suite: Suite,
-    out: Path,
-    engines: tuple[Engine, ...],
-    options: RunOptions = DEFAULTS,
-    missing: Sequence[tuple[str, str]] = (),
-    progress: Progress = UNHEARD,
-) -> Summary:
-    """Judge a suite into a folder.
+def run(plan: Plan, out: Path, progress: Progress = UNHEARD) -> Summary:
+    """Judge what is planned into a folder.
 
     The folder keeps what an interrupted run of the same suite, engines and versions
     left.
-
-    `missing`: the engines that cannot answer here, each with the reason.
     """
-    plan = Plan(suite, engines, options, missing)
     with open_store(plan, out) as store:
         plan.judge(store, WHOLE_RUN, progress)
         summary = write_outcome(plan, store.read, out, progress)
@@ -141,7 +129,9 @@ def write_outcome(
         for _, records in pool.judge_tasks(jobs, limit, options.workers):
             summary.picture(*records)
             progress.advance(DRAWING, 1)
-    about = describe_run(engines, suite.fingerprint(), describe_scenes(suite))
+    about = describe_run(
+        engines, suite.fingerprint(), describe_scenes(suite), plan.asked
+    )
     write_about(about, out)
     summary.date = about.date
     summary.commit = about.commit

@@ -1,0 +1,221 @@
+"""What happens to one row from a run to the next, and what a run ends with."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from fourbar.errors import FAILED, HOLDS
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, Row
+from fourbar_validation.compare.tolerance import EPS
+from fourbar_validation.regression import render
+from fourbar_validation.regression.changes import Kind
+from fourbar_validation.regression.record import NOTHING_KNOWN, About
+from fourbar_validation.regression.rules import list_weakened
+from tests.support.runs import HERE, compare_rows, kinds
+
+ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-9, AGREES, "", 1.0, 1.0)
+
+
+def changed(**fields: object) -> Row:
+    return replace(ROW, **fields)  # type: ignore[arg-type]
+
+
+NAN = math.nan
+FAILING = changed(verdict=FAILS)
+OTHER = changed(quantity="F12")
+SIMULATED = changed(error=1e-6, allowed=1e-5)
+HARD = changed(condition=0.01, allowed=1e-13)
+ALARM = changed(quantity="watch", verdict=FAILS, error=NAN)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "kind"),
+    [
+        ([ROW], [ROW], Kind.SAME),
+        ([FAILING], [FAILING], Kind.STILL_FAILS),
+        ([ROW], [changed(error=ROW.error + 40 * EPS)], Kind.SAME),
+        ([ROW], [changed(error=60 * EPS)], Kind.GREW),
+        ([changed(allowed=1e-15)], [changed(error=60 * EPS)], Kind.WORSE),
+        ([HARD], [replace(HARD, error=3000 * EPS)], Kind.SAME),
+        ([HARD], [replace(HARD, error=6000 * EPS, allowed=1.0)], Kind.WORSE),
+        ([HARD], [replace(HARD, error=6000 * EPS, condition=1.0)], Kind.WORSE),
+        ([SIMULATED], [replace(SIMULATED, error=1.2e-6)], Kind.SAME),
+        ([SIMULATED], [replace(SIMULATED, error=1.3e-6)], Kind.GREW),
+        ([SIMULATED], [replace(SIMULATED, error=1.3e-5, allowed=1)], Kind.WORSE),
+        ([SIMULATED], [replace(SIMULATED, error=0.7e-6)], Kind.BETTER),
+        ([SIMULATED], [replace(SIMULATED, error=0.9e-6)], Kind.SAME),
+        ([ROW], [changed(verdict=DEGRADED)], Kind.VERDICT_WORSE),
+        ([ROW], [changed(verdict=REFUSES, error=NAN)], Kind.VERDICT_WORSE),
+        ([ROW], [changed(verdict=FAILS, error=NAN)], Kind.VERDICT_WORSE),
+        ([FAILING], [ROW], Kind.VERDICT_BETTER),
+        ([FAILING], [changed(verdict=FAILS, error=NAN)], Kind.WORSE),
+        ([ROW], [], Kind.GONE),
+        ([FAILING], [], Kind.GONE),
+        ([ALARM], [], Kind.GONE_FAILURE),
+        ([], [OTHER], Kind.NEW),
+        ([], [replace(OTHER, verdict=FAILS)], Kind.NEW_FAILURE),
+        ([ROW], [changed(setting="h/2", error=1.0)], Kind.NOT_COMPARED),
+        ([ROW], [changed(setting="h/2", verdict=FAILS)], Kind.NEW_FAILURE),
+    ],
+)
+def test_each_kind_of_change(old: list[Row], new: list[Row], kind: Kind) -> None:
+    beside = changed(engine="formulas", error=0.0, allowed=0.0)
+    found = compare_rows((HERE, [*old, beside]), (HERE, [*new, beside]))
+    (line,) = found.table[found.table.engine == "engine"].itertuples()
+    assert line.kind == kind
+    regresses = kind in (Kind.VERDICT_WORSE, Kind.WORSE, Kind.GONE, Kind.NEW_FAILURE)
+    assert bool(found.regressed) == regresses
+    assert f"{1 + (kind == Kind.SAME)} {kind}" in render.write_verdict(found)
+
+
+def test_settings_are_paired_only_where_each_run_has_one_of_its_own() -> None:
+    first, second = (changed(setting=name) for name in ("h", "h/2"))
+    third, none = (changed(setting=name) for name in ("h/4", "-"))
+    for old, new in (
+        ([first], [second, third]),
+        ([first, second], [third]),
+        ([first], [none]),
+        ([none], [first]),
+        ([first], [replace(second, quantity="F12")]),
+        ([first], [replace(second, engine="formulas")]),
+    ):
+        assert Kind.NOT_COMPARED not in kinds(old, new)
+        assert Kind.GONE in kinds(old, new) and Kind.NEW in kinds(old, new)
+    assert kinds([first, second], [third, second]) == [Kind.NOT_COMPARED, Kind.SAME]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "status"),
+    [
+        ([ROW], [OTHER], FAILED),
+        ([], [ROW], FAILED),
+        ([changed(verdict=REFUSES)], [changed(verdict=REFUSES)], FAILED),
+        ([FAILING], [FAILING], HOLDS),
+    ],
+)
+def test_two_runs_without_a_comparison_in_common_are_no_success(
+    old: list[Row],
+    new: list[Row],
+    status: int,
+) -> None:
+    assert compare_rows((HERE, old), (HERE, new)).status == status
+
+
+def test_of_two_rows_of_one_name_the_worse_counts_in_either_order() -> None:
+    for twice in ([ROW, FAILING], [FAILING, ROW]):
+        assert kinds([ROW], twice) == [Kind.VERDICT_WORSE]
+        assert kinds(twice, twice) == [Kind.STILL_FAILS]
+        assert kinds(twice, [ROW]) == [Kind.VERDICT_BETTER]
+
+
+def test_the_worst_change_comes_first() -> None:
+    old = [changed(scene=name, allowed=1e-15) for name in "abcd"]
+    errors = {"a": 1e-9, "b": NAN, "c": 1e-6, "d": 1e-12}
+    new = [
+        changed(scene=name, error=error, verdict=FAILS)
+        for name, error in errors.items()
+    ]
+    new[1] = changed(scene="b", verdict=REFUSES, error=NAN)
+    found = compare_rows((HERE, old), (HERE, new))
+    assert [*found.of(Kind.VERDICT_WORSE).scene] == ["c", "a", "d", "b"]
+
+
+@pytest.mark.parametrize(
+    ("factor", "weaker"), [("1.001e-14", True), ("1e-14", False), ("9e-15", False)]
+)
+def test_a_factor_that_grew_by_a_thousandth_is_a_weaker_rule(
+    factor: str,
+    weaker: bool,
+) -> None:
+    rules = [{"engine": {"factor": text}} for text in ("1e-14", factor)]
+    assert bool(list_weakened(*rules)) == weaker
+
+
+def about(engines: dict[str, str], **settings: str) -> About:
+    """The record of a run of guests: name of the column, and version."""
+    names = ", ".join(engines)
+    answers = settings.pop("answers", "F12, torque")
+    return replace(
+        NOTHING_KNOWN,
+        versions={name: version for name, version in engines.items() if version},
+        settings={"engines": names, "guests": names, "chosen": ""} | settings,
+        rules={name: {"answers": answers, "factor": "1e-9"} for name in engines},
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "pairs"),
+    [
+        ({"wg": "1"}, {"wg": "2"}, {}),
+        ({"wg": "1"}, {"wg 2": "2", "wg 3": "3"}, {"wg": "wg 2"}),
+        ({"wg 1": "1", "wg 2": "2"}, {"wg": "3"}, {"wg 1": "wg"}),
+        ({"wg 1": "1", "wg 2": "2"}, {"wg": "2"}, {"wg 2": "wg"}),
+        (
+            {"wg 1": "1", "wg 2": "2"},
+            {"wg 2": "2", "wg 3": "3"},
+            {"wg 1": "wg 3"},
+        ),
+        ({"wg": ""}, {"wg2": ""}, {"wg": "wg2"}),
+        ({"wg": "", "a": ""}, {"wg2": "", "b": ""}, {}),
+        ({"wg": "", "a": ""}, {"wg2": "", "a": ""}, {"wg": "wg2"}),
+    ],
+)
+def test_versions_and_a_renamed_guest_are_compared_as_one(
+    old: dict[str, str],
+    new: dict[str, str],
+    pairs: dict[str, str],
+) -> None:
+    runs = [
+        (about(engines), [changed(engine=name) for name in engines])
+        for engines in (old, new)
+    ]
+    found = compare_rows(*runs)
+    gone = old.keys() - new.keys() - pairs.keys()
+    assert found.gone == [f"engine {name} is gone (1 row)" for name in sorted(gone)]
+    assert found.status == bool(gone)
+    same = [*found.table.engine[found.table.kind == Kind.SAME]]
+    assert same == sorted({*pairs.values(), *(old.keys() & new.keys())})
+    said = "\n".join(found.notes)
+    assert all(before in said and after in said for before, after in pairs.items())
+
+
+def test_a_renamed_guest_is_held_to_its_rule_and_to_what_it_answered() -> None:
+    old, wider = about({"wg": ""}), about({"wg2": ""})
+    wider.rules["wg2"]["factor"] = "1e-2"
+    renamed = changed(engine="wg2")
+    found = compare_rows((old, [changed(engine="wg")]), (wider, [renamed]))
+    assert [str(one) for one in found.weakened] == ["wg2: factor 1e-9 -> 1e-2"]
+    assert render.write_differences(found).startswith("Weaker rule: wg2: factor")
+    fewer = about({"wg2": ""}, answers="torque")
+    found = compare_rows((old, [changed(engine="wg")]), (fewer, [renamed]))
+    assert found.gone == ["engine wg is gone (1 row)"] and found.status == FAILED
+    assert render.write_differences(found).startswith("Gone: engine wg is gone")
+
+
+def test_what_was_not_asked_for_is_not_run_and_what_was_is_gone() -> None:
+    whole = about({"wg": "", "b": ""}, **{"scenes of": "hard"})
+    both = [changed(scene=s, engine=e) for s in "st" for e in ("wg", "b")]
+    for settings, rows, not_run, gone in (
+        ({"chosen": "b"}, both[1::2], ["wg (2 rows)"], []),
+        ({"missing": "wg"}, both[1::2], ["wg (2 rows)"], []),
+        ({}, both[1::2], [], ["engine wg is gone (2 rows)"]),
+        ({"scenes of": ""}, both[:2], ["scene t (2 rows)"], []),
+        ({"scenes of": "x"}, both[:2], ["scene t (2 rows)"], []),
+        ({"scenes of": "hard"}, both[:2], [], ["scene t is gone (2 rows)"]),
+    ):
+        asked = about({row.engine: "" for row in rows}, **settings)
+        found = compare_rows((whole, both), (asked, rows))
+        assert (found.not_run, found.gone) == (not_run, gone), settings
+        assert found.status == bool(gone)
+
+
+def test_a_scene_that_an_engine_newly_refuses_is_one_regression() -> None:
+    old = [changed(engine="wg", quantity=name) for name in ("F12", "torque")]
+    refusal = changed(engine="wg", quantity="all", verdict=REFUSES, error=NAN)
+    found = compare_rows((HERE, [*old, ROW]), (HERE, [refusal, ROW]))
+    assert found.gone == ["scene scene is newly refused by wg (3 rows)"]
+    first = render.write_differences(found).splitlines()[0]
+    assert first == f"Gone: {found.gone[0]}" and found.status == FAILED
+    as_before = compare_rows((HERE, [refusal, ROW]), (HERE, [refusal, ROW]))
+    assert not as_before.gone and as_before.status == HOLDS
