@@ -7,6 +7,8 @@ docs/protocol.md states what a class has.
 import json
 import os
 import sys
+import sysconfig
+import traceback
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, distributions, version
@@ -23,6 +25,7 @@ from fourbar_validation.compare.rows import say_error
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.guests import NOT_FOUND, adjust_engines, hash_files
 from fourbar_validation.engines.registry import BALLS, ENGINES, load_further
+from fourbar_validation.places import PACKAGE
 from fourbar_validation.report.machine import DISTRIBUTIONS
 
 _ALL_BUT_CYLINDER = (
@@ -193,6 +196,20 @@ def answer(make: _Factory, question: dict[str, Any]) -> dict[str, Any]:
     return protocol.answer_to_json(scene, command, reply)
 
 
+def _say_where(error: BaseException) -> str:
+    """Say in which line of the engine's own code an error was raised."""
+    frames = [
+        frame
+        for frame in traceback.extract_tb(error.__traceback__)
+        if not Path(frame.filename).is_relative_to(PACKAGE)
+    ]
+    installed = sysconfig.get_path("purelib"), sysconfig.get_path("stdlib")
+    own = [frame for frame in frames if not frame.filename.startswith(installed)]
+    for frame in (own or frames)[-1:]:
+        return f" ({frame.filename}, line {frame.lineno})"
+    return ""
+
+
 def serve(
     entry: str,
     questions: IO[bytes],
@@ -217,7 +234,9 @@ def serve(
         except InputError as error:
             text = json.dumps({"id": question["id"], "error": str(error)})
         except BaseException as error:  # whatever a class of the user's raises
-            text = json.dumps({"id": question["id"], "error": say_error(error)})
+            traceback.print_exception(error)  # to output.txt
+            told = f"{say_error(error)}{_say_where(error)}"
+            text = json.dumps({"id": question["id"], "error": told})
         replies.write(text.encode() + b"\n")
         replies.flush()
 

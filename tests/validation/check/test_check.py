@@ -22,7 +22,7 @@ from fourbar.scene.motion import Law
 from fourbar.solving import solve
 from fourbar_validation.check.check import Judgement, judge_table
 from fourbar_validation.check.judge import Allowance
-from fourbar_validation.check.mistakes import list_hypotheses
+from fourbar_validation.check.mistakes import list_column_mistakes, list_hypotheses
 from fourbar_validation.check.theirs import LARGEST_TABLE_FILE, NOT_JUDGED, read_table
 from fourbar_validation.cli import status
 from fourbar_validation.compare.scales import TERMS_OF_UNIT, scale_of
@@ -180,6 +180,12 @@ def solved(
 
 def same(scene: Scene) -> Scene:
     return scene
+
+
+def y_reversed(scene: Scene) -> Numbers:
+    numbers = right(scene)
+    vectors = {n: v for n, v in numbers.items() if v.ndim == 2}
+    return numbers | {name: v * (1.0, -1.0) for name, v in vectors.items()}
 
 
 def inertial_times(scene: Scene, by_mass: float, by_inertia: float) -> Numbers:
@@ -671,6 +677,34 @@ MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]
         "m a and I alpha in kg mm/s^2",
     ),
     (
+        "y reversed",
+        "crank_rocker",
+        FORCES,
+        y_reversed,
+        "y reversed",
+    ),
+    (
+        "gravity doubled",
+        "crank_rocker",
+        FORCES,
+        solved(lambda s: replace(s, effects=(fourbar.Gravity(2.0 * 9.81),))),
+        "gravity is doubled",
+    ),
+    (
+        "loads doubled",
+        "thesis",
+        FORCES,
+        solved(lambda s: replace(s, loads=s.loads + s.loads)),
+        "the loads are doubled",
+    ),
+    (
+        "load 1 doubled",
+        "thesis",
+        FORCES,
+        solved(lambda s: replace(s, loads=s.loads + s.loads[:1])),
+        f"load 1 (bar {SCENES['thesis'].loads[0].bar}) is doubled",
+    ),
+    (
         "loads reversed",
         "thesis",
         FORCES,
@@ -843,7 +877,10 @@ def test_every_hypothesis_has_a_case_and_no_two_have_one_text() -> None:
     texts = {
         kind(mistake.text)
         for scene in SCENES.values()
-        for mistake in list_hypotheses(scene, command(scene))
+        for mistake in (
+            *list_column_mistakes(),
+            *list_hypotheses(scene, command(scene)),
+        )
     }
     unnamed = {
         text for text in texts if not any(kind(words) in text for *_, words in MISTAKES)

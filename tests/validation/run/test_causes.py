@@ -6,6 +6,8 @@ the mistake is made in a calculation which knows nothing of the hypotheses.
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,10 +17,13 @@ import fourbar
 from fourbar.scene import Command, Scene
 from fourbar_validation.check.calculated import find_wrenches
 from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.rows import AGREES, FAILS, FORMULAS, Row
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import Engine
+from fourbar_validation.report.overview import Overview
+from fourbar_validation.report.record import Record
 from fourbar_validation.run.judge import judge
 from tests.support.guests import PLAIN
 from tests.support.scenes import crank_rocker
@@ -27,6 +32,7 @@ SCENE = crank_rocker(
     motion=fourbar.Motion(fourbar.Sweep(0.1, 6.0, 30), 10.0, 5.0),
     loads=(),
 )
+CAPABILITIES = Path(__file__).parents[3] / "models" / "capabilities"
 SOLVER = PLAIN.partition("\nNAMES =")[0]
 TORQUE = '"torque": moments[0] - cross(r2, F32)'
 FORCES = "(force.real, force.imag)"
@@ -295,7 +301,7 @@ def test_the_joint_of_a_driven_bar_carries_the_bars_behind_it(
     np.testing.assert_allclose(cut["torque"], torque, atol=1e-12)
 
 
-def find_causes(guest: type, scene: Scene = SCENE) -> list[str]:
+def find_causes(guest: Callable[[], Any], scene: Scene = SCENE) -> list[str]:
     engine = Engine("plain", guest, EQUIVALENCE)
     record = judge("scene", scene, [engine], order=False)
     assert any(row.engine == "plain" for row in record.rows)
@@ -323,6 +329,225 @@ def test_free_bodies_give_back_the_forces_that_they_are_made_of() -> None:
 
 def test_a_right_guest_has_no_cause() -> None:
     assert find_causes(make_guest()) == []
+
+
+class Altered:
+    """Free bodies whose numbers are changed at last."""
+
+    name = "plain"
+    commands = FreeBody.commands
+
+    def __init__(self, change: Change) -> None:
+        self.change = change
+
+    def answer(self, scene: Scene, at: Command) -> Answer:
+        answer = FreeBody().answer(scene, at)
+        numbers = dict(answer.quantities)
+        self.change(numbers, at)
+        return replace(answer, engine=self.name, quantities=numbers)
+
+
+def reverse_F43(numbers: dict[str, np.ndarray], at: Command) -> None:
+    numbers["F43"] = -numbers["F43"]
+
+
+def turn_F32_alone(numbers: dict[str, np.ndarray], at: Command) -> None:
+    turned = dict(numbers)
+    turn_into_bars(turned, at)
+    numbers["F32"] = turned["F32"]
+
+
+def reverse_y(numbers: dict[str, np.ndarray], at: Command) -> None:
+    for name in ("F12", "F32", "F43", "F14"):
+        numbers[name] = numbers[name] * (1.0, -1.0)
+
+
+def half_a_step_late(numbers: dict[str, np.ndarray], at: Command) -> None:
+    step = at.angle[1] - at.angle[0]
+    before = FreeBody().answer(SCENE, at._replace(angle=at.angle - 0.5 * step))
+    for name in ("F12", "F32", "F43", "F14", "torque"):
+        numbers[name] = before.quantities[name]
+
+
+def take_inertia_as_about_the_pin(numbers: dict[str, np.ndarray], at: Command) -> None:
+    bar = SCENE.linkage.coupler
+    less = bar.moment_of_inertia - bar.mass * bar.mass_centre[0] ** 2
+    for factor, inertia in ((1.0, 0.0), (less, 1.0), (-less, 0.0)):
+        changed = replace(bar, inertia=inertia)
+        linkage = replace(SCENE.linkage, coupler=changed)
+        part = FreeBody().answer(replace(SCENE, linkage=linkage), at).quantities
+        for name in ("F12", "F32", "F43", "F14", "torque"):
+            start = 0.0 if factor == 1.0 else numbers[name]
+            numbers[name] = start + factor * part[name]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (turn_F32_alone, "F32 is in the frame of bar 2, not in world axes: F32"),
+        (reverse_y, "y reversed: F12, F32, F43, F14"),
+        (
+            half_a_step_late,
+            "half a step late: numbers between a position and the one before (forces"
+            " alone)",
+        ),
+        (
+            take_inertia_as_about_the_pin,
+            "coupler: inertia about G used as the inertia about the pin",
+        ),
+    ],
+)
+def test_a_mistake_in_numbers_of_another_engine_is_named(
+    change: Change,
+    words: str,
+) -> None:
+    assert find_causes(partial(Altered, change))[0] == words
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("kite", "parallelogram", "command_coupler", "command_output"),
+        *("stroke_input", "stroke_output", "cylinder_1_3", "law_cycloidal"),
+    ],
+)
+def test_a_sign_is_named_under_every_command_and_at_change_points(name: str) -> None:
+    scene = fourbar.load(CAPABILITIES / f"{name}.toml")
+    causes = find_causes(partial(Altered, reverse_F43), scene)
+    assert causes == ["sign reversed, or F_ij given for F_ji: F43"]
+
+
+class Scaled:
+    """Free bodies in which something that acts is left out, doubled or reversed."""
+
+    name = "plain"
+
+    def __init__(self, without: Scene, factor: float) -> None:
+        self.without, self.factor = without, factor
+
+    def answer(self, scene: Scene, at: Command) -> Answer:
+        whole = FreeBody().answer(scene, at)
+        rest = FreeBody().answer(self.without, at)
+        numbers = dict(whole.quantities)
+        for name in ("F12", "F32", "F43", "F14", "torque"):
+            left = rest.quantities[name]
+            numbers[name] = left + self.factor * (numbers[name] - left)
+        numbers.pop("torque_inertia", None)
+        return replace(whole, engine=self.name, quantities=numbers)
+
+
+GROUND, COUPLER = fourbar.Place(1, (0.3, 0.2)), fourbar.Place(3, (0.1, 0.4))
+SPRING = fourbar.Spring(GROUND, COUPLER, 90.0, 0.1, 4.0)
+SLACK = fourbar.Spring(GROUND, fourbar.Place(4, (0.1, 0.0)), 50.0, 0.1)
+ACTING: dict[str, tuple[Any, Any]] = {
+    "the springs": (fourbar.Springs((SPRING, SLACK)), None),
+    "part 2 of the springs": (
+        fourbar.Springs((SPRING, SLACK)),
+        fourbar.Springs((SPRING,)),
+    ),
+    "the preload of spring 1": (
+        fourbar.Springs((SPRING,)),
+        fourbar.Springs((replace(SPRING, preload=0.0),)),
+    ),
+    "the viscous damping": (fourbar.Viscous((("O4", 0.2),)), None),
+    "the torsion springs": (fourbar.Torsion((("O4", 2.0, 1.0, 0.0),)), None),
+    "the flywheel": (fourbar.Flywheel(0.3), None),
+    "the dry friction": (fourbar.Friction((("O4", 0.5),)), None),
+    "load 1 (bar 4)": (fourbar.Load(4, (3.0, 0.7), from_pin=(0.05, 1.0)), None),
+}
+
+
+@pytest.mark.parametrize(
+    "done", [(0.0, "missing"), (2.0, "doubled"), (-1.0, "reversed")]
+)
+@pytest.mark.parametrize("name", ACTING)
+def test_what_acts_may_be_left_out_doubled_or_reversed(
+    name: str,
+    done: tuple[float, str],
+) -> None:
+    factor, word = done
+    acting, instead = ACTING[name]
+    bare = replace(SCENE, effects=(fourbar.Gravity(),))
+    if isinstance(acting, fourbar.Load):
+        scene, without = replace(bare, loads=(acting,)), bare
+    else:
+        scene = replace(bare, effects=(*bare.effects, acting))
+        left = () if instead is None else (instead,)
+        without = replace(bare, effects=(*bare.effects, *left))
+    verb = "are" if name.endswith("s") else "is"
+    causes = find_causes(partial(Scaled, without, factor), scene)
+    assert f"{name} {verb} {word}" in causes
+
+
+def name_wrong(changes: dict[str, Change]) -> dict[str, str]:
+    """Who is called wrong, and why, where engines answer with these changes."""
+
+    class Named(Altered):
+        def __init__(self, name: str, change: Change) -> None:
+            super().__init__(change)
+            self.name = name
+
+    engines = [
+        Engine(name, partial(Named, name, change), EQUIVALENCE, ("F43", "torque"))
+        for name, change in changes.items()
+    ]
+    overview = Overview()
+    overview.add(judge("scene", SCENE, engines, order=False))
+    return {cause.engine: cause.text for cause in overview.causes}
+
+
+def test_two_engines_that_agree_with_each_other_blame_the_formulas_alone() -> None:
+    twice = {"one": reverse_F43, "two": reverse_F43}
+    words = "one, two agree with each other, and differ from it in F43"
+    assert name_wrong(twice) == {FORMULAS: words}
+    assert name_wrong({**twice, "three": nothing}) == {FORMULAS: words}
+    # where as many agree with the formulas each is wrong by itself
+    outvoted = name_wrong({**twice, "three": nothing, "four": nothing})
+    assert outvoted.keys() == twice.keys()
+    # nor where each differs in a way of its own
+    assert name_wrong({"one": reverse_F43, "two": reverse_y}).keys() == twice.keys()
+
+
+def test_what_differs_is_what_the_engine_itself_has_wrong() -> None:
+    closure, inertia = (
+        Row("s", "wg", "exact", name, 0.3, 1e-14, FAILS, "", 1.0, 1.0)
+        for name in ("closure", "torque_inertia")
+    )
+    agreeing = [
+        replace(closure, quantity=name, verdict=AGREES, error=0.0)
+        for name in ("theta_3", "F12")
+    ]
+    for row, words in (
+        (closure, "closure differs, pin forces and motion agree"),
+        (inertia, "inertial part of the torque differs, pin forces and motion agree"),
+    ):
+        overview = Overview()
+        overview.add(Record("s", rows=[row, *agreeing], causes={"wg": []}))
+        assert overview.causes[0].text.startswith(words)
+
+
+def test_only_engines_that_declare_few_errors_are_independent() -> None:
+    rows = [
+        Row("s", engine, "exact", name, 0.0, 1e-14, AGREES, "", 1.0, 1.0)
+        for engine in ("one", "two")
+        for name in ("torque", "F12", "F32", "F43", "F14")
+    ]
+    for declared, confirmed in ((1e-4, 1), (1.1e-4, 0)):
+        overview = Overview()
+        overview.declared = {"one": 1e-14, "two": declared}
+        overview.add(Record("s", rows=rows))
+        assert overview.checked_twice == confirmed
+
+
+def test_where_nobody_looked_the_report_says_so() -> None:
+    row = Row("s", "wg", "exact", "torque", 0.3, 1e-14, FAILS, "", 1.0, 1.0)
+    for causes, words in (
+        ({}, "mistakes are not looked for there"),
+        ({"wg": []}, "no known mistake explains it"),
+    ):
+        overview = Overview()
+        overview.add(Record("s", rows=[row], causes=causes))
+        assert overview.causes[0].text.endswith(words)
 
 
 def test_what_nobody_knows_is_no_known_mistake() -> None:

@@ -10,18 +10,18 @@ them, or a force in place of a balance.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects import Gravity
 from fourbar.errors import FourBarError
-from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import FORCE_NAMES, PIN_FORCES, VECTORS, Array
+from fourbar.linkage import BAR_NAMES, MOVING_BARS
+from fourbar.quantities import FORCE_NAMES, PIN_FORCES, UNITS, VECTORS, Array
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -52,6 +52,12 @@ _LATE = {
     "one step early: numbers of the position after": -1,
 }
 """Mistakes in time, and by how many positions the numbers are late."""
+
+
+_BETWEEN = {
+    "half a step late: numbers between a position and the one before": 1,
+    "half a step early: numbers between a position and the one after": -1,
+}
 
 
 class _BarWrenches(NamedTuple):
@@ -230,6 +236,7 @@ class _Calculation:
         yield from self._equal_forces()
         yield from self._velocity_terms()
         yield from self._accelerations_of_centres()
+        yield from self._inertias()
         yield from self._weights()
         yield from self._arms_of_loads()
 
@@ -259,6 +266,10 @@ class _Calculation:
         for bar in (1, *MOVING_BARS):
             text = f"forces are in the frame of bar {bar}, not in world axes"
             yield _state(text, self._turned(dict.fromkeys(FORCE_BETWEEN, bar)))
+        for name in FORCE_BETWEEN:
+            for bar in (1, *MOVING_BARS):
+                text = f"{name} is in the frame of bar {bar}, not in world axes"
+                yield _state(text, self._turned({name: bar}), whole=False)
 
     def _turned(self, frames: dict[str, int]) -> MistakenNumbers:
         theta: dict[int, Array] = {
@@ -348,6 +359,19 @@ class _Calculation:
         needed = wrenches.changed(bar, body.mass * a, body.moment_of_inertia * alpha)
         return needed, {f"a_G{bar}": getattr(self.right, f"a_G{bar}") + a}
 
+    def _inertias(self) -> Iterator[Mistake]:
+        """Take a moment of inertia about G for that about the bar's first pin."""
+        every = self.wrenches
+        text = "inertia about G used as the inertia about the pin"
+        for bar in MOVING_BARS:
+            body = self.judge.scene.linkage.bar(bar)
+            alpha = np.asarray(getattr(self.right, f"alpha_{bar}"))
+            less = -body.mass * body.mass_centre[0] ** 2 * alpha
+            every = every.changed(bar, q=less)
+            alone = self.wrenches.changed(bar, q=less)
+            yield _state(f"{BAR_NAMES[bar]}: {text}", alone.solve())
+        yield _state(f"every bar: {text}", every.solve())
+
     def _weights(self) -> Iterator[Mistake]:
         """Leave out the weight of one bar."""
         for effect in self.judge.scene.effects:
@@ -411,6 +435,7 @@ def find_miscalculated(judge: Judge) -> Iterator[Mistake]:
     if judge.stage == "force":
         yield from _find_impulses(judge)
     yield from _find_late(judge)
+    yield from _find_between(judge)
     yield from _find_other_branch(judge)
 
 
@@ -508,6 +533,48 @@ def _find_late(judge: Judge) -> Iterator[Mistake]:
                 return moved
 
             yield Mistake(text + what, predict)
+
+
+def _find_between(judge: Judge) -> Iterator[Mistake]:
+    """Give each position the numbers half a step before it, or half a step after."""
+    at = judge.at
+    if len(at.angle) < ENOUGH_POSITIONS + 1:
+        return
+    for text, step in _BETWEEN.items():
+        moved: dict[str, Any] = {
+            name: _shift_by_half(values, step)
+            for name in ("angle", "speed", "acceleration", "stroke", "stroke_speed")
+            if (values := getattr(at, name, None)) is not None and np.ndim(values) == 1
+        }
+        try:
+            between = solve(
+                judge.scene,
+                judge.stage,
+                at=at._replace(**moved, remainder=None, lost=None),
+            )
+        except FourBarError:
+            continue
+        for what, names in (("", UNITS), (" (forces alone)", FORCE_NAMES)):
+
+            def predict(
+                quantity: str,
+                right: Solution,
+                between: Solution = between,
+                names: Collection[str] = names,
+            ) -> Array | None:
+                if quantity == right.commanded or quantity not in names:
+                    return None
+                values: Array | None = getattr(between, quantity, None)
+                return values
+
+            yield Mistake(text + what, predict)
+
+
+def _shift_by_half(values: Array, step: int) -> Array:
+    """Return numbers half a step before (step 1) or after (-1) each position."""
+    ends = 2.0 * values[:1] - values[1:2], 2.0 * values[-1:] - values[-2:-1]
+    extended = np.concatenate((ends[0], values, ends[1]))
+    return np.asarray(0.5 * (values + extended[1 - step : len(extended) - 1 - step]))
 
 
 def _find_other_branch(judge: Judge) -> Iterator[Mistake]:

@@ -63,10 +63,17 @@ def find_fitted(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
     """List every mistake whose number the table gives, the simplest first."""
     yield from _find_ratios(judge, differing)
     yield from _try_exchanged(differing)
-    yield from _try_order(judge)
+    moved = all(
+        key in differing or not np.ptp(judge.ours(key)[judge.where(key)], axis=0).any()
+        for key in judge.table.values
+        if judge.where(key).any()
+    )
+    if moved:  # another order or zero leaves nothing right that varies
+        yield from _try_order(judge)
     if any(name_quantity(key) in FORCE_NAMES for key in differing):
         yield from _try_factors(judge, differing)
-    yield from _try_offset(judge)
+    if moved:
+        yield from _try_offset(judge)
 
 
 def _find_ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:

@@ -118,6 +118,7 @@ class Judge:
         self.right = solve(scene, self.stage, at=self.at)
         self.ok = self.right.status_code == OK
         self._scales: dict[str, Scale] = {}
+        self._exact: dict[str, Array] = {}
         for key in table.values:
             if getattr(self.right, name_quantity(key)) is None:
                 if self.at.speed is None:
@@ -157,6 +158,15 @@ class Judge:
             )
         return self._scales[key]
 
+    def _find_exact(self, key: str) -> Array:
+        """Compute the error that round-off allows a key at each position, (n,)."""
+        if key not in self._exact:
+            scale, linkage = self.scale(key), self.scene.linkage
+            condition = find_condition(name_quantity(key), linkage, self.right)
+            allowed = scale.factor * EQUIVALENCE.allowed(condition)
+            self._exact[key] = np.where(scale.size == 0.0, 0.0, allowed)
+        return self._exact[key]
+
     def size(self, key: str) -> Array:
         """Compute what the error of a key is divided by at each position, (n,)."""
         return self.scale(key).size
@@ -175,8 +185,7 @@ class Judge:
         `ours` is taken for the right numbers.
         """
         quantity = name_quantity(key)
-        size, factor = self.size(key), self.scale(key).factor
-        scale = replace_zero_size(size)  # quantities whose terms are all 0
+        scale = replace_zero_size(self.size(key))  # quantities whose terms are all 0
         theirs = self.table.values[key]
         theirs = np.where(
             np.isnan(theirs),
@@ -184,7 +193,6 @@ class Judge:
             theirs,
         )  # a component that their table does not have
         apart = compute_difference(quantity, ours, theirs)
-        condition = find_condition(quantity, self.scene.linkage, self.right)
         # the number a mistake would have printed is rounded at its own size, however
         # much larger
         unchanged = self.ours(key)
@@ -198,7 +206,7 @@ class Judge:
             for other in self.near
         ]
         spread = divide(np.fmax.reduce(moves), scale) if moves else 0.0
-        exact = np.where(size == 0.0, 0.0, factor * EQUIVALENCE.allowed(condition))
+        exact = self._find_exact(key)
         allowed = (exact + spread) * larger + divide(self.table.rounding[key], scale)
         return (
             divide(apart, scale),

@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects import Gravity, Load
+from fourbar.effects import Effect, Gravity
 from fourbar.errors import FourBarError
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import Bar
@@ -27,7 +27,6 @@ from fourbar_validation.scenes.bars import list_moving, replace_bars
 RPM = np.pi / 30.0
 """rad/s of one rev/min."""
 _GRAVITY_TURNED = {
-    "reversed": np.pi,
     "turned by 90 deg": np.pi / 2.0,
     "turned by -90 deg": -np.pi / 2.0,
 }
@@ -40,8 +39,8 @@ brings every row that differs nearer.
 """
 
 
-def list_hypotheses(scene: Scene, command: Command) -> Iterator[Mistake]:
-    """List every mistake that can be made on this scene, the simplest first."""
+def list_column_mistakes() -> Iterator[Mistake]:
+    """List the mistakes that a column can have by itself."""
     for text, change, applies in _COLUMN_MISTAKES:
         yield Mistake(text, partial(_change_column, change, applies), whole=False)
     for bar in (2, 3):
@@ -50,7 +49,13 @@ def list_hypotheses(scene: Scene, command: Command) -> Iterator[Mistake]:
             partial(_subtract_angle_of, bar),
             whole=False,
         )
-    yield from _scale_inertial(scene, command)
+
+
+def list_hypotheses(scene: Scene, command: Command) -> Iterator[Mistake]:
+    """List every mistake that can be made on this scene, the simplest first."""
+    if command.speed is not None:
+        yield from _scale_inertial(scene, command)
+        yield from _scale_actions(scene, command)
     for text, changed, other_command in _list_other_problems(scene, command):
         try:
             wrong = solve(
@@ -104,8 +109,6 @@ def _scale_inertial(scene: Scene, command: Command) -> Iterator[Mistake]:
 
     Forces and torque are linear in each.
     """
-    if command.speed is None:
-        return
     bare = replace(scene, loads=(), effects=())
     massless = {
         name: replace(bar.with_mass(0.0), inertia=bar.moment_of_inertia)
@@ -150,6 +153,85 @@ def _scale_inertial(scene: Scene, command: Command) -> Iterator[Mistake]:
         scaled(-1.0, -1.0),
     )
     yield Mistake("I alpha with the wrong sign", scaled(1.0, -1.0))
+
+
+_ACTIONS = {
+    "gravity": "gravity",
+    "springs": "the springs",
+    "torsion": "the torsion springs",
+    "viscous": "the viscous damping",
+    "friction": "the dry friction",
+    "pin_friction": "the friction of the pin load",
+    "flywheel": "the flywheel",
+}
+"""Names of the effects of the package, by their keys."""
+_PARTS = {
+    "springs": "springs",
+    "torsion": "springs",
+    "viscous": "coefficients",
+    "friction": "torques",
+    "pin_friction": "pins",
+}
+"""Field with the parts of an effect, by its key."""
+_SCALED = {0.0: "missing", 2.0: "doubled", -1.0: "reversed"}
+"""Factors on what acts besides inertia, and what was done to it."""
+
+
+def _scale_actions(scene: Scene, command: Command) -> Iterator[Mistake]:
+    """Leave out, double or reverse each load and effect, and each part of one.
+
+    Forces and torque are linear in each but the friction of the pin load.
+    """
+    for name, without in _list_without(scene):
+        try:
+            left = solve(without, "force", at=command)
+        except FourBarError:  # nothing can drive or hold the scene without it
+            continue
+        verb = "are" if name.endswith("s") else "is"
+        for factor, done in _SCALED.items():
+            yield Mistake(f"{name} {verb} {done}", partial(_scale_from, left, factor))
+
+
+def _scale_from(
+    without: Solution,
+    factor: float,
+    quantity: str,
+    right: Solution,
+) -> Array | None:
+    values = getattr(right, quantity, None)
+    if quantity not in FORCE_NAMES or values is None:
+        return None
+    left = getattr(without, quantity)
+    return np.asarray(left + factor * (values - left))
+
+
+def _list_without(scene: Scene) -> Iterator[tuple[str, Scene]]:
+    """List what acts besides inertia, each with the scene without it."""
+    if scene.loads:
+        yield "the loads", replace(scene, loads=())
+    for number, load in enumerate(scene.loads, 1):
+        loads = tuple(one for one in scene.loads if one is not load)
+        yield f"load {number} (bar {load.bar})", replace(scene, loads=loads)
+    for effect in scene.effects:
+        name = _ACTIONS.get(effect.key, f"effect {effect.key}")
+        others = tuple(one for one in scene.effects if one is not effect)
+        yield name, replace(scene, effects=others)
+        for text, changed in _list_without_part(effect, name):
+            yield text, replace(scene, effects=(*others, changed))
+
+
+def _list_without_part(effect: Any, name: str) -> Iterator[tuple[str, Effect]]:
+    """List the parts of an effect, each with the effect without it."""
+    field = _PARTS.get(effect.key, "")
+    parts = getattr(effect, field, ())
+    for i, part in enumerate(parts):
+        if len(parts) > 1:
+            kept = {field: (*parts[:i], *parts[i + 1 :])}
+            yield f"part {i + 1} of {name}", replace(effect, **kept)
+        if getattr(part, "preload", 0.0):
+            relaxed = replace(part, preload=0.0)
+            kept = {field: (*parts[:i], relaxed, *parts[i + 1 :])}
+            yield f"the preload of spring {i + 1}", replace(effect, **kept)
 
 
 def _list_other_problems(
@@ -213,41 +295,16 @@ def _change_gravity(scene: Scene) -> Iterator[tuple[str, Scene]]:
             replace(scene, effects=(*others, Gravity())),
         )
         return
-    yield "gravity is missing", replace(scene, effects=others)
     for text, angle in _GRAVITY_TURNED.items():
         turned = (replace(effect, angle=effect.angle + angle) for effect in gravity)
         yield f"gravity is {text}", replace(scene, effects=(*others, *turned))
 
 
 def _change_loads(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    def without(i: int) -> Scene:
-        return replace(scene, loads=scene.loads[:i] + scene.loads[i + 1 :])
-
-    def reversing(i: int) -> Scene:
-        return replace(
-            scene,
-            loads=(
-                *scene.loads[:i],
-                _reverse_load(scene.loads[i]),
-                *scene.loads[i + 1 :],
-            ),
-        )
-
-    names = [
-        f"load {number} (bar {load.bar})" for number, load in enumerate(scene.loads, 1)
-    ]
-    if names:
-        yield "the loads are missing", replace(scene, loads=())
-        yield from ((f"{name} is missing", without(i)) for i, name in enumerate(names))
-    if len(names) > 1:
-        yield (
-            "the loads are reversed",
-            replace(scene, loads=tuple(map(_reverse_load, scene.loads))),
-        )
-    yield from ((f"{name} is reversed", reversing(i)) for i, name in enumerate(names))
-    for i, (name, load) in enumerate(zip(names, scene.loads, strict=True)):
+    for i, load in enumerate(scene.loads):
         if load.force is None or load.arm is not None:
             continue
+        name = f"load {i + 1} (bar {load.bar})"
         other = "bar"
         how = "turns with the bar"
         if load.frame == "bar":
@@ -272,14 +329,6 @@ def _change_bars(scene: Scene) -> Iterator[tuple[str, Scene]]:
                 changed_bars[name] = changed
         if len(changed_bars) > 1:
             yield f"every bar: {text}", replace_bars(scene, **changed_bars)
-
-
-def _reverse_load(load: Load) -> Load:
-    force = None
-    if load.force is not None:
-        size, angle = load.force
-        force = (-size, angle)
-    return replace(load, force=force, moment=-load.moment)
 
 
 def _measure_from_other_pin(bar: Bar) -> Bar | None:
@@ -357,6 +406,7 @@ _COLUMN_MISTAKES: tuple[
         _is_angle,
     ),
     ("x and y exchanged", lambda values: values[:, ::-1], VECTORS.__contains__),
+    ("y reversed", lambda values: values * (1.0, -1.0), VECTORS.__contains__),
     (
         (
             "measured from the other end of the bar (half a turn off): theta_4 or"
@@ -368,6 +418,11 @@ _COLUMN_MISTAKES: tuple[
 )
 """Mistakes in a column: name, change of the values, and quantities. The quantities are
 those whose columns can have it.
+"""
+
+
+ENOUGH_EXPLAINED = 0.9
+"""Part of the quantities that differ which a mistake of the calculation must explain.
 """
 
 
@@ -392,30 +447,77 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
     """Find the mistakes under which quantities that differ agree.
 
     The most complete come first, then those that come near. A mistake that breaks a
-    quantity which agreed as it was is none. One of the calculation that explains no
-    quantity must bring most that differ nearer: of several only the nearest is named,
-    for they exclude each other.
+    quantity which agreed as it was is none. One of the calculation must explain nine
+    tenths of the quantities that differ, or bring most of them nearer: of several only
+    the nearest is named, for they exclude each other.
     """
     explanations: list[Explanation] = []
     near: list[tuple[float, Explanation]] = []
-    for mistake in chain(
-        find_miscalculated(judge),
-        list_hypotheses(judge.scene, judge.at),
-        find_fitted(judge, differing),
-    ):
-        weighed = _weigh(judge, mistake, differing)
-        if weighed is None:
-            continue
-        if weighed.explained or (weighed.nearer and not mistake.whole):
-            explanations.append(weighed.explanation(mistake, differing))
-        elif weighed.is_near(differing):
+    for find in _SOURCES:
+        for mistake in find(judge, differing):
+            weighed = _weigh(judge, mistake, differing)
+            if weighed is None:
+                continue
             explanation = weighed.explanation(mistake, differing)
-            near.append((weighed.remaining, explanation))
+            if len(weighed.explained) >= ENOUGH_EXPLAINED * len(differing) or (
+                not mistake.whole and (weighed.explained or weighed.nearer)
+            ):
+                explanations.append(explanation)
+            elif weighed.is_near(differing):
+                near.append((weighed.remaining, explanation))
+        if any(explanation.complete for explanation in explanations):
+            break
     if near:
         _, nearest = min(near, key=lambda pair: pair[0])
         explanations.append(nearest)
     explanations.sort(key=lambda e: (-len(e.quantities), -len(e.nearer)))
     return explanations[:MOST_EXPLANATIONS]
+
+
+def explain_all(judge: Judge, differing: list[str]) -> list[Explanation]:
+    """Find the mistakes under which every quantity that differs agrees.
+
+    Most fall at the first number that they leave wrong.
+    """
+    labels = tuple(map(judge.table.label, differing))
+    explanations: list[Explanation] = []
+    for find in _SOURCES:
+        explanations += [
+            Explanation(mistake.text, labels, True, mistake.whole)
+            for mistake in find(judge, differing)
+            if _explains_all(judge, mistake, differing)
+        ]
+        if explanations:
+            break
+    return explanations[:MOST_EXPLANATIONS]
+
+
+def _explains_all(judge: Judge, mistake: Mistake, differing: list[str]) -> bool:
+    numbers = 0
+    for key in dict.fromkeys((*differing, *judge.table.values)):
+        ours = judge.ours(key)
+        predicted = mistake.prediction(key, judge.right)
+        if predicted is not None and np.array_equal(predicted, ours, equal_nan=True):
+            predicted = None
+        differs = key in differing
+        if predicted is not None and (differs or mistake.whole):
+            if not judge.explained(key, predicted, mistake.times, mistake.left):
+                return False
+        elif differs:
+            return False
+        numbers += differs * int(judge.where(key).sum())
+    return not mistake.fitted or numbers >= ENOUGH_NUMBERS
+
+
+_SOURCES: tuple[Callable[[Judge, list[str]], Iterator[Mistake]], ...] = (
+    lambda judge, differing: list_column_mistakes(),
+    lambda judge, differing: chain(
+        find_miscalculated(judge), list_hypotheses(judge.scene, judge.at)
+    ),
+    find_fitted,
+)
+"""Sources of mistakes, the cheapest first: one is asked if none before it explains all.
+"""
 
 
 class _Weighed(NamedTuple):

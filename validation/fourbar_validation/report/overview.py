@@ -41,6 +41,10 @@ ENGINE_NAMES = {
     "ball-arithmetic": "320-bit balls",
 }
 """Names of engines as people write them, with the place of the version."""
+INDEPENDENT_ERROR = 1e-4
+"""Largest error that an engine may declare which counts as an independent one: at 1e-2
+a pin force without an inertia may agree.
+"""
 _MOST_KINDS = 500
 """Causes that are told apart; further ones are one."""
 OTHER_CAUSES = "other causes"
@@ -103,7 +107,7 @@ class OverviewLine:
     compared: int = 0
     failed: int = 0
     answered: bool = False
-    """True if any number of it was compared. The reason why none was is not in the
+    """True if any number of it was compared. The reason why none was stands beneath the
     table.
     """
     reasons: AlikeTexts = field(default_factory=AlikeTexts)
@@ -174,6 +178,8 @@ class Overview:
         """Rules that are weaker than in that run."""
         self.baseline = ""
         """That run in words."""
+        self.declared: dict[str, float] = {}
+        """Error that each engine declares, relative to the scale."""
         self._lines: dict[str, OverviewLine] = {}
         self._kinds: dict[tuple[str, tuple[str, ...]], _SimilarScenes] = {}
 
@@ -212,7 +218,10 @@ class Overview:
             line.columns[group].add(row, float(find_used(row.error, row.allowed)))
 
     def _add_agreement(self, rows: Sequence[Row]) -> None:
-        """Count a scene of which two engines confirm the torque and all pin forces."""
+        """Count a scene of which two engines confirm the torque and all pin forces.
+
+        An engine that declares more than INDEPENDENT_ERROR confirms nothing.
+        """
         asked: dict[str, dict[str, bool]] = {}
         for row in rows:
             if row.quantity in DRIVES:
@@ -222,7 +231,11 @@ class Overview:
             if row.engine != FORMULAS and name in ("torque", *PIN_FORCES):
                 asked.setdefault(row.engine, {})[name] = row.verdict in HOLDING_VERDICTS
         whole = len(PIN_FORCES) + 1
-        agreeing = [all(of.values()) for of in asked.values() if len(of) == whole]
+        agreeing = [
+            all(of.values())
+            for engine, of in asked.items()
+            if len(of) == whole and self.declared.get(engine, 0.0) <= INDEPENDENT_ERROR
+        ]
         if asked:
             self.with_forces += 1
             self.checked_twice += sum(agreeing) >= 2
@@ -232,7 +245,9 @@ class Overview:
         failing: dict[str, list[Row]] = {}
         for row in scene.rows:
             if row.failed:
-                failing.setdefault(row.engine, []).append(row)
+                ours = row.quantity.removesuffix("_inertia") in scene.against
+                engine = FORMULAS if ours else row.engine
+                failing.setdefault(engine, []).append(row)
         for engine, rows in failing.items():
             # without an answer the rest is a consequence
             whole = [row for row in rows if row.quantity == "all"]
@@ -297,9 +312,12 @@ class Overview:
             else:
                 line.name = pattern.format(version).replace(" ,", ",").strip()
         order = list(ENGINE_NAMES)
-        lines = [line for line in self._lines.values() if line.answered]
         return sorted(
-            lines,
+            (
+                line
+                for line in self._lines.values()
+                if line.answered or line.failed or line.reasons
+            ),
             key=lambda line: (
                 order.index(line.engine) if line.engine in order else len(order),
                 line.name,
@@ -387,18 +405,27 @@ def _name_causes(
         ]
     if known := scene.causes.get(engine):
         return [f"{text}, all else agrees" for text in known]
+    if engine == FORMULAS and scene.against:
+        engines = sorted({name for names in scene.against.values() for name in names})
+        return [
+            f"{', '.join(engines)} agree with each other, and differ from it in"
+            f" {', '.join([*scene.against][:4])}"
+        ]
     if engine == FORMULAS:
         names = sorted({row.quantity for row in rows})
         return [
             f"{', '.join(names[:3])} {'does' if len(names) == 1 else 'do'} not hold"
         ]
-    groups = {_find_group(row) or row.quantity for row in rows}
+    groups = set(map(_name_group, rows))
     missing = sorted({row.quantity for row in rows if math.isnan(row.error)})
     if missing and len(missing) == len({row.quantity for row in rows}):
         return [f"no number for {', '.join(missing[:4])}"]
     differ = [group for group in OVERVIEW_GROUPS if group in groups]
     differ += sorted(groups - set(OVERVIEW_GROUPS))
-    agree = [group for group in OVERVIEW_GROUPS if group not in groups]
+    answered = {
+        _name_group(row) for row in scene.rows if row.engine == engine and row.passed
+    }
+    agree = [group for group in OVERVIEW_GROUPS if group in answered - groups]
     words = _join_groups(differ[:3], "differ")
     if agree:
         words += f", {_join_groups(agree, 'agree')}"
@@ -409,7 +436,18 @@ def _name_causes(
             f"{words}: from digit {digits} on, as where numbers are single "
             "precision or an iteration ends early"
         ]
+    if engine not in scene.causes:
+        return [f"{words}; mistakes are not looked for there"]
     return [f"{words}; no known mistake explains it"]
+
+
+def _name_group(row: Row) -> str:
+    """Name what an engine's row is about, where it is said what differs."""
+    if row.quantity.removesuffix("_inertia") != row.quantity:
+        return f"inertial part of the {row.quantity.removesuffix('_inertia')}"
+    if row.quantity == "closure":  # an identity of the engine's own angles
+        return row.quantity
+    return _find_group(row) or row.quantity
 
 
 def _join_groups(groups: Sequence[str], verb: str) -> str:

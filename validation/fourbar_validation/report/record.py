@@ -47,7 +47,13 @@ class Record:
     output: dict[str, str] = field(default_factory=dict)
     """engine: what it printed."""
     causes: dict[str, list[str]] = field(default_factory=dict)
-    """engine: known mistakes that explain all that differs, the simplest first."""
+    """engine: known mistakes that explain all that differs, the simplest first. An
+    engine for which none could be looked for is absent.
+    """
+    against: dict[str, list[str]] = field(default_factory=dict)
+    """Quantities in which engines agree with each other and differ from the formulas,
+    with the names of these engines.
+    """
     figure: str | None = None
     """SVG of the answers, or None where there is nothing to draw."""
     thumbnail: str | None = None
@@ -125,4 +131,5 @@ class Record:
             evidence={**self.evidence, **further.evidence},
             output={**self.output, **further.output},
             causes={**self.causes, **further.causes},
+            against={**self.against, **further.against},
         )

@@ -4,29 +4,89 @@ Rows are on the scene's motion, on the linkage, and on the inertial part of the 
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from fourbar.linkage import copy_with
 from fourbar.mjcf.document import LIGHT_BAR_RATIO
-from fourbar.quantities import COUPLE, FORCE_NAMES
+from fourbar.quantities import COUPLE, FORCE_NAMES, UNITS
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
 from fourbar_validation.compare.scales import has_angles
+from fourbar_validation.compare.tolerance import compute_difference
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.registry import Engine, make_demands
 from fourbar_validation.run.causes import find_causes
 from fourbar_validation.run.question import Question
 
+EXACT = "exact"
+"""Setting of an engine whose errors are round-off."""
+
 
 def compare_answers(question: Question) -> Iterator[Row]:
     """Compare every engine's answer with the formulas."""
-    for engine in question.engines:
-        yield from question.attempt(
+    rows = [
+        row
+        for engine in question.engines
+        for row in question.attempt(
             partial(_answer_of_engine, question, engine), engine.name
         )
+    ]
+    question.against = find_agreement(question, rows)
+    yield from rows
+
+
+def find_agreement(question: Question, rows: Sequence[Row]) -> dict[str, list[str]]:
+    """Find the quantities in which engines agree with each other, and not with us.
+
+    They are two at least, and more than those that agree with us. The engines of each
+    quantity are returned; two versions of one engine count once.
+    """
+    against: dict[str, list[str]] = {}
+    versions = {
+        engine.name: getattr(engine, "stated_name", "") or engine.name
+        for engine in question.engines
+    }
+    exact = [row for row in rows if row.setting == EXACT and row.quantity in UNITS]
+    for quantity in dict.fromkeys(row.quantity for row in exact if row.failed):
+        of_quantity = [row for row in exact if row.quantity == quantity]
+        right = {versions[row.engine] for row in of_quantity if row.passed}
+        failing = [row for row in of_quantity if row.failed]
+        for row in failing:
+            alike = [
+                one.engine for one in failing if _agree(question, row, one, quantity)
+            ]
+            names = {versions[name] for name in alike}
+            if len(names) > max(1, len(right), len(against.get(quantity, ()))):
+                against[quantity] = alike
+    return against
+
+
+def _agree(question: Question, row: Row, other: Row, quantity: str) -> bool:
+    """Return whether two engines that differ from us have one number.
+
+    They are held against each other at the position where the first one is worst, by
+    the larger error that either is allowed.
+    """
+    values, others = (
+        question.answered[one.engine][0].quantities.get(quantity)
+        for one in (row, other)
+    )
+    ours = getattr(question.solution, quantity)
+    if not math.isfinite(row.error) or ours is None or values is None or others is None:
+        return False
+    if not len(values) == len(others) == len(ours):
+        return False
+    position = np.abs(question.at.angle - row.theta_2).argmin()
+    at = slice(position, position + 1)
+    apart = compute_difference(quantity, values[at], others[at])
+    from_us = compute_difference(quantity, ours[at], values[at])
+    allowed = 2.0 * max(row.allowed, other.allowed)
+    return bool(apart[0] * row.error <= allowed * from_us[0])
 
 
 def _answer_of_engine(question: Question, engine: Engine) -> Iterator[Row]:
@@ -35,10 +95,22 @@ def _answer_of_engine(question: Question, engine: Engine) -> Iterator[Row]:
         question.leave_out(answer.engine, answer.refusal)
     rows = compare_answer(question, engine, answer)
     if any(row.failed for row in rows):
-        question.causes[engine.name] = find_causes(question, answer, engine.tolerance)
+        _note_causes(question, question, engine, answer)
     yield from rows
     if question.order and engine.order and answer.refusal is None:
         answer.evidence |= _observe_order_of_engine(question, engine)
+
+
+def _note_causes(
+    question: Question,
+    asked: Question,
+    engine: Engine,
+    answer: Answer,
+) -> None:
+    """Look for the mistakes behind an answer; nothing is noted if none can be."""
+    causes = find_causes(asked, answer, engine.tolerance)
+    if causes is not None:
+        question.causes[engine.name] = causes
 
 
 def compare_answer(
@@ -145,7 +217,7 @@ def _check_inertia(
     ]
     rows = [row for row in rows if row.quantity != "undecided"]
     if any(row.failed for row in rows) and engine.name not in question.causes:
-        question.causes[engine.name] = find_causes(bare, answer, engine.tolerance)
+        _note_causes(question, bare, engine, answer)
     if rows:  # a failure besides the torque, or in place of it, is not left out
         worst = max(rows, key=lambda row: VERDICTS.index(row.verdict))
         if worst.quantity in (drive, "all"):

@@ -5,12 +5,12 @@ import numpy as np
 from fourbar.errors import FourBarError
 from fourbar.quantities import OK, UNITS, Array
 from fourbar_validation.check.judge import Judge
-from fourbar_validation.check.mistakes import explain
+from fourbar_validation.check.mistakes import explain_all
 from fourbar_validation.check.rows import RowCommands
 from fourbar_validation.check.theirs import NOT_JUDGED, TheirTable, Unit
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.pins import state_from_pins
-from fourbar_validation.compare.tolerance import ErrorBound, magnitude
+from fourbar_validation.compare.tolerance import ErrorBound, Mask, magnitude
 from fourbar_validation.run.question import Question
 
 MOST_POSITIONS_SEARCHED = 400
@@ -24,47 +24,51 @@ def find_causes(
     question: Question,
     answer: Answer,
     tolerance: ErrorBound,
-) -> list[str]:
+) -> list[str] | None:
     """List the mistakes that explain all that differs in an answer, the simplest first.
 
-    The scene is stated as an engine is told it, with every place from the bar's first
-    pin.
+    None if none could be looked for. The scene is stated as an engine is told it, with
+    every place from the bar's first pin.
     """
     at = answer.at
-    if at is None or at.commanded != "theta_2" or answer.assembled is None:
-        return []
+    if at is None or answer.assembled is None:
+        return None
     try:
-        table = make_answer_table(answer, tolerance)
+        regular = question.solution.status_code == OK
+        table = make_answer_table(answer, tolerance, regular)
         rows = RowCommands(at.part(slice(0, len(table.places))))
         judge = Judge(state_from_pins(question.scene), table, rows=rows)
     except FourBarError:
-        return []
+        return None
     differing = [key for key in judge.table.values if differs(judge, key)]
     if not differing:
         return []
     with np.errstate(all="ignore"):
-        explanations = explain(judge, differing)
-    causes = []
-    for explanation in explanations:
-        if explanation.complete:
-            if explanation.whole:
-                of_columns = ""
-            else:
-                of_columns = ", ".join(explanation.quantities)
-            causes.append(f"{explanation.text}: {of_columns}".removesuffix(": "))
-    return causes
+        explanations = explain_all(judge, differing)
+    return [
+        explanation.text
+        if explanation.whole
+        else f"{explanation.text}: {', '.join(explanation.quantities)}"
+        for explanation in explanations
+    ]
 
 
-def make_answer_table(answer: Answer, tolerance: ErrorBound) -> TheirTable:
+def make_answer_table(
+    answer: Answer,
+    tolerance: ErrorBound,
+    regular: Mask,
+) -> TheirTable:
     """Return a table of an engine's numbers, as if they had been read from a file.
 
     Numbers are taken to be rounded to what the engine is held to, so that a mistake
     need not explain more of it.
+
+    `regular`: positions that are looked at; beside a change point numbers are anything.
     """
     assert answer.at is not None and answer.assembled is not None
     rows = slice(MOST_POSITIONS_SEARCHED)
     angle = np.asarray(answer.at.angle[rows], dtype=float)
-    blank = ~answer.assembled[rows]
+    blank = ~(answer.assembled & regular)[rows]
     if not tolerance.conditioned:
         slack = tolerance.factor
     else:
@@ -72,7 +76,7 @@ def make_answer_table(answer: Answer, tolerance: ErrorBound) -> TheirTable:
     values: dict[str, Array] = {}
     rounding: dict[str, Array] = {}
     for name, numbers in answer.quantities.items():
-        if name not in UNITS or name in NOT_JUDGED or name == "theta_2":
+        if name not in UNITS or name in NOT_JUDGED or name == answer.at.commanded:
             continue
         kept = np.array(numbers[rows], dtype=float)
         kept[blank] = np.nan

@@ -221,6 +221,9 @@ class Plan:
         summary = Summary()
         summary.tolerances = list(dict.fromkeys(tolerances))
         summary.missing = self.missing
+        summary.overview.declared = {
+            engine.name: engine.tolerance.factor for engine in self.engines
+        }
         summary.stated = {
             engine.name: engine.version
             for engine in self.engines

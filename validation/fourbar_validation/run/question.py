@@ -67,6 +67,8 @@ class Question:
     """Comparisons left out, each with the reason."""
     causes: dict[str, list[str]] = field(default_factory=dict)
     """Known mistakes that explain what differs, by engine."""
+    against: dict[str, list[str]] = field(default_factory=dict)
+    """Quantities in which engines agree with each other against the formulas."""
     timings: list[Timing] = field(default_factory=list)
     reversals: list[Reversal] = field(default_factory=list)
     """Positions where dry friction reverses and the pin forces jump."""
@@ -219,6 +221,7 @@ class Question:
             self.left_out,
             output=self.output,
             causes=self.causes,
+            against=self.against,
             solution=self.solution,
             answers=[answer for answer, _ in answered],
             reversals=self.reversals,
