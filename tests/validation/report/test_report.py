@@ -522,6 +522,27 @@ def test_failures_are_one_line_an_engine_and_cause(
     assert "fails scene" not in printed, "rows stay in the files"
 
 
+def test_a_red_figure_draws_the_error_and_the_limit_of_the_guest() -> None:
+    """A reversed force lies on the curve of its size."""
+    scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))
+    solution = fourbar.solve(scene, "force")
+    answer = Answer(
+        "mine",
+        "exact",
+        solution.at,
+        np.ones(len(solution), dtype=bool),
+        {"torque": solution.torque, "F43": -solution.F43},
+    )
+    row = Row("s", "mine", "exact", "F43", 2.0, 1e-6, FAILS, "", 1.0, 1.0)
+    largest = int(np.argmax(np.max(np.abs(solution.F43), axis=0)))
+    record = Record("s", scene, rows=[row], solution=solution, answers=[answer])
+    drawn = draw_scene_figure(record) or ""
+    assert f"F43 {'xy'[largest]} (N)" in drawn and "allowed to mine" in drawn
+    held = replace(record, rows=[replace(row, verdict=AGREES, allowed=1e-14)])
+    drawn = draw_scene_figure(held) or ""
+    assert "F43 " not in drawn and "allowed to mine" not in drawn
+
+
 def test_what_no_known_mistake_explains_is_told_by_what_differs_and_what_agrees() -> (
     None
 ):

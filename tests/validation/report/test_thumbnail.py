@@ -1,6 +1,7 @@
 """Small pictures of a scene: marks stand where something is judged."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 
@@ -43,3 +44,42 @@ def test_no_mark_stands_where_nothing_is_judged() -> None:
     )
     everywhere = count_marks(Record("all", plain, solution=whole, answers=[answer]))
     assert of_the_kite == everywhere - 1
+
+
+def test_marks_stand_at_the_positions_of_their_engine() -> None:
+    """An engine that answers the first half of a turn has no mark beyond its middle."""
+    plain = fourbar.load(MODELS / "crank_rocker.toml")
+    whole = fourbar.solve(plain, "force")
+    at = command(plain)
+    half = at.part(slice(0, len(at.angle) // 2 + 1))
+    torque = whole.torque[: len(half.angle)]
+    answers = [
+        Answer("free-body", "exact", at, quantities={"torque": whole.torque}),
+        Answer("mujoco-simulated", "RK4", half, quantities={"torque": torque}),
+    ]
+    places = []
+    for answer in answers:
+        record = Record("half", plain, solution=whole, answers=[answer])
+        drawn = draw_thumbnail(record) or ""
+        marks = re.findall(r'mark" cx="([\d.]+)" cy="([\d.]+)"', drawn)
+        places.append({(float(x), float(y)) for x, y in marks})
+        assert ">torque on bar 2</text>" in drawn
+    (whole_turn, half_turn) = places
+    x = sorted(x for x, _ in whole_turn)
+    middle = 0.5 * (x[0] + x[-1] + (x[1] - x[0]))
+    assert max(x for x, _ in half_turn) <= middle < max(x)
+
+
+def test_where_a_curve_is_cut_a_bar_says_so() -> None:
+    plain = fourbar.load(MODELS / "crank_rocker.toml")
+    whole = fourbar.solve(plain, "force")
+    pole = whole.torque.copy()
+    pole[100:102] *= 1e3
+    bars = [
+        len(re.findall('class="cut"', draw_thumbnail(record) or ""))
+        for record in (
+            Record("as it is", plain, solution=whole),
+            Record("pole", plain, solution=replace(whole, torque=pole)),
+        )
+    ]
+    assert bars == [0, 1]

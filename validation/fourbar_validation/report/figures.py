@@ -17,7 +17,7 @@ from fourbar.show.plot.view import View
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.reversals import Reversal, break_curve
+from fourbar_validation.compare.reversals import break_curve
 from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
@@ -39,6 +39,7 @@ from fourbar_validation.report.svg import (
     set_frame,
     write_svg,
 )
+from fourbar_validation.report.thumbnail import choose_base
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -171,14 +172,15 @@ def _draw_quantity(
         squeeze=False,
     )
     axes = list(panels[:, 0])
-    _draw_values(axes[0], quantity, solution, [*exact, *simulated], record.reversals)
+    _draw_values(axes[0], quantity, solution, [*exact, *simulated], record)
     for below, group in zip(axes[1:], groups, strict=True):
         _draw_errors(below, quantity, record, solution, group)
         below.set_ylabel(
             "error / scale" if quantity in FORCE_NAMES else "error (rad)",
             fontsize=8.5,
         )
-    axes[-1].set_xlabel("time (s)" if solution.time is not None else "θ₂ (°)")
+    angle = f"θ{solution.at.bar} (°)".translate(_SUBSCRIPT)
+    axes[-1].set_xlabel("time (s)" if solution.time is not None else angle)
     figure.align_ylabels(axes)
     for panel in axes:
         set_frame(panel)
@@ -190,27 +192,30 @@ def _draw_values(
     quantity: str,
     solution: Solution,
     answers: list[Answer],
-    reversals: list[Reversal],
+    record: Record,
 ) -> None:
     """Draw the formulas as a band, broken at reversals, and each engine's marks.
 
     The marks stand at positions of their own.
     """
     good = solution.status_code == OK
-    ours = np.where(good, _take_plain(quantity, getattr(solution, quantity)), np.nan)
+    axis = _choose_component(quantity, record, solution, answers)
+    values = _take_plain(quantity, getattr(solution, quantity), axis)
+    ours = np.where(good, values, np.nan)
     base = _choose_base(solution, None)
+    reversals = record.reversals
     line = ours
     if reversals:
         theta_2, line = break_curve(
             solution.theta_2,
             ours,
             reversals,
-            lambda side: _take_plain(quantity, getattr(side, quantity)),
+            lambda side: _take_plain(quantity, getattr(side, quantity), axis),
         )
         base = np.degrees(theta_2)
     axes.plot(base, line, color=BAND, lw=5, solid_capstyle="butt")
     for turn, answer in enumerate(answers):
-        theirs = _take_plain(quantity, answer.quantities[quantity])
+        theirs = _take_plain(quantity, answer.quantities[quantity], axis)
         phase = (turn + 0.5) / (len(answers) * MARKS_OF_A_CURVE)
         places = np.unique(
             (
@@ -223,7 +228,7 @@ def _draw_values(
             **_mark(answer, 5.5),
         )
     _limit_to_bulk(axes, ours[good])
-    axes.set_ylabel(_label(quantity, solution))
+    axes.set_ylabel(_label(quantity, solution, axis))
 
 
 def _draw_errors(
@@ -260,6 +265,20 @@ def _draw_errors(
     )
     low = float(np.nanmin(allowed[good]))
     high = float(np.nanmax(allowed[good]))
+    for engine, limit in _find_own_limits(quantity, record, answers, high):
+        colour = choose_style(engine).colour
+        axes.axhline(limit, color=colour, lw=1.1, ls=(0, (5, 2)))
+        axes.annotate(
+            f"allowed to {engine}",
+            (0.99, limit),
+            (0, -9),
+            xycoords=axes.get_yaxis_transform(),
+            textcoords="offset points",
+            fontsize=8.5,
+            ha="right",
+            color=colour,
+        )
+        high = max(high, limit)
     for turn, answer in enumerate(answers):
         if answer.at is None:
             formulas = solution
@@ -304,6 +323,22 @@ def _draw_errors(
     )
 
 
+def _find_own_limits(
+    quantity: str,
+    record: Record,
+    answers: list[Answer],
+    common: float,
+) -> list[tuple[str, float]]:
+    """List the engines that are allowed more than the others, with their limit."""
+    engines = {answer.engine for answer in answers}
+    return [
+        (row.engine, row.allowed)
+        for row in record.rows
+        if row.quantity == quantity and row.engine in engines and row.compared
+        if row.allowed > 2.0 * common
+    ]
+
+
 def find_worst_of_segments(
     error: Array,
     phase: float,
@@ -337,16 +372,45 @@ def _mark(answer: Answer, size: float) -> dict[str, Any]:
     }
 
 
-def _take_plain(quantity: str, values: Array) -> Array:
-    """Take a scalar as it is (angles in degrees), the magnitude of a vector."""
+def _choose_component(
+    quantity: str,
+    record: Record,
+    solution: Solution,
+    answers: list[Answer],
+) -> int | None:
+    """Return the component of a force that is wrong; None if none is.
+
+    A force whose sign or direction is wrong lies on the curve of magnitudes.
+    """
+    wrong = {
+        row.engine for row in record.rows if row.failed and row.quantity == quantity
+    }
+    ours = getattr(solution, quantity)
+    differences = [
+        np.nanmax(np.abs(answer.quantities[quantity] - ours), axis=0, initial=0.0)
+        for answer in answers
+        if answer.engine in wrong and answer.quantities[quantity].shape == ours.shape
+    ]
+    if ours.ndim == 1 or not differences:
+        return None
+    return int(np.argmax(np.max(differences, axis=0)))
+
+
+def _take_plain(quantity: str, values: Array, axis: int | None = None) -> Array:
+    """Take a scalar as it is (angles in degrees).
+
+    `axis`: component to take of a vector; left out: its magnitude.
+    """
     if quantity in ANGLES:
         return np.degrees(values)
+    if values.ndim == 2 and axis is not None:
+        return np.asarray(values[:, axis])
     if values.ndim == 2:
         return magnitude(values)
     return values
 
 
-def _label(quantity: str, solution: Solution) -> str:
+def _label(quantity: str, solution: Solution, axis: int | None = None) -> str:
     if quantity == LINE.value:
         return "F (N)"
     if quantity == "torque":
@@ -354,18 +418,15 @@ def _label(quantity: str, solution: Solution) -> str:
     name = quantity.replace("theta_", "θ").translate(_SUBSCRIPT)
     if quantity in ANGLES:
         return f"{name} (°)"
+    if axis is not None:
+        return f"{quantity} {'xy'[axis]} (N)"
     return f"|{quantity}| (N)"
 
 
 def _choose_base(solution: Solution, command: Command | None) -> Array:
-    """Return what a curve is drawn over: theta_2 in degrees.
-
-    The time in s takes its place where the motion is free.
-    """
-    angle = (solution.at if command is None else command).angle
-    if solution.time is not None and len(solution.time) == len(angle):
-        return solution.time
-    return np.degrees(angle)
+    """Return what a curve is drawn over: theta_2 in degrees, or the time in s."""
+    base = choose_base(solution, solution.at if command is None else command)
+    return base if base is solution.time else np.degrees(base)
 
 
 def _limit_to_bulk(axes: "Axes", values: Array) -> None:

@@ -162,7 +162,7 @@ def write_html(
     engines = _list_engines(cell.row for view in views for cell in view.cells)
     failing = sorted(
         (cell for view in views for cell in view.cells if cell.row.failed),
-        key=lambda c: c.line,
+        key=lambda cell: (-cell.used, cell.line),
     )
     return render(
         "fourbar_validation.report",
@@ -173,6 +173,7 @@ def write_html(
         own_engines=[name for name in engines if name == FORMULAS],
         own=OWN_CONSISTENCY,
         failing=failing,
+        failing_scenes={cell.row.scene for cell in failing},
         groups=OVERVIEW_GROUPS,
         causes=summary.overview.causes,
         places={

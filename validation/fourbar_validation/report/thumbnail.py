@@ -1,11 +1,13 @@
-"""Small pictures of a scene, without words: linkage, and torque over the motion."""
+"""Small pictures of a scene: linkage, and what drives it over the motion."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.quantities import OK, Array
+from fourbar.quantities import LINE, OK, Array
+from fourbar.scene import Command
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.engines.description import name_driving
@@ -16,10 +18,18 @@ THUMBNAIL_HEIGHT, LINKAGE_WIDTH, _CURVE, EDGE = 76.0, 96.0, 150.0, 6.0
 """Sizes in pixels: height, widths of both pictures, and their margin."""
 POINTS_OF_A_CURVE = 120
 """Points of a curve."""
-PlacePoints = Callable[[Array], tuple[Array, Array]]
-"""Function that places values in the picture."""
 MARKS_OF_AN_ENGINE = 7
 """Marks of one engine on it."""
+
+
+def choose_base(solution: Solution, command: Command) -> Array:
+    """Return what a curve is drawn over: the commanded angle, or the time.
+
+    The time takes its place where the motion is free or follows a law.
+    """
+    if solution.time is not None and len(solution.time) == len(command.angle):
+        return solution.time
+    return command.angle
 
 
 def draw_thumbnail(record: Record) -> str | None:
@@ -68,7 +78,10 @@ def _write_points(places: Array) -> str:
 
 
 def _draw_curve(record: Record, solution: Solution) -> str:
-    """Draw the formulas' torque as a band, and each engine's as marks on it."""
+    """Draw the formulas' torque as a band, and each engine's as marks on it.
+
+    Where the curve leaves the picture, as towards a pole, it is cut, and a bar says so.
+    """
     assert record.scene is not None
     name = name_driving(record.scene)
     released = record.scene.motion.free is not None  # no torque acts
@@ -82,23 +95,42 @@ def _draw_curve(record: Record, solution: Solution) -> str:
     low, high = np.nanpercentile(ours[good], [2.0, 98.0])
     span = max(float(high - low), 1e-300)
 
-    def place(values: Array) -> tuple[Array, Array]:
-        along = np.linspace(0.0, 1.0, len(values))
+    base = choose_base(solution, solution.at)
+    first, last = float(base.min()), float(base.max())
+
+    def place(base: Array, values: Array) -> tuple[Array, Array]:
+        along = (base - first) / max(last - first, 1e-300)
         x = LINKAGE_WIDTH + EDGE + (_CURVE - 2.0 * EDGE) * along
         height = np.clip((values - low) / span, -0.1, 1.1)
-        bottom = THUMBNAIL_HEIGHT - 2.0 * EDGE
-        room = THUMBNAIL_HEIGHT - 4.0 * EDGE
+        bottom = THUMBNAIL_HEIGHT - 3.0 * EDGE
+        room = THUMBNAIL_HEIGHT - 5.0 * EDGE
         return x, bottom - room * height
 
     points = min(len(ours), POINTS_OF_A_CURVE)
     kept = np.linspace(0, len(ours) - 1, points).astype(int)
-    x, y = place(np.where(good, ours, np.nan))
+    x, y = place(base, np.where(good, ours, np.nan))
     drawn = "".join(_write_path(x[kept], y[kept]))
     marks = ""
     answers = [one for one in record.answers if name in one.quantities]
     for turn, answer in enumerate(answers):
-        marks += _draw_marks(answer, name, turn / max(len(answers), 1), place, good)
-    return f'<path class="formulas" d="{drawn}"/>{marks}'
+        at = solution.at if answer.at is None else answer.at
+        over = choose_base(solution, at)
+        phase = turn / max(len(answers), 1)
+        marks += _draw_marks(answer, name, phase, partial(place, over), good)
+    heights = np.clip((ours - low) / span, -0.1, 1.1)
+    cut = np.isin(heights, (-0.1, 1.1)) & good
+    ends = np.flatnonzero(np.diff(np.concatenate(([0], cut.astype(int), [0]))))
+    for start, stop in ends.reshape(-1, 2).tolist():
+        left, right = float(x[start]) - 1.5, float(x[stop - 1]) + 1.5
+        marks += f'<path class="cut" d="M{left:.1f} {y[start]:.1f}H{right:.1f}"/>'
+    words = (
+        "drive force" if name == LINE.value else f"torque on bar {solution.drive_bar}"
+    )
+    label = (
+        f'<text class="name" x="{LINKAGE_WIDTH + EDGE:g}"'
+        f' y="{THUMBNAIL_HEIGHT - 1.0:g}">{words}</text>'
+    )
+    return f'<path class="formulas" d="{drawn}"/>{marks}{label}'
 
 
 def _write_path(x: Array, y: Array) -> list[str]:
@@ -118,7 +150,7 @@ def _draw_marks(
     answer: Answer,
     name: str,
     phase: float,
-    place: PlacePoints,
+    place: Callable[[Array], tuple[Array, Array]],
     good: NDArray[np.bool_],
 ) -> str:
     """Draw some answers of an engine.
