@@ -38,12 +38,13 @@ from fourbar_validation.engines.guests import STATED_BY_THE_ENGINE
 from fourbar_validation.engines.limits import BOUNDARIES
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression import record, render, rules
-from fourbar_validation.regression.accept import (
-    HISTORY,
-    accept_command,
-    compare_command,
-)
+from fourbar_validation.regression.accept import accept_command, compare_command
 from fourbar_validation.regression.changes import Kind, compare_runs
+from fourbar_validation.regression.history import (
+    HISTORY,
+    collect_history,
+    summarise,
+)
 from fourbar_validation.regression.record import (
     NOTHING_KNOWN,
     About,
@@ -969,6 +970,18 @@ def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(tmp_path: Path) -
         and table.version_newcomer.isna().sum() == 2
     )
     assert table.scene_hash.nunique() == 1
+    of_runs = summarise(kept / HISTORY)
+    assert [*of_runs.date] == dates and [*of_runs.engine] == ["engine"] * 3
+    assert [*of_runs.used] == [1e-15 * n / 1e-14 for n in (1, 2, 3)]
+    assert [*of_runs.time] == [3.0] * 3
+    (section,) = collect_history(kept)
+    (figure,) = section.figures
+    assert "3 accepted runs" in figure.caption
+    assert all(f"{night}abcdef" in figure.svg for night in range(3))
+    assert collect_history(tmp_path) == []
+    (kept / HISTORY).write_bytes(b"no columns")
+    with pytest.raises(InputError, match="is damaged, or no table"):
+        summarise(kept / HISTORY)
 
 
 @pytest.mark.slow

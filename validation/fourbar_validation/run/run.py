@@ -23,6 +23,7 @@ from fourbar_validation.compare.rows import (
 from fourbar_validation.engines.guests import list_numbers
 from fourbar_validation.engines.mujoco.picture import render_pictures
 from fourbar_validation.engines.registry import Engine
+from fourbar_validation.regression.history import collect_history
 from fourbar_validation.regression.record import (
     ABOUT_FILE,
     CSV_FILE,
@@ -152,6 +153,8 @@ def write_outcome(
     sections = collect_sections(
         read_columns(out / PARQUET_FILE) if isinstance(suite, Hard) else None, out
     )
+    if options.against is not None:
+        sections += collect_history(before.table.parent)
     STYLE_NUMBERS.update(list_numbers(engines))
     page = write_html(
         summary,
