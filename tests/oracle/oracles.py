@@ -5,11 +5,8 @@ An oracle takes a question of the harness and yields its rows. No run makes them
 
 from collections.abc import Callable, Iterable, Iterator
 
-import pytest
-
 from fourbar.scene import Scene
 from fourbar_validation.compare.rows import Row
-from fourbar_validation.engines.registry import ENGINES, make_prediction
 from fourbar_validation.run.judge import make_question
 from fourbar_validation.run.question import NotAskedError, Question
 from tests.oracle.cuts import internal_forces
@@ -17,26 +14,7 @@ from tests.oracle.equilibria import equilibria
 from tests.oracle.files import sdf, usd
 from tests.oracle.printed import blocks, error_bars, friction_residual, points
 from tests.oracle.sensitivities import sensitivity, study, tolerances
-from tests.oracle.statements import check_statements
 from tests.oracle.summary import summary
-
-PINOCCHIO = next(engine for engine in ENGINES if engine.name == "pinocchio-inverse")
-
-
-def statements(question: Question) -> list[Row]:
-    """Hold ranges, limits, transmission and assemblies to Pinocchio's open trees."""
-    pytest.importorskip("pinocchio")
-    answer = question.answer(PINOCCHIO)
-    if answer.refusal is not None:
-        raise NotAskedError(answer.refusal)
-    return check_statements(
-        question.name,
-        question.scene,
-        question.adapter(PINOCCHIO),
-        answer,
-        predicted=make_prediction(PINOCCHIO, question.scene, question.at, answer),
-    )
-
 
 Oracle = Callable[[Question], Iterable[Row]]
 AT_POSITIONS: tuple[Oracle, ...] = (points, blocks, error_bars, friction_residual)
@@ -46,10 +24,8 @@ OF_FORCES: tuple[Oracle, ...] = (
     *(summary, equilibria, sdf, usd),
 )
 """Oracles that need the forces of the free bodies."""
-ORACLES = {
-    oracle.__name__: oracle for oracle in (*AT_POSITIONS, statements, *OF_FORCES)
-}
-AT_THETA_2 = (error_bars, statements, sdf, usd)
+ORACLES = {oracle.__name__: oracle for oracle in (*AT_POSITIONS, *OF_FORCES)}
+AT_THETA_2 = (error_bars, sdf, usd)
 """Oracles that need a command of theta_2."""
 
 
@@ -58,7 +34,7 @@ def ask(oracle: Oracle, question: Question) -> Iterator[Row]:
 
     Raises NotAskedError where the scene has nothing that it could compare.
     """
-    if question.at.speed is None and oracle not in (statements, equilibria):
+    if question.at.speed is None and oracle is not equilibria:
         raise NotAskedError("the scene has no speed")
     if oracle in AT_THETA_2 and question.at.commanded != "theta_2":
         raise NotAskedError(f"{question.at.commanded} is commanded")

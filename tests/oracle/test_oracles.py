@@ -12,16 +12,14 @@ SHIPPED = read_default_suite()
 RANDOM_SCENES = 200
 SEED = 68
 SAMPLE = {
-    "slender": ORACLES.keys()
-    - {"blocks", "error_bars", "friction_residual", "statements"},
+    "slender": ORACLES.keys() - {"blocks", "error_bars", "friction_residual"},
     "limited": {"study", "sensitivity", "equilibria"},
     "loaded": {"internal_forces", "summary"},
     "part of a turn": {"summary"},
     "simulated, damped": {"sdf"},
     "simulated, tolerances": {"tolerances", "sdf"},
     "simulated, drawn": {"study", "sensitivity"},
-    "crank-rocker": {"points", "blocks", "error_bars", "statements"},
-    "parallelogram": {"statements"},
+    "crank-rocker": {"points", "blocks", "error_bars"},
     "sliding pins": {"blocks", "friction_residual"},
     "near a limit": {"error_bars"},
     "short output": {"error_bars"},

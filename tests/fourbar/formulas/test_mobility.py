@@ -34,6 +34,11 @@ the angle, and the sum with theta_1 and pi, 2 pi: 1/2 eps of at most 4 pi.
 PRINTED_8 = 0.5e-8
 """Half a unit in the last digit of an angle printed to eight decimals of a degree, deg.
 """
+SCAN = 20_000
+SCAN_STEP = 20.0 * math.pi / SCAN
+"""What a scan of SCAN positions can miss of a range, rad: one step at each end, the
+output up to ten times as fast.
+"""
 GRID = 2000
 """Positions of a scan over one turn."""
 
@@ -333,6 +338,58 @@ def test_limits_close_the_loop_with_two_bars_collinear() -> None:
                     if bar == 2
                     else math.copysign(1.0, math.sin(angles[4] - angles[3]))
                 )
+
+
+def test_swing_is_what_a_scan_of_the_output_finds() -> None:
+    seen = set()
+    for bars in random_linkages(6, 60):
+        if change_points(bars):
+            continue  # there the output's range is that of several smooth paths
+        seen.add(classify(bars).code[:4])
+        start, stop = find_intervals(bars)[0]
+        phase = np.arange(0.5, SCAN) * (math.pi / SCAN)
+        theta_2 = 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(
+            phase
+        )  # dense where theta_4 goes as a root
+        branches = (1,) if turns_fully(bars) else (1, -1)
+        theta_4 = [np.unwrap(angle(bars, theta_2, branch, 4)) for branch in branches]
+        if len(theta_4) == 2:  # both branches start from the same limit position
+            theta_4[1] += (
+                2 * math.pi * round((theta_4[0][0] - theta_4[1][0]) / (2 * math.pi))
+            )
+        scanned = max(x.max() for x in theta_4) - min(x.min() for x in theta_4)
+        assert scanned == pytest.approx(swing(bars), abs=SCAN_STEP), bars.lengths
+    assert seen >= {"GCCC", "GCRR", "GRCR", "GRRC", "RRR1", "RRR2", "RRR3", "RRR4"}
+
+
+def test_ranges_of_coupler_and_output_hold_every_position_and_no_more() -> None:
+    for bars in random_linkages(8, 24):
+        theta_2 = bars.ground_angle + (np.arange(GRID) + 0.5) * (2 * math.pi / GRID)
+        theta_2 = theta_2[closes(bars, theta_2) > 0.0]
+        for bar in (3, 4):
+            reached = np.concatenate(
+                [angle(bars, theta_2, branch, bar) for branch in (1, -1)]
+            )
+            clear = np.min(
+                [
+                    np.abs(np.sin(0.5 * (reached - end)))
+                    for end in np.ravel(find_intervals(bars, bar))
+                ],
+                axis=0,
+            )
+            assert inside(reached[clear > 1e-6], find_intervals(bars, bar)).all()
+            # the first range holds the ground's direction (bar 4: its opposite) or
+            # begins less than pi after it
+            first, half = find_intervals(bars, bar)[0][0], math.pi if bar == 4 else 0.0
+            assert abs(first - (bars.ground_angle + half)) <= math.pi * (1.0 + EPS)
+            for start, stop in find_intervals(bars, bar):
+                for end in (start, stop) if not turns_fully(bars, bar) else ():
+                    # theta_k goes as a square root near its limit's theta_2, or is
+                    # tangent to it
+                    assert (
+                        np.abs(np.sin(0.5 * (reached - end))).min()
+                        < 20.0 * math.pi / GRID
+                    )
 
 
 def test_time_ratio_is_the_time_of_both_strokes() -> None:
