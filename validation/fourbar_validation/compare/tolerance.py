@@ -236,14 +236,6 @@ def count_half_turns(ground_angle: float, theta_2: Array | float = 0.0) -> float
     )
 
 
-def find_roundoff(linkage: FourBar, theta_2: Array | float = 0.0) -> float:
-    """Compute by what two derivations of an angle may differ, rad.
-
-    The angle is one against the ground.
-    """
-    return EQUIVALENCE.factor * count_half_turns(linkage.ground_angle, theta_2)
-
-
 def sum_lengths(linkage: FourBar) -> float:
     """Sum of the four lengths, m: the terms of the loop closure."""
     return math.fsum(linkage.lengths)
