@@ -154,7 +154,8 @@ def _list_stretches(
 ) -> list[_Stretch]:
     """List where a spring is beyond a length, from where it is at positions."""
     rows = np.flatnonzero(beyond[1:] != beyond[:-1])
-    crossings = _locate_crossings(scene, solution, spring, end, rows)
+    known = np.where(beyond[rows], rows, rows + 1)
+    crossings = _locate_crossings(scene, solution, spring, end, rows, known)
     stretches = list[_Stretch]()
     start = None
     for row, place in zip(rows, crossings, strict=True):
@@ -173,14 +174,15 @@ def _locate_crossings(
     spring: Spring,
     end: float,
     rows: NDArray[np.intp],
+    known: NDArray[np.intp],
 ) -> Array:
     """Find where a spring reaches a length in the steps that begin at rows.
 
-    A step in which nothing lies between the two positions gives the later one: steps of
-    a release or a list, and those where the loop does not close.
+    A step in which nothing lies between the two positions gives the known one of them:
+    steps of a release or a list, and those where the loop does not close.
     """
     at = solution.at
-    places = np.array(at.places[rows + 1], dtype=float)
+    places = np.array(at.places[known], dtype=float)
     assembled = solution.assembled[rows] & solution.assembled[rows + 1]
     if scene.motion.free is not None or isinstance(scene.motion.angle, np.ndarray):
         assembled[:] = False
@@ -235,6 +237,8 @@ def _write_stretch(solution: Solution, stretch: _Stretch, units: Conversion) -> 
         "" if place is None else f"{name} = {write_short(place, unit, units)}"
         for place in stretch
     ]
+    if start == stop:
+        return f"at {ends[0]}"
     if start is None:
         return f"up to {ends[1]}"
     if stop is None:

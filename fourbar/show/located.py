@@ -28,6 +28,8 @@ LOCATED = 1e-11
 """Part of the motion within which an extreme is located."""
 CONSTANT = 1e-12
 """Part of a column's usual value within which two values are one."""
+UNBOUNDED = 1e6
+"""Times its usual size beyond which a column's largest value stands beside a pole."""
 USUAL = 90.0
 """Percentile of a column's sizes, and of its distances from the median."""
 
@@ -218,6 +220,11 @@ class _LocatedSearch:
     def _refuse(self, text: str, why: str, values: Array) -> NotAssembledError:
         """Make the error of a value that no position has, with the column's range."""
         ends = dict.fromkeys(self._find_extent(values))
+        usual = float(np.percentile(np.abs(values), USUAL))
+        if max(map(abs, ends)) > UNBOUNDED * usual:
+            return NotAssembledError(
+                f"--at {self.name} = {text}: {why}, and grows without bound"
+            )
         unit = "" if self.unit == "1" else self.unit
         extent = write_in_units(unit, *ends, between=" to ")
         word = "is" if len(ends) == 1 else "goes from"

@@ -147,7 +147,7 @@ def test_between_the_positions_of_a_list_nothing_is_located(
     file.write_text(text, encoding="utf-8")
     assert status(["analyze", str(file)]) == 0
     printed = " ".join(capsys.readouterr().out.split())
-    assert "from theta_2 = 80 deg to theta_2 = 12 deg and from theta_2 = 50" in printed
+    assert "at theta_2 = 80 deg and from theta_2 = 50 deg on" in printed
 
 
 def told(text: str) -> str:
@@ -164,6 +164,12 @@ def test_a_spring_that_changes_its_sense_is_told_where(length: str) -> None:
     said = f"spring 1 pulls from theta_2 = {reach(0.4)} on and pushes elsewhere"
     assert (said in told(text)) == (length == "400 mm")
     assert "elsewhere" not in told(f'{text}acts = "push"\n')
+    for angles, where in (("10 20 80", "from"), ("80 20 10", "up to")):
+        listed = [f"{angle} deg" for angle in angles.split()]
+        some = re.sub("theta_2 = .*", f"theta_2 = {json.dumps(listed)}", text)
+        last = " on" if where == "from" else ""
+        said = f"spring 1 pulls {where} theta_2 = 20 deg{last} and pushes elsewhere"
+        assert (said in told(some)) == (length == "400 mm")
 
 
 @pytest.mark.parametrize(

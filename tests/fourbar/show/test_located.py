@@ -11,6 +11,7 @@ from fourbar.errors import FourBarError, InputError, NotAssembledError
 from fourbar.files import loads
 from fourbar.show.columns import choose_columns
 from fourbar.show.located import list_positions, locate
+from tests.support.scenes import crank_rocker
 
 MODELS = Path(__file__).parents[3] / "models"
 LOCATED = 1e-11
@@ -171,6 +172,13 @@ def test_a_column_that_jumps_over_a_value_does_not_have_it() -> None:
     )
     with pytest.raises(NotAssembledError, match="jumps over it at time = 0 s, 1 s;"):
         locate(scene, "torque", "0.5 N m")
+
+
+def test_a_column_with_poles_says_that_it_grows_without_bound() -> None:
+    """omega_2/omega_4 of a crank-rocker is never small, and infinite at its limits."""
+    scene = crank_rocker(motion=fourbar.Motion())
+    with pytest.raises(NotAssembledError, match=r"jumps.*, and grows without bound"):
+        locate(scene, "mechanical_advantage", "1")
 
 
 def test_a_linkage_is_searched_up_to_where_it_ceases_to_assemble() -> None:

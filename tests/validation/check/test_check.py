@@ -1861,3 +1861,40 @@ def test_a_right_table_of_fewer_digits_than_it_prints_is_told_the_tolerance(
     capsys.readouterr()
     assert status(["check", str(scene), str(table)]) == FAILED
     assert "all agree within" not in capsys.readouterr().out
+
+
+def _round(number: float) -> float:
+    """Round a number to 8 digits."""
+    return float(f"{number:.7e}")
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_table_with_mistakes_and_few_right_digits_is_told_both(
+    sign: float,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Angles half a turn off, perhaps forces of the other sign, and 8 right digits.
+
+    With the tolerance that is named the mistakes explain all that differs.
+    """
+    scene = MODELS / "crank_rocker.toml"
+    numbers = fourbar.solve(fourbar.load(scene))
+    angles = (numbers.theta_2, numbers.theta_4, sign * numbers.torque)
+    rows = [
+        f"{theta_2!r},{_round(theta_4) + math.pi:.14e},{_round(torque):.14e}"
+        for theta_2, theta_4, torque in np.transpose(angles).tolist()
+    ]
+    table = tmp_path / "theirs.csv"
+    table.write_text("\n".join(["theta_2,theta_4,torque", *rows]))
+    assert status(["check", str(scene), str(table)]) == FAILED
+    told = " ".join(capsys.readouterr().out.split())
+    assert "measured from the other end of the bar" in told
+    assert ("sign reversed" in told) == (sign < 0.0)
+    (named,) = re.findall("that apart, all agree within (1e-[0-9]+): --rtol", told)
+    assert 1e-8 <= float(named) <= 1e-7
+    judge = ["check", str(scene), str(table), "--rtol"]
+    assert status([*judge, named]) == FAILED
+    assert "explains" in capsys.readouterr().out
+    assert status([*judge, str(0.01 * float(named))]) == FAILED
+    assert "no single known mistake" in capsys.readouterr().out

@@ -2,9 +2,10 @@
 
 import json
 import math
+from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -36,6 +37,8 @@ class Judgement:
     """
     explanations: list[Explanation]
     tolerance: Allowance | None = None
+    explained_power: int | None = None
+    """Power of ten within which all numbers agree once the mistakes are mended."""
 
     @cached_property
     def differing(self) -> list[Discrepancy]:
@@ -131,7 +134,7 @@ class Judgement:
             for digits, names in sorted(fewest.items())
         )
 
-    def together(self) -> bool:
+    def is_explained(self) -> bool:
         """Return whether the explanations account for every quantity that differs."""
         explained = {
             quantity
@@ -197,12 +200,31 @@ def judge_table(
         explanations = explain(judge, differing)
     else:
         explanations = []
-    return Judgement(
+    judgement = Judgement(
         findings,
         judge.without_answer(),
         explanations,
         tolerance,
     )
+    if tolerance is None and explanations and not judgement.is_explained():
+        power = _find_explained_power(scene, table)
+        return replace(judgement, explained_power=power)
+    return judgement
+
+
+def _find_explained_power(scene: Scene, table: TheirTable) -> int | None:
+    """Find the power of ten as a tolerance of which known mistakes explain a table.
+
+    None if they do not even within what a table in few digits may be off by.
+    """
+    powers = range(_LEAST_POWER, round(math.log10(FEWEST_DIGITS)) + 1)
+
+    def explains(power: int) -> bool:
+        return judge_table(scene, table, Allowance(10.0**power)).is_explained()
+
+    if not explains(powers[-1]):
+        return None
+    return powers[bisect_left(powers, True, key=explains)]
 
 
 def write_judgement_json(judgement: Judgement, table: TheirTable) -> str:
@@ -291,6 +313,8 @@ def _list_cases_of_table(judgement: Judgement, name: str) -> Iterator[JunitCase]
 
 
 MOST_SHOWN_OF_EACH = 3
+_LEAST_POWER = -12
+"""Least power of ten that is tried as a tolerance: to round-off a table needs none."""
 FEWEST_DIGITS = 1e-4
 """Part of each number by which a table may be off that is right, in fewer digits than
 it prints.
@@ -462,18 +486,18 @@ def show_judgement(
         )
     for explanation in judgement.explanations:
         print_sentence(f"looks like: {explanation.text} ({_write_extent(explanation)})")
-    if differing and not any(
-        explanation.complete for explanation in judgement.explanations
-    ):
-        if judgement.together():
-            together = "these together explain all of it"
-        else:
-            together = "no single known mistake explains it"
-        print_sentence(together)
     power = judgement.agreed_power
+    mended = judgement.explained_power
+    if differing and mended is None:
+        if not judgement.is_explained():
+            print_sentence("no single known mistake explains it")
+        elif not any(one.complete for one in judgement.explanations):
+            print_sentence("these together explain all of it")
     if power is not None:
+        print_sentence(f"all agree within 1e{power}: --rtol 1e{power + 1} judges so")
+    elif mended is not None:
         print_sentence(
-            f"all agree within 1e{power}: --rtol 1e{power + 1} judges so",
+            f"that apart, all agree within 1e{mended}: --rtol 1e{mended} judges so"
         )
     print_sentence(judgement.sentence())
 
