@@ -1504,8 +1504,9 @@ def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(
     [
         (
             {"law": Law((0.0, 0.5, 1.0, 1.5), (0.0, 1.0, 2.0, 3.0))},
-            "along a law at the scene's own positions",
+            "at the scene's own positions",
         ),
+        ({"theta_2": [0.1, 0.2], "omega_2": [1.0, 2.0]}, "motion.omega_2 = "),
     ],
 )
 def test_a_motion_that_rows_are_not_found_by_is_refused_in_one_line(

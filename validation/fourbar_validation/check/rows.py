@@ -91,7 +91,7 @@ def _refuse_law(scene: Scene) -> None:
     """Raise InputError for a law or a list, whose speed elsewhere is not known."""
     if scene.motion.law is not None or scene.motion.has_rate_of_each:
         allowed = (
-            "a table is judged along a law or speeds of each angle at the scene's own"
+            "a table is judged along a law or listed speeds at the scene's own"
             " positions, all of them in its order"
         )
         key = scene.motion.names[1] if scene.motion.law is None else "law"
