@@ -36,6 +36,7 @@ from fourbar.scene import find_signs
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.acting import list_spring_notes
 from fourbar.show.driving import read_drive_demand
+from fourbar.show.motion_curves import find_drive_rounding
 from fourbar.show.tables import (
     MOST_ROWS_PRINTED,
     make_plain_table,
@@ -481,6 +482,7 @@ def _write_holding(rest: Equilibria, units: Conversion) -> tuple[list[str], Any]
     low = getattr(positions, drive.keys.low)
     high = getattr(positions, drive.keys.high)
     assert values is not None
+    values = np.where(np.abs(values) <= find_drive_rounding(positions), 0.0, values)
     unit, factor = find_unit_in(drive.unit, units)
     columns = {"theta_2 (deg)": write_cells(np.degrees(positions.theta_2))}
     if low is None or high is None:
@@ -498,7 +500,7 @@ def _write_holding(rest: Equilibria, units: Conversion) -> tuple[list[str], Any]
 
     on = "" if positions.drive is not None else f" on bar {positions.drive_bar}"
     lines = [f"{drive.name}{on} that holds it at rest, and how it moves when released"]
-    if np.isfinite(values).any():
+    if np.nanmax(np.abs(values), initial=0.0) > 0.0:
         most = int(np.nanargmax(np.abs(values)))
         largest = "largest" if low is None else "largest without friction"
         lines.append(

@@ -18,7 +18,7 @@ import fourbar
 from fourbar.effects import Place
 from fourbar.errors import InputError
 from fourbar.files import dump, load, loads, save
-from fourbar.files.scene_text import write_new_scene
+from fourbar.files.scene_text import NEW_POSITIONS, write_new_scene
 from fourbar.quantities.units import UnitError, to_si
 from tests.support.scenes import crank_rocker
 from tests.support.texts import LENGTHS
@@ -526,9 +526,11 @@ def test_the_comments_of_a_new_file_have_its_units_and_can_be_used(
     units: set[str],
     gravity: float,
 ) -> None:
+    comment = re.compile(r"^# (?=\w+ = |\[)", re.MULTILINE)
+    positions = loads(comment.sub("", write_new_scene([length] * 4, NEW_POSITIONS)))
+    assert positions.points and positions.motion.speed and not positions.effects
     text = write_new_scene([length] * 4)
-    used = re.sub(r"^# (?=\w+ = |\[)", "", text, flags=re.MULTILINE)
-    scene = loads(used)
+    scene = loads(comment.sub("", text))
     assert len(scene.loads) == 2 and scene.points and len(scene.effects) == 2
     weight = scene.effects[0]
     assert isinstance(weight, fourbar.Gravity)
