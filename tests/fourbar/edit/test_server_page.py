@@ -917,3 +917,24 @@ def test_a_path_stays_as_a_target_with_the_dead_centres_of_both(
     kept, shown = list_marks(".mark.behind"), list_marks(".mark:not(.behind)")
     np.testing.assert_allclose(sorted(kept), before, atol=pixel)
     np.testing.assert_allclose(sorted(shown), find_dead_centres(), atol=pixel)
+
+
+@pytest.mark.slow
+def test_a_force_that_grows_between_the_positions_is_said_beside_its_curve(
+    chromium,
+    opened,
+    tmp_path: Path,
+) -> None:
+    """The cylinder's stroke stands still twice in a turn, at no position of these."""
+    cylinder = (
+        'from = { bar = 1, from_pin = ["100 mm", "-60 deg"] }\n'
+        'to = { bar = 4, from_pin = ["80 mm", "0 deg"] }\n'
+    )
+    text = (MODELS / "crank_rocker.toml").read_text().replace("bar = 2\n", cylinder)
+    (tmp_path / "a.toml").write_text(text)
+    chromium.get(opened(tmp_path / "a.toml"))
+    wait_for(chromium, AT_REST)
+    assert chromium.execute_script("return data.peaks.drive_force") is None
+    for name in ("strip", "chart-note"):
+        told = chromium.find_element("id", name).text
+        assert "grows without bound" in told, name
