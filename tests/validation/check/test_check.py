@@ -147,6 +147,19 @@ def test_a_theta_2_rounded_as_the_rest_is_allowed_for_and_excuses_no_more(
     assert {finding.quantity for finding in judgement.differing} == {"F43"}
 
 
+def test_blank_cells_are_counted(tmp_path: Path) -> None:
+    numbers = right(SCENES["thesis"])
+    numbers["torque"] = np.where(
+        np.arange(len(numbers["torque"])) == 3, numbers["torque"], np.nan
+    )
+    path = write(tmp_path / "theirs.csv", numbers, names=("torque",))
+    path.write_text(path.read_text().replace("nan", ""))
+    judgement = judged(SCENES["thesis"], path)
+    blank = len(numbers["torque"]) - 1
+    assert judgement.blank == blank and judgement.status == 0
+    assert judgement.sentence().endswith(f"; {blank} of {blank + 1} cells are blank")
+
+
 def test_whole_degrees_are_positions_that_somebody_chose(tmp_path: Path) -> None:
     path = tmp_path / "theirs.csv"
     path.write_text("theta_2 [deg],torque\n10,1.0\n20.5,1.0\n")

@@ -13,7 +13,10 @@ from fourbar.effects import LinearDrive, Place
 from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
+    FULL_ACCURACY,
     IDENTITY,
+    SIMULATED,
+    ErrorBound,
     compute_difference,
     divide,
     find_condition,
@@ -187,3 +190,15 @@ def test_the_scale_is_of_positions_whose_condition_is_a_tenth_at_least() -> None
     scale = scale_of("F12", s.scene, s, s.F12).size
     assert scale[well] == pytest.approx(size[well].max())
     assert (scale[~well] < 2.0 * size[~well]).all()
+
+
+@pytest.mark.parametrize(
+    ("bound", "times"),
+    [(EQUIVALENCE, 8.0), (IDENTITY, 1.0), (SIMULATED, 1.0), (FULL_ACCURACY, 1.0)],
+)
+def test_only_an_exact_comparison_is_allowed_more_where_the_condition_is_poor(
+    bound: ErrorBound,
+    times: float,
+) -> None:
+    good, poor = bound.allowed(np.array([1.0, 0.125]))
+    assert good == bound.factor and poor == times * good

@@ -43,6 +43,23 @@ def test_a_verdict_is_its_outcome(verdict: str) -> None:
     assert suite.get("skipped") == str(int(OUTCOMES[verdict] == "skipped"))
 
 
+def test_each_suite_and_the_document_count_their_cases() -> None:
+    verdicts = {"a": (AGREES, FAILS, REFUSES, FAILS), "b": (UNDECIDED, AGREES)}
+    cases = list_cases(
+        replace(ROW, scene=scene, quantity=f"F{i}", verdict=verdict)
+        for scene, some in verdicts.items()
+        for i, verdict in enumerate(some)
+    )
+    document = ET.fromstring(write_document("run", cases))
+    counted = {
+        suite.get("name"): tuple(
+            int(suite.get(kind, "")) for kind in ("tests", "failures", "skipped")
+        )
+        for suite in (document, *document)
+    }
+    assert counted == {"run": (6, 2, 2), "a": (4, 2, 1), "b": (2, 0, 1)}
+
+
 def test_every_failure_is_a_case_after_many_that_hold() -> None:
     bad = replace(ROW, verdict=FAILS)
     cases = list(list_cases([*[ROW] * 60, bad, *[ROW] * 60, bad]))

@@ -37,6 +37,8 @@ class Judgement:
     """
     explanations: list[Explanation]
     tolerance: Allowance | None = None
+    blank: int = 0
+    """Cells of the judged columns in which no number stands."""
     explained_power: int | None = None
     """Power of ten within which all numbers agree once the mistakes are mended."""
 
@@ -110,6 +112,9 @@ class Judgement:
             agreed += f", compared to {self.digits}"
         if self.not_judged:
             agreed += f"; no digit left to judge {self.not_judged} more by"
+        if self.blank:
+            cells = len(self.findings) + self.blank
+            agreed += f"; {self.blank} of {cells} cells are blank"
         return agreed
 
     @property
@@ -205,6 +210,7 @@ def judge_table(
         judge.without_answer(),
         explanations,
         tolerance,
+        sum(int((~table.stated(key)).sum()) for key in judge.table.values),
     )
     if tolerance is None and explanations and not judgement.is_explained():
         power = _find_explained_power(scene, table)
@@ -241,6 +247,7 @@ def write_judgement_json(judgement: Judgement, table: TheirTable) -> str:
         "agree": judgement.agreeing,
         "agree_to_round_off": judgement.exact,
         "not_judged": judgement.not_judged,
+        "blank": judgement.blank,
         "tolerance": None if tolerance is None else asdict(tolerance),
         "found_by": table.found_by,
         "left_out": table.left_out,
