@@ -76,6 +76,22 @@ def test_a_scene_is_written_that_the_formulas_solve(tmp_path: Path) -> None:
     assert np.isfinite(fourbar.solve(scene).torque).all()
 
 
+def test_a_scene_is_read_again_however_many_meshes_are_missing(tmp_path: Path) -> None:
+    """The reader takes no line of more than a hundred dots."""
+    geoms = "".join(f'<geom type="mesh" mesh="m{i}"/>' for i in range(150))
+    meshes = "".join(f'<mesh name="m{i}" file="m{i}.stl"/>' for i in range(150))
+    text = (MODELS / "biped_foot.xml").read_text(encoding="utf-8")
+    text = text.replace("<worldbody>", f"<asset>{meshes}</asset><worldbody>{geoms}", 1)
+    robot = tmp_path / "foot.xml"
+    robot.write_text(text, encoding="utf-8")
+    out = tmp_path / "foot.toml"
+    arguments = [str(robot), "-o", str(out)]
+    result = CliRunner().invoke(robot_command, arguments, standalone_mode=False)
+    assert result.exception is None, result.output
+    assert "m149.stl" in out.read_text(encoding="utf-8")
+    assert fourbar.load(out).linkage.ground > 0.0
+
+
 def test_a_speed_without_a_scene_is_refused() -> None:
     arguments = [str(MODELS / "gripper.xml"), "--speed", "1"]
     with pytest.raises(UsageError, match="--speed goes with -o"):

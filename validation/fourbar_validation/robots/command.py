@@ -5,6 +5,7 @@ A scene is made from one of them.
 
 import math
 from pathlib import Path
+from textwrap import wrap
 
 import click
 
@@ -29,6 +30,8 @@ from fourbar_validation.robots.options import (
     speed_option,
 )
 
+_COLUMNS_OF_A_COMMENT = 78
+"""Columns of a comment in a scene: a file's reader takes no line of a hundred dots."""
 PRINTED_AS_ZERO = 1e-12
 """m or deg; less is printed as 0."""
 SCENE = "fourbar_validation.engines.mujoco.robots.scene:read_loop_scene"
@@ -85,8 +88,12 @@ def _write_scene(made: LoopScene) -> str:
 
     Comments say where it is from and what it leaves out.
     """
-    lines = [*made.parts, *made.remarks, *made.notes]
-    comments = "".join(f"# {escape_controls(line)}\n" for line in lines)
+    lines = [
+        part
+        for line in (*made.parts, *made.remarks, *made.notes)
+        for part in wrap(escape_controls(line), _COLUMNS_OF_A_COMMENT)
+    ]
+    comments = "".join(f"# {line}\n" for line in lines)
     return f"{comments}\n{dump(made.scene)}"
 
 

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from fourbar.solving import solve
 from fourbar_validation.engines.mujoco.robots.answers import (
     LoopMeasurement,
     MeasureOptions,
@@ -33,6 +34,8 @@ TORQUES = {0.0: 0.13648498112812546, 111.0: -0.5759040624467816}
 """N m at positions of j2, deg, at 1 rad/s: Newton's steps on the gap in the plane, its
 second derivative by differences, and multipliers by least squares.
 """
+CHORD = 1e-3
+"""rad; theta_3 between two positions that are 3 deg apart, by a chord."""
 SAME = 1e-9
 """Relative; the differences of the derivation have some ten digits."""
 
@@ -77,3 +80,31 @@ def test_an_offset_is_named_with_the_force_that_mujoco_has_there(offset: float) 
 def test_ends_in_one_plane_are_not_remarked() -> None:
     (closure,) = list_closures(file_of(0.0), PoseOptions()).closures
     assert closure.loop is not None and not closure.loop.remarks
+
+
+HALF = """
+<body name="half" pos="{x} {y} 0" euler="0 0 40"><joint name="pin" axis="0 0 1"/>
+ <inertial pos="0 0 0" mass=".01" diaginertia="1e-5 1e-5 1e-5"/>
+ <body name="end" euler="90 0 0"/></body></body>
+"""
+"""Half of the coupler on the rocker's end, whose welded part has axes of its own."""
+
+
+def test_a_weld_holds_the_turn_whatever_the_axes_of_its_bodies() -> None:
+    """Both halves of the coupler turn alike: no motion of the loop parts them."""
+    x, y = -0.03665501207128674, 0.21692489504446885
+    text = OFFSET.format(offset=0.0)
+    start, rocker = text.split("</body>\n</worldbody>")
+    text = f"{start}{HALF.format(x=x, y=y)}</worldbody>{rocker}"
+    weld = '<weld name="pin" body1="coupler" body2="end"/>'
+    text = text.replace('<connect name="pin" site1="s3" site2="s4"/>', weld)
+    options = MeasureOptions(PoseOptions(), speed=1.0)
+    (loop,) = measure_loops(RobotFile(Path("halves.xml"), text), options, None).loops
+    formulas = solve(loop.scene, "position")
+    expected = np.interp(
+        [row.theta_2 for row in loop.states.rows],
+        formulas.theta_2 + loop.turned,
+        formulas.theta_3 + loop.turned,
+    )
+    found = np.array([row.bars.theta_3 for row in loop.states.rows])
+    assert np.abs(np.sin(found - expected)).max() < CHORD

@@ -61,6 +61,7 @@ from fourbar_validation.engines.mujoco.robots.loop import RobotLoop
 from fourbar_validation.engines.mujoco.robots.planes import (
     copy_for_closures,
     project_closures,
+    resolve_normals,
 )
 from fourbar_validation.engines.mujoco.runner import Stepper
 
@@ -398,7 +399,9 @@ class LoopInside:
             data.efc_pos[: data.nefc],
             data.efc_J.reshape(-1, self.closure.nv)[: data.nefc],
             data.efc_id[: data.nefc],
-            dict.fromkeys(self.loop.closures, normal),
+            resolve_normals(
+                self.closure, data, dict.fromkeys(self.loop.closures, normal)
+            ),
         )
 
     def state(self, theta_2: float, omega_2: float) -> _RobotState | None:

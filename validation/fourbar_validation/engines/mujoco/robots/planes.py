@@ -5,7 +5,7 @@ there decides neither whether the loop closes nor how it moves.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from copy import copy
 
 import mujoco
@@ -60,16 +60,33 @@ def find_normals(
     return normals
 
 
-def project_rows(rows: Array, normal: Array) -> Array:
+def resolve_normals(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    normals: Mapping[int, Array],
+) -> dict[int, tuple[Array, Array]]:
+    """Return each normal in the axes of the world, and in those of the second end.
+
+    MuJoCo states the turn of a weld in the axes of its second body or site.
+    """
+    resolved = {}
+    for number, normal in normals.items():
+        second = int(model.eq_obj2id[number])
+        by_sites = model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE
+        axes = data.site_xmat[second] if by_sites else data.xmat[second]
+        resolved[number] = (normal, axes.reshape(3, 3).T @ normal)
+    return resolved
+
+
+def project_rows(rows: Array, normal: Array, turned: Array) -> Array:
     """Return rows of a connect or a weld without what no planar motion changes.
 
     The first three rows are a shift, (3,) or (3, nv), and three more of a weld are a
-    turn.
+    turn. `turned`: the normal in the axes of the turn.
     """
-    across = np.outer(normal, normal)
-    parts = [rows[:3] - across @ rows[:3]]
+    parts = [rows[:3] - np.outer(normal, normal) @ rows[:3]]
     if len(rows) > len(normal):
-        parts.append(across @ rows[3:])
+        parts.append(np.outer(turned, turned) @ rows[3:])
     return np.concatenate(parts)
 
 
@@ -77,7 +94,7 @@ def project_closures(
     residual: Array,
     jacobian: Array,
     equalities: NDArray[np.int32],
-    normals: dict[int, Array],
+    normals: Mapping[int, tuple[Array, Array]],
 ) -> tuple[Array, Array]:
     """Project the residuals of closures on their planes, and their derivatives.
 
@@ -85,15 +102,16 @@ def project_closures(
     ----------
     residual, jacobian : of all rows, (m,) and (m, nv).
     equalities : number of the equality of each row, (m,).
-    normals : of the plane of each equality that has one.
+    normals : of the plane of each equality that has one, as `resolve_normals` gives
+        them.
     """
     residual = residual.copy()
     jacobian = jacobian.copy()
-    for number, normal in normals.items():
+    for number, pair in normals.items():
         rows = np.flatnonzero(equalities == number)
         if len(rows):
-            residual[rows] = project_rows(residual[rows], normal)
-            jacobian[rows] = project_rows(jacobian[rows], normal)
+            residual[rows] = project_rows(residual[rows], *pair)
+            jacobian[rows] = project_rows(jacobian[rows], *pair)
     return residual, jacobian
 
 

@@ -27,6 +27,7 @@ from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
 from fourbar_validation.engines.mujoco.robots.planes import (
     find_normals,
     project_closures,
+    resolve_normals,
 )
 
 FREE_JOINT, BALL, SLIDE, HINGE_JOINT = (
@@ -301,7 +302,9 @@ class _Closing:
             data.efc_pos[: data.nefc][rows],
             jacobian[rows],
             data.efc_id[: data.nefc][rows],
-            find_normals(self.model, data, self.held),
+            resolve_normals(
+                self.model, data, find_normals(self.model, data, self.held)
+            ),
         )
 
     def _move_to(self, qpos: Array) -> tuple[Array, Array]:
