@@ -449,6 +449,14 @@ ACTING: dict[str, tuple[Any, Any]] = {
         fourbar.Springs((SPRING,)),
         fourbar.Springs((replace(SPRING, preload=0.0),)),
     ),
+    "the free length of spring 1": (
+        fourbar.Springs((SPRING,)),
+        fourbar.Springs((replace(SPRING, length=0.0),)),
+    ),
+    "the rest angle of torsion spring 1": (
+        fourbar.Torsion((("O4", 2.0, 1.0, 0.0),)),
+        fourbar.Torsion((("O4", 2.0, 0.0, 0.0),)),
+    ),
     "the viscous damping": (fourbar.Viscous((("O4", 0.2),)), None),
     "the torsion springs": (fourbar.Torsion((("O4", 2.0, 1.0, 0.0),)), None),
     "the flywheel": (fourbar.Flywheel(0.3), None),

@@ -4,6 +4,7 @@ The numbers that each would make are held against the table.
 """
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
@@ -228,10 +229,23 @@ def _list_without_part(effect: Any, name: str) -> Iterator[tuple[str, Effect]]:
         if len(parts) > 1:
             kept = {field: (*parts[:i], *parts[i + 1 :])}
             yield f"part {i + 1} of {name}", replace(effect, **kept)
-        if getattr(part, "preload", 0.0):
-            relaxed = replace(part, preload=0.0)
+        for text, relaxed in _relax(effect.key, part):
             kept = {field: (*parts[:i], relaxed, *parts[i + 1 :])}
-            yield f"the preload of spring {i + 1}", replace(effect, **kept)
+            yield f"the {text} spring {i + 1}", replace(effect, **kept)
+
+
+def _relax(key: str, spring: Any) -> Iterator[tuple[str, Any]]:
+    """List the numbers that shift a spring's force, each with it left out."""
+    if key == "springs":
+        for text, name in {"preload": "preload", "free length": "length"}.items():
+            if getattr(spring, name):
+                with suppress(FourBarError):  # one that acts one way needs its length
+                    yield f"{text} of", replace(spring, **{name: 0.0})
+    elif key == "torsion":
+        for text, place in {"rest angle": 2, "preload": 3}.items():
+            if spring[place]:
+                relaxed = (*spring[:place], 0.0, *spring[place + 1 :])
+                yield f"{text} of torsion", relaxed
 
 
 def _list_other_problems(
