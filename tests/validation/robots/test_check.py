@@ -879,6 +879,37 @@ def test_a_ratio_beyond_the_range_of_doubles_has_its_remark() -> None:
     assert difference.remark.startswith("10^308 times")
 
 
+def rows_with(torque: float, force: float) -> list[Row]:
+    errors = {"torque": torque, "F12": force}
+    return [
+        Row("", "how", "-", name, error, 1e-5, FAILS, "", 0.0, 1.0)
+        for name, error in errors.items()
+    ]
+
+
+@pytest.mark.parametrize(
+    ("key", "cost"), [("closure.solref", 0.0), ("bars.coupler.mass", 0.048)]
+)
+def test_a_setting_that_leaves_the_worst_error_costs_nothing(
+    key: str, cost: float
+) -> None:
+    """The output's mass is wrong, and both time constants leave F12 0.3 off."""
+    difference = Difference(key, 0.02, 0.03, "")
+    priced = price(difference, rows_with(0.05, 0.3), rows_with(0.002, 0.3))
+    assert priced.cost == pytest.approx(cost)
+
+
+@pytest.mark.parametrize(
+    ("key", "finer"),
+    [("option.timestep", 0.5), ("option.tolerance", 0.5), ("option.iterations", 2.0)],
+)
+def test_a_setting_that_is_finer_is_no_difference(key: str, finer: float) -> None:
+    ours = {"lengths.input": ModelEntry(1.0), key: ModelEntry(1.0)}
+    for value, count in ((finer, 0), (1.0 / finer, 1)):
+        theirs = ours | {key: ModelEntry(value)}
+        assert len(find_differences(ours, theirs)) == count
+
+
 REFUSED = [
     (
         "no such body",

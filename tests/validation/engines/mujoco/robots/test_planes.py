@@ -94,8 +94,13 @@ def test_a_weld_holds_the_turn_whatever_the_axes_of_its_bodies() -> None:
     """Both halves of the coupler turn alike: no motion of the loop parts them."""
     x, y = -0.03665501207128674, 0.21692489504446885
     text = OFFSET.format(offset=0.0)
-    start, rocker = text.split("</body>\n</worldbody>")
-    text = f"{start}{HALF.format(x=x, y=y)}</worldbody>{rocker}"
+    start, _, bodies = text.partition("<worldbody>")
+    bodies, _, end = bodies.partition("</worldbody>")
+    crank, _, rocker = bodies.partition('<body name="rocker" pos="0.3 0 0">')
+    rocker = rocker.strip().removesuffix("</body>")
+    halved = f'<body name="rocker" pos="0.3 0 0">{rocker}{HALF.format(x=x, y=y)}'
+    # the rocker comes first: its half of the coupler tells theta_3
+    text = f"{start}<worldbody>{halved}{crank}</worldbody>{end}"
     weld = '<weld name="pin" body1="coupler" body2="end"/>'
     text = text.replace('<connect name="pin" site1="s3" site2="s4"/>', weld)
     options = MeasureOptions(PoseOptions(), speed=1.0)
