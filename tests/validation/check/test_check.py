@@ -21,6 +21,7 @@ from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import Law
 from fourbar.solving import solve
 from fourbar_validation.check.check import Judgement, judge_table
+from fourbar_validation.check.columns import MADE_OF, list_names_of_points
 from fourbar_validation.check.judge import Allowance
 from fourbar_validation.check.mistakes import list_column_mistakes, list_hypotheses
 from fourbar_validation.check.theirs import LARGEST_TABLE_FILE, NOT_JUDGED, read_table
@@ -1339,6 +1340,46 @@ def test_the_file_of_analyze_is_read_as_it_is_and_as_a_spreadsheet_saves_it(
         "left out (blank): torque_low, torque_high" in out
         and "429 of 429 numbers agree" in out
     )
+
+
+OFF = 1e-6
+"""Part of its largest number by which a column is off: beyond every allowed error."""
+
+
+@pytest.mark.parametrize("name", ["drawn", "springs", "push_output"])
+def test_every_column_of_the_file_of_analyze_is_known(
+    name: str,
+    tmp_path: Path,
+) -> None:
+    """Those that are made of a solution's quantities are judged too."""
+    scene = MODELS / "capabilities" / f"{name}.toml"
+    path = tmp_path / "theirs.csv"
+    assert fourbar_status(["analyze", str(scene), "--csv", "-o", str(path)]) == HOLDS
+    stated = fourbar.load(scene)
+    points = list_names_of_points(stated)
+    table = read_table(path, points=points).from_pin(stated.origin)
+    assert "not a known column" not in table.left_out.values()
+    judgement = judge_table(stated, table)
+    assert judgement.compared and not judgement.differing
+    made = [key for key in table.values if key.strip("|") not in UNITS]
+    assert len(made) > len(MADE_OF)
+    for key in made:
+        column = table.values[key]
+        off = {**table.values, key: column + OFF * np.nanmax(np.abs(column))}
+        exact = {**table.rounding, key: np.zeros(len(column))}
+        theirs = replace(table, values=off, rounding=exact)
+        differing = judge_table(stated, theirs).differing
+        assert {finding.quantity for finding in differing} == {key}
+
+
+def test_ratios_and_differences_that_analyze_writes_are_no_unknown_columns(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "theirs.csv"
+    columns = "theta_2,theta_3,theta_4-theta_3,omega_4/omega_2,torque"
+    line = ["analyze", str(MODELS / "crank_rocker.toml"), "--columns", columns]
+    assert fourbar_status([*line, "--csv", "-o", str(path)]) == HOLDS
+    assert "not a known column" not in read_table(path).left_out.values()
 
 
 def test_blank_cells_state_nothing_and_the_rest_of_their_row_is_judged(

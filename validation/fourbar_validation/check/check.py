@@ -14,8 +14,10 @@ import numpy as np
 
 from fourbar.errors import FAILED, HOLDS, LONGEST_MESSAGE, InputError, shorten
 from fourbar.files import load
+from fourbar.quantities import UNITS
 from fourbar.scene import Scene
 from fourbar.writing import require_file, write_text
+from fourbar_validation.check.columns import list_names_of_points
 from fourbar_validation.check.judge import Allowance, Discrepancy, Judge
 from fourbar_validation.check.mistakes import NEARER, Explanation, explain
 from fourbar_validation.check.theirs import TheirTable, name_quantity, read_table
@@ -198,10 +200,17 @@ def judge_table(
         for finding in findings
         if finding.judged and not finding.agrees
     }
+    of_formulas = {
+        key: values
+        for key, values in table.values.items()
+        if name_quantity(key) in UNITS
+    }
     differing = sorted(
-        key for key in table.values if table.label(key) in differing_quantities
+        key for key in of_formulas if table.label(key) in differing_quantities
     )
     if differing:
+        if len(of_formulas) < len(table.values):
+            judge = Judge(scene, replace(table, values=of_formulas), tolerance)
         explanations = explain(judge, differing)
     else:
         explanations = []
@@ -410,7 +419,8 @@ def check_command(
 
         return check_problem(scene, theirs)
     stated = load(scene)
-    table = read_table(theirs, stated.motion.commanded)
+    points = list_names_of_points(stated)
+    table = read_table(theirs, stated.motion.commanded, points)
     for path in (json, junit):
         if path is not None:
             require_file(path, scene, theirs)

@@ -16,6 +16,7 @@ from fourbar.quantities import OK, Array
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
+from fourbar_validation.check.columns import compute_column, find_made_of
 from fourbar_validation.check.rows import (
     RowCommands,
     find_row_commands,
@@ -119,8 +120,13 @@ class Judge:
         self.ok = self.right.status_code == OK
         self._scales: dict[str, Scale] = {}
         self._exact: dict[str, Array] = {}
+        self._right_columns: dict[str, Array] = {}
         for key in table.values:
-            if getattr(self.right, name_quantity(key)) is None:
+            name = name_quantity(key)
+            column = compute_column(self.right, name)
+            if column is not None:
+                self._right_columns[name] = column
+            else:
                 if self.at.speed is None:
                     raise InputError(
                         f"motion.omega_{self.at.bar}",
@@ -135,9 +141,10 @@ class Judge:
 
     def ours(self, key: str, solution: Solution | None = None) -> Array:
         """Give the formulas' values of a key of the table."""
-        values: Array = getattr(
-            self.right if solution is None else solution, name_quantity(key)
-        )
+        values: Array | None = self._right_columns[name_quantity(key)]
+        if solution is not None:
+            values = compute_column(solution, name_quantity(key))
+        assert values is not None
         if key.startswith("|"):
             return magnitude(values)
         return values
@@ -149,12 +156,12 @@ class Judge:
     def scale(self, key: str) -> Scale:
         """Compute size of a key and how far its terms cancel, (n,)."""
         if key not in self._scales:
-            quantity = name_quantity(key)
+            name = name_quantity(key)
             self._scales[key] = scale_of(
-                quantity,
+                find_made_of(name, self.scene),
                 self.scene,
                 self.right,
-                getattr(self.right, quantity),
+                self._right_columns[name],
             )
         return self._scales[key]
 
@@ -162,7 +169,8 @@ class Judge:
         """Compute the error that round-off allows a key at each position, (n,)."""
         if key not in self._exact:
             scale, linkage = self.scale(key), self.scene.linkage
-            condition = find_condition(name_quantity(key), linkage, self.right)
+            made_of = find_made_of(name_quantity(key), self.scene)
+            condition = find_condition(made_of, linkage, self.right)
             allowed = scale.factor * EQUIVALENCE.allowed(condition)
             self._exact[key] = np.where(scale.size == 0.0, 0.0, allowed)
         return self._exact[key]

@@ -17,6 +17,7 @@ import csv
 import io
 import math
 import re
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
@@ -25,8 +26,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError
-from fourbar.quantities import COUPLE, LINE, UNITS, VECTORS, Array
+from fourbar.quantities import COUPLE, LINE, UNITS, VECTORS, Array, find_derived
+from fourbar.solution import find_unit_of_quantity
 from fourbar.writing import read_text
+from fourbar_validation.check.columns import GROWING
 from fourbar_validation.compare.tolerance import EPS
 
 _DECIMALS = 4
@@ -40,6 +43,7 @@ NOT_JUDGED = {
         "an error of the formulas themselves",
     ),
     **dict.fromkeys(("status", "branch", "drive_bar"), "stated by the scene"),
+    **GROWING,
 }
 """Columns of `fourbar analyze --csv` that are no answer, and why."""
 _BLANK = "blank"
@@ -110,15 +114,13 @@ _MOST_DEGREES = 1e6
 LARGEST_TABLE_FILE = 64 * 2**20
 """Bytes; a table larger than this is not a hand-made comparison."""
 _HEADING = re.compile(
-    r"\|?(?P<name>\w[\w ]*?)\|?\s*"
+    r"\|?(?P<name>\w[\w /]*?)\|?\s*"
     r"(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))?"
     r"(?P<letter>_[xy])?"
 )
 """Heading of a column: a name, its unit in brackets, and a component. The name may
 stand between bars.
 """
-DRAWN_PLACES = frozenset(name for name in VECTORS if UNITS[name] == "m")
-"""Quantities that are places, in the coordinates of a scene's drawing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,12 +183,17 @@ class TheirTable:
         """
         if not any(origin):
             return self
+        drawn = {
+            key
+            for key, value in self.values.items()
+            if value.ndim == 2 and find_unit_of_quantity(key) == "m"
+        }
+        if not drawn:
+            return self
         values = {
-            key: value - origin if key in DRAWN_PLACES else value
+            key: value - origin if key in drawn else value
             for key, value in self.values.items()
         }
-        if not values.keys() & DRAWN_PLACES:
-            return self
         x, y = origin
         note = (
             f"places are those of the drawing; shown from O2, at ({x:.6g}, {y:.6g}) m"
@@ -199,11 +206,17 @@ def name_quantity(key: str) -> str:
     return key.strip("|")
 
 
-def read_table(path: Path, commanded: str = "theta_2") -> TheirTable:
+def read_table(
+    path: Path,
+    commanded: str = "theta_2",
+    points: Collection[str] = (),
+) -> TheirTable:
     """Read a CSV table; InputError names the column or line that cannot be read.
 
     `commanded`: name of the angle that the scene commands. Rows are found by it, or by
     another bar's angle where the table does not have it.
+
+    `points`: names of places, velocities and accelerations of the scene's points.
     """
     (_, headings), *rows = _read_lines(path)
     unit_line = [""] * len(headings)
@@ -216,7 +229,9 @@ def read_table(path: Path, commanded: str = "theta_2") -> TheirTable:
             "needs a header and at least one row",
             str(path),
         )
-    columns, left_out, renamings = _read_headings(path, headings, unit_line, commanded)
+    columns, left_out, renamings = _read_headings(
+        path, headings, unit_line, commanded, points
+    )
     _drop_repeated(path, columns, left_out, headings, rows)
     names = [name for name, _ in columns.values()]
     found_by = next((name for name in (commanded, *_PLACES) if name in names), None)
@@ -485,9 +500,18 @@ def _read_comma(cell: str) -> str:
     return text.replace(",", ".")
 
 
-def _find_name(name: str, commanded: str) -> str:
+def _is_vector(name: str) -> bool:
+    """Return True for a vector of a solution, or a derived one."""
+    derived = find_derived(name)
+    return name in VECTORS or (derived is not None and derived.kind == "vector")
+
+
+def _find_name(name: str, commanded: str, points: Collection[str]) -> str:
     """Find the quantity that a column's name means, in any letters."""
-    if name in UNITS or name in NOT_JUDGED:
+    if name in UNITS or name in NOT_JUDGED or find_derived(name) is not None:
+        return name
+    vector = name[:-2] if name[-2:] in ("_x", "_y") else name
+    if vector in points or _is_vector(vector):
         return name
     plain = _spell(name)
     if plain in _COMMANDED_ANGLE:
@@ -529,6 +553,7 @@ def _read_headings(
     headings: list[str],
     unit_line: list[str],
     commanded: str,
+    points: Collection[str],
 ) -> tuple[dict[int, tuple[str, Unit]], dict[str, str], dict[str, str]]:
     """Return each column's name and unit by its place in a row.
 
@@ -544,15 +569,21 @@ def _read_headings(
             name = match["name"] + (match["letter"] or "")
         else:
             name = heading.strip()
-        name = _find_name(name, commanded)
-        if name[-2:] in ("_x", "_y") and name[:-2] in VECTORS:
-            quantity = name[:-2]
-        else:
-            quantity = name
+        name = _find_name(name, commanded, points)
+        vector = name[:-2] if name[-2:] in ("_x", "_y") else name
+        of_vector = vector in points or _is_vector(vector)
+        quantity = vector if of_vector else name
         if not name and index >= len(headings) - 1:
             continue  # an empty cell that a spreadsheet leaves at the end of a line
-        if match is None or quantity in NOT_JUDGED or quantity not in UNITS:
+        known = quantity in UNITS or of_vector or find_derived(quantity) is not None
+        if match is None or quantity in NOT_JUDGED or not known:
             column = heading.strip() or f"column {index + 1}"
+            parts = re.split("[-/]", re.sub(r"\s*\[.*", "", heading.strip()))
+            if len(parts) > 1 and all(
+                part in UNITS or part in points for part in parts
+            ):
+                left_out[column] = "follows from columns that are judged"
+                continue
             left_out[column] = NOT_JUDGED.get(quantity, "not a known column")
             if quantity not in NOT_JUDGED and (renaming := _suggest_column(name)):
                 left_out[column] += f": {renaming}"
@@ -564,7 +595,7 @@ def _read_headings(
             below = ""
         text = (match["square"] or match["round"] or below).strip()
         columns[index] = (
-            f"|{name}|" if name in VECTORS else name,
+            f"|{name}|" if of_vector and name == vector else name,
             _read_unit(path, heading, quantity, text),
         )
     return columns, left_out, renamings
@@ -576,11 +607,11 @@ def _read_unit(
     quantity: str,
     text: str,
 ) -> Unit:
-    if not text or text == UNITS[quantity]:
-        return Unit(UNITS[quantity], 1.0)
+    unit = find_unit_of_quantity(quantity)
+    if not text or text == unit:
+        return Unit(unit, 1.0)
     from fourbar.quantities.units import find_factor
 
-    unit = UNITS[quantity]
     plain = {_spell(name): name for name in OTHER_UNITS.get(unit, ())}
     try:
         return Unit(text, find_factor(unit, text))
