@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.evaluation.case import compute_shown_state
+from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK, compute_shown_state
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.quantities import PIN_FORCES, Array
@@ -21,7 +21,7 @@ from fourbar.show.driving import is_once_round, read_drive_demand
 from fourbar.show.panels import SHALLOW, Panels, Wanted, fit_panels
 from fourbar.show.units import SHOWN_AS_ZERO, drop_rounding
 from fourbar.solution import Solution
-from fourbar.solving import solve
+from fourbar.solving import solve, split
 from fourbar.studies.internal_forces import Bending, largest_bending
 
 _PANELS_OF_A_TURN, _MOST_FIRST_PANELS = 48, 960
@@ -362,7 +362,27 @@ def compute_pin_loads(solution: Solution) -> dict[str, Array]:
 
 
 def compute_bending(scene: Scene, solution: Solution) -> dict[int, Bending]:
-    """Compute the largest bending moment of each bar at each position."""
+    """Compute the largest bending moment of each bar at each position.
+
+    Many positions are solved again block by block: the forces along the bars of all of
+    them would take several times the memory of the solution.
+    """
+    count = len(solution)
+    if count <= POSITIONS_OF_A_BLOCK or solution.at.independent is not None:
+        return _compute_bending_of_block(scene, solution)
+    blocks = [
+        _compute_bending_of_block(scene, solve(scene, at=solution.at.part(rows)))
+        for rows in split(count, POSITIONS_OF_A_BLOCK)
+    ]
+    return {
+        bar: Bending(
+            *map(np.concatenate, zip(*(block[bar] for block in blocks), strict=True))
+        )
+        for bar in MOVING_BARS
+    }
+
+
+def _compute_bending_of_block(scene: Scene, solution: Solution) -> dict[int, Bending]:
     forces = [*compute_pin_loads(solution).values()]
     if solution.drive_force is not None:
         forces.append(np.abs(solution.drive_force))

@@ -27,6 +27,7 @@ from fourbar.show.motion_curves import (
 from fourbar.show.panels import LOCATED, Peak, Wanted, fit_panels
 from fourbar.solution import Solution
 from fourbar.solving import solve
+from fourbar.studies.internal_forces import Bending
 
 _INSET = 1e-9
 """Part of a range that is left out at its limit positions. These may not assemble as
@@ -240,20 +241,26 @@ def _list_pin_loads(motion: MotionCurves) -> dict[str, PinLoad]:
 def locate_bending(motion: MotionCurves) -> dict[int, BarBending]:
     """Locate the largest bending moment of each bar, and where along the bar it is."""
     panels = motion.panels
-    of_positions = compute_bending(motion.scene, motion.solution)
+    peaks = {
+        bar: panels.find_peak(name)
+        for bar in MOVING_BARS
+        if panels.has_value(name := f"bending_{bar}")
+    }
+    of_positions = dict[int, Bending]()
+    if not panels.located or len(peaks) < len(MOVING_BARS):
+        of_positions = compute_bending(motion.scene, motion.solution)
     located = {}
     for bar in MOVING_BARS:
-        peak = None
         solution = motion.solution
-        x = of_positions[bar].x
-        row = int(np.argmax(np.nan_to_num(np.abs(of_positions[bar].moment), nan=-1.0)))
-        if panels.has_value(name := f"bending_{bar}"):
-            peak = panels.find_peak(name)
-            if panels.located:
-                solution = motion.solve_at(np.array([peak.place]))
-                x = compute_bending(motion.scene, solution)[bar].x
-                row = 0
-        located[bar] = BarBending(peak, float(x[row]), solution, row)
+        row = 0
+        if panels.located and bar in peaks:
+            solution = motion.solve_at(np.array([peaks[bar].place]))
+            x = compute_bending(motion.scene, solution)[bar].x
+        else:
+            x = of_positions[bar].x
+            moment = np.abs(of_positions[bar].moment)
+            row = int(np.argmax(np.nan_to_num(moment, nan=-1.0)))
+        located[bar] = BarBending(peaks.get(bar), float(x[row]), solution, row)
     return located
 
 

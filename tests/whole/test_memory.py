@@ -1,0 +1,58 @@
+"""Memory and processor time of long sweeps, looked at from outside the process."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.errors import HOLDS
+from fourbar.scene import command
+from fourbar.show import motion_curves
+from fourbar.solving import solve
+
+MODELS = Path(__file__).parents[2] / "models"
+MOST_MEMORY, MOST_TIME = 600, 8.0
+"""MB, s: what `analyze` of a million positions may take. The arrays of its solution are
+400 MB, and their evaluation with error bars takes 4 s.
+"""
+BUSY = 2.0
+"""Factor of processor time on cores that others use too."""
+
+
+@pytest.mark.slow
+@pytest.mark.linux
+def test_analyze_of_a_million_positions_needs_little_beyond_them(
+    tmp_path: Path,
+) -> None:
+    scene = tmp_path / "million.toml"
+    text = (MODELS / "crank_rocker.toml").read_text(encoding="utf-8")
+    longer, steps = re.subn(r"steps = \d+", "steps = 999998", text)
+    assert steps == 1
+    scene.write_text(longer, encoding="utf-8")
+    line = [sys.executable, "-m", "fourbar", "analyze", str(scene)]
+    with subprocess.Popen(line, stdout=subprocess.DEVNULL) as started:
+        _, status, used = os.wait4(started.pid, 0)
+        started.returncode = os.waitstatus_to_exitcode(status)
+    assert started.returncode == HOLDS
+    assert used.ru_maxrss / 1024 < MOST_MEMORY
+    assert used.ru_utime + used.ru_stime < BUSY * MOST_TIME
+
+
+@pytest.mark.parametrize("name", ["crank_rocker", "capabilities/springs"])
+def test_bending_is_the_same_in_blocks(
+    name: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene = fourbar.load(MODELS / f"{name}.toml")
+    solution = solve(scene, at=command(scene))
+    whole = motion_curves.compute_bending(scene, solution)
+    monkeypatch.setattr(motion_curves, "POSITIONS_OF_A_BLOCK", 7)
+    in_blocks = motion_curves.compute_bending(scene, solution)
+    for bar, bending in whole.items():
+        np.testing.assert_array_equal(in_blocks[bar].moment, bending.moment)
+        np.testing.assert_array_equal(in_blocks[bar].x, bending.x)
