@@ -686,6 +686,8 @@ def _save_file(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     """Write the file; where it is another one than was read, only on demand."""
     name = session.path.name
     if session._read_disk() != session.disk and not asked.get("over"):
+        if not session.path.exists():
+            return {"ask": f"{name} was removed meanwhile. Write it again?"}
         return {"ask": f"{name} was changed on the disk meanwhile. Overwrite it?"}
     data = session.now.text.encode()
     write_bytes(session.path, data)

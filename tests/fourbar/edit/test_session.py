@@ -658,6 +658,8 @@ def test_save_keeps_the_rest_and_asks_before_it_overwrites_what_changed(
     session.do({"do": "set", "path": ["lengths", "input"], "value": "106 mm"})
     assert "changed on the disk" in session.do({"do": "save"})["ask"]
     assert session.path.read_text() == "title = 'somebody else'"
+    session.path.unlink()
+    assert "was removed" in session.do({"do": "save"})["ask"]
     assert session.do({"do": "save", "over": True})["saved"]
     assert '"106 mm"' in session.path.read_text()
 

@@ -334,19 +334,30 @@ def _open_described(
 
     Raises InputError if either is damaged.
     """
+    about, tables = _read_record(record, key)
+    if tables is None:
+        return Recorded(about, table, key=key)
+    _require_undamaged(tables, table.parent, table.name, key)
+    return Recorded(about, table, True, key)
+
+
+def _read_record(
+    record: Path,
+    key: str,
+) -> tuple[About, Mapping[str, Mapping[str, Any]] | None]:
+    """Read a record and what it says of its tables; None if it is an older one."""
     try:
         kept = json.loads(record.read_text(encoding="utf-8"))
         stated = kept.pop("sha256", None)
         about = _make_record(kept)
-        tables = kept.get("tables")
+        tables: Mapping[str, Mapping[str, Any]] | None = kept.get("tables")
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
         raise InputError(key, str(record), "is not a record written by `run`") from None
     if stated is None and tables is None:
-        return Recorded(about, table, key=key)
+        return about, None
     if stated != _hash_own(kept):
         raise InputError(key, str(record), "is damaged: it is not what `run` wrote")
-    _require_undamaged(tables, table.parent, table.name, key)
-    return Recorded(about, table, True, key)
+    return about, tables
 
 
 def _make_record(kept: dict[str, Any]) -> About:
@@ -380,16 +391,21 @@ def find_baseline(name_or_path: str) -> Path:
     """
     if (
         not Path(name_or_path).exists()
-        and (SHIPPED / name_or_path / CSV_FILE).is_file()
+        and (SHIPPED / name_or_path / ABOUT_FILE).is_file()
     ):
         return SHIPPED / name_or_path
     return Path(name_or_path)
 
 
 def accept(run: Recorded, target: Path) -> None:
-    """Keep a run, with its times, as the accepted state in a folder."""
+    """Keep a run, with its times, as the accepted state in a folder.
+
+    Of its two tables the compressed one is kept, if it has it.
+    """
     target.mkdir(parents=True, exist_ok=True)
-    kept = {run.table.name, TIMINGS_FILE}
+    compressed = run.table.with_name(PARQUET_FILE)
+    table = compressed if compressed.is_file() else run.table
+    kept = {table.name, TIMINGS_FILE}
     for name in RECORD_FILES:
         if name in kept and (table := run.table.with_name(name)).is_file():
             _copy(table, target / name)

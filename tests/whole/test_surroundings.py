@@ -1,0 +1,158 @@
+"""A clock that jumps, a user who may write nowhere, and tables made to harm."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fourbar.errors import BROKEN, HOLDS, LONGEST_MESSAGE, InputError
+from fourbar_validation.regression.record import ACCEPTED, find_baseline, open_run
+
+MODELS = Path(__file__).parents[2] / "models"
+RUN = ["--random", "6", "--engines", "free-body", "--no-pictures", "--workers", "2"]
+MUTATIONS = int(os.environ.get("MUTATIONS", "40"))
+JUMPING_CLOCK = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <time.h>
+/* the clock on the wall goes to and fro by a day at each look */
+int clock_gettime(clockid_t id, struct timespec *t) {
+    static int (*real)(clockid_t, struct timespec *);
+    static long looks;
+    if (!real) real = dlsym(RTLD_NEXT, "clock_gettime");
+    int status = real(id, t);
+    if (id == CLOCK_REALTIME) t->tv_sec += (looks++ % 3 - 1) * 86400;
+    return status;
+}
+"""
+
+
+def harness(*line: object, **settings: Any) -> subprocess.CompletedProcess[str]:
+    words = [sys.executable, "-m", "fourbar_validation", *map(str, line)]
+    return subprocess.run(
+        words, capture_output=True, text=True, check=False, **settings
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.linux
+@pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
+def test_a_clock_that_jumps_changes_no_byte(tmp_path: Path) -> None:
+    (tmp_path / "clock.c").write_text(JUMPING_CLOCK, encoding="utf-8")
+    library = tmp_path / "clock.so"
+    compile_it = ["cc", "-shared", "-fPIC", "-o", str(library)]
+    subprocess.run([*compile_it, str(tmp_path / "clock.c"), "-ldl"], check=True)
+    jumping = os.environ | {"LD_PRELOAD": str(library)}
+    code = "import time; print(len({time.time() // 43200 for _ in range(3)}))"
+    seen = subprocess.check_output([sys.executable, "-c", code], env=jumping)
+    assert int(seen) > 1
+    bytes_of = []
+    for name, environment in (("steady", os.environ), ("jumping", jumping)):
+        done = harness("run", *RUN, "-o", tmp_path / name, env=environment)
+        assert (done.returncode, done.stderr) == (HOLDS, "")
+        bytes_of.append((tmp_path / name / "results.csv").read_bytes())
+    assert bytes_of[0] == bytes_of[1]
+
+
+@pytest.fixture
+def locked() -> Iterator[Path]:
+    """A folder that its user may read and not write, with a scene."""
+    folder = Path(tempfile.mkdtemp())
+    shutil.copy(MODELS / "crank_rocker.toml", folder / "scene.toml")
+    folder.chmod(0o555)
+    yield folder
+    folder.chmod(0o755)
+    shutil.rmtree(folder)
+
+
+@pytest.mark.slow
+@pytest.mark.posix
+@pytest.mark.parametrize(
+    ("program", "line", "status"),
+    [
+        ("fourbar", ["analyze", "scene.toml"], HOLDS),
+        ("fourbar", ["analyze", "scene.toml", "--csv", "-o", "a.csv"], BROKEN),
+        ("fourbar", ["plot", "scene.toml", "-o", "a.svg"], BROKEN),
+        ("fourbar", ["mjcf", "scene.toml", "-o", "scene.xml"], BROKEN),
+        ("fourbar_validation", ["run", "scene.toml", *RUN[2:], "-o", "out"], BROKEN),
+    ],
+    ids=lambda value: " ".join(value[:1]) if isinstance(value, list) else "",
+)
+def test_a_user_who_may_write_nowhere_gets_numbers_or_one_line(
+    locked: Path,
+    program: str,
+    line: list[str],
+    status: int,
+) -> None:
+    """Nor at home, where libraries keep their caches."""
+    environment = os.environ | {"HOME": str(locked), "PYTHONDONTWRITEBYTECODE": "1"}
+    rights: list[str] = []
+    if os.geteuid() == 0:  # to whom no folder is locked, but by this
+        if shutil.which("setpriv") is None:
+            pytest.skip("root has all rights, and setpriv takes none away")
+        rights = ["setpriv", "--bounding-set=-dac_override,-dac_read_search,-fowner"]
+    done = subprocess.run(
+        [*rights, sys.executable, "-m", program, *line],
+        cwd=locked,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert done.returncode == status, done.stderr
+    if status == HOLDS:
+        assert "torque" in done.stdout and done.stderr == ""
+    else:
+        assert done.stderr.startswith("error: ") and done.stderr.count("\n") == 1
+        assert len(done.stderr) <= LONGEST_MESSAGE
+    assert [path.name for path in locked.iterdir()] == ["scene.toml"]
+
+
+def damage(table: bytes, rng: np.random.Generator) -> bytes:
+    """Turn bits, cut, or write over the footer of a parquet file."""
+    kind = rng.integers(4)
+    changed = bytearray(table)
+    footer = int.from_bytes(table[-8:-4], "little")
+    if kind == 0:
+        for place in rng.integers(len(changed), size=rng.integers(1, 9)):
+            changed[place] ^= 1 << rng.integers(8)
+    elif kind == 1:
+        changed = changed[: rng.integers(len(changed))]
+    elif kind == 2:
+        for place in rng.integers(footer, size=4):
+            changed[-9 - place] = rng.integers(256)
+    else:
+        changed[-8:-4] = rng.bytes(4)
+    return bytes(changed)
+
+
+@pytest.mark.slow
+@pytest.mark.linux
+def test_a_damaged_table_is_refused_or_read(tmp_path: Path) -> None:
+    """Each in a process of its own, which a fault of the reader would end."""
+    table = (find_baseline(ACCEPTED) / "results.parquet").read_bytes()
+    rng = np.random.default_rng(3)
+    statuses = []
+    for _ in range(MUTATIONS):
+        (tmp_path / "results.parquet").write_bytes(damage(table, rng))
+        child = os.fork()
+        if child == 0:
+            try:
+                for _row in open_run(tmp_path).rows():
+                    pass
+                os._exit(0)
+            except InputError:
+                os._exit(2)
+            except BaseException:
+                os._exit(9)
+        statuses.append(os.waitpid(child, 0)[1])
+    assert {os.waitstatus_to_exitcode(status) for status in statuses} == {0, 2}
