@@ -4,6 +4,7 @@ Drawings use matplotlib's object interface and leave no global state behind.
 """
 
 import io
+import logging
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -91,6 +92,8 @@ HEADED: dict[str, Any] = {
     "shrinkB": 0.0,
 }
 """An arrow from end to end."""
+# else its notes on a home without rights, where it has no cache, go to standard error
+logging.getLogger("matplotlib").addHandler(logging.NullHandler())
 STYLE_FILE = Path(__file__).with_name("fourbar.mplstyle")
 PICTURE_DPI = 200
 FORMATS = ("svg", "png", "pdf")
