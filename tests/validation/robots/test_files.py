@@ -15,7 +15,7 @@ from fourbar_validation.engines.mujoco.robots.compiled import (
     list_unknown_parts,
 )
 from fourbar_validation.robots import files, guard
-from fourbar_validation.robots.files import is_four_bar_alone, read_robot
+from fourbar_validation.robots.files import read_robot
 from tests.whole.test_imports import ROOT
 
 TETRAHEDRON = (
@@ -237,18 +237,6 @@ def test_a_complaint_of_the_compiler_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="does not compile it") as caught:
         compile_robot(read_robot(path))
     assert "\n" not in str(caught.value)
-
-
-def test_a_file_with_more_than_three_joints_is_a_robot(tmp_path: Path) -> None:
-    path = tmp_path / "robot.xml"
-    joint = '<default><joint damping="1"/></default><worldbody>{}</worldbody>'
-    for bodies, alone in (
-        (3 * "<body><joint/></body>", True),
-        (4 * "<body><joint/></body>", False),
-        ("<body><freejoint/>" + 3 * "<body><joint/></body>" + "</body>", False),
-    ):
-        path.write_text(f"<mujoco>{joint.format(bodies)}</mujoco>")
-        assert is_four_bar_alone(read_robot(path)) == alone
 
 
 @pytest.mark.parametrize("rows", ["file='hills.png'", "nrow='60000' ncol='60000'"])

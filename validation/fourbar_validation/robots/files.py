@@ -27,8 +27,6 @@ NOT_THERE = (
     "is not there; it must lie in the folder of the file, in a folder beside it, or in "
     "that of --assets DIR"
 )
-_HINGES = 3
-"""Joints of a four-bar whose fourth pin is an equality."""
 _REACHING_OUT = ("attach", "model")
 """Elements that load other models, in which a loop may be."""
 _FOR_THE_EYE = ("texture", "skin", "layer", "sensor")
@@ -71,17 +69,6 @@ def read_robot(path: Path, assets: Path | None = None) -> RobotFile:
     InputError : what the file may not hold, or names and is not there, in one line.
     """
     return _RobotReading(path, assets).read()
-
-
-def is_four_bar_alone(file: RobotFile) -> bool:
-    """Tell whether a file has no more joints than _HINGES."""
-    joints = [
-        element
-        for world in ET.fromstring(file.text).iter("worldbody")
-        for element in world.iter()
-        if element.tag in ("joint", "freejoint")
-    ]
-    return len(joints) <= _HINGES
 
 
 def mend_text(text: str) -> str:

@@ -46,7 +46,7 @@ from fourbar_validation.robots.differences import (
     price,
 )
 from fourbar_validation.robots.guard import examine_guarded
-from fourbar_validation.robots.measure import MEASURE_SECONDS, turn_vectors
+from fourbar_validation.robots.measure import turn_vectors
 from fourbar_validation.robots.unread import list_unread
 
 FILE_AT_ONE_STATE = "mjcf-one-state"
@@ -187,7 +187,7 @@ def judge_file(
     held = replace(options, error=None)
     if options.speed is not None:
         scene = replace(scene, motion=scene.motion.replace(speed=options.speed))
-    with examine_guarded(file.path, MEASURE_SECONDS) as examined:
+    with examine_guarded(file.path) as examined:
         generated = examined(_EXAMINE, scene, None)
         theirs = examined(_EXAMINE, scene, file, held)
         ours = {
