@@ -28,7 +28,8 @@ from fourbar_validation.engines.registry import Engine
 from fourbar_validation.engines.table import choose_engines
 from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run import pool
-from fourbar_validation.run.run import RunOptions, run
+from fourbar_validation.run.plan import RunOptions
+from fourbar_validation.run.run import run
 from fourbar_validation.scenes.suites import LARGEST_LIST, read_suite
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
