@@ -370,7 +370,9 @@ def _report_interruption(
     if not issubclass(kind, KeyboardInterrupt):
         sys.__excepthook__(kind, error, trace)
         return
-    print("error: interrupted", file=sys.stderr, flush=True)
+    # a worker that starts meanwhile leaves the line to the command
+    if "--multiprocessing-fork" not in sys.orig_argv:
+        print("error: interrupted", file=sys.stderr, flush=True)
     os._exit(INTERRUPTED)
 
 
