@@ -24,7 +24,7 @@ JUDGED_BY = {
         "fourbar/cli: evaluate export given; fourbar/show: tables"
     ),
     "whole/test_exits.py": (
-        "validation: cli; validation/report: terminal; lab: cli fuzz_files"
+        "validation: cli; validation/report: sentences terminal; lab: cli fuzz_files"
     ),
     "whole/test_kills.py": "validation/run: pool",
     "whole/test_results_format.py": "validation/compare: columns",
@@ -42,6 +42,7 @@ JUDGED_BY = {
     ),
     "fourbar/test_solving.py": "fourbar/evaluation: case",
     "fourbar/show/test_located.py": "fourbar/studies: course",
+    "fourbar/show/test_summary.py": "fourbar/show: driving motion_curves",
     "fourbar/studies/test_paths.py": "fourbar/show: paths",
     # parts of one document or picture
     "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: document model",
@@ -70,14 +71,16 @@ JUDGED_BY = {
     "validation/engines/test_free_body.py": (
         "validation/engines: free_body_closure free_body_effects"
     ),
-    "validation/scenes/test_hard_families.py": ("validation/engines/mujoco: shipped"),
+    "validation/scenes/test_hard_families.py": (
+        "validation/engines/mujoco: shipped; validation/scenes: bars"
+    ),
     "validation/report/test_sections.py": "validation/report: hard_picture",
     "validation/engines/mujoco/test_simulate.py": (
         "validation/engines/mujoco: drives monitor"
     ),
     "validation/run/test_released.py": "validation/engines/mujoco: forward",
     "validation/check/test_check.py": (
-        "validation/check: calculated fitted judge mistakes theirs"
+        "validation/check: calculated columns fitted judge mistakes theirs"
     ),
     "validation/robots/test_check.py": (
         "validation/robots: differences guard judge; "
@@ -100,7 +103,7 @@ JUDGED_BY = {
         "summary svg templating words"
     ),
     # studies: each through its command
-    "lab/test_bench.py": "lab: contenders",
+    "lab/test_bench.py": "lab: contenders starts",
     "lab/test_stability.py": "lab: families slopes tally",
     "lab/test_faults.py": "lab: fault_scenes injection",
     "validation/cost/test_cost.py": "validation/cost: series formulas pictures study",
