@@ -53,7 +53,7 @@ COMMANDS = {
     ),
     "check-mjcf": Listed(
         "fourbar_validation.robots.check:check_mjcf_command",
-        "Compare your own MJCF with a scene.",
+        "Measure the loops of your own MJCF or SDF in MuJoCo, or judge one by a scene.",
         "mujoco",
     ),
     "published": Listed(
