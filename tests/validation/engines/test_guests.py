@@ -37,6 +37,16 @@ from tests.support.scenes import crank_rocker
 from tests.whole.test_imports import ROOT
 
 HERE = "tests.support.hostile_class:"
+
+
+def place_of(text: str) -> str:
+    """The file and the line of the hostile class that has a text."""
+    file = ROOT / "tests" / "support" / "hostile_class.py"
+    lines = file.read_text(encoding="utf-8").splitlines()
+    (number,) = (i for i, line in enumerate(lines, 1) if text in line)
+    return f"({file}, line {number})"
+
+
 TORQUE = '"torque": moments[0] - cross(r2, F32)'
 SCRIPT = ROOT / "tests" / "support" / "plain_engine.mjs"
 SCENE = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0), loads=())
@@ -375,9 +385,9 @@ def test_a_class_is_served_by_our_host() -> None:
         name: rows["all"][1] for name, rows in by_engine.items() if "all" in rows
     }
     assert reasons == {
-        "prints": "ValueError: no licence",
+        "prints": f"ValueError: no licence {place_of('licence')}",
         "empty": "TypeError: the answer is a NoneType, not a fourbar_validation.Answer",
-        "leaves": "SystemExit: 0",
+        "leaves": f"SystemExit: 0 {place_of('sys.exit(0)')}",
         "complex": "TypeError: an answer holds real numbers, not complex128",
         "shapes": reasons["shapes"],
         "elsewhere": reasons["elsewhere"],
@@ -585,9 +595,8 @@ def test_a_run_with_guests_ends_with_their_rows_and_none_of_their_processes(
     for name in ("formulas", "free-body", "right"):
         assert rows[name] == {(AGREES, "")}, name
     assert rows["silent"] == {(FAILS, "no answer within 5 s")}
-    assert rows["prints"] == {
-        (FAILS, "ValueError: no licence; what it printed: output.txt")
-    }
+    raised = f"ValueError: no licence {place_of('licence')}"
+    assert rows["prints"] == {(FAILS, f"{raised}; what it printed: output.txt")}
     text = (tmp_path / "out" / "output.txt").read_text()
     assert text.count("\\x1b]0;owned\\x07begin\nfrom a shell") == 2
     if sys.platform == "linux":
