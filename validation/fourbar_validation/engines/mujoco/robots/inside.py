@@ -970,6 +970,13 @@ def reflect(model: mujoco.MjModel, loop: RobotLoop) -> Array | None:
     direction = cmath.phase(line)
     reflected = (2.0 * direction - theta_3, 2.0 * direction - theta_4)
     qpos = turn_hinges(model, loop, theta_2, *reflected)
+    # put together anew, no spring is wound by more than half a turn
+    for pin, joint in loop.hinges.items():
+        if pin == "O2":
+            continue
+        address = model.jnt_qposadr[joint]
+        drawn = model.qpos0[address]
+        qpos[address] = drawn + math.remainder(qpos[address] - drawn, math.tau)
     if not LoopInside(model, loop).close_gap(qpos):
         return None
     return qpos
