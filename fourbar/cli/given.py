@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 
 from fourbar.errors import ELSEWHERE, InputError, state_messages_in
 from fourbar.linkage import ANY_NUMBER, POSITIVE, require
@@ -273,6 +272,8 @@ def take_motion(scene: Scene, text: str) -> Scene:
     Angles, speeds and accelerations are those of the bar at the positions of the other
     scene that have them; an angle that the text adds is where the two are joined.
     """
+    import numpy as np
+
     from fourbar.files import load
     from fourbar.solving import find_last_stage, solve
 

@@ -113,7 +113,7 @@ class Wanted(NamedTuple):
 
 
 @dataclass
-class Curve:
+class PanelCurve:
     """One curve on the panels of a motion, p of them in the order of the motion."""
 
     values: Array
@@ -150,7 +150,7 @@ class Panels:
     stop: Array
     share: Array
     """Part of the motion that each panel is, (p,)."""
-    curves: dict[str, Curve]
+    curves: dict[str, PanelCurve]
     located: bool = True
     """False if the panels are single positions."""
 
@@ -165,7 +165,7 @@ class Panels:
         n = len(places)
         single = {}
         for name, values in curves.items():
-            single[name] = Curve(values.reshape(n, 1, -1), np.full(n, np.inf), [])
+            single[name] = PanelCurve(values.reshape(n, 1, -1), np.full(n, np.inf), [])
         return cls(places, places, share, single, located=False)
 
     def with_points(self, places: Array, curves: Mapping[str, Array]) -> "Panels":
@@ -182,7 +182,7 @@ class Panels:
             values = np.repeat(points, curve.values.shape[1], axis=1)
             error = np.concatenate([np.full(len(places), np.inf), curve.error])
             poles = [panel + len(places) for panel in curve.poles]
-            added[name] = Curve(
+            added[name] = PanelCurve(
                 np.concatenate([values, curve.values])[order],
                 error[order],
                 np.flatnonzero(np.isin(order, poles)).tolist(),
@@ -479,14 +479,14 @@ def _join(
         error = np.concatenate([one.error[keep] for one, keep in pairs])[order]
         late = np.zeros(len(order), dtype=bool)
         late[-kept[-1].sum() :] = unsettled[name][kept[-1]]
-        curve = Curve(values, error, [])
+        curve = PanelCurve(values, error, [])
         curve.poles = _find_poles(curve, late[order])
         curves[name] = curve
     share = (stop - start) / (stop - start).sum()
     return Panels(start, stop, share, curves)
 
 
-def _find_poles(curve: Curve, unsettled: NDArray[np.bool_]) -> list[int]:
+def _find_poles(curve: PanelCurve, unsettled: NDArray[np.bool_]) -> list[int]:
     """Find the panels that no halving settles and towards which a curve grows.
 
     The panels beside them have two, four and eight times their width. At a jump and in

@@ -22,7 +22,7 @@ from fourbar_validation.engines.mujoco.robots.examine import (
 )
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.robots.files import read_robot
-from fourbar_validation.robots.judge import Judgement, judge_file, list_answers
+from fourbar_validation.robots.judge import LoopJudgement, judge_file, list_answers
 
 Point = tuple[float, float]
 TILT = (0.3, -0.2, 0.7, 0.5)
@@ -263,7 +263,7 @@ def _answers_or_none(measured: LoopMeasurement | None) -> list[Answer] | None:
     return None if measured is None else list_answers(measured)
 
 
-def judge_path(name: str, scene: Scene, path: Path) -> Judgement:
+def judge_path(name: str, scene: Scene, path: Path) -> LoopJudgement:
     """Judge a file as `check-mjcf SCENE FILE` does."""
     return judge_file(name, scene, read_robot(path), MeasureOptions(PoseOptions()))
 

@@ -28,7 +28,7 @@ from fourbar_validation.engines.registry import Engine
 from fourbar_validation.engines.table import choose_engines
 from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run import pool
-from fourbar_validation.run.plan import RunOptions
+from fourbar_validation.run.plan import Plan, RunOptions
 from fourbar_validation.run.run import run
 from fourbar_validation.scenes.suites import LARGEST_LIST, read_suite
 from tests.support.here import judge_here
@@ -92,7 +92,7 @@ def test_reports_hold_hostile_text_as_text(
 ) -> None:
     judge_here(monkeypatch)
     out = tmp_path / "deep" / "out"
-    summary = run(Named(), out, EXACT, RunOptions(workers=1))
+    summary = run(Plan(Named(), EXACT, RunOptions(workers=1)), out)
     html = (out / "report.html").read_text()
     assert "<script>alert" not in html
     assert "<img src=x" not in html
@@ -385,7 +385,8 @@ def test_running_out_of_memory_costs_its_own_row(
     for size in ("SCENES_OF_A_SLOW_TASK", "SCENES_OF_A_QUICK_TASK"):
         monkeypatch.setattr(fourbar_validation.run.plan, size, 2)
     greedy = Engine("greedy", Greedy, EQUIVALENCE)
-    run(suite, tmp_path / "run", (*EXACT, greedy), RunOptions(workers=1, drawn=False))
+    options = RunOptions(workers=1, drawn=False)
+    run(Plan(suite, (*EXACT, greedy), options), tmp_path / "run")
     failing = [
         row
         for row in read_columns(tmp_path / "run" / "results.csv")

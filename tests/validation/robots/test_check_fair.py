@@ -34,7 +34,7 @@ from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.judge import (
     FILE_AT_ONE_STATE,
     FILE_THROUGH_TIME,
-    Judgement,
+    LoopJudgement,
 )
 from tests.support.robots import answer_of, judge_path, notes_of
 from tests.support.robots import examine_text as examine
@@ -357,7 +357,7 @@ def stopped(text: str) -> str:
 
 
 @cache
-def report_of(spoil: Callable[[str], str], folder: Path) -> Judgement:
+def report_of(spoil: Callable[[str], str], folder: Path) -> LoopJudgement:
     """The report on the arm's file with two faults.
 
     A mass that is 1 % off, and one that explains the error.
@@ -387,7 +387,7 @@ def test_the_cause_that_explains_the_error_stands_first(
     assert cost is not None and cost > 0.1 * worst
 
 
-def force_errors(report: Judgement) -> dict[tuple[str, str], float]:
+def force_errors(report: LoopJudgement) -> dict[tuple[str, str], float]:
     return {
         (cost.row.engine, cost.row.quantity): cost.row.error
         for cost in report.errors

@@ -125,8 +125,8 @@ def _collect_motion(scene: Scene, angle: float) -> dict[str, float]:
     omega, alpha = motion.find_rates(np.array([angle]))
     return {
         position: angle,
-        speed: float(np.max(omega or 0.0)),
-        acceleration: float(np.max(alpha)),
+        speed: 0.0 if omega is None else np.ravel(omega)[0],
+        acceleration: np.ravel(alpha)[0],
     }
 
 

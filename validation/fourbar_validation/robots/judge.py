@@ -109,7 +109,7 @@ class JudgedError:
 
 
 @dataclass(frozen=True, slots=True)
-class Judgement:
+class LoopJudgement:
     """Report on the loop of a user's file that is nearest to a scene."""
 
     measured: LoopMeasurement
@@ -174,7 +174,7 @@ def judge_file(
     scene: Scene,
     file: RobotFile,
     options: MeasureOptions,
-) -> Judgement:
+) -> LoopJudgement:
     """Judge a file in a guarded process.
 
     The error of the options is what it is held to; None: that of the generated file,
@@ -214,7 +214,7 @@ def judge_file(
     errors = [
         JudgedError(row, ours.get((row.engine, row.quantity), math.nan)) for row in rows
     ]
-    return Judgement(
+    return LoopJudgement(
         theirs.measured, order(differences), errors, [*theirs.notes, *unread]
     )
 

@@ -32,7 +32,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
 )
 from fourbar_validation.report.sentences import make_words_table, print_sentence
 from fourbar_validation.report.templating import escape_cell
-from fourbar_validation.robots.judge import Judgement
+from fourbar_validation.robots.judge import LoopJudgement
 from fourbar_validation.robots.measure import (
     MEASURED_THROUGH_TIME,
     RIGID,
@@ -109,7 +109,7 @@ def describe_measurement(measurement: RobotMeasurement) -> Iterator[ReportBlock]
         yield f"note: {note}"
 
 
-def describe_judgement(judgement: Judgement, stated: str) -> Iterator[ReportBlock]:
+def describe_judgement(judgement: LoopJudgement, stated: str) -> Iterator[ReportBlock]:
     """Describe a file that is judged against a scene.
 
     `stated`: options that win over the scene, as they were typed; "" without any.
@@ -124,7 +124,7 @@ def describe_judgement(judgement: Judgement, stated: str) -> Iterator[ReportBloc
     )
 
 
-def _describe_differences(judgement: Judgement) -> Iterator[ReportBlock]:
+def _describe_differences(judgement: LoopJudgement) -> Iterator[ReportBlock]:
     """List what differs from the generated file, with its cost, and the errors."""
     if not judgement.differences:
         yield "It differs in nothing from the generated MJCF."
@@ -160,7 +160,7 @@ def _write_heading(loop: LoopMeasurement, *, judged: bool, stated: str) -> str:
 
 def _describe_loop(
     loop: LoopMeasurement,
-    judgement: Judgement | None = None,
+    judgement: LoopJudgement | None = None,
     stated: str = "",
 ) -> Iterator[ReportBlock]:
     yield _write_heading(loop, judged=judgement is not None, stated=stated)
