@@ -10,6 +10,11 @@ from tests.oracle.scenes import take_scene
 
 SHIPPED = read_default_suite()
 RANDOM_SCENES = 200
+OF_MANY_MEMBERS = ("tolerances", "study")
+FEWER = 4
+"""One random scene in so many is judged by the oracles that solve hundreds of linkages:
+they take half of the time.
+"""
 SEED = 68
 SAMPLE = {
     "slender": ORACLES.keys() - {"blocks", "error_bars", "friction_residual"},
@@ -58,4 +63,5 @@ def test_every_shipped_scene_holds(number: int) -> None:
 @pytest.mark.parametrize("number", range(RANDOM_SCENES))
 def test_random_scenes_hold(number: int) -> None:
     scene = draw_random_scene(SEED, number, tuple(DrawnType))
-    assert not find_failing(judge_by(scene))
+    without = OF_MANY_MEMBERS if number % FEWER else ()
+    assert not find_failing(judge_by(scene, without=without))
