@@ -799,7 +799,7 @@ def _require_command(
 
 def _require_rates(key: str, rates: Any, unit: str, angle: Any) -> float | Array:
     """Return one rate, or an array of one for each angle, checked."""
-    if np.ndim(rates) == 0:
+    if not isinstance(rates, (list, tuple)) and np.ndim(rates) == 0:
         return require(key, rates, unit)
     array = require_numbers(key, rates, unit=unit)
     if unit.startswith("m") or not isinstance(angle, np.ndarray):

@@ -86,7 +86,7 @@ def test_the_run_of_a_pull_request_is_held_against_what_comes_along(
     """
     about, rows = read_run(find_baseline(ACCEPTED))
     assert about.engines is not None
-    others = about.engines - {"free-body"}
+    others = {*about.engines} - {"free-body"}
     few = [row for row in rows if row.scene == "crank_rocker"]
     few = [row for row in few if row.engine not in others]
     (checkout / "comes").mkdir()

@@ -116,8 +116,11 @@ def test_every_quantity_of_a_scene_is_described(results: Path) -> None:
     of_positions = {q.name for q in QUANTITIES}
     rows = [
         row
-        for file in (results / "results", SHIPPED_RUN)
-        for row in read_columns(file / "results.csv")
+        for file in (
+            results / "results" / "results.csv",
+            SHIPPED_RUN / "results.parquet",
+        )
+        for row in read_columns(file)
     ]
     whole_range = crank_rocker(motion=Motion(None, 10.0))
     rows += judge("whole range", whole_range, []).rows
