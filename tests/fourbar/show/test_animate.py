@@ -104,6 +104,19 @@ RELEASED = crank_rocker(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "angles",
+    [fourbar.Sweep(0.0, 2.0 * math.pi, 12), fourbar.Sweep(3.0, 1.0, 12), 1.0],
+    ids=["turn", "backwards", "one position"],
+)
+def test_what_is_solved_already_changes_no_number(angles: object) -> None:
+    scene = crank_rocker(motion=fourbar.Motion(angles, 10.0))
+    plain = animate.collect_live_data(scene, signs=(1, -1))
+    solved = fourbar.solve(scene)
+    shown = animate.collect_live_data(scene, signs=(1, -1), solved=solved)
+    np.testing.assert_equal(shown, plain)
+
+
 def test_a_free_motion_is_embedded_instant_by_instant() -> None:
     data, solution = embedded(animate.write_page(RELEASED)), fourbar.solve(RELEASED)
     (columns,) = data["branches"].values()
