@@ -61,7 +61,7 @@ def test_commands_start_within_their_limits() -> None:
     """Two processes that follow one another share what else the machine does."""
     beyond = {
         what: ratio
-        for what, ratio in measure_starts(3).items()
+        for what, ratio in measure_starts().items()
         if not bench.SPEED_LIMITS[what].holds(ratio)
     }
     assert not beyond
