@@ -208,9 +208,8 @@ def test_a_bar_that_does_not_turn_takes_no_torque(
     branch: int,
     drive_bar: int,
 ) -> None:
-    """T3 of a parallelogram and T4 of a folded kite are tested.
-
-    They would have a pole at every position.
+    """T3 of a parallelogram and T4 of a folded kite would have a pole at every
+    position.
     """
     motion = Motion(np.linspace(0.3, 2.0, 5), 1.0, 2.0, branch)
     for effects in (
@@ -279,10 +278,7 @@ def test_beyond_the_range_of_doubles_the_status_says_so_from_that_stage_on() -> 
 
 
 def test_where_it_depends_on_the_position_only_those_positions_are_lost() -> None:
-    """The force of a spring of 1e308 N/m, 0.8 m long.
-
-    Its distance grows with theta_2.
-    """
+    """The force of a spring of 1e308 N/m, 0.8 m long, overflows as its ends part."""
     spring = Spring(Place(1, (3.0, 0.0)), Place(2, (1.0, 0.0)), 1e308, 0.0)
     solution = solved(
         Scene(

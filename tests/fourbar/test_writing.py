@@ -1,6 +1,5 @@
-"""What becomes of the file that was there.
-
-Its mode, the links that lead to it, and its bytes where writing fails.
+"""A file that is written again keeps its mode and its links, and its bytes where
+writing fails.
 """
 
 import os

@@ -20,9 +20,8 @@ from tests.validation.cost.test_cost import turning
 
 @pytest.mark.slow
 def test_unseen_linkages_are_served_and_not_at_three_times_the_cheapest() -> None:
-    """A few of those of the study `advice`, of every type.
-
-    They are judged between the positions that the advice saw.
+    """Two linkages of the study `advice`, of other types, are judged between the
+    positions that the advice saw.
     """
     costs = {("RK4", True): 1.0}
     for index in range(2):

@@ -103,10 +103,7 @@ def test_a_force_that_vanishes_is_held_to_its_prediction(
     times: float,
     found: bool,
 ) -> None:
-    """Relative to 0 no error has a size.
-
-    It is judged in newtons, and not left unjudged.
-    """
+    """An error has no size relative to a force of 0, and is judged in newtons."""
     scene = loads(
         (COUNTEREXAMPLES / "bar_with_all_mass_stands_for_an_instant.toml").read_text(
             encoding="utf-8"

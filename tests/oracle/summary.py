@@ -549,9 +549,8 @@ def _judge_pins(judged: _SummaryJudge) -> None:
 
 
 def _judge_bending(judged: _SummaryJudge) -> None:
-    """Judge the largest bending moment of each bar.
-
-    It is cut at its place, and at many positions.
+    """Judge the largest bending moment of each bar: cut at its place, and at many
+    positions.
     """
     stated = state_from_pins(judged.scene)
     commanded = judged.solution.at

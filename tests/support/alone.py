@@ -1,7 +1,8 @@
-"""A command in a process that has loaded the libraries and nothing of the project.
+"""Commands in processes forked from one that has loaded the libraries and nothing of
+the project.
 
-It is forked from one like that. What a command must import by itself shows as in a
-process of its own, without the second that numpy and pint take.
+What a command must import by itself shows as in a process of its own, without the
+second that numpy and pint take.
 """
 
 import os

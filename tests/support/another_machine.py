@@ -77,9 +77,8 @@ def environment(core: str) -> dict[str, str]:
 
 @cache
 def machine(core: str | None = None) -> str:
-    """Return what a fresh process calculates with.
-
-    It is as it is started, or under the variables of a core.
+    """Return what a fresh process calculates with, under the variables of a core if one
+    is named.
     """
     line = [sys.executable, "-c", f"from {__name__} import here; print(here())"]
     changed = os.environ | ({} if core is None else environment(core))

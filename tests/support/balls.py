@@ -1,7 +1,4 @@
-"""Every output of the thirteen equations in 320-bit balls.
-
-They share nothing with the formulas.
-"""
+"""Thirteen equations in 320-bit balls, which share nothing with the formulas."""
 
 import numpy as np
 from flint import arb, ctx

@@ -10,10 +10,7 @@ def point(
     curve: str = "c",
     kind: str = STEPPED_MOTION,
 ) -> CostPoint:
-    """Return a point with one error of all quantities.
-
-    It takes a microsecond a step.
-    """
+    """Return a point with one error of all quantities and a microsecond a step."""
     errors = WorstErrors(*[worst] * len(ERROR_NAMES))
     return CostPoint(
         curve,

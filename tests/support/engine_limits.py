@@ -117,9 +117,8 @@ def _compiles(inertia: float) -> bool:
 
 
 def _centre_kept(r: float) -> bool:
-    """Tell whether the compiled MJCF keeps a mass centre where it was put.
-
-    It is at this distance from its pin.
+    """Tell whether the compiled MJCF keeps a mass centre at a distance r from its pin,
+    m.
     """
     base = _base()
     scene = replace_bars(base, output=replace(base.linkage.output, centre=(r, 0.5)))
@@ -131,10 +130,7 @@ def _centre_kept(r: float) -> bool:
 
 
 def _proximal(mu: float) -> bool:
-    """Tell whether Pinocchio's constrained acceleration is a number.
-
-    It has this proximal parameter.
-    """
+    """Tell whether Pinocchio's constrained acceleration is finite at a proximal mu."""
     scene = replace(_base(), loads=(), motion=Motion(1.0, 3.0))
     kept = pinocchio.PROXIMAL_SETTINGS
     try:

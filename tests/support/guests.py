@@ -1,6 +1,5 @@
-"""Programs that answer as guests, and the processes of a test.
-
-They are made of the engine of docs/protocol.md.
+"""Programs that answer as guests, made of the engine of docs/protocol.md, and the
+processes of a test.
 """
 
 import os

@@ -35,10 +35,7 @@ def summary_of(records: Iterable[Record]) -> Summary:
 
 
 def judge_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Do in this process, one item after another, what workers would do.
-
-    It is not under test here.
-    """
+    """Do the items of the workers in this process, one after another."""
 
     def over_none(
         function: Callable[[Any], Any],

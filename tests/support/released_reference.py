@@ -140,9 +140,8 @@ class Equations:
             raise NotImplementedError(type(term).__name__)
 
     def _add_load(self, load: Load) -> None:
-        """Move the force to G, in the axes that it is stated in.
-
-        Its couple about G is added.
+        """Add a load at G: its force in the axes that it is stated in, its couple about
+        G.
         """
         if load.table is not None or load.point is not None:
             raise NotImplementedError("a load of a table, or at a named point")

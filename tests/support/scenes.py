@@ -60,10 +60,11 @@ TURN = crank_rocker(
 
 
 def low_parallelogram(steps: int = 8, **changes: object) -> fourbar.Scene:
-    """A parallelogram that stays below its ground's line, beyond a change point.
+    """Return a parallelogram below its ground's line, beyond a change point.
 
-    It is "open", and the sine between bars 3 and 4 is negative all the way. Told the
-    name of the assembly in place of that sign, an engine answers the antiparallelogram.
+    The assembly is "open", and the sine between bars 3 and 4 is negative all the way:
+    told the name of the assembly in place of that sign, an engine answers the
+    antiparallelogram.
     """
     ground_angle = 0.2
     linkage = replace(fourbar.uniform(0.3, 0.1, 0.3, 0.1), ground_angle=ground_angle)

@@ -48,9 +48,8 @@ class LoopSettings:
 
 @dataclass(frozen=True)
 class Servo:
-    """An actuator on the crank.
-
-    Its torque is position_gain (target - theta_2) + velocity_gain (omega - omega_2).
+    """Actuator on the crank, of torque position_gain (target - theta_2) + velocity_gain
+    (omega - omega_2).
     """
 
     position_gain: float
@@ -177,9 +176,8 @@ class Loop:
         return self.centres[number] + _polar(load.from_centre or (0.0, 0.0))
 
     def drive_direction(self, angles: Array) -> tuple[list[complex], list[float]]:
-        """Return the forces and couples by which the drive of size one acts.
-
-        They act on bars 2, 3 and 4; each couple is about the first pin of the bar.
+        """Return the forces on bars 2, 3 and 4, and their couples about the first pin
+        of the bar, of a drive of size one.
         """
         forces, couples = [0j, 0j, 0j], [0.0, 0.0, 0.0]
         if isinstance(self.drive, int):
@@ -491,9 +489,8 @@ class Simulation:
         )
 
     def exerted(self) -> float:
-        """Return the torque on the crank.
-
-        It is what a servo gives it, or the multiplier of the equality with the wheel.
+        """Return the torque on the crank, N m: that of the servo, or the multiplier of
+        the equality with the wheel.
         """
         if isinstance(self.settings.carrier, Servo):
             return float(self.data.actuator_force[-1])
@@ -522,9 +519,8 @@ class Simulation:
         return acceleration, closing, float(part * scale)
 
     def generalized_drive(self, angles: Array) -> Array:
-        """Return the forces on the three joints by which the drive of size one acts.
-
-        They follow from virtual work.
+        """Return the generalized forces on the three joints of a drive of size one, by
+        virtual work.
         """
         pushes, couples = self.loop.drive_direction(angles)
         crank = self.loop.a * np.exp(1j * angles[0])
@@ -578,9 +574,8 @@ def measure(
     settings: LoopSettings,
     settle: bool = False,
 ) -> dict[str, float]:
-    """Return the worst error of the drive and of each pin's force.
-
-    It is relative to the largest value in the sweep.
+    """Return the worst error of the drive and of each pin's force, relative to the
+    largest value in the sweep.
     """
     simulation = Simulation(scene, settings)
     samples = simulation.run(settle)

@@ -60,10 +60,7 @@ class Moody:
 
 
 def dies_at_first(*_: object) -> None:
-    """Starts no worker of a process as long as some of its lives are left.
-
-    They are in the folder that the run was given.
-    """
+    """End the process and take one of its lives as long as the folder LIVES has any."""
     lives = sorted(Path(os.environ["LIVES"]).iterdir())
     if lives:
         lives[0].unlink(missing_ok=True)

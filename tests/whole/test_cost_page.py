@@ -1,6 +1,5 @@
-"""The page on the cost of accuracy.
-
-Its numbers are computed again, and its pictures drawn again from few points.
+"""The page on the cost of accuracy: its numbers are computed again, its pictures drawn
+again from few points.
 """
 
 import math

@@ -80,9 +80,8 @@ def test_the_run_of_a_pull_request_is_held_against_what_comes_along(
     checkout: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The accepted state of the project is cut down.
-
-    It keeps the scene and the engine of this run.
+    """The accepted state of the project is cut down to the scene and the engine of this
+    run.
     """
     about, rows = read_run(find_baseline(ACCEPTED))
     assert about.engines is not None
@@ -245,9 +244,8 @@ def test_the_scene_file_is_one(checkout: Path) -> None:
 
 @pytest.mark.parametrize("page", [*PAGES, *FORMS], ids=lambda page: page.name)
 def test_every_other_command_line_is_one_that_its_program_takes(page: Path) -> None:
-    """Parse the command lines in running text and shell blocks.
-
-    They run for minutes or name a SCENE.
+    """Parse the command lines, which run for minutes or name a SCENE, in running text
+    and shell blocks.
     """
     text = page.read_text(encoding="utf-8")
     lines = re.findall(

@@ -169,9 +169,8 @@ def test_without_its_file_a_scene_neither_reads_nor_writes_the_example(
 
 
 def test_the_drive_makes_up_for_what_the_example_takes(latch: Any) -> None:
-    """Power of the couple, angle and speed those of the free bodies.
-
-    It acts at few positions, and in both senses.
+    """The couple, at angles and speeds of the free bodies, has the power that the drive
+    makes up for: at few positions, and in both senses.
     """
     scene = guide_scene()
     with_it, without = solve(scene).torque, solve(replace(scene, effects=())).torque

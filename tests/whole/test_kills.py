@@ -386,9 +386,8 @@ def test_whatever_ended_it_a_rerun_goes_on_and_ends_with_the_same_bytes(
     tmp_path: Path,
     undisturbed: Path,
 ) -> None:
-    """Interrupted, killed at random moments and met with a full disk.
-
-    These happen one after the other in one folder.
+    """A run is interrupted, killed at random moments and met with a full disk, one
+    after the other in one folder.
     """
     process = start(tmp_path, COUNT)
     wait_for_parts(tmp_path, process, at_least=1)

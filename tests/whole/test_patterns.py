@@ -65,9 +65,8 @@ PATTERNS = dict(list_patterns())
 
 
 def measure_slowest(pattern: re.Pattern[str]) -> float:
-    """Return the longest processor time of a search in hostile texts, s.
-
-    It ends at the first one that is too long.
+    """Return the longest processor time of a search in hostile texts, s, up to the
+    first that is too long.
     """
     slowest = 0.0
     for length in LENGTHS:

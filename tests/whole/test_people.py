@@ -187,9 +187,8 @@ def test_four_pins_and_the_speed_of_the_output_as_they_are_drawn(
 
 
 def test_a_linkage_by_the_coordinates_of_its_joints(ask: Steps, tmp_path: Path) -> None:
-    """E stands where it is drawn, in the coordinates of the drawing.
-
-    Its path goes through it.
+    """E stands where it is drawn, in the coordinates of the drawing, and its path goes
+    through it.
     """
     (tmp_path / "joints.toml").write_text(COORDINATES)
     text = ask("analyze", "joints.toml", "--at", "drawn")

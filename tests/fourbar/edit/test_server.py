@@ -74,9 +74,8 @@ def wait_until(happened: Callable[[], object]) -> None:
 
 @pytest.fixture
 def bench(path: Path, monkeypatch: pytest.MonkeyPatch, capsys):
-    """Run a coroutine against a workbench that listens.
-
-    It gets the workbench and its address.
+    """Return a function that runs a coroutine with a listening workbench and its
+    address.
     """
     monkeypatch.setattr(server, "GONE", 0.3)
 

@@ -1,7 +1,4 @@
-"""A scene that is changed step by step.
-
-Its text, its history, its answers and what is kept on the disk.
-"""
+"""Steps that change a scene: its text, its history, its answers and its files."""
 
 import base64
 import cmath

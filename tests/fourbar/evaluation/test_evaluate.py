@@ -1,6 +1,5 @@
-"""Error bars against the true error, by ball arithmetic.
-
-They once were too small, too large, or none.
+"""Error bars against the true error in ball arithmetic, where they once were too small,
+too large or missing.
 """
 
 from collections.abc import Callable
@@ -64,10 +63,8 @@ def sized(k: float = 1.0, turns: float = 0.0) -> Scene:
 
 
 def near_a_limit(effect: Springs | Torsion) -> Scene:
-    """Springs alone.
-
-    They pull as uncertainly as the directions of bars 3 and 4, which are nearly in
-    line.
+    """Scene near a limit whose springs alone act: their pull is as uncertain as the
+    directions of bars 3 and 4, which are nearly in line.
     """
     linkage = FourBar(0.3, Bar(0.25), Bar(0.1), Bar(0.22))
     limit = fourbar.limit_positions(linkage)[0].theta_2
@@ -193,9 +190,8 @@ def test_a_bar_is_of_the_motion_that_begins_to_one_side() -> None:
 
 
 def test_a_bar_is_as_wide_as_what_a_position_loses() -> None:
-    """Where a spring's ends nearly meet its direction is lost.
-
-    That is no power of any sine.
+    """The direction of a spring is lost where its ends nearly meet, by no power of any
+    sine.
     """
     scene = FAULT_SCENES["ends of a spring nearly meet"]
     rows = printed.error_bars(Question("", scene, command(scene)))

@@ -158,12 +158,11 @@ bend little within one.
 
 
 def forces_by_energy(theta: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Compute pin forces of ROCKER, (4, 2), at angles of its bars.
+    """Compute F12, F32, F43 and F14 of ROCKER, (4, 2), at other angles of its bars.
 
-    They are F12, F32, F43, F14 if it is released at other angles. Speeds by the
-    conservation of energy, along the one direction that the loop allows. Accelerations
-    of the three mass centres and the four pin forces together are 17 linear equations,
-    regular where any two bars are in line.
+    Speeds follow from the conservation of energy, along the one direction that the loop
+    allows. Accelerations of the three mass centres and the four pin forces together are
+    17 linear equations, regular where any two bars are in line.
     """
     _, a, b, c = ROCKER.lengths
     half = 0.5 * np.array([a, b, c])

@@ -600,10 +600,7 @@ def test_the_harness_asks_who_takes_the_command_and_writes_who_refuses() -> None
 
 
 class Undeclared:
-    """An engine that does not say what commands it takes.
-
-    It is asked for none but theta_2.
-    """
+    """An engine that does not say what commands it takes is asked for theta_2 alone."""
 
     name = "undeclared"
 

@@ -1,7 +1,5 @@
-"""A stroke commanded.
-
-It returns itself, its bar moves as when it is commanded alone, and what cannot be is
-refused.
+"""Commands of a stroke: the stroke returns itself, its bar moves as when it is
+commanded alone, and an impossible stroke is refused.
 """
 
 import math

@@ -1,7 +1,4 @@
-"""Jumps and peaks between the steps of a sweep are found.
-
-They are where geometry and much finer steps have them.
-"""
+"""Jumps and peaks between the steps of a sweep, against geometry and finer steps."""
 
 import math
 import resource

@@ -1,6 +1,5 @@
-"""Means and energies that `analyze` gives, which the steps of a motion do not change.
-
-They are those of a weight at the end of a crank, of which all is known by hand.
+"""Means and energies of `analyze` do not change with the steps of a motion: those of a
+weight at the end of a crank are known by hand.
 """
 
 import math

@@ -1,6 +1,5 @@
-"""Summaries of motions that pass a pole, a change point or a gap.
-
-It lies between two positions of the sweep.
+"""Summaries of motions that pass a pole, a change point or a gap between two positions
+of the sweep.
 """
 
 import math

@@ -1,7 +1,5 @@
-"""The set of problems.
-
-Its files are those of today, its answers those of derivations that share no code with
-them.
+"""Files of the set of problems are up to date, and its answers are those of derivations
+that share no code with them.
 """
 
 import json
@@ -332,11 +330,11 @@ def solve_pin_forces(
     theta: Any,
     omega: Any,
 ) -> dict[str, list[list[float]]]:
-    """Return the pin forces of a released parallelogram.
+    """Return the pin forces of a released parallelogram, N, from the balances of its
+    coupler, which does not turn.
 
-    They follow from the balances of its coupler, which does not turn. Moments of the
-    coupler about B give the part of F32 across it, moments of the input about O2 the
-    part along it.
+    Moments of the coupler about B give the part of F32 across it, moments of the input
+    about O2 the part along it.
     """
     mp = pytest.importorskip("mpmath").mp
     scene, k = problem["scene"], pendulum(problem)[0]

@@ -1,6 +1,5 @@
-"""The test files for other projects state the answers of models/problems.
-
-They import no module of this project.
+"""Test files for other projects state the answers of models/problems and import no
+module of this project.
 """
 
 import ast

@@ -1,6 +1,5 @@
-"""The advice: the figures it reaches, and the file it writes.
-
-It is tested too what it says where nothing serves.
+"""Advice: the figures it reaches, the file it writes, and what it says where nothing
+serves.
 """
 
 import math
@@ -72,9 +71,8 @@ def test_the_solver_is_searched_too() -> None:
 
 
 def test_a_drive_elsewhere_is_judged_between_the_steps_too() -> None:
-    """Fourteen steps a turn hold the torque of bar 4 within 0.7 % at the steps.
-
-    They miss 9 % between.
+    """Fourteen steps a turn hold the torque of bar 4 within 0.7 % at the steps, and
+    miss 9 % between them.
     """
     scene = fourbar.load(MODELS / "drag_link.toml")
     setup = JudgedSetup(scene)
@@ -149,9 +147,8 @@ def test_the_file_alone_keeps_the_error(tmp_path: Path) -> None:
 
 
 def test_what_lies_between_two_steps_is_judged_too() -> None:
-    """Two steps are right at both of their ends.
-
-    They miss what the pin forces do between.
+    """Two steps that are right at both of their ends miss what the pin forces do
+    between.
     """
     scene = replace(turning(), motion=fourbar.Motion(fourbar.Sweep(0.0, 1.0, 36), 10.0))
     setup = JudgedSetup(scene)

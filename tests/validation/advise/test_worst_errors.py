@@ -26,9 +26,8 @@ COMMAND = command(SCENE)
 
 
 def answer(**off: float) -> dict[str, Any]:
-    """Give the right torque and pin forces, off at the last position.
-
-    They are off by a part of their largest value.
+    """Return the right torque and pin forces, off at the last position by a part of
+    their largest value.
     """
     solution = fourbar.solve(SCENE)
     quantities = {name: np.array(getattr(solution, name)) for name in ERROR_NAMES}

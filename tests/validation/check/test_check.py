@@ -293,10 +293,7 @@ def with_gravity(angle: float) -> Callable[[Scene], Numbers]:
 
 
 def in_other_frame(scene: Scene) -> Scene:
-    """A scene of a load whose direction is kept, or turns with its bar.
-
-    It turned where it now is kept.
-    """
+    """Return the scene with its force in the other frame, "world" or "bar"."""
     moment, force = scene.loads
     frame = {"bar": "world", "world": "bar"}[force.frame]
     return replace(scene, loads=(moment, replace(force, frame=frame)))
@@ -1159,9 +1156,8 @@ def test_no_line_is_wider_than_a_terminal_and_none_ends_within_a_word(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The longest says which mistake explains all quantities of a table in kg mm/s^2.
-
-    Its words are one line when the lines are put together again.
+    """The longest line says which mistake explains all quantities of a table in kg
+    mm/s^2; put together again, its lines are one.
     """
     scene_file = tmp_path / "scene.toml"
     scene_file.write_text(
@@ -1577,10 +1573,7 @@ def test_a_motion_that_rows_are_not_found_by_is_refused_in_one_line(
 
 
 def write_torques(path: Path, form: Callable[[list[tuple[float, float]]], str]) -> Path:
-    """Write theta_2 in whole degrees and the right torque in a form.
-
-    They are of a crank-rocker.
-    """
+    """Write theta_2 of a crank-rocker in whole degrees and its torque in a form."""
     scene = SCENES["crank_rocker"]
     degrees = np.arange(0.0, 360.0, 30.0)
     base = command(scene)

@@ -115,9 +115,8 @@ def compare(
     predicted: Predicted | None,
     nearby: Callable[..., dict[str, np.ndarray]] | None = None,
 ) -> dict[str, Row]:
-    """Rows of an answer that is the formulas' own, changed.
-
-    It is that of a crank at constant speed.
+    """Return the rows, by quantity, of the formulas' own answer to a crank at constant
+    speed, changed.
     """
     motion = fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0)
     scene = crank_rocker(motion=motion, loads=())

@@ -55,9 +55,8 @@ def compare(answer: Answer, **held: object) -> dict[str, Row]:
 
 
 def moved(name: str, place: int, by: float) -> Array:
-    """Return a quantity that is off at one position.
-
-    It is off by so many parts of its largest value.
+    """Return a quantity that is off at one position by so many parts of its largest
+    value.
     """
     values = np.array(getattr(FORMULAS, name))
     values[place] += by * (1.0 if name[:5] == "theta" else np.abs(values).max())
@@ -81,9 +80,10 @@ def test_an_error_at_any_position_fails_its_row_there(name: str, place: int) -> 
 
 @pytest.mark.parametrize("factor", (0.2, 5.0))
 def test_what_is_allowed_is_fifty_last_digits_over_the_condition(factor: float) -> None:
-    """Of theta_3 it is 50 eps over the condition of the position.
+    """Allowed of theta_3 are 50 eps over the condition of the position.
 
-    That is |sin(theta_4 - theta_3)| and the shorter of bars 3, 4 over the longest bar.
+    The condition is |sin(theta_4 - theta_3)| times the shorter of bars 3, 4 over the
+    longest bar.
     """
     assert (K, EPS) == (50.0, 2.0**-52)
     s = abs(math.sin(FORMULAS.theta_4[MIDDLE] - FORMULAS.theta_3[MIDDLE]))
@@ -197,9 +197,8 @@ def test_ten_times_its_prediction_an_error_is_degraded_and_no_more(
 
 
 def test_a_scene_of_which_most_numbers_are_undecided_does_not_hold() -> None:
-    """A tolerance that is wide at every position leaves nothing to decide by.
-
-    It is wider than a thousandth.
+    """A tolerance wider than a thousandth at every position leaves nothing to decide
+    by.
     """
     blind = replace(FORMULAS, condition=np.full(POSITIONS, 1e-14))
     answer = make_answer()

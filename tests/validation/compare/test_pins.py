@@ -1,6 +1,5 @@
-"""Places from the first pins of their bars.
-
-They are judged without the formulas' conversion of them.
+"""Places stated from the first pins of their bars, judged without the formulas'
+conversion of them.
 """
 
 import math

@@ -168,9 +168,8 @@ def test_an_error_that_is_no_number_is_the_worst(missing: float) -> None:
 
 
 def test_the_scale_is_of_positions_whose_condition_is_a_tenth_at_least() -> None:
-    """A rocker's pin forces grow towards its limit.
-
-    Those of worse conditions excuse no others.
+    """A rocker's pin forces grow towards its limit, and those of worse conditions
+    excuse no others.
     """
     linkage = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
     limit = fourbar.limit_positions(linkage)[0].theta_2

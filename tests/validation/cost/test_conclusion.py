@@ -8,9 +8,8 @@ from tests.support.costs import point
 
 
 def test_statement_and_conclusion_have_one_criterion() -> None:
-    """A setting counts by its error at the steps and between them.
-
-    It does so here and on the front.
+    """A setting counts, here and on the front, by its error at the steps and between
+    them.
     """
     curves = {
         "recommended": [point(30, 5e-5)],

@@ -43,9 +43,8 @@ from tests.support.scenes import CYLINDER, crank_rocker, thesis
 
 
 def turning(omega: float = 10.0, positions: int = 36) -> fourbar.Scene:
-    """The crank-rocker a = 0.1, b = 0.25, c = 0.22, d = 0.3 m, over a revolution.
-
-    It has gravity.
+    """Return the crank-rocker a = 0.1, b = 0.25, c = 0.22, d = 0.3 m with gravity, over
+    a revolution.
     """
     sweep = fourbar.Sweep(0.0, 2.0 * math.pi, positions)
     return fourbar.Scene(

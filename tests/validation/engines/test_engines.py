@@ -335,9 +335,8 @@ def test_bars_without_mass_or_inertia(name: str) -> None:
 
 @each_engine
 def test_light_bars_are_held_or_refused(name: str) -> None:
-    """Below 2.2e-16 kg Pinocchio puts the mass centre elsewhere.
-
-    It sums two inertias.
+    """Below 2.2e-16 kg Pinocchio, which sums two inertias, puts the mass centre
+    elsewhere.
     """
     linkage = with_bar(2, mass=0.2).linkage
     light = {

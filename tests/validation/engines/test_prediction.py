@@ -43,9 +43,8 @@ BOUNDED = ("theta_3", "theta_4", "B", "G3", "G4", "sin_mu", "condition")
 
 
 def touch() -> Scene:
-    """Command bar 2 to within a rounding of where its loop ceases to close.
-
-    It goes in the sense in which it closes.
+    """Command bar 2 to within a rounding of where its loop ceases to close, in the
+    sense in which it closes.
     """
     limit = next(x.theta_2 for x in limit_positions(ROCKER) if 0.0 < x.theta_2 < np.pi)
     angles = limit + np.arange(-6, 7) * EPS

@@ -1,7 +1,5 @@
-"""docs/protocol.md.
-
-Its engine answers by the page's words alone, and its schema is what both sides write
-and read.
+"""docs/protocol.md: its engine answers by the page's words alone, and its schema is
+what both sides write and read.
 """
 
 import json

@@ -364,9 +364,8 @@ def test_public_test_cases_agree_to_the_last_digit() -> None:
 
 
 def test_answers_that_sympy_leaves_to_be_solved() -> None:
-    """Mass matrix and forcing give the accelerations that are compared.
-
-    They are as printed in test_jointsmethod.py.
+    """Mass matrix and forcing as printed in test_jointsmethod.py give the accelerations
+    that are compared.
     """
     mass = np.array(
         [

@@ -1,6 +1,5 @@
-"""What the exact engines say of the scenes of a run is the accepted state.
-
-It is so on whatever machine that was made.
+"""The accepted state is what the exact engines say of the scenes of a run, on any
+machine.
 """
 
 from dataclasses import replace

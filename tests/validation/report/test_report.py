@@ -481,9 +481,8 @@ def test_failures_are_one_line_an_engine_and_cause(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """A mistake that explains more scenes is named first.
-
-    It comes before one that fits a few by chance.
+    """A mistake that explains more scenes is named before one that fits a few by
+    chance.
     """
     swapped, sign = "F32 and F43 are exchanged: F32, F43", "sign reversed"
     scenes = [

@@ -493,9 +493,8 @@ def test_the_one_thing_that_is_wrong_costs_as_much_alone_in_the_generated_file(
     old: str,
     new: str,
 ) -> None:
-    """Another tree in another plane, made wrong in one entry.
-
-    Its price is the error of that file, by another model.
+    """Made wrong in one entry, a tree in another plane has as its price the error of
+    that file by another model.
     """
     text = other_plane(f'site1="r" site2="q" {STIFF}')
     assert old in text

@@ -90,9 +90,8 @@ def error_of(scene: Scene, examined: Examined, how: str, name: str) -> float:
 
 
 def bisect_on_the_couple(text: str, theta_2: float, alpha_2: float) -> float:
-    """Ask MuJoCo for the couple on the input at keyframe 0.
-
-    It is moved to an angle by a chain of Newton steps.
+    """Return MuJoCo's couple on the input, N m, at keyframe 0 moved to an angle by
+    Newton steps.
     """
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
@@ -130,9 +129,8 @@ def examined_dry() -> Examined:
 
 @pytest.mark.slow
 def test_a_file_with_dry_friction_is_right_to_the_softness_of_its_loop() -> None:
-    """Two trials and a line gave a couple that accelerates the crank wrongly.
-
-    It was -56 rad/s^2 in place of 0.
+    """Two trials and a line gave a couple that accelerates the crank by -56 rad/s^2 in
+    place of 0.
     """
     for how in (FILE_AT_ONE_STATE, FILE_THROUGH_TIME):
         assert error_of(DRY, examined_dry(), how, "torque") < SOFT_FRICTION
@@ -238,9 +236,8 @@ def test_armature_that_the_scene_does_not_have_is_inertia_of_the_input() -> None
 
 
 def limited(pin: str, low: float, high: float) -> str:
-    """The file of the arm without friction, with a joint range in rad.
-
-    It has its own zero.
+    """Return the file of the arm without friction, with a joint range in rad from its
+    own zero.
     """
     text = write_mjcf(BARE, drive="none").replace('limit="disable" ', "")
     hinge = f'name="{pin}" type="hinge"'
@@ -249,9 +246,8 @@ def limited(pin: str, low: float, high: float) -> str:
 
 
 def counted_from_elsewhere(text: str, pin: str) -> str:
-    """The same file with another zero of a joint.
-
-    Its `ref` and range are moved alike.
+    """Return the same file with another zero of a joint: `ref` and range are moved
+    alike.
     """
 
     def moved(match: re.Match[str]) -> str:
@@ -439,10 +435,7 @@ def test_a_setting_costs_what_typing_it_into_the_file_gains(
 
 
 def test_where_no_force_gives_the_acceleration_is_said() -> None:
-    """The tendon of a cylinder that carries a part of what the motion asks for.
-
-    It carries no more than that part.
-    """
+    """The tendon of a cylinder carries only a part of what the motion asks for."""
     end, start = fourbar.Place(4, (0.09, 0.7)), fourbar.Place(1, (0.1, -1.0))
     scene = replace(
         BARE, drive_bar=None, drive=fourbar.LinearDrive(start, end),

@@ -44,9 +44,8 @@ def nothing(numbers: dict[str, np.ndarray], at: Command) -> None:
 
 
 def make_guest(*replacements: tuple[str, str], change: Change = nothing) -> type:
-    """Make the page's engine with other words in its text.
-
-    Its numbers are others at last.
+    """Return the page's engine with other words in its text and a change of its
+    numbers.
     """
     text = SOLVER
     for old, new in replacements:
@@ -282,9 +281,8 @@ def test_the_joint_of_a_driven_bar_carries_the_bars_behind_it(
     pin: str,
     bar: int,
 ) -> None:
-    """The work of the weights in a tree is that of its torque.
-
-    Its driven joint alone turns.
+    """The work of the weights in a tree whose driven joint alone turns is that of its
+    torque.
     """
     scene = crank_rocker(loads=(), drive_bar=bar)
     standing = scene.motion.replace(speed=0.0, acceleration=0.0)

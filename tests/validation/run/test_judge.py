@@ -176,9 +176,8 @@ AT_REST = 1
 
 
 def with_friction() -> Scene:
-    """A crank-rocker with dry friction at O4, at the dead centre of bar 4.
-
-    It is on either side of it too.
+    """Return a crank-rocker with dry friction at O4, at the dead centre of bar 4 and on
+    either side of it.
     """
     linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
     d, a, b, c = linkage.lengths

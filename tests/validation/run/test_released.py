@@ -201,9 +201,8 @@ def test_an_engine_is_run_at_twice_its_step_however_close_the_instants_are() -> 
 def test_an_engine_that_predicts_nothing_of_itself_is_undecided(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """One is wrong by 3 rad at its step and by 5 rad at twice it.
-
-    It has no digit by which it could agree.
+    """An engine that is wrong by 3 rad at its step and by 5 rad at twice it has no
+    digit by which it could agree.
     """
     off = iter([3.0, 5.0])
     rows = answering(

@@ -1,6 +1,5 @@
-"""A run held against an earlier one says how a failure stood there.
-
-It is the failure that the verdict names.
+"""A run held against an earlier one says how the failure that its verdict names stood
+there.
 """
 
 from dataclasses import replace

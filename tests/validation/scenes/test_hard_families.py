@@ -137,9 +137,8 @@ def test_beyond_a_toggle_no_engine_finds_a_position() -> None:
 def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A millionth of the torque is within what the last digits excuse.
-
-    They are those of theta_2, for every engine.
+    """A millionth of the torque is within what the last digits of theta_2 excuse for
+    every engine.
     """
     lengths, true = (
         draw_lengths_of_type(DrawnType.TRIPLE_ROCKER, 0),
@@ -322,9 +321,8 @@ def test_near_a_toggle_a_wrong_force_fails_that_the_law_excuses() -> None:
 
 
 def test_predictions_know_what_no_law_in_sines_knows() -> None:
-    """A parallelogram that stays parallel is regular in the formulas.
-
-    It is 1/d^3 in the data; a scale changes nothing.
+    """A parallelogram that stays parallel is regular in the formulas and 1/d^3 in the
+    data; a scale changes nothing.
     """
     for name, scene in toggle(distances=(1e-4,), seeds=range(1)):
         at_ = fourbar.command(scene)
@@ -425,9 +423,8 @@ def test_a_reset_and_what_caused_it_are_seen(
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Any,
 ) -> None:
-    """A state or an acceleration that MuJoCo takes for bad.
-
-    It occurs once, in the middle of the run.
+    """A state or an acceleration that MuJoCo takes for bad occurs once, in the middle
+    of the run.
     """
     monkeypatch.chdir(tmp_path)
     true, calls = ClosedLoop.forward, []
@@ -480,9 +477,8 @@ def test_a_free_motion_through_change_points_in_every_engine() -> None:
 def test_an_engine_that_drifts_unpredicted_fails(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Wrong by the same amount with either step.
-
-    Its own step says nothing of it, the exact solution does.
+    """Wrong by the same amount with either step, an engine predicts nothing of it; the
+    exact solution shows it.
     """
     from fourbar_validation.engines import pinocchio
 

@@ -171,9 +171,8 @@ def test_a_drive_that_does_not_follow_the_law_fails_the_run(
     factor: float,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The engine is judged at the motion it made.
-
-    That it is not the law's, its own speed says.
+    """The engine is judged at the motion it made; its own speed says that it is not the
+    law's.
     """
     monkeypatch.setattr(
         runner.LawSegment, "alpha", changed(runner.LawSegment.alpha, factor)

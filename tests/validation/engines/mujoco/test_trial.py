@@ -1,7 +1,4 @@
-"""The errors that `cost` plots are those of a second loop.
-
-It is so for every drive, integrator and softness.
-"""
+"""Errors that `cost` plots are a second loop's: every drive, integrator, softness."""
 
 import math
 import statistics

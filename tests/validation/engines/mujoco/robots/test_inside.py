@@ -70,10 +70,7 @@ def open_loop(name: str) -> tuple[LoopInside, LoopScene]:
 
 
 def spread_over_range(inside: LoopInside, made: LoopScene, count: int) -> np.ndarray:
-    """Angles of bar 2 in the loop's plane, rad.
-
-    They lie within the range that its hinges leave it.
-    """
+    """Return angles of bar 2 in the loop's plane within its hinges' range, rad."""
     sweep = made.scene.motion.angle
     assert isinstance(sweep, Sweep)
     angles = np.linspace(sweep.start, sweep.stop, count + 2)[1:-1]
@@ -137,9 +134,8 @@ def test_the_torque_is_the_one_that_mujoco_gives_when_asked_by_itself(
 
 @pytest.mark.parametrize("name", [*FILES, *TEXTS])
 def test_rigid_pins_in_the_robot_are_the_formulas_of_its_scene(name: str) -> None:
-    """Multipliers on MuJoCo's mass matrix of the whole robot.
-
-    They are held against a scene of three bars, and its free bodies.
+    """Multipliers on MuJoCo's mass matrix of the whole robot are the forces of a scene
+    of three bars, and of its free bodies.
     """
     inside, made = open_loop(name)
     angles = spread_over_range(inside, made, 5)

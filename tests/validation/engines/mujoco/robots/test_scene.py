@@ -182,10 +182,7 @@ def read(
 
 
 def compare(text: str, made: LoopScene, speed: float = 3.0) -> None:
-    """Hold torque and pin forces of the scene against the whole robot.
-
-    They are compared over the sweep.
-    """
+    """Hold torque and pin forces of the scene's sweep against the whole robot."""
     robot = WholeRobot(text, made)
     solution = fourbar.solve(made.scene)
     driven = made.loop.hinges["O2"]
