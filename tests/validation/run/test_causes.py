@@ -402,13 +402,31 @@ def test_a_mistake_in_numbers_of_another_engine_is_named(
     assert find_causes(partial(Altered, change))[0] == words
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        *("kite", "parallelogram", "command_coupler", "command_output"),
-        *("stroke_input", "stroke_output", "cylinder_1_3", "law_cycloidal"),
-    ],
-)
+OTHER_COMMANDS = [
+    *("kite", "parallelogram", "command_coupler", "command_output"),
+    *("stroke_input", "stroke_output", "cylinder_1_3", "law_cycloidal"),
+]
+
+
+@pytest.mark.parametrize("name", OTHER_COMMANDS)
+def test_what_nothing_explains_fails_by_its_numbers_under_every_command(
+    name: str,
+) -> None:
+    """Mistakes that are tried in vain, as a zero that is elsewhere, hide no number."""
+
+    def spoil(numbers: dict[str, np.ndarray], at: Command) -> None:
+        for place, (quantity, values) in enumerate(numbers.items()):
+            ripple = np.cos(place + np.arange(values.size) ** 2.0)
+            numbers[quantity] = values + np.ptp(values) * ripple.reshape(values.shape)
+
+    scene = fourbar.load(CAPABILITIES / f"{name}.toml")
+    engine = Engine("plain", partial(Altered, spoil), EQUIVALENCE)
+    rows = judge("scene", scene, [engine], order=False).rows
+    failed = {row.quantity for row in rows if row.failed}
+    assert "F12" in failed and "all" not in failed
+
+
+@pytest.mark.parametrize("name", OTHER_COMMANDS)
 def test_a_sign_is_named_under_every_command_and_at_change_points(name: str) -> None:
     scene = fourbar.load(CAPABILITIES / f"{name}.toml")
     causes = find_causes(partial(Altered, reverse_F43), scene)

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -327,13 +326,13 @@ def _scale_load(
 
 
 def _try_offset(judge: Judge) -> Iterator[Mistake]:
-    """Try the crank angle from another zero.
+    """Try the commanded angle from another zero, where no stroke is commanded.
 
     The offset is that at which theirs fit best, refined by Gauss and Newton.
     """
     keys = [key for key in judge.table.values if judge.size(key).any()]
     numbers = sum(np.count_nonzero(judge.where(key)) for key in keys)
-    if numbers < ENOUGH_NUMBERS:
+    if numbers < ENOUGH_NUMBERS or judge.at.stroke is not None:
         return
     n = len(judge.at.angle)
     rows = np.unique(np.linspace(0, n - 1, _TRIED).round().astype(int))
@@ -387,15 +386,10 @@ def _compute_residuals(
 
     Returns one line for each offset; what they do not state counts as right.
     """
-    command = judge.at
     m = len(offsets)
-    repeated: dict[str, Any] = {}
-    for name in ("angle", "branch", "speed", "acceleration"):
-        values = getattr(command, name)
-        if np.ndim(values) == 1:
-            repeated[name] = np.tile(values[rows], m)
-    repeated["angle"] += np.repeat(offsets, len(rows))
-    at = command._replace(**repeated, remainder=None, time=None)
+    repeated = judge.at.part(np.tile(rows, m))
+    angle = repeated.angle + np.repeat(offsets, len(rows))
+    at = repeated._replace(angle=angle, remainder=None, time=None)
     moved = solve(judge.scene, judge.stage, at=at)
     parts = []
     for key in keys:
