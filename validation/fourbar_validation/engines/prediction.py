@@ -28,7 +28,7 @@ import numpy as np
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES, STAGE_OF, VECTORS, Array
 from fourbar.scene import Command, Scene, with_signs
-from fourbar_validation.compare.pins import find_centre, find_mass
+from fourbar_validation.compare.pins import find_centre, find_inertia, find_mass
 from fourbar_validation.compare.tolerance import (
     EPS,
     OF_THE_INPUT,
@@ -89,19 +89,14 @@ def predict_about_mass_centre(
     """Predict for an engine that moves a tree about the common mass centre.
 
     MuJoCo moves it so; the mass centre is that of all bodies. Every bar is accelerated
-    with the first of its tree and back again by its own joint.
+    with the first of its tree and back again by its own joint, and its inertia leaves
+    the rounding of both in the joints' couples.
     """
-    furthest = max(
-        abs(find_centre(scene.linkage.bar(number))[0]) for number in MOVING_BARS
-    )
-    return _predict_error(
-        scene,
-        command,
-        quantity,
-        sum_lengths(scene.linkage) + furthest,
-        mask,
-        carried=True,
-    )
+    bars = scene.linkage.moving
+    furthest = max(abs(find_centre(bar)[0]) for bar in bars)
+    reach = sum_lengths(scene.linkage) + furthest
+    inertias = (max(find_mass(bar) * reach * reach, find_inertia(bar)) for bar in bars)
+    return _predict_error(scene, command, quantity, reach, mask, max(inertias))
 
 
 def predict_for_any_method(
@@ -126,14 +121,13 @@ def _predict_error(
     quantity: str,
     reach: float,
     mask: Mask | None = None,
-    *,
-    carried: bool = False,
+    carried: float = 0.0,
 ) -> Array:
     """Predict the absolute error of a quantity at each position, (n,).
 
-    A mask chooses positions. With `carried` the accelerations of the bars are
-    differences of others as large as the fastest bar's at `reach`. NaN where the loop
-    does not close. Infinite at a singular position, where the equations have no answer,
+    A mask chooses positions. `carried` is the moment of inertia, kg m^2, that is
+    accelerated as the fastest bar is, and back again. NaN where the loop does not
+    close. Infinite at a singular position, where the equations have no answer,
     and where rounding decides whether the loop closes; but there angles and places are
     bounded by how far the loop opens, and what the input alone decides loses nothing.
     """
@@ -154,7 +148,7 @@ def _predict_error(
         )
         if quantity in OF_THE_INPUT:
             if moved is not None and moved.states(quantity):
-                errors[i] = moved.first_order(quantity, reach, carried=carried)
+                errors[i] = moved.first_order(quantity, reach, carried)
             continue
         bound = math.inf
         if touching[i]:
@@ -169,12 +163,12 @@ def _predict_error(
         if lost and STAGE_OF.get(quantity) != "position":
             errors[i] = math.inf
             continue
-        first = moved.first_order(quantity, reach, carried=carried)
+        first = moved.first_order(quantity, reach, carried)
         errors[i] = min(first, bound)
         if quantity in DRIVING:
             turned = max(moved.first_order(f"theta_{bar}", reach) for bar in (3, 4))
             pulled = max(
-                moved.first_order(force, reach, carried=carried) for force in PIN_FORCES
+                moved.first_order(force, reach, carried) for force in PIN_FORCES
             )
             lever = sum_lengths(scene.linkage) if quantity == COUPLE.value else 1.0
             errors[i] += pulled * turned * lever
@@ -226,9 +220,7 @@ class Sensitivities(NamedTuple):
     1 m, and by couples on the bars of the strongest pin force times 1 m.
     """
     carried: dict[str, float]
-    """Change by couples on the bars: the heaviest bar's inertial force at 1 m of the
-    fastest bar, times 1 m.
-    """
+    """Change by couples on the bars: 1 kg m^2 at the fastest bar's acceleration."""
 
     def states(self, name: str) -> bool:
         """Return whether the output has a value.
@@ -241,8 +233,7 @@ class Sensitivities(NamedTuple):
         self,
         name: str,
         reach: float,
-        *,
-        carried: bool = False,
+        carried: float = 0.0,
     ) -> float:
         """Return the predicted error of an output; of a vector, the norm.
 
@@ -254,8 +245,7 @@ class Sensitivities(NamedTuple):
             component = name + axis
             part = RANDOM_WALK * self.data.get(component, math.inf)
             part += reach * self.loop.get(component, 0.0)
-            if carried:
-                part += reach * reach * self.carried.get(component, 0.0)
+            part += carried * self.carried.get(component, 0.0)
             parts.append(part)
         return EPS * math.hypot(*parts)
 
@@ -309,11 +299,10 @@ def _compute_sensitivity(
         # the couple on a bar, or the force that drives, is rounded too
         lever = sum_lengths(scene.linkage) if drive == COUPLE.value else 1.0
         strongest += abs(base[drive]) / lever
-        heaviest = max(find_mass(scene.linkage.bar(bar)) for bar in MOVING_BARS)
         for bar in MOVING_BARS:
             rounded = move(**{f"couple_{bar}": strongest * step})
             _add_response(loop, base, rounded)
-            misplaced = move(**{f"couple_{bar}": heaviest * hardest * step})
+            misplaced = move(**{f"couple_{bar}": hardest * step})
             _add_response(carried, base, misplaced)
     return Sensitivities(data, loop, carried)
 
