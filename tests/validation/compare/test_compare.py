@@ -5,6 +5,7 @@ The unit of an error where nothing is allowed is tested too.
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from fourbar_validation.compare.compare import (
     Demands,
     Errors,
     Predicted,
+    _WorstPosition,
     judge_errors,
 )
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, Row
@@ -27,18 +29,42 @@ from tests.support.scenes import crank_rocker
 ALLOWED = 1e-14
 
 
-def make_errors(*error: float, condition: float = 1.0, **changes: object) -> Errors:
+def judge_quantity(
+    *error: float,
+    predicted: np.ndarray | None = None,
+    **changes: Any,
+) -> _WorstPosition:
+    """Judge the errors of a quantity, between two that are exact."""
     n = len(error)
-    parts: dict[str, object] = {
-        "error": np.array(error),
+    parts: dict[str, Any] = {
         "allowed": np.full(n, ALLOWED),
-        "scale": Scale(np.ones(n), np.ones(n), np.zeros(n, dtype=bool)),
         "relative": np.ones(n, dtype=bool),
-        "condition": np.full(n, condition),
         "mask": np.ones(n, dtype=bool),
+        "cancellation": np.ones(n),
         "tolerance": EQUIVALENCE,
+        **changes,
     }
-    return Errors(**{**parts, **changes})  # type: ignore[arg-type]
+
+    def place(values: np.ndarray, others: float) -> np.ndarray:
+        other = np.full_like(values, others)
+        return np.stack([other, values, other])
+
+    ones = np.ones((3, n))
+    errors = Errors(
+        place(np.array(error), 0.0),
+        place(parts["allowed"], ALLOWED),
+        Scale(ones, place(parts["cancellation"], 1.0), np.zeros((3, n), dtype=bool)),
+        place(parts["relative"], 1.0),
+        ones,
+        place(parts["mask"], 1.0),
+        parts["tolerance"],
+        np.full((3, n), np.nan),
+        np.zeros(3, dtype=np.intp),
+    )
+    expected = None if predicted is None else place(predicted, 0.0)
+    before, worst, after = judge_errors(errors, expected)
+    assert before == after and (before.verdict, before.error) == (AGREES, 0.0)
+    return worst
 
 
 @pytest.mark.parametrize(
@@ -57,18 +83,18 @@ def test_an_error_beyond_the_allowed_one_is_held_to_its_prediction(
     allowed: float,
 ) -> None:
     expected = None if predicted is None else np.array([0.0, predicted, 0.0])
-    worst = judge_errors(make_errors(1e-15, 1e-12, 0.0), expected)
+    worst = judge_quantity(1e-15, 1e-12, 0.0, predicted=expected)
     assert (worst.position, worst.verdict) == (1, verdict)
     assert worst.allowed == pytest.approx(allowed, abs=0)
 
 
 def test_within_what_is_allowed_no_prediction_is_needed() -> None:
-    worst = judge_errors(make_errors(1e-15, 9e-15, 0.0), None)
+    worst = judge_quantity(1e-15, 9e-15, 0.0)
     assert (worst.position, worst.verdict, worst.decided) == (1, AGREES, 3)
 
 
 def test_no_number_fails_wherever_it_stands() -> None:
-    worst = judge_errors(make_errors(np.nan, 0.0, allowed=np.ones(2)), None)
+    worst = judge_quantity(np.nan, 0.0, allowed=np.ones(2))
     assert (worst.position, worst.verdict, worst.reason[:3]) == (0, FAILS, "NaN")
 
 
@@ -86,13 +112,15 @@ def test_a_position_at_which_too_much_is_allowed_is_undecided(
 ) -> None:
     """One position that decides is enough for a row."""
     tolerance = replace(EQUIVALENCE, factor=declared)
-    scale = Scale(np.ones(2), np.full(2, 123.0), np.zeros(2, dtype=bool))
 
     def judge(*allowed: float) -> tuple[str, int]:
-        errors = make_errors(
-            1.0, 0.0, allowed=np.array(allowed), scale=scale, tolerance=tolerance
+        worst = judge_quantity(
+            1.0,
+            0.0,
+            allowed=np.array(allowed),
+            cancellation=np.full(2, 123.0),
+            tolerance=tolerance,
         )
-        worst = judge_errors(errors, None)
         assert "the terms cancel 1.2e+02-fold" in worst.reason
         return worst.verdict, worst.decided
 
@@ -105,9 +133,13 @@ def test_a_prediction_of_the_whole_value_leaves_no_digit_but_in_a_unit_of_its_ow
     None
 ):
     """At a scale of 0 a prediction of 2 is 2 N and not twice the value."""
-    vanishing = make_errors(1.0, allowed=np.zeros(1), relative=np.zeros(1, dtype=bool))
-    assert judge_errors(vanishing, np.array([2.0])).verdict == DEGRADED
-    assert judge_errors(make_errors(1.0), np.array([2.0])).verdict == UNDECIDED
+    twice = np.array([2.0])
+    own_unit = np.zeros(1, dtype=bool)
+    vanishing = judge_quantity(
+        1.0, predicted=twice, allowed=np.zeros(1), relative=own_unit
+    )
+    assert vanishing.verdict == DEGRADED
+    assert judge_quantity(1.0, predicted=twice).verdict == UNDECIDED
 
 
 def compare(

@@ -4,8 +4,8 @@ The row states the position where the quantity is worst.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -75,8 +75,8 @@ AnswerNearby = Callable[[Mask], dict[str, Array]]
 """Function that evaluates every quantity again at the positions of a mask. theta_2 is
 varied within its rounding; elsewhere it is NaN.
 """
-Scales = dict[str, tuple[Scale, Array]]
-"""Scale by the formulas and condition of each quantity at each position."""
+Scales = dict[tuple[str, ...], tuple[Scale, Array]]
+"""Scale by the formulas and conditions, (q, n), by the quantities that have them."""
 
 _OF_THE_FORMULAS = (
     *DRY_FRICTION_QUANTITIES,
@@ -411,11 +411,10 @@ class Comparison:
 
     def _judge(self, due: Sequence[_Due], judged: _Judged) -> None:
         """Judge the errors of quantities at their positions."""
-        errors = self._measure(due)
-        for i, one in enumerate(due):
-            of_one = self._take_again(one.quantity, one.ours, errors.select(i))
-            predicted = self._predict(one.quantity, of_one)
-            worst = judge_errors(of_one, predicted, self.demands.method)
+        errors = self._take_again(due, self._measure(due))
+        verdicts = judge_errors(errors, self._predict(due, errors), self.demands.method)
+        theta_2 = self.formulas.theta_2
+        for one, worst in zip(due, verdicts, strict=True):
             judged.decided += worst.decided
             judged.rows[one.quantity] = Row(
                 *self._who,
@@ -424,7 +423,7 @@ class Comparison:
                 worst.allowed,
                 worst.verdict,
                 escape_controls(worst.reason + one.note),
-                float(self.formulas.theta_2[worst.position]),
+                float(theta_2[worst.position]),
                 worst.condition,
             )
 
@@ -448,23 +447,30 @@ class Comparison:
             condition=condition,
             mask=np.array(masks),
             tolerance=tolerance,
+            again=np.full(condition.shape, np.nan),
+            settled=np.zeros(len(due), dtype=np.intp),
         )
 
-    def _take_again(self, quantity: str, ours: Array, errors: "Errors") -> "Errors":
-        """Ask again within the rounding of theta_2 for an error that is too large."""
+    def _take_again(self, due: Sequence[_Due], errors: "Errors") -> "Errors":
+        """Ask again within the rounding of theta_2 for errors that are too large."""
         beyond = errors.mask & (errors.error > errors.allowed)
         if self.demands.answer_nearby is None or not beyond.any():
             return errors
-        theirs = self._answered_nearby[quantity]
-        again = find_error(quantity, ours, theirs, errors.scale.size)
-        return errors._replace(
+        again = np.full_like(errors.error, np.nan)
+        for i in np.flatnonzero(beyond.any(axis=1)).tolist():
+            quantity = due[i].quantity
+            theirs = self._answered_nearby[quantity]
+            size = errors.scale.size[i]
+            again[i] = find_error(quantity, due[i].ours, theirs, size)
+        return replace(
+            errors,
             error=np.where(beyond, np.fmin(errors.error, again), errors.error),
             again=again,
-            settled=int(np.count_nonzero(beyond & (again <= errors.allowed))),
+            settled=np.count_nonzero(beyond & (again <= errors.allowed), axis=1),
         )
 
-    def _predict(self, quantity: str, errors: "Errors") -> Array | None:
-        """Predict the errors beyond the allowed ones, in the unit of the errors.
+    def _predict(self, due: Sequence[_Due], errors: "Errors") -> Array | None:
+        """Predict the errors beyond the allowed ones, (q, n), in the errors' units.
 
         None where nothing predicts them. A position that was asked again needs no more
         than what is allowed there: the prediction knows nothing of theta_2's rounding.
@@ -472,45 +478,43 @@ class Comparison:
         predicted = self.demands.predicted
         if predicted is None:
             return None
-        beyond = errors.beyond
-        if not beyond.any():
-            return np.zeros_like(errors.error)
-        share = divide(predicted(quantity, beyond), errors.scale.size)
-        if errors.again is not None:
-            was_asked = np.isfinite(errors.again)
-            share = np.where(was_asked, np.fmin(share, errors.allowed), share)
-        return np.nan_to_num(share, nan=0.0, posinf=np.inf)
+        shares = np.zeros_like(errors.error)
+        for i in np.flatnonzero(errors.beyond.any(axis=1)).tolist():
+            share = divide(
+                predicted(due[i].quantity, errors.beyond[i]), errors.scale.size[i]
+            )
+            was_asked = np.isfinite(errors.again[i])
+            share = np.where(was_asked, np.fmin(share, errors.allowed[i]), share)
+            shares[i] = np.nan_to_num(share, nan=0.0, posinf=np.inf)
+        return shares
 
-    def _scale(self, quantities: Sequence[str]) -> tuple[Scale, Array]:
+    def _scale(self, quantities: tuple[str, ...]) -> tuple[Scale, Array]:
         """Return scale and condition of quantities at each position, (q, n).
 
         Of formulas and another derivation the stricter one counts.
         """
-        missing = [name for name in quantities if name not in self.scales]
         formulas = self.formulas
         answered = self._solution
-        if missing:
+        if quantities not in self.scales:
             reference = answered if self.reference is None else self.reference
             conditions = take_strictest_conditions(
-                missing, self.scene.linkage, formulas, reference
+                quantities, self.scene.linkage, formulas, reference
             )
-            values = [getattr(formulas, name) for name in missing]
-            scale = TermSizes(self.scene, formulas).scales(missing, values)
-            for i, name in enumerate(missing):
-                self.scales[name] = scale.select(i), conditions[i]
-        of_each = [self.scales[name] for name in quantities]
-        scale = Scale(*map(np.array, zip(*(one for one, _ in of_each), strict=True)))
+            values = [getattr(formulas, name) for name in quantities]
+            scale = TermSizes(self.scene, formulas).scales(quantities, values)
+            self.scales[quantities] = scale, conditions
+        scale, conditions = self.scales[quantities]
         for solution in (answered, self.reference):
             if solution is not None:
                 theirs = find_scale_of_answer(quantities, self.scene, solution)
                 if theirs is not None:
-                    scale = scale.take_strictest(theirs)
-                    break
-        return scale, np.array([condition for _, condition in of_each])
+                    return scale.take_strictest(theirs), conditions
+        return scale, conditions
 
 
-class Errors(NamedTuple):
-    """Errors of one quantity, each (n,), all in one unit; or of several, (q, n)."""
+@dataclass(frozen=True)
+class Errors:
+    """Errors of several quantities, (q, n), each in one unit."""
 
     error: Array
     allowed: Array
@@ -523,69 +527,44 @@ class Errors(NamedTuple):
     """Positions that are compared."""
     tolerance: ErrorBound
     """Tolerance that the errors are held to."""
-    again: Array | None = None
+    again: Array
     """Errors of a second answer within the rounding of theta_2; NaN where not asked."""
-    settled: int = 0
-    """Number of positions at which that answer agrees."""
+    settled: NDArray[np.intp]
+    """Number of positions at which that answer agrees, (q,)."""
 
-    def select(self, i: int) -> "Errors":
-        """Select the errors of one quantity of several."""
-        return self._replace(
-            error=self.error[i],
-            allowed=self.allowed[i],
-            scale=self.scale.select(i),
-            relative=self.relative[i],
-            condition=self.condition[i],
-            mask=self.mask[i],
-        )
-
-    @property
+    @cached_property
     def decidable(self) -> Mask:
         """Positions that are compared and have enough digits to decide by."""
         most = max(MOST_ALLOWED, self.tolerance.factor)
         return np.asarray(self.mask & (self.allowed <= most))
 
-    @property
+    @cached_property
     def judged(self) -> Mask:
         """Positions that have a verdict: an error that is no number needs no digits."""
         return np.asarray(self.decidable | (self.mask & ~np.isfinite(self.error)))
 
-    @property
+    @cached_property
     def beyond(self) -> Mask:
         """Positions at which the error is beyond the allowed one, or is no number."""
         return np.asarray(self.judged & ~(self.error <= self.allowed))
 
-    def explain(self, i: int) -> str:
-        """Say in a sentence what is allowed at a position, and why."""
-        condition = float(self.condition[i])
-        why = self.tolerance.explain(condition)
-        cancellation = float(self.scale.cancellation[i])
+    def explain(self, at: tuple[int, int]) -> str:
+        """Say in a sentence what a quantity is allowed at a position, and why."""
+        why = self.tolerance.explain(float(self.condition[at]))
+        cancellation = float(self.scale.cancellation[at])
         if cancellation > K:
             why += f", times N/K: the terms cancel {cancellation:.2g}-fold"
-        if self.scale.vanishes[i]:
+        if self.scale.vanishes[at]:
             why += ", of the sum of its terms, which cancel"
         return why
 
-    def explain_undecided(self, i: int) -> str:
-        """Say why a position has too few digits to decide by."""
-        why = f"eps/condition = {EPS / self.condition[i]:.1e}"
-        cancellation = float(self.scale.cancellation[i])
+    def explain_undecided(self, at: tuple[int, int]) -> str:
+        """Say why a quantity has too few digits to decide by at a position."""
+        why = f"eps/condition = {EPS / self.condition[at]:.1e}"
+        cancellation = float(self.scale.cancellation[at])
         if cancellation > K:
             why += f", the terms cancel {cancellation:.2g}-fold"
         return why
-
-    def write_notes(self, undecided: int) -> str:
-        """Return the end of a reason: how many positions have no verdict.
-
-        Positions that were asked again count as well.
-        """
-        notes = ""
-        if undecided:
-            limit = f"more than {MOST_ALLOWED:g} allowed"
-            notes += f"; {undecided} positions with {limit} not judged"
-        if self.settled:
-            notes += f"; {self.settled} positions within the rounding of theta_2"
-        return notes
 
 
 class _WorstPosition(NamedTuple):
@@ -605,65 +584,72 @@ def judge_errors(
     errors: Errors,
     predicted: Array | None,
     method: str = "",
-) -> _WorstPosition:
-    """Judge errors by the allowed error.
+) -> Iterator[_WorstPosition]:
+    """Judge the errors of each quantity by the allowed error.
 
     Larger ones are judged by TIMES_PREDICTED times the predicted one, which the row
     then states as `allowed`. An error that is no number fails. The position is that
     where an error uses most of what is allowed.
 
-    `predicted`: None where nothing predicts the errors. `method`: for which they are
-    predicted, as the end of a reason.
+    `predicted`: (q, n), None where nothing predicts the errors. `method`: for which
+    they are predicted, as the end of a reason.
     """
-    decidable = errors.decidable
     judged = errors.judged
     beyond = errors.beyond
     bound = errors.allowed
-    no_digit = np.zeros_like(beyond)
+    no_digit: Mask = np.zeros_like(beyond)
     if predicted is not None and beyond.any():
         bound = np.where(beyond, np.maximum(bound, TIMES_PREDICTED * predicted), bound)
         # where a first-order prediction reaches the value itself, no digit is left
         reaches = np.where(errors.relative, predicted >= 1.0, predicted == np.inf)
-        no_digit = beyond & np.isfinite(errors.error) & reaches
+        no_digit = np.asarray(beyond & np.isfinite(errors.error) & reaches)
     used = find_used(errors.error, bound)
     used[no_digit] = np.minimum(used[no_digit], 1.0)
-    candidates = next(mask for mask in (beyond, judged, errors.mask) if mask.any())
-    i = int(np.argmax(np.where(candidates, used, -1.0)))
-    error = float(errors.error[i])
-    if math.isnan(error):
-        verdict = FAILS
-        why = "NaN"
-    elif no_digit[i]:
-        assert predicted is not None
-        verdict = UNDECIDED
-        why = f"an error of {predicted[i]:.1e} of the value is predicted"
-    elif not judged[i]:
-        verdict = UNDECIDED
-        why = errors.explain_undecided(i)
-    elif not beyond[i]:
-        verdict = AGREES
-        why = errors.explain(i)
-    elif predicted is None:
-        verdict = FAILS
-        why = errors.explain(i)
-    elif used[i] <= 1.0:
-        verdict = DEGRADED
-        why = f"{error:.1e} of {predicted[i]:.1e} predicted for this position{method}"
-    else:
-        verdict = FAILS
-        why = f"{error:.1e} where {predicted[i]:.1e} was predicted{method}"
-    if judged.any():
-        undecided = int(np.count_nonzero(errors.mask & ~decidable))
-        why += errors.write_notes(undecided)
-    return _WorstPosition(
-        i,
-        verdict,
-        why,
-        error,
-        float(bound[i]),
-        float(errors.condition[i]),
-        int(np.count_nonzero(decidable & ~no_digit)),
-    )
+    candidates = np.where(judged.any(axis=1, keepdims=True), judged, errors.mask)
+    candidates = np.where(beyond.any(axis=1, keepdims=True), beyond, candidates)
+    worst = np.where(candidates, used, -1.0).argmax(axis=1).tolist()
+    decided = np.count_nonzero(errors.decidable & ~no_digit, axis=1).tolist()
+    undecided = np.count_nonzero(errors.mask & ~errors.decidable, axis=1).tolist()
+    for i, position in enumerate(worst):
+        at = i, position
+        error = float(errors.error[at])
+        if math.isnan(error):
+            verdict = FAILS
+            why = "NaN"
+        elif not judged[at]:
+            verdict = UNDECIDED
+            why = errors.explain_undecided(at)
+        elif not beyond[at]:
+            verdict = AGREES
+            why = errors.explain(at)
+        elif predicted is None:
+            verdict = FAILS
+            why = errors.explain(at)
+        elif no_digit[at]:
+            verdict = UNDECIDED
+            why = f"an error of {predicted[at]:.1e} of the value is predicted"
+        elif used[at] <= 1.0:
+            verdict = DEGRADED
+            expected = f"{predicted[at]:.1e} predicted for this position"
+            why = f"{error:.1e} of {expected}{method}"
+        else:
+            verdict = FAILS
+            why = f"{error:.1e} where {predicted[at]:.1e} was predicted{method}"
+        if judged[i].any():
+            if undecided[i]:
+                limit = f"more than {MOST_ALLOWED:g} allowed"
+                why += f"; {undecided[i]} positions with {limit} not judged"
+            if again := errors.settled[i]:
+                why += f"; {again} positions within the rounding of theta_2"
+        yield _WorstPosition(
+            position,
+            verdict,
+            why,
+            error,
+            float(bound[at]),
+            float(errors.condition[at]),
+            decided[i],
+        )
 
 
 def _mark_stated(pairs: Sequence[_Pair], formulas: Solution) -> Mask:
