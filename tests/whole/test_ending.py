@@ -9,8 +9,11 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fourbar.errors import INTERRUPTED
@@ -40,6 +43,12 @@ while True:
 """
 READING = "loops"
 GUEST = "guest"
+STARTING = b"spawn_main"
+"""Word in the command line of a process that `multiprocessing` starts."""
+START_SECONDS = 1.0
+"""What a worker takes until it is at work, on an idle machine."""
+KILLS = int(os.environ.get("KILLS", "3"))
+"""Moments of a start at which it is interrupted; every night there are fifty."""
 
 
 def start(what: str, folder: Path, mark: str) -> "subprocess.Popen[bytes]":
@@ -62,21 +71,53 @@ def start(what: str, folder: Path, mark: str) -> "subprocess.Popen[bytes]":
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         env={**os.environ, "MARK_OF_A_TEST": mark},
+        start_new_session=True,
     )
 
 
-def wait_until_busy(what: str, mark: str) -> None:
-    """Wait until the process that takes long has begun."""
-    word = b"spawn_main" if what == READING else b"busy.py"
-    for _ in range(600):
+def wait_for_process(word: bytes, mark: str) -> None:
+    """Wait until a process runs that has the word in its command line."""
+    for _ in range(3000):
         for process in list_processes(mark):
             line = Path(f"/proc/{process}/cmdline").read_bytes()
             # the harness's own line names the guest too
             if word in line and b"validation" not in line:
-                time.sleep(1.0)
                 return
-        time.sleep(0.05)
+        time.sleep(0.01)
     raise AssertionError("nothing was started")
+
+
+@contextmanager
+def leaving_nothing(mark: str) -> Iterator[None]:
+    """Hold that soon after the body no process has the mark."""
+    try:
+        yield
+        until = time.monotonic() + PATIENCE
+        while list_processes(mark) and time.monotonic() < until:
+            time.sleep(0.1)
+        assert not list_processes(mark)
+    finally:
+        for left in list_processes(mark):
+            os.kill(left, signal.SIGKILL)
+
+
+@pytest.mark.slow
+@pytest.mark.linux
+@pytest.mark.usefixtures("interruptible")
+@pytest.mark.timeout(120 + 10 * KILLS)
+@pytest.mark.parametrize("what", [READING, GUEST])
+def test_ctrl_c_while_workers_start_is_one_line(what: str, tmp_path: Path) -> None:
+    """A terminal sends it to all processes of the command."""
+    for moment in np.linspace(0.0, START_SECONDS, KILLS):
+        mark = f"{tmp_path}/{what}/{moment}"
+        process = start(what, tmp_path, mark)
+        with leaving_nothing(mark):
+            wait_for_process(STARTING, mark)
+            time.sleep(moment)
+            os.killpg(process.pid, signal.SIGINT)
+            _, errors = process.communicate(timeout=PATIENCE)
+        assert errors.decode().strip() == "error: interrupted", moment
+        assert process.returncode == INTERRUPTED
 
 
 @pytest.mark.slow
@@ -90,17 +131,11 @@ def test_nothing_outlives_a_command_that_is_ended(
 ) -> None:
     mark = f"{tmp_path}/{what}"
     process = start(what, tmp_path, mark)
-    try:
-        wait_until_busy(what, mark)
+    with leaving_nothing(mark):
+        wait_for_process(STARTING if what == READING else b"busy.py", mark)
+        time.sleep(START_SECONDS)
         process.send_signal(ended_by)
         _, errors = process.communicate(timeout=PATIENCE)
-        until = time.monotonic() + PATIENCE
-        while list_processes(mark) and time.monotonic() < until:
-            time.sleep(0.1)
-        assert not list_processes(mark)
-    finally:
-        for left in list_processes(mark):
-            os.kill(left, signal.SIGKILL)
     if ended_by == signal.SIGTERM:
         assert process.returncode == INTERRUPTED
         # click ends the line of the terminal's ^C first

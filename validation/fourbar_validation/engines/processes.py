@@ -18,6 +18,7 @@ from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing import parent_process
+from multiprocessing.resource_tracker import ensure_running
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
@@ -81,6 +82,25 @@ def end_with_parent() -> None:
         os._exit(1)
 
     threading.Thread(target=wait_for_end, daemon=True).start()
+
+
+@contextmanager
+def hold_interruption() -> Iterator[None]:
+    """Hold Ctrl-C back until the body ends, in the processes too that it starts.
+
+    A process inherits the block and keeps it, so that nothing interrupts its first
+    imports: the command ends it. Windows has no such block; there nothing is held.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    # the tracker of `multiprocessing` ends a block where it is started itself
+    ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def bound_processor_time(seconds: float) -> None:

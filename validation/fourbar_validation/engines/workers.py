@@ -16,6 +16,7 @@ from fourbar.errors import DependencyError
 from fourbar_validation.engines.processes import (
     bound_memory,
     end_with_parent,
+    hold_interruption,
     keep_output,
 )
 
@@ -74,11 +75,12 @@ class _PoolOfItems:
     def submit(self, item: Any) -> "Future[Any]":
         """Hand in an item; NoWorkersError where the pool is broken."""
         try:
-            future: Future[Any] = self.pool.schedule(
-                self.function,
-                args=(item,),
-                timeout=self.seconds,
-            )
+            with hold_interruption():
+                future: Future[Any] = self.pool.schedule(
+                    self.function,
+                    args=(item,),
+                    timeout=self.seconds,
+                )
         except RuntimeError:
             raise _lost_workers() from None
         return future

@@ -15,6 +15,7 @@ from fourbar_validation.engines.processes import (
     bound_memory,
     bound_processor_time,
     end_with_parent,
+    hold_interruption,
 )
 
 ROBOT_SECONDS = 120.0
@@ -51,11 +52,13 @@ def examine_guarded(
 
         def examined(*arguments: object) -> Any:
             try:
-                return pool.schedule(
-                    _examine_robot,
-                    args=(seconds, *arguments),
-                    timeout=seconds,
-                ).result()
+                with hold_interruption():
+                    future = pool.schedule(
+                        _examine_robot,
+                        args=(seconds, *arguments),
+                        timeout=seconds,
+                    )
+                return future.result()
             except FourBarError as error:
                 if not isinstance(error, InputError) or error.key != "MJCF":
                     raise
