@@ -10,6 +10,9 @@ import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 import fourbar
@@ -20,12 +23,13 @@ from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.scene import Command, Scene
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.columns import read_columns
-from fourbar_validation.compare.rows import FAILS, RESULT_COLUMNS
+from fourbar_validation.compare.columns import LONGEST_CELL, read_columns
+from fourbar_validation.compare.rows import COLUMN_TYPES, FAILS, RESULT_COLUMNS
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.processes import WORKER_MEMORY, bound_memory
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.engines.table import choose_engines
+from fourbar_validation.regression.record import MOST_ROWS_COMPARED
 from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run import pool
 from fourbar_validation.run.plan import Plan, RunOptions
@@ -197,6 +201,42 @@ def test_what_is_no_table_of_results_is_one_line(
         printed = capsys.readouterr()
         assert code == BAD_INPUT, (rows[:20], record[:20])
         assert len(printed.err.splitlines()) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("rows", "reason", "words"),
+    [
+        (MOST_ROWS_COMPARED + 1, "", f"has {MOST_ROWS_COMPARED + 1} rows"),
+        (1000, "a" * (LONGEST_CELL + 1), "is not a table written by `run`"),
+    ],
+    ids=["rows", "a cell"],
+)
+def test_a_small_parquet_of_very_much_is_one_line(
+    rows: int,
+    reason: str,
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Of one row many times, or of one long text, a file has some kilobytes."""
+    index = pa.array(np.zeros(rows, np.int32))
+    columns = {
+        name: (
+            pa.array(np.ones(rows))
+            if kind is float
+            else pa.DictionaryArray.from_arrays(
+                index, pa.array([reason if name == "reason" else "agrees"])
+            )
+        )
+        for name, kind in COLUMN_TYPES.items()
+    }
+    file = tmp_path / "results.parquet"
+    pq.write_table(pa.table(columns), file)
+    assert file.stat().st_size < 2 * LONGEST_CELL
+    assert status(["compare", str(tmp_path), str(tmp_path)]) == BAD_INPUT
+    complained = capsys.readouterr().err
+    assert complained.count("\n") == 1 and words in complained
 
 
 @pytest.mark.parametrize(

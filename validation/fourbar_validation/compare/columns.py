@@ -32,6 +32,10 @@ whatever it holds.
 """
 BATCH_ROWS = 20_000
 """Rows in memory while the file is read."""
+LONGEST_CELL = 100_000
+"""Most characters of a cell. The longest that a run writes is an engine's message, of
+some thousands.
+"""
 CSV_ROWS = 1_000_000
 """Most rows of the text table. Further ones are in results.parquet alone."""
 
@@ -161,49 +165,56 @@ def _read_cells(path: Path) -> Iterator[list[list[Any]]]:
 
     Words that recur are kept once.
     """
-    for cells in _read_batches(path, list(COLUMN_TYPES)):
+    for batch in _read_batches(path, list(COLUMN_TYPES)):
         words: dict[str, str] = {}
         yield [
             (
-                [math.nan if cell is None else cell for cell in column]
+                [math.nan if cell is None else cell for cell in column.to_pylist()]
                 if kind is float
                 else _read_words(column, words)
             )
-            for column, kind in zip(cells, COLUMN_TYPES.values(), strict=True)
+            for column, kind in zip(batch, COLUMN_TYPES.values(), strict=True)
         ]
 
 
 def count_rows(path: Path) -> int:
     """Return how many rows a table of scenes has."""
-    return sum(len(cells) for (cells,) in _read_batches(path, ["scene"]))
+    if path.suffix == ".parquet":
+        import pyarrow.parquet as pq
+
+        return int(pq.read_metadata(path).num_rows)
+    return sum(len(column) for (column,) in _read_batches(path, ["scene"]))
 
 
-def _read_batches(path: Path, columns: list[str]) -> Iterator[list[list[Any]]]:
+def _read_batches(path: Path, columns: list[str]) -> Iterator[list[Any]]:
+    """Read columns of Arrow, some thousands of rows at a time.
+
+    Texts are columns of indices and words, as a word may be long and recur.
+    """
     with ExitStack() as files:
         if path.suffix == ".parquet":
             batches = _read_parquet
         else:
             batches = _open_csv
         for batch in batches(path, columns, files):
-            yield [batch.column(name).to_pylist() for name in columns]
+            yield [batch.column(name) for name in columns]
 
 
 def _read_parquet(path: Path, columns: list[str], files: ExitStack) -> Any:
     import pyarrow.parquet as pq
 
-    return files.enter_context(pq.ParquetFile(path)).iter_batches(
-        BATCH_ROWS,
-        columns=columns,
-    )
+    texts = [name for name in columns if COLUMN_TYPES[name] is not float]
+    table = files.enter_context(pq.ParquetFile(path, read_dictionary=texts))
+    return table.iter_batches(BATCH_ROWS, columns=columns)
 
 
 def _open_csv(path: Path, columns: list[str], files: ExitStack) -> Any:
     import pyarrow as pa
     from pyarrow import csv
 
+    word = pa.dictionary(pa.int32(), pa.string())
     kinds = {
-        name: pa.float64() if COLUMN_TYPES[name] is float else pa.string()
-        for name in columns
+        name: pa.float64() if COLUMN_TYPES[name] is float else word for name in columns
     }
     wanted = csv.ConvertOptions(column_types=kinds, include_columns=columns)
     return files.enter_context(
@@ -215,8 +226,12 @@ def _open_csv(path: Path, columns: list[str], files: ExitStack) -> Any:
     )
 
 
-def _read_words(cells: list[str], words: dict[str, str]) -> list[str]:
-    for cell in dict.fromkeys(cells):
-        if cell not in words:
-            words[cell] = sys.intern(escape_controls(read_cell_text(cell)))
-    return [words[cell] for cell in cells]
+def _read_words(column: Any, words: dict[str, str]) -> list[str]:
+    known = []
+    for word in column.dictionary.to_pylist():
+        if len(word) > LONGEST_CELL:
+            raise ValueError(f"a cell of {len(word)} characters")
+        if word not in words:
+            words[word] = sys.intern(escape_controls(read_cell_text(word)))
+        known.append(words[word])
+    return [known[index] for index in column.indices.to_pylist()]

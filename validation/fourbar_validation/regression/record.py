@@ -42,6 +42,8 @@ TIMINGS_FILE = "timings.csv"
 RECORD_FILES = (CSV_FILE, PARQUET_FILE, TIMINGS_FILE)
 UNFINISHED = "run.json"
 """File that a run keeps in its folder until it is finished."""
+MOST_ROWS_COMPARED = 3_000_000
+"""Rows of a run that are held in memory at once, in four gigabytes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,9 +237,17 @@ class Recorded:
             yield from read_columns(self.table)
 
     def frame(self) -> "DataFrame":
-        """Return the rows as a table; InputError if it is damaged."""
+        """Return the rows as a table; InputError if it is damaged or too long."""
         with self._name_damage():
-            return read_frame(self.table)
+            rows = count_rows(self.table)
+            if rows <= MOST_ROWS_COMPARED:
+                return read_frame(self.table)
+        raise InputError(
+            self.key,
+            str(self.table),
+            f"has {rows} rows; at most {MOST_ROWS_COMPARED} are compared: run fewer"
+            " scenes, or compare the tables by pandas or DuckDB",
+        )
 
     def times(self) -> Iterator[tuple[str, list[tuple[str, float]]]]:
         """Yield each scene, and (engine, its time over that of the formulas).
@@ -403,15 +413,36 @@ def accept(run: Recorded, target: Path) -> None:
     Of its two tables the compressed one is kept, if it has it.
     """
     target.mkdir(parents=True, exist_ok=True)
-    compressed = run.table.with_name(PARQUET_FILE)
-    table = compressed if compressed.is_file() else run.table
-    kept = {table.name, TIMINGS_FILE}
+    table = _find_kept_table(run)
+    _copy(table, target / table.name)  # first: by it `is_half_accepted` knows the run
+    times = run.table.with_name(TIMINGS_FILE)
     for name in RECORD_FILES:
-        if name in kept and (table := run.table.with_name(name)).is_file():
-            _copy(table, target / name)
-        else:
+        if name == times.name and times.is_file():
+            _copy(times, target / name)
+        elif name != table.name:
             (target / name).unlink(missing_ok=True)  # a file of the previous state
     write_about(run.about, target)
+
+
+def _find_kept_table(run: Recorded) -> Path:
+    compressed = run.table.with_name(PARQUET_FILE)
+    return compressed if compressed.is_file() else run.table
+
+
+def is_half_accepted(run: Recorded, target: Path) -> bool:
+    """Tell whether `accept` of the run was killed once its table was in place.
+
+    The record is then that of the previous state, which does not describe the table.
+    """
+    table = _find_kept_table(run)
+    there = target / table.name
+    if not there.is_file() or _hash_file(there) != _hash_file(table):
+        return False
+    try:
+        open_run(target)
+    except InputError:
+        return True
+    return False
 
 
 def _copy(source: Path, target: Path) -> None:
