@@ -162,8 +162,9 @@ class _SceneBlock:
 
         If nothing acts, it writes the rates.
         """
-        if not acts(self.facts.scene) and self.facts.rates:
-            return self._write_rates()
+        if not acts(self.facts.scene):
+            stroke = [] if self.facts.stroke_range is None else self._write_stroke()
+            return [*stroke, *self._write_rates()]
         return [
             *self._write_drive(pressure),
             *self._write_pins(),
@@ -172,11 +173,13 @@ class _SceneBlock:
         ]
 
     def _write_rates(self) -> list[str]:
-        """Write the largest speed and acceleration of the bars that follow.
+        """Write the largest speed and acceleration of the bars that follow, if any.
 
         Bars are columns of one table.
         """
         rates = self.facts.rates
+        if not rates:
+            return []
         rows = [("rates", [f"bar {bar} ({BAR_NAMES[bar]})" for bar in rates])]
         for label, unit, index in (("omega", "rad/s", 0), ("alpha", "rad/s^2", 1)):
             peaks = [pair[index] for pair in rates.values()]

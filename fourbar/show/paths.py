@@ -2,9 +2,11 @@
 
 from typing import Any
 
+import numpy as np
+
 from fourbar.errors import clean_line
 from fourbar.scene import Scene
-from fourbar.show.units import choose_unit
+from fourbar.show.units import choose_unit, drop_rounding
 from fourbar.solution import Conversion, find_unit_in
 from fourbar.studies.paths import measure_paths
 
@@ -22,7 +24,10 @@ def write_paths(scene: Scene, units: Conversion) -> list[str]:
         largest = max(path.stroke, *map(abs, (*path.x, *path.y)))
         factor, length = choose_unit(largest, "m", units)
         x, y, (across, along) = (
-            [f"{factor * number:#.6g}".rstrip(".") for number in pair]
+            [
+                f"{factor * number:#.6g}".rstrip(".")
+                for number in drop_rounding(np.array(pair), largest)
+            ]
             for pair in (path.x, path.y, (path.straightness, path.stroke))
         )
         turned, angle = find_unit_in("rad", units)

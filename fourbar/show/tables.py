@@ -14,6 +14,7 @@ import numpy as np
 
 from fourbar.errors import clean_line
 from fourbar.quantities import ANGLES, OK, PIN_FORCES, UNITS, Array
+from fourbar.show.acting import list_arm_notes
 from fourbar.show.columns import Column
 from fourbar.show.derived import derive, list_derived_names
 from fourbar.show.driving import read_drive_demand
@@ -139,7 +140,8 @@ def print_positions(
             for column in columns
         }
     shown, left_out = make_table(solution, width, units, every=step, cells=cells)
-    notes = []
+    told = [] if solution.scene is None else list_arm_notes(solution.scene)
+    notes = [line for note in told for line in wrap_line(note)]
     if step > 1:
         more = "; --all shows each" if every is None else ""
         notes.append(

@@ -251,8 +251,11 @@ def write_cell(number: float, form: str) -> str:
 
 
 def write_digits(value: float, digits: int = SHOWN_DIGITS) -> str:
-    """Write a number with some significant digits, up to a million without exponent."""
-    return f"{float(f'{value:.{digits}g}'):.6g}"
+    """Write a number with some significant digits, up to a million without exponent.
+
+    Zero has no sign.
+    """
+    return f"{float(f'{value:.{digits}g}') + 0.0:.6g}"
 
 
 def write_ends(values: float | Array, write: Callable[[float], str]) -> str:

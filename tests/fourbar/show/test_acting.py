@@ -192,3 +192,13 @@ def test_a_place_that_is_taken_is_named(load: str, said: str) -> None:
     assert said in block
     if not said:
         assert "enters bar" not in block and "arm counts" not in block
+
+
+def test_a_table_and_the_json_say_from_where_an_arm_counts(tmp_path, capsys):
+    file = tmp_path / "hatch.toml"
+    load = '[[loads]]\nbar = 4\nforce = ["1 N", "0 deg"]\narm = ["1 mm", "0 deg"]'
+    file.write_text(f"{HATCH.partition('[effects]')[0]}{load}", encoding="utf-8")
+    said = "arm counts from G of bar 4, taken to be mid-bar"
+    for option in ("--columns=theta_2,torque", "--table", "--json"):
+        assert status(["analyze", str(file), option]) == 0
+        assert said in " ".join(capsys.readouterr().out.split())

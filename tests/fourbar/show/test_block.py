@@ -236,6 +236,13 @@ def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore() -> None:
     )
 
 
+def test_a_cylinder_that_nothing_loads_has_its_range_too() -> None:
+    motion = fourbar.Motion(stroke=fourbar.Sweep(0.17, 0.33, 40), side="left")
+    bars = fourbar.FourBar(0.3, *map(fourbar.Bar, (0.1, 0.25, 0.22)))
+    text = plain(block(fourbar.Scene(bars, motion, drive=CYLINDER)))
+    assert "stroke 170 mm to 330 mm; assembles from 160 mm to 340 mm" in text
+
+
 def test_a_bore_is_that_of_the_motion_and_not_of_its_positions() -> None:
     """The couple on the crank is largest at 101.3 deg, between two positions."""
     corners = tuple(np.radians((0.0, 95.0, 101.3, 107.0, 360.0)))

@@ -14,7 +14,7 @@ from fourbar.cli import status
 from fourbar.errors import HOLDS, InputError
 from fourbar.quantities import UNITS
 from fourbar.show import notebook
-from fourbar.show.units import units, units_of_scene
+from fourbar.show.units import units, units_of_scene, write_digits
 from tests.support.scenes import crank_rocker
 
 PURE = (
@@ -229,3 +229,10 @@ def test_a_released_motion_has_speeds_that_suit_its_accelerations(
     motion = {"theta_2": "0 deg", "free": {"duration": "1 s"}, **stated}
     of_scene = units_of_scene({"lengths": {"ground": length}, "motion": motion})
     assert of_scene["rad/s"][0] == shown
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(-0.0, "0"), (-1e-3, "-0.001"), (123456.7, "123500")]
+)
+def test_a_number_has_four_digits_and_zero_no_sign(value: float, text: str) -> None:
+    assert write_digits(value) == text

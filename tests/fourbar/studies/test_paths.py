@@ -139,3 +139,10 @@ def test_paths_are_printed_and_none_of_single_positions() -> None:
         "    from theta_2 = 20 to 100 deg",
     ]
     assert measure_paths(loads(CRANK + 'theta_2 = ["20 deg", "100 deg"]')) == {}
+
+
+def test_the_rounding_of_a_path_is_printed_as_zero() -> None:
+    """The crank begins upright: its end has an x of 5e-18 m there."""
+    motion = 'theta_2 = { from = "90 deg", to = "100 deg", steps = 3 }'
+    first, *_ = write_paths(loads(CRANK + motion), units("mm deg"))
+    assert first.startswith("path of P: x from -13.8919 to 0.00000 mm, ")

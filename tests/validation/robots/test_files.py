@@ -135,6 +135,10 @@ def test_no_file_outside_is_opened(tmp_path: Path) -> None:
         (b"<mujoco model='\xff'/>", "UTF-8"),
         ("<svg/>", "must be an MJCF, an SDF or a URDF"),
         ("<mujoco>", "no XML"),
+        (
+            "<robot xmlns:xacro='http://ros.org/wiki/xacro'><xacro:macro/></robot>",
+            'is a xacro: "xacro FILE > robot.urdf"',
+        ),
         ("<mujoco>" + 200 * "<body>" + 200 * "</body>" + "</mujoco>", "deeper"),
     ],
 )
@@ -146,6 +150,12 @@ def test_what_a_file_may_not_hold_is_one_line(
     path = tmp_path / "robot.xml"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     assert_refused(path, words)
+
+
+def test_a_usd_is_refused_by_its_name(tmp_path: Path) -> None:
+    path = tmp_path / "robot.usd"
+    path.write_bytes(b"PXR-USDC")
+    assert_refused(path, "is a USD: give the robot's MJCF, SDF or URDF")
 
 
 def assert_refused(path: Path, words: str) -> None:

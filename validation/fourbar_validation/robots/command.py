@@ -74,7 +74,10 @@ def _show_report(report: RobotReport) -> None:
     for closure in report.closures:
         print_sentence(_write_closure(closure))
     if not report.closures:
-        click.echo("The file has no equality: no loop is closed in it.")
+        print_sentence(
+            "No loop is closed in the file: a <connect> between two sites closes one, "
+            "in an SDF a further joint or <drake:ball_constraint>."
+        )
     for closure in report.closures:
         remarks = () if closure.loop is None else closure.loop.remarks
         for remark in remarks:

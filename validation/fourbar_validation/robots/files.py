@@ -16,6 +16,9 @@ from fourbar.errors import InputError
 from fourbar.writing import read_text
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 
+_USD = (".usd", ".usda", ".usdc", ".usdz")
+_XACRO = "ros.org/wiki/xacro"
+"""Part of the namespace of the macros that a URDF is written with."""
 LARGEST_TEXT = 16 * 2**20
 """Bytes of a file and its includes; a humanoid takes half a million."""
 LARGEST_ASSETS = 512 * 2**20
@@ -98,6 +101,10 @@ class _RobotReading:
         """Read and screen everything."""
         if self.assets is not None and not self.assets.is_dir():
             raise InputError("--assets", str(self.assets), "must be a folder")
+        if self.path.suffix.lower() in _USD:
+            raise self._refuse(
+                self.path.name, "is a USD: give the robot's MJCF, SDF or URDF"
+            )
         root = self._parse(self.path)
         if root.tag == "sdf":
             root = self._convert_sdf(root)
@@ -149,6 +156,10 @@ class _RobotReading:
     def _reduce_urdf(self, root: ET.Element) -> None:
         """Leave what MuJoCo's own reader of URDF needs: inertias and joints."""
         left_out = {child.tag for child in root} - {"link", "joint", "material"}
+        if any(_XACRO in tag for tag in left_out):
+            raise self._refuse(
+                self.path.name, 'is a xacro: "xacro FILE > robot.urdf" writes its URDF'
+            )
         for child in list(root):
             if child.tag not in ("link", "joint"):
                 root.remove(child)
@@ -160,7 +171,8 @@ class _RobotReading:
             self.notes.append(f"left out of the URDF: {', '.join(sorted(left_out))}")
         self.notes.append(
             "a URDF is a tree: its only loops are mimic joints, and check-mjcf SCENE "
-            "FILE --mimic JOINT judges one"
+            "FILE --mimic JOINT judges one; to close another, save it as MJCF "
+            "(mj_saveLastXML) and add a <connect>"
         )
 
     def _refuse(self, what: object, allowed: str) -> InputError:

@@ -30,6 +30,7 @@ UNBOUNDED = 1e16
 _WIDEST = 1e9
 """rad or m; stands for a missing end of a range of which the other is stated."""
 _DRAKE = "{http://drake.mit.edu}"
+_BUSHING = "drake:linear_bushing_rpy"
 _DEGREES_OF_FREEDOM = {
     "fixed": (),
     "revolute": ("axis",),
@@ -277,6 +278,13 @@ class _Edge(NamedTuple):
             for name in ("damping", "friction", "spring_stiffness")
         )
 
+    def read_start(self) -> float:
+        """Return <initial_position> of a joint with one axis, rad or m; 0 without."""
+        if self.element is None or len(_DEGREES_OF_FREEDOM[self.kind]) != 1:
+            return 0.0
+        text = _text(self.element, "axis/initial_position", "0")
+        return _numbers(text, 1, f"initial_position of {self.name}")[0]
+
 
 class _Conversion:
     """One SDF file that is being converted."""
@@ -323,6 +331,11 @@ class _Conversion:
         if self.left_out:
             names = ", ".join(sorted(self.left_out))
             self.notes.append(f"left out of the SDF: {names}")
+        if _BUSHING in self.left_out:
+            self.notes.append(
+                f"{_BUSHING} joins two links by springs; if it closes the loop, put "
+                "<drake:ball_constraint> in its place, a rigid pin"
+            )
         return mujoco, self.notes
 
     def _collect(self, scope: _Scope) -> Iterator[_Scope]:
@@ -451,16 +464,17 @@ class _Conversion:
         pose = link.pose()
         if bearer is not None:
             pose = np.linalg.inv(bearer.pose()) @ pose
-        attributes = {"name": self._name(link), **_write_place(pose)}
-        if _text(link.element, "gravity") in ("false", "0"):
-            attributes["gravcomp"] = "1"
-        body = ET.SubElement(self.body[bearer], "body", attributes)
+        body = ET.SubElement(self.body[bearer], "body")
         self.body[link] = body
         if edge is None:
             ET.SubElement(body, "freejoint", name=f"free joint of {self._name(link)}")
         elif edge.element is not None:
-            for attributes in self._list_joints(edge, link):
-                ET.SubElement(body, "joint", attributes)
+            for joint in self._list_joints(edge, link):
+                pose = pose @ _move_to_start(joint)
+                ET.SubElement(body, "joint", joint)
+        body.attrib |= {"name": self._name(link), **_write_place(pose)}
+        if _text(link.element, "gravity") in ("false", "0"):
+            body.set("gravcomp", "1")
         if not link.scope.static:
             self._add_inertia(body, link)
 
@@ -475,6 +489,7 @@ class _Conversion:
         if edge.kind == "ball":
             yield {"name": name, "type": "ball", "pos": place}
         axes = _DEGREES_OF_FREEDOM[edge.kind]
+        start = edge.read_start()
         forwards = edge.child is not None and edge.child == link
         for tag in axes if forwards else reversed(axes):
             axis = joint.find(tag)
@@ -488,6 +503,7 @@ class _Conversion:
                 "type": "slide" if edge.kind == "prismatic" else "hinge",
                 "pos": place,
                 "axis": _write(turned if forwards else -turned),
+                **({"ref": repr(start)} if start else {}),
                 **_read_dynamics(axis, edge.name),
             }
 
@@ -636,7 +652,13 @@ class _Conversion:
                     ("reference", "0"),
                 )
             )
-            constant = offset - multiplier * reference
+            # MuJoCo's polynomial counts both joints from where they start
+            start = sum(
+                other.read_start()
+                for other in self.edges
+                if (other.scope, other.name) == (edge.scope, leader)
+            )
+            constant = offset + multiplier * (start - reference) - edge.read_start()
             ET.SubElement(
                 self.equality,
                 "joint",
@@ -675,6 +697,22 @@ def _read_dynamics(axis: ET.Element, name: str) -> dict[str, str]:
         high = _WIDEST if upper is None else upper
         attributes["range"] = _write([low, high])
     return attributes
+
+
+def _move_to_start(joint: dict[str, str]) -> Array:
+    """Return the motion of a link by the `ref` of its joint in MJCF, (4, 4)."""
+    matrix = np.eye(4)
+    start = float(joint.get("ref", "0"))
+    if not start:
+        return matrix
+    axis, place = (np.array(joint[name].split(), float) for name in ("axis", "pos"))
+    axis /= np.linalg.norm(axis)
+    if joint["type"] == "slide":
+        matrix[:3, 3] = start * axis
+    else:
+        matrix[:3, :3] = Rotation.from_rotvec(start * axis).as_matrix()
+        matrix[:3, 3] = place - matrix[:3, :3] @ place
+    return matrix
 
 
 def _read_limit(axis: ET.Element, end: str, name: str) -> float | None:
