@@ -178,10 +178,7 @@ def require_pair(key: str, value: Any, by: Declared) -> tuple[float, float]:
     try:
         size, other = value
     except (TypeError, ValueError):
-        if by.pair == "rad":
-            names = "size, angle"
-        else:
-            names = ", ".join(by.units)
+        names = "size, angle" if by.pair == "rad" else ", ".join(by.units)
         raise InputError(key, value, f"must be a pair ({names})") from None
     unit, second = by.units
     bound, of_second = by.bounds
@@ -218,10 +215,7 @@ def copy_with(description: Description, /, **changed: Any) -> Description:
     kind: Any = description.__class__
     copied: Description = object.__new__(kind)
     for name in list_fields(kind):
-        if name in changed:
-            value = changed[name]
-        else:
-            value = getattr(description, name)
+        value = changed[name] if name in changed else getattr(description, name)
         object.__setattr__(copied, name, value)
     return copied
 

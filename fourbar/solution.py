@@ -163,10 +163,7 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
         )
         on = f"on bar {self.drive_bar}"
         if self.drive is not None:
-            if self.drive.has_stroke:
-                on = "along a line"
-            else:
-                on = "at a point"
+            on = "along a line" if self.drive.has_stroke else "at a point"
         of = f" {self.title!r}" if self.title else ""
         lines = [
             f"Solution{of}: {describe_extent(self.theta_2)}, drive {on}",
@@ -348,10 +345,7 @@ def write_csv(
     `chosen`: the columns by heading, in these units; left out: all quantities.
     """
     size = solution.theta_2.size
-    if chosen is None:
-        first = _list_leading(solution)
-    else:
-        first = {}
+    first = _list_leading(solution) if chosen is None else {}
     if chosen is None:
         scalars: Mapping[str, Array | None] = {
             column.heading: column.values for column in _list_scalars(solution, units)
@@ -426,10 +420,7 @@ def _list_scalars(solution: Solution, units: Conversion = SI) -> list[_ScalarCol
     columns = []
     for name, values in quantities.items():
         unit, _ = find_unit_in(find_unit_of_quantity(name), units)
-        if units and unit != "1":
-            named = f" [{unit}]"
-        else:
-            named = ""
+        named = f" [{unit}]" if units and unit != "1" else ""
         for part, column in _split_columns(name, values).items():
             columns.append(_ScalarColumn(f"{part}{named}", unit, column))
     time = compute_times(solution.scene, solution.at)

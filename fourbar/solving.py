@@ -162,10 +162,7 @@ class Results:
         self.codes: NDArray[np.uint8] = np.zeros(shape, dtype=np.uint8)
         self.arrays: dict[str, Array] = {}
         for name in request.wanted:
-            if name in SCALARS:
-                shape_of_one = shape
-            else:
-                shape_of_one = (*shape, 2)
+            shape_of_one = shape if name in SCALARS else (*shape, 2)
             self.arrays[name] = given[name] if name in given else np.empty(shape_of_one)
         self.sign_may_differ: bool = False
         """True if sin(theta_4 - theta_3) may have another sign than the branch."""
@@ -319,10 +316,7 @@ def _require_command_at(commanded: Command) -> None:
         if value.shape != shape or value.dtype.kind not in "iuf":
             raise InputError(f"at.{key}", value, f"must be numbers, shape {shape}")
     branch = commanded.branch
-    if n == 1:
-        are_branches = branch.item() in (1, -1)
-    else:
-        are_branches = (np.abs(branch) == 1).all()
+    are_branches = branch.item() in (1, -1) if n == 1 else (np.abs(branch) == 1).all()
     if not are_branches:
         raise InputError("at.branch", branch, f"{A_BRANCH} at each position")
     _require_rate(acceleration, commanded.acceleration, n)
@@ -390,10 +384,7 @@ def find_requested(
             if name not in stages or name in foreign:
                 known = ", ".join(name for name in stages if name not in foreign)
                 raise InputError("out", name, f"must be among {known}")
-            if name in SCALARS:
-                wanted_shape = shape
-            else:
-                wanted_shape = (*shape, 2)
+            wanted_shape = shape if name in SCALARS else (*shape, 2)
             expect(f"out.{name}", array, np.ndarray)
             if (
                 array.shape != wanted_shape

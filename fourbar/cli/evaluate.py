@@ -51,10 +51,7 @@ def classify_command(
             "must be four ratios, or four lengths each with its unit",
         )
     d, a, b, c = given.read_lengths(lengths)
-    if all(ratios):
-        units = None
-    else:
-        units = suit_units(lengths[0])
+    units = None if all(ratios) else suit_units(lengths[0])
     ratios_only = {"m": ("", 1.0)}
     with state_messages_in(ratios_only if all(ratios) else units_of_length(lengths[0])):
         linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
@@ -143,10 +140,7 @@ def new(
     if file == STANDARD_STREAM:
         return
     # to be copied into any shell
-    if " " not in str(file):
-        shown = str(file)
-    else:
-        shown = f'"{file}"'
+    shown = str(file) if " " not in str(file) else f'"{file}"'
     click.echo(f"wrote {file}; edit it, then: fourbar analyze {shown}")
 
 
@@ -412,26 +406,17 @@ def _write_positions(
 
     scene = solution.scene
     assert scene is not None
-    if names is None:
-        columns = []
-    else:
-        columns = choose_columns(scene, solution, names)
+    columns = [] if names is None else choose_columns(scene, solution, names)
     if form == "json":
         motor = write_motor(scene, solution, units)
         notes = [*list_arm_notes(scene), *list_spring_notes(scene, solution, units)]
         paths = collect_paths(scene, units)
         return write_json(solution, units, motor=motor, notes=notes, paths=paths)
     if form == "csv":
-        if columns:
-            chosen = _list_chosen(columns, units)
-        else:
-            chosen = None
+        chosen = _list_chosen(columns, units) if columns else None
         return write_csv(solution, units, decimal or ".", chosen)
     on_terminal = out is None and sys.stdout.isatty()
-    if on_terminal:
-        width = shutil.get_terminal_size().columns
-    else:
-        width = None
+    width = shutil.get_terminal_size().columns if on_terminal else None
     return print_positions(solution, width, units, every=every, columns=columns)
 
 
@@ -443,10 +428,7 @@ def _list_chosen(columns: "list[Column]", units: Conversion) -> dict[str, Array]
     chosen = dict[str, Array]()
     for column in columns:
         label = column.label(units)
-        if units and label:
-            heading = f"{column.name} [{label}]"
-        else:
-            heading = column.name
+        heading = f"{column.name} [{label}]" if units and label else column.name
         chosen[heading] = column.shown(units)
     return chosen
 

@@ -166,10 +166,7 @@ def plot(
     from fourbar.show.plot import draw
 
     with given.open_scene(scene) as described, given.show_waiting(described):
-        if at is None:
-            place = None
-        else:
-            place = _find_place(described, at)
+        place = None if at is None else _find_place(described, at)
         draw(
             described,
             out,
@@ -193,10 +190,7 @@ def _find_place(scene: Scene, text: str) -> float:
     For a motion over time it is the angle at that time.
     """
     positions = given.find_positions(scene, text)
-    if positions.stroke is None:
-        places = positions.angle
-    else:
-        places = positions.stroke
+    places = positions.angle if positions.stroke is None else positions.stroke
     return float(places[0])
 
 

@@ -97,10 +97,7 @@ def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:
             )
         return out
 
-    if required:
-        help_text = "Write to FILE."
-    else:
-        help_text = "Write to FILE instead of printing."
+    help_text = "Write to FILE." if required else "Write to FILE instead of printing."
     return click.option(
         "-o",
         "--out",

@@ -511,10 +511,7 @@ class _FreeBodies(NamedTuple):
         virtual work, and then is one more load; where it acts on two moving bars or on
         bar 3, the pair of bars whose directions differ most keeps the digits.
         """
-        if with_inertia:
-            inertial = self.inertial
-        else:
-            inertial = _InertialForces()
+        inertial = self.inertial if with_inertia else _InertialForces()
         if self.per_newton is not None:
             Q = actions.generalized_forces()[0]
             force = driving_torque(self.gain, inertial.total, Q)

@@ -14,10 +14,10 @@ is possible.
 
 import cmath
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -31,12 +31,14 @@ from fourbar.errors import (
     say_install,
 )
 from fourbar.evaluation.case import Case
+from fourbar.formulas.arithmetic import angle
+from fourbar.formulas.mobility import TURN
 from fourbar.formulas.motion import Coefficients, State, rates
-from fourbar.formulas.path import NO_DIGIT_LEFT, drive_sine, prepare_path
+from fourbar.formulas.path import NO_DIGIT_LEFT, LoopPath, drive_sine, prepare_path
 from fourbar.formulas.pin_forces import Body
-from fourbar.formulas.position import HalfAngle, Position, loop
+from fourbar.formulas.position import Position, loop
 from fourbar.formulas.torque import half_slope, inertia
-from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.linkage import FourBar
 from fourbar.quantities import NO_DIRECTION, Array
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.scene import Independent
@@ -158,10 +160,7 @@ def release_at(scene: Scene, times: Array) -> Released:
             begun = Case.of(scene).begin_with(motion.part(slice(0, 1)))
             state, _ = begun.at(motion)
             for term in begun.terms:
-                if term.counts_turns:
-                    codes = term.status(state, motion.branch)
-                else:
-                    codes = None
+                codes = term.status(state, motion.branch) if term.counts_turns else None
                 if codes is not None and codes.any():
                     raise LimitError(
                         f"effects.{term.key}: at {released.time[np.argmax(codes)]:.6g}"
@@ -180,50 +179,55 @@ def _convert_to_floats(numbers: Any) -> Any:
     return type(numbers)(*converted)
 
 
-class _Reading:
-    """The linkage read in the angle of bar 2, 3 or 4, with its assembly."""
+class _Reading(NamedTuple):
+    """The angle in which a motion is read: that of bar 2, 3 or 4, with its assembly."""
 
-    def __init__(self, linkage: FourBar, bar: int) -> None:
+    path: LoopPath
+    branch: float
+
+    @classmethod
+    def of(cls, linkage: FourBar, bar: int, branch: float) -> Self:
+        """Read a linkage in the angle of a bar, in Python's own numbers."""
         path = prepare_path(linkage.lengths, linkage.ground_angle, bar)
-        self.path = path._replace(
+        plain = path._replace(
             lengths=_convert_to_floats(path.lengths),
             u1=complex(path.u1),
             unit=float(path.unit),
         )
-        self.bar = bar
-        self.branch = 1.0
-        self.last: tuple[tuple[float, float], tuple[Position, Coefficients]] | None = (
-            None
-        )
+        return cls(plain, branch)
 
-    def evaluate(self, q: float) -> tuple[Position, Coefficients]:
-        """Compute the position and its coefficients by q; the last results are kept."""
-        if self.last is None or self.last[0] != (q, self.branch):
-            self.last = (q, self.branch), self._at(q)
-        return self.last[1]
+    def close(self, q: Any) -> tuple[Position, Coefficients]:
+        """Compute position and coefficients at one angle, a Python float, or at (n,).
 
-    def _at(self, q: float) -> tuple[Position, Coefficients]:
+        A motion may start at a limit of the bar that it is read from: coefficients are
+        then infinite, and another bar is taken.
+        """
         half = self.path.half_angle(q)
+        if not isinstance(q, float):
+            return self.path.close(q, half, self.branch, margin=-1.0)[:2]
         try:
-            return self._by(q, _convert_to_floats(half))
+            plain = _convert_to_floats(half)
+            position, k, _ = self.path.close(q, plain, self.branch, margin=-1.0)
         except ZeroDivisionError:  # NumPy's numbers give inf or NaN instead
-            return self._by(q, half)
-
-    def _by(self, q: float, half: HalfAngle) -> tuple[Position, Coefficients]:
-        # a motion may start at a limit of the bar that it is read from: coefficients
-        # are then infinite, and another bar is taken
-        position, k, _ = self.path.close(q, half, self.branch, margin=-1.0)
+            position, k, _ = self.path.close(q, half, self.branch, margin=-1.0)
         if self.path.may_stay_parallel:
-            return (_convert_to_floats(position), _convert_to_floats(k))
-        return (position, k)
+            return _convert_to_floats(position), _convert_to_floats(k)
+        return position, k
 
+    def measure_room(self, position: Position) -> float:
+        """Return how far the bar's sine is above that at which the other one is read.
 
-def _compute_sines(position: Position) -> dict[int, float]:
-    """Compute the sines between two bars by the number of the third.
+        Bar 3, in which a motion may start alone, has none.
+        """
+        if self.path.bar == 3:
+            return -1.0
+        own, other = (drive_sine(position, bar) for bar in (self.path.bar, self.other))
+        return float(abs(own) - _CHANGE_OVER * abs(other))
 
-    At the limits of that bar they are zero.
-    """
-    return {bar: float(drive_sine(position, bar)) for bar in MOVING_BARS}
+    @property
+    def other(self) -> int:
+        """Number of the other bar of 2 and 4."""
+        return 6 - self.path.bar
 
 
 def integrate(
@@ -263,404 +267,305 @@ def integrate(
             "a free motion cannot carry friction that depends on the pin forces"
         )
     with np.errstate(invalid="ignore", divide="ignore", over="ignore", under="ignore"):
-        return _IntegrationRun(linkage, terms, theta, omega, branch, bar).integrate(
-            times
-        )
+        run = _Run(linkage, terms, times)
+        return run.begin(theta, omega, float(branch), bar)
 
 
-class _IntegrationRun:
-    """State of an integration: its angle, and what has been reported so far."""
+class _Run:
+    """Integration of a motion: the linkage, what acts on it, and what is reported."""
 
     def __init__(
         self,
         linkage: FourBar,
         terms: tuple[Effect, ...],
-        theta: float,
-        omega: float,
-        branch: int,
-        bar: int,
+        times: Array,
     ) -> None:
         self.linkage = linkage
         self.terms = terms
-        self.bar = bar
+        self.times = times
         self.lengths = _convert_to_floats(loop(*linkage.lengths))
-        two, three, four = (
-            _convert_to_floats(body) for body in list_bodies(linkage, terms)
-        )
+        two, three, four = map(_convert_to_floats, list_bodies(linkage, terms))
         self.bodies: tuple[Body, Body, Body] = two, three, four
-        self.readings = {each: _Reading(linkage, each) for each in (2, 4)}
-        if bar != 3:
-            self.reading = self.readings[bar]
-        else:
-            self.reading = _Reading(linkage, 3)
-        self.reading.branch = self.branch = float(branch)
-        position, k = self.reading.evaluate(theta)
+        self.is_dry = any(term.dry for term in terms)
+        self.steps = 0
+        self.energies: list[Array] = []
+        """Kinetic energy and work at the instants of each stretch, (2, n), J."""
+        self.rows: list[Array] = []
+        """Reported instants of each stretch, (n, 10), as `_conclude` reads them."""
+        self.change_points: list[float] = []
+
+    def begin(self, theta: float, omega: float, branch: float, bar: int) -> Released:
+        """Follow the motion from an angle and a speed of a bar, and report it."""
+        reading = _Reading.of(self.linkage, bar, branch)
+        position, k = reading.close(theta)
         if not np.isfinite(position.u3):
-            raise InputError(
-                f"motion.theta_{bar}",
-                theta,
-                "the linkage does not assemble there",
-            )
-        self.theta = {
-            2: float(np.angle(position.u2)),
-            4: float(np.angle(position.u4)),
-            bar: theta,
-        }
-        self.y = np.array([theta, omega, 0.0])
+            key = f"motion.theta_{bar}"
+            raise InputError(key, theta, "the linkage does not assemble there")
         if not float(self._compute_inertia(position, k)) > 0.0:
             raise FourBarError(
                 "nothing that moves has inertia: the free motion is undetermined"
             )
-        self._require_directions(theta, position, k, omega)
-        self._change_over()
-        self.side = 0.0  # sense of motion if dry friction depends on it
-        self.holding = (
-            0.0  # fraction of its torque with which dry friction holds at a standstill
-        )
-        ahead, back = self._try_both_senses()
-        self.dry = ahead != back
-        self.start_energy = self._compute_kinetic_energy()
-        self.times = np.empty(0)
-        self.t = 0.0
-        self.steps = 0
-        self.change_points: list[float] = []
-        self.drift = self.largest = 0.0
-        self.rows: list[tuple[float, ...]] = []
-
-    def _require_directions(
-        self,
-        q: float,
-        position: Position,
-        k: Coefficients,
-        rate: float,
-    ) -> None:
-        """Raise a LimitError if a force has no direction at the start.
-
-        Rounding would give it a direction at each step.
-        """
-        state = self._make_state(q, position, k, rate)
         for term in self.terms:
-            codes = term.status(state, None)
+            codes = term.status(self._make_state(reading, theta, omega), None)
             if codes is not None and np.any(codes == NO_DIRECTION):
+                # rounding would give the force a direction at each step
                 raise LimitError(
                     f"effects.{term.key}: two points coincide where the linkage is "
                     "released, and a force along their line has no direction"
                 )
+        angles = {2: cmath.phase(position.u2), 4: cmath.phase(position.u4), bar: theta}
+        y = np.array([theta, omega, 0.0])
+        if reading.measure_room(position) < 0.0:
+            reading, y = self._change_over(reading, angles, y)
+        self._follow(reading, angles, y)
+        return self._conclude(branch)
 
     def _compute_inertia(self, position: Position, k: Coefficients) -> Any:
         return sum(inertia(self.lengths.a, self.bodies, position, k))
 
-    def _compute_kinetic_energy(self) -> float:
-        position, k = self._at()
-        equivalent_inertia = float(self._compute_inertia(position, k))
-        return 0.5 * equivalent_inertia * float(self.y[1]) ** 2
-
-    def _at(self) -> tuple[Position, Coefficients]:
-        return self.reading.evaluate(float(self.y[0]))
-
-    def _compute_generalized_force(
-        self,
-        q: float,
-        position: Position,
-        k: Coefficients,
-        rate: float,
-    ) -> float:
-        """Compute Q under everything that acts.
-
-        The speed is not zero where friction needs a direction.
-        """
-        state = self._make_state(q, position, k, rate)
-        return float(
-            Actions(state, self.bodies).add(self.terms).generalized_forces()[0]
-        )
-
-    def _make_state(
-        self,
-        q: float,
-        position: Position,
-        k: Coefficients,
-        rate: float,
-    ) -> State:
-        """Make the state at an angle and a speed of the bar that is read."""
+    def _make_state(self, reading: _Reading, q: Any, rate: Any) -> State:
+        """Make the state at angles and speeds of the bar that is read."""
+        position, k = reading.close(q)
         return State(
             self.lengths,
             self.linkage.ground_angle,
-            q if self.reading.bar == 2 else cmath.phase(position.u2),
+            q if reading.path.bar == 2 else angle(position.u2),
             position,
             k,
             rate,
             rates(k, rate, 0.0),
         )
 
-    def _try_both_senses(self) -> list[float]:
-        q = float(self.y[0])
-        return [
-            self._compute_generalized_force(q, *self._at(), rate)
-            for rate in (VANISHING_SPEED, -VANISHING_SPEED)
-        ]
+    def _compute_generalized_force(self, state: State) -> Any:
+        return Actions(state, self.bodies).add(self.terms).generalized_forces()[0]
 
-    def _compute_rates(self, _: float, y: Array) -> list[float]:
-        q = float(y[0])
-        rate = float(y[1])
-        position, k = self.reading.evaluate(q)
-        # friction keeps its sense beyond a standstill, at which the step is then cut
-        if self.side:
-            moving = self.side * max(self.side * rate, VANISHING_SPEED)
-        else:
-            moving = rate
-        Q = self._compute_generalized_force(q, position, k, moving)
-        slope = half_slope(self.lengths.a, self.bodies, position, k)
+    def _compute_rates(self, reading: _Reading, y: Any, side: float) -> list[Any]:
+        """Compute the rates of angle, speed and work, at one instant or at (n,).
+
+        Friction keeps its side beyond a standstill, at which the step is then cut.
+        """
+        q, rate, _ = y
+        moving = side * np.maximum(side * rate, VANISHING_SPEED) if side else rate
+        state = self._make_state(reading, q, moving)
+        Q = self._compute_generalized_force(state)
+        slope = half_slope(self.lengths.a, self.bodies, state.position, state.k)
+        equivalent_inertia = self._compute_inertia(state.position, state.k)
         # NumPy's division raises no error where the inertia vanishes
-        return [
-            rate,
-            float(
-                np.float64(Q - slope * rate * rate) / self._compute_inertia(position, k)
-            ),
-            Q * rate,
-        ]
+        growth = np.divide(Q - slope * rate * rate, equivalent_inertia)
+        return [rate, growth, Q * rate]
 
-    def _change_over(self) -> bool:
-        """Take the other angle if it is further from its limit.
+    def _change_over(
+        self,
+        reading: _Reading,
+        angles: Mapping[int, float],
+        y: Array,
+    ) -> tuple[_Reading, Array]:
+        """Read the motion in the angle of the other bar; from bar 3, the better one.
 
         Position, velocity and work are kept.
         """
-        position, k = self._at()
-        sines = _compute_sines(position)
-        bar = 6 - self.reading.bar
-        if self.reading.bar == 3:  # only at the start
-            bar = max((2, 4), key=lambda number: abs(sines[number]))
-        elif abs(sines[self.reading.bar]) >= _CHANGE_OVER * abs(sines[bar]):
-            return False
-        q = self.theta[bar]
-        reading = self.readings[bar]
-        reading.branch = float(reading.path.sign(q, math.copysign(1.0, sines[bar])))
-        _, speed, work = self.y
-        rate = 0.0
-        if speed:
-            rate = float(speed * (k.h2 if bar == 2 else k.h4))
-        self.reading = reading
-        self.y = np.array([q, rate, work])
-        return True
+        position, k = reading.close(float(y[0]))
+        sines = {bar: float(drive_sine(position, bar)) for bar in (2, 4)}
+        bar = reading.other
+        if bar == 3:
+            bar = max(sines, key=lambda number: abs(sines[number]))
+        _, speed, work = y
+        rate = speed and float(speed * (k.h2 if bar == 2 else k.h4))
+        other = _Reading.of(self.linkage, bar, 1.0)
+        sign = other.path.sign(angles[bar], math.copysign(1.0, sines[bar]))
+        return other._replace(branch=float(sign)), np.array([angles[bar], rate, work])
 
-    def _turn(self, position: Position) -> None:
-        """Bring theta_2 and theta_4 up to date, continuous over the steps."""
-        for bar, u in ((2, position.u2), (4, position.u4)):
-            now = cmath.phase(u)
-            self.theta[bar] = now + 2.0 * math.pi * round(
-                (self.theta[bar] - now) / (2.0 * math.pi)
-            )
+    def _find_side(self, reading: _Reading, y: Array) -> tuple[float, bool]:
+        """Return the side of dry friction, and True if the linkage moves on.
 
-    def _starts(self) -> bool:
-        """Return True if the linkage moves on.
-
-        At a standstill dry friction holds it against any weaker force.
+        At a standstill dry friction holds the linkage against any weaker force, with a
+        fraction of its torque in place of the side.
         """
-        self.side = 0.0
-        rate = float(self.y[1])
-        if not self.dry:
-            return True
-        if rate == 0.0:
-            ahead, back = self._try_both_senses()
-            if ahead <= 0.0 <= back:
-                if ahead < back:
-                    self.holding = (ahead + back) / (back - ahead)
-                else:
-                    self.holding = 0.0
-                return False
-            rate = 1.0 if ahead > 0.0 else -1.0
-        self.side = math.copysign(1.0, rate)
-        return True
+        q, rate, _ = map(float, y)
+        if not self.is_dry or rate:
+            return (math.copysign(1.0, rate) if self.is_dry else 0.0), True
+        ahead, back = (
+            float(self._compute_generalized_force(self._make_state(reading, q, slow)))
+            for slow in (VANISHING_SPEED, -VANISHING_SPEED)
+        )
+        if ahead <= 0.0 <= back:
+            return ((ahead + back) / (back - ahead) if ahead < back else 0.0), False
+        return (1.0 if ahead > 0.0 else -1.0), True
 
-    def integrate(self, times: Array) -> Released:
-        """Integrate over the times and report."""
+    def _follow(self, reading: _Reading, angles: dict[int, float], y: Array) -> None:
+        """Follow the motion stretch by stretch to its end.
+
+        A stretch ends at a standstill, or where another angle is read.
+        """
+        start = 0.0
+        end = float(self.times[-1])
+        due = self.times
+        while due.size:
+            side, moves = self._find_side(reading, y)
+            if not moves or start == end:
+                still = np.repeat(y[:, np.newaxis], due.size, axis=1)
+                self._report(reading, angles, due, still, due, side, moves)
+                break
+            solved = self._integrate(reading, start, y, side)
+            start = float(solved.t[-1])
+            now = due[due <= start]
+            due = due[now.size :]
+            instants = np.union1d(solved.t, now)
+            motion = solved.sol(instants)
+            angles = self._report(reading, angles, instants, motion, now, side, moves)
+            y = np.array(solved.y[:, -1])
+            if not solved.t_events[0].size:
+                y[1] = 0.0
+            else:
+                reading, y = self._change_over(reading, angles, y)
+
+    def _integrate(self, reading: _Reading, start: float, y: Array, side: float) -> Any:
+        """Integrate one stretch, to the end of the motion at most."""
         try:
-            from scipy.integrate import DOP853
+            from scipy.integrate import DOP853, solve_ivp
         except ModuleNotFoundError:
             raise DependencyError(
                 f"SciPy is needed for free motion: {say_install('studies')}"
             ) from None
-        end = float(times[-1])
-        self.times = times
-        self.largest = self.start_energy
-        moves = self._starts()
-        self._report(0.0, lambda _: self.y)
-        while self.t < end:
-            if not moves:
-                self._report(end, lambda _: self.y)
-                break
-            solver = DOP853(
-                self._compute_rates,
-                self.t,
-                self.y,
-                end,
-                rtol=_SCIPY_LEAST,
-                atol=ABSOLUTE,
+        run = self
+        end = float(self.times[-1])
+
+        class Solver(DOP853):  # type: ignore[misc]  # SciPy has no types
+            """SciPy's, with a smaller tolerance and a largest number of steps."""
+
+            def __init__(self, *arguments: Any, **options: Any) -> None:
+                super().__init__(*arguments, rtol=_SCIPY_LEAST, **options)
+                self.rtol = RELATIVE
+
+            def step(self) -> Any:
+                run.steps += 1
+                if run.steps > MOST_INTEGRATION_STEPS:
+                    allowed = (
+                        f"this motion is followed for {MOST_INTEGRATION_STEPS} steps,"
+                        f" here to {self.t:.6g} s; make it shorter"
+                    )
+                    raise InputError("motion.free.duration", end, allowed)
+                return super().step()
+
+        def compute_rates(_: float, y: Array) -> list[Any]:
+            return self._compute_rates(reading, y.tolist(), side)
+
+        def has_room(_: float, y: Array) -> float:
+            return reading.measure_room(reading.close(float(y[0]))[0])
+
+        def moves(_: float, y: Array) -> float:
+            return side * float(y[1])
+
+        events: list[Any] = [has_room, moves] if side else [has_room]
+        for event in events:
+            event.terminal = True
+            event.direction = -1.0
+        solved = solve_ivp(
+            compute_rates,
+            (start, end),
+            y,
+            method=Solver,
+            dense_output=True,
+            events=events,
+            atol=ABSOLUTE,
+        )
+        if not solved.success:
+            raise FourBarError(
+                f"the free motion cannot be continued beyond {solved.t[-1]:.9g} s:"
+                f" {solved.message}"
             )
-            solver.rtol = RELATIVE
-            moves = self._follow_solver(solver)
-        theta_2, omega_2, alpha_2, branch, bar, *independent = (
-            np.array(self.rows).reshape(-1, 10).T
-        )
-        time = np.asarray(times[: len(self.rows)])
-        motion = Command(theta_2, branch.astype(np.int8), omega_2, alpha_2, None, time)
-        motion = motion._replace(
-            independent=Independent(bar.astype(np.int8), *independent)
-        )
-        return Released(
-            motion,
-            self.drift / self.largest if self.largest else 0.0,
-            tuple(sorted(self.change_points)),  # two may lie within one step
-        )
+        self._note_change_points(reading.path, solved)
+        return solved
 
-    def _follow_solver(self, solver: Any) -> bool:
-        """Take steps until the motion ends or another solver is needed.
+    def _note_change_points(self, path: LoopPath, solved: Any) -> None:
+        """Note the times at which all bars are collinear: another motion is possible.
 
-        Return True if the linkage moves then.
+        A step may be several turns long.
         """
-        while solver.status == "running":
-            self.steps += 1
-            message = solver.step()
-            if solver.status == "failed":
-                raise FourBarError(
-                    f"the free motion cannot be continued beyond {self.t:.9g} s:"
-                    f" {message}"
-                )
-            if self.steps > MOST_INTEGRATION_STEPS:
-                allowed = (
-                    f"this motion is followed for {MOST_INTEGRATION_STEPS} steps,"
-                    f" here to {self.t:.6g} s; make it shorter"
-                )
-                raise InputError("motion.free.duration", float(self.times[-1]), allowed)
-            dense = _interpolate(solver)
-            t = solver.t
-            new = solver.y
-            rested = bool(self.side and self.side * new[1] < 0.0)
-            if rested:
-                t = _find_root(dense, lambda y: float(y[1]), solver.t_old, t)
-                q, _, work = dense(t)
-                new = np.array([q, 0.0, work])
-            self._note_change_points(solver.t_old, t, dense)
-            self._report(t, dense)
-            self.t, self.y = t, np.array(new)
-            self._turn(self._at()[0])
-            energy = self._compute_kinetic_energy() - self.start_energy
-            self.drift = max(self.drift, abs(energy - float(self.y[2])))
-            self.largest = max(
-                self.largest,
-                abs(energy + self.start_energy),
-                abs(float(self.y[2])),
-            )
-            if rested or self._change_over():
-                return self._starts()
-        return True
+        from scipy.optimize import brentq
 
-    def _note_change_points(
-        self,
-        start: float,
-        stop: float,
-        dense: Callable[[float], Array],
-    ) -> None:
-        """Note the times within a step at which all bars are collinear.
-
-        Another motion is possible there.
-        """
-        path = self.reading.path
         beginning = path.theta_1 + (math.pi if path.bar == 4 else 0.0)
         for passes, psi in ((path.passing.inner, 0.0), (path.passing.outer, math.pi)):
             if not passes:
                 continue
-            point = beginning + psi
-            before = (float(dense(start)[0]) - point) / (2.0 * math.pi)
-            after = (float(dense(stop)[0]) - point) / (2.0 * math.pi)
-            passed = range(math.floor(before) + 1, math.floor(after) + 1)
-            if after < before:
-                passed = range(math.ceil(after), math.ceil(before))
-            for turn in passed:
 
-                def find_gap(y: Array, turn: int = turn, point: float = point) -> float:
-                    return float(y[0]) - (point + 2.0 * math.pi * turn)
+            def count(time: float, point: float = beginning + psi) -> float:
+                return float(solved.sol(time)[0] - point) / TURN
 
-                self.change_points.append(_find_root(dense, find_gap, start, stop))
+            for low, high in pairwise(solved.t):
+                first, last = sorted((count(low), count(high)))
+                for turn in range(math.ceil(first), math.floor(last) + 1):
+                    time = brentq(lambda t, n, f: f(t) - n, low, high, (turn, count))
+                    self.change_points.append(time)
 
-    def _report(self, until: float, dense: Callable[[float], Array]) -> None:
-        """Report the instants up to a time, from the motion as a function of time."""
-        for time in self.times[len(self.rows) :]:
-            if time > until:
-                break
-            self.rows.append(self._make_row(dense(float(time))))
+    def _report(
+        self,
+        reading: _Reading,
+        angles: Mapping[int, float],
+        instants: Array,
+        motion: Array,
+        due: Array,
+        side: float,
+        moves: bool,
+    ) -> dict[int, float]:
+        """Report a stretch, and return the angles of bars 2 and 4 at its end.
 
-    def _make_row(self, y: Array) -> tuple[float, ...]:
-        """Return one instant as a row of numbers.
-
-        The row holds theta_2, omega_2, alpha_2, the branch, and the angle, speed and
-        acceleration of the independent angle.
+        Parameters
+        ----------
+        angles : of both bars at its beginning; they are continuous over the turns.
+        instants, motion : its steps and those that are due, s, with (3, n) there.
+        due : those to report.
         """
-        q = float(y[0])
-        rate = float(y[1])
-        position, k = self.reading.evaluate(q)
-        wrapped = cmath.phase(position.u2)
-        turns = round((self.theta[2] - wrapped) / (2.0 * math.pi))
-        theta_2 = wrapped + 2.0 * math.pi * turns
-        if self.reading.bar == 2:
-            theta_2 = q
-        still = self.dry and rate == 0.0 and not self.side
-        if still:
-            growth = 0.0
-        else:
-            growth = self._compute_rates(0.0, y)[1]
+        q, rate, work = motion
+        position, k = reading.close(q)
+        energy = 0.5 * self._compute_inertia(position, k) * rate * rate
+        self.energies.append(np.array([energy, work]))
+        turned = {}
+        for bar, u in ((2, position.u2), (4, position.u4)):
+            phase = np.unwrap(np.broadcast_to(angle(u), q.shape))
+            turned[bar] = phase + TURN * round((angles[bar] - phase[0]) / TURN)
+        turned[reading.path.bar] = q
+        growth = self._compute_rates(reading, motion, side)[1] if moves else 0.0 * q
         moving = rates(k, rate, growth)
-        sine = _compute_sines(position)[2]
-        if abs(sine) > NO_DIGIT_LEFT:  # at a limit of theta_2 both branches meet
-            self.branch = float(
-                self.readings[2].path.sign(theta_2, math.copysign(1.0, sine))
-            )
-        if self.dry and rate == 0.0:
-            side = self.side or self.holding
-        else:
-            side = 0.0
-        independent = (
-            float(self.reading.bar),
+        columns = (
+            turned[2],
+            moving.omega_2,
+            moving.alpha_2,
+            drive_sine(position, 2),
+            reading.path.bar,
             q,
             rate,
             growth,
-            self.reading.branch,
-            side,
+            reading.branch,
+            np.where(rate == 0.0, side, 0.0),
         )
-        return (
+        rows = np.stack(np.broadcast_arrays(*columns), axis=1)
+        self.rows.append(rows[np.searchsorted(instants, due)])
+        return {bar: float(values[-1]) for bar, values in turned.items()}
+
+    def _conclude(self, branch: float) -> Released:
+        """Put the reported instants together; the branch is that of the start."""
+        rows = np.concatenate(self.rows)
+        theta_2, omega_2, alpha_2, sine, bar, *independent = rows.T
+        path = _Reading.of(self.linkage, 2, branch).path
+        signs = np.array(path.sign(theta_2, np.copysign(1.0, sine)))
+        # at a limit of theta_2 both branches meet, and the last one goes on
+        is_sure = np.abs(sine) > NO_DIGIT_LEFT
+        last = np.maximum.accumulate(np.where(is_sure, np.arange(sine.size), -1))
+        signs = np.where(last < 0, branch, signs[last])
+        command = Command(
             theta_2,
-            float(moving.omega_2),
-            float(moving.alpha_2),
-            self.branch,
-            *independent,
+            signs.astype(np.int8),
+            omega_2,
+            alpha_2,
+            time=np.asarray(self.times),
+            independent=Independent(bar.astype(np.int8), *independent),
         )
-
-
-def _find_root(
-    dense: Callable[[float], Array],
-    f: Callable[[Array], float],
-    low: float,
-    high: float,
-) -> float:
-    """Find the time in a step at which f of the motion is zero.
-
-    The start of the step is returned if f is zero there.
-    """
-    from scipy.optimize import brentq
-
-    if f(dense(low)) * f(dense(high)) >= 0.0:
-        return low
-    return float(brentq(lambda t: f(dense(t)), low, high, xtol=1e-15, rtol=1e-15))
-
-
-def _interpolate(solver: Any) -> Callable[[float], Array]:
-    """Return the motion within the last step of the solver.
-
-    Three more evaluations of it wait for the first call.
-    """
-    dense_output = cache(solver.dense_output)
-
-    def motion(t: float) -> Array:
-        state: Array = dense_output()(t)
-        return state
-
-    return motion
+        energy, work = np.concatenate(self.energies, axis=1)
+        largest = float(np.max(np.abs([energy, work])))
+        drift = float(np.max(np.abs(energy - energy[0] - work)))
+        return Released(
+            command,
+            drift / largest if largest else 0.0,
+            tuple(sorted(set(self.change_points))),  # two may lie within one step
+        )

@@ -61,10 +61,7 @@ def read_stated_place(
     if len(stated) > 1:
         allowed = f"{stated[0]} states the place already; state one of them"
         raise read.refuse(f"{key}.{stated[1]}", entry[stated[1]], allowed)
-    if "point" in stated:
-        name = entry.get("point")
-    else:
-        name = None
+    name = entry.get("point") if "point" in stated else None
     if name is not None:
         read.choice(f"{key}.point", name, bars)
         bar = entry.get("bar", bars[name])

@@ -314,10 +314,7 @@ def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
         )
     points = []
     for name, point in value.items():
-        if BARE_KEY.fullmatch(name):
-            key = f"points.{name}"
-        else:
-            key = "points"
+        key = f"points.{name}" if BARE_KEY.fullmatch(name) else "points"
         entry = read_table_with_place(read, key, point, ("bar", *STATED_PLACES))
         place = read_stated_place(read, key, entry, {})
         points.append(Point(name, place.bar, place.from_pin, place.from_centre))

@@ -228,10 +228,7 @@ def list_scene_tables(scene: Scene) -> dict[str, Any]:
 def _write_bar(bar: Bar) -> dict[str, Any]:
     if bar == Bar(bar.length):
         return {}
-    if bar.density is None:
-        left_out = {"length"}
-    else:
-        left_out = {"length", "mass"}
+    left_out = {"length"} if bar.density is None else {"length", "mass"}
     numbers = write_numbers(bar).items()
     return {name: text for name, text in numbers if name not in left_out}
 
@@ -349,10 +346,7 @@ def _write_effect(effect: Effect) -> Any:
             }
             rows[pin] = texts.get("", texts)
         return rows
-    if hasattr(effect, "bar"):
-        bar = {"bar": effect.bar}
-    else:
-        bar = {}
+    bar = {"bar": effect.bar} if hasattr(effect, "bar") else {}
     return {**bar, **write_numbers(effect)}
 
 

@@ -225,19 +225,13 @@ def half_angle(
         passing = find_passing(lengths)
     t = tangent(0.5 * psi)
     # tan h is zero at this change point: a tiny step off it gives the limits there
-    if opposite:
-        passes_at_zero = passing.outer
-    else:
-        passes_at_zero = passing.inner
+    passes_at_zero = passing.outer if opposite else passing.inner
     if is_any(passes_at_zero):
         t = select(passes_at_zero, t + np.copysign(_TINY_TANGENT, t), t)
     kk = 1.0 / (1.0 + t * t)
     sk = t * kk
     ss = t * sk
-    if opposite:
-        squares = (kk, ss, -sk)
-    else:
-        squares = (ss, kk, sk)
+    squares = (kk, ss, -sk) if opposite else (ss, kk, sk)
     root_sign = find_root_sign(psi, passing, opposite=opposite)
     return compute_factors(lengths, *squares, root_sign)
 

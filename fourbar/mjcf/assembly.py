@@ -109,10 +109,7 @@ def _write_comment(
     """Say in what state the file stands, and where its reader's numbers are."""
     notes = NOTES["assembled"]
     bar = scene.drive_bar
-    if bar != 3:
-        joint = f", joint {FIRST_PIN[bar]}"
-    else:
-        joint = ""
+    joint = f", joint {FIRST_PIN[bar]}" if bar != 3 else ""
     lines = [
         notes["opens"]
         .strip()
@@ -179,10 +176,7 @@ def write_sdf(
             **({"xmlns:drake": DRAKE_NAMESPACE} if reader == "drake" else {}),
         },
     )
-    if reader == "gazebo":
-        at_B = f", joint B {omega_2 + at_A - omega_4!r} rad/s"
-    else:
-        at_B = ""
+    at_B = f", joint B {omega_2 + at_A - omega_4!r} rad/s" if reader == "gazebo" else ""
     for line in _write_comment(
         scene,
         "SDF",
@@ -359,10 +353,7 @@ def write_usd(
 """)
     comment = _write_comment(scene, "USD", "newton", assembled, plane=plane)
     notes = json.dumps(comment)
-    if pull:
-        down = plane.turn(x / pull, y / pull)
-    else:
-        down = (0.0, -1.0, 0.0)
+    down = plane.turn(x / pull, y / pull) if pull else (0.0, -1.0, 0.0)
     return f"""#usda 1.0
 (
     doc = {notes}

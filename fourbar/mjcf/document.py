@@ -231,10 +231,7 @@ def _size_control(scene: Scene) -> float:
     """
     motion = scene.motion.replace(speed=scene.motion.speed or 0.0)
     solution = solve(replace(scene, motion=motion), "force")
-    if scene.drive is None:
-        driving = solution.torque
-    else:
-        driving = solution.drive_force
+    driving = solution.torque if scene.drive is None else solution.drive_force
     sizes = np.abs(np.asarray(driving))
     largest = float(sizes[np.isfinite(sizes)].max(initial=0.0))
     if not largest:
@@ -651,10 +648,7 @@ def make_scene(
     title = f"four-bar {ground!r} {input!r} {coupler!r} {output!r}"
     # half a turn from the ground's line would start a parallelogram in its change point
     quarter = linkage.ground_angle + math.pi / 2.0
-    if turns_fully(linkage):
-        start = quarter
-    else:
-        start = 0.5 * sum(choose_range(linkage))
+    start = quarter if turns_fully(linkage) else 0.5 * sum(choose_range(linkage))
     return Scene(linkage, Motion(start, omega), title=title)
 
 

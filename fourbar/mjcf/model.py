@@ -484,10 +484,7 @@ class Model:
         z: float,
     ) -> None:
         """Add a bar's shape: for the eye only, without mass and without contact."""
-        if number == 1:
-            theta = self.linkage.ground_angle
-        else:
-            theta = 0.0
+        theta = self.linkage.ground_angle if number == 1 else 0.0
         cos = math.cos(theta)
         sin = math.sin(theta)
         shape = {
@@ -604,10 +601,7 @@ class Model:
             return
         actuators = ET.SubElement(root, "actuator")
         if drive:
-            if drive.get("tendon") == CYLINDER:
-                name = CYLINDER
-            else:
-                name = "drive"
+            name = CYLINDER if drive.get("tendon") == CYLINDER else "drive"
             ET.SubElement(actuators, "general", drive, name=name)
         if cylinder:
             ET.SubElement(actuators, "general", name=CYLINDER, tendon=CYLINDER)

@@ -182,10 +182,7 @@ def find_unit(text: object, otherwise: str) -> str:
     """Return the unit that a text has; another one where it has none."""
     last = _FEET.sub("", str(text).strip())  # the inches of 1'6"
     number_text = _FRACTION.match(last) or NUMBER_TEXT.match(last)
-    if number_text:
-        unit = last[number_text.end() :].strip()
-    else:
-        unit = ""
+    unit = last[number_text.end() :].strip() if number_text else ""
     unit = re.sub('[″”"]', "in", re.sub("[′’']", "ft", unit))
     return unit or otherwise
 
@@ -196,10 +193,7 @@ def half_unit_of_text(text: object, unit: str) -> float:
     A number without decimals gives 0.
     """
     last = _FEET.sub("", str(text).strip())
-    if _FRACTION.match(last):
-        number_text = None
-    else:
-        number_text = NUMBER_TEXT.match(last)
+    number_text = None if _FRACTION.match(last) else NUMBER_TEXT.match(last)
     if number_text is None:
         return 0.0
     digits, _, power = number_text[0].lower().partition("e")

@@ -783,10 +783,7 @@ def _require_command(
         if angles.size == 0:
             raise InputError(f"motion.{theta}", angle, "must be one angle or more")
         angles.flags.writeable = False
-        if angles.ndim == 0:
-            angle = float(angles)
-        else:
-            angle = angles
+        angle = float(angles) if angles.ndim == 0 else angles
     if speed is not None:
         speed = _require_rates(f"motion.{omega}", speed, per_second, angle)
         highest = float(np.max(np.abs(speed)))

@@ -159,10 +159,7 @@ def find_unit_of_key(key: str) -> str | None:
         numbers = {**STATED_PLACES, "direction": Declared("rad")}
     elif table == "effects" and names and (kind := effects.list_kinds().get(names[0])):
         numbers = {**kind.numbers, "gravity": effects.Gravity.numbers["magnitude"]}
-    if names and names[-1] in ("0", "1"):
-        part = names.pop()
-    else:
-        part = ""
+    part = names.pop() if names and names[-1] in ("0", "1") else ""
     stated = numbers.get(names[-1] if names else "", numbers.get(""))
     if stated is None:
         return None

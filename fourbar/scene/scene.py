@@ -192,10 +192,7 @@ class Scene:
         NotAssembledError : there is no position to draw.
         DependencyError : matplotlib is missing.
         """
-        if units is None:
-            options = {}
-        else:
-            options = {"units": units}
+        options = {} if units is None else {"units": units}
         return load_show("plot").draw_figure(
             self,
             figure,
@@ -368,10 +365,7 @@ class Command(NamedTuple):
     @property
     def places(self) -> Array:
         """Commanded angles, strokes, or times of a law, at each position."""
-        if self.stroke is None:
-            places = self.angle
-        else:
-            places = self.stroke
+        places = self.angle if self.stroke is None else self.stroke
         return places if self.time is None else self.time
 
     def part(self, index: Any) -> "Command":
@@ -736,10 +730,7 @@ def command(scene: Scene) -> Command:
     if motion.law is not None:
         places = motion.law.times()
     elif stated is None:
-        if scene.drawing is None:
-            drawn = None
-        else:
-            drawn = scene.drawing.angle(bar)
+        drawn = None if scene.drawing is None else scene.drawing.angle(bar)
         places = default_places(scene, drawn)
     elif isinstance(stated, Sweep):
         places = np.linspace(stated.start, stated.stop, stated.steps + 1)

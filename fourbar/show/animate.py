@@ -249,10 +249,7 @@ def _over(
 
     Values are included where they are not those of theta_2, a speed where it is one.
     """
-    if name == "theta_2":
-        shown = None
-    else:
-        shown = values.tolist()
+    shown = None if name == "theta_2" else values.tolist()
     return {
         "name": name,
         "commanded": commanded,

@@ -127,20 +127,14 @@ class _SceneBlock:
     def __init__(self, facts: Facts, units: Conversion) -> None:
         self.facts = facts
         self.units = units
-        if facts.kind == "position":
-            self.digits = POSITION_DIGITS
-        else:
-            self.digits = SHOWN_DIGITS
+        self.digits = POSITION_DIGITS if facts.kind == "position" else SHOWN_DIGITS
         self.longest = max(facts.scene.linkage.lengths)
         if facts.kind in ("law", "released"):
             self.symbol = "t"
             self.unit = "s"
         else:
             self.symbol = facts.solution.commanded
-            if facts.solution.at.stroke is None:
-                self.unit = "rad"
-            else:
-                self.unit = "m"
+            self.unit = "rad" if facts.solution.at.stroke is None else "m"
 
     def write(self, pressure: float | None, *, headed: bool = True) -> list[str]:
         """Write all paragraphs; a blank line parts them. `headed`: with the linkage."""
@@ -215,10 +209,7 @@ class _SceneBlock:
         one = self.facts.solution
         name = one.commanded
         unit = "rad" if one.at.stroke is None else "m"
-        if one.at.stroke is None:
-            place = one.at.angle
-        else:
-            place = one.at.stroke
+        place = one.at.angle if one.at.stroke is None else one.at.stroke
         text = f"at {name} = {self._value(float(place[0]), unit)}"
         if one.time is None:
             return text
@@ -254,24 +245,15 @@ class _SceneBlock:
         name = f"{self._name_linkage()}:"
         lengths = self._write_lengths()
         line = f"{name} {lengths}"
-        if len(line) <= BLOCK_WIDTH:
-            lines = [line]
-        else:
-            lines = [name, f"    {lengths}"]
+        lines = [line] if len(line) <= BLOCK_WIDTH else [name, f" {lengths}"]
         return [*lines, *self._write_change_points()]
 
     def _name_linkage(self) -> str:
         """Name the linkage by its type, its title and its branch."""
         scene, motion = self.facts.scene, self.facts.scene.motion
         name = name_assembly(scene.linkage, motion.bar, motion.branch)
-        if scene.title:
-            title = f' "{clean_line(scene.title)}"'
-        else:
-            title = ""
-        if motion.bar == 2:
-            of_bar = ""
-        else:
-            of_bar = f" of the command {motion.commanded}"
+        title = f' "{clean_line(scene.title)}"' if scene.title else ""
+        of_bar = "" if motion.bar == 2 else f" of the command {motion.commanded}"
         branch = f"{BRANCH_NAMES[motion.branch]} branch{of_bar}"
         return f"{name[0].upper()}{name[1:]}{title}, {branch}"
 
@@ -420,18 +402,12 @@ class _SceneBlock:
                 f" {write_digits(last - first)} s"
             )
         else:
-            if self.unit == "m":
-                name = "stroke"
-            else:
-                name = BAR_NAMES[bar]
+            name = "stroke" if self.unit == "m" else BAR_NAMES[bar]
             begin = (
                 f"{name} from {self._place(first, named=False)} to"
                 f" {self._place(last, named=False)}{self._write_inset()}"
             )
-        if facts.kind == "released":
-            following = [2, 4]
-        else:
-            following = [4 if bar != 4 else 2]
+        following = [2, 4] if facts.kind == "released" else [4 if bar != 4 else 2]
         return "; ".join(
             [
                 begin,
@@ -607,10 +583,7 @@ class _SceneBlock:
         """Write power and energy of the drive, and what a motor must have."""
         facts, duty, power = self.facts, self.facts.duty, self.facts.solution.power
         if duty is None:
-            if power is not None:
-                one = float(power[0])
-            else:
-                one = 0.0
+            one = float(power[0]) if power is not None else 0.0
             if facts.peak is not None and not self._without_rounding(facts.peak.value):
                 one = 0.0
             if one:
@@ -627,18 +600,12 @@ class _SceneBlock:
             and duty.energy_in is not None
             and duty.energy_out is not None
         ):
-            if facts.kind == "law":
-                over = "over the motion"
-            else:
-                over = "over the sweep"
+            over = "over the motion" if facts.kind == "law" else "over the sweep"
             if facts.kind == "turn":
                 turns = round(
                     abs(facts.commanded[1] - facts.commanded[0]) / (2.0 * math.pi)
                 )
-                if turns == 1:
-                    over = "per turn"
-                else:
-                    over = f"in {turns} turns"
+                over = "per turn" if turns == 1 else f"in {turns} turns"
             most = max(duty.energy_in, duty.energy_out)
             forward, back = (
                 self._value(energy, "J", most)
@@ -713,10 +680,7 @@ class _SceneBlock:
         low, high = (
             self._value(x.value, "m", self.longest) for x in facts.stroke_range
         )
-        if facts.kind == "position":
-            row = low
-        else:
-            row = f"{low} to {high}"
+        row = low if facts.kind == "position" else f"{low} to {high}"
         if facts.stroke_limits is not None:
             ends = (self._value(x, "m", self.longest) for x in facts.stroke_limits)
             row += "; assembles from {} to {}".format(*ends)
@@ -910,10 +874,7 @@ class _SceneBlock:
                 below = f"below 1e{math.ceil(math.log10(facts.error)):+03d}"
             else:
                 below = "zero"
-            if facts.error < self._changes_a_digit:
-                changed = "none of these"
-            else:
-                changed = "some"
+            changed = "none of these" if facts.error < self._changes_a_digit else "some"
             lines.append(
                 f"rounding changes {changed} digits (worst error bar {below} of the"
                 " value)"
@@ -953,10 +914,7 @@ class _SceneBlock:
             return []
         worst = int(np.nanargmax(share))
         digits = max(math.floor(-math.log10(share[worst])), 0)
-        if solution.time is None:
-            place = solution.at.places
-        else:
-            place = solution.time
+        place = solution.at.places if solution.time is None else solution.time
         start = (
             f"{digits} digits left of {drive.symbol} at"
             f" {self._place(float(place[worst]))}"
@@ -1012,10 +970,7 @@ def write_motor(
     duty = motor_duty(solution)
     if duty is None:
         return None
-    if solution.drive is None:
-        si = DUTY_UNITS
-    else:
-        si = {**DUTY_UNITS, "peak_speed": "m/s"}
+    si = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}
     shown = {name: find_unit_in(unit, units) for name, unit in si.items()}
     force = find_unit_in("N", units)[1]
     angle = find_unit_in("rad", units)[1]

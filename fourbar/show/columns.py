@@ -172,10 +172,7 @@ def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
         close = get_close_matches(name, ["time", *quantities], 1)
         if names_other_mechanism(stem):
             raise InputError("--columns", name, f"unknown; {ELSEWHERE}")
-        if close:
-            hint = f'did you mean "{close[0]}"? '
-        else:
-            hint = ""
+        hint = f'did you mean "{close[0]}"? ' if close else ""
         raise InputError(
             "--columns",
             name,

@@ -52,10 +52,7 @@ def derive(solution: Solution, name: str) -> Array | None:
 
 def list_derived_names(solution: Solution) -> list[str]:
     """List the derived quantities of a solution, those of its springs last."""
-    if solution.scene is None:
-        count = 0
-    else:
-        count = len(list_springs(solution.scene))
+    count = 0 if solution.scene is None else len(list_springs(solution.scene))
     springs = [
         f"spring_{number}_{quantity.name}"
         for number in range(count)

@@ -161,10 +161,7 @@ class PositionSheet:
         for name in ("transmission", "omega_3/omega_2", "omega_4/omega_2"):
             values = derive(self.solution, name)
             assert values is not None
-            if name == "transmission":
-                label = "transmission angle"
-            else:
-                label = name
+            label = "transmission angle" if name == "transmission" else name
             rows.append(self._write_number(label, values, DERIVED_NAMES[name].unit))
         rows.append(self._write_advantage())
         rows += [*self._write_force_ratios(), *self._write_drive_ratios()]

@@ -197,10 +197,7 @@ def _explain_turning(
     )
     name = BAR_NAMES[bar]
     touches = reach.beyond_stretched == 0.0 or reach.beyond_folded == 0.0
-    if touches:
-        when = "are in line at change points alone"
-    else:
-        when = "are never in line"
+    when = "are in line at change points alone" if touches else "are never in line"
     yield f"{name}: no limits, {one} and {two} {when}:"
     relation = "=" if reach.beyond_stretched == 0.0 else "<"
     yield (
@@ -236,10 +233,7 @@ def list_shown(derivatives: Sensitivity) -> list[str]:
 def find_largest(derivatives: Sensitivity, quantity: str) -> float:
     """Return the largest magnitude of a quantity; NaN if no position has a value."""
     value = derivatives.value(quantity)
-    if value.ndim == 1:
-        size = np.abs(value)
-    else:
-        size = np.hypot(*value.T)
+    size = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
     if np.isfinite(size).any():
         return float(np.nanmax(size))
     return math.nan

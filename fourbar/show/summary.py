@@ -305,10 +305,7 @@ def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]
 
     low, high = min(find_intervals(scene.linkage, at.bar), key=find_excess)
     width = high - low
-    if width < TURN:
-        low = here - (here - low) % TURN
-    else:
-        low = here - 0.5 * TURN
+    low = here - (here - low) % TURN if width < TURN else here - 0.5 * TURN
     high = low + (1.0 - _INSET) * width
     low += _INSET * width
     branch = int(at.branch[first])

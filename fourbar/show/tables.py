@@ -255,10 +255,7 @@ def _list_columns_of(solution: Solution, name: str) -> dict[str, Array]:
         return {name: values}
     sizes = np.hypot(values[:, 0], values[:, 1])
     x, y = drop_rounding(values, sizes[:, None]).T
-    if has_size(name):
-        size = {f"|{name}|": sizes}
-    else:
-        size = {}
+    size = {f"|{name}|": sizes} if has_size(name) else {}
     return {**size, f"{name}_x": x, f"{name}_y": y}
 
 
@@ -304,10 +301,7 @@ def write_cells(values: Array, form: str = ".6g") -> list[str]:
     """
     sizes = np.abs(values[np.isfinite(values)])
     # not the largest, which may stand beside a pole
-    if sizes.size:
-        usual = float(np.percentile(sizes, 90.0))
-    else:
-        usual = 0.0
+    usual = float(np.percentile(sizes, 90.0)) if sizes.size else 0.0
     return [write_cell(value, form) for value in drop_rounding(values, usual).tolist()]
 
 

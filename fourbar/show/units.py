@@ -195,10 +195,7 @@ def _suit_rotation(stated: str, unit: str) -> Conversion:
     if turned == "rpm":
         return {"rad/s": COMMON["rad/s"]}
     angle = turned.removesuffix("/s")
-    if angle == "rad":
-        factor = 1.0
-    else:
-        factor = DEGREES["rad"][1]
+    factor = 1.0 if angle == "rad" else DEGREES["rad"][1]
     rates = {"rad/s": (f"{angle}/s", factor), "rad/s^2": (f"{angle}/s^2", factor)}
     if unit == "rad/s":
         return rates

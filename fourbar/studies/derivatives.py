@@ -323,10 +323,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
     keys = {
         theta: SceneNumber((), scene.motion.numbers[scene.motion.commanded].unit)
     } | entries
-    if commanded.stroke is None:
-        most = np.nan
-    else:
-        most = float(commanded.stroke.max())
+    most = np.nan if commanded.stroke is None else float(commanded.stroke.max())
     numbers = [
         most if key == theta else read_number(scene, entry)
         for key, entry in keys.items()
@@ -409,10 +406,7 @@ class _SlopedPath(LoopPath):
         s = np.sin(0.5 * psi)
         k = np.cos(0.5 * psi)
         opposite = self.bar == 4
-        if opposite:
-            squares = (k * k, s * s, -(s * k))
-        else:
-            squares = (s * s, k * k, s * k)
+        squares = (k * k, s * s, -(s * k)) if opposite else (s * s, k * k, s * k)
         # a sign has no slope: the linkages beside keep the assembly
         root_sign = find_root_sign(without_slopes(psi), self.passing, opposite=opposite)
         return compute_factors(self.lengths, *squares, root_sign)

@@ -249,10 +249,7 @@ def _describe_equilibrium(
     `size`: of the terms of Q about there.
     """
     state = curve.state(point[None])
-    if abs(state.k.h2[0]) < STANDING_BAR * abs(state.k.h4[0]):
-        bar = 4
-    else:
-        bar = 2
+    bar = 4 if abs(state.k.h2[0]) < STANDING_BAR * abs(state.k.h4[0]) else 2
     square = float(state.k[bar - 2][0]) ** 2
     along_curve = float(curve.slope(point[None])[0])
     moving = _drop_standing_bar(curve.lengths, state.k)
@@ -261,10 +258,7 @@ def _describe_equilibrium(
     J = float(np.sum(inertias)) / square
     stability = "undecided"
     if abs(along_curve) > _A_JUMP * size:  # never of NaN
-        if slope < 0.0:
-            stability = "stable"
-        else:
-            stability = "unstable"
+        stability = "stable" if slope < 0.0 else "unstable"
     frequency = None
     if stability == "stable" and J > 0.0:
         frequency = math.sqrt(-slope / J) / TURN

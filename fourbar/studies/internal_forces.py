@@ -223,10 +223,7 @@ class _Recorder(Actions):
         """Record a force on the bar, world axes."""
         if bar == self.bar:
             back = np.conj(self.state.direction(bar))
-            if beyond is None:
-                place = point
-            else:
-                place = point + beyond * back
+            place = point if beyond is None else point + beyond * back
             self.items.append((place, force * back, 0.0))
 
     def couple(self, bar: int, moment: Any) -> None:
@@ -309,10 +306,7 @@ def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
         foot, force, couple = _sum_by_foot(
             acting, np.zeros(n), SAME_FOOT * described.length
         )
-        if uniform:
-            density = described.mass / described.length
-        else:
-            density = 0.0
+        density = described.mass / described.length if uniform else 0.0
         return _Beam(
             described.length,
             foot,
@@ -392,10 +386,7 @@ def _support(
     for pin, x, x_other in zip(ENDS[recorder.bar], ends, ends[::-1], strict=True):
         name = PIN_FORCE[pin]
         force = getattr(solution, name)
-        if name[2] == str(recorder.bar):
-            sign = 1.0
-        else:
-            sign = -1.0
+        sign = 1.0 if name[2] == str(recorder.bar) else -1.0
         along = (sign * (force[:, 0] + 1j * force[:, 1]) * back).real
         moments = 0.0
         for place, acting, couple in [*recorder.items, *inertial]:

@@ -426,10 +426,7 @@ def find_misfit(scene: Scene, entry: SceneNumber, tolerance: Tolerance) -> str |
             "first"
         )
     if entry.bound != ANY_NUMBER and tolerance.reach >= number:
-        if tolerance.sigma:
-            three = "three sigma of it "
-        else:
-            three = ""
+        three = "three sigma of it " if tolerance.sigma else ""
         itself = write_in_units(entry.unit, number)
         return f"{three}must be less than the number itself, {itself}"
     return None

@@ -57,10 +57,7 @@ def find_positions(scene: Scene, wanted: list[tuple[str, float]]) -> Command:
     """
     if scene.motion.free is not None:
         return join_commands([_find_released(scene, *entry) for entry in wanted])
-    if scene.motion.law is None:
-        find = _find_places
-    else:
-        find = _find_times
+    find = _find_places if scene.motion.law is None else _find_times
     places = [place for entry in wanted for place in find(scene, *entry)]
     return command_at(scene, np.array(places))
 

@@ -46,10 +46,7 @@ def instant_centres(
     for name, value in (("theta_2", theta_2), ("branch", branch)):
         if value is not None:
             raise InputError(name, value, "must be left out: the positions are stated")
-    if isinstance(of, Scene):
-        solution = solve(of, "position")
-    else:
-        solution = of
+    solution = solve(of, "position") if isinstance(of, Scene) else of
     A, B = (_as_complex(vector) for vector in (solution.A, solution.B))
     assert solution.ground is not None
     length, angle = solution.ground

@@ -125,10 +125,7 @@ class Sloped(NDArrayOperatorsMixin):
         for by, number in zip(_RULES[function](values, *plain), inputs, strict=True):
             if isinstance(number, Sloped):
                 unchanged = isinstance(by, float) and by == 1.0
-                if unchanged:
-                    term = number.slopes
-                else:
-                    term = by * number.slopes
+                term = number.slopes if unchanged else by * number.slopes
                 slopes = term if slopes is None else slopes + term
         return Sloped(values, slopes)
 

@@ -78,10 +78,7 @@ class Study:
         block = request.block
         with np.errstate(all="ignore"):
             for rows in split(m, max(1, block // n)):
-                if request.asks_forces:
-                    begins = self.begin(rows)
-                else:
-                    begins = self.scene
+                begins = self.begin(rows) if request.asks_forces else self.scene
                 for columns in split(n, block):
                     scene = self.members(rows, columns.stop - columns.start, begins)
                     case = Case.of(scene, commanded.bar, side).beside(self.scene)
