@@ -13,7 +13,7 @@ for the coefficients h_k, and so is finite where these are not.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Self
 
 from fourbar.effects.effect import Actions
@@ -21,7 +21,7 @@ from fourbar.effects.place import Place
 from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Body
-from fourbar.linkage import FourBar
+from fourbar.linkage import Declared, FourBar
 
 MASSLESS = (Body(0.0, 0.0, 0.0j),) * 3
 
@@ -30,6 +30,10 @@ class ForceDrive(ABC):
     """A drive that exerts a force, N; a subclass says where and in which direction."""
 
     __slots__ = ()
+    numbers: ClassVar[Mapping[str, Declared]] = {}
+    """Declarations of the drive's numbers by name."""
+    places: ClassVar[Mapping[str, str]] = {}
+    """Fields that hold places, by the keys under which these are stated."""
     has_stroke: ClassVar[bool] = False
     """True if the drive is between two points, whose distance is its stroke."""
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 from fourbar.effects.effect import Actions, Effect
 from fourbar.formulas.arithmetic import is_any, polar, vector
 from fourbar.formulas.motion import State
-from fourbar.linkage import MOVING_BARS, Declared, FourBar, check_numbers
+from fourbar.linkage import MOVING_BARS, Declared, FourBar, ListedNumber, check_numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +26,14 @@ class Gravity(Effect):
 
     def __post_init__(self) -> None:
         check_numbers(self, "effects.gravity")
+
+    @classmethod
+    def list_numbers(cls) -> list[ListedNumber]:
+        """List magnitude and angle, which the key of the effect holds as a pair."""
+        return [
+            ListedNumber(str(index), (name,), by.unit, by.bound)
+            for index, (name, by) in enumerate(cls.numbers.items())
+        ]
 
     @property
     def field(self) -> Any:

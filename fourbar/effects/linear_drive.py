@@ -8,7 +8,7 @@ import numpy as np
 
 from fourbar.effects.effect import Actions
 from fourbar.effects.force_drive import ForceDrive
-from fourbar.effects.place import Place, require_ends
+from fourbar.effects.place import ENDS_OF_A_LINE, Place, require_ends
 from fourbar.effects.spring import COINCIDENT_POINTS
 from fourbar.errors import InputError, write_in_units
 from fourbar.formulas.arithmetic import Number, is_any
@@ -30,6 +30,7 @@ class LinearDrive(ForceDrive):
     start: Place
     end: Place
     has_stroke: ClassVar[bool] = True
+    places: ClassVar[dict[str, str]] = ENDS_OF_A_LINE
 
     def __post_init__(self) -> None:
         start, end = require_ends("drive", self.start, self.end)

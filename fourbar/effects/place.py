@@ -29,6 +29,8 @@ STATED_PLACES = {
     "from_centre": Declared("m", left_out=None, pair="rad"),
 }
 """Forms in which numbers state a place that turns with its bar; `point` is a name."""
+ENDS_OF_A_LINE = {"from": "start", "to": "end"}
+"""Fields of a line between two bars that hold its ends, by their keys."""
 AT_FIRST_PIN = (0.0, 0.0)
 """Place of the bar's first pin, m and rad."""
 
@@ -49,6 +51,11 @@ class Place(NamedTuple):
     from_pin: tuple[float, float] | None = None
     from_centre: tuple[float, float] | None = None
     point: str | None = None
+
+    @property
+    def numbers(self) -> dict[str, Declared]:
+        """Declarations of the forms in which numbers state a place."""
+        return STATED_PLACES
 
     def settle(self, linkage: FourBar, points: Mapping[str, "Place"]) -> "Place":
         """Return the same place from the bar's first pin, by numbers that are stated.

@@ -7,6 +7,7 @@ derivative by the independent angle.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -19,7 +20,14 @@ from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import Number, is_any, polar
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.linkage import MOVING_BARS, FourBar, copy_with, require, require_bar
+from fourbar.linkage import (
+    MOVING_BARS,
+    Declared,
+    FourBar,
+    check_numbers,
+    copy_with,
+    require_bar,
+)
 from fourbar.quantities import NO_LEVER, OK
 
 
@@ -38,12 +46,13 @@ class PointDrive(ForceDrive):
     place: Place
     direction: float
     frame: str = "world"
+    numbers: ClassVar[dict[str, Declared]] = {"direction": Declared("rad")}
+    places: ClassVar[dict[str, str]] = {"": "place"}
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "place", require_place("drive", self.place))
         require_bar("drive.bar", self.place.bar)
-        direction = require("drive.direction", self.direction, "rad")
-        object.__setattr__(self, "direction", direction)
+        check_numbers(self, "drive")
         require_frame("drive.frame", self.frame)
 
     def with_places(self, change: Callable[[Place], Place]) -> "PointDrive":

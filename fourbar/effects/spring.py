@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, Effect
-from fourbar.effects.place import STATED_PLACES, Place, change_each, require_ends
+from fourbar.effects.place import (
+    ENDS_OF_A_LINE,
+    STATED_PLACES,
+    Place,
+    change_each,
+    require_ends,
+)
 from fourbar.errors import InputError, expect, write_in_units
 from fourbar.formulas.arithmetic import Number, is_any, select
 from fourbar.formulas.motion import State
@@ -74,6 +80,7 @@ class Spring:
         "length": Declared("m", AT_LEAST_ZERO),
         "preload": Declared("N", left_out=0.0),
     }
+    places: ClassVar[dict[str, str]] = ENDS_OF_A_LINE
 
     def __post_init__(self) -> None:
         for name, point in zip(
@@ -214,6 +221,7 @@ class Springs(Effect):
 
     springs: tuple[Spring, ...]
     key: ClassVar[str] = "springs"
+    entries: ClassVar[str] = "springs"
     in_balls: ClassVar[bool] = True
     example: ClassVar[str] = (
         'springs = [{ from = { bar = 1, from_pin = ["10 cm", "-90 deg"] }, '

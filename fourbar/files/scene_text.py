@@ -16,21 +16,14 @@ import numpy as np
 
 from fourbar.effects import (
     Effect,
-    Gravity,
-    Load,
-    Place,
-    PointDrive,
     Springs,
     list_kinds,
 )
-from fourbar.effects.effect import PinRows
-from fourbar.effects.place import STATED_PLACES
 from fourbar.errors import InputError, expect
 from fourbar.files.drawing import choose_assembly, meet_lengths, read_point
 from fourbar.files.fields import (
     Reader,
     convert_to_polar,
-    write_declared,
     write_numbers,
     write_pair,
     write_quantity,
@@ -50,7 +43,12 @@ from fourbar.scene.motion import (
     Sweep,
 )
 from fourbar.scene.pictures import TracedPicture
-from fourbar.studies.keys import find_misfit, list_entries
+from fourbar.studies.keys import (
+    find_misfit,
+    list_described,
+    list_entries,
+    read_numbers,
+)
 from fourbar.writing import write_text
 
 BRANCH_OF_NAME = {name: branch for branch, name in BRANCH_NAMES.items()}
@@ -89,14 +87,11 @@ def dump(scene: Scene) -> str:
         top["source"] = scene.source
     described = list_scene_tables(scene)
     motion = _write_motion(scene.motion)
-    points = {}
-    for point in scene.points:
-        points[point.name] = {"bar": point.bar, **write_numbers(point)}
     bars = described["bars"]
     _add_strokes(described["effects"], scene)
     for picture in scene.pictures:
         bars.setdefault(BAR_NAMES[picture.bar], {})["picture"] = picture.name
-    _restore_coordinates({**described, "points": points}, scene.coordinates)
+    _restore_coordinates(described, scene.coordinates)
     pins_or_lengths = _write_lengths(scene, described["lengths"], motion)
     read_back = scene
     if "lengths" in dict(pins_or_lengths):
@@ -111,7 +106,7 @@ def dump(scene: Scene) -> str:
         *tables_of_bars,
         ("motion", motion),
         ("drive", described["drive"]),
-        ("points", points),
+        ("points", described["points"]),
         *loads,
         ("effects", described["effects"]),
         ("tolerances", _write_tolerances(read_back)),
@@ -194,43 +189,79 @@ def _restore_coordinates(
 
 
 def list_scene_tables(scene: Scene) -> dict[str, Any]:
-    """Write lengths, bars, drive, loads and effects as a file's tables.
+    """Write lengths, bars, drive, points, loads and effects as a file's tables.
 
     A bar that states nothing is left out.
 
     Raises InputError where a file cannot hold the effects.
     """
-    lengths = {
-        name: write_quantity(length, "m")
-        for name, length in zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
+    _require_writable(scene.effects)
+    described = list_described(scene)
+    bars = {key: one.bar for key, _, one in described if hasattr(one, "bar")}
+    if scene.drive is None:
+        bars["drive"] = scene.drive_bar
+    entries = list_entries(scene)
+    numbers = {
+        key: write_quantity(number, entries[key].unit)
+        for key, number in read_numbers(scene).items()
+        if number is not None and not entries[key].is_coordinate
     }
-    lengths["ground_angle"] = write_quantity(scene.linkage.ground_angle, "rad")
-    effects = {effect.key: _write_effect(effect) for effect in scene.effects}
-    if len(effects) != len(scene.effects):
-        raise InputError(
-            "effects",
-            [effect.key for effect in scene.effects],
-            "a scene file holds one effect of each kind",
-        )
-    bars = {
-        name: _write_bar(scene.linkage.bar(number))
-        for name, number in BAR_NUMBERS.items()
+    words = {
+        f"{key}.{name}": word
+        for key, _, one in described
+        for name in _WORDS
+        if (word := getattr(one, name, None)) is not None
     }
-    return {
-        "lengths": lengths,
-        "bars": {name: entry for name, entry in bars.items() if entry},
-        "drive": _write_drive(scene),
-        "loads": [_load_entry(load) for load in scene.loads],
-        "effects": effects,
-    }
+    tables: dict[str, Any] = {name: {} for name in _WRITTEN}
+    stated: dict[str, Any] = {f"effects.{effect.key}": {} for effect in scene.effects}
+    stated |= {f"{key}.bar": bar for key, bar in bars.items()}
+    for key, value in (stated | numbers | words).items():
+        *path, last = key.split(".")
+        holder = tables
+        for name in path:
+            holder = holder.setdefault(name, {})
+        holder[last] = value
+    for name, bar in BAR_NUMBERS.items():
+        stated_bar = scene.linkage.bar(bar)
+        if stated_bar == Bar(stated_bar.length):
+            del tables["bars"][name]
+    written = {name: _make_lists(tables[name]) for name in _WRITTEN}
+    written["loads"] = written["loads"] or []
+    for entry, load in zip(written["loads"], scene.loads, strict=True):
+        if load.table is not None:
+            angles = [write_quantity(angle, "rad") for angle in load.table.theta_2]
+            entry["table"] = {"theta_2": angles, "factor": list(load.table.factor)}
+    return written
 
 
-def _write_bar(bar: Bar) -> dict[str, Any]:
-    if bar == Bar(bar.length):
-        return {}
-    left_out = {"length"} if bar.density is None else {"length", "mass"}
-    numbers = write_numbers(bar).items()
-    return {name: text for name, text in numbers if name not in left_out}
+_WRITTEN = ("lengths", "bars", "drive", "points", "loads", "effects")
+"""Tables of what a scene describes, in the order of a file."""
+_WORDS = ("frame", "point", "acts")
+"""Words that may describe a load, a place, a spring or a drive."""
+
+
+def _make_lists(value: Any) -> Any:
+    """Return a table by numbers 0, 1, ... as a list, and so those within it."""
+    if not isinstance(value, dict):
+        return value
+    entries = {key: _make_lists(entry) for key, entry in value.items()}
+    is_list = bool(entries) and all(map(str.isdigit, entries))
+    return [*entries.values()] if is_list else entries
+
+
+def _require_writable(effects: tuple[Effect, ...]) -> None:
+    """Raise InputError where a file has no form of an effect, or not of them all."""
+    keys = [effect.key for effect in effects]
+    for effect in effects:
+        if list_kinds().get(effect.key) is not type(effect):
+            raise InputError(
+                f"effects.{effect.key}",
+                type(effect).__name__,
+                "a scene file cannot state this effect",
+            )
+    if len(set(keys)) < len(keys):
+        allowed = "a scene file holds one effect of each kind"
+        raise InputError("effects", keys, allowed)
 
 
 def _write_motion(motion: Motion) -> dict[str, Any]:
@@ -294,90 +325,6 @@ def _write_law(law: Law | Rise | Sine) -> dict[str, Any]:
     }
     ends = {"ends": law.ends} if law.omega is None else {}
     return {**entry, "steps": law.steps, **ends}
-
-
-def _load_entry(load: Load) -> dict[str, Any]:
-    entry: dict[str, Any] = {
-        "bar": load.bar,
-        **write_numbers(load),
-        "frame": load.frame,
-    }
-    if load.point is not None:
-        entry["point"] = load.point
-    if load.table is not None:
-        angles = [write_quantity(angle, "rad") for angle in load.table.theta_2]
-        entry["table"] = {"theta_2": angles, "factor": list(load.table.factor)}
-    return entry
-
-
-def _write_effect(effect: Effect) -> Any:
-    """Write the value of an effect under its key.
-
-    Raises InputError if a scene file has no form of it.
-    """
-    if list_kinds().get(effect.key) is not type(effect):
-        raise InputError(
-            f"effects.{effect.key}",
-            type(effect).__name__,
-            "a scene file cannot state this effect",
-        )
-    if isinstance(effect, Gravity):
-        return write_pair(
-            effect.magnitude,
-            effect.angle,
-            effect.numbers["magnitude"].unit,
-        )
-    if isinstance(effect, Springs):
-        entries = []
-        for spring in effect.springs:
-            acts = {} if spring.acts is None else {"acts": spring.acts}
-            entries.append({**_write_ends(spring), **write_numbers(spring), **acts})
-        return entries
-    if isinstance(effect, PinRows):
-        rows = {}
-        for pin, *values in effect.rows:
-            texts = {
-                name: write_declared(x, declared)
-                for (name, declared), x in zip(
-                    effect.numbers.items(),
-                    values,
-                    strict=True,
-                )
-            }
-            rows[pin] = texts.get("", texts)
-        return rows
-    bar = {"bar": effect.bar} if hasattr(effect, "bar") else {}
-    return {**bar, **write_numbers(effect)}
-
-
-def _write_ends(line: Any) -> dict[str, Any]:
-    return {
-        "from": {"bar": line.start.bar, **_write_place(line.start)},
-        "to": {"bar": line.end.bar, **_write_place(line.end)},
-    }
-
-
-def _write_drive(scene: Scene) -> dict[str, Any]:
-    """Write the bar on which a couple acts, or a force along a line or at a place."""
-    drive = scene.drive
-    if drive is None:
-        return {"bar": scene.drive_bar}
-    if not isinstance(drive, PointDrive):
-        return _write_ends(drive)
-    direction = write_quantity(drive.direction, "rad")
-    where = {"bar": drive.place.bar, **_write_place(drive.place)}
-    return {**where, "direction": direction, "frame": drive.frame}
-
-
-def _write_place(place: Place) -> dict[str, Any]:
-    """Write the form in which a place is stated."""
-    if place.point is not None:
-        return {"point": place.point}
-    return {
-        name: write_declared(pair, declared)
-        for name, declared in STATED_PLACES.items()
-        if (pair := getattr(place, name)) is not None
-    }
 
 
 def _write_toml_table(name: str, entries: dict[str, Any]) -> str:

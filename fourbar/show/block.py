@@ -245,7 +245,7 @@ class _SceneBlock:
         name = f"{self._name_linkage()}:"
         lengths = self._write_lengths()
         line = f"{name} {lengths}"
-        lines = [line] if len(line) <= BLOCK_WIDTH else [name, f" {lengths}"]
+        lines = [line] if len(line) <= BLOCK_WIDTH else [name, f"    {lengths}"]
         return [*lines, *self._write_change_points()]
 
     def _name_linkage(self) -> str:

@@ -6,8 +6,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects import Gravity, Springs
-from fourbar.effects.effect import PinRows
 from fourbar.effects.place import STATED_PLACES, Place
 from fourbar.errors import (
     ELSEWHERE,
@@ -34,9 +32,9 @@ from fourbar.linkage import (
     PINS,
     POSITIVE,
     Bar,
-    Declared,
     FourBar,
     copy_with,
+    list_numbers,
 )
 from fourbar.scene import Scene
 from fourbar.scene.drawing import DRAWN_WORD, DrawnPins
@@ -98,84 +96,46 @@ class SceneNumber(NamedTuple):
         return np.isfinite(values) & low
 
 
-def _list_entries(
-    description: Any,
-    key: str,
-    place: NumberPath,
-) -> dict[str, SceneNumber]:
-    """List the entries of the numbers that a description states.
+def list_described(scene: Scene) -> list[tuple[str, NumberPath, Any]]:
+    """List drive, loads, points and effects with their keys, each before its places.
 
-    A magnitude and its angle are two.
+    Entries of an effect that holds a list stand in its place. Between key and
+    description are the attributes and indices that lead to it.
     """
+    described: list[tuple[str, NumberPath, Any]] = []
+
+    def add(key: str, path: NumberPath, holder: Any) -> None:
+        if field := getattr(holder, "entries", ""):
+            for index, entry in enumerate(getattr(holder, field)):
+                add(f"{key}.{index}", (*path, field, index), entry)
+            return
+        described.append((key, path, holder))
+        for name, attribute in getattr(holder, "places", {}).items():
+            place = (*path, attribute), getattr(holder, attribute)
+            if name:
+                described.append((f"{key}.{name}", *place))
+            else:  # in the holder's own table, of whose numbers it is the first
+                described.insert(-1, (key, *place))
+
+    if scene.drive is not None:
+        add("drive", ("drive",), scene.drive)
+    for index, load in enumerate(scene.loads):
+        add(f"loads.{index}", ("loads", index), load)
+    for index, point in enumerate(scene.points):
+        add(point.key, ("points", index), point)
+    for index, effect in enumerate(scene.effects):
+        add(f"effects.{effect.key}", ("effects", index), effect)
+    return described
+
+
+def _list_entries(key: str, path: NumberPath, described: Any) -> dict[str, SceneNumber]:
+    """List the entries of the numbers that a description, or its class, states."""
     entries = dict[str, SceneNumber]()
-    for name, stated in description.numbers.items():
-        if stated.pair:
-            entries |= _make_pair(f"{key}.{name}", (*place, name), stated)
-        else:
-            entries[f"{key}.{name}"] = SceneNumber((*place, name), *stated[:2])
-    return entries
-
-
-def _make_pair(
-    key: str,
-    place: NumberPath,
-    by: Declared,
-    names: tuple[str | int, str | int] = (0, 1),
-) -> dict[str, SceneNumber]:
-    """Make the two entries of a pair, mostly a magnitude with its angle."""
-    parts = zip(names, by.units, by.bounds, strict=True)
-    return {
-        f"{key}.{index}": SceneNumber((*place, name), unit, bound)
-        for index, (name, unit, bound) in enumerate(parts)
-    }
-
-
-def _list_effect(effect: Any, key: str, place: NumberPath) -> dict[str, SceneNumber]:
-    """List the entries of an effect under its key, at its place."""
-    if isinstance(effect, Gravity):
-        of_gravity = effect.numbers["magnitude"]._replace(pair="rad")
-        return _make_pair(key, place, of_gravity, ("magnitude", "angle"))
-    if isinstance(effect, PinRows):
-        return {
-            f"{key}.{row[0]}.{name}".removesuffix("."): SceneNumber(
-                (*place, effect.field, index, column), *declared[:2]
-            )
-            for index, row in enumerate(effect.rows)
-            for column, (name, declared) in enumerate(effect.numbers.items(), 1)
-        }
-    if not isinstance(effect, Springs):
-        return _list_entries(effect, key, place)
-    entries = dict[str, SceneNumber]()
-    for index, spring in enumerate(effect.springs):
-        spring_place = (*place, "springs", index)
-        entries |= _list_entries(spring, f"{key}.{index}", spring_place)
-        entries |= _list_ends(spring, f"{key}.{index}", spring_place)
-    return entries
-
-
-def _list_ends(line: Any, key: str, place: NumberPath) -> dict[str, SceneNumber]:
-    entries = dict[str, SceneNumber]()
-    for name, end in (("from", "start"), ("to", "end")):
-        entries |= _list_place(getattr(line, end), f"{key}.{name}", (*place, end))
-    return entries
-
-
-def _list_drive(drive: Any) -> dict[str, SceneNumber]:
-    if drive.has_stroke:
-        return _list_ends(drive, "drive", ("drive",))
-    place = _list_place(drive.place, "drive", ("drive", "place"))
-    return place | {"drive.direction": SceneNumber(("drive", "direction"), "rad")}
-
-
-def _list_place(stated: Any, key: str, place: NumberPath) -> dict[str, SceneNumber]:
-    """List the entries of the form in which a place is stated.
-
-    A named point has its entries elsewhere.
-    """
-    entries = dict[str, SceneNumber]()
-    for name, declared in STATED_PLACES.items():
-        if getattr(stated, name) is not None:
-            entries |= _make_pair(f"{key}.{name}", (*place, name), declared)
+    for number in list_numbers(described):
+        name = number.path[0]
+        if isinstance(described, type) or getattr(described, str(name)) is not None:
+            place = (*path, *number.path)
+            entries[f"{key}.{number.key}"] = SceneNumber(place, *number[2:])
     return entries
 
 
@@ -184,7 +144,7 @@ def _list_bar(bar: Bar, number: int) -> dict[str, SceneNumber]:
 
     A bar with a density has no entry for its mass.
     """
-    entries = _list_entries(Bar, "", ("linkage", BAR_NAMES[number]))
+    entries = _list_entries("", ("linkage", BAR_NAMES[number]), Bar)
     absent = {name for name in _BY_MATERIAL if getattr(bar, name) is None}
     if bar.density is not None:
         absent.add("mass")
@@ -238,7 +198,7 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
     Coordinates of drawn pins come first, then lengths, those of other drawn places
     last. What is commanded is not among them.
     """
-    of_ground = _list_entries(FourBar, "lengths", ("linkage",))
+    of_ground = _list_entries("lengths", ("linkage",), FourBar)
     bars = {
         BAR_NAMES[bar]: _list_bar(scene.linkage.bar(bar), bar) for bar in MOVING_BARS
     }
@@ -262,19 +222,8 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
             entries[f"motion.{name}"] = SceneNumber(
                 ("motion", field), scene.motion.numbers[name].unit
             )
-    if scene.drive is not None:
-        entries |= _list_drive(scene.drive)
-    for index, load in enumerate(scene.loads):
-        numbers = _list_entries(load, f"loads.{index}", ("loads", index))
-        entries |= {
-            key: entry
-            for key, entry in numbers.items()
-            if getattr(load, str(entry.place[2])) is not None
-        }
-    for index, point in enumerate(scene.points):
-        entries |= _list_place(point, point.key, ("points", index))
-    for index, effect in enumerate(scene.effects):
-        entries |= _list_effect(effect, f"effects.{effect.key}", ("effects", index))
+    for key, path, described in list_described(scene):
+        entries |= _list_entries(key, path, described)
     if scene.drawing is None:
         return entries
     return _list_pins() | entries | _list_drawn_places(scene, entries)
