@@ -5,6 +5,7 @@ The comparison fails there and nowhere else.
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from fourbar_validation.compare.compare import COMPARED_QUANTITIES, Comparison, 
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, Row
 from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, K
 from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.prediction import predict_from_data
 from tests.support.scenes import balance, crank_rocker
 
 POSITIONS = 40
@@ -179,6 +181,19 @@ def test_a_balanced_crank_agrees_and_a_slip_of_1e_9_does_not(
         for row in Comparison("", scene, answer, formulas, held).rows()
     }
     assert {row.quantity for row in rows.values() if row.failed} == {name}
+
+
+def test_what_is_predicted_is_not_multiplied_by_the_terms_that_cancel() -> None:
+    """The sensitivities that predict an error hold them; twice they excuse 1e-6."""
+    pytest.importorskip("flint")
+    scene = balance(1e-4)
+    formulas = fourbar.solve(scene, "force")
+    answer = FreeBody().answer(scene, formulas.at)
+    predict = partial(predict_from_data, scene, formulas.at)
+    held = Demands(EQUIVALENCE, ("torque",), predict)
+    answer.quantities["torque"] *= 1.0 + 1e-8
+    rows = Comparison("", scene, answer, formulas, held).rows()
+    assert [row.quantity for row in rows if row.failed] == ["torque"]
 
 
 @pytest.mark.parametrize(("times", "verdict"), [(9.0, DEGRADED), (11.0, FAILS)])

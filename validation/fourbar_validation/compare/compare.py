@@ -474,6 +474,7 @@ class Comparison:
 
         None where nothing predicts them. A position that was asked again needs no more
         than what is allowed there: the prediction knows nothing of theta_2's rounding.
+        N multiplies none: sensitivities hold the terms that cancel.
         """
         predicted = self.demands.predicted
         if predicted is None:
