@@ -1,9 +1,11 @@
 """A printed figure, ours, and what the named errata make of ours."""
 
 import tomllib
+from collections.abc import Mapping
 from decimal import ROUND_DOWN, ROUND_HALF_EVEN, Decimal
 from pathlib import Path
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 FIGURE_VERDICTS = ("rounded", "truncated", "differs")
 
@@ -57,6 +59,26 @@ class PublishedFigure(NamedTuple):
             self.made is not None
             and compare_figure(self.printed, self.made, self.noise) != "differs"
         )
+
+
+Slips = dict[str, tuple[tuple[str, ...], float | None]]
+"""Figures that errata touch, by name: the errata, and ours after them."""
+_NONE: Mapping[str, Any] = MappingProxyType({})
+
+
+def compare_table(
+    table: str,
+    printed: Mapping[str, str],
+    ours: Mapping[str, float],
+    slips: Mapping[str, Any] = _NONE,
+    noise: Mapping[str, float] = _NONE,
+) -> list[PublishedFigure]:
+    """Put ours beside the figures of a printed table, by their names."""
+    figures = []
+    for name, text in printed.items():
+        figure = PublishedFigure(table, name, text, ours[name], *slips.get(name, ()))
+        figures.append(figure._replace(noise=noise.get(name, 0.0)))
+    return figures
 
 
 def compare_figure(

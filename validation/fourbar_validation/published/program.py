@@ -22,21 +22,8 @@ from fourbar_validation.compare.tolerance import EPS
 from fourbar_validation.published.thirteen import EquationTerms, assemble_equations
 
 DATA = Path(__file__).parent / "data"
-PRINTED_UNKNOWNS = (
-    "F12x",
-    "F12y",
-    "F32x",
-    "F32y",
-    "F23x",
-    "F23y",
-    "F43x",
-    "F43y",
-    "F14x",
-    "F14y",
-    "F34x",
-    "F34y",
-    "T4",
-)
+_PINS = ("F12", "F32", "F23", "F43", "F14", "F34")
+PRINTED_UNKNOWNS = (*(f"{pin}{axis}" for pin in _PINS for axis in "xy"), "T4")
 BAR_LENGTHS = (20.0, 48.0, 55.0, 20.0)
 """Bars 1 to 4, cm."""
 MASSES = {2: 57.0, 3: 0.544, 4: 0.2}
@@ -124,16 +111,9 @@ def compute_motion(theta_2: Array, branch: int = 1) -> fourbar.Solution:
 def compute_right_unknowns() -> dict[str, float]:
     """Compute the 13 unknowns by our formulas at theta_2 = 135 deg, N and N cm."""
     s = fourbar.solve(make_model_scene(THETA_2))
-    pins: dict[str, Any] = {
-        "F12": s.F12,
-        "F32": s.F32,
-        "F23": -s.F32,
-        "F43": s.F43,
-        "F14": s.F14,
-        "F34": -s.F43,
-    }
+    pins = (s.F12, s.F32, -s.F32, s.F43, s.F14, -s.F43)
     unknowns = {}
-    for name, force in pins.items():
+    for name, force in zip(_PINS, pins, strict=True):
         unknowns[f"{name}x"] = float(force[0, 0])
         unknowns[f"{name}y"] = float(force[0, 1])
     unknowns["T4"] = 100.0 * float(s.torque[0])
@@ -237,7 +217,7 @@ def compute_thesis_program(
 ) -> dict[str, float]:
     """Compute the 13 unknowns of section 5.7 at theta_2 = 135 deg, N and N cm."""
     unknowns = np.linalg.solve(*make_equations(errors, inertias))
-    return dict(zip(PRINTED_UNKNOWNS, map(float, unknowns), strict=True))
+    return dict(zip(PRINTED_UNKNOWNS, unknowns.tolist(), strict=True))
 
 
 def bound_round_off(
@@ -256,13 +236,8 @@ def bound_round_off(
     moved = np.abs(np.linalg.inv(matrix)) @ (
         np.abs(matrix) @ np.abs(unknowns) + np.abs(right)
     )
-    return dict(
-        zip(
-            PRINTED_UNKNOWNS,
-            map(float, len(PRINTED_UNKNOWNS) * EPS * moved),
-            strict=True,
-        )
-    )
+    bounds = len(PRINTED_UNKNOWNS) * EPS * moved
+    return dict(zip(PRINTED_UNKNOWNS, bounds.tolist(), strict=True))
 
 
 _PRINTED_INERTIAS = (0.2924725333, 0.1075266667)
@@ -270,15 +245,16 @@ _TYPED_INERTIAS = (0.292472, 0.107526)
 """I_G3, I_G4 of the manual's table and of section 5.7, kg cm^2, solved back from the
 printed unknowns.
 """
+_ALL_ERRORS = ProgramErrors(True, True, True, True, True)
 ERRATA_IN_ORDER: tuple[tuple[str, ProgramErrors, tuple[float, float] | None], ...] = (
     ("", ProgramErrors(), None),
     ("3", ProgramErrors(True), None),
     ("1", ProgramErrors(True, True), None),
     ("2", ProgramErrors(True, True, True), None),
     ("4", ProgramErrors(True, True, True, True), None),
-    ("5", ProgramErrors(True, True, True, True, True), None),
-    ("manual", ProgramErrors(True, True, True, True, True), _PRINTED_INERTIAS),
-    ("5b", ProgramErrors(True, True, True, True, True), _TYPED_INERTIAS),
+    ("5", _ALL_ERRORS, None),
+    ("manual", _ALL_ERRORS, _PRINTED_INERTIAS),
+    ("5b", _ALL_ERRORS, _TYPED_INERTIAS),
 )
 """The errata in the order in which they are made, from right to published."""
 

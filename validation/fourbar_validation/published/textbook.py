@@ -9,9 +9,7 @@ import tomllib
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import NamedTuple
 
 import fourbar
 from fourbar_validation.places import MODELS
@@ -80,14 +78,7 @@ def compute_value(
         if quantity[-2:] in COMPONENT_AXES
         else (quantity, None)
     )
-    values: Any
-    if name == "v_A":
-        values = solution.omega_2[:, None] * np.stack(
-            [-solution.A[:, 1], solution.A[:, 0]],
-            axis=1,
-        )
-    else:
-        values = getattr(solution, name)
+    values = getattr(solution, name)
     return float(values[position] if axis is None else values[position, axis])
 
 

@@ -9,12 +9,15 @@ constant that nobody else defines. Units as printed: cm, deg, rad/s, cm/s^2, N, 
 import csv
 import json
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
 from fourbar.formulas.mobility import limit_positions
-from fourbar_validation.published.figures import PublishedFigure
+from fourbar_validation.published.figures import (
+    PublishedFigure,
+    Slips,
+    compare_table,
+)
 from fourbar_validation.published.program import (
     BAR_LENGTHS,
     CENTRE,
@@ -50,52 +53,45 @@ step is 5.7e-14 deg = 1e-15 rad.
 d, a, b, c = BAR_LENGTHS
 
 
-def list_thesis_figures() -> Iterator[PublishedFigure]:
+def list_thesis_figures() -> list[PublishedFigure]:
     """List every published figure of the thesis."""
     k = Kinematics()
-    yield from list_positions()
-    yield from _list_half_angle_constants()
-    yield from _list_limits()
-    yield from _list_simulation_window()
-    yield from list_printed_kinematics(k)
-    yield from _list_constants(k)
-    yield from list_printed_unknowns()
+    return [
+        *_list_positions(),
+        *_list_half_angle_constants(),
+        *_list_limits(),
+        *_list_simulation_window(),
+        *_list_printed_kinematics(k),
+        *_list_constants(k),
+        *_list_printed_unknowns(),
+    ]
 
 
-def list_positions() -> Iterator[PublishedFigure]:
+def _list_positions() -> list[PublishedFigure]:
     """List section 2.4's table: theta_3 and theta_4 of both roots at 281 positions."""
-    rows = list(
-        csv.DictReader(
-            (DATA / "positions.csv").read_text(encoding="utf-8").splitlines()
-        )
-    )
+    text = (DATA / "positions.csv").read_text(encoding="utf-8")
+    rows = list(csv.DictReader(text.splitlines()))
     theta_2 = np.radians([float(row["theta2_deg"]) for row in rows])
+    printed = {}
+    ours = {}
     for branch, third, fourth in (
         (1, "theta3_1", "theta4_2"),
         (-1, "theta3_2", "theta4_1"),
     ):
         s = compute_motion(theta_2, branch)
         for row, theta_3, theta_4 in zip(rows, s.theta_3, s.theta_4, strict=True):
-            for name, angle in (
-                (third, float(theta_3)),
-                (fourth, to_ours(float(theta_4))),
-            ):
-                text = row[f"{name}_deg"]
-                ours = math.degrees(angle)
-                ours += 360.0 * round((float(text) - ours) / 360.0)
-                where_it_is = f"{row['theta2_deg']} {name}"
-                lost = ("6",) if where_it_is == "136 theta3_1" else ()
-                yield PublishedFigure(
-                    "2.4 positions",
-                    where_it_is,
-                    text,
-                    ours,
-                    lost,
-                    10.0 * ours if lost else None,
-                )
+            for name, angle in ((third, theta_3), (fourth, to_ours(theta_4))):
+                place = f"{row['theta2_deg']} {name}"
+                printed[place] = row[f"{name}_deg"]
+                degrees = math.degrees(angle)
+                turns = round((float(printed[place]) - degrees) / 360.0)
+                ours[place] = degrees + 360.0 * turns
+    lost = "136 theta3_1"
+    slips: Slips = {lost: (("6",), 10.0 * ours[lost])}
+    return compare_table("2.4 positions", printed, ours, slips)
 
 
-def _list_half_angle_constants() -> Iterator[PublishedFigure]:
+def _list_half_angle_constants() -> list[PublishedFigure]:
     """List section 2.4 at theta_2 = 90 deg.
 
     k1 cos + k2 sin + k3 + e^2 = 0, A t^2 + B t + C = 0, t = tan(theta/2).
@@ -103,116 +99,79 @@ def _list_half_angle_constants() -> Iterator[PublishedFigure]:
     theta_2 = math.radians(90.0)
     x = a * math.cos(theta_2) + d * math.cos(THETA_1)
     y = a * math.sin(theta_2) + d * math.sin(THETA_1)
-    roots = {branch: compute_motion(np.array([theta_2]), branch) for branch in (1, -1)}
-    angles = {
-        "theta3_1": float(roots[1].theta_3[0]),
-        "theta3_2": float(roots[-1].theta_3[0]),
-        "theta4_1": to_ours(float(roots[-1].theta_4[0])),
-        "theta4_2": to_ours(float(roots[1].theta_4[0])),
-    }
-    printed = read_printed()["published"]["section_2_4_theta2_90"]
+    ours = {}
+    for branch, third, fourth in ((1, 1, 2), (-1, 2, 1)):
+        s = compute_motion(np.array([theta_2]), branch)
+        ours[f"theta3_{third}_deg"] = math.degrees(s.theta_3[0])
+        ours[f"theta4_{fourth}_deg"] = math.degrees(to_ours(s.theta_4[0]))
+    printed = {}
+    tables = read_printed()["published"]["section_2_4_theta2_90"]
     for name, length, second in (("theta4", c, b), ("theta3", b, c)):
         k1 = 2.0 * length * x
         k2 = 2.0 * length * y
         k3 = x * x + y * y - second**2
-        ours = {
-            "k1": k1,
-            "k2": k2,
-            "k3": k3,
-            "A": k3 + length**2 - k1,
-            "B": 2.0 * k2,
-            "C": k3 + length**2 + k1,
-        }
-        ours |= {f"{key}_deg": math.degrees(angle) for key, angle in angles.items()}
-        for key, text in printed[name].items():
-            label = key if key.startswith("theta") else f"{name} {key}"
-            yield PublishedFigure(
-                "2.4 constants",
-                label,
-                text,
-                ours[key],
-            )
+        ours[f"{name} k1"] = k1
+        ours[f"{name} k2"] = k2
+        ours[f"{name} k3"] = k3
+        ours[f"{name} A"] = k3 + length**2 - k1
+        ours[f"{name} B"] = 2.0 * k2
+        ours[f"{name} C"] = k3 + length**2 + k1
+        for key, text in tables[name].items():
+            printed[key if key in ours else f"{name} {key}"] = text
+    return compare_table("2.4 constants", printed, ours)
 
 
-def _list_simulation_window() -> Iterator[PublishedFigure]:
+def _list_simulation_window() -> list[PublishedFigure]:
     """List the manual's window: angles e1..e4 in rad and deg, of theta_2 = 0."""
     s = compute_motion(np.array([0.0]))
-    theta_3 = float(s.theta_3[0])
-    theta_4 = to_ours(float(s.theta_4[0]))
+    theta_3 = s.theta_3[0]
+    theta_4 = to_ours(s.theta_4[0])
     ours = {
         "e1_rad": THETA_1,
         "e2_rad": 0.0,
         "e3_rad": theta_3,
         "e4_rad": theta_4,
         "teta1_deg": to_degrees(THETA_1),
-    }
-    ours |= {
         "tetaDos_deg": 0.0,
         "anguloTres_deg": to_degrees(theta_3),
         "anguloCuatro_deg": to_degrees(theta_4),
     }
-    for name, text in read_printed()["published"]["manual_simulation_window"].items():
-        if name != "note":
-            yield PublishedFigure(
-                "manual, window",
-                name,
-                text,
-                ours[name],
-                ("17",) if name == "tetaDos_deg" else (),
-            )
+    printed = read_printed()["published"]["manual_simulation_window"]
+    del printed["note"]
+    return compare_table(
+        "manual, window", printed, ours, {"tetaDos_deg": (("17",), None)}
+    )
 
 
-def _list_limits() -> Iterator[PublishedFigure]:
+def _list_limits() -> list[PublishedFigure]:
     """List table 3.2: cosines whose existence decides, and limit positions.
 
     The limit positions are those that do exist.
     """
     linkage = make_model_scene(THETA_2).linkage
-    output = limit_positions(linkage, 4)
-    dead_centre = limit_positions(linkage, 2)
-    cosines = {
-        1: ((a + b) ** 2 + d**2 - c**2) / (2.0 * (a + b) * d),
-        2: ((a - b) ** 2 + d**2 - c**2) / (2.0 * abs(a - b) * d),
-        3: (a**2 + d**2 - (b + c) ** 2) / (2.0 * a * d),
-        4: (a**2 + d**2 - (b - c) ** 2) / (2.0 * a * d),
+    second = to_degrees(limit_positions(linkage, 4)[-1].theta_2)
+    fourth = to_degrees(limit_positions(linkage, 2)[0].theta_2)
+    ours = {
+        "row 1 cosine": ((a + b) ** 2 + d**2 - c**2) / (2.0 * (a + b) * d),
+        "row 2 cosine": ((a - b) ** 2 + d**2 - c**2) / (2.0 * abs(a - b) * d),
+        "row 2 theta_2": second,
+        "row 3 cosine": (a**2 + d**2 - (b + c) ** 2) / (2.0 * a * d),
+        "row 4 cosine": (a**2 + d**2 - (b - c) ** 2) / (2.0 * a * d),
+        "row 4 theta_2": fourth,
+        "row 4 arc cosine": fourth - math.degrees(to_ours(THETA_1)),
     }
-    limits = {
-        2: to_degrees(output[-1].theta_2),
-        4: to_degrees(dead_centre[0].theta_2),
+    keys = {
+        "cosine": "discriminant_printed",
+        "theta_2": "value_printed_deg",
+        "arc cosine": "acos_printed_deg",
     }
-    printed = json.loads((DATA / "limits.json").read_text(encoding="utf-8"))
-    for row in printed["table_3_2"]:
-        number = row["row"]
-        yield PublishedFigure(
-            "3.2 limits",
-            f"row {number} cosine",
-            row["discriminant_printed"],
-            cosines[number],
-        )
-        if number == 2:
-            made = limits[2] - to_degrees(THETA_1)
-            yield PublishedFigure(
-                "3.2 limits",
-                "row 2 theta_2",
-                row["value_printed_deg"],
-                limits[2],
-                ("14",),
-                made,
-            )
-        if number == 4:
-            yield PublishedFigure(
-                "3.2 limits",
-                "row 4 theta_2",
-                row["value_printed_deg"],
-                limits[4],
-            )
-            arc = limits[4] - math.degrees(to_ours(THETA_1))
-            yield PublishedFigure(
-                "3.2 limits",
-                "row 4 arc cosine",
-                row["acos_printed_deg"],
-                arc,
-            )
+    table = json.loads((DATA / "limits.json").read_text(encoding="utf-8"))["table_3_2"]
+    printed = {}
+    for name in ours:
+        _, number, what = name.split(maxsplit=2)
+        printed[name] = table[int(number) - 1][keys[what]]
+    slips: Slips = {"row 2 theta_2": (("14",), second - to_degrees(THETA_1))}
+    return compare_table("3.2 limits", printed, ours, slips)
 
 
 def truncate(value: float, decimals: int) -> float:
@@ -269,7 +228,7 @@ def _compute_our_kinematics(k: Kinematics) -> dict[str, float]:
     return {key: float(value) for key, value in values.items()}
 
 
-def _list_slips(k: Kinematics) -> dict[str, tuple[tuple[str, ...], float]]:
+def _list_slips(k: Kinematics) -> Slips:
     """List the figures that the errata touch, with the value that these lead to."""
     x, y = k.a_G[3]
     slipped = x + k.slip
@@ -283,51 +242,36 @@ def _list_slips(k: Kinematics) -> dict[str, tuple[tuple[str, ...], float]]:
     }
 
 
-def list_printed_kinematics(k: Kinematics) -> Iterator[PublishedFigure]:
+def _list_printed_kinematics(k: Kinematics) -> list[PublishedFigure]:
     """List section 4.12, and the manual's table of the program's 17 digits."""
     ours = _compute_our_kinematics(k)
     slips = _list_slips(k)
-    by_hand = {
+    by_hand: Slips = {
+        **slips,
         "R23_j": (("12",), _compute_cut_arm(k, 6)),
         "R43_j": (("12",), -_compute_cut_arm(k, 6)),
     }
-    for name, text in read_printed()["published"]["section_4_12_hand"].items():
-        errata, made = {**slips, **by_hand}.get(name, ((), None))
-        yield PublishedFigure(
-            "4.12",
-            name,
-            text,
-            ours[name],
-            errata,
-            made,
-        )
     sizes = {
         "t": math.degrees(1.0),
         "R": abs(CENTRE[2]),
         "A": float(np.abs(k.a_G[2]).max()),
     }
-    for name, text in read_printed()["published"]["manual_program_kinematic"].items():
-        errata, made = slips.get(name, ((), None))
-        size = sizes.get(name[0], 1.0)
-        yield PublishedFigure(
-            "manual, kinematics",
-            name,
-            text,
-            ours[name],
-            errata,
-            made,
-            _ANGLE_NOISE * size,
-        )
+    noise = {name: _ANGLE_NOISE * sizes.get(name[0], 1.0) for name in ours}
+    printed = read_printed()["published"]
+    program = printed["manual_program_kinematic"]
+    return [
+        *compare_table("4.12", printed["section_4_12_hand"], ours, by_hand),
+        *compare_table("manual, kinematics", program, ours, slips, noise),
+    ]
 
 
-def _list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
-    """Yield the constants of section 5.7: inertias, right sides, arms, the matrix."""
+def _list_constants(k: Kinematics) -> list[PublishedFigure]:
+    """List the constants of section 5.7: inertias, right sides, arms, the matrix."""
     source = read_printed()
-    yield from _list_inertias(source["inputs"]["inertia_kg_cm2_printed"])
     ours = _compute_our_constants(k)
     slips = _list_slips_of_constants(k)
     force_2 = MASSES[2] * truncate(k.a_G[2][0], 6)
-    by_hand: dict[str, tuple[tuple[str, ...], float | None]] = {
+    by_hand: Slips = {
         **slips,
         "k3_2_in_eq_5_6": (("12b",), None),
         "k4_1": (("12b",), None),
@@ -335,71 +279,36 @@ def _list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
         "k2y": (("1", "12c"), MASSES[2] * truncate(k.a_G[2][1], 6)),
         "k4x": (("1", "12c"), MASSES[4] * truncate(k.a_G[4][0], 10)),
     }
-    for name, text in source["published"]["section_5_7_hand_constants"].items():
-        errata, changed = by_hand.get(name, ((), None))
-        yield PublishedFigure(
-            "5.7 constants",
-            name,
-            text,
-            float(ours[name]),
-            errata,
-            changed,
-        )
     matrix = source["published"]["section_5_7_matrix_as_printed"]
     sides = [f"k{bar}{key}" for bar in (2, 3, 4) for key in ("x", "y", "_5")]
-    entries = list(zip(sides, matrix["rhs"], strict=False))
+    in_matrix = dict(zip(sides, matrix["rhs"], strict=False))
     for bar, row in ((2, "row3_bar2"), (3, "row6_bar3"), (4, "row9_bar4")):
-        entries += [(f"k{bar}_{n}", text) for n, text in enumerate(matrix[row][:4], 1)]
-    for name, text in entries:
-        errata, changed = slips.get(name, ((), None))
-        if "12" in errata:  # the matrix has these arms in full
-            errata, changed = (), None
-        yield PublishedFigure(
-            "5.7 matrix",
-            name,
-            text,
-            float(ours[name]),
-            errata,
-            changed,
-        )
+        for number in (1, 2, 3, 4):
+            in_matrix[f"k{bar}_{number}"] = matrix[row][number - 1]
     for number, text in enumerate(matrix["rhs"][9:], 10):
-        yield PublishedFigure(
-            "5.7 matrix",
-            f"right side, row {number}",
-            text,
-            0.0,
-        )
-    yield PublishedFigure(
-        "5.7 matrix",
-        "T4 in row 9",
-        matrix["row9_bar4"][4],
-        1.0,
-    )
-
-
-def _list_inertias(printed: dict[str, str]) -> Iterator[PublishedFigure]:
-    """List the three inertias about the mass centres."""
-    yield PublishedFigure(
-        "5.7 inertias",
-        "I_G2",
-        printed["I_G2"],
-        INERTIA_2,
-    )
-    for bar in (3, 4):
-        yield PublishedFigure(
-            "5.7 inertias",
-            f"I_G{bar}",
-            printed[f"I_G{bar}"],
-            compute_inertia(bar),
-            ("3",),
-            compute_inertia(bar, about_long_axis=True),
-        )
+        in_matrix[f"right side, row {number}"] = text
+        ours[f"right side, row {number}"] = 0.0
+    in_matrix["T4 in row 9"] = matrix["row9_bar4"][4]
+    ours["T4 in row 9"] = 1.0
+    # the matrix has the arms in full
+    in_full = {name: slip for name, slip in slips.items() if "12" not in slip[0]}
+    by_program = source["inputs"]["inertia_kg_cm2_printed"]
+    inertias = {f"I_G{bar}": by_program[f"I_G{bar}"] for bar in MASSES}
+    of_hand = source["published"]["section_5_7_hand_constants"]
+    return [
+        *compare_table("5.7 inertias", inertias, ours, slips),
+        *compare_table("5.7 constants", of_hand, ours, by_hand),
+        *compare_table("5.7 matrix", in_matrix, ours, in_full),
+    ]
 
 
 def _compute_our_constants(k: Kinematics) -> dict[str, float]:
     """Compute ours by the names of section 5.7."""
     x, y = split_components(LOAD_ARM, LOAD_ANGLE)
     ours: dict[str, float] = {
+        "I_G2": INERTIA_2,
+        "I_G3": compute_inertia(3),
+        "I_G4": compute_inertia(4),
         "R_ext_i": x,
         "R_ext_j": y,
         "moment_of_force_N_cm": -y * FORCE_ON_BAR_2,
@@ -422,11 +331,12 @@ def _compute_our_constants(k: Kinematics) -> dict[str, float]:
     return ours
 
 
-def _list_slips_of_constants(
-    k: Kinematics,
-) -> dict[str, tuple[tuple[str, ...], float]]:
+def _list_slips_of_constants(k: Kinematics) -> Slips:
     """List the constants that the errata touch, with the value that these lead to."""
-    slips: dict[str, tuple[tuple[str, ...], float]] = {}
+    about_long_axis = {
+        bar: compute_inertia(bar, about_long_axis=True) for bar in (3, 4)
+    }
+    slips: Slips = {f"I_G{bar}": (("3",), about_long_axis[bar]) for bar in (3, 4)}
     for bar, a_G in k.a_G.items():
         force = FORCE_ON_BAR_2 if bar == 2 else 0.0
         slip = k.slip if bar == 3 else 0.0
@@ -434,8 +344,8 @@ def _list_slips_of_constants(
         slips[f"k{bar}x"] = (errata, MASSES[bar] * (a_G[0] + slip) - force)
         slips[f"k{bar}y"] = (("1",), MASSES[bar] * a_G[1])
     # the sign of I alpha is wrong for bar 3 alone, erratum 7
-    inertial_3 = -1.0 * compute_inertia(3, about_long_axis=True) * k.alpha[3]
-    inertial_4 = compute_inertia(4, about_long_axis=True) * k.alpha[4]
+    inertial_3 = -1.0 * about_long_axis[3] * k.alpha[3]
+    inertial_4 = about_long_axis[4] * k.alpha[4]
     slips["k3_5"] = (("3", "2", "7"), inertial_3 - COUPLE_ON_A_BAR)
     slips["k4_5"] = (("3", "2"), inertial_4 - COUPLE_ON_A_BAR)
     for number, sign in ((1, -1.0), (3, 1.0)):
@@ -444,25 +354,20 @@ def _list_slips_of_constants(
     return slips
 
 
-def list_printed_unknowns() -> Iterator[PublishedFigure]:
+def _list_printed_unknowns() -> list[PublishedFigure]:
     """List the 13 unknowns, of the program (the manual's table) and of section 5.7."""
-    right = compute_right_unknowns()
     steps = climb_ladder()
-    names = tuple(name for name, _, _ in ERRATA_IN_ORDER if name in "12345" and name)
-    for key, label, step, last in (
-        ("manual_program_dynamic", "manual, unknowns", -2, ()),
-        ("section_5_7_hand_solution", "5.7 unknowns", -1, ("5b",)),
+    names = ("3", "1", "2", "4", "5")
+    figures = []
+    for key, label, step, errata in (
+        ("manual_program_dynamic", "manual, unknowns", -2, names),
+        ("section_5_7_hand_solution", "5.7 unknowns", -1, (*names, "5b")),
     ):
-        noise = bound_round_off(
-            *ERRATA_IN_ORDER[step][1:]
-        )  # printed with up to 17 digits
-        for name, text in read_printed()["published"][key].items():
-            yield PublishedFigure(
-                label,
-                name,
-                text,
-                right[name],
-                (*names, *last),
-                steps[step][1][name],
-                noise[name],
-            )
+        figures += compare_table(
+            label,
+            read_printed()["published"][key],
+            compute_right_unknowns(),
+            {name: (errata, made) for name, made in steps[step][1].items()},
+            bound_round_off(*ERRATA_IN_ORDER[step][1:]),  # printed with up to 17 digits
+        )
+    return figures
