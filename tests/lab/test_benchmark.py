@@ -112,6 +112,7 @@ def test_a_stranger_s_engine_has_the_letters_that_its_numbers_earn(
     )
 
 
+@pytest.mark.slow
 def test_what_was_answered_is_not_asked_again(folder: Path) -> None:
     first = run(folder, "crank_rocker")
     code = (folder / "mine.py").read_text()
@@ -184,6 +185,7 @@ def test_entries_that_cannot_be_read_are_named_in_one_line(
     assert capsys.readouterr().err.count("\n") == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("library", ["mujoco", "pinocchio"])
 def test_an_engine_answers_the_slider_cranks(library: str, folder: Path) -> None:
     pytest.importorskip(library)
@@ -229,6 +231,7 @@ for question in map(json.loads, sys.stdin):
 """
 
 
+@pytest.mark.slow
 def test_of_several_timesteps_the_finest_is_judged_and_each_setting_is_a_row(
     folder: Path,
 ) -> None:

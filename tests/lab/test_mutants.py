@@ -51,6 +51,7 @@ def test_without_a_mutant_the_harness_holds() -> None:
         assert not is_caught(scene, command, answers)
 
 
+@pytest.mark.slow
 def test_the_harness_alone_catches_a_wrong_sign(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -17,7 +17,7 @@ from fourbar_lab.stability import judge_samples
 from fourbar_lab.tally import CHANCE, TOO_SMALL, USELESS, Tally, is_by_chance
 
 pytestmark = pytest.mark.slow  # random campaigns
-SAMPLES = 40
+SAMPLES = 20
 """Per family: about 1 s each; the ten thousand of each are `python -m fourbar_lab
 stability`.
 """

@@ -126,6 +126,7 @@ def passing_change_points(name: str, branch: int) -> Scene:
     return fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "branch"), [("a parallelogram", 1), ("a kite", -1)])
 def test_members_near_a_change_point_keep_the_nominal_assembly(
     name: str,

@@ -1,4 +1,9 @@
-"""What fourbar derives from a solution holds by every oracle, over many scenes."""
+"""What fourbar derives from a solution holds by every oracle, over many scenes.
+
+`ORACLE_SCENES=n` judges n random scenes in place of the few of `make test-all`.
+"""
+
+import os
 
 import pytest
 
@@ -9,7 +14,7 @@ from tests.oracle.oracles import ORACLES, judge_by
 from tests.oracle.scenes import take_scene
 
 SHIPPED = read_default_suite()
-RANDOM_SCENES = 200
+RANDOM_SCENES = int(os.environ.get("ORACLE_SCENES", "40"))
 OF_MANY_MEMBERS = ("tolerances", "study")
 FEWER = 4
 """One random scene in so many is judged by the oracles that solve hundreds of linkages:

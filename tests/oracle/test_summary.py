@@ -149,6 +149,7 @@ def said() -> dict[str, Any]:
     return {"summarize": module.summarize_scene(question), "write_motor": motor}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("function", "rows", "path", "change"),
     [
@@ -200,6 +201,7 @@ def test_a_bar_that_bends_more_elsewhere_fails(
     assert judge(TURN) == {"bending"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("turns", "factor"), [(1, 5), (3, 5), (0.75, 0.75)])
 def test_an_open_motion_is_told_from_a_turn(
     turns: float, factor: float, monkeypatch: pytest.MonkeyPatch
@@ -241,6 +243,7 @@ BESIDE_A_POLE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BESIDE_A_POLE)
 def test_beside_a_pole_bending_agrees(name: str) -> None:
     rows = summary(make_question("scene", BESIDE_A_POLE[name], ()))

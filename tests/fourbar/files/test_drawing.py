@@ -300,6 +300,7 @@ def test_mjcf_stands_where_the_drawing_has_it(tmp_path: Path) -> None:
         assert data.site(name).xpos[:2] == pytest.approx(place, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_parallelogram_drawn_on_a_grid_is_one() -> None:
     """To a tenth of a millimetre the lengths of opposite bars differ.
 

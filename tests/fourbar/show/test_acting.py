@@ -156,6 +156,7 @@ def told(text: str) -> str:
     return " ".join(" ".join(write_block(scene, fourbar.solve(scene))).split())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", ["400 mm", "600 mm"])
 def test_a_spring_that_changes_its_sense_is_told_where(length: str) -> None:
     """It pulls from where its ends are farther apart than its length."""

@@ -117,6 +117,7 @@ def test_what_is_solved_already_changes_no_number(angles: object) -> None:
     np.testing.assert_equal(shown, plain)
 
 
+@pytest.mark.slow
 def test_a_free_motion_is_embedded_instant_by_instant() -> None:
     data, solution = embedded(animate.write_page(RELEASED)), fourbar.solve(RELEASED)
     (columns,) = data["branches"].values()

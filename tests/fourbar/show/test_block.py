@@ -39,6 +39,7 @@ def opposite(side: float, first: float, second: float) -> float:
     return math.acos((first**2 + second**2 - side**2) / (2.0 * first * second))
 
 
+@pytest.mark.slow
 def test_where_the_assembly_ends_is_the_limit_of_the_commanded_bar() -> None:
     text, scene = plain(block(thesis(fourbar.Sweep(0.0, math.tau, 360)))), thesis()
     limits = fourbar.limit_positions(scene.linkage, 2)
@@ -261,6 +262,7 @@ def test_a_bore_is_that_of_the_motion_and_not_of_its_positions() -> None:
     assert re.search(rf"{bore:.4g} mm\b[^;]* to {word} {abs(force):.4g} N", text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bar", (2, 3))
 def test_a_cylinder_assembles_from_where_its_ends_meet(bar: int) -> None:
     """The ends lie as far from O2, or the ground's end is on the path of the other,
@@ -478,6 +480,7 @@ def test_the_largest_rates_of_following_bars_are_those_of_fine_steps(
             )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lengths", [(0.3, 0.4, 0.2, 0.25), (0.2, 0.25, 0.21, 0.22)])
 @pytest.mark.parametrize("bar", [2, 4])
 def test_a_range_that_is_left_out_is_printed_with_the_limits(

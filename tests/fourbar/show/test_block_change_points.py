@@ -136,6 +136,7 @@ def test_a_scene_without_a_range_covers_both_turns_of_a_single_change_point() ->
     assert len(fourbar.solve(fourbar.Scene(with_both))) == 361
 
 
+@pytest.mark.slow
 def test_lengths_are_equal_within_the_rounding_of_what_is_stated(
     tmp_path: Path,
 ) -> None:
@@ -391,6 +392,7 @@ pin_friction = { O4 = { coefficient = 0.12, radius = "6 mm" } }
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", [8, 80, 81])
 def test_a_torque_that_grows_behind_a_maximum_has_no_peak(steps: int) -> None:
     """The pins' friction grows with their load towards the change point."""

@@ -695,6 +695,7 @@ GALLERY = sorted((ROOT / "models" / "gallery").glob("*.toml"))
 CROWDED = (ROOT / "models" / "thesis.toml", ROOT / "models" / "crank_rocker.toml")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [400, 1024, 1440])
 def test_no_label_of_the_gallery_covers_another_one_or_a_symbol(
     browse,

@@ -143,6 +143,7 @@ def test_the_printed_energies_of_a_law_do_not_depend_on_its_steps(steps: int) ->
     assert "sums over" not in text
 
 
+@pytest.mark.slow
 def test_what_has_a_pole_has_no_mean_and_its_power_has_one() -> None:
     """Beside a pole no integral of the torque's square exists."""
     turn = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 36), 10.0)

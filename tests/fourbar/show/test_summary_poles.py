@@ -50,6 +50,7 @@ def write(scene: fourbar.Scene, **options: object) -> str:
     return " ".join(" ".join(lines).split())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", (20, 37, 72, 360))
 def test_a_force_with_a_pole_is_no_number_anywhere(steps: int) -> None:
     """A cylinder that passes its dead points, where it has no lever."""
@@ -95,6 +96,7 @@ def test_speed_and_power_beside_a_pole_of_the_force_are_located() -> None:
     assert duty["peak_power"] == pytest.approx(np.abs(power).max(), rel=PEAK)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", (36, 360))
 @pytest.mark.parametrize("start", (5.0, 6.3))
 def test_pin_forces_at_a_change_point_grow_and_the_torque_has_its_largest_value(
@@ -130,6 +132,7 @@ def test_a_search_that_hits_a_pole_still_finds_that_it_grows() -> None:
     assert between.panels.growing == {"F12", "F32", "F43", "F14"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "lengths", ((0.37, 0.09, 0.09, 0.37), (0.4, 0.1, 0.3, 0.2), (0.3, 0.1, 0.25, 0.22))
 )
@@ -146,6 +149,7 @@ def test_ranges_of_a_backward_sweep_are_those_of_its_angles(
         assert high.value - 0.1 <= angles.max() <= high.value
 
 
+@pytest.mark.slow
 def test_the_swing_of_an_output_is_not_counted_over_a_gap() -> None:
     """Both circuits are one for these lengths.
 
@@ -201,6 +205,7 @@ def test_a_pole_between_two_positions_that_rise_past_it_is_found(speed: float) -
     assert hidden > 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("last", "grows"), [(0.0, False), (-2.0, True)])
 def test_a_pole_just_beyond_the_last_position_is_none_between(
     last: float,

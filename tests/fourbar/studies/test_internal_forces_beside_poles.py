@@ -115,6 +115,7 @@ def test_the_rounding_of_a_pole_bends_no_bar_without_drive(
     assert output_bar == pytest.approx(expected, rel=ROUNDED, abs=0.0)
 
 
+@pytest.mark.slow
 def test_the_largest_moments_are_those_of_many_digits() -> None:
     """That of the input is the same everywhere, that of the output has a maximum."""
     facts = summarize(SCENE, fourbar.solve(SCENE))

@@ -143,6 +143,7 @@ COORDINATES = {"pins": 14, "pins,": 14, "places": 30, "cylinder": 12}
 """Count of the coordinates of pins and places, by the first word of the name."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("check", ["sensitivity", "study"])
 @pytest.mark.parametrize("name", STATED)
 def test_coordinates_move_as_in_files_with_them_moved(name: str, check: str) -> None:

@@ -201,6 +201,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_in_the_drive_is_caught(
     monkeypatch: pytest.MonkeyPatch,

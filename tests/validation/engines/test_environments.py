@@ -110,6 +110,7 @@ def test_two_versions_are_judged_side_by_side(
     )
 
 
+@pytest.mark.slow
 def test_an_environment_that_cannot_be_made_is_one_line(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

@@ -709,7 +709,7 @@ def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine: Any) ->
     program = guests.serve_adapter(engine.name, 120.0)
     start = partial(guests.GuestClient, engine.name, program, guests.ask_hello(program))
     outside = replace(engine, start=start)
-    loaded = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 40), 10.0))
+    loaded = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0))
     stroke = fourbar.Motion(
         stroke=fourbar.Sweep(0.25, 0.35, 8),
         stroke_speed=0.2,

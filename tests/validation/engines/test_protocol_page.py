@@ -140,6 +140,7 @@ def check(part: str) -> Any:
     )
 
 
+@pytest.mark.slow
 def test_what_the_judge_writes_is_what_the_schema_says() -> None:
     seen, question = 0, check("question")
     for scene in scenes():

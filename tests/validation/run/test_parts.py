@@ -49,6 +49,7 @@ def assert_same(out: Path, whole: Path) -> None:
         assert (out / name).read_bytes() == (whole / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_parts_are_collected_into_the_bytes_of_a_whole_run(
     parts: list[str],
     tmp_path: Path,
@@ -66,6 +67,7 @@ def judge_nothing(job: object) -> None:
     raise AssertionError(f"{job} was judged again")
 
 
+@pytest.mark.slow
 def test_a_run_over_all_parts_in_one_folder_writes_the_report(tmp_path: Path) -> None:
     out = tmp_path / "out"
     for k in (2, 1):
@@ -117,6 +119,7 @@ def test_parts_of_another_run_are_refused(
     assert "it differs in code" in said
 
 
+@pytest.mark.slow
 def test_two_copies_of_a_part_are_one_only_if_their_rows_are_the_same(
     parts: list[str],
     tmp_path: Path,
