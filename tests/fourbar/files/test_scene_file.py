@@ -290,6 +290,12 @@ MISTAKES = [
     ),
     ("loads as a table", "[[loads]]", "[loads]", ["loads", "[[loads]]"]),
     (
+        "load over time",
+        "bar = 4",
+        'bar = 4\ntable = { time = ["0 s", "1 s"], factor = [0.0, 1.0] }',
+        ["loads[0].table.time", "follows theta_2, not time", "--drive motor"],
+    ),
+    (
         "frame misspelt",
         "bar = 4",
         'bar = 4\nframe = "body"',
