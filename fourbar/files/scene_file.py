@@ -590,9 +590,9 @@ def _read_load_table(read: Reader, key: str, value: object) -> Table:
     """Read the factors of a load over theta_2."""
     if isinstance(value, dict) and "time" in value:
         allowed = (
-            "a load follows theta_2, not time: of a sweep at one speed theta_2 = omega_2"
-            " t; a torque over time that moves the linkage is for a simulator (fourbar"
-            " mjcf SCENE --drive motor)"
+            "a load follows theta_2, not time: at one speed theta_2 is omega_2 t; a"
+            " torque over time that moves the linkage is for a simulator (fourbar mjcf"
+            " SCENE --drive motor)"
         )
         raise read.refuse(f"{key}.time", value["time"], allowed)
     columns = read.table(key, value, ("theta_2", "factor"))
