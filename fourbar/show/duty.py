@@ -13,7 +13,7 @@ from fourbar.errors import DependencyError, InputError, expect, say_install
 from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.arithmetic import dot
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
-from fourbar.quantities import Array
+from fourbar.quantities import JAMMED, WOUND, Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.show.driving import Driving, is_once_round, read_drive_demand
 from fourbar.show.motion_curves import describe_motion
@@ -187,7 +187,7 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
     its steps. Of a list or a study they are those of the positions that have a value,
     the energies by the trapezoidal rule. What grows without bound is None, and so are
     means and energies of a sweep with an acceleration, which passes its positions at no
-    one speed.
+    one speed, and the energies of a motion on a part of which no forces exist.
 
     Returns None where no position has a torque or force of the drive: a released
     linkage, or positions alone.
@@ -220,6 +220,8 @@ def _integrate_duty(solution: Solution, drive: Driving) -> MotorDuty:
     panels = motion.panels
     name = drive.keys.value
     linear = solution.drive is not None
+    # over a stretch without forces the energies would be those of a part, unsaid
+    whole = not np.isin(solution.status_code, (WOUND, JAMMED)).any()
 
     def find_largest(curve: str) -> float | None:
         if not panels.has_value(curve):
@@ -241,7 +243,7 @@ def _integrate_duty(solution: Solution, drive: Driving) -> MotorDuty:
         rms_force=rms if linear else None,
     )
     second = motion.places_of_second
-    if not second or not panels.has_value("power"):
+    if not second or not whole or not panels.has_value("power"):
         return duty
     work = np.diff(panels.accumulate("power")) / second
     duty = duty._replace(

@@ -300,3 +300,13 @@ def test_a_position_without_forces_is_not_where_a_light_load_is_largest() -> Non
     load = bearing_load(fourbar.solve(replace(s.scene, motion=listed)), "O2")
     assert load.largest == np.nanmax(size)
     assert load.where == s.theta_2[np.nanargmax(size)]
+
+
+def test_a_turn_on_a_part_of_which_a_spring_is_wound_has_no_energies() -> None:
+    """A spring keeps what it is given: the energies of the rest would be no turn's."""
+    torsion = fourbar.effects.Torsion((("A", 2.0, math.radians(86.0), 0.0),))
+    turn = fourbar.Sweep(0.0, math.tau, 120)
+    scene = crank_rocker(motion=fourbar.Motion(turn, 1.0), effects=(torsion,))
+    duty = motor_duty(fourbar.solve(scene))
+    assert duty.peak_torque is not None and duty.closed
+    assert (duty.energy_in, duty.energy_out, duty.energy_swing) == (None, None, None)
