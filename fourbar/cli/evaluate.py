@@ -1,7 +1,5 @@
 """The commands that evaluate a linkage, what may vary of it, and where it rests."""
 
-import shutil
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,6 +39,7 @@ def classify_command(
     """
     from fourbar.linkage import Bar, FourBar
     from fourbar.show.studies import write_type, write_type_json
+    from fourbar.show.tables import wrap_line
     from fourbar.show.units import suit_units, units_of_length
 
     ratios = [given.is_bare(text) for text in lengths]
@@ -55,11 +54,13 @@ def classify_command(
     ratios_only = {"m": ("", 1.0)}
     with state_messages_in(ratios_only if all(ratios) else units_of_length(lengths[0])):
         linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
-    lines = write_type(linkage, units, everything=everything)
-    given.print_to(
-        write_type_json(linkage) if as_json else "\n".join([*lines, ""]),
-        out,
-    )
+    if as_json:
+        text = write_type_json(linkage)
+    else:
+        width = given.find_width(out)
+        lines = write_type(linkage, units, everything=everything)
+        text = "".join(f"{part}\n" for line in lines for part in wrap_line(line, width))
+    given.print_to(text, out)
 
 
 @click.command(cls=given.LengthsCommand)
@@ -321,7 +322,8 @@ def analyze(  # noqa: PLR0913 - one for each option
             raise _assembles_nowhere(scene, described)
     if form == "summary":
         with state_messages_in(shown):
-            text = _write_summary(described, solution, shown, bore, asked)
+            width = given.find_width(out)
+            text = _write_summary(described, solution, shown, bore, asked, width)
     else:
         text = _write_positions(solution, form, shown, columns, every, decimal, out)
     given.print_to(text, out)
@@ -359,6 +361,7 @@ def _write_summary(
     units: Conversion,
     pressure: float | None,
     asked: dict[str, Command],
+    width: int | None,
 ) -> str:
     """Write the block of a scene, or what `--at` asked for.
 
@@ -371,7 +374,7 @@ def _write_summary(
     from fourbar.studies.course import follow
 
     if not asked:
-        block = write_block(scene, solution, units, pressure=pressure)
+        block = write_block(scene, solution, units, pressure=pressure, width=width)
         return "\n".join([*block, *write_paths(scene, units), ""])
     lines: list[str] = []
     headed = True
@@ -381,7 +384,9 @@ def _write_summary(
             continue
         one = solve(scene, find_last_stage(scene), at=at)
         follow(scene, one)
-        block = write_block(scene, one, units, pressure=pressure, headed=headed)
+        block = write_block(
+            scene, one, units, pressure=pressure, headed=headed, width=width
+        )
         headed = False
         lines += [*block, ""]
     return "\n".join(lines)
@@ -415,8 +420,7 @@ def _write_positions(
     if form == "csv":
         chosen = _list_chosen(columns, units) if columns else None
         return write_csv(solution, units, decimal or ".", chosen)
-    on_terminal = out is None and sys.stdout.isatty()
-    width = shutil.get_terminal_size().columns if on_terminal else None
+    width = given.find_width(out)
     return print_positions(solution, width, units, every=every, columns=columns)
 
 
@@ -466,10 +470,11 @@ def _print_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
         derivatives = sensitivity(stated)
     if not derivatives.solution.assembled.any():
         raise _assembles_nowhere(scene, stated)
-    given.print_to(
-        (write_sensitivity_json if as_json else write_sensitivity)(derivatives),
-        out,
-    )
+    if as_json:
+        text = write_sensitivity_json(derivatives)
+    else:
+        text = write_sensitivity(derivatives, given.find_width(out))
+    given.print_to(text, out)
 
 
 @click.command()
@@ -532,7 +537,8 @@ def tolerance(
     if as_json:
         text = shown.write_spreads_json(spreads)
     else:
-        text = shown.write_spreads(spreads, {**DEGREES, **named})
+        width = given.find_width()
+        text = shown.write_spreads(spreads, {**DEGREES, **named}, width)
     given.print_to(text, None)
 
 
@@ -558,5 +564,6 @@ def equilibrium_command(scene: Path, as_json: bool, out: Path | None) -> None:
     if as_json:
         text = write_equilibria_json(described.title, rest)
     else:
-        text = write_equilibria(described.title, rest, given.suit_file_units())
+        units, width = given.suit_file_units(), given.find_width(out)
+        text = write_equilibria(described.title, rest, units, width)
     given.print_to(text, out)

@@ -328,6 +328,13 @@ def _read_drawn(scene: Scene, name: str, text: str) -> float:
     return drawn
 
 
+def find_width(out: Path | None = None) -> int | None:
+    """Return the columns of the terminal that is printed to; None: a file or pipe."""
+    from fourbar.show.tables import find_terminal_width
+
+    return find_terminal_width() if out is None else None
+
+
 def print_to(text: str, out: Path | None) -> None:
     """Print to standard output, or write a file atomically."""
     from fourbar.writing import write_text

@@ -39,7 +39,7 @@ from fourbar.show.motion_curves import acts, find_drive_rounding
 from fourbar.show.panels import Peak
 from fourbar.show.position import PositionSheet
 from fourbar.show.summary import Facts, summarize
-from fourbar.show.tables import BLOCK_WIDTH, wrap_line
+from fourbar.show.tables import find_block_width, wrap_line
 from fourbar.show.units import (
     COMMON,
     POSITION_DIGITS,
@@ -97,6 +97,7 @@ def write_block(
     *,
     pressure: float | None = None,
     headed: bool = True,
+    width: int | None = None,
 ) -> list[str]:
     """Write the summary of a solved scene line by line; of one position, everything.
 
@@ -105,9 +106,10 @@ def write_block(
     units : units of the numbers; one that is left out is the SI unit with a prefix.
     pressure : pressure of a cylinder, Pa; adds the bore that it needs.
     headed : begin with the linkage.
+    width : that of a terminal.
     """
-    facts = summarize(scene, solution)
-    return write_facts(facts, units, pressure=pressure, headed=headed)
+    block = _SceneBlock(summarize(scene, solution), units, width)
+    return block.write(pressure, headed=headed)
 
 
 def write_facts(
@@ -124,8 +126,14 @@ def write_facts(
 class _SceneBlock:
     """The facts of a scene and the units that they are written in."""
 
-    def __init__(self, facts: Facts, units: Conversion) -> None:
+    def __init__(
+        self,
+        facts: Facts,
+        units: Conversion,
+        width: int | None = None,
+    ) -> None:
         self.facts = facts
+        self.width = find_block_width(width)
         self.units = units
         self.digits = POSITION_DIGITS if facts.kind == "position" else SHOWN_DIGITS
         self.longest = max(facts.scene.linkage.lengths)
@@ -146,9 +154,9 @@ class _SceneBlock:
         lines: list[str] = []
         for paragraph in filter(None, paragraphs):
             if lines:
-                lines += wrap_line("")
+                lines.append("")
             for line in paragraph:
-                lines += wrap_line(line)
+                lines += wrap_line(line, self.width)
         return [line.replace(_TIED, " ") for line in lines]
 
     def _write_loads(self, pressure: float | None) -> list[str]:
@@ -180,7 +188,10 @@ class _SceneBlock:
             rows.append((f"  {label}", self._cells_of_peaks(peaks, unit)))
             names = [f"{label}_{bar}" for bar in rates]
             rows.append(("  at", self._places_of_peaks(peaks, names)))
-        return [*_align(rows), "no mass, load or effect: nothing loads pins and drive"]
+        return [
+            *_align(rows, self.width),
+            "no mass, load or effect: nothing loads pins and drive",
+        ]
 
     def _write_position(
         self,
@@ -245,7 +256,7 @@ class _SceneBlock:
         name = f"{self._name_linkage()}:"
         lengths = self._write_lengths()
         line = f"{name} {lengths}"
-        lines = [line] if len(line) <= BLOCK_WIDTH else [name, f"    {lengths}"]
+        lines = [line] if len(line) <= self.width else [name, f"    {lengths}"]
         return [*lines, *self._write_change_points()]
 
     def _name_linkage(self) -> str:
@@ -743,7 +754,7 @@ class _SceneBlock:
                 for cell, mean in zip(self._cells(sizes, "N"), means, strict=True)
             ]
             rows.append(("  RMS", cells))
-        lines = _align(rows)
+        lines = _align(rows, self.width)
         if facts.kind in ("list", "released"):
             return [*lines, "  peak and RMS are those of these positions"]
         return lines
@@ -769,7 +780,7 @@ class _SceneBlock:
         stresses = self._write_stresses()
         if any(stress != "-" for stress in stresses):
             rows.append(("  stress", stresses))
-        return [*_align(rows), *list_couple_notes(facts.scene)]
+        return [*_align(rows, self.width), *list_couple_notes(facts.scene)]
 
     def _write_stresses(self) -> list[str]:
         """Write the largest bending stress of each bar.
@@ -939,12 +950,18 @@ class _SceneBlock:
         return f"  {label:<{INDENT - 2}}{text}"
 
 
-def _align(rows: list[tuple[str, list[str]]]) -> list[str]:
-    """Write rows of a label and cells that stand below each other."""
+def _align(rows: list[tuple[str, list[str]]], most: int) -> list[str]:
+    """Write rows of a label and cells that stand below each other.
+
+    Cells beyond so many columns follow in further rows of the same labels.
+    """
     width = max(LEAST_COLUMN, 2 + max(len(cell) for _, cells in rows for cell in cells))
+    fitting = max(1, (most - INDENT + 2) // width)
     return [
-        f"{label:<{INDENT}}{''.join(f'{cell:<{width}}' for cell in cells)}".rstrip()
+        f"{label:<{INDENT}}{''.join(f'{cell:<{width}}' for cell in part)}".rstrip()
+        for first in range(0, len(rows[0][1]), fitting)
         for label, cells in rows
+        if (part := cells[first : first + fitting])
     ]
 
 

@@ -239,10 +239,12 @@ def find_largest(derivatives: Sensitivity, quantity: str) -> float:
     return math.nan
 
 
-def write_sensitivity(derivatives: Sensitivity) -> str:
+def write_sensitivity(derivatives: Sensitivity, width: int | None = None) -> str:
     """Write the numbers that matter most, as lines and a table.
 
     The lines above the table say what each quantity depends on most.
+
+    `width`: that of a terminal.
     """
     names = list_shown(derivatives)
     influences = {name: derivatives.influences(name) for name in names}
@@ -285,8 +287,8 @@ def write_sensitivity(derivatives: Sensitivity) -> str:
         rows,
         left=("",),
     )
-    wrapped = [part for line in lines for part in wrap_line(line)]
-    return write_table(derivatives.solution.title, wrapped, table)
+    title = derivatives.solution.title
+    return write_table(title, lines, table, width=width)
 
 
 def rank_numbers(derivatives: Sensitivity, names: list[str]) -> list[str]:
@@ -336,25 +338,31 @@ _WITHOUT_MOVE = (NOT_ASSEMBLED, SINGULAR, NO_DIRECTION, WOUND)
 _MOVES = {0: "stays", 1: "theta_2 grows", -1: "theta_2 falls"}
 
 
-def write_equilibria(title: str, rest: Equilibria, units: Conversion = COMMON) -> str:
+def write_equilibria(
+    title: str,
+    rest: Equilibria,
+    units: Conversion = COMMON,
+    width: int | None = None,
+) -> str:
     """Write the tables of equilibria and of what holds the positions as text.
 
     A branch in the tables is the assembly, as a scene states it with the position.
 
-    `units`: units of the numbers; one that is left out is the SI unit.
+    `units`: units of the numbers; one that is left out is the SI unit. `width`: that
+    of a terminal.
     """
     rest = _name_assemblies(rest)
     reached = [position for position in rest.found if position.reached]
     others = [position for position in rest.found if not position.reached]
     lines = _count_equilibria(rest, len(reached), units)
-    blocks = [_write_resting(title, lines, reached, units)]
+    blocks = [_write_resting(title, lines, reached, units, width)]
     if others:
         line = (
             f"{_write_count(len(others))} in the other assembly at angles theta_2 of"
             " this sweep, which does not reach it"
         )
-        blocks.append(_write_resting("", wrap_line(line), others, units))
-    blocks.append(write_table("", *_write_holding(rest, units)))
+        blocks.append(_write_resting("", [line], others, units, width))
+    blocks.append(write_table("", *_write_holding(rest, units), width=width))
     return "\n\n".join(block.rstrip("\n") for block in blocks) + "\n"
 
 
@@ -363,10 +371,12 @@ def _write_resting(
     lines: list[str],
     found: list[Equilibrium],
     units: Conversion,
+    width: int | None,
 ) -> str:
     """Write the table of some equilibria with its title and lines."""
     if not found:
-        return "\n".join([*([clean_line(title)] if title else []), *lines])
+        headed = [*([clean_line(title)] if title else []), *lines]
+        return "\n".join(part for line in headed for part in wrap_line(line, width))
     torque = find_unit_in("N m", units)[0]
     heads = [
         "theta_2\n(deg)",
@@ -386,7 +396,7 @@ def _write_resting(
         for position in found
         if position.held is not None
     ]
-    return write_table(title, lines, table, held)
+    return write_table(title, lines, table, held, width)
 
 
 def _find_inertia_unit(units: Conversion) -> tuple[str, float]:
@@ -456,9 +466,7 @@ def _count_equilibria(rest: Equilibria, reached: int, units: Conversion) -> list
         for ends in rest.held
         if all(position.held != ends for position in rest.found)
     ]
-    return [
-        part for line in (*lines, *_list_notes(rest, units)) for part in wrap_line(line)
-    ]
+    return [*lines, *_list_notes(rest, units)]
 
 
 def _list_notes(rest: Equilibria, units: Conversion) -> list[str]:

@@ -5,6 +5,8 @@ The table of positions of `analyze --table` is one.
 
 import io
 import math
+import shutil
+import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from textwrap import wrap
@@ -67,18 +69,32 @@ def write_table(
     if title:
         console.print(Text(clean_line(title)))
     for line in lines:
-        console.print(Text(line))
+        console.print(Text("\n".join(wrap_line(line, width))))
     console.print(shown)
     for line in after:
-        console.print(Text(line))
+        console.print(Text("\n".join(wrap_line(line, width))))
     return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))
 
 
-def wrap_line(line: str) -> list[str]:
-    """Break a line that is wider than a block; what follows is indented."""
-    if len(line) <= BLOCK_WIDTH:
+def find_terminal_width() -> int | None:
+    """Return the columns of the terminal that is printed to; None: it is none."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+
+
+def find_block_width(width: int | None) -> int:
+    """Return the columns of a block on a terminal of a width; None: a file."""
+    return BLOCK_WIDTH if width is None else min(width, BLOCK_WIDTH)
+
+
+def wrap_line(line: str, width: int | None = None) -> list[str]:
+    """Break a line that is wider than a block; what follows is indented.
+
+    `width`: that of a terminal.
+    """
+    most = find_block_width(width)
+    if len(line) <= most:
         return [line]
-    return wrap(line, BLOCK_WIDTH, subsequent_indent="    ", break_on_hyphens=False)
+    return wrap(line, most, subsequent_indent="    ", break_on_hyphens=False)
 
 
 def make_plain_table(
@@ -92,10 +108,11 @@ def make_plain_table(
     `left`: headings of those that are not.
     """
     from rich import box
-    from rich.table import Table
     from rich.text import Text
 
-    shown = Table(
+    from fourbar.show.folded import FoldedTable
+
+    shown = FoldedTable(
         box=box.SIMPLE_HEAD,
         show_edge=False,
         pad_edge=False,

@@ -18,7 +18,6 @@ from fourbar.show.tables import (
     BLOCK_WIDTH,
     make_plain_table,
     show_running,
-    wrap_line,
     write_table,
 )
 from fourbar.show.units import drop_rounding, write_cell
@@ -76,7 +75,11 @@ def find_part_unit(part: str) -> str:
     return unit
 
 
-def write_spreads(spreads: Tolerances, units: Conversion = DEGREES) -> str:
+def write_spreads(
+    spreads: Tolerances,
+    units: Conversion = DEGREES,
+    width: int | None = None,
+) -> str:
     """Write one row for each quantity.
 
     The lines above say what was tried and what the variance of each is due to.
@@ -97,14 +100,13 @@ def write_spreads(spreads: Tolerances, units: Conversion = DEGREES) -> str:
     for part, worst in shown.items():
         if most := _name_largest(spreads, spreads.spreads[part], worst):
             lines.append(f"  {part}: {most}")
-    wrapped = [part for line in lines for part in wrap_line(line)]
     title = spreads.scene.title
     for digits in range(_MOST_DIGITS, _FEWEST_DIGITS - 1, -1):
         table = _make_table(spreads, shown, units, digits)
         written = write_table("", [], table)
         if max(map(len, written.split("\n"))) <= BLOCK_WIDTH:
             break
-    return write_table(title, wrapped, table)
+    return write_table(title, lines, table, width=width)
 
 
 def _make_table(

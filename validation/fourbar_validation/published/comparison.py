@@ -76,9 +76,12 @@ def compare_figures(show_all: bool) -> int:
     Return 1 on a difference that no erratum explains.
     """
     from rich.console import Console
-    from rich.table import Table
+
+    from fourbar.show.folded import FoldedTable
+    from fourbar.show.tables import wrap_line
 
     console = Console(highlight=False, markup=False)
+    page = min(PAGE_WIDTH, console.width)
     counts: Counter[tuple[str, str]] = Counter()
     met: Counter[str] = Counter()
     unexplained = []
@@ -100,14 +103,15 @@ def compare_figures(show_all: bool) -> int:
             ours = f"ours {figure.ours:.10g}" + (
                 "" if verdict == "differs" else f", {verdict}"
             )
-            click.echo(
-                f"{figure.table}: {figure.name}  printed {figure.printed}  {ours}"
-            )
+            line = f"{figure.table}: {figure.name}  printed {figure.printed}  {ours}"
+            click.echo("\n".join(wrap_line(line, console.width)))
         if verdict == "differs":
             click.echo(
-                click.wrap_text(explain_difference(figure), PAGE_WIDTH, "    ", "    ")
+                click.wrap_text(explain_difference(figure), page, "    ", "    ")
             )
-    total = Table(*("table", *FIGURE_VERDICTS), title="Printed figures against ours")
+    total = FoldedTable(
+        *("table", *FIGURE_VERDICTS), title="Printed figures against ours"
+    )
     for table in dict.fromkeys(key[0] for key in counts):
         total.add_row(
             table, *(str(counts[table, verdict]) for verdict in FIGURE_VERDICTS)
@@ -125,7 +129,7 @@ def compare_figures(show_all: bool) -> int:
         f" equals it. {sums[2]} figures differ: the errata named reproduce {reproduced}"
         f" of them digit for digit, and {misprints} are misprints."
     )
-    click.echo(click.wrap_text(summary, PAGE_WIDTH) + "\n")
+    click.echo(click.wrap_text(summary, page) + "\n")
     console.print("The errata met above (all: errata.toml of published/):")
     for name, erratum in ERRATA.items():
         if met[name]:
@@ -134,7 +138,7 @@ def compare_figures(show_all: bool) -> int:
                 f" {erratum.right}. "
             )
             text += f"Why: {erratum.derivation}. Effect: {erratum.effect}."
-            click.echo(click.wrap_text(text, PAGE_WIDTH, "", "    "))
+            click.echo(click.wrap_text(text, page, "", "    "))
     if unexplained:
         console.print(f"No erratum explains {len(unexplained)} of the differences.")
     if not sum(sums):

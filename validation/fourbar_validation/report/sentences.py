@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from fourbar.errors import clean_line
-from fourbar.show.tables import wrap_line
+from fourbar.show.tables import find_terminal_width, wrap_line
 from fourbar_validation.compare.rows import escape_controls
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ def print_sentence(text: str) -> None:
     """Print a sentence, broken where it is wider than a block."""
     import click
 
-    for line in wrap_line(escape_controls(text)):
+    for line in wrap_line(escape_controls(text), find_terminal_width()):
         click.echo(line)
 
 
@@ -29,10 +29,11 @@ def make_words_table(
     """Make a table whose first columns are words and whose others are numbers."""
     from rich.box import SIMPLE_HEAD
     from rich.markup import escape
-    from rich.table import Table
+
+    from fourbar.show.folded import FoldedTable
 
     settings: dict[str, Any] = {"box": SIMPLE_HEAD, "pad_edge": False}
-    shown = Table(**(settings | options))
+    shown = FoldedTable(**(settings | options))
     for index, heading in enumerate(headings):
         shown.add_column(
             heading,

@@ -16,10 +16,6 @@ from fourbar_validation.report.templating import write_error
 if TYPE_CHECKING:
     from rich.table import Table
 
-_NARROWEST = 80
-"""Least columns of the table. A narrower terminal breaks its lines, where rich would
-cut its numbers.
-"""
 MOST_CAUSES_PRINTED = 18
 """Causes of failures that are printed, one line each; the report has all."""
 _MOST_NOTES = 10
@@ -41,10 +37,9 @@ def print_table(
     from rich.markup import escape
 
     console = Console()
-    wide = Console(width=max(console.width, _NARROWEST))
     colour = "green" if summary.good else "red"
     console.print(f"[bold {colour}]{escape(clean_line(summary.headline))}[/]")
-    wide.print(_make_overview(summary))
+    console.print(_make_overview(summary))
     causes = summary.overview.causes
     for cause in causes[:MOST_CAUSES_PRINTED]:
         console.print(f"[bold red]wrong:[/] {escape(clean_line(str(cause)))}")
@@ -57,22 +52,18 @@ def print_table(
     for engine, reason in summary.missing:
         console.print(f"[bold red]Not run:[/] {escape(engine)}: {escape(reason)}")
     if verbose:
-        _print_rows(summary, console, wide)
+        _print_rows(summary, console)
     console.print(
         f"Report: {escape(clean_line(str(out / 'report.html')))}",
         soft_wrap=True,
     )
 
 
-def _print_rows(
-    summary: Summary,
-    console: Any,
-    wide: Any,
-) -> None:
+def _print_rows(summary: Summary, console: Any) -> None:
     """Print the worst rows, those that fail, and why others were not compared."""
     from rich.markup import escape
 
-    wide.print(_make_worst_table(summary))
+    console.print(_make_worst_table(summary))
     for row in summary.failures:
         console.print(
             f"[bold red]fails[/] {escape(clean_line(row.scene))} {escape(row.engine)} "
@@ -92,9 +83,10 @@ def _make_overview(summary: Summary) -> "Table":
     """Make the table of engines: largest error and allowance in each group."""
     from rich.box import SIMPLE_HEAD
     from rich.markup import escape
-    from rich.table import Table
 
-    shown = Table(
+    from fourbar.show.folded import FoldedTable
+
+    shown = FoldedTable(
         box=SIMPLE_HEAD,
         pad_edge=False,
         collapse_padding=True,
@@ -156,13 +148,17 @@ def _make_bare_table(
     title: str | None = None,
 ) -> "Table":
     from rich.box import SIMPLE_HEAD
-    from rich.table import Table
 
-    shown = Table(title=title, box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
+    from fourbar.show.folded import FoldedTable
+
+    shown = FoldedTable(
+        title=title, box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True
+    )
     for heading in (*words, *numbers):
         shown.add_column(
             heading,
             justify="left" if heading in words else "right",
-            no_wrap=True,
+            overflow="fold",
+            no_wrap=heading in numbers,
         )
     return shown

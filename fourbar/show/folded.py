@@ -1,0 +1,67 @@
+"""Tables of rich that a narrow terminal shows whole."""
+
+from copy import copy
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from rich.measure import Measurement
+from rich.table import Column, Table
+
+from fourbar.show.tables import BLOCK_WIDTH
+
+if TYPE_CHECKING:
+    from rich.console import Console, ConsoleOptions, RenderResult
+
+_ANY_WIDTH = 10_000
+
+
+class FoldedTable(Table):
+    """A table that is printed as several where a terminal is narrower than a block.
+
+    Each of them begins with the first column, so that no number is broken or cut.
+    """
+
+    def __rich_console__(
+        self,
+        console: "Console",
+        options: "ConsoleOptions",
+    ) -> "RenderResult":
+        """Yield the table, or below each other tables of some of its columns."""
+        parts = [self]
+        if options.max_width < BLOCK_WIDTH:
+            parts = self._split(console, options)
+        for number, part in enumerate(parts):
+            if number:
+                yield ""
+            yield from Table.__rich_console__(part, console, options)
+
+    def _split(
+        self,
+        console: "Console",
+        options: "ConsoleOptions",
+    ) -> "list[FoldedTable]":
+        """Return tables that fit, the first with the title, the last with the caption.
+
+        One of two columns is not split, and rich breaks the words in it.
+        """
+        wide = options.update_width(_ANY_WIDTH)
+        first, *others = self.columns or [Column()]
+        parts = [self._keep([first])]
+        for column in others:
+            wider = self._keep([*parts[-1].columns, column])
+            needed = Measurement.get(console, wide, wider).maximum
+            if len(wider.columns) <= 2 or needed <= options.max_width:
+                parts[-1] = wider
+            else:
+                parts.append(self._keep([first, column]))
+        parts[0].title = self.title
+        parts[-1].caption = self.caption
+        return parts
+
+    def _keep(self, columns: list[Column]) -> "FoldedTable":
+        kept = copy(self)
+        kept.columns = [
+            replace(column, _index=index) for index, column in enumerate(columns)
+        ]
+        kept.title = kept.caption = None
+        return kept
