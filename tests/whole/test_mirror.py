@@ -80,7 +80,7 @@ JUDGED_BY = {
     ),
     "validation/run/test_released.py": "validation/engines/mujoco: forward",
     "validation/check/test_check.py": (
-        "validation/check: calculated columns fitted judge mistakes theirs"
+        "validation/check: calculated columns fitted judge mistakes theirs variants"
     ),
     "validation/robots/test_check.py": (
         "validation/robots: differences guard judge; "

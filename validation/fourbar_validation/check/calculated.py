@@ -10,10 +10,10 @@ them, or a force in place of a balance.
 """
 
 import math
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +21,13 @@ from numpy.typing import NDArray
 from fourbar.effects import Gravity
 from fourbar.errors import FourBarError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
-from fourbar.quantities import FORCE_NAMES, PIN_FORCES, UNITS, VECTORS, Array
+from fourbar.quantities import FORCE_NAMES, PIN_FORCES, VECTORS, Array
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.check.judge import Judge, Mistake
 from fourbar_validation.check.theirs import name_quantity
+from fourbar_validation.compare.tolerance import EPS
 from fourbar_validation.engines.description import FORCE_BETWEEN
 
 MistakenNumbers = dict[str, Array]
@@ -47,17 +48,17 @@ dynamics of a loop; 2e-8 was seen.
 """
 
 
+EPS_SINGLE = float(np.finfo(np.float32).eps)
+"""Round-off of numbers of single precision."""
+LEAST_OF_SINGLE = EPS_SINGLE / 100.0
+"""Median error, as a part of each size, from which numbers may be single ones."""
+MOST_IN_COMMON = 0.5
+"""Correlation of the errors of neighbours that round-off does not reach."""
 _LATE = {
     "one step late: numbers of the position before": 1,
     "one step early: numbers of the position after": -1,
 }
 """Mistakes in time, and by how many positions the numbers are late."""
-
-
-_BETWEEN = {
-    "half a step late: numbers between a position and the one before": 1,
-    "half a step early: numbers between a position and the one after": -1,
-}
 
 
 class _BarWrenches(NamedTuple):
@@ -435,8 +436,29 @@ def find_miscalculated(judge: Judge) -> Iterator[Mistake]:
     if judge.stage == "force":
         yield from _find_impulses(judge)
     yield from _find_late(judge)
-    yield from _find_between(judge)
     yield from _find_other_branch(judge)
+
+
+def find_single_precision(judge: Judge) -> Iterator[Mistake]:
+    """Yield the mistake of too short numbers if errors are such as these leave.
+
+    No error is beyond what round-off of that size allows, most are larger than those of
+    a file that is rounded elsewhere, and those of neighbours have nothing in common.
+    """
+    errors = []
+    common = []
+    for key, theirs in judge.table.values.items():
+        mask = judge.where(key)
+        error = judge.judged(key, judge.ours(key))[0][mask]
+        if not np.all(error <= EPS_SINGLE / EPS * judge.find_exact(key)[mask]):
+            return
+        errors.append(error[error > 0.0])
+        apart = (theirs - judge.ours(key))[mask]
+        common.append(np.nansum(apart[1:] * apart[:-1]) / np.nansum(apart**2))
+    typical = np.median(np.concatenate(errors))
+    if typical >= LEAST_OF_SINGLE and np.nanmedian(common) < MOST_IN_COMMON:
+        text = f"single precision: errors are those of numbers of {EPS_SINGLE:.1e}"
+        yield _state(text, judge.table.values)
 
 
 def _state(
@@ -533,48 +555,6 @@ def _find_late(judge: Judge) -> Iterator[Mistake]:
                 return moved
 
             yield Mistake(text + what, predict)
-
-
-def _find_between(judge: Judge) -> Iterator[Mistake]:
-    """Give each position the numbers half a step before it, or half a step after."""
-    at = judge.at
-    if len(at.angle) < ENOUGH_POSITIONS + 1:
-        return
-    for text, step in _BETWEEN.items():
-        moved: dict[str, Any] = {
-            name: _shift_by_half(values, step)
-            for name in ("angle", "speed", "acceleration", "stroke", "stroke_speed")
-            if (values := getattr(at, name, None)) is not None and np.ndim(values) == 1
-        }
-        try:
-            between = solve(
-                judge.scene,
-                judge.stage,
-                at=at._replace(**moved, remainder=None, lost=None),
-            )
-        except FourBarError:
-            continue
-        for what, names in (("", UNITS), (" (forces alone)", FORCE_NAMES)):
-
-            def predict(
-                quantity: str,
-                right: Solution,
-                between: Solution = between,
-                names: Collection[str] = names,
-            ) -> Array | None:
-                if quantity == right.commanded or quantity not in names:
-                    return None
-                values: Array | None = getattr(between, quantity, None)
-                return values
-
-            yield Mistake(text + what, predict)
-
-
-def _shift_by_half(values: Array, step: int) -> Array:
-    """Return numbers half a step before (step 1) or after (-1) each position."""
-    ends = 2.0 * values[:1] - values[1:2], 2.0 * values[-1:] - values[-2:-1]
-    extended = np.concatenate((ends[0], values, ends[1]))
-    return np.asarray(0.5 * (values + extended[1 - step : len(extended) - 1 - step]))
 
 
 def _find_other_branch(judge: Judge) -> Iterator[Mistake]:

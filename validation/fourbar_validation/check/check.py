@@ -19,7 +19,7 @@ from fourbar.scene import Scene
 from fourbar.writing import require_file, write_text
 from fourbar_validation.check.columns import list_names_of_points
 from fourbar_validation.check.judge import Allowance, Discrepancy, Judge
-from fourbar_validation.check.mistakes import NEARER, Explanation, explain
+from fourbar_validation.check.mistakes import Explanation, explain
 from fourbar_validation.check.theirs import TheirTable, name_quantity, read_table
 from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.compare.scales import VANISHING
@@ -221,25 +221,32 @@ def judge_table(
         tolerance,
         sum(int((~table.stated(key)).sum()) for key in judge.table.values),
     )
-    if tolerance is None and explanations and not judgement.is_explained():
-        power = _find_explained_power(scene, table)
-        return replace(judgement, explained_power=power)
+    unexplained = bool(differing) and not judgement.is_explained()
+    if tolerance is None and unexplained and judgement.agreed_power is None:
+        return _explain_in_fewer_digits(scene, table, judgement)
     return judgement
 
 
-def _find_explained_power(scene: Scene, table: TheirTable) -> int | None:
-    """Find the power of ten as a tolerance of which known mistakes explain a table.
+def _explain_in_fewer_digits(
+    scene: Scene,
+    table: TheirTable,
+    judgement: Judgement,
+) -> Judgement:
+    """Explain a table by mistakes that its numbers show in fewer digits than printed.
 
-    None if they do not even within what a table in few digits may be off by.
+    Returned as it is if no mistake explains all of it even within what a table in few
+    digits may be off by.
     """
     powers = range(_LEAST_POWER, round(math.log10(FEWEST_DIGITS)) + 1)
 
-    def explains(power: int) -> bool:
-        return judge_table(scene, table, Allowance(10.0**power)).is_explained()
+    def explain_within(power: int) -> list[Explanation]:
+        within = judge_table(scene, table, Allowance(10.0**power))
+        return within.explanations if within.is_explained() else []
 
-    if not explains(powers[-1]):
-        return None
-    return powers[bisect_left(powers, True, key=explains)]
+    if not explain_within(powers[-1]):
+        return judgement
+    power = powers[bisect_left(powers, True, key=lambda p: bool(explain_within(p)))]
+    return replace(judgement, explanations=explain_within(power), explained_power=power)
 
 
 def write_judgement_json(judgement: Judgement, table: TheirTable) -> str:
@@ -341,14 +348,7 @@ def _write_extent(explanation: Explanation) -> str:
     """Write how far a mistake explains what differs."""
     if explanation.complete:
         return "explains everything that differs: " + ", ".join(explanation.quantities)
-    parts = []
-    if explanation.quantities:
-        parts.append("explains " + ", ".join(explanation.quantities))
-    if explanation.nearer:
-        parts.append(
-            ", ".join(explanation.nearer) + f" then at least {NEARER:g} times nearer"
-        )
-    return "; ".join(parts)
+    return "explains " + ", ".join(explanation.quantities)
 
 
 @click.command("check")

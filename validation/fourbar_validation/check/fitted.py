@@ -4,17 +4,14 @@ The number is a ratio, a factor, an offset or another order.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects import Gravity, Load
-from fourbar.errors import FourBarError
-from fourbar.linkage import BAR_NAMES, Bar
+from fourbar.effects import Gravity
+from fourbar.linkage import BAR_NAMES
 from fourbar.quantities import FORCE_NAMES, UNITS, VECTORS, Array
 from fourbar.quantities.units import find_factor
 from fourbar.scene import Scene
@@ -22,14 +19,24 @@ from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.check.judge import Judge, Mistake
 from fourbar_validation.check.theirs import OTHER_UNITS, name_quantity
+from fourbar_validation.check.variants import (
+    Predict,
+    Variant,
+    predict_variants,
+    state_all,
+)
 from fourbar_validation.compare.tolerance import compute_difference, replace_zero_size
-from fourbar_validation.scenes.bars import replace_bars
+from fourbar_validation.scenes.bars import list_moving
 
 ENOUGH_NUMBERS = 3
 """Numbers that a fitted one must explain: fewer are explained by chance."""
 CARRIED = 2.0
 """Factor on what is allowed. A fitted number carries the rounding of the numbers it was
 fitted to.
+"""
+NEAR_ENOUGH = 10.0 * CARRIED
+"""Factor on what is allowed within which a ratio is looked at more closely: the best
+fit has no more of the rounding of its numbers than that.
 """
 _FACTORS = {
     0.5: "halved",
@@ -39,6 +46,7 @@ _FACTORS = {
     4.0: "m L^2/3, of a slender bar about its end, where m L^2/12 is right",
 }
 """Factors of a moment of inertia, and the mistake behind each."""
+_INERTIA = "moment of inertia"
 LEAST_FACTOR = 1e-9
 """Least factor. What a smaller one multiplies was left out, which is a mistake of its
 own.
@@ -47,10 +55,14 @@ NEAR_A_PLAIN_NUMBER = 1e-2
 """Relative distance within which a fitted number is tried as a plain one."""
 OFFSETS_TRIED = 72
 """Offsets of the crank angle that are tried before one is fitted, 5 deg apart."""
+PROMISING = 0.5
+"""Mean misfit, as a part of each quantity's size and at most 1 of each number, below
+which an offset is fitted. Within 2.5 deg of the right one it is a few hundredths.
+"""
 _TRIED = 37
 """Rows by which the offsets are tried."""
-NEWTON = 12
-"""Steps of the fit; it is quadratic, and starts within 5 deg."""
+NEWTON = 6
+"""Steps of the fit; it is quadratic, and starts within 2.5 deg."""
 FIT_STEP = 1e-6
 """Step of the finite difference from which the fit finds its slope, rad."""
 MOST_ROWS_REORDERED = 1000
@@ -93,6 +105,8 @@ def _find_ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
         announced = judge.table.units[key]
         unit = UNITS[name_quantity(key)]
         near = float(ours @ theirs) / squares
+        if not judge.explained(key, near * judge.ours(key), NEAR_ENOUGH):
+            continue
         ratio_found = _name_ratio(
             judge,
             key,
@@ -199,9 +213,8 @@ def _compute_residual(
 def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
     """Try a moment of inertia, a mass, gravity or a load times a factor.
 
-    Forces and torque are linear in each.
+    Forces and torque are linear in each, so that the doubled number tells the factor.
     """
-    scene = judge.scene
     keys = [key for key in differing if name_quantity(key) in FORCE_NAMES]
     keys = [
         key for key in keys if not key.startswith("|")
@@ -214,115 +227,85 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
     )
     if np.count_nonzero(theirs) < ENOUGH_NUMBERS:
         return
-    bars = ("input", "coupler", "output")
-    inertia = (
-        "moment of inertia",
-        lambda bar, f: replace(bar, inertia=f * bar.moment_of_inertia),
-    )
-    mass = ("mass", lambda bar, f: bar.with_mass(f * bar.mass))
-    of_bars = [
-        (
-            f"{which[0] if len(which) == 1 else 'every bar'}: {word}",
-            word,
-            partial(_scale_bars, scene, which, change),
-        )
-        for which, (word, change) in (
-            *(((bar,), property_) for bar in bars for property_ in (inertia, mass)),
-            (bars, inertia),
-        )
-    ]
-    of_loads = [
-        (f"load {number} (bar {load.bar})", "load", partial(_scale_load, scene, load))
-        for number, load in enumerate(scene.loads, 1)
-    ]
-    for name, word, scaled in (
-        *of_bars,
-        ("gravity", "gravity", partial(_scale_gravity, scene)),
-        *of_loads,
-    ):
-        try:
-            twice = solve(scaled(2.0), "force", at=judge.at)
-            moves = np.concatenate(
-                [
-                    _compute_residual(judge, k, judge.ours(k, twice), judge.ours(k))
-                    for k in keys
-                ]
-            )
-            slope = float(moves @ moves)
-            if slope:
-                factor = 1.0 + float(moves @ theirs) / slope
-            else:
-                factor = math.nan
-            if not LEAST_FACTOR < factor < math.inf or factor == 1.0:
-                continue
-            if word == inertia[0]:
-                plain = next(
-                    (
-                        f
-                        for f in _FACTORS
-                        if abs(factor / f - 1.0) < NEAR_A_PLAIN_NUMBER
-                    ),
-                    None,
-                )
-            else:
-                plain = None
-            for f in (factor,) if plain is None else (plain, factor):
-                wrong = solve(scaled(f), "force", at=judge.at)
-                if f == plain:
-                    what = f"{_FACTORS[f]}"
-                else:
-                    what = f"{f:.6g} times ours (fitted)"
-                yield Mistake(
-                    f"{name} {what}",
-                    lambda quantity, right, wrong=wrong: getattr(wrong, quantity, None),  # type: ignore[misc]
-                    times=1.0 if f == plain else CARRIED,
-                )
-                if f == plain and all(
-                    judge.explained(key, judge.ours(key, wrong)) for key in keys
-                ):
-                    break
-        except FourBarError:  # the factor leaves no valid scene
-            continue
-
-
-def _scale_bars(
-    scene: Scene,
-    which: Sequence[str],
-    change: Callable[[Bar, float], Bar],
-    f: float,
-) -> Scene:
-    return replace_bars(
+    scene = state_all(judge.scene)
+    parts = dict(_list_factors(scene))
+    doubled = predict_variants(
         scene,
-        **{bar: change(getattr(scene.linkage, bar), f) for bar in which},
+        judge.at,
+        [Variant(name, _scale(numbers, 2.0)) for name, numbers in parts.items()],
     )
-
-
-def _scale_gravity(scene: Scene, f: float) -> Scene:
-    scaled = (
-        (
-            replace(effect, magnitude=f * effect.magnitude)
-            if isinstance(effect, Gravity)
-            else effect
+    fitted = []
+    for (name, numbers), predict in zip(parts.items(), doubled, strict=True):
+        moves = np.concatenate(
+            [
+                _compute_residual(judge, key, predicted, judge.ours(key))
+                for key in keys
+                if (predicted := _predict_key(predict, key, judge)) is not None
+            ]
         )
-        for effect in scene.effects
-    )
-    return replace(scene, effects=tuple(scaled))
+        squares = float(moves @ moves)
+        factor = 1.0 + float(moves @ theirs) / squares if squares else math.nan
+        if LEAST_FACTOR < factor < math.inf and factor != 1.0:
+            for f, what, times in _name_factors(name, factor):
+                fitted.append((times, Variant(f"{name} {what}", _scale(numbers, f))))
+    if not fitted:
+        return
+    variants = [variant for _, variant in fitted]
+    predictions = predict_variants(scene, judge.at, variants)
+    explained = set()
+    for (times, variant), predict in zip(fitted, predictions, strict=True):
+        changed = frozenset(variant.numbers)
+        if changed in explained:
+            continue  # by a plain factor
+        yield Mistake(variant.text, predict, times=times)
+        if times == 1.0 and all(
+            (predicted := _predict_key(predict, key, judge)) is not None
+            and judge.explained(key, predicted)
+            for key in keys
+        ):
+            explained.add(changed)
 
 
-def _scale_load(
-    scene: Scene,
-    load: Load,
-    f: float,
-) -> Scene:
-    force = None
-    if load.force is not None:
-        size, angle = load.force
-        force = (f * size, angle)
-    scaled = replace(load, force=force, moment=f * load.moment)
-    loads = []
-    for candidate in scene.loads:
-        loads.append(scaled if candidate is load else candidate)
-    return replace(scene, loads=tuple(loads))
+def _predict_key(predict: Predict, key: str, judge: Judge) -> Array | None:
+    return Mistake("", predict).prediction(key, judge.right)
+
+
+def _scale(numbers: dict[str, float], factor: float) -> dict[str, float]:
+    return {key: factor * x for key, x in numbers.items()}
+
+
+def _list_factors(scene: Scene) -> Iterator[tuple[str, dict[str, float]]]:
+    """List what may have a factor, with its numbers by their keys."""
+    inertias: dict[str, float] = {}
+    for name, bar in list_moving(scene):
+        inertia = {f"bars.{name}.inertia": bar.moment_of_inertia}
+        inertias |= inertia
+        mass = {f"bars.{name}.mass": bar.mass}
+        yield f"{name}: {_INERTIA}", inertia
+        yield f"{name}: mass", mass
+        yield f"{name}: mass and {_INERTIA}", mass | inertia
+    yield f"every bar: {_INERTIA}", inertias
+    for effect in scene.effects:
+        if isinstance(effect, Gravity):
+            yield "gravity", {"effects.gravity.0": effect.magnitude}
+    for number, load in enumerate(scene.loads):
+        numbers = {f"loads.{number}.moment": load.moment}
+        if load.force is not None:
+            numbers[f"loads.{number}.force.0"] = load.force[0]
+        yield f"load {number + 1} (bar {load.bar})", numbers
+
+
+def _name_factors(name: str, factor: float) -> Iterator[tuple[float, str, float]]:
+    """Yield the plain factor near a fitted one, and the fitted one.
+
+    Each comes with what was done, and the factor on what is allowed.
+    """
+    if name.endswith(f": {_INERTIA}"):
+        for plain, mistake in _FACTORS.items():
+            if abs(factor / plain - 1.0) < NEAR_A_PLAIN_NUMBER:
+                yield plain, mistake, 1.0
+                break
+    yield factor, f"{factor:.6g} times ours (fitted)", CARRIED
 
 
 def _try_offset(judge: Judge) -> Iterator[Mistake]:
@@ -340,6 +323,8 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
     residuals = _compute_residuals(judge, keys, tried, rows)
     sizes = np.abs(np.nan_to_num(residuals, nan=1.0))
     misfits = np.mean(np.minimum(sizes, 1.0), axis=1)
+    if not misfits.min() < PROMISING:
+        return
     offset = float(tried[np.argmin(misfits)])
     everything = np.arange(n)
     for _ in range(NEWTON):
@@ -415,15 +400,12 @@ def _try_order(judge: Judge) -> Iterator[Mistake]:
         return
     apart = np.zeros((n, n))
     for key in keys:
-        ours = judge.ours(key)
-        theirs = table.values[key]
-        scale = judge.size(key).max()
-        for i in range(n):
-            if ours.ndim == 2:
-                filled = np.where(np.isnan(theirs[i]), ours, theirs[i])
-            else:
-                filled = np.full(n, theirs[i])
-            apart[i] += compute_difference(name_quantity(key), ours, filled) / scale
+        tiled = np.tile(np.arange(n), n)
+        ours = judge.ours(key)[tiled]
+        theirs = np.repeat(table.values[key], n, axis=0)
+        filled = np.where(np.isnan(theirs), ours, theirs)
+        difference = compute_difference(name_quantity(key), ours, filled)
+        apart += difference.reshape(n, n) / judge.size(key).max()
     nearest = np.argmin(apart, axis=1)
     in_place = np.arange(n)
     # a revolution ends where it began

@@ -120,6 +120,7 @@ class Judge:
         self.ok = self.right.status_code == OK
         self._scales: dict[str, Scale] = {}
         self._exact: dict[str, Array] = {}
+        self._where: dict[str, Mask] = {}
         self._right_columns: dict[str, Array] = {}
         for key in table.values:
             name = name_quantity(key)
@@ -151,7 +152,9 @@ class Judge:
 
     def where(self, key: str) -> Mask:
         """Mark the rows in which both have a number, (n,)."""
-        return np.asarray(self._answer(key) & self.table.stated(key))
+        if key not in self._where:
+            self._where[key] = np.asarray(self._answer(key) & self.table.stated(key))
+        return self._where[key]
 
     def scale(self, key: str) -> Scale:
         """Compute size of a key and how far its terms cancel, (n,)."""
@@ -165,7 +168,7 @@ class Judge:
             )
         return self._scales[key]
 
-    def _find_exact(self, key: str) -> Array:
+    def find_exact(self, key: str) -> Array:
         """Compute the error that round-off allows a key at each position, (n,)."""
         if key not in self._exact:
             scale, linkage = self.scale(key), self.scene.linkage
@@ -214,7 +217,7 @@ class Judge:
             for other in self.near
         ]
         spread = divide(np.fmax.reduce(moves), scale) if moves else 0.0
-        exact = self._find_exact(key)
+        exact = self.find_exact(key)
         allowed = (exact + spread) * larger + divide(self.table.rounding[key], scale)
         return (
             divide(apart, scale),

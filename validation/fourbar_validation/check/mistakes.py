@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,10 +20,15 @@ from fourbar.quantities import FORCE_NAMES, VECTORS, Array
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
-from fourbar_validation.check.calculated import find_miscalculated
+from fourbar_validation.check.calculated import (
+    ENOUGH_POSITIONS,
+    find_miscalculated,
+    find_single_precision,
+)
 from fourbar_validation.check.fitted import ENOUGH_NUMBERS, find_fitted
 from fourbar_validation.check.judge import Judge, Mistake
-from fourbar_validation.scenes.bars import list_moving, replace_bars
+from fourbar_validation.check.variants import Variant, predict_variants, state_all
+from fourbar_validation.scenes.bars import list_moving
 
 RPM = np.pi / 30.0
 """rad/s of one rev/min."""
@@ -34,10 +39,11 @@ _GRAVITY_TURNED = {
 """Directions that gravity may be given, by their angle from the right one."""
 MOST_EXPLANATIONS = 5
 """Explanations that are printed."""
-NEARER = 10.0
-"""Ratio of improvement above which a mistake is named. It then explains not all, but
-brings every row that differs nearer.
-"""
+_BETWEEN = {
+    "half a step late: numbers between a position and the one before": 1,
+    "half a step early: numbers between a position and the one after": -1,
+}
+"""Mistakes in time, and the side on which the numbers were taken."""
 
 
 def list_column_mistakes() -> Iterator[Mistake]:
@@ -57,16 +63,15 @@ def list_hypotheses(scene: Scene, command: Command) -> Iterator[Mistake]:
     if command.speed is not None:
         yield from _scale_inertial(scene, command)
         yield from _scale_actions(scene, command)
-    for text, changed, other_command in _list_other_problems(scene, command):
-        try:
-            wrong = solve(
-                changed,
-                "position" if other_command.speed is None else "force",
-                at=other_command,
-            )
-        except FourBarError:  # the mistake leaves no valid scene
-            continue
-        yield Mistake(text, partial(_take_from, wrong))
+    variants = list(_list_variants(scene, command))
+    predictions = predict_variants(state_all(scene), command, variants)
+    for variant, predict in zip(variants, predictions, strict=True):
+        yield Mistake(variant.text, predict, times=variant.times)
+    if command.speed is not None:
+        for text, changed in _list_other_scenes(scene):
+            with suppress(FourBarError):  # the mistake leaves no valid scene
+                wrong = solve(changed, "force", at=command)
+                yield Mistake(text, partial(_take_from, wrong))
 
 
 def _change_column(
@@ -110,16 +115,11 @@ def _scale_inertial(scene: Scene, command: Command) -> Iterator[Mistake]:
 
     Forces and torque are linear in each.
     """
-    bare = replace(scene, loads=(), effects=())
-    massless = {
-        name: replace(bar.with_mass(0.0), inertia=bar.moment_of_inertia)
-        for name, bar in list_moving(bare)
-    }
-    pointlike = {name: replace(bar, inertia=0.0) for name, bar in list_moving(bare)}
-    of_mass, of_inertia = (
-        solve(replace_bars(bare, **bars), "force", at=command)
-        for bars in (pointlike, massless)
-    )
+    bare = state_all(replace(scene, loads=(), effects=()))
+    names = [f"bars.{name}" for name, _ in list_moving(scene)]
+    pointlike = Variant("I = 0", {f"{name}.inertia": 0.0 for name in names})
+    massless = Variant("m = 0", {f"{name}.mass": 0.0 for name in names})
+    of_mass, of_inertia = predict_variants(bare, command, (pointlike, massless))
 
     def scaled(
         by_mass: float,
@@ -128,9 +128,11 @@ def _scale_inertial(scene: Scene, command: Command) -> Iterator[Mistake]:
         def predict(quantity: str, right: Solution) -> Array | None:
             if quantity not in FORCE_NAMES:
                 return None
-            extra = (by_mass - 1.0) * getattr(of_mass, quantity) + (
-                by_inertia - 1.0
-            ) * getattr(of_inertia, quantity)
+            m_a = of_mass(quantity, right)
+            i_alpha = of_inertia(quantity, right)
+            if m_a is None or i_alpha is None:
+                return None
+            extra = (by_mass - 1.0) * m_a + (by_inertia - 1.0) * i_alpha
             return np.asarray(getattr(right, quantity) + extra)
 
         return predict
@@ -248,73 +250,11 @@ def _relax(key: str, spring: Any) -> Iterator[tuple[str, Any]]:
                 yield f"{text} of torsion", relaxed
 
 
-def _list_other_problems(
-    scene: Scene,
-    command: Command,
-) -> Iterator[tuple[str, Scene, Command]]:
-    """List scenes and commands that mistakes amount to; the formulas answer them."""
-    for text, other_command in _list_other_commands(command):
-        yield text, scene, other_command
-    for text, changed in chain(
-        _change_gravity(scene),
-        _change_loads(scene),
-        _change_bars(scene),
-    ):
-        yield text, changed, command
+def _list_other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
+    """List scenes that differ by a word: the bar of the torque, or a load's frame."""
     for drive in {2, 3, 4} - {scene.drive_bar} if scene.drive is None else ():
-        yield (
-            f"the torque acts on bar {drive} instead of bar {scene.drive_bar}",
-            replace(scene, drive_bar=drive),
-            command,
-        )
-
-
-def _list_other_commands(command: Command) -> Iterator[tuple[str, Command]]:
-    yield "the other branch", command._replace(branch=-command.branch)
-    name = command.commanded
-    yield f"{name} read as degrees", command._replace(angle=np.radians(command.angle))
-    in_degrees = np.degrees(
-        np.fmod(command.angle, TURN)
-    )  # a whole turn is 6.28 of these degrees
-    yield (
-        f"{name} in radians where degrees were announced",
-        command._replace(angle=in_degrees),
-    )
-    if command.speed is not None:
-        yield (
-            "no inertial forces (statics)",
-            command._replace(speed=0.0, acceleration=0.0),
-        )
-        if np.any(command.acceleration):
-            left_out = f"alpha_{command.bar} is left out"
-            yield left_out, command._replace(acceleration=0.0)
-        yield (
-            f"omega_{command.bar} in rev/min taken for rad/s",
-            command._replace(speed=command.speed / RPM),
-        )
-        yield (
-            f"omega_{command.bar} in rad/s taken for rev/min",
-            command._replace(speed=command.speed * RPM),
-        )
-
-
-def _change_gravity(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    gravity = [effect for effect in scene.effects if isinstance(effect, Gravity)]
-    others = tuple(
-        effect for effect in scene.effects if not isinstance(effect, Gravity)
-    )
-    if not gravity:
-        yield (
-            "gravity along -y is included though the scene has none",
-            replace(scene, effects=(*others, Gravity())),
-        )
-        return
-    for text, angle in _GRAVITY_TURNED.items():
-        turned = (replace(effect, angle=effect.angle + angle) for effect in gravity)
-        yield f"gravity is {text}", replace(scene, effects=(*others, *turned))
-
-
-def _change_loads(scene: Scene) -> Iterator[tuple[str, Scene]]:
+        text = f"the torque acts on bar {drive} instead of bar {scene.drive_bar}"
+        yield text, replace(scene, drive_bar=drive)
     for i, load in enumerate(scene.loads):
         if load.force is None or load.arm is not None:
             continue
@@ -329,71 +269,106 @@ def _change_loads(scene: Scene) -> Iterator[tuple[str, Scene]]:
         yield f"{name}: its direction {how}", replace(scene, loads=tuple(loads))
 
 
-def _change_bars(scene: Scene) -> Iterator[tuple[str, Scene]]:
+def _list_variants(scene: Scene, command: Command) -> Iterator[Variant]:
+    """List the problems that differ by numbers of the scene, or by the command."""
+    yield from _list_other_commands(command)
+    yield from _change_gravity(scene)
+    yield from _change_bars(scene)
+
+
+def _list_other_commands(command: Command) -> Iterator[Variant]:
+    name = command.commanded
+    angle = command.angle
+    yield Variant("the other branch", at=command._replace(branch=-command.branch))
+    as_degrees = command._replace(angle=np.radians(angle))
+    yield Variant(f"{name} read as degrees", at=as_degrees)
+    # a whole turn is 6.28 of these degrees
+    in_degrees = command._replace(angle=np.degrees(np.fmod(angle, TURN)))
+    text = f"{name} in radians where degrees were announced"
+    yield Variant(text, at=in_degrees, times=float(np.degrees(1.0)))
+    if command.speed is not None:
+        at_rest = command._replace(speed=0.0, acceleration=0.0)
+        yield Variant("no inertial forces (statics)", at=at_rest)
+        bar = command.bar
+        if np.any(command.acceleration):
+            steady = command._replace(acceleration=0.0)
+            yield Variant(f"alpha_{bar} is left out", at=steady)
+        for words, factor in (
+            ("rev/min taken for rad/s", 1.0 / RPM),
+            ("rad/s taken for rev/min", RPM),
+        ):
+            other = command._replace(speed=command.speed * factor)
+            yield Variant(f"omega_{bar} in {words}", at=other)
+    if len(angle) <= ENOUGH_POSITIONS:
+        return
+    for text, step in _BETWEEN.items():
+        moved: dict[str, Any] = {
+            name: _shift_by_half(values, step)
+            for name in ("angle", "speed", "acceleration", "stroke", "stroke_speed")
+            if (values := getattr(command, name)) is not None and np.ndim(values) == 1
+        }
+        between = command._replace(**moved)
+        yield Variant(text, at=between)
+        yield Variant(f"{text} (forces alone)", at=between, names=FORCE_NAMES)
+
+
+def _shift_by_half(values: Array, step: int) -> Array:
+    """Return numbers half a step before (step 1) or after (-1) each position."""
+    ends = 2.0 * values[:1] - values[1:2], 2.0 * values[-1:] - values[-2:-1]
+    extended = np.concatenate((ends[0], values, ends[1]))
+    return np.asarray(0.5 * (values + extended[1 - step : len(extended) - 1 - step]))
+
+
+def _change_gravity(scene: Scene) -> Iterator[Variant]:
+    magnitude = "effects.gravity.0"
+    for effect in scene.effects:
+        if isinstance(effect, Gravity):
+            for text, angle in _GRAVITY_TURNED.items():
+                turned = {"effects.gravity.1": effect.angle + angle}
+                yield Variant(f"gravity is {text}", turned)
+            return
+    text = "gravity along -y is included though the scene has none"
+    yield Variant(text, {magnitude: Gravity().magnitude})
+
+
+def _change_bars(scene: Scene) -> Iterator[Variant]:
+    every: dict[str, dict[str, float]] = {}
     for name, bar in list_moving(scene):
-        for text, change in _BAR_MISTAKES:
-            changed = change(bar)
-            if changed is not None:
-                yield f"{name}: {text}", replace_bars(scene, **{name: changed})
-    for text, change in _BAR_MISTAKES:
-        changed_bars = {}
-        for name, bar in list_moving(scene):
-            changed = change(bar)
-            if changed is not None:
-                changed_bars[name] = changed
-        if len(changed_bars) > 1:
-            yield f"every bar: {text}", replace_bars(scene, **changed_bars)
+        for text, numbers in _list_bar_mistakes(bar):
+            keyed = {f"bars.{name}.{key}": x for key, x in numbers.items()}
+            yield Variant(f"{name}: {text}", keyed)
+            every.setdefault(text, {}).update(keyed)
+    for text, numbers in every.items():
+        yield Variant(f"every bar: {text}", numbers)
 
 
-def _measure_from_other_pin(bar: Bar) -> Bar | None:
+def _list_bar_mistakes(bar: Bar) -> Iterator[tuple[str, dict[str, float]]]:
+    """List the numbers of a bar that mistakes give it, by their keys."""
     r, phi = bar.mass_centre
-    if not bar.mass:
-        return None
-    x = bar.length - r * np.cos(phi)
-    y = r * np.sin(phi)
-    distance = float(np.hypot(x, y))
-    angle = float(np.arctan2(y, x))
-    return replace(bar, centre=(distance, angle))
+    inertia = bar.moment_of_inertia
 
+    def centre(r: float, phi: float) -> dict[str, float]:
+        return {"centre.0": r, "centre.1": phi}
 
-def _rotate_bar(bar: Bar) -> Bar | None:
-    r, phi = bar.mass_centre
-    if bar.mass and r:
-        return replace(bar, centre=(r, phi + np.pi))
-    return None
-
-
-def _mirror(bar: Bar) -> Bar | None:
-    r, phi = bar.mass_centre
-    if bar.mass and r and np.sin(phi):
-        return replace(bar, centre=(r, -phi))
-    return None
-
-
-_BAR_MISTAKES: tuple[tuple[str, Callable[[Bar], Bar | None]], ...] = (
-    ("mass centre measured from the wrong pin", _measure_from_other_pin),
-    (
-        "mass centre taken at mid-bar",
-        lambda bar: replace(bar, centre=(bar.length / 2.0, 0.0)) if bar.mass else None,
-    ),
-    ("mass centre turned by 180 deg about the bar's first pin", _rotate_bar),
-    ("mass centre on the other side of the bar's line", _mirror),
-    (
-        "inertia about the pin used as the inertia about G",
-        lambda bar: (
-            replace(
-                bar,
-                inertia=bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2,
-            )
-            if bar.mass
-            else None
-        ),
-    ),
-    (
-        "moment of inertia left out",
-        lambda bar: replace(bar, inertia=0.0) if bar.moment_of_inertia else None,
-    ),
-)
+    if bar.mass:
+        x = bar.length - r * np.cos(phi)
+        y = r * np.sin(phi)
+        from_second_pin = centre(float(np.hypot(x, y)), float(np.arctan2(y, x)))
+        yield "mass centre measured from the wrong pin", from_second_pin
+        yield "mass centre taken at mid-bar", centre(bar.length / 2.0, 0.0)
+        if r:
+            text = "mass centre turned by 180 deg about the bar's first pin"
+            yield text, centre(r, phi + np.pi)
+        if r * np.sin(phi):
+            yield "mass centre on the other side of the bar's line", centre(r, -phi)
+        text = "inertia about the pin used as the inertia about G"
+        yield text, {"inertia": inertia + bar.mass * r**2}
+        yield "mass left out", {"mass": 0.0}
+    if inertia:
+        yield "moment of inertia left out", {"inertia": 0.0}
+        if bar.mass:
+            text = "mass and moment of inertia left out"
+            yield text, {"mass": 0.0, "inertia": 0.0}
 
 
 def _is_angular(quantity: str) -> bool:
@@ -436,7 +411,8 @@ those whose columns can have it.
 
 
 ENOUGH_EXPLAINED = 0.9
-"""Part of the quantities that differ which a mistake of the calculation must explain.
+"""Part of the quantities that differ which must agree once a mistake is assumed, or the
+mistakes of several columns together.
 """
 
 
@@ -451,76 +427,77 @@ class Explanation:
     """True if every quantity that differed now agrees."""
     whole: bool = True
     """True if the mistake is one of the calculation, False if it is one of columns."""
-    nearer: tuple[str, ...] = ()
-    """Quantities that it explains for the most part. What remains is NEARER times
-    smaller.
-    """
 
 
+@np.errstate(all="ignore")
 def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
-    """Find the mistakes under which quantities that differ agree.
+    """Find the mistakes under which nine tenths of what differs agrees.
 
-    The most complete come first, then those that come near. A mistake that breaks a
-    quantity which agreed as it was is none. One of the calculation must explain nine
-    tenths of the quantities that differ, or bring most of them nearer: of several only
-    the nearest is named, for they exclude each other.
+    The most complete come first. A mistake of the calculation breaks no quantity that
+    agreed as it was; those of columns count together.
     """
-    explanations: list[Explanation] = []
-    near: list[tuple[float, Explanation]] = []
+    least = ENOUGH_EXPLAINED * len(differing)
+    whole: list[Explanation] = []
+    of_columns: list[Explanation] = []
     for find in _SOURCES:
         for mistake in find(judge, differing):
-            weighed = _weigh(judge, mistake, differing)
-            if weighed is None:
-                continue
-            explanation = weighed.explanation(mistake, differing)
-            if len(weighed.explained) >= ENOUGH_EXPLAINED * len(differing) or (
-                not mistake.whole and (weighed.explained or weighed.nearer)
-            ):
-                explanations.append(explanation)
-            elif weighed.is_near(differing):
-                near.append((weighed.remaining, explanation))
-        if any(explanation.complete for explanation in explanations):
+            explained = _list_explained(judge, mistake, differing, least)
+            if explained:
+                explanation = Explanation(
+                    mistake.text,
+                    tuple(map(judge.table.label, explained)),
+                    len(explained) == len(differing),
+                    mistake.whole,
+                )
+                (whole if mistake.whole else of_columns).append(explanation)
+        if any(explanation.complete for explanation in (*whole, *of_columns)):
             break
-    if near:
-        _, nearest = min(near, key=lambda pair: pair[0])
-        explanations.append(nearest)
-    explanations.sort(key=lambda e: (-len(e.quantities), -len(e.nearer)))
+    together = {name for one in of_columns for name in one.quantities}
+    if len(together) < least:
+        of_columns.clear()
+    explanations = [*of_columns, *whole]
+    explanations.sort(key=lambda explanation: -len(explanation.quantities))
     return explanations[:MOST_EXPLANATIONS]
 
 
-def explain_all(judge: Judge, differing: list[str]) -> list[Explanation]:
-    """Find the mistakes under which every quantity that differs agrees.
+def _list_explained(
+    judge: Judge,
+    mistake: Mistake,
+    differing: list[str],
+    least: float,
+) -> list[str]:
+    """List the keys that differ and agree once a mistake is assumed.
 
-    Most fall at the first number that they leave wrong.
+    Empty if a mistake of the calculation explains fewer than `least`, breaks one that
+    agreed, or is fitted to fewer than ENOUGH_NUMBERS.
     """
-    labels = tuple(map(judge.table.label, differing))
-    explanations: list[Explanation] = []
-    for find in _SOURCES:
-        explanations += [
-            Explanation(mistake.text, labels, True, mistake.whole)
-            for mistake in find(judge, differing)
-            if _explains_all(judge, mistake, differing)
-        ]
-        if explanations:
-            break
-    return explanations[:MOST_EXPLANATIONS]
-
-
-def _explains_all(judge: Judge, mistake: Mistake, differing: list[str]) -> bool:
+    explained = []
+    possible = len(differing)
     numbers = 0
-    for key in dict.fromkeys((*differing, *judge.table.values)):
+    others = judge.table.values if mistake.whole else ()
+    for key in dict.fromkeys((*differing, *others)):
         ours = judge.ours(key)
         predicted = mistake.prediction(key, judge.right)
         if predicted is not None and np.array_equal(predicted, ours, equal_nan=True):
             predicted = None
-        differs = key in differing
-        if predicted is not None and (differs or mistake.whole):
-            if not judge.explained(key, predicted, mistake.times, mistake.left):
-                return False
-        elif differs:
-            return False
-        numbers += differs * int(judge.where(key).sum())
-    return not mistake.fitted or numbers >= ENOUGH_NUMBERS
+        if predicted is not None and judge.where(key).any():
+            agrees = judge.explained(key, predicted, mistake.times, mistake.left)
+        else:
+            agrees = False
+        if key not in differing:
+            if predicted is not None and not agrees:
+                return []
+        elif agrees:
+            explained.append(key)
+            error, allowed, _ = judge.judged(key, ours)
+            numbers += int((error > allowed)[judge.where(key)].sum())
+        elif mistake.whole:
+            possible -= 1
+            if possible < least:
+                return []
+    if mistake.whole and mistake.fitted and numbers < ENOUGH_NUMBERS:
+        return []
+    return [key for key in judge.table.values if key in explained]
 
 
 _SOURCES: tuple[Callable[[Judge, list[str]], Iterator[Mistake]], ...] = (
@@ -529,73 +506,7 @@ _SOURCES: tuple[Callable[[Judge, list[str]], Iterator[Mistake]], ...] = (
         find_miscalculated(judge), list_hypotheses(judge.scene, judge.at)
     ),
     find_fitted,
+    lambda judge, differing: find_single_precision(judge),
 )
 """Sources of mistakes, the cheapest first: one is asked if none before it explains all.
 """
-
-
-class _Weighed(NamedTuple):
-    """Labels of the quantities that a mistake explains or brings nearer."""
-
-    explained: list[str]
-    nearer: list[str]
-    numbers: int
-    """Numbers that differ of the quantities in `nearer`."""
-    remaining: float
-    """Largest error that remains of those."""
-
-    def is_near(self, differing: list[str]) -> bool:
-        """Return True if it brings more numbers nearer than chance does."""
-        most = 2 * len(self.nearer) > len(differing)
-        return most and self.numbers >= ENOUGH_NUMBERS
-
-    def explanation(self, mistake: Mistake, differing: list[str]) -> Explanation:
-        """Return what is reported of the mistake."""
-        return Explanation(
-            mistake.text,
-            tuple(self.explained),
-            len(self.explained) == len(differing),
-            mistake.whole,
-            tuple(self.nearer),
-        )
-
-
-def _weigh(judge: Judge, mistake: Mistake, differing: list[str]) -> _Weighed | None:
-    """Hold what a mistake would make against the table.
-
-    None if it breaks a quantity that agreed. A number that is fitted to fewer than
-    ENOUGH_NUMBERS explains nothing.
-    """
-    explained = []
-    explained_numbers = 0
-    nearer = []
-    numbers = 0
-    remaining = 0.0
-    for key in judge.table.values:
-        predicted = mistake.prediction(key, judge.right)
-        if predicted is None or np.array_equal(
-            predicted,
-            judge.ours(key),
-            equal_nan=True,
-        ):
-            continue
-        before, allowed, _ = judge.judged(key, judge.ours(key))
-        mask = judge.where(key)
-        differs = int((before > allowed)[mask].sum())
-        if judge.explained(key, predicted, mistake.times, mistake.left):
-            if key in differing:
-                explained.append(judge.table.label(key))
-                explained_numbers += differs
-        elif key not in differing:
-            if mistake.whole:
-                return None
-        else:
-            after = judge.judged(key, predicted)[0]
-            enough = differs >= min(ENOUGH_NUMBERS, int(mask.sum()))
-            if enough and np.all((after <= np.maximum(before / NEARER, allowed))[mask]):
-                nearer.append(judge.table.label(key))
-                numbers += differs
-                remaining = max(remaining, float(after[mask].max()))
-    if mistake.whole and mistake.fitted and explained_numbers < ENOUGH_NUMBERS:
-        explained = []
-    return _Weighed(explained, nearer, numbers, remaining)

@@ -176,6 +176,17 @@ class TheirTable:
         finite = np.isfinite(self.values[key])
         return np.asarray(finite.any(axis=1) if finite.ndim == 2 else finite)
 
+    def part(self, rows: slice) -> "TheirTable":
+        """Return some of the rows."""
+        return replace(
+            self,
+            places=self.places[rows],
+            values={key: value[rows] for key, value in self.values.items()},
+            rounding={key: value[rows] for key, value in self.rounding.items()},
+            lines=self.lines[rows],
+            places_rounding=self.places_rounding[rows],
+        )
+
     def from_pin(self, origin: tuple[float, float]) -> "TheirTable":
         """Return the table with its places from O2.
 

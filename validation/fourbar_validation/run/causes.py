@@ -5,7 +5,7 @@ import numpy as np
 from fourbar.errors import FourBarError
 from fourbar.quantities import OK, UNITS, Array
 from fourbar_validation.check.judge import Judge
-from fourbar_validation.check.mistakes import explain_all
+from fourbar_validation.check.mistakes import explain
 from fourbar_validation.check.rows import RowCommands
 from fourbar_validation.check.theirs import NOT_JUDGED, TheirTable, Unit
 from fourbar_validation.compare.answer import Answer
@@ -15,6 +15,10 @@ from fourbar_validation.run.question import Question
 
 MOST_POSITIONS_SEARCHED = 400
 """Positions, in a row, by which a mistake is looked for."""
+FIRST_ROWS = 30
+"""Rows, about the first that differs, by which mistakes are tried first. One that these
+do not contradict is held to all rows.
+"""
 SAME_NUMBERS = 1e-9
 """Part of a quantity's largest value within which a mistake must give an exact engine's
 numbers: it was made in another order of summation than the hypothesis."""
@@ -33,23 +37,40 @@ def find_causes(
     at = answer.at
     if at is None or answer.assembled is None:
         return None
+    scene = state_from_pins(question.scene)
     try:
         regular = question.solution.status_code == OK
         table = make_answer_table(answer, tolerance, regular)
-        rows = RowCommands(at.part(slice(0, len(table.places))))
-        judge = Judge(state_from_pins(question.scene), table, rows=rows)
+        judge = Judge(scene, table, rows=RowCommands(at.part(slice(len(table.places)))))
+        wrong = {key: find_wrong(judge, key) for key in judge.table.values}
+        differing = [key for key, rows in wrong.items() if rows.any()]
+        if not differing:
+            return []
+        rows = choose_rows(np.logical_or.reduce(list(wrong.values())))
+        if len(table.places) > FIRST_ROWS:
+            few = Judge(scene, table.part(rows), rows=RowCommands(judge.at.part(rows)))
+            differing_there = [key for key in differing if wrong[key][rows].any()]
+            if not list_explanations(few, differing_there):
+                return []
+        return list_explanations(judge, differing)
     except FourBarError:
         return None
-    differing = [key for key in judge.table.values if differs(judge, key)]
-    if not differing:
-        return []
-    with np.errstate(all="ignore"):
-        explanations = explain_all(judge, differing)
+
+
+def choose_rows(wrong: Mask) -> slice:
+    """Choose the rows by which mistakes are tried first, about the first wrong one."""
+    latest = max(0, len(wrong) - FIRST_ROWS)
+    start = min(max(0, int(np.argmax(wrong)) - FIRST_ROWS // 2), latest)
+    return slice(start, start + FIRST_ROWS)
+
+
+def list_explanations(judge: Judge, differing: list[str]) -> list[str]:
+    """List the mistakes that explain what differs in a table."""
     return [
         explanation.text
         if explanation.whole
         else f"{explanation.text}: {', '.join(explanation.quantities)}"
-        for explanation in explanations
+        for explanation in explain(judge, differing)
     ]
 
 
@@ -105,8 +126,7 @@ def make_answer_table(
     )
 
 
-def differs(judge: Judge, key: str) -> bool:
-    """Return whether any number of a quantity is beyond what is allowed."""
-    mask = judge.where(key) & (judge.right.status_code == OK)
+def find_wrong(judge: Judge, key: str) -> Mask:
+    """Mark the rows in which a quantity is beyond what is allowed, (n,)."""
     error, allowed, _ = judge.judged(key, judge.ours(key))
-    return bool(np.any(~(error[mask] <= allowed[mask])))
+    return np.asarray(judge.where(key) & judge.ok & ~(error <= allowed))

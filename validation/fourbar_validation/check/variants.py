@@ -1,0 +1,106 @@
+"""Wrong problems that a mistake may amount to, all solved at once.
+
+A mistake in what was solved is another number of the scene or another command: one
+member of a study, whose members together take a tenth of the time of one by one.
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fourbar.effects import Gravity
+from fourbar.quantities import UNITS, Array
+from fourbar.scene import Command, Scene
+from fourbar.solution import Solution
+from fourbar.studies.keys import list_entries, read_number
+from fourbar.studies.study import Study
+from fourbar_validation.scenes.bars import list_moving, replace_bars
+
+_STACKED = (
+    "angle",
+    "branch",
+    "speed",
+    "acceleration",
+    "time",
+    "condition",
+    "stroke",
+    "stroke_speed",
+)
+"""Fields of a command that may be an array; those beyond a double are left out."""
+Predict = Callable[[str, Solution], Array | None]
+"""quantity, right solution -> what would have been printed; None: nothing changes."""
+
+
+class Variant(NamedTuple):
+    """Problem that somebody solved in place of the one that was set."""
+
+    text: str
+    """Mistake that leads to it."""
+    numbers: Mapping[str, float] = {}
+    """Numbers of the scene that are others, by key."""
+    at: Command | None = None
+    """Other command, if it is another one."""
+    names: Collection[str] = UNITS
+    """Quantities that were taken from it."""
+    times: float = 1.0
+    """Factor on what is allowed, where the rounding of an angle is magnified."""
+
+
+def state_all(scene: Scene) -> Scene:
+    """State every number that a variant may change: bars in full, and gravity."""
+    bars = {
+        name: replace(
+            bar.with_mass(bar.mass),
+            inertia=bar.moment_of_inertia,
+            centre=bar.mass_centre,
+        )
+        for name, bar in list_moving(scene)
+    }
+    if not any(isinstance(effect, Gravity) for effect in scene.effects):
+        scene = replace(scene, effects=(*scene.effects, Gravity(0.0)))
+    return replace_bars(scene, **bars)
+
+
+def predict_variants(
+    scene: Scene,
+    at: Command,
+    variants: Sequence[Variant],
+) -> list[Predict]:
+    """Solve the variants of a scene that states all; return what each predicts."""
+    entries = list_entries(scene)
+    keys = {key for variant in variants for key in variant.numbers}
+    values = {}
+    invalid = np.zeros(len(variants), dtype=bool)
+    for key in keys:
+        usual = read_number(scene, entries[key])
+        column = [variant.numbers.get(key, usual) for variant in variants]
+        values[key] = np.array(column, dtype=float)
+        invalid |= ~entries[key].holds(values[key])
+    commands = [variant.at or at for variant in variants]
+    stacked: dict[str, Any] = {
+        name: _stack([getattr(command, name) for command in commands], len(at.angle))
+        for name in _STACKED
+    }
+    together = at._replace(**stacked, remainder=None, lost=None)
+    stage = "position" if at.speed is None else "force"
+    wrong = Study(scene, values, invalid, together).solve(stage)
+
+    def predict_member(member: int, names: Collection[str]) -> Predict:
+        def predict(quantity: str, right: Solution) -> Array | None:
+            values = getattr(wrong, quantity, None)
+            if values is None or quantity not in names or quantity == right.commanded:
+                return None
+            return np.asarray(values[member])
+
+        return predict
+
+    return [predict_member(i, variant.names) for i, variant in enumerate(variants)]
+
+
+def _stack(values: list[Any], n: int) -> Array | None:
+    """Stack a field of m commands to (m, n); None if it is not stated."""
+    if values[0] is None:
+        return None
+    return np.stack([np.broadcast_to(value, (n,)) for value in values])
