@@ -584,7 +584,8 @@ def test_what_nobody_knows_is_no_known_mistake() -> None:
 def test_a_search_that_finds_nothing_costs_few_solutions() -> None:
     """Every number is wrong by itself, so that every mistake is tried.
 
-    100 ms are 140 times what the scene's own 31 positions take, 0.7 ms.
+    The time is some 100 times what 31 positions take, 0.7 ms on a free processor; when
+    each mistake was solved by itself it was 1000 times.
     """
     scene = fourbar.load(CAPABILITIES.parent / "thesis.toml")
     question = make_question("thesis", scene, [])
@@ -600,7 +601,7 @@ def test_a_search_that_finds_nothing_costs_few_solutions() -> None:
         return min(seconds)
 
     search = least_seconds(lambda: find_causes_of(question, answer, EQUIVALENCE))
-    assert search < 140.0 * least_seconds(lambda: fourbar.solve(SCENE))
+    assert search < 300.0 * least_seconds(lambda: fourbar.solve(SCENE))
 
 
 def disturb(numbers: dict[str, np.ndarray], at: Command) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fourbar.effects import Gravity
 from fourbar.linkage import BAR_NAMES
-from fourbar.quantities import FORCE_NAMES, UNITS, VECTORS, Array
+from fourbar.quantities import FORCE_NAMES, STAGE_OF, STAGES, UNITS, VECTORS, Array
 from fourbar.quantities.units import find_factor
 from fourbar.scene import Scene
 from fourbar.solution import Solution
@@ -61,6 +61,8 @@ which an offset is fitted. Within 2.5 deg of the right one it is a few hundredth
 """
 _TRIED = 37
 """Rows by which the offsets are tried."""
+MOST_FITTED = 3
+"""Quantities to which an offset is fitted, those of the motion first."""
 NEWTON = 6
 """Steps of the fit; it is quadratic, and starts within 2.5 deg."""
 FIT_STEP = 1e-6
@@ -314,6 +316,7 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
     The offset is that at which theirs fit best, refined by Gauss and Newton.
     """
     keys = [key for key in judge.table.values if judge.size(key).any()]
+    keys = sorted(keys, key=_find_stage)[:MOST_FITTED]
     numbers = sum(np.count_nonzero(judge.where(key)) for key in keys)
     if numbers < ENOUGH_NUMBERS or judge.at.stroke is not None:
         return
@@ -361,6 +364,11 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
     )
 
 
+def _find_stage(key: str) -> int:
+    """Return the number of the stage that computes a quantity."""
+    return STAGES.index(STAGE_OF.get(name_quantity(key), "force"))
+
+
 def _compute_residuals(
     judge: Judge,
     keys: list[str],
@@ -375,7 +383,8 @@ def _compute_residuals(
     repeated = judge.at.part(np.tile(rows, m))
     angle = repeated.angle + np.repeat(offsets, len(rows))
     at = repeated._replace(angle=angle, remainder=None, time=None)
-    moved = solve(judge.scene, judge.stage, at=at)
+    latest = max(map(_find_stage, keys))
+    moved = solve(judge.scene, STAGES[latest], at=at)
     parts = []
     for key in keys:
         theirs = judge.table.values[key][rows].reshape(len(rows), -1)
