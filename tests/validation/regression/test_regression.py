@@ -43,6 +43,7 @@ from fourbar_validation.regression.changes import Kind, compare_runs
 from fourbar_validation.regression.history import (
     HISTORY,
     collect_history,
+    find_since,
     summarise,
 )
 from fourbar_validation.regression.record import (
@@ -982,6 +983,90 @@ def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(tmp_path: Path) -
     (kept / HISTORY).write_bytes(b"no columns")
     with pytest.raises(InputError, match="is damaged, or no table"):
         summarise(kept / HISTORY)
+
+
+HELD = replace(ROW, engine="mine", quantity="F32")
+FAILED = replace(HELD, error=1e-3, verdict=FAILS)
+SINCE = [
+    ([[HELD]], FAILED, "held in {before}"),
+    ([[HELD], [HELD]], FAILED, "held in {before}"),
+    ([[FAILED]], FAILED, "failed too in {before}"),
+    (
+        [[FAILED], [FAILED]],
+        FAILED,
+        "failed too in {before}, and in every accepted run since the run of 2026-01-01"
+        " at commit c0",
+    ),
+    (
+        [[FAILED], [HELD], [FAILED], [FAILED]],
+        FAILED,
+        "has failed since the run of 2026-01-03 at commit c2; it held in the run of"
+        " 2026-01-02 at commit c1",
+    ),
+    ([[replace(HELD, quantity="F43")]], FAILED, "is not in {before}"),
+    ([[replace(FAILED, engine="theirs")]], FAILED, "is not in {before}"),
+    ([[replace(FAILED, scene="b")]], FAILED, "is not in {before}"),
+    ([[HELD]], replace(FAILED, quantity="all"), "answered in {before}"),
+    ([[FAILED]], replace(FAILED, quantity="all"), "answered in {before}"),
+    (
+        [[HELD], [replace(FAILED, quantity="all")]],
+        replace(FAILED, quantity="all"),
+        "has failed since the run of 2026-01-02 at commit c1; it answered in the run of"
+        " 2026-01-01 at commit c0",
+    ),
+]
+"""Rows of accepted runs, the oldest first; a row that fails now; since when."""
+
+
+@pytest.mark.parametrize(("runs", "failure", "words"), SINCE)
+def test_a_failure_is_looked_up_in_the_accepted_runs(
+    runs: list[list[Row]],
+    failure: Row,
+    words: str,
+    tmp_path: Path,
+) -> None:
+    kept = tmp_path / "kept"
+    other = replace(HELD, scene="other")
+    for number, rows in enumerate(runs):
+        record, stated = made([*rows, other], {"scene": SCENE})
+        date = f"2026-01-0{number + 1}T02:00:00+00:00"
+        about = replace(record, date=date, commit=f"c{number}")
+        latest = save_run(tmp_path / str(number), stated, about=about)
+        accepting = ["accept", str(latest), "--to", str(kept)]
+        assert status([*accepting, "--even-failing", "--allow-weaker"]) == 0
+    key = (failure.scene, failure.engine, failure.quantity)
+    before = open_run(kept)
+    assert find_since(before, [key])[key] == words.format(before=before.describe())
+    if len(runs) == 1:  # a run that was not accepted tells of itself
+        alone = open_run(latest)
+        assert find_since(alone, [key])[key] == words.format(before=alone.describe())
+
+
+def test_the_page_of_differences_begins_with_a_picture_of_what_fails_first(
+    tmp_path: Path,
+) -> None:
+    kept = tmp_path / "kept"
+    errors = [1e-15, 2e-3, 3e-3, 4e-3]
+    for number, error in enumerate(errors):
+        verdict = FAILS if error > 1e-14 else AGREES
+        row = replace(HELD, error=error, verdict=verdict)
+        record, rows = made([row], {"scene": SCENE})
+        about = replace(record, date=f"2026-01-0{number + 1}", commit=f"c{number}")
+        latest = save_run(tmp_path / str(number), rows, about=about)
+        if number < 3:
+            accepting = ["accept", str(latest), "--to", str(kept), "--even-failing"]
+            assert status(accepting) == 0
+    page = tmp_path / "page.html"
+    status(["compare", str(kept), str(latest), "--html", str(page)])
+    text = page.read_text("utf-8")
+    picture = text.index("<svg")
+    assert text.index("</h1>") < picture < text.index("<h2>")
+    since = "since the run of 2026-01-02 at commit c1"
+    caption = f"F32: error in the accepted runs and in this one. It has failed {since}"
+    assert caption in text
+    assert text.count(since) == 3  # of the picture, its name, and the row
+    svg = text[picture : text.index("</svg>")]
+    assert all(f">{name}<" in svg for name in ("c0", "c1", "c2", "this run"))
 
 
 @pytest.mark.slow

@@ -19,7 +19,7 @@ from fourbar_validation.regression.record import (
 )
 from fourbar_validation.report.record import Record
 from fourbar_validation.run.plan import Plan, RunOptions
-from fourbar_validation.run.run import find_since, run
+from fourbar_validation.run.run import run
 from tests.support.here import judge_here
 from tests.support.runs import save_run
 from tests.support.unlucky import Few
@@ -31,31 +31,6 @@ FAILED = replace(ROW, error=1e-3, verdict=FAILS)
 
 def save(folder: Path, rows: list[Row]) -> Recorded:
     return open_run(save_run(folder, rows, about=MINE))
-
-
-@pytest.mark.parametrize(
-    ("before", "failure", "words"),
-    [
-        ([ROW], FAILED, "It held in "),
-        ([FAILED], FAILED, "It failed too in "),
-        ([replace(ROW, scene="b"), FAILED], FAILED, "It failed too in "),
-        ([replace(ROW, quantity="F43")], FAILED, "It is not in "),
-        ([replace(ROW, engine="theirs")], FAILED, "It is not in "),
-        ([ROW], replace(FAILED, quantity="all"), "It answered in "),
-        ([replace(ROW, scene="b")], replace(FAILED, quantity="all"), "It is not in "),
-    ],
-)
-def test_a_failure_is_looked_up_in_an_earlier_run(
-    tmp_path: Path,
-    before: list[Row],
-    failure: Row,
-    words: str,
-) -> None:
-    earlier = save(tmp_path / "before", before)
-    since = find_since(failure, earlier)
-    assert since == f"{words}{earlier.describe()}."
-    assert str(tmp_path / "before") in since
-    assert find_since(None, earlier) == ""
 
 
 def test_a_rule_that_is_weaker_than_before_stands_first(

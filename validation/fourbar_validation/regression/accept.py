@@ -13,7 +13,12 @@ from fourbar_validation.compare.rows import FAILS, Counts
 from fourbar_validation.engines.processes import bound_memory
 from fourbar_validation.regression import render
 from fourbar_validation.regression.changes import Differences, compare_runs
-from fourbar_validation.regression.history import HISTORY, append
+from fourbar_validation.regression.history import (
+    HISTORY,
+    append,
+    draw_row,
+    find_since,
+)
 from fourbar_validation.regression.record import (
     ABOUT_FILE,
     ACCEPTED,
@@ -93,6 +98,7 @@ def report_differences(
         f"{table}: not verified, its {ABOUT_FILE} states no SHA-256 or is missing"
         for table in unproven
     ]
+    _tell_since(differences, before, draw=forms.get("html") is not None)
     for form, path in forms.items():
         if path is not None:
             write_text(path, FORMS[form](differences))
@@ -106,6 +112,20 @@ def report_differences(
             "with --only and --engines",
         )
     return differences.status
+
+
+def _tell_since(differences: Differences, before: Recorded, *, draw: bool) -> None:
+    """Say since which accepted run the rows fail that are written; draw the first."""
+    failing = differences.failing[: render.MOST_ROWS_ON_THE_PAGE]
+    keys = [tuple(key) for key in failing[["scene", "engine", "quantity"]].to_numpy()]
+    since = find_since(before, keys)
+    differences.table.loc[failing.index, "since"] = [since[key] for key in keys]
+    if draw and len(failing):
+        first = next(failing.itertuples())
+        name = f"{first.scene} / {first.engine} / {first.quantity}"
+        caption = f"{name}: error in the accepted runs and in this one. It"
+        differences.picture = draw_row(before, first)
+        differences.caption = f"{caption} {since[keys[0]]}."
 
 
 def _read_choice(

@@ -123,7 +123,8 @@ class Differences:
 
     table: "DataFrame"
     """A line for each row of either run, in the order of KEY: the columns of both runs,
-    the kind of change, and `round_off`, the change of the error that has no meaning.
+    the kind of change, `round_off`, the change of the error that has no meaning, and
+    `since`, the accepted run since which it fails.
     """
     surroundings: list[tuple[str, str, str]]
     """(what, old, new) of versions, machine and settings."""
@@ -135,6 +136,9 @@ class Differences:
     """Engines and scenes of another name, and what an older record cannot say."""
     baseline: str = ""
     """The old run in words: where it lies, of which date and commit."""
+    picture: str = ""
+    """Error of the first row that fails, over the accepted runs, as SVG."""
+    caption: str = ""
 
     def of(self, *kinds: Kind) -> "DataFrame":
         """Return the lines of some kinds, the worst first."""
@@ -142,6 +146,15 @@ class Differences:
         return lines.sort_values(
             ["fails", "grown"], ascending=False, kind="stable", na_position="first"
         )
+
+    @property
+    def failing(self) -> "DataFrame":
+        """Return the lines of rows that fail, in the order in which they are shown."""
+        lines = self.of(*REGRESSIONS, Kind.STILL_FAILS)
+        order = [*Kind]
+        shown = lines.kind.map(order.index).sort_values(kind="stable").index
+        lines = lines.loc[shown]
+        return lines[lines.fails]
 
     @property
     def kinds(self) -> Counter[Kind]:
@@ -470,6 +483,7 @@ def _classify(
         table.kind.isin(told), ""
     )
     table["fails"] = fails
+    table["since"] = ""
     floor = np.fmax(old, table.round_off)
     table["grown"] = (new / floor).where(in_old & in_new, 1.0)
     return table

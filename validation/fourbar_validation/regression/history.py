@@ -7,6 +7,8 @@ versions in columns of their own (`version_mujoco`).
 
 import hashlib
 import json
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +16,7 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.writing import write_bytes
-from fourbar_validation.compare.rows import COMPARED_VERDICTS, FORMULAS
+from fourbar_validation.compare.rows import COMPARED_VERDICTS, FAILS, FORMULAS
 from fourbar_validation.regression.record import Recorded
 from fourbar_validation.report.html import Section, SectionFigure
 from fourbar_validation.report.svg import ALLOWED, choose_style, set_frame, write_svg
@@ -113,6 +115,107 @@ def _make_table(run: Recorded) -> Any:
     ).replace_schema_metadata()
 
 
+RowKey = tuple[str, str, str]
+"""Scene, engine and quantity of a row."""
+_KEY = ["scene", "engine", "quantity"]
+
+
+def read_history(before: Recorded) -> "DataFrame":
+    """Return the rows of the accepted runs up to one, the oldest first.
+
+    A run that was not accepted, whose folder has no history, is the only one.
+    """
+    import pandas
+
+    file = before.table.parent / HISTORY
+    columns = ["date", "commit", *_KEY, "verdict", "error", "allowed"]
+    if not file.is_file():
+        about = before.about
+        lines = before.frame().assign(date=about.date, commit=about.commit)[columns]
+    else:
+        with _name_damage(file):
+            lines = pandas.read_parquet(file, columns=columns)
+        lines = lines[lines.quantity != TIME]
+    return lines.astype(dict.fromkeys(columns[:6], str)).sort_values(
+        "date", kind="stable"
+    )
+
+
+def find_since(before: Recorded, failing: Iterable[RowKey]) -> dict[RowKey, str]:
+    """Say since which accepted run each failing row fails, as the end of "It ...".
+
+    An engine without an answer (quantity "all") has no such row where it answered.
+    """
+    history = read_history(before)
+    of_engines = dict(list(history.groupby(["scene", "engine"])))
+    return {
+        (scene, engine, quantity): _tell_since(
+            of_engines.get((scene, engine), history[:0]), quantity, before
+        )
+        for scene, engine, quantity in failing
+    }
+
+
+def _tell_since(lines: "DataFrame", quantity: str, before: Recorded) -> str:
+    """Say since which run a quantity of an engine fails, from its rows in a scene."""
+    if quantity != "all":
+        lines = lines[lines.quantity == quantity]
+    fails = (lines.verdict == FAILS) & (lines.quantity == quantity)
+    runs = fails.groupby([lines.date, lines.commit], sort=False).any()
+    if runs.empty:
+        return f"is not in {before.describe()}"
+    held = "answered in" if quantity == "all" else "held in"
+    if not runs.iloc[-1]:
+        return f"{held} {before.describe()}"
+    if runs.all():
+        many = f", and in every accepted run since {_name_run(runs.index[0])}"
+        return f"failed too in {before.describe()}" + many * (len(runs) > 1)
+    last = len(runs) - 1 - int(np.argmin(runs.to_numpy()[::-1]))
+    return (
+        f"has failed since {_name_run(runs.index[last + 1])}; it {held}"
+        f" {_name_run(runs.index[last])}"
+    )
+
+
+def _name_run(index: Any) -> str:
+    date, commit = index
+    return f"the run of {date[:10]}" + f" at commit {commit}" * bool(commit)
+
+
+def draw_row(before: Recorded, row: Any) -> str:
+    """Draw error over what is allowed of one row, over the accepted runs and this one.
+
+    `row`: line of the table of differences. Empty if no run has a number.
+    """
+    history = read_history(before)
+    same = [history[name] == getattr(row, name) for name in _KEY]
+    lines = history[np.logical_and.reduce(same)].tail(MOST_RUNS_DRAWN - 1)
+    labels = [f"{run.date[:10]}\n{run.commit[:7]}" for run in lines.itertuples()]
+    errors = np.array([*lines.error, row.error_new], dtype=float)
+    allowed = np.array([*lines.allowed, row.allowed_new], dtype=float)
+    if not np.any(errors > 0.0):
+        return ""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.6, 2.6), layout="constrained")
+    axes = figure.subplots()
+    places = np.arange(len(errors))
+    axes.plot(places, allowed, color=ALLOWED, lw=1.1, ls=(0, (5, 2)), label="allowed")
+    axes.plot(places, errors, label="error", **choose_style(row.engine).line)
+    _label_runs(axes, [*labels, "this run"])
+    axes.set_ylabel("error / scale")
+    axes.legend(frameon=False, fontsize=8)
+    return write_svg(figure, "row")
+
+
+def _label_runs(axes: Any, labels: list[str]) -> None:
+    """Write the runs under a logarithmic axis, eight of them at most."""
+    step = -(-len(labels) // 8)
+    axes.set_xticks(range(0, len(labels), step), labels[::step], fontsize=8)
+    axes.set_yscale("log")
+    set_frame(axes)
+
+
 def collect_history(folder: Path) -> list[Section]:
     """Return the section on the accepted runs of a folder; none without a history."""
     file = folder / HISTORY
@@ -134,6 +237,16 @@ def collect_history(folder: Path) -> list[Section]:
     return [Section("history", "Over the accepted runs", text, figures=[figure])]
 
 
+@contextmanager
+def _name_damage(file: Path) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, ValueError):
+        raise InputError(
+            "--against", str(file), "is damaged, or no table written by `accept`"
+        ) from None
+
+
 def summarise(file: Path) -> "DataFrame":
     """Return a line for each run and engine, by date: `used` and `time`.
 
@@ -143,14 +256,10 @@ def summarise(file: Path) -> "DataFrame":
     import pandas
 
     columns = ["run", "date", "commit", "engine", "quantity", "verdict", "error"]
-    try:
+    with _name_damage(file):
         lines = pandas.read_parquet(
             file, columns=[*columns, "allowed", "times_formulas"]
         )
-    except (OSError, ValueError):
-        raise InputError(
-            "--against", str(file), "is damaged, or no table written by `accept`"
-        ) from None
     lines = lines[lines.engine != FORMULAS]
     compared = lines.verdict.isin(COMPARED_VERDICTS) & (lines.allowed > 0.0)
     lines["used"] = (lines.error / lines.allowed).where(compared)
@@ -183,10 +292,7 @@ def _draw(table: "DataFrame") -> str:
     panels[0].set_ylabel("error / allowed")
     panels[1].set_ylabel("time / formulas")
     labels = [f"{run.date[:10]}\n{run.commit[:7]}" for run in runs.itertuples()]
-    step = -(-len(labels) // 8)
-    panels[1].set_xticks(range(0, len(labels), step), labels[::step], fontsize=8)
     for axes in panels:
-        axes.set_yscale("log")
-        set_frame(axes)
+        _label_runs(axes, labels)
     figure.legend(loc="outside upper left", ncols=4, frameon=False, fontsize=8)
     return write_svg(figure, "history")

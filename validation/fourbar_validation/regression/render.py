@@ -30,6 +30,7 @@ CHANGE_HEADINGS = (
     "round-off",
     "old verdict",
     "new verdict",
+    "since when",
 )
 MOST_ROWS_ON_THE_PAGE = 1000
 """Rows of one kind on the page."""
@@ -82,6 +83,8 @@ def _write_change_line(row: Any) -> str:
         words += f", {row.verdict_old} -> {row.verdict_new} ({row.reason_new})"
     elif row.fails:
         words += f", {row.verdict_new} ({row.reason_new})"
+    if row.verdict_old == row.verdict_new and row.since:
+        words += f"; it {row.since}"
     return f"{words}; round-off moves it by {write_error(row.round_off)}"
 
 
@@ -169,6 +172,7 @@ def _write_change_cells(row: Any) -> tuple[str, ...]:
         write_error(row.round_off),
         row.verdict_old,
         f"{row.verdict_new}: {row.reason_new}" if row.fails else row.verdict_new,
+        row.since,
     )
 
 

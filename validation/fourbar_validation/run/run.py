@@ -23,12 +23,11 @@ from fourbar_validation.compare.rows import (
 from fourbar_validation.engines.guests import list_numbers
 from fourbar_validation.engines.mujoco.picture import render_pictures
 from fourbar_validation.engines.registry import Engine
-from fourbar_validation.regression.history import collect_history
+from fourbar_validation.regression.history import collect_history, find_since
 from fourbar_validation.regression.record import (
     ABOUT_FILE,
     CSV_FILE,
     PARQUET_FILE,
-    Recorded,
     describe_run,
     open_run,
     write_about,
@@ -143,7 +142,9 @@ def write_outcome(
     if options.against is not None:
         before = open_run(options.against, "--against")
         overview = summary.overview
-        overview.since = find_since(overview.named_failure, before)
+        if failure := overview.named_failure:
+            key = (failure.scene, failure.engine, failure.quantity)
+            overview.since = f"It {find_since(before, [key])[key]}."
         weakened = list_weakened(before.about.rules, about.rules)
         overview.weaker = [f"{rule}" for rule in weakened]
         overview.baseline = before.describe()
@@ -165,29 +166,6 @@ def write_outcome(
     )
     write_text(out / "report.html", page)
     return summary
-
-
-def find_since(failure: Row | None, before: Recorded) -> str:
-    """Say how a failure stood in an earlier run; nothing if there is no failure.
-
-    An engine without an answer has no such row in a run in which it answered.
-    """
-    if failure is None:
-        return ""
-    answered = False
-    for row in before.rows():
-        if (row.scene, row.engine) != (failure.scene, failure.engine):
-            continue
-        if row.quantity == failure.quantity:
-            if row.failed:
-                held = "It failed too in"
-            else:
-                held = "It held in"
-            return f"{held} {before.describe()}."
-        answered = True
-    if answered and failure.quantity == "all":
-        return f"It answered in {before.describe()}."
-    return f"It is not in {before.describe()}."
 
 
 def _collect_tasks(
