@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from fourbar.errors import InputError
 from fourbar.evaluation.case import Case, Dynamics, condense_branch, find_margin
 from fourbar.formulas import longer as longer_numbers
-from fourbar.formulas.arithmetic import U, angle, is_any, select
+from fourbar.formulas.arithmetic import U, angle, is_any, is_zero, select
 from fourbar.formulas.longer import lengthen, shorten
+from fourbar.formulas.mobility import TURN
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT, LoopPath
 from fourbar.formulas.position import HalfAngle
@@ -358,6 +359,7 @@ def _compute_unresolved(
     double's digits. Where a double is as far off by coincidence, its distance to the
     long double is no bound. What rounding does follows from the slope:
         dF = (dF/dq) max(|q|, 1) _LONG_EPS ROUNDINGS_IN_FULL,
+    where q less a ground angle of 0 is exact, so that |q| counts up to two turns alone;
     dF/dq by a step that is short against the distance to the limit, which is some s^2
     (s the sine of the command). NaN where no double lies a step away. Beyond ten
     million turns, where none may do so anywhere, doubles decide the step.
@@ -382,7 +384,8 @@ def _compute_unresolved(
         return np.nan, np.nan
     with np.errstate(all="ignore"):
         gap, drive_gap = _compute_gaps(dynamics, there)
-        rounding = ROUNDINGS_IN_FULL * _LONG_EPS * size
+        most = np.where(is_zero(case.linkage.ground_angle), 2.0 * TURN, np.inf)
+        rounding = ROUNDINGS_IN_FULL * _LONG_EPS * np.fmin(size, most)
         share = rounding / np.where(step >= _LEAST_STEP * size, step, np.nan)
         return gap * share, drive_gap * share
 

@@ -15,7 +15,7 @@ import numpy as np
 from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK, compute_shown_state
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
-from fourbar.quantities import PIN_FORCES, Array
+from fourbar.quantities import NO_LEVER, NO_TORQUE, PIN_FORCES, Array
 from fourbar.scene import Scene, command_at
 from fourbar.show.driving import is_once_round, read_drive_demand
 from fourbar.show.panels import SHALLOW, Panels, Wanted, fit_panels
@@ -30,6 +30,10 @@ commanded.
 """
 _SAME_EDGE = 1e-9
 """Part of the motion within which two ends of panels are one."""
+_BESIDE_A_POLE = 1e-4
+"""Distance from a listed position without a lever at which its forces are compared with
+those at a quarter of it, rad. Positions have some 12 digits there.
+"""
 _ANGLES = ("theta_2", "theta_3", "theta_4", "sin_mu")
 _NO_BENDING = 1e-13
 """Bending moment that is round-off, over the pin forces times the longest bar."""
@@ -166,6 +170,7 @@ def _fit_curves(solution: Solution) -> MotionCurves:
             Panels.of_positions(places, list_curves(scene, solution), share)
             for list_curves in (_list_positions, _list_curves)
         )
+        _mark_poles(scene, solution, panels)
         return MotionCurves(scene, solution, positions, panels, [], np.zeros(0))
     exact, even = _cut(scene, solution)
     located = _locate_breaks(scene, solution, _join_edges(exact, even))
@@ -196,6 +201,34 @@ def _fit_curves(solution: Solution) -> MotionCurves:
         names = [name for _, name in reversals]
         reversals = list(zip(angles.tolist(), names, strict=True))
     return MotionCurves(scene, solution, positions, panels, reversals, breaks)
+
+
+def _mark_poles(scene: Scene, solution: Solution, panels: Panels) -> None:
+    """Mark listed positions without a lever, beside which a curve grows.
+
+    A curve that does not double at a quarter of the distance stays bounded there.
+    """
+    rows = np.flatnonzero(np.isin(solution.status_code, (NO_LEVER, NO_TORQUE)))
+    motion = scene.motion
+    listed = motion.free is None and motion.stroke is None
+    if solution.F12 is None or not listed or motion.has_rate_of_each or not rows.size:
+        return
+    places = solution.at.places[rows]
+    far, near = (
+        _list_curves(
+            scene,
+            solve(
+                scene, at=command_at(scene, np.concatenate([places - x, places + x]))
+            ),
+        )
+        for x in (_BESIDE_A_POLE, 0.25 * _BESIDE_A_POLE)
+    )
+    for name, curve in panels.curves.items():
+        before, after = (
+            np.abs(curves[name].reshape(2, len(rows), -1)).max(axis=-1)
+            for curves in (far, near)
+        )
+        curve.poles = rows[(after > 2.0 * before).any(axis=0)].tolist()
 
 
 def _goes_on_between(scene: Scene, solution: Solution) -> bool:

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from fourbar.effects import Load, Table
+from fourbar.formulas.mobility import TURN, choose_range
 from fourbar.linkage import PIN_FORCE
 from fourbar.scene import Scene, command_at
-from fourbar.scene.motion import Motion, Rise
+from fourbar.scene.motion import RISE_LAWS, Motion, Rise, Sine
 from fourbar.show.block import write_motor
 from fourbar_lab.fault_scenes import CRANK_ROCKER
 from fourbar_validation.compare.scales import make_reference
@@ -23,6 +24,7 @@ from tests.oracle.test_oracles import RANDOM_SCENES, SEED, SHIPPED
 from tests.oracle.variants import ask_free_bodies
 
 POSITIONS_OF_A_PIECE = 4001
+LAWS = 60
 EXCESS = 1e-4
 """Part by which a value may exceed a printed peak, which has four digits."""
 
@@ -112,3 +114,31 @@ def test_no_position_of_a_shipped_scene_exceeds_a_peak(number: int) -> None:
 @pytest.mark.parametrize("number", range(RANDOM_SCENES))
 def test_no_position_of_a_random_scene_exceeds_a_peak(number: int) -> None:
     require_no_excess(draw_random_scene(SEED, number, tuple(DrawnType)))
+
+
+def draw_motion(seed: int, number: int) -> Scene:
+    """Draw a random linkage whose commanded angle follows a random law.
+
+    Parts of the law last from 5 ms to 1 s, and 12 to 90 steps cover all of them.
+    """
+    rng = np.random.default_rng([seed, number])
+    kinds = tuple(DrawnType)
+    scene = draw_random_scene(seed, number, kinds)
+    low, high = choose_range(scene.linkage)
+    first, last = low + (high - low) * rng.uniform((0.05, 0.55), (0.45, 0.95))
+    steps = int(rng.integers(12, 91))
+    dwell, rise, fall, rest = 10.0 ** rng.uniform(-2.3, 0.0, 4)
+    if rng.random() < 0.2:
+        half = 0.5 * (last - first)
+        law: Rise | Sine = Sine(first + half, half, TURN / rise, dwell, fall, steps)
+    else:
+        kind = str(rng.choice(RISE_LAWS))
+        falls = {"fall": fall, "rest": rest} if rng.random() < 0.8 else {}
+        law = Rise(kind, (last - first, rise), first, dwell, steps=steps, **falls)
+    return replace(scene, motion=Motion(law=law), drive=None, drive_bar=2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(LAWS))
+def test_no_position_of_a_random_law_exceeds_a_peak(number: int) -> None:
+    require_no_excess(draw_motion(SEED, number))

@@ -85,8 +85,21 @@ def exactly_one() -> Scene:
     )
 
 
+def far_away(angle: float, ground_angle: float) -> Scene:
+    """Move the angles of a crank-rocker; less a ground at 0 rad they are exact."""
+    scene = sized()
+    linkage = replace(scene.linkage, ground_angle=ground_angle)
+    angles = angle + np.linspace(0.0, 6.0, 25)
+    return replace(scene, linkage=linkage, motion=scene.motion.replace(angle=angles))
+
+
 SCENES = {f"{k:g} m": sized(k) for k in (1.0, 1e60, 1e-60, 1e-75, 1e100)}
 SCENES |= {"centres of many turns": sized(turns=TURNS), "one": exactly_one()}
+SCENES |= {
+    f"{angle:g} rad, ground at {ground_angle} rad": far_away(angle, ground_angle)
+    for angle in (1e3, 1e6, 1e8, 4e9)
+    for ground_angle in (0.0, 0.2)
+}
 SPRINGS = Springs(
     (Spring(Place(2, (0.1, 0.6)), Place(3, (0.05, -0.4)), 80.0, 0.01, 2.0),)
 )
@@ -298,8 +311,11 @@ def test_an_error_bar_holds_what_long_doubles_do_not_resolve(
 
 @pytest.mark.parametrize("power", range(24, 41, 2))
 def test_an_error_bar_grows_with_the_angle(power: int) -> None:
-    """A crank under its weight, m g r cos(theta), whose angle has 64 bits."""
-    linkage = fourbar.FourBar(0.3, Bar(0.1, 1.0), Bar(0.25), Bar(0.22))
+    """A crank under its weight, m g r cos(theta).
+
+    Less the ground's angle theta has 64 bits.
+    """
+    linkage = fourbar.FourBar(0.3, Bar(0.1, 1.0), Bar(0.25), Bar(0.22), 0.2)
     angle = 2.0**power
     scene = Scene(linkage, Motion(angle, 1.0), effects=(fourbar.Gravity(),))
     error = fourbar.solve(scene, "error").torque_error[0]

@@ -76,6 +76,21 @@ def test_a_force_with_a_pole_is_no_number_anywhere(steps: int) -> None:
     assert np.abs(speeds).max() < 1e-6
 
 
+def test_a_listed_position_without_a_lever_is_one_at_which_the_force_grows() -> None:
+    """Ends of the cylinder and O2 are in line; another position has a force."""
+    on_ground, on_bar = (place.from_pin[1] for _, place in CYLINDER.ends)
+    dead = crank_rocker().linkage.ground_angle + on_ground - on_bar
+    motion = fourbar.Motion(np.array([1.0, dead]), 10.0)
+    scene = crank_rocker(motion=motion, drive=CYLINDER)
+    assert list(fourbar.solve(scene).status) == ["ok", "no_lever"]
+    facts = find_facts(scene)
+    assert facts.peak is None and facts.pins["O2"].peak is None
+    assert facts.pins["B"].peak is not None
+    text = write(scene, pressure=1e6)
+    assert f"grows without bound at theta_2 = {math.degrees(dead):.4g} deg" in text
+    assert "bore none is enough" in text and "peak unbounded" in text
+
+
 def test_speed_and_power_beside_a_pole_of_the_force_are_located() -> None:
     """The largest speed of the stroke is omega times the largest lever.
 
