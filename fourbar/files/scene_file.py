@@ -101,6 +101,11 @@ SCENE_TABLES = (
     "tolerances",
     "picture",
 )
+_A_GIVEN_DRIVE = (
+    "a drive is what is solved for; a torque or force that is given is a load"
+    " ([[loads]]), which moves the linkage with motion.free"
+)
+_LIKE_A_SWEEP = re.compile(r"\d[^\d]*(\bto\b|\.\.|:|;)\s*-?\d")
 _A_LINE = "a drive along a line has from and to alone"
 _A_POINT = "a force acts at a place: state point, from_pin or from_centre"
 MOST_POINTS_OF_A_SCENE = 1000
@@ -287,6 +292,10 @@ def _read_drive(
 ) -> tuple[int | None, ForceDrive | None]:
     """Read the bar on which a couple acts, or a force along a line or at a place."""
     allowed = ("bar", "from", "to", *PLACES_OF_ENDS, "direction", "frame")
+    if isinstance(value, dict):
+        for name in ("torque", "moment", "force"):
+            if name in value:
+                raise read.refuse(f"drive.{name}", value[name], _A_GIVEN_DRIVE)
     entry = read_table_with_place(read, "drive", value, allowed)
     stated = entry.keys()
     if "from" in stated or "to" in stated:
@@ -561,6 +570,9 @@ def _read_commanded(
 
     An angle may be stated from a limit position.
     """
+    if isinstance(value, str) and _LIKE_A_SWEEP.search(value):
+        form = '{ from = "0 deg", to = "360 deg", steps = 360 }'
+        raise read.refuse(key, value, f"is no number; a sweep is written {form}")
     if value is None or isinstance(value, (str, int, float)):
         return read.quantity(key, value, unit)
     if isinstance(value, list) and value:
@@ -636,6 +648,8 @@ def _read_effect(
     """Read an effect from the value under its key."""
     kind: Any = list_kinds()[key]
     path = f"effects.{key}"
+    if kind.example and not isinstance(value, dict | list):
+        raise read.refuse(path, value, f"must be like {kind.example}")
     if kind is Gravity:
         return Gravity(*read.polar(path, value, kind.numbers["magnitude"].unit))
     if kind is Springs:

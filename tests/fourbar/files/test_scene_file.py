@@ -290,6 +290,24 @@ MISTAKES = [
     ),
     ("loads as a table", "[[loads]]", "[loads]", ["loads", "[[loads]]"]),
     (
+        "gravity without a direction",
+        '["9.81 m/s^2", "-90 deg"]',
+        '"9.81 m/s^2"',
+        ["effects.gravity", 'like gravity = ["9.81 m/s^2", "-90 deg"]'],
+    ),
+    (
+        "sweep as a text",
+        '"60 deg"',
+        '"0 deg to 360 deg"',
+        ["motion.theta_2", "steps = 360 }"],
+    ),
+    (
+        "torque that is given",
+        "[drive]",
+        '[drive]\ntorque = "5 N m"',
+        ["drive.torque", "is a load", "motion.free"],
+    ),
+    (
         "load over time",
         "bar = 4",
         'bar = 4\ntable = { time = ["0 s", "1 s"], factor = [0.0, 1.0] }',
