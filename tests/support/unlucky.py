@@ -67,6 +67,14 @@ def dies_at_first(*_: object) -> None:
         os._exit(1)
 
 
+def start_and_sleep(starts: Path) -> str:
+    """Tell that it has begun, in a file, and work for some looks of the pool."""
+    with starts.open("a") as file:
+        file.write("begun\n")
+    time.sleep(1.0)
+    return "done"
+
+
 def die_with_the_pipe(_: object) -> None:
     """Kill this worker while it holds the lock of the pipe that all workers share."""
     frame = sys._getframe()

@@ -14,6 +14,7 @@ import tomllib
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
@@ -53,6 +54,7 @@ from tests.support.unlucky import (
     Unlucky,
     die_with_the_pipe,
     dies_at_first,
+    start_and_sleep,
 )
 
 SEED = 7
@@ -180,6 +182,31 @@ def test_a_worker_killed_with_the_lock_of_the_pipe_ends_the_run_within_seconds()
     with pytest.raises(workers.NoWorkersError, match="what is finished is kept"):
         list(results)
     assert time.monotonic() - begin < 60.0
+
+
+@pytest.mark.slow
+def test_a_clock_that_jumps_forward_ends_nothing(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As that of a machine does which slept while an item was worked at."""
+    starts = tmp_path / "starts"
+    jump = 1e6
+
+    def now() -> float:
+        return time.time() + jump * starts.exists()
+
+    clock = SimpleNamespace(time=now, sleep=time.sleep)
+    monkeypatch.setattr("pebble.pool.process.time", clock)
+    results = workers.apply_over_processes(
+        start_and_sleep,
+        [(0, [starts])],
+        1,
+        seconds=workers.SCENE_SECONDS,
+        instead=workers.fail,
+    )
+    assert list(results) == [(0, ["done"])]
+    assert len(starts.read_text().splitlines()) > 1
 
 
 @pytest.mark.slow

@@ -4,13 +4,14 @@ The results are the same whatever the number of processes. A task has some items
 each item a limit of time. A worker that dies or hangs costs the item that it was at.
 """
 
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing import get_context
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 from fourbar.errors import DependencyError
 from fourbar_validation.engines.processes import (
@@ -38,6 +39,10 @@ A worker that is killed while it reads or writes there leaves the pipe locked fo
 the others then wait twice as long, and the run ends and can be resumed. A message takes
 milliseconds.
 """
+_ENDED_BY_PEBBLE = ("Task timeout",)
+"""First argument of the TimeoutError of an item that took too long. One that an item
+raises itself has another.
+"""
 Task = tuple[int, Sequence[Any]]
 """Number and items."""
 Attempt = Callable[[Any], Any]
@@ -64,6 +69,13 @@ def prepare_worker(_: object = None) -> None:
     keep_output()
 
 
+class _Submitted(NamedTuple):
+    """An item's future, and when the item was handed in by the monotonic clock, s."""
+
+    future: "Future[Any]"
+    since: float
+
+
 @dataclass(frozen=True)
 class _PoolOfItems:
     """Items handed to a pool, each with its limit of time."""
@@ -72,7 +84,7 @@ class _PoolOfItems:
     function: Callable[[Any], Any]
     seconds: float | None
 
-    def submit(self, item: Any) -> "Future[Any]":
+    def submit(self, item: Any) -> "_Submitted":
         """Hand in an item; NoWorkersError where the pool is broken."""
         try:
             with hold_interruption():
@@ -83,23 +95,29 @@ class _PoolOfItems:
                 )
         except RuntimeError:
             raise _lost_workers() from None
-        return future
+        return _Submitted(future, time.monotonic())
 
     def attempt(self, item: Any) -> Any:
         """Do one item: its result, or the exception that it ended with."""
         return self.outcome(item, self.submit(item))
 
-    def outcome(self, item: Any, future: "Future[Any]") -> Any:
+    def outcome(self, item: Any, submitted: "_Submitted") -> Any:
         """Return an item's result, or the exception that it ended with.
 
         A worker may have been killed from outside, for example where memory ran out.
         Its item is tried once more, and then it is held to have killed the worker.
+        Pebble measures the limit of time by the clock on the wall, which jumps when a
+        machine sleeps: an item that was ended too soon is tried again.
         """
         from pebble import ProcessExpired
 
+        future, since = submitted
         error = future.exception()
+        while self._is_too_soon(error, since):
+            future = self.submit(item).future
+            error = future.exception()
         if isinstance(error, ProcessExpired):
-            future = self.submit(item)
+            future = self.submit(item).future
             error = future.exception()
         if isinstance(error, BrokenProcessPool):
             raise _lost_workers()
@@ -107,10 +125,18 @@ class _PoolOfItems:
             raise error
         return future.result() if error is None else error
 
+    def _is_too_soon(self, error: BaseException | None, since: float) -> bool:
+        return (
+            self.seconds is not None
+            and isinstance(error, TimeoutError)
+            and error.args[:1] == _ENDED_BY_PEBBLE
+            and time.monotonic() - since < self.seconds
+        )
+
     def outcomes(
         self,
         items: Sequence[Any],
-        futures: "Sequence[Future[Any]]",
+        submissions: "Sequence[_Submitted]",
         instead: _Instead,
     ) -> list[Any]:
         """Return the results of items in order.
@@ -118,8 +144,8 @@ class _PoolOfItems:
         An item that failed has its replacement in the result's place.
         """
         results = []
-        for item, future in zip(items, futures, strict=True):
-            outcome = self.outcome(item, future)
+        for item, submitted in zip(items, submissions, strict=True):
+            outcome = self.outcome(item, submitted)
             if isinstance(outcome, BaseException):
                 outcome = instead(item, outcome, self.attempt)
             results.append(outcome)
@@ -184,11 +210,11 @@ def apply_over_processes(
         def finish(
             number: int,
             items: Sequence[Any],
-            waiting: Sequence[Future[Any]],
+            waiting: Sequence[_Submitted],
         ) -> tuple[int, list[Any]]:
             return number, pool_of_items.outcomes(items, waiting, instead)
 
-        in_flight: deque[tuple[int, Sequence[Any], list[Future[Any]]]] = deque()
+        in_flight: deque[tuple[int, Sequence[Any], list[_Submitted]]] = deque()
         try:
             for number, items in tasks:
                 waiting = [pool_of_items.submit(item) for item in items]
