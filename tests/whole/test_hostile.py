@@ -139,6 +139,7 @@ def test_sdf_and_usd_hold_a_hostile_title_as_a_text(kind: str) -> None:
     ) and not root.findall(".//script")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_differences_hold_hostile_names_as_text(
     kind: str,

@@ -108,27 +108,6 @@ def test_an_arm_in_world_axes_keeps_its_lever_about_G() -> None:
     np.testing.assert_allclose(one.F43, other.F43, rtol=1e-10)
 
 
-def test_one_place_in_three_forms_is_one_load() -> None:
-    bar = crank_rocker().linkage.coupler
-    G = bar.to_centre
-    place = cmath.rect(0.19, -0.4)
-    forms: tuple[dict[str, Any], ...] = (
-        {"from_pin": cmath.polar(place)},
-        {"from_centre": cmath.polar(place - G)},
-        {"point": "P"},
-    )
-    point = fourbar.Point("P", 3, cmath.polar(place))
-    torques = []
-    for form in forms:
-        acting = Load(3, (5.0, 1.2), frame="world", **form)
-        scene = crank_rocker(loads=(acting,), points=(point,))
-        torques.append(fourbar.solve(scene).torque)
-        engines = scene.settled().loads[0].place
-        assert engines is not None and engines.vector() == pytest.approx(place)
-    for torque in torques[1:]:
-        np.testing.assert_allclose(torque, torques[0], rtol=1e-11)
-
-
 def test_a_member_of_a_study_moves_its_load_with_the_point_and_with_the_centre() -> (
     None
 ):
@@ -155,27 +134,29 @@ def test_a_member_of_a_study_moves_its_load_with_the_point_and_with_the_centre()
     assert not np.allclose(expected.torque, fourbar.solve(scene).torque)
 
 
-def test_ends_of_springs_and_cylinders_state_their_places_likewise() -> None:
-    G = crank_rocker().linkage.coupler.to_centre
+def test_one_place_in_three_forms_is_one_load_one_spring_and_one_cylinder() -> None:
     place = cmath.rect(0.19, -0.4)
-    ends = (
-        Place(3, cmath.polar(place)),
-        Place(3, from_centre=cmath.polar(place - G)),
-        Place(3, point="P"),
-    )
     point = fourbar.Point("P", 3, cmath.polar(place))
     ground = Place(1, (0.2, 2.0))
-    springs, cylinders = [], []
-    for end in ends:
-        spring = fourbar.Spring(ground, end, 200.0, 0.05)
-        sprung = crank_rocker(effects=(fourbar.Springs((spring,)),), points=(point,))
-        springs.append(fourbar.solve(sprung).torque)
-        line = fourbar.LinearDrive(ground, end)
-        pushed = crank_rocker(drive=line, points=(point,))
-        cylinders.append(fourbar.solve(pushed).drive_force)
-    for torques in (springs, cylinders):
-        np.testing.assert_allclose(torques[1], torques[0], rtol=1e-9)
-        np.testing.assert_array_equal(torques[2], torques[0])
+    forms: tuple[dict[str, Any], ...] = (
+        {"from_pin": cmath.polar(place)},
+        {"from_centre": cmath.polar(place - crank_rocker().linkage.coupler.to_centre)},
+        {"point": "P"},
+    )
+    drives = []
+    for form in forms:
+        load, end = Load(3, (5.0, 1.2), **form), Place(3, **form)
+        spring = fourbar.Springs((fourbar.Spring(ground, end, 200.0, 0.05),))
+        loaded = crank_rocker(loads=(load,), points=(point,))
+        sprung = crank_rocker(effects=(spring,), points=(point,))
+        pushed = crank_rocker(drive=fourbar.LinearDrive(ground, end), points=(point,))
+        pushing = fourbar.solve(pushed).drive_force
+        torques = fourbar.solve(loaded).torque, fourbar.solve(sprung).torque
+        drives.append([*torques, pushing])
+        settled = loaded.settled().loads[0].place
+        assert settled is not None and settled.vector() == pytest.approx(place)
+    np.testing.assert_allclose(drives[1], drives[0], rtol=1e-9)
+    np.testing.assert_array_equal(drives[2], drives[0])
 
 
 EVERY_FORM = """

@@ -26,7 +26,7 @@ from fourbar import (
     uniform,
     vary,
 )
-from fourbar.effects import Gravity, Torsion, Viscous
+from fourbar.effects import Gravity, Viscous
 from fourbar.errors import InputError, LimitError
 from fourbar.formulas.mobility import find_limit_angles, limit_positions
 from fourbar.linkage import MOVING_BARS
@@ -344,6 +344,7 @@ def replace_alpha(solution: Solution) -> Solution:
     return replace(solution, alpha_2=none, alpha_3=none, alpha_4=none)
 
 
+@pytest.mark.slow
 def test_released_at_theta_4_it_passes_limits_of_theta_2_and_its_own() -> None:
     rocker = FourBar(0.5, Bar(0.4, 1.0), Bar(0.3, 1.0), Bar(0.25, 1.0))
     limit = limit_positions(rocker)[0]
@@ -603,23 +604,3 @@ class Undeclared:
     """An engine that does not say what commands it takes is asked for theta_2 alone."""
 
     name = "undeclared"
-
-
-@pytest.mark.parametrize("bar", [3, 4])
-def test_springs_count_turns_along_the_commanded_angle(bar: int) -> None:
-    """A drag link, whose bars all turn.
-
-    Where a spring is wound is the same whichever of them is told to.
-    """
-    springs = Torsion.at(**{pin: (0.1, 0.3, 0.0) for pin in ("O2", "A", "B", "O4")})
-    scene = Scene(
-        uniform(0.1, 0.3, 0.25, 0.28),
-        Motion(np.linspace(0.2, 5.2, 26), 1.0),
-        effects=(springs,),
-    )
-    forth = solve(scene, "acceleration")
-    for pin, *_ in springs.springs:
-        one_spring = replace(scene, effects=(Torsion.at(**{pin: (0.1, 0.3, 0.0)}),))
-        wanted = solve(one_spring, "force").status
-        assert solve(one_spring, "force", at=of_bar(forth, bar)).status == wanted
-        assert ("wound" in wanted) == (pin in ("O2", "O4"))

@@ -127,6 +127,7 @@ def test_peaks_and_means_are_those_of_much_finer_steps() -> None:
     assert float(swing) == pytest.approx(np.ptp(np.cumsum(steps)), rel=5e-3)
 
 
+@pytest.mark.slow
 def test_each_kind_of_motion_shows_what_it_has_and_nothing_else() -> None:
     block_of = lambda **motion: block(crank_rocker(motion=fourbar.Motion(**motion)))  # noqa: E731
     positions = block_of(theta_2=fourbar.Sweep(0.0, math.tau, 36))
@@ -172,6 +173,7 @@ def test_each_kind_of_motion_shows_what_it_has_and_nothing_else() -> None:
     assert re.search(r"^  at       0?\S+ s", released, re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_what_grows_without_bound_is_no_number_beside_a_jump() -> None:
     """The force of a cylinder has a pole within the sweep; friction reverses there."""
     scene = fourbar.load(

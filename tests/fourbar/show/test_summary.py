@@ -254,6 +254,7 @@ def test_forces_whose_squares_overflow_have_the_peaks_and_means_of_smaller_ones(
         assert rms / 1e300 == pytest.approx(load.rms, rel=EXACT)
 
 
+@pytest.mark.slow
 def test_towards_a_limit_within_the_last_step_it_grows_too() -> None:
     """A sweep that ends where the loop no longer closes.
 

@@ -167,6 +167,7 @@ def test_what_lies_between_two_steps_is_judged_too() -> None:
     assert largest[1] == pytest.approx(largest[0], rel=1e-2)
 
 
+@pytest.mark.slow
 def test_out_of_reach_is_reported_with_what_would_reach_it(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

@@ -1949,6 +1949,7 @@ length = "18 in"
 """The cylinder holds the spring: no pin has a load but rounding."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [[], ["--degrees"], ["--radians"], ["--csv-comma"]])
 @pytest.mark.parametrize("name", ["thesis", "gallery/pump_jack", "unloaded", "saved"])
 def test_the_default_csv_returns_to_the_last_digit(

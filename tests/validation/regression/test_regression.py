@@ -353,6 +353,7 @@ def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(
         read_run(tmp_path)
 
 
+@pytest.mark.slow
 def test_of_two_long_runs_every_row_is_counted_and_the_worst_are_listed(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

@@ -521,6 +521,7 @@ def test_failures_are_one_line_an_engine_and_cause(
     assert "fails scene" not in printed, "rows stay in the files"
 
 
+@pytest.mark.slow
 def test_a_red_figure_draws_the_error_and_the_limit_of_the_guest() -> None:
     """A reversed force lies on the curve of its size."""
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))

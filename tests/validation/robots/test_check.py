@@ -732,6 +732,7 @@ def test_a_servo_and_another_equality_are_taken_off_and_reported() -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for() -> None:
     drive = fourbar.LinearDrive(Place(2, (0.17, -1.1)), Place(4, (0.09, 0.7)))
     scene = replace(CRANK_ROCKER, drive_bar=None, drive=drive)

@@ -310,6 +310,7 @@ def turned(scene: Scene, angle: float) -> Scene:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scene", "other"),
     [

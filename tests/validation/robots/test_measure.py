@@ -75,6 +75,7 @@ def test_options_that_do_not_go_together_are_refused() -> None:
         assert result.exception is not None, arguments
 
 
+@pytest.mark.slow
 def test_a_turn_of_a_parallelogram_is_reported_in_lines_of_a_terminal(
     tmp_path: Path,
 ) -> None:

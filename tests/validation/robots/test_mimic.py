@@ -294,6 +294,7 @@ def test_a_follower_on_the_crank_turns_the_coupler(tmp_path: Path) -> None:
     assert math.degrees(report.shifted) == pytest.approx(7.418, abs=5e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("tree", "bars"),
     [

@@ -483,6 +483,7 @@ ACTING: dict[str, tuple[Any, Any]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "done", [(0.0, "missing"), (2.0, "doubled"), (-1.0, "reversed")]
 )

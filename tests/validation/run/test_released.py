@@ -155,6 +155,7 @@ def answering(monkeypatch: pytest.MonkeyPatch, change: Any) -> list[Row]:
     ]
 
 
+@pytest.mark.slow
 def test_an_engine_that_stops_before_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     def cut(answer: Any) -> Any:
         return replace(

@@ -202,6 +202,7 @@ def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit() -> None
             )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("figure", "panels"), [("overview", 5), ("kinematics", 1)])
 def test_positions_at_rest_have_no_panel_of_zeros(figure: str, panels: int) -> None:
     """With a speed there are speeds, accelerations and power besides."""

@@ -66,6 +66,7 @@ def measured(drive: str) -> LoopMeasurement:
     return loop
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drive", DRIVES)
 def test_every_drive_is_that_of_the_formulas_in_a_file_without_it(drive: str) -> None:
     loop = measured(drive)

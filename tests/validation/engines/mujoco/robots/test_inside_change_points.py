@@ -60,6 +60,7 @@ def measured(text: str, speed: float = 1.0, **pose: str) -> LoopMeasurement:
     return loop
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", ["0deg", "10deg", "-160deg", "200deg"])
 def test_states_are_compared_in_the_assembly_of_the_robot(start: str) -> None:
     assert find_left_out(measured(SINGLE, j2=start)) < 1e-8

@@ -50,6 +50,7 @@ def measured(offset: float) -> LoopMeasurement:
     return loop
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("offset", [1e-5, 1e-3])
 def test_an_offset_along_the_axes_changes_nothing_in_the_plane(offset: float) -> None:
     loop = measured(offset)
