@@ -107,6 +107,10 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
     """Times at which a free motion passed a change point, s. Another motion was
     possible there.
     """
+    with_extremes: Command | None = field(default=None, kw_only=True)
+    """Instants of a free motion, and those between at which an angle of it is largest
+    or smallest.
+    """
 
     at: Command = field(default=None, kw_only=True)  # type: ignore[assignment]  # by `solve`
     """Positions that were solved, with what is commanded."""

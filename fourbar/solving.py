@@ -96,7 +96,7 @@ def solve(
     require_whole("side", side, (-1, 0, 1), "must be -1, 0 or 1")
     if not isinstance(scene, Scene):
         return _require_study(scene, at).solve(stage, out=out, side=side)
-    change_points: tuple[float, ...] | None = None
+    of_release: dict[str, Any] = {}
     if at is not None:
         _require_command_at(at)
         commanded = at
@@ -105,7 +105,8 @@ def solve(
 
         released = release(scene)
         commanded = released.command
-        change_points = released.change_points
+        of_release["change_points"] = released.change_points
+        of_release["with_extremes"] = released.with_extremes
     else:
         commanded = command(scene)
     request = find_requested(scene, commanded, stage, out)
@@ -119,13 +120,7 @@ def solve(
                 results = alone
             else:
                 results = _solve_blocks(case, commanded, request)
-    return make_solution(
-        scene,
-        commanded,
-        results,
-        solved=scene,
-        change_points=change_points,
-    )
+    return make_solution(scene, commanded, results, solved=scene, **of_release)
 
 
 class _Requested(NamedTuple):
@@ -438,14 +433,14 @@ def make_solution(
     results: Results,
     *,
     solved: Scene | None = None,
-    change_points: tuple[float, ...] | None = None,
+    **of_release: Any,
 ) -> Solution:
     """Put the arrays of a solution in their places.
 
     Parameters
     ----------
     solved : the scene, or None for a study, whose numbers are arrays.
-    change_points : times at which a free motion passed a change point, s.
+    of_release : what a free motion passed: `change_points` and `with_extremes`.
     """
     codes = results.codes
     quantities_by_name = results.arrays
@@ -493,7 +488,7 @@ def make_solution(
         origin=scene.origin,
         lengths=scene.linkage.lengths,
         drive=scene.settled_drive(),
-        change_points=change_points,
+        **of_release,
         at=commanded,
     )
 

@@ -57,6 +57,8 @@ MOST_INTEGRATION_STEPS = 200_000
 hundred turns of the fastest bar take a thousand, so it is thousands of turns long, or
 something makes it infinitely fast.
 """
+_STANDS = 1e-12
+"""Part of the largest velocity coefficient below which another one is rounding."""
 VANISHING_SPEED = 2.0**-300
 """Speed at which viscous damping vanishes and dry friction has its direction."""
 
@@ -76,6 +78,10 @@ class Released:
     change_points: tuple[float, ...] = ()
     """Times at which the motion passed a change point, s. Another motion was possible
     there.
+    """
+    with_extremes: Command | None = None
+    """The same command with more instants between: those at which the angle of a bar or
+    the sine of the transmission angle is largest or smallest.
     """
 
     @property
@@ -290,6 +296,8 @@ class _Run:
         self.steps = 0
         self.energies: list[Array] = []
         """Kinetic energy and work at the instants of each stretch, (2, n), J."""
+        self.reported: list[Array] = []
+        """Reported times of each stretch, s."""
         self.rows: list[Array] = []
         """Reported instants of each stretch, (n, 10), as `_conclude` reads them."""
         self.change_points: list[float] = []
@@ -410,6 +418,8 @@ class _Run:
             start = float(solved.t[-1])
             now = due[due <= start]
             due = due[now.size :]
+            extremes = np.setdiff1d(self._find_extremes(reading, solved), now)
+            now = np.sort(np.concatenate([now, extremes]))
             instants = np.union1d(solved.t, now)
             motion = solved.sol(instants)
             angles = self._report(reading, angles, instants, motion, now, side, moves)
@@ -477,6 +487,32 @@ class _Run:
         self._note_change_points(reading.path, solved)
         return solved
 
+    def _find_extremes(self, reading: _Reading, solved: Any) -> Array:
+        """Find the times in a stretch at which an angle or sin(mu) turns back."""
+        from scipy.optimize import brentq
+
+        def compute_slopes(y: Array) -> Array:
+            position, k = reading.close(y[0])
+            cosine = (position.u4 * np.conj(position.u3)).real
+            by_angle = (k.h2, k.h3, k.h4, cosine * (k.h4 - k.h3))
+            slopes = np.array(np.broadcast_arrays(y[1], *by_angle), dtype=float)
+            sizes = np.abs(slopes[1:])
+            slopes[1:][sizes <= _STANDS * sizes.max(axis=0)] = 0.0
+            return slopes
+
+        slopes = compute_slopes(solved.sol(solved.t))
+        times = [time for event in solved.t_events[1:] for time in event]
+        rows, steps = np.nonzero(slopes[:, 1:] * slopes[:, :-1] < 0.0)
+        for row, step in zip(rows.tolist(), steps.tolist(), strict=True):
+
+            def find_slope(time: float, row: int = row) -> float:
+                return float(compute_slopes(solved.sol(time))[row])
+
+            ends = solved.t[step : step + 2]
+            if find_slope(ends[0]) * find_slope(ends[1]) < 0.0:
+                times.append(brentq(find_slope, *ends, xtol=1e-15))
+        return np.array(times)
+
     def _note_change_points(self, path: LoopPath, solved: Any) -> None:
         """Note the times at which all bars are collinear: another motion is possible.
 
@@ -541,6 +577,7 @@ class _Run:
         )
         rows = np.stack(np.broadcast_arrays(*columns), axis=1)
         self.rows.append(rows[np.searchsorted(instants, due)])
+        self.reported.append(due)
         return {bar: float(values[-1]) for bar, values in turned.items()}
 
     def _conclude(self, branch: float) -> Released:
@@ -553,19 +590,21 @@ class _Run:
         is_sure = np.abs(sine) > NO_DIGIT_LEFT
         last = np.maximum.accumulate(np.where(is_sure, np.arange(sine.size), -1))
         signs = np.where(last < 0, branch, signs[last])
+        times = np.concatenate(self.reported)
         command = Command(
             theta_2,
             signs.astype(np.int8),
             omega_2,
             alpha_2,
-            time=np.asarray(self.times),
+            time=times,
             independent=Independent(bar.astype(np.int8), *independent),
         )
         energy, work = np.concatenate(self.energies, axis=1)
         largest = float(np.max(np.abs([energy, work])))
         drift = float(np.max(np.abs(energy - energy[0] - work)))
         return Released(
-            command,
+            command.part(np.isin(times, self.times)),
             drift / largest if largest else 0.0,
             tuple(sorted(set(self.change_points))),  # two may lie within one step
+            command,
         )

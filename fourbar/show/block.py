@@ -469,6 +469,8 @@ class _SceneBlock:
         solution = self.facts.solution
         assert free is not None
         begin = f"released for {write_digits(free.duration)} s, without a drive"
+        if self.facts.period is not None:
+            begin += f", period {write_digits(self.facts.period)} s"
         if not solution.change_points:
             return begin
         times = " and ".join(f"{write_digits(t)} s" for t in solution.change_points)

@@ -2,8 +2,8 @@
 
 A sweep or a motion law is described by polynomials on panels, whatever its steps. The
 panels end where effects say that forces jump or bend, and where one part of a law
-follows on another. Listed positions and the instants of a released motion are all there
-is: nothing is searched between them.
+follows on another. Between listed positions nothing is searched, and between the
+instants of a released motion only where its angles are largest or smallest.
 """
 
 from dataclasses import dataclass
@@ -165,11 +165,12 @@ def _fit_curves(solution: Solution) -> MotionCurves:
         share = np.ones(len(solution))
         if is_once_round(solution):
             share[-1] = 0.0  # the first position again
-        places = solution.at.places if solution.time is None else solution.time
-        positions, panels = (
-            Panels.of_positions(places, list_curves(scene, solution), share)
-            for list_curves in (_list_positions, _list_curves)
-        )
+        panels = _take_positions(solution, _list_curves(scene, solution), share)
+        extremes = solution
+        if solution.with_extremes is not None:
+            extremes = solve(scene, "position", at=solution.with_extremes)
+        curves = _list_positions(scene, extremes)
+        positions = _take_positions(extremes, curves, np.ones(len(extremes)))
         _mark_poles(scene, solution, panels)
         return MotionCurves(scene, solution, positions, panels, [], np.zeros(0))
     exact, even = _cut(scene, solution)
@@ -229,6 +230,14 @@ def _mark_poles(scene: Scene, solution: Solution, panels: Panels) -> None:
             for curves in (far, near)
         )
         curve.poles = rows[(after > 2.0 * before).any(axis=0)].tolist()
+
+
+def _take_positions(
+    solution: Solution, curves: dict[str, Array], share: Array
+) -> Panels:
+    """Take the positions of a solution for panels with nothing between them."""
+    places = solution.at.places if solution.time is None else solution.time
+    return Panels.of_positions(places, curves, share)
 
 
 def _goes_on_between(scene: Scene, solution: Solution) -> bool:

@@ -24,7 +24,7 @@ from fourbar.show.motion_curves import (
     compute_pin_loads,
     describe_motion,
 )
-from fourbar.show.panels import LOCATED, Peak, Wanted, fit_panels
+from fourbar.show.panels import LOCATED, TIED, Peak, Wanted, fit_panels
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar.studies.internal_forces import Bending
@@ -107,6 +107,8 @@ class Facts:
     bending: dict[int, BarBending]
     stroke_range: tuple[Peak, Peak] | None
     """Smallest and largest stroke of the motion."""
+    period: float | None
+    """Time after which a released motion repeats itself, s; None if it does not."""
     stroke_limits: tuple[float, float] | None
     """Smallest and largest stroke that assembles on the branch. With a stroke commanded
     it is that of the side.
@@ -182,6 +184,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
         pins=_list_pin_loads(motion) if has_forces else {},
         bending=locate_bending(motion) if has_forces else {},
         stroke_range=find_range("stroke") if has_stroke else None,
+        period=_find_period(scene, solution),
         stroke_limits=_find_stroke_limits(scene, solution) if has_stroke else None,
         error=_find_largest_error_bar(solution, drive),
     )
@@ -222,8 +225,9 @@ def _find_transmission(motion: MotionCurves) -> Peak:
         low, high = (panels.find_peak("sin_mu", sense) for sense in (-1, 1))
         least = low if low.value > 0.0 else high
     else:
-        sines = np.abs(solution.sin_mu)
-        least = Peak(float(np.nanmin(sines)), float(panels.start[np.nanargmin(sines)]))
+        sines = np.abs(panels.curves["sin_mu"].sizes[:, 0])
+        row = int(np.argmax(sines <= np.nanmin(sines) + TIED))
+        least = Peak(float(sines[row]), float(panels.start[row]))
     mu = math.asin(min(1.0, abs(least.value)))
     return Peak(0.0 if mu <= ZERO_TRANSMISSION_ANGLE else mu, least.place)
 
@@ -321,6 +325,30 @@ def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]
     least, most = (panels.find_peak("stroke", sense).value for sense in (-1, 1))
     # a cylinder whose ends meet has a corner there
     return 0.0 if least <= LOCATED * most else least, most
+
+
+def _find_period(scene: Scene, solution: Solution) -> float | None:
+    """Find the time after which a released motion repeats itself; None if it does not.
+
+    A motion that loses no energy comes back to its start, and to where an angle is
+    largest or smallest for the first time.
+    """
+    if solution.with_extremes is None:
+        return None
+    motion = solve(scene, "velocity", at=solution.with_extremes)
+    times = np.asarray(motion.time)
+    rows = np.flatnonzero(~np.isin(times[1:], solution.time)) + 1
+    speeds = np.array([getattr(motion, f"omega_{bar}") for bar in MOVING_BARS])
+    same_speed = TIED * np.abs(speeds).max()
+    units = np.exp(1j * np.array([motion.theta_2, motion.theta_4]))
+    for start in [0, *rows[:1].tolist()]:
+        later = rows[rows > start]
+        is_same = (np.abs(units[:, later] - units[:, [start]]) <= TIED).all(axis=0)
+        speed_changes = np.abs(speeds[:, later] - speeds[:, [start]])
+        is_same &= (speed_changes <= same_speed).all(axis=0)
+        if is_same.any():
+            return float(times[later[np.argmax(is_same)]] - times[start])
+    return None
 
 
 def _find_largest_error_bar(solution: Solution, drive: Driving | None) -> float | None:

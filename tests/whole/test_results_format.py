@@ -52,6 +52,7 @@ NOT_QUANTITIES = (
         "branch",
         "ground",
         "change_points",
+        "with_extremes",
         "lengths",
         "origin",
         "at",

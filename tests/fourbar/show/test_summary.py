@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
+from scipy.special import ellipk
 
 import fourbar
 from fourbar.files import loads
@@ -16,7 +18,7 @@ from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, command_at
 from fourbar.scene.motion import Law
 from fourbar.show.motion_curves import MotionCurves, describe_motion
-from fourbar.show.summary import summarize
+from fourbar.show.summary import Facts, summarize
 from tests.support.scenes import CYLINDER, crank_rocker, thesis
 
 LOCATED = 1e-7
@@ -359,3 +361,47 @@ def test_the_summary_beside_a_dead_point_is_as_quick_with_pin_friction(
         assert done.returncode == 0 and "cylinder from bar" in done.stdout, done.stderr
         seconds.append(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before)
     assert seconds[1] < 5.0 * seconds[0]
+
+
+EXTREME = 1e-9
+"""rad and relative: the dense output of the integrator, and equal extremes."""
+ARM, AWAY, CRANK, COUPLER = 0.5, math.radians(25.0), 2.0, 5.0
+INERTIA = 2.0 * CRANK * ARM**2 / 3.0 + COUPLER * ARM**2
+WEIGHT = 9.8 * (CRANK + COUPLER) * ARM
+
+
+def release_pendulum(omega: float, *effects: fourbar.effects.Effect) -> Facts:
+    """Release a parallelogram, which is one pendulum: its coupler does not turn.
+
+    The seven instants that it states are never extreme.
+    """
+    crank = fourbar.Bar(ARM, CRANK)
+    linkage = fourbar.FourBar(0.6, crank, fourbar.Bar(0.6, COUPLER), crank)
+    motion = fourbar.Motion(1.5 * math.pi - AWAY, omega, free=fourbar.Free(3.0, 7))
+    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(9.8), *effects))
+    return summarize(scene, fourbar.solve(scene))
+
+
+def test_a_released_swing_has_its_period_and_the_first_of_equal_extremes() -> None:
+    """The period of a pendulum is an elliptic integral."""
+    facts = release_pendulum(0.0)
+    slow = math.sqrt(INERTIA / WEIGHT)
+    period = 4.0 * slow * float(ellipk(math.sin(0.5 * AWAY) ** 2))
+    assert facts.period == pytest.approx(period, rel=EXTREME)
+    low, high = facts.angles[2]
+    assert low == pytest.approx((1.5 * math.pi - AWAY, 0.0), abs=EXTREME)
+    highest = 1.5 * math.pi + AWAY
+    assert high == pytest.approx((highest, 0.5 * period), abs=EXTREME)
+    damped = release_pendulum(0.0, fourbar.Viscous((("O2", 1e-6),)))
+    assert damped.period is None
+
+
+def test_a_released_turn_has_its_period() -> None:
+    """The time of a turn is the integral of 1/omega, by the energy."""
+    energy = 0.5 * INERTIA * 30.0**2 - WEIGHT * math.cos(AWAY)
+
+    def compute_slowness(theta: float) -> float:
+        return math.sqrt(0.5 * INERTIA / (energy + WEIGHT * math.cos(theta)))
+
+    period, _ = quad(compute_slowness, 0.0, 2.0 * math.pi, epsabs=1e-13)
+    assert release_pendulum(30.0).period == pytest.approx(period, rel=EXTREME)

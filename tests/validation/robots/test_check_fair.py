@@ -16,18 +16,20 @@ import pytest
 
 import fourbar
 from fourbar.effects import Flywheel, Friction
+from fourbar.errors import InputError
 from fourbar.linkage import Bar, FourBar
 from fourbar.mjcf import RECIPE, write_mjcf
 from fourbar.quantities import FORCE_NAMES
-from fourbar.scene import Scene
+from fourbar.scene import Scene, command
 from fourbar.solving import solve
-from fourbar_validation.compare.rows import AGREES, DEGRADED
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.examine import (
     Examined,
     predict_softness,
 )
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
 from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
 from fourbar_validation.robots.differences import find_differences
 from fourbar_validation.robots.files import read_robot
@@ -35,8 +37,9 @@ from fourbar_validation.robots.judge import (
     FILE_AT_ONE_STATE,
     FILE_THROUGH_TIME,
     LoopJudgement,
+    judge_file,
 )
-from tests.support.robots import answer_of, judge_path, notes_of
+from tests.support.robots import Planar, answer_of, judge_path, notes_of
 from tests.support.robots import examine_text as examine
 from tests.support.scenes import mirrored
 
@@ -585,3 +588,38 @@ def test_a_range_that_ends_where_the_motion_does_is_not_the_cause(
         for note in [*report.notes, *report.measured.remarks]
     )
     assert force_errors(report) == pytest.approx(force_errors(free), rel=1e-9)
+
+
+STIFF = 'solimp="0.9999 0.9999 0.001 0.5 2"'
+
+
+def read_cut(cut: str) -> tuple[Scene, RobotFile]:
+    """Return a file that closes its loop at a pin, as stiff as it may be, and its scene
+    at a few positions.
+    """
+    text = Planar(base="", drive="", cut=cut, equality=STIFF).text()
+    file = RobotFile(Path("cut.xml"), text)
+    scene = read_loop_scene(file, PoseOptions(), None, 1.0).scene
+    few = np.linspace(*command(scene).theta_2[[0, -1]], 5)
+    return replace(scene, motion=scene.motion.replace(angle=few)), file
+
+
+def test_a_softness_that_nothing_typed_mends_stays_a_difference() -> None:
+    scene, file = read_cut("A")
+    options = MeasureOptions(PoseOptions(), error=1e-9)
+    judgement = judge_file("cut", scene, file, options)
+    assert judgement.counts[FAILS]
+    costs = {one.key: one.price for one in judgement.differences}
+    assert costs["closure.softness"] == "-"
+
+
+def test_a_loop_closed_at_the_input_of_the_scene_is_told_so() -> None:
+    """Seen from its other end the same file has its hinge at the input."""
+    scene, file = read_cut("O4")
+    link = scene.linkage
+    other = FourBar(link.ground, link.output, link.coupler, link.input)
+    with pytest.raises(InputError, match="closes the loop at pin O2 of the scene"):
+        find_loop_of_scene(
+            file, replace(scene, linkage=other), MeasureOptions(PoseOptions())
+        )
+    find_loop_of_scene(file, scene, MeasureOptions(PoseOptions()))

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 from functools import cache
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
 )
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
-from fourbar_validation.robots.measure import list_errors_by_method
+from fourbar_validation.robots.measure import list_errors_by_method, write_percent
 from fourbar_validation.robots.report import (
     STATES_FILE,
     TextTable,
@@ -64,6 +65,22 @@ def test_the_states_are_those_that_were_asked_at() -> None:
     assert float(first["gap [mm]"]) == 1e3 * row.gap
     size = sum(part**2 for part in row.rigid.forces["F43"]) ** 0.5
     assert float(first["F43 of rigid pins [N]"]) == pytest.approx(size, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("part", "written"),
+    [
+        (0.0, "0 %"),
+        (5e-9, "< 0.000001 %"),
+        (5e-8, "0.00000500 %"),
+        (0.0999951, "10.0 %"),
+        (1.01, "101 %"),
+        (12345.6, "1230000 %"),
+        (math.inf, "inf %"),
+    ],
+)
+def test_percentages_have_one_notation(part: float, written: str) -> None:
+    assert write_percent(part) == written
 
 
 def test_a_page_holds_sentences_tables_and_elements() -> None:

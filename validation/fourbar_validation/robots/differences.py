@@ -56,9 +56,9 @@ class Difference:
     written: str = ""
     """Element and attribute in their file, where there is one."""
     cost: float | None = None
-    """What this entry alone, as in theirs, adds to the error of the generated file: of
-    torque and pin forces that which grows most. None if it was not measured, or cannot
-    be set alone.
+    """What this entry alone adds to an error: of torque and pin forces that which grows
+    most, of a setting the worst one. None if it was not measured, or cannot be set
+    alone.
     """
     quantity: str = ""
     """Quantity that has this error."""

@@ -50,9 +50,9 @@ _DIFFERENCES = ("cost", "what differs")
 _ABOUT_COSTS = (
     "cost: what this one entry adds to the error of the file itself, if it is a"
     " setting, contacts, a range, a motor or gravcomp; of the others what it adds, as"
-    " in the file, to the error of the generated one. Of torque and pin forces the one"
-    " that grows most. A dash: this entry cannot be set by itself, or the file holds"
-    " what it is held to"
+    " in the file, to the error of the generated one. It is that of the torque or pin"
+    " force whose error grows most; of a setting, how far the worst error of all grows."
+    " A dash: this entry cannot be set by itself, or the file holds what it is held to"
 )
 _SETTINGS = ("changed alone", "single states", "through time", "cost")
 SCENE_ROUND_OFF = 1e-8

@@ -724,7 +724,7 @@ def mend_entry(
 
     False if that is not possible. Contacts are switched off, a
     stop and the motors at a pin are removed, the loop is made as stiff as MuJoCo lets
-    it be, and a setting gets its value.
+    it be unless it is, and a setting gets its value.
     """
     model = seen.model
     subject, _, rest = key.partition(".")
@@ -748,6 +748,8 @@ def mend_entry(
     elif key == "closure.solref":
         model.eq_solref[seen.closure] = value
     elif key in ("closure.solimp", "closure.softness"):
+        if np.all(model.eq_solimp[seen.closure, :2] == STIFFEST):
+            return False
         model.eq_solimp[seen.closure, :2] = STIFFEST
     elif subject == "pins" and what in FRICTION_COMPLIANCE.values():
         (field,) = (

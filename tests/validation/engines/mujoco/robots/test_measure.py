@@ -245,3 +245,31 @@ def test_an_actuator_without_a_name_is_told_by_its_joint() -> None:
     file = make_parallelogram(0.5, 0.4, "0 0 0")
     made = read_loop_scene(file, PoseOptions(), None, None)
     assert "not in the scene: an actuator without a name, on hinge_2" in made.remarks
+
+
+def test_what_a_second_solver_of_dry_friction_changes_is_said() -> None:
+    """The same file without it is measured by itself.
+
+    Below the speed at which dry friction acts in full the solver changes it, and never
+    the force of the loop.
+    """
+    plain = make_parallelogram(0.5, 0.4, "0 0 0")
+    rubbing = plain.text.replace('name="hinge_2"', 'name="hinge_2" frictionloss="0.1"')
+    assert rubbing != plain.text
+    twice = rubbing.replace("<worldbody>", '<option noslip_iterations="5"/><worldbody>')
+    options = MeasureOptions(PoseOptions(), speed=1e-3)
+    with_it, without = (
+        measure_loops(replace(plain, text=text), options, None).loops[0]
+        for text in (twice, rubbing)
+    )
+    changed = max(
+        np.abs(np.subtract(mine.soft.values()[name], other.soft.values()[name])).max()
+        / with_it.scales[name]
+        for name in FORCE_QUANTITIES
+        for mine, other in zip(with_it.states.rows, without.states.rows, strict=True)
+    )
+    (remark,) = (text for text in with_it.remarks if "noslip" in text)
+    told = float(remark.split("errors by ")[1].split()[0])
+    assert changed > 1e-3
+    assert told == pytest.approx(changed, rel=0.5)  # one digit, the size of a vector
+    assert not any("noslip" in text for text in without.remarks)

@@ -186,12 +186,28 @@ def _fit(
         return missed, len(_list_misnamed(model, way, usual))
 
     loop = min(fitting, key=rank)
+    _require_driven_hinge(scene, loop)
     pose = replace(options.pose, drive=name_joint(model, loop.joint))
     loop, robot = close_onto(scene, posed, loop, pose)
     made = make_loop_scene(compiled, robot, loop, options.speed, loop.name)
     turned = find_turn(scene, made.loop)
     found = LoopOfScene(file, compiled, robot, made.loop, turned, made.parts)
     return miss_lengths(scene, loop), found
+
+
+def _require_driven_hinge(scene: Scene, loop: RobotLoop) -> None:
+    """Refuse a loop whose equality is the pin about which a scene's input turns."""
+    ground, crank, coupler, output = loop.lengths
+    exchanged = replace(loop, lengths=(ground, output, coupler, crank))
+    missed = miss_lengths(scene, loop)
+    if loop.cut == "O4" and miss_lengths(scene, exchanged) < missed - ALIKE:
+        raise InputError(
+            "--loop",
+            loop.name,
+            "closes the loop at pin O2 of the scene, where no hinge of the file is then"
+            " driven; close it at another pin, or measure it without SCENE, driven at"
+            " its other hinge on the ground",
+        )
 
 
 def _list_ways(
