@@ -339,6 +339,29 @@ def half_a_step(
 
 
 OMEGA = {"thesis": 0.2244, "crank_rocker": 10.0}
+RATES = ("omega_3", "omega_4", "alpha_3", "alpha_4")
+
+
+def differences(*at: int) -> Callable[[Scene], Numbers]:
+    """Rates by differences of angles at these steps; first and last for speeds."""
+
+    def planted(scene: Scene) -> Numbers:
+        numbers = right(scene)
+        theta = numbers["theta_2"]
+        step = theta[1] - theta[0]
+        second = step / OMEGA["crank_rocker"]
+        near = [right(scene, theta_2=theta + number * step) for number in at]
+        for bar in "34":
+            angle = np.exp([1j * each[f"theta_{bar}"] for each in near])
+            before, after = np.angle(angle[1:] / angle[:-1])
+            speed = {0: before, -2: after}.get(at[0], 0.5 * (before + after))
+            numbers[f"omega_{bar}"] = speed / second
+            numbers[f"alpha_{bar}"] = (after - before) / second**2
+        return numbers
+
+    return planted
+
+
 MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]] = [
     # id, scene, columns, what was done, words of the explanation
     (
@@ -934,6 +957,20 @@ MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]
         ALL,
         in_degrees(0.0),
         "degrees from 0 to 360 where radians",
+    ),
+    *(
+        (
+            f"{name} differences",
+            "crank_rocker",
+            RATES,
+            differences(*at),
+            f"accelerations are {name} differences",
+        )
+        for name, at in (
+            ("forward", (0, 1, 2)),
+            ("backward", (-2, -1, 0)),
+            ("central", (-1, 0, 1)),
+        )
     ),
     (
         "drive on bar 3",

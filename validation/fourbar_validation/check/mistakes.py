@@ -3,7 +3,7 @@
 The numbers that each would make are held against the table.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -63,6 +63,7 @@ def list_hypotheses(scene: Scene, command: Command) -> Iterator[Mistake]:
     if command.speed is not None:
         yield from _scale_inertial(scene, command)
         yield from _scale_actions(scene, command)
+        yield from _take_differences(scene, command)
     variants = list(_list_variants(scene, command))
     predictions = predict_variants(state_all(scene), command, variants)
     for variant, predict in zip(variants, predictions, strict=True):
@@ -248,6 +249,63 @@ def _relax(key: str, spring: Any) -> Iterator[tuple[str, Any]]:
             if spring[place]:
                 relaxed = (*spring[:place], 0.0, *spring[place + 1 :])
                 yield f"{text} of torsion", relaxed
+
+
+_DIFFERENCES = {
+    "forward": ((0, 1), (0, 1, 2)),
+    "backward": ((-1, 0), (-2, -1, 0)),
+    "central": ((-1, 1), (-1, 0, 1)),
+}
+"""Steps of the table at which an angle is taken for its speed and acceleration."""
+_SAME_STEP = 1e-6
+"""Part of a step by which the steps of a table may differ: the rounding of a file."""
+
+
+def _take_differences(scene: Scene, command: Command) -> Iterator[Mistake]:
+    """Take speeds and accelerations from the angles at neighbouring rows of a table.
+
+    The rows are those of a motion at one speed, at equal steps.
+    """
+    steps = np.diff(command.angle)
+    speed = np.asarray(command.speed, dtype=float)
+    changes = np.any(command.acceleration) or np.ptp(speed) != 0.0 or not speed.any()
+    if changes or steps.size < ENOUGH_NUMBERS or not steps[0]:
+        return
+    if np.ptp(steps) > _SAME_STEP * abs(steps[0]):
+        return
+    moved = {
+        number: solve(
+            scene,
+            "position",
+            at=command._replace(angle=command.angle + number * steps[0]),
+        )
+        for number in range(-2, 3)
+    }
+    second = steps[0] / float(speed.max())
+    for name, (of_speed, of_acceleration) in _DIFFERENCES.items():
+        predict = partial(_difference, moved, second, of_speed, of_acceleration)
+        yield Mistake(f"speeds and accelerations are {name} differences", predict)
+
+
+def _difference(
+    moved: Mapping[int, Solution],
+    second: float,
+    of_speed: tuple[int, ...],
+    of_acceleration: tuple[int, ...],
+    quantity: str,
+    right: Solution,
+) -> Array | None:
+    """Divide differences of an angle by those of the time; None for no rate of one."""
+    rate, _, bar = quantity.rpartition("_")
+    taken = {"omega": of_speed, "alpha": of_acceleration}.get(rate)
+    if taken is None or quantity.endswith(right.commanded[-1]):
+        return None
+    angles = [getattr(moved[number], f"theta_{bar}") for number in taken]
+    turns = np.diff(angles, axis=0)
+    turns -= TURN * np.rint(turns / TURN)
+    if rate == "omega":
+        return np.asarray(turns[0] / (second * (taken[1] - taken[0])))
+    return np.asarray((turns[1] - turns[0]) / second**2)
 
 
 def _list_other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
