@@ -205,30 +205,30 @@ class Later:
         return getattr(import_module(module), name)(*arguments)
 
 
-_ENGINES_PACKAGE = "fourbar_validation.engines"
-SIMULATED_TO_ERROR = Later(f"{_ENGINES_PACKAGE}.mujoco.trial:SimulatedToError")
+ENGINES_PACKAGE = "fourbar_validation.engines"
+SIMULATED_TO_ERROR = Later(f"{ENGINES_PACKAGE}.mujoco.trial:SimulatedToError")
 """Simulation with settings for a wanted error."""
 ENGINES = (
     Engine(
         "pinocchio-inverse",
-        Later(f"{_ENGINES_PACKAGE}.pinocchio:PinocchioInverse"),
+        Later(f"{ENGINES_PACKAGE}.pinocchio:PinocchioInverse"),
         EQUIVALENCE,
         predictor=predict_in_world_axes,
         library="pinocchio",
     ),
     Engine(
         "mujoco-inverse",
-        Later(f"{_ENGINES_PACKAGE}.mujoco.inverse:MujocoInverse"),
+        Later(f"{ENGINES_PACKAGE}.mujoco.inverse:MujocoInverse"),
         EQUIVALENCE,
         predictor=predict_about_mass_centre,
         library="mujoco",
     ),
     Engine(
         "mujoco-simulated",
-        Later(f"{_ENGINES_PACKAGE}.mujoco.simulate:MujocoSimulated"),
+        Later(f"{ENGINES_PACKAGE}.mujoco.simulate:MujocoSimulated"),
         SIMULATED,
         UNKNOWNS,
-        order=Later(f"{_ENGINES_PACKAGE}.mujoco.simulate:observe_order"),
+        order=Later(f"{ENGINES_PACKAGE}.mujoco.simulate:observe_order"),
         through_time=True,
         generated=True,
         residuals=True,

@@ -44,26 +44,27 @@ from fourbar_validation.compare.tolerance import (
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.guests import Guest
-from fourbar_validation.engines.registry import Engine, find_missing, make_demands
+from fourbar_validation.engines.registry import (
+    ENGINES_PACKAGE,
+    Engine,
+    Later,
+    find_missing,
+    make_demands,
+)
 from fourbar_validation.report.record import Timing
 from fourbar_validation.run.question import Question, select_positions, take_member
 
-
-def _answer_mujoco(step: float) -> Any:
-    from fourbar_validation.engines.mujoco.forward import MujocoForward
-
-    return MujocoForward(step)
-
-
-def _answer_pinocchio(step: float) -> Any:
-    from fourbar_validation.engines.pinocchio import PinocchioReleased
-
-    return PinocchioReleased(step)
-
-
 FORWARD = {
-    "mujoco-forward": (_answer_mujoco, 1e-3, "mujoco"),
-    "pinocchio-forward": (_answer_pinocchio, 1e-3, "pinocchio"),
+    "mujoco-forward": (
+        Later(f"{ENGINES_PACKAGE}.mujoco.forward:MujocoForward"),
+        1e-3,
+        "mujoco",
+    ),
+    "pinocchio-forward": (
+        Later(f"{ENGINES_PACKAGE}.pinocchio:PinocchioReleased"),
+        1e-3,
+        "pinocchio",
+    ),
 }
 """Engines that integrate by themselves. Each has a function that starts it with a step,
 the longest step (s), and its library.
