@@ -184,8 +184,8 @@ SPEED_LIMITS = {
     ),
     "a judged scene / one position": _SpeedLimit(
         "<=",
-        300.0,
-        "30 ms where a position takes 0.1 ms: two million scenes a night on 20 cores",
+        200.0,
+        "20 ms where a position takes 0.1 ms: a million scenes a night on one core",
         JUDGED_SCENE,
         ONE_POSITION,
     ),
