@@ -301,11 +301,6 @@ def count_turns(lengths: tuple[Number, Number, Number, Number], bar: int) -> Num
     return np.where(passing.outer ^ passing.inner, 2, 1)
 
 
-def find_singular(position: Position) -> Number:
-    """Mark positions where velocities are 0/0 because bars 3 and 4 lie in one line."""
-    return np.abs(position.sin_mu) <= NO_DIGIT_LEFT
-
-
 def compute_state(
     linkage: FourBar,
     theta_2: Number,

@@ -12,7 +12,8 @@ import pytest
 import fourbar
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.motion import State
-from fourbar.formulas.path import compute_state, find_singular
+from fourbar.formulas.path import NO_DIGIT_LEFT, compute_state
+from fourbar.formulas.position import Position
 
 EPS = 2.0**-52
 LENGTHS = (0.3, 0.1, 0.25, 0.22)
@@ -31,6 +32,11 @@ def linkage(
 
 def angle(state: State, bar: int) -> np.ndarray:
     return np.angle(state.direction(bar))
+
+
+def find_singular(position: Position) -> np.ndarray:
+    """Mark positions whose bars 3 and 4 lie in one line."""
+    return np.abs(position.sin_mu) <= NO_DIGIT_LEFT
 
 
 def assembled(state: State) -> np.ndarray:

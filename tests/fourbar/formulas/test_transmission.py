@@ -1,21 +1,19 @@
 """Transmission angle against the cosine law in many digits, the rest against a scan."""
 
 import math
+from typing import Any
 
 import mpmath as mp
 import numpy as np
 import pytest
 
 from fourbar.formulas.mobility import find_intervals, limit_positions
-from fourbar.formulas.path import compute_state
-from fourbar.formulas.transmission import (
-    distance_to_singular,
-    mechanical_advantage,
-    speed_ratio,
-    transmission_angle,
-    transmission_extremes,
-)
+from fourbar.formulas.transmission import transmission_extremes
 from fourbar.linkage import Bar, FourBar
+from fourbar.scene import Scene
+from fourbar.scene.motion import Motion
+from fourbar.show.derived import derive
+from fourbar.solving import solve
 from tests.fourbar.formulas.test_points import random_positions
 
 EPS = 2.0**-52
@@ -26,10 +24,12 @@ ANGLE = 16.0 * EPS
 SCAN = 4001
 HIGHER_ORDER = 1.1
 """What the terms beyond the leading one may add to the miss of a scan."""
-PARALLEL = 1e-9
-"""Sine of two bars that stay parallel, with the rounding of two circles that touch."""
-OUTSIDE = 1e-9
-"""rad beyond an edge of assembly."""
+
+
+def derive_at(name: str, bars: FourBar, theta_2: Any, branch: int) -> np.ndarray:
+    """Derive a quantity where the input turns at 3 rad/s."""
+    motion = Motion(np.array(theta_2, ndmin=1), 3.0, branch=branch)
+    return derive(solve(Scene(bars, motion)), name)
 
 
 def test_transmission_angle_is_the_acute_angle_between_coupler_and_output() -> None:
@@ -41,14 +41,15 @@ def test_transmission_angle_is_the_acute_angle_between_coupler_and_output() -> N
             at_B = mp.acos((squares + 2 * a * d * mp.cos(psi)) / (2 * b * c))
             slope = float(a * d / (b * c)) + 1.0  # of mu sin(mu) over psi
             size = max(1.0, float(a * a + d * d) / float(b * c))
-            error = transmission_angle(drawn.moving())[0] - min(at_B, mp.pi - at_B)
+            mu = derive_at("transmission", *drawn)[0]
+            error = mu - min(at_B, mp.pi - at_B)
             assert abs(error) <= ANGLE * (slope + size) / drawn.sine
 
 
 def test_transmission_angle_keeps_its_digits_where_it_vanishes() -> None:
     psi = 10.0 ** -np.arange(1.0, 14.0)
     parallelogram = FourBar(0.3, Bar(0.1), Bar(0.3), Bar(0.1))
-    mu = transmission_angle(compute_state(parallelogram, psi, 1))
+    mu = derive_at("transmission", parallelogram, psi, 1)
     assert mu == pytest.approx(psi, rel=8 * EPS)
 
 
@@ -109,105 +110,23 @@ def test_speeds_follow_from_the_lever_of_the_coupler_and_power_is_kept() -> None
         lever_in = drawn.bars.input.length * math.sin(drawn.theta_2[0] - theta_3)
         lever_out = drawn.bars.output.length * math.sin(theta_4 - theta_3)
         rounding = 256 * EPS * (drawn.bars.input.length + drawn.bars.output.length)
-        assert speed_ratio(moving)[0] * lever_out == pytest.approx(
+        ratio = derive_at("omega_4/omega_2", *drawn)[0]
+        assert ratio * lever_out == pytest.approx(
             lever_in, abs=rounding / drawn.sine**2
         )
-        for radii in ((), (0.1, 0.4)):
-            r_in, r_out = radii or (1.0, 1.0)
-            power = mechanical_advantage(moving, *radii) * r_out * moving.omega(4)
-            assert power == pytest.approx(r_in * 3.0, rel=16 * EPS)
+        power = derive_at("mechanical_advantage", *drawn)[0] * moving.omega(4)
+        assert power == pytest.approx(3.0, rel=16 * EPS)
 
 
 def test_advantage_where_the_output_stands_and_where_the_input_does() -> None:
     folded = FourBar(2.0, Bar(1.0), Bar(1.0), Bar(2.0))  # a kite with B on O2
-    standing = compute_state(folded, np.array([1.0]), -1)
-    assert np.isinf(mechanical_advantage(standing)).all()
+    assert not np.isfinite(derive_at("mechanical_advantage", folded, 1.0, -1))
     rocker = FourBar(3.0, Bar(2.5), Bar(1.0), Bar(2.2))
     limit = limit_positions(rocker)[0].theta_2
-    near = compute_state(rocker, limit + np.array([1e-4, 1e-6, 1e-8]), 1)
-    advantage = np.abs(mechanical_advantage(near))
+    near = limit + np.array([1e-4, 1e-6, 1e-8])
+    advantage = np.abs(derive_at("mechanical_advantage", rocker, near, 1))
     # it falls as the root of the distance
     assert advantage[:-1] / advantage[1:] == pytest.approx([10.0, 10.0], rel=1e-2)
     parallelogram = FourBar(2.0, Bar(1.0), Bar(2.0), Bar(1.0))
-    on_change_point = compute_state(parallelogram, np.array([0.0]), 1)
-    assert speed_ratio(on_change_point) == mechanical_advantage(on_change_point) == 1.0
-
-
-LINKAGES = {
-    "crank": (3.0, 1.0, 2.5, 2.2, 0.5),
-    "rocker": (3.0, 2.5, 1.0, 2.2, 0.7),
-    "inner limits alone": (2.0, 2.5, 4.0, 2.2, -2.0),
-    "outer limits alone": (4.0, 2.0, 2.5, 2.2, 3.0),
-    "parallelogram": (2.0, 1.0, 2.0, 1.0, 0.5),
-}
-
-
-def close(lengths: tuple[float, ...], theta_2: np.ndarray, branch: int) -> list:
-    """Directions of bars 2, 3 and 4 by two circles; NaN where they do not meet."""
-    d, a, b, c, theta_1 = lengths
-    if lengths == LINKAGES["parallelogram"]:  # goes on through its change points
-        branch = branch * np.sign(np.sin(theta_2 - theta_1))
-    A = a * np.exp(1j * theta_2)
-    gap = d * np.exp(1j * theta_1) - A
-    e = np.abs(gap)
-    foot = (e**2 + b * b - c * c) / (2.0 * e)
-    with np.errstate(invalid="ignore"):
-        height = np.sqrt(b * b - foot**2)
-    to_B = gap / e * (foot + 1j * branch * height)
-    return [np.exp(1j * theta_2), to_B / b, (to_B - gap) / c]
-
-
-def scan_singular(lengths: tuple[float, ...], drive: int, branch: int) -> list[float]:
-    """Angles of the input between whose neighbours the sine of the drive vanishes."""
-    theta_2 = np.linspace(0.0, math.tau, SCAN) + 1e-4
-    directions = close(lengths, theta_2, branch)
-    edges = np.diff(np.isnan(directions[1]).astype(int)) != 0
-    one, other = (directions[bar - 2] for bar in (2, 3, 4) if bar != drive)
-    sine = np.where(np.isnan(one), 1.0, (one.conj() * other).imag)
-    sine[np.abs(sine) < PARALLEL] = 1.0
-    edges |= sine[:-1] * sine[1:] < 0.0
-    return (0.5 * (theta_2[1:] + theta_2[:-1]))[edges].tolist()
-
-
-@pytest.mark.parametrize("branch", [1, -1])
-@pytest.mark.parametrize("drive", [2, 3, 4])
-@pytest.mark.parametrize("name", LINKAGES)
-def test_the_distance_is_that_to_what_a_scan_finds(
-    name: str, drive: int, branch: int
-) -> None:
-    lengths = LINKAGES[name]
-    d, a, b, c, theta_1 = lengths
-    bars = FourBar(d, Bar(a), Bar(b), Bar(c), theta_1)
-    theta_2 = np.linspace(-9.0, 9.0, 600)
-    theta_2 = theta_2[np.isfinite(close(lengths, theta_2, branch)[1])]
-    places = scan_singular(lengths, drive, branch)
-    if name == "parallelogram":
-        places += [theta_1, theta_1 + math.pi]
-    away = np.remainder(theta_2[:, None] - places + math.pi, math.tau) - math.pi
-    nearest = np.abs(away).min(axis=1, initial=math.inf)
-    ours = distance_to_singular(bars, theta_2, drive, branch)
-    assert ours == pytest.approx(nearest, abs=math.tau / (SCAN - 1))
-    sides = np.full(theta_2.shape, branch)
-    assert np.array_equal(distance_to_singular(bars, theta_2, drive, sides), ours)
-    both = np.minimum(ours, distance_to_singular(bars, theta_2, drive, -branch))
-    assert np.array_equal(distance_to_singular(bars, theta_2, drive), both)
-
-
-@pytest.mark.parametrize("name", list(LINKAGES)[1:4])
-def test_the_distance_to_the_edge_of_assembly_has_all_digits(name: str) -> None:
-    d, a, b, c, theta_1 = LINKAGES[name]
-    bars = FourBar(d, Bar(a), Bar(b), Bar(c), theta_1)
-    theta_2 = np.linspace(*find_intervals(bars)[0], 9)[1:-1] + 4 * math.pi
-    distance = distance_to_singular(bars, theta_2)
-
-    def assembles(offset: np.ndarray) -> np.ndarray:
-        state = compute_state(bars, theta_2 + offset, 1)
-        return np.isfinite(state.position.sin_mu)
-
-    inside = distance * (1.0 - OUTSIDE)
-    outside = distance * (1.0 + OUTSIDE)
-    assert (assembles(inside) & assembles(-inside)).all()
-    assert not (assembles(outside) & assembles(-outside)).any()
-    coarse = theta_2.astype(np.float32)
-    of_doubles = distance_to_singular(bars, coarse.astype(float))
-    assert np.array_equal(distance_to_singular(bars, coarse), of_doubles)
+    for name in ("omega_4/omega_2", "mechanical_advantage"):
+        assert derive_at(name, parallelogram, 0.0, 1) == 1.0
