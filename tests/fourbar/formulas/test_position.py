@@ -51,21 +51,27 @@ def find_assembly(psi: float, sign: int) -> int:
     return sign if psi > 0.0 else -sign
 
 
+def close_triangle(lengths: tuple[float, ...], psi: mpf, branch: int) -> list[mp.mpc]:
+    """Return the vectors AB and O4B, m, by the triangle A, B, O4."""
+    d, a, b, c = map(mpf, lengths)
+    A = a * mp.expj(psi)
+    e = abs(d - A)
+    at_A = branch * mp.acos((b * b + e * e - c * c) / (2 * b * e))
+    coupler = b * ((d - A) / e) * mp.expj(at_A)
+    return [coupler, A + coupler - d]
+
+
 def differences(lengths: tuple[float, ...], psi: float, branch: int) -> list[mpf]:
     """h3, h4, h3', h4' from the directions of the triangle A, B, O4 about psi."""
-    d, a, b, c = map(mpf, lengths)
-
-    def angles(theta: mpf) -> tuple[mpf, mpf]:
-        A = a * mp.expj(theta)
-        e = abs(d - A)
-        B = A + b * ((d - A) / e) * mp.expj(
-            branch * mp.acos((b * b + e * e - c * c) / (2 * b * e))
-        )
-        return mp.arg(B - A), mp.arg(B - d)
-
     with mp.workdps(90):
         step = mpf(10) ** -STEP
-        before, middle, after = (angles(mpf(psi) + k * step) for k in (-1, 0, 1))
+        before, middle, after = (
+            [
+                mp.arg(bar)
+                for bar in close_triangle(lengths, mpf(psi) + k * step, branch)
+            ]
+            for k in (-1, 0, 1)
+        )
         first = [(y - x) / (2 * step) for x, y in zip(before, after, strict=True)]
         return first + [
             (x - 2 * y + z) / step**2
@@ -107,13 +113,8 @@ def test_small_sines_of_coupler_and_output_keep_their_digits(
     plain = close_loop(bars, u1, direction(psi) * u1, half, assembly)
     corrected = take_sines_of_rates(bars, plain, coefficients(bars, plain))
     with mp.workdps(50):
-        d, a, b, c = map(mpf, lengths)
-        A = a * mp.expj(mpf(psi))
-        e = abs(d - A)
-        B = A + b * ((d - A) / e) * mp.expj(
-            branch * mp.acos((b * b + e * e - c * c) / (2 * b * e))
-        )
-        exact = (B - A) / b, (B - d) / c
+        coupler, output = close_triangle(lengths, mpf(psi), branch)
+        exact = coupler / mpf(lengths[2]), output / mpf(lengths[3])
     for ours, theirs, before in zip(
         (corrected.u3, corrected.u4),
         exact,
