@@ -148,17 +148,8 @@ def test_from_the_ground_to_a_bar_only_the_pin_there_bears_the_push(
 
 
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
-def test_its_power_is_that_of_the_torque_and_its_line_has_no_sense(
-    start_bar: int,
-    end_bar: int,
-) -> None:
-    s, torque = fourbar.solve(driven(start_bar, end_bar)), fourbar.solve(crank_rocker())
-    np.testing.assert_allclose(
-        s.power,
-        torque.power,
-        rtol=0,
-        atol=ROUND_OFF * np.abs(torque.power).max(),
-    )
+def test_its_line_has_no_sense(start_bar: int, end_bar: int) -> None:
+    s = fourbar.solve(driven(start_bar, end_bar))
     back = fourbar.solve(
         crank_rocker(
             drive=fourbar.LinearDrive(
@@ -181,12 +172,9 @@ def test_its_power_is_that_of_the_torque_and_its_line_has_no_sense(
             atol=1e-12,
         )
     np.testing.assert_array_equal(back.drive_line, -s.drive_line)
-    assert (
-        s.torque is None
-        and s.drive_bar is None
-        and torque.drive_force is None
-        and torque.stroke is None
-    )
+    assert s.torque is None and s.drive_bar is None
+    torque = fourbar.solve(crank_rocker())
+    assert torque.drive_force is None and torque.stroke is None
 
 
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)

@@ -385,25 +385,6 @@ def test_a_spring_between_places_that_are_one_is_refused_where_it_is_released(
     assert np.abs(one - other).max() < 1e-9
 
 
-@pytest.mark.parametrize("bar", (3, 4))
-def test_a_release_at_an_angle_of_another_bar_is_the_same_motion(bar: int) -> None:
-    scene = fourbar.Scene(
-        HANGING,
-        fourbar.Motion(0.5, 2.0),
-        effects=(fourbar.Gravity(),),
-    )
-    free = fourbar.Free(0.2, 8)
-    start = solve(scene, "velocity")
-    angle, speed = (getattr(start, f"{name}_{bar}")[0] for name in ("theta", "omega"))
-    sign = {3: math.sin(start.theta_4[0] - 0.5), 4: math.sin(start.theta_3[0] - 0.5)}
-    named: dict[str, float] = {f"theta_{bar}": angle, f"omega_{bar}": speed}
-    other = fourbar.Motion(**named, branch=int(np.sign(sign[bar])), free=free)  # type: ignore[arg-type]
-    one = fourbar.release(replace(scene, motion=fourbar.Motion(0.5, 2.0, free=free)))
-    two = fourbar.release(replace(scene, motion=other))
-    assert np.abs(np.sin(0.5 * (one.theta_2 - two.theta_2))).max() < 1e-9
-    assert np.abs(one.omega_2 - two.omega_2).max() < 1e-7
-
-
 def test_change_points_of_several_turns_are_noted_when_they_are_passed() -> None:
     """A flywheel turns a massless parallelogram evenly.
 

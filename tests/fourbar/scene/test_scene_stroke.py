@@ -17,7 +17,7 @@ from fourbar.files.scene_file import loads
 from fourbar.files.scene_text import dump
 from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import Sweep
-from fourbar.studies.keys import read_place, replace_numbers
+from fourbar.studies.keys import read_place
 from fourbar_validation.engines.prediction import compute_reference
 from tests.support.balls import answer_in_balls
 from tests.support.scenes import crank_rocker
@@ -34,10 +34,6 @@ doubles lose, or some of them.
 """
 ENDS = {2: Place(2, (0.12, 0.4)), 4: Place(4, (0.15, -0.6))}
 GROUND = Place(1, (0.3, 2.2))
-SAMPLED = 0.02
-"""Relative, of the standard deviation of 256 quasi-random samples, whose tails end at
-half a sample.
-"""
 DIFFERENCES = 1e-5
 """Relative, of differences over two millionths of a length of a tenth: (1e-5)^2 times
 third derivatives of 1e4.
@@ -206,47 +202,6 @@ def test_who_does_not_take_it_says_so() -> None:
     assert replace(by_stroke, title="b") != by_stroke
 
 
-@pytest.mark.parametrize(("bar", "strokes"), [(2, (0.25, 0.35)), (4, (0.45, 0.52))])
-def test_a_study_of_strokes_is_as_its_members_one_by_one(
-    bar: int,
-    strokes: tuple[float, float],
-) -> None:
-    by_stroke = scene(
-        bar,
-        Sweep(*strokes, 6),
-        stroke_speed=0.2,
-        stroke_acceleration=0.1,
-    )
-    values = {
-        "lengths.input": [0.1, 0.11],
-        "drive.to.from_pin.0": [0.12, 0.14],
-        "drive.from.from_pin.1": [2.2, 2.3],
-    }
-    values |= {"lengths.ground_angle": [0.0, 0.2], "motion.stroke_speed": [0.2, -0.3]}
-    study = fourbar.solve(fourbar.vary(by_stroke, values))
-    for k in range(2):
-        one = fourbar.solve(
-            replace_numbers(by_stroke, {key: pair[k] for key, pair in values.items()})
-        )
-        assert one.status == study.status[k] and one.status.count("ok") > 5
-        for name in (
-            "theta_2",
-            "theta_4",
-            "alpha_3",
-            "drive_force",
-            "F14",
-            "condition",
-            "stroke",
-        ):
-            theirs = getattr(one, name)
-            np.testing.assert_allclose(
-                getattr(study, name)[k],
-                theirs,
-                rtol=ROUND_OFF,
-                atol=1e-12,
-            )
-
-
 def test_a_member_whose_cylinder_cannot_have_the_stroke_does_not_assemble() -> None:
     solution = fourbar.solve(
         fourbar.vary(
@@ -298,19 +253,6 @@ def test_sensitivities_at_a_stroke_are_its_differences(bar: int, stroke: float) 
                 rtol=DIFFERENCES,
                 atol=1e-11 * size,
             )
-
-
-def test_tolerances_at_a_stroke_spread_as_first_order_says() -> None:
-    drawn = fourbar.Tolerance("drive.to.from_pin.0", 1e-5, sigma=True)
-    by_stroke = replace(
-        scene(2, Sweep(0.25, 0.35, 5), stroke_speed=0.2),
-        tolerances=(drawn,),
-    )
-    spread, slopes = fourbar.tolerances(by_stroke, 256), fourbar.sensitivity(by_stroke)
-    for name in ("theta_2", "theta_4", "drive_force"):
-        wanted = 1e-5 * np.abs(slopes.of(name, drawn.key))
-        np.testing.assert_allclose(spread.spreads[name].deviation, wanted, rtol=SAMPLED)
-    assert not spread.without.any()
 
 
 @pytest.mark.parametrize(
