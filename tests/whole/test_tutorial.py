@@ -31,6 +31,8 @@ def test_a_page_does_and_prints_what_it_says(
         "pandas",
         reason="the tutorial makes a table of pandas: pip install pandas",
     )
+    if page == "recipes":
+        pytest.importorskip("pinocchio", reason="a recipe needs it: pip install pin")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "models").symlink_to(ROOT / "models")
     names: dict[str, object] = {}
