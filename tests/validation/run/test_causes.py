@@ -213,6 +213,25 @@ BUGS: dict[str, tuple[type, str]] = {
         make_guest(("(1j * turning - w * w) * arm", "-w * w * arm")),
         "alpha x r is missing in a_G of every bar, r from its first pin to G",
     ),
+    "centripetal part doubled": (  # bulletphysics/bullet3#4451
+        make_guest(("turning - w * w)", "turning - 2.0 * w * w)")),
+        "-omega^2 r is doubled in a_G of every bar, r from its first pin to G",
+    ),
+    "tangential part doubled": (
+        make_guest(("(1j * turning - w * w)", "(2j * turning - w * w)")),
+        "alpha x r is doubled in a_G of every bar, r from its first pin to G",
+    ),
+    "no inertia of the first bar": (  # ipab-slmc/exotica#134
+        make_guest(
+            ('bar["mass"] * (a_pin', 'bar["mass"] * (name != "input") * (a_pin'),
+            ('bar.get("inertia"', '(name != "input") * bar.get("inertia"'),
+        ),
+        "input: mass and moment of inertia left out",
+    ),
+    "torque twice": (  # bulletphysics/bullet3#2966
+        make_guest((TORQUE, '"torque": 2.0 * (moments[0] - cross(r2, F32))')),
+        "every number is 2 times ours: torque",
+    ),
     "tangential part reversed": (
         make_guest(("(1j * turning - w * w)", "(-1j * turning - w * w)")),
         "alpha x r has the wrong sign in a_G of every bar, r from its first pin to G",
@@ -506,6 +525,25 @@ def test_what_acts_may_be_left_out_doubled_or_reversed(
     assert f"{name} {verb} {word}" in causes
 
 
+@pytest.mark.parametrize(
+    ("names", "where"),
+    [  # osrf/drcsim#193: the wrench of the constraints alone
+        (("F12", "F32", "F43", "F14"), "in the pin forces alone"),
+        (("torque",), "in what drives alone"),
+    ],
+)
+def test_what_acts_may_be_missing_in_some_quantities(
+    names: tuple[str, ...],
+    where: str,
+) -> None:
+    def leave_out(numbers: dict[str, np.ndarray], at: Command) -> None:
+        without = FreeBody().answer(replace(SCENE, effects=()), at).quantities
+        numbers |= {name: without[name] for name in names}
+
+    causes = find_causes(partial(Altered, leave_out))
+    assert causes[0] == f"gravity is missing {where}"
+
+
 def name_wrong(changes: dict[str, Change]) -> dict[str, str]:
     """Who is called wrong, and why, where engines answer with these changes."""
 
@@ -691,6 +729,23 @@ class FromG(Misplaced):
         return replace(load, from_pin=None, from_centre=load.from_pin)
 
 
+class AtPoint(Misplaced):
+    """Forces act at the mass centre, or at the first pin, wherever they should."""
+
+    def __init__(self, at_pin: bool) -> None:
+        self.place = {"from_pin" if at_pin else "from_centre": (0.0, 0.0)}
+
+    def change(
+        self,
+        scene: Scene,
+        right: fourbar.Solution,
+        i: int,
+        load: fourbar.Load,
+    ) -> fourbar.Load:
+        none = {"arm": None, "from_pin": None, "from_centre": None}
+        return replace(load, **none | self.place)
+
+
 class Turning(Misplaced):
     """Forces of fixed direction turn with their bars."""
 
@@ -715,6 +770,10 @@ class Turning(Misplaced):
             "from_pin",
             "its place is measured from G, not from the bar's first pin",
         ),
+        # stack-of-tasks/pinocchio#1544
+        (partial(AtPoint, True), "arm", "its force acts at the first pin of the bar"),
+        (partial(AtPoint, False), "from_pin", "its force acts at G of the bar"),
+        # stack-of-tasks/pinocchio#1543
         (Turning, "arm", "its direction turns with the bar"),
         (Turning, "from_pin", "its direction turns with the bar"),
     ],

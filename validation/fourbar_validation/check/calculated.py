@@ -328,8 +328,10 @@ class _Calculation:
         parts = {
             "-omega^2 r is missing in a_G": (centripetal, -1.0),
             "-omega^2 r has the wrong sign in a_G": (centripetal, -2.0),
+            "-omega^2 r is doubled in a_G": (centripetal, 1.0),
             "alpha x r is missing in a_G": (tangential, -1.0),
             "alpha x r has the wrong sign in a_G": (tangential, -2.0),
+            "alpha x r is doubled in a_G": (tangential, 1.0),
         }
         for text, (part, times) in parts.items():
             wrenches = self.wrenches
@@ -394,8 +396,11 @@ class _Calculation:
             others = scene.loads[:number] + scene.loads[number + 1 :]
             without = solve(replace(scene, loads=others), "force", at=self.judge.at)
             bar = load.bar
-            force = find_wrenches(scene, without).p[bar] - self.wrenches.p[bar]
+            needed = find_wrenches(scene, without)
+            force = needed.p[bar] - self.wrenches.p[bar]
             moment = cross_vectors(self.wrenches.arms[bar], force)
+            if load.table is None:
+                yield from self._move_load(number, needed, load.moment, moment)
             name = f"load {number + 1} (bar {bar})"
             what = "its place"
             if load.arm is not None:
@@ -419,6 +424,25 @@ class _Calculation:
                     f"{name}: {what} is measured from G, not from the bar's first pin",
                     self.wrenches.changed(bar, q=-moment).solve(),
                 )
+
+    def _move_load(
+        self,
+        number: int,
+        without: _BarWrenches,
+        couple: float,
+        moment: Array,
+    ) -> Iterator[Mistake]:
+        """Let the force of a load act at G, or at the bar's first pin.
+
+        `without`: what the bars need without it; `moment`: of the force at G about that
+        pin.
+        """
+        bar = self.judge.scene.loads[number].bar
+        name = f"load {number + 1} (bar {bar})"
+        at_centre = without.q[bar] - self.wrenches.q[bar] - couple
+        for place, more in (("G", at_centre), ("the first pin", at_centre + moment)):
+            text = f"{name}: its force acts at {place} of the bar"
+            yield _state(text, self.wrenches.changed(bar, q=more).solve())
 
 
 def find_miscalculated(judge: Judge) -> Iterator[Mistake]:

@@ -3,7 +3,7 @@
 The numbers that each would make are held against the table.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -16,7 +16,7 @@ from fourbar.effects import Effect, Gravity
 from fourbar.errors import FourBarError
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import Bar
-from fourbar.quantities import FORCE_NAMES, VECTORS, Array
+from fourbar.quantities import FORCE_NAMES, LINE, PIN_FORCES, VECTORS, Array
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -179,6 +179,12 @@ _PARTS = {
 """Field with the parts of an effect, by its key."""
 _SCALED = {0.0: "missing", 2.0: "doubled", -1.0: "reversed"}
 """Factors on what acts besides inertia, and what was done to it."""
+_WHERE = {
+    "": FORCE_NAMES,
+    " in the pin forces alone": PIN_FORCES,
+    " in what drives alone": ("torque", LINE.value),
+}
+"""Quantities in which that was done."""
 
 
 def _scale_actions(scene: Scene, command: Command) -> Iterator[Mistake]:
@@ -193,17 +199,20 @@ def _scale_actions(scene: Scene, command: Command) -> Iterator[Mistake]:
             continue
         verb = "are" if name.endswith("s") else "is"
         for factor, done in _SCALED.items():
-            yield Mistake(f"{name} {verb} {done}", partial(_scale_from, left, factor))
+            for where, names in _WHERE.items():
+                predict = partial(_scale_from, left, factor, names)
+                yield Mistake(f"{name} {verb} {done}{where}", predict)
 
 
 def _scale_from(
     without: Solution,
     factor: float,
+    names: Collection[str],
     quantity: str,
     right: Solution,
 ) -> Array | None:
     values = getattr(right, quantity, None)
-    if quantity not in FORCE_NAMES or values is None:
+    if quantity not in names or values is None:
         return None
     left = getattr(without, quantity)
     return np.asarray(left + factor * (values - left))
