@@ -580,8 +580,9 @@ def test_the_least_of_timings_counts_and_the_middle_one_tells_their_scatter() ->
 
 def test_the_front_is_listed_by_what_lies_between_the_steps_too() -> None:
     """A point that is right at its steps alone is not on the front."""
-    worse = replace(point(6, 0.5), at_steps=WorstErrors(*[1e-9] * len(ERROR_NAMES)))
-    assert list_front({"c": [worse, point(10, 1e-2), point(20, 1e-3)]}) == [
+    right = WorstErrors(*[1e-9] * len(ERROR_NAMES))
+    worse, worst = (replace(point(n, 0.5), at_steps=right) for n in (6, 15))
+    assert list_front({"c": [worse, worst, point(10, 1e-2), point(20, 1e-3)]}) == [
         ("c, 6 steps a revolution", "5e-01", "0.01", "0.01"),
         ("c, 10 steps a revolution", "1e-02", "0.02", "0.01"),
         ("c, 20 steps a revolution", "1e-03", "0.04", "0.02"),
