@@ -113,7 +113,7 @@ class Group:
         cause = f", {self.worst.cause}" if self.worst.cause else ""
         return (
             f"{self.worst.engine}, {self.scenes} of {self.of_scenes} scenes,"
-            f" {self.rows} rows ({names}{more}){cause}"
+            f" {self.rows} row{'s' * (self.rows > 1)} ({names}{more}){cause}"
         )
 
 
