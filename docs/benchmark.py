@@ -11,7 +11,7 @@ import io
 import json
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +39,7 @@ from fourbar.show.plot.style import (
 from fourbar.show.plot.view import make_view
 from fourbar.writing import write_text
 from fourbar_lab.benchmark import DIFFERENTIATED as LOOP
-from fourbar_lab.benchmark import draw_panels, name_row, read_work
+from fourbar_lab.benchmark import REFUSED, draw_panels, name_row, read_work
 from fourbar_lab.simulators.findings import read_findings
 from fourbar_validation.check.problem import MISSING, WORSE
 from fourbar_validation.compare.rows import read_cell_text
@@ -178,9 +178,10 @@ def read_rows() -> list[dict[str, str]]:
 
 
 def write_matrix(names: list[str]) -> list[str]:
-    """Write a row for each engine with two letters for each problem.
+    """Write two letters for each engine and problem, and why one is none of A and R.
 
-    Below it is written why a letter is none of A and R.
+    The problems that few engines answer have a table of their own: one of all problems
+    is wider than the column in which GitHub shows a page.
     """
     letters: dict[str, dict[str, str]] = {}
     reasons: dict[str, list[str]] = {}
@@ -194,20 +195,47 @@ def write_matrix(names: list[str]) -> list[str]:
             "not read",
         ):
             reasons.setdefault(row["reason"], []).append(row["engine"])
-    rows = [
-        ["engine", *(str(number) for number in range(1, len(names) + 1))],
-        ["---", *[":-:"] * len(names)],
-    ]
-    rows += [
-        [engine, *(cells.get(name, MISSING) for name in names)]
+    several = [name for name in names if is_four_bar_at_positions(name)]
+    rest = [name for name in names if name not in several]
+    answering = [
+        engine
         for engine, cells in letters.items()
+        if any(cells.get(name, MISSING) != REFUSED for name in rest)
     ]
-    lines = [f"|{'|'.join(row)}|" for row in rows]
     return [
-        *lines,
+        *write_letters(letters, letters, several, names),
+        "",
+        f"Problems {names.index(rest[0]) + 1} to {len(names)} are refused by all"
+        " engines but these:",
+        "",
+        *write_letters(letters, answering, rest, names),
         "",
         *(f"- {name_together(engines)}: {why}" for why, engines in reasons.items()),
     ]
+
+
+def is_four_bar_at_positions(name: str) -> bool:
+    """Tell whether a problem is a four-bar at single positions."""
+    problem = read_problem(name)
+    return (problem["mechanism"], problem["ask"]) == ("four-bar", "answer")
+
+
+def write_letters(
+    letters: dict[str, dict[str, str]],
+    engines: Iterable[str],
+    columns: list[str],
+    names: list[str],
+) -> list[str]:
+    """Write a table of engines and some of the problems, which have their numbers."""
+    rows = [
+        ["engine", *(str(names.index(name) + 1) for name in columns)],
+        ["---", *[":-:"] * len(columns)],
+    ]
+    rows += [
+        [engine, *(letters[engine].get(name, MISSING) for name in columns)]
+        for engine in engines
+    ]
+    return [f"|{'|'.join(row)}|" for row in rows]
 
 
 def name_together(engines: list[str]) -> str:

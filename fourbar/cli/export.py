@@ -137,7 +137,7 @@ _without_loads_option = click.option(
 )
 @click.option(
     "--at",
-    metavar="PLACE",
+    metavar="POSITION",
     help='Position of linkage and free bodies, like "135 deg" or "theta_4=30 deg".',
 )
 @click.option(

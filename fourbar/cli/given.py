@@ -57,7 +57,7 @@ at_option = click.option(
     "--at",
     "at",
     multiple=True,
-    metavar="PLACE",
+    metavar="POSITION",
     help=(
         'Position, like "60 deg", "time=0.2 s", "B_x=80 mm" or any column with a value;'
         " repeatable."

@@ -199,11 +199,14 @@ class Session:
 
     @property
     def fresh(self) -> bool:
-        """Return True if nothing is stated yet.
+        """Return True if nothing is stated yet but a picture to trace.
 
         A page then shows an empty drawing.
         """
-        return self.disk is None and len(self.texts) == 1
+        stated = {
+            key: self.now.plain[key] for key in self.now.plain.keys() - {"picture"}
+        }
+        return self.disk is None and stated == _read_placeholder()
 
     @property
     def saved(self) -> bool:
@@ -264,6 +267,7 @@ class Session:
             "changed": self.now.text != self.kept[self.reference],
             "kept": [*self.kept],
             "keys": {key: entry.unit for key, entry in entries.items()},
+            "fresh": self.fresh,
         }
         if settled:
             description["saved"] = self.saved
@@ -343,6 +347,12 @@ class Session:
 
 
 _cached_units = cache(units)
+
+
+@cache
+def _read_placeholder() -> dict[str, Any]:
+    """Return what the scene states that stands for none."""
+    return tomllib.loads(write_new_scene(NEW))
 
 
 def _require_readable_units(name: str) -> None:
@@ -657,8 +667,12 @@ def _take_picture(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     return {"note": f"the picture is {name}"}
 
 
-def _draw_pins(session: Session, asked: dict[str, Any]) -> None:
-    """State four pins in the plane, given in a unit, in place of those of the file."""
+def _draw_pins(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
+    """State four pins in the plane, given in a unit, in place of those of the file.
+
+    The first drawing becomes the state at the start: it replaces no linkage of the
+    user's.
+    """
     unit = str(asked["unit"])
     grain = float(asked["grain"])
     pins = {}
@@ -667,7 +681,9 @@ def _draw_pins(session: Session, asked: dict[str, Any]) -> None:
         written_y = write_rounded(float(y), grain, unit)
         pins[pin] = (written_x, written_y)
     drawn = write_drawn_scene(pins)
-    text = drawn if session.fresh else session.now.text
+    is_first = session.fresh
+    text = drawn if is_first else session.now.text
+    picture = session.now.plain.get("picture")
 
     def alter(document: SceneDocument) -> None:
         document.become(text)
@@ -678,8 +694,13 @@ def _draw_pins(session: Session, asked: dict[str, Any]) -> None:
             document.remove(["motion", "branch"])
         for pin, place in pins.items():
             document.put(["pins", pin], list(place))
+        if is_first and picture is not None:
+            document.put(["picture"], picture)
 
     session.change(alter)
+    if is_first:
+        session.kept["start"] = session.now.text
+    return {"refer": is_first}
 
 
 def _save_file(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
@@ -711,7 +732,6 @@ def _begin_page(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     return {
         "offers": offers,
         "file": session.path.name,
-        "fresh": session.fresh,
         "refer": True,
     }
 

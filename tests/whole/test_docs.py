@@ -385,15 +385,42 @@ def test_a_page_begins_with_what_its_reader_can_do(page: Path) -> None:
     )
 
 
+def prose(page: Path) -> str:
+    """Return the text of a page without programs and formulas."""
+    return re.sub(
+        r"^(```|\$\$).*?\1$",
+        "",
+        page.read_text(encoding="utf-8"),
+        flags=re.MULTILINE | re.DOTALL,
+    )
+
+
+COLUMN, CELL, LETTER, CAPITAL = 830, 27, 8, 3
+"""px: the column in which GitHub shows a page, the margins of a cell, a letter, and by
+how much a capital is broader.
+"""
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_no_table_is_wider_than_the_column_of_a_page(page: Path) -> None:
+    """A cell breaks between words, so its longest word decides."""
+    text = re.sub(r"\[([^]\n]*)\]\([^)\n]*\)", r"\1", prose(page))
+    for table in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE):
+        head, _, *rows = (line.strip("|").split("|") for line in table.splitlines())
+        width = sum(
+            CELL + max(map(measure_word, " ".join(column).split()), default=0)
+            for column in zip(head, *rows, strict=False)
+        )
+        assert width <= COLUMN, head
+
+
+def measure_word(word: str) -> int:
+    return LETTER * len(word) + CAPITAL * sum(map(str.isupper, word))
+
+
 def test_paragraphs_are_short_and_tables_hold_the_rest() -> None:
     for page in (page for page in PAGES if page.parent in (ROOT, DOCS)):
-        text = re.sub(
-            r"^(```|\$\$).*?\1$",
-            "",
-            page.read_text(encoding="utf-8"),
-            flags=re.MULTILINE | re.DOTALL,
-        )
-        for paragraph in re.split(r"\n\s*\n", text):
+        for paragraph in re.split(r"\n\s*\n", prose(page)):
             if not re.match(r"[|#!\-`]|\d+\. |---", paragraph.strip()):
                 assert len(paragraph.split()) <= 95, (
                     page.name,

@@ -146,9 +146,11 @@ document.addEventListener("paste", event => { const [file] = event.clipboardData
 document.addEventListener("dragover", event => event.preventDefault());
 document.addEventListener("drop", event => { event.preventDefault(); const [file] = event.dataTransfer.files; if (file) takePicture(file); });
 byId("measure").addEventListener("click", () => {
+  sketchAgain = Boolean(sketch);
   if (sketch) endSketch();
   measured = [];
   document.body.classList.add("measuring");
+  hideLinkage(sketchAgain);
   say("Click two points of the picture between which you know the length.");
 });
 picture.addEventListener("click", event => {
@@ -163,6 +165,7 @@ picture.addEventListener("click", event => {
   document.body.classList.remove("measuring");
   const [, long, of] = /^\s*([\d.]+)\s*(.+)$/.exec(stated ?? "") ?? [];
   if (long > 0 && pixels > 0) ask({ do: "set", path: ["picture", "scale"], value: `${Number((long / pixels).toPrecision(6))} ${of}` }, ["picture", "scale"]);
+  else if (sketchAgain) beginSketch();
 });
 
 // ---- a linkage drawn by four clicks ----------------------------------------------------------------
@@ -174,22 +177,29 @@ const sketchBar = element("div", { id: "sketch-bar", className: "bar", hidden: t
   element("label", {}, "or type x, y in its unit", element("input", { id: "pin-xy", placeholder: "60, -5", size: 10, spellcheck: false })),
   element("button", { type: "button", id: "no-sketch", textContent: "Keep the linkage as it is" }));
 picture.before(sketchBar);
-let sketch = null;   // pins placed so far, and where the next one would be
+let sketch = null, sketchAgain = false, isFresh = false;   // pins placed so far, and where the next one would be; whether to go on after a measurement; whether the linkage is a placeholder
+function hideLinkage(hidden) {
+  document.body.classList.toggle("sketching", hidden);
+  refresh();   // a picture that is traced then fills the drawing
+}
 function beginSketch() {
   if (playing) play(false);
+  sketchAgain = false;
+  hideLinkage(true);
+  const [, number, stated] = isFresh && /^\s*([\d.e-]+)\s*(.+)$/.exec(plain.picture?.scale ?? "") || [];   // a new scene takes the unit of the measured length
+  const [name, factor] = stated ? [stated, number / data.traced.scale] : [unit.name, unit.factor];
   const origin = data.traced ? toScreen(data.traced.shift.map(x => -x)) : [0.35 * view.width, 0.6 * view.height];   // of what is typed
-  const wide = view.width / view.k * unit.factor, decade = 10 ** Math.floor(Math.log10(wide));
-  byId("sketch-width").value = `${data.traced ? wide : Math.round(wide / decade) * decade} ${unit.name}`;
+  const wide = view.width / view.k * factor, decade = 10 ** Math.floor(Math.log10(wide));
+  byId("sketch-width").value = `${data.traced ? wide : Math.round(wide / decade) * decade} ${name}`;
   byId("sketch-width").parentElement.hidden = Boolean(data.traced);
   sketch = { pins: [], origin, here: [...origin], typed: false };
-  document.body.classList.add("sketching");
   sketchBar.hidden = false;
   picture.focus();
   drawSketch();
 }
 function endSketch() {
   sketch = null;
-  document.body.classList.remove("sketching");
+  hideLinkage(false);
   sketchBar.hidden = true;
   sketched.replaceChildren();
 }
@@ -198,7 +208,7 @@ function drawSketch() {
   byId("next-pin").textContent = `Click where pin ${next} joins ${JOINED[next]}; or move the cross with the arrow keys and press Enter.`;
   sketched.replaceChildren();
   const grid = gridOf();
-  [view.width, view.height].forEach((size, j) => {
+  if (!data.traced) [view.width, view.height].forEach((size, j) => {
     for (let n = Math.ceil(-sketch.origin[j] / grid.pixels); sketch.origin[j] + n * grid.pixels < size; n++) {
       const at = sketch.origin[j] + n * grid.pixels, number = String(Number(((j ? -n : n) * grid.step).toPrecision(6)));
       make(sketched, "line", { class: "grid", ...j ? { x1: 0, x2: view.width, y1: at, y2: at } : { x1: at, x2: at, y1: 0, y2: view.height } });

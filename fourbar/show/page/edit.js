@@ -67,7 +67,7 @@ function take(about) {
   if (own) inFlight = null;
   if (about.check) showCheck(about.check);
   if (about.compared) { keptData = about; compareAnew(); }
-  if (about.offers) { if (about.fresh && !offers) beginSketch(); offers = about.offers; fileName = about.file; shape = ""; }
+  if (about.offers) { sketchAgain ||= about.fresh && !offers; offers = about.offers; fileName = about.file; shape = ""; }
   if (about.refused !== undefined) refuse(own?.request.do === "text" ? TEXT : own?.path ?? null, about.refused);
   else if (own) { refuse(own.path, ""); refuse(null, ""); if (own.request.do === "text") refuse(TEXT, ""); }
   if (about.ask) { byId("ask").firstElementChild.textContent = about.ask; byId("ask").hidden = false; }
@@ -123,6 +123,8 @@ function show(about, own) {
   if (about.saved !== undefined) say(about.saved ? `${fileName} is saved` : `${fileName}: not saved yet; kept in ${fileName}.edit`);
   else if (own && own.request.do !== "hello") say(`${fileName}: changed`);
   showPositions();
+  isFresh = about.fresh;
+  if (sketchAgain && own && (own.request.do === "hello" || own.request.path?.[0] === "picture")) beginSketch();
 }
 
 // A line of what is printed: one of a table keeps its columns, any other breaks.

@@ -104,8 +104,8 @@ function fit() {
     curve.push([broken ? "M" : "L", g]);
     broken = false;
   }
-  points.push(...tracedCorners());
-  if (!held) Object.assign(view, fitted(points, tips, small ? 30 : 58));
+  const corners = tracedCorners(), alone = corners.length && document.body.classList.contains("sketching");
+  if (!held) Object.assign(view, alone ? fitted(corners, [], 8, Infinity) : fitted([...points, ...corners], tips, small ? 30 : 58));
   parts.curve.setAttribute("d", curve.map(([step, g]) => step + toScreen(g).map(v => v.toFixed(2)).join(" ")).join(""));
   parts.traces.replaceChildren();   // in metres: the group carries the scale
   parts.traces.setAttribute("transform", `translate(${view.x} ${view.y}) scale(${view.k} ${-view.k})`);
@@ -127,7 +127,7 @@ function arrowShares(name, i) {
 }
 
 // The greatest scale at which pins keep a margin and arrows with their names stay inside, and the length of an arrow.
-function fitted(points, tips, margin) {
+function fitted(points, tips, margin, longestBar = Math.min(view.width, view.height)) {
   const edge = 30, side = Math.min(view.width, view.height);
   // of all tips k foot + arrow share only those count that no other exceeds in both
   const far = (j, sign) => {
@@ -141,7 +141,7 @@ function fitted(points, tips, margin) {
   // the scale at which it would fill the picture without margins
   const full = Math.min(...[view.width, view.height].map((size, j) => size / Math.max(1e-9 * lengths[0], ends[j].reduce((sum, { point }) => sum + point, 0))));
   const largest = arrow => {
-    let low = 0, high = side / Math.max(...lengths);
+    let low = 0, high = Math.min(full, longestBar / Math.max(...lengths));
     for (let n = 0; n < 24; n++) { const k = 0.5 * (low + high); if (fits(k, arrow)) low = k; else high = k; }
     return low;
   };

@@ -24,6 +24,10 @@ _LED = 15.0
 """Distance from which a label is led to its point by a thin line, points. The points
 are typographic.
 """
+_COST_OF_A_LEADER = 3.0
+"""What a led label costs beside one that stands near but less outward, or that touches
+a thin line: as much as three dots of that line.
+"""
 
 
 @dataclass(slots=True)
@@ -38,6 +42,10 @@ class Label:
     size: float = 8.5
     dots_clear: float = 0.0
     """Radius of the mark at the point itself, typographic points."""
+    ring: float = 0.0
+    """Radius of a ring around `at` that the label names, data coordinates: the label
+    stands next to any point of it.
+    """
 
 
 @dataclass(slots=True)
@@ -102,7 +110,11 @@ class Labels:
             else:
                 away = math.pi / 2
             room = rooms[axes]
-            centre = room.choose_spot((x, y), away, half, label.dots_clear)
+            beside = label.at[0] + label.ring, label.at[1]
+            ring = float(axes.transData.transform(beside)[0] - x)
+            centre, (x, y) = room.choose_spot(
+                (x, y), away, half, label.dots_clear, ring
+            )
             lower = (centre[0] - half[0], centre[1] - half[1])
             upper = (centre[0] + half[0], centre[1] + half[1])
             room.boxes.append((*lower, *upper))
@@ -115,7 +127,7 @@ class Labels:
                 # the limits stay, by which the labels were placed
                 keep_limits: dict[str, Any] = {"scalex": False, "scaley": False}
                 axes.plot(
-                    *zip(label.at, to_data(edge), strict=True),
+                    *zip(to_data((x, y)), to_data(edge), strict=True),
                     color=label.colour,
                     lw=0.5,
                     zorder=8.5,
@@ -148,13 +160,14 @@ class _Room:
         away: float,
         half: DrawnPoint,
         mark: float,
-    ) -> DrawnPoint:
-        """Choose the centre of a label: the candidate that covers least.
+        ring: float,
+    ) -> tuple[DrawnPoint, DrawnPoint]:
+        """Choose the centre of a label, and the point of its ring next to which it is.
 
-        Among equal ones the nearest and most outward is taken. A leader crosses
-        neither a text nor another leader.
+        The candidate that covers least is taken, among equal ones the nearest and most
+        outward. A leader crosses neither a text nor another leader.
         """
-        best = point
+        best = (point, point)
         best_cost = math.inf
         dots = np.concatenate(self.dots)
         edge = 0.5 * self.per_point * dots[:, 2]
@@ -164,18 +177,23 @@ class _Room:
                 # outwards first, then by turns to either side
                 side = 1 if k % 2 else -1
                 angle = away + (k + 1) // 2 * side * math.tau / LABEL_DIRECTIONS
-                x = point[0] + math.cos(angle) * (gap + half[0])
-                y = point[1] + math.sin(angle) * (gap + half[1])
+                start = (
+                    point[0] + math.cos(angle) * ring,
+                    point[1] + math.sin(angle) * ring,
+                )
+                x = start[0] + math.cos(angle) * (gap + half[0])
+                y = start[1] + math.sin(angle) * (gap + half[1])
                 hit_in_x = np.abs(dots[:, 0] - x) < half[0] + edge
                 hit_in_y = np.abs(dots[:, 1] - y) < half[1] + edge
                 covered = float((hit_in_x & hit_in_y) @ dots[:, 2])
                 clashes = sum(_overlaps((x, y), half, box) for box in self.boxes)
                 cost = 100.0 * clashes + 30.0 * self._leaves((x, y), half)
                 if reach > _LED:
-                    cost += 40.0 * self._count_crossed(point, (x, y), half)
+                    crossed = self._count_crossed(start, (x, y), half)
+                    cost += _COST_OF_A_LEADER + 40.0 * crossed
                 cost += covered + 0.04 * reach + 0.05 * k
                 if cost < best_cost:
-                    best = (x, y)
+                    best = ((x, y), start)
                     best_cost = cost
         return best
 

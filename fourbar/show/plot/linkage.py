@@ -172,6 +172,7 @@ def draw_mechanism(
                     away,
                     symbols.SYMBOL_COLOURS.get(symbol.kind, symbols.PIN_COLOUR),
                     8.0,
+                    ring=shown.ring,
                 )
             )
     return drawn

@@ -276,6 +276,8 @@ class _DrawnSymbol:
     """Place of the text; None: it is placed already."""
     away: complex = 0.0j
     """Direction from there outwards, of length 1."""
+    ring: float = 0.0
+    """Radius around the place of the text, next to which the text may stand."""
 
 
 def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) -> Pose:
@@ -396,7 +398,8 @@ def _draw_ring(
     width = 2.2 if kind == "flywheel" else 1.2
     _draw_line(axes, drawn, ring, _colour_of(symbol), width)
     drawn.away = cmath.rect(1.0, _NAMED_AT.get(kind, _NAME_OF_OTHERS))
-    drawn.label = split_complex(centre + radius * drawn.away)
+    drawn.label = split_complex(centre)
+    drawn.ring = radius
 
 
 def split_complex(z: complex) -> DrawnPoint:

@@ -810,15 +810,14 @@ def test_a_photo_is_traced_to_a_scene(chromium, opened, tmp_path: Path) -> None:
     driver.find_element("id", "measure").click()
     click("O2")
     click("O4")
-    driver.switch_to.alert.send_keys("350 mm")
+    driver.switch_to.alert.send_keys("35 cm")
     driver.switch_to.alert.accept()
-    wait_for(driver, "data.traced.scale")
+    wait_for(driver, "data.traced.scale && sketch")  # the drawing goes on
     scale = driver.execute_script("return data.traced.scale") * share
     assert scale == pytest.approx(0.25e-3, rel=CLICKS / apart)
-    driver.find_element("id", "sketch").click()
     for pin in PHOTO:
         click(pin)
-    wait_for(driver, "plain.pins && at(row)")
+    wait_for(driver, "plain.pins?.O4[0].endsWith(' cm') && at(row)")
     lengths = driver.execute_script("return data.lengths")
     for length, (one, other) in zip(
         lengths, (("O2", "O4"), ("O2", "A"), ("A", "B"), ("B", "O4")), strict=True

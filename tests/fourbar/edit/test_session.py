@@ -19,6 +19,7 @@ import pytest
 import fourbar
 from fourbar.files import loads
 from fourbar.files.scene_text import write_new_scene
+from fourbar.linkage import MOVING_BARS
 from fourbar.quantities.units import find_unit
 
 pytest.importorskip(
@@ -464,6 +465,8 @@ def test_a_state_that_assembles_nowhere_names_what_it_commands(
         evaluate_scene(scene, {})
 
 
+FOUR_DIGITS = 1e-3
+"""Masses of a new scene are written with four digits."""
 PINS_DRAWN = [[0.0, 0.0], [3.0, 4.0], [14.0, 9.0], [12.0, -5.0]]
 
 
@@ -891,6 +894,22 @@ def test_a_picture_is_kept_beside_the_scene_and_over_no_file(
     traced = session.answer()["data"]["traced"]
     assert traced["file"] == name
     assert traced["shift"] == pytest.approx((0.0, 0.0))
+
+
+def test_a_picture_alone_leaves_a_new_scene_without_a_linkage(tmp_path: Path) -> None:
+    session = Session(tmp_path / "new.toml", tmp_path / "exports")
+    data = base64.b64encode(b"\x89PNG\r\n\x1a\n...").decode()
+    picture = session.do({"do": "picture", "data": f"data:image/png;base64,{data}"})
+    assert picture["fresh"]
+    asked = {"do": "draw", "pins": PINS_DRAWN, "unit": "in", "grain": 1e-6}
+    first = session.do(asked)
+    assert not first["fresh"] and not first["changed"] and first["refer"]
+    assert first["plain"]["picture"] == picture["plain"]["picture"]
+    bars = [session.now.scene.linkage.bar(number) for number in MOVING_BARS]
+    per_length = [bar.mass / bar.length for bar in bars]
+    assert per_length == pytest.approx(per_length[:1] * 3, rel=FOUR_DIGITS)
+    again = session.do(asked | {"pins": [[0, 0], *PINS_DRAWN[1:3], [12, -6]]})
+    assert again["changed"] and not again["refer"]
 
 
 @pytest.mark.parametrize(

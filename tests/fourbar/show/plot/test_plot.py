@@ -150,11 +150,16 @@ def test_every_figure_draws_both_branches_and_no_texts_overlap(name: str) -> Non
         assert not clashes(figure)
 
 
-@pytest.mark.parametrize("name", ["tailgate", "landing_gear"])
-def test_a_leader_crosses_neither_a_text_nor_another_leader(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "dimensions"),
+    [("tailgate", True), ("landing_gear", True), ("double_crank_pump", False)],
+)
+def test_a_leader_crosses_neither_a_text_nor_another_leader(
+    name: str, dimensions: bool
+) -> None:
     gallery = Path(__file__).parents[4] / "models" / "gallery"
     scene = fourbar.load(gallery / f"{name}.toml")
-    figure = draw_figure(scene, "linkage", dimensions=True).figure
+    figure = draw_figure(scene, "linkage", dimensions=dimensions).figure
     (axes,) = figure.axes
     leaders = [
         line.get_path().transformed(axes.transData)
