@@ -205,8 +205,7 @@ def write_matrix(names: list[str]) -> list[str]:
     return [
         *write_letters(letters, letters, several, names),
         "",
-        f"Problems {names.index(rest[0]) + 1} to {len(names)} are refused by all"
-        " engines but these:",
+        f"All other engines refuse {names.index(rest[0]) + 1} to {len(names)}:",
         "",
         *write_letters(letters, answering, rest, names),
         "",

@@ -244,9 +244,7 @@ def draw_figure(
                 value,
                 f"must be left out of {figure}; it shows in {', '.join(TAKERS[key])}",
             )
-    if position is None:
-        position = None
-    else:
+    if position is not None:
         position = require("position", position)
     with apply_style():
         if branches == "both":
