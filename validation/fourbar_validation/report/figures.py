@@ -3,6 +3,7 @@
 Drawn are the linkage, every engine's answer over the formulas, and the errors beneath.
 """
 
+import math
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -312,10 +313,11 @@ def _draw_errors(
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0e}"))
     middle = int(np.flatnonzero(good)[np.count_nonzero(good) // 2])
     place = (float(_choose_base(solution, None)[middle]), float(allowed[middle]))
+    is_low = place[1] < math.sqrt(low * high)  # marks stand beneath it
     axes.annotate(
         "allowed",
         place,
-        (0, -9),
+        (0, 3 if is_low else -9),
         textcoords="offset points",
         fontsize=8.5,
         ha="center",
