@@ -74,7 +74,7 @@ class Stage:
         return annotation
 
     def add_label(self, label: Label) -> Artist:
-        """Put the picture of a label outwards from its point.
+        """Put the picture of a label outwards from its point, or from its ring.
 
         No free spot is searched: from frame to frame the label would jump.
         """
@@ -83,7 +83,8 @@ class Stage:
         assert isinstance(picture, _Picture)
         dx, dy = np.subtract(label.at, label.shun)
         away = complex(dx, dy) / max(math.hypot(dx, dy), 1e-300)
-        picture.put(self._axes.transData.transform(label.at), away)
+        beside = np.add(label.at, (label.ring * away.real, label.ring * away.imag))
+        picture.put(self._axes.transData.transform(beside), away)
         return picture
 
 
