@@ -275,6 +275,16 @@ def solved_with(
     )
 
 
+def stretched(scene: Scene, name: str, factor: float) -> Scene:
+    """A scene with another length, whose bars keep mass, centre and inertia."""
+    linkage = scene.linkage
+    if name == "ground":
+        return bars(scene, ground=factor * linkage.ground)
+    bar = getattr(linkage, name)
+    kept = {"centre": bar.mass_centre, "inertia": bar.moment_of_inertia}
+    return bars(scene, **{name: replace(bar, length=factor * bar.length, **kept)})
+
+
 def in_degrees(first: float) -> Callable[[Scene], Numbers]:
     """Angles in degrees within a turn from `first`."""
 
@@ -743,6 +753,21 @@ MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]
         ALL,
         solved(same, omega_2=10.0 * math.pi / 30),
         "rad/s taken for rev/min",
+    ),
+    *(
+        (
+            f"length of the {name}",
+            "crank_rocker",
+            ALL,
+            solved(lambda s, name=name, factor=factor: stretched(s, name, factor)),
+            f"{name}: length {factor:g} times ours",
+        )
+        for name, factor in (
+            ("ground", 1.01),
+            ("input", 0.98),
+            ("coupler", 1.001),
+            ("output", 0.95),
+        )
     ),
     (
         "columns exchanged",

@@ -87,6 +87,8 @@ def find_fitted(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
         yield from _try_factors(judge, differing)
     if moved:
         yield from _try_offset(judge)
+        if any(key.startswith("theta") for key in judge.table.values):
+            yield from _try_lengths(judge)
 
 
 def _find_ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
@@ -315,8 +317,7 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
 
     The offset is that at which theirs fit best, refined by Gauss and Newton.
     """
-    keys = [key for key in judge.table.values if judge.size(key).any()]
-    keys = sorted(keys, key=_find_stage)[:MOST_FITTED]
+    keys = _list_fitted(judge)
     numbers = sum(np.count_nonzero(judge.where(key)) for key in keys)
     if numbers < ENOUGH_NUMBERS or judge.at.stroke is not None:
         return
@@ -362,6 +363,49 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
         take,
         times=CARRIED,
     )
+
+
+def _try_lengths(judge: Judge) -> Iterator[Mistake]:
+    """Try other lengths, each fitted by Gauss and Newton from the right one."""
+    scene = state_all(judge.scene)
+    lengths = {name: bar.length for name, bar in list_moving(scene)}
+    lengths["ground"] = scene.linkage.ground
+    keys = _list_fitted(judge)
+    factors = dict.fromkeys(lengths, 1.0)
+
+    def predict_all(*shifts: float) -> list[Predict]:
+        variants = [
+            Variant(name, {f"lengths.{name}": lengths[name] * (factors[name] + shift)})
+            for name in lengths
+            for shift in shifts
+        ]
+        return predict_variants(scene, judge.at, variants)
+
+    def compute_residual(predict: Predict) -> Array:
+        parts = []
+        for key in keys:
+            predicted = _predict_key(predict, key, judge)
+            if predicted is not None:
+                theirs = judge.table.values[key]
+                parts.append(_compute_residual(judge, key, theirs, predicted))
+        return np.concatenate(parts)
+
+    for _ in range(NEWTON):
+        residuals = map(compute_residual, predict_all(0.0, FIT_STEP, -FIT_STEP))
+        for name, here, more, less in zip(lengths, *[residuals] * 3, strict=True):
+            slope = (less - more) / (2.0 * FIT_STEP)
+            step = float(slope @ here) / float(slope @ slope)
+            if math.isfinite(step) and 0.0 < factors[name] + step < math.inf:
+                factors[name] += step
+    for name, predict in zip(lengths, predict_all(0.0), strict=True):
+        text = f"{name}: length {factors[name]:.6g} times ours (fitted)"
+        yield Mistake(text, predict, times=CARRIED)
+
+
+def _list_fitted(judge: Judge) -> list[str]:
+    """List the columns to which a number of the motion is fitted."""
+    keys = [key for key in judge.table.values if judge.size(key).any()]
+    return sorted(keys, key=_find_stage)[:MOST_FITTED]
 
 
 def _find_stage(key: str) -> int:

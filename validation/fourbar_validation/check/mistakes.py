@@ -27,7 +27,12 @@ from fourbar_validation.check.calculated import (
 )
 from fourbar_validation.check.fitted import ENOUGH_NUMBERS, find_fitted
 from fourbar_validation.check.judge import Judge, Mistake
-from fourbar_validation.check.variants import Variant, predict_variants, state_all
+from fourbar_validation.check.variants import (
+    Predict,
+    Variant,
+    predict_variants,
+    state_all,
+)
 from fourbar_validation.scenes.bars import list_moving
 
 RPM = np.pi / 30.0
@@ -282,14 +287,13 @@ def _take_differences(scene: Scene, command: Command) -> Iterator[Mistake]:
         return
     if np.ptp(steps) > _SAME_STEP * abs(steps[0]):
         return
-    moved = {
-        number: solve(
-            scene,
-            "position",
-            at=command._replace(angle=command.angle + number * steps[0]),
-        )
-        for number in range(-2, 3)
-    }
+    numbers = range(-2, 3)
+    shifted = [
+        Variant("", at=command._replace(angle=command.angle + number * steps[0]))
+        for number in numbers
+    ]
+    predictions = predict_variants(state_all(scene), command, shifted)
+    moved = dict(zip(numbers, predictions, strict=True))
     second = steps[0] / float(speed.max())
     for name, (of_speed, of_acceleration) in _DIFFERENCES.items():
         predict = partial(_difference, moved, second, of_speed, of_acceleration)
@@ -297,7 +301,7 @@ def _take_differences(scene: Scene, command: Command) -> Iterator[Mistake]:
 
 
 def _difference(
-    moved: Mapping[int, Solution],
+    moved: Mapping[int, Predict],
     second: float,
     of_speed: tuple[int, ...],
     of_acceleration: tuple[int, ...],
@@ -309,7 +313,7 @@ def _difference(
     taken = {"omega": of_speed, "alpha": of_acceleration}.get(rate)
     if taken is None or quantity.endswith(right.commanded[-1]):
         return None
-    angles = [getattr(moved[number], f"theta_{bar}") for number in taken]
+    angles = [np.asarray(moved[number](f"theta_{bar}", right)) for number in taken]
     turns = np.diff(angles, axis=0)
     turns -= TURN * np.rint(turns / TURN)
     if rate == "omega":
