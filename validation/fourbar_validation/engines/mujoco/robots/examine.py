@@ -6,15 +6,18 @@ entry changed at a time.
 
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from fourbar.errors import FourBarError
+from fourbar.errors import FourBarError, LimitError
 from fourbar.mjcf import write_mjcf
 from fourbar.scene import Scene
+from fourbar_validation.compare.tolerance import wrap_difference
 from fourbar_validation.engines.description import Value
 from fourbar_validation.engines.mujoco.describe import (
     STIFFEST,
@@ -25,7 +28,6 @@ from fourbar_validation.engines.mujoco.describe import (
     set_entry,
 )
 from fourbar_validation.engines.mujoco.robots.answers import (
-    FORCE_QUANTITIES,
     LoopMeasurement,
     MeasureOptions,
     measure_sizes,
@@ -149,7 +151,8 @@ def _take_in_time(
 def predict_softness(
     scene: Scene, file: RobotFile, options: MeasureOptions
 ) -> dict[str, float]:
-    """Predict the error of torque (N m) and pin forces (N) by MuJoCo's soft closure.
+    """Predict the errors by MuJoCo's soft closure of torque, N m, pin forces, N, angles
+    and speeds through time, rad and rad/s.
 
     The error of a soft constraint goes as (1 - d)/d in its impedance d. Between
     STIFFEST and an impedance of twice that yield it grows by itself, so the error is
@@ -161,24 +164,30 @@ def predict_softness(
         if not found.robot.model.eq_active0[found.loop.equality]:
             return {}
         stiff, softer = (_answer_at_yield(found, scene, times) for times in (1.0, 2.0))
-    pairs = list(zip(stiff, softer, strict=False))
-    return {
-        name: float(
-            np.nanmax(
-                measure_sizes([one[name] - other[name] for one, other in pairs]),
-                initial=0.0,
-            )
-        )
-        for name in FORCE_QUANTITIES
-    }
+    softness = {}
+    for at_stiff, at_softer in zip(stiff, softer, strict=True):
+        pairs = list(zip(at_stiff, at_softer, strict=False))
+        for name in at_stiff[0] if pairs else ():
+            changes = np.array([one[name] - other[name] for one, other in pairs])
+            if name.startswith("theta"):
+                changes = wrap_difference(changes)
+            softness[name] = float(np.nanmax(measure_sizes(changes), initial=0.0))
+    return softness
 
 
 def _answer_at_yield(
     found: LoopOfScene, scene: Scene, times: float
-) -> list[dict[str, np.ndarray]]:
-    """Return torque and pin forces of the states at a multiple of the least yield."""
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Return torque and pin forces of single states at a multiple of the least yield,
+    and the motion of the bars through time; nothing where it is not simulated.
+    """
     seen = SeenLoop(found.robot.model, found.loop, found.turned).with_model()
     impedance = 1.0 / (1.0 + times * (1.0 / STIFFEST - 1.0))
     seen.model.eq_solimp[[*found.loop.closures], :2] = impedance
     inside, motion = put_loop_inside(found, scene, seen.model)
-    return [row.soft.values() for row in inside.answer_states(*motion).rows]
+    forces = [row.soft.values() for row in inside.answer_states(*motion).rows]
+    moved: list[dict[str, Any]] = []
+    with suppress(LimitError):
+        through = inside.answer_through_time(*motion)
+        moved += (row.bars._asdict() for row in through.rows)
+    return forces, moved
