@@ -23,9 +23,7 @@ from fourbar.formulas.longer import lengthen, shorten
 from fourbar.formulas.mobility import TURN
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT, LoopPath
-from fourbar.formulas.position import HalfAngle
 from fourbar.quantities import (
-    ANGLES,
     CHANGE_POINT,
     COUPLE,
     JAMMED,
@@ -79,8 +77,8 @@ class Evaluated(NamedTuple):
     """Status codes."""
     values: dict[str, Any]
     """Quantities by name, vectors as x + i y."""
-    state: State | None
-    """Positions and motion; None where angles alone were evaluated."""
+    state: State
+    """Positions and motion."""
 
 
 def evaluate(
@@ -95,10 +93,8 @@ def evaluate(
 
     `command`: positions (n,), or one in plain numbers.
     """
-    if _asks_angles_alone(case, command, wanted):
-        return _evaluate_angles(case, command, wanted)
     state, refined_rows = case.at(command, moving=last_stage > 0)
-    codes = _compute_codes(case.path, state.sine, state.position.half, command)
+    codes = _compute_codes(case.path, state, command)
     values = list_kinematics(case, state, wanted)
     if command.condition is not None and "condition" in wanted:
         values["condition"] = values["condition"] * command.condition
@@ -139,29 +135,21 @@ def evaluate_released(
     Results are those of a command of theta_2, in whichever bar's angle they are read.
     """
     codes, values, state = evaluate(case, command, last_stage, wanted)
-    if state is not None:
-        by_input = state._replace(bar=2, sine=state.position.sin_mu)
-        others = wanted & {"theta_4", "condition", *LINE_QUANTITIES}
-        values |= list_kinematics(case._replace(drive=drive), by_input, others)
+    by_input = state._replace(bar=2, sine=state.position.sin_mu)
+    others = wanted & {"theta_4", "condition", *LINE_QUANTITIES}
+    values |= list_kinematics(case._replace(drive=drive), by_input, others)
     if last_stage >= FORCE:
         of_drive = {"power", *(COUPLE if drive is None else LINE)}
         values |= {name: np.zeros(codes.shape) for name in of_drive & wanted}
     return Evaluated(codes, values, state)
 
 
-def _compute_codes(
-    path: LoopPath,
-    sine: Any,
-    half: HalfAngle,
-    command: Command,
-    unit: float = 1.0,
-) -> Any:
-    """Compute the status of each position from the sine of the transmission angle.
-
-    `sine`: times `unit`.
-    """
+def _compute_codes(path: LoopPath, state: State, command: Command) -> Any:
+    """Compute the status of each position from the sine of the transmission angle."""
+    half = state.position.half
+    sine = state.sine
     size = abs(sine)
-    margin = find_margin(command) * unit
+    margin = find_margin(command)
     if command.condition is not None:
         size = np.where(np.isnan(size), size, np.minimum(size, command.condition))
     if type(size) is float and size > margin:
@@ -179,23 +167,6 @@ def _compute_codes(
     # theta_2 - theta_1 overflows, so the loop cannot be evaluated
     codes[np.isnan(half.kk)] = OVERFLOW
     return codes
-
-
-def _asks_angles_alone(case: Case, command: Command, wanted: Set[str]) -> bool:
-    """Return True if only theta_3 and theta_4 are wanted; bars then need no vectors."""
-    angles_alone = len(wanted) <= len(ANGLES) and wanted <= set(ANGLES)
-    of_input = command.bar == 2 and command.remainder is None
-    return angles_alone and of_input and not case.path.may_stay_parallel
-
-
-def _evaluate_angles(case: Case, command: Command, wanted: Set[str]) -> Evaluated:
-    """Evaluate theta_3 and theta_4 alone, without the vectors of the bars."""
-    half, _ = case.half_angle(command.angle, None)
-    theta_3, theta_4, root = case.path.angles(half, condense_branch(command.branch))
-    unit = 2.0 * case.path.lengths.b * case.path.lengths.c
-    codes = _compute_codes(case.path, root, half, command, unit)
-    angles = {"theta_3": theta_3, "theta_4": theta_4}
-    return Evaluated(codes, {name: angles[name] for name in wanted}, None)
 
 
 def _list_forces(
@@ -418,7 +389,7 @@ def withhold_infinite(case: Case, evaluated: Evaluated) -> None:
     codes, values, state = evaluated
     if not is_finite(values):
         in_line: Any = False
-        if state is not None and case.drive is None:
+        if case.drive is None:
             sine = case.path.drive_sine(state.position, case.drive_bar)
             in_line = np.abs(sine) <= NO_DIGIT_LEFT
         _withhold(values, codes, np.broadcast_to(in_line, codes.shape))

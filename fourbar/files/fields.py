@@ -42,7 +42,13 @@ _MEANT = {
     **{"weight": "mass", "torque": "moment", "couple": "moment"},
     **{"rate": "stiffness", "k": "stiffness", "material": "density"},
     **{"crank": "input", "rocker": "output", "follower": "output", "frame": "ground"},
-    **{"x": "from_pin", "y": "from_pin", "speed": "omega_2", "rpm": "omega_2"},
+    **{
+        "x": "from_pin",
+        "y": "from_pin",
+        "at": "from_pin",
+        "speed": "omega_2",
+        "rpm": "omega_2",
+    },
 }
 """Words that are no keys, and the keys that may be meant by them."""
 _LIKELY = {"rad": "deg", "m": "mm", "rad/s": "rpm"}

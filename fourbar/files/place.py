@@ -3,7 +3,7 @@
 A place is stated in polar form or by x and y.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from fourbar.effects.load import PLACES_OF_LOADS
@@ -12,33 +12,6 @@ from fourbar.files.fields import Reader
 
 PLACES_OF_ENDS = (*STATED_PLACES, "point")
 """Keys of which one states an end of a spring or cylinder, or the point of a force."""
-AT_OF_A_LOAD = {
-    "bar": "write from_centre, with the same numbers, or from_pin, or point",
-    "world": (
-        "write from_pin or from_centre = [distance, angle from the bar's line], or "
-        "point; an arm from G that keeps its direction is now written arm"
-    ),
-}
-"""Key that replaces `at` in a load of an old file, by the load's frame."""
-
-
-def read_table_with_place(
-    read: Reader,
-    key: str,
-    value: object,
-    allowed: Iterable[str],
-    instead: str = "",
-) -> dict[str, Any]:
-    """Read a table in which a place is stated.
-
-    The key `at` of old files is refused, with what to write.
-
-    `instead`: that, where it is not `from_pin`.
-    """
-    if isinstance(value, dict) and "at" in value:
-        written = instead or "write from_pin = [distance, angle from the bar's line]"
-        raise read.refuse(f"{key}.at", value["at"], f"is no key any more: {written}")
-    return read.table(key, value, allowed)
 
 
 def read_stated_place(

@@ -40,10 +40,8 @@ from fourbar.files.drawing import (
 )
 from fourbar.files.fields import BARE_KEY, Reader
 from fourbar.files.place import (
-    AT_OF_A_LOAD,
     PLACES_OF_ENDS,
     read_stated_place,
-    read_table_with_place,
 )
 from fourbar.files.scene_text import BAR_NUMBERS, BRANCH_OF_NAME, SIGMA
 from fourbar.formulas.mobility import meet_change_points
@@ -296,7 +294,7 @@ def _read_drive(
         for name in ("torque", "moment", "force"):
             if name in value:
                 raise read.refuse(f"drive.{name}", value[name], _A_GIVEN_DRIVE)
-    entry = read_table_with_place(read, "drive", value, allowed)
+    entry = read.table("drive", value, allowed)
     stated = entry.keys()
     if "from" in stated or "to" in stated:
         for name in stated - {"from", "to"}:
@@ -324,7 +322,7 @@ def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
     points = []
     for name, point in value.items():
         key = f"points.{name}" if BARE_KEY.fullmatch(name) else "points"
-        entry = read_table_with_place(read, key, point, ("bar", *STATED_PLACES))
+        entry = read.table(key, point, ("bar", *STATED_PLACES))
         place = read_stated_place(read, key, entry, {})
         points.append(Point(name, place.bar, place.from_pin, place.from_centre))
     return tuple(points)
@@ -621,9 +619,7 @@ def _read_load_table(read: Reader, key: str, value: object) -> Table:
 
 def _read_load(read: Reader, key: str, value: object, bars: Mapping[str, int]) -> Load:
     allowed = ("bar", *Load.numbers, "point", "frame", "table")
-    turns = isinstance(value, dict) and value.get("frame") == "bar"
-    instead = AT_OF_A_LOAD["bar" if turns else "world"]
-    entry = read_table_with_place(read, key, value, allowed, instead)
+    entry = read.table(key, value, allowed)
     table = None
     if "table" in entry:
         table = _read_load_table(read, f"{key}.table", entry["table"])
@@ -735,7 +731,7 @@ def _read_ends(
     for name in ("from", "to"):
         path = f"{key}.{name}"
         allowed = ("bar", *PLACES_OF_ENDS)
-        entry = read_table_with_place(read, path, row.get(name), allowed)
+        entry = read.table(path, row.get(name), allowed)
         end = read_stated_place(read, path, entry, bars)
         ends.append(Place(end.bar, AT_FIRST_PIN) if end == Place(end.bar) else end)
     return ends[0], ends[1]

@@ -50,7 +50,6 @@ from fourbar.formulas.position import (
     loop,
     put_parallel_pairs,
     reorder_lengths,
-    signed_root,
 )
 from fourbar.linkage import FourBar
 
@@ -144,32 +143,6 @@ class LoopPath(NamedTuple):
                 *find_parallel_pairs(self.lengths, branch),
             )
         return position
-
-    def angles(self, half: HalfAngle, branch: Number) -> tuple[Number, Number, Number]:
-        """Compute theta_3, theta_4 and the root alone.
-
-        The angles are arguments of what `close_loop` divides by lengths, in (-pi, pi].
-        In real numbers, against the ground; a turned ground's angle is added.
-        """
-        d, a, b, c, _, _ = self.lengths
-        ss, kk, sk, _, inner, _ = half
-        root = signed_root(half, branch)
-        at_A = inner + 2.0 * b * (b - c)
-        at_O4 = 2.0 * c * (b - c) - inner
-        x = (d - a) * kk + (d + a) * ss
-        y = (-2.0 * a) * sk
-        along = x * root
-        across = y * root
-        theta_3 = np.arctan2(along + y * at_A, x * at_A - across)
-        theta_4 = np.arctan2(along + y * at_O4, x * at_O4 - across)
-        if np.any(self.theta_1):
-            theta_3, theta_4 = (
-                np.remainder(np.pi - theta - self.theta_1, 2.0 * np.pi)
-                for theta in (theta_3, theta_4)
-            )
-            theta_3 = np.pi - theta_3
-            theta_4 = np.pi - theta_4
-        return theta_3, theta_4, root
 
     def close(
         self,

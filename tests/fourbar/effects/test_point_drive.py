@@ -136,7 +136,7 @@ def test_a_study_and_a_file_carry_it() -> None:
         ('point = "handle"\n', 'from = { bar = 1 }\npoint = "handle"\n', "from and to"),
         ('point = "handle"\n', 'bar = 1\nfrom_pin = ["1 m", "0 deg"]\n', "drive.bar"),
         ('frame = "bar"\n[[', 'frame = "body"\n[[', "drive.frame"),
-        ('point = "handle"\n', 'at = ["1 m", "0 deg"]\nbar = 2\n', "no key any more"),
+        ('point = "handle"\n', 'at = ["1 m", "0 deg"]\nbar = 2\n', "drive.at"),
         ('point = "handle"\n', 'bar = 2\nfrom_pin = ["0 m", "0 deg"]\n', "fixed pin"),
     ],
 )
