@@ -5,6 +5,7 @@ cases.
 """
 
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import mpmath
@@ -69,7 +70,12 @@ F12X = (
     161.418168408309,
 )
 MODELS = Path(__file__).parents[3] / "models"
-ALL = tuple(list_figures())
+
+
+@cache
+def list_all() -> tuple[PublishedFigure, ...]:
+    """Return every figure; all of them take some seconds."""
+    return tuple(list_figures())
 
 
 def test_the_published_torque_error_by_error() -> None:
@@ -167,7 +173,7 @@ def test_noise_is_of_the_last_digits_alone() -> None:
 
 
 def test_every_figure_is_compared() -> None:
-    tables = Counter(figure.table for figure in ALL)
+    tables = Counter(figure.table for figure in list_all())
     assert tables == {
         "2.4 positions": 281 * 4,
         "2.4 constants": 16,
@@ -183,9 +189,11 @@ def test_every_figure_is_compared() -> None:
         "Maple": 5,
         "public test cases": 16,
     }
-    assert len({(figure.table, figure.name) for figure in ALL}) == len(ALL)
+    assert len({(figure.table, figure.name) for figure in list_all()}) == len(
+        list_all()
+    )
     assert Counter(
-        figure.verdict() for figure in ALL if figure.table != "public test cases"
+        figure.verdict() for figure in list_all() if figure.table != "public test cases"
     ) == {
         "rounded": 1233,
         "truncated": 28,
@@ -198,7 +206,7 @@ def test_every_difference_is_what_its_errata_make_of_ours() -> None:
 
     An agreement needs no misprint to explain it.
     """
-    differ = [figure for figure in ALL if figure.verdict() == "differs"]
+    differ = [figure for figure in list_all() if figure.verdict() == "differs"]
     assert all(is_explained(figure) for figure in differ)
     misprints = {
         figure.name: figure.errata for figure in differ if not figure.reproduced()
@@ -228,7 +236,7 @@ def test_each_erratum_named_is_needed() -> None:
     """
     idle = [
         f"{figure.table} {figure.name}"
-        for figure in ALL
+        for figure in list_all()
         if figure.errata and figure.verdict() != "differs"
     ]
     assert idle == ["5.7 matrix k4_5"]
@@ -437,11 +445,11 @@ def test_the_command_explains_every_difference() -> None:
     process = CliRunner().invoke(published, standalone_mode=False)
     assert process.return_value == 0
     assert max(map(len, process.output.splitlines())) <= 80
-    for figure in ALL:
+    for figure in list_all():
         line = f"{figure.table}: {figure.name}  printed {figure.printed}"
         assert (line in process.output) == (figure.verdict() == "differs")
     assert CliRunner().invoke(published, ["--all"]).output.count("  printed ") == len(
-        ALL
+        list_all()
     )
 
 
