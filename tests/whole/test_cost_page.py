@@ -96,6 +96,8 @@ def test_the_first_sentences_are_those_of_the_table() -> None:
     assert f"MuJoCo's defaults cost {default[4]} ms for two digits" in PAGE
     assert f"Six digits of every pin force cost MuJoCo {six[4]} ms" in README
     assert f"This costs {six[4]} ms of processor time" in README
+    (friction,) = re.findall(r"^\|friction\|[^|]*\|\+([^|]*)\|", PAGE, re.MULTILINE)
+    assert f"Dry friction adds {friction} to a step" in README
     assert 1e-3 < float(default[3]) < 1e-2
 
 

@@ -162,6 +162,27 @@ def test_every_command_prints_what_is_shown(
             assert (checkout / file).stat().st_size > 0, command
 
 
+def test_the_readme_goes_on_from_its_first_scene(
+    checkout: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The commands and the call that stand in its sentences."""
+    begin, *_ = re.findall(r"^\$ fourbar (new .*)$", read("README.md"), re.MULTILINE)
+    sentences = read("README.md").partition("rounding changes none")[2]
+    at, pins, _ = re.findall(r"`fourbar ((?:analyze|new|edit) .*?)`", sentences)
+    for command in (begin, at, pins):
+        assert STATUS_OF["fourbar"](shlex.split(command)) == HOLDS, command
+    assert "at theta_2 = 60 deg" in capsys.readouterr().out.replace(",", "")
+    (call,) = re.findall(r"In Python `(.*?)` is an array", sentences)
+    assert isinstance(eval(call, {"fourbar": fourbar}), np.ndarray)
+    lengths = [
+        load(checkout / f"{n}.toml").linkage.lengths for n in ("first", "second")
+    ]
+    assert lengths[0] == (0.3, 0.1, 0.25, 0.22)
+    by_pins = [math.hypot(*side) for side in ((250, 50), (0, 100), (175, 50), (75, 0))]
+    assert lengths[1] == pytest.approx([side / 1000.0 for side in by_pins])
+
+
 @pytest.mark.usefixtures("checkout")
 @pytest.mark.parametrize(
     ("name", "count"),
