@@ -25,8 +25,8 @@ from fourbar_validation.robots.options import (
     ROBOT_PATH,
     loop_option,
     pose_options,
+    read_number,
     read_pose,
-    read_speed,
     speed_option,
 )
 
@@ -128,7 +128,7 @@ def robot_command(
     The command says which loops are planar four-bars.
     """
     options = read_pose(pose, key, hold, drive)
-    omega = read_speed(speed)
+    omega = read_number("--speed", speed, "rad/s")
     if out is None and speed is not None:
         raise click.UsageError("--speed goes with -o: it is that of the scene")
     if out is not None:

@@ -31,7 +31,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
 )
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.guard import examine_guarded
-from fourbar_validation.robots.options import read_pose, read_speed
+from fourbar_validation.robots.options import read_number, read_pose
 
 _MEASURE = "fourbar_validation.engines.mujoco.robots.measure:measure_loops"
 MEASURE_SECONDS = 600.0
@@ -224,16 +224,6 @@ def find_worst_of_loop(loop: LoopMeasurement) -> float:
     return max(error.part for error in list_errors_by_method(loop))
 
 
-def _read_torque(text: str | None) -> float | None:
-    """Read the value of `torque_option`, N m."""
-    if text is None:
-        return None
-    try:
-        return require("--torque", float(text))
-    except ValueError:
-        return require("--torque", text, "N m")
-
-
 def _read_span(text: str | None) -> tuple[float, float] | None:
     """Read the value of `range_option`, rad."""
     if text is None:
@@ -267,8 +257,8 @@ def read_measure_options(
     return MeasureOptions(
         read_pose(robot["pose"], robot["key"], robot["hold"], robot["drive"]),
         loop,
-        read_speed(robot["speed"]),
-        _read_torque(robot.get("torque")),
+        read_number("--speed", robot["speed"], "rad/s"),
+        read_number("--torque", robot.get("torque"), "N m"),
         wanted,
         _read_span(robot.get("span")),
     )

@@ -113,14 +113,14 @@ def read_pose(
     )
 
 
-def read_speed(text: str | None) -> float | None:
-    """Read the value of `speed_option`, rad/s."""
+def read_number(option: str, text: str | None, unit: str) -> float | None:
+    """Read the value of an option, a number in the unit or with one of its own."""
     if text is None:
         return None
     try:
-        return require("--speed", float(text))
+        return require(option, float(text))
     except ValueError:
-        return require("--speed", text, "rad/s")
+        return require(option, text, unit)
 
 
 def _split_at_commas(values: tuple[str, ...]) -> list[str]:

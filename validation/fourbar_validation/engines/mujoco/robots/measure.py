@@ -298,8 +298,9 @@ def _describe_findings(
         name = model.actuator(inside.acting.actuator).name
         yield f"its actuator {name!r} gives the cylinder's force that is solved for"
     if inside.as_it_is and inside.contacts:
+        contacts = "contact" if inside.contacts == 1 else "contacts"
         yield (
-            f"{inside.contacts} contacts at a position where nothing but pins should"
+            f"{inside.contacts} {contacts} at a position where nothing but pins should"
             " touch"
         )
     if through is not None and through.skipped:
