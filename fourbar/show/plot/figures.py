@@ -42,51 +42,40 @@ _Painter = Callable[["SubFigure", View, Labels], None]
 
 
 def _draw_overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
-    if not shown.moves:
-        panels = figure.subplot_mosaic(
-            [["linkage", "angles"], ["linkage", "mu"]],
-            width_ratios=[1.15, 1.0],
-        )
-        linkage.draw_linkage(panels["linkage"], shown, labels)
-        curves.draw_angles(panels["angles"], shown)
-        draw_transmission(panels["mu"], shown)
-        return
-    if shown.rests:
-        panels = figure.subplot_mosaic(
-            [
-                ["linkage", "linkage", "torque"],
-                ["linkage", "linkage", "angles"],
-                ["forces", "forces", "mu"],
-            ],
-        )
-        linkage.draw_linkage(panels["linkage"], shown, labels)
-        curves.draw_drive(panels["torque"], shown)
-        curves.draw_angles(panels["angles"], shown)
-        curves.draw_forces(panels["forces"], shown)
-        draw_transmission(panels["mu"], shown)
-        return
     free = shown.scene.motion.free is not None
-    panels = figure.subplot_mosaic(
-        [
+    layout: list[Any]
+    widths = None
+    if not shown.moves:
+        layout = [["linkage", "angles"], ["linkage", "mu"]]
+        widths = [1.15, 1.0]
+    elif shown.rests:
+        layout = [
+            ["linkage", "linkage", "torque"],
+            ["linkage", "linkage", "angles"],
+            ["forces", "forces", "mu"],
+        ]
+    else:
+        layout = [
             ["linkage", "linkage", "torque"],
             ["linkage", "linkage", "forces" if free else "power"],
             ["angles", "omega", "alpha"],
             ["mu", "mu", "mu"] if free else ["forces", "forces", "mu"],
-        ],
-    )
+        ]
+    panels = figure.subplot_mosaic(layout, width_ratios=widths)
     linkage.draw_linkage(panels["linkage"], shown, labels)
-    curves.draw_angles(panels["angles"], shown)
-    curves.draw_velocities(panels["omega"], shown)
-    curves.draw_accelerations(panels["alpha"], shown)
-    # what drives: torque or force, and power, or in a free motion the work of loads and
-    # effects
-    if free:
-        curves.draw_energy(panels["torque"], shown)
-    else:
-        curves.draw_drive(panels["torque"], shown)
-        curves.draw_power(panels["power"], shown)
-    curves.draw_forces(panels["forces"], shown)
-    draw_transmission(panels["mu"], shown)
+    painters: dict[str, Callable[[Any, View], None]] = {
+        "angles": curves.draw_angles,
+        "omega": curves.draw_velocities,
+        "alpha": curves.draw_accelerations,
+        # what drives; in a free motion the work of loads and effects
+        "torque": curves.draw_energy if free else curves.draw_drive,
+        "power": curves.draw_power,
+        "forces": curves.draw_forces,
+        "mu": draw_transmission,
+    }
+    for name, paint in painters.items():
+        if name in panels:
+            paint(panels[name], shown)
 
 
 def _draw_kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:

@@ -612,7 +612,7 @@ def test_a_motion_through_time_is_drawn_over_time(scene: fourbar.Scene) -> None:
 @pytest.mark.slow
 def test_both_branches_of_a_release_share_their_scales() -> None:
     bars = [fourbar.Bar(0.22, 0.5), fourbar.Bar(0.25, 0.8), fourbar.Bar(0.2, 0.4)]
-    motion = fourbar.Motion(math.radians(60.0), 0.0, free=fourbar.Free(2.0, 200))
+    motion = fourbar.Motion(math.radians(60.0), 0.0, free=fourbar.Free(0.6, 60))
     scene = fourbar.Scene(
         fourbar.FourBar(0.3, *bars),
         motion,
