@@ -7,7 +7,6 @@ import json
 import re
 from contextlib import suppress
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -498,6 +497,9 @@ def _fill_in(
     per_metre = float(examples["per_length"]) / length
     masses = (f"{float(f'{per_metre * x:.4g}')!r}" for x in lengths)
     moving = zip(("input", "coupler", "output"), masses, strict=True)
+    # loads much that no other command needs
+    from importlib.resources import files
+
     text = files("fourbar.files").joinpath(template).read_text(encoding="utf-8")
     return Template(text).substitute(
         linkage=lines,

@@ -47,7 +47,7 @@ STARTING = b"spawn_main"
 """Word in the command line of a process that `multiprocessing` starts."""
 START_SECONDS = 1.0
 """What a worker takes until it is at work, on an idle machine."""
-KILLS = int(os.environ.get("KILLS", "3"))
+KILLS = int(os.environ.get("KILLS", "2"))
 """Moments of a start at which it is interrupted; every night there are fifty."""
 
 
@@ -108,7 +108,7 @@ def leaving_nothing(mark: str) -> Iterator[None]:
 @pytest.mark.parametrize("what", [READING, GUEST])
 def test_ctrl_c_while_workers_start_is_one_line(what: str, tmp_path: Path) -> None:
     """A terminal sends it to all processes of the command."""
-    for moment in np.linspace(0.0, START_SECONDS, KILLS):
+    for moment in START_SECONDS * (np.arange(KILLS) + 0.5) / KILLS:
         mark = f"{tmp_path}/{what}/{moment}"
         process = start(what, tmp_path, mark)
         with leaving_nothing(mark):
