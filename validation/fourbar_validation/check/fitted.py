@@ -390,9 +390,19 @@ def _try_lengths(judge: Judge) -> Iterator[Mistake]:
                 parts.append(_compute_residual(judge, key, theirs, predicted))
         return np.concatenate(parts)
 
+    least = math.inf
     for _ in range(NEWTON):
-        residuals = map(compute_residual, predict_all(0.0, FIT_STEP, -FIT_STEP))
-        for name, here, more, less in zip(lengths, *[residuals] * 3, strict=True):
+        residuals = [
+            compute_residual(predict)
+            for predict in predict_all(0.0, FIT_STEP, -FIT_STEP)
+        ]
+        before = least
+        least = min(float(np.linalg.norm(here)) for here in residuals[::3])
+        if not least < 0.5 * before:
+            break  # nothing fits better, or only by rounding
+        for name, here, more, less in zip(
+            lengths, residuals[::3], residuals[1::3], residuals[2::3], strict=True
+        ):
             slope = (less - more) / (2.0 * FIT_STEP)
             step = float(slope @ here) / float(slope @ slope)
             if math.isfinite(step) and 0.0 < factors[name] + step < math.inf:
