@@ -51,6 +51,14 @@ _MEANT = {
     },
 }
 """Words that are no keys, and the keys that may be meant by them."""
+_TABLE_OF = {
+    "ground_angle": "lengths",
+    **dict.fromkeys(("branch", "side", "stroke", "law", "free"), "motion"),
+    **dict.fromkeys(("theta_2", "omega_2", "alpha_2"), "motion"),
+    **dict.fromkeys(("gravity", "viscous", "friction", "pin_friction"), "effects"),
+    **dict.fromkeys(("torsion", "springs", "flywheel"), "effects"),
+}
+"""Tables of keys that are easily written elsewhere."""
 _LIKELY = {"rad": "deg", "m": "mm", "rad/s": "rpm"}
 """Units that a number without one may have been meant in, other than the SI unit. They
 are suggested where no number beside it has a unit of the kind.
@@ -104,6 +112,8 @@ class Reader:
         for name, entry in value.items():
             if name not in names:
                 known = f"{_suggest_word(name, names)}allowed: {', '.join(names)}"
+                if _TABLE_OF.get(name, key) != key:
+                    known = f"write it under [{_TABLE_OF[name]}]"
                 hint = ELSEWHERE if _is_elsewhere(key, value, names) else known
                 raise self.refuse(_join_key(key, name), entry, f"unknown key; {hint}")
         return value

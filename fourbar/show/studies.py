@@ -24,6 +24,7 @@ from fourbar.formulas.mobility import (
 from fourbar.formulas.transmission import transmission_extremes
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar
 from fourbar.quantities import (
+    CHANGE_POINT,
     COUPLE,
     LINE,
     NO_DIRECTION,
@@ -333,7 +334,7 @@ def write_sensitivity_json(derivatives: Sensitivity) -> str:
 
 
 _EQUILIBRIUM_SCHEMA = "fourbar-equilibrium/1"
-_WITHOUT_MOVE = (NOT_ASSEMBLED, SINGULAR, NO_DIRECTION, WOUND)
+_WITHOUT_MOVE = (NOT_ASSEMBLED, SINGULAR, NO_DIRECTION, WOUND, CHANGE_POINT)
 """Statuses at which no force says how a released linkage moves."""
 _MOVES = {0: "stays", 1: "theta_2 grows", -1: "theta_2 falls"}
 

@@ -31,7 +31,14 @@ from fourbar.formulas.mobility import (
 from fourbar.formulas.motion import Coefficients
 from fourbar.formulas.position import Loop
 from fourbar.formulas.torque import inertia
-from fourbar.quantities import JAMMED, NOT_ASSEMBLED, SINGULAR, WOUND, Array
+from fourbar.quantities import (
+    CHANGE_POINT,
+    JAMMED,
+    NOT_ASSEMBLED,
+    SINGULAR,
+    WOUND,
+    Array,
+)
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import DEFAULT_STEPS, Motion
 from fourbar.scene.scene import default_places
@@ -129,8 +136,8 @@ class Equilibria(NamedTuple):
     `torque_low` to `torque_high` does.
     """
     moves: NDArray[np.int8]
-    """Sign of the change of theta_2 when each position is released. 0: it stays, or has
-    no speeds.
+    """Sign of the change of theta_2 when each position is released. 0: it stays, has no
+    speeds, or has two ways to move.
     """
 
 
@@ -181,7 +188,8 @@ def equilibrium(scene: Scene) -> Equilibria:
             curve,
             np.stack([psi, positions.branch * transmission(curve.ratios, psi)], axis=1),
         )
-        sense[np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR, WOUND))] = 0
+        undecided = (NOT_ASSEMBLED, SINGULAR, WOUND, CHANGE_POINT)
+        sense[np.isin(positions.status_code, undecided)] = 0
         flat, ends = (
             tuple(part.ends for part in ranges if _is_reached(curve, part))
             for ranges in (level, held)

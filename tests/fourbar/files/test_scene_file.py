@@ -76,6 +76,18 @@ MISTAKES = [
         ["colour", "title, source, lengths"],
     ),
     (
+        "key of another table at the top",
+        'title = "good"',
+        'branch = "open"',
+        ["branch = 'open'", "write it under [motion]"],
+    ),
+    (
+        "effect in the motion",
+        "omega_2",
+        'gravity = "9.81 m/s^2"\nomega_2',
+        ["motion.gravity", "write it under [effects]"],
+    ),
+    (
         "unknown key, closest named",
         "omega_2",
         "omega2",

@@ -535,6 +535,20 @@ def test_released_ones_begin_to_move_as_stated() -> None:
 
 
 @pytest.mark.slow
+def test_at_a_change_point_a_released_parallelogram_has_two_ways_to_move() -> None:
+    """Elsewhere it falls: the height of its mass centres grows with sin(theta_2)."""
+    arm = Bar(0.5, 21.0)
+    scene = Scene(FourBar(0.6, arm, Bar(0.6, 25.0), arm), Motion(0.0), effects=(DOWN,))
+    equilibria = equilibrium(scene)
+    angle = equilibria.positions.theta_2
+    at_change_point = np.abs(np.sin(angle)) < CLOSE
+    falls = -np.sign(np.cos(angle)) * (np.abs(np.cos(angle)) > CLOSE)
+    np.testing.assert_array_equal(equilibria.moves, np.where(at_change_point, 0, falls))
+    rows = write_equilibria("", equilibria).splitlines()
+    words = {row.split()[0]: row.split()[-1] for row in rows if row.split()}
+    assert [words[angle] for angle in ("0", "180", "360")] == ["change_point"] * 3
+
+
 def test_the_command_prints_what_python_finds(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
