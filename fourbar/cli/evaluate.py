@@ -38,8 +38,8 @@ def classify_command(
     like 30cm work too.
     """
     from fourbar.linkage import Bar, FourBar
+    from fourbar.show.lines import wrap_line
     from fourbar.show.studies import write_type, write_type_json
-    from fourbar.show.tables import wrap_line
     from fourbar.show.units import suit_units, units_of_length
 
     ratios = [given.is_bare(text) for text in lengths]

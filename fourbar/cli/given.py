@@ -330,7 +330,7 @@ def _read_drawn(scene: Scene, name: str, text: str) -> float:
 
 def find_width(out: Path | None = None) -> int | None:
     """Return the columns of the terminal that is printed to; None: a file or pipe."""
-    from fourbar.show.tables import find_terminal_width
+    from fourbar.show.lines import find_terminal_width
 
     return find_terminal_width() if out is None else None
 

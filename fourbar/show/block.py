@@ -35,11 +35,11 @@ from fourbar.show.acting import (
 from fourbar.show.change_point import has_growing_forces
 from fourbar.show.driving import describe_drive
 from fourbar.show.duty import DUTY_UNITS, MotorDuty, bearing_load, motor_duty
+from fourbar.show.lines import find_block_width, wrap_line
 from fourbar.show.motion_curves import acts, find_drive_rounding
 from fourbar.show.panels import Peak
 from fourbar.show.position import PositionSheet
 from fourbar.show.summary import Facts, summarize
-from fourbar.show.tables import find_block_width, wrap_line
 from fourbar.show.units import (
     COMMON,
     POSITION_DIGITS,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rich.measure import Measurement
 from rich.table import Column, Table
 
-from fourbar.show.tables import BLOCK_WIDTH
+from fourbar.show.lines import BLOCK_WIDTH
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult

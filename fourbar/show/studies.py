@@ -37,11 +37,11 @@ from fourbar.scene import find_signs
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.acting import list_spring_notes
 from fourbar.show.driving import read_drive_demand
+from fourbar.show.lines import wrap_line
 from fourbar.show.motion_curves import find_drive_rounding
 from fourbar.show.tables import (
     MOST_ROWS_PRINTED,
     make_plain_table,
-    wrap_line,
     write_cells,
     write_table,
 )

@@ -5,11 +5,8 @@ The table of positions of `analyze --table` is one.
 
 import io
 import math
-import shutil
-import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +17,7 @@ from fourbar.show.acting import list_arm_notes
 from fourbar.show.columns import Column
 from fourbar.show.derived import derive, list_derived_names
 from fourbar.show.driving import read_drive_demand
+from fourbar.show.lines import wrap_line
 from fourbar.show.units import drop_rounding, write_cell
 from fourbar.solution import (
     DEGREES,
@@ -36,8 +34,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
-BLOCK_WIDTH = 80
-"""Columns of a printed block."""
 MOST_DIGITS = 16
 """Largest number of significant digits of a double."""
 GAP = 2
@@ -74,27 +70,6 @@ def write_table(
     for line in after:
         console.print(Text("\n".join(wrap_line(line, width))))
     return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))
-
-
-def find_terminal_width() -> int | None:
-    """Return the columns of the terminal that is printed to; None: it is none."""
-    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-
-
-def find_block_width(width: int | None) -> int:
-    """Return the columns of a block on a terminal of a width; None: a file."""
-    return BLOCK_WIDTH if width is None else min(width, BLOCK_WIDTH)
-
-
-def wrap_line(line: str, width: int | None = None) -> list[str]:
-    """Break a line that is wider than a block; what follows is indented.
-
-    `width`: that of a terminal.
-    """
-    most = find_block_width(width)
-    if len(line) <= most:
-        return [line]
-    return wrap(line, most, subsequent_indent="    ", break_on_hyphens=False)
 
 
 def make_plain_table(

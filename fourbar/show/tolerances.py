@@ -14,8 +14,8 @@ import numpy as np
 from fourbar.errors import DependencyError, InputError
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNITS, Array
 from fourbar.scene import Scene
+from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.tables import (
-    BLOCK_WIDTH,
     make_plain_table,
     show_running,
     write_table,

@@ -13,8 +13,8 @@ from fourbar.cli import status
 from fourbar.scene import command_at
 from fourbar.scene.motion import Law
 from fourbar.show.block import write_block, write_motor
+from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.summary import summarize
-from fourbar.show.tables import BLOCK_WIDTH
 from fourbar.show.units import suit_units
 from fourbar.solving import find_last_stage
 from tests.support.scenes import CYLINDER, crank_rocker, thesis

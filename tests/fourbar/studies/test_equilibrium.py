@@ -32,8 +32,8 @@ from fourbar.cli import status
 from fourbar.effects import Place
 from fourbar.files import loads
 from fourbar.scene.motion import Free
+from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.studies import write_equilibria
-from fourbar.show.tables import BLOCK_WIDTH
 from fourbar.studies.circuit_curve import POSITIONS_OF_A_BRANCH, CircuitCurve
 from fourbar.studies.equilibrium import Equilibria, Equilibrium, equilibrium
 from tests.support.scenes import CYLINDER, crank_rocker

@@ -78,7 +78,7 @@ def compare_figures(show_all: bool) -> int:
     from rich.console import Console
 
     from fourbar.show.folded import FoldedTable
-    from fourbar.show.tables import wrap_line
+    from fourbar.show.lines import wrap_line
 
     console = Console(highlight=False, markup=False)
     page = min(PAGE_WIDTH, console.width)

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from fourbar.errors import clean_line
-from fourbar.show.tables import find_terminal_width, wrap_line
+from fourbar.show.lines import find_terminal_width, wrap_line
 from fourbar_validation.compare.rows import escape_controls
 
 if TYPE_CHECKING:
