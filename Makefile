@@ -73,7 +73,7 @@ long-free:
 	FREE_MOTIONS=30 $(BIN)/python -m pytest -n 2 \
 		tests/fourbar/evaluation/test_free_motion_reference.py
 long-oracles:
-	ORACLE_SCENES=200 $(BIN)/python -m pytest -n 2 tests/oracle
+	ORACLE_SHARE=1 $(BIN)/python -m pytest -n 2 tests/oracle
 long-faults:
 	$(BIN)/python -m fourbar_lab faults
 long-fuzz:
