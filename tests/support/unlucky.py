@@ -68,7 +68,8 @@ def dies_at_first(*_: object) -> None:
 
 
 def start_and_sleep(starts: Path) -> str:
-    """Tell that it has begun, in a file, and work for some looks of the pool."""
+    """Work for some looks of the pool, before and after telling of it in a file."""
+    time.sleep(1.0)
     with starts.open("a") as file:
         file.write("begun\n")
     time.sleep(1.0)

@@ -629,9 +629,9 @@ def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(
 
 
 def test_a_scene_of_many_positions_has_longer_before_it_counts_as_hanging() -> None:
-    assert pool.find_time_limit(Files((), 50_000), ()) > 20 * pool.find_time_limit(
-        Random(1, 0, TYPES), ()
-    )
+    """One of fifty thousand needs minutes in the simulators."""
+    one = pool.find_time_limit(Random(1, 0, TYPES), ())
+    assert pool.find_time_limit(Files((), 50_000), ()) > 5.0 * one
 
 
 class Blunders:

@@ -102,7 +102,7 @@ def test_a_free_motion_near_a_limit_raises_no_alarm(
     scene = FAULT_SCENES["double rocker released"]
     often = replace(
         scene,
-        motion=scene.motion.replace(free=Free(1.0, 1000)),
+        motion=scene.motion.replace(free=Free(1.0, 4000)),
     )  # nearer to its limits
     rows = judge("released", often, BY_ITSELF).rows
     assert not [row for row in rows if row.failed] and DEGRADED in {
