@@ -78,3 +78,15 @@ def test_the_lab_alone_adds_engines(
         and engine.code
         for engine in engines
     )
+
+
+def test_ctrl_c_while_a_compiled_module_starts_is_no_broken_library(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """pybind11 raises an ImportError then, from what ended it."""
+    module = "raise ImportError('initialization failed') from KeyboardInterrupt()\n"
+    (tmp_path / "interrupted.py").write_text(module)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        registry.find_missing("interrupted")

@@ -144,6 +144,13 @@ def find_missing(library: str) -> str | None:
 
 
 def _find_broken(library: str, error: BaseException) -> str:
+    """Say that a library does not load.
+
+    Raises KeyboardInterrupt where Ctrl-C ended the start of a compiled module, which
+    says so as the cause of its ImportError.
+    """
+    if isinstance(error.__cause__, KeyboardInterrupt):
+        raise error.__cause__
     return f"{library} is installed, but does not load: {say_error(error)}"
 
 
