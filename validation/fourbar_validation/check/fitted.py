@@ -404,8 +404,9 @@ def _try_lengths(judge: Judge) -> Iterator[Mistake]:
             lengths, residuals[::3], residuals[1::3], residuals[2::3], strict=True
         ):
             slope = (less - more) / (2.0 * FIT_STEP)
-            step = float(slope @ here) / float(slope @ slope)
-            if math.isfinite(step) and 0.0 < factors[name] + step < math.inf:
+            squares = float(slope @ slope)
+            step = float(slope @ here) / squares if squares else math.nan
+            if 0.0 < factors[name] + step < math.inf:
                 factors[name] += step
     for name, predict in zip(lengths, predict_all(0.0), strict=True):
         text = f"{name}: length {factors[name]:.6g} times ours (fitted)"
