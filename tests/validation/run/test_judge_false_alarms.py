@@ -12,7 +12,7 @@ import fourbar
 from fourbar.effects import Gravity
 from fourbar.linkage import Bar, FourBar
 from fourbar.scene import Command, Scene
-from fourbar.scene.motion import Free, Motion
+from fourbar.scene.motion import Free, Law, Motion
 from fourbar.solution import Solution
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.compare.answer import Answer
@@ -20,11 +20,13 @@ from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.registry import ENGINES, Engine, hold_fully
 from fourbar_validation.run import released
-from fourbar_validation.run.judge import judge
+from fourbar_validation.run.judge import judge, make_question
+from fourbar_validation.run.law import check_law
 from fourbar_validation.run.question import Question
 from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.random import draw_random_scene
 from tests.oracle import printed
+from tests.support.scenes import crank_rocker
 
 EXACT = [engine for engine in ENGINES if not engine.through_time]
 BY_ITSELF = [engine for engine in EXACT if not engine.library]
@@ -289,3 +291,20 @@ def test_moments_about_far_centres_are_right_to_full_accuracy() -> None:
         assert any(engine == wrong.name for engine, *_ in failed)
         reasons += " ".join(row.reason for row in rows if row.engine == right.name)
     assert "by a method in world axes or about the mass centres" in reasons
+
+
+@pytest.mark.parametrize("ends", ["free", "rest", "periodic"])
+def test_a_table_of_uneven_steps_that_overshoots_its_points_is_a_right_law(
+    ends: str,
+) -> None:
+    """Steps of 1 ms to 1 s throw the cubic far beyond the angles between them."""
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        steps = 10.0 ** rng.uniform(-3.0, 0.0, 6)
+        angles = rng.uniform(-1.0, 1.0, 7) * 10.0 ** rng.uniform(-3.0, 0.5)
+        angles[-1] = angles[0]
+        time = (0.0, *np.cumsum(steps).tolist())
+        law = Law(time=time, theta_2=tuple(angles.tolist()), ends=ends)
+        scene = replace(crank_rocker(), motion=Motion(law=law))
+        (row,) = check_law(make_question("law", scene, ()))
+        assert not row.failed, row
