@@ -274,7 +274,8 @@ class Bar:
         the plane of motion.
     diameter : of a round cross-section, m, in place of `section`.
 
-    >>> Bar("0.4 m", density="7850 kg/m^3", section=("20 mm", "5 mm")).mass
+    >>> bar = Bar("0.4 m", density="7850 kg/m^3", section=("20 mm", "5 mm"))
+    >>> round(bar.mass, 6)
     0.314
     """
 

@@ -51,6 +51,20 @@ def _add_to(sums: dict[Any, Any], key: Any, value: Any) -> None:
 class Actions:
     """Sums over everything that acts on bars 2, 3, 4 apart from pins and inertia.
 
+    An effect states what it does by `force`, `couple`, `pin_couple` and `pull`; what
+    the drive has to balance is the generalized force of the sums. A force of 3 N that
+    pulls up at pin A, the end of a level crank of 0.1 m:
+
+    >>> from fourbar import uniform
+    >>> from fourbar.formulas.path import compute_state
+    >>> linkage = uniform(0.3, 0.1, 0.25, 0.22)
+    >>> state = compute_state(linkage, theta_2=0.0, branch=1.0)
+    >>> actions = Actions(state, list_bodies(linkage))
+    >>> actions.force(2, 3.0j, point=0.1)
+    >>> Q, _ = actions.generalized_forces()
+    >>> round(float(Q), 12)
+    0.3
+
     Parameters
     ----------
     state : positions and motion.

@@ -98,7 +98,21 @@ class Dynamics(NamedTuple):
 
 
 class Case(NamedTuple):
-    """A scene in the numbers of the formulas."""
+    """A scene in the numbers of the formulas.
+
+    A case is made once for all positions of a command; `at` closes the loop at them,
+    and `dynamics` computes pin forces and the effort of the drive.
+
+    >>> from fourbar import Motion, Scene, Sweep, command, uniform
+    >>> motion = Motion(theta_2=Sweep("30 deg", "90 deg", 3), omega_2="100 rpm")
+    >>> scene = Scene(uniform(0.3, 0.1, 0.25, 0.22, per_metre=2.0), motion)
+    >>> at = command(scene)
+    >>> case = Case.of(scene)
+    >>> state, _ = case.at(at)
+    >>> dynamics = case.dynamics(state, at.acceleration)
+    >>> dynamics.effort.round(4)
+    array([-0.1207,  0.2423,  0.2899,  0.1913])
+    """
 
     linkage: FourBar
     lengths: Loop

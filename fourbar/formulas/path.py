@@ -60,7 +60,18 @@ ROLES_OF_BARS = {2: (2, 3, 4), 3: (3, 2, 4), 4: (4, 3, 2)}
 
 
 class LoopPath(NamedTuple):
-    """The loop as it is read from the bar whose angle is independent."""
+    """The loop as it is read from the bar whose angle is independent.
+
+    Read from bar 4, the triangle that closes is that of bars 2 and 3, and `in_order`
+    gives the bars their own names back.
+
+    >>> path = prepare_path((4.0, 1.0, 3.5, 2.0), 0.0, bar=4)
+    >>> theta_4 = 2.0
+    >>> position = path.position(theta_4, path.half_angle(theta_4), branch=1.0)
+    >>> p = path.in_order(position)
+    >>> abs(1.0 * p.u2 + 3.5 * p.u3 - 4.0 - 2.0 * p.u4) < 1e-14
+    True
+    """
 
     bar: int
     """2, 3 or 4."""

@@ -3,12 +3,9 @@
 Exact sums, the path read from either end, shapes, the half angle in many digits.
 """
 
-import doctest
 import itertools
 import math
-import pkgutil
 from fractions import Fraction
-from importlib import import_module
 from typing import Any
 
 import mpmath as mp
@@ -77,16 +74,6 @@ DIGITS_LEFT = 1e-40
 """Relative to the offset: of 120 digits an offset of 1e-40 takes 40, and a limit near a
 change point some 20 more.
 """
-
-
-MODULES = [module.name for module in pkgutil.iter_modules(fourbar.formulas.__path__)]
-
-
-@pytest.mark.parametrize("name", MODULES)
-def test_examples_in_the_formulas(name: str) -> None:
-    failed, attempted = doctest.testmod(import_module(f"fourbar.formulas.{name}"))
-    assert failed == 0
-    assert attempted > 0 or name not in ("position", "motion", "pin_forces", "torque")
 
 
 class Carrying(float):

@@ -39,7 +39,16 @@ LONGEST_REASON = 500
 
 @dataclass(frozen=True, slots=True, order=True)
 class Row:
-    """One comparison at the position where error/allowed is worst."""
+    """One comparison at the position where error/allowed is worst.
+
+    >>> who = ("press", "free-body", "exact")
+    >>> errors = np.array([2e-16, 8e-15])
+    >>> row = Row.judged(who, "torque", errors, 1e-14, "rounding", np.array([0.0, 0.1]))
+    >>> row.verdict, row.error, row.theta_2
+    ('agrees', 8e-15, 0.1)
+    >>> Row.judged(who, "torque", math.nan, 1e-14, "rounding").verdict
+    'fails'
+    """
 
     scene: str
     engine: str

@@ -32,7 +32,22 @@ from fourbar_validation.run.transformed import check_transformed
 
 
 class Check(NamedTuple):
-    """A check: what makes its rows, whether they count, and when it is left out."""
+    """A check: what makes its rows, whether they count, and when it is left out.
+
+    The list `CHECKS` is the only place that names a check.
+
+    >>> from fourbar import Motion, Scene, Sweep, uniform
+    >>> motion = Motion(theta_2=Sweep(0.0, 1.0, 10), omega_2=10.0)
+    >>> scene = Scene(uniform(0.3, 0.1, 0.25, 0.22, per_metre=2.0), motion)
+    >>> def check_power(question):
+    ...     solution = question.solution
+    ...     error = solution.power - solution.torque * solution.omega_2
+    ...     scale = abs(solution.power).max()
+    ...     yield question.row("power = T omega", error / scale, 1e-15, "one product")
+    >>> question = make_question("mine", scene, ())
+    >>> [row.verdict for row in Check(check_power).rows(question)]
+    ['agrees']
+    """
 
     make_rows: Callable[[Question], Iterable[Row]]
     compares: bool = False

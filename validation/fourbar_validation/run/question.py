@@ -50,7 +50,19 @@ class NotAskedError(Exception):
 
 @dataclass(eq=False)
 class Question:
-    """A scene at the positions of a command, and every answer to it."""
+    """A scene at the positions of a command, and every answer to it.
+
+    What several checks need is computed once, when the first of them reads it.
+
+    >>> from fourbar import Motion, Sweep, command, uniform
+    >>> motion = Motion(theta_2=Sweep(0.0, 1.0, 10), omega_2=10.0)
+    >>> scene = Scene(uniform(0.3, 0.1, 0.25, 0.22, per_metre=2.0), motion)
+    >>> question = Question("mine", scene, command(scene), [FREE_BODY])
+    >>> answer = question.answer(FREE_BODY)
+    >>> difference = answer.quantities["torque"] - question.solution.torque
+    >>> bool(abs(difference).max() < 1e-12 * abs(question.solution.torque).max())
+    True
+    """
 
     name: str
     scene: Scene

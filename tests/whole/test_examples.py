@@ -1,0 +1,51 @@
+"""Examples in docstrings print what they say."""
+
+import doctest
+from importlib import import_module
+
+import pytest
+
+from tests.whole.test_imports import ROOT
+
+PACKAGES = ("fourbar", "validation/fourbar_validation", "lab/fourbar_lab")
+MET_FIRST = {
+    "fourbar.formulas": ("position", "motion", "pin_forces", "torque", "path"),
+    "fourbar.effects": ("effect",),
+    "fourbar.evaluation": ("case",),
+    "fourbar_validation.compare": ("rows",),
+    "fourbar_validation.run": ("judge", "question"),
+}
+"""Modules that have examples: those that one meets first."""
+
+
+def find_modules() -> list[str]:
+    """Return the names of the modules whose docstrings have an example."""
+    names = []
+    for package in PACKAGES:
+        folder = ROOT / package
+        for path in sorted(folder.rglob("*.py")):
+            if ">>> " in path.read_text(encoding="utf-8"):
+                module = path.relative_to(folder.parent).with_suffix("")
+                names.append(".".join(module.parts).removesuffix(".__init__"))
+    return names
+
+
+MODULES = find_modules()
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples_print_what_they_say(
+    name: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(ROOT)  # some load a scene of `models`
+    failed, attempted = doctest.testmod(import_module(name))
+    assert failed == 0
+    assert attempted > 0
+
+
+def test_what_one_meets_first_has_an_example() -> None:
+    first = {
+        f"{package}.{name}" for package, names in MET_FIRST.items() for name in names
+    }
+    assert first <= set(MODULES)
