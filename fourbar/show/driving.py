@@ -62,11 +62,11 @@ def describe_drive(scene: Scene) -> str:
 
 
 def is_once_round(solution: Solution) -> Any:
-    """Return True if a motion covers whole turns; for a study (m,).
+    """Return True if the last position repeats the first; for a study an array (m,).
 
-    Its last position then repeats the first. An assembly with a single change point
-    repeats after two turns. Speed and acceleration must repeat too: a motion law may
-    end at another speed than it begins with.
+    The motion then covers whole turns, of an assembly with a single change point an
+    even number of them. Speed and acceleration must repeat too: a motion law may end at
+    another speed than it begins with.
     """
     angle = solution.at.angle
     bar = solution.at.bar

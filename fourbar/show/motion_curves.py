@@ -70,7 +70,7 @@ class MotionCurves:
     def solve_with_peaks(self) -> Solution:
         """Solve at the positions of the sweep and at what its steps pass over.
 
-        These are the largest of each magnitude, and both sides of each jump.
+        Steps pass over the largest of each magnitude, and over both sides of a jump.
         """
         panels = self.panels
         if not panels.located or self.solution.F12 is None:

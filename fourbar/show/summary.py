@@ -1,6 +1,6 @@
 """Summary of a solved scene: ranges, peaks and their places, drive and ends of motion.
 
-It has the needs of the drive and the ends of the motion. `summarize` collects the facts
+`summarize` collects the facts
 from the curves over the motion; `fourbar.show.block` prints them.
 """
 

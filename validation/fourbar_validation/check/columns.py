@@ -1,6 +1,6 @@
 """Columns of `fourbar analyze --csv` besides the quantities of a solution.
 
-They are judged as the quantity whose terms they are made of.
+Each is judged as the quantity whose terms it is made of.
 """
 
 from fourbar.errors import InputError

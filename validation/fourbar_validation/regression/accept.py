@@ -177,10 +177,7 @@ def compare_command(
 
 
 def _require_as_strict(run: Recorded, target: Path) -> None:
-    """Refuse a run that is weaker than the accepted one.
-
-    Its rules are weaker, or it leaves out what the accepted run judged.
-    """
+    """Refuse a run with weaker rules than the accepted one, or less that it judges."""
     if not (target / ABOUT_FILE).is_file() or is_half_accepted(run, target):
         return
     accepted = open_run(target, "--to")

@@ -248,10 +248,10 @@ def _name_damage(file: Path) -> Iterator[None]:
 
 
 def summarise(file: Path) -> "DataFrame":
-    """Return a line for each run and engine, by date: `used` and `time`.
+    """Return a line for each run and engine, by date, with `used` and `time`.
 
-    Their values are the largest error over what is allowed, and the median of the time
-    over that of the formulas. InputError if the file is damaged.
+    `used` is the largest error over what is allowed, `time` the median over that of the
+    formulas. A damaged file raises InputError.
     """
     import pandas
 

@@ -43,8 +43,8 @@ def compare_answers(question: Question) -> Iterator[Row]:
 def find_agreement(question: Question, rows: Sequence[Row]) -> dict[str, list[str]]:
     """Find the quantities in which engines agree with each other, and not with us.
 
-    They are two at least, and more than those that agree with us. The engines of each
-    quantity are returned; two versions of one engine count once.
+    Returned are the engines of each such quantity: two at least, and more than agree
+    with us. Two versions of one engine count once.
     """
     against: dict[str, list[str]] = {}
     versions = {
@@ -69,8 +69,8 @@ def find_agreement(question: Question, rows: Sequence[Row]) -> dict[str, list[st
 def _agree(question: Question, row: Row, other: Row, quantity: str) -> bool:
     """Return whether two engines that differ from us have one number.
 
-    They are held against each other at the position where the first one is worst, by
-    the larger error that either is allowed.
+    The position is that where the first one is worst, and the two may differ by the
+    larger error that either is allowed.
     """
     values, others = (
         question.answered[one.engine][0].quantities.get(quantity)
