@@ -40,6 +40,23 @@ def crank_rocker(**changes: object) -> fourbar.Scene:
     return fourbar.Scene(**{**parts, **changes})  # type: ignore[arg-type]
 
 
+def bare(
+    d: float, a: float, b: float, c: float, theta_1: float = 0.0
+) -> fourbar.FourBar:
+    """Make a linkage of bars without mass."""
+    moving = (fourbar.Bar(length) for length in (a, b, c))
+    return fourbar.FourBar(d, *moving, ground_angle=theta_1)
+
+
+def draw_linkage(rng: np.random.Generator, integers: bool = False) -> fourbar.FourBar:
+    """Draw lengths that can close, of 0.1 to 1 or of whole numbers, and theta_1."""
+    while True:
+        lengths = rng.integers(1, 7, 4) if integers else rng.uniform(0.1, 1.0, 4)
+        if 2.0 * lengths.max() < lengths.sum() - (0.0 if integers else 0.01):
+            theta_1 = rng.uniform(-math.pi, math.pi)
+            return bare(*map(float, lengths), float(theta_1))
+
+
 def balance(left: float, omega_2: float = 0.01) -> fourbar.Scene:
     """Make a crank whose counterweight leaves a part of its weight's moment."""
     linkage = fourbar.FourBar(

@@ -14,24 +14,11 @@ from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT, compute_state
 from fourbar.formulas.position import Position
+from tests.support.scenes import bare
 
 EPS = 2.0**-52
-LENGTHS = (0.3, 0.1, 0.25, 0.22)
-ANGLES = np.linspace(-3.0, 6.0, 41)
 CLOSURE = 8 * EPS
 """Of the sum of the lengths: eight roundings of unit vectors and their sum."""
-
-
-def linkage(
-    theta_1: float = 0.4,
-    lengths: tuple[float, ...] = LENGTHS,
-) -> fourbar.FourBar:
-    ground, *moving = lengths
-    return fourbar.FourBar(ground, *map(fourbar.Bar, moving), ground_angle=theta_1)
-
-
-def angle(state: State, bar: int) -> np.ndarray:
-    return np.angle(state.direction(bar))
 
 
 def find_singular(position: Position) -> np.ndarray:
@@ -44,15 +31,10 @@ def assembled(state: State) -> np.ndarray:
 
 
 def test_positions_that_cannot_close_are_nan_and_say_so() -> None:
-    link = fourbar.uniform(1.0, 1.0, 0.4, 0.4)
-    moving = compute_state(link, np.array([0.5, 2.0]), 1)
+    moving = compute_state(bare(1.0, 1.0, 0.4, 0.4), np.array([0.5, 2.0]), 1)
     assert assembled(moving).tolist() == [True, False]
-    for value in (
-        angle(moving, 3),
-        moving.omega(3),
-        moving.alpha(4),
-        moving.point(3, 0.1),
-    ):
+    rates = moving.omega(3), moving.alpha(4), moving.point(3, 0.1)
+    for value in (moving.direction(3), *rates):
         assert np.isnan(value).tolist() == [False, True]
 
 
@@ -71,18 +53,13 @@ def test_beyond_a_limit_nothing_assembles_however_near(
     lengths: tuple[float, ...],
     offset: float,
 ) -> None:
-    link = linkage(0.2, lengths)
+    link = bare(*lengths, 0.2)
     # the first limit ends the range in which the linkage closes, the second begins it
-    for limit, inside in ((1, -1.0), (2, 1.0)):
-        status = [
-            fourbar.solve(
-                fourbar.Scene(
-                    link, fourbar.Motion(fourbar.FromLimit(limit, side * offset), 1.0)
-                )
-            ).status
-            for side in (inside, 0.0, -inside)
-        ]
-        assert status == [["ok"], ["singular"], ["not_assembled"]]
+    for number, inside in ((1, -offset), (2, offset)):
+        limits = [fourbar.FromLimit(number, x) for x in (inside, 0.0, -inside)]
+        motions = [fourbar.Motion(limit, 1.0) for limit in limits]
+        status = [fourbar.solve(fourbar.Scene(link, m)).status[0] for m in motions]
+        assert status == ["ok", "singular", "not_assembled"]
 
 
 STEP = 1e-4
@@ -96,7 +73,7 @@ BY_DIFFERENCES = 1e-5
 @pytest.mark.parametrize("bar", [2, 3, 4])
 def test_points_move_as_their_positions_do(bar: int, alpha: float) -> None:
     """Speeds and accelerations of points are differences of their places."""
-    link, omega, z = linkage(), 3.0, 0.05 - 0.02j
+    link, omega, z = bare(0.3, 0.1, 0.25, 0.22, 0.4), 3.0, 0.05 - 0.02j
     angles = np.linspace(0.3, 6.0, 9)
 
     def place_at(time: float) -> np.ndarray:
@@ -104,15 +81,10 @@ def test_points_move_as_their_positions_do(bar: int, alpha: float) -> None:
         return compute_state(link, theta_2, 1).point(bar, z)
 
     moving = compute_state(link, angles, 1, omega, alpha)
-    d, a, b, c = link.lengths
-    units = {k: np.exp(1j * angle(moving, k)) for k in (2, 3, 4)}
-    O4 = d * cmath.exp(1j * link.ground_angle)
-    first = {2: 0.0, 3: a * units[2], 4: O4}[bar]
-    assert np.abs(a * units[2] + b * units[3] - c * units[4] - O4).max() <= CLOSURE
-    assert np.abs(moving.direction(bar) - units[bar]).max() <= CLOSURE
+    first = {2: 0.0, 3: 0.1 * moving.direction(2), 4: 0.3 * cmath.exp(0.4j)}[bar]
     assert np.abs(moving.foot(bar) - first).max() <= CLOSURE
     here = moving.point(bar, z)
-    assert np.abs(here - first - z * units[bar]).max() <= CLOSURE
+    assert np.abs(here - first - z * moving.direction(bar)).max() <= CLOSURE
     ahead, back = place_at(STEP), place_at(-STEP)
     speed = (ahead - back) / (2 * STEP)
     bend = (ahead - 2.0 * here + back) / STEP**2
@@ -128,8 +100,7 @@ def test_on_a_change_point_everything_is_the_limit_of_its_assembly() -> None:
 
     An antiparallelogram has h4 = -(d - a)/(d + a) and its inverse there.
     """
-    link = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
-    theta_2 = np.array([0.0, 1.0, math.pi])
+    link, theta_2 = bare(0.3, 0.1, 0.3, 0.1), np.array([0.0, 1.0, math.pi])
     parallel = compute_state(link, theta_2, 1, 2.0, 5.0)
     assert find_singular(parallel.position).tolist() == [True, False, True]
     assert np.array_equal(parallel.omega(4), [2.0, 2.0, 2.0])
@@ -144,18 +115,15 @@ def test_on_a_change_point_everything_is_the_limit_of_its_assembly() -> None:
 def test_within_the_rounding_of_a_change_point_no_direction_is_left(
     lengths: tuple[float, ...],
 ) -> None:
-    theta_2 = math.pi + 2.0 * EPS * np.arange(5)  # the next doubles after pi
-    moving = compute_state(fourbar.uniform(*lengths), theta_2, 1)
+    """The speeds have all their digits."""
+    link, after = bare(*lengths), 2.0 * EPS * np.arange(5)  # the next doubles after pi
+    moving = compute_state(link, math.pi + after, 1)
     assert (np.abs(moving.position.sin_mu) < 8.0 * EPS).all()
     assert find_singular(moving.position).all()
-    # the speeds have all their digits
-    near = compute_state(
-        fourbar.uniform(*lengths), math.pi + np.array([-1e-8, 1e-8]), 1
-    )
-    assert moving.omega(3) == pytest.approx(np.full(5, near.omega(3).mean()), abs=1e-14)
-    assert not find_singular(
-        compute_state(fourbar.uniform(*lengths), theta_2 + 1e-13, 1).position
-    ).any()
+    near = compute_state(link, math.pi + np.array([-1e-8, 1e-8]), 1).omega(3).mean()
+    assert moving.omega(3) == pytest.approx(np.full(5, near), abs=1e-14)
+    beside = compute_state(link, math.pi + after + 1e-13, 1)
+    assert not find_singular(beside.position).any()
 
 
 @pytest.mark.parametrize(
@@ -174,29 +142,22 @@ def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
 
     A folded kite has B on O2.
     """
-    link = linkage(theta_1, lengths)
+    link = bare(*lengths, theta_1)
     theta_2 = theta_1 + math.pi * half_turn + np.array([1e-9, 0.5, 2.0])
     moving = compute_state(link, theta_2, branch, 2.0, 3.0)
-    u1, u2 = cmath.exp(1j * theta_1), moving.position.u2
-    together = lengths[1] == lengths[3]  # a parallelogram
-    directions, speeds, growths = (
-        ((u1, u2), (0.0, 2.0), (0.0, 3.0))
-        if together
-        else ((-u2, -u1), (2.0, 0.0), (3.0, 0.0))
-    )
+    u1, u2 = np.full(3, cmath.exp(1j * theta_1)), moving.position.u2
+    parallelogram = lengths[1] == lengths[3]
+    directions = (u1, u2) if parallelogram else (-u2, -u1)
+    speeds, growths = ((0.0, 2.0), (0.0, 3.0))
+    if not parallelogram:
+        speeds, growths = speeds[::-1], growths[::-1]
     for k, bar in enumerate((3, 4)):
-        assert moving.direction(bar) == pytest.approx(
-            np.broadcast_to(directions[k], 3),
-            abs=EPS,
-        )
+        assert moving.direction(bar) == pytest.approx(directions[k], abs=EPS)
         assert np.array_equal(moving.omega(bar), np.full(3, speeds[k]))
         assert np.array_equal(moving.alpha(bar), np.full(3, growths[k]))
     # between the bars: the angle of input and ground
-    assert np.abs(moving.position.sin_mu) == pytest.approx(
-        np.abs(np.sin(theta_2 - theta_1)),
-        rel=8 * EPS,
-        abs=2 * EPS,
-    )
+    sines, right = moving.position.sin_mu, np.sin(theta_2 - theta_1)
+    assert abs(sines) == pytest.approx(abs(right), rel=8 * EPS, abs=2 * EPS)
 
 
 @pytest.mark.parametrize("theta_1", [0.0, 0.4, -2.5])
@@ -208,33 +169,24 @@ def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(
     """As theta_2 falls to theta_1 bars 3 and 4 come to lie together on the ground's
     line.
     """
-    link = fourbar.FourBar(
-        0.3, fourbar.Bar(0.3), fourbar.Bar(0.2), fourbar.Bar(0.2), theta_1
-    )
-    step = 2.0**-30
+    link, step = bare(0.3, 0.3, 0.2, 0.2, theta_1), 2.0**-30
     # on it, and so near that e^2 leaves the range of doubles
-    for psi, towards in (
-        (0.0, 1.0),
-        *((side * psi, side) for psi in (1e-170, 1e-157) for side in (1.0, -1.0)),
-    ):
-        if psi != 0.0 and theta_1 != 0.0:
-            continue
+    beside = [side * psi for psi in (1e-170, 1e-157) for side in (1.0, -1.0)]
+    for psi in (0.0, *(beside if theta_1 == 0.0 else ())):
+        towards = math.copysign(step, psi)
         on, near = (
-            compute_state(link, theta_1 + np.array([psi, 0.5]), branch, 2.0, 3.0)
-            for psi in (psi, towards * step)
+            compute_state(link, theta_1 + np.array([at, 0.5]), branch, 2.0, 3.0)
+            for at in (psi, towards)
         )
-        for bar in (3, 4):
-            assert on.direction(bar) == pytest.approx(
-                near.direction(bar),
-                abs=2.0 * step,
-            )
         assert find_singular(on.position).tolist() == [True, False]
+        for bar in (3, 4):
+            u = near.direction(bar)
+            assert on.direction(bar) == pytest.approx(u, abs=2.0 * step)
         assert on.omega(3) == pytest.approx(near.omega(3), abs=8.0 * step)
         assert on.alpha(4) == pytest.approx(near.alpha(4), abs=8.0 * step)
     # with b and c unlike each other nothing closes there
-    assert not assembled(
-        compute_state(fourbar.uniform(0.3, 0.3, 0.2, 0.25), np.zeros(1), branch)
-    ).any()
+    open_one = compute_state(bare(0.3, 0.3, 0.2, 0.25), np.zeros(1), branch)
+    assert not assembled(open_one).any()
 
 
 def test_near_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit() -> None:
@@ -242,18 +194,14 @@ def test_near_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit() -> No
 
     So does the angle between them.
     """
-    link = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
+    link = bare(0.3, 0.1, 0.3, 0.1)
     position = compute_state(link, np.linspace(0.01, 3.1, 200), 1).position
-    assert np.array_equal(position.sin_mu, position.u2.imag) and np.array_equal(
-        dot(position.u3, position.u4), position.u2.real
-    )
+    assert np.array_equal(position.sin_mu, position.u2.imag)
+    assert np.array_equal(dot(position.u3, position.u4), position.u2.real)
     # 8 EPS has no digit left, the next double has
-    assert find_singular(
-        compute_state(link, np.array([8.0 * EPS, 8.0 * EPS * (1.0 + EPS)]), 1).position
-    ).tolist() == [
-        True,
-        False,
-    ]
+    next_double = np.array([8.0 * EPS, 8.0 * EPS * (1.0 + EPS)])
+    beside = find_singular(compute_state(link, next_double, 1).position)
+    assert beside.tolist() == [True, False]
 
 
 def test_short_ground_and_input_leave_no_digit_of_mu() -> None:
@@ -264,17 +212,15 @@ def test_short_ground_and_input_leave_no_digit_of_mu() -> None:
     b, psi = 0.9, np.linspace(0.0, 2.0 * math.pi, 41)
     for least, most in ((0.7, 2.0), (0.02, 0.03), (1.1, 1.3)):
         d, a = (4.0 * EPS * b * part for part in (most + least, most - least))
-        link = fourbar.uniform(d, a, b, b)
+        link = bare(d, a, b, b)
         moving = compute_state(link, psi, 1, 2.0)
+        singular = find_singular(moving.position)
         e = np.abs(d - a * np.exp(1j * psi))
-        assert assembled(moving).all() and np.array_equal(
-            find_singular(moving.position), e / b <= 8.0 * EPS
-        )
-        assert np.array_equal(np.isnan(moving.omega(3)), find_singular(moving.position))
+        assert assembled(moving).all()
+        assert np.array_equal(singular, e / b <= 8.0 * EPS)
+        assert np.array_equal(np.isnan(moving.omega(3)), singular)
         status = fourbar.solve(fourbar.Scene(link, fourbar.Motion(psi, 2.0))).status
-        assert [word == "singular" for word in status] == find_singular(
-            moving.position
-        ).tolist()
+        assert [word == "singular" for word in status] == singular.tolist()
 
 
 @pytest.mark.parametrize("theta_1", [0.0, 1.2, -2.9])
@@ -291,22 +237,15 @@ def test_angles_alone_are_those_of_the_whole_position(
 
     To the roundings of an angle.
     """
-    link = linkage(theta_1, lengths)
-    theta_2 = theta_1 + np.concatenate([np.linspace(-7.0, 7.0, 57), [0.0, np.pi, 1e-9]])
-    command = fourbar.scene.Command(
-        theta_2, np.full(theta_2.shape, branch, np.int8), None, 0.0
-    )
-    positions = fourbar.solve(fourbar.Scene(link), "position", at=command)
-    alone = fourbar.solve(
-        fourbar.Scene(link),
-        at=command,
-        out={"theta_3": np.empty(theta_2.shape), "theta_4": np.empty(theta_2.shape)},
-    )
+    angles = np.concatenate([np.linspace(-7.0, 7.0, 57), [0.0, np.pi, 1e-9]])
+    motion = fourbar.Motion(theta_1 + angles, branch=branch)
+    scene = fourbar.Scene(bare(*lengths, theta_1), motion)
+    positions = fourbar.solve(scene, "position")
+    out = {name: np.empty(angles.shape) for name in ("theta_3", "theta_4")}
+    alone = fourbar.solve(scene, out=out)
     assert alone.status == positions.status
-    for name in ("theta_3", "theta_4"):
-        ours, theirs = getattr(alone, name), getattr(positions, name)
-        assert np.array_equal(np.isnan(ours), np.isnan(theirs))
-        assert (
-            np.nanmax(np.abs(np.remainder(ours - theirs + np.pi, 2.0 * np.pi) - np.pi))
-            <= 1e-15 * 32
-        )
+    for name, ours in out.items():
+        apart = ours - getattr(positions, name)
+        assert np.array_equal(np.isnan(ours), np.isnan(getattr(positions, name)))
+        turned = np.remainder(apart + np.pi, math.tau) - np.pi
+        assert np.nanmax(np.abs(turned)) <= 32 * 1e-15

@@ -16,6 +16,7 @@ from fourbar.formulas.pin_forces import Wrenches, pin_forces, solve_between
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar_lab.contenders import make_example
 from fourbar_validation.published.thirteen import EquationTerms, solve_thirteen
+from tests.support.scenes import bare
 
 EPS = 2.0**-52
 SOLVED = 1e-11
@@ -30,39 +31,27 @@ each.
 def make_bodies(case: fourbar.Scene, command: fourbar.scene.Command) -> EquationTerms:
     """Right-hand sides of the thirteen equations from the kinematics, gravity alone."""
     s = fourbar.solve(case, "acceleration", at=command)
-    gravity = np.array(
-        next(
-            (
-                effect.vector
-                for effect in case.effects
-                if isinstance(effect, fourbar.Gravity)
-            ),
-            (0.0, 0.0),
-        )
-    )
-    first = {
-        2: np.zeros_like(s.A),
-        3: s.A,
-        4: np.full_like(s.A, (case.linkage.ground, 0.0)),
-    }
+    vectors = (e.vector for e in case.effects if isinstance(e, fourbar.Gravity))
+    gravity = np.array(next(vectors, (0.0, 0.0)))
+    O4 = np.full_like(s.A, (case.linkage.ground, 0.0))
+    first = {2: np.zeros_like(s.A), 3: s.A, 4: O4}
     second = {2: s.A, 3: s.B, 4: s.B}
-    bars = {k: case.linkage.bar(k) for k in MOVING_BARS}
-    centre = {k: getattr(s, f"G{k}") for k in MOVING_BARS}
-    return EquationTerms(
-        {k: first[k] - centre[k] for k in MOVING_BARS},
-        {k: second[k] - centre[k] for k in MOVING_BARS},
-        {k: bars[k].mass * (getattr(s, f"a_G{k}") - gravity) for k in MOVING_BARS},
-        {k: bars[k].moment_of_inertia * getattr(s, f"alpha_{k}") for k in MOVING_BARS},
-    )
+    terms = EquationTerms({}, {}, {}, {})
+    for k, bar in zip(MOVING_BARS, case.linkage.moving, strict=True):
+        centre, growth = getattr(s, f"G{k}"), getattr(s, f"a_G{k}")
+        inertial = bar.mass * (growth - gravity)
+        couple = bar.moment_of_inertia * getattr(s, f"alpha_{k}")
+        parts = first[k] - centre, second[k] - centre, inertial, couple
+        for table, part in zip(terms, parts, strict=True):
+            table[k] = part
+    return terms
 
 
 def scene(drive_bar: int) -> fourbar.Scene:
-    link = fourbar.FourBar(
-        0.3,
+    bars = (
         fourbar.Bar(0.1, 0.2, 1e-3, (0.03, 0.4)),
         fourbar.Bar(0.25, 0.5, None, (0.1, -0.2)),
         fourbar.Bar(0.22, 0.4),
-        0.3,
     )
     loads = (
         fourbar.Load(3, (5.0, 1.0), from_centre=(0.05, 0.3), moment=0.2, frame="bar"),
@@ -73,13 +62,12 @@ def scene(drive_bar: int) -> fourbar.Scene:
         fourbar.Viscous.at(O2=0.1, A=0.05, B=0.02),
         fourbar.Friction.at(O4=0.03),
     )
-    return fourbar.Scene(
-        link,
-        fourbar.Motion(np.linspace(0.1, 6.0, 31), -8.0, 20.0),
-        drive_bar,
-        loads,
-        effects,
-    )
+    link = fourbar.FourBar(0.3, *bars, 0.3)
+    motion = fourbar.Motion(np.linspace(0.1, 6.0, 31), -8.0, 20.0)
+    return fourbar.Scene(link, motion, drive_bar, loads, effects)
+
+
+ANGLES = np.linspace(0.1, 6.0, 13)
 
 
 @pytest.mark.parametrize("drive_bar", [2, 3, 4])
@@ -102,19 +90,13 @@ def test_bars_without_mass_or_inertia(
 
     The thirteen equations leave none out.
     """
-    bars = (
-        fourbar.Bar(x, *body, (0.4 * x, 0.3))
-        for x, body in zip((0.1, 0.25, 0.22), bodies, strict=True)
-    )
-    link, motion = fourbar.FourBar(0.3, *bars), fourbar.Motion(0.0, 10.0)
-    command = fourbar.scene.Command(
-        np.linspace(0.1, 6.0, 13), np.ones(13, np.int8), 10.0, alpha
-    )
+    lengths = zip((0.1, 0.25, 0.22), bodies, strict=True)
+    bars = (fourbar.Bar(x, *body, (0.4 * x, 0.3)) for x, body in lengths)
+    link, motion = fourbar.FourBar(0.3, *bars), fourbar.Motion(ANGLES, 10.0, alpha)
     for effects in ((), (fourbar.Gravity(),)):
         case = fourbar.Scene(link, motion, drive_bar, effects=effects)
-        compare_with_thirteen(
-            make_bodies(case, command), fourbar.solve(case, at=command)
-        )
+        bodies_then = make_bodies(case, fourbar.command(case))
+        compare_with_thirteen(bodies_then, fourbar.solve(case))
 
 
 def compare_with_thirteen(bodies: EquationTerms, s: fourbar.Solution) -> None:
@@ -122,10 +104,9 @@ def compare_with_thirteen(bodies: EquationTerms, s: fourbar.Solution) -> None:
     unknowns = solve_thirteen(bodies, s.drive_bar)
     size = SOLVED * np.max(np.abs(unknowns[:, :12])) / np.min(np.abs(s.drive_condition))
     for name, column in (("F12", 0), ("F32", 2), ("F43", 6), ("F14", 8)):
-        assert (
-            np.max(np.abs(unknowns[:, column : column + 2] - getattr(s, name))) <= size
-        )
-    assert np.max(np.abs(unknowns[:, 12] - s.torque)) <= size
+        force = unknowns[:, column : column + 2]
+        assert force == pytest.approx(getattr(s, name), rel=0.0, abs=size)
+    assert unknowns[:, 12] == pytest.approx(s.torque, rel=0.0, abs=size)
 
 
 @pytest.mark.parametrize(
@@ -139,37 +120,21 @@ def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
     drive_bar: int,
 ) -> None:
     """With the couples mu r |F| the thirteen equations give these forces again."""
-    case = fourbar.Scene(
-        make_example().linkage,
-        fourbar.Motion(0.0, 10.0),
-        drive_bar,
-        effects=(fourbar.Gravity(),),
-    )
-    command = fourbar.scene.Command(
-        np.linspace(0.1, 6.0, 13), np.ones(13, np.int8), 10.0, 0.0
-    )
     friction = fourbar.PinFriction.at(**{pin: (0.1, 0.02) for pin in pins})
-    s, bodies = (
-        fourbar.solve(replace(case, effects=(*case.effects, friction)), at=command),
-        make_bodies(case, command),
-    )
+    motion, gravity = fourbar.Motion(ANGLES, 10.0), fourbar.Gravity()
+    linkage = make_example().linkage
+    case = fourbar.Scene(linkage, motion, drive_bar, effects=(gravity, friction))
+    s, bodies = fourbar.solve(case), make_bodies(case, fourbar.command(case))
     rate = {1: 0.0, 2: s.omega_2, 3: s.omega_3, 4: s.omega_4}
     for pin in pins:
         i, j = PINS[pin]
-        couple = (
-            0.1
-            * 0.02
-            * np.hypot(*getattr(s, PIN_FORCE[pin]).T)
-            * np.sign(rate[j] - rate[i])
-        )
+        size = np.hypot(*getattr(s, PIN_FORCE[pin]).T)
+        couple = 0.1 * 0.02 * size * np.sign(rate[j] - rate[i])
         for bar, sign in ((i, 1.0), (j, -1.0)):
             if bar != 1:
                 bodies.inertia_moment[bar][:] -= sign * couple
-    largest = max(np.max(np.hypot(*getattr(s, name).T)) for name in PIN_FORCE.values())
-    assert (
-        s.friction_residual is not None
-        and np.max(s.friction_residual) <= 8.0 * EPS * 0.1 * 0.02 * largest
-    )
+    largest = max(np.hypot(*getattr(s, name).T).max() for name in PIN_FORCE.values())
+    assert s.friction_residual.max() <= 8.0 * EPS * 0.1 * 0.02 * largest
     compare_with_thirteen(bodies, s)
 
 
@@ -189,19 +154,12 @@ def test_bars_without_mass_hold_a_load_where_the_input_turns_back() -> None:
 
     In it the speeds are 0/0, and with them no force is.
     """
-    link = fourbar.FourBar(
-        0.5, fourbar.Bar(0.4), fourbar.Bar(0.3), fourbar.Bar(0.25), 0.2
-    )
+    link = bare(0.5, 0.4, 0.3, 0.25, 0.2)
     loads = (fourbar.Load(3, (2.0, 0.3), arm=(0.1, 0.02)),)
-    on, close, near = (
-        fourbar.solve(
-            fourbar.Scene(
-                link, fourbar.Motion(fourbar.FromLimit(1, offset), 1.0), 4, loads
-            ),
-            "error",
-        )
-        for offset in (0.0, -1e-20, -1e-22)
-    )
+    limits = [fourbar.FromLimit(1, offset) for offset in (0.0, -1e-20, -1e-22)]
+    motions = [fourbar.Motion(limit, 1.0) for limit in limits]
+    scenes = [fourbar.Scene(link, motion, 4, loads) for motion in motions]
+    on, close, near = (fourbar.solve(one, "error") for one in scenes)
     assert on.status == ["singular"] and close.status == near.status == ["ok"]
     forces = ("torque", "F12", "F32", "F43", "F14")
     for name in forces:
@@ -213,19 +171,15 @@ def test_bars_without_mass_hold_a_load_where_the_input_turns_back() -> None:
 
 
 def test_written_into_given_arrays() -> None:
-    case = scene(2)
-    solution = fourbar.solve(case)
+    solution = fourbar.solve(scene(2))
     out = {"torque": np.empty(31), "F43": np.empty((31, 2))}
-    part = fourbar.solve(case, out=out)
-    assert part.torque is out["torque"] and np.array_equal(
-        out["torque"], solution.torque
-    )  # type: ignore[arg-type]
-    assert np.array_equal(out["F43"], solution.F43)  # type: ignore[arg-type]
-    assert part.F12 is None and part.theta_3 is None
-    with pytest.raises(fourbar.InputError, match=r"out\.torque"):
-        fourbar.solve(case, out={"torque": np.empty(30)})
-    with pytest.raises(fourbar.InputError, match="T2"):
-        fourbar.solve(case, out={"T2": np.empty(31)})
+    part = fourbar.solve(scene(2), out=out)
+    assert part.torque is out["torque"] and part.F12 is part.theta_3 is None
+    for name, array in out.items():
+        assert np.array_equal(array, getattr(solution, name))
+    for wrong, words in (("torque", r"out\.torque"), ("T2", "T2")):
+        with pytest.raises(fourbar.InputError, match=words):
+            fourbar.solve(scene(2), out={wrong: np.empty(30)})
 
 
 def test_the_forces_of_a_member_are_the_same_alone_and_beside_others() -> None:
@@ -233,17 +187,14 @@ def test_the_forces_of_a_member_are_the_same_alone_and_beside_others() -> None:
     input.
     """
     case = replace(scene(2), motion=fourbar.Motion(1.0, -8.0, 20.0))
-    ground, names = np.array([0.06, 0.3, 0.08]), ("F12", "F32", "F43", "F14", "torque")
-    together = fourbar.solve(fourbar.vary(case, {"lengths.ground": ground}))
-    for member, length in enumerate(ground):
-        alone = fourbar.solve(
-            fourbar.vary(case, {"lengths.ground": np.array([length])})
-        )
-        for name in names:
-            assert np.array_equal(
-                getattr(together, name)[member], getattr(alone, name)[0]
-            ), (length, name)
-            assert np.isfinite(getattr(alone, name)).all()
+    key, grounds = "lengths.ground", np.array([0.06, 0.3, 0.08])
+    together = fourbar.solve(fourbar.vary(case, {key: grounds}))
+    for member, length in enumerate(grounds):
+        alone = fourbar.solve(fourbar.vary(case, {key: np.array([length])}))
+        for name in ("F12", "F32", "F43", "F14", "torque"):
+            one = getattr(alone, name)[0]
+            assert np.array_equal(getattr(together, name)[member], one), (length, name)
+            assert np.isfinite(one).all()
 
 
 @pytest.mark.parametrize("beside", [1e-3, 1e-6, 1e-9])
@@ -253,13 +204,11 @@ def test_a_force_beside_B_has_its_moment_there(beside: float) -> None:
     Then b u3 x F32 is the moment about B: force times arm.
     """
     b, direction = 0.25, 0.3
-    link = fourbar.FourBar(
-        0.3, fourbar.Bar(0.1), fourbar.Bar(b, centre=(0.0, 0.0)), fourbar.Bar(0.22)
-    )
+    coupler = fourbar.Bar(b, centre=(0.0, 0.0))
+    link = replace(bare(0.3, 0.1, b, 0.22), coupler=coupler)
     load = fourbar.Load(3, (1.0, direction), from_centre=(b + beside, 0.0), frame="bar")
-    s = fourbar.solve(
-        fourbar.Scene(link, fourbar.Motion(np.linspace(0.1, 6.0, 7), 0.0), 4, (load,))
-    )
+    motion = fourbar.Motion(np.linspace(0.1, 6.0, 7), 0.0)
+    s = fourbar.solve(fourbar.Scene(link, motion, 4, (load,)))
     arm = (b + beside) - b  # exact: as the doubles have it
     exact = arm * math.sin(direction) / (b * np.abs(np.sin(s.theta_3 - s.theta_2)))
     assert np.hypot(*s.F32.T) == pytest.approx(exact, rel=GROWN)
@@ -273,11 +222,10 @@ def test_the_moments_of_bars_of_any_ratio_balance(ratio: float, couple: float) -
     Bar 4 is commanded: a long input says little of the angle of a short bar.
     """
     b, c = 1.0, ratio
-    case = fourbar.Scene(fourbar.uniform(1.5 + c, 1.2, b, c))
-    theta_4 = np.array([math.pi - 0.3 / max(1.0, c)])
-    zero = np.zeros(1)
-    command = fourbar.scene.Command(theta_4, np.ones(1), zero + 2.0, zero, bar=4)
-    state = compute_shown_state(case, command)
+    theta_4 = math.pi - 0.3 / max(1.0, c)
+    motion = fourbar.Motion(theta_4=[theta_4], omega_4=2.0)
+    case = fourbar.Scene(fourbar.uniform(1.5 + c, 1.2, b, c), motion)
+    state = compute_shown_state(case, fourbar.command(case))
     assert abs(state.position.sin_mu) > 0.1
     position, lengths = state.position, state.lengths
     w = Wrenches(R3=0.7 - 0.2j, M3=0.9, M4=0.3 * c, C=couple)

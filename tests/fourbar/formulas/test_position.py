@@ -1,33 +1,103 @@
-"""Kinematic coefficients near change points, against differences in many digits."""
+"""Directions and coefficients of every reading against circles in many digits."""
 
-import mpmath as mp
 import numpy as np
 import pytest
-from mpmath import mpf
+from mpmath import mp, mpf
 
 from fourbar.formulas.arithmetic import cross, dot
-from fourbar.formulas.motion import (
-    State,
-    coefficients,
-    rates,
-    take_sines_of_rates,
+from fourbar.formulas.mobility import choose_range, limit_positions
+from fourbar.formulas.motion import coefficients, take_sines_of_rates
+from fourbar.formulas.path import (
+    compute_state,
+    drive_sine,
+    drive_sine_of_triangle,
+    prepare_path,
 )
-from fourbar.formulas.path import compute_state, drive_sine, prepare_path
 from fourbar.formulas.pin_forces import Body, Wrenches, coupler_about_B, pin_forces
-from fourbar.formulas.position import (
-    close_loop,
-    direction,
-    half_angle,
-    loop,
-)
-from fourbar.linkage import uniform
+from fourbar.formulas.position import close_loop, direction, half_angle, loop
+from fourbar.linkage import MOVING_BARS, uniform
+from tests.support.exact_loop import ExactLoop
+from tests.support.scenes import bare, draw_linkage
 
-FEW_ROUNDINGS = 8.0 * 2.0**-52
+EPS = 2.0**-52
+FIRST, SECOND = 32.0, 128.0
+"""Roundings in a first and a second coefficient; each is magnified by 1/sin^2 mu and
+1/sin^4 mu at most: one power of 1/sin^2 mu from the angles, one from the division by
+the root of the area.
+"""
+FEW_ROUNDINGS = 8.0 * EPS
 """Of 1 + |h3| + |h4|, which the coefficients are sums of; their slopes are quotients of
 these and h.
 """
-STEP = 30
-"""Digits of the step: differences of angles with 90 digits keep 30."""
+LEAST_SINE = 0.02
+DRIVEN = {2: (3, 4), 3: (2, 4), 4: (2, 3)}
+"""The two bars whose sine a drive on a bar is divided by."""
+LINKAGES = {
+    "a = d": bare(0.3, 0.3, 0.25, 0.22, -2.0),
+    "b = c": bare(0.3, 0.1, 0.25, 0.25, 1.0),
+    "input longer than ground": bare(0.1, 0.3, 0.25, 0.32),
+    "parallelogram": bare(0.3, 0.1, 0.3, 0.1, 0.4),
+    "kite b = c, a = d": bare(0.3, 0.3, 0.2, 0.2, 0.4),
+    "kite a = b, c = d": bare(0.2, 0.3, 0.3, 0.2),
+    "change point in line": bare(0.3, 0.1, 0.2, 0.2, 0.4),
+    "touching folded": bare(0.2, 0.1, 0.4, 0.3, 0.4),
+    "rocker": bare(0.5, 0.4, 0.3, 0.25, 0.2),
+    "4 a d > 4 b c": bare(0.4, 0.35, 0.1, 0.08),
+    **{f"drawn {n}": draw_linkage(np.random.default_rng(n)) for n in range(4)},
+}
+
+
+@pytest.mark.parametrize("bar", MOVING_BARS)
+@pytest.mark.parametrize("name", LINKAGES)
+def test_every_reading_lies_and_moves_as_circles_meet(name: str, bar: int) -> None:
+    """Read from a bar the limits of the others are positions like any other."""
+    linkage, compared = LINKAGES[name], 0
+    path = prepare_path(linkage.lengths, linkage.ground_angle, bar)
+    low, high = choose_range(linkage, bar)
+    angles = [low + (high - low) * part for part in (0.03, 0.21, 0.45, 0.7, 0.96)]
+    for other in DRIVEN[bar]:
+        angles += [limit[bar - 2] for limit in limit_positions(linkage, other)]
+    size = 1.0 + max(linkage.lengths) / min(linkage.lengths)
+    for q, branch in [(q, branch) for q in angles for branch in (1, -1)]:
+        with np.errstate(all="ignore"):
+            position, k, own_sine = path.close(q, path.half_angle(q), branch)
+        sine = abs(float(own_sine))
+        if not sine > LEAST_SINE:
+            continue
+        compared += 1
+        directions = dict(zip((1, *MOVING_BARS), position[:4], strict=True))
+        sign = int(path.sign(q, branch))
+        with mp.workdps(50):
+            exact = ExactLoop(linkage)
+            right, rates = (
+                exact.close(bar, mpf(q), sign),
+                exact.rates(bar, mpf(q), sign),
+            )
+            to_O4 = exact.lengths[0] * right[1] - exact.lengths[1] * right[2]
+            turned = FIRST * EPS * size / sine
+            assert abs(mp.mpc(complex(position.diagonal)) - to_O4) <= turned
+            for number, u in directions.items():
+                assert abs(mp.mpc(complex(u)) - right[number]) <= turned
+            for drive, (i, j) in DRIVEN.items():
+                between = (mp.conj(right[i]) * right[j]).imag
+                assert abs(path.drive_sine(position, drive) - between) <= 2.0 * turned
+            assert abs(position.sin_mu - (mp.conj(right[3]) * right[4]).imag) <= turned
+            slopes = [
+                [mpf(float(h)) - derivatives[order] for h, derivatives in pairs]
+                for order, pairs in enumerate(
+                    zip(values, rates.values(), strict=True)
+                    for values in (k[:3], k[5:])
+                )
+            ]
+            first, second = (max(map(abs, missed)) for missed in slopes)
+            allowed = FIRST * EPS * size**2 / sine**2
+            assert first <= allowed
+            assert second <= SECOND * EPS * size**3 / sine**4
+            assert abs(k.h23 - (rates[2][0] - rates[3][0])) <= 2.0 * allowed
+            assert abs(k.h43 - (rates[4][0] - rates[3][0])) <= 2.0 * allowed
+    assert compared >= 3
+
+
 SHORT = (
     # (d, a, b, c), psi, sign of the root: d - a = +-(b - c) exactly, so the diagonal
     # turns fast and the bars do not
@@ -43,195 +113,104 @@ SHORT = (
 )
 
 
-def find_assembly(psi: float, sign: int) -> int:
-    """The assembly with this sign of the root at psi.
-
-    With E2 = 0 it changes at psi = 0.
-    """
-    return sign if psi > 0.0 else -sign
-
-
-def close_triangle(lengths: tuple[float, ...], psi: mpf, branch: int) -> list[mp.mpc]:
-    """Return the vectors AB and O4B, m, by the triangle A, B, O4."""
-    d, a, b, c = map(mpf, lengths)
-    A = a * mp.expj(psi)
-    e = abs(d - A)
-    at_A = branch * mp.acos((b * b + e * e - c * c) / (2 * b * e))
-    coupler = b * ((d - A) / e) * mp.expj(at_A)
-    return [coupler, A + coupler - d]
-
-
-def differences(lengths: tuple[float, ...], psi: float, branch: int) -> list[mpf]:
-    """h3, h4, h3', h4' from the directions of the triangle A, B, O4 about psi."""
+@pytest.mark.parametrize(("lengths", "psi", "sign"), SHORT)
+def test_digits_are_kept_where_the_diagonal_is_short(lengths, psi, sign: int) -> None:
+    """With E2 = 0 the assembly of this sign of the root changes at psi = 0."""
+    assembly = sign if psi > 0.0 else -sign
+    k = compute_state(uniform(*lengths), psi, assembly).k
     with mp.workdps(90):
-        step = mpf(10) ** -STEP
-        before, middle, after = (
-            [
-                mp.arg(bar)
-                for bar in close_triangle(lengths, mpf(psi) + k * step, branch)
-            ]
-            for k in (-1, 0, 1)
-        )
-        first = [(y - x) / (2 * step) for x, y in zip(before, after, strict=True)]
-        return first + [
-            (x - 2 * y + z) / step**2
-            for x, y, z in zip(before, middle, after, strict=True)
-        ]
-
-
-@pytest.mark.parametrize(("lengths", "psi", "branch"), SHORT)
-def test_coefficients_keep_their_digits_where_the_diagonal_is_short(
-    lengths: tuple[float, ...],
-    psi: float,
-    branch: int,
-) -> None:
-    k = compute_state(uniform(*lengths), psi, find_assembly(psi, branch)).k
-    h3, h4, dh3, dh4 = differences(lengths, psi, branch)
+        exact = ExactLoop(uniform(*lengths))
+        right = exact.close(2, mpf(psi), sign)
+        rates = exact.rates(2, mpf(psi), sign)
+    (h3, dh3), (h4, dh4) = rates[3], rates[4]
     size = FEW_ROUNDINGS * (1 + abs(h3) + abs(h4))
-    for coefficient, exact in (
-        (k.h3, h3),
-        (k.h4, h4),
-        (k.h23, 1 - h3),
-        (k.h43, h4 - h3),
-    ):
-        assert abs(exact - float(coefficient)) < size
-    for coefficient, exact in ((k.dh3, dh3), (k.dh4, dh4)):
-        assert abs(exact - float(coefficient)) < size / abs(psi)
+    for ours, theirs in ((k.h3, h3), (k.h4, h4), (k.h23, 1 - h3), (k.h43, h4 - h3)):
+        assert abs(theirs - float(ours)) < size
+    for ours, theirs in ((k.dh3, dh3), (k.dh4, dh4)):
+        assert abs(theirs - float(ours)) < size / abs(psi)
 
-
-@pytest.mark.parametrize("theta_1", [0.0, 0.4])
-@pytest.mark.parametrize(("lengths", "psi", "branch"), SHORT)
-def test_small_sines_of_coupler_and_output_keep_their_digits(
-    lengths: tuple[float, ...],
-    psi: float,
-    branch: int,
-    theta_1: float,
-) -> None:
     bars, half = loop(*lengths), half_angle(loop(*lengths), psi)
-    u1 = complex(np.exp(1j * theta_1))
-    assembly = find_assembly(psi, branch)
-    plain = close_loop(bars, u1, direction(psi) * u1, half, assembly)
-    corrected = take_sines_of_rates(bars, plain, coefficients(bars, plain))
-    with mp.workdps(50):
-        coupler, output = close_triangle(lengths, mpf(psi), branch)
-        exact = coupler / mpf(lengths[2]), output / mpf(lengths[3])
-    for ours, theirs, before in zip(
-        (corrected.u3, corrected.u4),
-        exact,
-        (plain.u3, plain.u4),
-        strict=True,
-    ):
-        apart = abs(mp.mpc(ours) - theirs * mp.mpc(u1))
-        assert apart < FEW_ROUNDINGS / abs(psi) and abs(
-            ours - before
-        ) < FEW_ROUNDINGS / abs(psi)
-        if theta_1 == 0.0:
-            assert abs(ours.imag - theirs.imag) < 4.0 * FEW_ROUNDINGS * abs(theirs.imag)
+    for theta_1 in (0.0, 0.4):
+        u1 = complex(np.exp(1j * theta_1))
+        plain = close_loop(bars, u1, direction(psi) * u1, half, assembly)
+        corrected = take_sines_of_rates(bars, plain, coefficients(bars, plain))
+        for ours, theirs, before in (
+            (corrected.u3, right[3], plain.u3),
+            (corrected.u4, right[4], plain.u4),
+        ):
+            assert abs(mp.mpc(ours) - theirs * mp.mpc(u1)) < FEW_ROUNDINGS / abs(psi)
+            assert abs(ours - before) < FEW_ROUNDINGS / abs(psi)
+            if theta_1 == 0.0:  # a small sine has all its digits
+                apart = abs(ours.imag - theirs.imag)
+                assert apart < 4.0 * FEW_ROUNDINGS * abs(theirs.imag)
 
 
 def test_small_sines_are_those_of_the_triangle_elsewhere() -> None:
-    bars, half = loop(0.3, 0.1, 0.25, 0.22), half_angle(loop(0.3, 0.1, 0.25, 0.22), 1.0)
-    position = close_loop(bars, 1.0 + 0.0j, direction(1.0), half, 1)
+    bars = loop(0.3, 0.1, 0.25, 0.22)
+    position = close_loop(bars, 1.0 + 0.0j, direction(1.0), half_angle(bars, 1.0), 1)
     assert take_sines_of_rates(bars, position, coefficients(bars, position)) is position
+
+
+@pytest.mark.parametrize("drive", [3, 4])
+@pytest.mark.parametrize("branch", [1, -1])
+def test_the_sine_of_the_drive_keeps_its_digits_on_a_short_ground(
+    branch: int, drive: int
+) -> None:
+    lengths = loop(2.0**-14, 1.5, 0.75, 1.25)
+    half = half_angle(lengths, 0.7)
+    position = close_loop(lengths, 1.0, direction(0.7), half, branch)
+    i, j = DRIVEN[drive]
+    with mp.workdps(60):
+        right = ExactLoop(bare(*lengths[:4])).close(2, mpf(0.7), branch)
+        exact = float((mp.conj(right[i]) * right[j]).imag)
+    computed = drive_sine_of_triangle(lengths, position, drive)
+    assert computed == pytest.approx(exact, rel=8.0 * EPS)
 
 
 def test_moment_of_the_coupler_about_B_is_that_of_its_inertia_at_the_mass_centre() -> (
     None
 ):
-    s = compute_state(
-        uniform(0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0]), 1, 3.0, -5.0
-    )
+    linkage, theta_2 = uniform(0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0])
+    s = compute_state(linkage, theta_2, 1, 3.0, -5.0)
     three = Body(0.7, 0.02, 0.11 + 0.07j)
     arm = s.point(3, three.z) - s.point(4, s.lengths.c)
     expected = -three.I * s.alpha(3) - three.m * cross(arm, s.acceleration(3, three.z))
-    moment = coupler_about_B(
-        s.lengths, three, s.position, s.moving, drive_sine(s.position, 4)
-    )
-    assert np.allclose(moment, expected, rtol=0.0, atol=64 * FEW_ROUNDINGS)
-
-
-def two_readings() -> tuple[State, State]:
-    """The same positions with theta_2 and with theta_4 as the independent angle."""
-    bars = uniform(0.3, 0.1, 0.25, 0.22)
-    by_2 = compute_state(bars, np.array([0.4, 1.0, 4.0]), 1)
-    lengths, theta_4 = by_2.lengths, np.angle(by_2.position.u4)
-    reading = prepare_path(lengths[:4], 0.0, 4)
-    sign = np.sign(drive_sine(by_2.position, 4))
-    position, k = reading.motion(
-        reading.position(theta_4, reading.half_angle(theta_4), sign), sign
-    )
-    return by_2, State(lengths, 0.0, by_2.theta_2, position, k, 1.0, rates(k, 1.0, 0.0))
+    sine = drive_sine(s.position, 4)
+    moment = coupler_about_B(s.lengths, three, s.position, s.moving, sine)
+    assert moment == pytest.approx(expected, abs=64 * FEW_ROUNDINGS)
 
 
 def test_grounds_at_several_angles_are_those_of_each() -> None:
-    bars, theta_2 = uniform(0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0])
-    lengths, theta_1 = bars.lengths, np.array([[0.0], [0.4], [1.0]])
+    lengths, theta_2 = (0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0])
+    theta_1 = np.array([[0.0], [0.4], [1.0]])
     many = prepare_path(tuple(length + 0.0 * theta_1 for length in lengths), theta_1)
     positions = many.position(theta_2, many.half_angle(theta_2), 1)
     for row, angle in enumerate(theta_1[:, 0]):
         one = prepare_path(lengths, float(angle))
         alone = one.position(theta_2, one.half_angle(theta_2), 1)
-        assert np.allclose(positions.u2[row], alone.u2, rtol=0.0, atol=FEW_ROUNDINGS)
-        assert np.allclose(
-            positions.u2[row],
-            np.exp(1j * theta_2),
-            rtol=0.0,
-            atol=FEW_ROUNDINGS,
-        )
+        for u2 in (alone.u2, np.exp(1j * theta_2)):
+            assert positions.u2[row] == pytest.approx(u2, abs=FEW_ROUNDINGS)
 
 
 @pytest.mark.parametrize("pin", ["O2", "A", "B", "O4"])
 def test_slip_is_that_of_the_two_bars(pin: str) -> None:
+    s = compute_state(uniform(0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0]), 1)
     i, j = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}[pin]
-    for s in two_readings():
-        h = (0.0, s.k.h2, s.k.h3, s.k.h4)
-        assert np.allclose(
-            s.slip(pin),
-            np.subtract(h[j - 1], h[i - 1]),
-            rtol=0.0,
-            atol=64 * FEW_ROUNDINGS,
-        )
-
-
-def test_a_point_moves_by_either_angle_alike() -> None:
-    by_2, by_4 = two_readings()
-    for bar in (2, 3, 4):
-        z = 0.07 + 0.03j
-        chain = by_4.point_coefficient(bar, z) * by_2.k.h4
-        assert np.allclose(
-            by_2.point_coefficient(bar, z),
-            chain,
-            rtol=0.0,
-            atol=64 * FEW_ROUNDINGS,
-        )
+    slip = np.subtract(s.omega(j), s.omega(i))
+    assert s.slip(pin) == pytest.approx(slip, abs=64 * FEW_ROUNDINGS)
 
 
 @pytest.mark.parametrize(("ground", "taken"), [(0.01, True), (1.1, False)])
 def test_a_short_ground_takes_the_moment_of_the_force_at_A_from_virtual_work(
-    ground: float,
-    taken: bool,
+    ground: float, taken: bool
 ) -> None:
     s = compute_state(uniform(ground, 1.0, 1.2, 1.1), np.array([0.4, 1.0, 4.0]), 1)
     wrenches = Wrenches(1.0 + 2.0j, -0.5j, 0.3 + 0.1j, 0.7, -0.4, 0.2)
-    forces = [
-        pin_forces(
-            s.lengths, s.position, 2, s.position.sin_mu, wrenches, 0.2j, moment
-        ).F32
-        for moment in (0.3, -0.5)
-    ]
-    along = [dot(s.position.u2, F32) for F32 in forces]
-    assert np.allclose(
-        *along,
-        rtol=0.0,
-        atol=64 * FEW_ROUNDINGS * np.max(np.abs(forces)),
-    )
-    for F32, moment in zip(forces, (0.3, -0.5), strict=True):
-        assert (
-            np.allclose(
-                cross(s.position.u2, F32),
-                moment,
-                rtol=0.0,
-                atol=FEW_ROUNDINGS * np.max(np.abs(F32)),
-            )
-            is taken
-        )
+    asked = s.lengths, s.position, 2, s.position.sin_mu, wrenches, 0.2j
+    first, second = (pin_forces(*asked, moment).F32 for moment in (0.3, -0.5))
+    allowed = 64 * FEW_ROUNDINGS * np.abs([first, second]).max()
+    u2 = s.position.u2
+    assert dot(u2, first) == pytest.approx(dot(u2, second), abs=allowed)
+    for F32, moment in ((first, 0.3), (second, -0.5)):
+        taken_up = np.abs(cross(u2, F32) - moment).max() <= allowed
+        assert taken_up is np.bool_(taken)

@@ -9,12 +9,13 @@ import pytest
 
 from fourbar.formulas.mobility import find_intervals, limit_positions
 from fourbar.formulas.transmission import transmission_extremes
-from fourbar.linkage import Bar, FourBar
+from fourbar.linkage import FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 from fourbar.show.derived import derive
 from fourbar.solving import solve
 from tests.fourbar.formulas.test_points import random_positions
+from tests.support.scenes import bare, draw_linkage
 
 EPS = 2.0**-52
 ANGLE = 16.0 * EPS
@@ -48,7 +49,7 @@ def test_transmission_angle_is_the_acute_angle_between_coupler_and_output() -> N
 
 def test_transmission_angle_keeps_its_digits_where_it_vanishes() -> None:
     psi = 10.0 ** -np.arange(1.0, 14.0)
-    parallelogram = FourBar(0.3, Bar(0.1), Bar(0.3), Bar(0.1))
+    parallelogram = bare(0.3, 0.1, 0.3, 0.1)
     mu = derive_at("transmission", parallelogram, psi, 1)
     assert mu == pytest.approx(psi, rel=8 * EPS)
 
@@ -57,11 +58,8 @@ def test_extremes_are_those_of_a_scan() -> None:
     rng = np.random.default_rng(22)
     kinds = set()
     for _ in range(80):
-        d, a, b, c = rng.uniform(0.1, 1.0, 4).tolist()
-        if 2.0 * max(d, a, b, c) > d + a + b + c - 0.01:
-            continue
-        theta_1 = float(rng.uniform(-3.0, 3.0))
-        bars = FourBar(d, Bar(a), Bar(b), Bar(c), theta_1)
+        bars = draw_linkage(rng)
+        (d, a, b, c), theta_1 = bars.lengths, bars.ground_angle
         extremes = transmission_extremes(bars)
         kinds.add((extremes.least == 0.0, extremes.greatest == math.pi))
         start, stop = find_intervals(bars)[0]
@@ -92,7 +90,7 @@ def test_extremes_are_those_of_a_scan() -> None:
 @pytest.mark.parametrize("gap", [1e-3, 1e-7, 1e-11, 1e-14])
 def test_extremes_keep_their_digits_near_a_change_point(gap: float) -> None:
     d, a, b, c = 0.3, 0.1, 0.25, 0.15 + gap
-    extremes = transmission_extremes(FourBar(d, Bar(a), Bar(b), Bar(c)))
+    extremes = transmission_extremes(bare(d, a, b, c))
     with mp.workdps(50):
         d, a, b, c = map(mp.mpf, (d, a, b, c))
         least, greatest = (
@@ -119,14 +117,14 @@ def test_speeds_follow_from_the_lever_of_the_coupler_and_power_is_kept() -> None
 
 
 def test_advantage_where_the_output_stands_and_where_the_input_does() -> None:
-    folded = FourBar(2.0, Bar(1.0), Bar(1.0), Bar(2.0))  # a kite with B on O2
+    folded = bare(2.0, 1.0, 1.0, 2.0)  # a kite with B on O2
     assert not np.isfinite(derive_at("mechanical_advantage", folded, 1.0, -1))
-    rocker = FourBar(3.0, Bar(2.5), Bar(1.0), Bar(2.2))
+    rocker = bare(3.0, 2.5, 1.0, 2.2)
     limit = limit_positions(rocker)[0].theta_2
     near = limit + np.array([1e-4, 1e-6, 1e-8])
     advantage = np.abs(derive_at("mechanical_advantage", rocker, near, 1))
     # it falls as the root of the distance
     assert advantage[:-1] / advantage[1:] == pytest.approx([10.0, 10.0], rel=1e-2)
-    parallelogram = FourBar(2.0, Bar(1.0), Bar(2.0), Bar(1.0))
+    parallelogram = bare(2.0, 1.0, 2.0, 1.0)
     for name in ("omega_4/omega_2", "mechanical_advantage"):
         assert derive_at(name, parallelogram, 0.0, 1) == 1.0

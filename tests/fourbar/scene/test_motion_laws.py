@@ -1,4 +1,4 @@
-"""Laws that are stated by a formula or by rates: exact polynomials, a sine, energy."""
+"""Laws against exact polynomials, differences, a sine's energy and the books."""
 
 import math
 
@@ -8,7 +8,8 @@ import pytest
 import fourbar
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
-from fourbar.scene.motion import Law
+from fourbar.linkage import MOVING_BARS
+from fourbar.scene.motion import Law, Motion, Rise
 
 EXACT = 1e-13
 """Relative to the largest term: some ten roundings of a polynomial of degree 5."""
@@ -70,26 +71,113 @@ def test_the_torque_of_a_sine_is_the_power_of_its_energy() -> None:
     assert s.theta_2[100] == pytest.approx(1.0 + math.sin(0.5 * s.time[100]))
 
 
-@pytest.mark.parametrize("bar", [2, 3, 4])
-@pytest.mark.parametrize("degree", [3, 5])
-def test_a_polynomial_comes_back_from_a_table_of_its_rates(
-    degree: int, bar: int
+@pytest.mark.parametrize("bar", MOVING_BARS)
+@pytest.mark.parametrize("rates", [0, 1, 2])
+def test_a_polynomial_comes_back_from_its_points_and_rates(
+    rates: int, bar: int
 ) -> None:
-    """Speeds make each piece a cubic, accelerations beside them a quintic."""
-    wanted = np.polynomial.Polynomial([1.0, 0.3, -0.2, 0.07, 0.02, -0.01][: degree + 1])
+    """Speeds make each piece a cubic, accelerations beside them a quintic.
+
+    Through four points alone goes one cubic.
+    """
+    coefficients = [1.0, 0.3, -0.2, 0.07, 0.02, -0.01][: 6 if rates == 2 else 4]
+    wanted = np.polynomial.Polynomial(coefficients)
     t = np.array([0.0, 0.3, 1.1, 1.5])
-    columns = {f"theta_{bar}": wanted(t), "omega": wanted.deriv(1)(t)}
-    if degree == 5:
-        columns["alpha"] = wanted.deriv(2)(t)
-    law = Law(tuple(t), **{name: tuple(column) for name, column in columns.items()})
+    columns = {
+        name: tuple(wanted.deriv(order)(t))
+        for order, name in enumerate((f"theta_{bar}", "omega", "alpha"))
+        if order <= rates
+    }
+    law = Law(tuple(t), **columns)
     between = np.linspace(0.0, 1.5, 50)
     for order, computed in enumerate(law.at(between)):
-        right = wanted.deriv(order)(between) if order else wanted(between)
+        right = wanted.deriv(order)(between)
         np.testing.assert_allclose(computed, right, atol=100.0 * EXACT)
-    motion = fourbar.Motion(law=law)
-    scene = fourbar.Scene(fourbar.uniform(0.2, 0.3, 0.25, 0.28), motion)
-    assert loads(dump(scene)).motion == motion
-    assert f"omega_{bar} = [" in dump(scene) and "ends" not in dump(scene)
+    scene = fourbar.Scene(fourbar.uniform(0.2, 0.3, 0.25, 0.28), Motion(law=law))
+    text = dump(scene)
+    assert loads(text).motion == scene.motion
+    assert (f"omega_{bar} = [" in text) == (rates > 0) != ("ends" in text)
+
+
+POINTS = (0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 2.5, math.tau)
+CAM = {"rise": (1.0, 0.5), "dwell": 0.2, "fall": 0.4, "rest": 0.1}
+LATE = (10.0, 11.0, 12.5, 14.0), (0.3, 2.0, 4.0, 0.3 + math.tau)
+LAWS = {
+    "free": Law(*POINTS, 10, "free"),
+    "rest": Law(*POINTS, 10, "rest"),
+    "periodic": Law(*POINTS, 10, "periodic"),
+    "periodic, from 10 s on": Law(*LATE, 8, "periodic"),
+    "cycloidal": Rise("cycloidal", theta_2=-0.4, **CAM),  # type: ignore[arg-type]
+    "345": Rise("345", theta_4=-0.4, **CAM),  # type: ignore[arg-type]
+    "345 that does not fall": Rise("345", (-1.0, 0.5), 2.0, dwell=0.3),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_rates_are_the_slopes_of_a_law_that_passes_its_points(name: str) -> None:
+    """Pieces join without a jump.
+
+    Central differences miss the third derivative times step^2/6, and rounding over
+    the step.
+    """
+    law, step = LAWS[name], 1e-5
+    joints = np.array(law.time)
+    inside = joints[:-1] + 0.37 * np.diff(joints)
+    before, here, after = (law.at(inside + shift) for shift in (-step, 0.0, step))
+    for order in (1, 2):
+        slope = (after[order - 1] - before[order - 1]) / (2.0 * step)
+        assert here[order] == pytest.approx(slope, rel=1e-7, abs=1e-6)
+    theta, omega, alpha = law.at(joints)
+    if isinstance(law, Law):
+        assert theta == pytest.approx(law.angle, rel=EXACT, abs=EXACT)
+    assert law.times()[[0, -1]] == pytest.approx(joints[[0, -1]], rel=EXACT)
+    if name.startswith("periodic"):
+        ends = [rate[[0, -1]] for rate in (omega, alpha)]
+        assert np.ptp(ends, axis=1) == pytest.approx([0.0, 0.0], abs=1e-11)
+    elif name != "free":
+        assert omega[[0, -1]] == pytest.approx([0.0, 0.0], abs=EXACT)
+    sides = np.array([law.at(joints[1:-1] + shift) for shift in (-1e-9, 1e-9)])
+    assert np.abs(np.diff(sides, axis=0)).max() < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("kind", "speed", "acceleration"),
+    [("cycloidal", 2.0, 2.0 * math.pi), ("345", 1.875, 10.0 / math.sqrt(3.0))],
+)
+def test_a_cam_has_the_factors_of_the_books(kind, speed, acceleration) -> None:
+    """C_v = 2 and C_a = 2 pi of the cycloidal law, 1.875 and 5.7735 of 3-4-5."""
+    law = LAWS[kind]
+    assert law.time == pytest.approx((0.0, 0.5, 0.7, 1.1, 1.2))
+    theta, omega, alpha = law.at(np.array(law.time))
+    assert theta == pytest.approx([-0.4, 0.6, 0.6, -0.4, -0.4], abs=1e-15)
+    assert np.abs(omega).max() < 1e-15 and np.abs(alpha).max() < 1e-12
+    _, omega, alpha = law.at(np.linspace(0.0, 0.5, 100_001))
+    assert np.abs(omega).max() * 0.5 == pytest.approx(speed, rel=1e-8)
+    assert np.abs(alpha).max() * 0.25 == pytest.approx(acceleration, rel=1e-8)
+    stays = LAWS["345 that does not fall"].at(np.array([0.5, 0.65, 0.8]))
+    assert np.array(stays).tolist() == [[1.0] * 3, [0.0] * 3, [0.0] * 3]
+
+
+RISE = {"kind": "345", "rise": (1.0, 0.5), "theta_2": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("make", "key"),
+    [
+        (lambda: Rise(**RISE | {"kind": "harmonic"}), "motion.law.kind"),
+        (lambda: Rise(**RISE | {"rise": (1.0, 0.0)}), "motion.law.rise"),
+        (lambda: Rise("345", (1.0, 0.5)), "motion.law.theta_2"),
+        (lambda: Rise(**RISE | {"rest": 0.1}), "motion.law.rest"),
+        (lambda: Rise(**RISE | {"dwell": -0.1}), "motion.law.dwell"),
+        (lambda: Law((0.0, 1.0), (0.0, 1.0)), "motion.law"),
+        (lambda: Law((0.0, 1.0, 1.0, 2.0), (0.0, 1.0, 2.0, 3.0)), "motion.law.time"),
+        (lambda: Motion(1.0, law=Law(*POINTS)), "motion.law"),
+    ],
+)
+def test_a_law_that_cannot_be_names_its_key(make, key: str) -> None:
+    with pytest.raises(InputError) as error:
+        make()
+    assert error.value.key.startswith(key)
 
 
 TABLE = 'time = ["0 s", "1 s"], theta_2 = ["0 deg", "60 deg"]'

@@ -218,20 +218,6 @@ def test_at_a_limit_of_theta_2_a_command_of_theta_4_has_motion_and_forces() -> N
         assert exact is not None and np.isfinite(float(exact[0]["torque"].mid()))
 
 
-def test_a_periodic_law_passes_its_points_whenever_it_begins() -> None:
-    """It gains a turn in 4 s, from 10 s on."""
-    times, angles = (10.0, 11.0, 12.5, 14.0), (0.3, 2.0, 4.0, 0.3 + 2.0 * np.pi)
-    law = Law(times, angles, 8, "periodic")
-    theta, omega, alpha = law.at(np.array(times))
-    assert theta == pytest.approx(angles, rel=4 * U)
-    assert (omega[0], alpha[0]) == pytest.approx((omega[-1], alpha[-1]), rel=1e-13)
-    early = Law(tuple(t - 10.0 for t in times), angles, 8, "periodic")
-    assert np.array(law.at(law.times())) == pytest.approx(
-        np.array(early.at(early.times())),
-        rel=1e-13,
-    )
-
-
 @pytest.mark.parametrize("bar", [3, 4])
 def test_a_sweep_a_law_and_what_is_left_out_follow_the_commanded_bar(bar: int) -> None:
     swept = solve(replace(LOADED, motion=Motion(**{f"omega_{bar}": 2.0})))
