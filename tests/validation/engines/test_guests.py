@@ -117,7 +117,7 @@ PROGRAMS: dict[str, tuple[str, str, str]] = {
     "one number short": (
         "values in solved]",
         "values in solved[1:]]",
-        "answers.theta_3 = ",
+        "entries of answers.theta_3 = 8: must be a list of 9 numbers",
     ),
     "log line": (
         "for question in",
@@ -133,7 +133,7 @@ PROGRAMS: dict[str, tuple[str, str, str]] = {
     "raises": (
         LAST,
         f"{AFTER_HELLO}    1 / 0\n",
-        "exit status 1: ZeroDivisionError: division",
+        "exit status 1: ZeroDivisionError: division by zero (",
     ),
     "early": (LAST, LAST + LAST, "answered question 1 where 2 was asked"),
     "for another": (
@@ -155,11 +155,15 @@ PROGRAMS: dict[str, tuple[str, str, str]] = {
     "1e400": (
         LAST,
         f"{WHOLE}    text = text.replace('0.33', '1e400')\n{SAY}",
-        "answers.torque = ",
+        "answers.torque, entry ",
     ),
-    "texts": (TORQUE, '"torque": "1.0"', "answers.torque = "),
-    "booleans": (TORQUE, '"torque": theta > 2', "answers.torque = "),
-    "long integers": (TORQUE, '"torque": 10**400', "answers.torque = "),
+    "texts": (
+        TORQUE,
+        '"torque": "1.0"',
+        "answers.torque, entry 0 = '1.0': must be a finite number or null",
+    ),
+    "booleans": (TORQUE, '"torque": theta > 2', "answers.torque, entry 0 = False"),
+    "long integers": (TORQUE, '"torque": 10**400', "answers.torque, entry 0 = 1000"),
     "repeated key": (
         LAST,
         f"{WHOLE}    text = text[:-1] + ', \"id\": 1}}'\n{SAY}",

@@ -567,8 +567,7 @@ def test_digits_that_are_missing_are_no_missing_term() -> None:
     (cause,) = summary_of([record_of("a", rows)]).overview.causes
     assert (
         cause.text
-        == "torque and pin forces differ, motion agrees: from digit 7 on, as where "
-        "numbers are single precision or an iteration ends early"
+        == "torque and pin forces differ, motion agrees: the first 7 digits agree"
     )
 
 

@@ -110,6 +110,10 @@ BUGS: dict[str, tuple[type, str]] = {
         make_guest((TORQUE, '"torque": cross(r2, F32) - moments[0]')),
         "sign reversed, or F_ij given for F_ji: torque",
     ),
+    "size": (
+        make_guest((TORQUE, '"torque": abs(moments[0] - cross(r2, F32))')),
+        "the sign is lost: sizes alone: torque",
+    ),
     "exchanged": (
         make_guest(('"F32": F32, "F43": F43', '"F32": F43, "F43": F32')),
         "F32 and F43 are exchanged: F32, F43",
@@ -663,7 +667,7 @@ def round_to_single(numbers: dict[str, np.ndarray], at: Command) -> None:
 
 
 def test_single_precision_is_named_and_a_smooth_error_of_its_size_is_not() -> None:
-    words = "single precision: errors are those of numbers of 1.2e-07"
+    words = "numbers have some 7 digits, as those of single precision"
     assert find_causes(partial(Altered, round_to_single)) == [words]
 
     def stretch(numbers: dict[str, np.ndarray], at: Command) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fourbar_validation.compare.rows import AGREES, FAILS, Row
+from fourbar_validation.compare.rows import AGREES, FAILS, FORMULAS, Row
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.guests import STATED_BY_THE_ENGINE
@@ -19,6 +19,7 @@ from fourbar_validation.regression.record import (
 )
 from fourbar_validation.report.record import Record
 from fourbar_validation.run.plan import Plan, RunOptions
+from fourbar_validation.run.pool import Job, _judge_by_engine
 from fourbar_validation.run.run import run
 from tests.support.here import judge_here
 from tests.support.runs import save_run
@@ -90,3 +91,17 @@ def test_the_verdict_says_since_when_of_the_failure_that_it_names(
     assert "worst F32 of c" in summary.headline
     assert summary.headline.endswith(f" It held in {before.describe()}.")
     assert "It held in" in (tmp_path / "now" / "report.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize("broken", ["", "mine"])
+def test_whoever_breaks_down_alone_is_blamed(broken: str) -> None:
+    def attempt(job: Job) -> Record | Exception:
+        if broken in [engine.name for engine in job.engines] or not broken:
+            return ZeroDivisionError("division by zero")
+        return Record(job.name)
+
+    engines = [Engine(name, FreeBody, EQUIVALENCE) for name in ("mine", "other")]
+    job = Job(Few(("a",)), 0, engines, draw=False)
+    (row,) = _judge_by_engine(job, ZeroDivisionError(), attempt).rows
+    assert row.engine == (broken or FORMULAS)
+    assert row.reason == "ZeroDivisionError: division by zero"

@@ -473,7 +473,7 @@ def find_single_precision(judge: Judge) -> Iterator[Mistake]:
     common = []
     for key, theirs in judge.table.values.items():
         mask = judge.where(key)
-        error = judge.judged(key, judge.ours(key))[0][mask]
+        error = judge.judged_right(key)[0][mask]
         if not np.all(error <= EPS_SINGLE / EPS * judge.find_exact(key)[mask]):
             return
         errors.append(error[error > 0.0])
@@ -481,7 +481,7 @@ def find_single_precision(judge: Judge) -> Iterator[Mistake]:
         common.append(np.nansum(apart[1:] * apart[:-1]) / np.nansum(apart**2))
     typical = np.median(np.concatenate(errors))
     if typical >= LEAST_OF_SINGLE and np.nanmedian(common) < MOST_IN_COMMON:
-        text = f"single precision: errors are those of numbers of {EPS_SINGLE:.1e}"
+        text = "numbers have some 7 digits, as those of single precision"
         yield _state(text, judge.table.values)
 
 
@@ -601,7 +601,7 @@ def _find_other_branch(judge: Judge) -> Iterator[Mistake]:
         )
     except FourBarError:
         return
-    error = judge.judged(key, judge.ours(key))[0]
+    error = judge.judged_right(key)[0]
     of_other = judge.judged(key, judge.ours(key, other))[0]
     left = of_other < error
     places = np.flatnonzero(left)

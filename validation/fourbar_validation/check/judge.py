@@ -121,6 +121,7 @@ class Judge:
         self._scales: dict[str, Scale] = {}
         self._exact: dict[str, Array] = {}
         self._where: dict[str, Mask] = {}
+        self._judged: dict[str, tuple[Array, Array, Array]] = {}
         self._right_columns: dict[str, Array] = {}
         for key in table.values:
             name = name_quantity(key)
@@ -189,6 +190,12 @@ class Judge:
         The result is empty if the angle is not rounded.
         """
         return [solve(self.scene, self.stage, at=at) for at in self.rows.near]
+
+    def judged_right(self, key: str) -> tuple[Array, Array, Array]:
+        """Return (error, allowed, apart) of the table against the right numbers."""
+        if key not in self._judged:
+            self._judged[key] = self.judged(key, self.ours(key))
+        return self._judged[key]
 
     def judged(self, key: str, ours: Array) -> tuple[Array, Array, Array]:
         """Return (error, allowed, apart) of the table, each (n,).
@@ -260,7 +267,7 @@ class Judge:
         for key, theirs in self.table.values.items():
             ours = self.ours(key)
             label = self.table.label(key)
-            error, allowed, apart = self.judged(key, ours)
+            error, allowed, apart = self.judged_right(key)
             permitted = self.permitted(key, ours)
             their_rows, our_rows = (
                 numbers.reshape(len(numbers), -1).tolist() for numbers in (theirs, ours)

@@ -454,6 +454,7 @@ _COLUMN_MISTAKES: tuple[
     tuple[str, Callable[[Array], Array], Callable[[str], bool]], ...
 ] = (
     ("sign reversed, or F_ij given for F_ji", np.negative, lambda quantity: True),
+    ("the sign is lost: sizes alone", np.abs, lambda quantity: quantity not in VECTORS),
     ("degrees where radians were announced", np.degrees, _is_angular),
     (
         "degrees from -180 to 180 where radians were announced",
@@ -560,7 +561,7 @@ def _list_explained(
                 return []
         elif agrees:
             explained.append(key)
-            error, allowed, _ = judge.judged(key, ours)
+            error, allowed, _ = judge.judged_right(key)
             numbers += int((error > allowed)[judge.where(key)].sum())
         elif mistake.whole:
             possible -= 1

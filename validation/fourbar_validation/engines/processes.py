@@ -199,6 +199,8 @@ def find_reason(errors: str) -> str:
     return lines[-1].strip() if lines else ""
 
 
+_PYTHON_FRAME = re.compile(r'^ *File "(.+)", (line \d+)', re.MULTILINE)
+"""A place in a file, as a traceback of Python names it."""
 OUTPUT_KEPT = 20_000
 """Bytes that are kept of one answer's output. Half are from its beginning, half from
 its end.
@@ -498,9 +500,12 @@ class Running:
             status = process.wait(1.0)
         except subprocess.TimeoutExpired:
             return EngineError("closed its standard output")
-        reason = find_reason(self._take_errors().decode(errors="backslashreplace"))
+        errors = self._take_errors().decode(errors="backslashreplace")
+        reason = find_reason(errors)
         if reason:
             said = f": {write_one_line(reason)}"
+            for place in _PYTHON_FRAME.findall(errors)[-1:]:
+                said += f" ({', '.join(place)})"
         else:
             said = ""
         if status in _KILLED:

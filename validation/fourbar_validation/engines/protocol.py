@@ -476,15 +476,21 @@ def _read_values(
         f"must be a list of {n} {'pairs [x, y]' if pairs else 'numbers'}, null where"
         " there is no value"
     )
-    if not isinstance(value, list) or len(value) != n:
-        raise InputError(f"{table}.{name}", value, wanted)
+    key = f"{table}.{name}"
+    if not isinstance(value, list):
+        raise InputError(key, value, wanted)
+    if len(value) != n:
+        raise InputError(f"entries of {key}", len(value), wanted)
     if pairs:
         value = [(None, None) if pair is None else pair for pair in value]
         if any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in value):
-            raise InputError(f"{table}.{name}", value, wanted)
-    array = _make_array(chain.from_iterable(value) if pairs else value)
+            raise InputError(key, value, wanted)
+    entries = list(chain.from_iterable(value) if pairs else value)
+    array = _make_array(entries)
     if array is None:
-        raise InputError(f"{table}.{name}", value, f"{wanted}; numbers are finite")
+        wrong = next(i for i, one in enumerate(entries) if _make_array([one]) is None)
+        place = f"{key}, entry {wrong // (1 + pairs)}"
+        raise InputError(place, entries[wrong], "must be a finite number or null")
     return array.reshape(n, 2) if pairs else array
 
 

@@ -18,6 +18,7 @@ from fourbar_validation.regression.history import (
     append,
     draw_row,
     find_since,
+    read_history,
 )
 from fourbar_validation.regression.record import (
     ABOUT_FILE,
@@ -98,7 +99,7 @@ def report_differences(
         f"{table}: not verified, its {ABOUT_FILE} states no SHA-256 or is missing"
         for table in unproven
     ]
-    _tell_since(differences, before, draw=forms.get("html") is not None)
+    _add_since(differences, before, draw=forms.get("html") is not None)
     for form, path in forms.items():
         if path is not None:
             write_text(path, FORMS[form](differences))
@@ -114,17 +115,18 @@ def report_differences(
     return differences.status
 
 
-def _tell_since(differences: Differences, before: Recorded, *, draw: bool) -> None:
+def _add_since(differences: Differences, before: Recorded, *, draw: bool) -> None:
     """Say since which accepted run the rows fail that are written; draw the first."""
     failing = differences.failing[: render.MOST_ROWS_ON_THE_PAGE]
     keys = [tuple(key) for key in failing[["scene", "engine", "quantity"]].to_numpy()]
-    since = find_since(before, keys)
+    history = read_history(before)
+    since = find_since(history, before, keys)
     differences.table.loc[failing.index, "since"] = [since[key] for key in keys]
     if draw and len(failing):
         first = next(failing.itertuples())
         name = f"{first.scene} / {first.engine} / {first.quantity}"
         caption = f"{name}: error in the accepted runs and in this one. It"
-        differences.picture = draw_row(before, first)
+        differences.picture = draw_row(history, first)
         differences.caption = f"{caption} {since[keys[0]]}."
 
 
@@ -165,8 +167,11 @@ def compare_command(
 ) -> int:
     """Say what changed from OLD to NEW.
 
-    OLD is a run's folder, its results.csv, or an accepted name. Scenes that changed
-        Exit status 2 where the runs share fewer than half of their rows.
+    OLD is a run's folder, its results.csv, or an accepted name. Rows that answer
+    another question (a scene that changed, other settings or positions) are named and
+    not compared; what the new run was not asked for is "not run". Exit status 1 on a
+    regression or if nothing was compared, 2 where the runs share fewer than half of
+    their rows.
     """
     return report_differences(
         find_baseline(old),

@@ -141,22 +141,25 @@ def read_history(before: Recorded) -> "DataFrame":
     )
 
 
-def find_since(before: Recorded, failing: Iterable[RowKey]) -> dict[RowKey, str]:
+def find_since(
+    history: "DataFrame",
+    before: Recorded,
+    failing: Iterable[RowKey],
+) -> dict[RowKey, str]:
     """Say since which accepted run each failing row fails, as the end of "It ...".
 
     An engine without an answer (quantity "all") has no such row where it answered.
     """
-    history = read_history(before)
     of_engines = dict(list(history.groupby(["scene", "engine"])))
     return {
-        (scene, engine, quantity): _tell_since(
+        (scene, engine, quantity): _write_since(
             of_engines.get((scene, engine), history[:0]), quantity, before
         )
         for scene, engine, quantity in failing
     }
 
 
-def _tell_since(lines: "DataFrame", quantity: str, before: Recorded) -> str:
+def _write_since(lines: "DataFrame", quantity: str, before: Recorded) -> str:
     """Say since which run a quantity of an engine fails, from its rows in a scene."""
     if quantity != "all":
         lines = lines[lines.quantity == quantity]
@@ -182,12 +185,11 @@ def _name_run(index: Any) -> str:
     return f"the run of {date[:10]}" + f" at commit {commit}" * bool(commit)
 
 
-def draw_row(before: Recorded, row: Any) -> str:
+def draw_row(history: "DataFrame", row: Any) -> str:
     """Draw error over what is allowed of one row, over the accepted runs and this one.
 
     `row`: line of the table of differences. Empty if no run has a number.
     """
-    history = read_history(before)
     same = [history[name] == getattr(row, name) for name in _KEY]
     lines = history[np.logical_and.reduce(same)].tail(MOST_RUNS_DRAWN - 1)
     labels = [f"{run.date[:10]}\n{run.commit[:7]}" for run in lines.itertuples()]

@@ -47,6 +47,8 @@ a pin force without an inertia may agree.
 """
 _MOST_KINDS = 500
 """Causes that are told apart; further ones are one."""
+_MOST_LISTED = len(PIN_FORCES) + 1
+"""Quantities listed in which fourbar differs from all engines."""
 OTHER_CAUSES = "other causes"
 NO_ANSWER_PREFIX = "no answer: "
 """Beginning of the cause of an engine that broke down."""
@@ -151,10 +153,15 @@ def _name_place(row: Row) -> str:
     return f"{row.scene}{where}"
 
 
+def _name_whole(row: Row) -> str:
+    """Name the quantity of a row, or that of which it is the inertial part."""
+    return row.quantity.removesuffix("_inertia")
+
+
 def _find_group(row: Row) -> str | None:
     """Find the column of an engine's row; None for what is no error of a quantity."""
     name = row.quantity
-    if name in DRIVES or name.removesuffix("_inertia") in DRIVES:
+    if _name_whole(row) in DRIVES:
         return TORQUE_GROUP
     if name in PIN_FORCES:
         return PIN_FORCE_GROUP
@@ -245,14 +252,16 @@ class Overview:
         failing: dict[str, list[Row]] = {}
         for row in scene.rows:
             if row.failed:
-                ours = row.quantity.removesuffix("_inertia") in scene.against
+                ours = _name_whole(row) in scene.against
                 engine = FORMULAS if ours else row.engine
                 failing.setdefault(engine, []).append(row)
         for engine, rows in failing.items():
             # without an answer the rest is a consequence
             whole = [row for row in rows if row.quantity == "all"]
-            used = [float(find_used(row.error, row.allowed)) for row in whole or rows]
-            worst = (whole or rows)[used.index(max(used))]
+            named = [row for row in rows if _name_whole(row) in scene.against]
+            shown = whole or (engine == FORMULAS and named) or rows
+            used = [float(find_used(row.error, row.allowed)) for row in shown]
+            worst = shown[used.index(max(used))]
             key = (engine, tuple(_name_causes(scene, engine, rows)))
             if key not in self._kinds and len(self._kinds) >= _MOST_KINDS:
                 key = (engine, (OTHER_CAUSES,))
@@ -409,7 +418,9 @@ def _name_causes(
         engines = sorted({name for names in scene.against.values() for name in names})
         return [
             f"{', '.join(engines)} agree with each other, and differ from it in"
-            f" {', '.join([*scene.against][:4])}"
+            f" {', '.join([*scene.against][:_MOST_LISTED])}"
+            + ", ..."
+            * (len(scene.against) > _MOST_LISTED)
         ]
     if engine == FORMULAS:
         names = sorted({row.quantity for row in rows})
@@ -432,10 +443,7 @@ def _name_causes(
     worst = max(row.error for row in rows)
     if worst < ERROR_OF_MISSING_DIGITS:
         digits = math.floor(-math.log10(worst))
-        return [
-            f"{words}: from digit {digits} on, as where numbers are single "
-            "precision or an iteration ends early"
-        ]
+        return [f"{words}: the first {digits} digits agree"]
     if engine not in scene.causes:
         return [f"{words}; mistakes are not looked for there"]
     return [f"{words}; no known mistake explains it"]
@@ -443,8 +451,8 @@ def _name_causes(
 
 def _name_group(row: Row) -> str:
     """Name what an engine's row is about, where it is said what differs."""
-    if row.quantity.removesuffix("_inertia") != row.quantity:
-        return f"inertial part of the {row.quantity.removesuffix('_inertia')}"
+    if _name_whole(row) != row.quantity:
+        return f"inertial part of the {_name_whole(row)}"
     if row.quantity == "closure":  # an identity of the engine's own angles
         return row.quantity
     return _find_group(row) or row.quantity
@@ -453,4 +461,5 @@ def _name_group(row: Row) -> str:
 def _join_groups(groups: Sequence[str], verb: str) -> str:
     """Write groups of quantities with their verb."""
     plural = len(groups) > 1 or groups[0].endswith("s")
-    return f"{' and '.join(groups)} {verb if plural else verb + 's'}"
+    listed = " and ".join([", ".join(groups[:-1]), groups[-1]][len(groups) < 2 :])
+    return f"{listed} {verb if plural else verb + 's'}"

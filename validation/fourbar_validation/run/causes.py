@@ -128,5 +128,5 @@ def make_answer_table(
 
 def find_wrong(judge: Judge, key: str) -> Mask:
     """Mark the rows in which a quantity is beyond what is allowed, (n,)."""
-    error, allowed, _ = judge.judged(key, judge.ours(key))
+    error, allowed, _ = judge.judged_right(key)
     return np.asarray(judge.where(key) & judge.ok & ~(error <= allowed))

@@ -6,7 +6,7 @@ A scene that breaks down is judged again engine by engine.
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from fourbar_validation.compare.rows import escape_controls, make_breakdown
+from fourbar_validation.compare.rows import FORMULAS, escape_controls, make_breakdown
 from fourbar_validation.engines import workers as worker_processes
 from fourbar_validation.engines.guests import QUESTIONS, Guest
 from fourbar_validation.engines.processes import SECONDS_PER_POSITION
@@ -81,26 +81,19 @@ def _judge_by_engine(
 ) -> Record:
     """Judge a scene that broke down one engine at a time.
 
-    An engine at fault gets a row that says what broke down.
+    An engine at fault gets a row that says what broke down; where the formulas do, no
+    engine is asked.
     """
-    record: Record | None = None
+    record = attempt(replace(job, engines=[]))
+    if not isinstance(record, Record):
+        return Record(job.name, rows=[make_breakdown(job.name, FORMULAS, record)])
     breakdowns = []
-    for engines in ([], *([engine] for engine in job.engines)):
-        outcome = attempt(replace(job, engines=engines))
+    for engine in job.engines:
+        outcome = attempt(replace(job, engines=[engine]))
         if isinstance(outcome, Record):
-            if record is None:
-                record = outcome
-            else:
-                record = record.joined(outcome)
+            record = record.joined(outcome)
         else:
-            breakdowns.append(
-                make_breakdown(
-                    job.name,
-                    engines[0].name if engines else "formulas",
-                    outcome,
-                )
-            )
-    record = record or Record(job.name)
+            breakdowns.append(make_breakdown(job.name, engine.name, outcome))
     return replace(record, rows=[*record.rows, *breakdowns])
 
 

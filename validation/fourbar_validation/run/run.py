@@ -23,7 +23,11 @@ from fourbar_validation.compare.rows import (
 from fourbar_validation.engines.guests import list_numbers
 from fourbar_validation.engines.mujoco.picture import render_pictures
 from fourbar_validation.engines.registry import Engine
-from fourbar_validation.regression.history import collect_history, find_since
+from fourbar_validation.regression.history import (
+    collect_history,
+    find_since,
+    read_history,
+)
 from fourbar_validation.regression.record import (
     ABOUT_FILE,
     CSV_FILE,
@@ -144,7 +148,8 @@ def write_outcome(
         overview = summary.overview
         if failure := overview.named_failure:
             key = (failure.scene, failure.engine, failure.quantity)
-            overview.since = f"It {find_since(before, [key])[key]}."
+            since = find_since(read_history(before), before, [key])
+            overview.since = f"It {since[key]}."
         weakened = list_weakened(before.about.rules, about.rules)
         overview.weaker = [f"{rule}" for rule in weakened]
         overview.baseline = before.describe()
