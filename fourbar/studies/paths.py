@@ -12,7 +12,7 @@ from fourbar.scene.motion import Sweep
 from fourbar.solution import shift_to_drawing
 from fourbar.studies.course import MotionCourse
 
-ROUNDS = 6
+ROUNDS = 3
 """Rounds in which the steps beside an extreme are divided."""
 PARTS = 16
 """Parts into which a step is divided in a round: with n places at first an extreme is
@@ -74,9 +74,9 @@ def _measure_path(course: MotionCourse, name: str) -> Path:
         first, last = places[steps], places[steps + 1]
         inside = np.arange(1, PARTS) / PARTS
         between = (first[:, None] + (last - first)[:, None] * inside).ravel()
-        kept = np.unique([steps, steps + 1])
-        places = np.concatenate([places[kept], between])
-        points = np.concatenate([points[kept], _locate_point(course, name, between)])
+        # all stay: without the others another direction would seem narrower
+        places = np.concatenate([places, between])
+        points = np.concatenate([points, _locate_point(course, name, between)])
         order = np.argsort(places)
         places, points = places[order], points[order]
     return _measure_points(places, points)

@@ -117,6 +117,35 @@ def test_the_arc_of_a_crank_has_its_chord_and_its_sagitta(
         assert np.degrees(path.ends) == pytest.approx(ends)
 
 
+CUTTER = ((0.65764732, 0.1, 0.7, 1.0), 1.0, -36.87)
+"""m, deg: ground, input, coupler and output of a web cutter, and its blade."""
+TRAINER = ((50.0, 8.0, 33.0, 34.0), 12.0, 167.0)
+"""The same of an elliptical trainer and its pedal."""
+
+
+@pytest.mark.parametrize(("lengths", "distance", "angle"), [CUTTER, TRAINER])
+def test_a_wide_curve_is_no_narrower_than_by_a_scan(
+    lengths: tuple[float, float, float, float],
+    distance: float,
+    angle: float,
+) -> None:
+    """Of an oval the width turns slowly, and every side of it decides."""
+    ground, crank, coupler, output = lengths
+    bars = zip(("ground", "input", "coupler", "output"), lengths, strict=True)
+    text = "".join(f'{bar} = "{length} m"\n' for bar, length in bars)
+    text = f"[lengths]\n{text}[motion]\n[points]\n"
+    text += f'P = {{ bar = 3, from_pin = ["{distance} m", "{angle} deg"] }}'
+    (path,) = measure_paths(loads(text)).values()
+    A = crank * np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 7201))
+    side = np.abs(ground - A)
+    at_A = np.arccos((coupler**2 + side**2 - output**2) / (2.0 * coupler * side))
+    unit = (ground - A) / side * np.exp(1j * at_A)
+    curve = A + distance * unit * np.exp(1j * math.radians(angle))
+    width, length, _ = scan(curve, np.linspace(0.0, np.pi, 7201))
+    assert path.straightness == pytest.approx(width, rel=1e-6)
+    assert path.stroke == pytest.approx(length, rel=1e-3)
+
+
 @pytest.mark.slow
 def test_a_circle_is_as_wide_in_every_direction() -> None:
     """The polygon of the steps would be narrower by 1e-6 of it."""
