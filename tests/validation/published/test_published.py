@@ -24,10 +24,15 @@ from fourbar_validation.published.comparison import (
     list_ladder_rows,
     published,
 )
-from fourbar_validation.published.figures import ERRATA, PublishedFigure, compare_figure
+from fourbar_validation.published.figures import (
+    ERRATA,
+    FOLDER,
+    PublishedFigure,
+    compare_figure,
+    read_printed,
+)
 from fourbar_validation.published.program import (
     BAR_LENGTHS,
-    DATA,
     ERRATA_IN_ORDER,
     THETA_1,
     THETA_2,
@@ -38,7 +43,6 @@ from fourbar_validation.published.program import (
     compute_thesis_program,
     make_equations,
     make_model_scene,
-    read_printed,
 )
 from fourbar_validation.published.textbook import (
     TEXTBOOK_FOLDER,
@@ -300,32 +304,29 @@ def test_torques_that_the_errata_state() -> None:
         and f"{program(1, 5) - program(1):.6f}" in states["5"]
     )
 
-    source = read_printed()["published"]
     k, matrix = (
-        source["section_5_7_hand_constants"],
-        source["section_5_7_matrix_as_printed"],
+        {name: figure.printed for name, figure in read_printed()[table].items()}
+        for table in ("5.7 constants", "5.7 matrix")
     )
     names = [f"k{bar}{key}" for bar in (2, 3, 4) for key in ("x", "y", "_5")]
-    arms = [[k[f"k{bar}_{n}"] for n in (1, 2, 3, 4)] for bar in (2, 3, 4)]
     used = {"k3_5": "14.99169304", "k4x": str(0.2 * -0.02840253815)}
 
-    def hand(*put_right: str) -> float:
-        return solve_as_printed(
-            [used[name] if name in put_right else k[name] for name in names], arms
-        )
+    def hand(numbers: dict[str, str], *put_right: str) -> float:
+        numbers = numbers | {name: used[name] for name in put_right}
+        arms = [[numbers[f"k{bar}_{n}"] for n in (1, 2, 3, 4)] for bar in (2, 3, 4)]
+        return solve_as_printed([numbers[name] for name in names], arms)
 
-    assert f"{hand('k4x'):.4f}" in states["7"]
-    assert f"{hand():.4f}" in states["8"] and f"{hand('k3_5'):.4f}" in states["8"]
-    assert f"{hand('k3_5', 'k4x'):.4f}" == f"{T4[-1]:.4f}"
+    assert f"{hand(k, 'k4x'):.4f}" in states["7"]
+    assert f"{hand(k):.4f}" in states["8"] and f"{hand(k, 'k3_5'):.4f}" in states["8"]
+    assert f"{hand(k, 'k3_5', 'k4x'):.4f}" == f"{T4[-1]:.4f}"
     assert f"{program(3, 1, 2, 4, 5) + 100 * 15 - 15:.3f}" in states["9"]
-    rows = [matrix[key][:4] for key in ("row3_bar2", "row6_bar3", "row9_bar4")]
-    assert f"{solve_as_printed(matrix['rhs'][:9], rows):.6f}" in states["13"]
+    assert f"{hand(matrix):.6f}" in states["13"]
 
 
 def test_open_loops_that_the_errata_state() -> None:
     """Closure of the angles as printed, in the thesis's polygon, cm."""
     table = np.genfromtxt(
-        DATA / "positions.csv",
+        FOLDER / "data" / "positions.csv",
         delimiter=",",
         skip_header=1,
         usecols=range(5),

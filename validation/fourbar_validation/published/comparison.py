@@ -4,7 +4,7 @@ Ours stand beside them, and differences are explained.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
@@ -16,15 +16,13 @@ from fourbar_validation.places import HARNESS_PROGRAM
 from fourbar_validation.published.figures import (
     ERRATA,
     FIGURE_VERDICTS,
+    POSITIONS,
     PublishedFigure,
-)
-from fourbar_validation.published.program import (
-    ERRATA_IN_ORDER,
-    climb_ladder,
     read_printed,
 )
-from fourbar_validation.published.textbook import compare_maple, compare_textbooks
-from fourbar_validation.published.thesis import list_thesis_figures
+from fourbar_validation.published.program import ERRATA_IN_ORDER, climb_ladder
+from fourbar_validation.published.textbook import compare_textbooks, compute_worksheet
+from fourbar_validation.published.thesis import ComputedTable, compute_tables
 from fourbar_validation.report.sentences import make_words_table
 from fourbar_validation.report.templating import render
 
@@ -36,8 +34,14 @@ def list_figures() -> Iterator[PublishedFigure]:
 
     The sources are the thesis, the Maple worksheet, and public test cases.
     """
-    yield from list_thesis_figures()
-    yield from compare_maple()
+    printed = read_printed()
+    computed = compute_tables(printed[POSITIONS])
+    computed["Maple"] = ComputedTable(compute_worksheet())
+    for table, figures in printed.items():
+        ours, made, noise = computed[table]
+        for name, (text, errata) in figures.items():
+            numbers = ours[name], errata, made.get(name), noise.get(name, 0.0)
+            yield PublishedFigure(table, name, text, *numbers)
     yield from compare_textbooks()
 
 
@@ -86,40 +90,33 @@ def compare_figures(show_all: bool) -> int:
     met: Counter[str] = Counter()
     unexplained = []
     reproduced = 0
-    console.print(
-        "Printed figures that differ from ours, and why:"
-        if not show_all
-        else "Printed figures:"
-    )
+    which = "" if show_all else " that differ from ours, and why"
+    console.print(f"Printed figures{which}:")
     for figure in list_figures():
         verdict = figure.verdict()
         counts[figure.table, verdict] += 1
-        if verdict == "differs":
+        differs = verdict == "differs"
+        if not (differs or show_all):
+            continue
+        ours = f"ours {figure.ours:.10g}" + f", {verdict}" * (not differs)
+        line = f"{figure.table}: {figure.name}  printed {figure.printed}  {ours}"
+        click.echo("\n".join(wrap_line(line, console.width)))
+        if differs:
             met.update(figure.errata)
             reproduced += figure.reproduced()
             if not is_explained(figure):
                 unexplained.append(figure)
-        if verdict == "differs" or show_all:
-            ours = f"ours {figure.ours:.10g}" + (
-                "" if verdict == "differs" else f", {verdict}"
-            )
-            line = f"{figure.table}: {figure.name}  printed {figure.printed}  {ours}"
-            click.echo("\n".join(wrap_line(line, console.width)))
-        if verdict == "differs":
-            click.echo(
-                click.wrap_text(explain_difference(figure), page, "    ", "    ")
-            )
-    total = FoldedTable(
-        *("table", *FIGURE_VERDICTS), title="Printed figures against ours"
-    )
-    for table in dict.fromkeys(key[0] for key in counts):
-        total.add_row(
-            table, *(str(counts[table, verdict]) for verdict in FIGURE_VERDICTS)
-        )
+            why = explain_difference(figure)
+            click.echo(click.wrap_text(why, page, "    ", "    "))
+    title = "Printed figures against ours"
+    total = FoldedTable("table", *FIGURE_VERDICTS, title=title)
+    tables = {table: None for table, _ in counts}
+    for table in tables:
+        of_table = [counts[table, verdict] for verdict in FIGURE_VERDICTS]
+        total.add_row(table, *map(str, of_table))
     total.add_section()
     sums = [
-        sum(n for (_, v), n in counts.items() if v == verdict)
-        for verdict in FIGURE_VERDICTS
+        sum(counts[table, verdict] for table in tables) for verdict in FIGURE_VERDICTS
     ]
     total.add_row(f"{sum(sums)} figures", *map(str, sums))
     console.print(total)
@@ -164,20 +161,14 @@ def list_ladder_rows() -> list[tuple[str, ...]]:
     the manual and section 5.7 print: 308.804 N cm and (161.418, -156.506) N. After each
     of these answers stand the figures as printed.
     """
-    source = read_printed()["published"]
-    tables = {
-        "manual": source["manual_program_dynamic"],
-        "5b": source["section_5_7_hand_solution"],
-    }
+    printed = read_printed()
+    tables = {"manual": printed["manual, unknowns"], "5b": printed["5.7 unknowns"]}
 
-    def write(figures: Mapping[str, str | float]) -> tuple[str, ...]:
-        return (
-            f"{float(figures['T4']):.9f}",
-            f"{float(figures['F12x']):.3f}",
-            f"{float(figures['F12y']):.3f}",
-        )
+    def write(T4: float, *F12: float) -> tuple[str, ...]:
+        return (f"{T4:.9f}", *(f"{component:.3f}" for component in F12))
 
-    rows = []
+    names = ("T4", "F12x", "F12y")
+    rows: list[tuple[str, ...]] = []
     for erratum, x in climb_ladder():
         did = "nothing wrong: SI, uniform bars m (L^2 + w^2)/12"
         right = "the answer of this project"
@@ -187,9 +178,10 @@ def list_ladder_rows() -> list[tuple[str, ...]]:
         elif erratum:
             did = "I_G3, I_G4 as printed in the manual, ten digits"
             right = "see #3"
-        rows.append((did, right, *write(x)))
-        if erratum in tables:
-            rows.append(("", "as printed:", *write(tables[erratum])))
+        rows.append((did, right, *write(*(x[name] for name in names))))
+        if table := tables.get(erratum):
+            unknowns = [float(table[name].printed) for name in names]
+            rows.append(("", "as printed:", *write(*unknowns)))
     return rows
 
 
@@ -216,24 +208,10 @@ def published(show_all: bool, out: Path | None) -> int:
             f"a free motion among the sources needs SciPy: {say_install('validation')}"
         ) from None
     rows = list_ladder_rows()
-    Console().print(
-        make_words_table(
-            ERRATA_HEADINGS,
-            rows,
-            2,
-            title="The published torque, error by error",
-            show_lines=True,
-        )
-    )
+    title = "The published torque, error by error"
+    table = make_words_table(ERRATA_HEADINGS, rows, 2, title=title, show_lines=True)
+    Console().print(table)
     if out is not None:
-        write_text(
-            out,
-            render(
-                "fourbar_validation.published",
-                "ladder.md.j2",
-                head=ERRATA_HEADINGS,
-                rows=rows,
-                program=HARNESS_PROGRAM,
-            ),
-        )
+        head = {"head": ERRATA_HEADINGS, "rows": rows, "program": HARNESS_PROGRAM}
+        write_text(out, render("fourbar_validation.published", "ladder.md.j2", **head))
     return compare_figures(show_all)

@@ -1,13 +1,15 @@
-"""A printed figure, ours, and what the named errata make of ours."""
+"""Printed figures, ours beside them, and what the named errata make of ours."""
 
+import csv
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator
 from decimal import ROUND_DOWN, ROUND_HALF_EVEN, Decimal
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+FOLDER = Path(__file__).parent
 FIGURE_VERDICTS = ("rounded", "truncated", "differs")
+POSITIONS = "2.4 positions"
 
 
 class _Erratum(NamedTuple):
@@ -26,11 +28,41 @@ class _Erratum(NamedTuple):
     """True if it may be a slip of the transcription that was read."""
 
 
-LISTED_ERRATA = tomllib.loads(
-    (Path(__file__).parent / "errata.toml").read_text(encoding="utf-8")
-)["erratum"]
+LISTED_ERRATA = tomllib.loads((FOLDER / "errata.toml").read_text(encoding="utf-8"))[
+    "erratum"
+]
 ERRATA = {entry["id"]: _Erratum(**entry) for entry in LISTED_ERRATA}
 """The errata of the sources, as data: `errata.toml` says what each field is."""
+
+
+class PrintedFigure(NamedTuple):
+    """Digits as printed, and the errata that lead from ours to them, as they are made.
+
+    The errata are named by their ids.
+    """
+
+    printed: str
+    errata: tuple[str, ...] = ()
+
+
+def read_printed() -> dict[str, dict[str, PrintedFigure]]:
+    """Read the figures of the thesis and of a Maple worksheet, by table and name."""
+    tables: dict[str, dict[str, PrintedFigure]] = {POSITIONS: {}}
+    for pair in (("theta3_1", "theta4_2"), ("theta3_2", "theta4_1")):
+        for row in _read_rows("positions.csv"):
+            for name in pair:
+                place = f"{row['theta2_deg']} {name}"
+                errata = ("6",) if place == "136 theta3_1" else ()
+                tables[POSITIONS][place] = PrintedFigure(row[f"{name}_deg"], errata)
+    for row in _read_rows("figures.csv"):
+        figure = PrintedFigure(row["printed"], tuple(row["errata"].split()))
+        tables.setdefault(row["table"], {})[row["name"]] = figure
+    return tables
+
+
+def _read_rows(name: str) -> Iterator[dict[str, str]]:
+    text = (FOLDER / "data" / name).read_text(encoding="utf-8")
+    yield from csv.DictReader(text.splitlines())
 
 
 class PublishedFigure(NamedTuple):
@@ -61,38 +93,14 @@ class PublishedFigure(NamedTuple):
         )
 
 
-Slips = dict[str, tuple[tuple[str, ...], float | None]]
-"""Figures that errata touch, by name: the errata, and ours after them."""
-_NONE: Mapping[str, Any] = MappingProxyType({})
-
-
-def compare_table(
-    table: str,
-    printed: Mapping[str, str],
-    ours: Mapping[str, float],
-    slips: Mapping[str, Any] = _NONE,
-    noise: Mapping[str, float] = _NONE,
-) -> list[PublishedFigure]:
-    """Put ours beside the figures of a printed table, by their names."""
-    figures = []
-    for name, text in printed.items():
-        figure = PublishedFigure(table, name, text, ours[name], *slips.get(name, ()))
-        figures.append(figure._replace(noise=noise.get(name, 0.0)))
-    return figures
-
-
-def compare_figure(
-    printed: str,
-    value: float,
-    noise: float = 0.0,
-) -> str:
+def compare_figure(printed: str, value: float, noise: float = 0.0) -> str:
     """Return "rounded", "truncated" or "differs", at the printed decimals."""
     theirs = Decimal(printed)
     ours = Decimal(value)
     unit = Decimal(1).scaleb(int(theirs.as_tuple().exponent))
-    if ours.quantize(unit, ROUND_HALF_EVEN) == theirs or abs(ours - theirs) <= Decimal(
-        noise
-    ):
+    if ours.quantize(unit, ROUND_HALF_EVEN) == theirs:
+        return "rounded"
+    if abs(ours - theirs) <= Decimal(noise):
         return "rounded"
     if ours.quantize(unit, ROUND_DOWN) == theirs:
         return "truncated"

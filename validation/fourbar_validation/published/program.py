@@ -7,11 +7,8 @@ mecanismos de cuatro barras", UNAM FES Cuautitlan, sections 4.12 and 5.7 and the
 program's tables in the manual.
 """
 
-import json
 import math
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,7 +18,6 @@ from fourbar.quantities import Array
 from fourbar_validation.compare.tolerance import EPS
 from fourbar_validation.published.thirteen import EquationTerms, assemble_equations
 
-DATA = Path(__file__).parent / "data"
 _PINS = ("F12", "F32", "F23", "F43", "F14", "F34")
 PRINTED_UNKNOWNS = (*(f"{pin}{axis}" for pin in _PINS for axis in "xy"), "T4")
 BAR_LENGTHS = (20.0, 48.0, 55.0, 20.0)
@@ -57,11 +53,6 @@ class ProgramErrors:
     alpha_3_for_acceleration_of_G4: bool = False
 
 
-def read_printed() -> Any:
-    """Read the transcribed tables of the thesis."""
-    return json.loads((DATA / "model_mechanism.json").read_text(encoding="utf-8"))
-
-
 def to_degrees(angle: float) -> float:
     """Convert to degrees in [0, 360), as the thesis has them."""
     return math.degrees(angle) % 360.0
@@ -83,24 +74,17 @@ def to_ours(theta: float) -> float:
 def make_model_scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
     """Make the model mechanism for our formulas, SI, uniform bars of `BAR_WIDTH`."""
     d, a, b, c = (0.01 * length for length in BAR_LENGTHS)
-    centre = {bar: (0.01 * distance, 0.0) for bar, distance in CENTRE.items()}
-    linkage = fourbar.FourBar(
-        d,
-        fourbar.Bar(a, MASSES[2], 1e-4 * INERTIA_2, centre[2]),
-        fourbar.Bar(b, MASSES[3], 1e-4 * compute_inertia(3), centre[3]),
-        fourbar.Bar(c, MASSES[4], 1e-4 * compute_inertia(4), centre[4]),
-        ground_angle=to_ours(THETA_1),
+    inertias = (INERTIA_2, compute_inertia(3), compute_inertia(4))
+    two, three, four = (
+        fourbar.Bar(length, MASSES[bar], 1e-4 * inertia, (0.01 * CENTRE[bar], 0.0))
+        for bar, length, inertia in zip(MOVING_BARS, (a, b, c), inertias, strict=True)
     )
+    linkage = fourbar.FourBar(d, two, three, four, ground_angle=to_ours(THETA_1))
     arm = (0.01 * LOAD_ARM, LOAD_ANGLE)
-    loads = [fourbar.Load(2, (FORCE_ON_BAR_2, 0.0), arm=arm)]
-    for bar in (2, 3, 4):
-        loads.append(fourbar.Load(bar, moment=0.01 * COUPLE_ON_A_BAR))
-    return fourbar.Scene(
-        linkage,
-        fourbar.Motion(theta_2, OMEGA_2, branch=branch),
-        drive_bar=4,
-        loads=tuple(loads),
-    )
+    couples = [fourbar.Load(bar, moment=0.01 * COUPLE_ON_A_BAR) for bar in MOVING_BARS]
+    loads = (fourbar.Load(2, (FORCE_ON_BAR_2, 0.0), arm=arm), *couples)
+    motion = fourbar.Motion(theta_2, OMEGA_2, branch=branch)
+    return fourbar.Scene(linkage, motion, drive_bar=4, loads=loads)
 
 
 def compute_motion(theta_2: Array, branch: int = 1) -> fourbar.Solution:
@@ -112,12 +96,8 @@ def compute_right_unknowns() -> dict[str, float]:
     """Compute the 13 unknowns by our formulas at theta_2 = 135 deg, N and N cm."""
     s = fourbar.solve(make_model_scene(THETA_2))
     pins = (s.F12, s.F32, -s.F32, s.F43, s.F14, -s.F43)
-    unknowns = {}
-    for name, force in zip(_PINS, pins, strict=True):
-        unknowns[f"{name}x"] = float(force[0, 0])
-        unknowns[f"{name}y"] = float(force[0, 1])
-    unknowns["T4"] = 100.0 * float(s.torque[0])
-    return unknowns
+    unknowns = np.concatenate([*(pin[0] for pin in pins), 100.0 * s.torque])
+    return dict(zip(PRINTED_UNKNOWNS, unknowns.tolist(), strict=True))
 
 
 def compute_inertia(bar: int, about_long_axis: bool = False) -> float:
@@ -142,25 +122,24 @@ class Kinematics:
         s = compute_motion(np.array([THETA_2]))
         self.theta_3 = float(s.theta_3[0])
         self.theta_4 = to_ours(float(s.theta_4[0]))
-        self.omega: dict[int, float] = {}
-        self.alpha: dict[int, float] = {}
-        self.a_G: dict[int, Array] = {}
-        for bar in MOVING_BARS:
-            self.omega[bar] = float(getattr(s, f"omega_{bar}")[0])
-            self.alpha[bar] = float(getattr(s, f"alpha_{bar}")[0])
-            self.a_G[bar] = 100.0 * getattr(s, f"a_G{bar}")[0]
+        self.omega, self.alpha = (
+            {bar: float(getattr(s, f"{name}_{bar}")[0]) for bar in MOVING_BARS}
+            for name in ("omega", "alpha")
+        )
+        self.a_G = {bar: 100.0 * getattr(s, f"a_G{bar}")[0] for bar in MOVING_BARS}
         self.a_A = 100.0 * s.a_A[0]
         self.slip = 2.0 * CENTRE[3] * self.alpha[3] * math.sin(self.theta_3)
         """Amount that erratum 4 adds to the x component of A_G3/A: -(L w^2 cos - L
         alpha sin) for -(... + ...), eq 4.20.
         """
+        _, a, b, c = BAR_LENGTHS
         self.arms = {  # from G; R14 points along B to O4, the thesis's theta_4
             "R12": split_components(-CENTRE[2], THETA_2),
-            "R32": split_components(BAR_LENGTHS[1] - CENTRE[2], THETA_2),
+            "R32": split_components(a - CENTRE[2], THETA_2),
             "R23": split_components(-CENTRE[3], self.theta_3),
-            "R43": split_components(BAR_LENGTHS[2] - CENTRE[3], self.theta_3),
+            "R43": split_components(b - CENTRE[3], self.theta_3),
             "R14": split_components(CENTRE[4], self.theta_4),
-            "R34": split_components(CENTRE[4] - BAR_LENGTHS[3], self.theta_4),
+            "R34": split_components(CENTRE[4] - c, self.theta_4),
         }
 
 
@@ -197,16 +176,10 @@ def make_equations(
     force[2][0] -= FORCE_ON_BAR_2
     _, y = split_components(LOAD_ARM, LOAD_ANGLE)
     moment[2] += y * FORCE_ON_BAR_2  # minus the moment of the load, -y F
-    first = {
-        2: np.array([k.arms["R12"]]),
-        3: np.array([k.arms["R23"]]),
-        4: np.array([k.arms["R14"]]),
-    }
-    second = {
-        2: np.array([k.arms["R32"]]),
-        3: np.array([k.arms["R43"]]),
-        4: np.array([k.arms["R34"]]),
-    }
+    first, second = (
+        {bar: np.array([k.arms[name]]) for bar, name in enumerate(names, 2)}
+        for names in (("R12", "R23", "R14"), ("R32", "R43", "R34"))
+    )
     matrix, right = assemble_equations(EquationTerms(first, second, force, moment), 4)
     return matrix[0], right[0]
 

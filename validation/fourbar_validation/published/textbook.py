@@ -3,21 +3,17 @@
 The test cases are listed in `textbook.toml`.
 """
 
-import json
 import math
 import tomllib
 from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 from typing import NamedTuple
 
 import fourbar
 from fourbar_validation.places import MODELS
-from fourbar_validation.published.figures import PublishedFigure
+from fourbar_validation.published.figures import FOLDER, PublishedFigure
 
 TEXTBOOK_FOLDER = MODELS / "textbook"
-PRINTED_ANSWERS = Path(__file__).parent / "textbook.toml"
-_SHEET = Path(__file__).parent / "data" / "maple.json"
 COMPONENT_AXES = {"_x": 0, "_y": 1}
 
 
@@ -34,52 +30,34 @@ class _TextbookAnswer(NamedTuple):
 
 def list_answers() -> list[_TextbookAnswer]:
     """List all of them."""
-    return [
-        _TextbookAnswer(**entry)
-        for entry in tomllib.loads(PRINTED_ANSWERS.read_text(encoding="utf-8"))[
-            "answer"
-        ]
-    ]
+    text = (FOLDER / "textbook.toml").read_text(encoding="utf-8")
+    return [_TextbookAnswer(**entry) for entry in tomllib.loads(text)["answer"]]
 
 
 def compare_textbooks() -> Iterator[PublishedFigure]:
     """Compare each answer with ours."""
     for answer in list_answers():
-        ours = compute_value(
-            _solve_book_scene(answer.scene),
-            answer.quantity,
-            answer.position,
-        )
-        yield PublishedFigure(
-            "public test cases",
-            f"{answer.scene} {answer.quantity}",
-            answer.printed,
-            ours,
-        )
+        solution = _solve_book_scene(answer.scene)
+        ours = compute_value(solution, answer.quantity, answer.position)
+        name = f"{answer.scene} {answer.quantity}"
+        yield PublishedFigure("public test cases", name, answer.printed, ours)
 
 
-def compute_value(
-    solution: fourbar.Solution,
-    quantity: str,
-    position: int,
-) -> float:
+def compute_value(solution: fourbar.Solution, quantity: str, position: int) -> float:
     """Compute a result, its negative, or the difference of two, at one position."""
     first, minus, second = quantity.partition(" - ")
-    if minus:
-        return compute_value(solution, first, position) - compute_value(
-            solution,
-            second,
-            position,
-        )
-    if quantity.startswith("-"):
-        return -compute_value(solution, quantity[1:], position)
-    name, axis = (
-        (quantity[:-2], COMPONENT_AXES[quantity[-2:]])
-        if quantity[-2:] in COMPONENT_AXES
-        else (quantity, None)
-    )
-    values = getattr(solution, name)
-    return float(values[position] if axis is None else values[position, axis])
+    value = _compute_term(solution, first, position)
+    return value - _compute_term(solution, second, position) if minus else value
+
+
+def _compute_term(solution: fourbar.Solution, term: str, position: int) -> float:
+    name = term.removeprefix("-")
+    axis = COMPONENT_AXES.get(name[-2:])
+    if axis is None:
+        value = float(getattr(solution, name)[position])
+    else:
+        value = float(getattr(solution, name[:-2])[position, axis])
+    return value if name == term else -value
 
 
 @cache
@@ -87,36 +65,18 @@ def _solve_book_scene(scene: str) -> fourbar.Solution:
     return fourbar.solve(fourbar.load(TEXTBOOK_FOLDER / f"{scene}.toml"))
 
 
-def compare_maple() -> Iterator[PublishedFigure]:
+def compute_worksheet() -> dict[str, float]:
     """Compute the worksheet's two solutions of positions, theta_1 = 0, rad.
 
     The constant of its real equation is computed too.
     """
-    sheet = json.loads(_SHEET.read_text(encoding="utf-8"))
-    a, b, c, d = (float(sheet["inputs"][name]) for name in "abcd")
+    d, a, b, c = 3.0, 0.8, 2.5, 2.0
     theta_2 = math.pi / 3.0
-    linkage = fourbar.FourBar(
-        d,
-        fourbar.Bar(a),
-        fourbar.Bar(b),
-        fourbar.Bar(c),
-    )
-    real = sheet["reduced_equations"]["real_constant"]
-    yield PublishedFigure(
-        "Maple",
-        "real constant",
-        real,
-        a * math.cos(theta_2) - d,
-    )
-    for branch, solution in zip((1, -1), sheet["solutions"], strict=True):
-        s = fourbar.solve(
-            fourbar.Scene(linkage, fourbar.Motion(theta_2, branch=branch))
-        )
-        for name, angle in (("theta3", s.theta_3), ("theta4", s.theta_4)):
-            key = f"{solution['configuration']} {name}"
-            yield PublishedFigure(
-                "Maple",
-                key,
-                solution[f"{name}_printed_rad"],
-                float(angle[0]),
-            )
+    linkage = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c))
+    ours = {"real constant": a * math.cos(theta_2) - d}
+    for name, branch in (("open", 1), ("crossed", -1)):
+        motion = fourbar.Motion(theta_2, branch=branch)
+        s = fourbar.solve(fourbar.Scene(linkage, motion))
+        ours[f"{name} theta3"] = float(s.theta_3[0])
+        ours[f"{name} theta4"] = float(s.theta_4[0])
+    return ours
