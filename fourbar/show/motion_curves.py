@@ -210,26 +210,18 @@ def _mark_poles(scene: Scene, solution: Solution, panels: Panels) -> None:
     A curve that does not double at a quarter of the distance stays bounded there.
     """
     rows = np.flatnonzero(np.isin(solution.status_code, (NO_LEVER, NO_TORQUE)))
-    motion = scene.motion
-    listed = motion.free is None and motion.stroke is None
-    if solution.F12 is None or not listed or motion.has_rate_of_each or not rows.size:
+    listed = scene.motion.free is None and solution.at.stroke is None
+    if solution.F12 is None or not listed or not rows.size:
         return
-    places = solution.at.places[rows]
-    far, near = (
-        _list_curves(
-            scene,
-            solve(
-                scene, at=command_at(scene, np.concatenate([places - x, places + x]))
-            ),
-        )
-        for x in (_BESIDE_A_POLE, 0.25 * _BESIDE_A_POLE)
-    )
+    at = solution.at.part(rows)._replace(remainder=None)
+    beside = [
+        _list_curves(scene, solve(scene, at=at._replace(angle=at.angle + away)))
+        for away in _BESIDE_A_POLE * np.array([-1.0, 1.0, -0.25, 0.25])
+    ]
     for name, curve in panels.curves.items():
-        before, after = (
-            np.abs(curves[name].reshape(2, len(rows), -1)).max(axis=-1)
-            for curves in (far, near)
-        )
-        curve.poles = rows[(after > 2.0 * before).any(axis=0)].tolist()
+        values = np.abs([curves[name].reshape(len(rows), -1) for curves in beside])
+        sizes = values.max(axis=-1)
+        curve.poles = rows[(sizes[2:] > 2.0 * sizes[:2]).any(axis=0)].tolist()
 
 
 def _take_positions(

@@ -310,10 +310,14 @@ class Panels:
             x[panel], values[panel] = _search(curve.series[panel], rank)
         ranks = np.where(np.isfinite(values), rank(values), -np.inf)
         first = int(np.argmax(ranks >= ranks.max() - TIED * scale))
-        after = min(first + 1, len(ranks) - 1)
-        is_point = self.start[after] == self.stop[after]
-        # the point at which a panel ends has the value that it rises to
-        if is_point and x[first] == 1.0 - _INSIDE and ranks[after] >= ranks[first]:
+        for after in range(first + 1, len(ranks)):
+            rise = ranks[after] - ranks[first]
+            # short panels, beside the pole of another curve, hold parts of one rise
+            rises = rise > _FLAT * scale
+            # the point at which a panel ends has the value that it rises to
+            is_end = self.start[after] == self.stop[after] and x[first] == 1.0 - _INSIDE
+            if not (rises or (is_end and rise >= 0.0)):
+                break
             first = after
         return Peak(float(values[first]), float(self._place(first, x[first])))
 
