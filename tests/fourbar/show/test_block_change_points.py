@@ -14,7 +14,6 @@ from click.testing import CliRunner
 
 import fourbar
 from fourbar.cli import group
-from fourbar.files import loads
 from fourbar.formulas.mobility import classify, find_miss, meet_change_points
 from fourbar.show.block import write_block
 from fourbar.show.studies import write_equilibria
@@ -327,7 +326,6 @@ def test_rounding_is_written_as_zero() -> None:
 
 @pytest.mark.slow
 def test_the_peak_of_a_release_over_change_points_is_said_to_grow() -> None:
-    pytest.importorskip("scipy")
     linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
     motion = fourbar.Motion(0.5, 25.0, free=fourbar.Free(0.4, 50))
     scene = fourbar.Scene(
@@ -346,11 +344,9 @@ def test_the_peak_of_a_release_over_change_points_is_said_to_grow() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("steps", [50, 100, 1000])
-def test_the_peak_of_a_release_with_limits_is_not_said_to_grow(steps: int) -> None:
+def test_the_peak_of_a_release_with_limits_is_not_said_to_grow() -> None:
     """Of equal halves each arm carries its own: no pin force grows, however near."""
-    pytest.importorskip("scipy")
-    motion = fourbar.Motion(0.5, 6.0, free=fourbar.Free(2.0, steps))
+    motion = fourbar.Motion(0.5, 6.0, free=fourbar.Free(0.5, 100))
     scene = fourbar.Scene(
         fourbar.uniform(0.3, 0.1, 0.3, 0.1),
         motion,
@@ -371,32 +367,3 @@ def test_a_kite_on_its_change_point_shows_zeros_and_not_their_rounding() -> None
     assert "-0.0000" not in text
     assert re.search(r"transmission angle +0 deg", text)
     assert re.search(r"torque +0 N m", text)
-
-
-FRICTION = """
-[lengths]
-ground = "60 mm"
-input = "180 mm"
-coupler = "60 mm"
-output = "180 mm"
-[bars.coupler]
-mass = "3 kg"
-[motion]
-theta_4 = { from = "-40 deg", to = "40 deg", steps = STEPS }
-omega_4 = "-0.2 rad/s"
-[drive]
-bar = 4
-[effects]
-gravity = ["9.81 m/s^2", "-90 deg"]
-pin_friction = { O4 = { coefficient = 0.12, radius = "6 mm" } }
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("steps", [8, 80, 81])
-def test_a_torque_that_grows_behind_a_maximum_has_no_peak(steps: int) -> None:
-    """The pins' friction grows with their load towards the change point."""
-    scene = loads(FRICTION.replace("STEPS", str(steps)))
-    lines = write_block(scene, fourbar.solve(scene, "error"))
-    (torque,) = (line for line in lines if line.startswith("  torque"))
-    assert "grows without bound at theta_4 = 0 deg" in torque

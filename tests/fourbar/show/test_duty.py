@@ -95,26 +95,6 @@ def test_the_swing_of_the_energy_of_a_balanced_weight_is_known_by_hand() -> None
         assert duty.energy_swing == pytest.approx(2.0 * 2.0 * 9.81 * 0.1, rel=1e-9)
 
 
-@pytest.mark.parametrize("second", [1.2, -1.2])
-def test_the_mean_torque_of_a_law_is_the_work_over_the_angle(second: float) -> None:
-    """The positions are few: the rule's integral of the speed is not the angle.
-
-    The bar that goes back at first turns forwards in the end.
-    """
-    places = (0.1, second, 3.7, 0.1 + math.tau)
-    law = Law((0.0, 0.2, 0.5, 1.0), places, ends="periodic", steps=16)
-    assert (law.at(np.zeros(1))[1] > 0.0) == (second > 0.0)
-    damped = (fourbar.Viscous.at(O2=0.01),)
-    scene = crank_rocker(motion=fourbar.Motion(law=law), effects=damped)
-    duty = motor_duty(fourbar.solve(scene))
-    assert duty is not None and duty.closed
-    assert duty.energy_in is not None and duty.energy_out is not None
-    work = duty.energy_in - duty.energy_out
-    # the difference of the energies has the roundings of the larger one
-    error = abs(duty.mean_torque * math.tau - work)
-    assert error < ROUND_OFF * duty.energy_in
-
-
 def test_the_json_holds_the_duty() -> None:
     scene = crank_rocker(
         motion=fourbar.Motion(np.linspace(0.0, math.tau, 61), 10.0)

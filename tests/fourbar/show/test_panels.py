@@ -117,6 +117,20 @@ def test_the_largest_size_is_the_first_of_equal_ones(
     assert found.place == pytest.approx(place, abs=2e-6)
 
 
+@pytest.mark.parametrize("edges", (EDGES, EDGES[::-1]))
+def test_a_flat_maximum_at_the_pole_of_another_curve_is_where_the_rise_ends(
+    edges: Array,
+) -> None:
+    """Panels beside a pole are so short that in many the values are nearly equal."""
+
+    def compute(places: Array) -> dict[str, Array]:
+        return {"flat": np.cos(places - POLE), "pole": 1.0 / np.abs(places - POLE)}
+
+    wanted = dict.fromkeys(("flat", "pole"), Wanted())
+    peak = fit_panels(compute, edges, wanted).find_peak("flat")
+    assert peak.place == pytest.approx(POLE, abs=2e-6)
+
+
 def test_both_ends_of_a_range_are_found_and_the_way_back_begins_at_its_end() -> None:
     forwards, backwards = (fit(np.sin, edges) for edges in (EDGES, EDGES[::-1]))
     for panels in (forwards, backwards):

@@ -1,53 +1,277 @@
-"""Jumps and peaks between the steps of a sweep, against geometry and finer steps."""
+"""Facts of a motion against a dense scan of `solve`, and releases by the energy."""
 
 import math
-import resource
-import subprocess
-import sys
+import time
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.polynomial.legendre import leggauss
 from scipy.integrate import quad
 from scipy.special import ellipk
 
 import fourbar
 from fourbar.files import loads
-from fourbar.quantities import PIN_FORCES
-from fourbar.scene import Command, command_at
-from fourbar.scene.motion import Law
-from fourbar.show.motion_curves import MotionCurves, describe_motion
+from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
+from fourbar.quantities import Array
+from fourbar.scene import command_at
+from fourbar.scene.motion import Law, Rise
+from fourbar.show.block import write_motor
+from fourbar.show.motion_curves import acts, describe_motion
 from fourbar.show.summary import Facts, summarize
-from tests.support.scenes import CYLINDER, crank_rocker, thesis
+from fourbar.studies.internal_forces import largest_bending
+from tests.support.scenes import CYLINDER, crank_rocker
 
-LOCATED = 1e-7
-"""rad: one of the five steps in which the tests cut a turn, cut down five times by 40,
-with room.
-"""
-PEAK = 1e-6
-"""Relative, of a largest value against that of steps of 0.01 degrees: (0.01 deg)^2
-times its curvature.
-"""
-SIX_DIGITS = 5e-6
-"""Relative, half a unit of the last of six digits."""
-EXACT = 1e-12
-"""Relative, of one position that is solved twice."""
-BARS = """
-[lengths]
-ground = "300 mm"
-input = "100 mm"
-coupler = "250 mm"
-output = "220 mm"
-[bars.input]
-mass = "0.2 kg"
-[bars.coupler]
-mass = "0.5 kg"
-[bars.output]
-mass = "0.4 kg"
-inertia = "20 kg cm^2"
-"""
+NODES, WEIGHTS = leggauss(600)
+"""Positions of each smooth piece of a motion, closer to each other at its ends."""
+EXACT = 1e-8
+"""Relative: a panel is settled to 1e-9 of the largest value."""
+SLIPS = 1e-7
+"""Part of the largest relative speed of a pin that is left where it reverses."""
+SUMMED = 1e-4
+"""Part of the work that a corner of a curve between two positions takes from sums."""
+SLOWER = 12.0
+"""Times a summary with friction in two pins may take: they are solved together."""
+SWING = 1e-2
+"""Relative, of an integral that is known at the ends of steps of 1/100."""
+
+
+def fall(duration: float) -> fourbar.Motion:
+    return fourbar.Motion(
+        law=Rise("cycloidal", (1.0, 0.5), 0.3, 0.2, duration, 0.1, 12)
+    )
+
+
+def rub(**torques: float) -> fourbar.Friction:
+    return fourbar.Friction.at(**torques)
+
+
 WIPER = fourbar.load(Path(__file__).parents[3] / "models" / "gallery" / "wiper.toml")
+TURN = fourbar.Motion(fourbar.Sweep(0.1, 0.1 + math.tau, 12), 10.0)
+BACK = fourbar.Motion(fourbar.Sweep(2.6, 1.3, 12), -4.0)
+PULLED = fourbar.Motion(
+    stroke=fourbar.Sweep(0.33, 0.17, 37), stroke_speed=-0.2, side="left"
+)
+THERE_AND_ON = (0.1, -1.2, 3.7, 0.1 + math.tau)
+CORNERS = tuple(np.radians([0.0, 98.3, 101.3, 104.3, 360.0]))
+SPIKE = fourbar.Load(
+    2, (-1.0, 0.3), moment=-0.05, table=fourbar.Table(CORNERS, (0.5, 0.5, 50, 0.5, 0.5))
+)
+MASSLESS = fourbar.FourBar(0.3, *map(fourbar.Bar, (0.1, 0.25, 0.22)))
+SCENES = {
+    "turn": (crank_rocker(motion=TURN), ""),
+    "turn backwards": (crank_rocker(motion=TURN.replace(speed=-10.0)), ""),
+    "accelerated": (crank_rocker(motion=TURN.replace(acceleration=5.0)), ""),
+    "wiper": (
+        replace(WIPER, motion=WIPER.motion.replace(angle=TURN.angle)),
+        "O4",
+    ),
+    "part of a turn": (crank_rocker(motion=BACK, drive_bar=4), ""),
+    "load with corners": (crank_rocker(motion=TURN, loads=(SPIKE,)), ""),
+    "fall in 5 ms": (crank_rocker(motion=fall(0.005)), ""),
+    "fall in 100 ms": (crank_rocker(motion=fall(0.1)), ""),
+    "law of a table": (
+        crank_rocker(
+            motion=fourbar.Motion(
+                law=Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), 20, "rest")
+            ),
+            effects=(rub(O2=0.05),),
+        ),
+        "O2",
+    ),
+    "closed law that goes back": (
+        crank_rocker(
+            motion=fourbar.Motion(
+                law=Law((0.0, 0.2, 0.5, 1.0), THERE_AND_ON, 16, "periodic")
+            ),
+            effects=(fourbar.Viscous.at(O2=0.01),),
+        ),
+        "",
+    ),
+    "stroke": (
+        crank_rocker(motion=PULLED, drive=CYLINDER, effects=(rub(O4=0.01),)),
+        "O4",
+    ),
+    "nothing acts": (fourbar.Scene(MASSLESS, TURN), ""),
+}
+"""Scenes, and the pin at which dry friction acts."""
+
+
+def list_sizes(scene: fourbar.Scene, s: fourbar.Solution) -> dict[str, Array]:
+    """List the sizes of what a summary has the peaks of, by name."""
+    drive, speed = "drive_force", s.stroke_speed
+    if s.drive is None:
+        drive, speed = "torque", getattr(s, f"omega_{s.drive_bar}")
+    curves = {drive: getattr(s, drive), "power": s.power, "speed": speed}
+    for name in PIN_FORCE.values():
+        curves[name] = np.hypot(*getattr(s, name).T)
+    for bar in MOVING_BARS:
+        curves[f"bending_{bar}"] = largest_bending(scene, s, bar).moment
+        if not acts(scene):
+            curves |= {n: getattr(s, n) for n in (f"omega_{bar}", f"alpha_{bar}")}
+    return {name: np.abs(values) for name, values in curves.items()}
+
+
+def find_slip(s: fourbar.Solution, pin: str) -> Array:
+    """Return the relative speed of the two bars at a pin, rad/s."""
+    first, second = PINS[pin]
+    turned = getattr(s, f"omega_{second}")
+    return turned if first == 1 else turned - getattr(s, f"omega_{first}")
+
+
+def scan(scene: fourbar.Scene, ends: Array, *corners: float) -> tuple[Array, Array]:
+    """Return places in the pieces between corners, and weights that integrate."""
+    low, high = np.sort(ends)
+    edges = np.unique([low, high, *(x for x in corners if low < x < high)])
+    centres = [(0.5 * (start + stop), stop - start) for start, stop in pairwise(edges)]
+    places = [centre + 0.5 * width * NODES for centre, width in centres]
+    weights = [0.5 * width * WEIGHTS for _, width in centres]
+    return np.concatenate(places), np.concatenate(weights)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_facts_are_those_of_a_dense_scan(name: str) -> None:
+    scene, pin = SCENES[name]
+    solution = fourbar.solve(scene)
+    facts = summarize(scene, solution)
+    panels = facts.motion.panels
+    assert not panels.growing
+    ends = solution.at.places[[0, -1]]
+    law = scene.motion.law
+    corners = [] if law is None else [*law.time]
+    corners += [x + k * math.tau for x in CORNERS for k in (0, 1) if "corners" in name]
+    assert [found for _, found in facts.motion.reversals] == [pin] * (
+        len(facts.motion.breaks) if pin else 0
+    )
+    if pin:
+        slips = find_slip(
+            fourbar.solve(scene, at=command_at(scene, scan(scene, ends)[0])), pin
+        )
+        left = find_slip(facts.motion.solve_at(facts.motion.breaks), pin)
+        assert len(left) == np.count_nonzero(slips[1:] * slips[:-1] < 0.0) > 0
+        assert np.abs(left).max() < SLIPS * np.abs(slips).max()
+        corners += facts.motion.breaks.tolist()
+    places, weights = scan(scene, ends, *corners)
+    dense = fourbar.solve(scene, at=command_at(scene, places))
+    sizes = list_sizes(scene, dense)
+    with_peaks = facts.motion.solve_with_peaks()
+    assert np.isin(solution.at.places, with_peaks.at.places).all()
+    assert (np.diff(with_peaks.at.places) * (ends[1] - ends[0]) > 0.0).all()
+    shown = list_sizes(scene, with_peaks)
+    for quantity, size in sizes.items():
+        peak = panels.find_peak(quantity)
+        assert size.max() <= abs(peak.value) * (1.0 + EXACT) + 1e-12, quantity
+        (there,) = list_sizes(scene, facts.motion.solve_at(np.array([peak.place])))[
+            quantity
+        ]
+        assert there == pytest.approx(abs(peak.value), rel=EXACT, abs=1e-12), quantity
+        if quantity in (*PIN_FORCE.values(), "power", "speed"):
+            most = shown[quantity].max()
+            assert most == pytest.approx(abs(peak.value), rel=EXACT, abs=1e-12)
+    for bar, (low, high) in facts.angles.items():
+        angles = getattr(dense, f"theta_{bar}")
+        assert low.value - EXACT <= angles.min() <= angles.max() <= high.value + EXACT
+        reached = facts.motion.solve_at(np.array([low.place, high.place]))
+        away = getattr(reached, f"theta_{bar}") - [low.value, high.value]
+        assert np.abs(np.sin(0.5 * away)).max() < EXACT
+        assert facts.bending[bar].peak == panels.find_peak(f"bending_{bar}")
+    sines = np.abs(dense.sin_mu)
+    assert math.sin(facts.transmission.value) <= sines.min() * (1.0 + EXACT)
+    (sine,) = facts.motion.solve_at(np.array([facts.transmission.place])).sin_mu
+    assert abs(sine) == pytest.approx(math.sin(facts.transmission.value), rel=EXACT)
+    for bar, rates in facts.rates.items():
+        if not acts(scene):
+            assert rates == tuple(
+                panels.find_peak(f"{letter}_{bar}") for letter in ("omega", "alpha")
+            )
+    check_entry(scene, facts, dense, weights)
+
+
+def check_entry(
+    scene: fourbar.Scene, facts: Facts, dense: fourbar.Solution, weights: Array
+) -> None:
+    """Check the numbers of the JSON against sums over the positions of a scan."""
+    entry = write_motor(scene, facts.solution, {})
+    assert entry is not None
+    panels = facts.motion.panels
+    drive, *_ = sizes = list_sizes(scene, dense)
+    kind = "torque" if drive == "torque" else "force"
+    peaks = {f"peak_{kind}": drive, "peak_power": "power", "peak_speed": "speed"}
+    for key, quantity in peaks.items():
+        assert entry[key] == abs(panels.find_peak(quantity).value)
+    assert facts.peak == panels.find_peak(drive)
+    steady = not np.any(scene.motion.acceleration)
+    means = {
+        quantity: pytest.approx(
+            math.sqrt(weights @ size**2 / weights.sum()), rel=EXACT, abs=1e-12
+        )
+        if steady
+        else None
+        for quantity, size in sizes.items()
+    }
+    assert entry[f"rms_{kind}"] == means[drive] and entry["rms_power"] == means["power"]
+    for pin, name in PIN_FORCE.items():
+        of_pin = entry["pins"][pin]
+        peak = panels.find_peak(name)
+        assert (of_pin["peak"], of_pin["rms"]) == (peak.value, means[name])
+        assert facts.pins[pin] == (peak, of_pin["rms"])
+        assert of_pin["theta_2"] == facts.motion.find_theta_2(peak.place)
+    if not steady:
+        assert (
+            entry["energy_in"] is entry["energy_out"] is entry["energy_swing"] is None
+        )
+        return
+    pace = abs(scene.motion.speed) if scene.motion.law is None else 1.0
+    work = weights * dense.power / pace
+    most = np.abs(work).sum()
+    for key, sign in (("energy_in", 1.0), ("energy_out", -1.0)):
+        right = np.maximum(sign * work, 0.0).sum()
+        assert entry[key] == pytest.approx(right, abs=SUMMED * most)
+    first, last = facts.solution.at.angle[[0, -1]]
+    closed = math.isclose(abs(last - first), math.tau)
+    assert entry["closed"] == closed
+    if not closed:
+        assert entry["mean_torque"] is entry["energy_swing"] is None
+        return
+    sense = math.copysign(math.tau, np.mean(dense.at.speed))
+    mean = work.sum() / sense
+    assert entry["mean_torque"] == pytest.approx(mean, abs=SUMMED * sizes[drive].max())
+    surplus = np.cumsum(work - work.sum() * weights / weights.sum())
+    assert entry["energy_swing"] == pytest.approx(np.ptp(surplus), rel=SWING, abs=1e-12)
+
+
+def test_a_list_has_its_own_peaks_and_means() -> None:
+    angles = np.array([0.3, 2.5, 0.4])
+    scene = crank_rocker(motion=fourbar.Motion(angles, 10.0))
+    solution = fourbar.solve(scene)
+    assert describe_motion(solution).solve_with_peaks() is solution
+    entry = write_motor(scene, solution, {})
+    assert entry is not None and solution.torque is not None
+    assert entry["peak_torque"] == np.abs(solution.torque).max()
+    rms = math.sqrt(np.square(solution.torque).mean())
+    assert entry["rms_torque"] == pytest.approx(rms, rel=EXACT)
+
+
+def test_forces_whose_squares_overflow_have_the_peaks_and_means_of_smaller_ones() -> (
+    None
+):
+    """Nothing acts but one force, so that everything is in proportion to it."""
+    small, huge = (
+        summarize(scene, fourbar.solve(scene))
+        for force in (1.0, 1e300)
+        for load in [fourbar.Load(3, (force, 0.4), from_pin=(0.05, 0.0))]
+        for scene in [fourbar.Scene(MASSLESS, TURN, loads=(load,))]
+    )
+    assert small.duty is not None and huge.duty is not None
+    names = ("peak_torque", "rms_torque", "peak_power", "rms_power", "energy_in")
+    pairs = [(getattr(huge.duty, n), getattr(small.duty, n)) for n in names]
+    pairs += [(huge.pins[pin].rms, load.rms) for pin, load in small.pins.items()]
+    for large, usual in pairs:
+        assert large / 1e300 == pytest.approx(usual, rel=EXACT)
+
+
 BUCKET = """
 [lengths]
 ground = "16.5 in"
@@ -55,13 +279,11 @@ input = "23.6 in"
 coupler = "22 in"
 output = "17.7 in"
 ground_angle = "-65 deg"
-[bars.input]
-mass = "130 lb"
 [bars.output]
 mass = "1650 lb"
 centre = ["26 in", "-75 deg"]
 [motion]
-stroke = { from = "44 in", to = "90.6 in", steps = 120 }
+stroke = { from = "44 in", to = "90.6 in", steps = 12 }
 stroke_speed = "3 in/s"
 side = "left"
 [drive]
@@ -71,296 +293,24 @@ to = { bar = 2, from_pin = ["23.6 in", "0 deg"] }
 gravity = ["1 g_0", "-90 deg"]
 """
 PIN = '{ coefficient = 0.15, radius = "2 in" }'
-FRICTION = f"pin_friction = {{ O2 = {PIN}, A = {PIN}, B = {PIN} }}\n"
-FINE = fourbar.Sweep(0.0, math.tau, 36000)
-
-
-def list_sizes(solution: fourbar.Solution) -> dict[str, np.ndarray]:
-    """Sizes of drive, power and pin forces at the positions."""
-    drive = "torque" if solution.drive is None else "drive_force"
-    sizes = {name: np.abs(getattr(solution, name)) for name in (drive, "power")}
-    forces = {name: np.hypot(*getattr(solution, name).T) for name in PIN_FORCES}
-    return sizes | forces
-
-
-def locate_between(_: fourbar.Scene, solution: fourbar.Solution) -> MotionCurves:
-    return describe_motion(solution)
-
-
-def swept(scene: fourbar.Scene, steps: int) -> fourbar.Scene:
-    return replace(
-        scene,
-        motion=scene.motion.replace(angle=fourbar.Sweep(0.0, math.tau, steps)),
-    )
-
-
-@pytest.mark.parametrize("steps", (72, 97, 360))
-def test_dry_friction_reverses_at_the_dead_centres_whatever_the_steps(
-    steps: int,
-) -> None:
-    """The output turns back where bars 2 and 3 are in line.
-
-    Cosine rule for O2, B, O4.
-    """
-    d, a, b, c = WIPER.linkage.lengths
-    stretched, folded = (
-        math.acos((r * r + d * d - c * c) / (2.0 * r * d)) for r in (b + a, b - a)
-    )
-    scene = swept(WIPER, steps)
-    between = locate_between(scene, fourbar.solve(scene))
-    assert [pin for _, pin in between.reversals] == ["O4", "O4"]
-    assert (
-        np.abs(
-            np.subtract(
-                [angle for angle, _ in between.reversals], [stretched, folded + math.pi]
-            )
-        ).max()
-        < LOCATED
-    )
-    located = list_sizes(between.solve_with_peaks())
-    for name in (
-        "F12",
-        "F32",
-        "F43",
-        "F14",
-    ):  # each is largest on one side of the first jump
-        most = max(_beside(scene, stretched, step)[name] for step in (-1, 1))
-        assert located[name].max() == pytest.approx(most, rel=PEAK)
-    assert located["F14"].max() == pytest.approx(22.464, abs=5e-4)
-
-
-def _beside(scene: fourbar.Scene, theta_2: float, step: int) -> dict[str, float]:
-    """Sizes next to an angle."""
-    command = Command(
-        np.array([theta_2 + step * 1e-8]),
-        np.array([1], dtype=np.int8),
-        scene.motion.omega_2,
-        0.0,
-    )
-    return {
-        name: float(size[0])
-        for name, size in list_sizes(fourbar.solve(scene, at=command)).items()
-    }
-
-
-def test_the_largest_of_coarse_steps_is_that_of_fine_ones() -> None:
-    coarse = swept(crank_rocker(), 24)
-    between = locate_between(coarse, fourbar.solve(coarse))
-    assert not between.panels.growing and not between.reversals
-    fine = list_sizes(
-        fourbar.solve(replace(coarse, motion=coarse.motion.replace(angle=FINE)))
-    )
-    for name, size in list_sizes(between.solve_with_peaks()).items():
-        assert size.max() == pytest.approx(fine[name].max(), rel=PEAK), name
-        peak = between.panels.find_peak(name)
-        assert abs(peak.value) == pytest.approx(fine[name].max(), rel=PEAK), name
-    of_coarse = np.isin(
-        between.solve_with_peaks().theta_2, fourbar.solve(coarse).theta_2
-    )
-    assert of_coarse.sum() == 25 and np.all(
-        np.diff(between.solve_with_peaks().theta_2) > 0.0
-    )
-
-
-def read_cam(fall: str, steps: int) -> fourbar.Scene:
-    return loads(
-        f"""{BARS}
-        [motion.law]
-        kind = "cycloidal"
-        theta_2 = "20 deg"
-        rise = ["60 deg", "0.5 s"]
-        dwell = "0.2 s"
-        fall = "{fall}"
-        rest = "0.1 s"
-        steps = {steps}
-        """
-    )
-
-
-@pytest.mark.parametrize(
-    ("fall", "steps", "torque", "time", "power"),
-    [
-        ("5 ms", 360, -1299.52, 0.701065, 281811.0),
-        ("5 ms", 12, -1299.52, 0.701065, 281811.0),
-        ("100 ms", 22, -3.24880, 0.721295, 35.2264),
-        ("100 ms", 28, -3.24880, 0.721295, 35.2264),
-    ],
-)
-def test_the_peak_of_a_short_fall_does_not_depend_on_the_steps(
-    fall: str,
-    steps: int,
-    torque: float,
-    time: float,
-    power: float,
-) -> None:
-    """Right are the free bodies at 20 000 instants of each piece of the law."""
-    scene = read_cam(fall, steps)
-    facts = summarize(scene, fourbar.solve(scene))
-    assert facts.peak is not None and facts.duty is not None
-    assert facts.peak.value == pytest.approx(torque, rel=SIX_DIGITS)
-    assert facts.peak.place == pytest.approx(time, rel=SIX_DIGITS)
-    assert facts.duty.peak_power == pytest.approx(power, rel=SIX_DIGITS)
-
-
-@pytest.mark.parametrize("steps", (7, 36, 361))
-def test_a_corner_of_a_load_between_two_positions_is_a_peak(steps: int) -> None:
-    """The load is fifty times larger at 101.3 degrees than at any position."""
-    scene = loads(
-        f"""{BARS}
-        [motion]
-        theta_2 = {{ from = "5 deg", to = "365 deg", steps = {steps} }}
-        omega_2 = "10 rad/s"
-        alpha_2 = "5 rad/s^2"
-        [[loads]]
-        bar = 2
-        moment = "-0.05 N m"
-        force = ["-1 N", "17 deg"]
-        arm = ["2 cm", "-40 deg"]
-        [loads.table]
-        theta_2 = ["0 deg", "98.3 deg", "101.3 deg", "104.3 deg", "360 deg"]
-        factor = [0.5, 0.5, 50.0, 0.5, 0.5]
-        """
-    )
-    corner = math.radians(101.3)
-    facts = summarize(scene, fourbar.solve(scene))
-    at_corner = fourbar.solve(scene, at=command_at(scene, np.array([corner])))
-    assert facts.peak is not None and facts.pins["O2"].peak is not None
-    assert at_corner.torque is not None and at_corner.F12 is not None
-    assert facts.peak.place == pytest.approx(corner, rel=SIX_DIGITS)
-    assert facts.peak.value == pytest.approx(at_corner.torque[0], rel=EXACT)
-    load = float(np.hypot(*at_corner.F12[0]))
-    assert facts.pins["O2"].peak.value == pytest.approx(load, rel=EXACT)
-
-
-def test_forces_whose_squares_overflow_have_the_peaks_and_means_of_smaller_ones() -> (
-    None
-):
-    """Nothing acts but one force, so that everything is in proportion to it."""
-    motion = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 12), 10.0)
-    facts = []
-    for force in (1.0, 1e300):
-        loads = (fourbar.Load(3, (force, 0.4), from_pin=(0.05, 0.0)),)
-        bars = map(fourbar.Bar, (0.1, 0.25, 0.22))
-        scene = fourbar.Scene(fourbar.FourBar(0.3, *bars), motion, 2, loads)
-        facts.append(summarize(scene, fourbar.solve(scene)))
-    small, huge = facts
-    assert small.peak is not None and huge.peak is not None
-    assert huge.peak.value / 1e300 == pytest.approx(small.peak.value, rel=EXACT)
-    assert small.duty is not None and huge.duty is not None
-    for name in ("rms_torque", "peak_power", "rms_power", "energy_in"):
-        ratio = getattr(huge.duty, name) / 1e300
-        assert ratio == pytest.approx(getattr(small.duty, name), rel=EXACT)
-    for pin, load in small.pins.items():
-        rms = huge.pins[pin].rms
-        assert load.rms is not None and rms is not None
-        assert rms / 1e300 == pytest.approx(load.rms, rel=EXACT)
+FRICTION = f"pin_friction = {{ A = {PIN}, B = {PIN} }}\n"
 
 
 @pytest.mark.slow
-def test_towards_a_limit_within_the_last_step_it_grows_too() -> None:
-    """A sweep that ends where the loop no longer closes.
-
-    Nothing beyond its last position was looked at.
-    """
-    scene = crank_rocker()
-    for steps in (9, 20):
-        swept = replace(
-            scene,
-            motion=fourbar.Motion(theta_4=fourbar.Sweep(1.5, 3.5, steps), omega_4=2.0),
-        )
-        solution = fourbar.solve(swept)
-        assert 0 < solution.assembled.sum() < steps + 1
-        assert {"speed", "power", "F12", "F32", "F43"} <= locate_between(
-            swept, solution
-        ).panels.growing
-
-
-def test_towards_a_pole_no_largest_value_is_made_up() -> None:
-    scene = swept(thesis(), 360)
-    solution = fourbar.solve(scene)
-    between = locate_between(scene, solution)
-    assert "torque" in between.panels.growing
-    assert summarize(scene, solution).peak is None
-
-
-def test_a_motion_law_is_looked_at_between_its_instants_and_listed_angles_are_not() -> (
-    None
-):
-    law = Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), steps=20, ends="rest")
-    scene = crank_rocker(
-        motion=fourbar.Motion(law=law),
-        effects=(fourbar.Friction.at(O2=0.05),),
-    )
-    between = locate_between(scene, fourbar.solve(scene))
-    fine = list_sizes(
-        fourbar.solve(
-            replace(scene, motion=fourbar.Motion(law=replace(law, steps=20000)))
-        )
-    )
-    assert [pin for _, pin in between.reversals] == ["O2"]
-    assert np.max(list_sizes(between.solve_with_peaks())["power"]) == pytest.approx(
-        fine["power"].max(),
-        rel=PEAK,
-    )
-    assert np.all(np.diff(between.solve_with_peaks().time) > 0.0)
-    listed = crank_rocker(motion=fourbar.Motion(np.linspace(0.0, 6.0, 9), 10.0))
-    assert (
-        describe_motion(solution := fourbar.solve(listed)).solve_with_peaks()
-        is solution
-    )
-
-
-def test_the_largest_force_of_a_stroke_is_that_of_fine_steps() -> None:
-    def of(steps: int) -> fourbar.Scene:
-        motion = fourbar.Motion(
-            stroke=fourbar.Sweep(0.33, 0.17, steps),
-            stroke_speed=-0.2,
-            side="left",
-        )
-        return crank_rocker(
-            motion=motion,
-            drive=CYLINDER,
-            effects=(fourbar.Friction((("O4", 0.01),)),),
-        )
-
-    between = locate_between(of(20), fourbar.solve(of(20)))
-    assert (
-        between.solve_with_peaks().at.stroke is not None
-        and (np.diff(between.solve_with_peaks().at.stroke) < 0.0).all()
-    )
-    fine = fourbar.solve(of(20000))
-    for name, size in list_sizes(fine).items():
-        assert list_sizes(between.solve_with_peaks())[name].max() == pytest.approx(
-            size.max(),
-            rel=PEAK,
-        ), name
-    slips = np.flatnonzero(np.diff(np.sign(fine.omega_4)))
-    assert [pin for _, pin in between.reversals] == ["O4"]
-    for (place, _), i in zip(between.reversals, slips, strict=True):
-        assert fine.at.stroke[i + 1] <= place <= fine.at.stroke[i]
-
-
-@pytest.mark.slow
-def test_the_summary_beside_a_dead_point_is_as_quick_with_pin_friction(
-    tmp_path: Path,
-) -> None:
+def test_the_summary_beside_a_dead_point_is_as_quick_with_pin_friction() -> None:
     """From 44 in on the linkage does not assemble at first.
 
     Many couples jam beside the dead point where it begins.
     """
     seconds = []
-    for name, text in (("without", BUCKET), ("with", BUCKET + FRICTION)):
-        (scene := tmp_path / f"{name}.toml").write_text(text)
-        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-        done = subprocess.run(
-            [sys.executable, "-m", "fourbar", "analyze", str(scene)],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0 and "cylinder from bar" in done.stdout, done.stderr
-        seconds.append(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before)
-    assert seconds[1] < 5.0 * seconds[0]
+    for text in (BUCKET, BUCKET + FRICTION):
+        scene = loads(text)
+        before = time.process_time()
+        facts = summarize(scene, fourbar.solve(scene))
+        assert facts.motion.stretches
+        seconds.append(time.process_time() - before)
+
+    assert seconds[1] < SLOWER * seconds[0], seconds
 
 
 EXTREME = 1e-9
@@ -370,21 +320,24 @@ INERTIA = 2.0 * CRANK * ARM**2 / 3.0 + COUPLER * ARM**2
 WEIGHT = 9.8 * (CRANK + COUPLER) * ARM
 
 
-def release_pendulum(omega: float, *effects: fourbar.effects.Effect) -> Facts:
+def release_pendulum(
+    omega: float, duration: float, *effects: fourbar.effects.Effect
+) -> Facts:
     """Release a parallelogram, which is one pendulum: its coupler does not turn.
 
     The seven instants that it states are never extreme.
     """
     crank = fourbar.Bar(ARM, CRANK)
     linkage = fourbar.FourBar(0.6, crank, fourbar.Bar(0.6, COUPLER), crank)
-    motion = fourbar.Motion(1.5 * math.pi - AWAY, omega, free=fourbar.Free(3.0, 7))
+    free = fourbar.Free(duration, 7)
+    motion = fourbar.Motion(1.5 * math.pi - AWAY, omega, free=free)
     scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(9.8), *effects))
     return summarize(scene, fourbar.solve(scene))
 
 
 def test_a_released_swing_has_its_period_and_the_first_of_equal_extremes() -> None:
     """The period of a pendulum is an elliptic integral."""
-    facts = release_pendulum(0.0)
+    facts = release_pendulum(0.0, 1.7)
     slow = math.sqrt(INERTIA / WEIGHT)
     period = 4.0 * slow * float(ellipk(math.sin(0.5 * AWAY) ** 2))
     assert facts.period == pytest.approx(period, rel=EXTREME)
@@ -392,7 +345,7 @@ def test_a_released_swing_has_its_period_and_the_first_of_equal_extremes() -> No
     assert low == pytest.approx((1.5 * math.pi - AWAY, 0.0), abs=EXTREME)
     highest = 1.5 * math.pi + AWAY
     assert high == pytest.approx((highest, 0.5 * period), abs=EXTREME)
-    damped = release_pendulum(0.0, fourbar.Viscous((("O2", 1e-6),)))
+    damped = release_pendulum(0.0, 1.7, fourbar.Viscous((("O2", 1e-6),)))
     assert damped.period is None
 
 
@@ -404,4 +357,5 @@ def test_a_released_turn_has_its_period() -> None:
         return math.sqrt(0.5 * INERTIA / (energy + WEIGHT * math.cos(theta)))
 
     period, _ = quad(compute_slowness, 0.0, 2.0 * math.pi, epsabs=1e-13)
-    assert release_pendulum(30.0).period == pytest.approx(period, rel=EXTREME)
+    facts = release_pendulum(30.0, 0.5)
+    assert facts.period == pytest.approx(period, rel=EXTREME)
