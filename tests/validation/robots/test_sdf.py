@@ -1,6 +1,7 @@
 """An SDF is the mechanism that it states, in whichever way it states it."""
 
 import math
+import re
 from pathlib import Path
 
 import mujoco
@@ -216,6 +217,67 @@ STATED = {
         ),
     ),
 }
+
+
+def write_drake() -> str:
+    """Return thin rods drawn anywhere, whose joints have a frame on each link.
+
+    The prefix is bound nowhere, as in Drake's own files.
+    """
+    frames = (
+        ("Gc", "ground", 0.0, START),
+        ("Gr", "ground", D, ROCKER),
+        ("Ca", "crank", A, ROD - START),
+        ("Rb", "rod", B, 0.0),
+        ("Ro", "rocker", C, 0.0),
+    )
+    joints = (
+        ("O2", "ground", "crank", "Gc", "crank"),
+        ("O4", "ground", "rocker", "Gr", "rocker"),
+        ("A", "crank", "rod", "Ca", "rod"),
+        ("B", "rocker", "rod", "Ro", "Rb"),
+    )
+    nothing = "<mass>0</mass><inertia><ixx>0</ixx><iyy>0</iyy><izz>0</izz></inertia>"
+    text = "".join(
+        write_link(name, length, "<pose>7 8 9 0 0 1</pose>")
+        for name, length in (("crank", A), ("rod", B), ("rocker", C))
+    )
+    text = re.sub(
+        "<ixx>1</ixx><iyy>1</iyy><izz>(.*?)<",
+        r"<ixx>0</ixx><iyy>\1</iyy><izz>\1<",
+        text,
+    )
+    text += f'<link name="ground"><inertial>{nothing}</inertial></link>'
+    text += '<joint name="G" type="fixed"><parent>world</parent><child>ground</child>'
+    text += "</joint>"
+    for name, link, x, angle in frames:
+        text += f'<frame name="{name}" attached_to="{link}">'
+        text += f"<pose>{x} 0 0 0 0 {angle}</pose></frame>"
+    for name, parent, child, at_parent, at_child in joints:
+        text += f'<joint name="{name}" type="revolute"><parent>{parent}</parent>'
+        text += f"<child>{child}</child><drake:parent_frame>{at_parent}"
+        text += f"</drake:parent_frame><drake:child_frame>{at_child}"
+        text += f"</drake:child_frame>{AXIS}</joint>"
+    return put((MODEL, f'<model name="linkage">{text}</model>'))
+
+
+def write_halves() -> str:
+    """Return the rod as two halves on each other, which a constraint welds."""
+    rod = make_bar(B)
+    half = COUPLER.replace(f"<mass>{rod.mass}", f"<mass>{rod.mass / 2.0}")
+    half = half.replace(f"<izz>{rod.inertia}", f"<izz>{rod.inertia / 2.0}")
+    weld = "<parent>rod</parent><child>shadow</child></drake:weld_constraint>"
+    return put(
+        (COUPLER, half + half.replace('"rod"', '"shadow"')),
+        (
+            CLOSING,
+            CLOSING.replace(">rod<", ">shadow<") + f"<drake:weld_constraint>{weld}",
+        ),
+    )
+
+
+STATED["two frames of each joint"] = write_drake()
+STATED["weld constraint"] = write_halves()
 ROD_MODEL = f"""<sdf version="1.9"><model name="rod"><pose>9 9 9 0 0 0</pose>
 {COUPLER.replace(f"{PIN_A.real} {PIN_A.imag} 0 0 0 {ROD}", "1 2 3 0 0 0.4")}
 <frame name="start" attached_to="rod"/></model></sdf>"""
@@ -548,15 +610,27 @@ ixz="0" iyz="0"/></inertial></link><gazebo/>
 <mimic joint="hip" multiplier="-1.5" offset="0.2"/></joint></robot>"""
 
 
+@pytest.mark.parametrize(
+    ("gazebo", "way"),
+    [
+        (
+            "<gazebo/>",
+            "a URDF is a tree: its only loops are mimic joints, and check-mjcf SCENE"
+            " FILE --mimic JOINT judges one; to close another, save it as MJCF"
+            " (mj_saveLastXML) and add a <connect> between two sites, one on each link",
+        ),
+        (
+            '<gazebo><joint name="last"/></gazebo>',
+            'last of <gazebo> may close loops, but are no URDF: "gz sdf -p FILE >'
+            ' robot.sdf" writes an SDF that has them',
+        ),
+    ],
+)
 def test_of_a_urdf_mimic_joints_are_listed_and_the_way_on_is_said(
-    tmp_path: Path,
+    gazebo: str, way: str, tmp_path: Path
 ) -> None:
-    report = list_closures(read(tmp_path, URDF), PoseOptions())
+    text = URDF.replace("<gazebo/>", gazebo)
+    report = list_closures(read(tmp_path, text), PoseOptions())
     (closure,) = report.closures
     assert closure.reason.startswith("knee follows hip, polycoef 0.2 -1.5 0 0 0")
-    assert report.notes[:2] == (
-        "left out of the URDF: gazebo",
-        "a URDF is a tree: its only loops are mimic joints, and check-mjcf SCENE FILE"
-        " --mimic JOINT judges one; to close another, save it as MJCF (mj_saveLastXML)"
-        " and add a <connect>",
-    )
+    assert report.notes[:2] == ("left out of the URDF: gazebo", way)

@@ -17,8 +17,6 @@ from fourbar.writing import read_text
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 
 _USD = (".usd", ".usda", ".usdc", ".usdz")
-_XACRO = "ros.org/wiki/xacro"
-"""Part of the namespace of the macros that a URDF is written with."""
 LARGEST_TEXT = 16 * 2**20
 """Bytes of a file and its includes; a humanoid takes half a million."""
 LARGEST_ASSETS = 512 * 2**20
@@ -78,11 +76,15 @@ def mend_text(text: str) -> str:
     """Return a text as XML where MuJoCo's reader asks for less.
 
     Comments are dropped, since two hyphens may stand in them; attributes get a blank
-    between them; an ampersand that begins no entity is one.
+    between them; an ampersand that begins no entity is one; a prefix that nothing
+    binds, like that of Drake's elements, stands for itself.
     """
     text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
     text = re.sub(r"""(=\s*(?:"[^"]*"|'[^']*'))(?=[A-Za-z_])""", r"\1 ", text)
-    return re.sub(r"&(?!#?\w+;)", "&amp;", text)
+    text = re.sub(r"&(?!#?\w+;)", "&amp;", text)
+    used, bound = (set(re.findall(one, text)) for one in (r"<(\w+):", r"xmlns:(\w+)"))
+    spaces = "".join(f' xmlns:{prefix}="{prefix}"' for prefix in sorted(used - bound))
+    return re.sub(r"<\w+", rf"\g<0>{spaces}", text, count=1)
 
 
 @dataclass
@@ -103,7 +105,9 @@ class _RobotReading:
             raise InputError("--assets", str(self.assets), "must be a folder")
         if self.path.suffix.lower() in _USD:
             raise self._refuse(
-                self.path.name, "is a USD: give the robot's MJCF, SDF or URDF"
+                self.path.name,
+                "is a USD: give the robot's MJCF, SDF or URDF, or the pins of its loop"
+                " to fourbar new --pins",
             )
         root = self._parse(self.path)
         if root.tag == "sdf":
@@ -156,10 +160,11 @@ class _RobotReading:
     def _reduce_urdf(self, root: ET.Element) -> None:
         """Leave what MuJoCo's own reader of URDF needs: inertias and joints."""
         left_out = {child.tag for child in root} - {"link", "joint", "material"}
-        if any(_XACRO in tag for tag in left_out):
+        if any("xacro}" in tag for tag in left_out):
             raise self._refuse(
                 self.path.name, 'is a xacro: "xacro FILE > robot.urdf" writes its URDF'
             )
+        closing = [one.get("name", "") for one in root.findall("gazebo/joint")]
         for child in list(root):
             if child.tag not in ("link", "joint"):
                 root.remove(child)
@@ -169,10 +174,16 @@ class _RobotReading:
                     link.remove(child)
         if left_out:
             self.notes.append(f"left out of the URDF: {', '.join(sorted(left_out))}")
+        if closing:
+            self.notes.append(
+                f"{', '.join(closing)} of <gazebo> may close loops, but are no URDF: "
+                '"gz sdf -p FILE > robot.sdf" writes an SDF that has them'
+            )
+            return
         self.notes.append(
             "a URDF is a tree: its only loops are mimic joints, and check-mjcf SCENE "
             "FILE --mimic JOINT judges one; to close another, save it as MJCF "
-            "(mj_saveLastXML) and add a <connect>"
+            "(mj_saveLastXML) and add a <connect> between two sites, one on each link"
         )
 
     def _refuse(self, what: object, allowed: str) -> InputError:
@@ -202,7 +213,9 @@ class _RobotReading:
             root = self._parse_text(mend_text(text), path)
         except (ET.ParseError, ValueError):
             raise self._refuse(path.name, f"is no XML: {error}") from None
-        self.notes.append(f"{path.name} is no XML ({error}), but read as MuJoCo does")
+        self.notes.append(
+            f"{path.name} is no XML ({error}), but read as simulators read it"
+        )
         return root
 
     def _parse_text(self, text: str, path: Path) -> ET.Element:

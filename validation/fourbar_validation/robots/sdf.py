@@ -1,17 +1,17 @@
 """An SDF world or model as MJCF.
 
 Links become bodies and joints become hinges, slides and balls. A joint that closes a
-loop, and Drake's ball constraint, become a connect. The text keeps every digit of the
-file; MuJoCo's own writer keeps six.
+loop, and Drake's constraints, become a connect or a weld. The text keeps every digit
+of the file; MuJoCo's own writer keeps six.
 """
 
 import heapq
 import math
+import re
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from copy import deepcopy
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -29,28 +29,28 @@ UNBOUNDED = 1e16
 """rad or m; a limit beyond it is none."""
 _WIDEST = 1e9
 """rad or m; stands for a missing end of a range of which the other is stated."""
-_DRAKE = "{http://drake.mit.edu}"
+LEAST_INERTIA = 1e-13
+"""kg m^2; a thin rod states 0 about itself, which MuJoCo takes from no moving body."""
 _BUSHING = "drake:linear_bushing_rpy"
-_DEGREES_OF_FREEDOM = {
-    "fixed": (),
-    "revolute": ("axis",),
-    "continuous": ("axis",),
-    "prismatic": ("axis",),
-    "universal": ("axis", "axis2"),
-    "revolute2": ("axis", "axis2"),
-    "ball": (),
+_PIN = "drake:ball_constraint"
+_WELD = "drake:weld_constraint"
+_FRAMES = ("drake:parent_frame", "drake:child_frame")
+"""Elements of a joint that name its frame on each link; they coincide at its zero."""
+_AXES = {
+    **{"fixed": (), "ball": ()},
+    **dict.fromkeys(("revolute", "continuous", "prismatic"), ("axis",)),
+    **dict.fromkeys(("universal", "revolute2"), ("axis", "axis2")),
 }
 """Elements that state the axes of each type of joint that is read."""
-_ELEMENTS_READ = {
-    *("world", "model", "link", "joint", "frame", "include", "pose", "inertial"),
-    *("collision", "gravity", "static", "physics", "parent", "child", "axis", "axis2"),
-    *("uri", "name", "placement_frame", "drake:ball_constraint"),
-}
-_OF_NO_FORCE = {
+_MEMBERS = ("link", "joint", "frame", "model", "include")
+_NAMED_NOWHERE = {
+    *(*_MEMBERS, "world", "pose", "inertial", "collision", "gravity", "static"),
+    *("physics", "parent", "child", "axis", "axis2", "uri", "name", "placement_frame"),
+    *(_PIN, _WELD, *_FRAMES),
     *("visual", "light", "scene", "gui", "audio", "atmosphere", "magnetic_field"),
     *("spherical_coordinates", "self_collide", "allow_auto_disable"),
 }
-"""Elements that no force of a loop depends on."""
+"""Elements that are read, or that no force of a loop depends on."""
 
 FindModel = Callable[[str], ET.Element]
 """Function from the URI of an <include> to the <sdf> of that file."""
@@ -67,20 +67,28 @@ def convert_sdf(root: ET.Element, find: FindModel) -> tuple[ET.Element, list[str
     ------
     InputError : what is missing or contradicts itself, in one line.
     """
-    return _Conversion(root, find).convert()
+    _name_prefixes(root)
+    return _Conversion(find).convert(root)
+
+
+def _name_prefixes(root: ET.Element) -> None:
+    """Write the tags of Drake's elements as files write them, "drake:..."."""
+    for element in root.iter():
+        element.tag = re.sub("{[^}]*drake[^}]*}", "drake:", element.tag)
 
 
 def _refuse(what: object, allowed: str) -> InputError:
     return InputError("SDF", what, allowed)
 
 
-def _tag(element: ET.Element) -> str:
-    return element.tag.replace(_DRAKE, "drake:")
-
-
 def _text(element: ET.Element, path: str, default: str = "") -> str:
     """Return the text of a descendant, or a default where it is missing or empty."""
-    return (element.findtext(path) or "").strip() or default
+    if ":" in path:  # ElementTree takes it for the prefix of a namespace
+        found = next((one for one in element if one.tag == path), None)
+        text = "" if found is None else found.text
+    else:
+        text = element.findtext(path)
+    return (text or "").strip() or default
 
 
 def _numbers(text: str, count: int, what: str) -> list[float]:
@@ -94,27 +102,41 @@ def _numbers(text: str, count: int, what: str) -> list[float]:
     return numbers
 
 
+def _number(element: ET.Element, path: str, default: str, name: str) -> float:
+    """Read one finite number below an element of a named link or joint."""
+    return _numbers(_text(element, path, default), 1, f"{path} of {name}")[0]
+
+
 def _is_true(text: str) -> bool:
     return text.strip().lower() in ("true", "1")
+
+
+def _join(scope: str, name: str) -> str:
+    """Return the full name of what a model calls by a name; "" is the world."""
+    if name in ("", "__model__"):
+        return scope
+    if name == "world":
+        return ""
+    return f"{scope}::{name}" if scope else name
 
 
 def _make_pose_matrix(element: ET.Element) -> Array:
     """Return the matrix of the <pose> of an element, (4, 4)."""
     matrix = np.eye(4)
     pose = element.find("pose")
-    if pose is None or not (pose.text or "").strip():
+    text = _text(element, "pose")
+    if pose is None or not text:
         return matrix
-    text = pose.text or ""
-    what = f"the pose of {element.get('name', _tag(element))}"
+    what = f"the pose of {element.get('name', element.tag)}"
     if pose.get("rotation_format") == "quat_xyzw":
-        *place, x, y, z, w = _numbers(text, 7, what)
-        rotation = Rotation.from_quat([x, y, z, w])
+        numbers = _numbers(text, 7, what)
+        rotation = Rotation.from_quat(numbers[3:])
     else:
-        *place, roll, pitch, yaw = _numbers(text, 6, what)
+        numbers = _numbers(text, 6, what)
         degrees = _is_true(pose.get("degrees", ""))
-        rotation = Rotation.from_euler("xyz", [roll, pitch, yaw], degrees=degrees)
+        rotation = Rotation.from_euler("xyz", numbers[3:], degrees=degrees)
     matrix[:3, :3] = rotation.as_matrix()
-    matrix[:3, 3] = place
+    matrix[:3, 3] = numbers[:3]
     return matrix
 
 
@@ -123,140 +145,36 @@ def _relative_to(element: ET.Element) -> str:
     return "" if pose is None else pose.get("relative_to", "")
 
 
-@dataclass(eq=False)
-class _Scope:
-    """The world or a model, in which names are looked up."""
+@dataclass(frozen=True, slots=True)
+class _Member:
+    """A model, link, joint or frame; names are full ones."""
 
     element: ET.Element
-    name: str
-    parent: "_Scope | None"
-    members: dict[str, "ET.Element | _Scope"] = field(default_factory=dict)
-    pending: set[str] = field(default_factory=set)
-    """Names whose pose is being computed."""
+    scope: str
+    """Model that holds it."""
+    static: bool
+    carrier: str
+    """What a joint or frame is attached to; that of a model is not known yet."""
 
     @property
-    def static(self) -> bool:
-        """Tell whether the model, or one that holds it, is fixed to the world."""
-        stated = _is_true(_text(self.element, "static"))
-        return stated or (self.parent is not None and self.parent.static)
-
-    def pose(self) -> Array:
-        """Return the pose of the scope's own frame in the world, (4, 4)."""
-        if self.parent is None:
-            return np.eye(4)
-        return np.asarray(self.parent.pose() @ self.parent.locate(self.name))
-
-    def member(self, name: str) -> "ET.Element | _Scope":
-        """Return a link, joint, frame or model by its name."""
-        if name not in self.members:
-            raise _refuse(name, f"is no link, joint, frame or model of {self.name}")
-        return self.members[name]
-
-    def model(self, name: str) -> "_Scope":
-        """Return a model by its name."""
-        member = self.member(name)
-        if isinstance(member, _Scope):
-            return member
-        raise _refuse(name, f"is no model of {self.name}")
-
-    def locate(self, name: str) -> Array:
-        """Return the pose of a member in the scope's own frame, (4, 4)."""
-        if name in ("", "__model__", "world"):
-            return np.eye(4)
-        if "::" in name:
-            first, _, rest = name.partition("::")
-            return np.asarray(self.locate(first) @ self.model(first).locate(rest))
-        if name in self.pending:
-            raise _refuse(name, "is placed relative to itself")
-        self.pending.add(name)
-        member = self.member(name)
-        if isinstance(member, _Scope):
-            element = member.element
-            placed = element.get("placement_frame", "")
-            offset = np.linalg.inv(member.locate(placed))
-            reference = _relative_to(element)
-        else:
-            offset = np.eye(4)
-            reference = _relative_to(member) or self._attachment(member)
-        pose = (
-            self.locate(reference) @ _make_pose_matrix(self._element(member)) @ offset
-        )
-        self.pending.discard(name)
-        return np.asarray(pose)
-
-    @staticmethod
-    def _element(member: "ET.Element | _Scope") -> ET.Element:
-        return member.element if isinstance(member, _Scope) else member
-
-    @staticmethod
-    def _attachment(element: ET.Element) -> str:
-        """Return the name of what a joint or frame is attached to; a link to none."""
-        if element.tag == "joint":
-            return _text(element, "child")
-        return element.get("attached_to", "")
-
-    def find_link(self, name: str) -> "_Link | None":
-        """Return the link that a name stands for or is attached to; None: the world."""
-        if name == "world":
-            return None
-        if "::" in name:
-            first, _, rest = name.partition("::")
-            return self.model(first).find_link(rest)
-        if name in ("", "__model__"):
-            if self.parent is None:
-                return None
-            return self.find_link(self._canonical_link())
-        if name in self.pending:
-            raise _refuse(name, "is attached to itself")
-        member = self.member(name)
-        if isinstance(member, _Scope):
-            return member.find_link("")
-        if member.tag == "link":
-            return _Link(self, name)
-        self.pending.add(name)
-        link = self.find_link(self._attachment(member))
-        self.pending.discard(name)
-        return link
-
-    def _canonical_link(self) -> str:
-        """Return the name of the link that carries the model's frame."""
-        stated = self.element.get("canonical_link")
-        if stated:
-            return stated
-        for name, member in self.members.items():
-            if isinstance(member, _Scope) or member.tag == "link":
-                return name
-        raise _refuse(self.name, "has no link")
+    def reference(self) -> str:
+        """Name of what the pose is stated in."""
+        stated = _relative_to(self.element)
+        if stated or self.element.tag not in ("joint", "frame"):
+            return _join(self.scope, stated)
+        return self.carrier
 
 
-@dataclass(frozen=True)
-class _Link:
-    """A link of a model."""
-
-    scope: _Scope
-    name: str
-
-    @property
-    def element(self) -> ET.Element:
-        """The <link>."""
-        element = self.scope.member(self.name)
-        assert isinstance(element, ET.Element)
-        return element
-
-    def pose(self) -> Array:
-        """Return the pose of the link in the world, (4, 4)."""
-        return np.asarray(self.scope.pose() @ self.scope.locate(self.name))
-
-
-class _Edge(NamedTuple):
-    """Joint between two links, None: the world; or what fixes a link to it."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Edge:
+    """Joint between two links, or what fixes a link to the world."""
 
     name: str
     kind: str
-    scope: _Scope
-    parent: _Link | None
-    child: _Link | None
-    element: ET.Element | None = None
+    parent: str
+    child: str
+    scope: str
+    element: ET.Element
 
     def rank(self) -> int:
         """Return how early the joint belongs to the tree: the last may close a loop.
@@ -266,64 +184,67 @@ class _Edge(NamedTuple):
         """
         if self.kind == "ball":
             return 4
-        if self.element is None or self.kind not in ("revolute", "continuous"):
+        if self.kind not in ("revolute", "continuous"):
             return 1
         follows = self.element.find("axis/mimic") is not None
         return 2 if self.has_dynamics() or follows else 3
 
     def has_dynamics(self) -> bool:
         """Tell whether the joint has damping, friction or a spring."""
-        return self.element is not None and any(
+        return any(
             float(_text(self.element, f"axis/dynamics/{name}", "0")) != 0.0
             for name in ("damping", "friction", "spring_stiffness")
         )
 
     def read_start(self) -> float:
         """Return <initial_position> of a joint with one axis, rad or m; 0 without."""
-        if self.element is None or len(_DEGREES_OF_FREEDOM[self.kind]) != 1:
+        if len(_AXES[self.kind]) != 1:
             return 0.0
-        text = _text(self.element, "axis/initial_position", "0")
-        return _numbers(text, 1, f"initial_position of {self.name}")[0]
+        return _number(self.element, "axis/initial_position", "0", self.name)
 
 
 class _Conversion:
-    """One SDF file that is being converted."""
+    """One SDF file that is being converted; links and frames have full names."""
 
-    def __init__(self, root: ET.Element, find: FindModel) -> None:
-        self.root = root
+    def __init__(self, find: FindModel) -> None:
         self.find = find
-        self.links: list[_Link] = []
+        self.members: dict[str, _Member] = {}
+        self.pending: set[tuple[str, str]] = set()
+        """Names whose pose in a frame, or whose link, is being looked for."""
         self.edges: list[_Edge] = []
-        self.constraints: list[tuple[_Scope, ET.Element]] = []
+        self.constraints: list[tuple[str, ET.Element]] = []
         self.notes: list[str] = []
         self.left_out: set[str] = set()
-        self.tree: dict[_Link, tuple[_Edge | None, _Link | None]] = {}
+        self.tree: dict[str, tuple[_Edge | None, str]] = {}
         """Joint by which each link hangs on another, and that link."""
-        self.names: dict[tuple[_Scope, str], str] = {}
+        self.names: dict[str, str] = {"": "world"}
 
-    def convert(self) -> tuple[ET.Element, list[str]]:
+    def convert(self, root: ET.Element) -> tuple[ET.Element, list[str]]:
         """Convert the file."""
-        worlds = [one for one in self.root if one.tag in ("world", "model")]
+        worlds = [one for one in root if one.tag in ("world", "model")]
         if not worlds:
-            raise _refuse(self.root.tag, "holds neither a <world> nor a <model>")
+            raise _refuse(root.tag, "holds neither a <world> nor a <model>")
         if worlds[0].tag == "world":
             world = worlds[0]
         else:
             world = ET.Element("world", {"name": "world"})
             world.extend(worlds)
-        scope = _Scope(world, "world", None)
-        for each in list(self._collect(scope)):
-            self._read_members(each)
-        self._name_members()
-        self._grow_tree()
+        self._collect("", world, static=False)
+        for name, member in self.members.items():
+            self._read_member(name, member)
+        links = [name for name in self.members if self._tag(name) == "link"]
+        self._name_members(links)
+        self._name_members(
+            [name for name in self.members if self._tag(name) == "joint"]
+        )
+        self._grow_tree(links)
         mujoco = ET.Element("mujoco")
         ET.SubElement(mujoco, "compiler", angle="radian")
         gravity = _numbers(_text(world, "gravity", DEFAULT_GRAVITY), 3, "gravity")
         timestep = _text(world, "physics/max_step_size", DEFAULT_TIMESTEP)
         ET.SubElement(mujoco, "option", gravity=_write(gravity), timestep=timestep)
         self.asset = ET.SubElement(mujoco, "asset")
-        self.body: dict[_Link | None, ET.Element]
-        self.body = {None: ET.SubElement(mujoco, "worldbody")}
+        self.body = {"": ET.SubElement(mujoco, "worldbody")}
         for link in self.tree:
             self._add_body(link)
         self.equality = ET.SubElement(mujoco, "equality")
@@ -338,58 +259,44 @@ class _Conversion:
             )
         return mujoco, self.notes
 
-    def _collect(self, scope: _Scope) -> Iterator[_Scope]:
-        """Read the names of a scope; yield it and the models inside."""
-        yield scope
-        for child in scope.element:
-            tag = _tag(child)
-            if tag == "drake:ball_constraint":
+    def _tag(self, name: str) -> str:
+        return self.members[name].element.tag
+
+    def _collect(self, scope: str, holder: ET.Element, *, static: bool) -> None:
+        """Read the names of a world or model, and then those of the models inside."""
+        models = []
+        for child in holder:
+            if child.tag in (_PIN, _WELD):
                 self.constraints.append((scope, child))
-            elif tag not in _ELEMENTS_READ | _OF_NO_FORCE:
-                self.left_out.add(tag)
-            if tag not in ("link", "joint", "frame", "model", "include"):
+            elif child.tag not in _NAMED_NOWHERE:
+                self.left_out.add(child.tag)
+            if child.tag not in _MEMBERS:
                 continue
-            element = self._include(child) if tag == "include" else child
+            element = self._include(child) if child.tag == "include" else child
             name = element.get("name", "")
-            if not name or name in scope.members:
-                raise _refuse(name, f"must be a name of its own, in {scope.name}")
+            full = _join(scope, name)
+            if not name or full in self.members:
+                raise _refuse(name, f"must be a name of its own, in {scope or 'world'}")
+            attached = element.get("attached_to", "")
+            if element.tag == "joint":
+                attached = _text(element, "child")
+            fixed = static or _is_true(_text(element, "static"))
+            carrier = _join(scope, attached)
+            self.members[full] = _Member(element, scope, fixed, carrier)
             if element.tag == "model":
-                scope.members[name] = _Scope(element, name, scope)
-                yield from self._collect(scope.model(name))
-            else:
-                scope.members[name] = element
-
-    def _read_members(self, scope: _Scope) -> None:
-        """Read the links and joints of a scope whose names are all known."""
-        for name, member in scope.members.items():
-            if isinstance(member, _Scope):
-                continue
-            unread = {_tag(child) for child in member} - _ELEMENTS_READ - _OF_NO_FORCE
-            self.left_out |= unread
-            if member.tag == "link":
-                self.links.append(_Link(scope, name))
-                if scope.static:
-                    link = self.links[-1]
-                    self.edges.append(_Edge("", "fixed", scope, None, link))
-            elif member.tag == "joint":
-                self._read_joint(scope, name, member)
-
-    def _read_joint(self, scope: _Scope, name: str, joint: ET.Element) -> None:
-        kind = joint.get("type", "")
-        if kind not in _DEGREES_OF_FREEDOM:
-            self.left_out.add(f"the {kind} joint {name}")
-            return
-        parent, child = (
-            scope.find_link(_text(joint, end)) for end in ("parent", "child")
-        )
-        self.edges.append(_Edge(name, kind, scope, parent, child, joint))
+                models.append(full)
+        for name in models:
+            model = self.members[name]
+            self._collect(name, model.element, static=model.static)
 
     def _include(self, include: ET.Element) -> ET.Element:
         """Return the model of an included file, with what the include states anew."""
         uri = _text(include, "uri")
         if _is_true(include.get("merge", "")):
             raise _refuse(uri, 'is included with merge="true", which is not read')
-        model = self.find(uri).find("model")
+        included = self.find(uri)
+        _name_prefixes(included)
+        model = included.find("model")
         if model is None:
             raise _refuse(uri, "holds no <model>")
         model = deepcopy(model)
@@ -405,37 +312,103 @@ class _Conversion:
             model.set("placement_frame", placement)
         return model
 
-    def _name_members(self) -> None:
-        """Name links and joints as the file does, with models where names repeat."""
-        for members in (
-            [(link.scope, link.name) for link in self.links],
-            [(edge.scope, edge.name) for edge in self.edges if edge.name],
-        ):
-            counts = Counter(name for _, name in members)
-            for scope, name in members:
-                models = []
-                holder = scope
-                while counts[name] > 1 and holder.parent is not None:
-                    models.append(holder.name)
-                    holder = holder.parent
-                self.names[scope, name] = "::".join([*reversed(models), name])
+    def _read_member(self, name: str, member: _Member) -> None:
+        """Read a link or a joint, now that all names are known."""
+        element = member.element
+        if element.tag == "model":
+            return
+        self.left_out |= {child.tag for child in element} - _NAMED_NOWHERE
+        if element.tag == "link" and member.static:
+            self.edges.append(_Edge("", "fixed", "", name, "", element))
+        if element.tag != "joint":
+            return
+        kind = element.get("type", "")
+        if kind not in _AXES:
+            self.left_out.add(f"the {kind} joint {element.get('name')}")
+            return
+        parent, child = (
+            self._find_link(_join(member.scope, _text(element, end)))
+            for end in ("parent", "child")
+        )
+        self.edges.append(_Edge(name, kind, parent, child, member.scope, element))
 
-    def _name(self, link: _Link | None) -> str:
-        return "world" if link is None else self.names[link.scope, link.name]
+    def _begin(self, name: str, asked: str) -> _Member:
+        """Return a member, of which the link or the pose in a frame is asked for."""
+        scope, _, short = name.rpartition("::")
+        if name not in self.members:
+            raise _refuse(short, f"is no link, joint, frame or model of {scope}")
+        if (name, asked) in self.pending:
+            raise _refuse(short, "is placed relative to itself or attached to itself")
+        self.pending.add((name, asked))
+        return self.members[name]
 
-    def _grow_tree(self) -> None:
+    def _locate(self, name: str, base: str = "") -> Array:
+        """Return the pose of a member in the frame of a model or the world, (4, 4)."""
+        if name == base:
+            return np.eye(4)
+        member = self._begin(name, base)
+        element = member.element
+        pose = self._locate(member.reference, base) @ _make_pose_matrix(element)
+        placed = element.get("placement_frame", "")
+        if placed:
+            pose = pose @ np.linalg.inv(self._locate(_join(name, placed), name))
+        self.pending.discard((name, base))
+        return np.asarray(pose)
+
+    def _find_link(self, name: str) -> str:
+        """Return the link that a name stands for or is attached to."""
+        if not name:
+            return ""
+        member = self._begin(name, "link")
+        link = name
+        if member.element.tag == "model":
+            inside = [
+                other.element.get("name", "")
+                for other in self.members.values()
+                if other.scope == name and other.element.tag in ("link", "model")
+            ]
+            stated = member.element.get("canonical_link")
+            if not (stated or inside):
+                raise _refuse(name, "has no link")
+            link = self._find_link(_join(name, stated or inside[0]))
+        elif member.element.tag != "link":
+            link = self._find_link(member.carrier)
+        self.pending.discard((name, "link"))
+        return link
+
+    def _locate_in(self, link: str, name: str) -> Array:
+        """Return the pose of a member in a link, (4, 4)."""
+        return np.asarray(np.linalg.inv(self._locate(link)) @ self._locate(name))
+
+    def _find_frame(self, edge: _Edge, link: str) -> str:
+        """Return the frame of a joint on one of its links."""
+        stated = _text(edge.element, _FRAMES[link == edge.child])
+        return _join(edge.scope, stated) if stated else edge.name
+
+    def _place(self, edge: _Edge, link: str) -> Array:
+        """Return the pose of a joint in one of its links, (4, 4)."""
+        return self._locate_in(link, self._find_frame(edge, link))
+
+    def _name_members(self, members: list[str]) -> None:
+        """Name links or joints as the file does, with models where names repeat."""
+        counts = Counter(name.rpartition("::")[2] for name in members)
+        for name in members:
+            short = name.rpartition("::")[2]
+            self.names[name] = short if counts[short] == 1 else name
+
+    def _grow_tree(self, links: list[str]) -> None:
         """Hang each link on another by a joint, from the world outwards."""
         joints = defaultdict(list)
         for number, edge in enumerate(self.edges):
             for end in (edge.parent, edge.child):
                 joints[end].append((edge.rank(), number))
-        reached: set[_Link | None] = set()
-        for root in (None, *self.links):
+        reached = set[str]()
+        for root in ("", *links):
             if root in reached:
                 continue
             reached.add(root)
-            if root is not None:
-                self.tree[root] = (None, None)
+            if root:
+                self.tree[root] = (None, "")
             heap = [(rank, 0, number) for rank, number in joints[root]]
             heapq.heapify(heap)
             while heap:
@@ -445,7 +418,7 @@ class _Conversion:
                     (edge.child, edge.parent),
                     (edge.parent, edge.child),
                 ):
-                    if link is None or link in reached:
+                    if link in reached:
                         continue
                     self.tree[link] = (edge, bearer)
                     reached.add(link)
@@ -453,199 +426,196 @@ class _Conversion:
                         heapq.heappush(heap, (rank, depth + 1, other))
         hanging = [edge for edge, _ in self.tree.values()]
         self.closing = [
-            edge
-            for edge in self.edges
-            if edge.name and not any(edge is other for other in hanging)
+            edge for edge in self.edges if edge.name and edge not in hanging
         ]
 
-    def _add_body(self, link: _Link) -> None:
+    def _add_body(self, link: str) -> None:
         """Add a link as a body of the one that it hangs on."""
         edge, bearer = self.tree[link]
-        pose = link.pose()
-        if bearer is not None:
-            pose = np.linalg.inv(bearer.pose()) @ pose
         body = ET.SubElement(self.body[bearer], "body")
         self.body[link] = body
         if edge is None:
-            ET.SubElement(body, "freejoint", name=f"free joint of {self._name(link)}")
-        elif edge.element is not None:
-            for joint in self._list_joints(edge, link):
+            pose = self._locate(link)
+            ET.SubElement(body, "freejoint", name=f"free joint of {self.names[link]}")
+        else:
+            pose = self._place(edge, bearer) @ np.linalg.inv(self._place(edge, link))
+            for joint in self._list_joints(edge, link) if edge.name else ():
                 pose = pose @ _move_to_start(joint)
                 ET.SubElement(body, "joint", joint)
-        body.attrib |= {"name": self._name(link), **_write_place(pose)}
-        if _text(link.element, "gravity") in ("false", "0"):
+        body.attrib |= {"name": self.names[link], **_write_place(pose)}
+        element = self.members[link].element
+        if _text(element, "gravity") in ("false", "0"):
             body.set("gravcomp", "1")
-        if not link.scope.static:
-            self._add_inertia(body, link)
+        if not self._is_fixed(link):
+            self._add_inertia(body, link, element)
 
-    def _list_joints(self, edge: _Edge, link: _Link) -> Iterator[dict[str, str]]:
+    def _is_fixed(self, link: str) -> bool:
+        """Tell whether a link is fixed to the world."""
+        edge, bearer = self.tree[link]
+        fixed = edge is not None and edge.kind == "fixed"
+        return fixed and (not bearer or self._is_fixed(bearer))
+
+    def _list_joints(self, edge: _Edge, link: str) -> Iterator[dict[str, str]]:
         """List the joints of MJCF of one joint of SDF, on the link that it carries."""
-        joint = edge.element
-        assert joint is not None
-        name = self.names[edge.scope, edge.name]
-        inside = np.linalg.inv(link.pose()) @ edge.scope.pose()
-        own = edge.scope.locate(edge.name)
-        place = _write((inside @ own)[:3, 3])
+        name = self.names[edge.name]
+        place = self._place(edge, link)
+        pin = {"pos": _write(place[:3, 3])}
         if edge.kind == "ball":
-            yield {"name": name, "type": "ball", "pos": place}
-        axes = _DEGREES_OF_FREEDOM[edge.kind]
+            yield {"name": name, "type": "ball", **pin}
         start = edge.read_start()
-        forwards = edge.child is not None and edge.child == link
+        forwards = edge.child == link
+        own = self._find_frame(edge, edge.child)
+        axes = _AXES[edge.kind]
         for tag in axes if forwards else reversed(axes):
-            axis = joint.find(tag)
+            axis = edge.element.find(tag)
             if axis is None:
                 axis = ET.Element(tag)
-            frame = self._find_axis_frame(edge, axis)
-            direction = _numbers(_text(axis, "xyz", "0 0 1"), 3, f"axis of {edge.name}")
-            turned = (inside @ frame)[:3, :3] @ direction
+            xyz = axis.find("xyz")
+            stated = "" if xyz is None else xyz.get("expressed_in", "")
+            frame = _join(edge.scope, stated) if stated else own
+            if not stated and _is_true(_text(axis, "use_parent_model_frame")):
+                frame = edge.scope
+            direction = _numbers(_text(axis, "xyz", "0 0 1"), 3, f"axis of {name}")
+            turned = (place @ self._locate_in(own, frame))[:3, :3] @ direction
             yield {
                 "name": name if tag == "axis" else f"{name}::{tag}",
                 "type": "slide" if edge.kind == "prismatic" else "hinge",
-                "pos": place,
+                **pin,
                 "axis": _write(turned if forwards else -turned),
                 **({"ref": repr(start)} if start else {}),
-                **_read_dynamics(axis, edge.name),
+                **_read_dynamics(axis, name),
             }
 
-    def _find_axis_frame(self, edge: _Edge, axis: ET.Element) -> Array:
-        """Return the pose in the model of the frame in which an axis is stated."""
-        xyz = axis.find("xyz")
-        named = "" if xyz is None else xyz.get("expressed_in", "")
-        if named:
-            return edge.scope.locate(named)
-        if _is_true(_text(axis, "use_parent_model_frame")):
-            return np.eye(4)
-        return edge.scope.locate(edge.name)
-
-    def _add_inertia(self, body: ET.Element, link: _Link) -> None:
+    def _add_inertia(self, body: ET.Element, link: str, element: ET.Element) -> None:
         """Add mass and inertia, as stated or of collisions; SDF's own are of size 1."""
-        name = self._name(link)
-        inertial = link.element.find("inertial")
+        name = self.names[link]
+        inertial = element.find("inertial")
         if inertial is None:
             inertial = ET.Element("inertial")
         if _is_true(inertial.get("auto", "")):
             if inertial.find("mass") is not None:
                 raise _refuse(name, 'states a <mass> beside auto="true": not read')
-            self._add_collisions(body, link, _text(inertial, "density"))
+            self._add_collisions(body, link, element, _text(inertial, "density"))
             return
         pose = _make_pose_matrix(inertial)
-        rotation = pose[:3, :3]
         xx, yy, zz, xy, xz, yz = (
-            _numbers(
-                _text(inertial, f"inertia/i{part}", "1" if part in _DIAGONAL else "0"),
-                1,
-                f"i{part} of {name}",
-            )[0]
-            for part in (*_DIAGONAL, "xy", "xz", "yz")
+            _number(inertial, f"inertia/i{part}", default, name)
+            for default, parts in (("1", ("xx", "yy", "zz")), ("0", ("xy", "xz", "yz")))
+            for part in parts
         )
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        moments, axes = np.linalg.eigh(tensor)
+        if moments[0] < LEAST_INERTIA:
+            tensor = axes @ np.diag(np.maximum(moments, LEAST_INERTIA)) @ axes.T
+        rotation = pose[:3, :3]
         if xy or xz or yz or not np.array_equal(rotation, np.eye(3)):
             tensor = rotation @ tensor @ rotation.T
             numbers = [*np.diagonal(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2]]
             stated = {"fullinertia": _write(numbers)}
         else:
-            stated = {"diaginertia": _write([xx, yy, zz])}
+            stated = {"diaginertia": _write(np.diagonal(tensor))}
         place = _write(pose[:3, 3])
-        (mass,) = _numbers(_text(inertial, "mass", "1"), 1, f"mass of {name}")
+        mass = _number(inertial, "mass", "1", name)
         if mass <= 0.0:
             raise _refuse(mass, f"must be above 0: the mass of {name}, kg")
         ET.SubElement(body, "inertial", {"pos": place, "mass": repr(mass), **stated})
 
-    def _add_collisions(self, body: ET.Element, link: _Link, density: str) -> None:
+    def _add_collisions(
+        self, body: ET.Element, link: str, element: ET.Element, density: str
+    ) -> None:
         """Add a link's collisions as geoms, from which MuJoCo computes its inertia."""
-        inside = np.linalg.inv(link.scope.locate(link.name))
-        for collision in link.element.findall("collision"):
+        scope = self.members[link].scope
+        for collision in element.findall("collision"):
             shape = collision.find("geometry/*")
             if shape is None or shape.tag == "plane":
                 continue
-            reference = _relative_to(collision) or link.name
-            pose = inside @ link.scope.locate(reference) @ _make_pose_matrix(collision)
+            stated = _relative_to(collision)
+            reference = _join(scope, stated) if stated else link
+            pose = self._locate_in(link, reference) @ _make_pose_matrix(collision)
             own = _text(collision, "density", density or DEFAULT_DENSITY)
             place = {**_write_place(pose), "density": own}
             ET.SubElement(body, "geom", {**self._read_shape(shape), **place})
         if body.find("geom") is None:
             reason = 'has no collision that its inertial auto="true" could be that of'
-            raise _refuse(self._name(link), reason)
+            raise _refuse(self.names[link], reason)
 
     def _read_shape(self, shape: ET.Element) -> dict[str, str]:
         """Return type and size of a geom."""
-        tag = _tag(shape)
-        if tag == "mesh":
-            number = len(self.asset)
+        if shape.tag == "mesh":
+            name = f"mesh {len(self.asset)}"
             scale = _write(_numbers(_text(shape, "scale", "1 1 1"), 3, "scale"))
-            file = _text(shape, "uri").partition("://")[2] or _text(shape, "uri")
-            ET.SubElement(
-                self.asset, "mesh", name=f"mesh {number}", file=file, scale=scale
+            file = _text(shape, "uri").rpartition("://")[2]
+            ET.SubElement(self.asset, "mesh", name=name, file=file, scale=scale)
+            return {"type": "mesh", "mesh": name}
+        if shape.tag not in _SIZES:
+            raise _refuse(
+                shape.tag, f"has no inertia here; read are {', '.join(_SIZES)}"
             )
-            return {"type": "mesh", "mesh": f"mesh {number}"}
-        if tag not in _SIZES:
-            raise _refuse(tag, f"has no inertia here; read are {', '.join(_SIZES)}")
         sizes = [
             factor * number
-            for name, count, factor in _SIZES[tag]
-            for number in _numbers(_text(shape, name), count, f"{name} of {tag}")
+            for name, count, factor in _SIZES[shape.tag]
+            for number in _numbers(_text(shape, name), count, f"{name} of {shape.tag}")
         ]
-        return {"type": tag, "size": _write(sizes)}
+        return {"type": shape.tag, "size": _write(sizes)}
 
     def _add_closures(self) -> None:
         """Add what closes loops, and the joints that follow others."""
         for edge in self.closing:
-            name = self.names[edge.scope, edge.name]
+            name = self.names[edge.name]
+            ends = {end: self._place(edge, end) for end in (edge.parent, edge.child)}
             if edge.kind == "fixed":
-                ET.SubElement(
-                    self.equality,
-                    "weld",
-                    name=name,
-                    body1=self._name(edge.parent),
-                    body2=self._name(edge.child),
+                self._close("weld", name, ends)
+            elif edge.kind not in ("revolute", "continuous", "ball"):
+                self.left_out.add(f"the {edge.kind} joint {name} of a loop")
+            else:
+                self._close("connect", name, ends)
+                lost = "; its damping, friction and spring are lost"
+                self.notes.append(
+                    f"{name} closes a loop: it is a <connect>, which holds its point "
+                    f"and not its axis{lost if edge.has_dynamics() else ''}"
                 )
-                continue
-            if edge.kind not in ("revolute", "continuous", "ball"):
-                self.left_out.add(f"the {edge.kind} joint {edge.name} of a loop")
-                continue
-            place = (edge.scope.pose() @ edge.scope.locate(edge.name))[:3, 3]
-            self._connect(name, {edge.parent: place, edge.child: place})
-            lost = "; its damping, friction and spring are lost"
-            self.notes.append(
-                f"{name} closes a loop: it is a <connect>, which holds its point "
-                f"and not its axis{lost if edge.has_dynamics() else ''}"
-            )
         for scope, constraint in self.constraints:
-            self._add_ball_constraint(scope, constraint)
+            self._add_constraint(scope, constraint)
         for edge in self.edges:
-            self._add_mimic(edge)
+            if edge not in self.closing:
+                self._add_mimic(edge)
 
-    def _add_ball_constraint(self, scope: _Scope, constraint: ET.Element) -> None:
-        places = {}
-        for body, point in (("body_A", "p_AP"), ("body_B", "p_BQ")):
-            start = f"{_DRAKE}ball_constraint_"
-            link = scope.find_link(_text(constraint, f"{start}{body}"))
-            text = _text(constraint, f"{start}{point}")
-            place = _numbers(text, 3, f"ball_constraint_{point}")
-            pose = np.eye(4) if link is None else link.pose()
-            places[link] = (pose @ [*place, 1.0])[:3]
-        if len(places) != 2:
-            raise _refuse("drake:ball_constraint", "must join two bodies")
-        self._connect("-".join(map(self._name, places)), places)
+    def _add_constraint(self, scope: str, constraint: ET.Element) -> None:
+        """Add a constraint of Drake: a weld of two frames, or a pin of two points."""
+        ends = {}
+        if constraint.tag == _WELD:
+            for end in ("parent", "child"):
+                frame = _join(scope, _text(constraint, end))
+                link = self._find_link(frame)
+                ends[link] = self._locate_in(link, frame)
+        else:
+            for body, point in (("body_A", "p_AP"), ("body_B", "p_BQ")):
+                text = _text(constraint, f"{_PIN}_{point}")
+                place = np.eye(4)
+                place[:3, 3] = _numbers(text, 3, f"ball_constraint_{point}")
+                link = self._find_link(
+                    _join(scope, _text(constraint, f"{_PIN}_{body}"))
+                )
+                ends[link] = place
+        if len(ends) != 2:
+            raise _refuse(constraint.tag, "must join two bodies")
+        kind = "weld" if constraint.tag == _WELD else "connect"
+        self._close(kind, "-".join(self.names[link] for link in ends), ends)
 
-    def _connect(self, name: str, places: dict[_Link | None, Array]) -> None:
-        """Connect two links at their places, (3,) each, m, in the world."""
-        connect = ET.SubElement(self.equality, "connect", name=name)
-        for number, (link, place) in enumerate(places.items(), 1):
-            pose = np.eye(4) if link is None else link.pose()
-            inside = np.linalg.inv(pose) @ [*place, 1.0]
-            site = {"name": f"{name} {number}", "pos": _write(inside[:3])}
+    def _close(self, kind: str, name: str, ends: dict[str, Array]) -> None:
+        """Close a loop between places of two links, (4, 4) each."""
+        closure = ET.SubElement(self.equality, kind, name=name)
+        for number, (link, place) in enumerate(ends.items(), 1):
+            site = {"name": f"{name} {number}", **_write_place(place)}
             ET.SubElement(self.body[link], "site", site)
-            connect.set(f"site{number}", site["name"])
+            closure.set(f"site{number}", site["name"])
 
     def _add_mimic(self, edge: _Edge) -> None:
         """Add the line by which a joint follows another."""
-        if edge.element is None or edge in self.closing:
-            return
         for mimic in edge.element.findall("axis/mimic"):
-            leader = mimic.get("joint", "")
+            leader = _join(edge.scope, mimic.get("joint", ""))
             multiplier, offset, reference = (
-                _numbers(_text(mimic, name, default), 1, f"{name} of {edge.name}")[0]
+                _number(mimic, name, default, edge.name)
                 for name, default in (
                     ("multiplier", "1"),
                     ("offset", "0"),
@@ -654,21 +624,18 @@ class _Conversion:
             )
             # MuJoCo's polynomial counts both joints from where they start
             start = sum(
-                other.read_start()
-                for other in self.edges
-                if (other.scope, other.name) == (edge.scope, leader)
+                other.read_start() for other in self.edges if other.name == leader
             )
             constant = offset + multiplier * (start - reference) - edge.read_start()
             ET.SubElement(
                 self.equality,
                 "joint",
-                joint1=self.names[edge.scope, edge.name],
-                joint2=self.names.get((edge.scope, leader), leader),
+                joint1=self.names[edge.name],
+                joint2=self.names.get(leader, leader),
                 polycoef=_write([constant, multiplier, 0.0, 0.0, 0.0]),
             )
 
 
-_DIAGONAL = ("xx", "yy", "zz")
 _SIZES = {
     "box": (("size", 3, 0.5),),
     "sphere": (("radius", 1, 1.0),),
@@ -683,19 +650,23 @@ def _read_dynamics(axis: ET.Element, name: str) -> dict[str, str]:
     """Return range, damping, friction and spring of an axis as attributes of MJCF."""
     attributes = {}
     for tag, attribute in (
-        ("dynamics/damping", "damping"),
-        ("dynamics/friction", "frictionloss"),
-        ("dynamics/spring_stiffness", "stiffness"),
-        ("dynamics/spring_reference", "springref"),
+        ("damping", "damping"),
+        ("friction", "frictionloss"),
+        ("spring_stiffness", "stiffness"),
+        ("spring_reference", "springref"),
     ):
-        (number,) = _numbers(_text(axis, tag, "0"), 1, f"{tag} of {name}")
+        number = _number(axis, f"dynamics/{tag}", "0", name)
         if number:
             attributes[attribute] = repr(number)
-    lower, upper = (_read_limit(axis, end, name) for end in ("lower", "upper"))
-    if lower is not None or upper is not None:
-        low = -_WIDEST if lower is None else lower
-        high = _WIDEST if upper is None else upper
-        attributes["range"] = _write([low, high])
+    limits = []
+    for end, widest in (("lower", -_WIDEST), ("upper", _WIDEST)):
+        text = _text(axis, f"limit/{end}", "inf")
+        limit = UNBOUNDED
+        if text.lstrip("+-") != "inf":
+            (limit,) = _numbers(text, 1, f"limit of {name}")
+        limits.append(widest if abs(limit) >= UNBOUNDED else limit)
+    if limits != [-_WIDEST, _WIDEST]:
+        attributes["range"] = _write(limits)
     return attributes
 
 
@@ -713,15 +684,6 @@ def _move_to_start(joint: dict[str, str]) -> Array:
         matrix[:3, :3] = Rotation.from_rotvec(start * axis).as_matrix()
         matrix[:3, 3] = place - matrix[:3, :3] @ place
     return matrix
-
-
-def _read_limit(axis: ET.Element, end: str, name: str) -> float | None:
-    """Return a limit of an axis, rad or m; None if there is none."""
-    text = _text(axis, f"limit/{end}", "inf")
-    if text.lstrip("+-") == "inf":
-        return None
-    (limit,) = _numbers(text, 1, f"limit of {name}")
-    return None if abs(limit) >= UNBOUNDED else limit
 
 
 def _write_place(pose: Array) -> dict[str, str]:

@@ -122,16 +122,18 @@ def _list_moved(model: mujoco.MjModel, stated: Array, closed: Array) -> list[str
     mujoco.mj_differentiatePos(model, change, 1.0, stated, closed)
     moved = []
     for joint in range(model.njnt):
-        dofs = list_dofs(model, joint)
-        amount = float(change[dofs[0]])
-        if len(dofs) > 1:
-            amount = float(np.linalg.norm(change[dofs]))
-        if abs(amount) <= OUTSIDE_A_RANGE:
-            continue
-        text = f"{math.degrees(amount):.4g} deg"
-        if int(model.jnt_type[joint]) == SLIDE:
-            text = f"{1e3 * amount:.4g} mm"
-        moved.append(f"{name_joint(model, joint)} by {text}")
+        amounts = change[list_dofs(model, joint)]
+        shifts = {SLIDE: 1, FREE_JOINT: 3}.get(int(model.jnt_type[joint]), 0)
+        parts = []
+        for part, factor, unit in (
+            (amounts[:shifts], 1e3, "mm"),
+            (amounts[shifts:], math.degrees(1.0), "deg"),
+        ):
+            amount = float(part[0] if len(part) == 1 else np.linalg.norm(part))
+            if abs(amount) > OUTSIDE_A_RANGE:
+                parts.append(f"{factor * amount:.4g} {unit}")
+        if parts:
+            moved.append(f"{name_joint(model, joint)} by {' and '.join(parts)}")
     return moved
 
 
@@ -285,9 +287,7 @@ class _Closing:
         self.data = mujoco.MjData(self.model)
         self.low, self.high = _list_bounds(model)
         self.joints = [
-            joint
-            for joint in _list_tied_joints(model)
-            if joint not in fixed and int(model.jnt_type[joint]) != FREE_JOINT
+            joint for joint in _list_tied_joints(model) if joint not in fixed
         ]
         self.dofs = [dof for joint in self.joints for dof in list_dofs(model, joint)]
 
