@@ -3,18 +3,13 @@
 From an empty scene to a saved file, numbers equal to `analyze`'s.
 """
 
-import asyncio
-import gc
 import json
 import math
 import shutil
 import subprocess
 import sys
-import threading
 import time
-import warnings
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -39,9 +34,8 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
 
-from fourbar.edit.server import Workbench
-from fourbar.edit.session import Session
 from fourbar.files import loads
+from tests.fourbar.edit.test_server import start
 
 PRINTED = 6e-5
 """Numbers are shown with five significant digits."""
@@ -88,39 +82,22 @@ MODELS = Path(__file__).parents[3] / "models"
 
 
 class Page:
-    """A page of the workbench in the browser, each file served in a thread."""
+    """A page of the workbench in the browser, and the servers of its files."""
 
     def __init__(self, driver: Any) -> None:
         self.driver = driver
-        self.ends: list[Callable[[], None]] = []
+        self.servers: list[subprocess.Popen[str]] = []
 
-    def serve(self, path: Path, port: int = 0) -> str:
+    def serve(self, path: Path, port: str = "0") -> str:
         """Serve a scene file, and return the address of its page."""
-        address: Future[str] = Future()
-
-        async def run() -> None:
-            bench = Workbench(Session(path, path.with_name("exports")))
-            bench.loop.add_signal_handler = lambda *_: None  # they are the process's
-            serving = asyncio.create_task(bench.serve(port))
-            thread = threading.current_thread()
-            self.ends.append(lambda: end(bench, thread))
-            address.set_result(await bench.address)
-            await serving
-            await asyncio.sleep(0.05)  # the connections close
-
-        def end(bench: Workbench, thread: threading.Thread) -> None:
-            bench.loop.call_soon_threadsafe(bench.ended.set)
-            thread.join(20.0)
-
-        threading.Thread(target=lambda: asyncio.run(run())).start()
-        return address.result(20.0)
+        self.servers.append(start(path, "--no-browser", "--port", port))
+        return str(self.servers[-1].stdout.readline().strip())
 
     def end(self) -> None:
-        while self.ends:
-            self.ends.pop()()
-        with warnings.catch_warnings():  # of lines that were cut on purpose
-            warnings.simplefilter("ignore", ResourceWarning)
-            gc.collect()
+        while self.servers:
+            server = self.servers.pop()
+            server.terminate()
+            server.communicate(timeout=20)
 
     def is_quiet(self) -> None:
         assert not self.driver.get_log("browser")
@@ -661,7 +638,7 @@ def test_a_page_finds_its_server_again_and_a_new_one_goes_on_from_the_state(
     page.wait("data.lengths[1] === 0.11")
     page.end()
     page.wait_for_text("bench", "The server has stopped")
-    again = page.serve(path, int(server.split("/")[2].partition(":")[2]))
+    again = page.serve(path, server.split("/")[2].partition(":")[2])
     assert again != server  # the token is another one, and the old page is told nothing
     time.sleep(2.0)
     assert page.value("line.readyState") != 1

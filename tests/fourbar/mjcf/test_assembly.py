@@ -28,113 +28,91 @@ STEPS = 20
 NUMBER = r"-?[\d.]+(?:e-?\d+)?"
 
 
-def ours(scene: Scene, q: Array, v: Array, a: Array) -> Any:
-    """The formulas at the simulator's own angle, speed and acceleration.
+Read = tuple[Array, Array, Array, float, Array]
+"""Angles, speeds and accelerations of the joints, T2, and the pin force at B."""
 
-    The file drives bar 2 whatever the scene.
+
+def errors(scene: Scene, read: Read) -> tuple[float, float]:
+    """Of T2 and of the pin force at B, by their greatest value in a turn.
+
+    The formulas are at the simulator's own angle, speed and acceleration, and the file
+    drives bar 2 whatever the scene.
     """
+    q, v, a, torque, force = read
     scene = replace(scene, drive_bar=2)
-    command = Command(
-        np.array([q[0]]), np.array([1]), np.array([v[0]]), np.array([a[0]])
-    )
-    return fourbar.solve(scene, "force", at=command)
+    state = (q[0], 1, v[0], a[0])
+    command = Command(*(np.array([x]) for x in state))
+    expected, turn = fourbar.solve(scene, at=command), fourbar.solve(scene)
+    apart = np.hypot(*(force - expected.F43[0])) / np.hypot(*turn.F43.T).max()
+    of_torque = abs(torque - expected.torque[0]) / np.abs(turn.torque).max()
+    return of_torque, float(apart)
 
 
-def errors(
-    scene: Scene,
-    q: Array,
-    v: Array,
-    a: Array,
-    torque: float,
-    force: Array,
-) -> tuple[float, float]:
-    """Of T2 and of the pin force at B, by their greatest value in a turn."""
-    expected, turn = (
-        ours(scene, q, v, a),
-        fourbar.solve(replace(scene, drive_bar=2), "force"),
-    )
-    return (
-        abs(torque - expected.torque[0]) / np.abs(turn.torque).max(),
-        float(np.hypot(*(force - expected.F43[0])) / np.hypot(*turn.F43.T).max()),
-    )
-
-
-def read_mujoco(text: str, forward: int) -> tuple[Array, Array, Array, float, Array]:
-    """As the comment of the file says."""
+def start_mujoco(text: str) -> tuple[Any, Any]:
     mujoco = pytest.importorskip("mujoco")
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def read_state(model: Any, state: Any, force: Any, world: Any = ...) -> Read:
+    """As the comment of the file says."""
+    parts = state.qpos, state.qvel, state.qacc, state.actuator_force
+    q, v, a, drive = (_to_numpy(part)[world].astype(float) for part in parts)
+    torque = drive[model.actuator("drive").id] - model.dof_armature[0] * a[0]
+    return q, v, a, float(torque), _to_numpy(force)[world][:2].astype(float)
+
+
+def _to_numpy(array: Any) -> Array:
+    return array.numpy() if hasattr(array, "numpy") else np.asarray(array)
+
+
+def read_mujoco(text: str, forward: int) -> Read:
+    import mujoco
+
+    model, data = start_mujoco(text)
     mujoco.mj_step(model, data, STEPS)
     for _ in range(forward):
         mujoco.mj_forward(model, data)
-    torque = (
-        data.actuator_force[model.actuator("drive").id]
-        - model.dof_armature[0] * data.qacc[0]
-    )
-    return data.qpos, data.qvel, data.qacc, float(torque), data.efc_force[:2]
+    return read_state(model, data, data.efc_force)
 
 
-def read_warp(text: str, forward: int) -> tuple[Array, Array, Array, float, Array]:
-    """As the comment of the file says.
-
-    The kernels compile for minutes the first time.
-    """
+def read_warp(text: str, forward: int) -> Read:
+    """The kernels compile for minutes the first time."""
     mjw = pytest.importorskip("mujoco_warp")
-    mujoco = importlib.import_module("mujoco")
-    model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_forward(model, data)
+    model, data = start_mujoco(text)
     theirs, state = mjw.put_model(model), mjw.put_data(model, data)
     for _ in range(STEPS):
         mjw.step(theirs, state)
     for _ in range(forward):
         mjw.forward(theirs, state)
-    q, v, a, drive = (
-        x.numpy()[0].astype(float)
-        for x in (state.qpos, state.qvel, state.qacc, state.actuator_force)
-    )
-    torque = drive[model.actuator("drive").id] - model.dof_armature[0] * a[0]
-    return q, v, a, float(torque), state.efc.force.numpy()[0, :2].astype(float)
+    return read_state(model, state, state.efc.force, 0)
 
 
-def read_mjx(text: str, steps: int) -> tuple[Array, Array, Array, float, Array]:
-    """As the comment of the file says."""
+def read_mjx(text: str, steps: int) -> Read:
     mjx = pytest.importorskip("mujoco.mjx")
-    mujoco, jax = importlib.import_module("mujoco"), importlib.import_module("jax")
+    jax = importlib.import_module("jax")
     jax.config.update("jax_enable_x64", True)
-    model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    theirs, state, step = (
-        mjx.put_model(model),
-        mjx.put_data(model, data),
-        jax.jit(mjx.step),
-    )
+    model, data = start_mujoco(text)
+    theirs, state = mjx.put_model(model), mjx.put_data(model, data)
+    step = jax.jit(mjx.step)
     for _ in range(steps):
         state = step(theirs, state)
     state = jax.jit(mjx.forward)(theirs, state)
-    q, v, a, drive = (
-        np.array(x, dtype=float)
-        for x in (state.qpos, state.qvel, state.qacc, state.actuator_force)
-    )
-    torque = drive[model.actuator("drive").id] - model.dof_armature[0] * a[0]
-    closing = getattr(state, "_impl", state).efc_force
-    return q, v, a, float(torque), np.array(closing, dtype=float)[:2]
+    return read_state(model, state, getattr(state, "_impl", state).efc_force)
 
 
 def keyframe(text: str) -> tuple[Array, float]:
     """Speeds of the keyframe, and the timestep."""
     root = ET.fromstring(text)
-    key, option = root.find("keyframe/key"), root.find("option")
-    assert key is not None and option is not None
-    return np.array([float(x) for x in str(key.get("qvel")).split()]), float(
-        str(option.get("timestep"))
-    )
+    speeds = root.find("keyframe/key").get("qvel").split()  # type: ignore[union-attr]
+    timestep = root.find("option").get("timestep")  # type: ignore[union-attr]
+    return np.array(speeds, dtype=float), float(str(timestep))
 
 
-def read_genesis(file: Path, steps: int) -> tuple[Array, Array, Array, float, Array]:
+def read_genesis(file: Path, steps: int) -> Read:
     """As the comment of the file says."""
     gs = pytest.importorskip("genesis")
     text = file.read_text()
@@ -154,16 +132,11 @@ def read_genesis(file: Path, steps: int) -> tuple[Array, Array, Array, float, Ar
     world.step()
     a = world.sim.rigid_solver.get_dofs_acc().cpu().numpy().ravel()
     torque = -float(bars.get_dofs_armature()[0]) * float(a[0])
-    return (
-        q,
-        v,
-        a,
-        torque,
-        world.sim.rigid_solver.constraint_solver.efc_force.to_numpy()[:2].ravel(),
-    )
+    solver = world.sim.rigid_solver.constraint_solver
+    return q, v, a, torque, solver.efc_force.to_numpy()[:2].ravel()
 
 
-def read_newton(file: Path, steps: int) -> tuple[Array, Array, Array, float, Array]:
+def read_newton(file: Path, steps: int) -> Read:
     """As the comment of the file says."""
     newton = pytest.importorskip("newton")
     speeds, timestep = keyframe(file.read_text())
@@ -181,12 +154,7 @@ def read_newton(file: Path, steps: int) -> tuple[Array, Array, Array, float, Arr
     data, mjw = solver.mjw_data, importlib.import_module("mujoco_warp")
     for _ in range(2):
         mjw.forward(solver.mjw_model, data)
-    q, v, a, drive = (
-        x.numpy()[0].astype(float)
-        for x in (data.qpos, data.qvel, data.qacc, data.actuator_force)
-    )
-    torque = float(drive[0] - solver.mj_model.dof_armature[0] * a[0])
-    return q, v, a, torque, data.efc.force.numpy()[0, :2].astype(float)
+    return read_state(solver.mj_model, data, data.efc.force, 0)
 
 
 MIDWAY = 200
@@ -254,7 +222,7 @@ def test_genesis_reads_as_the_comment_says(tmp_path: Path) -> None:
     ):
         (file := tmp_path / "four_bar.xml").write_text(write_mjcf_for(scene, "genesis"))
         read = read_genesis(file, MIDWAY)
-        assert max(errors(moves_as, *read)) < YIELDING
+        assert max(errors(moves_as, read)) < YIELDING
         assert read[1][0] == pytest.approx(10.0, rel=1e-6), (
             "the keyframe's speed, of an accelerated scene too"
         )
@@ -266,7 +234,7 @@ def test_newton_reads_the_mjcf_as_the_comment_says(tmp_path: Path) -> None:
         scene = crank_rocker(motion=motion, drive_bar=4)
         (file := tmp_path / "four_bar.xml").write_text(write_mjcf_for(scene, "newton"))
         read = read_newton(file, MIDWAY)
-        assert max(errors(scene, *read)) < SINGLE
+        assert max(errors(scene, read)) < SINGLE
         assert read[2][0] == pytest.approx(motion.acceleration, abs=0.01)
 
 
@@ -284,15 +252,15 @@ turn.
 def test_warp_reads_as_the_comment_says() -> None:
     scene = crank_rocker(drive_bar=4)
     text = write_mjcf_for(scene, "warp")
-    assert max(errors(scene, *read_warp(text, forward=2))) < SINGLE
+    assert max(errors(scene, read_warp(text, forward=2))) < SINGLE
     assert "forward twice" in text
 
 
 @pytest.mark.nightly
 def test_mjx_reads_as_the_comment_says() -> None:
     scene = crank_rocker(drive_bar=4)
-    assert max(errors(scene, *read_mjx(write_mjcf_for(scene, "mjx"), STEPS))) < YIELDING
-    assert max(errors(scene, *read_mjx(write_mjcf_for(scene, "mjx"), 0))) > 0.1, (
+    assert max(errors(scene, read_mjx(write_mjcf_for(scene, "mjx"), STEPS))) < YIELDING
+    assert max(errors(scene, read_mjx(write_mjcf_for(scene, "mjx"), 0))) > 0.1, (
         "a state that was only set"
     )
 
@@ -302,7 +270,7 @@ def test_each_file_loads_in_mujoco_and_runs(simulator: str) -> None:
     """Single precision, pads or none: MuJoCo itself carries all of them."""
     scene = crank_rocker()
     assert (
-        max(errors(scene, *read_mujoco(write_mjcf_for(scene, simulator), forward=1)))
+        max(errors(scene, read_mujoco(write_mjcf_for(scene, simulator), forward=1)))
         < CARRIED
     )
 
