@@ -19,7 +19,7 @@ from fourbar.errors import InputError, name_unit, state_messages_in, write_in_un
         ("3 kg", "'3 kg'"),
     ],
 )
-def test_a_number_of_numpy_is_shown_as_a_plain_one(value: object, shown: str) -> None:
+def test_a_number_of_numpy_is_shown_as_a_plain_one(value, shown):
     error = InputError("lengths.input", value, "must be less")
     assert str(error) == f"lengths.input = {shown}: must be less"
     assert str(pickle.loads(pickle.dumps(error))) == str(error)
@@ -28,7 +28,7 @@ def test_a_number_of_numpy_is_shown_as_a_plain_one(value: object, shown: str) ->
 INCHES = {"m": ("in", 1.0 / 0.0254), "rad": ("deg", 180.0 / math.pi)}
 
 
-def test_numbers_are_stated_in_the_units_of_messages() -> None:
+def test_numbers_are_stated_in_the_units_of_messages():
     with state_messages_in(INCHES):
         error = InputError("lengths", (0.0508, 0.254), "must close", unit="m")
         within = write_in_units("m", 0.0254)

@@ -22,7 +22,7 @@ def make_scene(*, diameter: float = 0.02) -> fourbar.Scene:
     return fourbar.Scene(fourbar.FourBar(d, *bars), motion)
 
 
-def test_density_and_cross_section_give_the_mass_of_a_uniform_bar() -> None:
+def test_density_and_cross_section_give_the_mass_of_a_uniform_bar():
     round_bar = Bar("0.4 m", density="7850 kg/m^3", diameter="20 mm")
     flat = Bar("0.4 m", density="7850 kg/m^3", section=("20 mm", "5 mm"))
     assert round_bar.mass == pytest.approx(STEEL * math.pi * 0.01**2 * 0.4, rel=1e-15)
@@ -30,7 +30,7 @@ def test_density_and_cross_section_give_the_mass_of_a_uniform_bar() -> None:
     assert flat.moment_of_inertia == pytest.approx(0.314 * 0.4**2 / 12.0, rel=1e-15)
 
 
-def test_the_section_modulus_is_that_of_the_second_moment_of_area() -> None:
+def test_the_section_modulus_is_that_of_the_second_moment_of_area():
     """I over the distance of the outermost fibre.
 
     Both are integrated over strips of the area.
@@ -63,15 +63,15 @@ def test_the_section_modulus_is_that_of_the_second_moment_of_area() -> None:
     ],
 )
 def test_a_material_that_states_no_mass_is_refused(
-    stated: dict[str, object],
-    key: str,
-) -> None:
+    stated,
+    key,
+):
     with pytest.raises(InputError) as error:
         Bar(0.4, **stated)  # type: ignore[arg-type]
     assert error.value.key == key
 
 
-def test_a_scene_file_names_the_bar_whose_material_is_wrong() -> None:
+def test_a_scene_file_names_the_bar_whose_material_is_wrong():
     text = """\
 [lengths]
 ground = "1 m"
@@ -85,7 +85,7 @@ density = "7850 kg/m^3"
         loads(text)
 
 
-def test_the_mass_follows_length_and_cross_section_in_a_study() -> None:
+def test_the_mass_follows_length_and_cross_section_in_a_study():
     scene = make_scene()
     varied = {"lengths.coupler": [1.0, 1.1], "bars.input.diameter": ["20 mm", "30 mm"]}
     study = fourbar.solve(fourbar.vary(scene, varied))
@@ -100,7 +100,7 @@ def test_the_mass_follows_length_and_cross_section_in_a_study() -> None:
 
 
 @pytest.mark.parametrize("key", ["lengths.coupler", "bars.coupler.diameter"])
-def test_the_sensitivity_to_a_length_counts_the_mass_that_follows(key: str) -> None:
+def test_the_sensitivity_to_a_length_counts_the_mass_that_follows(key):
     scene, step = make_scene(), 1e-6
     derived = fourbar.sensitivity(scene)
     row = list(derived.keys).index(key)
@@ -111,14 +111,14 @@ def test_the_sensitivity_to_a_length_counts_the_mass_that_follows(key: str) -> N
     assert derived.by["torque"][row] == pytest.approx(quotient, rel=CLOSE)
 
 
-def test_a_file_keeps_the_material_and_an_engine_is_told_the_mass() -> None:
+def test_a_file_keeps_the_material_and_an_engine_is_told_the_mass():
     scene = make_scene()
     assert loads(fourbar.dump(scene)).linkage == scene.linkage
     bars = scene_to_json(scene)["bars"]
     assert bars["input"] == {"mass": scene.linkage.input.mass}
 
 
-def test_a_stated_mass_takes_the_place_of_the_density() -> None:
+def test_a_stated_mass_takes_the_place_of_the_density():
     bar = make_scene().linkage.input
     heavier = bar.with_mass(3.0)
     assert (heavier.mass, heavier.density, heavier.diameter) == (3.0, None, 0.02)

@@ -19,7 +19,7 @@ def pointed() -> Scene:
     return replace(crank_rocker(), points=(Point("P", 3, (0.1, 0.2)),))
 
 
-def test_a_quantity_is_found_by_its_name() -> None:
+def test_a_quantity_is_found_by_its_name():
     solution = fourbar.solve(pointed())
     assert solution["torque"] is solution.torque
     assert solution["F12"] is solution.F12
@@ -35,7 +35,7 @@ def test_a_quantity_is_found_by_its_name() -> None:
         iter(solution)
 
 
-def test_a_scene_without_a_title_leaves_no_empty_quotes() -> None:
+def test_a_scene_without_a_title_leaves_no_empty_quotes():
     scene = crank_rocker()
     named, unnamed = (
         repr(fourbar.solve(replace(scene, title=title))) for title in ("press", "")
@@ -44,14 +44,14 @@ def test_a_scene_without_a_title_leaves_no_empty_quotes() -> None:
     assert unnamed.startswith("Solution: ")
 
 
-def test_a_solution_is_frozen() -> None:
+def test_a_solution_is_frozen():
     solution = fourbar.solve(crank_rocker())
     for name in ("torque", "scene", "title"):
         with pytest.raises(FrozenInstanceError):
             setattr(solution, name, None)
 
 
-def test_solutions_are_equal_bit_by_bit() -> None:
+def test_solutions_are_equal_bit_by_bit():
     scene = pointed()
     solution, again = fourbar.solve(scene), fourbar.solve(scene)
     assert solution == again
@@ -65,7 +65,7 @@ def test_solutions_are_equal_bit_by_bit() -> None:
     assert fourbar.solve(scene, "velocity") != fourbar.solve(scene)
 
 
-def test_a_data_frame_names_the_unit_of_each_column() -> None:
+def test_a_data_frame_names_the_unit_of_each_column():
     pytest.importorskip("pandas", reason="to_pandas needs pandas: pip install pandas")
     table = fourbar.solve(pointed()).to_pandas()
     units = table.attrs["units"]
@@ -82,7 +82,7 @@ def test_a_data_frame_names_the_unit_of_each_column() -> None:
 
 
 @pytest.mark.parametrize("missing", [[], [0, 1], [4, 8, 12, 17, 21, 26]])
-def test_angles_of_several_turns_are_continuous_across_gaps(missing: list[int]) -> None:
+def test_angles_of_several_turns_are_continuous_across_gaps(missing):
     sweep = np.array([np.linspace(-3.0, 16.0, 30), np.linspace(2.0, -14.0, 30)])
     sweep[:, missing] = np.nan
     wrapped = np.angle(np.exp(1j * sweep))

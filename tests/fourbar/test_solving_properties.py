@@ -46,7 +46,7 @@ SCENES = {
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_loop_forces_moments_and_power_balance(name: str) -> None:
+def test_loop_forces_moments_and_power_balance(name):
     rows = [*check_identities(make_question(name, SCENES[name], ()))]
     assert {"closure", "power"} <= {row.quantity for row in rows}
     assert not [row for row in rows if row.failed]
@@ -105,7 +105,7 @@ SCALED = {
 
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize("name", SCALED)
-def test_forces_scale_with_the_units(name: str, branch: int) -> None:
+def test_forces_scale_with_the_units(name, branch):
     first, second, ratio = SCALED[name]
     ours = fourbar.solve(in_units(branch=branch, **first))
     theirs = fourbar.solve(in_units(branch=branch, **second))

@@ -22,9 +22,9 @@ def mode(path: Path) -> int:
 
 @pytest.mark.parametrize("before", [0o600, 0o640, 0o664, 0o755], ids=oct)
 def test_an_existing_file_keeps_its_mode_and_a_new_one_is_an_ordinary_file(
-    tmp_path: Path,
-    before: int,
-) -> None:
+    tmp_path,
+    before,
+):
     path = tmp_path / "a"
     write_bytes(path, b"new")
     umask = os.umask(0)
@@ -38,8 +38,8 @@ def test_an_existing_file_keeps_its_mode_and_a_new_one_is_an_ordinary_file(
 
 
 def test_a_symbolic_link_stays_and_the_file_that_it_names_is_written(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     (tmp_path / "far").mkdir()
     real, link, chain = tmp_path / "far" / "real", tmp_path / "link", tmp_path / "chain"
     link.symlink_to("far/real")
@@ -59,7 +59,7 @@ def test_a_symbolic_link_stays_and_the_file_that_it_names_is_written(
 
 
 @pytest.mark.slow
-def test_save_and_analyze_write_through_links_and_keep_the_mode(tmp_path: Path) -> None:
+def test_save_and_analyze_write_through_links_and_keep_the_mode(tmp_path):
     for name, write in {
         "scene.toml": lambda path: fourbar.save(fourbar.load(CRANK_ROCKER), path),
         "table.csv": lambda path: status(

@@ -78,7 +78,7 @@ def read_csv(ended: Ended) -> list[dict[str, str]]:
 
 
 @pytest.mark.parametrize("name", ["thesis", "drag_link"])
-def test_json_and_csv_have_every_key_and_every_digit(name: str, run: Fourbar) -> None:
+def test_json_and_csv_have_every_key_and_every_digit(name, run):
     file = MODELS / f"{name}.toml"
     document, solution = (
         strict(run("analyze", file, "--json")),
@@ -102,7 +102,7 @@ def test_json_and_csv_have_every_key_and_every_digit(name: str, run: Fourbar) ->
     assert "time" not in document
 
 
-def test_null_where_there_is_no_value(run: Fourbar) -> None:
+def test_null_where_there_is_no_value(run):
     sweep = fourbar.Motion(np.radians([10.0, 135.0]), 0.2244)
     save(crank_rocker(linkage=thesis().linkage, motion=sweep), "scene.toml")
     document = strict(run("analyze", "scene.toml", "--json"))
@@ -115,8 +115,8 @@ def test_null_where_there_is_no_value(run: Fourbar) -> None:
 
 
 def test_one_position_is_an_array_and_has_no_forces_without_a_speed(
-    run: Fourbar,
-) -> None:
+    run,
+):
     save(crank_rocker(motion=fourbar.Motion(1.0)), "scene.toml")
     document = strict(run("analyze", "scene.toml", "--json"))
     assert set(CONTRACT) <= set(document) and np.shape(document["theta_3"]) == (1,)
@@ -127,7 +127,7 @@ def test_one_position_is_an_array_and_has_no_forces_without_a_speed(
     assert row["torque [N m]"] == "" and row["theta_2 [rad]"] == "1.0"
 
 
-def test_a_free_motion_has_time_and_no_drive(run: Fourbar) -> None:
+def test_a_free_motion_has_time_and_no_drive(run):
     released = fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5, 4))
     save(crank_rocker(motion=released), "scene.toml")
     document = strict(run("analyze", "scene.toml", "--json"))
@@ -138,9 +138,7 @@ def test_a_free_motion_has_time_and_no_drive(run: Fourbar) -> None:
 
 
 @pytest.mark.parametrize("ending", ["csv", "json", "txt"])
-def test_a_file_holds_what_would_be_printed_and_its_name_asks_for_the_form(
-    ending: str, run: Fourbar
-) -> None:
+def test_a_file_holds_what_would_be_printed_and_its_name_asks_for_the_form(ending, run):
     named, asked = Path(f"named.{ending}"), Path("asked")
     form = () if ending == "txt" else (f"--{ending}",)
     takes_csv = ("analyze", CRANK_ROCKER), ("classify", 4, 2, 3, 3)
@@ -151,7 +149,7 @@ def test_a_file_holds_what_would_be_printed_and_its_name_asks_for_the_form(
             assert options[0].read_text() == printed
 
 
-def test_every_command_can_write_what_it_prints() -> None:
+def test_every_command_can_write_what_it_prints():
     """The workbench writes what its page asks for."""
     for name, command in group.commands.items():
         wanted = "--exports" if name == "edit" else "--out"
@@ -160,8 +158,8 @@ def test_every_command_can_write_what_it_prints() -> None:
 
 @pytest.mark.parametrize(("command", "ending"), [("sdf", "sdf"), ("usd", "usda")])
 def test_sdf_and_usd_are_written_of_four_lengths_and_name_what_they_leave_out(
-    command: str, ending: str, run: Fourbar
-) -> None:
+    command, ending, run
+):
     lengths = ("300 mm", "10 cm", 0.25, 0.22)
     target = Path(f"bars.{ending}")
     asked = ("--lengths", *lengths, "--omega", "60 rpm", "-o", target)
@@ -178,7 +176,7 @@ def test_sdf_and_usd_are_written_of_four_lengths_and_name_what_they_leave_out(
     assert run(command, CRANK_ROCKER, "--without-loads", "-o", "a")[0] == HOLDS
 
 
-def test_mjcf_of_a_scene_and_of_bare_lengths(run: Fourbar) -> None:
+def test_mjcf_of_a_scene_and_of_bare_lengths(run):
     from fourbar.mjcf import list_defaults, make_scene
     from fourbar.mjcf.document import write_mjcf_for
 
@@ -195,7 +193,7 @@ def test_mjcf_of_a_scene_and_of_bare_lengths(run: Fourbar) -> None:
         assert Path("a.xml").read_text() == text
 
 
-def test_what_rests_at_every_angle_is_no_range_of_one(run: Fourbar) -> None:
+def test_what_rests_at_every_angle_is_no_range_of_one(run):
     save(replace(balance(0.0), effects=()), "balanced.toml")
     code, out, _ = run("equilibrium", "balanced.toml")
     assert code == 0
@@ -205,7 +203,7 @@ def test_what_rests_at_every_angle_is_no_range_of_one(run: Fourbar) -> None:
 @pytest.mark.parametrize(
     "name", ["=cmd|'calc'!A0", "+1", "-A1", "@SUM(A1)", "P,=1+1", "P\n=1+1"]
 )
-def test_a_heading_of_csv_is_a_word_and_no_formula(name: str, run: Fourbar) -> None:
+def test_a_heading_of_csv_is_a_word_and_no_formula(name, run):
     """A spreadsheet calculates a cell that begins with =, and a point heads columns."""
     file = Path("scene.toml")
     save(crank_rocker(points=(fourbar.Point("P", 3, (0.1, 0.7)),)), file)
@@ -218,7 +216,7 @@ def test_a_heading_of_csv_is_a_word_and_no_formula(name: str, run: Fourbar) -> N
     assert (code, out) == (BAD_INPUT, "") and "must be a word of letters" in err
 
 
-def test_degrees_are_of_angles_alone_and_named(run: Fourbar) -> None:
+def test_degrees_are_of_angles_alone_and_named(run):
     plain = strict(run("analyze", CRANK_ROCKER, "--json"))
     turned = strict(run("analyze", CRANK_ROCKER, "--json", "--degrees"))
     assert turned["angle_unit"] == "deg"
@@ -235,7 +233,7 @@ ROW = re.compile(r" *\d+\.\d{4} ")
 
 
 @pytest.mark.slow
-def test_the_table_of_positions_says_in_what_units(run: Fourbar) -> None:
+def test_the_table_of_positions_says_in_what_units(run):
     lines = run("analyze", THESIS, "--table")[1].split("\n")
     assert lines[0] == "Thesis model mechanism" and len(lines) > 361
     heading = next(n for n, line in enumerate(lines) if "theta_2 " in line)
@@ -245,7 +243,7 @@ def test_the_table_of_positions_says_in_what_units(run: Fourbar) -> None:
     assert radians[heading + 1].split()[0] == "rad"
 
 
-def test_a_terminal_gets_some_forty_rows() -> None:
+def test_a_terminal_gets_some_forty_rows():
     lines = print_positions(load(CRANK_ROCKER), 80).splitlines()
     rows = [line for line in lines if ROW.match(line)]
     assert len(rows) == 37
@@ -256,7 +254,7 @@ def test_a_terminal_gets_some_forty_rows() -> None:
 
 
 @pytest.mark.slow
-def test_every_thins_the_table_and_keeps_its_last_position(run: Fourbar) -> None:
+def test_every_thins_the_table_and_keeps_its_last_position(run):
     thinned = run("analyze", CRANK_ROCKER, "--every", 100)[1].splitlines()
     rows = [line.split()[0] for line in thinned if ROW.match(line)]
     assert rows == ["0.0000", "100.0000", "200.0000", "300.0000", "360.0000"]
@@ -266,8 +264,8 @@ def test_every_thins_the_table_and_keeps_its_last_position(run: Fourbar) -> None
 
 @pytest.mark.parametrize("width", [40, 80, 120, 400])
 def test_a_narrow_terminal_gets_whole_columns_and_the_names_of_what_is_missing(
-    width: int,
-) -> None:
+    width,
+):
     text = print_positions(crank_rocker(), width)
     table = [line for line in text.split("\n") if not line.startswith("not shown")]
     assert max(map(len, table)) <= width and "…" not in text and "T2" in text
@@ -278,7 +276,7 @@ def print_positions(scene: fourbar.Scene, width: int) -> str:
     return tables.print_positions(fourbar.solve(scene), width)
 
 
-def test_the_digits_of_the_torque() -> None:
+def test_the_digits_of_the_torque():
     solution = fourbar.solve(crank_rocker(), "error")
     columns = tables.list_columns(solution)
     (cells,) = (columns[name] for name in columns if "digits" in name)
@@ -290,9 +288,7 @@ def test_the_digits_of_the_torque() -> None:
         assert digits == tables.MOST_DIGITS or relative > 10.0 ** -(digits + 1)
 
 
-def test_no_command_is_a_question_for_help(
-    run: Fourbar, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_no_command_is_a_question_for_help(run, capsys):
     """The line of each command stands there whole, in 80 columns."""
     code, out, err = run()
     assert (code, err) == (HOLDS, "") and out == run("-h")[1]
@@ -306,7 +302,7 @@ def test_no_command_is_a_question_for_help(
     assert harness == HOLDS and "advise" in capsys.readouterr().out
 
 
-def test_the_shell_completes(run: Fourbar, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_shell_completes(run, monkeypatch):
     monkeypatch.setenv("_FOURBAR_COMPLETE", "zsh_source")
     code, out, _ = run()
     assert code == HOLDS and "compdef" in out
@@ -325,12 +321,12 @@ def test_the_shell_completes(run: Fourbar, monkeypatch: pytest.MonkeyPatch) -> N
         ("2 1 2 1", "at change points alone:\n    ground + input = 3 = coupler"),
     ],
 )
-def test_classify(lengths: str, line: str, run: Fourbar) -> None:
+def test_classify(lengths, line, run):
     code, out, err = run("classify", *lengths.split())
     assert (code, err) == (HOLDS, "") and line in out
 
 
-def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:
+def test_classify_says_what_turns_and_how_far(run):
     """By the law of cosines where two bars are collinear."""
 
     def angle(opposite: float, first: float, second: float) -> float:
@@ -379,9 +375,7 @@ def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:
         (("2'", '8"', "1'8\"", "1'6\""), (0.6096, 0.2032, 0.508, 0.4572)),
     ],
 )
-def test_new_writes_a_file_and_names_the_command_that_reads_it(
-    texts: tuple[str, ...], lengths: tuple[float, ...], run: Fourbar
-) -> None:
+def test_new_writes_a_file_and_names_the_command_that_reads_it(texts, lengths, run):
     code, out, _ = run("new", "my wiper.toml", "--lengths", *texts)
     assert code == HOLDS
     assert shlex.split(out.strip())[-3:] == ["fourbar", "analyze", "my wiper.toml"]
@@ -396,9 +390,7 @@ def test_new_writes_a_file_and_names_the_command_that_reads_it(
     ],
     ids=lambda bars: bars[0],
 )
-def test_who_asks_for_positions_only_is_told_no_force(
-    bars: tuple[str, ...], run: Fourbar
-) -> None:
+def test_who_asks_for_positions_only_is_told_no_force(bars, run):
     path = Path("positions.toml")
     assert run("new", path, *bars, "--positions-only")[0] == HOLDS
     assert load(path).motion.speed is None and load(path).effects == ()
@@ -411,9 +403,7 @@ def test_who_asks_for_positions_only_is_told_no_force(
 @pytest.mark.parametrize(
     ("units", "unit"), [((), "lbf in"), (("--units", "SI"), "N m")]
 )
-def test_plot_and_animate_show_the_units_of_the_scene(
-    units: tuple[str, ...], unit: str, run: Fourbar
-) -> None:
+def test_plot_and_animate_show_the_units_of_the_scene(units, unit, run):
     run("new", "inches.toml", "--lengths", "12 in", "4 in", "10 in", "9 in")
     assert run("plot", "inches.toml", *units, "-o", "a.svg")[0] == HOLDS
     picture = Path("a.svg").read_text().replace("mN m", "N m")
@@ -431,9 +421,7 @@ def test_plot_and_animate_show_the_units_of_the_scene(
         (("animate", "--seconds", "0.12", "-o", "a.gif"), ": 3 frames", "GIF89a"),
     ],
 )
-def test_plot_and_animate_write_what_their_ending_says(
-    arguments: tuple[str, ...], said: str, holds: str, run: Fourbar
-) -> None:
+def test_plot_and_animate_write_what_their_ending_says(arguments, said, holds, run):
     command, *options = arguments
     file = Path(options[-1])
     printed = f"wrote {file}{said}\n"
@@ -450,9 +438,7 @@ def test_plot_and_animate_write_what_their_ending_says(
         (KeyboardInterrupt(), INTERRUPTED),
     ],
 )
-def test_what_goes_wrong_is_one_line_and_a_status(
-    error: BaseException, code: int, run: Fourbar, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_goes_wrong_is_one_line_and_a_status(error, code, run, monkeypatch):
     """After an interrupt click ends the line that the terminal has started with ^C."""
 
     def broken(*_: object) -> None:
@@ -469,9 +455,7 @@ def test_what_goes_wrong_is_one_line_and_a_status(
             run("analyze", THESIS)
 
 
-def test_a_full_disk_leaves_the_old_file(
-    run: Fourbar, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_full_disk_leaves_the_old_file(run, monkeypatch, tmp_path):
     def full(_: int) -> None:
         raise OSError(28, "No space left on device")
 
@@ -485,7 +469,7 @@ def test_a_full_disk_leaves_the_old_file(
 
 
 @pytest.mark.posix
-def test_a_device_is_written_to_and_stays_one(run: Fourbar) -> None:
+def test_a_device_is_written_to_and_stays_one(run):
     pipe = Path("pipe")
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDWR | os.O_NONBLOCK)
@@ -497,7 +481,7 @@ def test_a_device_is_written_to_and_stays_one(run: Fourbar) -> None:
         os.close(reader)
 
 
-def test_a_title_does_not_steer_the_terminal(run: Fourbar) -> None:
+def test_a_title_does_not_steer_the_terminal(run):
     title = "\x1b[2J\x1b]0;x\x07\r\n[bold]name"
     save(crank_rocker(title=title), "scene.toml")
     out = run("analyze", "scene.toml")[1]
@@ -513,7 +497,7 @@ def start(*arguments: str, **streams: object) -> "subprocess.CompletedProcess[st
 
 
 @pytest.mark.slow
-def test_the_command_line_starts_light() -> None:
+def test_the_command_line_starts_light():
     heavy = ["pint", "rich", "matplotlib", "scipy", "mujoco", "pinocchio", "jinja2"]
     program = "import sys, fourbar.cli; print({*sys.argv[1:]} & {*sys.modules})"
     assert start("-c", program, *heavy).stdout == "set()\n"
@@ -527,7 +511,7 @@ def test_the_command_line_starts_light() -> None:
     "arguments",
     [("classify", "3", "1", "2", "3"), ("analyze", "models/thesis.toml", "--json")],
 )
-def test_a_reader_that_leaves_early_is_no_error(arguments: tuple[str, ...]) -> None:
+def test_a_reader_that_leaves_early_is_no_error(arguments):
     reading, writing = os.pipe()
     os.close(reading)
     done = start("-m", "fourbar", *arguments, stdout=writing)
@@ -540,7 +524,7 @@ def test_a_reader_that_leaves_early_is_no_error(arguments: tuple[str, ...]) -> N
     not Path("/dev/full").exists(),
     reason="only Linux has a device that is always full",
 )
-def test_standard_output_that_is_full() -> None:
+def test_standard_output_that_is_full():
     with Path("/dev/full").open("w") as full:
         done = start("-m", "fourbar", "analyze", "models/thesis.toml", stdout=full)
     assert (done.returncode, done.stderr.count("\n")) == (BROKEN, 1)
@@ -637,9 +621,7 @@ REFUSED_FILES = [  # text of a scene file, words of the line that refuses it
 
 
 @pytest.mark.parametrize(("text", "words"), REFUSED_FILES)
-def test_a_file_is_refused_in_its_own_units_and_points_on(
-    text: str, words: str, run: Fourbar
-) -> None:
+def test_a_file_is_refused_in_its_own_units_and_points_on(text, words, run):
     Path("scene.toml").write_text(text)
     refuses(run("analyze", "scene.toml"), words)
 
@@ -701,8 +683,8 @@ REFUSED = [  # arguments, words of the line that refuses them
 
 @pytest.mark.parametrize(("arguments", "words"), REFUSED)
 def test_arguments_are_refused_in_one_line_and_nothing_is_written(
-    arguments: tuple[object, ...], words: str, run: Fourbar, tmp_path: Path
-) -> None:
+    arguments, words, run, tmp_path
+):
     refuses(run(*arguments), words)
     assert not [*tmp_path.iterdir()]
 
@@ -715,9 +697,7 @@ def test_arguments_are_refused_in_one_line_and_nothing_is_written(
         ("analyze", CRANK_ROCKER, "--columns", "theta_44"),
     ],
 )
-def test_what_is_no_other_mechanism_does_not_point_on(
-    arguments: tuple[str, ...], run: Fourbar
-) -> None:
+def test_what_is_no_other_mechanism_does_not_point_on(arguments, run):
     code, _, err = run(*arguments)
     assert code == BAD_INPUT and "PMKS+" not in err
 
@@ -732,8 +712,8 @@ def test_what_is_no_other_mechanism_does_not_point_on(
 )
 @pytest.mark.parametrize("command", ["analyze", "mjcf"])
 def test_an_output_that_cannot_be_is_refused_before_anything_is_solved(
-    command: str, out: str, why: str, run: Fourbar, monkeypatch, tmp_path: Path
-) -> None:
+    command, out, why, run, monkeypatch, tmp_path
+):
     monkeypatch.setattr(Case, "of", None)
     text = THESIS.read_text()
     Path("a").write_text(text)
@@ -741,7 +721,7 @@ def test_an_output_that_cannot_be_is_refused_before_anything_is_solved(
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": text}
 
 
-def test_an_output_angle_out_of_range_is_refused_with_the_range(run: Fourbar) -> None:
+def test_an_output_angle_out_of_range_is_refused_with_the_range(run):
     """The crank is in line with the coupler: sides 5, 4.5 and 2 or 6."""
     Path("scene.toml").write_text(INCHES)
     cosines = ((5**2 + 4.5**2 - side**2) / (2 * 5 * 4.5) for side in (2, 6))
@@ -750,7 +730,7 @@ def test_an_output_angle_out_of_range_is_refused_with_the_range(run: Fourbar) ->
     refuses(run("analyze", "scene.toml", "--at", "theta_4=200 deg"), said)
 
 
-def test_points_in_the_table_have_the_coordinates_of_the_drawing(run: Fourbar) -> None:
+def test_points_in_the_table_have_the_coordinates_of_the_drawing(run):
     """O2 is not the origin of the drawing; `--at` and CSV have its coordinates too."""
     Path("drawn.toml").write_text(
         '[pins]\nO2 = ["100 mm", "20 mm"]\nA = ["100 mm", "120 mm"]\n'
@@ -765,7 +745,7 @@ def test_points_in_the_table_have_the_coordinates_of_the_drawing(run: Fourbar) -
     assert code == 0 and (shown["P_x"], shown["P_y"]) == ("150", "80")
 
 
-def test_a_linkage_moves_as_the_bar_of_another_does(run: Fourbar) -> None:
+def test_a_linkage_moves_as_the_bar_of_another_does(run):
     """By two commands the torque is that of the motion stated as three arrays."""
     second = MODELS / "drag_link.toml"
     moved = fourbar.solve(load(CRANK_ROCKER))
@@ -777,7 +757,7 @@ def test_a_linkage_moves_as_the_bar_of_another_does(run: Fourbar) -> None:
     assert document["alpha_4"] == expected.alpha_4.tolist()
 
 
-def test_one_position_has_the_angles_that_the_sweep_has_there(run: Fourbar) -> None:
+def test_one_position_has_the_angles_that_the_sweep_has_there(run):
     """Beyond half a turn of the output of a drag-link, and whatever else is asked."""
     scene, rows = MODELS / "drag_link.toml", [120, 10, 300]
     sweep = fourbar.solve(load(scene))

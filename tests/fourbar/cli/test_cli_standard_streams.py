@@ -38,7 +38,7 @@ def call_fourbar(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["-", "/dev/stdin"])
 @pytest.mark.posix
-def test_a_scene_is_read_from_standard_input(name: str, tmp_path: Path) -> None:
+def test_a_scene_is_read_from_standard_input(name, tmp_path):
     for form in ("--json", "--degrees"):  # the block has the units of the file
         of_file = call_fourbar(tmp_path, "analyze", str(SCENE), form)
         of_pipe = call_fourbar(tmp_path, "analyze", name, form)
@@ -48,7 +48,7 @@ def test_a_scene_is_read_from_standard_input(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.posix
-def test_a_scene_is_read_from_a_pipe_of_the_shell(tmp_path: Path) -> None:
+def test_a_scene_is_read_from_a_pipe_of_the_shell(tmp_path):
     line = f"{sys.executable} -m fourbar analyze <(cat '{SCENE}') --json"
     piped = subprocess.run(["bash", "-c", line], capture_output=True, check=True)
     assert json.loads(piped.stdout)["title"]
@@ -56,7 +56,7 @@ def test_a_scene_is_read_from_a_pipe_of_the_shell(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.posix
-def test_a_mistake_on_standard_input_is_one_line(tmp_path: Path) -> None:
+def test_a_mistake_on_standard_input_is_one_line(tmp_path):
     wrong = call_fourbar(tmp_path, "analyze", "-", scene=b"[lengths]\nground = 3\n")
     assert wrong.returncode == BAD_INPUT
     assert wrong.stderr.count(b"\n") == 1 and b"lengths.ground" in wrong.stderr
@@ -77,10 +77,10 @@ def test_a_mistake_on_standard_input_is_one_line(tmp_path: Path) -> None:
     ids=lambda value: value[0] if isinstance(value, tuple) else "",
 )
 def test_a_file_is_written_to_standard_output(
-    arguments: tuple[str, ...],
-    start: bytes,
-    tmp_path: Path,
-) -> None:
+    arguments,
+    start,
+    tmp_path,
+):
     written = call_fourbar(tmp_path, *arguments)
     assert written.returncode == 0, written.stderr
     assert written.stdout.lower().startswith(start.lower())
@@ -88,7 +88,7 @@ def test_a_file_is_written_to_standard_output(
 
 
 @pytest.mark.slow
-def test_the_defaults_of_lengths_do_not_enter_the_file(tmp_path: Path) -> None:
+def test_the_defaults_of_lengths_do_not_enter_the_file(tmp_path):
     import xml.etree.ElementTree as ET
 
     lengths = ("0.3", "0.1", "0.25", "0.22")

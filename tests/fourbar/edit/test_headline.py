@@ -38,7 +38,7 @@ def load_coarse(name: str) -> fourbar.Scene:
 
 
 @pytest.mark.parametrize("name", BOUNDED)
-def test_at_rest_the_headline_has_the_numbers_of_analyze(name: str) -> None:
+def test_at_rest_the_headline_has_the_numbers_of_analyze(name):
     scene = load_coarse(name)
     block = " ".join(write_block(scene, fourbar.solve(scene), COMMON))
     headline = evaluate_scene(scene, COMMON, settled=True)["headline"]
@@ -46,13 +46,13 @@ def test_at_rest_the_headline_has_the_numbers_of_analyze(name: str) -> None:
     peak = re.sub(r"^peak (torque|drive force) ", "", drive)
     assert re.search(rf"(torque|force) +peak -?{re.escape(peak)} at", block), drive
     load = re.fullmatch(r"largest pin force (\S+ \S+) at \w\d?", pins)
-    assert load is not None and load[1] in block, pins
+    assert load[1] in block, pins
 
 
 @pytest.mark.parametrize("name", BOUNDED)
 def test_while_one_drags_the_numbers_of_the_positions_are_reached_at_least(
-    name: str,
-) -> None:
+    name,
+):
     scene = load_coarse(name)
     solution = fourbar.solve(scene)
     headline = evaluate_scene(scene, COMMON)["headline"]
@@ -68,7 +68,7 @@ def test_while_one_drags_the_numbers_of_the_positions_are_reached_at_least(
 
 
 @pytest.mark.parametrize("name", UNBOUNDED)
-def test_what_grows_without_bound_is_no_number(name: str) -> None:
+def test_what_grows_without_bound_is_no_number(name):
     scene = fourbar.load(MODELS / f"{name}.toml")
     data = evaluate_scene(scene, COMMON, settled=True)
     drive, pins, _ = data["headline"].split("; ")
@@ -78,7 +78,7 @@ def test_what_grows_without_bound_is_no_number(name: str) -> None:
     assert unbounded & {"torque", "drive_force"}
 
 
-def test_a_balanced_drive_has_no_peak_of_rounding() -> None:
+def test_a_balanced_drive_has_no_peak_of_rounding():
     """Nothing acts on this linkage at a constant speed but inertia, which is zero."""
     scene = fourbar.load(MODELS / "capabilities" / "parallelogram.toml")
     gravity_only = replace(scene, effects=(), loads=())

@@ -149,7 +149,7 @@ async def told(line, request: dict | None = None) -> dict:
     return await heard(line, lambda about: about.get("for") == "mine")
 
 
-def test_only_a_page_with_the_token_from_this_address_is_answered(bench) -> None:
+def test_only_a_page_with_the_token_from_this_address_is_answered(bench):
     async def ask(made: Workbench, address: str) -> None:
         root, port = address[: address.rindex("/", 0, -1) + 1], port_of(address)
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[A-Za-z0-9_-]{32,}/", address)
@@ -206,7 +206,7 @@ def test_only_a_page_with_the_token_from_this_address_is_answered(bench) -> None
     bench(ask)
 
 
-def test_a_request_of_a_hundred_megabytes_is_not_read(bench) -> None:
+def test_a_request_of_a_hundred_megabytes_is_not_read(bench):
     async def ask(made: Workbench, address: str) -> None:
         host, port = address.split("/")[2].split(":")
         reader, writer = await asyncio.open_connection(host, int(port))
@@ -234,7 +234,7 @@ def test_a_request_of_a_hundred_megabytes_is_not_read(bench) -> None:
 @pytest.mark.slow
 def test_a_hundred_requests_at_once_are_answered_and_of_a_drag_only_the_latest(
     bench,
-) -> None:
+):
     async def ask(made: Workbench, address: str) -> None:
         assert await asyncio.gather(*(status(address) for _ in range(30))) == [200] * 30
         line = await page(address)
@@ -269,7 +269,7 @@ def test_a_hundred_requests_at_once_are_answered_and_of_a_drag_only_the_latest(
     bench(ask)
 
 
-def test_error_bars_follow_and_every_page_sees_the_change(bench) -> None:
+def test_error_bars_follow_and_every_page_sees_the_change(bench):
     async def ask(made: Workbench, address: str) -> None:
         first_page, second_page = await page(address), await page(address)
         await told(first_page, {"do": "hello"})
@@ -294,7 +294,7 @@ def test_error_bars_follow_and_every_page_sees_the_change(bench) -> None:
 
 
 @pytest.mark.slow
-def test_samples_of_a_scene_that_has_changed_are_given_up(bench, monkeypatch) -> None:
+def test_samples_of_a_scene_that_has_changed_are_given_up(bench, monkeypatch):
     collect, changed, finished = server.collect_tolerances, threading.Event(), []
 
     def watched(*arguments):
@@ -318,7 +318,7 @@ def test_samples_of_a_scene_that_has_changed_are_given_up(bench, monkeypatch) ->
     bench(ask)
 
 
-def test_it_ends_when_the_last_page_has_gone_and_not_before(bench) -> None:
+def test_it_ends_when_the_last_page_has_gone_and_not_before(bench):
     async def ask(made: Workbench, address: str) -> None:
         one = await page(address)
         await told(one, {"do": "hello"})
@@ -336,7 +336,7 @@ def test_it_ends_when_the_last_page_has_gone_and_not_before(bench) -> None:
 def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
     bench,
     monkeypatch,
-) -> None:
+):
     program = (
         "import sys, time, pathlib; print('agrees', flush=True); out ="
         " pathlib.Path(sys.argv[-1]); "
@@ -383,7 +383,7 @@ def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
 def test_a_change_overtakes_a_summary_that_is_being_computed(
     bench,
     monkeypatch,
-) -> None:
+):
     evaluate, asked_for, released, summaries = (
         session.evaluate_scene,
         threading.Event(),
@@ -424,7 +424,7 @@ def test_a_change_overtakes_a_summary_that_is_being_computed(
 
 
 @pytest.mark.slow
-def test_a_page_that_closes_while_answers_wait_leaves_no_trace(bench, caplog) -> None:
+def test_a_page_that_closes_while_answers_wait_leaves_no_trace(bench, caplog):
     async def ask(made: Workbench, address: str) -> None:
         line = await page(address)
         reading = asyncio.create_task(
@@ -469,7 +469,7 @@ def test_the_line_of_a_page_that_does_not_read_is_dropped(
     bench,
     caplog,
     monkeypatch,
-) -> None:
+):
     """One page changes the scene, another one that reads nothing is told each time."""
     monkeypatch.setattr(server, "MOST_UNREAD", 100_000)
     frame = {"note": "x" * 60_000}
@@ -494,7 +494,7 @@ def test_the_line_of_a_page_that_does_not_read_is_dropped(
     assert not caplog.records
 
 
-def test_the_picture_is_served_as_an_image_alone(bench, path: Path) -> None:
+def test_the_picture_is_served_as_an_image_alone(bench, path):
     """An SVG opened by its address runs no script and reaches nothing here."""
 
     async def ask(made: Workbench, address: str) -> None:
@@ -538,9 +538,9 @@ def processor_time(process: subprocess.Popen) -> float:
     ids=["within its limit of files", "beyond its limit of files"],
 )
 def test_half_open_connections_neither_stop_the_server_nor_stay(
-    path: Path,
-    files: int,
-) -> None:
+    path,
+    files,
+):
     import resource
 
     # imported before the limit holds: the server alone is tried
@@ -592,7 +592,7 @@ server.edit(Path(sys.argv[1]), Path(sys.argv[1] + "_exports"), browse=False)
     assert error == "" and '"105 mm"' in path.read_text()
 
 
-def test_the_oldest_connection_gives_way_and_a_page_stays(bench) -> None:
+def test_the_oldest_connection_gives_way_and_a_page_stays(bench):
     async def ask(made: Workbench, address: str) -> None:
         line = await page(address)
         await told(line, {"do": "hello"})
@@ -610,17 +610,15 @@ def test_the_oldest_connection_gives_way_and_a_page_stays(bench) -> None:
     bench(ask)
 
 
-def test_a_page_in_the_background_which_is_woken_once_a_minute_finds_its_server() -> (
-    None
-):
+def test_a_page_in_the_background_which_is_woken_once_a_minute_finds_its_server():
     assert GONE >= 60.0 + 20.0
 
 
 @pytest.mark.slow
 @pytest.mark.posix
 def test_the_browser_gets_a_private_page_and_the_token_stands_in_no_list_of_processes(
-    path: Path,
-) -> None:
+    path,
+):
     seen, browser = path.with_name("seen"), path.with_name("browser")
     browser.write_text(f'#!/bin/sh\necho "$@" >> {seen}.part; mv {seen}.part {seen}\n')
     browser.chmod(0o755)
@@ -643,7 +641,7 @@ def test_the_browser_gets_a_private_page_and_the_token_stands_in_no_list_of_proc
 
 @pytest.mark.slow
 @pytest.mark.posix
-def test_a_second_workbench_on_one_file_leads_to_the_first(path: Path) -> None:
+def test_a_second_workbench_on_one_file_leads_to_the_first(path):
     link = path.with_name("link.toml")
     link.symlink_to(path)
     first, second = (start(name, "--no-browser") for name in (path, link))
@@ -665,9 +663,9 @@ def test_a_second_workbench_on_one_file_leads_to_the_first(path: Path) -> None:
 
 @pytest.mark.posix
 def test_a_file_that_another_one_locks_and_gives_no_address_for_is_named(
-    tmp_path: Path,
+    tmp_path,
     monkeypatch,
-) -> None:
+):
     from fourbar.edit import redirect
 
     monkeypatch.setattr(redirect, "PATIENCE", 0.1)
@@ -683,10 +681,10 @@ def test_a_file_that_another_one_locks_and_gives_no_address_for_is_named(
 @pytest.mark.posix
 @pytest.mark.parametrize("how", ["linked", "another's", "written by hand", "longer"])
 def test_a_file_of_the_page_s_name_that_is_somebody_else_s_stays_as_it_is(
-    tmp_path: Path,
+    tmp_path,
     monkeypatch,
-    how: str,
-) -> None:
+    how,
+):
     ours = REDIRECT_PAGE.format(address="http://127.0.0.1:4000/token/")
     content = {"written by hand": "<html>", "longer": ours + "<p>"}.get(how, ours)
     page = tmp_path / f"a.toml{REDIRECT_ENDING}"
@@ -704,9 +702,9 @@ def test_a_file_of_the_page_s_name_that_is_somebody_else_s_stays_as_it_is(
 @pytest.mark.posix
 @pytest.mark.parametrize("left", ["", REDIRECT_PAGE.format(address="http://x/")])
 def test_an_empty_page_and_one_of_a_killed_server_are_written_over(
-    tmp_path: Path,
-    left: str,
-) -> None:
+    tmp_path,
+    left,
+):
     page = tmp_path / f"a.toml{REDIRECT_ENDING}"
     page.write_text(left)
     redirect = Redirect(tmp_path / "a.toml")
@@ -721,8 +719,8 @@ def test_an_empty_page_and_one_of_a_killed_server_are_written_over(
 @pytest.mark.slow
 @pytest.mark.posix
 def test_the_command_prints_the_address_alone_and_ends_by_an_interrupt(
-    path: Path,
-) -> None:
+    path,
+):
     began = time.monotonic()
     with start(path, "--no-browser") as process:
         address = process.stdout.readline()

@@ -215,9 +215,7 @@ def page(chromium: Any) -> Iterator[Page]:
 
 
 @pytest.mark.slow
-def test_the_table_of_limits_keeps_its_columns_in_a_narrow_window(
-    page: Page, path: Path
-) -> None:
+def test_the_table_of_limits_keeps_its_columns_in_a_narrow_window(page, path):
     path.write_text(fourbar.dump(fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22))))
     page.resize(400)
     page.get(path)
@@ -241,9 +239,7 @@ def test_the_table_of_limits_keeps_its_columns_in_a_narrow_window(
 
 
 @pytest.mark.slow
-def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(
-    page: Page, path: Path
-) -> None:
+def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(page, path):
     page.open(path)
     page.type("field:title", "<b>Mine</b><script>alert(1)</script>")
     page.type("field:lengths/input", "4 in")
@@ -300,9 +296,7 @@ SHOWN_FIELDS = (
 
 
 @pytest.mark.slow
-def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(
-    page: Page, path: Path
-) -> None:
+def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(page, path):
     page.get(path)
     page.wait("offers && sketch")
     assert not page.shows("bar-2")  # the drawing is empty
@@ -382,9 +376,7 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(
 
 
 @pytest.mark.slow
-def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(
-    page: Page, path: Path
-) -> None:
+def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(page, path):
     page.get(path)
     page.wait("offers && sketch")
     page.click_pins("1000 mm", (120, 300), (170, 180), (400, 120), (380, 330))
@@ -440,9 +432,7 @@ def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(
 
 
 @pytest.mark.slow
-def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(
-    page: Page, path: Path
-) -> None:
+def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(page, path):
     page.get(path)
     page.wait("offers && sketch && document.activeElement === picture")
 
@@ -517,9 +507,7 @@ def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(
 
 
 @pytest.mark.slow
-def test_each_label_is_what_a_screen_reader_says_and_each_choice_a_list(
-    page: Page, path: Path
-) -> None:
+def test_each_label_is_what_a_screen_reader_says_and_each_choice_a_list(page, path):
     path.write_text((MODELS / "gallery" / "excavator_bucket.toml").read_text())
     page.open(path)
     visible = (
@@ -574,8 +562,8 @@ MOVED = (
 
 @pytest.mark.slow
 def test_it_opens_in_the_middle_with_a_linkage_that_fills_half_and_labels_apart(
-    page: Page, path: Path
-) -> None:
+    page, path
+):
     for model in MOVED:
         name = model.rpartition("/")[2]
         file = path.with_name(f"{name}.toml")
@@ -597,9 +585,7 @@ def test_it_opens_in_the_middle_with_a_linkage_that_fills_half_and_labels_apart(
 
 
 @pytest.mark.slow
-def test_undo_takes_a_refused_entry_back_and_leaves_the_last_good_state(
-    page: Page, path: Path
-) -> None:
+def test_undo_takes_a_refused_entry_back_and_leaves_the_last_good_state(page, path):
     page.open(path)
     page.type("field:lengths/input", "110 mm")
     page.wait("data.lengths[1] === 0.11")
@@ -629,9 +615,7 @@ def test_undo_takes_a_refused_entry_back_and_leaves_the_last_good_state(
 
 
 @pytest.mark.slow
-def test_a_page_finds_its_server_again_and_a_new_one_goes_on_from_the_state(
-    page: Page, path: Path
-) -> None:
+def test_a_page_finds_its_server_again_and_a_new_one_goes_on_from_the_state(page, path):
     server = page.open(path)
     page.run("line.close()")
     page.type("field:lengths/input", "110 mm")
@@ -649,9 +633,7 @@ def test_a_page_finds_its_server_again_and_a_new_one_goes_on_from_the_state(
 
 
 @pytest.mark.slow
-def test_a_refused_entry_stays_with_its_message_when_tab_follows_at_once(
-    page: Page, path: Path
-) -> None:
+def test_a_refused_entry_stays_with_its_message_when_tab_follows_at_once(page, path):
     page.open(path)
     page.type("field:lengths/input", f"4 lb{Keys.TAB}")
     entry = "document.getElementById('field:lengths/input')"
@@ -673,8 +655,8 @@ def test_a_refused_entry_stays_with_its_message_when_tab_follows_at_once(
 
 @pytest.mark.slow
 def test_a_strip_beside_the_drawing_tells_the_largest_numbers_and_a_change_of_type(
-    page: Page, path: Path
-) -> None:
+    page, path
+):
     page.open(path)
     page.wait(AT_REST)
     drive, pins, _ = page.text("strip").split("; ")
@@ -691,9 +673,7 @@ def test_a_strip_beside_the_drawing_tells_the_largest_numbers_and_a_change_of_ty
 
 
 @pytest.mark.slow
-def test_choosing_another_commanded_angle_keeps_the_position(
-    page: Page, path: Path
-) -> None:
+def test_choosing_another_commanded_angle_keeps_the_position(page, path):
     page.open(path)
     page.run("go(nearest(2.0))")
     choose = "const s = document.getElementById('command'); s.value = 'theta_4'; "
@@ -705,7 +685,7 @@ def test_choosing_another_commanded_angle_keeps_the_position(
 
 
 @pytest.mark.slow
-def test_no_number_of_the_scene_is_cut_off_in_its_field(page: Page, path: Path) -> None:
+def test_no_number_of_the_scene_is_cut_off_in_its_field(page, path):
     """The pump-jack states a ground of 98.595131725659 in, which no half line holds."""
     path.write_text((MODELS / "gallery" / "pump_jack.toml").read_text())
     cut_off = (
@@ -724,7 +704,7 @@ def test_no_number_of_the_scene_is_cut_off_in_its_field(page: Page, path: Path) 
 
 
 @pytest.mark.slow
-def test_a_change_beyond_ten_times_is_no_percentage(page: Page, path: Path) -> None:
+def test_a_change_beyond_ten_times_is_no_percentage(page, path):
     page.open(path)
     said = page.value(
         "[changeOf(1, 8835.11), changeOf(2, 3), changeOf(2, 1.9),"
@@ -742,7 +722,7 @@ CLICKS = 2.0
 
 
 @pytest.mark.slow
-def test_a_photo_is_traced_to_a_scene(page: Page, path: Path) -> None:
+def test_a_photo_is_traced_to_a_scene(page, path):
     from PIL import Image
 
     noise = Image.effect_noise((3000, 2000), 60.0).convert("RGB")
@@ -802,11 +782,11 @@ def test_a_photo_is_traced_to_a_scene(page: Page, path: Path) -> None:
         assert off < PIXELS, pin
     page.save()
     scene = fourbar.load(path)
-    assert scene.picture is not None and scene.picture.name == "mine.jpg"
+    assert scene.picture.name == "mine.jpg"
 
 
 @pytest.mark.slow
-def test_what_one_drags_for_is_seen_without_a_scroll(page: Page, path: Path) -> None:
+def test_what_one_drags_for_is_seen_without_a_scroll(page, path):
     path.write_text((MODELS / "crank_rocker.toml").read_text())
     page.resize(1024, 700)
     page.get(path)
@@ -826,9 +806,7 @@ def test_what_one_drags_for_is_seen_without_a_scroll(page: Page, path: Path) -> 
 
 
 @pytest.mark.slow
-def test_a_path_stays_as_a_target_with_the_dead_centres_of_both(
-    page: Page, path: Path
-) -> None:
+def test_a_path_stays_as_a_target_with_the_dead_centres_of_both(page, path):
     lengths = {"ground": 300, "input": 100, "coupler": 250, "output": 220}
     rows = "\n".join(f'{name} = "{value} mm"' for name, value in lengths.items())
     path.write_text(f"[lengths]\n{rows}\n")
@@ -863,9 +841,7 @@ def test_a_path_stays_as_a_target_with_the_dead_centres_of_both(
 
 
 @pytest.mark.slow
-def test_a_force_that_grows_between_the_positions_is_said_beside_its_curve(
-    page: Page, path: Path
-) -> None:
+def test_a_force_that_grows_between_the_positions_is_said_beside_its_curve(page, path):
     """The cylinder's stroke stands still twice in a turn, at no position of these."""
     cylinder = (
         'from = { bar = 1, from_pin = ["100 mm", "-60 deg"] }\n'

@@ -86,8 +86,8 @@ def leaves(value, path=()):
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_a_file_is_unchanged_on_a_round_trip_and_one_number_changes_one_place(
-    path: Path,
-) -> None:
+    path,
+):
     text = path.read_bytes().decode()
     assert SceneDocument(text).text() == text
     document, numbers = SceneDocument(text), 0
@@ -107,7 +107,7 @@ def test_a_file_is_unchanged_on_a_round_trip_and_one_number_changes_one_place(
     assert numbers > 3 and tomllib.loads(document.text()) == tomllib.loads(text)
 
 
-def test_each_part_that_is_offered_is_one_that_the_file_takes() -> None:
+def test_each_part_that_is_offered_is_one_that_the_file_takes():
     names = {"points": "P", "tolerances": "lengths.input"}
     parts = list_offers()["parts"]
     for part in parts:
@@ -128,7 +128,7 @@ def test_each_part_that_is_offered_is_one_that_the_file_takes() -> None:
 
 
 @pytest.mark.parametrize("in_place", ["density", "mass"])
-def test_each_field_that_is_offered_is_one_that_the_file_takes(in_place: str) -> None:
+def test_each_field_that_is_offered_is_one_that_the_file_takes(in_place):
     """A density stands in place of a mass.
 
     Each field is set in one of two documents.
@@ -150,7 +150,7 @@ def test_each_field_that_is_offered_is_one_that_the_file_takes(in_place: str) ->
         assert bar.mass == pytest.approx(0.2 if in_place == "density" else steel)
 
 
-def test_what_a_pair_consists_of_is_read_from_the_declarations() -> None:
+def test_what_a_pair_consists_of_is_read_from_the_declarations():
     pairs = list_offers()["pairs"]
     for key in ("centre", "from_pin", "from_centre", "arm"):
         assert pairs.pop(key) == ["distance", "angle"]
@@ -162,8 +162,8 @@ def test_what_a_pair_consists_of_is_read_from_the_declarations() -> None:
 
 
 def test_what_the_file_refuses_is_refused_in_its_words_and_the_last_good_state_stays(
-    session: Session,
-) -> None:
+    session,
+):
     before = session.now.text
     for place, value, words in (
         ("lengths/input", "100 kg", '"kg" does not convert to m'),
@@ -184,7 +184,7 @@ def test_what_the_file_refuses_is_refused_in_its_words_and_the_last_good_state_s
     assert session.now.text == before.replace('input = "100 mm"', 'input = "4 in"')
 
 
-def test_a_gesture_is_one_step_back(session: Session) -> None:
+def test_a_gesture_is_one_step_back(session):
     before = session.now.text
     for size in range(101, 131):
         put(session, "lengths/input", f"{size} mm", gesture="wheel")
@@ -276,9 +276,7 @@ DRAGGED = {
 
 
 @pytest.mark.parametrize("name", DRAGGED)
-def test_what_is_dragged_stands_where_it_was_dragged_to(
-    loaded: Session, name: str
-) -> None:
+def test_what_is_dragged_stands_where_it_was_dragged_to(loaded, name):
     what, place_of = DRAGGED[name]
     to = {"B": 0.2 + 0.25j, "O4": 0.33 + 0.05j}.get(name, TO)
     assert place_of(drag(loaded, what, to)) == pytest.approx(to, abs=3 * PIXEL)
@@ -290,7 +288,7 @@ def test_what_is_dragged_stands_where_it_was_dragged_to(
         assert units == {"x": "in", "y": "mm"}
 
 
-def test_pin_A_goes_along_its_bar_whose_angle_is_commanded(session: Session) -> None:
+def test_pin_A_goes_along_its_bar_whose_angle_is_commanded(session):
     """O2 cannot be dragged."""
     length = abs(complex(*drag(session, "A", 0.08 + 0.09j).A[0]))
     assert length == pytest.approx(abs(0.08 + 0.09j), abs=PIXEL)
@@ -301,8 +299,8 @@ def test_pin_A_goes_along_its_bar_whose_angle_is_commanded(session: Session) -> 
 @pytest.mark.parametrize("frame", ["world", "bar"])
 @pytest.mark.parametrize("size", ["5 N", "-5 N"])
 def test_the_arrow_of_a_load_goes_where_it_is_dragged_and_a_negative_force_stays(
-    loaded: Session, frame: str, size: str
-) -> None:
+    loaded, frame, size
+):
     path = ["loads", 3]
     changed = loaded.now.text.replace('"5 N"', f'"{size}"')
     text = changed.replace('y = "20 mm" }', f'y = "20 mm" }}\nframe = "{frame}"')
@@ -317,7 +315,7 @@ def test_the_arrow_of_a_load_goes_where_it_is_dragged_and_a_negative_force_stays
     assert np.angle(acts / arrow) == pytest.approx(0.0, abs=0.02)
 
 
-def test_a_place_by_coordinates_stays_so_until_it_is_restated(loaded: Session) -> None:
+def test_a_place_by_coordinates_stays_so_until_it_is_restated(loaded):
     path = ["loads", 3, "from_pin"]
     stated = loaded.now.scene.loads[3].from_pin
     for by, kind in (("polar", list), ("xy", dict)):
@@ -334,9 +332,9 @@ BUCKET = ROOT / "models" / "gallery" / "excavator_bucket.toml"
 
 @pytest.mark.parametrize("command", ["theta_3", "theta_4", "stroke"])
 def test_another_command_goes_over_the_same_motion(
-    tmp_path: Path,
-    command: str,
-) -> None:
+    tmp_path,
+    command,
+):
     session = start(tmp_path, BUCKET)
     before = fourbar.solve(session.now.scene)
     accepted(ask(session, "command", command=command))
@@ -353,7 +351,7 @@ def test_another_command_goes_over_the_same_motion(
     assert ask(session, "undo")["text"] == BUCKET.read_text()
 
 
-def test_what_cannot_be_commanded_is_one_line(session: Session) -> None:
+def test_what_cannot_be_commanded_is_one_line(session):
     for command, words in (
         ("stroke", "needs a cylinder"),
         ("theta_1", "must be one of"),
@@ -365,8 +363,8 @@ def test_what_cannot_be_commanded_is_one_line(session: Session) -> None:
 
 
 def test_a_stroke_out_of_range_is_refused_in_the_units_of_the_file(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     """The range shows on solving, when the file has been read."""
     session = start(tmp_path, STROKE_INPUT)
     units = session.now.units
@@ -382,8 +380,8 @@ def test_a_stroke_out_of_range_is_refused_in_the_units_of_the_file(
 
 
 def test_a_state_that_assembles_nowhere_names_what_it_commands(
-    session: Session,
-) -> None:
+    session,
+):
     """The output of this linkage rocks, and does not come to 0 deg."""
     scene = replace(session.now.scene, motion=fourbar.Motion(theta_4=0.0))
     with pytest.raises(
@@ -400,9 +398,9 @@ PINS_DRAWN = [[0.0, 0.0], [3.0, 4.0], [14.0, 9.0], [12.0, -5.0]]
 
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(
-    tmp_path: Path,
-    mirrored: bool,
-) -> None:
+    tmp_path,
+    mirrored,
+):
     session = Session(tmp_path / "new.toml", tmp_path / "exports")
     assert ask(session, "hello")["fresh"]
     pins = [[x, -y if mirrored else y] for x, y in PINS_DRAWN]
@@ -457,10 +455,10 @@ def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(
     ],
 )
 def test_results_have_the_units_of_the_file_until_others_are_chosen(
-    session: Session,
-    length: str,
-    force: str,
-) -> None:
+    session,
+    length,
+    force,
+):
     text = session.now.text.replace('ground = "300 mm"', f"ground = '''{length}'''")
     told = ask(session, "text", text=text)
     assert "refused" not in told, told
@@ -473,7 +471,7 @@ def test_results_have_the_units_of_the_file_until_others_are_chosen(
     assert session.units.get("N", ("N", 1.0))[0] == force
 
 
-def test_numbers_get_the_digits_of_a_pixel_and_keep_their_unit() -> None:
+def test_numbers_get_the_digits_of_a_pixel_and_keep_their_unit():
     assert write_rounded(0.123456, 0.003, "m") == "0.123 m"
     assert write_rounded(123.456, 3.0, "mm") == "123 mm"
     assert write_rounded(1234.0, 300.0, "mm") == "1200 mm"
@@ -505,7 +503,7 @@ def settled(session: Session) -> dict:
     )
 
 
-def test_the_answer_is_what_analyze_says(session: Session) -> None:
+def test_the_answer_is_what_analyze_says(session):
     put(session, "bars/coupler/mass", "2 lb")
     told = unpacked(pack_frame(settled(session)))
     scene = loads(session.now.text)
@@ -523,7 +521,7 @@ def test_the_answer_is_what_analyze_says(session: Session) -> None:
     )
 
 
-def test_every_linkage_that_people_know_has_an_answer(tmp_path: Path) -> None:
+def test_every_linkage_that_people_know_has_an_answer(tmp_path):
     for path in [
         *(ROOT / "models").glob("*.toml"),
         *(ROOT / "models" / "gallery").glob("*.toml"),
@@ -533,7 +531,7 @@ def test_every_linkage_that_people_know_has_an_answer(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_an_answer_takes_ten_bare_solves_at_most(session: Session) -> None:
+def test_an_answer_takes_ten_bare_solves_at_most(session):
     best = {"bare": math.inf, "answer": math.inf}
     # what the other tests of this process hold is not searched for garbage in here
     gc.collect()
@@ -560,8 +558,8 @@ def test_an_answer_takes_ten_bare_solves_at_most(session: Session) -> None:
 
 
 def test_save_keeps_the_rest_and_asks_before_it_overwrites_what_changed(
-    session: Session,
-) -> None:
+    session,
+):
     put(session, "lengths/input", "105 mm")
     assert ask(session, "save")["saved"] and session.saved
     assert session.path.read_text() == CRANK_ROCKER.read_text().replace(
@@ -577,7 +575,7 @@ def test_save_keeps_the_rest_and_asks_before_it_overwrites_what_changed(
     assert '"106 mm"' in session.path.read_text()
 
 
-def test_a_session_goes_on_where_it_stopped(session: Session) -> None:
+def test_a_session_goes_on_where_it_stopped(session):
     put(session, "lengths/input", "105 mm")
     ask(session, "keep")
     put(session, "lengths/input", "110 mm")
@@ -635,7 +633,7 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize("name", DAMAGES)
-def test_a_damaged_state_file_is_one_line(session: Session, name: str) -> None:
+def test_a_damaged_state_file_is_one_line(session, name):
     put(session, "lengths/input", "105 mm")
     session.write_state_file()
     before = session.state_file.read_text()
@@ -653,9 +651,9 @@ def test_a_damaged_state_file_is_one_line(session: Session, name: str) -> None:
 
 @pytest.mark.slow
 def test_the_history_of_a_large_scene_stays_within_what_the_next_start_reads(
-    session: Session,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    session,
+    monkeypatch,
+):
     """Both limits and the scene are a tenth as large.
 
     Reading the text takes the time.
@@ -686,8 +684,8 @@ def test_the_history_of_a_large_scene_stays_within_what_the_next_start_reads(
 
 @pytest.mark.posix
 def test_a_scene_behind_a_link_is_saved_where_it_is_and_keeps_its_mode(
-    session: Session,
-) -> None:
+    session,
+):
     session.path.chmod(0o600)
     link = session.path.with_name("link.toml")
     link.symlink_to(session.path)
@@ -699,7 +697,7 @@ def test_a_scene_behind_a_link_is_saved_where_it_is_and_keeps_its_mode(
     assert session.path.stat().st_mode & 0o777 == 0o600
 
 
-def test_exports_go_into_their_folder_under_their_own_names(session: Session) -> None:
+def test_exports_go_into_their_folder_under_their_own_names(session):
     for name, ending in (("csv", "csv"), ("mjcf", "xml"), ("page", "html")):
         ask(session, "export", format=name)
         assert (session.exports.folder / f"scene.{ending}").stat().st_size > 1000
@@ -707,7 +705,7 @@ def test_exports_go_into_their_folder_under_their_own_names(session: Session) ->
     assert len(list(session.path.parent.rglob("*"))) == 5
 
 
-def test_a_new_scene_begins_where_there_is_no_file(tmp_path: Path) -> None:
+def test_a_new_scene_begins_where_there_is_no_file(tmp_path):
     session = Session(tmp_path / "new.toml", tmp_path / "exports")
     assert not session.saved and session.answer()["undo"] is False
     ask(session, "save")
@@ -715,8 +713,8 @@ def test_a_new_scene_begins_where_there_is_no_file(tmp_path: Path) -> None:
 
 
 def test_a_slip_of_the_finger_on_the_steps_does_not_fill_the_memory(
-    session: Session,
-) -> None:
+    session,
+):
     from fourbar.edit.session import MOST_SOLVED_ANEW
 
     path = ["motion", "theta_2", "steps"]
@@ -728,7 +726,7 @@ def test_a_slip_of_the_finger_on_the_steps_does_not_fill_the_memory(
     accepted(ask(session, "set", path=path, value="100"))
 
 
-def test_another_command_goes_over_the_position_that_is_shown(tmp_path: Path) -> None:
+def test_another_command_goes_over_the_position_that_is_shown(tmp_path):
     """The output of a crank-rocker turns back twice.
 
     The page shows one of the stretches.
@@ -743,7 +741,7 @@ def test_another_command_goes_over_the_position_that_is_shown(tmp_path: Path) ->
         assert np.abs(np.exp(1j * covered) - np.exp(1j * shown)).min() < 0.03
 
 
-def test_new_entries_and_limits_have_the_units_of_the_scene(tmp_path: Path) -> None:
+def test_new_entries_and_limits_have_the_units_of_the_scene(tmp_path):
     path = tmp_path / "inches.toml"
     path.write_text(write_new_scene(["12 in", "4 in", "10.123456789 in", "9 in"]))
     session = Session(path, tmp_path / "exports")
@@ -782,11 +780,11 @@ def test_new_entries_and_limits_have_the_units_of_the_scene(tmp_path: Path) -> N
     ],
 )
 def test_a_picture_is_kept_beside_the_scene_and_over_no_file(
-    session: Session,
-    kind: str,
-    content: bytes,
-    name: str,
-) -> None:
+    session,
+    kind,
+    content,
+    name,
+):
     taken = session.path.with_name("scene.jpg")
     taken.write_bytes(b"somebody's")
     data = base64.b64encode(content).decode()
@@ -802,7 +800,7 @@ def test_a_picture_is_kept_beside_the_scene_and_over_no_file(
     assert traced["shift"] == pytest.approx((0.0, 0.0))
 
 
-def test_a_picture_alone_leaves_a_new_scene_without_a_linkage(tmp_path: Path) -> None:
+def test_a_picture_alone_leaves_a_new_scene_without_a_linkage(tmp_path):
     session = Session(tmp_path / "new.toml", tmp_path / "exports")
     data = base64.b64encode(b"\x89PNG\r\n\x1a\n...").decode()
     picture = ask(session, "picture", data=f"data:image/png;base64,{data}")
@@ -823,9 +821,9 @@ def test_a_picture_alone_leaves_a_new_scene_without_a_linkage(tmp_path: Path) ->
     ["data:text/html;base64,PHN2Zz4=", "data:image/png;base64,PGh0bWw+", "photo.png"],
 )
 def test_what_is_no_picture_is_refused_and_leaves_no_file(
-    session: Session,
-    data: str,
-) -> None:
+    session,
+    data,
+):
     before = {*session.path.parent.iterdir()}
     answer = ask(session, "picture", data=data)
     assert "must be a PNG, JPEG or SVG picture" in answer["refused"]

@@ -41,7 +41,7 @@ LAST_DIGITS = 64 * 2.0**-52
 def alone(*effects: object, **motion: object) -> Scene:
     """Static, so that only the effects act."""
     stated = {"theta_2": np.linspace(0.2, 6.0, 9), "omega_2": 0.0, **motion}
-    return crank_rocker(motion=Motion(**stated), loads=(), effects=effects)  # type: ignore[arg-type]
+    return crank_rocker(motion=Motion(**stated), loads=(), effects=effects)
 
 
 GAS = Place(1, (0.2, 2.0)), Place(4, (0.22, 0.0))
@@ -98,7 +98,7 @@ def energy_of_weights(s: fourbar.Solution) -> np.ndarray:
     ],
     ids=["coil", "gas", "of no length", "torsion", "weights"],
 )
-def test_the_torque_is_the_slope_of_the_energy(effect, energy) -> None:
+def test_the_torque_is_the_slope_of_the_energy(effect, energy):
     scene = alone(effect, theta_2=np.linspace(-1.0, 2.0, 9))
     ahead, behind = (
         energy(solve(replace(scene, motion=Motion(scene.motion.theta_2 + step))))
@@ -108,13 +108,13 @@ def test_the_torque_is_the_slope_of_the_energy(effect, energy) -> None:
     assert solve(scene).torque == pytest.approx(slope, abs=SECOND_ORDER, rel=0)
 
 
-def test_a_gas_spring_of_one_force_pushes_with_it_everywhere() -> None:
+def test_a_gas_spring_of_one_force_pushes_with_it_everywhere():
     constant = Spring(*GAS, 0.0, 0.5, -FORCES[0])
     assert Spring.gas(*GAS, 0.5, 0.3, FORCES[0]) == constant
 
 
 @pytest.mark.parametrize(("bar", "name"), [(2, "input"), (4, "output")])
-def test_a_flywheel_is_inertia_of_the_bar(bar: int, name: str) -> None:
+def test_a_flywheel_is_inertia_of_the_bar(bar, name):
     scene = crank_rocker(effects=(Gravity(), Flywheel(0.02, bar)), drive_bar=bar)
     plain = scene.linkage.bar(bar)
     heavier = replace(plain, inertia=plain.moment_of_inertia + 0.02)
@@ -142,7 +142,7 @@ CONES = [  # (F, C), then x and the distance from jamming, by hand
 
 
 @pytest.mark.parametrize(("F", "C", "number", "x", "far"), CONES)
-def test_one_cone_has_one_none_or_two_solutions(F, C, number, x, far) -> None:
+def test_one_cone_has_one_none_or_two_solutions(F, C, number, x, far):
     """On a line F = 1, C = c: x = k (1 + c x), x = k |1 - c x|.
 
     The distance from jamming is the slope 1 - k e.C of x - k |F + C x|, e along
@@ -164,9 +164,7 @@ def test_one_cone_has_one_none_or_two_solutions(F, C, number, x, far) -> None:
         (-2.0, -3.0, MANY),
     ],
 )
-def test_two_pins_that_do_not_feel_each_other_are_two_single_ones(
-    c1: float, c2: float, number: int
-) -> None:
+def test_two_pins_that_do_not_feel_each_other_are_two_single_ones(c1, c2, number):
     F = np.array([[[1.0, 0.0], [2.0, 0.0]]] * 2)
     C = np.array([[[[c1, 0.0], [0.0, 0.0]], [[0.0, 0.0], [c2, 0.0]]]] * 2)
     sliding = solve_sliding(F, C, np.array([[1.0, 1.0], [0.25, 0.125]]))
@@ -181,7 +179,7 @@ def test_two_pins_that_do_not_feel_each_other_are_two_single_ones(
         assert sliding.from_jamming[0] == pytest.approx(far, rel=1e-12)
 
 
-def test_jamming_is_a_status_and_leaves_no_force() -> None:
+def test_jamming_is_a_status_and_leaves_no_force():
     s = solve(crank_rocker(effects=(PinFriction.at(A=(50.0, 0.01)),)))
     assert {"jammed", "several"} == set(s.status)
     jammed = np.array([status == "jammed" for status in s.status])
@@ -193,7 +191,7 @@ def test_jamming_is_a_status_and_leaves_no_force() -> None:
     "friction",
     [Friction.at(O2=0.02, B=0.03), PinFriction.at(O2=(0.2, 0.01), B=(0.3, 0.02))],
 )
-def test_at_rest_the_interval_is_that_of_beginning_to_move(friction: object) -> None:
+def test_at_rest_the_interval_is_that_of_beginning_to_move(friction):
     """Its ends are the torques of slow motions in either sense, at rest their inside.
 
     (1e-9 rad/s)^2 of inertia is nothing against these torques.
@@ -214,14 +212,14 @@ def test_at_rest_the_interval_is_that_of_beginning_to_move(friction: object) -> 
     assert bare.torque_low is bare.torque_high is bare.friction_residual is None
 
 
-def test_pin_load_friction_needs_the_pin_forces() -> None:
+def test_pin_load_friction_needs_the_pin_forces():
     motion = Motion(1.0, 0.0, free=fourbar.Free(1.0, 10))
     friction = PinFriction.at(A=(0.1, 0.01))
     with pytest.raises(LimitError, match="pin forces"):
         solve(crank_rocker(motion=motion, effects=(friction,)))
 
 
-def test_a_table_is_linear_between_its_points_and_periodic() -> None:
+def test_a_table_is_linear_between_its_points_and_periodic():
     table = Table((1.0, 2.0, 1.0 + math.tau), (0.0, 4.0, 0.0))
     angles = np.array([1.0, 1.25, 2.0, 1.5 - math.tau, 1.25 + 3 * math.tau])
     right = [0.0, 1.0, 4.0, 2.0, 1.0]
@@ -234,7 +232,7 @@ def test_a_table_is_linear_between_its_points_and_periodic() -> None:
         quarter.at(np.radians([45.0, 120.0]))
 
 
-def test_a_load_over_theta_2_is_the_load_times_its_factor() -> None:
+def test_a_load_over_theta_2_is_the_load_times_its_factor():
     load = Load(4, (3.0, 0.7), arm=(0.05, 1.0), moment=0.2)
     table = Table((0.0, math.pi, math.tau), (1.0, 3.0, 1.0))
     base = alone(theta_2=[math.pi / 2])
@@ -243,7 +241,7 @@ def test_a_load_over_theta_2_is_the_load_times_its_factor() -> None:
     assert solve(tabled).torque == pytest.approx(solve(twice).torque, rel=1e-14)
 
 
-def test_breaks_change_their_sign_where_forces_jump_or_bend() -> None:
+def test_breaks_change_their_sign_where_forces_jump_or_bend():
     """Corners of a table lie whole turns apart; the output turns back in line."""
     stated = Table((0.4, 1.0, 1.5), (1.0, 3.0, 2.0))
     load = Load(2, moment=1.0, table=stated)
@@ -292,7 +290,7 @@ SAME_BAR = Place(2, (0.1, 0.0)), Place(2, (0.2, 0.0))
         (lambda: Table((0.0, 1.0, 7.0), (1.0, 1.0, 1.0)), "loads.table.theta_2"),
     ],
 )
-def test_bad_input_names_its_key(make, key: str) -> None:
+def test_bad_input_names_its_key(make, key):
     with pytest.raises(InputError) as error:
         make()
     assert error.value.key == key

@@ -55,10 +55,10 @@ def driven(start_bar: int, end_bar: int, **changes: Any) -> fourbar.Scene:
 @pytest.mark.parametrize("lengths", [WIDE, SHORT, KITE])
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
 def test_forces_are_those_of_thirteen_equations_in_balls_within_their_error_bars(
-    start_bar: int,
-    end_bar: int,
-    lengths: tuple[float, ...],
-) -> None:
+    start_bar,
+    end_bar,
+    lengths,
+):
     d, *moving = lengths
     scene = driven(start_bar, end_bar)
     bars = [
@@ -107,9 +107,9 @@ def compare_with_balls(
 
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
 def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
-    start_bar: int,
-    end_bar: int,
-) -> None:
+    start_bar,
+    end_bar,
+):
     """At rest forces grow without end only for a line to bar 2, without lever there."""
     link = fourbar.uniform(0.2, 0.48, 0.55, 0.2)
     near = fourbar.Motion(fourbar.FromLimit(1, 1e-10), 0.0)
@@ -131,9 +131,7 @@ def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
 
 
 @pytest.mark.parametrize(("bar", "pin"), [(2, "F12"), (4, "F14")])
-def test_from_the_ground_to_a_bar_only_the_pin_there_bears_the_push(
-    bar: int, pin: str
-) -> None:
+def test_from_the_ground_to_a_bar_only_the_pin_there_bears_the_push(bar, pin):
     torque, s = (
         fourbar.solve(crank_rocker(drive_bar=bar)),
         fourbar.solve(driven(1, bar)),
@@ -148,7 +146,7 @@ def test_from_the_ground_to_a_bar_only_the_pin_there_bears_the_push(
 
 
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
-def test_its_line_has_no_sense(start_bar: int, end_bar: int) -> None:
+def test_its_line_has_no_sense(start_bar, end_bar):
     s = fourbar.solve(driven(start_bar, end_bar))
     back = fourbar.solve(
         crank_rocker(
@@ -179,9 +177,9 @@ def test_its_line_has_no_sense(start_bar: int, end_bar: int) -> None:
 
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
 def test_the_condition_is_the_slope_of_the_stroke_over_what_its_ends_could_move(
-    start_bar: int,
-    end_bar: int,
-) -> None:
+    start_bar,
+    end_bar,
+):
     """In [0, 1] for linkages of every type.
 
     ds/dtheta_2 here from differences of the stroke.
@@ -223,7 +221,7 @@ def test_the_condition_is_the_slope_of_the_stroke_over_what_its_ends_could_move(
     assert seen >= 5
 
 
-def test_where_it_has_no_lever_or_no_direction_there_are_no_forces() -> None:
+def test_where_it_has_no_lever_or_no_direction_there_are_no_forces():
     link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
     motion = fourbar.Motion(np.array([0.0, 0.5, math.pi]), 1.0)
     s = fourbar.solve(
@@ -275,9 +273,9 @@ def test_where_it_has_no_lever_or_no_direction_there_are_no_forces() -> None:
     ],
 )
 def test_ends_that_keep_their_distance_are_refused_in_one_line(
-    start: Any,
-    end: Any,
-) -> None:
+    start,
+    end,
+):
     drive = fourbar.LinearDrive(Place(start[0], start[1:]), Place(end[0], end[1:]))
     with pytest.raises(
         fourbar.InputError,
@@ -320,9 +318,9 @@ FROM, TO = (
     ],
 )
 def test_a_file_with_a_wrong_drive_is_refused_in_one_line(
-    drive: str,
-    says: str,
-) -> None:
+    drive,
+    says,
+):
     with pytest.raises(fourbar.InputError, match=says) as caught:
         loads(TEXT + drive, "scene.toml")
     assert "\n" not in str(caught.value) and str(caught.value).startswith(
@@ -330,7 +328,7 @@ def test_a_file_with_a_wrong_drive_is_refused_in_one_line(
     )
 
 
-def test_it_reads_back_as_it_was_written_and_is_carried_by_studies() -> None:
+def test_it_reads_back_as_it_was_written_and_is_carried_by_studies():
     scene = loads(TEXT + FROM + TO + '[tolerances]\n"drive.from.from_pin.0" = "1 mm"\n')
     again = loads(dump(scene))
     assert again.drive == scene.drive
@@ -353,7 +351,7 @@ def test_it_reads_back_as_it_was_written_and_is_carried_by_studies() -> None:
         fourbar.vary(scene, {"drive.from.bar": [2]})
 
 
-def test_its_duty_has_a_peak_force_and_no_peak_torque() -> None:
+def test_its_duty_has_a_peak_force_and_no_peak_torque():
     scene = driven(1, 3, motion=fourbar.Motion(np.linspace(0.4, 2.0, 7), 10.0, 5.0))
     s = fourbar.solve(scene)
     duty, entry = motor_duty(s), write_motor(scene, s, {})
@@ -364,9 +362,9 @@ def test_its_duty_has_a_peak_force_and_no_peak_torque() -> None:
 
 @pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
 def test_friction_at_rest_holds_as_much_force_as_its_work(
-    start_bar: int,
-    end_bar: int,
-) -> None:
+    start_bar,
+    end_bar,
+):
     motion = fourbar.Motion(np.array([0.4, 1.3, 2.0, 4.5]), 10.0)
     scene = driven(start_bar, end_bar, motion=motion)
     speeds = fourbar.solve(scene).stroke_speed / 10.0
@@ -376,14 +374,14 @@ def test_friction_at_rest_holds_as_much_force_as_its_work(
     np.testing.assert_allclose(width, 0.1 / np.abs(speeds), rtol=1e-9)
 
 
-def test_files_of_simulators_refuse_it_by_name() -> None:
+def test_files_of_simulators_refuse_it_by_name():
     scene = driven(1, 4, loads=())
     for write in (write_sdf, write_usd):
         with pytest.raises(fourbar.FourBarError, match="a drive that exerts a force"):
             write(scene)
 
 
-def test_a_released_linkage_has_a_stroke_and_no_force() -> None:
+def test_a_released_linkage_has_a_stroke_and_no_force():
     scene = driven(
         1,
         4,

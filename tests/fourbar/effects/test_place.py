@@ -25,17 +25,15 @@ ROUND_OFF = 1e-13
 """Relative; two evaluations of some fifty roundings each, far from limits."""
 
 
-def test_a_weight_hung_at_the_tip_of_the_rocker() -> None:
+def test_a_weight_hung_at_the_tip_of_the_rocker():
     """Right values by virtual work and circles that meet, apart from this program."""
     torque = fourbar.solve(loads(HUNG)).torque
     right = [0.441477, -0.417152, -0.621733, 0.532516]
-    assert torque is not None
     np.testing.assert_allclose(torque, right, atol=PRINTED, rtol=0.0)
 
 
-def test_a_pull_at_the_tip_of_massless_bars() -> None:
+def test_a_pull_at_the_tip_of_massless_bars():
     torque = fourbar.solve(loads(PULL)).torque
-    assert torque is not None
     assert torque[0] == pytest.approx(1.656231, abs=PRINTED)
 
 
@@ -70,10 +68,10 @@ def find_place(scene: Scene, load: Load, s: fourbar.Solution) -> np.ndarray:
 @pytest.mark.parametrize("bar", [3, 4])
 @pytest.mark.parametrize("form", PLACES)
 def test_a_force_does_the_work_of_its_place_and_its_direction(
-    form: str,
-    bar: int,
-    frame: str,
-) -> None:
+    form,
+    bar,
+    frame,
+):
     """T2 dtheta_2 = -F . dr of a massless linkage at rest.
 
     dr is a central difference of the place.
@@ -97,7 +95,7 @@ def test_a_force_does_the_work_of_its_place_and_its_direction(
     np.testing.assert_allclose(here.torque, -along / (2.0 * step), atol=1e-8)
 
 
-def test_an_arm_in_world_axes_keeps_its_lever_about_G() -> None:
+def test_an_arm_in_world_axes_keeps_its_lever_about_G():
     """It is the force at G and a couple, which is how the thesis has it."""
     size, direction, arm, angle = 10.0, 0.3, 0.05, 4.6
     couple = arm * size * math.sin(direction - angle)
@@ -108,9 +106,7 @@ def test_an_arm_in_world_axes_keeps_its_lever_about_G() -> None:
     np.testing.assert_allclose(one.F43, other.F43, rtol=1e-10)
 
 
-def test_a_member_of_a_study_moves_its_load_with_the_point_and_with_the_centre() -> (
-    None
-):
+def test_a_member_of_a_study_moves_its_load_with_the_point_and_with_the_centre():
     """A place at a named point or from G follows these.
 
     The same scene stated anew does so too.
@@ -134,7 +130,7 @@ def test_a_member_of_a_study_moves_its_load_with_the_point_and_with_the_centre()
     assert not np.allclose(expected.torque, fourbar.solve(scene).torque)
 
 
-def test_one_place_in_three_forms_is_one_load_one_spring_and_one_cylinder() -> None:
+def test_one_place_in_three_forms_is_one_load_one_spring_and_one_cylinder():
     place = cmath.rect(0.19, -0.4)
     point = fourbar.Point("P", 3, cmath.polar(place))
     ground = Place(1, (0.2, 2.0))
@@ -154,7 +150,7 @@ def test_one_place_in_three_forms_is_one_load_one_spring_and_one_cylinder() -> N
         torques = fourbar.solve(loaded).torque, fourbar.solve(sprung).torque
         drives.append([*torques, pushing])
         settled = loaded.settled().loads[0].place
-        assert settled is not None and settled.vector() == pytest.approx(place)
+        assert settled.vector() == pytest.approx(place)
     np.testing.assert_allclose(drives[1], drives[0], rtol=1e-9)
     np.testing.assert_array_equal(drives[2], drives[0])
 
@@ -193,7 +189,7 @@ length = "1 mm"
 """
 
 
-def test_every_form_reads_back_as_it_was_written() -> None:
+def test_every_form_reads_back_as_it_was_written():
     scene = loads(EVERY_FORM)
     assert [load.bar for load in scene.loads] == [3, 4, 2]
     text = dump(scene)
@@ -223,10 +219,10 @@ def test_every_form_reads_back_as_it_was_written() -> None:
     ],
 )
 def test_a_place_that_is_stated_wrongly_is_refused_with_what_to_write(
-    old: str,
-    new: str,
-    words: str,
-) -> None:
+    old,
+    new,
+    words,
+):
     with pytest.raises(InputError) as refused:
         loads(EVERY_FORM.replace(old, new, 1))
     assert words in str(refused.value) and "\n" not in str(refused.value)
@@ -251,17 +247,17 @@ def test_a_place_that_is_stated_wrongly_is_refused_with_what_to_write(
         ),
     ],
 )
-def test_python_refuses_what_is_no_place(make: Any) -> None:
+def test_python_refuses_what_is_no_place(make):
     with pytest.raises(InputError):
         make()
 
 
-def test_places_of_loads_are_given_by_keyword() -> None:
+def test_places_of_loads_are_given_by_keyword():
     with pytest.raises(TypeError):
         Load(3, (1.0, 0.0), (0.1, 0.0))  # type: ignore[misc]
 
 
-def test_the_error_bar_covers_a_place_from_the_centre() -> None:
+def test_the_error_bar_covers_a_place_from_the_centre():
     """The error bar of the torque holds against 40 digits of virtual work."""
     flint = pytest.importorskip("flint")
     from fourbar_validation.engines.balls import compute_outputs, make_balls

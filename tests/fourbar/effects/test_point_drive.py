@@ -37,7 +37,7 @@ frame = "bar"
 """A hand at the handle, the grip of the jaw as the load."""
 
 
-def test_pliers_multiply_the_force_of_the_hand() -> None:
+def test_pliers_multiply_the_force_of_the_hand():
     """Right: omega_4/omega_2 0.1332544 and a force ratio of 4.26/0.1332544 = 31.969."""
     s = fourbar.solve(loads(HELD))
     assert s.omega_4[0] / s.omega_2[0] == pytest.approx(0.1332544, abs=5e-8)
@@ -59,9 +59,9 @@ def driven(bar: int, frame: str, **changes: Any) -> Scene:
 @pytest.mark.parametrize("frame", ["world", "bar"])
 @pytest.mark.parametrize("bar", [2, 3, 4])
 def test_the_power_of_the_force_is_that_of_a_couple_on_the_input(
-    bar: int,
-    frame: str,
-) -> None:
+    bar,
+    frame,
+):
     """F (e . v_P) = T2 omega_2.
 
     v_P is the velocity of the point as the solution has it.
@@ -85,7 +85,7 @@ def test_the_power_of_the_force_is_that_of_a_couple_on_the_input(
 
 @pytest.mark.parametrize("frame", ["world", "bar"])
 @pytest.mark.parametrize("bar", [2, 3, 4])
-def test_free_bodies_find_the_same_forces(bar: int, frame: str) -> None:
+def test_free_bodies_find_the_same_forces(bar, frame):
     scene = driven(bar, frame)
     s = fourbar.solve(scene)
     answer = FreeBody().answer(scene, fourbar.command(scene))
@@ -103,7 +103,7 @@ def test_free_bodies_find_the_same_forces(bar: int, frame: str) -> None:
     )
 
 
-def test_where_the_point_moves_across_the_direction_there_is_no_lever() -> None:
+def test_where_the_point_moves_across_the_direction_there_is_no_lever():
     """A crank pushed along itself: the point has no speed in that direction."""
     drive = PointDrive(Place(2, (0.1, 0.0)), 0.0, "bar")
     s = fourbar.solve(crank_rocker(drive=drive, motion=fourbar.Motion(0.7, 10.0)))
@@ -111,7 +111,7 @@ def test_where_the_point_moves_across_the_direction_there_is_no_lever() -> None:
     assert np.isnan(s.drive_force[0]) and np.isnan(s.F12[0]).all()
 
 
-def test_a_study_and_a_file_carry_it() -> None:
+def test_a_study_and_a_file_carry_it():
     scene = loads(HELD)
     assert loads(dump(scene)) == scene
     keys = {"drive.direction": [math.pi / 2, 1.2], "points.handle.from_pin.0": 0.1}
@@ -141,16 +141,16 @@ def test_a_study_and_a_file_carry_it() -> None:
     ],
 )
 def test_a_drive_that_is_stated_wrongly_is_refused_in_one_line(
-    old: str,
-    new: str,
-    words: str,
-) -> None:
+    old,
+    new,
+    words,
+):
     with pytest.raises(InputError) as refused:
         loads(HELD.replace(old, new, 1))
     assert words in str(refused.value) and "\n" not in str(refused.value)
 
 
-def test_a_stroke_is_of_a_cylinder_alone() -> None:
+def test_a_stroke_is_of_a_cylinder_alone():
     motion = fourbar.Motion(stroke=0.3, stroke_speed=0.1, side="left")
     with pytest.raises(InputError, match="no cylinder"):
         crank_rocker(drive=PointDrive(Place(2, (0.1, 0.0)), 1.0), motion=motion)

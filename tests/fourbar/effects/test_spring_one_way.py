@@ -6,7 +6,6 @@ it: nothing of the formulas is used.
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -93,7 +92,7 @@ def inertia_of_door(theta: float) -> float:
     return float(slender + 0.06 * speed**2 + 35e-6 * turn**2)
 
 
-def test_the_door_is_held_by_what_its_energy_asks() -> None:
+def test_the_door_is_held_by_what_its_energy_asks():
     """At 40 deg the spring is longer than its free length, at 120 deg shorter."""
     scene = make_door('theta_2 = ["40 deg", "100 deg", "120 deg"]\nomega_2 = "0 rad/s"')
     assert loads(dump(scene)) == scene
@@ -108,14 +107,14 @@ def test_the_door_is_held_by_what_its_energy_asks() -> None:
     assert s.torque[0] - fastened.torque[0] == pytest.approx(0.0265373, abs=6e-8)
 
 
-def test_a_door_without_other_forces_is_free_beyond_the_springs_length() -> None:
+def test_a_door_without_other_forces_is_free_beyond_the_springs_length():
     scene = make_door('theta_2 = ["40 deg", "120 deg"]\nomega_2 = "0 rad/s"')
     alone = replace(scene, loads=(), effects=scene.effects[-1:])
     torque = fourbar.solve(alone).torque
     assert torque[0] == 0.0 and torque[1] == pytest.approx(0.0506291, abs=6e-8)
 
 
-def test_no_equilibrium_is_found_where_the_spring_would_have_to_pull() -> None:
+def test_no_equilibrium_is_found_where_the_spring_would_have_to_pull():
     sweep = 'theta_2 = { from = "40 deg", to = "150 deg", steps = 11 }'
     found = fourbar.equilibrium(make_door(sweep, "")).found
     assert [math.degrees(one.place.theta_2) for one in found] == pytest.approx(
@@ -124,7 +123,7 @@ def test_no_equilibrium_is_found_where_the_spring_would_have_to_pull() -> None:
     assert fourbar.equilibrium(make_door(sweep)).found == ()
 
 
-def test_a_released_door_arrives_as_its_energy_says() -> None:
+def test_a_released_door_arrives_as_its_energy_says():
     """t = integral of d theta/omega, omega^2 = 2 (U(start) - U)/J."""
     motion = 'theta_2 = "150 deg"\nfree = { duration = "0.04 s", steps = 4000 }'
     s = fourbar.solve(make_door(motion))
@@ -150,9 +149,7 @@ ENDS = Place(1, (0.1, 0.5)), Place(2, (0.1, 0.0))
 
 
 @pytest.mark.parametrize(("acts", "status"), [("push", NO_DIRECTION), ("pull", 0)])
-def test_where_its_ends_meet_a_spring_that_only_pulls_is_off(
-    acts: str, status: int
-) -> None:
+def test_where_its_ends_meet_a_spring_that_only_pulls_is_off(acts, status):
     spring = Spring(*ENDS, 200.0, 0.05, acts=acts)
     scene = crank_rocker(
         motion=fourbar.Motion([0.7, 0.9], 8.0), effects=(fourbar.Springs((spring,)),)
@@ -164,7 +161,7 @@ def test_where_its_ends_meet_a_spring_that_only_pulls_is_off(
         assert s.torque[0] == bare.torque[0]
 
 
-def test_a_sensitivity_is_null_where_a_spring_comes_off_and_nowhere_else() -> None:
+def test_a_sensitivity_is_null_where_a_spring_comes_off_and_nowhere_else():
     """The distance of the ends is 2 r sin(half the angle between them)."""
     off = 0.2 * math.sin(0.5)
     scene = crank_rocker(
@@ -186,16 +183,14 @@ def test_a_sensitivity_is_null_where_a_spring_comes_off_and_nowhere_else() -> No
         ("pull", {"length": 0.0}, "0 N"),
     ],
 )
-def test_a_spring_that_never_comes_off_is_refused(
-    acts: str, numbers: dict[str, Any], words: str
-) -> None:
+def test_a_spring_that_never_comes_off_is_refused(acts, numbers, words):
     stated = {"stiffness": 200.0, "length": 0.05} | numbers
     with pytest.raises(InputError) as refused:
         Spring(*ENDS, **stated, acts=acts)
     assert "springs.acts" in str(refused.value) and words in str(refused.value)
 
 
-def test_a_gas_spring_acts_one_way_too_and_a_study_keeps_the_sense() -> None:
+def test_a_gas_spring_acts_one_way_too_and_a_study_keeps_the_sense():
     gas = Spring.gas(*ENDS, 0.12, 0.05, 0.0, 20.0, acts="push")
     scene = crank_rocker(
         motion=fourbar.Motion([1.0, 2.5], 0.0), effects=(fourbar.Springs((gas,)),)

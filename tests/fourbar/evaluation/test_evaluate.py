@@ -199,7 +199,7 @@ def test_a_bar_is_of_the_motion_that_begins_to_one_side() -> None:
     )
     for side in (-1, 1):
         torque_error = fourbar.solve(still, "error", side=side).torque_error
-        assert torque_error is not None and torque_error.max() < 1e-13
+        assert torque_error.max() < 1e-13
 
 
 def test_a_bar_is_as_wide_as_what_a_position_loses() -> None:
@@ -333,4 +333,4 @@ def test_an_error_bar_at_the_end_of_a_table_of_a_load() -> None:
         loads=(load,),
     )
     error = fourbar.solve(scene, "error").torque_error
-    assert error is not None and np.all((error > 0.0) & (error < 1e-14))
+    assert np.all((error > 0.0) & (error < 1e-14))

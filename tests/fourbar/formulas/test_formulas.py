@@ -80,12 +80,12 @@ class Carrying(float):
         (power_of_two(0.7), 1.0, float),
     ],
 )
-def test_plain_numbers_stay_plain(computed, value, kind: type) -> None:
+def test_plain_numbers_stay_plain(computed, value, kind):
     """Python's own floats give Python's own results, in a third of NumPy's time."""
     assert type(computed) is kind and computed == value
 
 
-def test_arrays_broadcast() -> None:
+def test_arrays_broadcast():
     column, row = np.array([[1.0], [2.0]]), np.array([3.0, 4.0, 5.0])
     for x, y in ((column, row), (column, 3.0), (3.0, row)):
         assert np.array_equal(vector(x, y), x + 1j * np.asarray(y))
@@ -115,7 +115,7 @@ def hard_doubles(seed: int, count: int) -> list[tuple[float, float, float, float
 
 
 @pytest.mark.slow
-def test_a_difference_of_two_sums_is_zero_where_it_is_zero_and_nowhere_else() -> None:
+def test_a_difference_of_two_sums_is_zero_where_it_is_zero_and_nowhere_else():
     # two lengths a billiardth of the others: what both sums lose is no double
     small = (
         0.9999999999999999,
@@ -144,7 +144,7 @@ def list_bounds(lengths: tuple[Fraction, ...], diagonal: Fraction) -> list[Fract
 
 
 @pytest.mark.slow
-def test_the_constants_of_the_loop_vanish_within_rounding_alone() -> None:
+def test_the_constants_of_the_loop_vanish_within_rounding_alone():
     """Squares in doubles may compare otherwise than exact ones beside a bound."""
     zeros, judged, at_a_bound = [0, 0], 0, 0
     # a + d and b + c, or a + c and b + d, from the same two sums
@@ -192,7 +192,7 @@ def test_the_constants_of_the_loop_vanish_within_rounding_alone() -> None:
         ((0.3, 0.3 * (1.0 + 2.0 * U), 0.2, 0.2), True),
     ],
 )
-def test_what_touches_is_up_to_the_rounding_of_the_lengths(lengths, touches) -> None:
+def test_what_touches_is_up_to_the_rounding_of_the_lengths(lengths, touches):
     bars = loop(*lengths)
     assert (bars.E2 == 0.0) == touches
     assert touches or bars[:4] == lengths
@@ -215,8 +215,8 @@ ANGLES = np.array([-2.5, -1e-7, 0.0, 0.3, 1.0, 2.0, math.pi, 4.0, 7.0])
 @pytest.mark.parametrize("bar", MOVING_BARS)
 @pytest.mark.parametrize(("theta_1", "branch"), [(0.0, 1), (0.4, -1)])
 def test_numbers_arrays_and_many_linkages_at_once_are_the_same_formulas(
-    theta_1: float, branch: int, bar: int
-) -> None:
+    theta_1, branch, bar
+):
     """A position alone is evaluated in Python's own floats, a sweep in an array."""
     rates = {f"omega_{bar}": 2.0, f"alpha_{bar}": -3.0, "branch": branch}
     motion = fourbar.Motion(**{f"theta_{bar}": theta_1 + ANGLES}, **rates)
@@ -267,7 +267,7 @@ def five(bars: FourBar, psi: mp.mpf) -> list[mp.mpf]:
 
 
 @pytest.mark.parametrize("offset", [None, "1e-25"])
-def test_the_half_angle_in_many_digits_is_rounded_once(offset: str | None) -> None:
+def test_the_half_angle_in_many_digits_is_rounded_once(offset):
     rng = np.random.default_rng(41)
     with mp.workdps(200):
         for _ in range(60):
@@ -279,7 +279,7 @@ def test_the_half_angle_in_many_digits_is_rounded_once(offset: str | None) -> No
                 assert abs(ours - exact) <= U * abs(exact)
 
 
-def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle() -> None:
+def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle():
     """From the ground's direction to the opposite, and after many turns.
 
     Angles are as near to both as doubles come.
@@ -334,10 +334,10 @@ LIMITS = [
 @pytest.mark.parametrize("size", [1e-6, 1e-12, 1e-20, 1e-30, 1e-40])
 @pytest.mark.parametrize(("bars", "stretched"), LIMITS)
 def test_an_offset_from_a_limit_in_many_digits(
-    bars: FourBar,
-    stretched: bool,
-    size: float,
-) -> None:
+    bars,
+    stretched,
+    size,
+):
     first = next(
         limit.theta_2 for limit in limit_positions(bars) if limit.stretched == stretched
     )
@@ -359,7 +359,7 @@ def test_an_offset_from_a_limit_in_many_digits(
             assert factor * offset < 0.0
 
 
-def test_a_limit_position_itself_closes_in_many_digits() -> None:
+def test_a_limit_position_itself_closes_in_many_digits():
     for theta_2 in (limit.theta_2 for limit in limit_positions(ROCKER)):
         remainder = limit_remainder(ROCKER, theta_2, theta_2, 0.0)
         half = exact_half_angle(ROCKER, theta_2, remainder)
@@ -367,7 +367,7 @@ def test_a_limit_position_itself_closes_in_many_digits() -> None:
 
 
 @pytest.mark.parametrize("lengths", [(0.6, 0.7, 0.1, 0.2), (0.7, 0.6, 0.2, 0.1)])
-def test_bars_that_miss_by_the_rounding_of_their_lengths_touch(lengths) -> None:
+def test_bars_that_miss_by_the_rounding_of_their_lengths_touch(lengths):
     """0.1 + 0.7 = 0.2 + 0.6 of the lengths meant, and not of the doubles."""
     d, a, b, c = map(Fraction, lengths)
     assert d + c != a + b
@@ -381,9 +381,7 @@ def test_bars_that_miss_by_the_rounding_of_their_lengths_touch(lengths) -> None:
 
 @pytest.mark.parametrize("bar", MOVING_BARS)
 @pytest.mark.parametrize("offset", [None, "1e-3"])
-def test_positions_decided_in_many_digits_replace_their_own_alone(
-    offset: str | None, bar: int
-) -> None:
+def test_positions_decided_in_many_digits_replace_their_own_alone(offset, bar):
     bars, theta = bare(0.3, 0.1, 0.25, 0.22, 0.4), np.linspace(0.1, 6.0, 7)
     path = prepare_path(bars.lengths, 0.4, bar)
     half = path.half_angle(theta)
@@ -410,7 +408,7 @@ def test_positions_decided_in_many_digits_replace_their_own_alone(
         (1e-3, (0.75, 0.75 + 1.4e-3, 2e-6, 1.4e-3)),
     ],
 )
-def test_the_factor_that_changes_less_gives_the_other_its_digits(psi, lengths) -> None:
+def test_the_factor_that_changes_less_gives_the_other_its_digits(psi, lengths):
     """outer + inner = 4 b c, of which both are small parts of 4 a d on short bars."""
     d, a, b, c = lengths
     half = half_angle(loop(*lengths), psi)

@@ -95,9 +95,9 @@ def list_angles(linkage: fourbar.FourBar, bar: int) -> np.ndarray:
 @pytest.mark.parametrize("bar", [2, 3, 4])
 @pytest.mark.parametrize("lengths", LINKAGES.values(), ids=LINKAGES)
 def test_an_assembly_goes_on_smoothly_through_change_points(
-    lengths: tuple[float, float, float, float],
-    bar: int,
-) -> None:
+    lengths,
+    bar,
+):
     bars = uniform(*lengths)
     linkage = fourbar.FourBar(
         bars.ground, bars.input, bars.coupler, bars.output, GROUND_ANGLE

@@ -63,9 +63,9 @@ ALIKE: list[Callable[..., Any]] = [
     ],
 )
 def test_a_function_keeps_the_digits_of_a_pair(
-    function: Callable[..., Pair],
-    reference: Callable[..., Any],
-) -> None:
+    function,
+    reference,
+):
     with mp.workdps(60):
         x, y = draw(1), draw(2)
         expected = [
@@ -76,7 +76,7 @@ def test_a_function_keeps_the_digits_of_a_pair(
             assert abs(ours - wanted) <= DIGITS * max(abs(wanted), 0.1)
 
 
-def test_what_is_no_number_stays_none_and_a_comparison_sees_the_last_digit() -> None:
+def test_what_is_no_number_stays_none_and_a_comparison_sees_the_last_digit():
     one, more = Pair(np.ones(1), np.zeros(1)), Pair(np.ones(1), np.full(1, 1e-25))
     assert (
         (more > one).all()

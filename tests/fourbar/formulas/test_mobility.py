@@ -102,7 +102,7 @@ deg."""
         ),
     ],
 )
-def test_limits_of_the_thesis(bar, theta_2, theta_4) -> None:
+def test_limits_of_the_thesis(bar, theta_2, theta_4):
     """Its theta_4 runs from B to O4: ours + 180 deg."""
     limits = np.degrees([limit[:3] for limit in limit_positions(THESIS, bar)])
     assert limits[:, 0] == pytest.approx(theta_2, abs=PRINTED_8)
@@ -110,7 +110,7 @@ def test_limits_of_the_thesis(bar, theta_2, theta_4) -> None:
     assert turned == pytest.approx(theta_4, abs=PRINTED_8)
 
 
-def test_range_swing_and_class_of_the_thesis() -> None:
+def test_range_swing_and_class_of_the_thesis():
     within = [85.61804062253105, 364.38195937746895]
     assert np.degrees(choose_range(THESIS)) == pytest.approx(within, abs=PRINTED_8)
     swung = math.degrees(swing(THESIS, 2))
@@ -141,7 +141,7 @@ def test_range_swing_and_class_of_the_thesis() -> None:
         ((0.1, 0.1, 0.1, 0.1), 14, "S3X", "rhombus"),
     ],
 )
-def test_barker_classes(lengths, barker: int, code: str, name: str) -> None:
+def test_barker_classes(lengths, barker, code, name):
     for scale in (1.0, 1e-9, 1e9, 1e300):
         kind = classify(uniform(*(scale * length for length in lengths)))
         assert (kind.barker, kind.code) == (barker, code)
@@ -154,7 +154,7 @@ def test_barker_classes(lengths, barker: int, code: str, name: str) -> None:
         assert {bar for bar in MOVING_BARS if turns_fully(bars, bar)} == turning
 
 
-def test_equality_is_decided_within_the_rounding_of_the_lengths() -> None:
+def test_equality_is_decided_within_the_rounding_of_the_lengths():
     assert 0.1 + 0.7 != 0.2 + 0.6  # in doubles; the lengths meant are equal sums
     assert change_points(uniform(0.2, 0.1, 0.7, 0.6))
     for ulps, barker in ((0, 10), (1, 10), (16, 2), (-16, 7)):
@@ -164,7 +164,7 @@ def test_equality_is_decided_within_the_rounding_of_the_lengths() -> None:
 
 @pytest.mark.parametrize("lengths", [*itertools.permutations((1.0, 2.0, 3.0, 6.0))])
 @pytest.mark.parametrize("theta_1", [0.3, -math.pi])
-def test_a_structure_stands_in_one_position(lengths, theta_1: float) -> None:
+def test_a_structure_stands_in_one_position(lengths, theta_1):
     bars = bare(*lengths, theta_1)
     assert classify(bars).code == "structure" and classify(bars).turning == ()
     (limit,) = limit_positions(bars)
@@ -174,7 +174,7 @@ def test_a_structure_stands_in_one_position(lengths, theta_1: float) -> None:
 
 
 @pytest.mark.parametrize("bars", random_linkages(1, 60))
-def test_circuits_agree_with_a_scan(bars: FourBar) -> None:
+def test_circuits_agree_with_a_scan(bars):
     """Positions are a graph.
 
     Neighbours on a branch are joined, and both branches next to a gap or across a
@@ -208,7 +208,7 @@ def test_circuits_agree_with_a_scan(bars: FourBar) -> None:
 
 
 @pytest.mark.parametrize("bar", MOVING_BARS)
-def test_ranges_hold_every_position_and_no_more(bar: int) -> None:
+def test_ranges_hold_every_position_and_no_more(bar):
     """theta_k goes as a square root near its limit's theta_2, or is tangent to it."""
     nearly_a_structure = bare(6.0, 1.0, 2.0, 3.0001, 0.3)
     for bars in [nearly_a_structure, *random_linkages(8, 48)]:
@@ -249,8 +249,8 @@ def exact_psi(bars: FourBar, bar: int, stretched: bool) -> mp.mpf:
 
 @pytest.mark.parametrize("bar", MOVING_BARS)
 def test_limits_keep_their_digits_and_close_the_loop_with_two_bars_in_line(
-    bar: int,
-) -> None:
+    bar,
+):
     checked, (first, second) = 0, OTHERS[bar]
     for bars in nearly_special(3, 100) + random_linkages(4, 80):
         d, a, b, c = bars.lengths
@@ -286,7 +286,7 @@ def test_limits_keep_their_digits_and_close_the_loop_with_two_bars_in_line(
     assert checked > 300
 
 
-def test_time_ratio_is_the_time_of_both_strokes() -> None:
+def test_time_ratio_is_the_time_of_both_strokes():
     """A central crank-rocker, d^2 + a^2 = b^2 + c^2, has equal strokes."""
     bars, n = uniform(3.0, 1.0, 2.5, 2.2), 200_000
     theta_2 = (np.arange(n) + 0.5) * (math.tau / n)
@@ -314,13 +314,13 @@ def test_time_ratio_is_the_time_of_both_strokes() -> None:
         ((0.5, 0.5 + 5 * EPS, 0.5, 0.5), ()),
     ],
 )
-def test_change_points_lie_along_the_ground_and_opposite(lengths, turns) -> None:
+def test_change_points_lie_along_the_ground_and_opposite(lengths, turns):
     bars = bare(*lengths, 0.4)
     assert change_points(bars) == tuple(0.4 + turn for turn in turns)
     assert turns_fully(bars) == (lengths[1] != 0.5 + 5 * EPS)
 
 
-def test_a_bar_that_does_not_move_is_refused_and_so_is_what_is_no_linkage() -> None:
+def test_a_bar_that_does_not_move_is_refused_and_so_is_what_is_no_linkage():
     with pytest.raises(InputError, match=r"^bar = 1: must be 2, 3 or 4"):
         limit_positions(THESIS, 1)
     with pytest.raises(InputError, match=r"^linkage = .*FourBar"):

@@ -30,7 +30,7 @@ def assembled(state: State) -> np.ndarray:
     return (state.position.half.outer >= 0.0) & (state.position.half.inner >= 0.0)
 
 
-def test_positions_that_cannot_close_are_nan_and_say_so() -> None:
+def test_positions_that_cannot_close_are_nan_and_say_so():
     moving = compute_state(bare(1.0, 1.0, 0.4, 0.4), np.array([0.5, 2.0]), 1)
     assert assembled(moving).tolist() == [True, False]
     rates = moving.omega(3), moving.alpha(4), moving.point(3, 0.1)
@@ -50,9 +50,9 @@ def test_positions_that_cannot_close_are_nan_and_say_so() -> None:
 )
 @pytest.mark.parametrize("offset", [1e-6, 1e-12, 1e-20, 1e-40])
 def test_beyond_a_limit_nothing_assembles_however_near(
-    lengths: tuple[float, ...],
-    offset: float,
-) -> None:
+    lengths,
+    offset,
+):
     link = bare(*lengths, 0.2)
     # the first limit ends the range in which the linkage closes, the second begins it
     for number, inside in ((1, -offset), (2, offset)):
@@ -71,7 +71,7 @@ BY_DIFFERENCES = 1e-5
 
 @pytest.mark.parametrize("alpha", [0.0, -7.0])
 @pytest.mark.parametrize("bar", [2, 3, 4])
-def test_points_move_as_their_positions_do(bar: int, alpha: float) -> None:
+def test_points_move_as_their_positions_do(bar, alpha):
     """Speeds and accelerations of points are differences of their places."""
     link, omega, z = bare(0.3, 0.1, 0.25, 0.22, 0.4), 3.0, 0.05 - 0.02j
     angles = np.linspace(0.3, 6.0, 9)
@@ -95,7 +95,7 @@ def test_points_move_as_their_positions_do(bar: int, alpha: float) -> None:
     assert moving.coefficient(1) == moving.omega(1) == moving.alpha(1) == 0.0
 
 
-def test_on_a_change_point_everything_is_the_limit_of_its_assembly() -> None:
+def test_on_a_change_point_everything_is_the_limit_of_its_assembly():
     """A parallelogram's bar 4 turns as bar 2.
 
     An antiparallelogram has h4 = -(d - a)/(d + a) and its inverse there.
@@ -113,8 +113,8 @@ def test_on_a_change_point_everything_is_the_limit_of_its_assembly() -> None:
 
 @pytest.mark.parametrize("lengths", [(3, 1, 2, 2), (0.99, 0.97, 0.98, 0.98)])
 def test_within_the_rounding_of_a_change_point_no_direction_is_left(
-    lengths: tuple[float, ...],
-) -> None:
+    lengths,
+):
     """The speeds have all their digits."""
     link, after = bare(*lengths), 2.0 * EPS * np.arange(5)  # the next doubles after pi
     moving = compute_state(link, math.pi + after, 1)
@@ -133,11 +133,11 @@ def test_within_the_rounding_of_a_change_point_no_direction_is_left(
 @pytest.mark.parametrize("half_turn", [0, 1])
 @pytest.mark.parametrize("theta_1", [0.0, 0.4])
 def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
-    lengths: tuple[float, ...],
-    branch: int,
-    half_turn: int,
-    theta_1: float,
-) -> None:
+    lengths,
+    branch,
+    half_turn,
+    theta_1,
+):
     """A parallelogram's coupler lies as its ground and bar 4 as bar 2.
 
     A folded kite has B on O2.
@@ -163,9 +163,9 @@ def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
 @pytest.mark.parametrize("theta_1", [0.0, 0.4, -2.5])
 @pytest.mark.parametrize("branch", [1, -1])
 def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(
-    branch: int,
-    theta_1: float,
-) -> None:
+    branch,
+    theta_1,
+):
     """As theta_2 falls to theta_1 bars 3 and 4 come to lie together on the ground's
     line.
     """
@@ -189,7 +189,7 @@ def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(
     assert not assembled(open_one).any()
 
 
-def test_near_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit() -> None:
+def test_near_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit():
     """Bars 3 and 4 of a parallelogram lie as its ground and input do.
 
     So does the angle between them.
@@ -204,7 +204,7 @@ def test_near_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit() -> No
     assert beside.tolist() == [True, False]
 
 
-def test_short_ground_and_input_leave_no_digit_of_mu() -> None:
+def test_short_ground_and_input_leave_no_digit_of_mu():
     """b = c, d and a a billiardth of them.
 
     mu = e/b, and A passes O4 so near that 8 EPS is reached.
@@ -229,10 +229,10 @@ def test_short_ground_and_input_leave_no_digit_of_mu() -> None:
     "lengths", [(0.3, 0.1, 0.25, 0.22), (0.3, 0.25, 0.1, 0.22), (0.3, 0.3, 0.2, 0.2)]
 )
 def test_angles_alone_are_those_of_the_whole_position(
-    lengths: tuple[float, float, float, float],
-    branch: int,
-    theta_1: float,
-) -> None:
+    lengths,
+    branch,
+    theta_1,
+):
     """The same angles, statuses and gaps, a limit and A on O4 among them.
 
     To the roundings of an angle.

@@ -82,10 +82,10 @@ ANGLES = np.linspace(0.1, 6.0, 13)
     ],
 )
 def test_bars_without_mass_or_inertia(
-    bodies: tuple[tuple[float, float], ...],
-    alpha: float,
-    drive_bar: int,
-) -> None:
+    bodies,
+    alpha,
+    drive_bar,
+):
     """Mass and inertia of 0 and of 1, where a term may be left out.
 
     The thirteen equations leave none out.
@@ -116,9 +116,9 @@ def compare_with_thirteen(bodies: EquationTerms, s: fourbar.Solution) -> None:
 )
 @pytest.mark.parametrize("drive_bar", [2, 3, 4])
 def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
-    pins: tuple[str, ...],
-    drive_bar: int,
-) -> None:
+    pins,
+    drive_bar,
+):
     """With the couples mu r |F| the thirteen equations give these forces again."""
     friction = fourbar.PinFriction.at(**{pin: (0.1, 0.02) for pin in pins})
     motion, gravity = fourbar.Motion(ANGLES, 10.0), fourbar.Gravity()
@@ -138,7 +138,7 @@ def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
     compare_with_thirteen(bodies, s)
 
 
-def test_a_force_between_two_bars_in_line_does_not_exist() -> None:
+def test_a_force_between_two_bars_in_line_does_not_exist():
     u, v = np.array([1.0, 1.0, 1.0]), np.array([1.0, 1j, 0.6 + 0.8j])
     with np.errstate(all="ignore"):
         force = solve_between(2.0, 3.0, u, v, cross(u, v))
@@ -149,7 +149,7 @@ def test_a_force_between_two_bars_in_line_does_not_exist() -> None:
     ) == pytest.approx([3.0, 3.0])
 
 
-def test_bars_without_mass_hold_a_load_where_the_input_turns_back() -> None:
+def test_bars_without_mass_hold_a_load_where_the_input_turns_back():
     """Near a limit position what they hold tends to a limit.
 
     In it the speeds are 0/0, and with them no force is.
@@ -170,7 +170,7 @@ def test_bars_without_mass_hold_a_load_where_the_input_turns_back() -> None:
         assert np.isnan(getattr(on, name)).all()
 
 
-def test_written_into_given_arrays() -> None:
+def test_written_into_given_arrays():
     solution = fourbar.solve(scene(2))
     out = {"torque": np.empty(31), "F43": np.empty((31, 2))}
     part = fourbar.solve(scene(2), out=out)
@@ -182,7 +182,7 @@ def test_written_into_given_arrays() -> None:
             fourbar.solve(scene(2), out={wrong: np.empty(30)})
 
 
-def test_the_forces_of_a_member_are_the_same_alone_and_beside_others() -> None:
+def test_the_forces_of_a_member_are_the_same_alone_and_beside_others():
     """F32 has a form of its own for members whose ground is shorter than their
     input.
     """
@@ -198,7 +198,7 @@ def test_the_forces_of_a_member_are_the_same_alone_and_beside_others() -> None:
 
 
 @pytest.mark.parametrize("beside", [1e-3, 1e-6, 1e-9])
-def test_a_force_beside_B_has_its_moment_there(beside: float) -> None:
+def test_a_force_beside_B_has_its_moment_there(beside):
     """The output is driven, and bars 2 and 4 are free of moments.
 
     Then b u3 x F32 is the moment about B: force times arm.
@@ -216,7 +216,7 @@ def test_a_force_beside_B_has_its_moment_there(beside: float) -> None:
 
 @pytest.mark.parametrize("ratio", [1e-5, 1e-3, 0.49, 0.51, 3.0, 1e3])
 @pytest.mark.parametrize("couple", [0.0, 0.4, 1e6])
-def test_the_moments_of_bars_of_any_ratio_balance(ratio: float, couple: float) -> None:
+def test_the_moments_of_bars_of_any_ratio_balance(ratio, couple):
     """Each moment equation holds to a rounding of its own terms, however short bar 4.
 
     Bar 4 is commanded: a long input says little of the angle of a short bar.

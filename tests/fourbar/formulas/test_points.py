@@ -60,7 +60,7 @@ def random_positions(seed: int, count: int, least_sine: float = 0.05) -> list[Dr
 
 
 @pytest.mark.parametrize("drawn", random_positions(12, 15))
-def test_point_coefficients_are_derivatives(drawn: Drawn) -> None:
+def test_point_coefficients_are_derivatives(drawn):
     theta_2, sine = mp.mpf(float(drawn.theta_2[0])), drawn.sine
     coefficients = point_coefficients(*drawn, 3, 0.3 - 0.2j)
     size = 1.0 + drawn.bars.input.length / min(drawn.bars.lengths)
@@ -79,7 +79,7 @@ def test_point_coefficients_are_derivatives(drawn: Drawn) -> None:
             assert error <= roundings * EPS * size ** (n + 1) / sine ** (2 * n)
 
 
-def test_the_coupler_turns_about_I13_and_bars_2_and_4_share_I24() -> None:
+def test_the_coupler_turns_about_I13_and_bars_2_and_4_share_I24():
     for drawn in random_positions(16, 60):
         moving, sine = drawn.moving(), drawn.sine
         O4 = drawn.bars.ground * moving.position.u1
@@ -97,7 +97,7 @@ def test_the_coupler_turns_about_I13_and_bars_2_and_4_share_I24() -> None:
         assert apart <= 1e3 * EPS * (abs(here) + 1.0) * (1.0 + abs(spin_4)) / sine**3
 
 
-def test_centres_at_infinity_have_a_direction() -> None:
+def test_centres_at_infinity_have_a_direction():
     """In a parallelogram bars 2 and 4 are parallel, and the coupler to the ground."""
     centres = instant_centres(bare(2.0, 1.0, 2.0, 1.0), np.array([1.0]), 1)
     of_coupler, of_arms = centres[1, 3], centres[2, 4]
@@ -122,8 +122,8 @@ CURVES = {
 
 @pytest.mark.parametrize("lengths", CURVES.values(), ids=CURVES)
 def test_coupler_curves_are_closed_and_lie_on_the_sextic(
-    lengths: tuple[float, float, float, float],
-) -> None:
+    lengths,
+):
     bars = bare(*lengths, 0.3)
     along, across = 0.4 * lengths[2], 0.3 * lengths[2]
     for circuit in range(len(circuits(bars))):
@@ -159,7 +159,7 @@ def _off_sextic(bars: FourBar, point: np.ndarray, along: float, across: float) -
     return float(np.minimum(*off)[height > 1e-3 * a].max())
 
 
-def test_symmetric_circuits_draw_mirror_images() -> None:
+def test_symmetric_circuits_draw_mirror_images():
     bars = bare(3.0, 2.5, 1.0, 2.2)
     first, second = (coupler_curve(bars, 0.5, 0.0, circuit) for circuit in (0, 1))
     assert (first.y > 0.0).mean() > 0.5 > (second.y > 0.0).mean()
@@ -168,7 +168,7 @@ def test_symmetric_circuits_draw_mirror_images() -> None:
         assert apart.min() < 1e-12
 
 
-def test_a_curve_with_one_change_point_takes_two_turns() -> None:
+def test_a_curve_with_one_change_point_takes_two_turns():
     bars = bare(2.0, 1.0, 4.0, 3.0)
     curve = coupler_curve(bars, 1.0, 1.0)
     assert turns_fully(bars)
@@ -177,7 +177,7 @@ def test_a_curve_with_one_change_point_takes_two_turns() -> None:
     assert set(curve.branch.tolist()) == {1, -1}
 
 
-def test_a_circuit_that_does_not_exist_is_refused() -> None:
+def test_a_circuit_that_does_not_exist_is_refused():
     bars = bare(2.0, 2.5, 4.0, 2.2)
     with pytest.raises(InputError, match="from 0 to 0"):
         coupler_curve(bars, 0.0, 0.0, 1)

@@ -49,7 +49,7 @@ LINKAGES = {
 
 @pytest.mark.parametrize("bar", MOVING_BARS)
 @pytest.mark.parametrize("name", LINKAGES)
-def test_every_reading_lies_and_moves_as_circles_meet(name: str, bar: int) -> None:
+def test_every_reading_lies_and_moves_as_circles_meet(name, bar):
     """Read from a bar the limits of the others are positions like any other."""
     linkage, compared = LINKAGES[name], 0
     path = prepare_path(linkage.lengths, linkage.ground_angle, bar)
@@ -114,7 +114,7 @@ SHORT = (
 
 
 @pytest.mark.parametrize(("lengths", "psi", "sign"), SHORT)
-def test_digits_are_kept_where_the_diagonal_is_short(lengths, psi, sign: int) -> None:
+def test_digits_are_kept_where_the_diagonal_is_short(lengths, psi, sign):
     """With E2 = 0 the assembly of this sign of the root changes at psi = 0."""
     assembly = sign if psi > 0.0 else -sign
     k = compute_state(uniform(*lengths), psi, assembly).k
@@ -145,7 +145,7 @@ def test_digits_are_kept_where_the_diagonal_is_short(lengths, psi, sign: int) ->
                 assert apart < 4.0 * FEW_ROUNDINGS * abs(theirs.imag)
 
 
-def test_small_sines_are_those_of_the_triangle_elsewhere() -> None:
+def test_small_sines_are_those_of_the_triangle_elsewhere():
     bars = loop(0.3, 0.1, 0.25, 0.22)
     position = close_loop(bars, 1.0 + 0.0j, direction(1.0), half_angle(bars, 1.0), 1)
     assert take_sines_of_rates(bars, position, coefficients(bars, position)) is position
@@ -153,9 +153,7 @@ def test_small_sines_are_those_of_the_triangle_elsewhere() -> None:
 
 @pytest.mark.parametrize("drive", [3, 4])
 @pytest.mark.parametrize("branch", [1, -1])
-def test_the_sine_of_the_drive_keeps_its_digits_on_a_short_ground(
-    branch: int, drive: int
-) -> None:
+def test_the_sine_of_the_drive_keeps_its_digits_on_a_short_ground(branch, drive):
     lengths = loop(2.0**-14, 1.5, 0.75, 1.25)
     half = half_angle(lengths, 0.7)
     position = close_loop(lengths, 1.0, direction(0.7), half, branch)
@@ -167,9 +165,7 @@ def test_the_sine_of_the_drive_keeps_its_digits_on_a_short_ground(
     assert computed == pytest.approx(exact, rel=8.0 * EPS)
 
 
-def test_moment_of_the_coupler_about_B_is_that_of_its_inertia_at_the_mass_centre() -> (
-    None
-):
+def test_moment_of_the_coupler_about_B_is_that_of_its_inertia_at_the_mass_centre():
     linkage, theta_2 = uniform(0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0])
     s = compute_state(linkage, theta_2, 1, 3.0, -5.0)
     three = Body(0.7, 0.02, 0.11 + 0.07j)
@@ -180,7 +176,7 @@ def test_moment_of_the_coupler_about_B_is_that_of_its_inertia_at_the_mass_centre
     assert moment == pytest.approx(expected, abs=64 * FEW_ROUNDINGS)
 
 
-def test_grounds_at_several_angles_are_those_of_each() -> None:
+def test_grounds_at_several_angles_are_those_of_each():
     lengths, theta_2 = (0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0])
     theta_1 = np.array([[0.0], [0.4], [1.0]])
     many = prepare_path(tuple(length + 0.0 * theta_1 for length in lengths), theta_1)
@@ -193,7 +189,7 @@ def test_grounds_at_several_angles_are_those_of_each() -> None:
 
 
 @pytest.mark.parametrize("pin", ["O2", "A", "B", "O4"])
-def test_slip_is_that_of_the_two_bars(pin: str) -> None:
+def test_slip_is_that_of_the_two_bars(pin):
     s = compute_state(uniform(0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0]), 1)
     i, j = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}[pin]
     slip = np.subtract(s.omega(j), s.omega(i))
@@ -202,8 +198,8 @@ def test_slip_is_that_of_the_two_bars(pin: str) -> None:
 
 @pytest.mark.parametrize(("ground", "taken"), [(0.01, True), (1.1, False)])
 def test_a_short_ground_takes_the_moment_of_the_force_at_A_from_virtual_work(
-    ground: float, taken: bool
-) -> None:
+    ground, taken
+):
     s = compute_state(uniform(ground, 1.0, 1.2, 1.1), np.array([0.4, 1.0, 4.0]), 1)
     wrenches = Wrenches(1.0 + 2.0j, -0.5j, 0.3 + 0.1j, 0.7, -0.4, 0.2)
     asked = s.lengths, s.position, 2, s.position.sin_mu, wrenches, 0.2j

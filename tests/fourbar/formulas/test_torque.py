@@ -59,9 +59,7 @@ def random_case(seed: int) -> tuple[fourbar.FourBar, tuple[fourbar.Load, ...], t
 
 @pytest.mark.parametrize("offset", [1e-2, 1e-8, 1e-14, 1e-30])
 @pytest.mark.parametrize("seed", [0, 1])
-def test_digits_are_kept_at_a_stated_distance_from_a_limit(
-    seed: int, offset: float
-) -> None:
+def test_digits_are_kept_at_a_stated_distance_from_a_limit(seed, offset):
     """On one side of a limit the linkage assembles, with the torque of balls."""
     linkage, loads, effects = random_case(seed)
     for number in range(1, len(limit_positions(linkage)) + 1):
@@ -81,7 +79,7 @@ def test_digits_are_kept_at_a_stated_distance_from_a_limit(
         assert any(assembled) and (offset > 1e-3 or not all(assembled))
 
 
-def test_where_the_loop_closes_is_known_at_the_last_digits_of_a_limit() -> None:
+def test_where_the_loop_closes_is_known_at_the_last_digits_of_a_limit():
     """Bars that miss each other by less than the rounding of the lengths meet."""
     compared, rng = [0, 0], np.random.default_rng(4)
     for linkage in (draw_linkage(rng) for _ in range(8)):
@@ -99,7 +97,7 @@ def test_where_the_loop_closes_is_known_at_the_last_digits_of_a_limit() -> None:
     assert min(compared) > 8
 
 
-def test_statics_of_motiongenesis() -> None:
+def test_statics_of_motiongenesis():
     """Equilibrium angles under H = 200 N (motiongenesis MGFourBarDynamicsFBD)."""
     bars = (fourbar.Bar(1.0, 10.0), fourbar.Bar(2.0, 20.0), fourbar.Bar(2.0, 20.0))
     linkage = fourbar.FourBar(1.0, *bars, ground_angle=np.pi / 2)
@@ -130,7 +128,7 @@ def inertia_of(linkage: fourbar.FourBar, state: State) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", LINKAGES)
-def test_equivalent_inertia_is_that_of_the_kinetic_energy(name: str) -> None:
+def test_equivalent_inertia_is_that_of_the_kinetic_energy(name):
     """J against the speeds of the mass centres, J' against its difference."""
     linkage, step = with_masses(LINKAGES[name]), 1e-5
     theta_2 = np.linspace(*choose_range(linkage), 7)[1:-1] + 0.1
@@ -156,8 +154,8 @@ def test_equivalent_inertia_is_that_of_the_kinetic_energy(name: str) -> None:
 
 @pytest.mark.parametrize("drive", [2, 3, 4])
 def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(
-    drive: int,
-) -> None:
+    drive,
+):
     """What depends on O4, on theta_2 and on rest next to motion, in one sweep."""
     linkage = with_masses(bare(0.3, 0.1, 0.25, 0.22, 0.4))
     ends = Place(1, (0.2, 0.3)), Place(4, (0.15, 0.2))
@@ -180,7 +178,7 @@ def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(
     assert Actions(state, list_bodies(linkage)).generalized_forces() == (0.0, 0.0)
 
 
-def test_a_single_pendulum() -> None:
+def test_a_single_pendulum():
     """Of a crank alone: T = (I + m r^2) alpha + m g r cos(theta_2 + phi).
 
     Of bars without mass none.

@@ -33,7 +33,7 @@ def derive_at(name: str, bars: FourBar, theta_2: Any, branch: int) -> np.ndarray
     return derive(solve(Scene(bars, motion)), name)
 
 
-def test_transmission_angle_is_the_acute_angle_between_coupler_and_output() -> None:
+def test_transmission_angle_is_the_acute_angle_between_coupler_and_output():
     with mp.workdps(50):
         for drawn in random_positions(21, 60, 1e-4):
             d, a, b, c = (mp.mpf(length) for length in drawn.bars.lengths)
@@ -47,14 +47,14 @@ def test_transmission_angle_is_the_acute_angle_between_coupler_and_output() -> N
             assert abs(error) <= ANGLE * (slope + size) / drawn.sine
 
 
-def test_transmission_angle_keeps_its_digits_where_it_vanishes() -> None:
+def test_transmission_angle_keeps_its_digits_where_it_vanishes():
     psi = 10.0 ** -np.arange(1.0, 14.0)
     parallelogram = bare(0.3, 0.1, 0.3, 0.1)
     mu = derive_at("transmission", parallelogram, psi, 1)
     assert mu == pytest.approx(psi, rel=8 * EPS)
 
 
-def test_extremes_are_those_of_a_scan() -> None:
+def test_extremes_are_those_of_a_scan():
     rng = np.random.default_rng(22)
     kinds = set()
     for _ in range(80):
@@ -88,7 +88,7 @@ def test_extremes_are_those_of_a_scan() -> None:
 
 
 @pytest.mark.parametrize("gap", [1e-3, 1e-7, 1e-11, 1e-14])
-def test_extremes_keep_their_digits_near_a_change_point(gap: float) -> None:
+def test_extremes_keep_their_digits_near_a_change_point(gap):
     d, a, b, c = 0.3, 0.1, 0.25, 0.15 + gap
     extremes = transmission_extremes(bare(d, a, b, c))
     with mp.workdps(50):
@@ -101,7 +101,7 @@ def test_extremes_keep_their_digits_near_a_change_point(gap: float) -> None:
         assert abs(extremes.least - least) <= 8 * EPS * least
 
 
-def test_speeds_follow_from_the_lever_of_the_coupler_and_power_is_kept() -> None:
+def test_speeds_follow_from_the_lever_of_the_coupler_and_power_is_kept():
     for drawn in random_positions(23, 40):
         moving = drawn.moving(3.0)
         theta_3, theta_4 = (np.angle(moving.direction(bar))[0] for bar in (3, 4))
@@ -116,7 +116,7 @@ def test_speeds_follow_from_the_lever_of_the_coupler_and_power_is_kept() -> None
         assert power == pytest.approx(3.0, rel=16 * EPS)
 
 
-def test_advantage_where_the_output_stands_and_where_the_input_does() -> None:
+def test_advantage_where_the_output_stands_and_where_the_input_does():
     folded = bare(2.0, 1.0, 1.0, 2.0)  # a kite with B on O2
     assert not np.isfinite(derive_at("mechanical_advantage", folded, 1.0, -1))
     rocker = bare(3.0, 2.5, 1.0, 2.2)

@@ -176,7 +176,7 @@ WHOLE = crank_rocker(
 STIFF = replace(KEPT, effects=(*JOINTS, Torsion.at(O4=(0.5, 0.2, 0.1))))
 
 
-def test_a_file_for_genesis_names_what_it_leaves_out() -> None:
+def test_a_file_for_genesis_names_what_it_leaves_out():
     at_B = (
         fourbar.Viscous.at(A=0.05, B=0.1),
         fourbar.Friction.at(B=0.2),
@@ -208,7 +208,7 @@ def _genesis() -> Iterator[None]:
 
 @pytest.mark.nightly
 @pytest.mark.usefixtures("_genesis")
-def test_genesis_reads_as_the_comment_says(tmp_path: Path) -> None:
+def test_genesis_reads_as_the_comment_says(tmp_path):
     assembled = (
         float(fourbar.solve(KEPT, "position").theta_4[0]) - KEPT.linkage.ground_angle
     )
@@ -229,7 +229,7 @@ def test_genesis_reads_as_the_comment_says(tmp_path: Path) -> None:
 
 
 @pytest.mark.nightly
-def test_newton_reads_the_mjcf_as_the_comment_says(tmp_path: Path) -> None:
+def test_newton_reads_the_mjcf_as_the_comment_says(tmp_path):
     for motion in (fourbar.Motion(1.0, 10.0), fourbar.Motion(1.0, 10.0, 30.0)):
         scene = crank_rocker(motion=motion, drive_bar=4)
         (file := tmp_path / "four_bar.xml").write_text(write_mjcf_for(scene, "newton"))
@@ -249,7 +249,7 @@ turn.
 
 
 @pytest.mark.nightly
-def test_warp_reads_as_the_comment_says() -> None:
+def test_warp_reads_as_the_comment_says():
     scene = crank_rocker(drive_bar=4)
     text = write_mjcf_for(scene, "warp")
     assert max(errors(scene, read_warp(text, forward=2))) < SINGLE
@@ -257,7 +257,7 @@ def test_warp_reads_as_the_comment_says() -> None:
 
 
 @pytest.mark.nightly
-def test_mjx_reads_as_the_comment_says() -> None:
+def test_mjx_reads_as_the_comment_says():
     scene = crank_rocker(drive_bar=4)
     assert max(errors(scene, read_mjx(write_mjcf_for(scene, "mjx"), STEPS))) < YIELDING
     assert max(errors(scene, read_mjx(write_mjcf_for(scene, "mjx"), 0))) > 0.1, (
@@ -266,7 +266,7 @@ def test_mjx_reads_as_the_comment_says() -> None:
 
 
 @pytest.mark.parametrize("simulator", SIMULATORS)
-def test_each_file_loads_in_mujoco_and_runs(simulator: str) -> None:
+def test_each_file_loads_in_mujoco_and_runs(simulator):
     """Single precision, pads or none: MuJoCo itself carries all of them."""
     scene = crank_rocker()
     assert (
@@ -301,7 +301,7 @@ FORCE = 0.01
 
 
 @pytest.mark.nightly
-def test_drake_loads_the_sdf_and_moves_as_released() -> None:
+def test_drake_loads_the_sdf_and_moves_as_released():
     pytest.importorskip("pydrake")
     plants, parsing = (
         importlib.import_module(f"pydrake.multibody.{name}")
@@ -352,7 +352,7 @@ def test_drake_loads_the_sdf_and_moves_as_released() -> None:
     )
 
 
-def test_the_pin_at_B_alone_closes_the_loop_from_outside() -> None:
+def test_the_pin_at_B_alone_closes_the_loop_from_outside():
     sdf, usd = write_sdf(released()), write_usd(released(effects=()))
     assert re.findall(r'joint name="(\w+)"', sdf) == [
         "ground_on_world",
@@ -395,10 +395,10 @@ LOADED, AT_B = (
     ],
 )
 def test_what_a_file_cannot_hold_is_refused(
-    write: Any,
-    scene: Scene,
-    words: str,
-) -> None:
+    write,
+    scene,
+    words,
+):
     with pytest.raises(LimitError, match=words):
         write(scene)
 
@@ -406,7 +406,7 @@ def test_what_a_file_cannot_hold_is_refused(
 @pytest.mark.parametrize(
     "write", [write_sdf, partial(write_sdf, reader="drake"), write_usd]
 )
-def test_without_loads_every_model_is_written_and_says_how_to_start(write: Any) -> None:
+def test_without_loads_every_model_is_written_and_says_how_to_start(write):
     for file in list_model_files():
         scene = fourbar.load(file)
         text = write(scene, without_loads=True)
@@ -440,7 +440,7 @@ step; measured 1.5e-3.
 
 
 @pytest.mark.nightly
-def test_newton_loads_the_usd_and_reads_as_the_comment_says() -> None:
+def test_newton_loads_the_usd_and_reads_as_the_comment_says():
     newton = pytest.importorskip("newton")
     pytest.importorskip("newton_usd_schemas")
     wheel = fourbar.Flywheel(100.0, 2)

@@ -107,7 +107,7 @@ def run_alone(scene: fourbar.Scene) -> tuple[float, float, float]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", DrawnType)
-def test_runs_alone(kind: DrawnType) -> None:
+def test_runs_alone(kind):
     rng = np.random.default_rng(SEED)
     for _ in range(8):
         scene = random_scene(rng, kind)
@@ -147,10 +147,10 @@ def opened(scene: fourbar.Scene) -> tuple[mujoco.MjModel, mujoco.MjData]:
     ids=["parallelogram", "kite a = b", "kite a = d", "a + d = b + c"],
 )
 def test_the_file_opens_in_the_assembly_beyond_change_points(
-    lengths: tuple[float, ...],
-    points: tuple[float, ...],
-    branch: int,
-) -> None:
+    lengths,
+    points,
+    branch,
+):
     """Pin B lies left of the diagonal from A to O4 in the open assembly's first
     half, and changes its side at each change point that the input passes, and
     nowhere else.
@@ -176,7 +176,7 @@ def sprung() -> fourbar.Scene:
     return crank_rocker(motion=fourbar.Motion(1.0, 10.0), effects=(springs,))
 
 
-def test_the_joints_count_the_turns_of_every_spring() -> None:
+def test_the_joints_count_the_turns_of_every_spring():
     """The springs at O4 and B rest three turns up and two down.
 
     The joint at A, which none holds, takes the rest.
@@ -193,7 +193,7 @@ def test_the_joints_count_the_turns_of_every_spring() -> None:
 
 
 @pytest.mark.slow
-def test_opens_assembled_and_moves_without_keyframe_or_control() -> None:
+def test_opens_assembled_and_moves_without_keyframe_or_control():
     rng = np.random.default_rng(SEED)
     scenes = [fourbar.load(file) for file in list_model_files()] + [sprung()]
     for scene in [*scenes, *(random_scene(rng, kind) for kind in [*DrawnType] * 3)]:
@@ -229,7 +229,7 @@ RELEASE = 1e-4
 
 
 @pytest.mark.parametrize("scale", (1.0, 0.01))
-def test_a_released_linkage_falls_by_itself(scale: float) -> None:
+def test_a_released_linkage_falls_by_itself(scale):
     bars = [
         fourbar.Bar(scale * length, mass)
         for length, mass in ((0.1, 0.2), (0.25, 0.5), (0.22, 0.4))
@@ -249,7 +249,7 @@ def test_a_released_linkage_falls_by_itself(scale: float) -> None:
         )
 
 
-def test_numbers_survive_bit_for_bit() -> None:
+def test_numbers_survive_bit_for_bit():
     scene = thesis()
     model = mujoco.MjModel.from_xml_string(write_mjcf(scene))
     for name, bar in (
@@ -262,7 +262,7 @@ def test_numbers_survive_bit_for_bit() -> None:
     assert not model.opt.gravity.any()
 
 
-def test_shapes_add_no_mass_and_change_no_bit() -> None:
+def test_shapes_add_no_mass_and_change_no_bit():
     text = write_mjcf(crank_rocker())
     bare = ET.fromstring(text)
     for body in bare.iter("body"):
@@ -278,9 +278,9 @@ def test_shapes_add_no_mass_and_change_no_bit() -> None:
 
 @pytest.mark.parametrize(("mass", "inertia"), [(0.0, None), (1e-16, 1.0), (1.0, 1e-16)])
 def test_massless_bar_is_refused_in_one_line(
-    mass: float,
-    inertia: float | None,
-) -> None:
+    mass,
+    inertia,
+):
     linkage = fourbar.FourBar(
         0.3,
         fourbar.Bar(0.1, 1.0),
@@ -291,14 +291,14 @@ def test_massless_bar_is_refused_in_one_line(
         write_mjcf(crank_rocker(linkage=linkage))
 
 
-def test_a_force_whose_flywheel_is_no_double_is_refused_in_one_line() -> None:
+def test_a_force_whose_flywheel_is_no_double_is_refused_in_one_line():
     scene = crank_rocker(loads=(fourbar.Load(3, (1e308, 0.4)),))
     with pytest.raises(fourbar.InputError, match=r"^flywheel = inf kg m\^2: [^\n]*$"):
         write_mjcf(scene)
 
 
 @pytest.mark.parametrize("omega", [None, 0.0])
-def test_at_rest_a_file_is_written_that_stays_at_rest(omega: float | None) -> None:
+def test_at_rest_a_file_is_written_that_stays_at_rest(omega):
     scene = crank_rocker(motion=fourbar.Motion(1.0, omega), loads=(), effects=())
     model, data = at_keyframe(scene)
     mujoco.mj_step(model, data, 100)
@@ -307,7 +307,7 @@ def test_at_rest_a_file_is_written_that_stays_at_rest(omega: float | None) -> No
     )  # rounding of the keyframe's gap, nothing else moves it
 
 
-def test_from_lengths_alone() -> None:
+def test_from_lengths_alone():
     scene = make_scene(0.3, 0.1, 0.25, 0.22)
     assert (scene.motion.omega_2, scene.motion.branch) == (1.0, 1)
     assert scene.linkage.coupler.mass == 0.25
@@ -315,7 +315,7 @@ def test_from_lengths_alone() -> None:
     assert all("\n" not in line for line in list_defaults(scene))
 
 
-def test_without_keyframe_no_position_is_written() -> None:
+def test_without_keyframe_no_position_is_written():
     text = write_mjcf(crank_rocker(), Settings(timestep=1e-3), keyframe=False)
     assert mujoco.MjModel.from_xml_string(text).nkey == 0
     with pytest.raises(fourbar.InputError, match="timestep"):
@@ -325,9 +325,9 @@ def test_without_keyframe_no_position_is_written() -> None:
 @pytest.mark.parametrize("pin", ("O2", "O4"))
 @pytest.mark.parametrize("theta_1", (0.0, 0.7, -2.0))
 def test_a_spring_at_a_ground_pin_rests_at_an_angle_from_the_ground(
-    pin: str,
-    theta_1: float,
-) -> None:
+    pin,
+    theta_1,
+):
     """Hinges count from the world's axis, a scene's rest from the ground bar.
 
     The preload moves it by -preload/k.
@@ -346,7 +346,7 @@ def test_a_spring_at_a_ground_pin_rests_at_an_angle_from_the_ground(
     assert model.qpos_spring[sprung_joint] == pytest.approx(0.4 + theta_1 - 0.2)
 
 
-def test_a_window_has_its_steps_wherever_it_lies() -> None:
+def test_a_window_has_its_steps_wherever_it_lies():
     """A quarter radian at 3 rad/s takes 1/12 s.
 
     The steps in it do not depend on the angle at which it begins.

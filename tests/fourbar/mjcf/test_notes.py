@@ -446,7 +446,7 @@ FILES: dict[str, tuple[Scene, Drive]] = {
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_every_sentence_holds(name: str) -> None:
+def test_every_sentence_holds(name):
     said = Opened(*FILES[name]).comments()
     assert len(said) >= 6 and all(len(line) <= 115 for line in said)
     for line in said:
@@ -456,9 +456,9 @@ def test_every_sentence_holds(name: str) -> None:
 
 
 def test_a_linkage_with_limits_says_so(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    tmp_path,
+    monkeypatch,
+):
     """MuJoCo writes a log of its resets into the working folder."""
     monkeypatch.chdir(tmp_path)
     file = Opened(thesis(), "flywheel")
@@ -466,7 +466,7 @@ def test_a_linkage_with_limits_says_so(
     starts_anew(file)
 
 
-def test_every_sentence_of_the_table_is_said_somewhere() -> None:
+def test_every_sentence_of_the_table_is_said_somewhere():
     said = [line for name in FILES for line in Opened(*FILES[name]).comments()]
     said += Opened(thesis(), "flywheel").comments()
     for start in SAID:
@@ -477,7 +477,7 @@ FOLLOWED = 1e-6
 """Of the torque of a controller, by the greatest in a turn; measured 5e-8."""
 
 
-def test_a_controller_of_ones_own_finds_the_torque() -> None:
+def test_a_controller_of_ones_own_finds_the_torque():
     """PD control about omega_2 t; its torque is the formulas' at what then happens."""
     file = Opened(
         crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.4, 6.0, 60), 10.0)), "motor"
@@ -496,7 +496,7 @@ def test_a_controller_of_ones_own_finds_the_torque() -> None:
     assert worst < FOLLOWED and abs(d.qpos[0] - 0.4 - 10.0 * d.time) < 0.05
 
 
-def test_a_motor_for_one_that_takes_none_is_refused() -> None:
+def test_a_motor_for_one_that_takes_none_is_refused():
     for wrong in (
         {"simulator": "newton", "drive": "motor"},
         {"drive": "servo"},

@@ -26,8 +26,8 @@ def scene() -> fourbar.Scene:
 
 @pytest.mark.parametrize("axis", AXES)
 def test_the_frame_turns_z_to_the_axis_by_the_shortest_way(
-    axis: tuple[float, float, float],
-) -> None:
+    axis,
+):
     plane = Plane(axis)
     turn = plane.rotation
     unit = np.array(axis) / np.linalg.norm(axis)
@@ -50,15 +50,15 @@ def test_the_frame_turns_z_to_the_axis_by_the_shortest_way(
 
 
 @pytest.mark.parametrize("axis", [(0.0, 0.0, 0.0), (1.0, 2.0), (1.0, 0.0, np.nan), "z"])
-def test_what_is_no_direction_is_refused(axis: object) -> None:
+def test_what_is_no_direction_is_refused(axis):
     with pytest.raises(InputError, match="axis"):
         Plane(axis)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("axis", AXES)
 def test_mujoco_moves_and_loads_a_tilted_linkage_alike(
-    axis: tuple[float, float, float],
-) -> None:
+    axis,
+):
     mujoco = pytest.importorskip("mujoco")
 
     plane = Plane(axis, ORIGIN)
@@ -85,8 +85,8 @@ def test_mujoco_moves_and_loads_a_tilted_linkage_alike(
 
 @pytest.mark.parametrize("axis", AXES)
 def test_an_sdf_has_its_model_and_gravity_turned(
-    axis: tuple[float, float, float],
-) -> None:
+    axis,
+):
     plane = Plane(axis, ORIGIN)
     trees = [
         ET.fromstring(write_sdf(scene(), without_loads=True, plane=place))
@@ -105,7 +105,7 @@ def test_an_sdf_has_its_model_and_gravity_turned(
     assert poses[0] == poses[1]
 
 
-def test_only_a_plane_that_is_tilted_is_called_so() -> None:
+def test_only_a_plane_that_is_tilted_is_called_so():
     """A plane that is moved alone says where O2 is."""
     texts = {}
     for name, plane in (
@@ -126,8 +126,8 @@ def test_only_a_plane_that_is_tilted_is_called_so() -> None:
 
 @pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), *AXES])
 def test_the_joints_of_a_usd_meet_wherever_the_plane_is(
-    axis: tuple[float, float, float],
-) -> None:
+    axis,
+):
     plane = Plane(axis, ORIGIN)
     text = write_usd(scene(), without_loads=True, plane=plane)
 

@@ -76,14 +76,14 @@ SAME: list[tuple[Callable[..., Any], tuple[Any, ...], tuple[Any, ...]]] = [
 
 @pytest.mark.parametrize(("make", "texts", "numbers"), SAME)
 def test_a_text_with_a_unit_is_its_number(
-    make: Callable[..., Any],
-    texts: Any,
-    numbers: Any,
-) -> None:
+    make,
+    texts,
+    numbers,
+):
     assert make(*texts) == make(*numbers)
 
 
-def test_a_motion_is_written_as_in_the_file() -> None:
+def test_a_motion_is_written_as_in_the_file():
     stated = fourbar.Motion(["10 deg", 1.0], "60 rpm", "30 deg/s^2", branch="crossed")  # type: ignore[arg-type]
     read = loads(
         '[lengths]\nground = "6 in"\ninput = "2 in"\n'
@@ -128,7 +128,7 @@ def test_a_motion_is_written_as_in_the_file() -> None:
         ),
     ],
 )
-def test_a_mistake_is_one_line(make: Callable[[], object], words: str) -> None:
+def test_a_mistake_is_one_line(make, words):
     with pytest.raises(InputError, match=words):
         make()
 
@@ -196,7 +196,7 @@ PREFIXES: dict[str, int] = {
 
 
 @pytest.mark.parametrize("name", UNITS)
-def test_every_unit_is_its_fraction(name: str) -> None:
+def test_every_unit_is_its_fraction(name):
     unit, exact = UNITS[name]
     assert to_si(f"1 {name}", unit) == float(exact)
     assert to_si(f"0.7 {name}", unit) == float(exact * Fraction(7, 10))
@@ -216,7 +216,7 @@ def test_every_unit_is_its_fraction(name: str) -> None:
         ("+3/8 in", Fraction(3, 8)),
     ],
 )
-def test_feet_and_inches_are_one_length(text: str, inches: Fraction | int) -> None:
+def test_feet_and_inches_are_one_length(text, inches):
     assert to_si(text, "m") == float(inches * FOOT / 12)
 
 
@@ -232,24 +232,24 @@ def test_feet_and_inches_are_one_length(text: str, inches: Fraction | int) -> No
         ("1 1/2 in", 0.0),
     ],
 )
-def test_half_a_unit_of_the_last_decimal(text: str, half: float) -> None:
+def test_half_a_unit_of_the_last_decimal(text, half):
     assert half_unit_of_text(text, "m") == pytest.approx(half, rel=1e-15)
 
 
 @pytest.mark.parametrize(
     "text", ["1'6", "1'6'", "6\"1'", "1'6 lb", "1'-\"", '1\'6""', "1'-6-\""]
 )
-def test_what_is_no_length_in_feet_and_inches_is_refused(text: str) -> None:
+def test_what_is_no_length_in_feet_and_inches_is_refused(text):
     with pytest.raises(UnitError):
         to_si(text, "m")
 
 
 @pytest.mark.parametrize("prefix", PREFIXES)
-def test_every_prefix_is_its_power_of_ten(prefix: str) -> None:
+def test_every_prefix_is_its_power_of_ten(prefix):
     assert to_si(f"3 {prefix}N", "N") == float(3 * Fraction(10) ** PREFIXES[prefix])
 
 
-def test_the_tables_name_every_unit_and_prefix() -> None:
+def test_the_tables_name_every_unit_and_prefix():
     lines = [
         line.split(" = ")
         for line in DEFINITIONS.strip().splitlines()
@@ -272,10 +272,10 @@ def test_the_tables_name_every_unit_and_prefix() -> None:
     ],
 )
 def test_units_are_read_as_people_write_them(
-    text: str,
-    unit: str,
-    value: float,
-) -> None:
+    text,
+    unit,
+    value,
+):
     assert to_si(text, unit) == value
 
 
@@ -289,6 +289,6 @@ def test_units_are_read_as_people_write_them(
         ("-5 rpm ccw", "-5 rpm"),
     ],
 )
-def test_a_sense_of_turning_is_a_sign(text: str, plain: str) -> None:
+def test_a_sense_of_turning_is_a_sign(text, plain):
     with pytest.raises(UnitError, match=f'positive: "{plain}"'):
         to_si(text, "rad/s")

@@ -16,7 +16,7 @@ ureg = pytest.importorskip("pint").UnitRegistry()
 MM, KG, DEG = ureg.millimeter, ureg.kilogram, ureg.degree
 
 
-def test_lengths_and_masses_are_converted_exactly() -> None:
+def test_lengths_and_masses_are_converted_exactly():
     bar = fourbar.Bar(0.1 * ureg.inch, mass=250.0 * ureg.gram, centre=(3 * MM, 5 * DEG))
     assert bar.length == 0.00254
     assert bar.mass == 0.25
@@ -24,14 +24,14 @@ def test_lengths_and_masses_are_converted_exactly() -> None:
     assert fourbar.FourBar(3 * MM, bar, bar, bar, 15.0 * DEG).ground == 0.003
 
 
-def test_arrays_of_angles_are_converted() -> None:
+def test_arrays_of_angles_are_converted():
     angles = np.array([0.0, 90.0, 180.0])
     motion = fourbar.Motion(angles * DEG, 60.0 * ureg.rpm)
     np.testing.assert_array_equal(motion.theta_2, np.radians(angles))
     assert motion.omega_2 == 2.0 * math.pi
 
 
-def test_effects_and_loads_take_them() -> None:
+def test_effects_and_loads_take_them():
     gravity = fourbar.Gravity(386.08858267716535 * ureg.inch / ureg.second**2)
     assert gravity.magnitude == pytest.approx(9.80665, rel=1e-15)
     damper = fourbar.Viscous((("O2", 1.0 * ureg.N * ureg.m * ureg.s / ureg.rad),))
@@ -46,19 +46,19 @@ def test_effects_and_loads_take_them() -> None:
         (ureg.Quantity([1.0, 2.0], "m"), "must be a finite number > 0"),
     ],
 )
-def test_what_is_no_length_is_refused(quantity: object, sentence: str) -> None:
+def test_what_is_no_length_is_refused(quantity, sentence):
     with pytest.raises(InputError, match=sentence):
         fourbar.Bar(quantity)  # type: ignore[arg-type]
 
 
-def test_hertz_are_no_speed() -> None:
+def test_hertz_are_no_speed():
     """pint converts 10 Hz to 10 rad/s, a sixth of the speed that is meant."""
     with pytest.raises(InputError, match=r'did you mean "10\.0 rev/s"'):
         fourbar.Motion(0.0, 10.0 * ureg.hertz)
 
 
 @pytest.mark.parametrize("unit", COMMON)
-def test_a_common_unit_is_what_the_library_makes_of_it(unit: str) -> None:
+def test_a_common_unit_is_what_the_library_makes_of_it(unit):
     number, dimension = ask_library(unit)
     # which power comes first hangs on what the library has read before
     powers = {f"{base[1:-1]}^{power}" for base, power in dimension.items()}

@@ -92,7 +92,6 @@ def find_pole(low: float, high: float) -> float:
     for _ in range(6):
         places = np.linspace(low, high, 101)
         force = solve_at(places).drive_force
-        assert force is not None
         step = int(np.flatnonzero(force[:-1] * force[1:] < 0.0)[0])
         low, high = places[step : step + 2]
     return 0.5 * (low + high)

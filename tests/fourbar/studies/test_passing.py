@@ -55,10 +55,10 @@ def test_places_lie_in_the_turn_of_the_sweep_in_rising_order() -> None:
 
 def test_a_release_has_a_state_at_its_start() -> None:
     found = find_positions(DROPPED, [("time", 0.0)])
-    assert found.time is not None and found.time.tolist() == [0.0]
+    assert found.time.tolist() == [0.0]
     start = fourbar.solve(DROPPED, at=found)
     assert start.theta_2[0] == pytest.approx(1.0, abs=LOCATED)
-    assert start.omega_2 is not None and start.omega_2[0] == 0.0
+    assert start.omega_2[0] == 0.0
 
 
 def test_a_place_out_of_range_is_refused_with_the_range() -> None:
@@ -94,7 +94,7 @@ def test_a_law_passes_an_angle_up_and_down() -> None:
     assert found.angle[:2] == pytest.approx(1.5, abs=LOCATED)
     assert found.time[0] < 1.0 < found.time[1] and found.time[2] == 0.5
     begins = find_positions(LAW, [("theta_2", 0.3)])
-    assert begins.time is not None and begins.time[0] == 0.0
+    assert begins.time[0] == 0.0
 
 
 @pytest.mark.slow
@@ -113,7 +113,7 @@ def test_a_release_is_met_when_it_first_passes() -> None:
     state = fourbar.solve(DROPPED, at=found)
     assert state.omega_2[0] == pytest.approx(fine.omega_2[first], rel=1e-3)
     timed = find_positions(DROPPED, [("time", 0.25), ("theta_2", value)])
-    assert timed.time is not None and timed.time[0] == 0.25
+    assert timed.time[0] == 0.25
     assert len(timed.angle) == 2 and timed.time[1] == found.time[0]
 
 
@@ -122,13 +122,12 @@ def test_a_stroke_is_found_where_an_angle_is_commanded() -> None:
     assert scene.drive is not None
     commanded = replace(scene, motion=fourbar.Motion(), tolerances=())
     stroke = fourbar.solve(commanded, "position").stroke
-    assert stroke is not None
     value = float(np.nanmean(stroke))
     found = find_positions(commanded, [("stroke", value)])
     solved = fourbar.solve(commanded, "position", at=found).stroke
     assert solved == pytest.approx(value, abs=LOCATED)
     back = find_positions(scene, [("theta_4", float(fourbar.solve(scene).theta_4[3]))])
-    assert back.stroke is not None and len(back.stroke) >= 1
+    assert len(back.stroke) >= 1
 
 
 def test_the_range_of_a_refusal_is_that_of_the_motion_and_not_the_other_one() -> None:
