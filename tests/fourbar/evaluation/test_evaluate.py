@@ -2,7 +2,6 @@
 too large or missing.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -112,10 +111,10 @@ SCENES |= {
 @pytest.mark.parametrize("kind", ["long doubles", "pairs of doubles"])
 @pytest.mark.parametrize("name", SCENES)
 def test_error_bars_are_of_the_size_of_the_error(
-    name: str,
-    kind: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    name,
+    kind,
+    monkeypatch,
+):
     scene = SCENES[name]
     if kind == "pairs of doubles":
         monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
@@ -144,9 +143,9 @@ def test_error_bars_are_of_the_size_of_the_error(
 @pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILY_DRAWERS)
 def test_error_bars_hold_with_pairs_of_doubles(
-    family: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    family,
+    monkeypatch,
+):
     """The numbers of a machine whose long doubles are no longer than doubles."""
     monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
     tally = judge_samples(family, range(3))
@@ -155,8 +154,8 @@ def test_error_bars_hold_with_pairs_of_doubles(
 
 
 def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     ends = fourbar.Point("P", 1, (0.2, 0.6)), fourbar.Point("Q", 3, (0.15, -0.4))
     spring = Spring(Place(1, (0.2, 0.6)), Place(3, (0.15, -0.4)), 80.0, 0.2)
     table = Table((0.0, 1.0, 4.0, 6.2), (1.0, 1.0, -2.0, -2.0))  # 0 at 2 rad
@@ -187,7 +186,7 @@ def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(
     assert {swept.theta_2[np.argmin(np.abs(gap))] for gap in away} <= set(seen[0])
 
 
-def test_a_bar_is_of_the_motion_that_begins_to_one_side() -> None:
+def test_a_bar_is_of_the_motion_that_begins_to_one_side():
     """The bar of a linkage about to move was the friction itself.
 
     The other evaluation did not have it.
@@ -202,7 +201,7 @@ def test_a_bar_is_of_the_motion_that_begins_to_one_side() -> None:
         assert torque_error.max() < 1e-13
 
 
-def test_a_bar_is_as_wide_as_what_a_position_loses() -> None:
+def test_a_bar_is_as_wide_as_what_a_position_loses():
     """The direction of a spring is lost where its ends nearly meet, by no power of any
     sine.
     """
@@ -212,8 +211,8 @@ def test_a_bar_is_as_wide_as_what_a_position_loses() -> None:
 
 
 def test_a_long_sweep_searches_for_friction_at_its_ends_alone(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     """Eight thousand positions of several loaded pins took eight minutes.
 
     Each was searched from many starts.
@@ -237,7 +236,7 @@ def test_a_long_sweep_searches_for_friction_at_its_ends_alone(
     assert 0 < len(searched) < 10
 
 
-def test_what_gravity_drops_of_its_direction_shows_in_the_error_bar() -> None:
+def test_what_gravity_drops_of_its_direction_shows_in_the_error_bar():
     """Compare a heavy crank beside its equilibrium with balls.
 
     cos(-pi/2) as a double is 6e-17, and taken for zero.
@@ -293,9 +292,9 @@ def beside_a_free_length() -> fourbar.Scene:
 )
 @pytest.mark.parametrize("make", (near_a_limit_of_bar_3, beside_a_free_length))
 def test_an_error_bar_holds_what_long_doubles_do_not_resolve(
-    make: Callable[[], fourbar.Scene],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    make,
+    monkeypatch,
+):
     """Double and long double agree here and are both wrong.
 
     Pairs of doubles have 32 digits.
@@ -310,7 +309,7 @@ def test_an_error_bar_holds_what_long_doubles_do_not_resolve(
 
 
 @pytest.mark.parametrize("power", range(24, 41, 2))
-def test_an_error_bar_grows_with_the_angle(power: int) -> None:
+def test_an_error_bar_grows_with_the_angle(power):
     """A crank under its weight, m g r cos(theta).
 
     Less the ground's angle theta has 64 bits.
@@ -323,7 +322,7 @@ def test_an_error_bar_grows_with_the_angle(power: int) -> None:
     assert error >= 0.5 * angle * np.finfo(np.longdouble).eps * slope
 
 
-def test_an_error_bar_at_the_end_of_a_table_of_a_load() -> None:
+def test_an_error_bar_at_the_end_of_a_table_of_a_load():
     """The slope of the forces would be taken beyond the table."""
     table = fourbar.Table((0.5, 1.0), (1.0, 2.0))
     load = fourbar.Load(4, moment=1.0, table=table)

@@ -227,7 +227,7 @@ MANY = [
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(("kind", "number"), list(dict.fromkeys([*SHOWN, *MANY])))
-def test_nine_digits_over_five_seconds(kind: str, number: int) -> None:
+def test_nine_digits_over_five_seconds(kind, number):
     case = motion(kind, number)
     m, theirs = ours(case), released(*case[:5], TIMES)
     shown = SHOWN.get((kind, number))
@@ -252,7 +252,7 @@ def test_nine_digits_over_five_seconds(kind: str, number: int) -> None:
         assert [*kinds, amplified > AMPLIFIED][shown]
 
 
-def test_the_motions_shown_meet_every_force() -> None:
+def test_the_motions_shown_meet_every_force():
     terms = [term for shown in SHOWN for term in motion(*shown).terms]
     assert {type(term) for term in terms} == {
         fourbar.Gravity,
@@ -270,7 +270,7 @@ def test_the_motions_shown_meet_every_force() -> None:
 
 
 @pytest.mark.slow
-def test_the_reference_against_a_printed_answer() -> None:
+def test_the_reference_against_a_printed_answer():
     """One window of IFToMM's A02 after ten seconds, through its change points.
 
     The source is lim.ii.udc.es/mbsbenchmark.
