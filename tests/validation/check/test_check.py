@@ -410,6 +410,13 @@ MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]
         "sign reversed",
     ),
     (
+        "torque without its sign",
+        "crank_rocker",
+        ALL,
+        lambda s: right(s) | {"torque": np.abs(right(s)["torque"])},
+        "the sign is lost: sizes alone",
+    ),
+    (
         "F23 for F32",
         "crank_rocker",
         ALL,
