@@ -59,8 +59,8 @@ at_option = click.option(
     multiple=True,
     metavar="POSITION",
     help=(
-        'Position, like "60 deg", "time=0.2 s", "B_x=80 mm" or any column with a value;'
-        " repeatable."
+        'Position, like "60 deg", "time=0.2 s", "B_x=80 mm", "F12_y=max" or any column'
+        " with a value, min or max; repeatable."
     ),
 )
 
@@ -238,16 +238,18 @@ def find_positions(scene: Scene, text: str) -> Command:
     those that the linkage can have, any other column has its value in the scene's
     motion.
     """
-    from fourbar.show.located import locate
+    from fourbar.show.located import SIDES, locate
     from fourbar.studies.passing import STATED_POSITIONS
     from fourbar.studies.passing import find_positions as find_stated
 
     name, equals, value = (part.strip() for part in text.rpartition("="))
     if not equals:
         name = scene.motion.commanded
+    if name == "t":  # as it is printed
+        name = "time"
     if value == "drawn":
         return find_stated(scene, [(name, _read_drawn(scene, name, text))])
-    if name not in STATED_POSITIONS:
+    if name not in STATED_POSITIONS or value in SIDES:
         return locate(scene, name, value)
     unit = {"stroke": "m", "time": "s"}.get(name, "rad")
     likely = {"stroke": "mm", "time": "s"}.get(name, "deg")

@@ -30,6 +30,8 @@ CONSTANT = 1e-12
 """Part of a column's usual value within which two values are one."""
 UNBOUNDED = 1e6
 """Times its usual size beyond which a column's largest value stands beside a pole."""
+SIDES = {"min": 1.0, "max": -1.0}
+"""Sign by which a column's least or greatest value, in place of a value, is its least."""
 USUAL = 90.0
 """Percentile of a column's sizes, and of its distances from the median."""
 
@@ -43,7 +45,8 @@ def locate(scene: Scene, name: str, text: str) -> Command:
     Parameters
     ----------
     name : a column, as `read_column` takes it.
-    text : the value with its unit; a pure number has none.
+    text : the value with its unit; a pure number has none. "min" and "max" stand for
+        the least and the greatest of the motion.
 
     Raises
     ------
@@ -97,7 +100,7 @@ class _LocatedSearch:
 
     def locate(self, text: str) -> Command:
         """Locate the positions that have a value, in the order of the motion."""
-        self.value = self._read_value(text)
+        self.value = 0.0 if text in SIDES else self._read_value(text)
         finite = self.values[np.isfinite(self.values)]
         if not finite.size:
             raise NotAssembledError(f"--at {self.name}: it has no value in this motion")
@@ -105,6 +108,11 @@ class _LocatedSearch:
             raise self._refuse(text, "it is constant", finite)
         # the largest value may stand beside a pole
         usual = float(np.percentile(np.abs(finite), USUAL))
+        if text in SIDES:
+            place, value = self._find_extreme(SIDES[text])
+            if abs(value) > UNBOUNDED * usual:
+                raise self._refuse(text, "it has none", finite)
+            return self.course.command(np.array([place]))
         gaps = self._measure_gaps(self.values)
         gaps[np.abs(gaps) <= CONSTANT * max(usual, abs(self.value))] = 0.0
         zeros = gaps == 0.0
@@ -237,22 +245,29 @@ class _LocatedSearch:
 
         `values`: those that are finite.
         """
-        from scipy.optimize.elementwise import find_minimum
-
-        ends = [float(values.min()), float(values.max())]
-        for number, side in enumerate((1.0, -1.0)):
-            row = int(np.nanargmin(side * self.values))
-            around = self.values[row - 1 : row + 2]
-            if 0 < row < len(self.values) - 1 and np.isfinite(around).all():
-                least = find_minimum(
-                    lambda place, side=side: side * self._read(place),
-                    tuple(self.places[row - 1 : row + 2]),
-                    tolerances=self._located,
-                )
-                ends[number] = side * float(least.f_x)
+        ends = [self._find_extreme(side)[1] for side in SIDES.values()]
         largest = float(np.abs(values).max())
         cleaned: list[float] = drop_rounding(np.array(ends), largest).tolist()
         return cleaned
+
+    def _find_extreme(self, side: float) -> tuple[float, float]:
+        """Find the place and the value of the column's extreme on this side.
+
+        `side`: one of `SIDES`.
+        """
+        from scipy.optimize.elementwise import find_minimum
+
+        row = int(np.nanargmin(side * self.values))
+        place, value = self.places[row], self.values[row]
+        around = self.values[row - 1 : row + 2]
+        if 0 < row < len(self.values) - 1 and np.isfinite(around).all():
+            least = find_minimum(
+                lambda places: side * self._read(places),
+                tuple(self.places[row - 1 : row + 2]),
+                tolerances=self._located,
+            )
+            place, value = least.x, side * least.f_x
+        return float(place), float(value)
 
 
 def _find_unit(column: Column) -> str:

@@ -730,6 +730,16 @@ def test_an_output_angle_out_of_range_is_refused_with_the_range(run):
     refuses(run("analyze", "scene.toml", "--at", "theta_4=200 deg"), said)
 
 
+def test_the_greatest_output_angle_and_a_printed_time_are_positions(run):
+    """The limit is that of the sides 5, 4.5 and 6; 0.1 s at 10 rad/s are 1 rad."""
+    Path("scene.toml").write_text(INCHES)
+    limit = 180.0 - math.degrees(math.acos((5**2 + 4.5**2 - 2**2) / (2 * 5 * 4.5)))
+    _, out, _ = run("analyze", "scene.toml", "--at", "theta_4=max")
+    assert re.search(rf"bar 4 +{limit:.4f} ", out)
+    _, out, _ = run("analyze", CRANK_ROCKER, "--at", "t=0.1 s")
+    assert f"at theta_2 = {math.degrees(1.0):.6g} deg" in out
+
+
 def test_points_in_the_table_have_the_coordinates_of_the_drawing(run):
     """O2 is not the origin of the drawing; `--at` and CSV have its coordinates too."""
     Path("drawn.toml").write_text(

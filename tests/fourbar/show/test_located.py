@@ -96,6 +96,27 @@ def test_an_extreme_that_touches_the_value_is_a_position() -> None:
         assert found == pytest.approx([math.pi / 2], abs=TOUCHED)
 
 
+@pytest.mark.parametrize(
+    ("name", "side", "place"),
+    [
+        ("B_y", "max", math.pi / 2),
+        ("v_B_x", "min", math.pi / 2),
+        ("B_x-B_y", "min", 3 * math.pi / 4),
+        ("theta_4", "max", math.radians(178.0)),
+        ("transmission", "max", math.pi / 2),
+    ],
+)
+def test_the_least_and_the_greatest_value_are_located(
+    name: str,
+    side: str,
+    place: float,
+) -> None:
+    """Between the steps by sines, and at the end of what grows all the way."""
+    sweep = '{ from = "0.3 deg", to = "178 deg", steps = 7 }'
+    found = locate(parallelogram(sweep), name, side).places
+    assert found == pytest.approx([place], abs=TOUCHED)
+
+
 def test_the_ends_of_a_motion_are_positions_and_one_position_is_one() -> None:
     """B_y is 0.25 m at 30 deg and at 150 deg, B_x 1.3 m at 0 and again at 360 deg."""
     scene = parallelogram('{ from = "10 deg", to = "150 deg", steps = 20 }')
@@ -146,6 +167,7 @@ def test_a_release_has_a_value_at_times() -> None:
     [
         ("B_y", "0.6 m", NotAssembledError, "no position has it; B_y goes from 0 to"),
         ("omega_4", "1 rad/s", NotAssembledError, "constant; omega_4 is 1 rad/s"),
+        ("omega_4", "max", NotAssembledError, "constant; omega_4 is 1 rad/s"),
         ("tork", "1 N m", InputError, '--at = .tork.: unknown; did you mean "torque"'),
         ("B_y", "0.6", InputError, 'unit is missing; did you mean "0.6 m"'),
         ("B_y", "6 s", InputError, "--at"),
@@ -177,8 +199,9 @@ def test_a_column_that_jumps_over_a_value_does_not_have_it() -> None:
 def test_a_column_with_poles_says_that_it_grows_without_bound() -> None:
     """omega_2/omega_4 of a crank-rocker is never small, and infinite at its limits."""
     scene = crank_rocker(motion=fourbar.Motion())
-    with pytest.raises(NotAssembledError, match=r"jumps.*, and grows without bound"):
-        locate(scene, "mechanical_advantage", "1")
+    for value, why in (("1", "jumps"), ("max", "has none")):
+        with pytest.raises(NotAssembledError, match=f"{why}.*, and grows without"):
+            locate(scene, "mechanical_advantage", value)
 
 
 def test_a_linkage_is_searched_up_to_where_it_ceases_to_assemble() -> None:
