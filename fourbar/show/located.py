@@ -31,7 +31,7 @@ CONSTANT = 1e-12
 UNBOUNDED = 1e6
 """Times its usual size beyond which a column's largest value stands beside a pole."""
 SIDES = {"min": 1.0, "max": -1.0}
-"""Sign by which a column's least or greatest value, in place of a value, is its least."""
+"""Signs by which the least or the greatest value of a column is its least."""
 USUAL = 90.0
 """Percentile of a column's sizes, and of its distances from the median."""
 
