@@ -43,9 +43,9 @@ from fourbar.show.summary import Facts, summarize
 from fourbar.show.units import (
     COMMON,
     POSITION_DIGITS,
+    SHOWN_AS_ZERO,
     SHOWN_DIGITS,
     choose_unit,
-    drop_rounding,
     write_digits,
     write_ends,
     write_short,
@@ -108,8 +108,8 @@ def write_block(
     headed : begin with the linkage.
     width : that of a terminal.
     """
-    block = _SceneBlock(summarize(scene, solution), units, width)
-    return block.write(pressure, headed=headed)
+    facts = summarize(scene, solution)
+    return write_facts(facts, units, pressure=pressure, headed=headed, width=width)
 
 
 def write_facts(
@@ -118,9 +118,10 @@ def write_facts(
     *,
     pressure: float | None = None,
     headed: bool = True,
+    width: int | None = None,
 ) -> list[str]:
     """Write facts that are collected already, as `write_block` does."""
-    return _SceneBlock(facts, units).write(pressure, headed=headed)
+    return _SceneBlock(facts, units, width).write(pressure, headed=headed)
 
 
 class _SceneBlock:
@@ -130,7 +131,7 @@ class _SceneBlock:
         self,
         facts: Facts,
         units: Conversion,
-        width: int | None = None,
+        width: int | None,
     ) -> None:
         self.facts = facts
         self.width = find_block_width(width)
@@ -721,18 +722,17 @@ class _SceneBlock:
             none = "none is enough, as the force grows without bound"
             return [self._row("bore", none)]
         panels = self.facts.motion.panels
-        push = max(0.0, panels.find_peak(LINE.value, 1).value)
-        pull = max(0.0, -panels.find_peak(LINE.value, -1).value)
         parts = []
-        if push:
-            bore = math.sqrt(4.0 * push / (math.pi * pressure))
-            parts.append(f"{self._value(bore, 'm')} to push {self._value(push, 'N')}")
-        if pull:
-            bore = math.sqrt(4.0 * pull / (math.pi * pressure))
-            parts.append(
-                f"{self._value(bore, 'm')}, and the rod's area besides, to pull"
-                f" {self._value(pull, 'N')}"
-            )
+        for sense, does in (
+            (1, " to push"),
+            (-1, ", and the rod's area besides, to pull"),
+        ):
+            force = sense * panels.find_peak(LINE.value, sense).value
+            if force > 0.0:
+                bore = math.sqrt(4.0 * force / (math.pi * pressure))
+                parts.append(
+                    f"{self._value(bore, 'm')}{does} {self._value(force, 'N')}"
+                )
         if parts:
             return [self._row("bore", f"at least {'; '.join(parts)}")]
         return []
@@ -750,12 +750,7 @@ class _SceneBlock:
         ]
         means = [load.rms for load in loads]
         if any(mean is not None for mean in means):
-            sizes = self._without_small([mean or 0.0 for mean in means])
-            cells = [
-                "-" if mean is None else cell
-                for cell, mean in zip(self._cells(sizes, "N"), means, strict=True)
-            ]
-            rows.append(("  RMS", cells))
+            rows.append(("  RMS", self._cells(self._without_small(means), "N")))
         lines = _align(rows, self.width)
         if facts.kind in ("list", "released"):
             return [*lines, "  peak and RMS are those of these positions"]
@@ -796,28 +791,19 @@ class _SceneBlock:
                 stresses.append(None)
             else:
                 stresses.append(bending.peak.value / modulus)
-        cells = self._cells([stress or 0.0 for stress in stresses], "Pa")
-        return [
-            "-" if stress is None else cell
-            for cell, stress in zip(cells, stresses, strict=True)
-        ]
+        return self._cells(stresses, "Pa")
 
     @staticmethod
-    def _without_small(values: list[float]) -> list[float]:
+    def _without_small(values: list[float | None]) -> list[float | None]:
         """Return zero for what is rounding of the largest of their kind."""
-        numbers = np.array(values)
-        largest = np.nanmax(np.abs(numbers), initial=0.0)
-        cleaned: list[float] = drop_rounding(numbers, largest).tolist()
-        return cleaned
+        largest = max((abs(value) for value in values if value), default=0.0)
+        least = SHOWN_AS_ZERO * largest
+        return [0.0 if value and abs(value) <= least else value for value in values]
 
     def _cells_of_peaks(self, peaks: list[Peak | None], unit: str) -> list[str]:
         """Write largest values of one kind, and which have no bound."""
-        sizes = self._without_small([peak.value if peak else 0.0 for peak in peaks])
-        cells = self._cells(sizes, unit)
-        return [
-            _UNBOUNDED if peak is None else cell
-            for cell, peak in zip(cells, peaks, strict=True)
-        ]
+        sizes = self._without_small([peak and peak.value for peak in peaks])
+        return self._cells(sizes, unit, _UNBOUNDED)
 
     def _places_of_peaks(
         self,
@@ -825,7 +811,7 @@ class _SceneBlock:
         names: list[str],
     ) -> list[str]:
         """Write where largest values of one kind are taken, or grow without bound."""
-        sizes = self._without_small([peak.value if peak else 0.0 for peak in peaks])
+        sizes = self._without_small([peak and peak.value for peak in peaks])
         panels = self.facts.motion.panels
         places = []
         for peak, size, name in zip(peaks, sizes, names, strict=True):
@@ -835,16 +821,20 @@ class _SceneBlock:
                 places.append(self._place(peak.place, named=False) if size else "-")
         return places
 
-    def _cells(self, values: list[float], unit: str) -> list[str]:
+    def _cells(
+        self, values: list[float | None], unit: str, missing: str = "-"
+    ) -> list[str]:
         """Write quantities of one kind with the prefix of the largest.
 
-        Quantities that lie far apart have a prefix each.
+        Quantities that lie far apart have a prefix each. `missing`: stands for none.
         """
         sizes = [abs(value) for value in values if value]
         largest = max(sizes, default=0.0)
         alike = min(sizes, default=0.0) >= OF_ONE_PREFIX * largest
         return [
-            self._value(value, unit, largest if alike or not value else None)
+            missing
+            if value is None
+            else self._value(value, unit, largest if alike or not value else None)
             for value in values
         ]
 

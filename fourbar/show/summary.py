@@ -24,7 +24,14 @@ from fourbar.show.motion_curves import (
     compute_pin_loads,
     describe_motion,
 )
-from fourbar.show.panels import LOCATED, TIED, Peak, Wanted, fit_panels
+from fourbar.show.panels import (
+    LOCATED,
+    TIED,
+    PanelCurve,
+    Peak,
+    Wanted,
+    fit_panels,
+)
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar.studies.internal_forces import Bending
@@ -222,12 +229,14 @@ def _find_transmission(motion: MotionCurves) -> Peak:
         zeros = panels.find_zeros("sin_mu")
         if len(zeros):
             return Peak(0.0, float(zeros[0]))
-        low, high = (panels.find_peak("sin_mu", sense) for sense in (-1, 1))
-        least = low if low.value > 0.0 else high
+        sines = panels.curves["sin_mu"]
+        # between two stretches it may change its sign without a zero
+        sizes = PanelCurve(np.abs(sines.values), sines.error, [])
+        least = replace(panels, curves={"": sizes}).find_peak("", -1)
     else:
-        sines = np.abs(panels.curves["sin_mu"].sizes[:, 0])
-        row = int(np.argmax(sines <= np.nanmin(sines) + TIED))
-        least = Peak(float(sines[row]), float(panels.start[row]))
+        absolute = np.abs(panels.curves["sin_mu"].sizes[:, 0])
+        row = int(np.argmax(absolute <= np.nanmin(absolute) + TIED))
+        least = Peak(float(absolute[row]), float(panels.start[row]))
     mu = math.asin(min(1.0, abs(least.value)))
     return Peak(0.0 if mu <= ZERO_TRANSMISSION_ANGLE else mu, least.place)
 
