@@ -16,11 +16,11 @@ import pytest
 
 import fourbar
 from fourbar.effects import Flywheel, Friction
-from fourbar.errors import InputError
 from fourbar.linkage import Bar, FourBar
 from fourbar.mjcf import RECIPE, write_mjcf
 from fourbar.quantities import FORCE_NAMES
 from fourbar.scene import Scene, command
+from fourbar.scene.motion import BRANCH_NAMES, Motion
 from fourbar.solving import solve
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS
 from fourbar_validation.compare.tolerance import wrap_difference
@@ -41,6 +41,8 @@ from fourbar_validation.robots.judge import (
     LoopJudgement,
     judge_file,
 )
+from fourbar_validation.robots.measure import find_left_out
+from fourbar_validation.run.transformed import _convert, _SceneConversion
 from tests.support.robots import Planar, answer_of, judge_path, notes_of
 from tests.support.robots import examine_text as examine
 from tests.support.scenes import mirrored
@@ -617,16 +619,34 @@ def test_a_softness_that_nothing_typed_mends_stays_a_difference() -> None:
     assert costs["closure.softness"] == "-"
 
 
-def test_a_loop_closed_at_the_input_of_the_scene_is_told_so() -> None:
-    """Seen from its other end the same file has its hinge at the input."""
+@pytest.mark.parametrize("drive_bar", [2, 3])
+def test_a_loop_closed_at_the_input_of_the_scene_is_judged(drive_bar: int) -> None:
+    """Seen from its other end the loop is cut at O2: no hinge bears the input."""
     scene, file = read_cut("O4")
-    link = scene.linkage
-    other = FourBar(link.ground, link.output, link.coupler, link.input)
-    with pytest.raises(InputError, match="closes the loop at pin O2 of the scene"):
-        find_loop_of_scene(
-            file, replace(scene, linkage=other), MeasureOptions(PoseOptions())
-        )
-    find_loop_of_scene(file, scene, MeasureOptions(PoseOptions()))
+    options = MeasureOptions(PoseOptions())
+    in_pose = find_loop_of_scene(file, scene, options).loop.angles[1]
+    few = in_pose + np.linspace(-0.3, 0.3, 9)
+    moved = scene.motion.replace(angle=few)
+    there = solve(replace(scene, motion=moved), "position")
+    other = _convert(scene.settled(), _SceneConversion(exchanged=True))
+    other = replace(other, drive_bar=drive_bar)
+    ways = [
+        replace(other, motion=Motion(np.asarray(there.theta_4), 2.0, branch=branch))
+        for branch in BRANCH_NAMES
+    ]
+    other = min(ways, key=lambda way: np.ptp(solve(way).theta_4 - there.theta_2))
+    assert find_loop_of_scene(file, other, options).loop.cut == "O2"
+    loop = examine_file(other, file, options).measured
+    assert loop.joint == "theta_2"
+    assert find_left_out(loop) < ROUND_OFF
+    through = loop.through_time
+    assert through is not None and len(through.rows) > 2
+    for answer in (loop.states, through):
+        assert answer.find_worst(loop.scales) < YIELD
+
+
+YIELD = 1e-3
+"""Error that the stiffest constraint leaves of the largest: 2e-4 as measured."""
 
 
 def test_what_the_stiffest_constraint_leaves_of_the_motion_is_predicted_too() -> None:

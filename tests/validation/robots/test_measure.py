@@ -88,8 +88,9 @@ def test_forces_in_a_plane_that_is_turned_are_those_of_the_scene() -> None:
 
     rows = []
     for i, theta_2 in enumerate(solution.theta_2):
-        angles = (solution.theta_3[i] + turned, solution.theta_4[i] + turned)
-        speeds = (solution.omega_3[i], solution.omega_4[i])
+        thetas = (theta_2, solution.theta_3[i], solution.theta_4[i])
+        angles = [theta + turned for theta in thetas]
+        speeds = (10.0, solution.omega_3[i], solution.omega_4[i])
         forces = {name: turn(getattr(solution, name)[i]) for name in PIN_FORCES}
         right = PinsAndTorque(solution.torque[i], forces)
         bars = BarMotion(*angles, *speeds)

@@ -13,7 +13,8 @@ import numpy as np
 
 from fourbar.formulas.mobility import change_points
 from fourbar.quantities import COUPLE, FORCE_NAMES, OK, PIN_FORCES, UNKNOWNS, Array
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, command
+from fourbar.scene.motion import COMMAND_NAMES
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.compare.answer import Answer
@@ -267,7 +268,11 @@ def list_rows(
         left = (softness or {}).get(_name_force(scene, quantity), 0.0)
         return np.full(len(mask), left)
 
-    held = Demands(tolerance, JUDGED_QUANTITIES)
+    at = command(scene)
+    judged = [name for name in JUDGED_QUANTITIES if name not in COMMAND_NAMES[at.bar]]
+    if at.bar != 2:
+        judged += ["theta_2", "omega_2"]
+    held = Demands(tolerance, judged)
     if softness:
         held = held._replace(predicted=predicted, method=f", {_BY_STIFFEST}")
     rows = []
@@ -335,14 +340,15 @@ def _make_answer(
     rows = inside.rows
     count = len(rows)
     opened = [angle - measured.turned for angle in inside.open]
-    angles = [row.theta_2 - measured.turned for row in rows]
-    speeds = [row.omega_2 for row in rows]
-    rates = [row.alpha_2 for row in rows]
+    angles = [row.angle - measured.turned for row in rows]
+    speeds = [row.speed for row in rows]
+    rates = [row.acceleration for row in rows]
     at = Command(
         np.array([*angles, *opened]),
         np.full(count + len(opened), measured.scene.motion.branch, dtype=np.int8),
         np.array([*speeds, *(speeds[:1] * len(opened))]),
         np.array([*rates, *(rates[:1] * len(opened))]),
+        bar=command(measured.scene).bar,
     )
     quantities = {}
     for name in FORCE_QUANTITIES:
@@ -352,6 +358,8 @@ def _make_answer(
         quantity = name_driving(measured.scene) if name == COUPLE.value else name
         quantities[quantity] = values
     for name in BarMotion._fields:
+        if name.endswith(f"_{at.bar}"):
+            continue
         values = np.array([getattr(row.bars, name) for row in rows])
         if name.startswith("theta"):
             values = values - measured.turned

@@ -14,7 +14,7 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar.quantities import COUPLE, OK, UNITS, Array
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.compare.reversals import mark_reversing
@@ -151,12 +151,12 @@ def _compare(
     """
     rows = answer.rows
     motion = loop.scene.motion
-    theta_2 = np.array([row.theta_2 for row in rows]) - loop.turned
     commanded = Command(
-        theta_2,
+        np.array([row.angle for row in rows]) - loop.turned,
         np.full(len(rows), motion.branch, dtype=np.int8),
-        np.array([row.omega_2 for row in rows]),
-        np.array([row.alpha_2 for row in rows]),
+        np.array([row.speed for row in rows]),
+        np.array([row.acceleration for row in rows]),
+        bar=command(loop.scene).bar,
     )
     formulas = solve(loop.scene, "force", at=commanded)
     reversing = mark_reversing(loop.scene, formulas, _SLIP)
@@ -183,7 +183,7 @@ def _compare(
             scale,
             scale != float(largest[name].max()),
             rows[worst].joint,
-            float(theta_2[worst]),
+            float(np.asarray(formulas.theta_2)[worst]),
             median,
         )
 

@@ -69,13 +69,15 @@ are told to grow: at 5 deg they are about three times those of a well-conditione
 position.
 """
 STATES_FILE = (
-    *("loop", "method", "joint [deg]", "omega_2 [rad/s]", "alpha_2 [rad/s^2]"),
+    *("loop", "method", "joint [deg]", "omega [rad/s]", "alpha [rad/s^2]"),
     *("drive [N m or N]", "drive of rigid pins [N m or N]"),
     *(f"{name} [N]" for name in PIN_FORCES),
     *(f"{name} of rigid pins [N]" for name in PIN_FORCES),
     "gap [mm]",
 )
-"""Columns of the file of states; pin forces by their size."""
+"""Columns of the file of states: omega and alpha are those of the commanded bar, pin
+forces are sizes.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +147,10 @@ def _describe_differences(judgement: LoopJudgement) -> Iterator[ReportBlock]:
 def _write_heading(loop: LoopMeasurement, *, judged: bool, stated: str) -> str:
     joints = [row.joint for row in loop.states.rows]
     first, last = (write_degrees(end) for end in (min(joints), max(joints)))
-    speed = loop.states.rows[0].omega_2
+    speeds = [row.speed for row in loop.states.rows]
+    speed = " to ".join(
+        f"{end:.4g}" for end in dict.fromkeys((min(speeds), max(speeds)))
+    )
     how = "in the whole robot against rigid pins, and these against the formulas"
     if judged:
         how = "in the whole robot against the formulas"
@@ -153,7 +158,7 @@ def _write_heading(loop: LoopMeasurement, *, judged: bool, stated: str) -> str:
             how = "with the file as it is against the formulas"
     given = f" (not as in the scene: {stated})" if stated else ""
     return (
-        f"{loop.name}: {loop.joint} from {first} to {last} deg at {speed:.4g}"
+        f"{loop.name}: {loop.joint} from {first} to {last} deg at {speed}"
         f" rad/s{given}, MuJoCo {how}"
     )
 
@@ -369,7 +374,7 @@ def _describe_deciding(
     state = advice.deciding
     if state is not None:
         method = MEASURED_THROUGH_TIME if state.through_time else f"at {STATES}"
-        near = _describe_limit(loop, state.theta_2 - loop.turned)
+        near = _describe_limit(loop, state.angle - loop.turned)
         yield (
             f"{state.quantity} {method} decides, at {loop.joint} ="
             f" {write_degrees(state.joint)} deg{', ' if near else ''}{near}"
@@ -442,7 +447,7 @@ def _list_states(
             (MEASURED_THROUGH_TIME, loop.through_time),
         ):
             for row in () if answer is None else answer.rows:
-                numbers = [math.degrees(row.joint), row.omega_2, row.alpha_2]
+                numbers = [math.degrees(row.joint), row.speed, row.acceleration]
                 numbers += [row.soft.torque, row.rigid.torque]
                 for pins in (row.soft, row.rigid):
                     numbers += [math.hypot(*pins.forces[name]) for name in PIN_FORCES]

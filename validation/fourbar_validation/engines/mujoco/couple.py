@@ -27,6 +27,10 @@ NOISE = 1e-3
 """Part of it that the noise of the file's solver may leave. Where the acceleration
 jumps, all of it is left.
 """
+LARGEST_TRIAL = 1e8
+"""N m or N: beside a heavy flywheel a larger trial is no number for MuJoCo, which takes
+controls up to 1e10.
+"""
 _DOUBLINGS = 40
 """Times that a trial's size is doubled in search of a couple, to both sides. Beyond
 1e12 times the size nothing is found.
@@ -55,7 +59,7 @@ def find_couple(
     speed = float(np.abs(data.qvel).max())
     others = max(float(np.abs(data.qacc_smooth).max()), speed * speed) or 1.0
     sought = max(abs(wanted - free), LEAST_ACCELERATION * others)
-    trial = float(model.dof_M0.sum()) * sought
+    trial = min(float(model.dof_M0.sum()) * sought, LARGEST_TRIAL)
     couple = solve_couple(acceleration, wanted, 0.0, trial, _REFINEMENTS)
     if couple is None or abs(acceleration(couple) - wanted) <= _MISSED * sought:
         return couple

@@ -169,7 +169,7 @@ def _describe_bar(
             across**2 @ model.body_inertia[part]
             + part_mass * (place - centre) @ (place - centre)
         )
-    arm = centre - seen.in_plane(seen.world(bar, FIRST_PIN[bar]))
+    arm = centre - seen.in_plane(seen.locate(bar, FIRST_PIN[bar]))
     x, y = seen.line(bar)
     angle = 0.0
     if arm.any():
@@ -317,9 +317,8 @@ def _describe_loads(seen: SeenLoop) -> Described:
     sums: dict[str, Array] = {}
     described: Described = {}
     pins = {joint: pin for pin, joint in seen.hinge.items()}
-    drives = seen.list_actuators(seen.loop.joint)
     for i in range(len(model.actuator_trntype)):
-        if i in drives:
+        if i in seen.drives:
             continue
         bias = _read_bias(model, i)
         if not bias.any():
@@ -390,7 +389,7 @@ def _read_load(
     force = axes @ gear[:3] * size
     couple = axes @ gear[3:] * size
     if bearer in MOVING_BARS:
-        fx, fy = seen.turned_back(bearer, force)
+        fx, fy = seen.resolve(bearer, force)
         directions = f"axes of the {BAR_NAMES[bearer]}"
     else:
         fx, fy = seen.in_plane(force)

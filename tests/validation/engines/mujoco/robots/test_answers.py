@@ -20,7 +20,7 @@ PINS = ("F12", "F32", "F43", "F14")
 OWN = RobotSettings(
     (0.02, 1.0), (0.9, 0.95, 0.001, 0.5, 2.0), 0.002, "Euler", "Newton", 100, 1e-8
 )
-AT_REST = BarMotion(0.0, 0.0, 0.0, 0.0)
+AT_REST = BarMotion(*[0.0] * 6)
 
 
 def make_row(torque: float, off: float, condition: float = 0.5) -> InsideRow:
@@ -86,7 +86,7 @@ def test_an_error_is_over_its_scale() -> None:
 
 def test_fewer_positions_keep_both_ends() -> None:
     motion = LoopMotion(tuple(np.linspace(0.0, 1.0, 101).tolist()), 1.0, 0.0)
-    assert motion.thin_out(3).theta_2 == (0.0, 0.5, 1.0)
+    assert motion.thin_out(3).angle == (0.0, 0.5, 1.0)
     assert motion.thin_out(500) == motion
 
 

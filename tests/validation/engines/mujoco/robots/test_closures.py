@@ -312,6 +312,16 @@ def test_another_hinge_of_the_ground_can_be_the_driven_one() -> None:
     d, a, b, c = planar.lengths()
     assert loop.lengths == pytest.approx((d, c, b, a))
     assert loop.cut == "A"
+    other = loop_of(planar.text(), drive="O2").seen_from_other_end()
+    if other.axis @ loop.axis < 0.0:
+        other = other.seen_from_behind()
+    for name in ("cut", "bodies", "hinges", "senses"):
+        assert getattr(other, name) == getattr(loop, name), name
+    turned = np.subtract(other.angles, loop.angles)
+    np.testing.assert_allclose(np.exp(1j * (turned - turned[0])), 1.0)
+    assert other.lengths == pytest.approx(loop.lengths)
+    for place, point in loop.points.items():
+        np.testing.assert_allclose(other.points[place], point, atol=1e-12)
     with pytest.raises(InputError, match="drives no four-bar"):
         loop_of(planar.text(), drive="A")
     with pytest.raises(InputError, match="no such joint; the file has: joint 0, O2"):

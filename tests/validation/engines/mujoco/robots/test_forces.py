@@ -72,7 +72,7 @@ def test_pin_forces_are_those_of_the_free_body(scene: Scene, flags: str) -> None
     file = RobotFile(Path("lifted.xml"), text)
     options = MeasureOptions(PoseOptions(), loop="B")
     (loop,) = measure_loops(file, options, scene).loops
-    rows = {round(math.degrees(row.theta_2)) % 360: row for row in loop.states.rows}
+    rows = {round(math.degrees(row.angle)) % 360: row for row in loop.states.rows}
     assert rows[90].soft.forces["F14"][1] == right
     assert rows[90].rigid.forces["F14"][1] == right
 

@@ -69,7 +69,7 @@ def test_states_are_compared_in_the_assembly_of_the_robot(start: str) -> None:
 def test_a_state_after_a_turn_is_that_of_the_same_motion() -> None:
     """Beyond its change point the other assembly has the branch of the scene."""
     loop = measured(SINGLE, j2="10deg")
-    theta_2 = np.array([row.theta_2 for row in loop.states.rows]) - loop.turned
+    theta_2 = np.array([row.angle for row in loop.states.rows]) - loop.turned
     assert np.ptp(theta_2) == pytest.approx(math.tau)
     linkage = loop.scene.linkage
     signs = find_signs(linkage, theta_2, loop.scene.motion.branch)

@@ -134,7 +134,7 @@ def test_the_loop_of_a_scene_is_found_by_its_lengths(name: str) -> None:
 
 
 def made_angles(made: object) -> list[float]:
-    return [row.theta_2 - made.turned for row in made.states.rows]  # type: ignore[attr-defined]
+    return [row.angle - made.turned for row in made.states.rows]  # type: ignore[attr-defined]
 
 
 def test_a_loop_that_is_not_there_is_refused() -> None:
@@ -175,7 +175,7 @@ def test_a_torque_that_vanishes_is_judged_on_the_pin_forces_times_a_bar() -> Non
         if (error.method, error.quantity) == (STATES, "torque")
     )
     # mass of the capsule times the centripetal acceleration of A, and of half the crank
-    speed = loop.states.rows[0].omega_2
+    speed = loop.states.rows[0].speed
     rod = 1000.0 * math.pi * 0.02**2
     crank = rod * (0.4 + 4.0 / 3.0 * 0.02)
     coupler = rod * (0.5 + 4.0 / 3.0 * 0.02)

@@ -108,7 +108,7 @@ def test_a_weld_holds_the_turn_whatever_the_axes_of_its_bodies() -> None:
     (loop,) = measure_loops(RobotFile(Path("halves.xml"), text), options, None).loops
     formulas = solve(loop.scene, "position")
     expected = np.interp(
-        [row.theta_2 for row in loop.states.rows],
+        [row.angle for row in loop.states.rows],
         formulas.theta_2 + loop.turned,
         formulas.theta_3 + loop.turned,
     )

@@ -14,6 +14,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
 )
 from fourbar_validation.engines.mujoco.robots.closures import find_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
+from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
@@ -38,7 +39,7 @@ def search(file: RobotFile) -> SettingsSearch:
     assert loop is not None
     middle = loop.angles[1]
     angles = tuple(middle + LIGHT_LOAD * step / 4.0 for step in range(-4, 5))
-    return SettingsSearch(posed.model, loop, LoopMotion(angles, 2.0, 0.0))
+    return SettingsSearch(LoopInside(posed.model, loop), LoopMotion(angles, 2.0, 0.0))
 
 
 def paste(text: str, advice: SettingsAdvice) -> str:
@@ -144,7 +145,7 @@ def test_states_beside_a_limit_decide_and_the_range_without_them_is_named() -> N
 
     def search(low: int, high: int) -> SettingsSearch:
         motion = LoopMotion(tuple(angles[low : high + 1]), 2.0, 0.0)
-        return SettingsSearch(posed.model, loop, motion)
+        return SettingsSearch(LoopInside(posed.model, loop), motion)
 
     whole = search(0, 8)
     stiff = replace(whole.own, solimp=STIFFEST_IMPEDANCE)
@@ -153,7 +154,7 @@ def test_states_beside_a_limit_decide_and_the_range_without_them_is_named() -> N
     deciding = whole.find_deciding(stiff)
     assert deciding is not None
     assert deciding.error == pytest.approx(error, rel=1e-9)
-    assert deciding.theta_2 == pytest.approx(last, abs=1e-2)
+    assert deciding.angle == pytest.approx(last, abs=1e-2)
     within = whole.find_range(stiff, wanted)
     assert within is not None
     count = min(range(9), key=lambda step: abs(angles[step] - first - within[1]))

@@ -1,7 +1,7 @@
 """Results of MuJoCo on the loops of a robot, as plain data."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -21,20 +21,38 @@ difference of two lengths is off by twice as much.
 
 
 class LoopMotion(NamedTuple):
-    """Angles of bar 2 in the plane of the loop, rad, with speed and acceleration."""
+    """Motion of the commanded bar in the plane of a loop."""
 
-    theta_2: tuple[float, ...]
-    omega_2: float
-    alpha_2: float
+    angle: tuple[float, ...]
+    """rad."""
+    speed: float | tuple[float, ...]
+    """rad/s, one of all positions or one of each."""
+    acceleration: float | tuple[float, ...]
+    """rad/s^2."""
+
+    @property
+    def varies(self) -> bool:
+        """Tell whether speed or acceleration differ from position to position."""
+        return bool(np.ptp(self.speed) or np.ptp(self.acceleration))
+
+    def states(self) -> Iterator[tuple[float, float, float]]:
+        """Iterate over angle, speed and acceleration of each position."""
+        for state in zip(*np.broadcast_arrays(*self), strict=True):
+            angle, speed, acceleration = map(float, state)
+            yield angle, speed, acceleration
 
     def thin_out(self, most: int) -> "LoopMotion":
-        """Return the motion with at most so many of the angles, both ends among them.
+        """Return the motion with at most so many positions, spread evenly.
 
-        The angles are spread evenly.
+        Both ends are among them.
         """
-        count = min(len(self.theta_2), most)
-        keep = np.linspace(0, len(self.theta_2) - 1, count).round().astype(int)
-        return self._replace(theta_2=tuple(self.theta_2[i] for i in keep))
+        count = min(len(self.angle), most)
+        keep = np.linspace(0, len(self.angle) - 1, count).round().astype(int)
+        states = [*self.states()]
+        angles, *rates = zip(*(states[i] for i in keep), strict=True)
+        if not self.varies:
+            return self._replace(angle=angles)
+        return LoopMotion(angles, *rates)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +88,7 @@ def find_scales(
     Parameters
     ----------
     sizes : size of the torque and of each pin force at each state, (n,), N m and N.
-    conditions : |sin(theta_4 - theta_3)| at each state, (n,).
+    conditions : |sin| of the angle between the bars that follow at each state, (n,).
     lever : longest moving bar, m; 1 where the drive is a force.
     """
     force = np.max([sizes[name] for name in PIN_FORCES], axis=0)
@@ -95,10 +113,12 @@ def divide(error: float, scale: float) -> float:
 
 
 class BarMotion(NamedTuple):
-    """Angles (rad) and speeds (rad/s) of bars 3 and 4 in the plane of a loop."""
+    """Angles (rad) and speeds (rad/s) of the moving bars in the plane of a loop."""
 
+    theta_2: float
     theta_3: float
     theta_4: float
+    omega_2: float
     omega_3: float
     omega_4: float
 
@@ -107,22 +127,22 @@ class BarMotion(NamedTuple):
 class InsideRow:
     """One state of a loop in its robot."""
 
-    theta_2: float
-    omega_2: float
-    alpha_2: float
+    angle: float
+    """Angle of the commanded bar, rad."""
+    speed: float
+    acceleration: float
     joint: float
     """Position of the driven joint as the file counts it, rad."""
     soft: PinsAndTorque
     """Torque and pin forces as MuJoCo has them."""
     rigid: PinsAndTorque
-    """Values with rigid pins at the closed state of the same theta_2, omega_2, alpha_2.
-    """
+    """Values with rigid pins at the closed state of the same command."""
     gap: float
     """Distance of the ends of the closure, m."""
     bars: BarMotion
     """Motion of the state that MuJoCo evaluates."""
     condition: float
-    """|sin(theta_4 - theta_3)| of the closed state of the same theta_2."""
+    """|sin| of the angle between the bars that follow in that closed state."""
     sticking: tuple[str, ...] = ()
     """Hinges that turn and whose dry friction MuJoCo has not let reach its couple."""
 
@@ -133,11 +153,11 @@ class InsideAnswer:
 
     rows: list[InsideRow] = field(default_factory=list)
     in_line: tuple[float, ...] = ()
-    """Positions of the driven joint that are left out, because the bars of pin B are in
-    line there, rad.
+    """Positions of the driven joint that are left out, because the bars that follow are
+    in line there, rad.
     """
     open: list[float] = field(default_factory=list)
-    """Angles of bar 2 at which the loop does not close, rad."""
+    """Angles of the commanded bar at which the loop does not close, rad."""
     settling: float = 0.0
     """Time after the start in which no state is judged, because the loop yields, s."""
     skipped: int = 0
@@ -269,8 +289,8 @@ class DecidingState:
     quantity: str
     joint: float
     """Position of the driven joint, rad."""
-    theta_2: float
-    """Angle of bar 2 in the plane of the loop, rad."""
+    angle: float
+    """Angle of the commanded bar in the plane of the loop, rad."""
     error: float
     """Error over the scale of the quantity."""
 
@@ -373,7 +393,7 @@ class LoopMeasurement:
     @property
     def moves(self) -> bool:
         """Tell whether the scene names a motion and not a few states at rest."""
-        speeds = [row.omega_2 for row in self.states.rows]
+        speeds = [row.speed for row in self.states.rows]
         return any(speeds) and len(speeds) + len(self.states.open) > 1
 
 

@@ -112,7 +112,7 @@ def find_closures(posed: PosedRobot, options: PoseOptions) -> list[RobotClosure]
     if options.drive is not None:
         joint = find_joint(posed.model, options.drive, "--drive")
         loops = [closure.loop for closure in closures if closure.loop is not None]
-        if not any(joint == loop.joint for loop in loops):
+        if not any(joint == loop.hinges["O2"] for loop in loops):
             raise InputError(
                 "--drive",
                 options.drive,
@@ -680,7 +680,6 @@ class _Finder:
         rigid = [other for other in tied if isinstance(other, str)]
         if rigid:
             return None, rigid[0]
-        remarks += layout.remarks
         remarks += _describe_offset(self.posed, tuple(closures), layout)
         moving = set(hinges.values())
         return (
@@ -861,7 +860,6 @@ class _Layout:
         self.model = posed.model
         self.data = posed.data
         self.ends = find_ends(posed.model, posed.data, equality)
-        self.remarks: list[str] = []
         self.senses: dict[str, float] = {}
         self.points: dict[tuple[int, str], Array] = {}
         self.places: dict[tuple[int, str], Array] = {}

@@ -8,9 +8,10 @@ import numpy as np
 
 from fourbar.effects import LinearDrive, PointDrive
 from fourbar.effects.place import Place
-from fourbar.linkage import ENDS
+from fourbar.linkage import FIRST_PIN
 from fourbar.quantities import Array
 from fourbar.scene import Scene
+from fourbar_validation.engines.mujoco.robots.frame import LoopFrame
 from fourbar_validation.engines.mujoco.robots.loop import RobotLoop
 
 
@@ -26,7 +27,7 @@ class _Wrench(NamedTuple):
 class FileCylinder:
     """Actuator of a file along a tendon that exerts what it is told to, N."""
 
-    acts_on_crank = False
+    couple_bar = None
 
     def __init__(self, model: mujoco.MjModel, scene: Scene, actuator: int) -> None:
         self.model = model
@@ -92,64 +93,43 @@ class LoopDrive:
         """Take a scene whose axes are turned by an angle in the loop's plane, rad."""
         self.model = model
         self.loop = loop
-        self.drive = scene.drive
-        self.bar = scene.drive_bar
+        self.drive = scene.settled_drive()
+        self.couple_bar = None if scene.drive is not None else scene.drive_bar
+        """Bar on which a couple acts, if that is the drive."""
         self.turned = turned
-        self.acts_on_crank = scene.drive is None and scene.drive_bar == 2
-
-    def _find_axes(self, data: mujoco.MjData) -> tuple[Array, Array, Array]:
-        """Return x, y and the normal of the plane in world axes."""
-        ground = data.xmat[self.loop.bodies[1][0]].reshape(3, 3)
-        normal = ground @ self.loop.axis
-        along = ground @ self.loop.along
-        return along, np.cross(normal, along), normal
-
-    def _locate(self, data: mujoco.MjData, bar: int, pin: str) -> Array:
-        body = self.loop.bodies[bar][0]
-        turn = data.xmat[body].reshape(3, 3)
-        return np.asarray(data.xpos[body] + turn @ self.loop.points[bar, pin])
-
-    def _find_place(self, data: mujoco.MjData, place: Place) -> tuple[Array, complex]:
-        """Return a place in world axes, (3,), m, and its bar's direction."""
-        along, across, normal = self._find_axes(data)
-        pins = [self._locate(data, place.bar, pin) for pin in ENDS[place.bar]]
-        line = pins[1] - pins[0]
-        line = line - (line @ normal) * normal
-        unit = line / np.linalg.norm(line)
-        arm: Any = complex(place.in_bar)
-        world = pins[0] + arm.real * unit + arm.imag * np.cross(normal, unit)
-        return world, complex(unit @ along, unit @ across)
 
     def _list_wrenches(self, data: mujoco.MjData) -> list[_Wrench]:
-        along, across, normal = self._find_axes(data)
+        frame = LoopFrame(self.loop, data, self.turned)
         none = np.zeros(3)
+        bodies = self.loop.bodies
+        if self.couple_bar is not None:
+            first = _Wrench(bodies[self.couple_bar][0], none, frame.normal, none)
+            return [first, _Wrench(bodies[1][0], none, -frame.normal, none)]
+
+        def locate(place: Place) -> tuple[Array, complex]:
+            """Return a place in world axes, (3,), m, and its bar's direction."""
+            line = complex(*frame.line(place.bar))
+            unit = line / abs(line)
+            arm: Any = unit * complex(place.in_bar)
+            pin = frame.locate(place.bar, FIRST_PIN[place.bar])
+            return pin + np.array([arm.real, arm.imag]) @ frame.axes, unit
+
         if isinstance(self.drive, PointDrive):
-            place, unit = self._find_place(data, self.drive.place)
-            angle = self.drive.direction
+            place, unit = locate(self.drive.place)
+            direction = cmath.rect(1.0, self.drive.direction)
             if self.drive.frame == "bar":
-                angle += cmath.phase(unit)
-            else:
-                angle += self.turned
-            force = np.cos(angle) * along + np.sin(angle) * across
+                direction *= unit
+            force = np.array([direction.real, direction.imag]) @ frame.axes
             pushed = [(self.drive.place.bar, force, place), (1, -force, place)]
-        elif isinstance(self.drive, LinearDrive):
-            start, _ = self._find_place(data, self.drive.start)
-            end, _ = self._find_place(data, self.drive.end)
-            line = end - start
-            line = line - (line @ normal) * normal
-            force = line / np.linalg.norm(line)
-            pushed = [
-                (self.drive.start.bar, -force, start),
-                (self.drive.end.bar, force, end),
-            ]
         else:
-            assert self.bar is not None
-            bodies = self.loop.bodies
-            first = _Wrench(bodies[self.bar][0], none, normal, none)
-            return [first, _Wrench(bodies[1][0], none, -normal, none)]
+            assert isinstance(self.drive, LinearDrive)
+            ends = (self.drive.start, self.drive.end)
+            (start, _), (end, _) = map(locate, ends)
+            line = frame.in_plane(end - start) @ frame.axes
+            force = line / np.linalg.norm(line)
+            pushed = [(ends[0].bar, -force, start), (ends[1].bar, force, end)]
         return [
-            _Wrench(self.loop.bodies[bar][0], force, none, point)
-            for bar, force, point in pushed
+            _Wrench(bodies[bar][0], force, none, point) for bar, force, point in pushed
         ]
 
     def exert(self, data: mujoco.MjData, size: float) -> None:

@@ -16,7 +16,11 @@ import numpy as np
 
 from fourbar.errors import FourBarError, LimitError
 from fourbar.mjcf import write_mjcf
-from fourbar.scene import Scene
+from fourbar.mjcf.document import Drive
+from fourbar.quantities import OK
+from fourbar.scene import Scene, command
+from fourbar.scene.motion import BRANCH_NAMES, Motion
+from fourbar.solving import solve
 from fourbar_validation.compare.tolerance import wrap_difference
 from fourbar_validation.engines.description import Value
 from fourbar_validation.engines.mujoco.describe import (
@@ -42,6 +46,7 @@ from fourbar_validation.engines.mujoco.robots.onto_scene import (
     LoopOfScene,
     find_loop_of_scene,
 )
+from fourbar_validation.engines.mujoco.robots.scene import miss_output
 from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
 
 PRICING = 60.0
@@ -62,9 +67,32 @@ class Examined:
     notes: list[str]
 
 
-def _generate(scene: Scene, drive: str | None = None) -> RobotFile:
-    text = write_mjcf(scene) if drive is None else write_mjcf(scene, drive="none")
-    return RobotFile(GENERATED, text)
+def _generate(scene: Scene, drive: Drive = "flywheel") -> RobotFile:
+    """Generate the file of a scene, at rest if no MJCF has a motion like its own."""
+    commanded = command(scene)
+    rates = (commanded.speed, commanded.acceleration)
+    varies = any(rate is not None and np.ptp(rate) for rate in rates)
+    if varies or commanded.bar != 2 or commanded.stroke is not None:
+        solution = solve(scene, "position")
+        closed = np.flatnonzero(solution.status_code == OK)
+        if not len(closed):
+            raise LimitError("the scene's loop closes at none of its positions")
+        first = closed[0]
+        moving = (solution.theta_2, solution.theta_3, solution.theta_4)
+        angles = [float(np.asarray(theta)[first]) for theta in moving]
+        at_rest = [
+            replace(scene, motion=Motion(angles[0], branch=branch))
+            for branch in BRANCH_NAMES
+        ]
+        pose = [scene.linkage.ground_angle, *angles]
+        scene = min(at_rest, key=lambda one: miss_output(one, pose))
+        drive = "none"
+    return RobotFile(GENERATED, write_mjcf(scene, drive=drive))
+
+
+def _see(found: LoopOfScene, scene: Scene) -> SeenLoop:
+    bar = command(scene).bar
+    return SeenLoop(found.robot.model, found.loop, found.turned, bar)
 
 
 def examine_file(
@@ -79,8 +107,7 @@ def examine_file(
     with collect_warnings() as warnings:
         found = find_loop_of_scene(file or _generate(scene), scene, options)
         measured = measure_on_scene(found, scene, options, briefly=True)
-        seen = SeenLoop(found.robot.model, found.loop, found.turned)
-        described = describe_model(seen, measured.flywheel)
+        described = describe_model(_see(found, scene), measured.flywheel)
     for pin, joint in found.loop.hinges.items():
         if joint in measured.unmet_stops:
             key = f"pins.{pin}.range"
@@ -98,7 +125,7 @@ def examine_changed(scene: Scene, changes: Changes) -> list[LoopMeasurement | No
     """
     file = _generate(scene, "none")
     found = find_loop_of_scene(file, scene, _PLAIN)
-    generated = describe_model(SeenLoop(found.robot.model, found.loop, found.turned))
+    generated = describe_model(_see(found, scene))
     texts = (set_entry(file.text, generated, key, value) for key, value in changes)
 
     def measure(text: str | None) -> LoopMeasurement | None:
@@ -126,7 +153,7 @@ def examine_mended(
     found = find_loop_of_scene(file, scene, options)
 
     def measure(change: tuple[str, Value | None]) -> LoopMeasurement | None:
-        seen = SeenLoop(found.robot.model, found.loop, found.turned).with_model()
+        seen = _see(found, scene).with_model()
         if not mend_entry(seen, *change):
             return None
         return measure_on_scene(found, scene, options, seen.model, briefly=True)
@@ -181,13 +208,13 @@ def _answer_at_yield(
     """Return torque and pin forces of single states at a multiple of the least yield,
     and the motion of the bars through time; nothing where it is not simulated.
     """
-    seen = SeenLoop(found.robot.model, found.loop, found.turned).with_model()
+    seen = _see(found, scene).with_model()
     impedance = 1.0 / (1.0 + times * (1.0 / STIFFEST - 1.0))
     seen.model.eq_solimp[[*found.loop.closures], :2] = impedance
     inside, motion = put_loop_inside(found, scene, seen.model)
-    forces = [row.soft.values() for row in inside.answer_states(*motion).rows]
+    forces = [row.soft.values() for row in inside.answer_states(motion).rows]
     moved: list[dict[str, Any]] = []
     with suppress(LimitError):
-        through = inside.answer_through_time(*motion)
+        through = inside.answer_through_time(motion)
         moved += (row.bars._asdict() for row in through.rows)
     return forces, moved

@@ -2,19 +2,20 @@
 
 MuJoCo gives its torque and pin forces there. No joint is removed, for that would change
 the softness that is measured: MuJoCo sizes a constraint's softness by the bodies of the
-whole model. The loop's driven hinge moves as commanded, the other joints of the robot
-stay where they are, contacts, joint limits and motors are off, and so are equalities
-between the moving bars and joints that stay. A file that holds nothing but the loop may
-be taken as it is: only what drives the driven hinge is off then.
+whole model. One bar of the loop moves as commanded, the other joints of the robot stay
+where they are, contacts, joint limits and motors are off, and so are equalities between
+the moving bars and joints that stay. A file that holds nothing but the loop may be
+taken as it is: only what drives the hinge of the commanded bar is off then.
 
 At a state the joint forces follow from MuJoCo's own inverse dynamics of its soft
-constraints. The driven hinge has the acceleration alpha, a held joint none, and the
-accelerations x of the loop's other hinges are those at which
+constraints. The commanded bar has the acceleration alpha, a held joint none, and the
+accelerations x of the hinges that follow are those at which
 
-    (M a(x) + c - J^T f(a(x)))_i = 0    at each of these hinges i,
+    basis^T (M a(x) + c - J^T f(a(x))) = 0
 
-since nothing acts there. The forces that hold the joints are then known, and the couple
-on the driven hinge is found by `mj_forward`, with the solver of the file.
+since nothing acts on them. The forces that hold the joints are then known, and the
+couple on the bar, or what its drive exerts, is found by `mj_forward`, with the solver
+of the file.
 
 Were the pins rigid, J a = -(dJ/dt) v would hold, with multipliers in the place of f,
 and dry friction in full: that couple and these pin forces are what MuJoCo's are
@@ -24,7 +25,7 @@ compared with, in the same model.
 import cmath
 import math
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from copy import copy
 from dataclasses import dataclass
 
@@ -32,7 +33,7 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import LimitError
-from fourbar.linkage import ENDS, PINS
+from fourbar.linkage import ENDS, MOVING_BARS, PINS
 from fourbar.quantities import Array
 from fourbar_validation.engines.description import FORCE_AT, FORCE_BETWEEN
 from fourbar_validation.engines.mujoco.closed_loop import WARNINGS
@@ -49,6 +50,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     BarMotion,
     InsideAnswer,
     InsideRow,
+    LoopMotion,
     PinsAndTorque,
     TornState,
 )
@@ -57,7 +59,8 @@ from fourbar_validation.engines.mujoco.robots.forces import (
     BearerForces,
     read_equality_force,
 )
-from fourbar_validation.engines.mujoco.robots.loop import RobotLoop
+from fourbar_validation.engines.mujoco.robots.frame import LoopFrame
+from fourbar_validation.engines.mujoco.robots.loop import DRIVEN_PINS, RobotLoop
 from fourbar_validation.engines.mujoco.robots.planes import (
     copy_for_closures,
     project_closures,
@@ -93,16 +96,19 @@ KNOWN_TRANSMISSION = 0.01
 """Part of the angle between bars 3 and 4 up to which the digits of a file may turn it:
 forces have two digits.
 """
-_SOLVE_STEPS = 60
-"""Newton steps for the hinges' accelerations; without friction one is enough."""
-_BALANCED = 1e-10
-"""Part of the generalized forces that may be left on a hinge on which nothing acts."""
+_BALANCED = 1e-14
+"""Relative step of the hinges' accelerations at which nothing is left that acts on
+them.
+"""
+_DIRECTIONS = {1: -1.0, 2: 1.0, 3: 1.0, 4: -1.0}
+"""Signs with which the bars add up to zero around the loop."""
 HEAVY = 1e4
 """Armature that holds a joint while the model is stepped, over the largest inertia of
 the robot. It lets the joints move by about its inverse; beyond 1e5 MuJoCo's solver
 loses the light bars beside it: at 1e6 the gap was three times too large.
 """
 LIMITS_OFF = int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+CONTACTS_OFF = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
 SETTLING_TIME = 5.0
 """Time constants after which the loop has yielded but for 1 %, at most half of the
 motion.
@@ -131,13 +137,17 @@ class _RobotState:
 
     qpos: Array
     qvel: Array
-    theta_2: float
 
 
 class LoopInside:
-    """A loop of a robot whose driven hinge moves.
+    """A loop of a robot of which one bar moves as commanded.
 
-    Every other joint of the robot is held.
+    Every other joint of the robot is held. A motion of the loop is written as
+
+        dq = basis x + step phi,    turn . dq = phi,    turn . basis = 0,
+
+    with phi the turn of the commanded bar and x that of the hinges that follow: a
+    couple on the bar is the generalized force `turn`, whichever hinges bear the bar.
     """
 
     def __init__(
@@ -146,55 +156,52 @@ class LoopInside:
         loop: RobotLoop,
         drive: LoopDrive | FileCylinder | None = None,
         *,
+        bar: int = 2,
         as_it_is: bool = False,
     ) -> None:
         """Take a loop.
 
         Parameters
         ----------
-        drive : what moves it; None: a couple on bar 2.
+        drive : what moves it; None: a couple on the commanded bar.
+        bar : the commanded bar, 2, 3 or 4.
         as_it_is : contacts, joint limits and other motors act as in the file.
         """
         self.loop = loop
         self.given = model
+        self.bar = bar
         self.as_it_is = as_it_is
-        self.acting = None if drive is None or drive.acts_on_crank else drive
+        self.acting = None if drive is None or drive.couple_bar == bar else drive
         self.model = copy(model)
         self.flags = int(model.opt.disableflags)
-        self.taken_off = list_actuators(model, loop.joint)
-        """Actuators on the driven hinge."""
-        off = self.taken_off
-        if as_it_is:
-            # a sweep ends at the limits of a joint, to round-off on either side
-            self.model.jnt_margin[:] -= _TOUCHED
-        else:
-            for name in ("CONTACT", "LIMIT"):
-                flag = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
-                self.model.opt.disableflags |= flag
-            off = [*off, *(i for i in range(model.nu) if takes_control(model, i))]
-        self.model.actuator_gainprm[off] = 0.0
-        self.model.actuator_biasprm[off] = 0.0
-        if isinstance(self.acting, FileCylinder):
-            self.acting.take_over(self.model)
-        # while joints are held, what ties them to the moving bars would only be torn
-        self.model.eq_active0[list(loop.other_equalities)] = 0
+        self.joint = loop.hinges.get(DRIVEN_PINS.get(bar, ""))
+        """Hinge between the ground and the commanded bar, if the file has one."""
+        self.taken_off: list[int] = []
+        """Actuators on that hinge."""
+        if self.joint is not None:
+            self.taken_off = list_actuators(model, self.joint)
+        self._switch_off()
         self.data = mujoco.MjData(self.model)
-        dofs = {pin: int(model.jnt_dofadr[j]) for pin, j in loop.hinges.items()}
-        self.drive = dofs["O2"]
-        self.passive = [dof for pin, dof in dofs.items() if pin != "O2"]
-        self.passive_addresses = [
-            int(model.jnt_qposadr[model.dof_jntid[dof]]) for dof in self.passive
-        ]
-        free = {self.drive, *self.passive}
-        self.held = [dof for dof in range(model.nv) if dof not in free]
-        self.sense = loop.senses["O2"]
-        self.address = int(model.jnt_qposadr[loop.joint])
         # the closure alone, for kinematics: with every row, and a dense derivative
         self.closure = copy_for_closures(self.model, loop.closures)
         self.closing = mujoco.MjData(self.closure)
+        joints = [*loop.hinges.values()]
+        self.moving: list[int] = model.jnt_dofadr[joints].tolist()
+        self.addresses = model.jnt_qposadr[joints]
+        self.held = [dof for dof in range(model.nv) if dof not in self.moving]
+        self._evaluate_closure(loop.qpos)
+        self.turn = self._find_turn()
+        self.lead = max(dof for dof in self.moving if self.turn[dof])
+        """Degree of freedom that follows from the others and the commanded angle."""
+        self.passive = [dof for dof in self.moving if dof != self.lead]
+        self.step = np.zeros(model.nv)
+        self.step[self.lead] = self.turn[self.lead]
+        self.basis = np.zeros((model.nv, len(self.passive)))
+        self.basis[self.passive, range(len(self.passive))] = 1.0
+        self.basis[self.lead] = -self.turn[self.lead] * self.turn[self.passive]
         self._last = loop.qpos.copy()
         self._rates = self._find_rates(self._last)
-        """Turn of the hinges that are not driven by that of the driven one, at the last
+        """Turn of the hinges that follow by that of the commanded bar, at the last
         pose.
         """
         without_friction = int(mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS)
@@ -212,41 +219,97 @@ class LoopInside:
         self._doubtful: list[InsideRow] = []
         """Last rows of a simulation that may be in the other assembly."""
 
+    def _switch_off(self) -> None:
+        """Switch off what acts on the loop beside its drive."""
+        off = self.taken_off
+        model = self.model
+        if self.as_it_is:
+            # a sweep ends at the limits of a joint, to round-off on either side
+            model.jnt_margin[:] -= _TOUCHED
+        else:
+            model.opt.disableflags |= LIMITS_OFF | CONTACTS_OFF
+            off = [*off, *(i for i in range(model.nu) if takes_control(model, i))]
+        model.actuator_gainprm[off] = 0.0
+        model.actuator_biasprm[off] = 0.0
+        if isinstance(self.acting, FileCylinder):
+            self.acting.take_over(model)
+        # while joints are held, what ties them to the moving bars would only be torn
+        model.eq_active0[list(self.loop.other_equalities)] = 0
+
+    def _find_turn(self) -> Array:
+        """Return the turn of the commanded bar by each degree of freedom, (nv,)."""
+        turn = np.zeros(self.model.nv)
+        if self.joint is not None:
+            sense = self.loop.senses[DRIVEN_PINS[self.bar]]
+            turn[self.model.jnt_dofadr[self.joint]] = sense
+            return turn
+        turns = np.zeros((3, self.model.nv))
+        body = self.loop.bodies[self.bar][0]
+        mujoco.mj_jacBody(self.closure, self.closing, None, turns, body)
+        normal = LoopFrame(self.loop, self.closing).normal
+        # axes are parallel but for what a file misaligns: each turns by one, or not
+        turn[self.moving] = np.rint(normal @ turns)[self.moving]
+        return turn
+
     def find_flywheel(self, inertia: float) -> None:
         """Take an armature of the driven hinge for a flywheel if it drives.
 
         `inertia`: of the flywheels of the scene, kg m^2, which count as load.
         """
-        armature = float(self.model.dof_armature[self.drive])
+        if self.joint is None:
+            return
+        armature = float(self.model.dof_armature[self.lead])
         others = float(self.model.dof_M0.sum() - self.model.dof_armature.sum())
         if armature > _DRIVING * (others + inertia):
             self.flywheel = armature
 
-    def find_carrier(self, heavy: float) -> float:
+    def _size_armature(self, heavy: float) -> float:
         """Return the armature that keeps speeds through time, kg m^2.
 
         `heavy`: its size over the robot's largest inertia.
         """
         inertias = self.model.dof_M0.copy()
-        inertias[self.drive] -= self.flywheel
+        inertias[self.lead] -= self.flywheel
         return heavy * float(inertias.max())
 
     def angle(self, qpos: Array) -> float:
-        """Return theta_2 of a pose, rad."""
-        turned = qpos[self.address] - self.loop.qpos[self.address]
-        return float(self.loop.angles[1] + self.sense * turned)
+        """Return the angle of the commanded bar in a pose, rad."""
+        turned = (qpos - self.loop.qpos)[self.addresses]
+        return float(self.loop.angles[self.bar - 1] + self.turn[self.moving] @ turned)
 
-    def position(self, theta_2: float) -> float:
-        """Return the position of the driven joint at an angle of bar 2, rad."""
-        turned = theta_2 - self.loop.angles[1]
-        return float(self.loop.qpos[self.address] + self.sense * turned)
+    def position(self, angle: float) -> float:
+        """Return the position of the driven joint at an angle of the commanded bar.
 
-    def close(self, theta_2: float) -> Array | None:
-        """Return the pose at an angle of bar 2, or None if the loop is open.
+        Without a hinge between the bar and the ground it is the angle itself, rad.
+        """
+        if self.joint is None:
+            return angle
+        turned = angle - self.loop.angles[self.bar - 1]
+        address = self.model.jnt_qposadr[self.joint]
+        return float(self.loop.qpos[address] + self.turn[self.lead] * turned)
 
-        The loop is followed from the last pose in strides, which are small where bars 3
-        and 4 are near to a line. A stride begins as the one before it went on, so that
-        the motion passes a change point smoothly.
+    def _read_position(self, qpos: Array) -> float:
+        """Return the position of the driven joint in a pose, as `position` does."""
+        if self.joint is None:
+            return self.angle(qpos)
+        return float(qpos[self.model.jnt_qposadr[self.joint]])
+
+    def _move(self, qpos: Array, motion: Array) -> None:
+        """Move the hinges of the loop by a motion, (nv,)."""
+        qpos[self.addresses] += motion[self.moving]
+
+    def _turn_to(self, qpos: Array, angle: float) -> None:
+        """Bring the commanded bar to an angle; the hinges that follow stay."""
+        address = self.model.jnt_qposadr[self.model.dof_jntid[self.lead]]
+        qpos[address] = self.loop.qpos[address]
+        qpos[address] += self.turn[self.lead] * (angle - self.angle(qpos))
+
+    def close(self, wanted: float) -> Array | None:
+        """Return the pose at an angle of the commanded bar, or None if it is open.
+
+        The loop is followed from the last pose in strides, which are small where the
+        bars that follow are near to a line. A stride begins as the one before it went
+        on, so that the motion passes a change point smoothly.
         """
         qpos = self._last.copy()
         rates = self._rates
@@ -256,11 +319,11 @@ class LoopInside:
             if abs(sine) < _FAR_FROM_A_LINE:
                 longest = _STRIDE
             angle = self.angle(qpos)
-            strides = max(math.ceil(abs(theta_2 - angle) / longest), 1)
+            strides = max(math.ceil(abs(wanted - angle) / longest), 1)
+            stride = (wanted - angle) / strides
             after = qpos.copy()
-            after[self.address] = self.position(angle + (theta_2 - angle) / strides)
-            turned = after[self.address] - qpos[self.address]
-            after[self.passive_addresses] += rates * turned
+            self._move(after, self.basis @ (rates * stride))
+            self._turn_to(after, angle + stride)
             closed = self.close_gap(after)
             if longest > _STRIDE and (
                 not closed or self._measure_sine(after) * sine < 0
@@ -268,9 +331,9 @@ class LoopInside:
                 longest = _STRIDE
                 continue
             if not closed:
-                return self._jump(theta_2)
-            if turned:
-                rates = (after - qpos)[self.passive_addresses] / turned
+                return self._jump(wanted)
+            if stride:
+                rates = self._measure_turns(after - qpos) / stride
             qpos = after
             longest = _LONG_STRIDE
             if strides == 1:
@@ -279,43 +342,62 @@ class LoopInside:
         self._rates = rates
         return qpos
 
-    def _jump(self, theta_2: float) -> Array | None:
-        """Return the pose at an angle of bar 2 to which no motion leads.
+    def _measure_turns(self, change: Array) -> Array:
+        """Return the turns of the hinges that follow in a change of pose, rad."""
+        joints = self.model.dof_jntid[self.passive]
+        return np.asarray(change[self.model.jnt_qposadr[joints]])
 
-        The assembly is that of the loop's pose; None if the loop is open.
+    def _jump(self, wanted: float) -> Array | None:
+        """Return the pose at an angle of the commanded bar to which no motion leads.
+
+        The assembly is that of the loop's pose; None if the loop is open. The bars are
+        vectors of a closed polygon, of which two make up for the rest, a triangle.
         """
-        ground, crank, coupler, output = self.loop.lengths
-        theta_1, _, theta_3, theta_4 = self.loop.angles
-        line = cmath.rect(ground, theta_1) - cmath.rect(crank, theta_2)
+        loop = self.loop
+        angles = dict(zip(ENDS, loop.angles, strict=True))
+        vectors = {
+            bar: _DIRECTIONS[bar] * cmath.rect(loop.lengths[bar - 1], angle)
+            for bar, angle in angles.items()
+        }
+        first, second = self._follow
+        side = math.copysign(1.0, (vectors[first].conjugate() * vectors[second]).imag)
+        angles[self.bar] = wanted
+        moved = cmath.rect(loop.lengths[self.bar - 1], wanted)
+        line = -vectors[1] - _DIRECTIONS[self.bar] * moved
         size = abs(line)
-        if not abs(coupler - output) < size < coupler + output:
+        near, far = (abs(vectors[bar]) for bar in self._follow)
+        if not abs(near - far) < size < near + far:
             return None
-        side = math.copysign(1.0, math.sin(theta_4 - theta_3))
-        near = (size**2 + coupler**2 - output**2) / (2.0 * size * coupler)
-        theta_3 = cmath.phase(line) + side * math.acos(near)
-        theta_4 = cmath.phase(cmath.rect(coupler, theta_3) - line)
-        qpos = turn_hinges(self.model, self.loop, theta_2, theta_3, theta_4)
+        apart = math.acos((size**2 + near**2 - far**2) / (2.0 * size * near))
+        vector = cmath.rect(near, cmath.phase(line) - side * apart)
+        angles[first] = cmath.phase(_DIRECTIONS[first] * vector)
+        angles[second] = cmath.phase(_DIRECTIONS[second] * (line - vector))
+        qpos = turn_hinges(self.model, loop, angles[2], angles[3], angles[4])
+        self._turn_to(qpos, wanted)
         if not self.close_gap(qpos):
             return None
         self._last = qpos.copy()
         self._rates = self._find_rates(qpos)
         return qpos
 
-    def _find_rates(self, qpos: Array) -> Array:
-        """Return the turn of the other hinges by that of the driven one, (k,).
+    @property
+    def _follow(self) -> tuple[int, int]:
+        """Moving bars that are not commanded."""
+        first, second = (bar for bar in MOVING_BARS if bar != self.bar)
+        return first, second
 
-        The loop is closed in a pose; k is the number of hinges that are not driven.
+    def _find_rates(self, qpos: Array) -> Array:
+        """Return the turn of the hinges that follow by that of the commanded bar, (k,).
+
+        The loop is closed in a pose.
         """
         _, jacobian = self._evaluate_closure(qpos)
-        return _solve_least_squares(
-            jacobian[:, self.passive],
-            -jacobian[:, self.drive],
-        )
+        return _solve_least_squares(jacobian @ self.basis, -jacobian @ self.step)
 
     def close_gap(self, qpos: Array) -> bool:
-        """Move the hinges that are not driven until the residual is least.
+        """Move the hinges that follow until the closure's residual is least.
 
-        The residual is that of the closure. Tell whether it is closed.
+        Return whether the loop is then closed.
         """
         least = math.inf
         best = qpos.copy()
@@ -328,69 +410,46 @@ class LoopInside:
             best = qpos.copy()
             if size <= RESIDUAL_OF_A_CLOSED_STATE:
                 break
-            step = _solve_least_squares(jacobian[:, self.passive], -residual)
-            qpos[self.passive_addresses] += step
+            turns = _solve_least_squares(jacobian @ self.basis, -residual)
+            self._move(qpos, self.basis @ turns)
+        # axes that are not parallel leave a gap
+        skew = self.loop.misaligned * max(self.loop.lengths)
         rounding = GAP_OF_ROUNDING * self.loop.rounding
-        allowed = max(RESIDUAL_OF_AN_OPEN_LOOP, self._skew(), rounding)
         qpos[:] = best
-        return least <= allowed
+        return least <= max(RESIDUAL_OF_AN_OPEN_LOOP, skew, rounding)
 
     def measure_transmission(self, qpos: Array) -> float:
-        """Return the least movement of the gap by the other hinges in a pose, m/rad.
+        """Return the least movement of the gap by the hinges that follow, m/rad.
 
-        At zero the bars of pin B are in line, and hinges that are not driven cannot
-        close a gap in one direction.
+        At zero the bars that follow are in line, and cannot close a gap in one
+        direction.
         """
         _, jacobian = self._evaluate_closure(qpos)
-        sizes = np.linalg.svd(jacobian[:, self.passive], compute_uv=False)
+        sizes = np.linalg.svd(jacobian @ self.basis, compute_uv=False)
         return float(sizes[1])
 
-    def _measure_condition(self, qpos: Array) -> float:
-        """Return |sin(theta_4 - theta_3)| in a pose."""
-        return abs(self._measure_sine(qpos))
-
     def _measure_sine(self, qpos: Array) -> float:
-        """Return sin(theta_4 - theta_3) in a pose."""
+        """Return the sine of the angle between the bars that follow in a pose."""
         self._evaluate_closure(qpos)
-        coupler, output = (self._find_line(bar) for bar in (3, 4))
-        ground = self.closing.xmat[self.loop.bodies[1][0]].reshape(3, 3)
-        return float(np.cross(coupler, output) @ ground @ self.loop.axis)
-
-    def _find_line(self, bar: int) -> Array:
-        """Return the unit vector from the first pin of a bar to its second, (3,).
-
-        World axes, in the pose in which the closure was evaluated last.
-        """
-        body = self.loop.bodies[bar][0]
-        first, second = (self.loop.points[bar, pin] for pin in ENDS[bar])
-        line = self.closing.xmat[body].reshape(3, 3) @ (second - first)
-        ground = self.closing.xmat[self.loop.bodies[1][0]].reshape(3, 3)
-        normal = ground @ self.loop.axis
-        line = line - (line @ normal) * normal
-        return np.asarray(line / np.linalg.norm(line))
+        frame = LoopFrame(self.loop, self.closing)
+        (x, y), (u, v) = (frame.line(bar) for bar in self._follow)
+        return float(x * v - y * u) / (math.hypot(x, y) * math.hypot(u, v))
 
     def _is_in_line(self, qpos: Array) -> bool:
-        """Tell whether the bars of pin B are in line: at a change point or a limit.
+        """Tell whether the bars that follow are in line: at a change point or a limit.
 
         The loop may go on in two ways there, or no way, and forces are not determined.
-        Nor are they where the digits of the file turn bars 3 and 4 by a part of the
+        Nor are they where the digits of the file turn these bars by a part of the
         angle between them, which is their rounding over the squared sine.
         """
         longest = self.loop.longest
         if self.measure_transmission(qpos) < LEAST_TRANSMISSION * longest:
             return True
         turned = self.loop.rounding / longest
-        return turned > KNOWN_TRANSMISSION * self._measure_condition(qpos) ** 2
-
-    def _skew(self) -> float:
-        """Return what axes that are not parallel leave of the gap, m."""
-        return self.loop.misaligned * max(self.loop.lengths)
+        return turned > KNOWN_TRANSMISSION * self._measure_sine(qpos) ** 2
 
     def _evaluate_closure(self, qpos: Array) -> tuple[Array, Array]:
-        """Return the closure's residual in the plane and its derivative.
-
-        The shapes are (m,) and (m, nv).
-        """
+        """Return the closure's residual in the plane, (m,), and its derivative."""
         data = self.closing
         data.qpos[:] = qpos
         mujoco.mj_fwdPosition(self.closure, data)
@@ -404,87 +463,84 @@ class LoopInside:
             ),
         )
 
-    def state(self, theta_2: float, omega_2: float) -> _RobotState | None:
-        """Return the closed state at an angle and a speed of bar 2, or None.
+    def state(self, angle: float, speed: float) -> _RobotState | None:
+        """Return the closed state at an angle and a speed of the commanded bar.
 
-        The answer is None if the loop does not close.
+        None if the loop does not close.
         """
-        qpos = self.close(theta_2)
+        qpos = self.close(angle)
         if qpos is None:
             return None
         _, jacobian = self._evaluate_closure(qpos)
-        speed = self.sense * omega_2
-        due = -jacobian[:, self.drive] * speed
-        qvel = np.zeros(self.model.nv)
-        qvel[self.drive] = speed
-        qvel[self.passive] = _solve_least_squares(jacobian[:, self.passive], due)
-        return _RobotState(qpos, qvel, theta_2)
+        due = -jacobian @ self.step * speed
+        turns = _solve_least_squares(jacobian @ self.basis, due)
+        return _RobotState(qpos, self.step * speed + self.basis @ turns)
 
-    def ask(
-        self,
-        qpos: Array,
-        qvel: Array,
-        alpha_2: float,
-    ) -> InsideRow:
-        """Evaluate a state in which bar 2 accelerates at alpha_2.
+    def ask(self, qpos: Array, qvel: Array, wanted: float) -> InsideRow:
+        """Evaluate a state in which the commanded bar accelerates as wanted, rad/s^2.
 
-        The couple on it is solved for.
+        The couple on it, or what its drive exerts, is solved for.
 
         Raises
         ------
-        LimitError : the loop does not close at its theta_2, or no couple moves it.
+        LimitError : the loop does not close at its angle, or its drive does not move
+            it.
         """
         model = self.model
         data = self.data
         qpos = qpos.copy()
         qvel = qvel.copy()
-        theta_2 = self.angle(qpos)
-        omega_2 = float(self.sense * qvel[self.drive])
-        closed = self.state(theta_2, omega_2)
+        angle = self.angle(qpos)
+        speed = float(self.turn @ qvel)
+        closed = self.state(angle, speed)
         if closed is None:
-            raise LimitError(f"the loop does not close at theta_2 = {theta_2:.6g} rad")
-        rigid, accelerations = self._solve_rigid(closed, alpha_2)
-        held = np.zeros(0)
-        if self.held:
+            raise LimitError(
+                f"the loop does not close at {self.name} = {angle:.6g} rad"
+            )
+        rigid, accelerations = self._solve_rigid(closed, wanted)
+
+        def place() -> None:
             mujoco.mj_resetData(model, data)
             data.qpos[:] = qpos
             data.qvel[:] = qvel
-            held = self._balance(accelerations)[self.held]
-        mujoco.mj_resetData(model, data)
-        data.qpos[:] = qpos
-        data.qvel[:] = qvel
-        data.qfrc_applied[self.held] = held
-        carried = self.flywheel * alpha_2
-        data.qfrc_applied[self.drive] = self.sense * carried
 
+        holding = np.zeros(model.nv)
+        if self.held:
+            place()
+            holding[self.held] = self._balance(accelerations)[self.held]
+        place()
         mujoco.mj_kinematics(model, data)
+        carried = self.flywheel * wanted
 
-        def acceleration(couple: float) -> float:
+        def accelerate(size: float) -> float:
             if self.acting is None:
-                data.qfrc_applied[self.drive] = self.sense * (carried + couple)
+                data.qfrc_applied[:] = holding + self.turn * (carried + size)
             else:
-                self.acting.exert(data, couple)
+                data.qfrc_applied[:] = holding + self.turn * carried
+                self.acting.exert(data, size)
             mujoco.mj_forward(model, data)
-            return float(self.sense * data.qacc[self.drive])
+            return float(self.turn @ data.qacc)
 
-        couple = find_couple(model, data, acceleration, alpha_2)
-        if couple is None:
+        size = find_couple(model, data, accelerate, wanted)
+        if size is None:
             raise LimitError(f"its drive does not move {self.name} in this robot")
         mujoco.mj_rnePostConstraint(model, data)
-        self._watch(data)
+        self.contacts = max(self.contacts, int(data.ncon))
+        limits = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT
+        self.stopped.update(data.efc_id[: data.nefc][limits].tolist())
         forces = self._read_forces(data)
-        if math.isnan(couple):
+        if math.isnan(size):
             forces = {name: np.full(2, np.nan) for name in forces}
         return InsideRow(
-            theta_2=theta_2,
-            omega_2=omega_2,
-            alpha_2=alpha_2,
-            joint=float(qpos[self.address]),
-            soft=PinsAndTorque(couple, forces),
+            angle,
+            speed,
+            wanted,
+            self._read_position(qpos),
+            soft=PinsAndTorque(size, forces),
             rigid=rigid,
             bars=self._read_bars(data),
             gap=self._measure_gap(qpos),
-            condition=self._measure_condition(closed.qpos),
+            condition=abs(self._measure_sine(closed.qpos)),
             sticking=self._list_sticking(),
         )
 
@@ -497,29 +553,16 @@ class LoopInside:
             if limits and self.model.jnt_limited[joint] and joint not in self.stopped
         ]
 
-    def _watch(self, data: mujoco.MjData) -> None:
-        """Take note of contacts, and of joints at a limit of their range."""
-        self.contacts = max(self.contacts, int(data.ncon))
-        kinds = data.efc_type[: data.nefc]
-        limits = kinds == mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT
-        self.stopped.update(data.efc_id[: data.nefc][limits].tolist())
-
     def _read_bars(self, data: mujoco.MjData) -> BarMotion:
-        """Return angles and speeds of bars 3 and 4 in an evaluated state."""
-        ground = self.loop.bodies[1][0]
-        frame = data.xmat[ground].reshape(3, 3)
-        normal = frame @ self.loop.axis
-        along = frame @ self.loop.along
-        across = np.cross(normal, along)
+        """Return angles and speeds of the moving bars in an evaluated state."""
         self._evaluate_closure(data.qpos)
-        angles = []
-        speeds = []
-        for bar in (3, 4):
-            line = self._find_line(bar)
-            angles.append(math.atan2(float(line @ across), float(line @ along)))
-            turning = data.cvel[self.loop.bodies[bar][0]] - data.cvel[ground]
-            speeds.append(float(turning[:3] @ normal))
-        return BarMotion(*angles, *speeds)
+        frame = LoopFrame(self.loop, self.closing)
+        ground = data.cvel[self.loop.bodies[1][0]]
+        speeds = [
+            float((data.cvel[self.loop.bodies[bar][0]] - ground)[:3] @ frame.normal)
+            for bar in MOVING_BARS
+        ]
+        return BarMotion(*map(frame.angle, MOVING_BARS), *speeds)
 
     def _list_sticking(self) -> tuple[str, ...]:
         """List the hinges of the loop that turn and stick.
@@ -529,16 +572,13 @@ class LoopInside:
         model = self.model
         data = self.data
         kinds = data.efc_type[: data.nefc]
-        rubbing = kinds == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
-        of_the_loop = (self.drive, *self.passive)
         names = []
-        for row in np.flatnonzero(rubbing):
+        for row in np.flatnonzero(kinds == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF):
             dof = int(data.efc_id[row])
-            in_full = _REACHED * model.dof_frictionloss[dof]
-            reached = abs(data.efc_force[row]) >= in_full
-            if dof in of_the_loop and not reached and data.qvel[dof]:
-                joint = int(model.dof_jntid[dof])
-                names.append(name_joint(model, joint))
+            reached = _REACHED * model.dof_frictionloss[dof]
+            sticks = abs(data.efc_force[row]) < reached and data.qvel[dof]
+            if dof in self.moving and sticks:
+                names.append(name_joint(model, int(model.dof_jntid[dof])))
         return tuple(names)
 
     def _measure_gap(self, qpos: Array) -> float:
@@ -555,15 +595,17 @@ class LoopInside:
 
     @property
     def name(self) -> str:
-        """Name of the driven joint."""
-        return name_joint(self.model, self.loop.joint)
+        """Name of the driven joint, or of the commanded angle if there is none."""
+        if self.joint is None:
+            return f"theta_{self.bar}"
+        return name_joint(self.model, self.joint)
 
     def _solve_rigid(
         self,
         state: _RobotState,
-        alpha_2: float,
+        wanted: float,
     ) -> tuple[PinsAndTorque, Array]:
-        """Solve for torque and pin forces with rigid pins at a closed state.
+        """Solve for the drive and pin forces with rigid pins at a closed state.
 
         Return all accelerations too, (nv,).
         """
@@ -573,109 +615,68 @@ class LoopInside:
         data.qvel[:] = state.qvel
         mujoco.mj_forward(model, data)
         rows = data.efc_J.reshape(-1, model.nv)[: data.nefc]
-        free = rows[:, self.passive]
-        drift = _measure_drift(data, rows @ state.qvel)
-        accelerations = np.zeros(model.nv)
-        accelerations[self.drive] = self.sense * alpha_2
-        due = drift - rows[:, self.drive] * accelerations[self.drive]
-        accelerations[self.passive] = _solve_least_squares(free, due)
+        accelerations = self.step * wanted
+        due = _measure_drift(data, rows @ state.qvel) - rows @ accelerations
+        turns = _solve_least_squares(rows @ self.basis, due)
+        accelerations = accelerations + self.basis @ turns
         needed = np.zeros(model.nv)
         mujoco.mj_mulM(model, data, needed, accelerations)
         needed += data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator
         needed += self._friction * np.sign(state.qvel)
-        needed[self.drive] -= self.sense * self.flywheel * alpha_2
-        couple, multipliers = self._solve_drive(rows, needed)
+        needed -= self.turn * self.flywheel * wanted
+        pull = self.turn if self.acting is None else self.acting.find_pull(data)
+        # M a + c - J^T f = pull s on the hinges of the loop; the closures bear what
+        # is across the pull
+        level = pull[self.moving] / np.linalg.norm(pull[self.moving])
+        away = np.eye(len(self.moving)) - np.outer(level, level)
+        columns = rows[:, self.moving].T
+        multipliers = _solve_least_squares(away @ columns, away @ needed[self.moving])
+        left = needed[self.moving] - columns @ multipliers
+        size = float(left @ level / np.linalg.norm(pull[self.moving]))
         data.qacc[:] = accelerations
         data.efc_force[: data.nefc] = multipliers
         if self.acting is not None:
-            self.acting.exert(data, couple)
+            self.acting.exert(data, size)
+            mujoco.mj_fwdActuation(model, data)  # a cylinder of the file pulls then
         mujoco.mj_rnePostConstraint(model, data)
         forces = self._read_forces(data)
         if self.acting is not None:
             self.acting.exert(data, 0.0)
-        return PinsAndTorque(couple, forces), accelerations
+        return PinsAndTorque(size, forces), accelerations
 
-    def _solve_drive(self, rows: Array, needed: Array) -> tuple[float, Array]:
-        """Solve for the drive, N m or N, and the multipliers of rigid pins, (m,), N.
+    def _balance(self, accelerations: Array) -> Array:
+        """Return the joint forces that leave the hinges that follow alone, (nv,).
 
-        `rows`: derivative of the closures, (m, nv); `needed`: generalized forces of the
-        motion, (nv,).
+        `accelerations`: those with rigid pins, (nv,), from which the others differ.
         """
-        if self.acting is None:
-            free = rows[:, self.passive]
-            multipliers = _solve_least_squares(free.T, needed[self.passive])
-            couple = needed[self.drive] - rows[:, self.drive] @ multipliers
-            return float(self.sense * couple), multipliers
-        moving = [self.drive, *self.passive]
-        pull = self.acting.find_pull(self.closing)[moving]
-        # without the pull the closures bear what is across it
-        level = pull / np.linalg.norm(pull)
-        away = np.eye(len(moving)) - np.outer(level, level)
-        columns = rows[:, moving].T
-        multipliers = _solve_least_squares(away @ columns, away @ needed[moving])
-        left = needed[moving] - columns @ multipliers
-        return float(left @ level / np.linalg.norm(pull)), multipliers
+        from scipy.optimize import root
 
-    def _balance(self, start: Array) -> Array:
-        """Return the joint forces that leave the other hinges alone, (nv,).
-
-        The hinges are those that are not driven.
-        """
         model = self.model
         data = self.data
-        passive = self.passive
-        accelerations = start.copy()
         mujoco.mj_forward(model, data)
         loads = data.qfrc_actuator.copy()
+        size = max(float(np.abs(accelerations[self.moving]).max()), 1.0)
 
-        def forces(at: Array) -> Array:
-            data.qacc[:] = at
+        def find_forces(turns: Array) -> Array:
+            data.qacc[:] = accelerations + self.basis @ (size * turns)
             mujoco.mj_inverse(model, data)
             return np.asarray(data.qfrc_inverse - loads)
 
-        residual = forces(accelerations)
-        for _ in range(_SOLVE_STEPS):
-            bias = np.abs(data.qfrc_bias[passive])
-            inertial = bias + np.abs(data.qfrc_constraint[passive])
-            allowed = _BALANCED * (inertial.max() or 1.0)
-            if np.all(np.abs(residual[passive]) <= allowed):
-                break
-            slopes = np.empty((len(passive), len(passive)))
-            size = max(float(np.abs(accelerations[passive]).max()), 1.0)
-            for column, dof in enumerate(passive):
-                moved = accelerations.copy()
-                moved[dof] += size
-                change = (forces(moved) - residual)[passive]
-                slopes[:, column] = change / size
-            step = np.linalg.lstsq(slopes, -residual[passive], rcond=None)[0]
-            part = 1.0
-            before = np.abs(residual[passive]).max()
-            while True:
-                moved = accelerations.copy()
-                moved[passive] += part * step
-                trial = forces(moved)
-                after = np.abs(trial[passive]).max()
-                if after < before or part < 1e-6:
-                    break
-                part *= 0.5
-            if after >= before:
-                break
-            accelerations = moved
-            residual = trial
-        forces(accelerations)
-        return np.asarray(residual)
+        def leave(turns: Array) -> Array:
+            return np.asarray(find_forces(turns) @ self.basis)
+
+        def differ(turns: Array) -> Array:
+            # the forces are linear but where dry friction reaches its couple
+            steps = np.eye(len(turns))
+            changes = [leave(turns + step) - leave(turns) for step in steps]
+            return np.column_stack(changes)
+
+        start = np.zeros(len(self.passive))
+        return find_forces(root(leave, start, jac=differ, tol=_BALANCED).x)
 
     def _read_forces(self, data: mujoco.MjData) -> dict[str, Array]:
         """Return the pin forces of an evaluated state in the plane's axes, (2,), N."""
-        ground_body = self.loop.bodies[1][0]
-        ground = data.xmat[ground_body].reshape(3, 3)
-        across = np.cross(self.loop.axis, self.loop.along)
-        axes = np.array(
-            [
-                ground @ self.loop.along,
-                ground @ across,
-            ]
-        )
+        frame = LoopFrame(self.loop, data)
         forces = {}
         for pin, name in FORCE_AT.items():
             joint = self.loop.hinges.get(pin)
@@ -687,7 +688,7 @@ class LoopInside:
                 bar = self._find_bar(body, pin)
             _, acted_on = FORCE_BETWEEN[name]
             sign = 1.0 if bar == acted_on else -1.0
-            forces[name] = sign * (axes @ force)
+            forces[name] = sign * frame.in_plane(force)
         return forces
 
     def _read_closure(self, data: mujoco.MjData, pin: str) -> tuple[Array, int]:
@@ -713,84 +714,65 @@ class LoopInside:
                     return bar
         return 1
 
-    def answer_states(
-        self,
-        theta_2: Sequence[float],
-        omega_2: float,
-        alpha_2: float,
-    ) -> InsideAnswer:
+    def answer_states(self, motion: LoopMotion) -> InsideAnswer:
         """Answer at closed states, each by itself.
 
-        States in which the bars of pin B are in line are left out and listed.
+        States in which the bars that follow are in line are left out and listed.
         """
         answer = InsideAnswer()
         in_line = []
-        for angle in theta_2:
-            state = self.state(angle, omega_2)
+        for angle, speed, acceleration in motion.states():
+            state = self.state(angle, speed)
             if state is None:
                 answer.open.append(angle)
-                continue
-            if self._is_in_line(state.qpos):
-                in_line.append(float(state.qpos[self.address]))
-                continue
-            answer.rows.append(self.ask(state.qpos, state.qvel, alpha_2))
+            elif self._is_in_line(state.qpos):
+                in_line.append(self._read_position(state.qpos))
+            else:
+                answer.rows.append(self.ask(state.qpos, state.qvel, acceleration))
         answer.in_line = tuple(in_line)
         return answer
 
     def answer_through_time(
-        self,
-        theta_2: Sequence[float],
-        omega_2: float,
-        alpha_2: float,
-        heavy: float = HEAVY,
+        self, motion: LoopMotion, heavy: float = HEAVY
     ) -> InsideAnswer:
         """Step the whole robot through the angles.
 
         Timestep, integrator and solver are those of the file. Each joint that is held,
-        and the driven one, gets an armature of `heavy` times the robot's largest
-        inertia. The couple that a state asks for acts on the driven one until the next,
-        so that its speed is kept.
+        and the commanded bar, gets an armature of `heavy` times the robot's largest
+        inertia. The couple that a state asks for acts on the bar until the next, so
+        that its speed is kept.
         """
+        if motion.varies:
+            raise LimitError(
+                "omega or alpha differs from position to position: that is no one"
+                " motion through time"
+            )
         answer = InsideAnswer()
-        angles = sorted(theta_2, reverse=omega_2 < 0.0)
-        model = copy(self.model)
+        _, omega, alpha = next(motion.states())
+        angles = sorted(motion.angle, reverse=omega < 0.0)
+        model, armature = self._make_heavy(heavy)
         data = mujoco.MjData(self.model)
         timestep = float(model.opt.timestep)
-        armature = self.find_carrier(heavy)
-        model.dof_armature[self.held] += armature
-        if self.flywheel:
-            armature = self.flywheel
-        else:
-            model.dof_armature[self.drive] += armature
-        state = self.state(angles[0], omega_2)
+        state = self.state(angles[0], omega)
         if state is None:
             raise LimitError("the loop does not close where the motion starts")
         data.qpos[:] = state.qpos
         data.qvel[:] = state.qvel
 
         def drive(row: InsideRow) -> None:
-            couple = armature * alpha_2 + self._find_crank_couple(row, data)
-            data.qfrc_applied[self.drive] = self.sense * couple
+            couple = armature * alpha + self._find_crank_couple(row, data)
+            data.qfrc_applied[:] = self.turn * couple
 
         mujoco.mj_forward(self.model, data)
-        drive(self.ask(state.qpos, state.qvel, alpha_2))
+        drive(self.ask(state.qpos, state.qvel, alpha))
         stepper = Stepper(model, data, timestep)
-        instants = [
-            _find_instant(angles[0], angle, omega_2, alpha_2) for angle in angles
-        ]
-        duration = instants[-1]
-        timesteps = duration / timestep
-        if not 1.0 <= timesteps <= MOST_TIMESTEPS:
-            raise LimitError(
-                f"its timestep of {timestep:g} s makes {timesteps:.3g}"
-                f" steps of the motion; must be 1 to {MOST_TIMESTEPS}: --speed states"
-                " another speed"
-            )
+        instants = [_find_instant(angles[0], angle, omega, alpha) for angle in angles]
+        _require_timesteps(instants[-1] / timestep, timestep)
         spent = 0.0
         self._doubtful.clear()
         # the loop starts exactly closed, and takes some time constants to yield as far
         # as it does
-        answer.settling = settling_time(self.find_constant(), duration)
+        answer.settling = settling_time(self.find_constant(), instants[-1])
         for instant in instants[1:]:
             if instant < answer.settling:
                 answer.skipped += 1
@@ -802,8 +784,7 @@ class LoopInside:
             if stepper.lost() or _has_warned(data):
                 answer.lost = "MuJoCo lost the motion: a value not finite, or too large"
                 break
-            acceleration = float(self.sense * data.qacc[self.drive])
-            row = self.ask(data.qpos, data.qvel, acceleration)
+            row = self.ask(data.qpos, data.qvel, float(self.turn @ data.qacc))
             answer.rows.append(row)
             drive(row)
             if self._left_assembly(answer, data.qpos):
@@ -813,13 +794,27 @@ class LoopInside:
         answer.seconds_per_step = spent / max(stepper.done, 1)
         return answer
 
+    def _make_heavy(self, heavy: float) -> tuple[mujoco.MjModel, float]:
+        """Return a model whose armatures keep speeds, and that of the commanded bar."""
+        model = copy(self.model)
+        armature = self._size_armature(heavy)
+        model.dof_armature[self.held] += armature
+        if self.flywheel:
+            return model, self.flywheel
+        if self.joint is None:
+            # about its own centre alone, and alike about every axis: it turns no other
+            model.body_inertia[self.loop.bodies[self.bar][0]] += armature
+        else:
+            model.dof_armature[self.lead] += armature
+        return model, armature
+
     def _find_crank_couple(self, row: InsideRow, data: mujoco.MjData) -> float:
-        """Return the couple on bar 2 with the power of a row's drive, N m."""
+        """Return the couple on the bar with the power of a row's drive, N m."""
         if not math.isfinite(row.soft.torque):
             return 0.0
         if self.acting is None:
             return row.soft.torque
-        return row.soft.torque * self.acting.find_speed(data) / row.omega_2
+        return row.soft.torque * self.acting.find_speed(data) / row.speed
 
     def _left_assembly(self, answer: InsideAnswer, qpos: Array) -> bool:
         """Tell whether the last row is in the other assembly, and drop such rows.
@@ -828,7 +823,7 @@ class LoopInside:
         before tell.
         """
         row = answer.rows[-1]
-        closed = self.close(row.theta_2)
+        closed = self.close(row.angle)
         assert closed is not None  # the row was evaluated there
         now, due = (self._measure_sine(pose) for pose in (qpos, closed))
         if now * due > 0.0:
@@ -847,7 +842,7 @@ class LoopInside:
 
     def answer_under_torque(
         self,
-        theta_2: Iterable[float],
+        angles: Iterable[float],
         torque: float,
         seconds: float,
     ) -> list[TornState]:
@@ -859,11 +854,11 @@ class LoopInside:
         states = []
         model = copy(self.model)
         data = mujoco.MjData(self.model)
-        model.dof_armature[self.held] += self.find_carrier(HEAVY)
+        model.dof_armature[self.held] += self._size_armature(HEAVY)
         # the motor may meet the stops of the file
         model.opt.disableflags &= ~(LIMITS_OFF & ~self.flags)
         steps = max(round(seconds / model.opt.timestep), 1)
-        for angle in theta_2:
+        for angle in angles:
             state = self.state(angle, 0.0)
             if state is None:
                 continue
@@ -871,21 +866,31 @@ class LoopInside:
             data.qpos[:] = state.qpos
             worst: TornState | None = None
             for _ in range(steps):
-                data.qfrc_applied[self.drive] = self.sense * torque
+                data.qfrc_applied[:] = self.turn * torque
                 mujoco.mj_step(model, data)
                 mujoco.mj_forward(model, data)
                 mujoco.mj_rnePostConstraint(model, data)
                 if _has_warned(data):
-                    start = float(state.qpos[self.address])
+                    start = self._read_position(state.qpos)
                     worst = TornState(start, math.inf, {})
                     break
                 gap = self._measure_gap(data.qpos)
                 if worst is None or gap > worst.gap:
-                    joint = float(data.qpos[self.address])
+                    joint = self._read_position(data.qpos)
                     worst = TornState(joint, gap, self._read_forces(data))
             assert worst is not None
             states.append(worst)
         return states
+
+
+def _require_timesteps(timesteps: float, timestep: float) -> None:
+    """Refuse a motion of more timesteps than one run takes, or of none."""
+    if not 1.0 <= timesteps <= MOST_TIMESTEPS:
+        raise LimitError(
+            f"its timestep of {timestep:g} s makes {timesteps:.3g}"
+            f" steps of the motion; must be 1 to {MOST_TIMESTEPS}: --speed states"
+            " another speed"
+        )
 
 
 def _solve_least_squares(matrix: Array, right: Array) -> Array:

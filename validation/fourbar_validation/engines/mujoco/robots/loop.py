@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from fourbar.linkage import BAR_NAMES, MOVING_BARS
+from fourbar.linkage import BAR_NAMES, ENDS, MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Scene
 
@@ -16,6 +16,8 @@ BAR_ROLES = {BAR_NAMES[bar]: bar for bar in MOVING_BARS}
 """Number of each moving bar, by its name."""
 SITE_ROLES = ("B3", "B4")
 """Roles of the sites of pin B on the coupler and on the output."""
+DRIVEN_PINS = {2: "O2", 4: "O4"}
+"""Pin between the ground and a commanded bar, where a motor turns it."""
 FLAT = 2e-3
 """rad; where the outputs of both assemblies are nearer the pose does not tell which it
 is: a loop that is closed to 1e-12 m leaves about half as much open where its bars are
@@ -106,7 +108,7 @@ class RobotLoop:
 
     @property
     def joint(self) -> int:
-        """Joint that is driven; pin O2 is always a hinge."""
+        """Joint that is driven; pin O2 of a loop as its file has it is a hinge."""
         return self.hinges["O2"]
 
     @property
@@ -134,6 +136,40 @@ class RobotLoop:
             angles=tuple(-angle for angle in self.angles),
             stated_angles=tuple(-angle for angle in self.stated_angles),
             senses={pin: -sense for pin, sense in self.senses.items()},
+        )
+
+    def seen_from_other_end(self) -> "RobotLoop":
+        """Return the loop with its output for its input."""
+        pins = {"O2": "O4", "A": "B", "B": "A", "O4": "O2"}
+        bars = {1: 1, 2: 4, 3: 3, 4: 2}
+        reversed_senses = {
+            pins[pin]: sense if pin in ENDS[1] else -sense
+            for pin, sense in self.senses.items()
+        }
+
+        def exchange(angles: tuple[float, ...]) -> tuple[float, ...]:
+            ground, crank, coupler, output = angles
+            turned = (
+                math.remainder(one + math.pi, math.tau) for one in (ground, coupler)
+            )
+            ground, coupler = turned
+            return ground, output, coupler, crank
+
+        ground, crank, coupler, output = self.lengths
+        return replace(
+            self,
+            cut=None if self.cut is None else pins[self.cut],
+            bodies={bar: self.bodies[bars[bar]] for bar in bars},
+            hinges={
+                pin: self.hinges[old] for pin, old in pins.items() if old in self.hinges
+            },
+            senses=reversed_senses,
+            points={
+                (bars[bar], pins[pin]): at for (bar, pin), at in self.points.items()
+            },
+            lengths=(ground, output, coupler, crank),
+            angles=exchange(self.angles),
+            stated_angles=exchange(self.stated_angles),
         )
 
     def describe_lengths(self) -> str:

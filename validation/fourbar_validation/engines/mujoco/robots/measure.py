@@ -12,6 +12,7 @@ import numpy as np
 
 from fourbar.effects import Flywheel
 from fourbar.errors import InputError, LimitError
+from fourbar.linkage import FIRST_PIN
 from fourbar.scene import Scene, command
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     describe_actuator,
@@ -176,7 +177,8 @@ def _put_inside(
 ) -> LoopInside:
     """Return a loop driven as a scene has it, by the file's own cylinder if it can."""
     drive = find_cylinder(model, scene) or LoopDrive(model, loop, scene, turned)
-    inside = LoopInside(model, loop, drive, as_it_is=as_it_is)
+    bar = command(scene).bar
+    inside = LoopInside(model, loop, drive, bar=bar, as_it_is=as_it_is)
     flywheels = (one for one in scene.effects if isinstance(one, Flywheel))
     inside.find_flywheel(sum(one.inertia for one in flywheels))
     return inside
@@ -198,12 +200,12 @@ def _measure_loop(
     if options.span is not None:
         motion = _take_span(motion, inside, options.span)
     motion = motion.thin_out(POSITIONS_OF_A_LOOP)
-    states = inside.answer_states(*motion)
+    states = inside.answer_states(motion)
     if not states.rows and states.in_line:
         raise LimitError(
-            f"{loop.name} is measured at no position: coupler and output are in line at"
-            " all of them, where the loop may go on in two ways; choose others by the"
-            " motion of a SCENE"
+            f"{loop.name} is measured at no position: the bars that follow are in line"
+            " at all of them, where the loop may go on in two ways; choose others by"
+            " the motion of a SCENE"
         )
     if not states.rows:
         raise LimitError(
@@ -214,26 +216,30 @@ def _measure_loop(
     through: InsideAnswer | None = None
     refusal = ""
     influence: Influence | None = None
-    closing = motion._replace(theta_2=_find_longest_run(states))
+    closing = motion
+    if not motion.varies:
+        closing = motion._replace(angle=_find_longest_run(states))
     try:
-        if motion.omega_2 == 0.0 or len(closing.theta_2) < 2:
+        if not np.any(motion.speed) or len(closing.angle) < 2:
             raise LimitError("nothing moves: a sweep at a speed is needed")
-        through = inside.answer_through_time(*closing)
+        through = inside.answer_through_time(closing)
         if not briefly and not inside.flywheel:
-            lighter = inside.answer_through_time(*closing, HEAVY * _LIGHTER)
+            lighter = inside.answer_through_time(closing, HEAVY * _LIGHTER)
             influence = _compare_at_same_angles(through, lighter, scales)
     except LimitError as error:
         refusal = str(error)
     torn: tuple[TornState, ...] = ()
     if options.torque is not None:
         seconds = _CONSTANTS * inside.find_constant()
-        starts = closing.thin_out(_TORN_POSITIONS).theta_2
+        starts = closing.thin_out(_TORN_POSITIONS).angle
         torn = tuple(inside.answer_under_torque(starts, options.torque, seconds))
     advice = None
     if options.error is not None and not briefly:
-        model = inside.given
-        search = SettingsSearch(model, loop, closing, inside.acting, share)
-        advice = search.advise(options.error, file)
+        if motion.varies:
+            raise LimitError(
+                f"settings are tried in one motion through time: {refusal}"
+            )
+        advice = SettingsSearch(inside, closing, share).advise(options.error, file)
     return LoopMeasurement(
         loop.name,
         inside.name,
@@ -267,7 +273,7 @@ def _measure_loop(
 def _find_longest_run(states: InsideAnswer) -> tuple[float, ...]:
     """Return the most angles in a row at which the loop closes, in their order."""
     runs: list[list[float]] = [[]]
-    closed = {row.theta_2 for row in states.rows}
+    closed = {row.angle for row in states.rows}
     for angle in sorted({*closed, *states.open}):
         if angle in closed:
             runs[-1].append(angle)
@@ -284,14 +290,15 @@ def _describe_findings(
 ) -> Iterator[str]:
     """Say what was taken off, and what was met on the way."""
     model = inside.given
+    pin = FIRST_PIN[inside.bar]
     if inside.flywheel:
         yield (
-            f"its armature of {inside.flywheel:.3g} kg m^2 on pin O2 is taken for a"
+            f"its armature of {inside.flywheel:.3g} kg m^2 on pin {pin} is taken for a"
             " flywheel that drives: the torque on it is not counted"
         )
     for number in inside.taken_off:
         yield (
-            f"its drive on pin O2, {describe_actuator(model, number)}, is taken off:"
+            f"its drive on pin {pin}, {describe_actuator(model, number)}, is taken off:"
             " the torque is solved for"
         )
     if isinstance(inside.acting, FileCylinder):
@@ -339,7 +346,7 @@ def _describe_noslip(
     if not iterations or not (rubs or inside.contacts):
         return
     options.noslip_iterations = 0
-    without = inside.answer_states(*motion)
+    without = inside.answer_states(motion)
     options.noslip_iterations = iterations
     change = _compare_at_same_angles(states, without, scales).worst
     text = (
@@ -357,23 +364,25 @@ def _describe_noslip(
 
 
 def _choose_motion(scene: Scene, turned: float) -> LoopMotion:
-    """Return the motion of a scene in the plane of the loop."""
+    """Return the motion of a scene in the plane of the loop, by rising angles."""
     commanded = command(scene)
-    if commanded.omega_2 is None:
+    if commanded.speed is None:
         raise InputError(
-            "motion.omega_2",
+            f"motion.omega_{commanded.bar}",
             None,
             "is needed: without a speed there is no torque to compare",
         )
-    if np.ptp(commanded.omega_2) != 0.0 or np.ptp(commanded.alpha_2) != 0.0:
-        raise LimitError(
-            "omega_2 or alpha_2 differs from position to position: that is no one"
-            " motion through time"
-        )
-    speed = float(np.max(commanded.omega_2))
-    acceleration = float(np.max(commanded.alpha_2))
-    angles = np.unique(commanded.theta_2) + turned
-    return LoopMotion(tuple(angles.tolist()), speed, acceleration)
+    states = np.unique(
+        np.column_stack(
+            np.broadcast_arrays(
+                commanded.angle + turned, commanded.speed, commanded.acceleration
+            )
+        ),
+        axis=0,
+    )
+    angles, *rates = (tuple(column.tolist()) for column in states.T)
+    speed, acceleration = (one if np.ptp(one) else one[0] for one in rates)
+    return LoopMotion(angles, speed, acceleration)
 
 
 def _take_span(
@@ -385,7 +394,7 @@ def _take_span(
     ------
     InputError : a range that the motion does not reach.
     """
-    joints = [inside.position(angle) for angle in motion.theta_2]
+    joints = [inside.position(angle) for angle in motion.angle]
     low, high = max(span[0], min(joints)), min(span[1], max(joints))
     if low >= high:
         moved, wanted = (
@@ -397,10 +406,12 @@ def _take_span(
             f"{wanted} deg",
             f"must overlap the motion of {inside.name}, {moved} deg",
         )
-    sense = inside.position(motion.theta_2[0] + 1.0) - joints[0]
+    if motion.varies:
+        raise InputError("--range", None, "needs a motion of one speed")
+    sense = inside.position(motion.angle[0] + 1.0) - joints[0]
     places = np.linspace(low, high, POSITIONS_OF_A_LOOP) - joints[0]
-    angles = np.sort(motion.theta_2[0] + sense * places)
-    return motion._replace(theta_2=tuple(angles.tolist()))
+    angles = np.sort(motion.angle[0] + sense * places)
+    return motion._replace(angle=tuple(angles.tolist()))
 
 
 def _compare_at_same_angles(

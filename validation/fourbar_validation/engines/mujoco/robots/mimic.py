@@ -153,10 +153,7 @@ def _measure_input(
         return None, 1.0
     output_angle = _find_angle_of_bar(model, data, follower, output_length, (x, y))
     behind = output_angle is not None and is_seen_from_behind(
-        scene,
-        0.0,
-        input_angle,
-        output_angle,
+        scene, (0.0, input_angle, math.nan, output_angle)
     )
     side = -1.0 if behind else 1.0
     return linkage.ground_angle + side * input_angle, side

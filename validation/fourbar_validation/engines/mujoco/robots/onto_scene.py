@@ -33,6 +33,7 @@ from fourbar_validation.engines.mujoco.robots.compiled import (
     CompiledRobot,
     compile_robot,
 )
+from fourbar_validation.engines.mujoco.robots.frame import LoopFrame
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside, reflect
 from fourbar_validation.engines.mujoco.robots.loop import (
     BAR_ROLES,
@@ -48,8 +49,8 @@ from fourbar_validation.engines.mujoco.robots.pose import (
     pose_robot,
 )
 from fourbar_validation.engines.mujoco.robots.scene import (
+    SceneOfLoop,
     is_seen_from_behind,
-    make_loop_scene,
     miss_output,
     write_pose,
 )
@@ -186,42 +187,32 @@ def _fit(
         return missed, len(_list_misnamed(model, way, usual))
 
     loop = min(fitting, key=rank)
-    _require_driven_hinge(scene, loop)
-    pose = replace(options.pose, drive=name_joint(model, loop.joint))
+    # one of its pins on the ground is a hinge, by which it is found again
+    ground = loop.hinges.get("O2", loop.hinges.get("O4", -1))
+    pose = replace(options.pose, drive=name_joint(model, ground))
     loop, robot = close_onto(scene, posed, loop, pose)
-    made = make_loop_scene(compiled, robot, loop, options.speed, loop.name)
-    turned = find_turn(scene, made.loop)
-    found = LoopOfScene(file, compiled, robot, made.loop, turned, made.parts)
+    described = SceneOfLoop(compiled, robot, loop)
+    described.meet_lengths()
+    found = LoopOfScene(
+        file,
+        compiled,
+        robot,
+        described.loop,
+        find_turn(scene, described.loop),
+        described.write_parts(),
+    )
     return miss_lengths(scene, loop), found
-
-
-def _require_driven_hinge(scene: Scene, loop: RobotLoop) -> None:
-    """Refuse a loop whose equality is the pin about which a scene's input turns."""
-    ground, crank, coupler, output = loop.lengths
-    exchanged = replace(loop, lengths=(ground, output, coupler, crank))
-    missed = miss_lengths(scene, loop)
-    if loop.cut == "O4" and miss_lengths(scene, exchanged) < missed - ALIKE:
-        raise InputError(
-            "--loop",
-            loop.name,
-            "closes the loop at pin O2 of the scene, where no hinge of the file is then"
-            " driven; close it at another pin, or measure it without SCENE, driven at"
-            " its other hinge on the ground",
-        )
 
 
 def _list_ways(
     posed: PosedRobot, loop: RobotLoop, pose: PoseOptions
 ) -> list[RobotLoop]:
-    """List a loop as it is driven, and driven at its output if that is a hinge."""
-    output = loop.hinges.get("O4")
-    ways = [pose.drive or name_joint(posed.model, loop.joint)]
-    if output is not None and pose.drive is None:
-        ways.append(name_joint(posed.model, output))
-    return [
-        choose_loop(find_closures(posed, replace(pose, drive=way)), loop.name)
-        for way in ways
-    ]
+    """List a loop as it is driven, and from its other end unless a joint is stated."""
+    if pose.drive is not None:
+        return [loop]
+    pose = replace(pose, drive=name_joint(posed.model, loop.hinges["O2"]))
+    driven = choose_loop(find_closures(posed, pose), loop.name)
+    return [driven, driven.seen_from_other_end()]
 
 
 def _find_body(model: mujoco.MjModel, name: str) -> int:
@@ -270,8 +261,7 @@ def close_onto(
             loop.seen_from_behind(),
         )
         return _close_flat(scene, posed, loop, pose, behind)
-    theta_1, theta_2, _, theta_4 = loop.angles
-    behind = is_seen_from_behind(scene, theta_1, theta_2, theta_4)
+    behind = is_seen_from_behind(scene, loop.angles)
     seen = loop.seen_from_behind() if behind else loop
     _require_assembly(scene, posed, seen)
     return seen, posed
@@ -285,23 +275,24 @@ def _close_flat(
     behind: bool,
 ) -> tuple[RobotLoop, PosedRobot]:
     """Close a loop whose pose does not tell its assembly onto that of a scene."""
+    driven = loop.hinges.get("O2")
 
     def sample_loop(at: PosedRobot) -> RobotLoop:
         sampled = choose_loop(find_closures(at, pose), loop.name)
+        if sampled.hinges.get("O2") != driven:
+            sampled = sampled.seen_from_other_end()
         return sampled.seen_from_behind() if behind else sampled
 
     loop = sample_loop(posed)
     if _measure_sine(loop) <= FLAT:
         posed = move_to(posed, _leave_flat(scene, posed, loop))
         loop = sample_loop(posed)
-    theta_1, theta_2, _, theta_4 = loop.angles
-    missed = miss_output(scene, theta_1, theta_2, theta_4)
+    missed = miss_output(scene, loop.angles)
     reflected = reflect(posed.model, loop)
     if reflected is not None:
         other_pose = move_to(posed, reflected)
         other = sample_loop(other_pose)
-        theta_1, theta_2, _, theta_4 = other.angles
-        missed_by_other = miss_output(scene, theta_1, theta_2, theta_4)
+        missed_by_other = miss_output(scene, other.angles)
         if missed_by_other < missed:
             posed = other_pose
             loop = other
@@ -324,12 +315,13 @@ def _leave_flat(
     loop: RobotLoop,
 ) -> Array:
     """Return a pose at an angle of the scene at which the bars are not in line."""
-    inside = LoopInside(posed.model, loop)
+    commanded = command(scene)
+    inside = LoopInside(posed.model, loop, bar=commanded.bar)
     turned = find_turn(scene, loop)
     best = loop.qpos
     largest = 0.0
-    for theta_2 in np.unique(command(scene).theta_2) + turned:
-        qpos = inside.close(float(theta_2))
+    for angle in np.unique(commanded.angle) + turned:
+        qpos = inside.close(float(angle))
         if qpos is None:
             continue
         size = inside.measure_transmission(qpos)
@@ -382,16 +374,9 @@ def _fits_gravity(
     for effect in scene.effects:
         if isinstance(effect, Gravity):
             wanted = wanted + effect.vector
-    ground = posed.data.xmat[loop.bodies[1][0]].reshape(3, 3)
-    along = ground @ loop.along
-    across = ground @ np.cross(loop.axis, loop.along)
+    turned = loop.angles[0] - scene.linkage.ground_angle
     gravity = model.opt.gravity * is_enabled(model, "gravity")
-    angle = scene.linkage.ground_angle - loop.angles[0]
-    cos = math.cos(angle)
-    sin = math.sin(angle)
-    x = float(gravity @ along)
-    y = float(gravity @ across)
-    of_robot = np.array([cos * x - sin * y, sin * x + cos * y])
+    of_robot = LoopFrame(loop, posed.data, turned).in_plane(gravity)
     size = float(np.linalg.norm(of_robot))
     wanted_size = float(np.linalg.norm(wanted))
     if size == 0.0 or wanted_size == 0.0:
@@ -412,14 +397,16 @@ def find_turn(scene: Scene, loop: RobotLoop) -> float:
     Whole turns bring it near the pose. With one change point a turn leads to the other
     assembly: of two turns the one counts after which the scene has that of the pose.
     """
-    theta_1, theta_2, _, theta_4 = loop.angles
-    turned = theta_1 - scene.linkage.ground_angle
-    middle = float(np.mean(command(scene).theta_2)) + turned
-    away = (middle - theta_2) / math.tau
+    commanded = command(scene)
+    turned = loop.angles[0] - scene.linkage.ground_angle
+    middle = float(np.mean(commanded.angle)) + turned
+    place = commanded.bar - 1
+    away = (middle - loop.angles[place]) / math.tau
 
     def rank(turns: int) -> tuple[bool, float]:
-        in_scene = theta_2 + math.tau * turns
-        missed = miss_output(scene, theta_1, in_scene, theta_4)
+        in_scene = [*loop.angles]
+        in_scene[place] += math.tau * turns
+        missed = miss_output(scene, in_scene)
         return missed > FLAT, round(abs(turns - away), 6)
 
     nearest = math.ceil(away - 0.5 - 1e-6)

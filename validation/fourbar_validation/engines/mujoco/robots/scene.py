@@ -6,7 +6,7 @@ counts with its mass. What a scene cannot hold is named with its size.
 
 import cmath
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -21,9 +21,9 @@ from fourbar.formulas.mobility import (
     list_met_equalities,
     turns_fully,
 )
-from fourbar.linkage import BAR_NAMES, ENDS, MOVING_BARS, PINS, Bar, FourBar
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, Bar, FourBar
 from fourbar.quantities import Array
-from fourbar.scene import Scene, find_signs
+from fourbar.scene import Scene, command, find_signs
 from fourbar.scene.motion import BRANCH_NAMES, CROSSED, OPEN, Motion, Sweep
 from fourbar.solving import solve
 from fourbar_validation.engines.free_body_closure import close
@@ -39,6 +39,7 @@ from fourbar_validation.engines.mujoco.robots.closures import (
     describe_equality,
     find_closures,
     name_body,
+    require_loops,
 )
 from fourbar_validation.engines.mujoco.robots.compiled import (
     CompiledRobot,
@@ -46,6 +47,7 @@ from fourbar_validation.engines.mujoco.robots.compiled import (
     list_unknown_parts,
 )
 from fourbar_validation.engines.mujoco.robots.digits import meet_lengths
+from fourbar_validation.engines.mujoco.robots.frame import LoopFrame
 from fourbar_validation.engines.mujoco.robots.inside import reflect
 from fourbar_validation.engines.mujoco.robots.loop import (
     FLAT,
@@ -102,14 +104,14 @@ def read_loop_scene(
     compiled = compile_robot(file)
     posed = pose_robot(compiled.model, options)
     closures = find_closures(posed, options)
-    if name is None:
-        names = [closure.name for closure in closures if closure.loop is not None]
-        if len(names) != 1:
-            listed = ", ".join(names) or "none"
-            raise InputError("--loop", None, f"states one of the four-bars: {listed}")
-        (name,) = names
-    loop = choose_loop(closures, name)
-    title = f"{name} of {file.path.name}"
+    loops = require_loops(closures)
+    if name is not None:
+        loops = [choose_loop(closures, name)]
+    if len(loops) > 1:
+        names = ", ".join(loop.name for loop in loops)
+        raise InputError("--loop", None, f"states one of the four-bars: {names}")
+    (loop,) = loops
+    title = f"{loop.name} of {file.path.name}"
     made = make_loop_scene(compiled, posed, loop, speed, title, str(file.path.name))
     notes = (*compiled.notes, *posed.notes)
     return replace(made, notes=notes)
@@ -124,7 +126,7 @@ def make_loop_scene(
     source: str = "",
 ) -> LoopScene:
     """Make a scene from a loop in its pose; errors as of `read_loop_scene`."""
-    made = _SceneOfLoop(compiled, posed, loop)
+    made = SceneOfLoop(compiled, posed, loop)
     scene = made.describe(DEFAULT_SPEED if speed is None else speed, title, source)
     remarks = [*loop.remarks, *made.remarks]
     if speed is None:
@@ -211,39 +213,32 @@ def _round_angle(angle: float) -> float:
     return math.radians(round(math.degrees(angle), _DECIMALS_OF_A_DEGREE) + 0.0)
 
 
-def miss_output(
-    scene: Scene,
-    theta_1: float,
-    theta_2: float,
-    theta_4: float,
-) -> float:
-    """Return by how much the output of a scene misses that of a loop, rad.
+def miss_output(scene: Scene, angles: Sequence[float]) -> float:
+    """Return by how much the motion of a scene misses a loop in its pose, rad.
 
-    The loop is in its pose; infinite if it is open.
+    The loop's commanded bar tells where the last bar that follows must be; infinite if
+    the scene is open there. `angles`: theta_1 to theta_4 of the loop, rad.
     """
     linkage = scene.linkage
-    angle = np.array([theta_2 - theta_1 + linkage.ground_angle])
-    branch = find_signs(linkage, angle, scene.motion.branch)
-    output = float(close(linkage, angle, branch).theta[1, 0])
-    away = output - linkage.ground_angle - (theta_4 - theta_1)
+    bar = command(scene).bar
+    last = max(MOVING_BARS, key=lambda one: (one != bar, one))
+    angle = np.array([angles[bar - 1] - angles[0] + linkage.ground_angle])
+    branch = find_signs(linkage, angle, scene.motion.branch, bar)
+    follows = float(close(linkage, angle, branch, bar).theta[1, 0])
+    away = follows - linkage.ground_angle - (angles[last - 1] - angles[0])
     if math.isfinite(away):
         return abs(math.remainder(away, math.tau))
     return math.inf
 
 
-def is_seen_from_behind(
-    scene: Scene,
-    theta_1: float,
-    theta_2: float,
-    theta_4: float,
-) -> bool:
+def is_seen_from_behind(scene: Scene, angles: Sequence[float]) -> bool:
     """Tell whether the plane of a loop is seen from the other side.
 
-    In its pose the loop then has the output of a scene. All angles turn the other way
+    In its pose the loop then has the assembly of a scene. All angles turn the other way
     there.
     """
-    missed = miss_output(scene, theta_1, theta_2, theta_4)
-    missed_behind = miss_output(scene, -theta_1, -theta_2, -theta_4)
+    missed = miss_output(scene, angles)
+    missed_behind = miss_output(scene, [-angle for angle in angles])
     return missed_behind < missed - _SAME_OUTPUT
 
 
@@ -258,7 +253,7 @@ class _Lump:
     """About the mass centre and the plane's normal, kg m^2."""
 
 
-class _SceneOfLoop:
+class SceneOfLoop:
     """A scene that is made from one loop."""
 
     def __init__(
@@ -271,11 +266,8 @@ class _SceneOfLoop:
         self.model = posed.model
         self.data = posed.data
         self.loop = loop
+        self.frame = LoopFrame(loop, posed.data)
         self.remarks: list[str] = []
-        ground = self.data.xmat[loop.bodies[1][0]].reshape(3, 3)
-        self.normal = ground @ loop.axis
-        self.along = ground @ loop.along
-        self.across = np.cross(self.normal, self.along)
         self.carried = _list_carried(self.model, loop)
         bodies = {body for carried in self.carried.values() for body in carried}
         parts = list_unknown_parts(compiled, bodies)
@@ -312,7 +304,7 @@ class _SceneOfLoop:
         """Describe the scene."""
         lumps = {bar: self._lump(bar) for bar in MOVING_BARS}
         armature = self._list_armature()
-        lengths = self._meet_lengths()
+        lengths = self.meet_lengths()
         bars = {}
         for bar, lump in lumps.items():
             inertia = lump.inertia + (armature.get("O4", 0.0) if bar == 4 else 0.0)
@@ -350,7 +342,7 @@ class _SceneOfLoop:
             source=source,
         )
 
-    def _meet_lengths(self) -> tuple[float, ...]:
+    def meet_lengths(self) -> tuple[float, ...]:
         """Return the lengths within the digits of the file, and say which are equal."""
         d, a, b, c = map(round_off, self.loop.lengths)
         stated = (d, a, b, c)
@@ -369,27 +361,17 @@ class _SceneOfLoop:
         return met
 
     def _in_plane(self, vector: Array) -> complex:
-        return complex(float(vector @ self.along), float(vector @ self.across))
-
-    def _locate(self, bar: int, pin: str) -> Array:
-        """Locate a pin of a bar in world axes, (3,), m."""
-        body = self.loop.bodies[bar][0]
-        turn = self.data.xmat[body].reshape(3, 3)
-        return np.asarray(self.data.xpos[body] + turn @ self.loop.points[bar, pin])
+        return complex(*self.frame.in_plane(vector))
 
     def _find_polar(self, bar: int, place: Array) -> tuple[float, float]:
         """Return a place from the first pin of a bar: distance, m, and angle, rad.
 
         The angle is from the bar's line.
         """
-        first, second = ENDS[bar]
-        pin = self._locate(bar, first)
-        line = self._in_plane(self._locate(bar, second) - pin)
-        arm = self._in_plane(place - pin)
-        if abs(arm) <= ROUND_OFF_OF_LOADS * abs(line):
+        arm = complex(*self.frame.along_bar(bar, place))
+        if abs(arm) <= ROUND_OFF_OF_LOADS * self.loop.lengths[bar - 1]:
             return 0.0, 0.0
-        turned = arm / line
-        return abs(arm), math.atan2(turned.imag, turned.real)
+        return cmath.polar(arm)
 
     def _lump(self, bar: int) -> _Lump:
         """Sum what a bar carries."""
@@ -403,7 +385,7 @@ class _SceneOfLoop:
         centre = masses @ data.xipos[bodies] / mass
         inertia = 0.0
         for body, body_mass in zip(bodies, masses, strict=True):
-            axis = data.ximat[body].reshape(3, 3).T @ self.normal
+            axis = data.ximat[body].reshape(3, 3).T @ self.frame.normal
             arm = self._in_plane(data.xipos[body] - centre)
             inertia += float(axis**2 @ model.body_inertia[body])
             inertia += float(body_mass) * abs(arm) ** 2
@@ -546,7 +528,7 @@ class _SceneOfLoop:
         if stops:
             self.remarks.append(
                 f"the range of {', '.join(sorted(stops))} ends the motion before that"
-                f" of {name_joint(self.model, self.loop.joint)}"
+                f" of {name_joint(self.model, self.loop.hinges['O2'])}"
             )
         if not free.any():
             raise InputError(
@@ -600,12 +582,12 @@ class _SceneOfLoop:
 
         `theta_2`: that of the pose, counted in the turns of the sweep.
         """
-        theta_1 = linkage.ground_angle
-        theta_4 = self.loop.angles[3]
+        _, _, theta_3, theta_4 = self.loop.angles
+        angles = (linkage.ground_angle, theta_2, theta_3, theta_4)
         apart = {}
         for branch in (OPEN, CROSSED):
-            scene = Scene(linkage, Motion(branch=branch))
-            apart[branch] = miss_output(scene, theta_1, theta_2, theta_4)
+            scene = Scene(linkage, Motion(theta_2, branch=branch))
+            apart[branch] = miss_output(scene, angles)
         if not abs(apart[OPEN] - apart[CROSSED]) > FLAT:
             text = "the bars of pin B are in line in this pose: open is taken"
             self._remark(f"{text}; --pose states another")
@@ -631,7 +613,7 @@ class _SceneOfLoop:
         """Name what acts on the loop and is not in the scene."""
         model = self.model
         loop = self.loop
-        across = float(self.gravity @ self.normal)
+        across = float(self.gravity @ self.frame.normal)
         weights = {bar: abs(lump.mass * across) for bar, lump in lumps.items()}
         if abs(across) > _ACROSS * float(np.linalg.norm(self.gravity)):
             texts = ", ".join(
@@ -704,7 +686,7 @@ class _SceneOfLoop:
                 kind == mujoco.mjtTrn.mjTRN_SITE
                 and int(model.site_bodyid[target]) in bodies
             )
-            if on_site or (on_joint and target != self.loop.joint):
+            if on_site or (on_joint and target != self.loop.hinges["O2"]):
                 self._leave_out(describe_actuator(model, number))
 
 

@@ -1,20 +1,19 @@
 """A loop of a compiled model in the axes of a scene, as its entries are described."""
 
-import math
 from copy import copy
 
 import mujoco
 import numpy as np
 
-from fourbar.linkage import ENDS, MOVING_BARS, PINS
-from fourbar.quantities import Array
+from fourbar.linkage import MOVING_BARS, PINS
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     find_roots,
     is_enabled,
     list_actuators,
 )
 from fourbar_validation.engines.mujoco.robots.closures import EQUALITY_KINDS
-from fourbar_validation.engines.mujoco.robots.loop import RobotLoop
+from fourbar_validation.engines.mujoco.robots.frame import LoopFrame
+from fourbar_validation.engines.mujoco.robots.loop import DRIVEN_PINS, RobotLoop
 
 _PLANES = {2: "x-y", 1: "x-z", 0: "y-z"}
 """Plane of the world by the axis that is normal to it."""
@@ -23,18 +22,26 @@ _UPRIGHT = 1e-9
 """
 
 
-class SeenLoop:
+class SeenLoop(LoopFrame):
     """Bars, pins and closure of a loop in its pose; everything else is held."""
 
-    def __init__(self, model: mujoco.MjModel, loop: RobotLoop, turned: float) -> None:
-        """Take a loop in whose plane the axes of the scene are turned, rad."""
+    def __init__(
+        self, model: mujoco.MjModel, loop: RobotLoop, turned: float, bar: int = 2
+    ) -> None:
+        """Take a loop in whose plane the axes of the scene are turned, rad.
+
+        `bar`: the commanded one, whose motors are the drive.
+        """
         self.model = model
-        self.loop = loop
         self.turned = turned
-        self.data = mujoco.MjData(model)
-        self.data.qpos[:] = loop.qpos
-        mujoco.mj_kinematics(model, self.data)
-        mujoco.mj_comPos(model, self.data)
+        data = mujoco.MjData(model)
+        data.qpos[:] = loop.qpos
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        super().__init__(loop, data, turned)
+        self.commanded = bar
+        driven = loop.hinges.get(DRIVEN_PINS.get(bar, ""))
+        self.drives = [] if driven is None else list_actuators(model, driven)
         self.hinge = loop.hinges
         self.sense = loop.senses
         self.closure = loop.equality
@@ -45,17 +52,11 @@ class SeenLoop:
             for bar, bodies in loop.bodies.items()
             for body in bodies
         }
-        ground = self.data.xmat[loop.bodies[1][0]].reshape(3, 3)
-        self.normal = ground @ loop.axis
-        along = ground @ loop.along
-        across = np.cross(self.normal, along)
-        cos = math.cos(turned)
-        sin = math.sin(turned)
-        self.axes = np.array([cos * along + sin * across, cos * across - sin * along])
 
     def with_model(self) -> "SeenLoop":
         """Return the same loop in a model of its own, which may be changed."""
-        return SeenLoop(copy(self.model), self.loop, self.turned)
+        model = copy(self.model)
+        return SeenLoop(model, self.loop, self.turned, self.commanded)
 
     @property
     def plane(self) -> str:
@@ -142,39 +143,10 @@ class SeenLoop:
         address = self.model.jnt_qposadr[self.hinge[pin]]
         return self._angle_at(pin, self.model.qpos_spring[address])
 
-    def in_plane(self, vector: Array) -> Array:
-        """Project on the plane, in the axes of the scene, (2,)."""
-        return np.asarray(self.axes @ vector)
-
-    def world(self, bar: int, pin: str) -> Array:
-        """Locate a pin of a bar in world axes, (3,), m."""
-        body = self.loop.bodies[bar][0]
-        turn = self.data.xmat[body].reshape(3, 3)
-        return np.asarray(self.data.xpos[body] + turn @ self.loop.points[bar, pin])
-
-    def line(self, bar: int) -> Array:
-        """Return a bar's line in the plane, first pin to second, (2,), m."""
-        first, second = (self.world(bar, pin) for pin in ENDS[bar])
-        return self.in_plane(second - first)
-
-    def along_bar(self, bar: int, world: Array) -> tuple[float, float]:
-        """Return (along, to the left) of a point from a bar's first pin, m."""
-        return self.turned_back(bar, world - self.world(bar, ENDS[bar][0]))
-
-    def turned_back(self, bar: int, vector: Array) -> tuple[float, float]:
-        """Resolve a vector along a bar's line and to its left."""
-        x, y = self.in_plane(vector)
-        along, left = self.line(bar)
-        size = math.hypot(along, left)
-        return (
-            float(along * x + left * y) / size,
-            float(along * y - left * x) / size,
-        )
-
     def measure_offset(self) -> float:
         """Return how far the ends of the closure are apart along the axes, m."""
         cut = self.loop.cut
         if cut is None:
             return 0.0
-        first, second = (self.world(bar, cut) for bar in PINS[cut])
+        first, second = (self.locate(bar, cut) for bar in PINS[cut])
         return abs(float((first - second) @ self.normal))

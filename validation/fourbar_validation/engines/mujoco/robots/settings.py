@@ -27,7 +27,6 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     TriedSettings,
     divide,
 )
-from fourbar_validation.engines.mujoco.robots.drive import FileCylinder, LoopDrive
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile, RobotLoop
 
@@ -114,20 +113,12 @@ class SettingsSearch:
     """Settings tried on one loop of a robot, for one motion."""
 
     def __init__(
-        self,
-        model: mujoco.MjModel,
-        loop: RobotLoop,
-        motion: LoopMotion,
-        drive: LoopDrive | FileCylinder | None = None,
-        share: float = 1.0,
+        self, inside: LoopInside, motion: LoopMotion, share: float = 1.0
     ) -> None:
-        self.model = model
-        self.drive = drive
-        self.loop = loop
-        self.lever = LoopInside(model, loop, drive).lever
+        self.inside = inside
         self.whole = motion
         self.motion = motion.thin_out(POSITIONS_OF_A_TRIAL)
-        self.own = read_settings(model, loop)
+        self.own = read_settings(inside.given, inside.loop)
         self.tried: dict[RobotSettings, TriedSettings] = {}
         self.end = time.process_time() + SEARCH_SECONDS * share
 
@@ -136,11 +127,11 @@ class SettingsSearch:
         before = self.measure(self.own)
         alone = sorted(map(self.measure, self._list_alone()), key=lambda one: one.error)
         best, reached = self._find_cheapest(wanted)
-        typed = _write_elements(file, self.loop, best)
+        typed = _write_elements(file, self.inside.loop, best)
         within = None if reached else self.find_range(best.settings, wanted)
         return SettingsAdvice(
             wanted,
-            len(self.motion.theta_2),
+            len(self.motion.angle),
             before,
             tuple(alone),
             best,
@@ -159,12 +150,13 @@ class SettingsSearch:
         One that takes too many steps is left out, as are those after it, and so are all
         where the settings tear the loop.
         """
-        changed = _set_settings(self.model, self.loop, settings)
-        inside = LoopInside(changed, self.loop, self.drive)
+        given = self.inside
+        changed = _set_settings(given.given, given.loop, settings)
+        inside = LoopInside(changed, given.loop, given.acting, bar=given.bar)
         answers = []
         with suppress(LimitError):
-            answers.append(inside.answer_states(*motion))
-            answers.append(inside.answer_through_time(*motion))
+            answers.append(inside.answer_states(motion))
+            answers.append(inside.answer_through_time(motion))
         return answers
 
     def find_deciding(self, settings: RobotSettings) -> DecidingState | None:
@@ -172,13 +164,13 @@ class SettingsSearch:
         answers = self._answer(settings, self.motion)
         if len(answers) < 2 or answers[1].lost:
             return None
-        scales = answers[0].scales(self.lever)
+        scales = answers[0].scales(self.inside.lever)
         states = [
             DecidingState(
                 answer is answers[1],
                 name,
                 row.joint,
-                row.theta_2,
+                row.angle,
                 divide(float(error), scales[name]),
             )
             for answer in answers
@@ -198,7 +190,7 @@ class SettingsSearch:
         answers = self._answer(settings, self.whole)
         if len(answers) < 2 or answers[1].lost:
             return None
-        states, through = ({row.theta_2: row for row in one.rows} for one in answers)
+        states, through = ({row.angle: row for row in one.rows} for one in answers)
         places = sorted(states)
         ranges = combinations(range(len(places)), 2)
         tried = 0
@@ -212,13 +204,13 @@ class SettingsSearch:
             ]
             if last - first < 2 or tried == RANGES_TRIED:
                 return None
-            scales = parts[0].scales(self.lever)
+            scales = parts[0].scales(self.inside.lever)
             if max(part.find_worst(scales) for part in parts) > wanted:
                 continue
             tried += 1
             inside = tuple(places[first : last + 1])
-            motion = self.whole._replace(theta_2=inside)
-            search = SettingsSearch(self.model, self.loop, motion, self.drive)
+            motion = self.whole._replace(angle=inside)
+            search = SettingsSearch(self.inside, motion)
             if search.measure(settings).error <= wanted:
                 ends = [states[place].joint for place in (low, high)]
                 return min(ends), max(ends)
@@ -231,7 +223,7 @@ class SettingsSearch:
         states = through = gap = seconds = math.inf
         answers = self._answer(settings, self.motion)
         if answers:
-            scales = answers[0].scales(self.lever)
+            scales = answers[0].scales(self.inside.lever)
             states = answers[0].find_worst(scales)
         if len(answers) == 2:
             answer = answers[1]

@@ -1,0 +1,63 @@
+"""A loop in a state of its model: axes of its plane, pins and lines of its bars."""
+
+import math
+
+import mujoco
+import numpy as np
+
+from fourbar.linkage import ENDS, FIRST_PIN
+from fourbar.quantities import Array
+from fourbar_validation.engines.mujoco.robots.loop import RobotLoop
+
+
+class LoopFrame:
+    """Plane of a loop in a state whose kinematics are evaluated."""
+
+    def __init__(
+        self, loop: RobotLoop, data: mujoco.MjData, turned: float = 0.0
+    ) -> None:
+        """Take axes that are turned by an angle in the plane of the loop, rad."""
+        self.loop = loop
+        self.data = data
+        ground = data.xmat[loop.bodies[1][0]].reshape(3, 3)
+        self.normal = ground @ loop.axis
+        along = ground @ loop.along
+        across = np.cross(self.normal, along)
+        cos = math.cos(turned)
+        sin = math.sin(turned)
+        self.axes = np.array([cos * along + sin * across, cos * across - sin * along])
+        """x and y in world axes, (2, 3)."""
+
+    def in_plane(self, vector: Array) -> Array:
+        """Project a vector of the world on the plane, (2,)."""
+        return np.asarray(self.axes @ vector)
+
+    def locate(self, bar: int, pin: str) -> Array:
+        """Locate a pin of a bar in world axes, (3,), m."""
+        body = self.loop.bodies[bar][0]
+        turn = self.data.xmat[body].reshape(3, 3)
+        return np.asarray(self.data.xpos[body] + turn @ self.loop.points[bar, pin])
+
+    def line(self, bar: int) -> Array:
+        """Return a bar's line in the plane, first pin to second, (2,), m."""
+        first, second = (self.locate(bar, pin) for pin in ENDS[bar])
+        return self.in_plane(second - first)
+
+    def angle(self, bar: int) -> float:
+        """Return the angle of a bar's line, rad."""
+        x, y = self.line(bar)
+        return math.atan2(y, x)
+
+    def resolve(self, bar: int, vector: Array) -> tuple[float, float]:
+        """Resolve a vector of the world along a bar's line and to its left."""
+        x, y = self.in_plane(vector)
+        along, left = self.line(bar)
+        size = math.hypot(along, left)
+        return (
+            float(along * x + left * y) / size,
+            float(along * y - left * x) / size,
+        )
+
+    def along_bar(self, bar: int, place: Array) -> tuple[float, float]:
+        """Return (along, to the left) of a place from a bar's first pin, m."""
+        return self.resolve(bar, place - self.locate(bar, FIRST_PIN[bar]))
