@@ -242,7 +242,7 @@ def _describe_pin(seen: SeenLoop, pin: str) -> Described:
             )
     if described[f"{key}.stiffness"].value:
         described[f"{key}.spring angle"] = ModelEntry(
-            seen.spring_angle(pin),
+            seen.rest_angle(pin, spring=True),
             element,
             "springref",
         )

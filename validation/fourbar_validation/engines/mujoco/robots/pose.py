@@ -25,6 +25,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
 )
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
 from fourbar_validation.engines.mujoco.robots.planes import (
+    copy_for_closures,
     find_normals,
     project_closures,
     resolve_normals,
@@ -71,7 +72,8 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
         kind.
     """
     stated, origin = _choose_start(model, options)
-    fixed = {find_joint(model, name, "--hold") for name in options.held}
+    held = {find_joint(model, name, "--hold") for name in options.held}
+    fixed = {*held}
     for name, text in options.joints.items():
         joint = find_joint(model, name, "--pose")
         unit = JOINT_UNITS.get(int(model.jnt_type[joint]))
@@ -79,23 +81,17 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
             raise InputError("--pose", f"{name}={text}", "must be a hinge or a slide")
         stated[model.jnt_qposadr[joint]] = _read_joint_position(name, text, unit)
         fixed.add(joint)
-    held = {find_joint(model, name, "--hold") for name in options.held}
     closing = _Closing(model, fixed, held)
     tied = {*closing.joints, *fixed}
     outside = [joint for joint in _find_outside(model, stated) if joint in tied]
-    names = _list_some([name_joint(model, joint) for joint in outside])
+    notes: list[str] = []
     if outside:
-        notes = [f"outside their ranges {origin}: {names}"]
-    else:
-        notes = []
+        names = _list_some([name_joint(model, joint) for joint in outside])
+        notes.append(f"outside their ranges {origin}: {names}")
     before = closing.size(stated)
     if before <= CLOSED_IN_THE_FILE and not set(outside) - fixed:
-        return PosedRobot(
-            model,
-            _evaluate_kinematics(model, stated),
-            stated,
-            tuple(notes),
-        )
+        data = _evaluate_kinematics(model, stated)
+        return PosedRobot(model, data, stated, tuple(notes))
     motors = {joint for joint, _ in list_motors(model)} - set(outside)
     passive = _Closing(model, fixed | motors, held)
     closed = passive.close(stated)
@@ -107,13 +103,9 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
         notes.append(f"the loops are closed again by least squares: {', '.join(moved)}")
     elif after > LARGEST_RESIDUAL:
         left = f"what is left is {1e3 * after:.3g} mm or mrad"
-        notes.append(_say_open(model, options, stated, left))
-    return PosedRobot(
-        model,
-        _evaluate_kinematics(model, closed),
-        stated,
-        tuple(notes),
-    )
+        notes.append(_say_open(model, options, stated, held, left))
+    data = _evaluate_kinematics(model, closed)
+    return PosedRobot(model, data, stated, tuple(notes))
 
 
 def _list_moved(model: mujoco.MjModel, stated: Array, closed: Array) -> list[str]:
@@ -141,6 +133,7 @@ def _say_open(
     model: mujoco.MjModel,
     options: PoseOptions,
     stated: Array,
+    held: set[int],
     left: str,
 ) -> str:
     """Say why no pose near the stated one closes all loops.
@@ -148,7 +141,6 @@ def _say_open(
     Joints that --pose states are held, which is the reason where no joint has a range
     and the loops close without that.
     """
-    held = {find_joint(model, name, "--hold") for name in options.held}
     free = _Closing(model, held, held)
     closes = free.size(free.close(stated)) <= LARGEST_RESIDUAL
     ranges = any(model.jnt_limited[joint] for joint in free.joints)
@@ -167,12 +159,8 @@ def _say_open(
 
 def move_to(posed: PosedRobot, qpos: Array) -> PosedRobot:
     """Return a robot whose loops are closed in another pose."""
-    return PosedRobot(
-        posed.model,
-        _evaluate_kinematics(posed.model, qpos),
-        qpos,
-        posed.notes,
-    )
+    data = _evaluate_kinematics(posed.model, qpos)
+    return PosedRobot(posed.model, data, qpos, posed.notes)
 
 
 def find_joint(
@@ -194,14 +182,9 @@ def find_joint(
 def _find_outside(model: mujoco.MjModel, qpos: Array) -> list[int]:
     """List the hinges and slides that are outside their ranges."""
     low, high = _list_bounds(model)
-    outside = []
-    for joint in range(model.njnt):
-        if int(model.jnt_type[joint]) in JOINT_UNITS:
-            value = qpos[model.jnt_qposadr[joint]]
-            dof = model.jnt_dofadr[joint]
-            if not low[dof] - OUTSIDE_A_RANGE <= value <= high[dof] + OUTSIDE_A_RANGE:
-                outside.append(joint)
-    return outside
+    outside = (qpos < low - OUTSIDE_A_RANGE) | (qpos > high + OUTSIDE_A_RANGE)
+    joints: list[int] = np.flatnonzero(outside[model.jnt_qposadr]).tolist()
+    return joints
 
 
 def _choose_start(model: mujoco.MjModel, options: PoseOptions) -> tuple[Array, str]:
@@ -241,13 +224,12 @@ def _read_joint_position(
 
 
 def _list_bounds(model: mujoco.MjModel) -> tuple[Array, Array]:
-    """Return the range of each degree of freedom, (nv,) each; infinite if unlimited."""
-    low = np.full(model.nv, -np.inf)
-    high = np.full(model.nv, np.inf)
-    for joint in range(model.njnt):
-        if model.jnt_limited[joint] and int(model.jnt_type[joint]) in JOINT_UNITS:
-            dof = model.jnt_dofadr[joint]
-            low[dof], high[dof] = model.jnt_range[joint]
+    """Return the range of each position, (nq,) each; infinite if unlimited."""
+    low = np.full(model.nq, -np.inf)
+    high = np.full(model.nq, np.inf)
+    limited = np.isin(model.jnt_type, [*JOINT_UNITS]) & (model.jnt_limited != 0)
+    addresses = model.jnt_qposadr[limited]
+    low[addresses], high[addresses] = model.jnt_range[limited].T
     return low, high
 
 
@@ -261,11 +243,8 @@ def _evaluate_kinematics(model: mujoco.MjModel, qpos: Array) -> mujoco.MjData:
 
 
 def _list_some(names: list[str], most: int = 6) -> str:
-    if len(names) > most:
-        more = f" and {len(names) - most} more"
-    else:
-        more = ""
-    return ", ".join(names[:most]) + more
+    listed = ", ".join(names[:most])
+    return f"{listed} and {len(names) - most} more" if names[most:] else listed
 
 
 class _Closing:
@@ -282,7 +261,11 @@ class _Closing:
         `fixed`: joints that closing does not move; `held`: those of them that are no
         joints of a loop.
         """
-        self.model = _copy_for_equalities(model)
+        active = np.flatnonzero(model.eq_active0)
+        self.model = copy_for_closures(model, active.tolist())
+        enabled = mujoco.mjtDisableBit.mjDSBL_EQUALITY
+        enabled |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+        self.model.opt.disableflags &= ~int(enabled)
         self.held = held
         self.data = mujoco.MjData(self.model)
         self.low, self.high = _list_bounds(model)
@@ -291,78 +274,52 @@ class _Closing:
         ]
         self.dofs = [dof for joint in self.joints for dof in list_dofs(model, joint)]
 
-    def _residuals(self) -> tuple[Array, Array]:
+    def _evaluate(self, qpos: Array) -> tuple[Array, Array]:
         """Return the equalities' residuals, (m,), and their Jacobian, (m, nv)."""
         data = self.data
+        data.qpos[:] = qpos
+        mujoco.mj_fwdPosition(self.model, data)
         if not data.nefc:
             return np.zeros(0), np.zeros((0, self.model.nv))
-        rows = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
-        jacobian = data.efc_J.reshape(-1, self.model.nv)[: data.nefc]
+        normals = find_normals(self.model, data, self.held)
         return project_closures(
-            data.efc_pos[: data.nefc][rows],
-            jacobian[rows],
-            data.efc_id[: data.nefc][rows],
-            resolve_normals(
-                self.model, data, find_normals(self.model, data, self.held)
-            ),
+            data.efc_pos[: data.nefc],
+            data.efc_J.reshape(-1, self.model.nv)[: data.nefc],
+            data.efc_id[: data.nefc],
+            resolve_normals(self.model, data, normals),
         )
-
-    def _move_to(self, qpos: Array) -> tuple[Array, Array]:
-        self.data.qpos[:] = qpos
-        mujoco.mj_fwdPosition(self.model, self.data)
-        return self._residuals()
 
     def size(self, qpos: Array) -> float:
         """Return the largest residual in a pose, m or rad."""
-        residuals, _ = self._move_to(qpos)
+        residuals, _ = self._evaluate(qpos)
         return float(np.abs(residuals).max(initial=0.0))
 
     def close(self, start: Array) -> Array:
         """Return the pose near `start` of least residuals in the ranges, (nq,)."""
         from scipy.optimize import lsq_linear
 
-        qpos = self._bring_inside(start)
+        qpos = start.copy()
+        joints = self.model.dof_jntid[self.dofs]
+        places = self.model.jnt_qposadr[joints]
+        low, high = self.low[places], self.high[places]
+        qpos[places] = np.clip(qpos[places], low, high)
         if not self.dofs:
             return qpos
         damping = _DAMPING * np.eye(len(self.dofs))
         for _ in range(MOST_NEWTON_STEPS):
-            residuals, jacobian = self._move_to(qpos)
+            residuals, jacobian = self._evaluate(qpos)
             if np.abs(residuals).max(initial=0.0) <= 1e-3 * CLOSED_IN_THE_FILE:
                 break
             matrix = np.vstack([jacobian[:, self.dofs], damping])
             wanted = np.concatenate([-residuals, np.zeros(len(self.dofs))])
-            low, high = self._list_room(qpos)
+            room = (  # scipy asks for some on both sides
+                np.clip(low - qpos[places], -LONGEST_NEWTON_STEP, -1e-15),
+                np.clip(high - qpos[places], 1e-15, LONGEST_NEWTON_STEP),
+            )
             step = np.zeros(self.model.nv)
-            step[self.dofs] = lsq_linear(matrix, wanted, (low, high)).x
+            step[self.dofs] = lsq_linear(matrix, wanted, room).x
             mujoco.mj_integratePos(self.model, qpos, step, 1.0)
         return qpos
-
-    def _bring_inside(self, start: Array) -> Array:
-        """Return the pose with every joint that may move inside its range."""
-        qpos = start.copy()
-        for joint in self.joints:
-            if int(self.model.jnt_type[joint]) in JOINT_UNITS:
-                address = self.model.jnt_qposadr[joint]
-                dof = int(self.model.jnt_dofadr[joint])
-                qpos[address] = np.clip(qpos[address], self.low[dof], self.high[dof])
-        return qpos
-
-    def _list_room(self, qpos: Array) -> tuple[Array, Array]:
-        """Return how far each unknown may step down and up."""
-        low = np.full(len(self.dofs), -LONGEST_NEWTON_STEP)
-        high = np.full(len(self.dofs), LONGEST_NEWTON_STEP)
-        place = {dof: number for number, dof in enumerate(self.dofs)}
-        for joint in self.joints:
-            if int(self.model.jnt_type[joint]) in JOINT_UNITS:
-                dof = int(self.model.jnt_dofadr[joint])
-                value = qpos[self.model.jnt_qposadr[joint]]
-                # scipy asks for room on both sides
-                down = min(self.low[dof] - value, -1e-15)
-                up = max(self.high[dof] - value, 1e-15)
-                number = place[dof]
-                low[number] = max(low[number], down)
-                high[number] = min(high[number], up)
-        return low, high
 
 
 def _list_tied_joints(model: mujoco.MjModel) -> list[int]:
@@ -379,20 +336,3 @@ def _list_tied_joints(model: mujoco.MjModel) -> list[int]:
             tied = (int(model.eq_obj1id[number]), int(model.eq_obj2id[number]))
             joints.update(joint for joint in tied if joint >= 0)
     return sorted(joints)
-
-
-def _copy_for_equalities(model: mujoco.MjModel) -> mujoco.MjModel:
-    """Copy a model so that its equalities are the only constraints.
-
-    The Jacobian is dense.
-    """
-    from copy import copy
-
-    alone = copy(model)
-    alone.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-    for name in ("CONTACT", "LIMIT", "FRICTIONLOSS", "ISLAND"):
-        alone.opt.disableflags |= int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
-    enabling = int(mujoco.mjtDisableBit.mjDSBL_EQUALITY)
-    enabling |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
-    alone.opt.disableflags &= ~enabling
-    return alone

@@ -7,7 +7,8 @@ counts with its mass. What a scene cannot hold is named with its size.
 import cmath
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -28,7 +29,6 @@ from fourbar.scene.motion import BRANCH_NAMES, CROSSED, OPEN, Motion, Sweep
 from fourbar.solving import solve
 from fourbar_validation.engines.free_body_closure import close
 from fourbar_validation.engines.mujoco.robots.ancestry import (
-    climb,
     describe_actuator,
     is_enabled,
     list_lifted_masses,
@@ -47,7 +47,6 @@ from fourbar_validation.engines.mujoco.robots.compiled import (
     list_unknown_parts,
 )
 from fourbar_validation.engines.mujoco.robots.digits import meet_lengths
-from fourbar_validation.engines.mujoco.robots.frame import LoopFrame
 from fourbar_validation.engines.mujoco.robots.inside import reflect
 from fourbar_validation.engines.mujoco.robots.loop import (
     FLAT,
@@ -61,6 +60,7 @@ from fourbar_validation.engines.mujoco.robots.pose import (
     PosedRobot,
     pose_robot,
 )
+from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
 
 DIGITS_OF_A_MODEL = 12
 """Significant digits of a number of the scene. Those beyond are round-off of the
@@ -140,22 +140,6 @@ def make_loop_scene(
         tuple(remarks),
         (),
     )
-
-
-def _list_carried(model: mujoco.MjModel, loop: RobotLoop) -> dict[int, list[int]]:
-    """Return the bodies that move with each moving bar, by the bar's number.
-
-    Bodies that hang on the bar by held joints are included.
-    """
-    bar_of = {body: bar for bar, bodies in loop.bodies.items() for body in bodies}
-    carried: dict[int, list[int]] = {bar: [] for bar in MOVING_BARS}
-    for body in range(1, model.nbody):
-        for above in climb(model, body):
-            if above in bar_of:
-                if bar_of[above] != 1:
-                    carried[bar_of[above]].append(body)
-                break
-    return carried
 
 
 def _reflect_armature(model: mujoco.MjModel, joint: int) -> float:
@@ -242,8 +226,7 @@ def is_seen_from_behind(scene: Scene, angles: Sequence[float]) -> bool:
     return missed_behind < missed - _SAME_OUTPUT
 
 
-@dataclass(frozen=True, slots=True)
-class _Lump:
+class _Lump(NamedTuple):
     """Bodies that a bar carries, as one rigid body in the plane."""
 
     mass: float
@@ -266,9 +249,9 @@ class SceneOfLoop:
         self.model = posed.model
         self.data = posed.data
         self.loop = loop
-        self.frame = LoopFrame(loop, posed.data)
+        self.seen = SeenLoop(posed.model, loop, 0.0)
         self.remarks: list[str] = []
-        self.carried = _list_carried(self.model, loop)
+        self.carried = {bar: self.seen.list_parts(bar) for bar in MOVING_BARS}
         bodies = {body for carried in self.carried.values() for body in carried}
         parts = list_unknown_parts(compiled, bodies)
         if parts:
@@ -325,13 +308,13 @@ class SceneOfLoop:
             bars[4],
             theta_1,
         )
-        path = self._find_sweep(linkage)
-        whole = math.tau * math.ceil((-math.pi - path.start) / math.tau)
-        start, stop = (_round_angle(end + whole) for end in (path.start, path.stop))
+        *ends, at_start = self._find_sweep(linkage)
+        whole = math.tau * math.ceil((-math.pi - ends[0]) / math.tau)
+        start, stop = (_round_angle(end + whole) for end in ends)
         theta_2 = Sweep(start, stop, SWEEP_INTERVALS) if stop > start else start
         branch = self._find_branch(linkage, self.loop.angles[1] + whole)
         motion = Motion(theta_2, speed, branch=branch)
-        effects = tuple(self._list_effects(armature, path.betas))
+        effects = tuple(self._list_effects(armature, at_start))
         self._remark_what_is_left_out(lumps)
         return Scene(
             linkage,
@@ -361,14 +344,14 @@ class SceneOfLoop:
         return met
 
     def _in_plane(self, vector: Array) -> complex:
-        return complex(*self.frame.in_plane(vector))
+        return complex(*self.seen.in_plane(vector))
 
     def _find_polar(self, bar: int, place: Array) -> tuple[float, float]:
         """Return a place from the first pin of a bar: distance, m, and angle, rad.
 
         The angle is from the bar's line.
         """
-        arm = complex(*self.frame.along_bar(bar, place))
+        arm = complex(*self.seen.along_bar(bar, place))
         if abs(arm) <= ROUND_OFF_OF_LOADS * self.loop.lengths[bar - 1]:
             return 0.0, 0.0
         return cmath.polar(arm)
@@ -385,7 +368,7 @@ class SceneOfLoop:
         centre = masses @ data.xipos[bodies] / mass
         inertia = 0.0
         for body, body_mass in zip(bodies, masses, strict=True):
-            axis = data.ximat[body].reshape(3, 3).T @ self.frame.normal
+            axis = data.ximat[body].reshape(3, 3).T @ self.seen.normal
             arm = self._in_plane(data.xipos[body] - centre)
             inertia += float(axis**2 @ model.body_inertia[body])
             inertia += float(body_mass) * abs(arm) ** 2
@@ -415,7 +398,7 @@ class SceneOfLoop:
     def _list_effects(
         self,
         armature: dict[str, float],
-        betas: dict[str, tuple[float, float]],
+        at_start: dict[str, float],
     ) -> Iterator[Effect]:
         """List the effects, the pins in their order."""
         model = self.model
@@ -438,7 +421,7 @@ class SceneOfLoop:
             yield Viscous(tuple(damping))
         if friction:
             yield Friction(tuple(friction))
-        springs = tuple(self._list_springs(hinges, betas))
+        springs = tuple(self._list_springs(hinges, at_start))
         if springs:
             yield Torsion(springs)
         if armature.get("O2"):
@@ -447,7 +430,7 @@ class SceneOfLoop:
     def _list_springs(
         self,
         hinges: dict[str, int],
-        betas: dict[str, tuple[float, float]],
+        at_start: dict[str, float],
     ) -> Iterator[tuple[str, float, float, float]]:
         """List pin, stiffness, rest angle and preload of the hinges' springs.
 
@@ -455,25 +438,16 @@ class SceneOfLoop:
         couple of whole turns beyond is a preload.
         """
         model = self.model
-        loop = self.loop
         if not is_enabled(model, "spring", "passive"):
             return
         for pin, joint in hinges.items():
             stiffness = float(model.jnt_stiffness[joint])
             if not stiffness:
                 continue
-            address = model.jnt_qposadr[joint]
-            wound = float(loop.qpos[address] - model.qpos_spring[address])
-            in_pose, at_start = betas[pin]
-            rest = in_pose - loop.senses[pin] * wound
-            turns = math.tau * round((at_start - rest) / math.tau)
-            angle = math.remainder(rest, math.tau)
-            yield (
-                pin,
-                round_off(stiffness),
-                _round_angle(angle),
-                round_off(stiffness * turns),
-            )
+            rest = self.seen.rest_angle(pin, spring=True)
+            turns = math.tau * round((at_start[pin] - rest) / math.tau)
+            angle = _round_angle(math.remainder(rest, math.tau))
+            yield pin, round_off(stiffness), angle, round_off(stiffness * turns)
 
     def _list_loads(self) -> Iterator[Load]:
         """Yield the forces by which bodies are held against gravity (gravcomp).
@@ -494,16 +468,18 @@ class SceneOfLoop:
             from_pin = (round_off(place[0]), _round_angle(place[1]))
             yield Load(bar, (size, angle), from_pin=from_pin)
 
-    def _find_sweep(self, linkage: FourBar) -> "_MotionOverRange":
+    def _find_sweep(self, linkage: FourBar) -> tuple[float, float, dict[str, float]]:
         """Follow the loop over the range of the driven hinge.
 
         The range ends where the loop does not assemble or another hinge stops it.
+        Return theta_2 at its ends, rad, and the angle between the bars of each pin at
+        the first of them, rad.
         """
         theta_2 = self.loop.angles[1]
-        low, high = self._find_range("O2", theta_2)
-        first, last = _find_assembling(linkage, theta_2)
-        low = max(low, first)
-        high = min(high, last)
+        low, high = _find_assembling(linkage, theta_2)
+        if stops := self.seen.stops("O2"):
+            low = max(low, stops[0] + self.loop.angles[0])
+            high = min(high, stops[1] + self.loop.angles[0])
         if math.isinf(low) and math.isinf(high):
             low = theta_2
             high = theta_2 + math.tau
@@ -515,20 +491,18 @@ class SceneOfLoop:
         in_pose = int(np.searchsorted(angles, theta_2))
         betas = self._follow(linkage, angles, in_pose)
         free = (angles >= low) & (angles <= high)
-        stops = []
-        for pin in self.loop.hinges.keys() - {"O2"}:
-            beta = betas[pin]
-            least, most = self._find_range(pin, float(beta[in_pose]))
-            above = beta >= least - OUTSIDE_A_RANGE
-            below = beta <= most + OUTSIDE_A_RANGE
-            inside = above & below
+        stopping = []
+        for pin in betas.keys() - {"O2"}:
+            least, most = self.seen.stops(pin) or (-math.inf, math.inf)
+            above = betas[pin] >= least - OUTSIDE_A_RANGE
+            inside = above & (betas[pin] <= most + OUTSIDE_A_RANGE)
             if not inside[free].all():
-                stops.append(name_joint(self.model, self.loop.hinges[pin]))
+                stopping.append(name_joint(self.model, self.loop.hinges[pin]))
             free &= inside
-        if stops:
+        if stopping:
             self.remarks.append(
-                f"the range of {', '.join(sorted(stops))} ends the motion before that"
-                f" of {name_joint(self.model, self.loop.hinges['O2'])}"
+                f"the range of {', '.join(sorted(stopping))} ends the motion before"
+                f" that of {name_joint(self.model, self.loop.joint)}"
             )
         if not free.any():
             raise InputError(
@@ -536,28 +510,9 @@ class SceneOfLoop:
                 self.loop.name,
                 "no position is within the ranges of its hinges",
             )
-        rows = _find_run(free, in_pose)
-        first = rows[0]
-        last = rows[-1]
-        return _MotionOverRange(
-            start=float(angles[first]),
-            stop=float(angles[last]),
-            betas={pin: (beta[in_pose], beta[first]) for pin, beta in betas.items()},
-        )
-
-    def _find_range(self, pin: str, beta: float) -> tuple[float, float]:
-        """Return the angles between the bars of a pin at which its hinge stops, rad.
-
-        `beta`: the angle in the pose.
-        """
-        model = self.model
-        loop = self.loop
-        joint = loop.hinges[pin]
-        if not model.jnt_limited[joint] or not is_enabled(model, "limit", "constraint"):
-            return -math.inf, math.inf
-        now = loop.qpos[model.jnt_qposadr[joint]]
-        ends = beta + loop.senses[pin] * (model.jnt_range[joint] - now)
-        return float(min(ends)), float(max(ends))
+        first, last = _find_run(free, in_pose)
+        at_start = {pin: float(beta[first]) for pin, beta in betas.items()}
+        return float(angles[first]), float(angles[last]), at_start
 
     def _follow(
         self,
@@ -565,17 +520,22 @@ class SceneOfLoop:
         angles: Array,
         in_pose: int,
     ) -> dict[str, Array]:
-        """Return the continuous angle between each pin's bars along theta_2, rad."""
+        """Return the angle between the bars of each hinge along theta_2, rad.
+
+        Continuous angles are counted from those of the loop in its pose.
+        """
         branch = self._find_branch(linkage, self.loop.angles[1])
-        motion = Motion(angles, branch=branch)
-        solution = solve(Scene(linkage, motion), "position")
-        thetas = {
-            1: np.full_like(angles, linkage.ground_angle),
-            2: angles,
-            3: solution.theta_3,
-            4: solution.theta_4,
-        }
-        return {pin: thetas[j] - thetas[i] for pin, (i, j) in PINS.items()}
+        solution = solve(Scene(linkage, Motion(angles, branch=branch)), "position")
+        ground = np.full_like(angles, linkage.ground_angle)
+        thetas = [ground, angles, solution.theta_3, solution.theta_4]
+        betas = {}
+        for pin in self.loop.hinges:
+            first, second = (bar - 1 for bar in PINS[pin])
+            beta = np.asarray(thetas[second]) - np.asarray(thetas[first])
+            drawn = self.loop.angles[second] - self.loop.angles[first]
+            turns = round((drawn - float(beta[in_pose])) / math.tau)
+            betas[pin] = beta + math.tau * turns
+        return betas
 
     def _find_branch(self, linkage: FourBar, theta_2: float) -> int:
         """Return the branch whose output stands as in the pose.
@@ -613,7 +573,7 @@ class SceneOfLoop:
         """Name what acts on the loop and is not in the scene."""
         model = self.model
         loop = self.loop
-        across = float(self.gravity @ self.frame.normal)
+        across = float(self.gravity @ self.seen.normal)
         weights = {bar: abs(lump.mass * across) for bar, lump in lumps.items()}
         if abs(across) > _ACROSS * float(np.linalg.norm(self.gravity)):
             texts = ", ".join(
@@ -660,22 +620,13 @@ class SceneOfLoop:
         model = self.model
         bodies = {b for c in self.carried.values() for b in c}
         joints = {*self.loop.hinges.values()}
-        for number in range(model.ntendon):
-            start = int(model.tendon_adr[number])
-            touches = False
-            for wrap in range(start, start + int(model.tendon_num[number])):
-                kind = mujoco.mjtWrap(int(model.wrap_type[wrap]))
-                target = int(model.wrap_objid[wrap])
-                if kind == mujoco.mjtWrap.mjWRAP_JOINT:
-                    touches |= target in joints
-                elif kind == mujoco.mjtWrap.mjWRAP_SITE:
-                    touches |= int(model.site_bodyid[target]) in bodies
+        for number in filter(self.seen.touches_tendon, range(model.ntendon)):
             acts = []
             for name in ("stiffness", "damping", "frictionloss"):
                 values = getattr(model, f"tendon_{name}")[number]
                 if np.any(values):
                     acts.append(f"{name} {float(np.max(values)):.6g}")
-            if touches and acts:
+            if acts:
                 name = model.tendon(number).name or str(number)
                 self._leave_out(f"the tendon {name} ({', '.join(acts)})")
         for number in range(model.nu):
@@ -686,33 +637,16 @@ class SceneOfLoop:
                 kind == mujoco.mjtTrn.mjTRN_SITE
                 and int(model.site_bodyid[target]) in bodies
             )
-            if on_site or (on_joint and target != self.loop.hinges["O2"]):
+            if on_site or (on_joint and target != self.loop.joint):
                 self._leave_out(describe_actuator(model, number))
 
 
-@dataclass(frozen=True, slots=True)
-class _MotionOverRange:
-    """Motion of a loop over its range."""
-
-    start: float
-    stop: float
-    betas: dict[str, tuple[float, float]]
-    """Angle between the bars of each pin, rad, in the pose and where the path starts.
-    """
-
-
-def _find_run(free: NDArray[np.bool_], near: int) -> NDArray[np.intp]:
-    """Return the indices of the run of True that is nearest to an index."""
+def _find_run(free: NDArray[np.bool_], near: int) -> tuple[int, int]:
+    """Return the ends of the run of True that is nearest to an index."""
     edges = np.flatnonzero(np.diff(free)) + 1
-    best: NDArray[np.intp] | None = None
-    least = math.inf
-    for run in np.split(np.arange(len(free)), edges):
-        distance = int(np.abs(run - near).min())
-        if free[run[0]] and distance < least:
-            best = run
-            least = distance
-    assert best is not None
-    return np.asarray(best)
+    runs = [run for run in np.split(np.arange(len(free)), edges) if free[run[0]]]
+    nearest = min(runs, key=lambda run: int(np.abs(run - near).min()))
+    return int(nearest[0]), int(nearest[-1])
 
 
 def _find_assembling(linkage: FourBar, theta_2: float) -> tuple[float, float]:

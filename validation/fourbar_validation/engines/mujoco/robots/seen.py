@@ -120,12 +120,12 @@ class SeenLoop(LoopFrame):
         """
         model = self.model
         joint = self.hinge[pin]
-        if not model.jnt_limited[joint] or not is_enabled(model, "limit"):
+        if not model.jnt_limited[joint] or not is_enabled(model, "limit", "constraint"):
             return None
-        ends = [self._angle_at(pin, end) for end in model.jnt_range[joint]]
+        ends = [self.angle_at(pin, end) for end in model.jnt_range[joint]]
         return min(ends), max(ends)
 
-    def _angle_at(self, pin: str, position: float) -> float:
+    def angle_at(self, pin: str, position: float) -> float:
         """Return the angle between the bars of a pin at a position of its hinge."""
         first, second = PINS[pin]
         angles = self.loop.angles
@@ -133,15 +133,13 @@ class SeenLoop(LoopFrame):
         turned = self.sense[pin] * (position - now)
         return float(angles[second - 1] - angles[first - 1] + turned)
 
-    def rest_angle(self, pin: str) -> float:
-        """Return the angle between the bars of a pin in the rest state, rad."""
-        address = self.model.jnt_qposadr[self.hinge[pin]]
-        return self._angle_at(pin, self.model.qpos0[address])
+    def rest_angle(self, pin: str, spring: bool = False) -> float:
+        """Return the angle between the bars of a pin in the rest state, rad.
 
-    def spring_angle(self, pin: str) -> float:
-        """Return the angle at which the spring of a hinge exerts nothing, rad."""
-        address = self.model.jnt_qposadr[self.hinge[pin]]
-        return self._angle_at(pin, self.model.qpos_spring[address])
+        `spring`: where the spring of its hinge exerts nothing.
+        """
+        rest = self.model.qpos_spring if spring else self.model.qpos0
+        return self.angle_at(pin, rest[self.model.jnt_qposadr[self.hinge[pin]]])
 
     def measure_offset(self) -> float:
         """Return how far the ends of the closure are apart along the axes, m."""
