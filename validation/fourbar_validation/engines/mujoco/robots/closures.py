@@ -7,6 +7,7 @@ no joint parts, or a held one, are one bar.
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations, pairwise, permutations
 
 import mujoco
@@ -64,22 +65,13 @@ EQUALITY_KINDS = {
     for name in ("connect", "weld", "joint", "tendon")
 }
 JOINT_WORDS = {FREE_JOINT: "free", BALL: "ball", SLIDE: "slide"}
-HOW_MANY = {1: "one", 2: "two", 3: "three"}
+NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven")
 NAMES_OF_LINKAGES = {6: "a six-bar", 8: "an eight-bar"}
 _SERVE_SPATIAL = "MuJoCo or Drake serve it, Pinocchio its inverse dynamics"
 _SERVE_PLANAR = "MuJoCo or Drake serve it, PMKS+ for a sketch"
 """Tools for mechanisms that are no planar four-bar."""
 _MOST_HOLDS = 5
 """Further choices of joints to hold that are printed."""
-HINGES_IN_WORDS = {
-    1: "one hinge",
-    2: "two hinges",
-    3: "three hinges",
-    4: "four hinges",
-    5: "five hinges",
-    6: "six hinges",
-    7: "seven hinges",
-}
 
 
 def list_closures(
@@ -175,6 +167,11 @@ def name_body(model: mujoco.MjModel, body: int) -> str:
     return model.body(body).name or f"body {body}"
 
 
+def _write_number(number: int, most: int = 7) -> str:
+    """Write a number as a word up to a largest one."""
+    return NUMBERS[number] if number <= most else str(number)
+
+
 def _measure_gap(
     ends: tuple[ClosureEnd, ClosureEnd],
     normal: Array | None = None,
@@ -240,9 +237,16 @@ class _Chain:
         return side
 
     @property
-    def kinds(self) -> list[int]:
-        """Types of the joints."""
-        return [int(self.model.jnt_type[joint]) for joint in self.joints]
+    def hinges(self) -> list[int]:
+        """Hinges among the joints."""
+        types = self.model.jnt_type
+        return [joint for joint in self.joints if types[joint] == HINGE_JOINT]
+
+    @property
+    def others(self) -> dict[int, int]:
+        """Type of each joint that is no hinge."""
+        types = {joint: int(self.model.jnt_type[joint]) for joint in self.joints}
+        return {joint: kind for joint, kind in types.items() if kind != HINGE_JOINT}
 
 
 class _Finder:
@@ -271,14 +275,18 @@ class _Finder:
         model = self.model
         name = self._name(number)
         kind = EQUALITY_KINDS.get(int(model.eq_type[number]), "flex")
-        solref = tuple(model.eq_solref[number].tolist())
-        solimp = tuple(model.eq_solimp[number].tolist())
+        found = RobotClosure(
+            name,
+            kind,
+            None,
+            f"a {kind} equality is no pin",
+            solref=tuple(model.eq_solref[number].tolist()),
+            solimp=tuple(model.eq_solimp[number].tolist()),
+        )
         if kind in ("joint", "tendon"):
-            text = self._describe_mimic(number, kind)
-            return RobotClosure(name, kind, None, text, solref=solref, solimp=solimp)
+            return replace(found, reason=self._describe_mimic(number, kind))
         if kind not in ("connect", "weld"):
-            text = f"a {kind} equality is no pin"
-            return RobotClosure(name, kind, None, text, solref=solref, solimp=solimp)
+            return found
         ends = find_ends(self.model, self.data, number)
         gap: float | None = None
         left: float | None = None
@@ -287,27 +295,20 @@ class _Finder:
             gap = _measure_gap(find_ends(self.model, self.before, number), normal)
             left = _measure_gap(ends, normal)
         chain = _Chain(self, ends[0].body, ends[1].body)
-        hinges = []
-        others = []
-        for joint, joint_kind in zip(chain.joints, chain.kinds, strict=True):
-            if joint_kind == HINGE_JOINT:
-                hinges.append(name_joint(model, joint))
-            else:
-                others.append(f"{name_joint(model, joint)} ({JOINT_WORDS[joint_kind]})")
         loop, reason = self._recognise(number, name, chain)
-        return RobotClosure(
-            name,
-            kind,
-            loop,
-            reason,
-            chain.ground_name,
-            tuple(hinges),
-            tuple(others),
-            self._measure_axes(chain)[0],
-            gap,
-            left,
-            solref,
-            solimp,
+        return replace(
+            found,
+            loop=loop,
+            reason=reason,
+            ground=chain.ground_name,
+            hinges=tuple(name_joint(model, joint) for joint in chain.hinges),
+            other_joints=tuple(
+                f"{name_joint(model, joint)} ({JOINT_WORDS[kind]})"
+                for joint, kind in chain.others.items()
+            ),
+            misaligned=self._measure_axes(chain)[0],
+            gap=gap,
+            left=left,
         )
 
     def _name(self, number: int) -> str:
@@ -379,16 +380,10 @@ class _Finder:
         Both ends of the bar that the ball carries stay in their planes, so that a hinge
         moves as the ball does. Empty where the loop is another.
         """
-        hinges = []
-        others = []
-        for joint, kind in zip(chain.joints, chain.kinds, strict=True):
-            if kind == HINGE_JOINT:
-                hinges.append(joint)
-            else:
-                others.append(joint)
-        kinds = [int(self.model.jnt_type[joint]) for joint in others]
+        others = chain.others
         pins = len(chain.joints) + is_pin
-        if kinds != [BALL] or pins != len(PINS) or self._find_skew_axes(chain):
+        is_one = [*others.values()] == [BALL] and pins == len(PINS)
+        if not is_one or self._find_skew_axes(chain):
             return ""
         (ball,) = others
         rest = mujoco.MjData(self.model)
@@ -398,7 +393,7 @@ class _Finder:
         mujoco.mj_kinematics(self.model, rest)
         body = int(self.model.jnt_bodyid[ball])
         # a joint states its axis in the frame of its body
-        axis = rest.xmat[body].reshape(3, 3).T @ rest.xaxis[hinges[0]]
+        axis = rest.xmat[body].reshape(3, 3).T @ rest.xaxis[chain.hinges[0]]
         numbers = " ".join(f"{part:.6g}" for part in np.round(axis, 12) + 0.0)
         typed = f'type="hinge" axis="{numbers}"'
         if self.model.jnt_limited[ball]:  # its range is not that of a hinge
@@ -415,29 +410,20 @@ class _Finder:
             BALL: f"is a ball joint: the loop is spatial ({_SERVE_SPATIAL})",
             SLIDE: f"is a slide: a slider-crank or of its kin ({_SERVE_PLANAR})",
         }
-        for joint, kind in zip(chain.joints, chain.kinds, strict=True):
-            if kind != HINGE_JOINT:
-                name = name_joint(self.model, joint)
-                return f"{name} {words[kind]}"
+        for joint, kind in chain.others.items():
+            return f"{name_joint(self.model, joint)} {words[kind]}"
         return ""
 
     def _measure_axes(self, chain: _Chain) -> tuple[float | None, str]:
         """Return the largest angle between two hinges' axes, rad, and which two."""
-        hinges = []
-        for joint, kind in zip(chain.joints, chain.kinds, strict=True):
-            if kind == HINGE_JOINT:
-                hinges.append(joint)
         largest: float | None = None
         names = ""
-        for one, other in combinations(hinges, 2):
-            across = np.cross(self.data.xaxis[one], self.data.xaxis[other])
-            sine = float(np.linalg.norm(across))
-            angle = math.asin(min(1.0, sine))
+        for pair in combinations(chain.hinges, 2):
+            across = np.cross(*self.data.xaxis[[*pair]])
+            angle = math.asin(min(1.0, float(np.linalg.norm(across))))
             if largest is None or angle > largest:
-                first = name_joint(self.model, one)
-                second = name_joint(self.model, other)
                 largest = angle
-                names = f"{first} and {second}"
+                names = " and ".join(name_joint(self.model, joint) for joint in pair)
         return largest, names
 
     def _find_skew_axes(self, chain: _Chain) -> str:
@@ -459,7 +445,7 @@ class _Finder:
     ) -> str:
         """Say what another number of hinges makes, and what makes it a four-bar."""
         freedoms = hinges - 3
-        count = HINGES_IN_WORDS.get(hinges, f"{hinges} hinges")
+        count = f"{_write_number(hinges)} hinge{'s' if hinges > 1 else ''}"
         if freedoms <= 0:
             if is_pin:
                 return f"{count} in a plane cannot move"
@@ -472,7 +458,7 @@ class _Finder:
         holds = self._list_holds(chain, motors, coupled, freedoms - 1)
         if not holds:
             return self._explain_coupling(number, chain, coupled)
-        text = f"{count} and {HOW_MANY.get(freedoms, freedoms)} freedoms"
+        text = f"{count} and {_write_number(freedoms, 3)} freedoms"
         if len(motors) > 1:
             motor_names = ", ".join(self._name_motor(*motor) for motor in motors)
             text += f", driven by {len(motors)} motors ({motor_names})"
@@ -482,16 +468,20 @@ class _Finder:
             text += f" (or {', '.join(others[:_MOST_HOLDS])})"
         return f"{text} makes it a four-bar"
 
+    def _list_others(self, number: int, *further: str) -> list[int]:
+        """List the other active connects and welds, and those of further kinds."""
+        kinds = ("connect", "weld", *further)
+        types = {n for n, kind in EQUALITY_KINDS.items() if kind in kinds}
+        of_kinds = np.isin(self.model.eq_type, [*types]) & (self.model.eq_active0 != 0)
+        return [other for other in np.flatnonzero(of_kinds).tolist() if other != number]
+
     def _find_coupled(self, number: int, chain: _Chain) -> dict[int, _Chain]:
         """Return the other closures whose loops move the same bars, with their chains.
 
         Loops that share bars with such a loop are among them.
         """
         chains = {number: chain}
-        for other in range(self.model.neq):
-            kind = EQUALITY_KINDS.get(int(self.model.eq_type[other]))
-            if not self.model.eq_active0[other] or kind not in ("connect", "weld"):
-                continue
+        for other in self._list_others(number):
             chains[other] = _Chain(self, *find_tied_bodies(self.model, other))
         joints = {*chain.joints}
         coupled = {number}
@@ -538,11 +528,11 @@ class _Finder:
         bars = len(joints) + 1 - max(freedoms - 1, 0)
         which = NAMES_OF_LINKAGES.get(bars, f"a linkage of {bars} bars")
         if freedoms > 1:
-            held = HOW_MANY.get(freedoms - 1, freedoms - 1)
+            held = _write_number(freedoms - 1, 3)
             which += f" once {held} of its freedoms is held"
         text = (
             f"with {names}, which moves its bars too, {len(joints)} hinges,"
-            f" {len(coupled) + 1} loops and {HOW_MANY.get(freedoms, freedoms)}"
+            f" {len(coupled) + 1} loops and {_write_number(freedoms, 3)}"
             f" {'freedom' if freedoms == 1 else 'freedoms'}: {which}"
             f" ({_SERVE_PLANAR})"
         )
@@ -756,12 +746,7 @@ class _Finder:
         """
         pushed: dict[int, str] = {}
         hinge_of = {self.root[int(self.model.jnt_bodyid[j])]: j for j in at_ground}
-        for other in range(self.model.neq):
-            kind = EQUALITY_KINDS.get(int(self.model.eq_type[other]))
-            if other == number or kind not in ("connect", "weld"):
-                continue
-            if not self.model.eq_active0[other]:
-                continue
+        for other in self._list_others(number):
             for end in find_ends(self.model, self.data, other):
                 root = self.root[end.body]
                 if root in hinge_of:
@@ -789,16 +774,11 @@ class _Finder:
         closures: list[int] = [number]
         others: list[int | str] = []
         pins = set(layout.hinges.values())
-        for other in range(model.neq):
-            kind = EQUALITY_KINDS.get(int(model.eq_type[other]))
-            if other == number or not model.eq_active0[other]:
-                continue
-            if kind == "joint":
+        for other in self._list_others(number, "joint"):
+            if EQUALITY_KINDS[int(model.eq_type[other])] == "joint":
                 tied = {int(model.eq_obj1id[other]), int(model.eq_obj2id[other])}
                 if tied & pins:
                     others.append(other)
-                continue
-            if kind not in ("connect", "weld"):
                 continue
             ends = find_ends(self.model, self.data, other)
             carried = [self._find_bar(end.body, moving) for end in ends]
