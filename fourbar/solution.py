@@ -476,12 +476,7 @@ def compute_times(scene: Scene | None, at: Command) -> Array | None:
     places = at.places
     if scene is None or at.time is not None or len(places) < 2:
         return None
-    if at.stroke is None:
-        speed = at.speed
-        acceleration = at.acceleration
-    else:
-        speed = at.stroke_speed
-        acceleration = scene.motion.acceleration
+    _, speed, acceleration = at.stated
     if speed is None:
         return None
     if np.ptp(speed) != 0.0 or np.any(acceleration) or not np.all(speed):

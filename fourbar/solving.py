@@ -6,7 +6,7 @@ The evaluation ends after the stage that is asked for.
 import cmath
 from collections.abc import Iterator, KeysView, Mapping
 from functools import cache
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,10 +36,17 @@ from fourbar.quantities import (
     UNITS,
     Array,
 )
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import (
+    Command,
+    LimitOrigin,
+    ReleaseOrigin,
+    Scene,
+    StrokeOrigin,
+    command,
+    with_signs,
+)
 from fourbar.scene.motion import COMMAND_NAMES
 from fourbar.scene.numbers import POINT_STAGES
-from fourbar.scene.scene import Independent, with_signs
 from fourbar.solution import Solution, unwrap
 
 _LONG_BLOCK = POSITIONS_OF_A_BLOCK // 4
@@ -109,21 +116,19 @@ def solve(
         of_release["with_extremes"] = released.with_extremes
     else:
         commanded = command(scene)
-    request = find_requested(scene, commanded, stage, out)
+    request = Request.of(scene, commanded, stage, out)
     with np.errstate(all="ignore"):
-        if commanded.independent is not None:
-            results = _solve_released(scene, commanded.independent, request)
+        if isinstance(commanded.origin, ReleaseOrigin):
+            results = _solve_released(scene, commanded.origin, request)
         else:
             case = _make_case(scene, commanded, request, side)
-            alone = _solve_alone(case, commanded, request)
-            if alone is not None:
-                results = alone
-            else:
-                results = _solve_blocks(case, commanded, request)
+            results = _solve_alone(case, commanded, request) or _solve_blocks(
+                case, commanded, request
+            )
     return make_solution(scene, commanded, results, solved=scene, **of_release)
 
 
-class _Requested(NamedTuple):
+class Request(NamedTuple):
     """Quantities that are evaluated, and the number of positions."""
 
     shape: tuple[int, ...]
@@ -132,8 +137,48 @@ class _Requested(NamedTuple):
     """Number of the last stage evaluated."""
     wanted: KeysView[str]
     """Names of the quantities."""
-    out: Mapping[str, Array] | None
+    out: Mapping[str, Array]
     """Arrays of the caller's to write into."""
+
+    @classmethod
+    def of(
+        cls,
+        scene: Scene,
+        commanded: Command,
+        stage: str | None,
+        out: Mapping[str, Array] | None,
+    ) -> Self:
+        """Make the request of the arguments of `solve`; an InputError as there.
+
+        If a bar other than the input is commanded, theta_2 and sin_mu, whose sign is
+        the branch, are evaluated too.
+        """
+        shape = commanded.angle.shape
+        points = tuple(point.name for point in scene.points)
+        if out is None:
+            if stage is None:
+                stage = "position" if commanded.speed is None else "force"
+            if not isinstance(stage, str) or stage not in STAGES:
+                raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
+            last_stage = STAGES.index(stage)
+            wanted = _list_wanted(last_stage, _list_absent(scene), points)
+        else:
+            foreign = _list_foreign(scene)
+            stages = _list_stages(points)
+            allowed = [name for name in stages if name not in foreign]
+            _require_out(out, shape, allowed)
+            wanted = out.keys()
+            needed = {STAGES.index(stages[name]) for name in out}
+            last_stage = max(needed, default=0)
+        if last_stage > 0 and commanded.speed is None:
+            raise InputError(
+                f"motion.omega_{commanded.bar}",
+                None,
+                f"is needed for the stage {STAGES[last_stage]!r}",
+            )
+        if commanded.bar != 2:
+            wanted = {**dict.fromkeys(wanted), "theta_2": None, "sin_mu": None}.keys()
+        return cls(shape, last_stage, wanted, out or {})
 
     @property
     def block(self) -> int:
@@ -148,17 +193,34 @@ class _Requested(NamedTuple):
         return self.last_stage >= FORCE
 
 
+def _require_out(out: Any, shape: tuple[int, ...], allowed: list[str]) -> None:
+    """Raise InputError for arrays that quantities cannot be written into."""
+    expect("out", out, Mapping)
+    for name, array in out.items():
+        if name not in allowed:
+            raise InputError("out", name, f"must be among {', '.join(allowed)}")
+        wanted = shape if name in SCALARS else (*shape, 2)
+        expect(f"out.{name}", array, np.ndarray)
+        fits = array.shape == wanted and array.dtype == np.float64
+        if not fits or not array.flags.writeable:
+            raise InputError(
+                f"out.{name}",
+                (array.shape, str(array.dtype)),
+                f"must be float64 of shape {wanted}, writeable",
+            )
+
+
 class Results:
     """Status codes and arrays of all positions, which are filled block by block."""
 
-    def __init__(self, request: _Requested) -> None:
+    def __init__(self, request: Request) -> None:
         shape = request.shape
-        given = request.out or {}
         self.codes: NDArray[np.uint8] = np.zeros(shape, dtype=np.uint8)
         self.arrays: dict[str, Array] = {}
         for name in request.wanted:
             shape_of_one = shape if name in SCALARS else (*shape, 2)
-            self.arrays[name] = given[name] if name in given else np.empty(shape_of_one)
+            given = request.out.get(name)
+            self.arrays[name] = np.empty(shape_of_one) if given is None else given
         self.sign_may_differ: bool = False
         """True if sin(theta_4 - theta_3) may have another sign than the branch."""
 
@@ -193,7 +255,7 @@ def _may_sign_differ(case: Case) -> bool:
 def _make_case(
     scene: Scene,
     commanded: Command,
-    request: _Requested,
+    request: Request,
     side: int,
 ) -> Case:
     """Make the case of one linkage, with effects that count turns from its start."""
@@ -204,19 +266,18 @@ def _make_case(
     return case.begin_with(stated if stated.bar == commanded.bar else commanded)
 
 
-def _solve_alone(case: Case, commanded: Command, request: _Requested) -> Results | None:
+def _solve_alone(case: Case, commanded: Command, request: Request) -> Results | None:
     """Solve a single position in plain numbers.
 
     Arrays of one entry cost several times as much. None for several positions, and
     where any result is no number: there NumPy goes on with inf and NaN, and statuses
     follow.
     """
-    if request.shape != (1,) or request.out is not None:
+    if request.shape != (1,) or request.out:
         return None
-    angle: Any
-    angle, *others = commanded.part((0,))
     # Python's own numbers halve a formula's time
-    position = Command(angle.item(), *others)
+    angle: Any = commanded.angle.item()
+    position = commanded.part((0,))._replace(angle=angle)
     try:
         codes, values, _ = evaluate(case, position, request.last_stage, request.wanted)
     except ArithmeticError:
@@ -235,7 +296,7 @@ def _solve_alone(case: Case, commanded: Command, request: _Requested) -> Results
     return results
 
 
-def _solve_blocks(case: Case, commanded: Command, request: _Requested) -> Results:
+def _solve_blocks(case: Case, commanded: Command, request: Request) -> Results:
     """Solve the positions of one linkage block by block."""
     results = Results(request)
     evaluated = None
@@ -249,12 +310,12 @@ def _solve_blocks(case: Case, commanded: Command, request: _Requested) -> Result
 
 def _solve_released(
     scene: Scene,
-    independent: Independent,
-    request: _Requested,
+    released: ReleaseOrigin,
+    request: Request,
 ) -> Results:
     """Solve a released motion, as the commands of bars 2 and 4 that it is made of."""
     results = Results(request)
-    for index, commanded, side in independent.commands():
+    for index, commanded, side in released.commands():
         case = Case.of_released(scene, commanded.bar, side)
         evaluated = evaluate_released(
             case,
@@ -289,38 +350,36 @@ def _require_command_at(commanded: Command) -> None:
     """Raise an InputError unless a command is well formed."""
     expect("at", commanded, Command)
     require_bar("at.bar", commanded.bar)
-    angle, speed, acceleration = COMMAND_NAMES[commanded.bar]
-    expect(f"at.{angle}", commanded.angle, np.ndarray)
-    expect("at.independent", commanded.independent, Independent, type(None))
-    n = commanded.angle.size
-    arrays: dict[str, Any] = {angle: commanded.angle, "branch": commanded.branch}
-    arrays |= {
-        name: getattr(commanded, name)
-        for name in ("condition", "stroke", "time", "lost")
-    }
-    if commanded.independent is not None:
-        arrays |= {
-            f"independent.{name}": values
-            for name, values in commanded.independent._asdict().items()
-        }
+    theta, omega, alpha = COMMAND_NAMES[commanded.bar]
+    angle, branch, speed, acceleration, _, time, origin = commanded
+    expect(f"at.{theta}", angle, np.ndarray)
+    n = angle.size
+    arrays: dict[str, Any] = {theta: angle, "branch": branch}
+    optional: dict[str, Any] = {"time": time}
+    rates: dict[str, Any] = {alpha: acceleration, omega: speed}
+    kinds = (LimitOrigin, StrokeOrigin, ReleaseOrigin, type(None))
+    expect("at.origin", origin, *kinds)
+    if isinstance(origin, LimitOrigin):
+        require("at.origin.remainder", origin.remainder)
+    elif isinstance(origin, StrokeOrigin):
+        arrays["origin.stroke"] = origin.stroke
+        optional["origin.lost"] = origin.lost
+        for name in ("condition", "acceleration", "speed"):
+            rates[f"origin.{name}"] = getattr(origin, name)
+    elif origin is not None:
+        arrays |= {f"origin.{key}": x for key, x in origin._asdict().items()}
+    arrays |= {key: value for key, value in optional.items() if value is not None}
     for key, value in arrays.items():
-        if value is None and key != "branch":
-            continue
         expect(f"at.{key}", value, np.ndarray)
-        shape = (n, 3) if key == "lost" else (n,)
+        shape = (n, 3) if key == "origin.lost" else (n,)
         if value.shape != shape or value.dtype.kind not in "iuf":
             raise InputError(f"at.{key}", value, f"must be numbers, shape {shape}")
-    branch = commanded.branch
     are_branches = branch.item() in (1, -1) if n == 1 else (np.abs(branch) == 1).all()
     if not are_branches:
         raise InputError("at.branch", branch, f"{A_BRANCH} at each position")
-    _require_rate(acceleration, commanded.acceleration, n)
-    if commanded.speed is not None:
-        _require_rate(speed, commanded.speed, n)
-        if commanded.stroke_speed is not None:
-            _require_rate("stroke_speed", commanded.stroke_speed, n)
-    if commanded.remainder is not None:
-        require("at.remainder", commanded.remainder)
+    for key, value in rates.items():
+        if value is not None or not key.endswith(("speed", omega)):
+            _require_rate(key, value, n)
 
 
 def _require_rate(name: str, value: Any, n: int) -> None:
@@ -345,64 +404,6 @@ def find_last_stage(scene: Scene) -> str:
     if motion.speed is None and motion.law is None and motion.free is None:
         return "position"
     return STAGES[-1]
-
-
-def find_requested(
-    scene: Scene,
-    commanded: Command,
-    stage: str | None,
-    out: Mapping[str, Array] | None,
-) -> _Requested:
-    """Find what is evaluated for the arguments of `solve`; an InputError as there.
-
-    If a bar other than the input is commanded, theta_2 and sin_mu, whose sign is the
-    branch, are evaluated too.
-    """
-    shape = commanded.angle.shape
-    if out is None:
-        if stage is None:
-            stage = "position" if commanded.speed is None else "force"
-        if not isinstance(stage, str) or stage not in STAGES:
-            raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
-        last_stage = STAGES.index(stage)
-        wanted = _list_wanted(
-            last_stage,
-            _list_absent(scene),
-            tuple(point.name for point in scene.points),
-        )
-    else:
-        expect("out", out, Mapping)
-        wanted = out.keys()
-        foreign = _list_foreign(scene)
-        stages = _list_stages(tuple(point.name for point in scene.points))
-        for name, array in out.items():
-            if name not in stages or name in foreign:
-                known = ", ".join(name for name in stages if name not in foreign)
-                raise InputError("out", name, f"must be among {known}")
-            wanted_shape = shape if name in SCALARS else (*shape, 2)
-            expect(f"out.{name}", array, np.ndarray)
-            if (
-                array.shape != wanted_shape
-                or array.dtype != np.float64
-                or not array.flags.writeable
-            ):
-                allowed = f"must be float64 of shape {wanted_shape}, writeable"
-                raise InputError(
-                    f"out.{name}",
-                    (array.shape, str(array.dtype)),
-                    allowed,
-                )
-        needed = {stages[name] for name in out}
-        last_stage = max(map(STAGES.index, needed), default=0)
-    if last_stage > 0 and commanded.speed is None:
-        raise InputError(
-            f"motion.omega_{commanded.bar}",
-            None,
-            f"is needed for the stage {STAGES[last_stage]!r}",
-        )
-    if commanded.bar != 2:
-        wanted = {**dict.fromkeys(wanted), "theta_2": None, "sin_mu": None}.keys()
-    return _Requested(shape, last_stage, wanted, out)
 
 
 def _list_stages(points: tuple[str, ...]) -> dict[str, str]:
@@ -445,11 +446,12 @@ def make_solution(
     codes = results.codes
     quantities_by_name = results.arrays
     _unwrap_angles(quantities_by_name, commanded.bar)
-    if commanded.stroke is not None:
+    if commanded.moves_stroke:
         # as commanded, wherever it has a value
-        for name in {"stroke", "stroke_speed"} & quantities_by_name.keys():
-            stroke = quantities_by_name[name]
-            stroke[...] = getattr(commanded, name) + 0.0 * stroke
+        for name, value in zip(commanded.names[:2], commanded.stated, strict=False):
+            if name in quantities_by_name:
+                stroke = quantities_by_name[name]
+                stroke[...] = value + 0.0 * stroke
     of_points: dict[str, dict[str, Array]] = {start: {} for start in POINT_STAGES}
     for point in scene.points:
         for start, arrays in of_points.items():
@@ -462,7 +464,7 @@ def make_solution(
             name: array for name, array in quantities_by_name.items() if name in UNITS
         }
     theta_2 = commanded.angle
-    if commanded.stroke is not None:
+    if commanded.moves_stroke:
         theta_2 = _turn_first(theta_2, commanded, quantities_by_name)
     if commanded.bar != 2:
         theta_2 = quantities["theta_2"]

@@ -190,8 +190,7 @@ def _find_place(scene: Scene, text: str) -> float:
     For a motion over time it is the angle at that time.
     """
     positions = given.find_positions(scene, text)
-    places = positions.angle if positions.stroke is None else positions.stroke
-    return float(places[0])
+    return float(positions.stated[0][0])
 
 
 @click.command()

@@ -308,9 +308,9 @@ class SolvedFriction(NamedTuple):
     """Pin forces with the friction that they make."""
 
     pins: PinForces
-    from_jamming: Any = None
+    from_jamming: Any = 1.0
     """Distance of the friction from jamming, in (0, 1]."""
-    residual: Any = None
+    residual: Any = 0.0
     """Largest |mu r |F| - couple| that remains, N m."""
     status: Any = None
 

@@ -9,7 +9,7 @@ from fourbar.effects.effect import Actions, SolvedFriction, list_bodies
 from fourbar.formulas.arithmetic import U, angle, is_any, select
 from fourbar.formulas.longer import change_numbers, lengthen, take_doubles
 from fourbar.formulas.motion import Coefficients, State, rates
-from fourbar.formulas.path import NO_DIGIT_LEFT, LoopPath, prepare_path
+from fourbar.formulas.path import LoopPath, prepare_path
 from fourbar.formulas.pin_forces import (
     MovingBodies,
     PinForces,
@@ -22,7 +22,7 @@ from fourbar.formulas.pin_forces import (
 from fourbar.formulas.position import HalfAngle, Loop, Passing, Position
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.quantities import COUPLE, JAMMED, LINE, Array, DriveNames
+from fourbar.quantities import COUPLE, JAMMED, LINE, DriveNames
 from fourbar.scene import Command, Scene
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def _needs_many_digits(factor: Any, constant: Any, size: Any) -> Any:
     return (constant < 0.0) & (abs(factor) < NEEDS_DIGITS * (abs(constant) + size))
 
 
-def condense_branch(branch: NDArray[np.int8]) -> Any:
+def _condense_branch(branch: NDArray[np.int8]) -> Any:
     """Return the branch as one number if all positions share it, else as an array.
 
     The formulas are quicker with one number.
@@ -69,16 +69,6 @@ def condense_branch(branch: NDArray[np.int8]) -> Any:
             return float(branch.flat[0])
         return float(branch)
     return branch
-
-
-def find_margin(commanded: Command) -> float:
-    """Return the sine at or below which a commanded position is singular.
-
-    The margin is 0 where the angle is known in many digits.
-    """
-    if commanded.remainder is None:
-        return NO_DIGIT_LEFT
-    return 0.0
 
 
 class Dynamics(NamedTuple):
@@ -221,42 +211,45 @@ class Case(NamedTuple):
         lever, most = self.drive.leverage(state, self.sines(state.position))
         return abs(lever) / most
 
+    def list_statuses(self, state: State, branch: Any) -> list[Any]:
+        """List the statuses of everything that acts and of the drive, None for `OK`."""
+        statuses: list[Any] = [term.status(state, branch) for term in self.terms]
+        if self.drive is not None:
+            statuses.append(self.drive.status(state, self.sines(state.position)))
+        return statuses
+
     def assemble(
         self,
-        q: Any,
+        commanded: Command,
         half: HalfAngle,
-        branch: Any,
-        speed: Any,
-        acceleration: Any,
         *,
         moving: bool = True,
-        condition: Any = None,
-        margin: float = NO_DIGIT_LEFT,
     ) -> State:
-        """Close the loop at a half angle.
+        """Close the loop at the half angles of a command.
 
-        Every path from an angle to the forces uses it.
-
-        Parameters
-        ----------
-        moving : False: positions only.
-        condition, margin : as in `LoopPath.close`.
+        Every path from an angle to the forces uses it. `moving`: False: positions only.
         """
         path = self.path
+        q = commanded.angle
+        speed: Any = 0.0
+        acceleration: Any = 0.0
+        branch = _condense_branch(commanded.branch)
         if moving:
+            acceleration = commanded.acceleration
+            if commanded.speed is not None:
+                speed = commanded.speed
             position, k, sine = path.close(
                 q,
                 half,
                 branch,
-                condition=condition,
-                margin=margin,
+                condition=commanded.condition,
+                margin=commanded.margin,
             )
         else:
             position = path.position(q, half, branch)
             k = _NO_MOTION
             sine = position.sin_mu  # before the bars are put in order
             position = path.in_order(position)
-            speed = acceleration = 0.0
         return State(
             self.lengths,
             self.linkage.ground_angle,
@@ -271,29 +264,13 @@ class Case(NamedTuple):
             path.passing,
         )
 
-    def at(
-        self,
-        commanded: Command,
-        *,
-        moving: bool = True,
-    ) -> tuple[State, NDArray[np.intp]]:
+    def at(self, commanded: Command, *, moving: bool = True) -> State:
         """Compute the positions of a command, and their motion.
 
-        `moving`: False: positions only. Returned too are the indices of the positions
-        whose half angle is evaluated in many digits.
+        `moving`: False: positions only.
         """
-        half, refined_rows = self.half_angle(commanded.angle, commanded.remainder)
-        state = self.assemble(
-            commanded.angle,
-            half,
-            condense_branch(commanded.branch),
-            0.0 if commanded.speed is None else commanded.speed,
-            commanded.acceleration,
-            moving=moving,
-            condition=commanded.condition,
-            margin=find_margin(commanded),
-        )
-        return state, refined_rows
+        half, _ = self.half_angle(commanded)
+        return self.assemble(commanded, half, moving=moving)
 
     @classmethod
     def of_released(cls, scene: Scene, bar: int, side: Any) -> "Case":
@@ -308,7 +285,7 @@ class Case(NamedTuple):
 
         The copy may hold many linkages.
         """
-        state, _ = self.at(start)
+        state = self.at(start)
         return self._replace(
             terms=tuple(term.begin_at(state, start.branch) for term in self.terms)
         )
@@ -319,27 +296,16 @@ class Case(NamedTuple):
         The case is returned as it is if the motion assembles nowhere or changes its
         branch.
         """
-        half, _ = self.half_angle(motion.angle, motion.remainder)
+        half, _ = self.half_angle(motion)
         assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
         if not assembled.any() or np.ptp(motion.branch) != 0:
             return self
-        first = int(np.argmax(assembled))
-        return self.begin_at(
-            Command(
-                motion.angle[first],
-                motion.branch[first],
-                0.0,
-                0.0,
-                motion.remainder,
-            )
-        )
+        start = motion.part(int(np.argmax(assembled)))
+        return self.begin_at(start._replace(speed=0.0, acceleration=0.0))
 
-    def half_angle(
-        self,
-        q: Array,
-        remainder: Any,
-    ) -> tuple[HalfAngle, NDArray[np.intp]]:
+    def half_angle(self, commanded: Command) -> tuple[HalfAngle, NDArray[np.intp]]:
         """Compute the half angles, and the indices of those in many digits."""
+        q, remainder = commanded.angle, commanded.remainder
         lengths = self.path.lengths
         half = self.path.half_angle(q)
         close: Any = remainder is not None
@@ -434,14 +400,8 @@ class Case(NamedTuple):
                     free_bodies.solve_pin_forces,
                 )
         Q = actions.generalized_forces()[0]
-        return Dynamics(
-            pins=friction.pins,
-            from_jamming=friction.from_jamming,
-            residual=friction.residual,
-            status=friction.status,
-            effort=driving_torque(gain, inertial.total, Q),
-            generalized_force=inertial.total - Q,
-        )
+        effort = driving_torque(gain, inertial.total, Q)
+        return Dynamics(*friction, effort, inertial.total - Q)
 
     def drive_interval(
         self,
@@ -451,10 +411,10 @@ class Case(NamedTuple):
     ) -> tuple[Any, Any, Any]:
         """Compute the least and greatest torque or force of the drive.
 
-        Both are equal unless dry friction holds a pin at rest. The third value marks
-        where one of them is NaN because friction jams the motion that would begin;
-        None: nowhere. The ends are those at which the linkage would begin to move
-        forwards or backwards, or, where only a pin comes to rest while the linkage
+        Both are equal unless dry friction holds a pin at rest. The third value is
+        `JAMMED` where one of them is NaN because friction jams the motion that would
+        begin; None: nowhere. The ends are those at which the linkage would begin to
+        move forwards or backwards, or, where only a pin comes to rest while the linkage
         moves, those just before and after its reversal.
         """
         actions = Actions(state, self.bodies)
@@ -473,7 +433,7 @@ class Case(NamedTuple):
         statuses = [one.status for one in (ahead, back) if one.status is not None]
         if not statuses:
             return low, high, None
-        return low, high, np.any(np.equal(statuses, JAMMED), axis=0)
+        return low, high, JAMMED * np.any(np.equal(statuses, JAMMED), axis=0)
 
 
 def _restore_unit(linkage: FourBar, path: LoopPath) -> Loop:
@@ -579,4 +539,4 @@ class _FreeBodies(NamedTuple):
 def compute_shown_state(scene: Scene, commanded: Command) -> State:
     """Compute the positions of a command and their motion, for what shows them."""
     with np.errstate(all="ignore"):
-        return Case.of(scene, commanded.bar).at(commanded)[0]
+        return Case.of(scene, commanded.bar).at(commanded)

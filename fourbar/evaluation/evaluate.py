@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError
-from fourbar.evaluation.case import Case, Dynamics, condense_branch, find_margin
+from fourbar.evaluation.case import Case, Dynamics
 from fourbar.formulas import longer as longer_numbers
 from fourbar.formulas.arithmetic import U, angle, is_any, is_zero, select
 from fourbar.formulas.longer import lengthen, shorten
@@ -26,7 +26,6 @@ from fourbar.formulas.path import NO_DIGIT_LEFT, LoopPath
 from fourbar.quantities import (
     CHANGE_POINT,
     COUPLE,
-    JAMMED,
     LINE,
     LINE_QUANTITIES,
     NO_DIRECTION,
@@ -93,33 +92,26 @@ def evaluate(
 
     `command`: positions (n,), or one in plain numbers.
     """
-    state, refined_rows = case.at(command, moving=last_stage > 0)
-    codes = _compute_codes(case.path, state, command)
+    half, refined_rows = case.half_angle(command)
+    state = case.assemble(command, half, moving=last_stage > 0)
     values = list_kinematics(case, state, wanted)
-    if command.condition is not None and "condition" in wanted:
+    if "condition" in wanted:
         values["condition"] = values["condition"] * command.condition
-    if last_stage >= FORCE:
-        acceleration = command.acceleration
-        dynamics = case.dynamics(state, acceleration, case.side)
-        error_bars = {}
-        if last_stage == ERROR:
-            error_bars = _compute_error_bars(
-                case,
-                command,
-                state,
-                dynamics,
-                refined_rows,
-            )
-        codes, forces = _list_forces(
-            case,
-            command,
-            state,
-            codes,
-            wanted,
-            dynamics,
-            error_bars,
-        )
-        values |= {name: value for name, value in forces.items() if name in wanted}
+    codes = _find_codes_of_loop(case.path, state, command)
+    if last_stage < FORCE:
+        return Evaluated(codes, values, state)
+    dynamics = case.dynamics(state, command.acceleration, case.side)
+    forces, jammed = _list_forces(case, command, state, dynamics, wanted)
+    if last_stage == ERROR:
+        forces |= _list_error_bars(case, command, state, dynamics, refined_rows)
+    statuses = (*case.list_statuses(state, command.branch), dynamics.status, jammed)
+    stated = [status for status in statuses if status is not None]
+    if stated:
+        of_effects = np.max(stated, axis=0)
+        codes = np.where(codes == OK, of_effects, codes).astype(np.uint8)
+    if is_any(codes > SINGULAR):
+        _withhold_forces(case, codes, forces)
+    values |= {name: value for name, value in forces.items() if name in wanted}
     return Evaluated(codes, values, state)
 
 
@@ -144,25 +136,22 @@ def evaluate_released(
     return Evaluated(codes, values, state)
 
 
-def _compute_codes(path: LoopPath, state: State, command: Command) -> Any:
-    """Compute the status of each position from the sine of the transmission angle."""
+def _find_codes_of_loop(path: LoopPath, state: State, command: Command) -> Any:
+    """Find the status of each position from the sine of the transmission angle."""
     half = state.position.half
     sine = state.sine
+    margin = command.margin
+    is_determined = command.condition > margin
     size = abs(sine)
-    margin = find_margin(command)
-    if command.condition is not None:
-        size = np.where(np.isnan(size), size, np.minimum(size, command.condition))
-    if type(size) is float and size > margin:
+    if type(size) is float and size > margin and is_determined:
         return OK
+    size = np.minimum(size, command.condition)
     codes = np.zeros(np.shape(sine), dtype=np.uint8)
     if np.min(size, initial=np.inf) > margin:
         return codes
     # some are at a limit, or NaN: the loop does not close there
     codes[size <= margin] = SINGULAR
-    on_change_point = (abs(sine) <= margin) & path.passes_zero(half)
-    if command.condition is not None:
-        on_change_point = on_change_point & (command.condition > margin)
-    codes[on_change_point] = CHANGE_POINT
+    codes[(abs(sine) <= margin) & path.passes_zero(half) & is_determined] = CHANGE_POINT
     codes[np.isnan(sine)] = NOT_ASSEMBLED
     # theta_2 - theta_1 overflows, so the loop cannot be evaluated
     codes[np.isnan(half.kk)] = OVERFLOW
@@ -173,50 +162,28 @@ def _list_forces(
     case: Case,
     command: Command,
     state: State,
-    codes: Any,
-    wanted: Set[str],
     dynamics: Dynamics,
-    error_bars: dict[str, Any],
-) -> tuple[Any, dict[str, Any]]:
-    """List the quantities of the force stage, and the statuses with those of effects.
+    wanted: Set[str],
+) -> tuple[dict[str, Any], Any]:
+    """List the quantities of the force stage.
 
-    Error bars are included.
+    The second result has the status `JAMMED` where friction jams a motion that would
+    begin; None: nowhere.
     """
-    drive_names = case.drive_names
-    values: dict[str, Any] = {
-        **dynamics.pins._asdict(),
-        drive_names.value: dynamics.effort,
-        **error_bars,
-    }
+    names = case.drive_names
+    values = {**dynamics.pins._asdict(), names.value: dynamics.effort}
     if "power" in wanted:
         values["power"] = dynamics.effort * case.drive_speed(state)
     if "drive_condition" in wanted:
-        condition = case.drive_condition(state)
-        if dynamics.from_jamming is not None:
-            condition = condition * dynamics.from_jamming
-        values["drive_condition"] = condition
+        values["drive_condition"] = case.drive_condition(state) * dynamics.from_jamming
     if "friction_residual" in wanted:
-        residual = 0.0 if dynamics.residual is None else dynamics.residual
-        values["friction_residual"] = residual
-    friction_status = dynamics.status
-    if drive_names.low in wanted or drive_names.high in wanted:
+        values["friction_residual"] = dynamics.residual
+    jammed = None
+    if names.low in wanted or names.high in wanted:
         acceleration = command.acceleration
         low, high, jammed = case.drive_interval(state, acceleration, dynamics.effort)
-        values |= {drive_names.low: low, drive_names.high: high}
-        if jammed is not None and friction_status is not None:
-            newly_jammed = jammed & (friction_status == OK)
-            friction_status = np.where(newly_jammed, JAMMED, friction_status)
-    statuses = [term.status(state, command.branch) for term in case.terms]
-    statuses.append(friction_status)
-    if case.drive is not None:
-        statuses.append(case.drive.status(state, case.sines(state.position)))
-    stated = [status for status in statuses if status is not None]
-    if stated:
-        of_effects = np.max(stated, axis=0)
-        codes = np.where(codes == OK, of_effects, codes).astype(np.uint8)
-    if is_any(codes > SINGULAR):
-        _withhold_forces(case, codes, values)
-    return codes, values
+        values |= {names.low: low, names.high: high}
+    return values, jammed
 
 
 def _withhold_forces(case: Case, codes: Any, values: dict[str, Any]) -> None:
@@ -229,24 +196,21 @@ def _withhold_forces(case: Case, codes: Any, values: dict[str, Any]) -> None:
     of_pins = {*PIN_FORCES, "force_error"}
     if any(term.loaded_pins for term in case.terms):
         of_pins |= values.keys()  # the drive balances friction of those forces
-    for name, value in values.items():
-        if name == "drive_condition":
-            continue
+    for name in values.keys() - {"drive_condition"}:
         missing = at_pins if name in of_pins else everywhere
-        values[name] = np.where(missing, _make_no_value(value), value)
+        values[name] = np.where(missing, _make_no_value(values[name]), values[name])
 
 
-def _compute_error_bars(
+def _list_error_bars(
     case: Case,
     command: Command,
     state: State,
     dynamics: Dynamics,
     refined_rows: NDArray[np.intp],
 ) -> dict[str, Any]:
-    """Compute the error bars of the drive (N m or N) and of the pin forces (N), (n,).
+    """List the error bars of the drive (N m or N) and of the pin forces (N), (n,).
 
-    The error bar of the pin forces is the worst of the four. The result is keyed by
-    name.
+    The error bar of the pin forces is the worst of the four.
 
     Parameters
     ----------
@@ -255,40 +219,30 @@ def _compute_error_bars(
         digits.
     """
     longer = case.lengthened()
-    remainder = command.remainder
     lost = command.lost
-    if lost is None:
-        lost = np.array([0.0 if remainder is None else float(remainder), 0.0, 0.0])
-    q = lengthen(state.q) + lost[..., 0]
-    speed = lengthen(state.speed) + lost[..., 1]
-    longer_acceleration = lengthen(command.acceleration) + lost[..., 2]
+    doubles = (state.q, state.speed, command.acceleration)
+    q, speed, acceleration = (
+        lengthen(number) + lost[..., column] for column, number in enumerate(doubles)
+    )
     half = longer.path.half_angle(q)
     if refined_rows.size:
         from fourbar.formulas.many_digits import decide_half_angles
 
-        left_out = 0.0 if remainder is not None else lost[..., 0]
         half = decide_half_angles(
             case.linkage,
             case.path.unit,
             half,
             refined_rows,
             state.q,
-            remainder,
+            command.remainder,
             case.path.bar,
-            left_out,
+            0.0 if command.remainder is not None else lost[..., 0],
         )
-    near = longer.assemble(
-        q,
-        half,
-        condense_branch(command.branch),
-        speed,
-        longer_acceleration,
-        condition=command.condition,
-        margin=find_margin(command),
-    )
-    longer_dynamics = longer.dynamics(near, longer_acceleration, case.side)
+    motion = command._replace(angle=q, speed=speed, acceleration=acceleration)
+    near = longer.assemble(motion, half)
+    longer_dynamics = longer.dynamics(near, acceleration, case.side)
     gap, drive_gap = _compute_gaps(dynamics, longer_dynamics)
-    if longer_numbers.HAS_LONG_DOUBLES and remainder is None:
+    if longer_numbers.HAS_LONG_DOUBLES and command.remainder is None:
         unresolved, drive_unresolved = _compute_unresolved(
             case,
             command,
@@ -341,13 +295,8 @@ def _compute_unresolved(
     moved = state.q + step
     step = moved - state.q
     shifted = case.assemble(
-        moved,
+        command._replace(angle=moved),
         case.path.half_angle(moved),
-        condense_branch(command.branch),
-        state.speed,
-        command.acceleration,
-        condition=command.condition,
-        margin=find_margin(command),
     )
     try:
         there = case.dynamics(shifted, command.acceleration, case.side)

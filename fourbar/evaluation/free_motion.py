@@ -40,8 +40,7 @@ from fourbar.formulas.position import Position, loop
 from fourbar.formulas.torque import half_slope, inertia
 from fourbar.linkage import FourBar
 from fourbar.quantities import NO_DIRECTION, Array
-from fourbar.scene import Command, Scene, command
-from fourbar.scene.scene import Independent
+from fourbar.scene import Command, ReleaseOrigin, Scene, command
 
 RELATIVE, ABSOLUTE = 3e-15, 3e-15
 """Tolerances of a step of DOP853. Below them a long fast motion errs by its round-off.
@@ -164,7 +163,7 @@ def release_at(scene: Scene, times: Array) -> Released:
         motion = released.command
         with np.errstate(all="ignore"):
             begun = Case.of(scene).begin_with(motion.part(slice(0, 1)))
-            state, _ = begun.at(motion)
+            state = begun.at(motion)
             for term in begun.terms:
                 codes = term.status(state, motion.branch) if term.counts_turns else None
                 if codes is not None and codes.any():
@@ -597,7 +596,7 @@ class _Run:
             omega_2,
             alpha_2,
             time=times,
-            independent=Independent(bar.astype(np.int8), *independent),
+            origin=ReleaseOrigin(bar.astype(np.int8), *independent),
         )
         energy, work = np.concatenate(self.energies, axis=1)
         largest = float(np.max(np.abs([energy, work])))

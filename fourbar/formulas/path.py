@@ -161,7 +161,7 @@ class LoopPath(NamedTuple):
         half: HalfAngle,
         branch: Number,
         *,
-        condition: Number = None,
+        condition: Number = 1.0,
         margin: float = NO_DIGIT_LEFT,
     ) -> tuple[Position, Coefficients, Number]:
         """Close the loop at a half angle.
@@ -175,8 +175,7 @@ class LoopPath(NamedTuple):
         singular = abs(position.sin_mu) <= margin
         if is_any(singular):
             singular = singular & ~np.asarray(self.passes_zero(half), dtype=bool)
-        if condition is not None:
-            singular = singular | (condition <= margin)
+        singular = singular | (condition <= margin)
         if is_any(singular):
             root = np.where(singular, np.nan, position.root)
             position = position._replace(root=root)

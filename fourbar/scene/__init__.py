@@ -1,7 +1,10 @@
 """The problem as stated: linkage, motion, drive, loads and effects."""
 
 from fourbar.scene.scene import Command as Command
+from fourbar.scene.scene import LimitOrigin as LimitOrigin
+from fourbar.scene.scene import ReleaseOrigin as ReleaseOrigin
 from fourbar.scene.scene import Scene as Scene
+from fourbar.scene.scene import StrokeOrigin as StrokeOrigin
 from fourbar.scene.scene import command as command
 from fourbar.scene.scene import command_at as command_at
 from fourbar.scene.scene import default_places as default_places

@@ -33,7 +33,7 @@ from fourbar.formulas.mobility import (
     find_limit_angles,
     turns_fully,
 )
-from fourbar.formulas.path import count_turns, prepare_path
+from fourbar.formulas.path import NO_DIGIT_LEFT, count_turns, prepare_path
 from fourbar.linkage import BAR_NAMES, FourBar, copy_with, require_bar
 from fourbar.quantities import Array
 from fourbar.scene.drawing import DrawnPins
@@ -278,8 +278,32 @@ class Scene:
         return any(effect.counts_turns for effect in self.effects)
 
 
-class Independent(NamedTuple):
-    """The angle in which a released motion is read at each of n instants.
+class LimitOrigin(NamedTuple):
+    """Limit position, plus an offset, that a commanded angle is."""
+
+    remainder: Any
+    """Exact angle (mpmath) minus its double, rad."""
+
+
+class StrokeOrigin(NamedTuple):
+    """Strokes of a cylinder, from which angles and rates of its bar follow."""
+
+    stroke: Array
+    """(n,), m."""
+    speed: float | Array | None
+    """m/s; None: positions only."""
+    acceleration: float | Array
+    """m/s^2."""
+    condition: float | Array = 1.0
+    """How well the stroke determines the angle, in [0, 1]."""
+    lost: Array | None = None
+    """Round-off left out of the bar's angle, speed and acceleration as doubles, (n, 3).
+    None: positions only.
+    """
+
+
+class ReleaseOrigin(NamedTuple):
+    """Angle in which a released motion is read at each of n instants.
 
     Bar 2 or 4 has this angle, whichever does not stop. At a limit of theta_2 bar 4's
     alone holds the forces, and dry friction at a standstill has a side of its own.
@@ -333,53 +357,94 @@ class Command(NamedTuple):
     """rad/s; None: positions only."""
     acceleration: float | Array
     """rad/s^2."""
-    remainder: Any = None
-    """Exact angle (mpmath) minus its double, rad. It is kept for an angle that is a
-    limit position plus an offset.
-    """
+    bar: int = 2
     time: Array | None = None
     """(n,), s; where the motion is given over time."""
-    bar: int = 2
-    condition: Array | None = None
-    """(n,), in [0, 1]: how well the command determines the angle. None: 1, it is the
-    angle itself.
-    """
-    stroke: Array | None = None
-    """(n,), m; where a stroke is commanded, from which the others follow."""
-    stroke_speed: float | Array | None = None
-    """m/s; None where no stroke is commanded, or positions only."""
-    lost: Array | None = None
-    """Round-off left out of angle, speed and acceleration as doubles, (n, 3). There is
-    some where they follow from a stroke.
-    """
-    independent: Independent | None = None
-    """Independent angle of a released motion."""
+    origin: LimitOrigin | StrokeOrigin | ReleaseOrigin | None = None
+    """What angle, speed and acceleration follow from; None: they are stated."""
+
+    @property
+    def names(self) -> tuple[str, str, str]:
+        """Names of the commanded position, speed and acceleration."""
+        return STROKE_COMMAND if self.moves_stroke else COMMAND_NAMES[self.bar]
 
     @property
     def commanded(self) -> str:
         """Name of what is commanded: the angle, or the stroke."""
-        if self.stroke is None:
-            return COMMAND_NAMES[self.bar][0]
-        return STROKE_COMMAND[0]
+        return self.names[0]
+
+    @property
+    def stated(self) -> tuple[Any, Any, Any]:
+        """Commanded angles or strokes, their speed and their acceleration."""
+        if isinstance(self.origin, StrokeOrigin):
+            return self.origin[:3]
+        return self.angle, self.speed, self.acceleration
 
     @property
     def places(self) -> Array:
         """Commanded angles, strokes, or times of a law, at each position."""
-        places = self.angle if self.stroke is None else self.stroke
-        return places if self.time is None else self.time
+        places: Array = self.stated[0] if self.time is None else self.time
+        return places
+
+    @property
+    def unit(self) -> str:
+        """Unit of what is commanded: "rad", or "m" of a stroke."""
+        return "m" if self.moves_stroke else "rad"
+
+    @property
+    def moves_stroke(self) -> bool:
+        """True if a stroke is commanded."""
+        return isinstance(self.origin, StrokeOrigin)
+
+    @property
+    def remainder(self) -> Any:
+        """Exact angle (mpmath) minus its double, rad; None: the double is exact."""
+        if isinstance(self.origin, LimitOrigin):
+            return self.origin.remainder
+        return None
+
+    @property
+    def condition(self) -> float | Array:
+        """How well the command determines the angle, in [0, 1]; 1: it is the angle."""
+        if isinstance(self.origin, StrokeOrigin):
+            return self.origin.condition
+        return 1.0
+
+    @property
+    def lost(self) -> Array:
+        """Round-off left out of angle, speed and acceleration, (3,) or (n, 3)."""
+        if isinstance(self.origin, StrokeOrigin) and self.origin.lost is not None:
+            return self.origin.lost
+        remainder = 0.0 if self.remainder is None else float(self.remainder)
+        return np.array([remainder, 0.0, 0.0])
+
+    @property
+    def margin(self) -> float:
+        """Sine at or below which a position is singular: 0 in many digits."""
+        return 0.0 if isinstance(self.origin, LimitOrigin) else NO_DIGIT_LEFT
+
+    def with_arrays(self, change: Callable[[Any], Any]) -> "Command":
+        """Return a copy with every field, those of the origin too, changed."""
+        origin: Any = self.origin
+        if origin is not None:
+            origin = type(origin)(*map(change, origin))
+        fields: list[Any] = [*map(change, self[:-1]), origin]
+        return Command(*fields)
 
     def part(self, index: Any) -> "Command":
         """Return the command at some of the positions."""
-        rows: list[Any] = [
-            value[index] if isinstance(value, np.ndarray) and value.ndim else value
-            for value in self
-        ]
-        part = Command(*rows)
-        if self.independent is None:
-            return part
-        return part._replace(
-            independent=Independent(*(value[index] for value in self.independent))
-        )
+
+        def take(value: Any) -> Any:
+            is_array = isinstance(value, np.ndarray) and value.ndim
+            return value[index] if is_array else value
+
+        return self.with_arrays(take)
+
+    def as_doubles(self) -> "Command":
+        """Return the command with the doubles of its angles, where limits lie near."""
+        if isinstance(self.origin, LimitOrigin):
+            return self._replace(origin=None)
+        return self
 
     @property
     def theta_2(self) -> Array:
@@ -581,12 +646,11 @@ def compute_bar_motion(
 ) -> tuple[Any, Any, Any, Any]:
     """Compute angle, speed and acceleration of the commanded bar, and the condition.
 
-    The condition of the command is None for 1. A stroke and its rates become those of
-    the bar here, angles stay. All may be arrays of any library, and numbers that carry
-    their derivatives.
+    A stroke and its rates become those of the bar here; angles stay, with a condition
+    of 1. All may be arrays of any library, and numbers that carry their derivatives.
     """
     if scene.motion.stroke is None:
-        return place, speed, acceleration, None
+        return place, speed, acceleration, 1.0
     return _find_triangle(scene.linkage, scene.settled_drive()).turn_bar(
         place,
         speed,
@@ -629,19 +693,8 @@ def command_stroke(
             ]
         lost = np.stack(np.broadcast_arrays(*gaps), axis=-1)
     branch = np.full(np.shape(angle), scene.motion.branch, dtype=np.int8)
-    return Command(
-        angle,
-        branch,
-        omega,
-        alpha,
-        None,
-        None,
-        scene.motion.bar,
-        condition,
-        stroke,
-        speed,
-        lost,
-    )
+    origin = StrokeOrigin(stroke, speed, acceleration, condition, lost)
+    return Command(angle, branch, omega, alpha, scene.motion.bar, origin=origin)
 
 
 def find_stroke_ranges(scene: Scene) -> list[tuple[float, float]]:
@@ -691,9 +744,9 @@ def command_at(scene: Scene, places: Array) -> Command:
         return command_stroke(scene, places, motion.speed, motion.acceleration)
     branch = np.full(places.shape, motion.branch, dtype=np.int8)
     if motion.law is None:
-        return Command(places, branch, *motion.find_rates(places), bar=bar)
+        return Command(places, branch, *motion.find_rates(places), bar)
     angle, speed, acceleration = motion.law.at(places)
-    return Command(angle, branch, speed, acceleration, time=places, bar=bar)
+    return Command(angle, branch, speed, acceleration, bar, places)
 
 
 def with_signs(linkage: FourBar, commanded: Command) -> Command:
@@ -726,7 +779,7 @@ def command(scene: Scene) -> Command:
     expect("scene", scene, Scene)
     motion, linkage, bar = scene.motion, scene.linkage, scene.motion.bar
     stated = motion.angle
-    remainder = None
+    origin = None
     if motion.law is not None:
         places = motion.law.times()
     elif stated is None:
@@ -749,16 +802,10 @@ def command(scene: Scene) -> Command:
 
         limit = limits[stated.limit - 1]
         places = np.array([limit + stated.offset])
-        remainder = limit_remainder(
-            linkage,
-            limit,
-            float(places[0]),
-            stated.offset,
-            bar,
-        )
+        angle = float(places[0])
+        remainder = limit_remainder(linkage, limit, angle, stated.offset, bar)
+        origin = LimitOrigin(remainder)
     else:
         places = np.array(stated, dtype=float, ndmin=1)
     commanded = command_at(scene, places)
-    if remainder is None:
-        return commanded
-    return commanded._replace(remainder=remainder)
+    return commanded if origin is None else commanded._replace(origin=origin)

@@ -208,10 +208,10 @@ def _locate_crossings(
 
 def _command_between(scene: Scene, at: Command, places: Array) -> Command:
     """Return the command at places between its own."""
-    if at.time is not None or at.stroke is not None:
+    if at.time is not None or at.moves_stroke:
         return command_at(scene, places)
     branch = np.full(places.shape, at.branch[0])
-    return Command(places, branch, None, 0.0, bar=at.bar)
+    return Command(places, branch, None, 0.0, at.bar)
 
 
 def _write_stretches(
@@ -228,7 +228,7 @@ def _write_stretch(solution: Solution, stretch: _Stretch, units: Conversion) -> 
         unit = "s"
     else:
         name = solution.commanded
-        unit = "rad" if solution.at.stroke is None else "m"
+        unit = solution.at.unit
     if start is None and stop is None:
         if len(solution) == 1:
             return "here"

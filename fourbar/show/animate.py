@@ -204,10 +204,10 @@ def _collect_sweep(
     start = None
     name = swept.commanded
     if len(commanded.angle) == 1:
-        if commanded.stroke is None:
-            away = np.angle(np.exp(1j * (thinned.angle - commanded.angle[0])))
-        else:
+        if commanded.moves_stroke:
             away = thinned.places - commanded.places
+        else:
+            away = np.angle(np.exp(1j * (thinned.angle - commanded.angle[0])))
         start = int(np.argmin(np.abs(away)))
     elif (drawn := find_drawn_place(scene)) is not None:
         start = int(np.argmin(np.abs(thinned.places - drawn)))

@@ -143,7 +143,7 @@ class _SceneBlock:
             self.unit = "s"
         else:
             self.symbol = facts.solution.commanded
-            self.unit = "rad" if facts.solution.at.stroke is None else "m"
+            self.unit = facts.solution.at.unit
 
     def write(self, pressure: float | None, *, headed: bool = True) -> list[str]:
         """Write all paragraphs; a blank line parts them. `headed`: with the linkage."""
@@ -220,9 +220,8 @@ class _SceneBlock:
         """
         one = self.facts.solution
         name = one.commanded
-        unit = "rad" if one.at.stroke is None else "m"
-        place = one.at.angle if one.at.stroke is None else one.at.stroke
-        text = f"at {name} = {self._value(float(place[0]), unit)}"
+        place = float(one.at.stated[0][0])
+        text = f"at {name} = {self._value(place, one.at.unit)}"
         if one.time is None:
             return text
         return f"{text}, t = {self._value(float(one.time[0]), 's', 1.0)}"
@@ -856,7 +855,7 @@ class _SceneBlock:
                 "the positions are passed at no one speed: no RMS values, no energies"
             )
         if facts.motion.reversals:
-            unit = "rad" if facts.solution.at.stroke is None else "m"
+            unit = facts.solution.at.unit
             places = ", ".join(  # of a motion law too by its angle, not by its time
                 f"{self._value(place, unit, self.longest if unit == 'm' else None)}"
                 f" ({pin})"

@@ -310,10 +310,7 @@ def _compute_spans(solution: Solution, power: Array) -> Array:
     """Compute the time between each two positions, s; NaN where nothing moves."""
     if solution.time is not None:
         return np.asarray(np.diff(solution.time))
-    if solution.at.stroke is None:
-        speed = getattr(solution, f"omega_{solution.at.bar}")
-    else:
-        speed = solution.stroke_speed
+    speed = getattr(solution, solution.at.names[1])
     speed = np.broadcast_to(np.asarray(speed), power.shape)[..., :-1]
     spans = np.full(speed.shape, np.nan)
     np.divide(np.diff(solution.at.places), speed, out=spans, where=speed != 0.0)

@@ -16,7 +16,7 @@ from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK, compute_shown_state
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.quantities import NO_LEVER, NO_TORQUE, PIN_FORCES, Array
-from fourbar.scene import Scene, command_at
+from fourbar.scene import ReleaseOrigin, Scene, command_at
 from fourbar.show.driving import is_once_round, read_drive_demand
 from fourbar.show.panels import SHALLOW, Panels, Wanted, fit_panels
 from fourbar.show.units import SHOWN_AS_ZERO, drop_rounding
@@ -210,10 +210,10 @@ def _mark_poles(scene: Scene, solution: Solution, panels: Panels) -> None:
     A curve that does not double at a quarter of the distance stays bounded there.
     """
     rows = np.flatnonzero(np.isin(solution.status_code, (NO_LEVER, NO_TORQUE)))
-    listed = scene.motion.free is None and solution.at.stroke is None
+    listed = scene.motion.free is None and not solution.at.moves_stroke
     if solution.F12 is None or not listed or not rows.size:
         return
-    at = solution.at.part(rows)._replace(remainder=None)
+    at = solution.at.part(rows).as_doubles()
     beside = [
         _list_curves(scene, solve(scene, at=at._replace(angle=at.angle + away)))
         for away in _BESIDE_A_POLE * np.array([-1.0, 1.0, -0.25, 0.25])
@@ -402,7 +402,7 @@ def compute_bending(scene: Scene, solution: Solution) -> dict[int, Bending]:
     them would take several times the memory of the solution.
     """
     count = len(solution)
-    if count <= POSITIONS_OF_A_BLOCK or solution.at.independent is not None:
+    if count <= POSITIONS_OF_A_BLOCK or isinstance(solution.at.origin, ReleaseOrigin):
         return _compute_bending_of_block(scene, solution)
     blocks = [
         _compute_bending_of_block(scene, solve(scene, at=solution.at.part(rows)))
@@ -468,7 +468,7 @@ def _join_turns(panels: Panels, solution: Solution, bar: int) -> None:
     stretch to the next, so that no turn of a later one follows from the first: it has
     the one with which all stretches together cover least.
     """
-    if bar == solution.at.bar and solution.at.stroke is None:
+    if solution.commanded == f"theta_{bar}":
         return  # as it is commanded
     curve = panels.curves[f"theta_{bar}"]
     values = curve.values[..., 0]

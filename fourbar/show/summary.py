@@ -206,7 +206,7 @@ def _find_kind(scene: Scene, solution: Solution, motion: MotionCurves) -> str:
         return "law"
     if isinstance(scene.motion.angle, np.ndarray):
         return "list"
-    closes = solution.at.stroke is None and is_once_round(solution)
+    closes = not solution.at.moves_stroke and is_once_round(solution)
     return "turn" if closes and not motion.stretches else "sweep"
 
 
@@ -306,8 +306,8 @@ def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]
     """
     at = solution.at
     first = int(np.argmax(solution.assembled))
-    if at.stroke is not None:
-        stroke = float(at.stroke[first])
+    if at.moves_stroke:
+        stroke = float(at.stated[0][first])
         ranges = find_stroke_ranges(scene)
         return min(ranges, key=lambda ends: max(ends[0] - stroke, stroke - ends[1]))
     here = float(at.angle[first])

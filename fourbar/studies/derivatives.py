@@ -323,7 +323,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
     keys = {
         theta: SceneNumber((), scene.motion.numbers[scene.motion.commanded].unit)
     } | entries
-    most = np.nan if commanded.stroke is None else float(commanded.stroke.max())
+    most = float(commanded.places.max()) if commanded.moves_stroke else np.nan
     numbers = [
         most if key == theta else read_number(scene, entry)
         for key, entry in keys.items()
@@ -350,7 +350,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
     }
     status = np.array(STATUS_NAMES, dtype="<U16")[solution.status_code]
     with np.errstate(all="ignore"):
-        _, decided = Case.of(scene, commanded.bar).half_angle(commanded.angle, None)
+        _, decided = Case.of(scene, commanded.bar).half_angle(commanded)
         status[decided] = STATUS_NAMES[
             SINGULAR
         ]  # doubles cannot tell the factors from zero
@@ -444,30 +444,17 @@ def _compute_derivatives(
             return number + _make_unit_slope(place[key], len(keys))
         return Sloped(number, np.zeros((len(keys), 1)))
 
-    rates = scene.motion if scene.motion.law is None else stated
-    numbers = (
-        stated.angle if stated.stroke is None else stated.stroke,
-        rates.speed,
-        rates.acceleration,
-    )
     commanded = {
         name: seeded(f"motion.{name}", number)
-        for name, number in zip(scene.motion.names, numbers, strict=True)
+        for name, number in zip(stated.names, stated.stated, strict=True)
     }
     q, speed, acceleration, condition = compute_bar_motion(scene, *commanded.values())
-    case, branch = Case.of(scene, stated.bar), stated.branch[index].astype(float)
+    case = Case.of(scene, stated.bar)
     case = case._replace(path=_SlopedPath(*case.path))
-    state = case.assemble(
-        q,
-        case.path.half_angle(q),
-        branch,
-        speed,
-        acceleration,
-        moving=moving,
-    )
+    motion = Command(q, stated.branch[index].astype(float), speed, acceleration)
+    state = case.assemble(motion, case.path.half_angle(q), moving=moving)
     quantities = {**list_kinematics(case, state, names), **commanded}
-    if condition is not None:
-        quantities["condition"] = quantities["condition"] * condition
+    quantities["condition"] = quantities["condition"] * condition
     held, off = np.zeros((2, len(index)), dtype=bool)
     if moving:
         actions = Actions(state, case.bodies)

@@ -242,7 +242,9 @@ def _solve_at_rest(scene: Scene, circuit: Circuit) -> Solution:
     return solve(
         scene,
         "force",
-        at=Command(commanded.theta_2, commanded.branch, 0.0, 0.0, commanded.remainder),
+        at=Command(
+            commanded.theta_2, commanded.branch, 0.0, 0.0, origin=commanded.origin
+        ),
     )
 
 

@@ -257,7 +257,7 @@ def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
     n = len(solution)
     with np.errstate(all="ignore"):
         case = Case.of(scene, solution.at.bar).begin_with(solution.at)
-        state, _ = case.at(solution.at)
+        state = case.at(solution.at)
         recorder = _Recorder(state, scene, bar)
         _record_drive(recorder, scene, solution)
         gravity = 0.0j

@@ -4,7 +4,7 @@ The quantity is an angle, the stroke or the time.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -21,7 +21,7 @@ from fourbar.scene.motion import (
     STROKE_COMMAND,
     Motion,
 )
-from fourbar.scene.scene import Independent, default_places, write_stroke_ranges
+from fourbar.scene.scene import default_places, write_stroke_ranges
 from fourbar.solution import compute_times
 from fourbar.solving import solve
 
@@ -333,15 +333,15 @@ def _take_last(motion: Command, time: float) -> Command:
 
 def join_commands(commands: list[Command]) -> Command:
     """Join commands of one motion into one command."""
-    fields = (_join_field(values) for values in zip(*commands, strict=True))
-    return Command(*fields)
+    joined: Command = _join(commands)
+    return joined
 
 
-def _join_field(values: tuple[Any, ...]) -> Any:
-    if isinstance(values[0], Independent):
-        return Independent(
-            *(np.concatenate(rows) for rows in zip(*values, strict=True))
-        )
-    if isinstance(values[0], np.ndarray) and values[0].ndim:
+def _join(values: Sequence[Any]) -> Any:
+    """Join arrays, and the fields of commands and origins; of others take the first."""
+    first = values[0]
+    if isinstance(first, tuple):
+        return type(first)(*map(_join, zip(*values, strict=True)))
+    if isinstance(first, np.ndarray) and first.ndim:
         return np.concatenate(values)
-    return values[0]
+    return first

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fourbar.errors import DependencyError, InputError, expect, say_install
 from fourbar.quantities import NOT_ASSEMBLED, PIN_FORCES, Array
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Scene, command
 from fourbar.solution import find_values, split_parts
 from fourbar.solving import solve
 from fourbar.studies.derivatives import Sensitivity, sensitivity
@@ -254,11 +254,12 @@ def tolerances(
     gone = np.zeros(len(study), dtype=bool)
     nominal_closes = slopes.solution.status_code != NOT_ASSEMBLED
     for columns, extra in _list_blocks(study, scene, samples, nominal_closes):
-        pieces: Any = (
-            x[:, extra] if isinstance(x, np.ndarray) and x.size > len(x) else x
-            for x in study.at
-        )
-        parts = replace(study, at=Command(*pieces))
+
+        def take(value: Any, extra: Any = extra) -> Any:
+            has_columns = isinstance(value, np.ndarray) and value.size > len(value)
+            return value[:, extra] if has_columns else value
+
+        parts = replace(study, at=study.at.with_arrays(take))
         width = columns.stop - columns.start
         solution = solve(parts)
         code = solution.status_code[:, -width:]

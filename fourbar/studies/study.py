@@ -18,7 +18,7 @@ from fourbar.scene.motion import FromLimit
 from fourbar.scene.numbers import find_unit_of_key
 from fourbar.scene.scene import command_stroke
 from fourbar.solution import Solution
-from fourbar.solving import Results, find_requested, make_solution, split
+from fourbar.solving import Request, Results, make_solution, split
 from fourbar.studies.keys import (
     COMMAND_KEYS,
     command_key,
@@ -71,7 +71,7 @@ class Study:
         Parameters and errors are those of `fourbar.solve`.
         """
         commanded = self.at
-        request = find_requested(self.scene, commanded, stage, out)
+        request = Request.of(self.scene, commanded, stage, out)
         results = Results(request)
         evaluated = None
         m, n = request.shape
@@ -128,15 +128,13 @@ class Study:
             return scene
         count = rows.stop - rows.start
         n = commanded.angle.shape[1]
-        flat = _take_members(commanded, rows, slice(0, n)).angle
-        half, _ = Case.of(self.members(rows, n, scene), commanded.bar).half_angle(
-            flat, None
-        )
+        flat = _take_members(commanded, rows, slice(0, n))
+        half, _ = Case.of(self.members(rows, n, scene), commanded.bar).half_angle(flat)
         assembled = ((half.outer >= 0.0) & (half.inner >= 0.0)).reshape(count, n)
         first = np.argmax(assembled, axis=1)
         begins = assembled.any(axis=1) & (np.ptp(commanded.branch[rows], axis=1) == 0)
         angle = np.where(begins, commanded.angle[rows][np.arange(count), first], np.nan)
-        start = Command(angle, commanded.branch[rows, 0], 0.0, 0.0, bar=commanded.bar)
+        start = Command(angle, commanded.branch[rows, 0], 0.0, 0.0, commanded.bar)
         counted = (
             Case.of(self.members(rows, 1, scene), commanded.bar)
             .beside(self.scene)
@@ -169,7 +167,7 @@ def _take_members(commanded: Command, rows: slice, columns: slice) -> Command:
             return _repeat(value[rows, 0], count)
         return value[rows, columns].reshape(-1, *value.shape[2:])
 
-    return Command(*(flat(value) for value in commanded))
+    return commanded.with_arrays(flat)
 
 
 def _find_pin_turns(effects: Iterable[Effect]) -> dict[int, Any]:
@@ -301,14 +299,7 @@ def _list_commands(
     )
     if scene.motion.stroke is None:
         branch = np.full(angle.shape, scene.motion.branch, dtype=np.int8)
-        return Command(
-            angle,
-            branch,
-            speed,
-            acceleration,
-            time=time,
-            bar=scene.motion.bar,
-        )
+        return Command(angle, branch, speed, acceleration, scene.motion.bar, time)
     varied = replace_numbers(
         scene, {key: array[:, None] for key, array in numbers.items()}
     )
@@ -359,4 +350,5 @@ def _read_angles(scene: Scene, arrays: Mapping[str, Array], key: str) -> Array:
             "depends on the linkage; a study states it: (n,) or (m, n) angles",
         )
     commanded = command(scene)
-    return (commanded.angle if commanded.stroke is None else commanded.stroke)[None, :]
+    angles: Array = commanded.stated[0]
+    return angles[None, :]

@@ -182,7 +182,7 @@ class _SummaryJudge:
     def closed(self) -> bool:
         """Return whether the free bodies end as they begin, after whole turns."""
         at = self.solution.at
-        if at.stroke is not None or abs(at.angle[-1] - at.angle[0]) < math.pi:
+        if at.moves_stroke or abs(at.angle[-1] - at.angle[0]) < math.pi:
             return False
         for bar in MOVING_BARS:
             theta = self.own.quantities[f"theta_{bar}"]

@@ -16,7 +16,7 @@ def answer_in_balls(scene: Scene, at: Command | None = None) -> dict[str, np.nda
     at = with_signs(scene.linkage, fourbar.command(scene) if at is None else at)
     rows, precision = [], ctx.prec
     try:
-        places = at.angle if at.stroke is None else at.stroke
+        places = at.stated[0]
         for place, branch in zip(places.tolist(), at.branch.tolist(), strict=True):
             inputs = make_balls(scene, place)
             inputs[at.commanded] += arb(0 if at.remainder is None else at.remainder)

@@ -57,7 +57,7 @@ class OfAnyBar(Right):
     effects = ("gravity", "loads", "cylinder")
 
     def answer(self, scene: Any, command: Any) -> Answer:
-        assert command.stroke is None or np.isnan(command.angle).all()
+        assert not command.moves_stroke or np.isnan(command.angle).all()
         return super().answer(scene, command)
 
 

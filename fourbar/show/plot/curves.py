@@ -649,7 +649,7 @@ def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
                     places.append(place)
                     heights.append(mu)
         # over a stroke its bar's angle rises or falls throughout
-        if positions.stroke is not None:
+        if positions.moves_stroke:
             places = np.interp(places, degrees[order], view.axis.values[order]).tolist()
         if not places:
             continue

@@ -129,9 +129,10 @@ class Axis(NamedTuple):
 
 def axis_of(scene: Scene, positions: Command, units: Conversion) -> Axis:
     """Make the axis of what is commanded."""
-    if positions.stroke is not None:
+    if positions.moves_stroke:
         factor, unit = choose_unit(max(scene.linkage.lengths), "m", units)
-        return Axis("stroke", "stroke", f" {unit}", factor, factor * positions.stroke)
+        strokes = factor * positions.stated[0]
+        return Axis("stroke", "stroke", f" {unit}", factor, strokes)
     return Axis(
         f"θ{'₀₁₂₃₄'[positions.bar]}",
         rf"$\{positions.commanded}$",
@@ -143,9 +144,9 @@ def axis_of(scene: Scene, positions: Command, units: Conversion) -> Axis:
 
 def where_in_words(solution: Solution) -> str:
     """Say the first position of a solution as the scene's file has it."""
-    stroke = solution.at.stroke
-    if stroke is not None:
-        return f"{solution.commanded} = {write_in_units('m', stroke[0])}"
+    if solution.at.moves_stroke:
+        stroke = float(solution.at.stated[0][0])
+        return f"{solution.commanded} = {write_in_units('m', stroke)}"
     return f"{solution.commanded} = {math.degrees(solution.at.angle[0]):.6g} deg"
 
 
@@ -187,7 +188,7 @@ def list_sweep(scene: Scene) -> Command:
         return stated.part(np.argsort(stated.places, kind="stable"))
     wide = command_at(scene, default_places(scene, float(stated.angle[0])))
     place = stated.places
-    if stated.stroke is None:
+    if not stated.moves_stroke:
         # the same position may lie whole turns away from the default range
         middle = 0.5 * (wide.angle[0] + wide.angle[-1])
         turns = np.round((middle - stated.angle) / math.tau)
@@ -327,7 +328,7 @@ def _choose_position(sweeps: "list[Solution]") -> float:
                 quality = np.minimum(quality, np.nan_to_num(condition[run]))
     good = places[quality >= min(CLEAR, float(quality.max()))]
     lead = 0.5 * (places[-1] - places[0])
-    if first_sweep.at.stroke is None:
+    if not first_sweep.at.moves_stroke:
         lead = min(_LEAD, lead)
     nearest = np.argmin(np.abs(good - (places[0] + lead)))
     return float(good[nearest])

@@ -59,7 +59,7 @@ def test_needs_no_driving_torque():
     """Told to move so, not released: of a release the torque is zero whatever it is."""
     terms = (DOWN, fourbar.Viscous.at(O2=0.002, B=0.001))
     m = integrate(HANGING, terms, 0.3, 2.0, -1, np.linspace(0.0, 2.0, 41))
-    told = m.command._replace(independent=None)
+    told = m.command._replace(origin=None)
     s = solve(fourbar.Scene(HANGING, effects=terms), "force", at=told)
     assert np.abs(s.torque).max() < NO_TORQUE
 

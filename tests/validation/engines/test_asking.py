@@ -47,8 +47,8 @@ def test_an_engine_is_not_told_the_angles_that_the_formulas_found_from_a_stroke(
     ask_at(engine, scene, command)
     assert np.isfinite(command.angle).all() and np.isnan(engine.command.angle).all()
     assert np.isnan(np.asarray(engine.command.speed)).all()
-    assert engine.command.condition is None and engine.command.lost is None
-    assert np.isfinite(engine.command.stroke).all()
+    assert engine.command.condition == 1.0 and not engine.command.lost.any()
+    assert np.isfinite(engine.command.stated[0]).all()
 
 
 def test_without_a_stroke_the_angles_are_the_command() -> None:

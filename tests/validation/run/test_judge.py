@@ -397,9 +397,7 @@ def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(
     assert commands
     for at in commands:
         assert (
-            at.stroke is not None
-            and np.isfinite(at.stroke).all()
-            and at.condition is None
+            at.moves_stroke and np.isfinite(at.stated[0]).all() and at.condition == 1.0
         )
         assert all(
             np.isnan(values).all() for values in (at.angle, at.speed, at.acceleration)

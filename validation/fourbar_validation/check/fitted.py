@@ -319,7 +319,7 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
     """
     keys = _list_fitted(judge)
     numbers = sum(np.count_nonzero(judge.where(key)) for key in keys)
-    if numbers < ENOUGH_NUMBERS or judge.at.stroke is not None:
+    if numbers < ENOUGH_NUMBERS or judge.at.moves_stroke:
         return
     n = len(judge.at.angle)
     rows = np.unique(np.linspace(0, n - 1, _TRIED).round().astype(int))
@@ -346,7 +346,7 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
         if abs(step) < FIT_STEP**2:
             break
     offset = math.remainder(offset, 2.0 * np.pi)
-    moved = judge.at._replace(angle=judge.at.angle + offset, remainder=None)
+    moved = judge.at.as_doubles()._replace(angle=judge.at.angle + offset)
     wrong = solve(judge.scene, judge.stage, at=moved)
 
     name = judge.at.commanded
@@ -437,7 +437,7 @@ def _compute_residuals(
     m = len(offsets)
     repeated = judge.at.part(np.tile(rows, m))
     angle = repeated.angle + np.repeat(offsets, len(rows))
-    at = repeated._replace(angle=angle, remainder=None, time=None)
+    at = repeated.as_doubles()._replace(angle=angle, time=None)
     latest = max(map(_find_stage, keys))
     moved = solve(judge.scene, STAGES[latest], at=at)
     parts = []

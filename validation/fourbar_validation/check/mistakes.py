@@ -17,7 +17,7 @@ from fourbar.errors import FourBarError
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import Bar
 from fourbar.quantities import FORCE_NAMES, LINE, PIN_FORCES, VECTORS, Array
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, StrokeOrigin
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.check.calculated import (
@@ -373,18 +373,23 @@ def _list_other_commands(command: Command) -> Iterator[Variant]:
     if len(angle) <= ENOUGH_POSITIONS:
         return
     for text, step in _BETWEEN.items():
-        moved: dict[str, Any] = {
-            name: _shift_by_half(values, step)
-            for name in ("angle", "speed", "acceleration", "stroke", "stroke_speed")
-            if (values := getattr(command, name)) is not None and np.ndim(values) == 1
-        }
-        between = command._replace(**moved)
+        motion = (command.angle, command.speed, command.acceleration)
+        angle, speed, acceleration = (_shift_by_half(rate, step) for rate in motion)
+        between = command._replace(angle=angle, speed=speed, acceleration=acceleration)
+        if isinstance(command.origin, StrokeOrigin):
+            strokes = _shift_by_half(command.origin.stroke, step)
+            between = between._replace(origin=command.origin._replace(stroke=strokes))
         yield Variant(text, at=between)
         yield Variant(f"{text} (forces alone)", at=between, names=FORCE_NAMES)
 
 
-def _shift_by_half(values: Array, step: int) -> Array:
-    """Return numbers half a step before (step 1) or after (-1) each position."""
+def _shift_by_half(values: Any, step: int) -> Any:
+    """Return numbers half a step before (step 1) or after (-1) each position.
+
+    One number of all positions stays.
+    """
+    if np.ndim(values) == 0:
+        return values
     ends = 2.0 * values[:1] - values[1:2], 2.0 * values[-1:] - values[-2:-1]
     extended = np.concatenate((ends[0], values, ends[1]))
     return np.asarray(0.5 * (values + extended[1 - step : len(extended) - 1 - step]))

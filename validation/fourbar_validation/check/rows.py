@@ -110,7 +110,7 @@ def _with_rounding(at: Command, table: TheirTable) -> RowCommands:
     if not rounding.any():
         return RowCommands(at)
     near = (
-        at._replace(angle=at.angle + shift, remainder=None)
+        at.as_doubles()._replace(angle=at.angle + shift)
         for shift in (-rounding, rounding)
     )
     return RowCommands(at, tuple(near))

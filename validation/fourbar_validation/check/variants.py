@@ -12,23 +12,12 @@ import numpy as np
 
 from fourbar.effects import Gravity
 from fourbar.quantities import UNITS, Array
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, StrokeOrigin
 from fourbar.solution import Solution
 from fourbar.studies.keys import list_entries, read_number
 from fourbar.studies.study import Study
 from fourbar_validation.scenes.bars import list_moving, replace_bars
 
-_STACKED = (
-    "angle",
-    "branch",
-    "speed",
-    "acceleration",
-    "time",
-    "condition",
-    "stroke",
-    "stroke_speed",
-)
-"""Fields of a command that may be an array; those beyond a double are left out."""
 Predict = Callable[[str, Solution], Array | None]
 """quantity, right solution -> what would have been printed; None: nothing changes."""
 
@@ -78,12 +67,9 @@ def predict_variants(
         column = [variant.numbers.get(key, usual) for variant in variants]
         values[key] = np.array(column, dtype=float)
         invalid |= ~entries[key].holds(values[key])
-    commands = [variant.at or at for variant in variants]
-    stacked: dict[str, Any] = {
-        name: _stack([getattr(command, name) for command in commands], len(at.angle))
-        for name in _STACKED
-    }
-    together = at._replace(**stacked, remainder=None, lost=None)
+    commands = [_leave_out_lost(variant.at or at) for variant in variants]
+    together: Command = _stack(commands, len(at.angle))
+    together = together._replace(bar=at.bar)
     stage = "position" if at.speed is None else "force"
     wrong = Study(scene, values, invalid, together).solve(stage)
 
@@ -99,8 +85,22 @@ def predict_variants(
     return [predict_member(i, variant.names) for i, variant in enumerate(variants)]
 
 
-def _stack(values: list[Any], n: int) -> Array | None:
-    """Stack a field of m commands to (m, n); None if it is not stated."""
-    if values[0] is None:
+def _leave_out_lost(command: Command) -> Command:
+    """Return a command without what its doubles leave out."""
+    if isinstance(command.origin, StrokeOrigin):
+        return command._replace(origin=command.origin._replace(lost=None))
+    return command.as_doubles()
+
+
+def _stack(values: Sequence[Any], n: int) -> Any:
+    """Stack the fields of m commands and of their origins to (m, n) each.
+
+    A field that is not stated is None.
+    """
+    first = values[0]
+    if first is None:
         return None
+    if isinstance(first, tuple):
+        fields = zip(*values, strict=True)
+        return type(first)(*(_stack(field, n) for field in fields))
     return np.stack([np.broadcast_to(value, (n,)) for value in values])

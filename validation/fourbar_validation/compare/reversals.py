@@ -172,10 +172,9 @@ def _locate_reversal(
     """
 
     def look(theta_2: float, side: int, stage: str) -> Solution:
-        moved = command._replace(
+        moved = command.as_doubles()._replace(
             angle=np.array([theta_2]),
             branch=command.branch[i : i + 1],
-            remainder=None,
             time=None,
         )
         return solve(scene, stage, at=moved, side=side)

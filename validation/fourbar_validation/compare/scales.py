@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from fourbar.effects import ForceDrive
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import COUPLE, LINE, OK, UNITS, Array
-from fourbar.scene import Scene
+from fourbar.scene import Scene, StrokeOrigin
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.effects import find_size
@@ -334,7 +334,7 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     if answer.at.speed is not None:
         rates = (("omega", answer.at.speed), ("alpha", answer.at.acceleration))
         for name, x in (
-            rates if answer.at.stroke is None else ()
+            () if answer.at.moves_stroke else rates
         ):  # the engine finds them if a stroke is commanded
             known[f"{name}_{answer.at.bar}"] = x + np.zeros(theta_2.shape)
         if {"omega_3", "omega_4"} <= known.keys():
@@ -348,9 +348,9 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     one, second = (theta[bar] for bar in theta if bar != answer.at.bar)
     known["condition"] = np.abs(np.sin(second - one))
     at = answer.at
-    if at.stroke is not None and drive is not None:
+    if isinstance(at.origin, StrokeOrigin) and drive is not None:
         lever = place_line(scene.linkage, drive, theta).lever
-        at = at._replace(condition=lever)
+        at = at._replace(origin=at.origin._replace(condition=lever))
         known["condition"] = known["condition"] * lever
     if "drive_condition" not in known:
         # an engine that knows how near friction is to jamming answers it

@@ -203,11 +203,10 @@ def find_conditions(
     else:
         decided = frozenset((f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}"))
     of_input = [quantity in decided for quantity in quantities]
-    commanded = formulas.at.condition
-    if commanded is None:
-        conditions[of_input] = 1.0
-    else:  # a stroke commands the bar as far as its cylinder has a lever
-        conditions[of_input] = _raise_to(powers[of_input], commanded)
+    # a stroke commands the bar as far as its cylinder has a lever
+    conditions[of_input] = _raise_to(
+        powers[of_input], np.asarray(formulas.at.condition)
+    )
     return conditions
 
 

@@ -66,7 +66,8 @@ def evaluate_single(scene: Scene, command: Command) -> QuantityValues:
             np.float32(value) for value in (command.omega_2 or 0.0, command.alpha_2)
         )
         half = path.half_angle(theta_2)
-        state = case.assemble(theta_2, half, command.branch, speed, growth)
+        moved = command._replace(angle=theta_2, speed=speed, acceleration=growth)
+        state = case.assemble(moved, half)
         state = change_numbers(state, _round_single)
         dynamics = case.dynamics(state, growth)
     assert dynamics.effort.dtype == np.float32

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fourbar.scene import Command, Scene, with_signs
+from fourbar.scene import Command, Scene, StrokeOrigin, with_signs
 from fourbar_validation.compare.answer import Adapter, Answer
 from fourbar_validation.engines.protocol import require_near
 
@@ -29,7 +29,7 @@ def ask_at(
         return replace(answer, at=command)
     if answer.at is None:
         return answer
-    if command.stroke is not None:
+    if command.moves_stroke:
         require_near(answer.at, command)
     return replace(answer, at=with_signs(scene.linkage, answer.at))
 
@@ -39,7 +39,7 @@ def remove_angles(command: Command) -> Command:
 
     The formulas computed it from the stroke.
     """
-    if command.stroke is None:
+    if not isinstance(command.origin, StrokeOrigin):
         return command
     unknown = np.full_like(command.angle, np.nan)
     speed = None if command.speed is None else unknown
@@ -47,6 +47,5 @@ def remove_angles(command: Command) -> Command:
         angle=unknown,
         speed=speed,
         acceleration=unknown,
-        condition=None,
-        lost=None,
+        origin=StrokeOrigin(*command.stated),
     )

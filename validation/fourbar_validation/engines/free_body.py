@@ -90,7 +90,7 @@ class FreeBody:
                 ),
             )
         asked = command
-        if command.stroke is not None:
+        if command.moves_stroke:
             command = find_angle(command, scene.motion, *measure_cylinder(scene))
         bar, closed = (
             command.bar,

@@ -236,18 +236,18 @@ def find_angle(
     The side is the one that is stated. `arm` and `ground`: as `measure_cylinder` has
     them, or as an engine measures them.
     """
-    assert command.stroke is not None
+    wanted = command.stated[0]
     sense = 1.0 if motion.side == "left" else -1.0
     towards = float(np.angle(ground / arm))
 
     def across(theta: Array) -> Array:
         return np.asarray(arm * np.exp(1j * theta) - ground)
 
-    low = np.zeros(len(command.stroke))
-    high = np.full(len(command.stroke), np.pi)
+    low = np.zeros(len(wanted))
+    high = np.full(len(wanted), np.pi)
     for _ in range(_STROKE_HALVINGS):
         middle = 0.5 * (low + high)
-        short = np.abs(across(towards + sense * middle)) < command.stroke
+        short = np.abs(across(towards + sense * middle)) < wanted
         low = np.where(short, middle, low)
         high = np.where(short, high, middle)
     theta = towards + sense * 0.5 * (low + high)

@@ -265,14 +265,14 @@ class Exact:
         moves = command.speed is not None
         wanted = STAGES if moves else ("position",)
         solved_motion: tuple[str, ...] = ()
-        if command.bar != 2 or command.stroke is not None:
+        if command.bar != 2 or command.moves_stroke:
             solved_motion = MADE if moves else MADE[:1]
         names = []
         for name, stage in STAGE_OF.items():
             if stage in wanted and name not in NOT_ANSWERED:
                 names.append(name)
         names += [name for name in solved_motion if name not in names]
-        if command.stroke is not None:
+        if command.moves_stroke:
             command = find_angle(command, scene.motion, *bars.cylinder(command.bar))
         names = list_unknowns(scene, names)
         if bars.alone and moves:

@@ -21,7 +21,14 @@ from fourbar.files.scene_text import list_scene_tables
 from fourbar.formulas.many_digits import WORKING_DIGITS
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.quantities import VECTORS, Array
-from fourbar.scene import Command, Scene, find_signs, with_signs
+from fourbar.scene import (
+    Command,
+    LimitOrigin,
+    Scene,
+    StrokeOrigin,
+    find_signs,
+    with_signs,
+)
 from fourbar.scene import command as command_of
 from fourbar.scene.motion import COMMAND_NAMES, STROKE_COMMAND, Free, Motion
 from fourbar_validation.compare.answer import Answer, EngineError, ReleasedAnswer
@@ -115,20 +122,15 @@ def command_to_json(scene: Scene, command: Command) -> dict[str, Any]:
 
     The place is an angle or a stroke.
     """
-    if command.stroke is None:
-        names = COMMAND_NAMES[command.bar]
-        values = (command.angle, command.speed, command.acceleration)
-    else:
-        names = STROKE_COMMAND
-        values = (command.stroke, command.stroke_speed, scene.motion.acceleration)
-    place, speed, acceleration = names
+    place, speed, acceleration = command.names
+    values = command.stated
     data = {place: _write_json_numbers(values[0])}
     if values[1] is not None:
         data |= {
             speed: _write_json_numbers(values[1]),
             acceleration: _write_json_numbers(values[2]),
         }
-    if command.stroke is not None:
+    if command.moves_stroke:
         data["side"] = scene.motion.side
     same = bool((command.branch == command.branch[0]).all())
     data["branch"] = int(command.branch[0]) if same else command.branch.tolist()
@@ -192,24 +194,15 @@ def command_from_json(scene: Scene, data: Any) -> tuple[Scene, Command]:
         time = _read_list("time", data["time"], n)
     else:
         time = None
-    command = Command(
-        places,
-        branch,
-        omega,
-        alpha,
-        _read_digits(data.get("remainder"), n),
-        time,
-        scene.motion.bar,
-    )
+    bar = scene.motion.bar
     if place == "stroke":
         unknown: Array = np.full(n, np.nan)  # no motion of the bar is commanded
-        command = command._replace(
-            angle=unknown,
-            speed=None if omega is None else unknown,
-            acceleration=unknown,
-        )
-        command = command._replace(stroke=places, stroke_speed=omega)
-    return scene, command
+        speed_of_bar = None if omega is None else unknown
+        origin = StrokeOrigin(places, omega, alpha)
+        return scene, Command(unknown, branch, speed_of_bar, unknown, bar, time, origin)
+    remainder = _read_digits(data.get("remainder"), n)
+    limit = None if remainder is None else LimitOrigin(remainder)
+    return scene, Command(places, branch, omega, alpha, bar, time, limit)
 
 
 def _find_names(data: Any) -> tuple[str, str, str]:
@@ -524,9 +517,7 @@ def read_answered_motion(data: Any, command: Command) -> Command:
     names = _find_names(data)
     n = len(command.angle)
     if names not in (
-        KINDS_OF_COMMAND[:-1]
-        if command.stroke is not None
-        else (COMMAND_NAMES[command.bar],)
+        KINDS_OF_COMMAND[:-1] if command.moves_stroke else (COMMAND_NAMES[command.bar],)
     ):
         raise InputError(
             "at",
@@ -547,10 +538,7 @@ def read_answered_motion(data: Any, command: Command) -> Command:
         for key in names[1:]
     )
     if acceleration is None:
-        if command.stroke is None:
-            acceleration = command.acceleration
-        else:
-            acceleration = 0.0
+        acceleration = 0.0 if command.moves_stroke else command.acceleration
     made = Command(
         _read_list(names[0], data[names[0]], n),
         branch,
@@ -558,9 +546,7 @@ def read_answered_motion(data: Any, command: Command) -> Command:
         acceleration,
         bar=bar,
     )
-    if (
-        command.stroke is not None
-    ):  # a stroke commands no motion of the bar: the caller knows its motion
+    if command.moves_stroke:  # no motion of the bar is commanded: the caller knows it
         return made
     require_near(made, command)
     stated: dict[str, Any] = {
@@ -572,7 +558,7 @@ def read_answered_motion(data: Any, command: Command) -> Command:
         np.array_equal(value, getattr(command, name)) for name, value in stated.items()
     ):
         return command
-    return command._replace(**stated, remainder=None)
+    return command.as_doubles()._replace(**stated)
 
 
 def require_near(made: Command, command: Command) -> None:

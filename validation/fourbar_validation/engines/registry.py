@@ -376,7 +376,7 @@ def make_prediction(
             quantity, np.zeros(len(mask))
         )
     predict = engine.predictor
-    if command.bar != 2 or command.stroke is not None:
+    if command.bar != 2 or command.moves_stroke:
         return None  # the prediction knows the command of bar 2 alone
     if predict is None or (
         engine.tolerance.conditioned

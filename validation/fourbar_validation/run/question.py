@@ -275,7 +275,7 @@ def spread_evenly(
 
 def select_positions(command: Command, indices: NDArray[np.intp]) -> Command:
     """Take some positions of a command."""
-    return command.part(indices)._replace(remainder=None)
+    return command.part(indices).as_doubles()
 
 
 def take_member(study: Solution, index: int | NDArray[np.intp]) -> Solution:

@@ -245,7 +245,7 @@ def _take_plain_positions(question: Question) -> _Few:
     scene = question.scene
     if at.speed is None:
         raise NotAskedError("the scene states positions only")
-    if at.stroke is not None or at.time is not None:
+    if at.moves_stroke or at.time is not None:
         raise NotAskedError("a stroke or a motion law is commanded")
     for term in (*scene.loads, *scene.effects):
         if type(term) not in _CONVERTED:
@@ -269,7 +269,7 @@ def _take_plain_positions(question: Question) -> _Few:
     begin = int(np.argmax(solution.assembled))
     chosen = spread_evenly(indices, POSITIONS_STATED_OTHERWISE)
     positions = np.concatenate([[begin], chosen[chosen != begin]])
-    command = at.part(positions)._replace(remainder=None)
+    command = at.part(positions).as_doubles()
     link = scene.linkage
     bars = [_make_bar_of_numbers(bar) for bar in link.moving]
     few = Scene(

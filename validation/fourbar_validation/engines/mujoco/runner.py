@@ -375,11 +375,11 @@ class Lead:
         self.loop = loop = ClosedLoop(write_mjcf(still, settings, keyframe=False))
         self.bar: int | None = command.bar
         """Number of the commanded bar; None if the stroke is commanded."""
-        if command.stroke is not None:
+        if command.moves_stroke:
             self.bar = None
             command = find_angle(command, motion, *loop.cylinder(command.bar))
         self.command = command
-        self.values = command.angle if command.stroke is None else command.stroke
+        self.values: Array = command.stated[0]
         self.speed = float(np.max(motion.speed or 0.0))
         self.acceleration = float(np.max(motion.acceleration))
         positions = range(len(self.values))

@@ -115,7 +115,7 @@ class MujocoSimulated:
                     f"{scene.motion.names[1]} is 0 or not stated: nothing to simulate"
                     " through time"
                 )
-            if command.bar != 2 or command.stroke is not None:
+            if command.bar != 2 or command.moves_stroke:
                 lead = Lead(scene, command)
                 scene = lead.scene
                 command = lead.command

@@ -145,7 +145,7 @@ class TrialSetup:
     """
 
     def __init__(self, scene: Scene, command: Command) -> None:
-        if command.bar != 2 or command.stroke is not None:
+        if command.bar != 2 or command.moves_stroke:
             raise LimitError(
                 "settings are tried along a sweep of theta_2, not of another bar or of "
                 "a stroke"
