@@ -98,7 +98,7 @@ class Case(NamedTuple):
     >>> scene = Scene(uniform(0.3, 0.1, 0.25, 0.22, per_metre=2.0), motion)
     >>> at = command(scene)
     >>> case = Case.of(scene)
-    >>> state, _ = case.at(at)
+    >>> state = case.at(at)
     >>> dynamics = case.dynamics(state, at.acceleration)
     >>> dynamics.effort.round(4)
     array([-0.1207,  0.2423,  0.2899,  0.1913])
