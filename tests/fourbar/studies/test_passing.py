@@ -127,7 +127,7 @@ def test_a_stroke_is_found_where_an_angle_is_commanded() -> None:
     solved = fourbar.solve(commanded, "position", at=found).stroke
     assert solved == pytest.approx(value, abs=LOCATED)
     back = find_positions(scene, [("theta_4", float(fourbar.solve(scene).theta_4[3]))])
-    assert len(back.stroke) >= 1
+    assert len(back.stated[0]) >= 1
 
 
 def test_the_range_of_a_refusal_is_that_of_the_motion_and_not_the_other_one() -> None:
