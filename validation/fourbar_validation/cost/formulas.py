@@ -61,10 +61,10 @@ def evaluate_single(scene: Scene, command: Command) -> QuantityValues:
     path = case.path._replace(u1=np.complex64(case.path.u1))
     case = case._replace(path=path)
     with np.errstate(all="ignore"):
-        theta_2 = command.theta_2.astype(np.float32)
-        speed, growth = (
-            np.float32(value) for value in (command.omega_2 or 0.0, command.alpha_2)
-        )
+        # arrays of a command are doubles by their type
+        theta_2: Any = command.theta_2.astype(np.float32)
+        speed: Any = np.float32(command.omega_2 or 0.0)
+        growth: Any = np.float32(command.alpha_2)
         half = path.half_angle(theta_2)
         moved = command._replace(angle=theta_2, speed=speed, acceleration=growth)
         state = case.assemble(moved, half)
