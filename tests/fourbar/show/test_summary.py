@@ -34,6 +34,9 @@ SUMMED = 1e-4
 """Part of the work that a corner of a curve between two positions takes from sums."""
 SLOWER = 12.0
 """Times a summary with friction in two pins may take: they are solved together."""
+BETWEEN_STEPS = 1e-3
+"""What 20 000 steps of a turn miss of an angle that grows as the root at a limit, rad.
+"""
 SWING = 1e-2
 """Relative, of an integral that is known at the ends of steps of 1/100."""
 
@@ -359,3 +362,25 @@ def test_a_released_turn_has_its_period() -> None:
     period, _ = quad(compute_slowness, 0.0, 2.0 * math.pi, epsabs=1e-13)
     facts = release_pendulum(30.0, 0.5)
     assert facts.period == pytest.approx(period, rel=EXTREME)
+
+
+def test_transmission_angle_is_the_least_of_all_stretches() -> None:
+    """The coupler rocks in two stretches; the sine of mu is positive in one of them and
+    negative in the other.
+    """
+    inch = 0.0254
+    bars = [fourbar.Bar(length * inch) for length in (0.2906, 1.203, 1.152)]
+    linkage = fourbar.FourBar(1.102 * inch, *bars)
+
+    def sweep(steps: int) -> fourbar.Scene:
+        angle = fourbar.Sweep(0.0, math.tau, steps)
+        return fourbar.Scene(linkage, fourbar.Motion(theta_3=angle, omega_3=1.0))
+
+    scene = sweep(12)
+    least = summarize(scene, fourbar.solve(scene)).transmission
+    dense = fourbar.solve(sweep(20_000))
+    turned = (dense.theta_4 - dense.theta_3) % math.pi
+    scanned = np.nanmin(np.minimum(turned, math.pi - turned))
+    signs = np.sign(dense.sin_mu[np.isfinite(dense.sin_mu)])
+    assert {*signs} == {-1.0, 1.0}
+    assert least.value == pytest.approx(scanned, abs=BETWEEN_STEPS)

@@ -72,7 +72,7 @@ def _generate(scene: Scene, drive: Drive = "flywheel") -> RobotFile:
     commanded = command(scene)
     rates = (commanded.speed, commanded.acceleration)
     varies = any(rate is not None and np.ptp(rate) for rate in rates)
-    if varies or commanded.bar != 2 or commanded.stroke is not None:
+    if varies or commanded.bar != 2 or scene.motion.stroke is not None:
         solution = solve(scene, "position")
         closed = np.flatnonzero(solution.status_code == OK)
         if not len(closed):
