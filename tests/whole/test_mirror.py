@@ -89,7 +89,7 @@ JUDGED_BY = {
         "validation/engines/mujoco/robots: examine seen"
     ),
     "validation/engines/mujoco/robots/test_closures.py": (
-        "validation/engines/mujoco/robots: ancestry loop"
+        "validation/engines/mujoco/robots: ancestry frame loop"
     ),
     "validation/robots/test_files.py": "validation/engines/mujoco/robots: compiled",
     "validation/robots/test_command.py": "validation/robots: options",

@@ -17,7 +17,7 @@ import numpy as np
 
 from fourbar.errors import say_install
 from fourbar.quantities import DRY_FRICTION_QUANTITIES, STAGE_OF, UNKNOWNS, Array
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, LimitOrigin, Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Adapter, Answer
 from fourbar_validation.compare.compare import (
@@ -427,7 +427,7 @@ def make_answer_nearby(
                     command.branch[row],
                     omega[row],
                     alpha[row],
-                    shift,
+                    origin=LimitOrigin(shift),
                 )
                 for name, values in ask_at(adapter, scene, moved).quantities.items():
                     out[name][row] = values
