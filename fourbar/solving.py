@@ -116,7 +116,7 @@ def solve(
         of_release["with_extremes"] = released.with_extremes
     else:
         commanded = command(scene)
-    request = Request.of(scene, commanded, stage, out)
+    request = SolveRequest.of(scene, commanded, stage, out)
     with np.errstate(all="ignore"):
         if isinstance(commanded.origin, ReleaseOrigin):
             results = _solve_released(scene, commanded.origin, request)
@@ -128,7 +128,7 @@ def solve(
     return make_solution(scene, commanded, results, solved=scene, **of_release)
 
 
-class Request(NamedTuple):
+class SolveRequest(NamedTuple):
     """Quantities that are evaluated, and the number of positions."""
 
     shape: tuple[int, ...]
@@ -213,7 +213,7 @@ def _require_out(out: Any, shape: tuple[int, ...], allowed: list[str]) -> None:
 class Results:
     """Status codes and arrays of all positions, which are filled block by block."""
 
-    def __init__(self, request: Request) -> None:
+    def __init__(self, request: SolveRequest) -> None:
         shape = request.shape
         self.codes: NDArray[np.uint8] = np.zeros(shape, dtype=np.uint8)
         self.arrays: dict[str, Array] = {}
@@ -255,7 +255,7 @@ def _may_sign_differ(case: Case) -> bool:
 def _make_case(
     scene: Scene,
     commanded: Command,
-    request: Request,
+    request: SolveRequest,
     side: int,
 ) -> Case:
     """Make the case of one linkage, with effects that count turns from its start."""
@@ -266,7 +266,9 @@ def _make_case(
     return case.begin_with(stated if stated.bar == commanded.bar else commanded)
 
 
-def _solve_alone(case: Case, commanded: Command, request: Request) -> Results | None:
+def _solve_alone(
+    case: Case, commanded: Command, request: SolveRequest
+) -> Results | None:
     """Solve a single position in plain numbers.
 
     Arrays of one entry cost several times as much. None for several positions, and
@@ -296,7 +298,7 @@ def _solve_alone(case: Case, commanded: Command, request: Request) -> Results | 
     return results
 
 
-def _solve_blocks(case: Case, commanded: Command, request: Request) -> Results:
+def _solve_blocks(case: Case, commanded: Command, request: SolveRequest) -> Results:
     """Solve the positions of one linkage block by block."""
     results = Results(request)
     evaluated = None
@@ -311,7 +313,7 @@ def _solve_blocks(case: Case, commanded: Command, request: Request) -> Results:
 def _solve_released(
     scene: Scene,
     released: ReleaseOrigin,
-    request: Request,
+    request: SolveRequest,
 ) -> Results:
     """Solve a released motion, as the commands of bars 2 and 4 that it is made of."""
     results = Results(request)

@@ -282,7 +282,9 @@ def _solve_coupled(
     n, p = k.shape
     x = np.full((n, p), np.nan)
     number = np.full(n, ONE_SOLUTION, dtype=np.uint8)
-    K = k[:, :, None] * np.hypot(C[..., 0], C[..., 1])
+    with np.errstate(over="ignore"):
+        K = k[:, :, None] * np.hypot(C[..., 0], C[..., 1])
+    finite = finite & np.isfinite(K).all(axis=(1, 2))
     eigenvalues = np.linalg.eigvals(K[finite])
     radius = np.full(n, np.nan)
     radius[finite] = np.abs(eigenvalues).max(axis=1)

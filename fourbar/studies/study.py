@@ -18,7 +18,7 @@ from fourbar.scene.motion import FromLimit
 from fourbar.scene.numbers import find_unit_of_key
 from fourbar.scene.scene import command_stroke
 from fourbar.solution import Solution
-from fourbar.solving import Request, Results, make_solution, split
+from fourbar.solving import Results, SolveRequest, make_solution, split
 from fourbar.studies.keys import (
     COMMAND_KEYS,
     command_key,
@@ -71,7 +71,7 @@ class Study:
         Parameters and errors are those of `fourbar.solve`.
         """
         commanded = self.at
-        request = Request.of(self.scene, commanded, stage, out)
+        request = SolveRequest.of(self.scene, commanded, stage, out)
         results = Results(request)
         evaluated = None
         m, n = request.shape

@@ -433,3 +433,14 @@ def test_a_payload_is_part_of_its_bar_by_the_sums_of_the_page(theta_2):
     assert whole.torque == pytest.approx(loaded.torque, rel=1e-12)
     for name in ("F12", "F32", "F43", "F14"):
         assert getattr(whole, name) == pytest.approx(getattr(loaded, name), rel=1e-12)
+
+
+def test_friction_beyond_the_range_of_doubles_is_no_crash():
+    """On a change point of bars of 1e-41 m the slope of the friction at A overflows."""
+    bar = fourbar.Bar(1e-41, mass=1.0)
+    linkage = fourbar.FourBar(1e-41, bar, bar, bar)
+    friction = fourbar.PinFriction.at(O2=(1.0, 1.0), A=(1.0, 1e168))
+    motion = fourbar.Motion(0.0, 1.0, 1.0)
+    solution = solve(fourbar.Scene(linkage, motion, effects=(friction,)))
+    assert solution.status == ["change_point"]
+    assert np.isnan(solution.torque).all()

@@ -292,9 +292,7 @@ def test_another_command_is_the_axis_and_the_linkage_follows(
         np.hypot(*drawn["O4"]) / 0.3 * s.B[20],
         atol=PIXEL,
     )
-    assert state_of(driver, "plotted.over") == pytest.approx(
-        getattr(s.at, "stroke" if name == "stroke" else "angle")
-    )
+    assert state_of(driver, "plotted.over") == pytest.approx(s.at.places)
     driver.find_element("id", "chart").click()  # its middle
     assert abs(state_of(driver, "row") - 20) <= 2
     closed = [i for i in range(41) if s.assembled[i]]
