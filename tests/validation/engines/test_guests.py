@@ -393,12 +393,10 @@ def test_a_class_is_served_by_our_host() -> None:
         "empty": "TypeError: the answer is a NoneType, not a fourbar_validation.Answer",
         "leaves": f"SystemExit: 0 {place_of('sys.exit(0)')}",
         "complex": "TypeError: an answer holds real numbers, not complex128",
-        "shapes": reasons["shapes"],
-        "elsewhere": reasons["elsewhere"],
+        "shapes": "entries of answers.F12 = 2: must be a list of 9 pairs [x, y], null "
+        "where there is no value",
+        "elsewhere": "at.omega_2: must be within 1 of the command",
     }
-    assert reasons["shapes"].startswith("answers.F12") and reasons[
-        "elsewhere"
-    ].startswith("at.omega_2")
 
 
 @pytest.mark.slow
