@@ -84,6 +84,15 @@ def end_with_parent() -> None:
     threading.Thread(target=wait_for_end, daemon=True).start()
 
 
+def open_no_windows() -> None:
+    """Let MuJoCo load no library of windows in this process, which draws nothing.
+
+    The library starts a program of its own to ask for its version: this costs a tenth
+    of a second, and a program that is killed midway complains on standard error.
+    """
+    os.environ["MUJOCO_GL"] = "disable"
+
+
 @contextmanager
 def hold_interruption() -> Iterator[None]:
     """Hold Ctrl-C back until the body ends, in the processes too that it starts.

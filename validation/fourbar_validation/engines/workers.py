@@ -19,6 +19,7 @@ from fourbar_validation.engines.processes import (
     end_with_parent,
     hold_interruption,
     keep_output,
+    open_no_windows,
 )
 
 if TYPE_CHECKING:
@@ -65,6 +66,7 @@ def prepare_worker(_: object = None) -> None:
 
     CONSTS.channel_lock_timeout = _LOCKED
     end_with_parent()
+    open_no_windows()
     bound_memory()
     keep_output()
 

@@ -16,6 +16,7 @@ from fourbar_validation.engines.processes import (
     bound_processor_time,
     end_with_parent,
     hold_interruption,
+    open_no_windows,
 )
 
 ROBOT_SECONDS = 120.0
@@ -96,6 +97,7 @@ def _confine(folder: str) -> None:
     os.chdir(folder)
     bound_memory()
     end_with_parent()
+    open_no_windows()
 
 
 def _examine_robot(seconds: float, adapter: str, *arguments: object) -> Any:
