@@ -152,3 +152,14 @@ def test_processor_time_is_bounded_by_the_process_itself() -> None:
     )
     ended = subprocess.run([sys.executable, "-c", spinning], timeout=60, check=False)
     assert ended.returncode == -signal.SIGXCPU
+
+
+def test_a_worker_loads_no_library_of_windows() -> None:
+    """The library starts a program, which outlives the worker or complains."""
+    looking = (
+        "from fourbar_validation.engines.processes import open_no_windows\n"
+        "open_no_windows()\n"
+        "import mujoco, sys\n"
+        "sys.exit('glfw' in sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", looking], timeout=60, check=True)
