@@ -19,10 +19,7 @@ from fourbar_validation.places import CHECKOUT, find_program
         ("", "fourbar-validation"),
     ],
 )
-def test_the_command_follows_from_the_file_that_was_started(
-    started: str,
-    program: str,
-) -> None:
+def test_the_command_follows_from_the_file_that_was_started(started, program):
     assert find_program(started) == program
 
 
@@ -38,10 +35,7 @@ def test_the_command_follows_from_the_file_that_was_started(
         ([sys.executable, "-m", "validation"], "python -m validation"),
     ],
 )
-def test_help_names_the_command_that_was_typed(
-    command: list[str],
-    program: str,
-) -> None:
+def test_help_names_the_command_that_was_typed(command, program):
     done = subprocess.run(
         [*command, "-h"],
         cwd=CHECKOUT,

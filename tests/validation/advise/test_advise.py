@@ -36,7 +36,7 @@ from tests.validation.cost.test_cost import turning
     ("omega", "required", "most"),
     [(10.0, 1e-4, 75), (1000.0, 1e-6, 300), (100.0, 2e-9, 1000)],
 )
-def test_figures_of_the_crank_rocker(omega: float, required: float, most: int) -> None:
+def test_figures_of_the_crank_rocker(omega, required, most):
     advice = advise.advise(turning(omega, 72), required)
     assert advice.reached and advice.best.steps_per_revolution <= most, advice.reason
     assert (
@@ -54,7 +54,7 @@ def test_figures_of_the_crank_rocker(omega: float, required: float, most: int) -
     assert advice.best.steps * advice.best.step_cost <= 1.2 * min(work) < max(work)
 
 
-def test_the_solver_is_searched_too() -> None:
+def test_the_solver_is_searched_too():
     """A solver that stops by itself takes a third of a step less, at the same error."""
     scene, required = turning(10.0, 72), 1e-4
     setup = JudgedSetup(scene)
@@ -70,7 +70,7 @@ def test_the_solver_is_searched_too() -> None:
     assert error == pytest.approx(advice.best.errors.worst, rel=0.5)
 
 
-def test_a_drive_elsewhere_is_judged_between_the_steps_too() -> None:
+def test_a_drive_elsewhere_is_judged_between_the_steps_too():
     """Fourteen steps a turn hold the torque of bar 4 within 0.7 % at the steps, and
     miss 9 % between them.
     """
@@ -82,7 +82,7 @@ def test_a_drive_elsewhere_is_judged_between_the_steps_too() -> None:
     assert matters.judge_trial(scene, trial).worst > 0.05
 
 
-def test_no_curve_is_drawn_through_a_pole() -> None:
+def test_no_curve_is_drawn_through_a_pole():
     """On the crank-rocker the torque of bar 4 has poles where the rocker reverses."""
     scene = replace(turning(), drive_bar=4)
     setup = JudgedSetup(scene)
@@ -98,14 +98,14 @@ def test_no_curve_is_drawn_through_a_pole() -> None:
     # of the thesis errors between the steps decide
     [("double_rocker", 1000), ("triple_rocker", 1000), ("thesis", 1600)],
 )
-def test_figures_of_rockers_and_the_thesis(name: str, most: int) -> None:
+def test_figures_of_rockers_and_the_thesis(name, most):
     advice = advise.advise(fourbar.load(MODELS / f"{name}.toml"), 1e-5)
     assert advice.reached, advice.reason
     assert advice.best.steps <= most
     assert advice.best.steps_per_revolution <= most
 
 
-def test_the_file_alone_keeps_the_error(tmp_path: Path) -> None:
+def test_the_file_alone_keeps_the_error(tmp_path):
     """What -o writes, loaded by nothing but its text.
 
     Reset to the keyframe and stepped for a revolution.
@@ -146,7 +146,7 @@ def test_the_file_alone_keeps_the_error(tmp_path: Path) -> None:
     assert steps < 100 and compute_errors(turning(), commanded, columns).worst <= 1e-5
 
 
-def test_what_lies_between_two_steps_is_judged_too() -> None:
+def test_what_lies_between_two_steps_is_judged_too():
     """Two steps that are right at both of their ends miss what the pin forces do
     between.
     """
@@ -168,10 +168,7 @@ def test_what_lies_between_two_steps_is_judged_too() -> None:
 
 
 @pytest.mark.slow
-def test_out_of_reach_is_reported_with_what_would_reach_it(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_out_of_reach_is_reported_with_what_would_reach_it(tmp_path, monkeypatch):
     monkeypatch.setattr(advise, "MOST_STEPS_OF_A_RUN", 1500)
     scene = tmp_path / "scene.toml"
     scene.write_text(fourbar.dump(turning(positions=12)))
@@ -202,7 +199,7 @@ def test_out_of_reach_is_reported_with_what_would_reach_it(
     assert process.return_value == 1 and "motion law" in process.output
 
 
-def test_a_predicted_error_that_is_no_number_is_no_small_one() -> None:
+def test_a_predicted_error_that_is_no_number_is_no_small_one():
     values = {"torque": np.ones(2), "F12": np.ones((2, 2))}
     predicted = {"torque": np.full(2, 1e-9), "F12": np.array([1e-9, np.nan])}
     answer = Answer("", "", quantities=values, predicted=predicted)
@@ -210,7 +207,7 @@ def test_a_predicted_error_that_is_no_number_is_no_small_one() -> None:
 
 
 @pytest.mark.parametrize("required", [0.0, 1.0, -1e-3, math.nan])
-def test_an_error_is_between_0_and_1(required: float) -> None:
+def test_an_error_is_between_0_and_1(required):
     with pytest.raises(fourbar.errors.InputError, match="above 0 and below 1"):
         advise.advise(turning(), required)
     with pytest.raises(fourbar.errors.InputError, match="above 0 and below 1"):
@@ -219,7 +216,7 @@ def test_an_error_is_between_0_and_1(required: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("required", [1e-3, 1e-7])
-def test_a_run_is_no_more_precise_than_required(required: float) -> None:
+def test_a_run_is_no_more_precise_than_required(required):
     scene = turning(positions=90)
     engines = [engine for engine in ENGINES if engine.through_time]
     record = judge("s", scene, adjust_engines(engines, required))
@@ -240,7 +237,7 @@ def test_a_run_is_no_more_precise_than_required(required: float) -> None:
     assert answer.evidence["steps"] < 628
 
 
-def test_a_guest_is_asked_for_the_error_and_not_answered_for_by_the_harness() -> None:
+def test_a_guest_is_asked_for_the_error_and_not_answered_for_by_the_harness():
     (simulated,) = (engine for engine in ENGINES if engine.through_time)
     guest = Guest("mujoco 3.3.7", partial(dict), simulated.tolerance, through_time=True)
     ours, theirs, exact = adjust_engines(
@@ -253,7 +250,7 @@ def test_a_guest_is_asked_for_the_error_and_not_answered_for_by_the_harness() ->
     assert theirs.tolerance == ours.tolerance != exact.tolerance == guest.tolerance
 
 
-def test_exact_engines_stay_exact() -> None:
+def test_exact_engines_stay_exact():
     changed = [
         new
         for old, new in zip(ENGINES, adjust_engines(ENGINES, 1e-3), strict=True)
@@ -265,7 +262,7 @@ def test_exact_engines_stay_exact() -> None:
     )
 
 
-def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason() -> None:
+def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason():
     """Each scene is made so that one setting carries it."""
     bars = (
         fourbar.Bar(0.10, 0.01),
@@ -296,7 +293,7 @@ def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason() -> No
     assert matters.write_sentence(quiet).startswith("No setting matters by itself")
 
 
-def test_the_time_of_the_settings_is_told() -> None:
+def test_the_time_of_the_settings_is_told():
     """A second of 10 rad/s has 1.59 revolutions.
 
     A trial takes longer than its steps and readings, for it assembles the model too;
@@ -324,7 +321,7 @@ def test_the_time_of_the_settings_is_told() -> None:
     assert time_steps(50 * best.steps) + time_readings(100) > revolution / 1e3
 
 
-def test_the_time_of_an_attempt_is_that_of_its_steps_and_readings() -> None:
+def test_the_time_of_an_attempt_is_that_of_its_steps_and_readings():
     setup = JudgedSetup(turning(10.0, 36))
     attempt = advise.advise(turning(10.0, 36), 1e-2, setup).best
     clocks = (lambda count: 2e-6 * count), (lambda count: 3e-5 * count)
@@ -335,7 +332,7 @@ def test_the_time_of_an_attempt_is_that_of_its_steps_and_readings() -> None:
     assert seconds == pytest.approx(expected, rel=1e-12)
 
 
-def test_several_scenes_have_one_table(tmp_path: Path) -> None:
+def test_several_scenes_have_one_table(tmp_path):
     files = []
     for name, scene in (
         ("one", turning(10.0, 36)),

@@ -2,7 +2,6 @@
 
 import math
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -27,7 +26,7 @@ SCENE = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 5.9, 39), 10.0))
 COMMAND = command(SCENE)
 
 
-def answer(**off: float) -> dict[str, Any]:
+def answer(**off):
     """Return the right torque and pin forces, off at the last position by a part of
     their largest value.
     """
@@ -42,7 +41,7 @@ def answer(**off: float) -> dict[str, Any]:
 
 @pytest.mark.parametrize("name", ERROR_NAMES)
 @pytest.mark.parametrize("part", (5e-6, 1e-9))
-def test_each_error_is_the_part_that_an_answer_is_off(name: str, part: float) -> None:
+def test_each_error_is_the_part_that_an_answer_is_off(name, part):
     errors = compute_errors(SCENE, COMMAND, answer(**{name: part}))
     for field, error in zip(ERROR_NAMES, errors, strict=True):
         assert error == pytest.approx(
@@ -54,7 +53,7 @@ def test_each_error_is_the_part_that_an_answer_is_off(name: str, part: float) ->
     assert errors.force == pytest.approx(0.0 if name == "torque" else part, abs=1e-12)
 
 
-def test_what_is_no_number_is_no_small_error() -> None:
+def test_what_is_no_number_is_no_small_error():
     for name in ("torque", "F32"):
         errors = compute_errors(SCENE, COMMAND, answer(**{name: math.nan}))
         assert getattr(errors, name) == errors.worst == math.inf
@@ -63,14 +62,14 @@ def test_what_is_no_number_is_no_small_error() -> None:
     assert compute_errors(SCENE, lost, answer()) == INFINITE_ERRORS
 
 
-def test_a_trial_that_lost_the_motion_has_no_error_that_serves() -> None:
+def test_a_trial_that_lost_the_motion_has_no_error_that_serves():
     trial = Trial(COMMAND, answer(), steps=40, broken="the loop came apart")
     assert judge_trial(SCENE, trial) == INFINITE_ERRORS
     assert judge_trial(SCENE, Trial(COMMAND, answer(), steps=40)).worst < 1e-12
 
 
 @pytest.mark.parametrize("steps", [250.0, 1000.0])
-def test_a_run_is_read_at_every_step_and_judged_between_them(steps: float) -> None:
+def test_a_run_is_read_at_every_step_and_judged_between_them(steps):
     """The scene's own 40 positions, and 180 more, are fewer than the steps."""
     setup = JudgedSetup(SCENE)
     trial = setup.try_out(Settings(steps_per_revolution=steps))
@@ -78,7 +77,7 @@ def test_a_run_is_read_at_every_step_and_judged_between_them(steps: float) -> No
     assert trial.readings == trial.steps + 1
 
 
-def test_what_lies_between_right_steps_is_judged() -> None:
+def test_what_lies_between_right_steps_is_judged():
     """Twelve intervals of a right answer, through which a curve misses its peaks."""
     at = COMMAND.part(slice(None, None, 3))
     solution = fourbar.solve(SCENE, at=at)
@@ -97,25 +96,25 @@ class Pretended:
 
     omega, alpha = 10.0, 0.0
 
-    def __init__(self, floor: float = 0.0, broken: str = "") -> None:
+    def __init__(self, floor=0.0, broken=""):
         self.floor, self.broken = floor, broken
 
-    def steps(self, settings: Any) -> int:
+    def steps(self, settings):
         return round(settings.steps_per_revolution)
 
-    def try_out(self, settings: Any) -> Trial:
+    def try_out(self, settings):
         n = settings.steps_per_revolution
         error = (10.0 / n) ** 4 + self.floor
         return Trial(
             COMMAND, answer(F43=error), self.steps(settings), n, (), self.broken
         )
 
-    def make_clocks(self, settings: Any) -> Any:
+    def make_clocks(self, settings):
         return (lambda steps: 1e-6 * steps), (lambda readings: 1e-6 * readings)
 
 
 @pytest.mark.parametrize("wanted", (1e-4, 1e-6))
-def test_advice_reaches_the_error_with_room_and_with_few_steps(wanted: float) -> None:
+def test_advice_reaches_the_error_with_room_and_with_few_steps(wanted):
     advice = advise.advise(SCENE, wanted, Pretended())  # type: ignore[arg-type]
     assert advice.reached and advice.best.errors.worst <= 0.7 * wanted
     least = 10.0 * (0.7 * wanted) ** -0.25
@@ -125,13 +124,13 @@ def test_advice_reaches_the_error_with_room_and_with_few_steps(wanted: float) ->
 @pytest.mark.parametrize(
     "setup", (Pretended(floor=1e-3), Pretended(broken="it came apart"))
 )
-def test_what_no_setting_reaches_is_not_advised(setup: Pretended) -> None:
+def test_what_no_setting_reaches_is_not_advised(setup):
     advice = advise.advise(SCENE, 1e-5, setup)  # type: ignore[arg-type]
     assert not advice.reached and "No setting of plain MJCF" in advice.reason
     assert advice.cells()[0].endswith("(not reached)")
 
 
-def test_the_greatest_deviation_of_the_speed_is_said() -> None:
+def test_the_greatest_deviation_of_the_speed_is_said():
     speed = np.full(40, 10.0)
     speed[7] = 10.5
     trial = SimpleNamespace(at=COMMAND._replace(speed=speed))

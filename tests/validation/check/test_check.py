@@ -20,7 +20,7 @@ from fourbar.quantities import LINE_QUANTITIES, OK, UNITS, VECTORS
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import Law
 from fourbar.solving import solve
-from fourbar_validation.check.check import Judgement, judge_table
+from fourbar_validation.check.check import judge_table
 from fourbar_validation.check.columns import MADE_OF, list_names_of_points
 from fourbar_validation.check.judge import Allowance
 from fourbar_validation.check.mistakes import list_column_mistakes, list_hypotheses
@@ -51,7 +51,7 @@ EVERY = 31
 Numbers = dict[str, np.ndarray]
 
 
-def right(scene: Scene, **changed: object) -> Numbers:
+def right(scene, **changed):
     """The right numbers at some positions; the command may be changed."""
     commanded = command(scene)
     fields = {"theta_2": "angle", "omega_2": "speed", "alpha_2": "acceleration"}
@@ -67,12 +67,7 @@ def right(scene: Scene, **changed: object) -> Numbers:
     return {name: np.array(getattr(solution, name)) for name in ("theta_2", *ALL)}
 
 
-def write(
-    path: Path,
-    numbers: Numbers,
-    names: tuple[str, ...] = ALL,
-    digits: int | None = None,
-) -> Path:
+def write(path, numbers, names=ALL, digits=None):
     columns = {"theta_2": numbers["theta_2"]}
     for name in names:
         if name in VECTORS:
@@ -99,27 +94,20 @@ def write(
     return path
 
 
-def judged(scene: Scene, path: Path) -> Judgement:
+def judged(scene, path):
     return judge_table(scene, read_table(path))
 
 
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("digits", [None, 5])
-def test_the_right_numbers_agree_also_when_rounded(
-    name: str,
-    digits: int | None,
-    tmp_path: Path,
-) -> None:
+def test_the_right_numbers_agree_also_when_rounded(name, digits, tmp_path):
     path = write(tmp_path / "theirs.csv", right(SCENES[name]), digits=digits)
     assert judged(SCENES[name], path).differing == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
-def test_a_torque_off_by_one_in_the_last_of_six_digits_is_found(
-    name: str,
-    tmp_path: Path,
-) -> None:
+def test_a_torque_off_by_one_in_the_last_of_six_digits_is_found(name, tmp_path):
     numbers = right(SCENES[name])
     numbers["torque"] = numbers["torque"] * (1.0 + 3e-5)
     judgement = judged(SCENES[name], write(tmp_path / "theirs.csv", numbers, digits=5))
@@ -129,9 +117,8 @@ def test_a_torque_off_by_one_in_the_last_of_six_digits_is_found(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_a_theta_2_rounded_as_the_rest_is_allowed_for_and_excuses_no_more(
-    name: str,
-    tmp_path: Path,
-) -> None:
+    name, tmp_path
+):
     numbers = right(SCENES[name])
     rounded = numbers | {
         "theta_2": np.array([float(f"{x:.6g}") for x in numbers["theta_2"]])
@@ -148,7 +135,7 @@ def test_a_theta_2_rounded_as_the_rest_is_allowed_for_and_excuses_no_more(
     assert {finding.quantity for finding in judgement.differing} == {"F43"}
 
 
-def test_blank_cells_are_counted(tmp_path: Path) -> None:
+def test_blank_cells_are_counted(tmp_path):
     numbers = right(SCENES["thesis"])
     numbers["torque"] = np.where(
         np.arange(len(numbers["torque"])) == 3, numbers["torque"], np.nan
@@ -161,7 +148,7 @@ def test_blank_cells_are_counted(tmp_path: Path) -> None:
     assert judgement.sentence().endswith(f"; {blank} of {blank + 1} cells are blank")
 
 
-def test_whole_degrees_are_positions_that_somebody_chose(tmp_path: Path) -> None:
+def test_whole_degrees_are_positions_that_somebody_chose(tmp_path):
     path = tmp_path / "theirs.csv"
     path.write_text("theta_2 [deg],torque\n10,1.0\n20.5,1.0\n")
     assert not read_table(path).places_rounding.any()
@@ -174,35 +161,33 @@ def test_whole_degrees_are_positions_that_somebody_chose(tmp_path: Path) -> None
     )
 
 
-def bars(scene: Scene, **changes: object) -> Scene:
+def bars(scene, **changes):
     return replace(scene, linkage=replace(scene.linkage, **changes))
 
 
-def units(*names: str, factor: float) -> Callable[[Scene], Numbers]:
-    def planted(scene: Scene) -> Numbers:
+def units(*names, factor):
+    def planted(scene):
         numbers = right(scene)
         return numbers | {name: numbers[name] * factor for name in names}
 
     return planted
 
 
-def solved(
-    change: Callable[[Scene], Scene], **command: object
-) -> Callable[[Scene], Numbers]:
+def solved(change, **command):
     return lambda scene: right(change(scene), **command)
 
 
-def same(scene: Scene) -> Scene:
+def same(scene):
     return scene
 
 
-def y_reversed(scene: Scene) -> Numbers:
+def y_reversed(scene):
     numbers = right(scene)
     vectors = {n: v for n, v in numbers.items() if v.ndim == 2}
     return numbers | {name: v * (1.0, -1.0) for name, v in vectors.items()}
 
 
-def inertial_times(scene: Scene, by_mass: float, by_inertia: float) -> Numbers:
+def inertial_times(scene, by_mass, by_inertia):
     """m a and I alpha by hand.
 
     What they add to static equilibrium is put on as loads at G, as d'Alembert does.
@@ -233,38 +218,35 @@ def inertial_times(scene: Scene, by_mass: float, by_inertia: float) -> Numbers:
     return {name: np.array(values) for name, values in numbers.items()}
 
 
-def other_pin(bar: fourbar.Bar) -> fourbar.Bar:
+def other_pin(bar):
     r, phi = bar.mass_centre
     x, y = bar.length - r * math.cos(phi), r * math.sin(phi)
     return replace(bar, centre=(math.hypot(x, y), math.atan2(y, x)))
 
 
-def about_pin(bar: fourbar.Bar) -> fourbar.Bar:
+def about_pin(bar):
     r = bar.mass_centre[0]
     return replace(bar, inertia=bar.moment_of_inertia + bar.mass * r**2)
 
 
-def at_mid_bar(bar: fourbar.Bar) -> fourbar.Bar:
+def at_mid_bar(bar):
     return replace(bar, centre=(bar.length / 2.0, 0.0))
 
 
-def turned_over(bar: fourbar.Bar) -> fourbar.Bar:
+def turned_over(bar):
     return replace(bar, centre=half_a_turn(bar))
 
 
-def mirrored(bar: fourbar.Bar) -> fourbar.Bar:
+def mirrored(bar):
     r, phi = bar.mass_centre
     return replace(bar, centre=(r, -phi))
 
 
-def without_inertia(bar: fourbar.Bar) -> fourbar.Bar:
+def without_inertia(bar):
     return replace(bar, inertia=0.0)
 
 
-def solved_with(
-    change: Callable[[fourbar.Bar], fourbar.Bar],
-    *names: str,
-) -> Callable[[Scene], Numbers]:
+def solved_with(change, *names):
     """Solve with some bars changed; without names every moving bar."""
     names = names or ("input", "coupler", "output")
     return solved(
@@ -275,7 +257,7 @@ def solved_with(
     )
 
 
-def stretched(scene: Scene, name: str, factor: float) -> Scene:
+def stretched(scene, name, factor):
     """A scene with another length, whose bars keep mass, centre and inertia."""
     linkage = scene.linkage
     if name == "ground":
@@ -285,10 +267,10 @@ def stretched(scene: Scene, name: str, factor: float) -> Scene:
     return bars(scene, **{name: replace(bar, length=factor * bar.length, **kept)})
 
 
-def in_degrees(first: float) -> Callable[[Scene], Numbers]:
+def in_degrees(first):
     """Angles in degrees within a turn from `first`."""
 
-    def planted(scene: Scene) -> Numbers:
+    def planted(scene):
         numbers = right(scene)
         for name in ("theta_3", "theta_4"):
             numbers[name] = first + (np.degrees(numbers[name]) - first) % 360.0
@@ -297,23 +279,23 @@ def in_degrees(first: float) -> Callable[[Scene], Numbers]:
     return planted
 
 
-def with_gravity(angle: float) -> Callable[[Scene], Numbers]:
+def with_gravity(angle):
     gravity = fourbar.Gravity(9.81, math.radians(angle))
     return solved(lambda scene: replace(scene, effects=(gravity,)))
 
 
-def in_other_frame(scene: Scene) -> Scene:
+def in_other_frame(scene):
     """Return the scene with its force in the other frame, "world" or "bar"."""
     moment, force = scene.loads
     frame = {"bar": "world", "world": "bar"}[force.frame]
     return replace(scene, loads=(moment, replace(force, frame=frame)))
 
 
-def half_a_turn(bar: fourbar.Bar) -> tuple[float, float]:
+def half_a_turn(bar):
     return bar.mass_centre[0], bar.mass_centre[1] + math.pi
 
 
-def reversed_load(load: fourbar.Load) -> fourbar.Load:
+def reversed_load(load):
     return replace(
         load,
         force=load.force and (-load.force[0], load.force[1]),
@@ -321,7 +303,7 @@ def reversed_load(load: fourbar.Load) -> fourbar.Load:
     )
 
 
-def tenth(load: fourbar.Load) -> fourbar.Load:
+def tenth(load):
     return replace(
         load,
         force=load.force and (0.1 * load.force[0], load.force[1]),
@@ -329,17 +311,15 @@ def tenth(load: fourbar.Load) -> fourbar.Load:
     )
 
 
-def exchanged(scene: Scene) -> Numbers:
+def exchanged(scene):
     numbers = right(scene)
     return numbers | {"F32": numbers["F32"][:, ::-1]}
 
 
-def half_a_step(
-    sign: float, names: tuple[str, ...] = ALL
-) -> Callable[[Scene], Numbers]:
+def half_a_step(sign, names=ALL):
     """Numbers half a step after (1) or before (-1) each position."""
 
-    def planted(scene: Scene) -> Numbers:
+    def planted(scene):
         numbers = right(scene)
         theta = numbers["theta_2"]
         between = right(scene, theta_2=theta + 0.5 * sign * (theta[1] - theta[0]))
@@ -352,10 +332,10 @@ OMEGA = {"thesis": 0.2244, "crank_rocker": 10.0}
 RATES = ("omega_3", "omega_4", "alpha_3", "alpha_4")
 
 
-def differences(*at: int) -> Callable[[Scene], Numbers]:
+def differences(*at):
     """Rates by differences of angles at these steps; first and last for speeds."""
 
-    def planted(scene: Scene) -> Numbers:
+    def planted(scene):
         numbers = right(scene)
         theta = numbers["theta_2"]
         step = theta[1] - theta[0]
@@ -1014,13 +994,13 @@ MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]
 ]
 
 
-def test_every_hypothesis_has_a_case_and_no_two_have_one_text() -> None:
+def test_every_hypothesis_has_a_case_and_no_two_have_one_text():
     """Whatever is swapped, left out or of another unit has a message.
 
     A case above demands it.
     """
 
-    def kind(text: str) -> str:
+    def kind(text):
         return re.sub(r"input|coupler|output|load \d|bar \d", "ONE", text)
 
     texts = {
@@ -1041,10 +1021,7 @@ def test_every_hypothesis_has_a_case_and_no_two_have_one_text() -> None:
 
 
 @pytest.mark.parametrize("digits", [4, 5])
-def test_a_ratio_fitted_to_rounded_numbers_and_one_to_SI_are_named(
-    digits: int,
-    tmp_path: Path,
-) -> None:
+def test_a_ratio_fitted_to_rounded_numbers_and_one_to_SI_are_named(digits, tmp_path):
     scene = SCENES["crank_rocker"]
     numbers = right(scene)
     for name in ("torque", "F12"):
@@ -1069,9 +1046,7 @@ def test_a_ratio_fitted_to_rounded_numbers_and_one_to_SI_are_named(
     )
 
 
-def test_a_position_that_agrees_by_chance_does_not_hide_a_mistake(
-    tmp_path: Path,
-) -> None:
+def test_a_position_that_agrees_by_chance_does_not_hide_a_mistake(tmp_path):
     scene = SCENES["crank_rocker"]
     numbers = right(scene)
     slip = numbers | {
@@ -1092,7 +1067,7 @@ def test_a_position_that_agrees_by_chance_does_not_hide_a_mistake(
     )
 
 
-def test_a_hypothesis_predicts_the_numbers_of_its_mistake() -> None:
+def test_a_hypothesis_predicts_the_numbers_of_its_mistake():
     """All that solve another problem, without a search for the one that fits."""
     tried = 0
     for name, scene in SCENES.items():
@@ -1130,13 +1105,8 @@ def test_a_hypothesis_predicts_the_numbers_of_its_mistake() -> None:
     ids=[m[0] for m in MISTAKES],
 )
 def test_a_known_mistake_is_the_first_explanation(
-    what: str,
-    scene: str,
-    columns: tuple[str, ...],
-    planted: Callable[[Scene], Numbers],
-    words: str,
-    tmp_path: Path,
-) -> None:
+    what, scene, columns, planted, words, tmp_path
+):
     judgement = judged(
         SCENES[scene], write(tmp_path / "theirs.csv", planted(SCENES[scene]), columns)
     )
@@ -1146,7 +1116,7 @@ def test_a_known_mistake_is_the_first_explanation(
     assert first.complete
 
 
-def test_two_mistakes_in_two_columns_are_both_named(tmp_path: Path) -> None:
+def test_two_mistakes_in_two_columns_are_both_named(tmp_path):
     scene = SCENES["crank_rocker"]
     numbers = right(scene)
     numbers |= {"torque": numbers["torque"] * 100.0, "F43": -numbers["F43"]}
@@ -1168,11 +1138,7 @@ EVERY_QUANTITY = [
     "quantity", [name for name in EVERY_QUANTITY if not name.startswith("torque_")]
 )
 @pytest.mark.parametrize("name", SCENES)
-def test_every_quantity_is_judged_at_its_own_scale(
-    name: str,
-    quantity: str,
-    tmp_path: Path,
-) -> None:
+def test_every_quantity_is_judged_at_its_own_scale(name, quantity, tmp_path):
     """Off by 1e-9 of its largest value it differs, whatever its unit.
 
     A_x was once judged in newtons.
@@ -1200,7 +1166,7 @@ def test_every_quantity_is_judged_at_its_own_scale(
     assert len(judgement.differing) == len(judgement.findings) > 0
 
 
-def test_a_quantity_of_no_known_scale_is_not_judged_by_another() -> None:
+def test_a_quantity_of_no_known_scale_is_not_judged_by_another():
     """Every unit that is judged has its sum of terms."""
     scene = SCENES["thesis"]
     assert (
@@ -1212,12 +1178,12 @@ def test_a_quantity_of_no_known_scale_is_not_judged_by_another() -> None:
 
 
 @pytest.mark.parametrize("letter", "xy")
-def test_one_component_is_judged_by_itself(letter: str, tmp_path: Path) -> None:
+def test_one_component_is_judged_by_itself(letter, tmp_path):
     scene, path = SCENES["crank_rocker"], tmp_path / "theirs.csv"
     numbers = right(scene)
     column = numbers["F12"][:, "xy".index(letter)]
 
-    def found(values: np.ndarray) -> Judgement:
+    def found(values):
         rows = [
             f"{t!r},{x!r}"
             for t, x in zip(numbers["theta_2"].tolist(), values.tolist(), strict=True)
@@ -1240,10 +1206,8 @@ def test_one_component_is_judged_by_itself(letter: str, tmp_path: Path) -> None:
     ("torque", "code"), [("0.0", HOLDS), ("0.04", FAILED), ("5.0", FAILED)]
 )
 def test_what_is_zero_by_all_its_terms_is_judged_in_its_own_unit(
-    torque: str,
-    code: int,
-    tmp_path: Path,
-) -> None:
+    torque, code, tmp_path
+):
     """Bars without mass or load take no torque.
 
     Half a printed digit over a scale of 0 once excused any number.
@@ -1261,9 +1225,7 @@ def test_what_is_zero_by_all_its_terms_is_judged_in_its_own_unit(
     )
 
 
-def test_a_released_scene_is_not_judged_at_the_speed_of_its_start(
-    tmp_path: Path,
-) -> None:
+def test_a_released_scene_is_not_judged_at_the_speed_of_its_start(tmp_path):
     released = replace(
         SCENES["crank_rocker"],
         motion=fourbar.Motion(1.0, 2.0, free=fourbar.Free(1.0, 10)),
@@ -1273,7 +1235,7 @@ def test_a_released_scene_is_not_judged_at_the_speed_of_its_start(
         judged(released, path)
 
 
-def test_nonsense_is_explained_by_nothing(tmp_path: Path) -> None:
+def test_nonsense_is_explained_by_nothing(tmp_path):
     scene = SCENES["crank_rocker"]
     numbers = right(scene)
     rng = np.random.default_rng(3)
@@ -1292,18 +1254,13 @@ PUBLISHED = {
 """The thesis's section 5.7 at theta_2 = 135 deg, N and N cm, digits as printed."""
 
 
-def test_a_number_at_the_end_of_the_range_differs_without_a_warning(
-    tmp_path: Path,
-) -> None:
+def test_a_number_at_the_end_of_the_range_differs_without_a_warning(tmp_path):
     path = tmp_path / "theirs.csv"
     path.write_text("theta_2,torque\n1e308,1e308\n")
     assert status(["check", str(MODELS / "crank_rocker.toml"), str(path)]) == FAILED
 
 
-def test_the_thesis_itself_differs_and_no_single_mistake_explains_it(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_thesis_itself_differs_and_no_single_mistake_explains_it(tmp_path, capsys):
     forces = ("F12", "F32", "F43", "F14")
     path = tmp_path / "thesis.csv"
     heading = ",".join(f"{name}_x,{name}_y" for name in forces)
@@ -1318,10 +1275,7 @@ def test_the_thesis_itself_differs_and_no_single_mistake_explains_it(
     assert "no single known mistake explains it" in printed
 
 
-def test_no_line_is_wider_than_a_terminal_and_none_ends_within_a_word(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_no_line_is_wider_than_a_terminal_and_none_ends_within_a_word(tmp_path, capsys):
     """The longest line says which mistake explains all quantities of a table in kg
     mm/s^2; put together again, its lines are one.
     """
@@ -1406,13 +1360,7 @@ BAD_TABLES = [
     BAD_TABLES,
     ids=[case[0] for case in BAD_TABLES],
 )
-def test_a_bad_table_is_one_line(
-    what: str,
-    text: str | bytes,
-    words: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_bad_table_is_one_line(what, text, words, tmp_path, capsys):
     path = tmp_path / "theirs.csv"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     code = status(["check", str(MODELS / "thesis.toml"), str(path)])
@@ -1428,10 +1376,7 @@ def test_a_bad_table_is_one_line(
     assert "\x1b" not in printed.err
 
 
-def test_a_table_that_is_too_large_or_missing_is_one_line(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_table_that_is_too_large_or_missing_is_one_line(tmp_path, capsys):
     large = tmp_path / "large.csv"
     with large.open("wb") as file:
         file.truncate(LARGEST_TABLE_FILE + 1)
@@ -1444,7 +1389,7 @@ def test_a_table_that_is_too_large_or_missing_is_one_line(
         assert words in capsys.readouterr().err
 
 
-def test_positions_that_do_not_assemble_are_named_by_their_line(tmp_path: Path) -> None:
+def test_positions_that_do_not_assemble_are_named_by_their_line(tmp_path):
     path = tmp_path / "theirs.csv"
     path.write_text("theta_2 [deg],theta_3\n\n45,1\n")
     judgement = judged(SCENES["thesis"], path)
@@ -1452,7 +1397,7 @@ def test_positions_that_do_not_assemble_are_named_by_their_line(tmp_path: Path) 
     assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == FAILED
 
 
-def test_agreement_is_exit_0_in_every_unit(tmp_path: Path) -> None:
+def test_agreement_is_exit_0_in_every_unit(tmp_path):
     numbers = right(SCENES["thesis"])
     path = tmp_path / "theirs.csv"
     rows = zip(
@@ -1471,7 +1416,7 @@ def test_agreement_is_exit_0_in_every_unit(tmp_path: Path) -> None:
     assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == HOLDS
 
 
-def rows_of(name: str, *options: str) -> list[list[str]]:
+def rows_of(name, *options):
     """The file of `fourbar analyze --csv`, cell by cell."""
     text = fourbar.solve(SCENES[name], "error").to_csv(degrees="--degrees" in options)
     assert text is not None
@@ -1481,11 +1426,8 @@ def rows_of(name: str, *options: str) -> list[list[str]]:
 @pytest.mark.parametrize("options", [(), ("--degrees",)])
 @pytest.mark.parametrize("delimiter", [",", ";", "\t"])
 def test_the_file_of_analyze_is_read_as_it_is_and_as_a_spreadsheet_saves_it(
-    delimiter: str,
-    options: tuple[str, ...],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    delimiter, options, tmp_path, capsys
+):
     # without the derived quantities, which stand before the time
     rows = [
         row[:14] + row[-22:-13] + row[-1:] for row in rows_of("thesis", *options)[:40]
@@ -1509,10 +1451,7 @@ OFF = 1e-6
 
 
 @pytest.mark.parametrize("name", ["drawn", "springs", "push_output"])
-def test_every_column_of_the_file_of_analyze_is_known(
-    name: str,
-    tmp_path: Path,
-) -> None:
+def test_every_column_of_the_file_of_analyze_is_known(name, tmp_path):
     """Those that are made of a solution's quantities are judged too."""
     scene = MODELS / "capabilities" / f"{name}.toml"
     path = tmp_path / "theirs.csv"
@@ -1534,9 +1473,7 @@ def test_every_column_of_the_file_of_analyze_is_known(
         assert {finding.quantity for finding in differing} == {key}
 
 
-def test_ratios_and_differences_that_analyze_writes_are_no_unknown_columns(
-    tmp_path: Path,
-) -> None:
+def test_ratios_and_differences_that_analyze_writes_are_no_unknown_columns(tmp_path):
     path = tmp_path / "theirs.csv"
     columns = "theta_2,theta_3,theta_4-theta_3,omega_4/omega_2,torque"
     line = ["analyze", str(MODELS / "crank_rocker.toml"), "--columns", columns]
@@ -1544,9 +1481,7 @@ def test_ratios_and_differences_that_analyze_writes_are_no_unknown_columns(
     assert "not a known column" not in read_table(path).left_out.values()
 
 
-def test_blank_cells_state_nothing_and_the_rest_of_their_row_is_judged(
-    tmp_path: Path,
-) -> None:
+def test_blank_cells_state_nothing_and_the_rest_of_their_row_is_judged(tmp_path):
     numbers = right(SCENES["thesis"])
     path = tmp_path / "theirs.csv"
     (one, two), (first, second) = (
@@ -1570,7 +1505,7 @@ def test_blank_cells_state_nothing_and_the_rest_of_their_row_is_judged(
     )
 
 
-def test_magnitudes_and_a_whole_imperial_table(tmp_path: Path) -> None:
+def test_magnitudes_and_a_whole_imperial_table(tmp_path):
     numbers = right(SCENES["crank_rocker"])
     inch, pound = 0.0254, 4.4482216152605
     columns = {
@@ -1597,9 +1532,8 @@ def test_magnitudes_and_a_whole_imperial_table(tmp_path: Path) -> None:
 
 
 def test_a_stated_tolerance_decides_and_the_exact_count_stands_next_to_it(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    tmp_path, capsys
+):
     numbers = right(SCENES["thesis"])
     off = numbers | {"torque": numbers["torque"] * (1.0 + 1e-4)}
     path, model = str(write(tmp_path / "theirs.csv", off)), str(MODELS / "thesis.toml")
@@ -1641,8 +1575,8 @@ def test_a_stated_tolerance_decides_and_the_exact_count_stands_next_to_it(
 
 
 def test_a_mistake_is_recognised_in_numbers_that_are_right_only_to_the_stated_tolerance(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     """A simulation's torque, a ten-thousandth off, under the wrong unit."""
     numbers = right(SCENES["crank_rocker"])
     numbers["torque"] = (
@@ -1658,9 +1592,7 @@ def test_a_mistake_is_recognised_in_numbers_that_are_right_only_to_the_stated_to
     )
 
 
-def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(
-    tmp_path: Path,
-) -> None:
+def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(tmp_path):
     parallelogram = fourbar.FourBar(
         0.3, fourbar.Bar(0.1, 0.2), fourbar.Bar(0.3, 0.5), fourbar.Bar(0.1, 0.2)
     )
@@ -1678,9 +1610,7 @@ def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(
     )
 
 
-def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(
-    tmp_path: Path,
-) -> None:
+def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(tmp_path):
     scene = SCENES["crank_rocker"]
     speed, acceleration = np.linspace(2.0, 9.0, 12), np.linspace(-30.0, 40.0, 12)
     log = right(scene, omega_2=speed, alpha_2=acceleration) | {
@@ -1726,11 +1656,8 @@ def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(
     ],
 )
 def test_a_motion_that_rows_are_not_found_by_is_refused_in_one_line(
-    motion: dict[str, object],
-    words: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    motion, words, tmp_path, capsys
+):
     table = write(tmp_path / "theirs.csv", right(SCENES["crank_rocker"]))
     scene = replace(SCENES["crank_rocker"], motion=fourbar.Motion(**motion))  # type: ignore[arg-type]
     (tmp_path / "scene.toml").write_text(fourbar.dump(scene))
@@ -1738,7 +1665,7 @@ def test_a_motion_that_rows_are_not_found_by_is_refused_in_one_line(
     assert words in capsys.readouterr().err
 
 
-def write_torques(path: Path, form: Callable[[list[tuple[float, float]]], str]) -> Path:
+def write_torques(path, form):
     """Write theta_2 of a crank-rocker in whole degrees and its torque in a form."""
     scene = SCENES["crank_rocker"]
     degrees = np.arange(0.0, 360.0, 30.0)
@@ -1753,10 +1680,10 @@ def write_torques(path: Path, form: Callable[[list[tuple[float, float]]], str]) 
     return path
 
 
-def lines(head: str, row: str) -> Callable[[list[tuple[float, float]]], str]:
+def lines(head, row):
     """Make a form of a heading and a line for each position."""
 
-    def form(rows: list[tuple[float, float]]) -> str:
+    def form(rows):
         return head + "".join(row.format(theta=t, torque=x) for t, x in rows)
 
     return form
@@ -1790,7 +1717,7 @@ ORDINARY: dict[str, Callable[[list[tuple[float, float]]], str]] = {
 }
 
 
-def in_thousands(rows: list[tuple[float, float]]) -> str:
+def in_thousands(rows):
     """Write micronewton metres with points between thousands, and a decimal comma."""
     text = "theta_2 [deg];torque [uN m]\n"
     for theta, torque in rows:
@@ -1804,17 +1731,14 @@ ORDINARY["decimal comma"] = lambda rows: ORDINARY["German"](rows).replace(".", "
 
 
 @pytest.mark.parametrize("form", ORDINARY)
-def test_an_ordinary_table_is_read(form: str, tmp_path: Path) -> None:
+def test_an_ordinary_table_is_read(form, tmp_path):
     path = write_torques(tmp_path / "theirs.csv", ORDINARY[form])
     judgement = judged(SCENES["crank_rocker"], path)
     assert (judgement.agreeing, judgement.compared) == (12, 12)
     assert re.search(r"agree, compared to \d+ digits", judgement.sentence())
 
 
-def test_degrees_under_a_bare_theta_2_are_recognised_and_said(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_degrees_under_a_bare_theta_2_are_recognised_and_said(tmp_path, capsys):
     bare = lines("theta_2,torque\n", "{theta:.0f},{torque:.9e}\n")
     path = write_torques(tmp_path / "theirs.csv", bare)
     scene = str(MODELS / "crank_rocker.toml")
@@ -1823,7 +1747,7 @@ def test_degrees_under_a_bare_theta_2_are_recognised_and_said(
     assert "theta_2 has no unit and goes to 330: it is read as degrees" in printed
 
 
-def test_a_bare_omega_suggests_the_commanded_one(tmp_path: Path) -> None:
+def test_a_bare_omega_suggests_the_commanded_one(tmp_path):
     form = lines("theta_2 [deg],torque,omega\n", "{theta:.0f},{torque:.9e},1\n")
     table = read_table(write_torques(tmp_path / "theirs.csv", form))
     assert table.left_out == {"omega": "not a known column: rename it if it is omega_2"}
@@ -1841,11 +1765,7 @@ def test_a_bare_omega_suggests_the_commanded_one(tmp_path: Path) -> None:
         ("angular speed", "rename it if it is omega_2, omega_3 or omega_4"),
     ],
 )
-def test_a_column_of_an_unknown_name_says_what_it_may_be(
-    heading: str,
-    words: str,
-    tmp_path: Path,
-) -> None:
+def test_a_column_of_an_unknown_name_says_what_it_may_be(heading, words, tmp_path):
     form = lines(f"theta_2 [deg],torque,{heading}\n", "{theta:.0f},{torque:.9e},1\n")
     path = write_torques(tmp_path / "theirs.csv", form)
     (why,) = read_table(path).left_out.values()
@@ -1856,9 +1776,7 @@ def test_a_column_of_an_unknown_name_says_what_it_may_be(
         read_table(path)
 
 
-def test_a_repeated_column_of_other_numbers_says_which_to_rename(
-    tmp_path: Path,
-) -> None:
+def test_a_repeated_column_of_other_numbers_says_which_to_rename(tmp_path):
     form = lines("theta_2 [deg],torque,T2\n", "{theta:.0f},{torque:.9e},0.5\n")
     path = write_torques(tmp_path / "theirs.csv", form)
     with pytest.raises(InputError, match="columns 2 and 3 are both torque, with other"):
@@ -1866,8 +1784,8 @@ def test_a_repeated_column_of_other_numbers_says_which_to_rename(
 
 
 def test_a_column_without_information_is_an_error_and_zeros_that_are_right_are_not(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     form = lines("theta_2 [deg],torque [kN m]\n", "{theta:.0f},0\n")
     path = write_torques(tmp_path / "theirs.csv", form)
     with pytest.raises(InputError, match="every number would agree; print more digits"):
@@ -1877,7 +1795,7 @@ def test_a_column_without_information_is_an_error_and_zeros_that_are_right_are_n
     assert judged(SCENES["crank_rocker"], path).status == HOLDS
 
 
-def test_the_table_of_a_drawing_agrees_in_its_coordinates(tmp_path: Path) -> None:
+def test_the_table_of_a_drawing_agrees_in_its_coordinates(tmp_path):
     scene = tmp_path / "drawn.toml"
     scene.write_text("""\
 [pins]
@@ -1903,9 +1821,7 @@ omega_2 = "1 rad/s"
     assert {finding.quantity for finding in as_it_stands.differing} >= {"A", "B"}
 
 
-def test_what_brings_one_number_nearer_and_no_other_is_no_explanation(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_brings_one_number_nearer_and_no_other_is_no_explanation(tmp_path, capsys):
     """Five numbers of one position, each wrong, by a script of a student.
 
     Impulses, a sign of I alpha and an offset of 4.1 deg come near to some by chance,
@@ -1952,9 +1868,7 @@ from_pin = ["3.06 m", "-31 deg"]
     assert "no single known mistake explains it" in printed
 
 
-def test_a_mistake_in_numbers_of_seven_digits_is_named_with_the_digits(
-    tmp_path: Path,
-) -> None:
+def test_a_mistake_in_numbers_of_seven_digits_is_named_with_the_digits(tmp_path):
     """Gravity is reversed, and a part of 1e-7 of another mistake remains."""
     scene = replace(SCENES["crank_rocker"], effects=(fourbar.Gravity(),))
     turned = replace(scene, effects=(fourbar.Gravity(angle=math.pi / 2.0),))
@@ -1968,10 +1882,8 @@ def test_a_mistake_in_numbers_of_seven_digits_is_named_with_the_digits(
 
 @pytest.mark.parametrize(("alike", "explained"), [(9, True), (8, False)])
 def test_a_mistake_that_explains_less_than_nine_tenths_is_not_printed(
-    alike: int,
-    explained: bool,
-    tmp_path: Path,
-) -> None:
+    alike, explained, tmp_path
+):
     """Ten columns differ, each by its sign or by chance."""
     scene = SCENES["crank_rocker"]
     names = ("F12", "F32", "F43", "F14", "theta_3", "theta_4", "omega_3", "omega_4")
@@ -1986,7 +1898,7 @@ def test_a_mistake_that_explains_less_than_nine_tenths_is_not_printed(
     assert bool(judgement.explanations) == explained
 
 
-def test_a_factor_is_not_fitted_to_a_single_number(tmp_path: Path) -> None:
+def test_a_factor_is_not_fitted_to_a_single_number(tmp_path):
     """Of one torque every mass and every load would be the cause."""
     numbers = right(SCENES["crank_rocker"])
     numbers = {name: values[:1] for name, values in numbers.items()}
@@ -2021,12 +1933,7 @@ length = "18 in"
 @pytest.mark.slow
 @pytest.mark.parametrize("options", [[], ["--degrees"], ["--radians"], ["--csv-comma"]])
 @pytest.mark.parametrize("name", ["thesis", "gallery/pump_jack", "unloaded", "saved"])
-def test_the_default_csv_returns_to_the_last_digit(
-    name: str,
-    options: list[str],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_default_csv_returns_to_the_last_digit(name, options, tmp_path, capsys):
     """As many numbers agree, without a tolerance, as of the file in SI units."""
     if name == "unloaded":
         scene = tmp_path / "scene.toml"
@@ -2065,11 +1972,8 @@ def test_the_default_csv_returns_to_the_last_digit(
 
 @pytest.mark.parametrize(("digits", "power"), [(8, -7), (5, -4)])
 def test_a_right_table_of_fewer_digits_than_it_prints_is_told_the_tolerance(
-    digits: int,
-    power: int,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    digits, power, tmp_path, capsys
+):
     """Rounded to so many digits, printed with 15; the option that is named agrees.
 
     A number that is off by 1 % has no such line.
@@ -2097,17 +2001,15 @@ def test_a_right_table_of_fewer_digits_than_it_prints_is_told_the_tolerance(
     assert "all agree within" not in capsys.readouterr().out
 
 
-def _round(number: float) -> float:
+def _round(number):
     """Round a number to 8 digits."""
     return float(f"{number:.7e}")
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_table_with_mistakes_and_few_right_digits_is_told_both(
-    sign: float,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    sign, tmp_path, capsys
+):
     """Angles half a turn off, perhaps forces of the other sign, and 8 right digits.
 
     With the tolerance that is named the mistakes explain all that differs.

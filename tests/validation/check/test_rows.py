@@ -5,7 +5,6 @@ The second derivation of a position is the intersection of two circles.
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,9 +12,8 @@ import pytest
 import fourbar
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError, LimitError
 from fourbar.files import loads
-from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
-from fourbar_validation.check.check import Judgement, judge_table
+from fourbar_validation.check.check import judge_table
 from fourbar_validation.check.rows import find_row_commands
 from fourbar_validation.check.theirs import read_table
 from fourbar_validation.cli import status
@@ -26,7 +24,7 @@ SAME_PLACE = 1e-9
 """rad: a position by two circles and one by the formulas, 0.1 rad off a limit."""
 
 
-def find_crank(scene: Scene, theta_4: Array, side: float) -> Array:
+def find_crank(scene, theta_4, side):
     """Return theta_2 at which the output has these angles, by two circles.
 
     A lies at the distances of input and coupler from O2 and B. `side`: +1 if A lies to
@@ -40,13 +38,7 @@ def find_crank(scene: Scene, theta_4: Array, side: float) -> Array:
     return np.angle((along + 1j * across) * B / away)
 
 
-def write_table(
-    path: Path,
-    angle: str,
-    angles: Array,
-    torque: Array,
-    form: str = "{:.12g}",
-) -> Path:
+def write_table(path, angle, angles, torque, form="{:.12g}"):
     """Write angles in deg with torques in N m."""
     rows = [f"{angle} [deg],torque"]
     for place, number in zip(np.degrees(angles), torque, strict=True):
@@ -55,11 +47,11 @@ def write_table(
     return path
 
 
-def judged(scene: Scene, path: Path) -> Judgement:
+def judged(scene, path):
     return judge_table(scene, read_table(path, scene.motion.commanded))
 
 
-def commanding(bar: int, first: float, last: float, steps: int = 8) -> Scene:
+def commanding(bar, first, last, steps=8):
     """A crank-rocker whose bar `bar` is commanded and driven over a range in deg."""
     start, stop = math.radians(first), math.radians(last)
     motion = fourbar.Motion(
@@ -74,12 +66,7 @@ def commanding(bar: int, first: float, last: float, steps: int = 8) -> Scene:
 
 @pytest.mark.parametrize(("bar", "ends"), [(4, (115.0, 155.0)), (3, (40.0, 75.0))])
 @pytest.mark.parametrize("same", [True, False])
-def test_a_table_of_the_commanded_bar_is_judged(
-    bar: int,
-    ends: tuple[float, float],
-    same: bool,
-    tmp_path: Path,
-) -> None:
+def test_a_table_of_the_commanded_bar_is_judged(bar, ends, same, tmp_path):
     scene = commanding(bar, *ends)
     angles = np.radians(np.linspace(*ends, 9 if same else 6))
     solution = fourbar.solve(replace(scene, motion=scene.motion.replace(angle=angles)))
@@ -101,9 +88,7 @@ def test_a_table_of_the_commanded_bar_is_judged(
     ]
 
 
-def test_a_mistake_in_the_velocity_terms_of_a_driven_rocker_is_named(
-    tmp_path: Path,
-) -> None:
+def test_a_mistake_in_the_velocity_terms_of_a_driven_rocker_is_named(tmp_path):
     """The other bars' accelerations follow that of the output alone."""
     scene = commanding(4, 115.0, 155.0)
     right = fourbar.solve(scene)
@@ -116,9 +101,7 @@ def test_a_mistake_in_the_velocity_terms_of_a_driven_rocker_is_named(
     assert first.complete and "(dJ/dt) v is missing" in first.text
 
 
-def test_the_scenes_own_positions_may_be_listed_by_another_bar(
-    tmp_path: Path,
-) -> None:
+def test_the_scenes_own_positions_may_be_listed_by_another_bar(tmp_path):
     """The angles of the output are printed to a hundredth of a degree, twice a turn."""
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 24), 10.0))
     right = fourbar.solve(scene)
@@ -134,11 +117,7 @@ def test_the_scenes_own_positions_may_be_listed_by_another_bar(
 @pytest.mark.parametrize(
     ("ends", "side"), [((60.0, 220.0), 1.0), ((245.0, 395.0), -1.0)]
 )
-def test_an_angle_of_the_output_is_a_position_of_a_crank(
-    ends: tuple[float, float],
-    side: float,
-    tmp_path: Path,
-) -> None:
+def test_an_angle_of_the_output_is_a_position_of_a_crank(ends, side, tmp_path):
     """It is passed twice a turn, and once within the range of the scene."""
     scene = commanding(2, *ends)
     limits = np.sort(fourbar.solve(scene, "position").theta_4[[0, -1]])
@@ -157,7 +136,7 @@ def test_an_angle_of_the_output_is_a_position_of_a_crank(
     assert judged(scene, path).status == HOLDS
 
 
-def test_the_rounding_of_another_bars_angle_is_allowed_for(tmp_path: Path) -> None:
+def test_the_rounding_of_another_bars_angle_is_allowed_for(tmp_path):
     """Six decimals are a rounded number; what half a unit changes is allowed."""
     scene = commanding(2, 60.0, 220.0)
     at = Command(np.array([1.2, 1.7, 2.4]), np.ones(3, np.int8), 2.0, -1.0)
@@ -169,10 +148,7 @@ def test_the_rounding_of_another_bars_angle_is_allowed_for(tmp_path: Path) -> No
     assert judged(scene, path).status == FAILED
 
 
-def test_an_angle_that_is_passed_twice_needs_the_commanded_one(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_an_angle_that_is_passed_twice_needs_the_commanded_one(tmp_path, capsys):
     scene = commanding(2, 0.0, 360.0)
     fourbar.save(scene, tmp_path / "scene.toml")
     theta_4 = np.radians([120.0, 140.0])
@@ -185,9 +161,7 @@ def test_an_angle_that_is_passed_twice_needs_the_commanded_one(
     assert "line 2, theta_4" in error and "120 deg" in error
 
 
-def test_an_angle_of_the_crank_is_a_position_of_a_driven_rocker(
-    tmp_path: Path,
-) -> None:
+def test_an_angle_of_the_crank_is_a_position_of_a_driven_rocker(tmp_path):
     scene = commanding(4, 115.0, 155.0)
     right = fourbar.solve(scene)
     middle = 0.5 * (right.theta_2[1:] + right.theta_2[:-1])
@@ -201,7 +175,7 @@ def test_an_angle_of_the_crank_is_a_position_of_a_driven_rocker(
     assert judged(scene, path).status == HOLDS
 
 
-def test_a_parallelogram_is_found_on_both_halves_of_its_turn(tmp_path: Path) -> None:
+def test_a_parallelogram_is_found_on_both_halves_of_its_turn(tmp_path):
     linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
     motion = fourbar.Motion(fourbar.Sweep(0.1, 6.1, 20), 5.0)
     scene = Scene(linkage, motion, effects=(fourbar.Gravity(),))
@@ -211,14 +185,14 @@ def test_a_parallelogram_is_found_on_both_halves_of_its_turn(tmp_path: Path) -> 
     assert judged(scene, path).status == HOLDS
 
 
-def test_an_angle_that_is_never_reached_has_no_motion(tmp_path: Path) -> None:
+def test_an_angle_that_is_never_reached_has_no_motion(tmp_path):
     scene = commanding(2, 60.0, 220.0)
     angles = np.radians([10.0, 130.0])
     path = write_table(tmp_path / "theirs.csv", "theta_4", angles, angles, "{:.0f}")
     assert judged(scene, path).not_assembled == [2]
 
 
-def test_the_word_angle_means_what_the_scene_commands(tmp_path: Path) -> None:
+def test_the_word_angle_means_what_the_scene_commands(tmp_path):
     path = tmp_path / "theirs.csv"
     path.write_text("Angle [deg],torque\n100,1.0\n")
     assert read_table(path, "theta_4").found_by == "theta_4"
@@ -227,7 +201,7 @@ def test_the_word_angle_means_what_the_scene_commands(tmp_path: Path) -> None:
     assert read_table(path).found_by == "theta_4"
 
 
-def test_a_command_of_a_stroke_is_refused(tmp_path: Path) -> None:
+def test_a_command_of_a_stroke_is_refused(tmp_path):
     text = """\
 [lengths]
 ground = "300 mm"
@@ -247,7 +221,7 @@ side = "left"
         judged(loads(text), path)
 
 
-def test_a_table_without_an_angle_names_the_commanded_one(tmp_path: Path) -> None:
+def test_a_table_without_an_angle_names_the_commanded_one(tmp_path):
     path = tmp_path / "theirs.csv"
     path.write_text("torque\n1.0\n")
     with pytest.raises(InputError, match=r"needs a column theta_4 \(say theta_4 \[deg"):

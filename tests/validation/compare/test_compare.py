@@ -3,7 +3,6 @@
 The unit of an error where nothing is allowed is tested too.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -16,11 +15,9 @@ from fourbar_validation.compare.compare import (
     Comparison,
     Demands,
     Errors,
-    Predicted,
-    _WorstPosition,
     judge_errors,
 )
-from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, Row
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED
 from fourbar_validation.compare.scales import Scale
 from fourbar_validation.compare.tolerance import EPS as LAST_DIGIT
 from fourbar_validation.compare.tolerance import EQUIVALENCE, K
@@ -29,11 +26,7 @@ from tests.support.scenes import crank_rocker
 ALLOWED = 1e-14
 
 
-def judge_quantity(
-    *error: float,
-    predicted: np.ndarray | None = None,
-    **changes: Any,
-) -> _WorstPosition:
+def judge_quantity(*error, predicted=None, **changes):
     """Judge the errors of a quantity, between two that are exact."""
     n = len(error)
     parts: dict[str, Any] = {
@@ -45,7 +38,7 @@ def judge_quantity(
         **changes,
     }
 
-    def place(values: np.ndarray, others: float) -> np.ndarray:
+    def place(values, others):
         other = np.full_like(values, others)
         return np.stack([other, values, other])
 
@@ -78,22 +71,20 @@ def judge_quantity(
     ],
 )
 def test_an_error_beyond_the_allowed_one_is_held_to_its_prediction(
-    predicted: float | None,
-    verdict: str,
-    allowed: float,
-) -> None:
+    predicted, verdict, allowed
+):
     expected = None if predicted is None else np.array([0.0, predicted, 0.0])
     worst = judge_quantity(1e-15, 1e-12, 0.0, predicted=expected)
     assert (worst.position, worst.verdict) == (1, verdict)
     assert worst.allowed == pytest.approx(allowed, abs=0)
 
 
-def test_within_what_is_allowed_no_prediction_is_needed() -> None:
+def test_within_what_is_allowed_no_prediction_is_needed():
     worst = judge_quantity(1e-15, 9e-15, 0.0)
     assert (worst.position, worst.verdict, worst.decided) == (1, AGREES, 3)
 
 
-def test_no_number_fails_wherever_it_stands() -> None:
+def test_no_number_fails_wherever_it_stands():
     worst = judge_quantity(np.nan, 0.0, allowed=np.ones(2))
     assert (worst.position, worst.verdict, worst.reason[:3]) == (0, FAILS, "NaN")
 
@@ -108,12 +99,12 @@ def test_no_number_fails_wherever_it_stands() -> None:
     ],
 )
 def test_a_position_at_which_too_much_is_allowed_is_undecided(
-    allowed: float, declared: float, verdict: str
-) -> None:
+    allowed, declared, verdict
+):
     """One position that decides is enough for a row."""
     tolerance = replace(EQUIVALENCE, factor=declared)
 
-    def judge(*allowed: float) -> tuple[str, int]:
+    def judge(*allowed):
         worst = judge_quantity(
             1.0,
             0.0,
@@ -129,9 +120,7 @@ def test_a_position_at_which_too_much_is_allowed_is_undecided(
     assert judge(allowed, ALLOWED) == ((FAILS, 2) if verdict == FAILS else (AGREES, 1))
 
 
-def test_a_prediction_of_the_whole_value_leaves_no_digit_but_in_a_unit_of_its_own() -> (
-    None
-):
+def test_a_prediction_of_the_whole_value_leaves_no_digit_but_in_a_unit_of_its_own():
     """At a scale of 0 a prediction of 2 is 2 N and not twice the value."""
     twice = np.array([2.0])
     own_unit = np.zeros(1, dtype=bool)
@@ -142,11 +131,7 @@ def test_a_prediction_of_the_whole_value_leaves_no_digit_but_in_a_unit_of_its_ow
     assert judge_quantity(1.0, predicted=twice).verdict == UNDECIDED
 
 
-def compare(
-    change: Callable[[Answer], None],
-    predicted: Predicted | None,
-    nearby: Callable[..., dict[str, np.ndarray]] | None = None,
-) -> dict[str, Row]:
+def compare(change, predicted, nearby=None):
     """Return the rows, by quantity, of the formulas' own answer to a crank at constant
     speed, changed.
     """
@@ -162,20 +147,20 @@ def compare(
     return {row.quantity: row for row in rows}
 
 
-def nothing(quantity: str, mask: np.ndarray) -> np.ndarray:
+def nothing(quantity, mask):
     return np.zeros(len(mask))
 
 
 @pytest.mark.parametrize("predicted", [None, nothing], ids=["unpredicted", "predicted"])
 def test_where_a_quantity_vanishes_its_error_has_its_own_unit_whoever_answers(
-    predicted: Predicted | None,
-) -> None:
+    predicted,
+):
     """alpha_2 is 0.
 
     An answer of 1e-3 rad/s^2 is wrong by that, and nothing is allowed.
     """
 
-    def turn(answer: Answer) -> None:
+    def turn(answer):
         answer.quantities["alpha_2"][3] = 1e-3
 
     row = compare(turn, predicted)["alpha_2"]
@@ -184,8 +169,8 @@ def test_where_a_quantity_vanishes_its_error_has_its_own_unit_whoever_answers(
     assert (row.error, row.allowed, row.verdict) == (0.0, 0.0, AGREES)
 
 
-def test_an_error_within_the_rounding_of_theta_2_is_taken_again() -> None:
-    def shift(answer: Answer) -> None:
+def test_an_error_within_the_rounding_of_theta_2_is_taken_again():
+    def shift(answer):
         answer.quantities["torque"] *= 1.0 + 1e-9
 
     assert compare(shift, nothing)["torque"].verdict == FAILS

@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.quantities import Array
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES, Comparison, Demands
-from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, Row
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED
 from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, K
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import predict_from_data
@@ -28,7 +27,7 @@ FORMULAS = fourbar.solve(SCENE)
 FIRST, MIDDLE, LAST = 0, 17, POSITIONS - 1
 
 
-def make_answer(**changed: Array | None) -> Answer:
+def make_answer(**changed):
     """Make an answer of an exact engine that agrees to the last digit.
 
     Some of it is changed; None: left out.
@@ -45,7 +44,7 @@ def make_answer(**changed: Array | None) -> Answer:
     return Answer("other", "exact", FORMULAS.at, assembled, quantities)
 
 
-def compare(answer: Answer, **held: object) -> dict[str, Row]:
+def compare(answer, **held):
     comparison = Comparison(
         "scene",
         SCENE,
@@ -56,7 +55,7 @@ def compare(answer: Answer, **held: object) -> dict[str, Row]:
     return {row.quantity: row for row in [*comparison.rows(), comparison.closure()]}
 
 
-def moved(name: str, place: int, by: float) -> Array:
+def moved(name, place, by):
     """Return a quantity that is off at one position by so many parts of its largest
     value.
     """
@@ -65,7 +64,7 @@ def moved(name: str, place: int, by: float) -> Array:
     return values
 
 
-def test_an_answer_without_an_error_agrees_in_every_quantity() -> None:
+def test_an_answer_without_an_error_agrees_in_every_quantity():
     rows = compare(make_answer())
     assert {row.verdict for row in rows.values()} == {AGREES}
     assert {*COMPARED_QUANTITIES, "closure", "assembled", "undecided"} == rows.keys()
@@ -73,7 +72,7 @@ def test_an_answer_without_an_error_agrees_in_every_quantity() -> None:
 
 @pytest.mark.parametrize("place", (FIRST, MIDDLE, LAST))
 @pytest.mark.parametrize("name", ("theta_3", "omega_4", "alpha_3", "torque", "F12"))
-def test_an_error_at_any_position_fails_its_row_there(name: str, place: int) -> None:
+def test_an_error_at_any_position_fails_its_row_there(name, place):
     rows = compare(make_answer(**{name: moved(name, place, 1e-9)}))
     failing = {row.quantity for row in rows.values() if row.failed}
     assert failing - {"closure"} == {name}
@@ -81,7 +80,7 @@ def test_an_error_at_any_position_fails_its_row_there(name: str, place: int) -> 
 
 
 @pytest.mark.parametrize("factor", (0.2, 5.0))
-def test_what_is_allowed_is_fifty_last_digits_over_the_condition(factor: float) -> None:
+def test_what_is_allowed_is_fifty_last_digits_over_the_condition(factor):
     """Allowed of theta_3 are 50 eps over the condition of the position.
 
     The condition is |sin(theta_4 - theta_3)| times the shorter of bars 3, 4 over the
@@ -97,27 +96,27 @@ def test_what_is_allowed_is_fifty_last_digits_over_the_condition(factor: float) 
         assert row.allowed == pytest.approx(allowed, rel=1e-6, abs=0)
 
 
-def test_both_components_of_a_force_count() -> None:
+def test_both_components_of_a_force_count():
     for axis in (0, 1):
         force = np.array(FORMULAS.F43)
         force[MIDDLE, axis] *= 1.0 + 1e-8
         assert compare(make_answer(F43=force))["F43"].failed
 
 
-def test_a_quantity_that_is_missing_fails() -> None:
+def test_a_quantity_that_is_missing_fails():
     for name in ("torque", "F14", "alpha_4"):
         row = compare(make_answer(**{name: None}))[name]
         assert row.failed and row.reason == "no answer"
 
 
 @pytest.mark.parametrize("place", (FIRST, LAST))
-def test_no_value_where_the_loop_closes_fails(place: int) -> None:
+def test_no_value_where_the_loop_closes_fails(place):
     for name in ("torque", "F32"):
         row = compare(make_answer(**{name: moved(name, place, math.nan)}))[name]
         assert row.failed and row.reason.startswith("NaN")
 
 
-def test_an_engine_that_closes_elsewhere_fails_either_way() -> None:
+def test_an_engine_that_closes_elsewhere_fails_either_way():
     assembled = np.ones(POSITIONS, dtype=bool)
     assembled[FIRST] = False
     for torque in (FORMULAS.torque, moved("torque", FIRST, math.nan)):
@@ -133,19 +132,19 @@ def test_an_engine_that_closes_elsewhere_fails_either_way() -> None:
     assert row.quantity == "assembled" and row.failed
 
 
-def replace_assembled(answer: Answer, assembled: np.ndarray) -> Answer:  # type: ignore[type-arg]
+def replace_assembled(answer, assembled):  # type: ignore[type-arg]
     answer.assembled = assembled
     return answer
 
 
-def test_angles_that_do_not_close_the_loop_fail_beside_their_own_row() -> None:
+def test_angles_that_do_not_close_the_loop_fail_beside_their_own_row():
     rows = compare(make_answer(theta_4=moved("theta_4", FIRST, 1e-10)))
     assert rows["closure"].failed
     assert rows["closure"].allowed == pytest.approx(IDENTITY.factor, rel=1.0, abs=0)
 
 
 @pytest.mark.parametrize("shrunk", ("formulas", "answer"))
-def test_neither_side_chooses_what_it_is_allowed(shrunk: str) -> None:
+def test_neither_side_chooses_what_it_is_allowed(shrunk):
     """A torque a millionth of the right one would have terms that cancel."""
     small = 1e-6 * np.asarray(FORMULAS.torque)
     formulas = replace(FORMULAS, torque=small) if shrunk == "formulas" else FORMULAS
@@ -164,9 +163,7 @@ def test_neither_side_chooses_what_it_is_allowed(shrunk: str) -> None:
 
 @pytest.mark.parametrize("name", ("torque", "F12", "alpha_4"))
 @pytest.mark.parametrize("left", (1e-1, 1e-2, 1e-4))
-def test_a_balanced_crank_agrees_and_a_slip_of_1e_9_does_not(
-    left: float, name: str
-) -> None:
+def test_a_balanced_crank_agrees_and_a_slip_of_1e_9_does_not(left, name):
     scene = balance(left)
     formulas = fourbar.solve(scene, "force")
     answer = FreeBody().answer(scene, formulas.at)
@@ -185,7 +182,7 @@ def test_a_balanced_crank_agrees_and_a_slip_of_1e_9_does_not(
     assert {row.quantity for row in rows.values() if row.failed} == {name}
 
 
-def test_what_is_predicted_is_not_multiplied_by_the_terms_that_cancel() -> None:
+def test_what_is_predicted_is_not_multiplied_by_the_terms_that_cancel():
     """The sensitivities that predict an error hold them; twice they excuse 1e-6."""
     pytest.importorskip("flint")
     scene = balance(1e-4)
@@ -199,21 +196,18 @@ def test_what_is_predicted_is_not_multiplied_by_the_terms_that_cancel() -> None:
 
 
 @pytest.mark.parametrize(("times", "verdict"), [(9.0, DEGRADED), (11.0, FAILS)])
-def test_ten_times_its_prediction_an_error_is_degraded_and_no_more(
-    times: float,
-    verdict: str,
-) -> None:
+def test_ten_times_its_prediction_an_error_is_degraded_and_no_more(times, verdict):
     most = np.abs(FORMULAS.torque).max()  # type: ignore[type-var]
     expected = np.full(POSITIONS, 1e-10 * most)
 
-    def predict(name: str, where: object) -> Array:
+    def predict(name, where):
         return expected if name == "torque" else 0.0 * expected
 
     answer = make_answer(torque=moved("torque", MIDDLE, times * 1e-10))
     assert compare(answer, predicted=predict)["torque"].verdict == verdict
 
 
-def test_a_scene_of_which_most_numbers_are_undecided_does_not_hold() -> None:
+def test_a_scene_of_which_most_numbers_are_undecided_does_not_hold():
     """A tolerance wider than a thousandth at every position leaves nothing to decide
     by.
     """

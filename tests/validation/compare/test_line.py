@@ -5,18 +5,16 @@ Every pair of bars holds, faults show, who cannot do it says so.
 
 from dataclasses import replace
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 import pytest
 
 import fourbar
 from fourbar.effects import LinearDrive, Place
-from fourbar.scene import Scene
 from fourbar_validation.compare.rows import AGREES, FAILS
 from fourbar_validation.engines.exact import BallArithmetic
 from fourbar_validation.engines.guests import GuestClient, Hello, Program
-from fourbar_validation.engines.registry import ENGINES, Engine, load_further
+from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 
@@ -30,7 +28,7 @@ PAIRS = list(combinations((1, 2, 3, 4), 2))
 PINS = fourbar.PinFriction.at(A=(0.1, 0.005), O4=(0.2, 0.004))
 
 
-def driven(one: int, other: int, **changes: Any) -> Scene:
+def driven(one, other, **changes):
     ends = Place(one, (0.17, -1.1)), Place(other, (0.09, 0.7))
     motion = fourbar.Motion(np.linspace(0.1, 6.2, 25), 10.0, 5.0)
     return crank_rocker(motion=motion, drive=LinearDrive(*ends), **changes)
@@ -38,10 +36,7 @@ def driven(one: int, other: int, **changes: Any) -> Scene:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("one", "other"), PAIRS)
-def test_every_pair_of_bars_agrees_with_thirteen_equations(
-    one: int,
-    other: int,
-) -> None:
+def test_every_pair_of_bars_agrees_with_thirteen_equations(one, other):
     for effects in (
         (fourbar.Gravity(), fourbar.Viscous.at(B=0.02)),
         (fourbar.Gravity(), PINS),
@@ -74,10 +69,8 @@ def test_every_pair_of_bars_agrees_with_thirteen_equations(
 @pytest.mark.parametrize("engine", EXACT, ids=lambda engine: engine.name)
 @pytest.mark.parametrize(("one", "other"), PAIRS)
 def test_every_pair_of_bars_agrees_with_the_multipliers_of_an_engine(
-    engine: Engine,
-    one: int,
-    other: int,
-) -> None:
+    engine, one, other
+):
     if missing := engine.missing():
         pytest.skip(missing)
     for effects in (
@@ -105,10 +98,7 @@ def test_every_pair_of_bars_agrees_with_the_multipliers_of_an_engine(
 
 @pytest.mark.parametrize("engine", [*FREE_BODY, *EXACT], ids=lambda engine: engine.name)
 @pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6])
-def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(
-    engine: Engine,
-    gap: float,
-) -> None:
+def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(engine, gap):
     if missing := engine.missing():
         pytest.skip(missing)
     linkage = crank_rocker().linkage
@@ -135,7 +125,7 @@ def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(
         ), quantity
 
 
-def test_positions_alone_have_a_stroke_that_is_judged() -> None:
+def test_positions_alone_have_a_stroke_that_is_judged():
     scene = driven(3, 4)
     rows = judge(
         "", replace(scene, motion=scene.motion.replace(speed=None)), FREE_BODY
@@ -146,7 +136,7 @@ def test_positions_alone_have_a_stroke_that_is_judged() -> None:
     }
 
 
-def test_statics_and_friction_at_rest_agree_too() -> None:
+def test_statics_and_friction_at_rest_agree_too():
     scene = driven(
         1,
         3,
@@ -163,21 +153,16 @@ def test_statics_and_friction_at_rest_agree_too() -> None:
     }
 
 
-def _reversed(
-    self: LinearDrive,
-    actions: Any,
-    force: Any,
-    act: Any = LinearDrive.act,
-) -> None:
+def _reversed(self, actions, force, act=LinearDrive.act):
     act(self, actions, -force)
 
 
-def _of_one_end(self: LinearDrive, actions: Any, force: Any) -> None:
+def _of_one_end(self, actions, force):
     push = force * self.line(actions.state)[1]
     actions.force(self.end.bar, push, self.end.in_bar)
 
 
-def _of_the_wrong_bar(self: LinearDrive, actions: Any, force: Any) -> None:
+def _of_the_wrong_bar(self, actions, force):
     push = force * self.line(actions.state)[1]
     actions.force(2, -push, self.start.in_bar)
     actions.force(3, push, self.end.in_bar)
@@ -203,16 +188,13 @@ FAULTS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_fault_in_the_drive_is_caught(
-    monkeypatch: pytest.MonkeyPatch,
-    fault: str,
-) -> None:
+def test_a_fault_in_the_drive_is_caught(monkeypatch, fault):
     monkeypatch.setattr(LinearDrive, *FAULTS[fault])
     rows = judge("", driven(2, 4), FREE_BODY).rows
     assert [row for row in rows if row.verdict == FAILS]
 
 
-def test_who_cannot_do_it_refuses_in_one_line_that_names_it() -> None:
+def test_who_cannot_do_it_refuses_in_one_line_that_names_it():
     scene = driven(1, 4)
     assert (
         "a drive that exerts a force"

@@ -3,7 +3,6 @@ conversion of them.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,7 +24,7 @@ LOADED = crank_rocker(
 )
 
 
-def test_places_are_sums_of_vectors_along_and_across_the_bar() -> None:
+def test_places_are_sums_of_vectors_along_and_across_the_bar():
     stated = state_from_pins(LOADED)
     for load, from_centre in zip(
         stated.loads,
@@ -41,9 +40,7 @@ def test_places_are_sums_of_vectors_along_and_across_the_bar() -> None:
         )
 
 
-def test_a_place_that_the_formulas_misread_widens_nothing(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_place_that_the_formulas_misread_widens_nothing(monkeypatch):
     """With places from G far away, a torque would be allowed to be as far off."""
     solution = fourbar.solve(LOADED)
     sizes = {
@@ -51,7 +48,7 @@ def test_a_place_that_the_formulas_misread_widens_nothing(
     }
     polar = Place.polar_from_pin
 
-    def misread(place: Place) -> tuple[Any, Any]:
+    def misread(place):
         distance, angle = polar(place)
         return (distance if place.from_centre is None else 1e8 * distance), angle
 
@@ -62,9 +59,7 @@ def test_a_place_that_the_formulas_misread_widens_nothing(
         )
 
 
-def test_a_scene_that_is_stated_otherwise_has_its_places_where_they_are(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_scene_that_is_stated_otherwise_has_its_places_where_they_are(monkeypatch):
     question = make_question("scene", LOADED, ())
     wanted = question.solution.torque
     monkeypatch.setattr(

@@ -31,7 +31,7 @@ ROUNDING = 1e-13
 """rad; near the reversal the speed that vanishes carries some hundred roundings."""
 
 
-def scene(pin: str, drive: int = 2, start: float = 0.1) -> Scene:
+def scene(pin, drive=2, start=0.1):
     sweep = Sweep(start, start + 2 * math.pi, 36)
     return Scene(
         LINKAGE,
@@ -41,7 +41,7 @@ def scene(pin: str, drive: int = 2, start: float = 0.1) -> Scene:
     )
 
 
-def dead_centres() -> list[float]:
+def dead_centres():
     """theta_2 where bars 2 and 3 lie in one line, by the cosine rule.
 
     There the rocker turns back.
@@ -55,7 +55,7 @@ def dead_centres() -> list[float]:
     ("pin", "places"),
     [("O4", dead_centres()), ("B", [math.pi, 2 * math.pi]), ("O2", [])],
 )
-def test_they_are_where_geometry_puts_them(pin: str, places: list[float]) -> None:
+def test_they_are_where_geometry_puts_them(pin, places):
     """The rocker turns at its dead centres.
 
     Bars 3 and 4 turn together where A lies on the line of centres.
@@ -69,7 +69,7 @@ def test_they_are_where_geometry_puts_them(pin: str, places: list[float]) -> Non
     assert {reversal.pin for reversal in reversals} <= {pin}
 
 
-def test_the_jump_is_that_of_statics() -> None:
+def test_the_jump_is_that_of_statics():
     """The couple on bar 4 changes by 2 f.
 
     Bar 3 takes the change as a force along itself: 2 f = c |sin mu| |dF43|.
@@ -86,7 +86,7 @@ def test_the_jump_is_that_of_statics() -> None:
 
 
 @pytest.mark.parametrize("start", [0.1, 0.0])
-def test_both_sides_are_judged_and_the_reversal_itself_is_not(start: float) -> None:
+def test_both_sides_are_judged_and_the_reversal_itself_is_not(start):
     """From 0 the sweep meets both reversals of pin B exactly.
 
     The engines' rounding decides their sense there.
@@ -106,7 +106,7 @@ def test_both_sides_are_judged_and_the_reversal_itself_is_not(start: float) -> N
     )  # the ends of a sweep that starts in one have a single side
 
 
-def test_a_curve_is_not_drawn_across_the_jump() -> None:
+def test_a_curve_is_not_drawn_across_the_jump():
     posed = scene("O4")
     solution = solve(posed)
     reversals = find_reversals(posed, command(posed), solution)
@@ -121,7 +121,7 @@ def test_a_curve_is_not_drawn_across_the_jump() -> None:
     assert (np.diff(x) >= 0).all()
 
 
-def test_only_a_pin_that_hardly_slips_reverses() -> None:
+def test_only_a_pin_that_hardly_slips_reverses():
     """Bars 2 and 3 turn at 2 and 2 + x: the mask is x <= slip (2 + 2 + x + 2)."""
     slip = 1e-6
     x = np.array([0.0, 5.9e-6, 6.1e-6, 1e-3, 1.0])

@@ -8,7 +8,6 @@ import math
 import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ import pytest
 import fourbar
 from fourbar.errors import FAILED, HOLDS
 from fourbar.formulas.mobility import limit_positions
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Scene, command
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer, ReleasedAnswer
 from fourbar_validation.compare.columns import read_columns
@@ -49,7 +48,7 @@ from tests.validation.run.test_judge import Echo, Refuses
 NAN = math.nan
 
 
-def rows(**counts: int) -> list[Row]:
+def rows(**counts):
     """So many rows of each verdict."""
     names = {
         "agree": AGREES,
@@ -65,14 +64,8 @@ def rows(**counts: int) -> list[Row]:
     ]
 
 
-def test_a_quantity_that_every_row_calls_degraded_is_counted_and_named() -> None:
-    def row(
-        scene: str,
-        engine: str,
-        quantity: str,
-        verdict: str,
-        allowed: float,
-    ) -> Row:
+def test_a_quantity_that_every_row_calls_degraded_is_counted_and_named():
+    def row(scene, engine, quantity, verdict, allowed):
         return replace(
             ROW,
             scene=scene,
@@ -154,16 +147,12 @@ IDENTITY = replace(ROW, engine="formulas", quantity="closure")
         ),
     ],
 )
-def test_all_hold_counts_what_was_compared_alone(
-    rows: list[Row],
-    sentence: str,
-    status: int,
-) -> None:
+def test_all_hold_counts_what_was_compared_alone(rows, sentence, status):
     counts = Counts(rows)
     assert (counts.sentence(), counts.status) == (sentence, status)
 
 
-def test_a_row_passes_where_it_was_compared_and_holds() -> None:
+def test_a_row_passes_where_it_was_compared_and_holds():
     assert {verdict: replace(ROW, verdict=verdict).passed for verdict in VERDICTS} == {
         **dict.fromkeys((AGREES, DEGRADED), True),
         **dict.fromkeys((UNDECIDED, REFUSES, FAILS), False),
@@ -177,7 +166,7 @@ def test_a_row_passes_where_it_was_compared_and_holds() -> None:
             replace(ROW, **changed)  # type: ignore[arg-type]
 
 
-def test_a_table_cannot_say_that_a_refusal_passed(tmp_path: Path) -> None:
+def test_a_table_cannot_say_that_a_refusal_passed(tmp_path):
     write_results(rows(refuse=1), tmp_path / "results.csv")
     text = (tmp_path / "results.csv").read_text()
     assert ",false,refuses," in text
@@ -190,7 +179,7 @@ def test_a_table_cannot_say_that_a_refusal_passed(tmp_path: Path) -> None:
 class OnlyWithEffects(Echo):
     """Refuses the scene without loads and effects."""
 
-    def answer(self, scene: Scene, command: Command) -> Answer:
+    def answer(self, scene, command):
         if scene.effects:
             return super().answer(scene, command)
         return Answer("echo", "exact", refusal="nothing acts")
@@ -199,7 +188,7 @@ class OnlyWithEffects(Echo):
 class AlarmedWithoutEffects(Echo):
     """Its watch on itself finds something wrong where nothing acts."""
 
-    def answer(self, scene: Scene, command: Command) -> Answer:
+    def answer(self, scene, command):
         answer = super().answer(scene, command)
         answer.alarms += [] if scene.effects else ["it shakes"]
         return answer
@@ -208,7 +197,7 @@ class AlarmedWithoutEffects(Echo):
 class SilentWithoutEffects(Echo):
     """Does not say where the loop closes where nothing acts."""
 
-    def answer(self, scene: Scene, command: Command) -> Answer:
+    def answer(self, scene, command):
         answer = super().answer(scene, command)
         return answer if scene.effects else replace(answer, assembled=None)
 
@@ -225,11 +214,7 @@ class SilentWithoutEffects(Echo):
         ),
     ],
 )
-def test_what_is_wrong_with_the_inertia_alone_is_a_row(
-    adapter: type,
-    verdict: str,
-    reason: str,
-) -> None:
+def test_what_is_wrong_with_the_inertia_alone_is_a_row(adapter, verdict, reason):
     engine = Engine("echo", adapter, EQUIVALENCE)
     inertial_rows = [
         row
@@ -239,7 +224,7 @@ def test_what_is_wrong_with_the_inertia_alone_is_a_row(
     assert [(row.verdict, row.reason) for row in inertial_rows] == [(verdict, reason)]
 
 
-def test_where_no_loop_closes_no_identity_is_counted_as_held() -> None:
+def test_where_no_loop_closes_no_identity_is_counted_as_held():
     apart = fourbar.Motion(
         fourbar.Sweep(2.0, 4.0, 5), 1.0
     )  # beyond the limits of this input
@@ -253,9 +238,7 @@ def test_where_no_loop_closes_no_identity_is_counted_as_held() -> None:
     assert verdicts["free-body", "assembled"] == AGREES
 
 
-def test_an_identity_that_is_due_nowhere_is_not_counted_as_held(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_identity_that_is_due_nowhere_is_not_counted_as_held(monkeypatch):
     monkeypatch.setattr(
         "fourbar_validation.run.question.mark_reversing",
         lambda scene, solution, _: np.ones(len(solution), bool),
@@ -267,7 +250,7 @@ def test_an_identity_that_is_due_nowhere_is_not_counted_as_held(
     assert verdicts.items() >= expected.items()
 
 
-def test_formulas_without_an_answer_fail() -> None:
+def test_formulas_without_an_answer_fail():
     scene = crank_rocker()
     commanded = command(scene)
     answer = Echo().answer(scene, commanded)
@@ -296,10 +279,8 @@ omega_2 = "1 rad/s"
 
 @pytest.mark.slow
 def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    tmp_path, monkeypatch, capsys
+):
     judge_here(monkeypatch)
     (tmp_path / "scene.toml").write_text(ONE_POSITION)
     out = tmp_path / "out"
@@ -325,7 +306,7 @@ def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
 
 
 @pytest.mark.slow
-def test_every_form_of_a_report_says_the_same_counts() -> None:
+def test_every_form_of_a_report_says_the_same_counts():
     refused = Engine("echo", Refuses, EQUIVALENCE)
     exact = next(w for w in ENGINES if w.name == "free-body")
     good, bad = (
@@ -348,14 +329,12 @@ def test_every_form_of_a_report_says_the_same_counts() -> None:
     assert Counts().status == FAILED
 
 
-def test_a_free_motion_that_every_engine_refuses_is_not_held(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_free_motion_that_every_engine_refuses_is_not_held(monkeypatch):
     class Refusing:
-        def __init__(self, step: float) -> None:
+        def __init__(self, step):
             self.step = step
 
-        def release(self, scene: Scene, times: object) -> ReleasedAnswer:
+        def release(self, scene, times):
             return ReleasedAnswer.refused("refusing", "-", "a declared limit")
 
     monkeypatch.setattr(
@@ -372,14 +351,14 @@ def test_a_free_motion_that_every_engine_refuses_is_not_held(
     assert summary_of([page]).verdict == sentence
 
 
-def junit(old: list[Row], new: list[Row]) -> ET.Element:
+def junit(old, new):
     return ET.fromstring(
         render.write_junit_of_changes(compare_rows((HERE, old), (HERE, new)))
     )
 
 
-def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before() -> None:
-    def of(quantity: str, verdict: str) -> Row:
+def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before():
+    def of(quantity, verdict):
         return replace(
             ROW,
             quantity=quantity,
@@ -449,13 +428,8 @@ def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before() -> N
     ],
 )
 def test_two_runs_without_a_comparison_in_common_are_no_success(
-    old: list[Row],
-    new: list[Row],
-    sentence: str,
-    code: int,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    old, new, sentence, code, tmp_path, capsys
+):
     folders = [
         str(save_run(tmp_path / name, rows))
         for name, rows in (("old", old), ("new", new))
@@ -470,15 +444,12 @@ def test_two_runs_without_a_comparison_in_common_are_no_success(
     ) and sentence in render.write_pull_request_comment(changes)
 
 
-def test_of_two_rows_of_one_name_the_worse_one_counts() -> None:
+def test_of_two_rows_of_one_name_the_worse_one_counts():
     both = [*rows(fail=1), *rows(agree=1)]
     assert compare_rows((HERE, rows(agree=1)), (HERE, both)).regressed
 
 
-def test_numbers_without_a_digit_do_not_agree(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_numbers_without_a_digit_do_not_agree(tmp_path, capsys):
     # 1e-13 rad from a limit of theta_2 the condition of the accelerations is about
     # 1e-13
     rocker = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
@@ -504,11 +475,7 @@ def test_numbers_without_a_digit_do_not_agree(
 
 
 @pytest.mark.slow
-def test_a_study_in_which_no_law_is_fitted_is_no_success(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_study_in_which_no_law_is_fitted_is_no_success(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(
         "fourbar_validation.cost.study.CostStudy.points", lambda _: iter(())
     )
@@ -539,13 +506,7 @@ def test_a_study_in_which_no_law_is_fitted_is_no_success(
         ([9.0, math.nan, 9.0], 2.0, [False, False, False], UNDECIDED, 0),
     ],
 )
-def test_one_rule_of_agreement(
-    error: list[float],
-    allowed: float | list[float],
-    mask: list[bool] | None,
-    verdict: str,
-    worst: int,
-) -> None:
+def test_one_rule_of_agreement(error, allowed, mask, verdict, worst):
     mask, places = None if mask is None else np.array(mask), np.array([1.0, 2.0, 3.0])
     bound = np.array(allowed) if isinstance(allowed, list) else allowed
     row = Row.judged(
@@ -554,7 +515,7 @@ def test_one_rule_of_agreement(
     assert (row.verdict, row.theta_2) == (verdict, worst + 1.0)
 
 
-def test_every_row_counts_however_many_there_are() -> None:
+def test_every_row_counts_however_many_there_are():
     many = rows(agree=70, fail=1)
     assert Counts(many)[AGREES] == 70 and Counts(many)[FAILS] == 1
     assert Counts(many).status == FAILED and Counts(rows(agree=70)).status == HOLDS
@@ -564,14 +525,14 @@ def test_every_row_counts_however_many_there_are() -> None:
     assert (counts.scenes, counts.scenes_compared, counts.total) == (2, 1, 43)
 
 
-def test_nothing_compared_is_no_success_whatever_was_refused() -> None:
+def test_nothing_compared_is_no_success_whatever_was_refused():
     for none in (rows(refuse=5), rows(undecided=5), [IDENTITY, IDENTITY], []):
         assert Counts(none).nothing and Counts(none).status == FAILED
     assert not any(row.passed for row in rows(refuse=1, undecided=1, fail=1))
 
 
 @pytest.mark.parametrize(("part", "passed"), [(0.9, True), (1.1, False), (8.0, False)])
-def test_a_row_agrees_up_to_what_is_allowed(part: float, passed: bool) -> None:
+def test_a_row_agrees_up_to_what_is_allowed(part, passed):
     errors = np.array([0.0, part, 0.5]) * 1e-12
     row = Row.judged(("a", "b", "-"), "c", errors, 1e-12, "why", np.arange(3.0))
     assert row.passed == passed and row.theta_2 == 1.0

@@ -25,9 +25,7 @@ from tests.support.scenes import balance
 ROCKER = uniform(0.3, 0.25, 0.1, 0.22)
 
 
-def test_the_scale_is_the_greatest_well_conditioned_value_and_elsewhere_the_value() -> (
-    None
-):
+def test_the_scale_is_the_greatest_well_conditioned_value_and_elsewhere_the_value():
     """It would be larger of terms that cancel.
 
     Near a limit, where forces diverge, it would be too.
@@ -56,7 +54,7 @@ def test_the_scale_is_the_greatest_well_conditioned_value_and_elsewhere_the_valu
         )
 
 
-def test_where_everything_cancels_the_scale_is_that_of_the_forces_that_cancel() -> None:
+def test_where_everything_cancels_the_scale_is_that_of_the_forces_that_cancel():
     """Two opposite forces at one point of bar 2 of a linkage at rest: no torque.
 
     2 x 50 N on 0.25 m cancel.
@@ -73,7 +71,7 @@ def test_where_everything_cancels_the_scale_is_that_of_the_forces_that_cancel() 
     assert np.all(scale.vanishes) and np.all(scale.cancellation == 1.0)
 
 
-def test_what_the_input_alone_decides_has_no_scale_of_the_other_bars() -> None:
+def test_what_the_input_alone_decides_has_no_scale_of_the_other_bars():
     """Beside a limit alpha_3 grows without bound, and a_A does not."""
     low = min(x.theta_2 for x in limit_positions(ROCKER) if 0.0 < x.theta_2 < np.pi)
     scene = Scene(ROCKER, Motion(np.array([low + 1e-9]), 10.0))
@@ -85,7 +83,7 @@ def test_what_the_input_alone_decides_has_no_scale_of_the_other_bars() -> None:
         np.testing.assert_allclose(scale_of(name, scene, solution, values).size, size)
 
 
-def test_terms_that_cancel_raise_what_is_allowed_by_what_they_exceed_the_rest() -> None:
+def test_terms_that_cancel_raise_what_is_allowed_by_what_they_exceed_the_rest():
     """The weights of counterweight and coupler have moments of 0.5 kg g 0.1 m each.
 
     The rest is `left` of one of them; in the harness's sum every force has a lever as
@@ -112,7 +110,7 @@ def test_terms_that_cancel_raise_what_is_allowed_by_what_they_exceed_the_rest() 
     assert np.all(angles.size == 1.0) and np.all(angles.cancellation == 1.0)
 
 
-def test_what_vanishes_is_judged_by_its_terms_and_what_has_none_by_nothing() -> None:
+def test_what_vanishes_is_judged_by_its_terms_and_what_has_none_by_nothing():
     scene = balance(1e-13, 0.0)
     solution = solve(scene)
     scale = scale_of("torque", scene, solution, solution.torque)
@@ -122,7 +120,7 @@ def test_what_vanishes_is_judged_by_its_terms_and_what_has_none_by_nothing() -> 
     assert not (nothing.size.any() or nothing.vanishes.any())
 
 
-def test_the_terms_of_an_angular_acceleration_are_those_of_its_own_bar() -> None:
+def test_the_terms_of_an_angular_acceleration_are_those_of_its_own_bar():
     """The accelerations of A and B, over the bar's length and the sine between both."""
     solution = solve(Scene(ROCKER, Motion(np.array([0.9]), 10.0, 7.0)))
     a, b, c = 0.25, 0.1, 0.22
@@ -135,7 +133,7 @@ def test_the_terms_of_an_angular_acceleration_are_those_of_its_own_bar() -> None
         np.testing.assert_allclose(scale.cancellation, expected)
 
 
-def test_an_answer_has_a_scale_of_its_own_from_its_rates_alone() -> None:
+def test_an_answer_has_a_scale_of_its_own_from_its_rates_alone():
     """Accelerations of mass centres that it lacks follow from its own motion."""
     scene = balance(1e-2, 5.0)
     solution = solve(scene)
@@ -148,7 +146,7 @@ def test_an_answer_has_a_scale_of_its_own_from_its_rates_alone() -> None:
     assert find_scale_of_answer(names, scene, replace(bare, alpha_4=None)) is None
 
 
-def test_the_pair_that_allows_less_of_an_error_is_taken_whole() -> None:
+def test_the_pair_that_allows_less_of_an_error_is_taken_whole():
     """Allowed are size times max(1, N/50): 4 and 3, 2 and 6, nothing known and 1."""
     no = np.zeros(3, dtype=bool)
     ours = Scale(np.array([2.0, 2.0, np.nan]), np.array([100.0, 1.0, np.nan]), no)

@@ -16,7 +16,6 @@ from fourbar_validation.compare.tolerance import (
     FULL_ACCURACY,
     IDENTITY,
     SIMULATED,
-    ErrorBound,
     compute_difference,
     divide,
     find_condition,
@@ -33,7 +32,7 @@ from tests.support.scenes import crank_rocker
 NAN, INF = float("nan"), float("inf")
 
 
-def test_angles_differ_modulo_a_turn_and_vectors_by_their_norm() -> None:
+def test_angles_differ_modulo_a_turn_and_vectors_by_their_norm():
     apart = compute_difference(
         "theta_3", np.array([np.pi - 0.25]), np.array([-np.pi + 0.25])
     )
@@ -50,7 +49,7 @@ def test_angles_differ_modulo_a_turn_and_vectors_by_their_norm() -> None:
     assert np.isnan(find_error("torque", np.ones(2), np.ones((2, 2)), np.ones(2))).all()
 
 
-def test_a_size_of_nothing_demands_nothing_but_zero() -> None:
+def test_a_size_of_nothing_demands_nothing_but_zero():
     assert divide(0.0, 0.0) == 0.0 and divide(1e-300, 0.0) > 1e15
     assert divide(np.array([0.25]), replace_zero_size(np.zeros(1))) == 0.25
 
@@ -66,20 +65,16 @@ def test_a_size_of_nothing_demands_nothing_but_zero() -> None:
         (INF, INF, INF),
     ],
 )
-def test_what_is_no_number_uses_more_than_is_allowed(
-    error: float,
-    allowed: float,
-    share: float,
-) -> None:
+def test_what_is_no_number_uses_more_than_is_allowed(error, allowed, share):
     assert find_used(error, allowed) == share
 
 
-def test_the_worst_error_is_the_one_that_is_no_number() -> None:
+def test_the_worst_error_is_the_one_that_is_no_number():
     assert find_worst(np.array([1.0, NAN, 3.0])) == 1
     assert find_worst(np.array([1.0, 2.0, 0.0])) == 1
 
 
-def test_conditions_of_several_quantities_are_those_of_their_units() -> None:
+def test_conditions_of_several_quantities_are_those_of_their_units():
     """Of angles s, of rates s^2, of forces s^2 times the drive's; of the input 1."""
     scene = crank_rocker(
         motion=fourbar.Motion(theta_3=np.linspace(0.7, 1.3, 5), omega_3=1.0),
@@ -100,7 +95,7 @@ def test_conditions_of_several_quantities_are_those_of_their_units() -> None:
     np.testing.assert_allclose(found, [*wanted.values()], rtol=1e-15)
 
 
-def test_of_a_stroke_the_angle_of_its_bar_is_conditioned_by_the_lever() -> None:
+def test_of_a_stroke_the_angle_of_its_bar_is_conditioned_by_the_lever():
     """From O2 to the line over the longer of both arms.
 
     What follows by |sin(theta_4 - theta_3)| too.
@@ -133,7 +128,7 @@ def test_of_a_stroke_the_angle_of_its_bar_is_conditioned_by_the_lever() -> None:
     assert (find_condition("theta_2", linkage, fourbar.solve(at_angles)) == 1.0).all()
 
 
-def test_an_angle_is_compared_modulo_one_turn_and_not_half_a_turn() -> None:
+def test_an_angle_is_compared_modulo_one_turn_and_not_half_a_turn():
     ours = np.array([0.0, 1.0, -3.0])
     for apart, error in ((math.pi, math.pi), (0.5, 0.5), (3.5, 2.0 * math.pi - 3.5)):
         found = compute_difference("theta_3", ours, ours + apart)
@@ -141,7 +136,7 @@ def test_an_angle_is_compared_modulo_one_turn_and_not_half_a_turn() -> None:
     assert compute_difference("omega_3", ours, ours + 7.0) == pytest.approx(7.0)
 
 
-def test_what_is_allowed_grows_as_the_condition_falls() -> None:
+def test_what_is_allowed_grows_as_the_condition_falls():
     """50 eps at condition 1, a hundred times as much at 0.01.
 
     An identity is allowed the same everywhere.
@@ -152,7 +147,7 @@ def test_what_is_allowed_grows_as_the_condition_falls() -> None:
     assert IDENTITY.allowed(condition) == pytest.approx(50.0 * 2.0**-52, rel=1e-12)
 
 
-def test_only_a_loop_that_misses_by_its_rounding_touches() -> None:
+def test_only_a_loop_that_misses_by_its_rounding_touches():
     linkage = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
     limit = fourbar.limit_positions(linkage)[0].theta_2
     off = np.array([0.0, 1e-9, -1e-9, 1e-3])
@@ -160,14 +155,14 @@ def test_only_a_loop_that_misses_by_its_rounding_touches() -> None:
 
 
 @pytest.mark.parametrize("missing", (math.nan, math.inf, -math.inf))
-def test_an_error_that_is_no_number_is_the_worst(missing: float) -> None:
+def test_an_error_that_is_no_number_is_the_worst(missing):
     errors = np.array([0.0, missing, 1.0])
     assert find_used(errors, np.ones(3))[1] == math.inf
     if math.isnan(missing):
         assert find_worst(errors) == 1
 
 
-def test_the_scale_is_of_positions_whose_condition_is_a_tenth_at_least() -> None:
+def test_the_scale_is_of_positions_whose_condition_is_a_tenth_at_least():
     """A rocker's pin forces grow towards its limit, and those of worse conditions
     excuse no others.
     """
@@ -196,8 +191,7 @@ def test_the_scale_is_of_positions_whose_condition_is_a_tenth_at_least() -> None
     [(EQUIVALENCE, 8.0), (IDENTITY, 1.0), (SIMULATED, 1.0), (FULL_ACCURACY, 1.0)],
 )
 def test_only_an_exact_comparison_is_allowed_more_where_the_condition_is_poor(
-    bound: ErrorBound,
-    times: float,
-) -> None:
+    bound, times
+):
     good, poor = bound.allowed(np.array([1.0, 0.125]))
     assert good == bound.factor and poor == times * good

@@ -7,7 +7,7 @@ from fourbar_validation.cost import conclusion, pictures
 from tests.support.costs import point
 
 
-def test_statement_and_conclusion_have_one_criterion() -> None:
+def test_statement_and_conclusion_have_one_criterion():
     """A setting counts, here and on the front, by its error at the steps and between
     them.
     """

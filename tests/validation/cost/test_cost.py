@@ -7,10 +7,8 @@ stopped.
 import json
 import math
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -36,13 +34,13 @@ from fourbar_validation.cost.cost import cost, list_front
 from fourbar_validation.cost.series import BEST, Spot
 from fourbar_validation.engines.mujoco import drives
 from fourbar_validation.engines.mujoco.forward import MujocoOneState
-from fourbar_validation.engines.mujoco.trial import Build, TrialSetup
+from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.scenes.suites import MODELS
 from tests.support.costs import point
 from tests.support.scenes import CYLINDER, crank_rocker, thesis
 
 
-def turning(omega: float = 10.0, positions: int = 36) -> fourbar.Scene:
+def turning(omega=10.0, positions=36):
     """Return the crank-rocker a = 0.1, b = 0.25, c = 0.22, d = 0.3 m with gravity, over
     a revolution.
     """
@@ -54,14 +52,10 @@ def turning(omega: float = 10.0, positions: int = 36) -> fourbar.Scene:
     )
 
 
-def tried(
-    scene: fourbar.Scene,
-    closure: Build | None = None,
-    drive: Build | None = None,
-) -> Callable[[Settings], WorstErrors]:
+def tried(scene, closure=None, drive=None):
     setup = TrialSetup(scene, command(scene))
 
-    def error(settings: Settings) -> WorstErrors:
+    def error(settings):
         trial = setup.try_out(settings, closure, drive)
         return (
             INFINITE_ERRORS
@@ -81,11 +75,7 @@ def tried(
         ("RK4", 4.0, (40, 80, 160, 320)),
     ],
 )
-def test_each_integrator_shows_its_order(
-    integrator: str,
-    order: float,
-    steps: tuple[int, ...],
-) -> None:
+def test_each_integrator_shows_its_order(integrator, order, steps):
     error = tried(turning())
     points = [
         error(
@@ -106,7 +96,7 @@ def test_each_integrator_shows_its_order(
     )
 
 
-def test_softness_is_proportional_to_1_minus_d_and_sags_with_the_square_of_tc() -> None:
+def test_softness_is_proportional_to_1_minus_d_and_sags_with_the_square_of_tc():
     plain = replace(BEST, pad=None, time_constant_steps=10.0)
     d = (0.99, 0.999, 0.9999)
     fast, slow = tried(turning()), tried(turning(0.1))
@@ -128,7 +118,7 @@ def test_softness_is_proportional_to_1_minus_d_and_sags_with_the_square_of_tc() 
     )
 
 
-def test_the_defaults_stay_at_their_floor_at_every_timestep(tmp_path: Path) -> None:
+def test_the_defaults_stay_at_their_floor_at_every_timestep(tmp_path):
     made = study.CostStudy("s", turning(), tmp_path)
     (curve,) = [
         c for c in study.design_curves(turning()) if c.name == "RK4, MuJoCo's defaults"
@@ -145,14 +135,14 @@ def test_the_defaults_stay_at_their_floor_at_every_timestep(tmp_path: Path) -> N
     assert fine.force == pytest.approx(7e-3, rel=0.3)
 
 
-def test_pads_do_what_an_edit_of_the_compiled_model_does() -> None:
+def test_pads_do_what_an_edit_of_the_compiled_model_does():
     plain, scene = replace(BEST, pad=None), turning()
     edited = tried(scene, lambda text, _: drives.Softened(text, 1e-8))(plain).worst
     padded, soft = (tried(scene)(replace(BEST, pad=pad)).worst for pad in (1e-4, None))
     assert padded == pytest.approx(edited, rel=0.5) and padded < soft / 30.0
 
 
-def test_only_tolerance_0_is_tight_with_a_heavy_flywheel() -> None:
+def test_only_tolerance_0_is_tight_with_a_heavy_flywheel():
     error = tried(turning())
     heavy = replace(BEST, flywheel=1e8)
     assert error(replace(heavy, tolerance=1e-8)).worst > 10.0 * error(heavy).worst
@@ -190,15 +180,11 @@ def test_only_tolerance_0_is_tight_with_a_heavy_flywheel() -> None:
         ),
     ],
 )
-def test_every_drive_exerts_the_torque_of_the_formulas(
-    build: Build,
-    settings: Settings,
-    allowed: float,
-) -> None:
+def test_every_drive_exerts_the_torque_of_the_formulas(build, settings, allowed):
     assert tried(turning(), drive=build)(settings).worst <= allowed
 
 
-def test_a_study_past_a_change_point_stays_on_the_assembly(tmp_path: Path) -> None:
+def test_a_study_past_a_change_point_stays_on_the_assembly(tmp_path):
     """The sign of an antiparallelogram's sine changes there; its assembly does not."""
     bars = (fourbar.Bar(0.1, 0.2), fourbar.Bar(0.3, 0.6), fourbar.Bar(0.1, 0.2))
     linkage = fourbar.FourBar(0.3, *bars)
@@ -212,7 +198,7 @@ def test_a_study_past_a_change_point_stays_on_the_assembly(tmp_path: Path) -> No
     assert extrapolated.errors.worst < 1e-5
 
 
-def test_one_state_is_wrong_in_proportion_and_right_in_the_limit() -> None:
+def test_one_state_is_wrong_in_proportion_and_right_in_the_limit():
     for scene in (
         turning(positions=12),
         crank_rocker(),
@@ -220,11 +206,7 @@ def test_one_state_is_wrong_in_proportion_and_right_in_the_limit() -> None:
     ):
         commanded = command(scene)
 
-        def wrong(
-            *impedances: float,
-            scene: fourbar.Scene = scene,
-            commanded: object = commanded,
-        ) -> float:
+        def wrong(*impedances, scene=scene, commanded=commanded):
             return compute_errors(
                 scene,
                 commanded,
@@ -236,7 +218,7 @@ def test_one_state_is_wrong_in_proportion_and_right_in_the_limit() -> None:
         assert wrong(0.9999, 0.9998, 0.9996, 0.9992) < 1e-5 * stiff
 
 
-def test_formulas_in_four_precisions() -> None:
+def test_formulas_in_four_precisions():
     for scene in (
         turning(positions=8),
         crank_rocker(),
@@ -257,7 +239,7 @@ def test_formulas_in_four_precisions() -> None:
         assert wrong["50 digits"] < 1e-50
 
 
-def test_single_precision_slides_too() -> None:
+def test_single_precision_slides_too():
     scene = replace(
         crank_rocker(),
         effects=(fourbar.PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03)),),
@@ -275,7 +257,7 @@ def test_single_precision_slides_too() -> None:
         formulas.solve_thirteen_equations(scene, command(scene))
 
 
-def test_what_is_no_number_or_not_compared_has_no_small_error() -> None:
+def test_what_is_no_number_or_not_compared_has_no_small_error():
     scene = turning(positions=8)
     commanded = formulas.choose_few(command(scene))
     exact, ours = (
@@ -302,7 +284,7 @@ def test_what_is_no_number_or_not_compared_has_no_small_error() -> None:
     )
 
 
-def change(rung: study.CostPoint, **errors: float) -> study.CostPoint:
+def change(rung, **errors):
     """Return a point with other errors of some quantities."""
     return replace(
         rung,
@@ -311,7 +293,7 @@ def change(rung: study.CostPoint, **errors: float) -> study.CostPoint:
     )
 
 
-def test_fit_floor_and_warning() -> None:
+def test_fit_floor_and_warning():
     slope, sigma = laws.fit([1.0, 2.0, 4.0, 8.0], [3.0, 6.0, 12.0, 24.0])
     assert slope == pytest.approx(1.0) and sigma < 1e-9
     falling = [point(10.0 * 2**k, 2.0 ** (-4 * k)) for k in range(6)]
@@ -349,9 +331,7 @@ no longer the motion.
         (*JUMPING[:5], math.inf, *JUMPING[6:]),
     ],
 )
-def test_a_jump_in_one_pin_force_is_named_and_its_law_fails(
-    jumping: tuple[float, ...],
-) -> None:
+def test_a_jump_in_one_pin_force_is_named_and_its_law_fails(jumping):
     ladder = [point(20.0 * 2**k, 0.05 / 2**k) for k in range(8)]
     ladder = [
         change(rung, F43=error) for rung, error in zip(ladder, jumping, strict=True)
@@ -380,7 +360,7 @@ def test_a_jump_in_one_pin_force_is_named_and_its_law_fails(
     )
 
 
-def test_each_quantity_has_its_own_order_and_floor() -> None:
+def test_each_quantity_has_its_own_order_and_floor():
     ladder = [
         change(point(20.0 * 2**k, 2.0 ** (-4 * k - 8)), F14=0.05 / 2**k, F32=1e-3)
         for k in range(8)
@@ -396,13 +376,13 @@ def test_each_quantity_has_its_own_order_and_floor() -> None:
     ]
 
 
-def test_no_order_is_expected_where_sag_and_softness_mix() -> None:
+def test_no_order_is_expected_where_sag_and_softness_mix():
     """A part of the error that does not depend on the time constant flattens the slope.
 
     Alone, a slope is a fault.
     """
 
-    def fit(constant: float, order: float) -> laws.ErrorLaw:
+    def fit(constant, order):
         rungs = [
             point(tc, constant + 1e-5 * tc**order, "sag tc, slow") for tc in (3, 5, 10)
         ]
@@ -423,7 +403,7 @@ def test_no_order_is_expected_where_sag_and_softness_mix() -> None:
     assert steep.decided and not steep.holds
 
 
-def test_a_quantity_that_no_timestep_brings_down_is_no_law_and_is_reported() -> None:
+def test_a_quantity_that_no_timestep_brings_down_is_no_law_and_is_reported():
     """In the thesis's mechanism the torque falls by its order with Euler.
 
     The pin forces are wrong throughout.
@@ -449,7 +429,7 @@ def test_a_quantity_that_no_timestep_brings_down_is_no_law_and_is_reported() -> 
     )
 
 
-def test_a_dip_and_a_motion_lost_at_coarse_steps_are_no_jump() -> None:
+def test_a_dip_and_a_motion_lost_at_coarse_steps_are_no_jump():
     """Where two sources cancel the error dips.
 
     The softest closures, and the fewest steps, carry no motion at all.
@@ -461,7 +441,7 @@ def test_a_dip_and_a_motion_lost_at_coarse_steps_are_no_jump() -> None:
     assert not any(laws.find_jumps(ladder, quantity) for quantity in ERROR_NAMES)
 
 
-def test_the_front_holds_what_nothing_beats() -> None:
+def test_the_front_holds_what_nothing_beats():
     points = [
         point(10, 1e-2),
         point(20, 1e-3),
@@ -472,13 +452,13 @@ def test_the_front_holds_what_nothing_beats() -> None:
     assert [p.steps for p in laws.find_pareto(points, "torque")] == [10, 20, 40]
 
 
-def test_a_study_is_resumed_where_it_was_interrupted(tmp_path: Path) -> None:
+def test_a_study_is_resumed_where_it_was_interrupted(tmp_path):
     done: list[str] = []
 
-    def units(stop: str | None) -> study.CostStudy:
+    def units(stop):
         made = study.CostStudy("s", turning(), tmp_path)
 
-        def unit(name: str) -> list[study.CostPoint]:
+        def unit(name):
             if name == stop:
                 raise KeyboardInterrupt
             done.append(name)
@@ -504,10 +484,7 @@ def test_a_study_is_resumed_where_it_was_interrupted(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_command_writes_table_report_and_pictures(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_command_writes_table_report_and_pictures(tmp_path, monkeypatch):
     scene = tmp_path / "small.toml"
     scene.write_text(fourbar.dump(turning(positions=12)))
     few = {
@@ -559,8 +536,8 @@ def test_the_command_writes_table_report_and_pictures(
 
 
 def test_a_scene_that_cannot_be_run_through_is_refused_before_anything_is_measured(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     scene, out = tmp_path / "law.toml", tmp_path / "out"
     scene.write_text(fourbar.dump(FAULT_SCENES["law"]))
     process = CliRunner().invoke(
@@ -574,11 +551,11 @@ def test_a_scene_that_cannot_be_run_through_is_refused_before_anything_is_measur
     assert not out.exists()
 
 
-def test_the_least_of_timings_counts_and_the_middle_one_tells_their_scatter() -> None:
+def test_the_least_of_timings_counts_and_the_middle_one_tells_their_scatter():
     assert study.summarise_timings([1.0, 9.0, 2.0, 2.2, 1.8]) == (1.0, 1.0)
 
 
-def test_the_front_is_listed_by_what_lies_between_the_steps_too() -> None:
+def test_the_front_is_listed_by_what_lies_between_the_steps_too():
     """A point that is right at its steps alone is not on the front."""
     right = WorstErrors(*[1e-9] * len(ERROR_NAMES))
     worse, worst = (replace(point(n, 0.5), at_steps=right) for n in (6, 15))
@@ -589,7 +566,7 @@ def test_the_front_is_listed_by_what_lies_between_the_steps_too() -> None:
     ]
 
 
-def test_names_in_a_picture_cover_no_other_and_are_not_cut() -> None:
+def test_names_in_a_picture_cover_no_other_and_are_not_cut():
     near = {"kind": study.EXACT_MOTION, "seconds_per_second": 0.3}
     curves = {
         "inverse": [
@@ -610,7 +587,7 @@ def test_names_in_a_picture_cover_no_other_and_are_not_cut() -> None:
     assert all(figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1 for box in boxes)
 
 
-def drive_by(drive: int | str) -> fourbar.Scene:
+def drive_by(drive):
     """Return the turning crank-rocker driven on a bar, or by a cylinder."""
     if isinstance(drive, int):
         return replace(turning(), drive_bar=drive)
@@ -618,9 +595,7 @@ def drive_by(drive: int | str) -> fourbar.Scene:
 
 
 @pytest.mark.parametrize("drive", [2, 3, 4, "cylinder"])
-def test_cost_measures_what_advise_measures(
-    drive: int | str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_cost_measures_what_advise_measures(drive, tmp_path, monkeypatch):
     """More steps than positions of the scene are judged between the steps as well."""
     step, reading = 2e-6, 3e-5
     monkeypatch.setattr(
@@ -643,9 +618,7 @@ def test_cost_measures_what_advise_measures(
     assert cost_point.seconds_per_revolution == pytest.approx(seconds, rel=1e-12)
 
 
-def test_a_settled_curve_is_judged_between_the_steps_of_its_last_turn(
-    tmp_path: Path,
-) -> None:
+def test_a_settled_curve_is_judged_between_the_steps_of_its_last_turn(tmp_path):
     made = study.CostStudy("s", replace(turning(), drive_bar=4), tmp_path)
     settings = replace(BEST, steps_per_revolution=200.0)
     spots = (Spot("s", settings),)
@@ -658,9 +631,7 @@ def test_a_settled_curve_is_judged_between_the_steps_of_its_last_turn(
 
 
 @pytest.mark.parametrize(("drive", "column"), [(2, 1), (4, 3)])
-def test_the_page_tells_what_a_curve_through_samples_misses(
-    drive: int, column: int
-) -> None:
+def test_the_page_tells_what_a_curve_through_samples_misses(drive, column):
     page = (MODELS.parent / "docs" / "cost.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (120|360|720) \|(.*)\|$", page, re.MULTILINE)
     assert len(rows) == 3
@@ -672,7 +643,7 @@ def test_the_page_tells_what_a_curve_through_samples_misses(
         assert missed == pytest.approx(printed, rel=0.05, abs=2e-13)
 
 
-def miss_between(scene: fourbar.Scene, count: int, degree: int) -> float:
+def miss_between(scene, count, degree):
     """Return the worst error between samples where the driven bar is far from rest."""
     fine = np.linspace(0.0, 2.0 * math.pi, 4 * count + 1)
     command_of_fine = command(scene)._replace(

@@ -21,7 +21,7 @@ from tests.support.costs import point
 STEPS = [40.0 * 2**k for k in range(6)]
 
 
-def fit_order(order: float) -> ErrorLaw:
+def fit_order(order):
     """Fit the law of RK4 to errors of an order."""
     ladder = [point(n, 1e-2 * (STEPS[0] / n) ** order) for n in STEPS]
     (law,) = (
@@ -31,13 +31,13 @@ def fit_order(order: float) -> ErrorLaw:
 
 
 @pytest.mark.parametrize(("order", "holds"), [(4.0, True), (3.8, True), (3.5, False)])
-def test_a_law_holds_within_a_third_of_an_order(order: float, holds: bool) -> None:
+def test_a_law_holds_within_a_third_of_an_order(order, holds):
     law = fit_order(order)
     assert law.exponent == pytest.approx(order, abs=1e-6) and law.expected == 4.0
     assert law.decided and law.holds == holds
 
 
-def test_a_law_with_a_jump_does_not_hold_whatever_its_slope() -> None:
+def test_a_law_with_a_jump_does_not_hold_whatever_its_slope():
     ladder = [point(n, 1e-2 * (STEPS[0] / n) ** 4) for n in STEPS]
     ladder[3] = point(STEPS[3], 2e-2)
     assert find_jumps(ladder, "F12") == [ladder[3]]
@@ -46,7 +46,7 @@ def test_a_law_with_a_jump_does_not_hold_whatever_its_slope() -> None:
     assert replace(law, jumps=()).holds
 
 
-def test_a_floor_is_the_last_error_that_twice_the_steps_do_not_lessen() -> None:
+def test_a_floor_is_the_last_error_that_twice_the_steps_do_not_lessen():
     falling = [point(n, 1.0 / n) for n in STEPS]
     assert find_floor(falling, "torque") is None
     floored = [*falling, point(2560.0, 0.9 / STEPS[-1])]
@@ -55,7 +55,7 @@ def test_a_floor_is_the_last_error_that_twice_the_steps_do_not_lessen() -> None:
     assert find_floor(lost, "torque") is None
 
 
-def test_the_cheapest_within_an_error_is_judged_by_the_quantity_that_is_asked() -> None:
+def test_the_cheapest_within_an_error_is_judged_by_the_quantity_that_is_asked():
     cheap = point(40.0, 1e-7)
     cheap = replace(cheap, errors=cheap.errors._replace(F43=1e-3))
     dear = point(400.0, 1e-7)
@@ -65,7 +65,7 @@ def test_the_cheapest_within_an_error_is_judged_by_the_quantity_that_is_asked() 
     assert find_cheapest(curves, "force", 1e-9) is None
 
 
-def test_nothing_on_the_front_is_beaten_in_cost_and_error() -> None:
+def test_nothing_on_the_front_is_beaten_in_cost_and_error():
     points = [
         point(10.0, 1e-3),
         point(20.0, 1e-2),

@@ -17,13 +17,13 @@ class Told:
     name, commands = "told", ("theta_2", "stroke")
     at: Command | None = None
 
-    def answer(self, scene: Scene, command: Command) -> Answer:
+    def answer(self, scene, command):
         self.command = command
         return Answer(self.name, "exact", at=self.at or command)
 
 
 @pytest.mark.parametrize("branch", [1, -1])
-def test_an_engine_is_told_the_sign_and_answers_at_the_assembly(branch: int) -> None:
+def test_an_engine_is_told_the_sign_and_answers_at_the_assembly(branch):
     """With a single change point the sign is back after two turns alone.
 
     A motion that the engine made is named by its assembly too.
@@ -39,9 +39,7 @@ def test_an_engine_is_told_the_sign_and_answers_at_the_assembly(branch: int) -> 
     assert made is not None and made.branch.tolist() == [branch] * 4
 
 
-def test_an_engine_is_not_told_the_angles_that_the_formulas_found_from_a_stroke() -> (
-    None
-):
+def test_an_engine_is_not_told_the_angles_that_the_formulas_found_from_a_stroke():
     scene = fourbar.load(MODELS / "capabilities" / "stroke_input.toml")
     command, engine = fourbar.command(scene), Told()
     ask_at(engine, scene, command)
@@ -51,7 +49,7 @@ def test_an_engine_is_not_told_the_angles_that_the_formulas_found_from_a_stroke(
     assert np.isfinite(engine.command.stated[0]).all()
 
 
-def test_without_a_stroke_the_angles_are_the_command() -> None:
+def test_without_a_stroke_the_angles_are_the_command():
     scene, engine = crank_rocker(), Told()
     command = fourbar.command(scene)
     ask_at(engine, scene, command)

@@ -3,11 +3,9 @@
 The run must catch the faults.
 """
 
-from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import cache
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +26,6 @@ from fourbar.effects import (
     Viscous,
     list_kinds,
 )
-from fourbar.scene import Scene
 from fourbar_validation.engines import free_body_effects
 from fourbar_validation.engines.effects import TERM_OF
 from fourbar_validation.engines.registry import ENGINES
@@ -91,7 +88,7 @@ NO_COUNTERPART = {
 
 
 @cache
-def scene(*names: str) -> Scene:
+def scene(*names):
     """A crank-rocker with the effects named, driven on bar 2.
 
     One for all faults in them.
@@ -104,10 +101,7 @@ def scene(*names: str) -> Scene:
     )
 
 
-def outcome(
-    posed: Scene,
-    engines: list[Any],
-) -> tuple[list[tuple[str, str, str]], set[str]]:
+def outcome(posed, engines):
     """What fails, and who refuses."""
     rows = judge("scene", posed, engines).rows
     return [(r.engine, r.quantity, r.reason) for r in rows if r.failed], {
@@ -115,18 +109,18 @@ def outcome(
     }
 
 
-def failing(posed: Scene, engines: list[Any]) -> list[tuple[str, str, str]]:
+def failing(posed, engines):
     return outcome(posed, engines)[0]
 
 
-def list_pairs(names: Iterable[str]) -> list[Any]:
+def list_pairs(names):
     return [
         pytest.param(pair, marks=pytest.mark.slow)
         for pair in combinations(sorted(names), 2)
     ]
 
 
-def test_every_effect_of_the_registry_is_here() -> None:
+def test_every_effect_of_the_registry_is_here():
     assert set(list_kinds()) <= set(ACTING)
 
 
@@ -135,7 +129,7 @@ def test_every_effect_of_the_registry_is_here() -> None:
     [(name,) for name in ACTING] + list_pairs(ACTING),
     ids="+".join,
 )
-def test_exact_engines_agree(names: tuple[str, ...]) -> None:
+def test_exact_engines_agree(names):
     assert outcome(scene(*names), EXACT) == ([], set())
 
 
@@ -146,9 +140,7 @@ def test_exact_engines_agree(names: tuple[str, ...]) -> None:
     + list_pairs(ACTING.keys() - NO_COUNTERPART["mujoco-simulated"]),
     ids="+".join,
 )
-def test_the_simulation_agrees_or_says_what_it_has_no_counterpart_for(
-    names: tuple[str, ...],
-) -> None:
+def test_the_simulation_agrees_or_says_what_it_has_no_counterpart_for(names):
     missing = NO_COUNTERPART["mujoco-simulated"] & set(names)
     assert outcome(scene(*names), SIMULATED) == (
         [],
@@ -159,13 +151,13 @@ def test_the_simulation_agrees_or_says_what_it_has_no_counterpart_for(
 @pytest.mark.slow
 @pytest.mark.parametrize("drive", [2, 3, 4])
 @pytest.mark.parametrize("branch", [1, -1])
-def test_all_at_once_on_every_drive_and_branch(drive: int, branch: int) -> None:
+def test_all_at_once_on_every_drive_and_branch(drive, branch):
     posed = scene(*ACTING)
     motion = posed.motion.replace(branch=branch, speed=-7.0)
     assert failing(replace(posed, drive_bar=drive, motion=motion), EXACT) == []
 
 
-def test_a_turned_frame_turns_gravity_with_it() -> None:
+def test_a_turned_frame_turns_gravity_with_it():
     """Ground, input and gravity turned by one angle.
 
     The same torque and the same forces, turned.
@@ -201,7 +193,7 @@ def test_a_turned_frame_turns_gravity_with_it() -> None:
 OTHER_PIN = {"O2": "A", "A": "B", "B": "O4", "O4": "O2"}
 
 
-def moved(effect: Effect) -> Effect:
+def moved(effect):
     """The effect at another pin, on another bar, or in another direction."""
     match effect:
         case Viscous():
@@ -229,10 +221,7 @@ def moved(effect: Effect) -> Effect:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ACTING)
-def test_an_effect_that_acts_elsewhere_in_the_formulas_fails_the_run(
-    name: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_effect_that_acts_elsewhere_in_the_formulas_fails_the_run(name, monkeypatch):
     """The formulas have it at another pin, on another bar or in another direction.
 
     The engines where it is.
@@ -253,19 +242,19 @@ def test_an_effect_that_acts_elsewhere_in_the_formulas_fails_the_run(
 class FaultyTree:
     """An engine's tree on which whatever acts is multiplied."""
 
-    def __init__(self, tree: Any, factor: float) -> None:
+    def __init__(self, tree, factor):
         self.tree, self.factor = tree, factor
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name):
         return getattr(self.tree, name)
 
-    def push(self, bar: int, force: Any, point: Any) -> None:
+    def push(self, bar, force, point):
         self.tree.push(bar, [self.factor * axis for axis in force], point)
 
-    def couple(self, bar: int, couple: float) -> None:
+    def couple(self, bar, couple):
         self.tree.couple(bar, self.factor * couple)
 
-    def gravity(self, vector: tuple[float, float]) -> None:
+    def gravity(self, vector):
         self.tree.gravity((self.factor * vector[0], self.factor * vector[1]))
 
 
@@ -277,16 +266,10 @@ class FaultyTree:
     ids=["wrong sign", "applied twice", "missing"],
 )
 def test_a_fault_in_the_wrench_on_the_free_bodies_fails_the_run(
-    name: str,
-    factor: float,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def faulty(right: Callable[..., None]) -> Callable[..., None]:
-        def act(
-            effect: Any,
-            motion: Any,
-            wrenches: free_body_effects.BodyWrenches,
-        ) -> None:
+    name, factor, monkeypatch
+):
+    def faulty(right):
+        def act(effect, motion, wrenches):
             alone = free_body_effects.BodyWrenches(len(motion.theta_2))
             right(effect, motion, alone)
             for bar in (2, 3, 4):
@@ -309,9 +292,7 @@ def test_a_fault_in_the_wrench_on_the_free_bodies_fails_the_run(
     assert "torque" in {quantity for _, quantity, _ in failed}
 
 
-def test_what_the_formulas_make_of_a_spring_does_not_reach_the_engines(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_the_formulas_make_of_a_spring_does_not_reach_the_engines(monkeypatch):
     monkeypatch.setattr(Spring, "slack", 0.0)
     failed = failing(
         scene("springs"), [engine for engine in EXACT if engine.name in ON_TREES]
@@ -326,11 +307,7 @@ def test_what_the_formulas_make_of_a_spring_does_not_reach_the_engines(
     [-1.0, 2.0, 0.0],
     ids=["wrong sign", "applied twice", "missing"],
 )
-def test_a_fault_in_the_engine_term_fails_the_run(
-    name: str,
-    factor: float,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_fault_in_the_engine_term_fails_the_run(name, factor, monkeypatch):
     key = ACTING[name].key
     right = TERM_OF[key]
     monkeypatch.setitem(

@@ -6,7 +6,6 @@ Nothing of it in the formulas, in the MJCF or in the compiled model.
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import pytest
@@ -14,7 +13,6 @@ import pytest
 import fourbar
 from fourbar.effects import FILE_OF, Friction, Viscous
 from fourbar.mjcf import write_mjcf
-from fourbar_validation.report.record import Record
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 from tests.validation.engines.test_effects import ACTING
@@ -22,11 +20,11 @@ from tests.validation.engines.test_effects import ACTING
 ROOT = Path(fourbar.__file__).parent.parent
 
 
-def called(**acting: Any) -> set[str]:
+def called(**acting):
     """Functions of the package that `solve` calls."""
     scene, calls = crank_rocker(**acting), set()
 
-    def note(frame: Any, event: str, _: Any) -> None:
+    def note(frame, event, _):
         if event == "call" and "fourbar" in frame.f_code.co_filename:
             calls.add(frame.f_code.co_qualname)
 
@@ -36,7 +34,7 @@ def called(**acting: Any) -> set[str]:
     return calls
 
 
-def test_a_term_of_an_effect_runs_where_a_scene_names_it_and_nowhere_else() -> None:
+def test_a_term_of_an_effect_runs_where_a_scene_names_it_and_nowhere_else():
     names = {*FILE_OF, "Load", "torque_interval", "solve_sliding"}
     bare, viscous = (
         called(loads=(), effects=()),
@@ -48,21 +46,21 @@ def test_a_term_of_an_effect_runs_where_a_scene_names_it_and_nowhere_else() -> N
     assert "Viscous.act" in viscous and "Gravity.act" not in viscous
 
 
-def compiled(*names: str) -> mujoco.MjModel:
+def compiled(*names):
     effects = tuple(ACTING[name] for name in names)
     return mujoco.MjModel.from_xml_string(
         write_mjcf(crank_rocker(loads=(), effects=effects))
     )
 
 
-def rows(model: mujoco.MjModel) -> int:
+def rows(model):
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
     return int(data.nefc)
 
 
-def disabled(model: mujoco.MjModel) -> set[str]:
+def disabled(model):
     flags = mujoco.mjtDisableBit
     return {
         name.removeprefix("mjDSBL_").lower()
@@ -75,7 +73,7 @@ def disabled(model: mujoco.MjModel) -> set[str]:
 BARE = {"contact", "limit", "island", "sensor", "spring", "damper", "frictionloss"}
 
 
-def test_the_bare_model_has_the_closed_loop_and_nothing_else() -> None:
+def test_the_bare_model_has_the_closed_loop_and_nothing_else():
     model = compiled()
     assert (
         model.nv,
@@ -115,12 +113,8 @@ def test_the_bare_model_has_the_closed_loop_and_nothing_else() -> None:
     ],
 )
 def test_each_effect_adds_what_it_needs_and_no_more(
-    name: str,
-    enabled: set[str],
-    more_rows: int,
-    tendons: int,
-    actuators: int,
-) -> None:
+    name, enabled, more_rows, tendons, actuators
+):
     model = compiled(name)
     assert (model.nv, model.neq, model.nu, model.nsensor) == (3, 1, actuators, 0)
     assert disabled(model) == BARE - enabled
@@ -128,7 +122,7 @@ def test_each_effect_adds_what_it_needs_and_no_more(
     assert model.ntendon == tendons  # one at the cut pin B, one for each linear spring
 
 
-def test_an_effect_of_zero_size_is_still_named() -> None:
+def test_an_effect_of_zero_size_is_still_named():
     """A torque of 0 that the scene writes down is the scene's.
 
     What it leaves out is not there at all.
@@ -153,7 +147,7 @@ print(*sorted({row.engine for row in record.rows}))
 
 
 @pytest.mark.slow
-def test_positions_alone_start_no_force_engine() -> None:
+def test_positions_alone_start_no_force_engine():
     done = subprocess.run(
         [sys.executable, "-c", POSITIONS_ONLY],
         capture_output=True,
@@ -172,7 +166,7 @@ def test_positions_alone_start_no_force_engine() -> None:
     assert all("the scene states positions only" in line for line in left_out)
 
 
-def moved(*motion: Any) -> Record:
+def moved(*motion):
     return judge(
         "scene",
         fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(*motion)),
@@ -189,10 +183,7 @@ def moved(*motion: Any) -> Record:
         ((1.0, 2.0), "a simulation needs more than one position"),
     ],
 )
-def test_what_does_not_move_through_time_is_not_simulated(
-    motion: tuple[Any, float],
-    reason: str,
-) -> None:
+def test_what_does_not_move_through_time_is_not_simulated(motion, reason):
     record = moved(*motion)
     assert f"mujoco-simulated: {reason}" in record.left_out
     assert {row.engine for row in record.rows} == {
@@ -203,7 +194,7 @@ def test_what_does_not_move_through_time_is_not_simulated(
     }
 
 
-def test_equal_positions_are_evaluated_once() -> None:
+def test_equal_positions_are_evaluated_once():
     assert (
         "positions: all are the same, one is evaluated"
         in moved([1.0, 1.0, 1.0], 2.0).left_out

@@ -4,7 +4,6 @@ Published figures, round-off agreement, the right branch, limits, faults that mu
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
@@ -41,7 +40,7 @@ from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.mujoco.inverse import MujocoInverse, MujocoTree
 from fourbar_validation.engines.pinocchio import PinocchioTree
 from fourbar_validation.engines.registry import ENGINES, load_further
-from fourbar_validation.engines.tree import KeptTree, keep_tree
+from fourbar_validation.engines.tree import keep_tree
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
@@ -79,7 +78,7 @@ MECHANISMS = {  # ground, input, coupler, output
 }
 
 
-def present(*names: str) -> list[Any]:
+def present(*names):
     """Engines, each skipped by its name where it is not installed."""
     libraries = {name: ENGINE[name].library for name in names}
     return [
@@ -101,7 +100,7 @@ further = pytest.mark.parametrize(
 )
 
 
-def bars(lengths: tuple[float, ...], ground_angle: float = 0.4) -> FourBar:
+def bars(lengths, ground_angle=0.4):
     """Bars whose mass centres lie off their lines."""
     d, *moving = lengths
     two, three, four = (
@@ -110,7 +109,7 @@ def bars(lengths: tuple[float, ...], ground_angle: float = 0.4) -> FourBar:
     return FourBar(d, two, three, four, ground_angle)
 
 
-def random_linkage(rng: np.random.Generator, shortest: float) -> FourBar:
+def random_linkage(rng, shortest):
     """Draw lengths from 10^shortest to 1."""
     while True:
         try:
@@ -121,11 +120,11 @@ def random_linkage(rng: np.random.Generator, shortest: float) -> FourBar:
             continue
 
 
-def answered(name: str, case: Scene, at: Command | None = None) -> Any:
+def answered(name, case, at=None):
     return ENGINE[name].start().answer(case, at or command(case))
 
 
-def failures(name: str, case: Scene, every: int = 1) -> list[tuple[str, str]]:
+def failures(name, case, every=1):
     """Quantities on which an engine and the formulas disagree, or its refusal."""
     commanded = command(case)
     commanded = commanded._replace(
@@ -147,7 +146,7 @@ def failures(name: str, case: Scene, every: int = 1) -> list[tuple[str, str]]:
 
 
 @each_engine
-def test_thesis_figures(name: str) -> None:
+def test_thesis_figures(name):
     got = answered(name, thesis()).quantities
     assert got["torque"][0] == pytest.approx(3.0930935923, abs=PRINTED, rel=0.0)
     figures = {"F12": (7.033117757, -2.121209407), "F32": (-15.480491243, 0.568582894)}
@@ -162,7 +161,7 @@ def test_thesis_figures(name: str) -> None:
 @pytest.mark.slow
 @each_engine
 @pytest.mark.parametrize("lengths", MECHANISMS.values(), ids=MECHANISMS.keys())
-def test_agrees_to_round_off(name: str, lengths: tuple[float, ...]) -> None:
+def test_agrees_to_round_off(name, lengths):
     for drive in (2, 3, 4):
         for branch in (1, -1):
             case = Scene(
@@ -173,7 +172,7 @@ def test_agrees_to_round_off(name: str, lengths: tuple[float, ...]) -> None:
 
 @pytest.mark.slow
 @further
-def test_each_load_and_effect(name: str) -> None:
+def test_each_load_and_effect(name):
     assert {effect: failures(name, scene(effect)) for effect in ACTING} == {
         effect: [] for effect in ACTING
     }
@@ -187,7 +186,7 @@ def test_each_load_and_effect(name: str) -> None:
 
 
 @further
-def test_random_linkages(name: str) -> None:
+def test_random_linkages(name):
     suite = Random(20, 3, tuple(DrawnType))
     for index in range(len(suite)):
         drawn = suite.scene(index)
@@ -198,7 +197,7 @@ def test_random_linkages(name: str) -> None:
 @further
 @pytest.mark.parametrize("frame", ["world", "bar"])
 @pytest.mark.parametrize("bar", [2, 3, 4])
-def test_a_force_at_a_point_drives(name: str, bar: int, frame: str) -> None:
+def test_a_force_at_a_point_drives(name, bar, frame):
     drive = PointDrive(Place(bar, (0.17, 0.6)), 1.1, frame)
     for lengths in MECHANISMS.values():
         motion = Motion(None, 10.0, 3.0)
@@ -208,9 +207,7 @@ def test_a_force_at_a_point_drives(name: str, bar: int, frame: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", present(*TREES, "free-body"))
-def test_it_assembles_where_the_circles_meet_and_on_the_commanded_branch(
-    name: str,
-) -> None:
+def test_it_assembles_where_the_circles_meet_and_on_the_commanded_branch(name):
     """On random linkages, bars up to a million times shorter than others.
 
     B lies left of the diagonal on branch +1.
@@ -248,7 +245,7 @@ def test_it_assembles_where_the_circles_meet_and_on_the_commanded_branch(
 
 @each_engine
 @pytest.mark.parametrize("offset", [1e-3, 1e-6, 1e-9, 1e-12])
-def test_assembles_up_to_a_limit_and_not_beyond(name: str, offset: float) -> None:
+def test_assembles_up_to_a_limit_and_not_beyond(name, offset):
     linkage = bars(MECHANISMS["triple rocker"], 0.0)
     d, a, b, c = linkage.lengths
     limit = math.acos(
@@ -267,7 +264,7 @@ def test_assembles_up_to_a_limit_and_not_beyond(name: str, offset: float) -> Non
 
 
 @each_engine
-def test_positions_only(name: str) -> None:
+def test_positions_only(name):
     quantities = answered(
         name, Scene(bars(MECHANISMS["crank-rocker"]), Motion(np.array([0.5, 1.0])))
     ).quantities
@@ -279,7 +276,7 @@ def test_positions_only(name: str) -> None:
 
 
 @each_tree
-def test_angles_are_continuous(name: str) -> None:
+def test_angles_are_continuous(name):
     theta_4 = answered(
         name,
         Scene(bars(MECHANISMS["drag link"]), Motion(np.linspace(0.0, 12.0, 240), 1.0)),
@@ -290,7 +287,7 @@ def test_angles_are_continuous(name: str) -> None:
     assert np.ptp(theta_4) > math.tau
 
 
-def with_bar(number: int, **values: Any) -> Scene:
+def with_bar(number, **values):
     """A crank-rocker with another mass, inertia or mass centre of one bar."""
     bars = {2: Bar(0.1, 0.2), 3: Bar(0.25, 0.5), 4: Bar(0.22, 0.4)}
     bars[number] = Bar(bars[number].length, **values)
@@ -315,7 +312,7 @@ REFUSED = {
 
 
 @each_engine
-def test_bars_without_mass_or_inertia(name: str) -> None:
+def test_bars_without_mass_or_inertia(name):
     """Exudyn and Pinocchio hold them.
 
     MuJoCo and OpenSim would drop them, and OpenSim and Drake divide by some.
@@ -334,7 +331,7 @@ def test_bars_without_mass_or_inertia(name: str) -> None:
 
 
 @each_engine
-def test_light_bars_are_held_or_refused(name: str) -> None:
+def test_light_bars_are_held_or_refused(name):
     """Below 2.2e-16 kg Pinocchio, which sums two inertias, puts the mass centre
     elsewhere.
     """
@@ -349,7 +346,7 @@ def test_light_bars_are_held_or_refused(name: str) -> None:
     )
 
 
-def test_the_floor_of_mujoco_is_where_it_is_stated_to_be() -> None:
+def test_the_floor_of_mujoco_is_where_it_is_stated_to_be():
     d, a, b, c = MECHANISMS["crank-rocker"]
     case = Scene(
         FourBar(
@@ -372,10 +369,7 @@ def test_the_floor_of_mujoco_is_where_it_is_stated_to_be() -> None:
 
 
 @pytest.mark.parametrize("name", present("opensim-constraints"))
-def test_simbody_loses_a_constraint_where_the_limit_says(
-    name: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_simbody_loses_a_constraint_where_the_limit_says(name, monkeypatch):
     """Bars 3 and 4 nearly in one line.
 
     Just inside the limit it is exact, well beyond it the force is lost.
@@ -392,7 +386,7 @@ def test_simbody_loses_a_constraint_where_the_limit_says(
     d, a, b, c = linkage.lengths
     limit = math.acos((d * d + a * a - (b + c) ** 2) / (2.0 * d * a))
 
-    def near(offset: float) -> Scene:
+    def near(offset):
         return Scene(linkage, Motion(limit - offset, 1.0))
 
     assert failures(name, near(1e-6)) == []
@@ -411,37 +405,37 @@ class Wind(Effect):
 
 
 @each_engine
-def test_what_has_no_model_is_refused_by_name(name: str) -> None:
+def test_what_has_no_model_is_refused_by_name(name):
     assert "'wind'" in (
         answered(name, replace(scene(), effects=(Wind(),))).refusal or ""
     )
 
 
-def scaled(method: Callable[..., Any], factor: float) -> Callable[..., Any]:
+def scaled(method, factor):
     """A method that answers another number."""
     return lambda *arguments: method(*arguments) * factor
 
 
-def wrong_loop_force(right: Callable[..., Any]) -> Callable[..., Any]:
+def wrong_loop_force(right):
     return lambda self, force, torque: right(self, (-force[0], -force[1]), torque)
 
 
-def no_drift(_: Callable[..., Any]) -> Callable[..., Any]:
+def no_drift(_):
     return lambda self, v: (0.0, 0.0)
 
 
-def nothing_on_bar_3(right: Callable[..., Any]) -> Callable[..., Any]:
+def nothing_on_bar_3(right):
     return lambda self, bar, couple: None if bar == 3 else right(self, bar, couple)
 
 
-def longer(right: Callable[..., Any]) -> Callable[..., Any]:
+def longer(right):
     return lambda self: {
         bar: [axis * (1.0 + 1e-9) for axis in force]
         for bar, force in right(self).items()
     }
 
 
-def larger(right: Callable[..., Any]) -> Callable[..., Any]:
+def larger(right):
     return lambda self, bar: right(self, bar) + 1e-13
 
 
@@ -496,12 +490,12 @@ SPOILED = Scene(
 )
 
 
-def judged(name: str) -> set[str]:
+def judged(name):
     return {failed_quantity for failed_quantity, _ in failures(name, SPOILED)}
 
 
 @each_engine
-def test_a_planted_fault_shows(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_planted_fault_shows(name, monkeypatch):
     owner: Any = type(ENGINE[name].start().build(SPOILED))  # type: ignore[attr-defined]
     assert judged(name) == set()
     for method, (fault, seen) in PLANTED[name].items():
@@ -547,7 +541,7 @@ STROKES = {
 }
 
 
-def commanded(what: str, branch: int) -> Scene:
+def commanded(what, branch):
     """A crank-rocker commanded at another bar than the input, or by a stroke.
 
     The stroke is that of the cylinder that drives it.
@@ -580,10 +574,8 @@ def commanded(what: str, branch: int) -> Scene:
     "what", ["theta_3", "theta_4", "stroke of bar 2", "stroke of bar 4"]
 )
 def test_an_engine_closes_its_own_loop_from_whatever_is_commanded(
-    name: str,
-    what: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    name, what, monkeypatch
+):
     for branch in (1, -1):
         case = commanded(what, branch)
         rows = [
@@ -615,18 +607,14 @@ def test_an_engine_closes_its_own_loop_from_whatever_is_commanded(
             ]
 
 
-def twice(row: Callable[..., Any]) -> Callable[..., Any]:
+def twice(row):
     """A row of a table that acts two times."""
     return lambda effect, bars: (row(effect, bars), row(effect, bars))
 
 
 @further
 @pytest.mark.parametrize("key", sorted(TERM_OF.keys() - {"gravity"}))
-def test_a_fault_in_a_row_shows_but_where_an_engine_has_its_own(
-    name: str,
-    key: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_fault_in_a_row_shows_but_where_an_engine_has_its_own(name, key, monkeypatch):
     """Also in what depends on the load of a pin."""
     monkeypatch.setitem(TERM_OF, key, twice(TERM_OF[key]))
     shown = {quantity for quantity, _ in failures(name, scene(key))}
@@ -634,10 +622,7 @@ def test_a_fault_in_a_row_shows_but_where_an_engine_has_its_own(
 
 
 @pytest.mark.parametrize("name", present("exudyn-constraints"))
-def test_a_fault_in_an_element_of_exudyn_shows(
-    name: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_fault_in_an_element_of_exudyn_shows(name, monkeypatch):
     from fourbar_lab.engines.exudyn_elements import ELEMENT_OF
 
     assert ELEMENT_OF.keys() == OWN[name]
@@ -650,10 +635,7 @@ def test_a_fault_in_an_element_of_exudyn_shows(
 
 @each_engine
 @pytest.mark.parametrize("index", [63, 97])
-def test_a_steady_input_keeps_its_digits_beside_bars_that_are_fast(
-    name: str,
-    index: int,
-) -> None:
+def test_a_steady_input_keeps_its_digits_beside_bars_that_are_fast(name, index):
     """The acceleration of A is judged by what bar 2 does alone.
 
     Bars 3 and 4 accelerate up to 4000 rad/s^2 there, and what is solved for all bars at
@@ -664,7 +646,7 @@ def test_a_steady_input_keeps_its_digits_beside_bars_that_are_fast(
 
 
 @each_engine
-def test_a_thousand_turns_take_no_position(name: str) -> None:
+def test_a_thousand_turns_take_no_position(name):
     linkage, angles = bars(MECHANISMS["crank-rocker"]), np.array([1.0, 4.0])
     near, far = (
         answered(name, Scene(linkage, Motion(x, 10.0, 3.0)))
@@ -679,7 +661,7 @@ def test_a_thousand_turns_take_no_position(name: str) -> None:
 
 
 @each_engine
-def test_a_position_before_leaves_nothing_behind(name: str) -> None:
+def test_a_position_before_leaves_nothing_behind(name):
     fast = Scene(
         bars(MECHANISMS["crank-rocker"]), Motion(np.array([1.0, 2.0]), 3e4, 1e9)
     )
@@ -699,7 +681,7 @@ def test_a_position_before_leaves_nothing_behind(name: str) -> None:
 
 
 @pytest.mark.parametrize("kind", [PinocchioTree, MujocoTree])
-def test_a_scene_before_leaves_nothing_behind(kind: type[KeptTree]) -> None:
+def test_a_scene_before_leaves_nothing_behind(kind):
     """An engine keeps one tree for all its scenes."""
     linkage, motion = (
         bars(MECHANISMS["crank-rocker"]),
@@ -728,11 +710,8 @@ def test_a_scene_before_leaves_nothing_behind(kind: type[KeptTree]) -> None:
     ],
 )
 def test_near_a_jam_an_engine_finds_the_one_solution_that_there_is(
-    drive: int,
-    mu: float,
-    r: float,
-    theta_2: float,
-) -> None:
+    drive, mu, r, theta_2
+):
     link, motion = uniform(0.3, 0.1, 0.25, 0.22), Motion(np.array([theta_2]), 3.0, 2.0)
     for arms, jams in ((r, False), (50.0, True)):
         friction = PinFriction.at(**dict.fromkeys(("A", "B", "O4"), (mu, arms)))
@@ -750,9 +729,7 @@ def test_near_a_jam_an_engine_finds_the_one_solution_that_there_is(
 
 
 @pytest.mark.parametrize("ground_angle", [0.0, 1.0, 2.5])
-def test_a_loop_that_just_closes_closes_however_the_ground_is_turned(
-    ground_angle: float,
-) -> None:
+def test_a_loop_that_just_closes_closes_however_the_ground_is_turned(ground_angle):
     """Its discriminant is 0 exactly.
 
     From turned directions it was undecided, and read as open.

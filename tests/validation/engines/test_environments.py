@@ -5,7 +5,6 @@ Read from engines.toml, installed once, and judged side by side.
 
 import sys
 import zipfile
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -45,12 +44,12 @@ class Toy:
 
 
 @pytest.fixture(autouse=True)
-def _ended() -> Iterator[None]:
+def _ended():
     yield
     end_guests()
 
 
-def write_wheel(folder: Path, version: str, factor: str) -> str:
+def write_wheel(folder, version, factor):
     """A release of "toy-engine"; its address for pip."""
     info = f"toy_engine-{version}.dist-info"
     files = {
@@ -74,10 +73,7 @@ def write_wheel(folder: Path, version: str, factor: str) -> str:
 
 
 @pytest.mark.slow
-def test_two_versions_are_judged_side_by_side(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_two_versions_are_judged_side_by_side(tmp_path, monkeypatch):
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     made = make_environment
     monkeypatch.setattr(
@@ -111,10 +107,7 @@ def test_two_versions_are_judged_side_by_side(
 
 
 @pytest.mark.slow
-def test_an_environment_that_cannot_be_made_is_one_line(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_environment_that_cannot_be_made_is_one_line(tmp_path, monkeypatch):
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     with pytest.raises(
         DependencyError,
@@ -132,14 +125,11 @@ def test_an_environment_that_cannot_be_made_is_one_line(
     )
 
 
-def test_an_environment_is_filled_by_its_own_pip(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_environment_is_filled_by_its_own_pip(tmp_path, monkeypatch):
     """The environment that runs may have been made by uv, and have none."""
     lines = []
 
-    def fails_at_pip(line: list[object]) -> Ended:
+    def fails_at_pip(line):
         lines.append(list(map(str, line)))
         return Ended("", "", failed="pip" in lines[-1], last="stop")
 
@@ -153,7 +143,7 @@ def test_an_environment_is_filled_by_its_own_pip(
     assert filled[-2:] == ["install", "x"]
 
 
-def test_an_adapter_of_ours_is_held_to_what_it_is_held_to_here() -> None:
+def test_an_adapter_of_ours_is_held_to_what_it_is_held_to_here():
     (ours,) = [engine for engine in ENGINES if engine.name == "mujoco-simulated"]
     guest = start_engine(Entry("mine", adapter="mujoco-simulated"), like=ours)
     assert (guest.name, guest.tolerance, guest.through_time, guest.residuals) == (
@@ -166,7 +156,7 @@ def test_an_adapter_of_ours_is_held_to_what_it_is_held_to_here() -> None:
 
 
 @pytest.mark.slow
-def test_an_engine_is_asked_for_its_steps_an_error_or_a_setting() -> None:
+def test_an_engine_is_asked_for_its_steps_an_error_or_a_setting():
     pytest.importorskip("mujoco")
     entry = Entry("mine", adapter="mujoco-simulated", steps=(48, 96))
     scene = crank_rocker(
@@ -220,11 +210,7 @@ def test_an_engine_is_asked_for_its_steps_an_error_or_a_setting() -> None:
         ),
     ],
 )
-def test_what_is_no_entry_is_named_with_its_file(
-    text: str,
-    words: str,
-    tmp_path: Path,
-) -> None:
+def test_what_is_no_entry_is_named_with_its_file(text, words, tmp_path):
     (tmp_path / "engines.toml").write_text(text)
     with pytest.raises(InputError) as error:
         read_engines([tmp_path])
@@ -233,7 +219,7 @@ def test_what_is_no_entry_is_named_with_its_file(
     )
 
 
-def test_a_name_that_is_nobody_s_is_refused_with_those_that_are_known() -> None:
+def test_a_name_that_is_nobody_s_is_refused_with_those_that_are_known():
     with pytest.raises(
         InputError,
         match=r"must be among pinocchio-inverse, .*mujoco 3\.3\.7",

@@ -25,9 +25,7 @@ INCH = 0.0254
         (INCH, ("8.1", "4.3", "9.9", "2.5")),
     ],
 )
-def test_decimals_whose_sums_are_equal_meet_in_one_line(
-    unit: float, stated: tuple[str, ...]
-) -> None:
+def test_decimals_whose_sums_are_equal_meet_in_one_line(unit, stated):
     """In their doubles the bars miss the line by the root of a rounding, 1e-8."""
     linkage = fourbar.uniform(*(float(number) * unit for number in stated))
     scale = Fraction("0.0254") if unit == INCH else Fraction(1, 1000)
@@ -46,14 +44,14 @@ def test_decimals_whose_sums_are_equal_meet_in_one_line(
 
 
 @pytest.mark.parametrize("lengths", [(0.3, 0.1, 0.25, 0.22), (0.1, 0.2, 0.3, 0.4001)])
-def test_other_lengths_are_their_doubles(lengths: tuple[float, ...]) -> None:
+def test_other_lengths_are_their_doubles(lengths):
     linkage = fourbar.uniform(*lengths)
     assert find_stated_lengths(linkage.lengths) == [
         Fraction(length) for length in lengths
     ]
 
 
-def test_the_status_on_a_change_point_in_decimals_is_right() -> None:
+def test_the_status_on_a_change_point_in_decimals_is_right():
     linkage = fourbar.uniform(0.08, 0.1, 0.12, 0.06)
     motion = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 36), 10.0)
     question = make_question("s", fourbar.Scene(linkage, motion), ())

@@ -45,7 +45,7 @@ ONE = [engine for engine in ENGINES if engine.name == "free-body"]
 RECTANGLE = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.3), fourbar.Bar(0.1))
 
 
-def answered(scene: Scene) -> dict[str, Any]:
+def answered(scene):
     answer = FreeBody().answer(scene, command(scene))
     assert (
         answer.refusal is None
@@ -56,7 +56,7 @@ def answered(scene: Scene) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("pin", ["O2", "O4"])
-def test_a_spring_is_wound_along_the_assembly_through_change_points(pin: str) -> None:
+def test_a_spring_is_wound_along_the_assembly_through_change_points(pin):
     """Of a parallelogram bars 2 and 4 turn together: each winds by what bar 2 turns.
 
     Also where all positions have one sign, and change points lie between them.
@@ -75,7 +75,7 @@ def test_a_spring_is_wound_along_the_assembly_through_change_points(pin: str) ->
         np.testing.assert_allclose(torque[~wound], due, rtol=1e-9)
 
 
-def test_it_imports_the_description_and_nothing_of_the_formulas() -> None:
+def test_it_imports_the_description_and_nothing_of_the_formulas():
     allowed = (
         "fourbar.linkage",
         "fourbar.scene",
@@ -108,12 +108,7 @@ def test_it_imports_the_description_and_nothing_of_the_formulas() -> None:
 # the closure
 
 
-def gap(
-    lengths: tuple[float, ...],
-    theta_2: Any,
-    theta_3: Any,
-    theta_4: Any,
-) -> list[Any]:
+def gap(lengths, theta_2, theta_3, theta_4):
     """Both closure equations, theta_1 = 0, m."""
     d, a, b, c = lengths
     z = (
@@ -125,7 +120,7 @@ def gap(
     return [mp.re(z), mp.im(z)]
 
 
-def test_the_angles_solve_the_closure_equations_to_50_digits() -> None:
+def test_the_angles_solve_the_closure_equations_to_50_digits():
     """Against Newton in 50 digits from its own angles.
 
     The error is that of the last digits of the longest bar.
@@ -166,14 +161,7 @@ def test_the_angles_solve_the_closure_equations_to_50_digits() -> None:
         (4, 1.0, (0, 0), (0, 0), (0, 0), (-10, 0)),
     ],
 )
-def test_a_lever_of_an_upright_rectangle(
-    drive: int,
-    torque: float,
-    F12: tuple[int, int],
-    F32: tuple[int, int],
-    F43: tuple[int, int],
-    F14: tuple[int, int],
-) -> None:
+def test_a_lever_of_an_upright_rectangle(drive, torque, F12, F32, F43, F14):
     """10 N push bar 4 at B along the coupler.
 
     The bars are upright and 0.1 m long, and the coupler a two-force bar.
@@ -185,7 +173,7 @@ def test_a_lever_of_an_upright_rectangle(
         assert got[name][0] == pytest.approx(force, abs=1e-13), name
 
 
-def test_weight_of_a_crank_and_a_flywheel() -> None:
+def test_weight_of_a_crank_and_a_flywheel():
     """Bar 2 alone has mass.
 
     T = (I + m r^2 + J) alpha + m g r cos theta_2, and O2 carries its weight and m a_G.
@@ -212,7 +200,7 @@ TORSION = fourbar.effects.Torsion.at(O4=(2.0, 1.9, 0.1))
 
 
 @pytest.mark.parametrize("drive", [2, 4])
-def test_over_a_turn_what_stores_energy_gives_it_back(drive: int) -> None:
+def test_over_a_turn_what_stores_energy_gives_it_back(drive):
     """The work of the drive over a revolution at constant speed is zero.
 
     The sum over a period converges like n^-n.
@@ -254,7 +242,7 @@ def test_over_a_turn_what_stores_energy_gives_it_back(drive: int) -> None:
     ],
     ids=lambda effect: effect.key,
 )
-def test_what_brakes_takes_the_power_that_the_drive_gives_more(effect: Any) -> None:
+def test_what_brakes_takes_the_power_that_the_drive_gives_more(effect):
     """Couple times slip at each pin, at every position.
 
     Of pin friction with the forces that it changes itself.
@@ -288,7 +276,7 @@ def test_what_brakes_takes_the_power_that_the_drive_gives_more(effect: Any) -> N
     )
 
 
-def test_dry_friction_does_nothing_at_rest() -> None:
+def test_dry_friction_does_nothing_at_rest():
     dry = (Friction.at(A=1.0), PinFriction.at(B=(0.2, 0.1)))
     still = crank_rocker(motion=fourbar.Motion([0.3, 2.0], 0.0), effects=dry)
     assert answered(still)["torque"] == pytest.approx(
@@ -308,7 +296,7 @@ def test_dry_friction_does_nothing_at_rest() -> None:
         (1.0, 1.0, math.nan),
     ],
 )
-def test_friction_of_one_pin(F: complex, C: complex, x: float) -> None:
+def test_friction_of_one_pin(F, C, x):
     """x = |F + C x| by hand.
 
     Where the couple adds to its own load by as much as it is, the pin jams.
@@ -321,7 +309,7 @@ def test_friction_of_one_pin(F: complex, C: complex, x: float) -> None:
     assert couples[0, 0] == pytest.approx(x, rel=1e-14, nan_ok=True)
 
 
-def test_friction_of_several_pins_fulfils_its_equations() -> None:
+def test_friction_of_several_pins_fulfils_its_equations():
     rng = np.random.default_rng(0)
     F, C = (
         rng.normal(size=(200, *shape)) + 1j * rng.normal(size=(200, *shape))
@@ -334,7 +322,7 @@ def test_friction_of_several_pins_fulfils_its_equations() -> None:
     assert np.abs(x - k * load).max() <= DIGITS * np.abs(x).max()
 
 
-def test_a_singular_position_costs_no_other() -> None:
+def test_a_singular_position_costs_no_other():
     matrix = np.array(
         [
             [[1.0, 2.0], [2.0, 4.0]],
@@ -350,7 +338,7 @@ def test_a_singular_position_costs_no_other() -> None:
     )
 
 
-def test_positions_alone_are_judged_with_what_is_stated_of_the_linkage() -> None:
+def test_positions_alone_are_judged_with_what_is_stated_of_the_linkage():
     rows = judge(
         "scene", crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20))), ONE
     ).rows
@@ -372,16 +360,16 @@ SCENE = crank_rocker()
 """One for all faults: what rounding must be expected to do to it is computed once."""
 
 
-def failing() -> set[str]:
+def failing():
     return {row.quantity for row in judge("scene", SCENE, ONE).rows if not row.passed}
 
 
-def test_without_a_fault_nothing_fails() -> None:
+def test_without_a_fault_nothing_fails():
     assert failing() == set()
 
 
 @pytest.mark.slow
-def test_faults_in_the_free_bodies_show(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_faults_in_the_free_bodies_show(monkeypatch):
     close, matrix, inertia, acting = (
         free_body.close,
         free_body._make_matrix,
@@ -389,12 +377,12 @@ def test_faults_in_the_free_bodies_show(monkeypatch: pytest.MonkeyPatch) -> None
         free_body.sum_acting,
     )
 
-    def arm_turned(motion: Any, drive_bar: int) -> Any:
+    def arm_turned(motion, drive_bar):
         made = matrix(motion, drive_bar)
         made[:, 2] *= [1.0] * 3 + [-1.0] + [1.0] * 9
         return made
 
-    def still(motion: Any, wrenches: Any) -> None:
+    def still(motion, wrenches):
         inertia(
             motion._replace(omega=dict.fromkeys(motion.omega, 0.0 * motion.omega[2])),
             wrenches,
@@ -418,9 +406,7 @@ def test_faults_in_the_free_bodies_show(monkeypatch: pytest.MonkeyPatch) -> None
             assert failing() >= expected, name
 
 
-def test_blocks_of_positions_make_no_difference(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_blocks_of_positions_make_no_difference(monkeypatch):
     full_answer = answered(crank_rocker())
     monkeypatch.setattr(free_body, "POSITIONS_SOLVED_AT_ONCE", 7)
     for name, values in answered(crank_rocker()).items():

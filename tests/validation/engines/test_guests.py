@@ -9,11 +9,8 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -39,7 +36,7 @@ from tests.whole.test_imports import ROOT
 HERE = "tests.support.hostile_class:"
 
 
-def place_of(text: str) -> str:
+def place_of(text):
     """The file and the line of the hostile class that has a text."""
     file = ROOT / "tests" / "support" / "hostile_class.py"
     lines = file.read_text(encoding="utf-8").splitlines()
@@ -55,12 +52,12 @@ Verdicts = dict[str, dict[str, tuple[str, str]]]
 
 
 @pytest.fixture(autouse=True)
-def _ended() -> Iterator[None]:
+def _ended():
     yield
     end_guests()
 
 
-def judged(scene: fourbar.Scene, *entries: str, seconds: float = 60.0) -> Verdicts:
+def judged(scene, *entries, seconds=60.0):
     """Verdict and reason by engine and quantity.
 
     A name without a colon is a class of tests.support.
@@ -78,18 +75,18 @@ def judged(scene: fourbar.Scene, *entries: str, seconds: float = 60.0) -> Verdic
     return by_engine
 
 
-def verdicts(rows: dict[str, tuple[str, str]]) -> set[str]:
+def verdicts(rows):
     return {verdict for verdict, _ in rows.values()}
 
 
-def others_agree(by_engine: Verdicts) -> bool:
+def others_agree(by_engine):
     return (
         verdicts(by_engine["formulas"]) == verdicts(by_engine["free-body"]) == {AGREES}
     )
 
 
 @pytest.mark.parametrize("language", ["python", "node"])
-def test_a_program_in_any_language_agrees(language: str, tmp_path: Path) -> None:
+def test_a_program_in_any_language_agrees(language, tmp_path):
     if language == "node" and shutil.which("node") is None:
         pytest.skip("no node")
     rows = judged(
@@ -276,14 +273,11 @@ FINE: dict[str, tuple[str, str]] = {
         ("", ""),
     ],
 )
-def test_the_reason_of_a_dead_program_is_the_line_that_says_why(
-    errors: str,
-    line: str,
-) -> None:
+def test_the_reason_of_a_dead_program_is_the_line_that_says_why(errors, line):
     assert processes.find_reason(errors) == line
 
 
-def test_a_torque_that_is_a_thousandth_off_fails_alone(tmp_path: Path) -> None:
+def test_a_torque_that_is_a_thousandth_off_fails_alone(tmp_path):
     by_engine = judged(
         SCENE,
         write_program(
@@ -299,10 +293,7 @@ def test_a_torque_that_is_a_thousandth_off_fails_alone(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.linux
 @pytest.mark.timeout(300)
-def test_whatever_a_program_does_costs_its_own_rows(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_whatever_a_program_does_costs_its_own_rows(tmp_path, monkeypatch):
     monkeypatch.setattr(processes, "WORKER_MEMORY", 2 * 10**8)
     monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
     entries = {}
@@ -331,10 +322,7 @@ def test_whatever_a_program_does_costs_its_own_rows(
 @pytest.mark.slow
 @pytest.mark.linux
 @pytest.mark.timeout(120)
-def test_a_program_that_is_silent_ends_at_its_limit(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_program_that_is_silent_ends_at_its_limit(tmp_path, monkeypatch):
     """With what it started, and is not asked again for that scene."""
     monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
     monkeypatch.setattr(processes, "MOST_ERRORS", 10**7)
@@ -351,7 +339,7 @@ def test_a_program_that_is_silent_ends_at_its_limit(
 
 
 @pytest.mark.linux
-def test_what_is_killed_from_outside_is_asked_again(tmp_path: Path) -> None:
+def test_what_is_killed_from_outside_is_asked_again(tmp_path):
     """Once."""
     lives = tmp_path / "lives"
     lives.write_text("x")
@@ -364,7 +352,7 @@ def test_what_is_killed_from_outside_is_asked_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_class_is_served_by_our_host() -> None:
+def test_a_class_is_served_by_our_host():
     classes = "Right Angle Changes Prints Empty Leaves Lacks Shapes Elsewhere Complex"
     by_engine = judged(SCENE, *classes.split())
     assert others_agree(by_engine) and verdicts(by_engine["right"]) == {AGREES}
@@ -400,7 +388,7 @@ def test_a_class_is_served_by_our_host() -> None:
 
 
 @pytest.mark.slow
-def test_a_guest_is_asked_for_what_its_hello_names(tmp_path: Path) -> None:
+def test_a_guest_is_asked_for_what_its_hello_names(tmp_path):
     four = crank_rocker(
         motion=fourbar.Motion(theta_4=fourbar.Sweep(1.8, 2.5, 8), omega_4=3.0)
     )
@@ -431,7 +419,7 @@ def test_a_guest_is_asked_for_what_its_hello_names(tmp_path: Path) -> None:
     )
 
 
-def test_a_guest_of_protocol_3_is_not_asked_for_springs_that_act_one_way() -> None:
+def test_a_guest_of_protocol_3_is_not_asked_for_springs_that_act_one_way():
     """Its hello names springs alone: those that act both ways it is asked as before."""
     program = guests.Program(("none",))
     hello = guests.Hello("sprung", effects=("springs",))
@@ -446,9 +434,7 @@ def test_a_guest_of_protocol_3_is_not_asked_for_springs_that_act_one_way() -> No
 
 
 @pytest.mark.slow
-def test_a_guest_that_integrates_is_asked_for_released_motions(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_guest_that_integrates_is_asked_for_released_motions(monkeypatch):
     pytest.importorskip("mujoco")
     monkeypatch.setattr(
         "fourbar_validation.run.released.LONGEST_TIMESTEP", 1e-3
@@ -476,14 +462,11 @@ def test_a_guest_that_integrates_is_asked_for_released_motions(
         (["1.2"], ["1.2"]),
     ],
 )
-def test_a_version_stands_in_a_name_only_beside_another_one(
-    stated: list[str],
-    names: list[str],
-) -> None:
+def test_a_version_stands_in_a_name_only_beside_another_one(stated, names):
     programs = [(one, "", guests.Program((one,))) for one in stated]
     hellos = {guests.Program((one,)): one for one in stated}
 
-    def say_hello(program: guests.Program) -> guests.Hello:
+    def say_hello(program):
         name = hellos[program]
         (version,) = (word for word in name.split() if "." in word)
         return guests.Hello(name, version=version)
@@ -497,7 +480,7 @@ def test_a_version_stands_in_a_name_only_beside_another_one(
 
 
 @pytest.mark.slow
-def test_names_stand_apart() -> None:
+def test_names_stand_apart():
     """Of another engine, of two guests, and of those whose hello fails.
 
     By entry, class or file.
@@ -524,7 +507,7 @@ def test_names_stand_apart() -> None:
         (HERE + "Absent", "AttributeError"),
     ],
 )
-def test_what_is_not_there_is_refused_in_one_line(entry: str, part: str) -> None:
+def test_what_is_not_there_is_refused_in_one_line(entry, part):
     with pytest.raises(InputError) as error:
         select_engines(Request(guest=(entry,)))
     assert (
@@ -539,7 +522,7 @@ def test_what_is_not_there_is_refused_in_one_line(entry: str, part: str) -> None
     ("name", "reason"),
     [("Nameless", "engine"), ("Loose", "tolerance"), ("Else", "answers")],
 )
-def test_a_hello_that_fails_is_one_failing_row(name: str, reason: str) -> None:
+def test_a_hello_that_fails_is_one_failing_row(name, reason):
     by_engine = judged(SCENE, name)
     ((engine, rows),) = [
         item for item in by_engine.items() if item[0] not in ("formulas", "free-body")
@@ -550,7 +533,7 @@ def test_a_hello_that_fails_is_one_failing_row(name: str, reason: str) -> None:
     assert engine == name and rows["all"][1].startswith(reason)
 
 
-def command_line(out: Path, *options: str) -> "subprocess.CompletedProcess[str]":
+def command_line(out, *options):
     line = [
         sys.executable,
         "-m",
@@ -572,9 +555,8 @@ def command_line(out: Path, *options: str) -> "subprocess.CompletedProcess[str]"
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_run_with_guests_ends_with_their_rows_and_none_of_their_processes(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    tmp_path, monkeypatch
+):
     monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
     for name in ("scene", "second"):
         save(SCENE, tmp_path / f"{name}.toml")
@@ -609,9 +591,7 @@ def test_a_run_with_guests_ends_with_their_rows_and_none_of_their_processes(
 @pytest.mark.slow
 @pytest.mark.linux
 @pytest.mark.timeout(200)
-def test_a_guest_that_kills_its_worker_turns_no_other_engine_red(
-    tmp_path: Path,
-) -> None:
+def test_a_guest_that_kills_its_worker_turns_no_other_engine_red(tmp_path):
     kills = write_program(tmp_path, "kills its parent", KILLS_ITS_PARENT)
     plain = write_program(tmp_path, "plain")
     save(SCENE, tmp_path / "scene.toml")
@@ -628,7 +608,7 @@ def test_a_guest_that_kills_its_worker_turns_no_other_engine_red(
 
 
 @pytest.mark.slow
-def test_a_report_shows_the_versions_that_guests_state(tmp_path: Path) -> None:
+def test_a_report_shows_the_versions_that_guests_state(tmp_path):
     stated = {"numpy-like": "", "own": "2.1", "own 3.0": "3.0"}
     hello = '["gravity"]}'
     entries = [
@@ -655,10 +635,7 @@ def answer(scene, at):
 
 
 @pytest.mark.slow
-def test_parts_judged_by_another_code_are_made_again(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_parts_judged_by_another_code_are_made_again(tmp_path, monkeypatch):
     """Runs that are interrupted once the first part is there.
 
     What the second one says of its parts.
@@ -673,11 +650,11 @@ def test_parts_judged_by_another_code_are_made_again(
     judge_here(monkeypatch)
 
     class Interrupting(Heard):
-        def advance(self, stage: str, scenes: int) -> None:
+        def advance(self, stage, scenes):
             if any((tmp_path / "out" / "parts").iterdir()):
                 raise KeyboardInterrupt
 
-    def notes(entries: Sequence[str]) -> list[str]:
+    def notes(entries):
         heard, engines = Interrupting(), guests.read_guests(entries, ())
         with pytest.raises(KeyboardInterrupt):
             plan = Plan(suite, engines, RunOptions(drawn=False))
@@ -705,7 +682,7 @@ def test_parts_judged_by_another_code_are_made_again(
     [*ENGINES, *load_further()],
     ids=lambda engine: engine.name,
 )
-def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine: Any) -> None:
+def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine):
     if missing := engine.missing():
         pytest.skip(missing)
     program = guests.serve_adapter(engine.name, 120.0)

@@ -5,13 +5,11 @@ from dataclasses import replace
 import pytest
 
 import fourbar
-from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.prediction import predict_for_any_method
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.run.answers import compare_answer
 from fourbar_validation.run.judge import make_question
-from fourbar_validation.run.question import Question
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.scenes import balance
 from tests.support.textbook import Textbook
@@ -29,12 +27,12 @@ MODELS = sorted(path.stem for path in (ROOT / "models").glob("*.toml"))
 SLIPPED = ("torque", "F12", "alpha_4")
 
 
-def ask(scene: fourbar.Scene) -> tuple[Question, Answer]:
+def ask(scene):
     question = make_question("scene", scene, (ENGINE,))
     return question, question.answer(ENGINE)
 
 
-def check(scene: fourbar.Scene) -> bool:
+def check(scene):
     """Judge the textbook right, and with a slip wrong; tell whether it answers."""
     question, answer = ask(scene)
     if answer.refusal is not None:
@@ -50,21 +48,21 @@ def check(scene: fourbar.Scene) -> bool:
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_it_agrees_on_every_model(name: str) -> None:
+def test_it_agrees_on_every_model(name):
     assert check(fourbar.load(ROOT / "models" / f"{name}.toml"))
 
 
 @pytest.mark.parametrize("left", (1e-1, 1e-2, 1e-4))
-def test_it_agrees_on_a_balanced_crank(left: float) -> None:
+def test_it_agrees_on_a_balanced_crank(left):
     assert check(balance(left))
 
 
-def test_it_agrees_on_random_scenes() -> None:
+def test_it_agrees_on_random_scenes():
     drawn = (draw_random_scene(991, i, tuple(DrawnType)) for i in range(10))
     assert sum(map(check, drawn)) >= 5
 
 
 @pytest.mark.slow
-def test_it_agrees_on_three_hundred_random_scenes() -> None:
+def test_it_agrees_on_three_hundred_random_scenes():
     drawn = (draw_random_scene(993, i, tuple(DrawnType)) for i in range(300))
     assert sum(map(check, drawn)) >= 200

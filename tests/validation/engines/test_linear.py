@@ -8,9 +8,7 @@ from fourbar_validation.engines.linear import solve_refined
 
 
 @pytest.mark.parametrize("steady", [0.0, 2.5])
-def test_what_few_equations_fix_keeps_its_digits_beside_unknowns_that_are_large(
-    steady: float,
-) -> None:
+def test_what_few_equations_fix_keeps_its_digits_beside_unknowns_that_are_large(steady):
     """A bar is commanded to turn steadily while the others accelerate 1e5 as fast.
 
     Elimination alone takes another equation's pivot first and leaves the rounding of
@@ -41,7 +39,7 @@ def test_what_few_equations_fix_keeps_its_digits_beside_unknowns_that_are_large(
     assert worst_of_elimination > 1e-12  # the scene shows what the step is for
 
 
-def test_many_systems_are_solved_at_once() -> None:
+def test_many_systems_are_solved_at_once():
     rng = np.random.default_rng(1)
     matrices, right = rng.normal(size=(4, 3, 3)), rng.normal(size=(4, 3, 2))
     solved = solve_refined(matrices, right)

@@ -11,7 +11,7 @@ from fourbar_validation.scenes.suites import MODELS
 from tests.support.scenes import crank_rocker
 
 
-def test_friction_of_loaded_pins_and_cylinders_are_refused() -> None:
+def test_friction_of_loaded_pins_and_cylinders_are_refused():
     sliding = crank_rocker(effects=(fourbar.PinFriction.at(A=(0.2, 0.02)),))
     with pytest.raises(LimitError, match="loads of pins"):
         PinocchioLoop(sliding)

@@ -33,7 +33,6 @@ from fourbar_validation.engines.registry import ENGINES, Engine, make_prediction
 from fourbar_validation.engines.tree import solve_closed, solve_multipliers
 from fourbar_validation.run.answers import compare_answer
 from fourbar_validation.run.judge import make_question
-from fourbar_validation.run.question import Question
 from tests.support.scenes import ON_COUPLER, crank_rocker
 
 pytest.importorskip("flint")
@@ -42,7 +41,7 @@ BOUNDED = ("theta_3", "theta_4", "B", "G3", "G4", "sin_mu", "condition")
 """What follows from the angles of bars 3 and 4 alone."""
 
 
-def touch() -> Scene:
+def touch():
     """Command bar 2 to within a rounding of where its loop ceases to close, in the
     sense in which it closes.
     """
@@ -56,7 +55,7 @@ def touch() -> Scene:
 
 
 @pytest.fixture(scope="module")
-def question() -> Question:
+def question():
     """Ask nobody of a loop that just closes."""
     return make_question("scene", touch(), ())
 
@@ -66,9 +65,8 @@ ENGINE = Engine("spoiled", FreeBody, FULL_ACCURACY, predictor=predict_from_data)
 
 @pytest.mark.parametrize("quantity", ("A", "G2", "v_A", "omega_2", "B", "G4"))
 def test_a_place_that_is_wrong_by_a_half_fails_where_the_loop_just_closes(
-    quantity: str,
-    question: Question,
-) -> None:
+    quantity, question
+):
     solution = question.solution
     numbers = {name: np.array(getattr(solution, name)) for name in COMPARED_QUANTITIES}
     numbers[quantity] *= 1.5
@@ -78,7 +76,7 @@ def test_a_place_that_is_wrong_by_a_half_fails_where_the_loop_just_closes(
     assert [row.quantity for row in rows if row.failed] == [quantity]
 
 
-def test_what_the_input_decides_is_predicted_to_its_last_digits() -> None:
+def test_what_the_input_decides_is_predicted_to_its_last_digits():
     scene = touch()
     command = fourbar.command(scene)
     for quantity in OF_THE_INPUT - {"theta_2"}:
@@ -93,11 +91,7 @@ def test_what_the_input_decides_is_predicted_to_its_last_digits() -> None:
 
 @pytest.mark.parametrize("stretched", (True, False))
 @pytest.mark.parametrize(("b", "c"), ((0.1, 0.22), (0.4, 0.07), (0.3, 1e-3)))
-def test_the_bound_of_the_angles_is_that_of_the_triangle(
-    b: float,
-    c: float,
-    stretched: bool,
-) -> None:
+def test_the_bound_of_the_angles_is_that_of_the_triangle(b, c, stretched):
     """Close a triangle that misses its line by the margin.
 
     The cosine rule is used in 200 bits.
@@ -147,10 +141,7 @@ WHEEL_ON_COUPLER = Scene(
         ("mujoco-inverse", WHEEL_ON_COUPLER),
     ),
 )
-def test_an_open_tree_of_uneven_bars_keeps_to_its_prediction(
-    name: str,
-    scene: Scene,
-) -> None:
+def test_an_open_tree_of_uneven_bars_keeps_to_its_prediction(name, scene):
     """All bars turn alike, and their accelerations are what is left of the speeds.
 
     Cramer's rule alone leaves them wrong by a hundred times what is predicted, and
@@ -173,7 +164,7 @@ def test_an_open_tree_of_uneven_bars_keeps_to_its_prediction(
         assert np.all(predicted[closed] < 1e-3 * magnitude(right)[closed]), quantity
 
 
-def test_a_step_of_refinement_leaves_the_residual_of_a_rounding() -> None:
+def test_a_step_of_refinement_leaves_the_residual_of_a_rounding():
     """Bars almost in line: the determinant has lost nine digits."""
     jacobian = np.array([[0.3, 1.0, -1.0], [0.2, 0.7, -0.7 + 1e-9]])
     turn = np.array([0.0, 1.0, 0.5])
@@ -186,7 +177,7 @@ def test_a_step_of_refinement_leaves_the_residual_of_a_rounding() -> None:
     assert np.all(np.abs(rest) <= 4.0 * EPS * (np.abs(columns) @ np.abs(multipliers)))
 
 
-def test_a_drive_that_exerts_a_force_is_predicted_and_moves_no_bar() -> None:
+def test_a_drive_that_exerts_a_force_is_predicted_and_moves_no_bar():
     driven = crank_rocker(drive=ON_COUPLER)
     turned = crank_rocker()
     command = fourbar.command(driven)

@@ -387,7 +387,7 @@ def test_what_is_none_is_refused_in_one_line(part, number):
 
 
 @pytest.mark.parametrize("data", WRONG_SETTINGS, ids=str)
-def test_a_setting_that_is_none_is_refused_in_one_line(data) -> None:
+def test_a_setting_that_is_none_is_refused_in_one_line(data):
     with pytest.raises(
         InputError,
         match=r"^setting = [^\n]*: must be an object with name, and steps_per_turn",
@@ -402,7 +402,7 @@ def test_a_setting_that_is_none_is_refused_in_one_line(data) -> None:
     }
 
 
-def test_an_engine_through_time_may_be_faster_by_what_the_acceleration_gives() -> None:
+def test_an_engine_through_time_may_be_faster_by_what_the_acceleration_gives():
     """omega^2 = omega_0^2 + 2 alpha theta.
 
     Of a stroke too, whose bar has the motion that the formulas state.

@@ -7,7 +7,6 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -42,7 +41,7 @@ NAMED = (*sorted(MODELS.glob("*.toml")), *sorted(MODELS.glob("textbook/*.toml"))
 
 
 @pytest.fixture
-def engine(tmp_path: Path) -> Path:
+def engine(tmp_path):
     """The page's engine, as a reader saves it."""
     (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     file = tmp_path / "engine.py"
@@ -50,7 +49,7 @@ def engine(tmp_path: Path) -> Path:
     return file
 
 
-def ask(engine: Path, *questions: dict[str, Any]) -> list[dict[str, Any]]:
+def ask(engine, *questions):
     """Ask it in a Python that sees nothing of this project, nor any library."""
     lines = "".join(
         json.dumps({"id": number, **question}) + "\n"
@@ -72,10 +71,7 @@ def ask(engine: Path, *questions: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 @pytest.mark.parametrize("file", NAMED, ids=lambda file: file.stem)
-def test_the_page_s_engine_answers_what_the_formulas_do(
-    engine: Path,
-    file: Path,
-) -> None:
+def test_the_page_s_engine_answers_what_the_formulas_do(engine, file):
     scene = fourbar.load(file)
     gravity = tuple(effect for effect in scene.effects if isinstance(effect, Gravity))
     motion = (
@@ -125,14 +121,14 @@ def test_the_page_s_engine_answers_what_the_formulas_do(
     assert compared == 7
 
 
-def test_the_page_s_engine_needs_no_library(engine: Path) -> None:
+def test_the_page_s_engine_needs_no_library(engine):
     lines = [line for line in engine.read_text().splitlines() if line.strip()]
     assert {line for line in lines if "import" in line} == {
         "import cmath, json, math, sys"
     }
 
 
-def check(part: str) -> Any:
+def check(part):
     jsonschema = pytest.importorskip("jsonschema")
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
     return jsonschema.Draft202012Validator(
@@ -141,7 +137,7 @@ def check(part: str) -> Any:
 
 
 @pytest.mark.slow
-def test_what_the_judge_writes_is_what_the_schema_says() -> None:
+def test_what_the_judge_writes_is_what_the_schema_says():
     seen, question = 0, check("question")
     for scene in scenes():
         told: dict[str, Any] = {"id": seen, "scene": protocol.scene_to_json(scene)}
@@ -157,7 +153,7 @@ def test_what_the_judge_writes_is_what_the_schema_says() -> None:
     assert seen > 100
 
 
-def test_what_an_engine_writes_is_what_the_schema_says(engine: Path) -> None:
+def test_what_an_engine_writes_is_what_the_schema_says(engine):
     scene = replace(crank_rocker(), loads=())
     commanded = list_positions(scene)
     # an engine is told the sign of the command's own sine at each position
@@ -189,10 +185,7 @@ def test_what_an_engine_writes_is_what_the_schema_says(engine: Path) -> None:
         ("setting", WRONG_SETTINGS),
     ],
 )
-def test_what_is_refused_is_none_by_the_schema_either(
-    part: str,
-    wrong: list[Any],
-) -> None:
+def test_what_is_refused_is_none_by_the_schema_either(part, wrong):
     refused = [
         data
         for data in wrong

@@ -3,10 +3,7 @@
 No other distribution adds one.
 """
 
-from collections.abc import Iterator
 from importlib.metadata import Distribution, PackageNotFoundError
-from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -15,7 +12,7 @@ from fourbar_validation.engines.registry import Engine
 from tests.whole.test_imports import ROOT
 
 
-def installed(folder: Path, name: str, entries: str) -> None:
+def installed(folder, name, entries):
     info = folder / f"{name.replace('-', '_')}-1.0.dist-info"
     info.mkdir(parents=True)
     (info / "METADATA").write_text(
@@ -25,10 +22,10 @@ def installed(folder: Path, name: str, entries: str) -> None:
 
 
 @pytest.fixture
-def only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def only(tmp_path, monkeypatch):
     """A folder that has all distributions."""
 
-    def find(name: str) -> Any:
+    def find(name):
         for one in Distribution.discover(path=[str(tmp_path)]):
             if one.metadata["Name"] == name:
                 return one
@@ -39,7 +36,7 @@ def only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     registry.load_further.cache_clear()
 
 
-def load() -> tuple[Engine, ...]:
+def load():
     registry.load_further.cache_clear()
     return registry.load_further()
 
@@ -47,10 +44,7 @@ def load() -> tuple[Engine, ...]:
 NAMES = ["exudyn-constraints", "opensim-constraints", "drake-inverse"]
 
 
-def test_the_lab_alone_adds_engines(
-    only: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_lab_alone_adds_engines(only, monkeypatch):
     assert [
         engine.name for engine in load()
     ] == NAMES  # of the checkout, where it lies on the path
@@ -81,9 +75,8 @@ def test_the_lab_alone_adds_engines(
 
 
 def test_ctrl_c_while_a_compiled_module_starts_is_no_broken_library(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    tmp_path, monkeypatch
+):
     """pybind11 raises an ImportError then, from what ended it."""
     module = "raise ImportError('initialization failed') from KeyboardInterrupt()\n"
     (tmp_path / "interrupted.py").write_text(module)

@@ -77,12 +77,12 @@ MODELS = Path(__file__).parents[3] / "models"
 
 
 @cache
-def list_all() -> tuple[PublishedFigure, ...]:
+def list_all():
     """Return every figure; all of them take some seconds."""
     return tuple(list_figures())
 
 
-def test_the_published_torque_error_by_error() -> None:
+def test_the_published_torque_error_by_error():
     for name, listed in (("T4", T4), ("F12x", F12X)):
         for figure, (_, x), (_, *step) in zip(
             listed,
@@ -97,7 +97,7 @@ def test_the_published_torque_error_by_error() -> None:
             )
 
 
-def test_the_thesis_without_its_errors_is_ours() -> None:
+def test_the_thesis_without_its_errors_is_ours():
     """The 13 x 13 system in kg, cm, s against our formulas in SI."""
     right, program, apart = (
         compute_right_unknowns(),
@@ -109,7 +109,7 @@ def test_the_thesis_without_its_errors_is_ours() -> None:
         assert unknown == pytest.approx(right[name], rel=0.0, abs=apart[name])
 
 
-def test_round_off_holds_for_other_pivots_and_inputs_typed_otherwise() -> None:
+def test_round_off_holds_for_other_pivots_and_inputs_typed_otherwise():
     """Against fifty digits: rows in any order, each number moved by a rounding.
 
     The bound is not idle either.
@@ -134,7 +134,7 @@ def test_round_off_holds_for_other_pivots_and_inputs_typed_otherwise() -> None:
     assert ratio.min() > 0.01 and ratio.max() < 1.0
 
 
-def test_rows_for_the_report() -> None:
+def test_rows_for_the_report():
     rows = list_ladder_rows()
     ladder = [row for row in rows if row[0]]
     assert [did.partition(" ")[0] for did, *_ in ladder] == [
@@ -167,16 +167,16 @@ def test_rows_for_the_report() -> None:
         ("0", -0.4, "rounded"),
     ],
 )
-def test_verdicts(printed: str, ours: float, verdict: str) -> None:
+def test_verdicts(printed, ours, verdict):
     assert compare_figure(printed, ours) == verdict
 
 
-def test_noise_is_of_the_last_digits_alone() -> None:
+def test_noise_is_of_the_last_digits_alone():
     assert compare_figure("308.8044071267012", 308.8044071267003, 1e-12) == "rounded"
     assert compare_figure("308.8044071267012", 308.8044071267027, 1e-12) == "differs"
 
 
-def test_every_figure_is_compared() -> None:
+def test_every_figure_is_compared():
     tables = Counter(figure.table for figure in list_all())
     assert tables == {
         "2.4 positions": 281 * 4,
@@ -205,7 +205,7 @@ def test_every_figure_is_compared() -> None:
     }
 
 
-def test_every_difference_is_what_its_errata_make_of_ours() -> None:
+def test_every_difference_is_what_its_errata_make_of_ours():
     """Save three misprints, for which no computation is known.
 
     An agreement needs no misprint to explain it.
@@ -233,7 +233,7 @@ def test_every_difference_is_what_its_errata_make_of_ours() -> None:
     )  # as data/README.md says
 
 
-def test_each_erratum_named_is_needed() -> None:
+def test_each_erratum_named_is_needed():
     """No figure names an erratum and yet is right before it is made.
 
     One entry of the matrix is, by its two digits.
@@ -246,7 +246,7 @@ def test_each_erratum_named_is_needed() -> None:
     assert idle == ["5.7 matrix k4_5"]
 
 
-def test_errata_are_complete() -> None:
+def test_errata_are_complete():
     assert {str(n) for n in range(1, 41)} <= set(ERRATA)
     for entry in ERRATA.values():
         assert all(
@@ -261,7 +261,7 @@ def test_errata_are_complete() -> None:
         )
 
 
-def solve_as_printed(sides: list[str], arms: list[list[str]]) -> float:
+def solve_as_printed(sides, arms):
     """T4 of the 13 x 13 system of section 5.7 from printed numbers, built anew."""
     matrix, right = np.zeros((13, 13)), np.zeros(13)
     right[:9] = [float(text) for text in sides]
@@ -278,8 +278,8 @@ def solve_as_printed(sides: list[str], arms: list[list[str]]) -> float:
     return float(np.linalg.solve(matrix, right)[12])
 
 
-def test_torques_that_the_errata_state() -> None:
-    def program(*made: int) -> float:
+def test_torques_that_the_errata_state():
+    def program(*made):
         return compute_thesis_program(
             ProgramErrors(*(number in made for number in (3, 1, 2, 4, 5)))
         )["T4"]
@@ -311,7 +311,7 @@ def test_torques_that_the_errata_state() -> None:
     names = [f"k{bar}{key}" for bar in (2, 3, 4) for key in ("x", "y", "_5")]
     used = {"k3_5": "14.99169304", "k4x": str(0.2 * -0.02840253815)}
 
-    def hand(numbers: dict[str, str], *put_right: str) -> float:
+    def hand(numbers, *put_right):
         numbers = numbers | {name: used[name] for name in put_right}
         arms = [[numbers[f"k{bar}_{n}"] for n in (1, 2, 3, 4)] for bar in (2, 3, 4)]
         return solve_as_printed([numbers[name] for name in names], arms)
@@ -323,7 +323,7 @@ def test_torques_that_the_errata_state() -> None:
     assert f"{hand(matrix):.6f}" in states["13"]
 
 
-def test_open_loops_that_the_errata_state() -> None:
+def test_open_loops_that_the_errata_state():
     """Closure of the angles as printed, in the thesis's polygon, cm."""
     table = np.genfromtxt(
         FOLDER / "data" / "positions.csv",
@@ -334,7 +334,7 @@ def test_open_loops_that_the_errata_state() -> None:
     d, a, b, c = BAR_LENGTHS
     unit = np.exp(1j * np.radians(table))
 
-    def gaps(third: int, fourth: int) -> np.ndarray:
+    def gaps(third, fourth):
         return np.abs(
             d * np.exp(1j * THETA_1)
             + a * unit[:, 0]
@@ -349,7 +349,7 @@ def test_open_loops_that_the_errata_state() -> None:
     assert f"{wrong.min():.1f} to {wrong.max():.1f} cm" in ERRATA["22"].derivation
 
 
-def test_limits_that_the_errata_state() -> None:
+def test_limits_that_the_errata_state():
     linkage = make_model_scene(THETA_2).linkage
     for bar, title in ((4, "limits"), (2, "dead centres")):
         angles = {
@@ -360,7 +360,7 @@ def test_limits_that_the_errata_state() -> None:
         assert angles == {part.strip() for part in stated.split(" and ")}
 
 
-def test_public_test_cases_agree_to_the_last_digit() -> None:
+def test_public_test_cases_agree_to_the_last_digit():
     assert {
         figure.name: figure.verdict()
         for figure in compare_textbooks()
@@ -372,7 +372,7 @@ def test_public_test_cases_agree_to_the_last_digit() -> None:
     assert len({answer.where.split(",")[0] for answer in list_answers()}) >= 3
 
 
-def test_answers_that_sympy_leaves_to_be_solved() -> None:
+def test_answers_that_sympy_leaves_to_be_solved():
     """Mass matrix and forcing as printed in test_jointsmethod.py give the accelerations
     that are compared.
     """
@@ -394,7 +394,7 @@ def test_answers_that_sympy_leaves_to_be_solved() -> None:
     ]
 
 
-def test_quantities_of_an_answer() -> None:
+def test_quantities_of_an_answer():
     s = fourbar.solve(scenes.thesis())
     assert compute_value(s, "-F14_y", 0) == -s.F14[0, 1]
     assert compute_value(s, "omega_3 - omega_2", 0) == s.omega_3[0] - s.omega_2[0]
@@ -409,7 +409,7 @@ def test_quantities_of_an_answer() -> None:
     [scenes.thesis(), fourbar.load(MODELS / "thesis.toml")],
     ids=["code", "file"],
 )
-def test_inputs_are_those_of_the_model(scene: fourbar.Scene) -> None:
+def test_inputs_are_those_of_the_model(scene):
     ours = make_model_scene(THETA_2)
     assert ours.linkage.lengths == pytest.approx(scene.linkage.lengths, rel=TYPED)
     assert ours.linkage.ground_angle == pytest.approx(
@@ -442,7 +442,7 @@ def test_inputs_are_those_of_the_model(scene: fourbar.Scene) -> None:
             assert load.arm == pytest.approx(their.arm, rel=TYPED)
 
 
-def test_the_command_explains_every_difference() -> None:
+def test_the_command_explains_every_difference():
     process = CliRunner().invoke(published, standalone_mode=False)
     assert process.return_value == 0
     assert max(map(len, process.output.splitlines())) <= 80
@@ -454,7 +454,7 @@ def test_the_command_explains_every_difference() -> None:
     )
 
 
-def test_a_difference_without_an_erratum_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_difference_without_an_erratum_fails(monkeypatch):
     wrong = PublishedFigure(
         "2.4 positions", "1 theta3_1", "167.877224", 167.8772234, ("4",), 167.8
     )

@@ -24,7 +24,7 @@ accepted` asks it too.
 
 
 @pytest.mark.slow
-def test_nothing_got_worse_since_the_accepted_state() -> None:
+def test_nothing_got_worse_since_the_accepted_state():
     """Of prescribed motions; a released one is simulated."""
     record, accepted = read_run(find_baseline(ACCEPTED))
     scenes = {SUITE.name(index): SUITE.scene(index) for index in range(len(SUITE))}
@@ -48,7 +48,7 @@ def test_nothing_got_worse_since_the_accepted_state() -> None:
 
 
 @pytest.mark.parametrize("turns", [0, 800])
-def test_a_row_states_the_condition_that_its_allowance_comes_from(turns: int) -> None:
+def test_a_row_states_the_condition_that_its_allowance_comes_from(turns):
     """A move is distinguished from round-off by the condition."""
     name, scene = next(
         (name, SUITE.scene(i))

@@ -10,14 +10,14 @@ from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, Ro
 from fourbar_validation.compare.tolerance import EPS
 from fourbar_validation.regression import render
 from fourbar_validation.regression.changes import Kind
-from fourbar_validation.regression.record import NOTHING_KNOWN, About
+from fourbar_validation.regression.record import NOTHING_KNOWN
 from fourbar_validation.regression.rules import list_weakened
 from tests.support.runs import HERE, compare_rows, kinds
 
 ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-9, AGREES, "", 1.0, 1.0)
 
 
-def changed(**fields: object) -> Row:
+def changed(**fields):
     return replace(ROW, **fields)  # type: ignore[arg-type]
 
 
@@ -59,7 +59,7 @@ ALARM = changed(quantity="watch", verdict=FAILS, error=NAN)
         ([ROW], [changed(setting="h/2", verdict=FAILS)], Kind.NEW_FAILURE),
     ],
 )
-def test_each_kind_of_change(old: list[Row], new: list[Row], kind: Kind) -> None:
+def test_each_kind_of_change(old, new, kind):
     beside = changed(engine="formulas", error=0.0, allowed=0.0)
     found = compare_rows((HERE, [*old, beside]), (HERE, [*new, beside]))
     (line,) = found.table[found.table.engine == "engine"].itertuples()
@@ -69,7 +69,7 @@ def test_each_kind_of_change(old: list[Row], new: list[Row], kind: Kind) -> None
     assert f"{1 + (kind == Kind.SAME)} {kind}" in render.write_verdict(found)
 
 
-def test_settings_are_paired_only_where_each_run_has_one_of_its_own() -> None:
+def test_settings_are_paired_only_where_each_run_has_one_of_its_own():
     first, second = (changed(setting=name) for name in ("h", "h/2"))
     third, none = (changed(setting=name) for name in ("h/4", "-"))
     for old, new in (
@@ -94,22 +94,18 @@ def test_settings_are_paired_only_where_each_run_has_one_of_its_own() -> None:
         ([FAILING], [FAILING], HOLDS),
     ],
 )
-def test_two_runs_without_a_comparison_in_common_are_no_success(
-    old: list[Row],
-    new: list[Row],
-    status: int,
-) -> None:
+def test_two_runs_without_a_comparison_in_common_are_no_success(old, new, status):
     assert compare_rows((HERE, old), (HERE, new)).status == status
 
 
-def test_of_two_rows_of_one_name_the_worse_counts_in_either_order() -> None:
+def test_of_two_rows_of_one_name_the_worse_counts_in_either_order():
     for twice in ([ROW, FAILING], [FAILING, ROW]):
         assert kinds([ROW], twice) == [Kind.VERDICT_WORSE]
         assert kinds(twice, twice) == [Kind.STILL_FAILS]
         assert kinds(twice, [ROW]) == [Kind.VERDICT_BETTER]
 
 
-def test_the_worst_change_comes_first() -> None:
+def test_the_worst_change_comes_first():
     old = [changed(scene=name, allowed=1e-15) for name in "abcd"]
     errors = {"a": 1e-9, "b": NAN, "c": 1e-6, "d": 1e-12}
     new = [
@@ -124,15 +120,12 @@ def test_the_worst_change_comes_first() -> None:
 @pytest.mark.parametrize(
     ("factor", "weaker"), [("1.001e-14", True), ("1e-14", False), ("9e-15", False)]
 )
-def test_a_factor_that_grew_by_a_thousandth_is_a_weaker_rule(
-    factor: str,
-    weaker: bool,
-) -> None:
+def test_a_factor_that_grew_by_a_thousandth_is_a_weaker_rule(factor, weaker):
     rules = [{"engine": {"factor": text}} for text in ("1e-14", factor)]
     assert bool(list_weakened(*rules)) == weaker
 
 
-def about(engines: dict[str, str], **settings: str) -> About:
+def about(engines, **settings):
     """The record of a run of guests: name of the column, and version."""
     names = ", ".join(engines)
     answers = settings.pop("answers", "F12, torque")
@@ -161,11 +154,7 @@ def about(engines: dict[str, str], **settings: str) -> About:
         ({"wg": "", "a": ""}, {"wg2": "", "a": ""}, {"wg": "wg2"}),
     ],
 )
-def test_versions_and_a_renamed_guest_are_compared_as_one(
-    old: dict[str, str],
-    new: dict[str, str],
-    pairs: dict[str, str],
-) -> None:
+def test_versions_and_a_renamed_guest_are_compared_as_one(old, new, pairs):
     runs = [
         (about(engines), [changed(engine=name) for name in engines])
         for engines in (old, new)
@@ -180,7 +169,7 @@ def test_versions_and_a_renamed_guest_are_compared_as_one(
     assert all(before in said and after in said for before, after in pairs.items())
 
 
-def test_a_renamed_guest_is_held_to_its_rule_and_to_what_it_answered() -> None:
+def test_a_renamed_guest_is_held_to_its_rule_and_to_what_it_answered():
     old, wider = about({"wg": ""}), about({"wg2": ""})
     wider.rules["wg2"]["factor"] = "1e-2"
     renamed = changed(engine="wg2")
@@ -193,7 +182,7 @@ def test_a_renamed_guest_is_held_to_its_rule_and_to_what_it_answered() -> None:
     assert render.write_differences(found).startswith("Gone: engine wg is gone")
 
 
-def test_what_was_not_asked_for_is_not_run_and_what_was_is_gone() -> None:
+def test_what_was_not_asked_for_is_not_run_and_what_was_is_gone():
     whole = about({"wg": "", "b": ""}, **{"scenes of": "hard"})
     both = [changed(scene=s, engine=e) for s in "st" for e in ("wg", "b")]
     for settings, rows, not_run, gone in (
@@ -210,7 +199,7 @@ def test_what_was_not_asked_for_is_not_run_and_what_was_is_gone() -> None:
         assert found.status == bool(gone)
 
 
-def test_a_scene_that_an_engine_newly_refuses_is_one_regression() -> None:
+def test_a_scene_that_an_engine_newly_refuses_is_one_regression():
     old = [changed(engine="wg", quantity=name) for name in ("F12", "torque")]
     refusal = changed(engine="wg", quantity="all", verdict=REFUSES, error=NAN)
     found = compare_rows((HERE, [*old, ROW]), (HERE, [refusal, ROW]))

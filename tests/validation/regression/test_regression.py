@@ -14,7 +14,6 @@ import os
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -50,7 +49,6 @@ from fourbar_validation.regression.history import (
 from fourbar_validation.regression.record import (
     NOTHING_KNOWN,
     About,
-    Recorded,
     describe_run,
     find_baseline,
     open_run,
@@ -70,7 +68,7 @@ ROW = Row(
 )
 
 
-def test_other_versions_are_reported() -> None:
+def test_other_versions_are_reported():
     older = About({**HERE.versions, "mujoco": "3.3.7"}, HERE.machine, HERE.settings)
     found = compare_rows((older, [ROW]), (HERE, [ROW]))
     assert [what for what, _, _ in found.surroundings] == ["mujoco"]
@@ -80,7 +78,7 @@ def test_other_versions_are_reported() -> None:
 MODEL = [str(Path(__file__).parents[3] / "models" / "crank_rocker.toml")]
 
 
-def test_command_writes_every_form_and_leaves_with_the_status(tmp_path: Path) -> None:
+def test_command_writes_every_form_and_leaves_with_the_status(tmp_path):
     hostile = replace(ROW, scene="<script>alert(1)</script>|`x`")
     old = save_run(tmp_path / "old", [ROW, hostile])
     new = save_run(
@@ -104,9 +102,7 @@ def test_command_writes_every_form_and_leaves_with_the_status(tmp_path: Path) ->
     assert "No regression" in same.output
 
 
-def test_accept_keeps_the_run_next_to_the_results_or_in_a_stated_folder(
-    tmp_path: Path,
-) -> None:
+def test_accept_keeps_the_run_next_to_the_results_or_in_a_stated_folder(tmp_path):
     run = save_run(tmp_path / "run", [ROW], "scene,engine,-,1,1,3.0\n")
     runner = CliRunner()
     for options, kept in (
@@ -131,7 +127,7 @@ def test_accept_keeps_the_run_next_to_the_results_or_in_a_stated_folder(
     )  # of this project, where no such folder is
 
 
-def damaged(folder: Path) -> Iterator[tuple[Path, str]]:
+def damaged(folder):
     """A run's folder damaged in one place after the other.
 
     The file that is to blame, and words of the message.
@@ -177,10 +173,7 @@ def damaged(folder: Path) -> Iterator[tuple[Path, str]]:
     about.write_bytes(files[about])
 
 
-def test_a_damaged_run_is_named_and_nothing_is_written(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_damaged_run_is_named_and_nothing_is_written(tmp_path, capsys):
     rows = [replace(ROW, engine=f"engine {k}") for k in range(4)]
     good, run = (
         save_run(tmp_path / name, rows, "scene,engine,-,1,1,3.0\n")
@@ -210,10 +203,7 @@ def test_a_damaged_run_is_named_and_nothing_is_written(
 
 
 @pytest.mark.slow
-def test_a_damaged_table_is_one_line_and_nothing_is_written(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_damaged_table_is_one_line_and_nothing_is_written(tmp_path, capsys):
     run, kept = save_run(tmp_path / "run", [ROW]), tmp_path / "kept"
     assert status(["accept", str(run), "--to", str(kept)]) == 0
     file, table = kept / HISTORY, (kept / "results.csv").read_bytes()
@@ -255,9 +245,8 @@ def test_a_damaged_table_is_one_line_and_nothing_is_written(
 
 
 def test_what_has_no_record_of_its_rows_is_compared_with_a_note_and_not_accepted(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    tmp_path, capsys
+):
     good, bare = (save_run(tmp_path / name, [ROW]) for name in ("good", "bare"))
     (bare / "record.json").unlink()
     assert status(["compare", str(bare), str(good)]) == 0
@@ -265,7 +254,7 @@ def test_what_has_no_record_of_its_rows_is_compared_with_a_note_and_not_accepted
     assert status(["accept", str(bare)]) == 2 and not (tmp_path / "accepted").exists()
 
 
-def test_what_is_empty_unfinished_or_fails_is_not_accepted(tmp_path: Path) -> None:
+def test_what_is_empty_unfinished_or_fails_is_not_accepted(tmp_path):
     fails, refuses = (
         replace(ROW, verdict=FAILS, error=1.0),
         replace(ROW, verdict=REFUSES),
@@ -318,20 +307,15 @@ def test_what_is_empty_unfinished_or_fails_is_not_accepted(tmp_path: Path) -> No
     ],
 )
 def test_options_of_a_run_that_would_do_nothing_are_refused_before_it(
-    arguments: list[str],
-    words: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    arguments, words, tmp_path, capsys
+):
     assert status(["run", *arguments, "--out", str(tmp_path / "out")]) == 2
     message = capsys.readouterr().err.strip()
     assert message.startswith("error: ") and words in message and "\n" not in message
     assert not (tmp_path / "out").exists()
 
 
-def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(
-    tmp_path: Path,
-) -> None:
+def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(tmp_path):
     rows = [ROW, replace(ROW, quantity="watch", error=math.nan, verdict=FAILS)]
     with ResultsWriter(tmp_path) as columns:
         columns.add(rows)
@@ -357,9 +341,8 @@ def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(
 
 @pytest.mark.slow
 def test_of_two_long_runs_every_row_is_counted_and_the_worst_are_listed(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    tmp_path, monkeypatch
+):
     monkeypatch.setattr("fourbar_validation.compare.columns.GROUP_ROWS", 60)
     for module in (
         "fourbar_validation.compare.columns",
@@ -413,10 +396,7 @@ def test_of_two_long_runs_every_row_is_counted_and_the_worst_are_listed(
     assert status(["compare", str(kept_as), str(tmp_path / "new")]) == 0
 
 
-def test_a_part_of_a_long_run_compares_with_its_part(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_part_of_a_long_run_compares_with_its_part(tmp_path, capsys):
     rows = [replace(ROW, scene=f"scene {k:03d}") for k in range(80)]
     all_rows, some = (
         save_run(tmp_path / "whole", rows),
@@ -436,7 +416,7 @@ def test_a_part_of_a_long_run_compares_with_its_part(
     assert " in 2 rows: 2 same" in verdict
 
 
-def disagreeing(worse: set[tuple[str, str]]) -> tuple[list[Row], list[Row]]:
+def disagreeing(worse):
     """Two runs of three scenes by three exact engines, a simulation and an identity.
 
     `worse`: engine and quantity.
@@ -496,10 +476,7 @@ def disagreeing(worse: set[tuple[str, str]]) -> tuple[list[Row], list[Row]]:
         ),
     ],
 )
-def test_the_report_says_who_is_at_fault(
-    worse: set[tuple[str, str]],
-    sentence: str,
-) -> None:
+def test_the_report_says_who_is_at_fault(worse, sentence):
     old, new = disagreeing(worse)
     changes = compare_rows((HERE, old), (HERE, new))
     assert changes.sentences == [sentence]
@@ -511,7 +488,7 @@ def test_the_report_says_who_is_at_fault(
         assert sentence in html.unescape(form(changes))
 
 
-def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first() -> None:
+def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first():
     old, new = disagreeing({("sim", "F12"), ("sim", "torque"), ("one", "torque")})
     better = [replace(row, error=1e-9) if row.engine == "two" else row for row in old]
     new = [
@@ -545,11 +522,7 @@ def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first() -> 
 SCENE = fourbar.load(Path(__file__).parents[3] / "models" / "crank_rocker.toml")
 
 
-def made(
-    rows: list[Row],
-    scenes: dict[str, fourbar.Scene],
-    engines: tuple[str, ...] = ("engine",),
-) -> WithRows:
+def made(rows, scenes, engines=("engine",)):
     free_bodies = [Engine(engine, FreeBody, EQUIVALENCE) for engine in engines]
     return (
         describe_run(
@@ -561,7 +534,7 @@ def made(
     )
 
 
-def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared() -> None:
+def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared():
     output = replace(SCENE.linkage.output, inertia=0.05)
     heavier = replace(
         SCENE,
@@ -597,10 +570,7 @@ def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared() -> Non
         assert "bars.output.inertia 0.048" in form(changes)
 
 
-def test_a_renamed_scene_is_found_by_what_it_states(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_renamed_scene_is_found_by_what_it_states(tmp_path, capsys):
     heavier = replace(
         SCENE,
         linkage=replace(
@@ -639,7 +609,7 @@ def test_a_renamed_scene_is_found_by_what_it_states(
         assert verdict.startswith("1 regression against") and " in 1 rows" in verdict
 
 
-def test_what_grew_within_its_allowance_is_shown_and_no_regression() -> None:
+def test_what_grew_within_its_allowance_is_shown_and_no_regression():
     """Another kernel of the BLAS turns 3.4e-7 into 5.2e-7 where 1 is allowed.
 
     A wider allowance excuses nothing.
@@ -654,7 +624,7 @@ def test_what_grew_within_its_allowance_is_shown_and_no_regression() -> None:
 
 
 @pytest.mark.slow
-def test_the_kernels_of_a_run_are_recorded_and_named_where_they_differ() -> None:
+def test_the_kernels_of_a_run_are_recorded_and_named_where_they_differ():
     """In two fresh processes, one of which takes this CPU for another."""
     code = (
         "from fourbar_validation.report.machine import find_kernels;"
@@ -682,7 +652,7 @@ def test_the_kernels_of_a_run_are_recorded_and_named_where_they_differ() -> None
     assert set(first) <= set(HERE.versions)
 
 
-def test_more_positions_and_other_settings_are_named_so() -> None:
+def test_more_positions_and_other_settings_are_named_so():
     finer = replace(
         SCENE,
         motion=SCENE.motion.replace(angle=fourbar.Sweep(0.0, 2.0 * math.pi, 720)),
@@ -707,7 +677,7 @@ def test_more_positions_and_other_settings_are_named_so() -> None:
     )
 
 
-def test_of_an_older_record_only_the_hash_can_say_that_scenes_changed() -> None:
+def test_of_an_older_record_only_the_hash_can_say_that_scenes_changed():
     old = About(
         HERE.versions, HERE.machine, {**HERE.settings, "suite": "0123456789abcdef"}
     )
@@ -728,7 +698,7 @@ def test_of_an_older_record_only_the_hash_can_say_that_scenes_changed() -> None:
     ) and "suites: no regression in 1 of 4 rows" in render.write_differences(changes)
 
 
-def widen(error: float, reason: str = "fewer digits") -> Engine:
+def widen(error, reason="fewer digits"):
     """The engine with a tolerance that it states itself."""
     stated = ErrorBound(
         STATED_BY_THE_ENGINE, f"{error:g} of the scale: {reason}", error, False
@@ -743,10 +713,7 @@ LOOSE = replace(
 )
 
 
-def test_a_wider_tolerance_is_a_regression_over_two_nights(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_wider_tolerance_is_a_regression_over_two_nights(tmp_path, capsys):
     """The first night widens it and is not accepted.
 
     The second hides an error in it.
@@ -773,10 +740,7 @@ def test_a_wider_tolerance_is_a_regression_over_two_nights(
     assert status(["compare", str(accepted), str(tmp_path / "first")]) == 0
 
 
-def test_a_run_of_another_suite_is_never_called_no_regression(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_run_of_another_suite_is_never_called_no_regression(tmp_path, capsys):
     """Two of eight rows stand in both: the verdict says so before anything else."""
     both = [ROW, replace(ROW, quantity="F12")]
     others = [replace(ROW, scene=f"scene {k}") for k in range(6)]
@@ -807,11 +771,7 @@ def test_a_run_of_another_suite_is_never_called_no_regression(
     ],
     ids=["reason", "stricter", "prediction", "fewer answers", "class"],
 )
-def test_each_entry_of_a_rule_can_weaken_it(
-    old: Engine,
-    new: Engine,
-    what: list[str],
-) -> None:
+def test_each_entry_of_a_rule_can_weaken_it(old, new, what):
     before, after = (describe_run([engine], "suite") for engine in (old, new))
     found = compare_rows((before, [ROW]), (after, [ROW]))
     assert [weakening.what for weakening in found.weakened] == what
@@ -819,9 +779,7 @@ def test_each_entry_of_a_rule_can_weaken_it(
     assert render.write_differences(found).startswith("Weaker rule: ") == bool(what)
 
 
-def test_k_and_a_stated_limit_are_rules_whoever_changes_them(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_k_and_a_stated_limit_are_rules_whoever_changes_them(monkeypatch):
     monkeypatch.setattr(rules, "K", 500.0)
     harsher = BOUNDARIES[0]._replace(boundary=0.5)
     monkeypatch.setattr(rules, "BOUNDARIES", (harsher, *BOUNDARIES[1:]))
@@ -833,7 +791,7 @@ def test_k_and_a_stated_limit_are_rules_whoever_changes_them(
     ]
 
 
-def test_rows_alone_say_that_their_class_is_another() -> None:
+def test_rows_alone_say_that_their_class_is_another():
     """Of tables without a record."""
     strict = replace(ROW, reason=EQUIVALENCE.explain(1.0))
     found = compare_rows((NOTHING_KNOWN, [strict]), (NOTHING_KNOWN, [LOOSE]))
@@ -844,7 +802,7 @@ def test_rows_alone_say_that_their_class_is_another() -> None:
     ).weakened
 
 
-def test_an_allowance_that_grew_tenfold_is_printed_and_no_regression() -> None:
+def test_an_allowance_that_grew_tenfold_is_printed_and_no_regression():
     """K eps/condition, at a worst position that is another one."""
     hard = replace(ROW, condition=1e-2, allowed=1e-12)
     found = compare_rows((HERE, [ROW]), (HERE, [hard]))
@@ -855,7 +813,7 @@ def test_an_allowance_that_grew_tenfold_is_printed_and_no_regression() -> None:
     assert not compare_rows((HERE, [ROW]), (HERE, [replace(hard, allowed=9e-14)])).grown
 
 
-def test_every_form_keeps_the_reason_of_a_crash() -> None:
+def test_every_form_keeps_the_reason_of_a_crash():
     """Its rows are gone, and the one in their place is new."""
     crash = Row.unmeasured(
         "scene", "engine", "", "all", FAILS, "Cannot find module 'x'"
@@ -870,7 +828,7 @@ def test_every_form_keeps_the_reason_of_a_crash() -> None:
         assert "Cannot find module" in html.unescape(form(found)), form
 
 
-def test_what_was_not_wanted_is_not_run_and_what_was_wanted_is_gone() -> None:
+def test_what_was_not_wanted_is_not_run_and_what_was_wanted_is_gone():
     rows = [
         replace(ROW, scene=scene, engine=engine)
         for scene in ("a", "b")
@@ -889,10 +847,7 @@ def test_what_was_not_wanted_is_not_run_and_what_was_wanted_is_gone() -> None:
     )  # without a record its rows say so
 
 
-def test_what_is_compared_can_be_chosen(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_is_compared_can_be_chosen(tmp_path, capsys):
     bad = replace(ROW, quantity="F12")
     old = save_run(tmp_path / "old", [ROW, bad])
     new = save_run(tmp_path / "new", [ROW, replace(bad, error=1e-9)])
@@ -909,10 +864,7 @@ def test_what_is_compared_can_be_chosen(
 
 
 @pytest.mark.slow
-def test_the_run_itself_is_written_as_junit(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_run_itself_is_written_as_junit(tmp_path, monkeypatch):
     monkeypatch.setattr("fourbar_validation.report.junit.MOST_PASSING_CASES", 10)
     judge_here(monkeypatch)
     xml, scene = (
@@ -943,7 +895,7 @@ def test_the_run_itself_is_written_as_junit(
     assert kinds == [("failure", "not held")] * 2 + [("skipped", "")]
 
 
-def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(tmp_path: Path) -> None:
+def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(tmp_path):
     import pandas as pd
 
     kept, dates = (
@@ -1022,12 +974,7 @@ SINCE = [
 
 
 @pytest.mark.parametrize(("runs", "failure", "words"), SINCE)
-def test_a_failure_is_looked_up_in_the_accepted_runs(
-    runs: list[list[Row]],
-    failure: Row,
-    words: str,
-    tmp_path: Path,
-) -> None:
+def test_a_failure_is_looked_up_in_the_accepted_runs(runs, failure, words, tmp_path):
     kept = tmp_path / "kept"
     other = replace(HELD, scene="other")
     for number, rows in enumerate(runs):
@@ -1040,7 +987,7 @@ def test_a_failure_is_looked_up_in_the_accepted_runs(
     key = (failure.scene, failure.engine, failure.quantity)
     before = open_run(kept)
 
-    def since(run: Recorded) -> str:
+    def since(run):
         return find_since(read_history(run), run, [key])[key]
 
     assert since(before) == words.format(before=before.describe())
@@ -1049,9 +996,7 @@ def test_a_failure_is_looked_up_in_the_accepted_runs(
         assert since(alone) == words.format(before=alone.describe())
 
 
-def test_the_page_of_differences_begins_with_a_picture_of_what_fails_first(
-    tmp_path: Path,
-) -> None:
+def test_the_page_of_differences_begins_with_a_picture_of_what_fails_first(tmp_path):
     kept = tmp_path / "kept"
     errors = [1e-15, 2e-3, 3e-3, 4e-3]
     for number, error in enumerate(errors):
@@ -1078,10 +1023,8 @@ def test_the_page_of_differences_begins_with_a_picture_of_what_fails_first(
 
 @pytest.mark.slow
 def test_a_name_that_does_not_print_or_is_a_formula_is_one_name_everywhere(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    tmp_path, monkeypatch, capsys
+):
     """Escapes change the order of names.
 
     A spreadsheet calculates a cell that begins with =.
@@ -1137,10 +1080,8 @@ def test_a_name_that_does_not_print_or_is_a_formula_is_one_name_everywhere(
     "name", ["lock", "run.json", "results.csv", "timings.csv", "report.html"]
 )
 def test_a_folder_where_a_file_of_a_run_belongs_is_one_line_before_it(
-    name: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    name, tmp_path, capsys
+):
     (tmp_path / "out" / name).mkdir(parents=True)
     assert (
         status(
@@ -1167,17 +1108,14 @@ def test_a_folder_where_a_file_of_a_run_belongs_is_one_line_before_it(
 @pytest.mark.parametrize(
     "name", ["results.csv", "results.parquet", "timings.csv", "record.json", HISTORY]
 )
-def test_accept_onto_a_folder_of_that_name_writes_nothing(
-    name: str,
-    tmp_path: Path,
-) -> None:
+def test_accept_onto_a_folder_of_that_name_writes_nothing(name, tmp_path):
     run, kept = save_run(tmp_path / "run", [ROW]), tmp_path / "kept"
     (kept / name).mkdir(parents=True)
     assert status(["accept", str(run), "--to", str(kept)]) == 2
     assert [path.name for path in kept.iterdir()] == [name]
 
 
-def test_folders_among_the_parts_of_a_run_are_swept_away(tmp_path: Path) -> None:
+def test_folders_among_the_parts_of_a_run_are_swept_away(tmp_path):
     for name in ("000000", "another", ".000000.part"):
         store = Store(tmp_path / name, {"of": "this"})
         with store.held():
@@ -1195,13 +1133,10 @@ def test_folders_among_the_parts_of_a_run_are_swept_away(tmp_path: Path) -> None
         pass
 
 
-def test_a_full_disk_names_the_file_that_does_not_fit(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_full_disk_names_the_file_that_does_not_fit(tmp_path, monkeypatch):
     run = save_run(tmp_path / "run", [ROW])
 
-    def full(source: Path, target: Path) -> None:
+    def full(source, target):
         raise OSError(
             errno.ENOSPC, "No space left on device", str(source), None, str(target)
         )  # as shutil does

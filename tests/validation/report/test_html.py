@@ -99,7 +99,7 @@ def wait(driver, condition):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("dark", [False, True])
-def test_all_text_is_readable(browse, dark: bool) -> None:
+def test_all_text_is_readable(browse, dark):
     driver = browse(report(copies(2, failing=1))[1], dark=dark)
     worst = driver.execute_script(CONTRASTS)
     assert len(worst) == 5
@@ -108,7 +108,7 @@ def test_all_text_is_readable(browse, dark: bool) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("dark", [False, True])
-def test_each_letter_of_the_benchmark_is_readable(browse, dark: bool) -> None:
+def test_each_letter_of_the_benchmark_is_readable(browse, dark):
     """Its matrix has grounds of green, yellow and red."""
     page = (ROOT / "docs" / "examples" / "benchmark.html").read_text()
     matrix = page[: page.index("</table>")]
@@ -119,7 +119,7 @@ def test_each_letter_of_the_benchmark_is_readable(browse, dark: bool) -> None:
 
 
 @pytest.mark.slow
-def test_engines_stand_before_what_checks_fourbar_against_itself(browse) -> None:
+def test_engines_stand_before_what_checks_fourbar_against_itself(browse):
     """The columns that a phone shows are those of engines, and so are the marks."""
     driver = browse(report(copies(2, failing=1))[1], 400)
     heads = driver.execute_script(
@@ -135,7 +135,7 @@ def test_engines_stand_before_what_checks_fourbar_against_itself(browse) -> None
 
 
 @pytest.mark.slow
-def test_the_table_of_orders_fits_a_phone(browse) -> None:
+def test_the_table_of_orders_fits_a_phone(browse):
     pages = copies(2)
     orders = {"error_at_4h": 1e-3, "error_at_2h": 1e-4, "observed_order": 3.0}
     for record in pages:
@@ -149,7 +149,7 @@ def test_the_table_of_orders_fits_a_phone(browse) -> None:
 
 
 @pytest.mark.slow
-def test_nothing_is_wider_than_a_phone_nor_left_out_there(browse) -> None:
+def test_nothing_is_wider_than_a_phone_nor_left_out_there(browse):
     driver = browse(report(copies(2, failing=1))[1], 360)
     assert driver.execute_script("return document.documentElement.scrollWidth") <= 360
     heads = driver.execute_script(
@@ -161,7 +161,7 @@ def test_nothing_is_wider_than_a_phone_nor_left_out_there(browse) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [1440, 400])
-def test_every_text_of_a_picture_is_whole_and_large_enough(browse, width: int) -> None:
+def test_every_text_of_a_picture_is_whole_and_large_enough(browse, width):
     """The pictures of the first screen, and those of a scene that is open."""
     driver = browse(report(copies(2, failing=1))[1], width)
     assert len(driver.find_elements("css selector", "details[open] svg")) == 3
@@ -171,7 +171,7 @@ def test_every_text_of_a_picture_is_whole_and_large_enough(browse, width: int) -
 
 
 @pytest.mark.slow
-def test_a_picture_has_no_paper_of_its_own(browse) -> None:
+def test_a_picture_has_no_paper_of_its_own(browse):
     """Its light paper would hide the light text of a dark page."""
     driver = browse(report(copies(2, failing=1))[1], dark=True)
     assert driver.find_elements("css selector", "svg")
@@ -180,7 +180,7 @@ def test_a_picture_has_no_paper_of_its_own(browse) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [2, ALL_OPEN + 2])
-def test_a_number_leads_to_its_row(browse, count: int) -> None:
+def test_a_number_leads_to_its_row(browse, count):
     driver = browse(report(copies(count))[1])
     link = driver.find_elements("css selector", "#overview ~ details td.cell a")[-1]
     target = link.get_attribute("href").rpartition("#")[2]
@@ -196,7 +196,7 @@ def test_a_number_leads_to_its_row(browse, count: int) -> None:
 
 
 @pytest.mark.slow
-def test_the_download_is_results_csv(browse) -> None:
+def test_the_download_is_results_csv(browse):
     pages = copies(2)
     driver = browse(report(pages)[1])
     script = "return document.querySelector('a[download]').href"
@@ -207,7 +207,7 @@ def test_the_download_is_results_csv(browse) -> None:
 
 
 @pytest.mark.slow
-def test_200_scenes_open_quickly_and_a_scene_when_opened(browse) -> None:
+def test_200_scenes_open_quickly_and_a_scene_when_opened(browse):
     driver = browse(report(copies(200))[1])
     times = driver.execute_script(
         "return JSON.stringify(performance.getEntriesByType('navigation')[0])"
@@ -221,7 +221,7 @@ def test_200_scenes_open_quickly_and_a_scene_when_opened(browse) -> None:
 
 
 @pytest.mark.slow
-def test_it_prints_on_paper(browse) -> None:
+def test_it_prints_on_paper(browse):
     driver = browse(report(copies(2, failing=1))[1], dark=True)
     pdf = driver.execute_cdp_cmd(
         "Page.printToPDF",

@@ -29,12 +29,12 @@ OUTCOMES = {
 }
 
 
-def record(*rows: Row) -> Record:
+def record(*rows):
     return Record("scene", title="Scene", rows=list(rows))
 
 
 @pytest.mark.parametrize("verdict", OUTCOMES)
-def test_a_verdict_is_its_outcome(verdict: str) -> None:
+def test_a_verdict_is_its_outcome(verdict):
     (case,) = list_cases([replace(ROW, verdict=verdict)])
     assert case.outcome == OUTCOMES[verdict]
     text = write_document("run", [case])
@@ -43,7 +43,7 @@ def test_a_verdict_is_its_outcome(verdict: str) -> None:
     assert suite.get("skipped") == str(int(OUTCOMES[verdict] == "skipped"))
 
 
-def test_each_suite_and_the_document_count_their_cases() -> None:
+def test_each_suite_and_the_document_count_their_cases():
     verdicts = {"a": (AGREES, FAILS, REFUSES, FAILS), "b": (UNDECIDED, AGREES)}
     cases = list_cases(
         replace(ROW, scene=scene, quantity=f"F{i}", verdict=verdict)
@@ -60,14 +60,14 @@ def test_each_suite_and_the_document_count_their_cases() -> None:
     assert counted == {"run": (6, 2, 2), "a": (4, 2, 1), "b": (2, 0, 1)}
 
 
-def test_every_failure_is_a_case_after_many_that_hold() -> None:
+def test_every_failure_is_a_case_after_many_that_hold():
     bad = replace(ROW, verdict=FAILS)
     cases = list(list_cases([*[ROW] * 60, bad, *[ROW] * 60, bad]))
     assert len(cases) == 122
     assert [case.outcome for case in cases].count("failure") == 2
 
 
-def test_the_worst_row_of_a_group_is_that_which_uses_most_of_its_allowance() -> None:
+def test_the_worst_row_of_a_group_is_that_which_uses_most_of_its_allowance():
     shares = {"F12": 0.2, "F32": 0.9, "F43": 0.5, "torque": 0.3}
     rows = [
         replace(ROW, quantity=name, error=share * 1e-14)
@@ -81,7 +81,7 @@ def test_the_worst_row_of_a_group_is_that_which_uses_most_of_its_allowance() -> 
     assert (line.compared, line.failed) == (4, 0)
 
 
-def test_a_missing_answer_uses_all_that_is_allowed() -> None:
+def test_a_missing_answer_uses_all_that_is_allowed():
     missing = replace(ROW, verdict=FAILS, error=math.nan)
     assert compute_shares([ROW, missing]) == pytest.approx([0.1, math.inf])
 
@@ -94,10 +94,7 @@ def test_a_missing_answer_uses_all_that_is_allowed() -> None:
         ((replace(ROW, verdict=REFUSES),), False),
     ],
 )
-def test_a_run_is_good_where_something_holds_and_nothing_fails(
-    rows: tuple[Row, ...],
-    good: bool,
-) -> None:
+def test_a_run_is_good_where_something_holds_and_nothing_fails(rows, good):
     summary = Summary()
     summary.add(record(*rows))
     assert summary.good == good

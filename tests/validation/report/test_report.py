@@ -16,7 +16,6 @@ from dataclasses import replace
 from functools import cache
 from html import unescape
 from importlib import import_module
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -43,7 +42,7 @@ from fourbar_validation.report.html import (
     write_summary_page,
 )
 from fourbar_validation.report.record import Record
-from fourbar_validation.report.summary import OWN_CONSISTENCY, Summary
+from fourbar_validation.report.summary import OWN_CONSISTENCY
 from fourbar_validation.report.svg import LEAST_DRAWN_ERROR
 from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run.judge import judge_for_report
@@ -57,7 +56,7 @@ HOSTILE = "</script><img src=x onerror=alert(1)>\"'&|`*"
 
 
 @cache
-def demo(*, draw: bool = True) -> Record:
+def demo(*, draw=True):
     """A small scene as two exact engines and the free bodies judge it."""
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))
     return judge_for_report(
@@ -68,7 +67,7 @@ def demo(*, draw: bool = True) -> Record:
     )
 
 
-def copies(count: int, *, failing: int = 0) -> list[Record]:
+def copies(count, *, failing=0):
     """The scene under many names; in the first ones a torque fails."""
     made = []
     for number in range(count):
@@ -81,7 +80,7 @@ def copies(count: int, *, failing: int = 0) -> list[Record]:
     return made
 
 
-def report(pages: list[Record], **more) -> tuple[Summary, str]:
+def report(pages, **more):
     """Summary and page, the lines of results.csv counted as `run` does."""
     lines, line = {}, 2
     for record in pages:
@@ -91,7 +90,7 @@ def report(pages: list[Record], **more) -> tuple[Summary, str]:
     return summary, write_html(summary, lines, **more)
 
 
-def unpacked(text: str) -> str:
+def unpacked(text):
     """The page with the packed bodies of its scenes laid open."""
     return re.sub(
         r'<script type="application/gzip">(.*?)</script>',
@@ -103,9 +102,7 @@ def unpacked(text: str) -> str:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [2, ALL_OPEN + 1])
-def test_every_link_leads_to_a_row_and_the_row_says_what_results_csv_says_there(
-    count: int,
-) -> None:
+def test_every_link_leads_to_a_row_and_the_row_says_what_results_csv_says_there(count):
     pages = copies(count, failing=1)
     _, text = report(pages)
     text = unpacked(text)
@@ -129,7 +126,7 @@ def test_every_link_leads_to_a_row_and_the_row_says_what_results_csv_says_there(
 
 
 @pytest.mark.slow
-def test_the_page_carries_results_csv_to_the_byte() -> None:
+def test_the_page_carries_results_csv_to_the_byte():
     pages = copies(3)
     _, text = report(pages)
     data = re.search(
@@ -142,7 +139,7 @@ def test_the_page_carries_results_csv_to_the_byte() -> None:
 
 
 @pytest.mark.slow
-def test_the_verdict_stands_first_and_a_failure_is_named_before_anything_else() -> None:
+def test_the_verdict_stands_first_and_a_failure_is_named_before_anything_else():
     summary, text = report(copies(3, failing=1))
     assert summary.headline.startswith("FAILS: ")
     body = unescape(text[text.index("<body>") :])
@@ -155,7 +152,7 @@ def test_the_verdict_stands_first_and_a_failure_is_named_before_anything_else() 
 
 
 @pytest.mark.slow
-def test_a_scene_cannot_write_into_the_demo() -> None:
+def test_a_scene_cannot_write_into_the_demo():
     hostile = replace(
         demo(),
         title=HOSTILE,
@@ -173,7 +170,7 @@ def test_a_scene_cannot_write_into_the_demo() -> None:
 
 
 @pytest.mark.slow
-def test_nothing_is_fetched() -> None:
+def test_nothing_is_fetched():
     _, text = report(
         copies(2),
         pictures={"scene-000": "iVBORw0KGgo="},
@@ -185,12 +182,12 @@ def test_nothing_is_fetched() -> None:
 
 
 @pytest.mark.slow
-def test_the_comment_of_a_pull_request_holds_200_scenes_that_all_fail() -> None:
+def test_the_comment_of_a_pull_request_holds_200_scenes_that_all_fail():
     assert len(write_summary_page(summary_of(copies(200, failing=200)))) < COMMENT_LIMIT
 
 
 @pytest.mark.slow
-def test_a_section_of_another_module_is_shown_and_linked() -> None:
+def test_a_section_of_another_module_is_shown_and_linked():
     _, text = report(
         copies(2),
         sections=[
@@ -204,7 +201,7 @@ def test_a_section_of_another_module_is_shown_and_linked() -> None:
     )
 
 
-def test_the_errors_drawn_are_the_largest_of_their_stretches() -> None:
+def test_the_errors_drawn_are_the_largest_of_their_stretches():
     error = np.random.default_rng(1).uniform(size=1000)
     for phase in (0.0, 0.3, 0.9):
         worst = find_worst_of_segments(error, phase)
@@ -217,7 +214,7 @@ def test_the_errors_drawn_are_the_largest_of_their_stretches() -> None:
     assert len(find_worst_of_segments(np.array([LEAST_DRAWN_ERROR]), 0.5)) == 1
 
 
-def test_the_times_of_engines_are_those_of_the_run() -> None:
+def test_the_times_of_engines_are_those_of_the_run():
     """The median over scenes.
 
     Of an engine that refused none, and beside our own consistency that of the formulas.
@@ -268,11 +265,7 @@ def test_the_times_of_engines_are_those_of_the_run() -> None:
     ],
     ids=["positions", "one position", "released", "sweep"],
 )
-def test_every_kind_of_scene_is_drawn(
-    motion: fourbar.Motion,
-    pictures: int,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_every_kind_of_scene_is_drawn(motion, pictures, monkeypatch):
     engines = tuple(w for w in ENGINES if w.name == "free-body")
     made = judge_for_report("kind", crank_rocker(motion=motion), engines)
     assert made.figure is not None and made.figure.count("<svg") == pictures
@@ -280,7 +273,7 @@ def test_every_kind_of_scene_is_drawn(
     assert "kind: crank-rocker" in text
 
 
-def test_an_engine_that_is_missing_is_reported_as_failing() -> None:
+def test_an_engine_that_is_missing_is_reported_as_failing():
     absent = replace(
         ENGINES[0],
         start=lambda: import_module("fourbar_validation.engines.absent").Absent(),
@@ -293,9 +286,7 @@ def test_an_engine_that_is_missing_is_reported_as_failing() -> None:
 
 
 @pytest.mark.slow
-def test_many_scenes_give_a_short_report_of_the_worst(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch):
     monkeypatch.setattr("fourbar_validation.report.summary.SCENES_SHOWN", 20)
     pages = copies(100)
     for number, record in enumerate(pages):
@@ -335,10 +326,7 @@ def test_many_scenes_give_a_short_report_of_the_worst(
 
 
 @pytest.mark.slow
-def test_every_engine_of_a_report_has_a_mark_of_its_own(
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-) -> None:
+def test_every_engine_of_a_report_has_a_mark_of_its_own(monkeypatch, tmp_path):
     """Whoever is drawn first, and in whatever process: the engine says its number."""
     monkeypatch.setattr(svg, "STYLE_NUMBERS", {})
     classes = "tests.support.hostile_class:"
@@ -373,10 +361,7 @@ def test_every_engine_of_a_report_has_a_mark_of_its_own(
     assert all(svg.choose_style(name).variable in svg.LIGHT_COLOURS for name in names)
 
 
-def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(tmp_path, capsys):
     """Beside the error what is allowed to it; a share of undecided numbers is no error.
 
     Our own rows are one.
@@ -439,7 +424,7 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
 
 
 @pytest.mark.slow
-def test_the_picture_shows_the_pin_force_that_fails() -> None:
+def test_the_picture_shows_the_pin_force_that_fails():
     """Without a failure it shows the largest."""
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))
     solution = fourbar.solve(scene, "force")
@@ -464,11 +449,11 @@ def test_the_picture_shows_the_pin_force_that_fails() -> None:
     assert f"|{other}|" in drawn and f"|{largest}|" not in drawn
 
 
-def record_of(name: str, rows: list[Row], **parts: object) -> Record:
+def record_of(name, rows, **parts):
     return Record(name, title=name, rows=rows, **parts)  # type: ignore[arg-type]
 
 
-def fail(row: Row, error: float = 1e-3) -> Row:
+def fail(row, error=1e-3):
     return replace(row, error=error, verdict=FAILS)
 
 
@@ -477,10 +462,7 @@ OF_MINE = Row(
 )
 
 
-def test_failures_are_one_line_an_engine_and_cause(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_failures_are_one_line_an_engine_and_cause(tmp_path, capsys):
     """A mistake that explains more scenes is named before one that fits a few by
     chance.
     """
@@ -522,7 +504,7 @@ def test_failures_are_one_line_an_engine_and_cause(
 
 
 @pytest.mark.slow
-def test_a_red_figure_draws_the_error_and_the_limit_of_the_guest() -> None:
+def test_a_red_figure_draws_the_error_and_the_limit_of_the_guest():
     """A reversed force lies on the curve of its size."""
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))
     solution = fourbar.solve(scene, "force")
@@ -543,9 +525,7 @@ def test_a_red_figure_draws_the_error_and_the_limit_of_the_guest() -> None:
     assert "F43 " not in drawn and "allowed to mine" not in drawn
 
 
-def test_what_no_known_mistake_explains_is_told_by_what_differs_and_what_agrees() -> (
-    None
-):
+def test_what_no_known_mistake_explains_is_told_by_what_differs_and_what_agrees():
     rows = [
         fail(OF_MINE),
         *(replace(OF_MINE, quantity=name) for name in ("F12", "theta_3")),
@@ -561,7 +541,7 @@ def test_what_no_known_mistake_explains_is_told_by_what_differs_and_what_agrees(
     assert cause.text == "no number for torque"
 
 
-def test_digits_that_are_missing_are_no_missing_term() -> None:
+def test_digits_that_are_missing_are_no_missing_term():
     rows = [fail(replace(OF_MINE, quantity=name), 3e-8) for name in ("torque", "F12")]
     rows.append(replace(OF_MINE, quantity="theta_3"))
     (cause,) = summary_of([record_of("a", rows)]).overview.causes
@@ -571,7 +551,7 @@ def test_digits_that_are_missing_are_no_missing_term() -> None:
     )
 
 
-def test_an_engine_that_broke_down_alone_is_named_without_a_quantity() -> None:
+def test_an_engine_that_broke_down_alone_is_named_without_a_quantity():
     dead = Row.unmeasured("a", "theirs", "", "all", FAILS, "exit status 3: no licence")
     headline = summary_of([record_of("a", [dead])]).headline
     assert (
@@ -580,11 +560,11 @@ def test_an_engine_that_broke_down_alone_is_named_without_a_quantity() -> None:
     )
 
 
-def refuse(scene: str, reason: str) -> Row:
+def refuse(scene, reason):
     return Row.unmeasured(scene, "theirs", "", "all", REFUSES, reason)
 
 
-def test_a_reason_keeps_its_numbers_and_counts_those_like_it() -> None:
+def test_a_reason_keeps_its_numbers_and_counts_those_like_it():
     """Reasons that differ in their numbers alone are one."""
     rows = [refuse(f"s{k}", f"2 of {k} signs were predicted") for k in (7, 8, 9)]
     rows.append(refuse("s", "it reads no cylinder"))
@@ -599,7 +579,7 @@ def test_a_reason_keeps_its_numbers_and_counts_those_like_it() -> None:
     ]
 
 
-def test_an_engine_without_an_answer_is_named_with_its_numbers() -> None:
+def test_an_engine_without_an_answer_is_named_with_its_numbers():
     """A failing number beside it does not take the place of the reason."""
     dead = Row.unmeasured("a", "theirs", "", "all", FAILS, "exit status 3 after 4 s")
     beside = fail(replace(OF_MINE, engine="theirs"), error=1e6)
@@ -607,7 +587,7 @@ def test_an_engine_without_an_answer_is_named_with_its_numbers() -> None:
     assert cause.text == "no answer: exit status 3 after 4 s"
 
 
-def test_a_weaker_rule_stands_before_a_verdict_that_holds() -> None:
+def test_a_weaker_rule_stands_before_a_verdict_that_holds():
     summary = summary_of([record_of("a", [OF_MINE])])
     assert summary.good
     summary.overview.weaker = ["mine: factor 1e-14 -> 0.01", "mine: class a -> b"]
@@ -618,10 +598,10 @@ def test_a_weaker_rule_stands_before_a_verdict_that_holds() -> None:
     )
 
 
-def test_two_engines_must_compare_torque_and_all_pin_forces_of_a_scene() -> None:
+def test_two_engines_must_compare_torque_and_all_pin_forces_of_a_scene():
     names = ("torque", "F12", "F32", "F43", "F14")
 
-    def scene(name: str, *engines: tuple[str, int]) -> Record:
+    def scene(name, *engines):
         return record_of(
             name,
             [
@@ -646,11 +626,8 @@ def test_two_engines_must_compare_torque_and_all_pin_forces_of_a_scene() -> None
 
 @pytest.mark.parametrize("columns", ["80", "40"])
 def test_a_value_far_beyond_what_is_allowed_leaves_the_numbers_of_the_table_whole(
-    columns: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    columns, tmp_path, monkeypatch, capsys
+):
     monkeypatch.setenv("COLUMNS", columns)
     row = Row(
         "thesis_printed_inertias",

@@ -1,7 +1,6 @@
 """Parts of the report from elsewhere: the hard cases, and what accuracy costs."""
 
 import base64
-from pathlib import Path
 
 import pytest
 from markupsafe import escape
@@ -28,11 +27,11 @@ from tests.support.here import summary_of
 from tests.validation.report.test_report import demo, report
 
 
-def judged(scene: str, verdict: str) -> Row:
+def judged(scene, verdict):
     return Row(scene, "engine", "exact", "torque", 1.0, 1.0, verdict, "", 0.0, 1.0)
 
 
-def test_every_scene_is_counted_in_its_family_alone() -> None:
+def test_every_scene_is_counted_in_its_family_alone():
     hard = Hard()
     rows = [judged(hard.name(index), AGREES) for index in range(len(hard))]
     table = {row[0]: row for row in collect_hard_cases(rows).rows}
@@ -45,7 +44,7 @@ def test_every_scene_is_counted_in_its_family_alone() -> None:
     assert set(table) == {family.name for family in HARD_FAMILIES}
 
 
-def test_a_failing_row_fails_its_family_in_the_report(tmp_path: Path) -> None:
+def test_a_failing_row_fails_its_family_in_the_report(tmp_path):
     rows = [
         judged("toggle-near-a", AGREES),
         judged("toggle-near-a", REFUSES),
@@ -80,9 +79,8 @@ def test_a_failing_row_fails_its_family_in_the_report(tmp_path: Path) -> None:
 
 
 def test_the_report_of_the_hard_suite_has_its_picture_every_statement_and_every_limit(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    tmp_path, monkeypatch
+):
     picture = "<svg><text>the picture</text></svg>"
     monkeypatch.setattr(
         "fourbar_validation.report.hard_picture.draw_picture", lambda: picture
@@ -104,7 +102,7 @@ def test_the_report_of_the_hard_suite_has_its_picture_every_statement_and_every_
     assert all(escape(limit.name) in text for limit in BOUNDARIES)
 
 
-def test_every_engine_says_what_its_time_goes_into() -> None:
+def test_every_engine_says_what_its_time_goes_into():
     assert set(WORK) == {
         "formulas",
         *(engine.name for engine in (*HARD_ENGINES, *load_further())),
@@ -112,7 +110,7 @@ def test_every_engine_says_what_its_time_goes_into() -> None:
 
 
 @pytest.mark.slow
-def test_a_study_of_cost_next_to_the_report_is_part_of_it(tmp_path: Path) -> None:
+def test_a_study_of_cost_next_to_the_report_is_part_of_it(tmp_path):
     assert collect_sections(None, tmp_path) == []
     folder = tmp_path / "cost" / "demo"
     folder.mkdir(parents=True)
@@ -139,5 +137,5 @@ def test_a_study_of_cost_next_to_the_report_is_part_of_it(tmp_path: Path) -> Non
         (1.5e7, "1.50e+07"),
     ],
 )
-def test_what_is_counted_is_written_for_people(value: float, text: str) -> None:
+def test_what_is_counted_is_written_for_people(value, text):
     assert count_or_size(value) == text

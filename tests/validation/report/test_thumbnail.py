@@ -14,12 +14,12 @@ from fourbar_validation.report.thumbnail import draw_thumbnail
 from fourbar_validation.scenes.suites import MODELS
 
 
-def count_marks(record: Record) -> int:
+def count_marks(record):
     """Count the marks of a scene's picture."""
     return len(re.findall('class="mark"', draw_thumbnail(record) or ""))
 
 
-def test_no_mark_stands_where_nothing_is_judged() -> None:
+def test_no_mark_stands_where_nothing_is_judged():
     """A kite begins at its change point, where its torque has a limit alone.
 
     An engine's number there is not judged; beside the curve it would look wrong.
@@ -46,7 +46,7 @@ def test_no_mark_stands_where_nothing_is_judged() -> None:
     assert of_the_kite == everywhere - 1
 
 
-def test_marks_stand_at_the_positions_of_their_engine() -> None:
+def test_marks_stand_at_the_positions_of_their_engine():
     """An engine that answers the first half of a turn has no mark beyond its middle."""
     plain = fourbar.load(MODELS / "crank_rocker.toml")
     whole = fourbar.solve(plain, "force")
@@ -70,7 +70,7 @@ def test_marks_stand_at_the_positions_of_their_engine() -> None:
     assert max(x for x, _ in half_turn) <= middle < max(x)
 
 
-def test_where_a_curve_is_cut_a_bar_says_so() -> None:
+def test_where_a_curve_is_cut_a_bar_says_so():
     plain = fourbar.load(MODELS / "crank_rocker.toml")
     whole = fourbar.solve(plain, "force")
     pole = whole.torque.copy()

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.check.calculated import find_wrenches
 from fourbar_validation.compare.answer import Answer
@@ -42,11 +42,11 @@ FORCES = "(force.real, force.imag)"
 Change = Callable[[dict[str, np.ndarray], Command], None]
 
 
-def nothing(numbers: dict[str, np.ndarray], at: Command) -> None:
+def nothing(numbers, at):
     """Leave the numbers as they are."""
 
 
-def make_guest(*replacements: tuple[str, str], change: Change = nothing) -> type:
+def make_guest(*replacements, change=nothing):
     """Return the page's engine with other words in its text and a change of its
     numbers.
     """
@@ -60,7 +60,7 @@ def make_guest(*replacements: tuple[str, str], change: Change = nothing) -> type
     class Plain:
         name = "plain"
 
-        def answer(self, scene: Scene, at: Command) -> Answer:
+        def answer(self, scene, at):
             described = protocol.scene_to_json(scene)
             told = protocol.command_to_json(scene, at)
             rows = [
@@ -81,17 +81,17 @@ def make_guest(*replacements: tuple[str, str], change: Change = nothing) -> type
     return Plain
 
 
-def shift(numbers: dict[str, np.ndarray], at: Command) -> None:
+def shift(numbers, at):
     for name, values in numbers.items():
         numbers[name] = np.concatenate((values[:1], values[:-1]))
 
 
-def in_degrees(numbers: dict[str, np.ndarray], at: Command) -> None:
+def in_degrees(numbers, at):
     for name in ("theta_3", "theta_4"):
         numbers[name] = np.degrees(numbers[name])
 
 
-def turn_into_bars(numbers: dict[str, np.ndarray], at: Command) -> None:
+def turn_into_bars(numbers, at):
     """Give each force in the frame of the bar on which it acts."""
     bars = {"F12": at.angle, "F32": at.angle, "F43": None, "F14": None}
     bars |= {"F43": numbers["theta_3"], "F14": numbers["theta_4"]}
@@ -100,7 +100,7 @@ def turn_into_bars(numbers: dict[str, np.ndarray], at: Command) -> None:
         numbers[name] = np.stack((c * x + s * y, c * y - s * x), axis=1)
 
 
-def times_the_step(numbers: dict[str, np.ndarray], at: Command) -> None:
+def times_the_step(numbers, at):
     for name in ("F12", "F32", "F43", "F14", "torque"):
         numbers[name] = 2e-3 * numbers[name]
 
@@ -294,7 +294,7 @@ TREE = (
 
 
 @pytest.mark.parametrize("bar", DRIVEN)
-def test_a_mistake_is_named_wherever_the_drive_acts(bar: int) -> None:
+def test_a_mistake_is_named_wherever_the_drive_acts(bar):
     scene = replace(SCENE, drive_bar=bar)
     assert find_causes(make_guest(*DRIVEN[bar]), scene) == []
     causes = find_causes(make_guest(*DRIVEN[bar], NO_VELOCITY_TERMS), scene)
@@ -303,10 +303,7 @@ def test_a_mistake_is_named_wherever_the_drive_acts(bar: int) -> None:
 
 
 @pytest.mark.parametrize(("pin", "bar"), [("A", 3), ("O4", 4), ("O4", 3)])
-def test_the_joint_of_a_driven_bar_carries_the_bars_behind_it(
-    pin: str,
-    bar: int,
-) -> None:
+def test_the_joint_of_a_driven_bar_carries_the_bars_behind_it(pin, bar):
     """The work of the weights in a tree whose driven joint alone turns is that of its
     torque.
     """
@@ -325,7 +322,7 @@ def test_the_joint_of_a_driven_bar_carries_the_bars_behind_it(
     np.testing.assert_allclose(cut["torque"], torque, atol=1e-12)
 
 
-def find_causes(guest: Callable[[], Any], scene: Scene = SCENE) -> list[str]:
+def find_causes(guest, scene=SCENE):
     engine = Engine("plain", guest, EQUIVALENCE)
     record = judge("scene", scene, [engine], order=False)
     assert any(row.engine == "plain" for row in record.rows)
@@ -336,13 +333,13 @@ def find_causes(guest: Callable[[], Any], scene: Scene = SCENE) -> list[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("bug", BUGS)
-def test_a_mistake_is_named_first(bug: str) -> None:
+def test_a_mistake_is_named_first(bug):
     guest, text = BUGS[bug]
     causes = find_causes(guest)
     assert causes and causes[0] == text, causes
 
 
-def test_free_bodies_give_back_the_forces_that_they_are_made_of() -> None:
+def test_free_bodies_give_back_the_forces_that_they_are_made_of():
     """Whatever acts: loads, gravity, and an acceleration of the crank."""
     scene = crank_rocker()
     right = fourbar.solve(scene, "force")
@@ -351,7 +348,7 @@ def test_free_bodies_give_back_the_forces_that_they_are_made_of() -> None:
         np.testing.assert_allclose(values[name], getattr(right, name), atol=1e-12)
 
 
-def test_a_right_guest_has_no_cause() -> None:
+def test_a_right_guest_has_no_cause():
     assert find_causes(make_guest()) == []
 
 
@@ -361,39 +358,39 @@ class Altered:
     name = "plain"
     commands = FreeBody.commands
 
-    def __init__(self, change: Change) -> None:
+    def __init__(self, change):
         self.change = change
 
-    def answer(self, scene: Scene, at: Command) -> Answer:
+    def answer(self, scene, at):
         answer = FreeBody().answer(scene, at)
         numbers = dict(answer.quantities)
         self.change(numbers, at)
         return replace(answer, engine=self.name, quantities=numbers)
 
 
-def reverse_F43(numbers: dict[str, np.ndarray], at: Command) -> None:
+def reverse_F43(numbers, at):
     numbers["F43"] = -numbers["F43"]
 
 
-def turn_F32_alone(numbers: dict[str, np.ndarray], at: Command) -> None:
+def turn_F32_alone(numbers, at):
     turned = dict(numbers)
     turn_into_bars(turned, at)
     numbers["F32"] = turned["F32"]
 
 
-def reverse_y(numbers: dict[str, np.ndarray], at: Command) -> None:
+def reverse_y(numbers, at):
     for name in ("F12", "F32", "F43", "F14"):
         numbers[name] = numbers[name] * (1.0, -1.0)
 
 
-def half_a_step_late(numbers: dict[str, np.ndarray], at: Command) -> None:
+def half_a_step_late(numbers, at):
     step = at.angle[1] - at.angle[0]
     before = FreeBody().answer(SCENE, at._replace(angle=at.angle - 0.5 * step))
     for name in ("F12", "F32", "F43", "F14", "torque"):
         numbers[name] = before.quantities[name]
 
 
-def take_inertia_as_about_the_pin(numbers: dict[str, np.ndarray], at: Command) -> None:
+def take_inertia_as_about_the_pin(numbers, at):
     bar = SCENE.linkage.coupler
     less = bar.moment_of_inertia - bar.mass * bar.mass_centre[0] ** 2
     for factor, inertia in ((1.0, 0.0), (less, 1.0), (-less, 0.0)):
@@ -421,10 +418,7 @@ def take_inertia_as_about_the_pin(numbers: dict[str, np.ndarray], at: Command) -
         ),
     ],
 )
-def test_a_mistake_in_numbers_of_another_engine_is_named(
-    change: Change,
-    words: str,
-) -> None:
+def test_a_mistake_in_numbers_of_another_engine_is_named(change, words):
     assert find_causes(partial(Altered, change))[0] == words
 
 
@@ -441,12 +435,10 @@ HARD_TO_EXPLAIN = {
 
 
 @pytest.mark.parametrize("name", HARD_TO_EXPLAIN)
-def test_what_nothing_explains_fails_by_its_numbers_under_every_command(
-    name: str,
-) -> None:
+def test_what_nothing_explains_fails_by_its_numbers_under_every_command(name):
     """Mistakes that are tried in vain, as a zero that is elsewhere, hide no number."""
 
-    def spoil(numbers: dict[str, np.ndarray], at: Command) -> None:
+    def spoil(numbers, at):
         for place, (quantity, values) in enumerate(numbers.items()):
             ripple = np.cos(place + np.arange(values.size) ** 2.0)
             numbers[quantity] = values + np.ptp(values) * ripple.reshape(values.shape)
@@ -458,7 +450,7 @@ def test_what_nothing_explains_fails_by_its_numbers_under_every_command(
 
 
 @pytest.mark.parametrize("name", OTHER_COMMANDS)
-def test_a_sign_is_named_under_every_command_and_at_change_points(name: str) -> None:
+def test_a_sign_is_named_under_every_command_and_at_change_points(name):
     scene = fourbar.load(CAPABILITIES / f"{name}.toml")
     causes = find_causes(partial(Altered, reverse_F43), scene)
     assert causes == ["sign reversed, or F_ij given for F_ji: F43"]
@@ -469,10 +461,10 @@ class Scaled:
 
     name = "plain"
 
-    def __init__(self, without: Scene, factor: float) -> None:
+    def __init__(self, without, factor):
         self.without, self.factor = without, factor
 
-    def answer(self, scene: Scene, at: Command) -> Answer:
+    def answer(self, scene, at):
         whole = FreeBody().answer(scene, at)
         rest = FreeBody().answer(self.without, at)
         numbers = dict(whole.quantities)
@@ -517,10 +509,7 @@ ACTING: dict[str, tuple[Any, Any]] = {
     "done", [(0.0, "missing"), (2.0, "doubled"), (-1.0, "reversed")]
 )
 @pytest.mark.parametrize("name", ACTING)
-def test_what_acts_may_be_left_out_doubled_or_reversed(
-    name: str,
-    done: tuple[float, str],
-) -> None:
+def test_what_acts_may_be_left_out_doubled_or_reversed(name, done):
     factor, word = done
     acting, instead = ACTING[name]
     bare = replace(SCENE, effects=(fourbar.Gravity(),))
@@ -542,11 +531,8 @@ def test_what_acts_may_be_left_out_doubled_or_reversed(
         (("torque",), "in what drives alone"),
     ],
 )
-def test_what_acts_may_be_missing_in_some_quantities(
-    names: tuple[str, ...],
-    where: str,
-) -> None:
-    def leave_out(numbers: dict[str, np.ndarray], at: Command) -> None:
+def test_what_acts_may_be_missing_in_some_quantities(names, where):
+    def leave_out(numbers, at):
         without = FreeBody().answer(replace(SCENE, effects=()), at).quantities
         numbers |= {name: without[name] for name in names}
 
@@ -554,11 +540,11 @@ def test_what_acts_may_be_missing_in_some_quantities(
     assert causes[0] == f"gravity is missing {where}"
 
 
-def name_wrong(changes: dict[str, Change]) -> dict[str, str]:
+def name_wrong(changes):
     """Who is called wrong, and why, where engines answer with these changes."""
 
     class Named(Altered):
-        def __init__(self, name: str, change: Change) -> None:
+        def __init__(self, name, change):
             super().__init__(change)
             self.name = name
 
@@ -571,7 +557,7 @@ def name_wrong(changes: dict[str, Change]) -> dict[str, str]:
     return {cause.engine: cause.text for cause in overview.causes}
 
 
-def test_two_engines_that_agree_with_each_other_blame_the_formulas_alone() -> None:
+def test_two_engines_that_agree_with_each_other_blame_the_formulas_alone():
     twice = {"one": reverse_F43, "two": reverse_F43}
     words = "one, two agree with each other, and differ from it in F43"
     assert name_wrong(twice) == {FORMULAS: words}
@@ -583,7 +569,7 @@ def test_two_engines_that_agree_with_each_other_blame_the_formulas_alone() -> No
     assert name_wrong({"one": reverse_F43, "two": reverse_y}).keys() == twice.keys()
 
 
-def test_what_differs_is_what_the_engine_itself_has_wrong() -> None:
+def test_what_differs_is_what_the_engine_itself_has_wrong():
     closure, inertia = (
         Row("s", "wg", "exact", name, 0.3, 1e-14, FAILS, "", 1.0, 1.0)
         for name in ("closure", "torque_inertia")
@@ -601,7 +587,7 @@ def test_what_differs_is_what_the_engine_itself_has_wrong() -> None:
         assert overview.causes[0].text.startswith(words)
 
 
-def test_only_engines_that_declare_few_errors_are_independent() -> None:
+def test_only_engines_that_declare_few_errors_are_independent():
     rows = [
         Row("s", engine, "exact", name, 0.0, 1e-14, AGREES, "", 1.0, 1.0)
         for engine in ("one", "two")
@@ -614,7 +600,7 @@ def test_only_engines_that_declare_few_errors_are_independent() -> None:
         assert overview.checked_twice == confirmed
 
 
-def test_where_nobody_looked_the_report_says_so() -> None:
+def test_where_nobody_looked_the_report_says_so():
     row = Row("s", "wg", "exact", "torque", 0.3, 1e-14, FAILS, "", 1.0, 1.0)
     for causes, words in (
         ({}, "mistakes are not looked for there"),
@@ -625,12 +611,12 @@ def test_where_nobody_looked_the_report_says_so() -> None:
         assert overview.causes[0].text.endswith(words)
 
 
-def test_what_nobody_knows_is_no_known_mistake() -> None:
+def test_what_nobody_knows_is_no_known_mistake():
     strange = make_guest((TORQUE, '"torque": 1.0 + 0.3 * math.sin(7.0 * theta)'))
     assert find_causes(strange) == []
 
 
-def test_a_search_that_finds_nothing_costs_few_solutions() -> None:
+def test_a_search_that_finds_nothing_costs_few_solutions():
     """Every number is wrong by itself, so that every mistake is tried.
 
     The time is some 100 times what 31 positions take, 0.7 ms on a free processor; when
@@ -641,7 +627,7 @@ def test_a_search_that_finds_nothing_costs_few_solutions() -> None:
     answer = Altered(disturb).answer(scene, question.at)
     assert find_causes_of(question, answer, EQUIVALENCE) == []
 
-    def least_seconds(function: Callable[[], object]) -> float:
+    def least_seconds(function):
         seconds = []
         for _ in range(5):
             begin = time.process_time()
@@ -653,24 +639,24 @@ def test_a_search_that_finds_nothing_costs_few_solutions() -> None:
     assert search < 300.0 * least_seconds(lambda: fourbar.solve(SCENE))
 
 
-def disturb(numbers: dict[str, np.ndarray], at: Command) -> None:
+def disturb(numbers, at):
     factor = 1.0 + 0.3 * np.sin(7.0 * np.arange(len(at.angle)))
     for name, values in numbers.items():
         numbers[name] = (values.T * factor).T
 
 
-def round_to_single(numbers: dict[str, np.ndarray], at: Command) -> None:
+def round_to_single(numbers, at):
     rng = np.random.default_rng(2)
     for name, values in numbers.items():
         noise = rng.uniform(-1.0, 1.0, values.shape) * np.abs(values).max()
         numbers[name] = values + np.finfo(np.float32).eps * noise
 
 
-def test_single_precision_is_named_and_a_smooth_error_of_its_size_is_not() -> None:
+def test_single_precision_is_named_and_a_smooth_error_of_its_size_is_not():
     words = "numbers have some 7 digits, as those of single precision"
     assert find_causes(partial(Altered, round_to_single)) == [words]
 
-    def stretch(numbers: dict[str, np.ndarray], at: Command) -> None:
+    def stretch(numbers, at):
         for name in ("F12", "torque"):
             numbers[name] = (numbers[name].T * (1.0 + 1e-7 * np.sin(at.angle))).T
 
@@ -682,7 +668,7 @@ class Misplaced:
 
     name = "plain"
 
-    def answer(self, scene: Scene, at: Command) -> Answer:
+    def answer(self, scene, at):
         right = fourbar.solve(scene, "position", at=at)
         parts = []
         for i in range(len(at.angle)):
@@ -696,26 +682,14 @@ class Misplaced:
         assembled = np.ones(len(parts), dtype=bool)
         return Answer(self.name, "exact", at, assembled, numbers)
 
-    def change(
-        self,
-        scene: Scene,
-        right: fourbar.Solution,
-        i: int,
-        load: fourbar.Load,
-    ) -> fourbar.Load:
+    def change(self, scene, right, i, load):
         raise NotImplementedError
 
 
 class FromThePin(Misplaced):
     """Arms are measured from the bar's first pin."""
 
-    def change(
-        self,
-        scene: Scene,
-        right: fourbar.Solution,
-        i: int,
-        load: fourbar.Load,
-    ) -> fourbar.Load:
+    def change(self, scene, right, i, load):
         first = {2: 0j, 3: complex(*right.A[i])}.get(load.bar)
         if first is None:
             d, theta_1 = scene.linkage.ground, scene.linkage.ground_angle
@@ -729,29 +703,17 @@ class FromThePin(Misplaced):
 class FromG(Misplaced):
     """Places that are told from the bar's first pin are taken from G."""
 
-    def change(
-        self,
-        scene: Scene,
-        right: fourbar.Solution,
-        i: int,
-        load: fourbar.Load,
-    ) -> fourbar.Load:
+    def change(self, scene, right, i, load):
         return replace(load, from_pin=None, from_centre=load.from_pin)
 
 
 class AtPoint(Misplaced):
     """Forces act at the mass centre, or at the first pin, wherever they should."""
 
-    def __init__(self, at_pin: bool) -> None:
+    def __init__(self, at_pin):
         self.place = {"from_pin" if at_pin else "from_centre": (0.0, 0.0)}
 
-    def change(
-        self,
-        scene: Scene,
-        right: fourbar.Solution,
-        i: int,
-        load: fourbar.Load,
-    ) -> fourbar.Load:
+    def change(self, scene, right, i, load):
         none = {"arm": None, "from_pin": None, "from_centre": None}
         return replace(load, **none | self.place)
 
@@ -759,13 +721,7 @@ class AtPoint(Misplaced):
 class Turning(Misplaced):
     """Forces of fixed direction turn with their bars."""
 
-    def change(
-        self,
-        scene: Scene,
-        right: fourbar.Solution,
-        i: int,
-        load: fourbar.Load,
-    ) -> fourbar.Load:
+    def change(self, scene, right, i, load):
         size, direction = load.force
         theta = float(getattr(right, f"theta_{load.bar}")[i])
         return replace(load, force=(size, direction + theta))
@@ -788,11 +744,7 @@ class Turning(Misplaced):
         (Turning, "from_pin", "its direction turns with the bar"),
     ],
 )
-def test_a_load_that_acts_elsewhere_is_named(
-    guest: type,
-    place: str,
-    words: str,
-) -> None:
+def test_a_load_that_acts_elsewhere_is_named(guest, place, words):
     motion = fourbar.Motion(fourbar.Sweep(0.1, 6.0, 8), 10.0)
     load = fourbar.Load(4, (3.0, 0.7), **{place: (0.05, 1.0)})
     scene = crank_rocker(motion=motion, loads=(load,))

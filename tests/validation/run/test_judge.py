@@ -31,7 +31,6 @@ from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import ENGINES, Engine, make_prediction
 from fourbar_validation.run import judge as judging
 from fourbar_validation.run.judge import judge
-from fourbar_validation.run.question import Question
 from tests.support.scenes import crank_rocker
 
 
@@ -43,10 +42,10 @@ class Echo:
 
     name = "echo"
 
-    def spoil(self, answer: Answer) -> Answer:
+    def spoil(self, answer):
         return answer
 
-    def answer(self, scene: Scene, command: Command) -> Answer:
+    def answer(self, scene, command):
         s = fourbar.solve(scene, at=with_signs(scene.linkage, command))
         numbers = {name: np.array(getattr(s, name)) for name in COMPARED_QUANTITIES}
         return self.spoil(
@@ -55,53 +54,53 @@ class Echo:
 
 
 class Silent(Echo):
-    def spoil(self, answer: Answer) -> Answer:
+    def spoil(self, answer):
         del answer.quantities["F12"]
         return answer
 
 
 class NotANumber(Echo):
-    def spoil(self, answer: Answer) -> Answer:
+    def spoil(self, answer):
         answer.quantities["torque"][3] = np.nan
         return answer
 
 
 class Elsewhere(Echo):
-    def spoil(self, answer: Answer) -> Answer:
+    def spoil(self, answer):
         assert answer.assembled is not None
         answer.assembled[5] = False
         return answer
 
 
 class Refuses(Echo):
-    def answer(self, scene: Scene, command: Command) -> Answer:
+    def answer(self, scene, command):
         return Answer("echo", "exact", refusal="a declared limit")
 
 
 class Breaks(Echo):
-    def answer(self, scene: Scene, command: Command) -> Answer:
+    def answer(self, scene, command):
         raise RuntimeError("engine on fire\nsecond line")
 
 
 class OneTurnMore(Echo):
-    def spoil(self, answer: Answer) -> Answer:
+    def spoil(self, answer):
         answer.quantities["theta_4"] += 2 * np.pi
         return answer
 
 
 class SlightlyOff(Echo):
-    def spoil(self, answer: Answer) -> Answer:
+    def spoil(self, answer):
         answer.quantities["torque"] *= 1.0 + 1e-9
         return answer
 
 
-def rows_of(adapter: type, scene: Scene | None = None) -> dict[str, Row]:
+def rows_of(adapter, scene=None):
     engine = Engine("echo", adapter, EQUIVALENCE)
     record = judge("scene", scene or crank_rocker(), [engine])
     return {row.quantity: row for row in record.rows if row.engine == "echo"}
 
 
-def test_an_equal_answer_agrees_in_every_quantity() -> None:
+def test_an_equal_answer_agrees_in_every_quantity():
     rows = rows_of(Echo)
     of_engines = {"assembled", "undecided", "closure", "torque_inertia"}
     assert set(rows) == {*COMPARED_QUANTITIES, *of_engines}
@@ -112,33 +111,31 @@ def test_an_equal_answer_agrees_in_every_quantity() -> None:
     ("engine", "quantity"),
     [(Silent, "F12"), (NotANumber, "torque"), (Elsewhere, "assembled")],
 )
-def test_silence_nan_and_a_missing_position_fail(engine: type, quantity: str) -> None:
+def test_silence_nan_and_a_missing_position_fail(engine, quantity):
     row = rows_of(engine)[quantity]
     assert row.verdict == FAILS
     assert not row.passed
 
 
-def test_a_declared_refusal_is_reported_and_does_not_fail() -> None:
+def test_a_declared_refusal_is_reported_and_does_not_fail():
     rows = rows_of(Refuses)
     assert set(rows) == {"all"}
     assert rows["all"].verdict == REFUSES
     assert not rows["all"].failed and not rows["all"].passed  # nothing was compared
 
 
-def test_an_engine_that_breaks_down_costs_its_own_row_in_one_line() -> None:
+def test_an_engine_that_breaks_down_costs_its_own_row_in_one_line():
     rows = rows_of(Breaks)
     assert rows["all"].verdict == FAILS
     assert "engine on fire" in rows["all"].reason
     assert "\n" not in rows["all"].reason
 
 
-def test_a_basis_that_breaks_down_is_no_agreement(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_basis_that_breaks_down_is_no_agreement(monkeypatch):
     """By the free bodies all are judged, also where they are no engine."""
     others = [engine for engine in ENGINES if engine.name == "mujoco-inverse"]
 
-    def broken(*_: object) -> Answer:
+    def broken(*_):
         raise IndexError("lost")
 
     monkeypatch.setattr(FreeBody, "answer", broken)
@@ -148,11 +145,11 @@ def test_a_basis_that_breaks_down_is_no_agreement(
     ]
 
 
-def test_angles_are_compared_modulo_a_turn() -> None:
+def test_angles_are_compared_modulo_a_turn():
     assert rows_of(OneTurnMore)["theta_4"].verdict == AGREES
 
 
-def test_a_torque_off_by_a_billionth_fails() -> None:
+def test_a_torque_off_by_a_billionth_fails():
     row = rows_of(SlightlyOff)["torque"]
     assert row.verdict == FAILS
     assert row.error == pytest.approx(1e-9, rel=0.5)
@@ -165,7 +162,7 @@ class OffAtTheReversal(Echo):
     Nowhere else is anything off.
     """
 
-    def spoil(self, answer: Answer) -> Answer:
+    def spoil(self, answer):
         for values in answer.quantities.values():
             values[AT_REST] += 1e-3 + 1e-3 * np.abs(values[AT_REST])
         return answer
@@ -175,7 +172,7 @@ AT_REST = 1
 """Position at which bar 4 stands still in its dry pin."""
 
 
-def with_friction() -> Scene:
+def with_friction():
     """Return a crank-rocker with dry friction at O4, at the dead centre of bar 4 and on
     either side of it.
     """
@@ -186,7 +183,7 @@ def with_friction() -> Scene:
     return Scene(linkage, motion, effects=(fourbar.Friction.at(O4=0.5),))
 
 
-def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is() -> None:
+def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is():
     rows = rows_of(OffAtTheReversal, with_friction())
     for quantity in COMPARED_QUANTITIES:
         row = rows[quantity]
@@ -198,7 +195,7 @@ def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is() -
             assert row.theta_2 == with_friction().motion.theta_2[AT_REST], quantity  # type: ignore[index]
 
 
-def test_where_no_digit_is_left_nothing_is_judged() -> None:
+def test_where_no_digit_is_left_nothing_is_judged():
     # 1e-13 rad from a limit of theta_2 the condition of the accelerations is about
     # 1e-13
     rocker = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
@@ -213,7 +210,7 @@ def test_where_no_digit_is_left_nothing_is_judged() -> None:
     pytest.fail("neither side of the limit assembles")
 
 
-def test_a_scene_of_which_most_numbers_are_undecided_does_not_hold() -> None:
+def test_a_scene_of_which_most_numbers_are_undecided_does_not_hold():
     needles = fourbar.uniform(
         0.3, 1e-14, 0.3, 2e-14
     )  # bar 4 turns by 0.3 eps/2e-14 where the loop closes to the last digit
@@ -223,7 +220,7 @@ def test_a_scene_of_which_most_numbers_are_undecided_does_not_hold() -> None:
     assert row.verdict == FAILS and row.error > row.allowed == 0.5
 
 
-def test_a_loop_said_to_be_open_a_thousand_roundings_from_its_limit_fails() -> None:
+def test_a_loop_said_to_be_open_a_thousand_roundings_from_its_limit_fails():
     rocker = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
     first = limit_positions(rocker)[0].theta_2
     thetas = np.array(
@@ -237,9 +234,7 @@ def test_a_loop_said_to_be_open_a_thousand_roundings_from_its_limit_fails() -> N
     )
 
 
-def test_an_engine_that_may_answer_within_the_rounding_of_theta_2_is_held_to_it() -> (
-    None
-):
+def test_an_engine_that_may_answer_within_the_rounding_of_theta_2_is_held_to_it():
     engine = Engine("echo", SlightlyOff, FULL_ACCURACY, answers_nearby=True)
     rows = {
         row.quantity: row
@@ -249,13 +244,13 @@ def test_an_engine_that_may_answer_within_the_rounding_of_theta_2_is_held_to_it(
     assert rows["torque"].verdict == FAILS and rows["F12"].verdict == AGREES
 
 
-def test_positions_alone_need_no_forces() -> None:
+def test_positions_alone_need_no_forces():
     scene = replace(crank_rocker(), motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 10)))
     rows = judge("scene", scene, []).rows
     assert {row.quantity for row in rows} == {"closure"}
 
 
-def test_results_survive_the_file(tmp_path) -> None:  # type: ignore[no-untyped-def]
+def test_results_survive_the_file(tmp_path):  # type: ignore[no-untyped-def]
     rows = judge("scene", crank_rocker(), [Engine("echo", Echo, EQUIVALENCE)]).rows
     write_results(rows, tmp_path / "results.csv")
     again = list(read_columns(tmp_path / "results.csv"))
@@ -265,9 +260,7 @@ def test_results_survive_the_file(tmp_path) -> None:  # type: ignore[no-untyped-
     )
 
 
-def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own() -> (
-    None
-):
+def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own():
     scene = crank_rocker()
     commanded = command(scene)
     engine = next(engine for engine in ENGINES if engine.residuals)
@@ -289,7 +282,7 @@ def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own()
 class AnswersAnyway(Echo):
     """Numbers of its own where the formulas state none."""
 
-    def spoil(self, answer: Answer) -> Answer:
+    def spoil(self, answer):
         answer.quantities = {
             name: np.nan_to_num(values, nan=7.0)
             for name, values in answer.quantities.items()
@@ -297,7 +290,7 @@ class AnswersAnyway(Echo):
         return answer
 
 
-def test_an_answer_that_the_formulas_withhold_is_not_compared() -> None:
+def test_an_answer_that_the_formulas_withhold_is_not_compared():
     """On bar 3 of a parallelogram no torque exists.
 
     No agreement, whatever the engine says; the motion is judged.
@@ -315,9 +308,7 @@ def test_an_answer_that_the_formulas_withhold_is_not_compared() -> None:
                 assert row.verdict == AGREES and row.reason.startswith(said)
 
 
-def test_positions_without_a_value_are_counted_next_to_those_that_were_compared() -> (
-    None
-):
+def test_positions_without_a_value_are_counted_next_to_those_that_were_compared():
     """An antiparallelogram driven by its coupler, through its change point."""
     motion = fourbar.Motion(np.array([-0.5, -0.3, 0.0, 0.3]), 1.0, branch=-1)
     scene = Scene(fourbar.uniform(1.0, 0.5, 1.0, 0.5), motion, 3)
@@ -330,7 +321,7 @@ def test_positions_without_a_value_are_counted_next_to_those_that_were_compared(
         assert said.startswith("round-off of both sides: 50 eps over the condition")
 
 
-def test_beyond_the_range_of_doubles_what_was_before_is_judged() -> None:
+def test_beyond_the_range_of_doubles_what_was_before_is_judged():
     heavy = fourbar.FourBar(
         3.0, fourbar.Bar(1.0, 1.0), fourbar.Bar(2.5, 1e308, 1.0), fourbar.Bar(2.2, 1.0)
     )
@@ -348,17 +339,15 @@ class Counting(FreeBody):
 
     started = 0
 
-    def __init__(self) -> None:
+    def __init__(self):
         Counting.started += 1
 
 
-def test_an_engine_is_started_once_a_scene_and_no_question_is_put_twice(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_engine_is_started_once_a_scene_and_no_question_is_put_twice(monkeypatch):
     put: list[tuple[Scene, Command]] = []
     true = FreeBody.answer
 
-    def noting(self: FreeBody, scene: Scene, command: Command) -> Answer:
+    def noting(self, scene, command):
         put.append((scene, command))
         return true(self, scene, command)
 
@@ -372,9 +361,7 @@ def test_an_engine_is_started_once_a_scene_and_no_question_is_put_twice(
     assert Counting.started == 1
 
 
-def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(monkeypatch):
     """Angle, rates and lever are what the formulas computed from the stroke.
 
     The engine finds its own.
@@ -382,7 +369,7 @@ def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(
     commands: list[Command] = []
     answering = FreeBody.answer
 
-    def seen(engine: FreeBody, scene: Scene, command: Command) -> Answer:
+    def seen(engine, scene, command):
         commands.append(command)
         return answering(engine, scene, command)
 
@@ -404,10 +391,8 @@ def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(
         )
 
 
-def test_a_check_that_raises_costs_its_own_rows_alone(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def check_nothing(_: Question) -> list[Row]:
+def test_a_check_that_raises_costs_its_own_rows_alone(monkeypatch):
+    def check_nothing(_):
         raise ArithmeticError("lost")
 
     scene = crank_rocker()
@@ -425,12 +410,10 @@ def test_a_check_that_raises_costs_its_own_rows_alone(
 
 
 @pytest.mark.parametrize("compares", [False, True])
-def test_a_check_says_itself_whether_it_is_a_comparison(
-    compares: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_check_says_itself_whether_it_is_a_comparison(compares, monkeypatch):
     """A name of its own makes no comparison of it, and an empty run does not pass."""
 
-    def check_something(question: Question) -> list[Row]:
+    def check_something(question):
         return [Row.judged((question.name, "mine", "exact"), "torque", 0.0, 1.0, "")]
 
     checks = (judging.Check(check_something, compares=compares),)

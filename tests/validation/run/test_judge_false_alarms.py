@@ -11,7 +11,7 @@ import pytest
 import fourbar
 from fourbar.effects import Gravity
 from fourbar.linkage import Bar, FourBar
-from fourbar.scene import Command, Scene
+from fourbar.scene import Scene
 from fourbar.scene.motion import Free, Law, Motion
 from fourbar.solution import Solution
 from fourbar_lab.fault_scenes import FAULT_SCENES
@@ -33,14 +33,7 @@ BY_ITSELF = [engine for engine in EXACT if not engine.library]
 POSITIONS = np.array([0.14, 1.75, 4.03, 4.73])
 
 
-def bars(
-    d: float,
-    a: float,
-    b: float,
-    c: float,
-    theta_1: float = 0.0,
-    r: float | None = None,
-) -> FourBar:
+def bars(d, a, b, c, theta_1=0.0, r=None):
     far = None if r is None else (r, 0.35)
     return FourBar(d, Bar(a, 0.01), Bar(b, 1.0, centre=far), Bar(c, 0.5), theta_1)
 
@@ -65,12 +58,12 @@ SCENES = {
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_engines_that_are_right_raise_no_alarm(name: str) -> None:
+def test_engines_that_are_right_raise_no_alarm(name):
     assert not [row for row in judge(name, SCENES[name], EXACT).rows if row.failed]
 
 
 @pytest.mark.slow
-def test_ratios_over_ten_decades_raise_no_alarm() -> None:
+def test_ratios_over_ten_decades_raise_no_alarm():
     """As `run --random N --type uneven`.
 
     In the last the forces were summed more strictly than its coupler allows.
@@ -93,9 +86,7 @@ def test_ratios_over_ten_decades_raise_no_alarm() -> None:
 
 
 @pytest.mark.slow
-def test_a_free_motion_near_a_limit_raises_no_alarm(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_free_motion_near_a_limit_raises_no_alarm(monkeypatch):
     """The engines get theta_2, omega_2 and alpha_2 of the independent theta_4, rounded.
 
     What that costs is computed.
@@ -112,16 +103,14 @@ def test_a_free_motion_near_a_limit_raises_no_alarm(
     }
 
 
-def test_what_is_wrong_by_more_than_is_predicted_fails(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_is_wrong_by_more_than_is_predicted_fails(monkeypatch):
     """The law in the condition is too strict in places.
 
     What is computed in its place there is no licence.
     """
     true = fourbar.solve
 
-    def off(*arguments: object, **keywords: object) -> Solution:
+    def off(*arguments, **keywords):
         solution: Solution = true(*arguments, **keywords)  # type: ignore[arg-type]
         if solution.omega_3 is None:
             return solution
@@ -132,7 +121,7 @@ def test_what_is_wrong_by_more_than_is_predicted_fails(
     assert {row.verdict for row in rows if row.quantity == "omega_3"} == {FAILS}
 
 
-def test_an_exact_zero_needs_no_error_bar(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_exact_zero_needs_no_error_bar(monkeypatch):
     """Bars 2 and 3 of a crossed kite turn together, bar 4 rests: no torque is needed.
 
     The balls' terms cancel to 1e-95 of themselves. What doubles leave still shows.
@@ -143,11 +132,11 @@ def test_an_exact_zero_needs_no_error_bar(monkeypatch: pytest.MonkeyPatch) -> No
     scene = fourbar.Scene(kite, motion, effects=(spring,))
     true, added = printed.solve, 0.0
 
-    def judged() -> str:
+    def judged():
         rows = printed.error_bars(Question("", scene, fourbar.command(scene)))
         return {row.quantity: row.verdict for row in rows}["torque_error"]
 
-    def with_more(scene: Scene, *stage: str, **keywords: object) -> Solution:
+    def with_more(scene, *stage, **keywords):
         solution: Solution = true(scene, *stage, **keywords)  # type: ignore[arg-type]
         solution.torque[1] += added
         return solution
@@ -158,15 +147,15 @@ def test_an_exact_zero_needs_no_error_bar(monkeypatch: pytest.MonkeyPatch) -> No
     assert judged() == FAILS
 
 
-def test_an_error_bar_of_no_error_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_bar_of_no_error_fails(monkeypatch):
     scene = replace(FAULT_SCENES["crank-rocker"], motion=Motion(POSITIONS, 10.0))
     true = printed.solve
 
-    def judged() -> str:
+    def judged():
         rows = printed.error_bars(Question("", scene, fourbar.command(scene)))
         return {row.quantity: row.verdict for row in rows}["force_error"]
 
-    def without(scene: Scene, *stage: str, **keywords: object) -> Solution:
+    def without(scene, *stage, **keywords):
         solution: Solution = true(scene, *stage, **keywords)  # type: ignore[arg-type]
         if stage == ("error",):
             solution.F12[1] = np.nan
@@ -186,7 +175,7 @@ class AboutCentres:
     name = "about centres"
     factor = 1.0
 
-    def answer(self, scene: Scene, at: Command) -> Answer:
+    def answer(self, scene, at):
         solved = [
             self._solve(scene, *numbers)
             for numbers in zip(
@@ -202,13 +191,7 @@ class AboutCentres:
         return Answer(self.name, "exact", at, np.ones(len(solved), bool), numbers)
 
     @staticmethod
-    def _solve(
-        scene: Scene,
-        theta: float,
-        omega: float,
-        alpha: float,
-        branch: int,
-    ) -> dict[str, object]:
+    def _solve(scene, theta, omega, alpha, branch):
         d, a, b, c = scene.linkage.lengths
         O4 = d * np.exp(1j * scene.linkage.ground_angle)
         A = a * np.exp(1j * theta)
@@ -263,7 +246,7 @@ class AMillionthOff(AboutCentres):
 
 
 @pytest.mark.slow
-def test_moments_about_far_centres_are_right_to_full_accuracy() -> None:
+def test_moments_about_far_centres_are_right_to_full_accuracy():
     """The digits that such a method loses are computed.
 
     The reason says for which.
@@ -294,9 +277,7 @@ def test_moments_about_far_centres_are_right_to_full_accuracy() -> None:
 
 
 @pytest.mark.parametrize("ends", ["free", "rest", "periodic"])
-def test_a_table_of_uneven_steps_that_overshoots_its_points_is_a_right_law(
-    ends: str,
-) -> None:
+def test_a_table_of_uneven_steps_that_overshoots_its_points_is_a_right_law(ends):
     """Steps of 1 ms to 1 s throw the cubic far beyond the angles between them."""
     rng = np.random.default_rng(5)
     for _ in range(20):

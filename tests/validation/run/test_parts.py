@@ -6,9 +6,7 @@ run.
 
 import json
 import shutil
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -25,14 +23,14 @@ TABLES = ("results.csv", "results.parquet")
 
 
 @pytest.fixture(autouse=True)
-def small_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
+def small_tasks(monkeypatch):
     """Two scenes a task, judged in this process."""
     judge_here(monkeypatch)
     monkeypatch.setattr(plan, "SCENES_OF_A_QUICK_TASK", 2)
 
 
 @pytest.fixture
-def parts(tmp_path: Path) -> list[str]:
+def parts(tmp_path):
     """The folders of three parts.
 
     Of four tasks the first and the last are of part 1.
@@ -43,17 +41,14 @@ def parts(tmp_path: Path) -> list[str]:
     return folders
 
 
-def assert_same(out: Path, whole: Path) -> None:
+def assert_same(out, whole):
     assert status(["run", *OPTIONS, "-o", str(whole)]) == HOLDS
     for name in TABLES:
         assert (out / name).read_bytes() == (whole / name).read_bytes()
 
 
 @pytest.mark.slow
-def test_parts_are_collected_into_the_bytes_of_a_whole_run(
-    parts: list[str],
-    tmp_path: Path,
-) -> None:
+def test_parts_are_collected_into_the_bytes_of_a_whole_run(parts, tmp_path):
     out = tmp_path / "all"
     assert status(["collect", *reversed(parts), "-o", str(out)]) == HOLDS
     assert_same(out, tmp_path / "whole")
@@ -63,12 +58,12 @@ def test_parts_are_collected_into_the_bytes_of_a_whole_run(
     assert not Path(parts[0], "results.csv").exists()
 
 
-def judge_nothing(job: object) -> None:
+def judge_nothing(job):
     raise AssertionError(f"{job} was judged again")
 
 
 @pytest.mark.slow
-def test_a_run_over_all_parts_in_one_folder_writes_the_report(tmp_path: Path) -> None:
+def test_a_run_over_all_parts_in_one_folder_writes_the_report(tmp_path):
     out = tmp_path / "out"
     for k in (2, 1):
         assert status(["run", *OPTIONS, "--part", f"{k}/2", "-o", str(out)]) == HOLDS
@@ -80,18 +75,14 @@ def test_a_run_over_all_parts_in_one_folder_writes_the_report(tmp_path: Path) ->
     assert_same(out, tmp_path / "whole")
 
 
-def refusal(line: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+def refusal(line, capsys):
     """The one line with which a command refuses its input."""
     capsys.readouterr()
     assert status(line) == BAD_INPUT
     return " ".join(capsys.readouterr().err.split())
 
 
-def test_what_is_missing_is_named_by_its_part(
-    parts: list[str],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_is_missing_is_named_by_its_part(parts, tmp_path, capsys):
     out = ["-o", str(tmp_path / "all")]
     said = refusal(["collect", parts[0], parts[2], *out], capsys)
     assert "1 of 4 tasks are missing: run --part 2/3 again" in said
@@ -102,11 +93,7 @@ def test_what_is_missing_is_named_by_its_part(
     assert damaged.exists() and not (tmp_path / "all" / "results.csv").exists()
 
 
-def test_parts_of_another_run_are_refused(
-    parts: list[str],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_parts_of_another_run_are_refused(parts, tmp_path, capsys):
     out, other = ["-o", str(tmp_path / "all")], str(tmp_path / "other")
     asked = [*OPTIONS, "--seed", "1", "--part", "2/3", "-o", other]
     assert status(["run", *asked]) == HOLDS
@@ -121,11 +108,8 @@ def test_parts_of_another_run_are_refused(
 
 @pytest.mark.slow
 def test_two_copies_of_a_part_are_one_only_if_their_rows_are_the_same(
-    parts: list[str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    parts, tmp_path, monkeypatch, capsys
+):
     copy = str(tmp_path / "copy")
     again = ["run", *OPTIONS, "--part", "2/3", "-o", copy]
     assert status(again) == HOLDS  # in other times
@@ -140,10 +124,10 @@ def test_two_copies_of_a_part_are_one_only_if_their_rows_are_the_same(
     assert status(["collect", parts[0], copy, parts[2], *out]) == HOLDS
 
 
-def worsen(put: Callable[..., None]) -> Callable[..., None]:
+def worsen(put):
     """A store that writes another error into one row of its results."""
 
-    def put_worse(store: Store, task: int, results: list[Any]) -> None:
+    def put_worse(store, task, results):
         row = next(row for row in results[0]["rows"] if row[1] == "free-body")
         row[4] = 0.5
         put(store, task, results)
@@ -151,10 +135,7 @@ def worsen(put: Callable[..., None]) -> Callable[..., None]:
     return put_worse
 
 
-def test_a_resumed_run_says_which_answers_it_keeps(
-    parts: list[str],
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_resumed_run_says_which_answers_it_keeps(parts, capsys):
     capsys.readouterr()
     assert status(["run", *OPTIONS, "--part", "1/3", "-o", parts[0]]) == HOLDS
     said = " ".join(capsys.readouterr().err.split())
@@ -162,11 +143,7 @@ def test_a_resumed_run_says_which_answers_it_keeps(
     assert "scenes, random-0-000000000, random-0-000000001, random-0-000000006" in said
 
 
-def test_what_is_no_folder_of_a_part_is_refused(
-    parts: list[str],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_is_no_folder_of_a_part_is_refused(parts, tmp_path, capsys):
     line = ["collect", str(tmp_path), "-o", str(tmp_path / "all")]
     assert "must be a folder that `run --part` wrote" in refusal(line, capsys)
     said = refusal(["collect", *parts, "-o", parts[1]], capsys)
@@ -176,7 +153,7 @@ def test_what_is_no_folder_of_a_part_is_refused(
     assert "must be a folder that `run --part` wrote" in refusal(line, capsys)
 
 
-def test_scene_files_need_not_be_where_parts_are_collected(tmp_path: Path) -> None:
+def test_scene_files_need_not_be_where_parts_are_collected(tmp_path):
     scene = tmp_path / "models" / "mine.toml"
     scene.parent.mkdir()
     root = Path(__file__).parents[3]
@@ -191,11 +168,9 @@ def test_scene_files_need_not_be_where_parts_are_collected(tmp_path: Path) -> No
 
 
 def test_an_engine_that_is_missing_has_the_status_of_a_whole_run(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    def miss(engine: Engine) -> str | None:
+    tmp_path, monkeypatch, capsys
+):
+    def miss(engine):
         return f"{engine.library} is not installed" if engine.library else None
 
     monkeypatch.setattr(Engine, "missing", miss)
@@ -216,16 +191,13 @@ def test_an_engine_that_is_missing_has_the_status_of_a_whole_run(
 @pytest.mark.parametrize(
     "text", ["0/3", "4/3", "1", "1/", "a/b", "-1/3", "1/0", "1.5/3"]
 )
-def test_a_part_is_k_of_n(text: str) -> None:
+def test_a_part_is_k_of_n(text):
     assert RunPart.read("2/3") == (2, 3)
     with pytest.raises(InputError, match="must be K/N"):
         RunPart.read(text)
 
 
-def test_a_part_has_no_verdict_to_compare(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_part_has_no_verdict_to_compare(tmp_path, capsys):
     line = ["run", *OPTIONS, "--part", "1/3", "--against", "accepted"]
     said = refusal([*line, "-o", str(tmp_path / "out")], capsys)
     assert "--against" in said and "collect the parts first" in said

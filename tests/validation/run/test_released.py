@@ -5,7 +5,6 @@ Judged to its end, whatever an engine does there.
 
 import json
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,13 +12,13 @@ import pytest
 import fourbar
 from fourbar.scene import Scene
 from fourbar.solving import solve
-from fourbar_validation.compare.rows import DEGRADED, FAILS, UNDECIDED, Row
+from fourbar_validation.compare.rows import DEGRADED, FAILS, UNDECIDED
 from fourbar_validation.report.record import Record
 from fourbar_validation.run import released as free
 from fourbar_validation.run.judge import judge, judge_for_report
 
 
-def falling(coupler: float = 0.15, **motion: Any) -> Scene:
+def falling(coupler=0.15, **motion):
     """It falls from rest until bars 3 and 4 lie in one line.
 
     With a coupler of 0.12 m that is a change point.
@@ -42,12 +41,7 @@ states itself; an engine that loses more than this has become worse.
 """
 
 
-def find_spread_by_energy(
-    scene: Scene,
-    solution: fourbar.Solution,
-    instant: int,
-    engine: str,
-) -> float:
+def find_spread_by_energy(scene, solution, instant, engine):
     """Find how far theta_2 goes apart, rad.
 
     An engine's loss of energy happens at an instant. The linkage has one freedom, so
@@ -82,16 +76,14 @@ def find_spread_by_energy(
     return spread
 
 
-def row(rows: list[Row], engine: str, quantity: str) -> Row:
+def row(rows, engine, quantity):
     (found,) = (row for row in rows if (row.engine, row.quantity) == (engine, quantity))
     return found
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("coupler", [0.12, 0.15])
-def test_every_engine_is_judged_through_limits_and_change_points(
-    coupler: float,
-) -> None:
+def test_every_engine_is_judged_through_limits_and_change_points(coupler):
     scene = falling(coupler)
     solution = solve(scene)
     assert set(solution.branch) == {1, -1}
@@ -114,8 +106,8 @@ def test_every_engine_is_judged_through_limits_and_change_points(
 
 @pytest.mark.parametrize("branch", [1, -1])
 def test_a_linkage_that_friction_holds_beyond_a_change_point_is_judged_as_it_stands(
-    branch: int,
-) -> None:
+    branch,
+):
     """The couples of dry friction that hold it are those of its own assembly."""
     friction = fourbar.effects.Friction.at(O2=5.0, A=5.0, B=5.0, O4=5.0)
     motion = fourbar.Motion(
@@ -140,7 +132,7 @@ def test_a_linkage_that_friction_holds_beyond_a_change_point_is_judged_as_it_sta
     assert [row for row in rows if row.verdict == FAILS] == []
 
 
-def answering(monkeypatch: pytest.MonkeyPatch, change: Any) -> list[Row]:
+def answering(monkeypatch, change):
     """The rows of Pinocchio where its answer is changed."""
     from fourbar_validation.engines.pinocchio import PinocchioReleased
 
@@ -156,8 +148,8 @@ def answering(monkeypatch: pytest.MonkeyPatch, change: Any) -> list[Row]:
 
 
 @pytest.mark.slow
-def test_an_engine_that_stops_before_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    def cut(answer: Any) -> Any:
+def test_an_engine_that_stops_before_fails(monkeypatch):
+    def cut(answer):
         return replace(
             answer,
             theta_2=answer.theta_2[:20],
@@ -171,11 +163,8 @@ def test_an_engine_that_stops_before_fails(monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize("index", [20, 60])
-def test_an_engine_that_is_nan_before_the_limit_or_behind_it_fails(
-    monkeypatch: pytest.MonkeyPatch,
-    index: int,
-) -> None:
-    def strike(answer: Any) -> Any:
+def test_an_engine_that_is_nan_before_the_limit_or_behind_it_fails(monkeypatch, index):
+    def strike(answer):
         answer.theta_2[index] = np.nan
         return answer
 
@@ -183,7 +172,7 @@ def test_an_engine_that_is_nan_before_the_limit_or_behind_it_fails(
     assert row(rows, "pinocchio-forward", "theta_2").verdict == FAILS
 
 
-def test_an_engine_is_run_at_twice_its_step_however_close_the_instants_are() -> None:
+def test_an_engine_is_run_at_twice_its_step_however_close_the_instants_are():
     """Released from rest by a couple alone.
 
     Kinetic energy and work are equal, and their difference is no scale.
@@ -199,9 +188,7 @@ def test_an_engine_is_run_at_twice_its_step_however_close_the_instants_are() -> 
         assert energy.verdict == DEGRADED and energy.error < 1e-3, energy
 
 
-def test_an_engine_that_predicts_nothing_of_itself_is_undecided(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_engine_that_predicts_nothing_of_itself_is_undecided(monkeypatch):
     """An engine that is wrong by 3 rad at its step and by 5 rad at twice it has no
     digit by which it could agree.
     """
@@ -214,7 +201,7 @@ def test_an_engine_that_predicts_nothing_of_itself_is_undecided(
 
 
 @pytest.mark.slow
-def test_the_summary_names_the_change_points_of_a_release() -> None:
+def test_the_summary_names_the_change_points_of_a_release():
     from fourbar.show.block import write_block
     from fourbar.solution import write_json
 
@@ -229,9 +216,7 @@ def test_the_summary_names_the_change_points_of_a_release() -> None:
 
 
 @pytest.mark.slow
-def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(monkeypatch):
     from fourbar_validation.report import figures
 
     scene = falling()

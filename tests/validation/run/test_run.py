@@ -3,7 +3,6 @@ there.
 """
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -13,7 +12,6 @@ from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.guests import STATED_BY_THE_ENGINE
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression.record import (
-    Recorded,
     describe_run,
     open_run,
 )
@@ -30,14 +28,11 @@ MINE = describe_run([Engine("mine", FreeBody, EQUIVALENCE)], "suite")
 FAILED = replace(ROW, error=1e-3, verdict=FAILS)
 
 
-def save(folder: Path, rows: list[Row]) -> Recorded:
+def save(folder, rows):
     return open_run(save_run(folder, rows, about=MINE))
 
 
-def test_a_rule_that_is_weaker_than_before_stands_first(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_rule_that_is_weaker_than_before_stands_first(tmp_path, monkeypatch):
     """Everything holds by the wider tolerance: the run is not green."""
     judge_here(monkeypatch)
     before = save(tmp_path / "before", [ROW])
@@ -59,9 +54,8 @@ def test_a_rule_that_is_weaker_than_before_stands_first(
 
 
 def test_the_verdict_says_since_when_of_the_failure_that_it_names(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    tmp_path, monkeypatch
+):
     """The cause of most scenes is named.
 
     The first scene that fails does not have it.
@@ -94,8 +88,8 @@ def test_the_verdict_says_since_when_of_the_failure_that_it_names(
 
 
 @pytest.mark.parametrize("broken", ["", "mine"])
-def test_whoever_breaks_down_alone_is_blamed(broken: str) -> None:
-    def attempt(job: Job) -> Record | Exception:
+def test_whoever_breaks_down_alone_is_blamed(broken):
+    def attempt(job):
         if broken in [engine.name for engine in job.engines] or not broken:
             return ZeroDivisionError("division by zero")
         return Record(job.name)

@@ -62,12 +62,12 @@ SCENES = {
 }
 
 
-def list_rows(scene: fourbar.Scene) -> dict[str, Any]:
+def list_rows(scene):
     question = make_question("scene", scene, ())
     return {row.quantity: row for row in check_transformed(question)}
 
 
-def test_a_spring_whose_ends_nearly_meet_is_not_judged_there() -> None:
+def test_a_spring_whose_ends_nearly_meet_is_not_judged_there():
     """The rounding of its ends turns its line; at the other positions it is judged."""
     ends = Place(1, (0.1, 0.8)), Place(2, (0.1, 0.0))
     spring = fourbar.Spring(*ends, 80.0, 0.05)
@@ -88,7 +88,7 @@ def test_a_spring_whose_ends_nearly_meet_is_not_judged_there() -> None:
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_a_scene_has_the_same_numbers_however_it_is_stated(name: str) -> None:
+def test_a_scene_has_the_same_numbers_however_it_is_stated(name):
     rows = list_rows(SCENES[name])
     assert not [row for row in rows.values() if row.failed]
     left_out = {
@@ -120,10 +120,7 @@ def test_a_scene_has_the_same_numbers_however_it_is_stated(name: str) -> None:
     ],
     ids=("arm", "friction", "positions"),
 )
-def test_what_cannot_be_stated_otherwise_is_said_with_its_reason(
-    scene: fourbar.Scene,
-    lines: list[str],
-) -> None:
+def test_what_cannot_be_stated_otherwise_is_said_with_its_reason(scene, lines):
     question = make_question("scene", scene, ())
     list(check_transformed(question))
     assert question.left_out == lines
@@ -142,9 +139,8 @@ CHANGE_POINTS = {
 @pytest.mark.parametrize("command", [2, 3, 4])
 @pytest.mark.parametrize("lengths", CHANGE_POINTS.values(), ids=CHANGE_POINTS)
 def test_an_assembly_through_change_points_is_the_same_however_it_is_stated(
-    lengths: tuple[float, ...],
-    command: int,
-) -> None:
+    lengths, command
+):
     ground, *others = lengths
     bars = [fourbar.Bar(length, 0.8, centre=(0.3 * length, 0.2)) for length in others]
     linkage = FourBar(ground, *bars, ground_angle=0.4)
@@ -184,10 +180,7 @@ IN_LINE = (
 @pytest.mark.slow
 @pytest.mark.parametrize("gap", (0, 1, 2, 3, 5, 8, 13, 21, 31, 33, 64, 1000))
 @pytest.mark.parametrize("command", (2, 3, 4))
-def test_lengths_that_miss_a_change_point_by_roundings_are_the_same(
-    command: int,
-    gap: int,
-) -> None:
+def test_lengths_that_miss_a_change_point_by_roundings_are_the_same(command, gap):
     """Rounding decides in each statement whether there is a change point."""
     judged = 0
     for lengths, sense, branch in product(IN_LINE, (-1, 1), (-1, 1)):
@@ -204,9 +197,7 @@ def test_lengths_that_miss_a_change_point_by_roundings_are_the_same(
     assert judged >= 20
 
 
-def test_springs_that_are_wound_through_a_change_point_by_rounding_are_not_judged() -> (
-    None
-):
+def test_springs_that_are_wound_through_a_change_point_by_rounding_are_not_judged():
     bars = [fourbar.Bar(length, 0.8) for length in (0.1, 0.25, 0.15)]
     springs = fourbar.Torsion.at(A=(0.4, 0.3, 0.2))
     motion = fourbar.Motion(fourbar.Sweep(0.9, 5.9, 7), 1.3)
@@ -220,20 +211,17 @@ def test_springs_that_are_wound_through_a_change_point_by_rounding_are_not_judge
 
 
 @pytest.mark.parametrize("index", range(6))
-def test_random_scenes_have_the_same_numbers(index: int) -> None:
+def test_random_scenes_have_the_same_numbers(index):
     rows = list_rows(draw_random_scene(3, index, tuple(DrawnType)))
     assert rows and not [row for row in rows.values() if row.failed]
 
 
 @pytest.mark.parametrize("name", TRANSFORMATIONS)
-def test_one_number_that_differs_fails_its_row(
-    name: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_one_number_that_differs_fails_its_row(name, monkeypatch):
     solve = transformed.solve
     calls = []
 
-    def differ(scene: fourbar.Scene, *stage: Any, **at: Any) -> Any:
+    def differ(scene, *stage, **at):
         """Change a torque in the last digits from the second call on."""
         solution = solve(scene, *stage, **at)
         calls.append(scene)
@@ -250,14 +238,12 @@ def test_one_number_that_differs_fails_its_row(
     assert row.failed and row.reason.endswith("worst in torque")
 
 
-def test_a_field_that_forgets_the_ground_fails_where_it_is_turned(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_field_that_forgets_the_ground_fails_where_it_is_turned(monkeypatch):
     """As a fault would: gravity from the ground's line in place of the world's."""
     field = fourbar.Gravity.field.fget  # type: ignore[attr-defined]
     held = crank_rocker().linkage.ground_angle
 
-    def turn(load: fourbar.Gravity) -> complex:
+    def turn(load):
         return field(load) * np.exp(1j * (load.angle + 0.5 * np.pi - held))  # type: ignore[no-any-return]
 
     monkeypatch.setattr(fourbar.Gravity, "field", property(turn))
@@ -265,7 +251,7 @@ def test_a_field_that_forgets_the_ground_fails_where_it_is_turned(
     assert rows["turned"].failed and rows["mirrored"].failed
 
 
-def test_a_place_of_the_coupler_is_read_from_its_other_pin() -> None:
+def test_a_place_of_the_coupler_is_read_from_its_other_pin():
     linkage = FourBar(
         0.3,
         fourbar.Bar(0.1),
@@ -281,7 +267,7 @@ def test_a_place_of_the_coupler_is_read_from_its_other_pin() -> None:
     assert SCALE == 128.0
 
 
-def test_every_effect_of_the_package_can_be_stated_otherwise() -> None:
+def test_every_effect_of_the_package_can_be_stated_otherwise():
     """Without a conversion, scenes with the effect would silently lose the check."""
     packaged = {getattr(fourbar.effects, name) for name in fourbar.effects.FILE_OF}
     assert {*_CONVERTED} == {fourbar.Load, *packaged}

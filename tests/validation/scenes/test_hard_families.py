@@ -5,7 +5,6 @@ Limits are where they were, and the watch bites.
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -13,8 +12,8 @@ import pytest
 
 import fourbar
 import fourbar_validation.run.question
-from fourbar.mjcf import RECIPE, Settings, write_mjcf
-from fourbar.scene import Command, Scene
+from fourbar.mjcf import RECIPE, write_mjcf
+from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, VERDICTS
@@ -31,7 +30,6 @@ from fourbar_validation.engines.prediction import (
 from fourbar_validation.engines.registry import (
     HARD_ENGINES,
     Engine,
-    Predictor,
     make_answer_nearby,
 )
 from fourbar_validation.run.judge import judge
@@ -40,7 +38,6 @@ from fourbar_validation.scenes import hard_families as families
 from fourbar_validation.scenes.hard_families import (
     HARD_FAMILIES,
     TOGGLE,
-    Family,
     Hard,
     draw_lengths_of_type,
     dress,
@@ -49,7 +46,7 @@ from fourbar_validation.scenes.hard_families import (
     toggle,
 )
 from fourbar_validation.scenes.random import DrawnType
-from tests.support.engine_limits import MEASURED, Measured
+from tests.support.engine_limits import MEASURED
 from tests.support.scenes import crank_rocker
 
 EXACT = tuple(w for w in HARD_ENGINES if not w.through_time)
@@ -60,7 +57,7 @@ SWEEP = crank_rocker(
 )
 
 
-def test_the_suite_is_made_from_its_parameters_alone() -> None:
+def test_the_suite_is_made_from_its_parameters_alone():
     first, second = Hard(), Hard()
     names = [first.name(i) for i in range(len(first))]
     assert names == sorted(set(names)) == [second.name(i) for i in range(len(second))]
@@ -77,7 +74,7 @@ def test_the_suite_is_made_from_its_parameters_alone() -> None:
     [f for f in HARD_FAMILIES if f.name != "released"],
     ids=lambda family: family.name,
 )
-def test_a_scene_of_each_family_holds(family: Family) -> None:
+def test_a_scene_of_each_family_holds(family):
     name, scene = list(family.scenes())[-1]
     few = (
         scene if not isinstance(scene.motion.theta_2, fourbar.Sweep) else _fewer(scene)
@@ -87,20 +84,18 @@ def test_a_scene_of_each_family_holds(family: Family) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*AT_CHANGE_POINTS, *THROUGH_CHANGE_POINTS])
-def test_every_kind_of_change_point_holds_on_both_sides_and_in_both_assemblies(
-    name: str,
-) -> None:
+def test_every_kind_of_change_point_holds_on_both_sides_and_in_both_assemblies(name):
     require_no_failure(name, (AT_CHANGE_POINTS | THROUGH_CHANGE_POINTS)[name])
 
 
-def require_no_failure(name: str, scene: Scene) -> None:
+def require_no_failure(name, scene):
     """No row of any check and engine fails, the file as it is shipped included."""
     rows = judge(name, scene, HARD_ENGINES).rows
     assert {row.verdict for row in rows} <= set(VERDICTS)
     assert [row for row in rows if row.verdict == FAILS] == []
 
 
-def _fewer(scene: Scene, steps: int = 12) -> Scene:
+def _fewer(scene, steps=12):
     sweep = scene.motion.theta_2
     assert isinstance(sweep, fourbar.Sweep)
     return replace(
@@ -109,7 +104,7 @@ def _fewer(scene: Scene, steps: int = 12) -> Scene:
     )
 
 
-def test_beyond_a_toggle_no_engine_finds_a_position() -> None:
+def test_beyond_a_toggle_no_engine_finds_a_position():
     lengths = draw_lengths_of_type(DrawnType.TRIPLE_ROCKER, 0)
     (psi, stretched), *_ = find_collinear_3_4(lengths)
     beyond = set_angles(
@@ -135,8 +130,8 @@ def test_beyond_a_toggle_no_engine_finds_a_position() -> None:
 
 
 def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     """A millionth of the torque is within what the last digits of theta_2 excuse for
     every engine.
     """
@@ -151,7 +146,7 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
     )
     balls = [engine for engine in HARD_ENGINES if engine.answers_nearby]
 
-    def verdicts() -> dict[str, str]:
+    def verdicts():
         return {
             row.quantity: row.verdict
             for row in judge("", near, balls).rows
@@ -167,7 +162,7 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
     }
     assert rows["torque"].verdict == DEGRADED and rows["torque"].allowed > 1e-6
 
-    def spoiled(*arguments: Any, **keywords: Any) -> Any:
+    def spoiled(*arguments, **keywords):
         solution = true(*arguments, **keywords)
         solution.torque[-1] *= 1.0 + 1e-6
         return solution
@@ -176,7 +171,7 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
     assert verdicts()["torque"] == FAILS
 
 
-def test_an_answer_nearby_is_one_within_the_rounding_of_theta_2() -> None:
+def test_an_answer_nearby_is_one_within_the_rounding_of_theta_2():
     scene = dress(families.ORDINARY_LENGTHS)
     command = fourbar.command(
         set_angles(scene, [0.7, 0.7 + 4.0 * 2.0**-52, 0.7 + 1e-13])
@@ -188,7 +183,7 @@ def test_an_answer_nearby_is_one_within_the_rounding_of_theta_2() -> None:
     ).tolist() == [True, True, False]
 
 
-def test_an_answer_nearby_has_the_sine_of_the_formulas() -> None:
+def test_an_answer_nearby_has_the_sine_of_the_formulas():
     """Of a shift in many digits.
 
     1e-9 rad from a limit position a sine of the formulas is met to its last digit.
@@ -209,9 +204,7 @@ def test_an_answer_nearby_has_the_sine_of_the_formulas() -> None:
 
 
 @pytest.mark.parametrize("kind", families.CHANGE_POINTS)
-def test_beyond_a_change_point_an_answer_nearby_is_one_of_the_same_assembly(
-    kind: str,
-) -> None:
+def test_beyond_a_change_point_an_answer_nearby_is_one_of_the_same_assembly(kind):
     """Pin forces grow as 1/distance there: the last digit of theta_2 is asked about.
 
     On the far side the sign of the sine is not that of the assembly's name.
@@ -231,7 +224,7 @@ def test_beyond_a_change_point_an_answer_nearby_is_one_of_the_same_assembly(
             assert (magnitude(formulas.F43 - again) <= K * EPS * size).all()
 
 
-def test_the_balls_know_a_coupler_that_does_not_turn() -> None:
+def test_the_balls_know_a_coupler_that_does_not_turn():
     """Of a parallelogram omega_3 is a ball about 0, at some positions about 0 exactly.
 
     The power of python-flint is NaN there, and so were all accelerations and forces.
@@ -246,15 +239,14 @@ def test_the_balls_know_a_coupler_that_does_not_turn() -> None:
 
 @pytest.mark.parametrize("name", AT_CHANGE_POINTS)
 def test_the_file_opens_in_the_assembly_that_is_stated_beyond_a_change_point_too(
-    name: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    name, monkeypatch
+):
     scene = AT_CHANGE_POINTS[name]
     row = compare_shipped(name, scene, fourbar.command(scene))
     assert row is not None and row.verdict != FAILS, row
     assert row.error < 1.0
 
-    def write_other(scene: Scene) -> str:
+    def write_other(scene):
         motion = scene.motion.replace(branch=-scene.motion.branch)
         return write_mjcf(replace(scene, motion=motion))
 
@@ -273,7 +265,7 @@ class Spoiled:
 
     name, part = "spoiled", 0.0
 
-    def answer(self, scene: Scene, command: Command) -> Answer:
+    def answer(self, scene, command):
         s = fourbar.solve(scene, at=command)
         numbers = {name: np.array(getattr(s, name)) for name in COMPARED_QUANTITIES}
         numbers["F32"] *= 1.0 + self.part
@@ -288,11 +280,7 @@ class AlmostRight(Spoiled):
     part = 1e-10
 
 
-def verdict_of(
-    adapter: type,
-    scene: Scene,
-    predictor: Predictor | None,
-) -> tuple[str, float]:
+def verdict_of(adapter, scene, predictor):
     tolerance = FULL_ACCURACY if predictor else _equivalence()
     engine = Engine("spoiled", adapter, tolerance, predictor=predictor)
     row = next(
@@ -303,13 +291,13 @@ def verdict_of(
     return row.verdict, row.allowed
 
 
-def _equivalence() -> Any:
+def _equivalence():
     from fourbar_validation.compare.tolerance import EQUIVALENCE
 
     return EQUIVALENCE
 
 
-def test_near_a_toggle_a_wrong_force_fails_that_the_law_excuses() -> None:
+def test_near_a_toggle_a_wrong_force_fails_that_the_law_excuses():
     """1e-8 rad from a toggle K eps/s^3 allows all; roundings of the data allow 4e-5."""
     lengths = draw_lengths_of_type(DrawnType.TRIPLE_ROCKER, 1)
     (psi, _), *_ = find_collinear_3_4(lengths)
@@ -320,7 +308,7 @@ def test_near_a_toggle_a_wrong_force_fails_that_the_law_excuses() -> None:
     assert verdict == DEGRADED and allowed < Wrong.part
 
 
-def test_predictions_know_what_no_law_in_sines_knows() -> None:
+def test_predictions_know_what_no_law_in_sines_knows():
     """A parallelogram that stays parallel is regular in the formulas and 1/d^3 in the
     data; a scale changes nothing.
     """
@@ -337,16 +325,12 @@ def test_predictions_know_what_no_law_in_sines_knows() -> None:
             ), name
 
 
-def test_every_declared_limit_is_measured() -> None:
+def test_every_declared_limit_is_measured():
     assert [limit.of for limit in MEASURED] == [*BOUNDARIES]
 
 
 @pytest.mark.parametrize("limit", MEASURED, ids=lambda limit: limit.of.name)
-def test_a_limit_is_where_it_was(
-    limit: Measured,
-    tmp_path: Any,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_limit_is_where_it_was(limit, tmp_path, monkeypatch):
     """A failure after an engine's upgrade means another limit.
 
     The engine has lifted or worsened it: measure it again.
@@ -356,11 +340,11 @@ def test_a_limit_is_where_it_was(
     assert not limit.holds(limit.outside)
 
 
-def simulated(settings: Settings = RECIPE, scene: Scene = SWEEP) -> Answer:
+def simulated(settings=RECIPE, scene=SWEEP):
     return simulate.MujocoSimulated(settings).answer(scene, fourbar.command(scene))
 
 
-def test_a_healthy_run_raises_no_alarm() -> None:
+def test_a_healthy_run_raises_no_alarm():
     answer = simulated()
     assert answer.refusal is None and answer.alarms == []
     assert (
@@ -369,20 +353,18 @@ def test_a_healthy_run_raises_no_alarm() -> None:
     )
 
 
-def alarm(answer: Answer, name: str) -> bool:
+def alarm(answer, name):
     return any(line.startswith(name) for line in answer.alarms)
 
 
-def test_power_and_acceleration_see_what_the_gap_does_not(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_power_and_acceleration_see_what_the_gap_does_not(monkeypatch):
     """A closure stiffer than RK4 can follow.
 
     Torque 98 % wrong and worse with a gap of 6e-6 m.
     """
 
     class Stiff(ClosedLoop):
-        def __init__(self, mjcf: str) -> None:
+        def __init__(self, mjcf):
             super().__init__(mjcf)
             self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_REFSAFE
 
@@ -397,7 +379,7 @@ def test_power_and_acceleration_see_what_the_gap_does_not(
     assert alarm(answer, "acceleration_gap") and alarm(answer, "power_gap")
 
 
-def test_a_solver_that_did_not_converge_is_seen() -> None:
+def test_a_solver_that_did_not_converge_is_seen():
     answer = simulated(replace(RECIPE, solver="CG", tolerance=1e-8))
     assert (
         alarm(answer, "force_gap")
@@ -406,30 +388,26 @@ def test_a_solver_that_did_not_converge_is_seen() -> None:
     )
 
 
-def test_a_gap_is_seen() -> None:
+def test_a_gap_is_seen():
     assert alarm(
         simulated(replace(RECIPE, impedance=0.1, pad=None, time_constant_steps=300.0)),
         "closure_gap",
     )
 
 
-def test_a_crank_that_does_not_turn_as_commanded_is_seen() -> None:
+def test_a_crank_that_does_not_turn_as_commanded_is_seen():
     assert alarm(simulated(replace(RECIPE, flywheel=1.0)), "speed_error")
 
 
 @pytest.mark.parametrize("what", ["qvel", "qacc"])
-def test_a_reset_and_what_caused_it_are_seen(
-    what: str,
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Any,
-) -> None:
+def test_a_reset_and_what_caused_it_are_seen(what, monkeypatch, tmp_path):
     """A state or an acceleration that MuJoCo takes for bad occurs once, in the middle
     of the run.
     """
     monkeypatch.chdir(tmp_path)
     true, calls = ClosedLoop.forward, []
 
-    def struck(self: ClosedLoop) -> None:
+    def struck(self):
         calls.append(self)
         if len(calls) == 5:
             if what == "qvel":
@@ -443,7 +421,7 @@ def test_a_reset_and_what_caused_it_are_seen(
     assert alarm(answer, "time_went_back") and alarm(answer, "bad_states")
 
 
-def test_an_alarm_fails_its_row(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_alarm_fails_its_row(monkeypatch):
     monkeypatch.setattr(simulate, "list_alarms", lambda *_: ["the sky falls"])
     rows = [
         r
@@ -453,7 +431,7 @@ def test_an_alarm_fails_its_row(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
-def test_a_free_motion_through_change_points_in_every_engine() -> None:
+def test_a_free_motion_through_change_points_in_every_engine():
     """IFToMM A02, one window, ten seconds: lim.ii.udc.es/mbsbenchmark."""
     (name, scene), *_ = families.released(durations=(10.0,), steps=10)
     pendulum = make_pendulum(scene)
@@ -474,9 +452,7 @@ def test_a_free_motion_through_change_points_in_every_engine() -> None:
     )
 
 
-def test_an_engine_that_drifts_unpredicted_fails(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_engine_that_drifts_unpredicted_fails(monkeypatch):
     """Wrong by the same amount with either step, an engine predicts nothing of it; the
     exact solution shows it.
     """
@@ -485,7 +461,7 @@ def test_an_engine_that_drifts_unpredicted_fails(
     (name, scene), *_ = families.released(durations=(1.0,), steps=4)
     true = pinocchio.PinocchioReleased.release
 
-    def off(self: Any, scene: Scene, times: np.ndarray) -> Any:
+    def off(self, scene, times):
         released = true(self, scene, times)
         released.theta_2 += 1e-3
         return released
@@ -499,7 +475,7 @@ def test_an_engine_that_drifts_unpredicted_fails(
     ] == [FAILS]
 
 
-def test_a_golden_file_of_others_swept_through_its_change_point() -> None:
+def test_a_golden_file_of_others_swept_through_its_change_point():
     """a, b, c, d = 1, 3, 2, 4 through 180 deg exactly.
 
     Others stored -99 910 N m there.
@@ -524,10 +500,7 @@ def test_a_golden_file_of_others_swept_through_its_change_point() -> None:
         ("speeds-+1e+3", None),
     ],
 )
-def test_the_file_as_shipped_is_driven_within_the_declared_limits_of_mujoco(
-    name: str,
-    why: str | None,
-) -> None:
+def test_the_file_as_shipped_is_driven_within_the_declared_limits_of_mujoco(name, why):
     suite = Hard()
     scene = next(
         suite.scene(index) for index in range(len(suite)) if suite.name(index) == name
@@ -540,9 +513,7 @@ def test_the_file_as_shipped_is_driven_within_the_declared_limits_of_mujoco(
     )
 
 
-def test_a_file_that_starts_almost_at_rest_is_judged_by_the_speed_that_it_reaches() -> (
-    None
-):
+def test_a_file_that_starts_almost_at_rest_is_judged_by_the_speed_that_it_reaches():
     scene = Scene(
         fourbar.uniform(0.3, 0.1, 0.25, 0.22),
         fourbar.Motion(fourbar.Sweep(0.1, 6.0, 4), 1e-9, 100.0),

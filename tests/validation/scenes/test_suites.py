@@ -4,15 +4,12 @@ How much is judged of a suite does not depend on pictures.
 """
 
 import itertools
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from fourbar.scene import Scene
-from fourbar.scene.motion import Law, Rise, Sine
+from fourbar.scene.motion import Law
 from fourbar_validation.engines.effects import TERM_OF
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.plan import Plan, RunOptions
@@ -22,12 +19,12 @@ from fourbar_validation.scenes.suites import Files, read_default_suite
 from tests.oracle.coordinates import is_coordinate
 
 
-def scenes() -> list[Scene]:
+def scenes():
     suite = read_default_suite()
     return [suite.scene(i) for i in range(len(suite))]
 
 
-def uses(scene: Scene) -> Iterator[Any]:
+def uses(scene):
     motion, drive = scene.motion, scene.drive
     yield from (effect.key for effect in scene.effects)
     yield f"command of {motion.commanded}"
@@ -61,7 +58,7 @@ def uses(scene: Scene) -> Iterator[Any]:
         yield "tolerance of a coordinate"
 
 
-def uses_of_law(law: Law | Rise | Sine) -> Iterator[str]:
+def uses_of_law(law):
     if not isinstance(law, Law):
         yield f"{law.kind} law"
         return
@@ -74,7 +71,7 @@ def uses_of_law(law: Law | Rise | Sine) -> Iterator[str]:
         yield "periodic law that begins late"
 
 
-def test_the_default_suite_uses_every_capability() -> None:
+def test_the_default_suite_uses_every_capability():
     used = {use for scene in scenes() for use in uses(scene)}
     wanted: set[Any] = TERM_OF.keys() - {"load"}
     wanted |= {
@@ -116,14 +113,14 @@ SUITE = read_default_suite()
     range(len(SUITE)),
     ids=[SUITE.name(i) for i in range(len(SUITE))],
 )
-def test_every_scene_of_it_holds(index: int) -> None:
+def test_every_scene_of_it_holds(index):
     rows = judge(SUITE.name(index), SUITE.scene(index), [FREE_BODY], order=False).rows
     assert not [row for row in rows if row.failed]
     assert any(row.compared and row.engine == FREE_BODY.name for row in rows)
 
 
 @pytest.mark.slow
-def test_pictures_change_nothing_that_is_judged(tmp_path: Path) -> None:
+def test_pictures_change_nothing_that_is_judged(tmp_path):
     suite = replace(read_default_suite(), texts=read_default_suite().texts[:1])
     assert isinstance(suite, Files)
     tables = []
