@@ -135,7 +135,8 @@ class Sensitivity:
     def value(self, quantity: str) -> Array:
         """Return the quantity, or a component or magnitude of it.
 
-        Places are in the coordinates of the scene's drawing, like their derivatives.
+        Places, (n, 2), are those that the derivatives are of: in the coordinates of
+        the scene's drawing, which are `solve(scene)[quantity] + scene.origin`.
 
         Raises InputError as `of` does.
         """

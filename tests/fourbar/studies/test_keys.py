@@ -240,6 +240,24 @@ def test_slopes_of_a_drawn_parallelogram_are_differences_of_its_members() -> Non
         )
 
 
+@pytest.mark.parametrize("name", ["A", "P"])
+def test_the_value_of_a_place_is_what_its_slopes_are_of(name: str) -> None:
+    """The drawing's coordinates, whose origin a moved O2 leaves; `solve` has O2's."""
+    scene = loads(DRAWING + ACTS)
+    slopes = fourbar.sensitivity(scene)
+    value = slopes.value(name)
+    assert value.shape == (5, 2)
+    np.testing.assert_array_equal(value, fourbar.solve(scene)[name] + scene.origin)
+    for axis in (0, 1):
+        key = f"pins.O2.{axis}"
+        moved = scene.drawing.place("O2")[axis] + np.array([-STEP, STEP])
+        ends = fourbar.solve(fourbar.vary(scene, {key: moved}))
+        origins = np.stack(np.broadcast_arrays(*ends.origin), axis=-1)
+        below, above = ends[name] + origins.reshape(2, 1, 2)
+        difference = (above - below) / (2.0 * STEP)
+        np.testing.assert_allclose(slopes.of(name, key), difference, atol=1e-5)
+
+
 def test_first_order_and_samples_of_pins_agree() -> None:
     scene = loads(DRAWING + ACTS)
     stated = (
