@@ -313,7 +313,7 @@ def analyze(  # noqa: PLR0913 - one for each option
             described = given.take_motion(stated, positions)
         bore = _read_pressure(described, pressure)
         shown = _choose_units(form, units, degrees)
-        asked = {text: given.find_positions(described, text) for text in at}
+        asked = {text: given.read_positions(described, text) for text in at}
         wanted = join_commands([*asked.values()]) if asked else None
         solution = solve(described, find_last_stage(described), at=wanted)
         if asked:

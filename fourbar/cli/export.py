@@ -189,7 +189,7 @@ def _find_place(scene: Scene, text: str) -> float:
 
     For a motion over time it is the angle at that time.
     """
-    positions = given.find_positions(scene, text)
+    positions = given.read_positions(scene, text)
     return float(positions.stated[0][0])
 
 

@@ -231,16 +231,15 @@ def read_number(key: str, text: str, unit: str, bound: str = ANY_NUMBER) -> floa
     return require(key, float(text) if is_bare(text) else text, unit, bound)
 
 
-def find_positions(scene: Scene, text: str) -> Command:
-    """Find the positions of a text like "60 deg", "theta_4=30 deg" or "P_y=30 mm".
+def read_positions(scene: Scene, text: str) -> Command:
+    """Read the positions of a text like "60 deg", "theta_4=30 deg" or "P_y=30 mm".
 
     Without a name the number is what the scene commands. Angles, strokes and times are
     those that the linkage can have, any other column has its value in the scene's
     motion.
     """
     from fourbar.show.located import SIDES, locate
-    from fourbar.studies.passing import STATED_POSITIONS
-    from fourbar.studies.passing import find_positions as find_stated
+    from fourbar.studies.passing import STATED_POSITIONS, find_positions
 
     name, equals, value = (part.strip() for part in text.rpartition("="))
     if not equals:
@@ -248,7 +247,7 @@ def find_positions(scene: Scene, text: str) -> Command:
     if name == "t":  # as it is printed
         name = "time"
     if value == "drawn":
-        return find_stated(scene, [(name, _read_drawn(scene, name, text))])
+        return find_positions(scene, [(name, _read_drawn(scene, name, text))])
     if name not in STATED_POSITIONS or value in SIDES:
         return locate(scene, name, value)
     unit = {"stroke": "m", "time": "s"}.get(name, "rad")
@@ -259,7 +258,7 @@ def find_positions(scene: Scene, text: str) -> Command:
             text,
             f'the unit is missing; did you mean "{value} {likely}"?',
         )
-    return find_stated(scene, [(name, read_number("--at", value, unit))])
+    return find_positions(scene, [(name, read_number("--at", value, unit))])
 
 
 _ANGLE_OF_SCENE = re.compile(r"(.+):\s*(theta_[234])\s*(?:([+-])\s*(.+))?")

@@ -25,8 +25,9 @@ from fourbar.quantities import FORCE_NAMES, PIN_FORCES, VECTORS, Array
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
-from fourbar_validation.check.judge import Judge, Mistake
+from fourbar_validation.check.judge import Judge
 from fourbar_validation.check.theirs import name_quantity
+from fourbar_validation.check.variants import Mistake
 from fourbar_validation.compare.tolerance import EPS
 from fourbar_validation.engines.description import FORCE_BETWEEN
 

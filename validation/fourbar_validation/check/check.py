@@ -1,4 +1,4 @@
-"""`python -m validation check SCENE THEIRS.csv`: judge a user's torques and forces."""
+"""`fourbar-validation check SCENE THEIRS.csv`: judge a user's torques and forces."""
 
 import json
 import math

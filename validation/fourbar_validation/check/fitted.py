@@ -17,9 +17,10 @@ from fourbar.quantities.units import find_factor
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
-from fourbar_validation.check.judge import Judge, Mistake
+from fourbar_validation.check.judge import Judge
 from fourbar_validation.check.theirs import OTHER_UNITS, name_quantity
 from fourbar_validation.check.variants import (
+    Mistake,
     Predict,
     Variant,
     predict_variants,

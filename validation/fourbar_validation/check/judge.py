@@ -4,7 +4,6 @@ A number gets its error, the allowed error, and what may explain the difference.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -310,38 +309,3 @@ class Judge:
     def _answer(self, key: str) -> Mask:
         finite = np.isfinite(self.ours(key))
         return np.asarray(finite.all(axis=1) if finite.ndim == 2 else finite)
-
-
-@dataclass(frozen=True, slots=True)
-class Mistake:
-    """A mistake as a hypothesis: what was done, and what the numbers become."""
-
-    text: str
-    predict: Callable[[str, Solution], Array | None]
-    """quantity, right solution -> what would have been printed. None where it changes
-    nothing of it.
-    """
-    whole: bool = True
-    """True if it was made in the calculation and shows in every quantity. A column's
-    unit shows in that column only.
-    """
-    times: float = 1.0
-    """Factor on the allowed error. A number that was fitted to rounded ones carries
-    their rounding once more.
-    """
-    left: float = 0.0
-    """Part of the largest value by which an engine may miss the prediction. The engine
-    makes this mistake.
-    """
-
-    @property
-    def fitted(self) -> bool:
-        """Return True if a number of it was fitted to the table."""
-        return self.times > 1.0
-
-    def prediction(self, key: str, right: Solution) -> Array | None:
-        """Return the numbers that this mistake predicts for a column, or None."""
-        predicted = self.predict(name_quantity(key), right)
-        if predicted is not None and key.startswith("|"):
-            return magnitude(predicted)
-        return predicted

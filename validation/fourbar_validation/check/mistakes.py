@@ -26,8 +26,9 @@ from fourbar_validation.check.calculated import (
     find_single_precision,
 )
 from fourbar_validation.check.fitted import ENOUGH_NUMBERS, find_fitted
-from fourbar_validation.check.judge import Judge, Mistake
+from fourbar_validation.check.judge import Judge
 from fourbar_validation.check.variants import (
+    Mistake,
     Predict,
     Variant,
     predict_variants,

@@ -1,11 +1,11 @@
-"""Wrong problems that a mistake may amount to, all solved at once.
+"""Mistakes as hypotheses, and wrong problems that they amount to, solved at once.
 
 A mistake in what was solved is another number of the scene or another command: one
 member of a study, whose members together take a tenth of the time of one by one.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,10 +16,46 @@ from fourbar.scene import Command, Scene, StrokeOrigin
 from fourbar.solution import Solution
 from fourbar.studies.keys import list_entries, read_number
 from fourbar.studies.study import Study
+from fourbar_validation.check.theirs import name_quantity
+from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.scenes.bars import list_moving, replace_bars
 
 Predict = Callable[[str, Solution], Array | None]
-"""quantity, right solution -> what would have been printed; None: nothing changes."""
+"""Function of a quantity and the right solution that returns the numbers of a mistake.
+None: the quantity has none.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """A mistake as a hypothesis: what was done, and what the numbers become."""
+
+    text: str
+    predict: Predict
+    whole: bool = True
+    """True if it was made in the calculation and shows in every quantity. A column's
+    unit shows in that column only.
+    """
+    times: float = 1.0
+    """Factor on the allowed error. A number that was fitted to rounded ones carries
+    their rounding once more.
+    """
+    left: float = 0.0
+    """Part of the largest value by which an engine may miss the prediction. The engine
+    makes this mistake.
+    """
+
+    @property
+    def fitted(self) -> bool:
+        """Return True if a number of it was fitted to the table."""
+        return self.times > 1.0
+
+    def prediction(self, key: str, right: Solution) -> Array | None:
+        """Return the numbers that this mistake predicts for a column, or None."""
+        predicted = self.predict(name_quantity(key), right)
+        if predicted is not None and key.startswith("|"):
+            return magnitude(predicted)
+        return predicted
 
 
 class Variant(NamedTuple):

@@ -519,6 +519,7 @@ class Errors:
 
     error: Array
     allowed: Array
+    """Errors that the tolerance allows; a row may be allowed what is predicted."""
     scale: Scale
     """Divisor of the errors and N. The size is 1 of the quantity's unit if it is 0."""
     relative: Mask

@@ -1,4 +1,4 @@
-"""`python -m validation cost`: the study of scenes, its table, laws and pictures."""
+"""`fourbar-validation cost`: the study of scenes, its table, laws and pictures."""
 
 import math
 from collections.abc import Mapping, Sequence

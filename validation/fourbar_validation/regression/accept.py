@@ -1,4 +1,4 @@
-"""`python -m validation compare` and `accept`."""
+"""`fourbar-validation compare` and `accept`."""
 
 from collections.abc import Callable
 from pathlib import Path

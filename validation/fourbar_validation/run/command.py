@@ -1,4 +1,4 @@
-"""`python -m validation run`: what is judged, by whom, how, and against what."""
+"""`fourbar-validation run`: what is judged, by whom, how, and against what."""
 
 from pathlib import Path
 from typing import Any
