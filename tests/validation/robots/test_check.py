@@ -965,6 +965,9 @@ def test_a_file_that_is_no_four_bar_is_one_line(
     assert "\n" not in str(caught.value)
 
 
+NO_FILE = RobotFile(Path("mine.xml"), "")
+
+
 def crash(scene: Scene, text: str | None, names: dict[str, str]) -> None:
     os.kill(os.getpid(), signal.SIGSEGV)
 
@@ -987,7 +990,7 @@ def test_ctrl_c_does_not_wait_for_the_file() -> None:
     try:
         with (
             pytest.raises(KeyboardInterrupt),
-            guard.examine_guarded(Path("mine.xml")) as examined,
+            guard.examine_guarded(NO_FILE) as examined,
         ):
             examined(f"{__name__}:hang", BARE, "<mujoco/>", {})
     finally:
@@ -1014,7 +1017,7 @@ def test_a_file_that_breaks_the_engine_is_one_line(
     )  # a busy machine starts a process slowly
     with (
         pytest.raises(InputError, match=word),
-        guard.examine_guarded(Path("mine.xml")) as examined,
+        guard.examine_guarded(NO_FILE) as examined,
     ):
         examined(f"{__name__}:{what.__name__}", BARE, "<mujoco/>", {})  # type: ignore[attr-defined]
 

@@ -152,6 +152,31 @@ def test_what_a_file_may_not_hold_is_one_line(
     assert_refused(path, words)
 
 
+@pytest.mark.parametrize(
+    ("name", "text", "kind"),
+    [
+        ("robot.xml", "<mujoco><worldbody><body/></worldbody></mujoco>", "MJCF"),
+        ("robot.sdf", "<sdf", "SDF"),
+        ("robot.world", "<sdf><world/><!DOCTYPE a></sdf>", "SDF"),
+        ("robot.xml", "<sdf><world/></sdf>", "SDF"),
+        ("robot.urdf", "<robot", "URDF"),
+        ("robot.xml", "<robot name='r'><link name='a'/></robot>", "URDF"),
+    ],
+)
+def test_a_message_begins_with_the_format_of_the_file(
+    name: str, text: str, kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / name
+    path.write_text(text)
+    scene = str(ROOT / "models" / "crank_rocker.toml")
+    out = str(tmp_path / "out")
+    assert status(["check-mjcf", scene, str(path), "--out", out]) == BAD_INPUT
+    message = capsys.readouterr().err.strip().splitlines()[-1]
+    assert message.startswith(f"error: {path}: {kind} = ")
+    others = {"MJCF", "SDF", "URDF"} - {kind}
+    assert not any(other in message.partition(f"{kind} = ")[2] for other in others)
+
+
 def test_a_usd_is_refused_by_its_name(tmp_path: Path) -> None:
     path = tmp_path / "robot.usd"
     path.write_bytes(b"PXR-USDC")

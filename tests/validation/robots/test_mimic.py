@@ -19,6 +19,7 @@ from fourbar_validation.robots.mimic import (
     measure_mimic,
     show_mimic,
 )
+from tests.validation.robots.test_sdf import URDF
 
 ROUND_OFF = 1e-12
 """rad, or without unit: angles and ratios of a few units in double precision."""
@@ -248,6 +249,10 @@ def test_a_joint_that_follows_none_is_refused(tmp_path: Path) -> None:
         measure_mimic(write(tmp_path), "c", KNEE)
     with pytest.raises(InputError, match="no such joint"):
         measure_mimic(write(tmp_path), "knee", KNEE)
+    path = tmp_path / "leg.urdf"
+    path.write_text(URDF.replace("<mimic", "<gone"))
+    with pytest.raises(InputError, match="the file has no <mimic> in its knee"):
+        measure_mimic(path, "knee", KNEE)
 
 
 COUPLER = """<mujoco><worldbody><body name="crank"><joint name="j2" axis="0 0 1"/>

@@ -347,6 +347,45 @@ def test_the_joint_farthest_from_the_world_closes_the_loop(tmp_path: Path) -> No
     assert compile_text(tmp_path, put((CLOSING, follows)))[0].eq("A").id == 0
 
 
+DAMPED = "<dynamics><damping>0.1</damping></dynamics></axis>"
+LIMITED = "<limit><lower>-3</lower></limit></axis>"
+
+
+@pytest.mark.parametrize(
+    ("kinds", "closing"),
+    [
+        ({}, "B"),
+        ({"B": LIMITED}, "A"),
+        ({"A": LIMITED, "B": DAMPED}, "O4"),
+        ({pin: LIMITED for pin in ("O2", "A", "B", "O4")}, "B"),
+        ({"B": DAMPED, "A": DAMPED, "O2": DAMPED, "O4": LIMITED}, "O4"),
+        ({pin: DAMPED for pin in ("O2", "A", "B", "O4")}, "halves"),
+    ],
+)
+def test_the_joint_that_loses_least_closes_the_loop(
+    kinds: dict[str, str], closing: str, tmp_path: Path
+) -> None:
+    """The rod is in two halves on each other that a fixed joint holds together."""
+    shadow = COUPLER.replace('"rod"', '"shadow"')
+    halves = (
+        '<joint name="halves" type="fixed"><parent>rod</parent>'
+        "<child>shadow</child></joint>"
+    )
+    on_shadow = CLOSING.replace(">rod<", ">shadow<") + halves
+    text = put((COUPLER, COUPLER + shadow), (CLOSING, on_shadow))
+    for pin, more in kinds.items():
+        start = text.index(f'<joint name="{pin}"')
+        text = text[:start] + text[start:].replace("</axis>", more, 1)
+    robot = read(tmp_path, text)
+    (closure,) = list_closures(robot, PoseOptions()).closures
+    assert closure.name == closing
+    assert closure.loop is not None
+    lengths = sorted(closure.loop.lengths)
+    assert lengths == pytest.approx(sorted((D, A, B, C)), rel=AGREES)
+    lost = [note.partition("; lost: ")[2] for note in robot.notes]
+    assert lost == ([] if closing == "halves" else ["range" * (closing in kinds)])
+
+
 def test_a_tensor_is_turned_with_its_frame(tmp_path: Path) -> None:
     stated = (
         "<inertial><pose>0 0 0 0.3 0.4 0.5</pose><mass>1</mass><inertia><ixx>2</ixx>"
@@ -431,7 +470,7 @@ def test_numbers_of_a_joint_are_those_of_its_file(tmp_path: Path) -> None:
         start = every.index(f'<joint name="{pin}"')
         every = every[:start] + every[start:].replace(AXIS, axis, 1)
     _, notes = compile_text(tmp_path, every)
-    assert notes[0].endswith("; its damping, friction and spring are lost")
+    assert notes[0].endswith("; lost: damping, frictionloss, stiffness, range")
 
 
 @pytest.mark.parametrize(

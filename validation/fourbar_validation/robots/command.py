@@ -134,7 +134,7 @@ def robot_command(
     if out is not None:
         require_file(out, robot)
     file = read_robot(robot, assets)
-    with examine_guarded(robot) as examined:
+    with examine_guarded(file) as examined:
         if out is not None:
             made: LoopScene = examined(SCENE, file, options, loop, omega)
         else:

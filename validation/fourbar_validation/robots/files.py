@@ -17,6 +17,10 @@ from fourbar.writing import read_text
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 
 _USD = (".usd", ".usda", ".usdc", ".usdz")
+_KINDS = {"mujoco": "MJCF", "sdf": "SDF", "robot": "URDF"}
+"""Format of a file, by its outermost element."""
+_KINDS_BY_NAME = {".sdf": "SDF", ".world": "SDF", ".urdf": "URDF"}
+"""Format of a file that is not parsed yet, by its suffix; others are MJCF."""
 LARGEST_TEXT = 16 * 2**20
 """Bytes of a file and its includes; a humanoid takes half a million."""
 LARGEST_ASSETS = 512 * 2**20
@@ -98,6 +102,12 @@ class _RobotReading:
     contents: dict[str, bytes] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    kind: str = field(init=False)
+    """Format of the file, which begins each message about it."""
+
+    def __post_init__(self) -> None:
+        """Tell the format by the name."""
+        self.kind = _KINDS_BY_NAME.get(self.path.suffix.lower(), "MJCF")
 
     def read(self) -> RobotFile:
         """Read and screen everything."""
@@ -110,16 +120,17 @@ class _RobotReading:
                 " to fourbar new --pins",
             )
         root = self._parse(self.path)
-        if root.tag == "sdf":
-            root = self._convert_sdf(root)
-        elif root.tag == "robot":
-            self._reduce_urdf(root)
-        elif root.tag != "mujoco":
+        if root.tag not in _KINDS:
             raise self._refuse(
                 root.tag,
                 "must be an MJCF, an SDF or a URDF, whose outermost element is "
                 "<mujoco>, <sdf> or <robot>",
             )
+        self.kind = _KINDS[root.tag]
+        if self.kind == "SDF":
+            root = self._convert_sdf(root)
+        elif self.kind == "URDF":
+            self._reduce_urdf(root)
         self._expand(root, self.path, 0)
         self._take_meshes(root)
         self._drop_pictures(root)
@@ -129,6 +140,7 @@ class _RobotReading:
         return RobotFile(
             self.path,
             text,
+            self.kind,
             self.contents,
             self.missing,
             tuple(self.notes),
@@ -187,23 +199,18 @@ class _RobotReading:
         )
 
     def _refuse(self, what: object, allowed: str) -> InputError:
-        return InputError(
-            "MJCF",
-            what,
-            allowed,
-            str(self.path),
-        )
+        return InputError(self.kind, what, allowed, str(self.path))
 
     def _parse(self, path: Path) -> ET.Element:
         """Parse one file; no document type, no depth without bound."""
-        text = read_text(path, "MJCF", LARGEST_TEXT)
+        text = read_text(path, self.kind, LARGEST_TEXT)
         self.size += len(text)
         if self.size > LARGEST_TEXT:
             raise self._refuse(path.name, f"and its includes exceed {LARGEST_TEXT} B")
         for word in ("<!DOCTYPE", "<!ENTITY"):
             if word in text.upper():
                 raise self._refuse(
-                    word, "is not allowed: an MJCF needs no document type"
+                    word, "is not allowed: the file needs no document type"
                 )
         try:
             return self._parse_text(text, path)

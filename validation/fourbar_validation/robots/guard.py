@@ -3,13 +3,13 @@
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from pkgutil import resolve_name
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from fourbar.errors import FourBarError, InputError
 from fourbar.show.tables import show_running
+from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 from fourbar_validation.engines.processes import (
     WORKER_MEMORY,
     bound_memory,
@@ -25,13 +25,14 @@ ROBOT_SECONDS = 120.0
 
 @contextmanager
 def examine_guarded(
-    mjcf: Path,
+    file: RobotFile,
     seconds: float | None = None,
 ) -> Iterator[Callable[..., Any]]:
     """Examine a file, by an adapter and its arguments, in another process.
 
     The process may crash, hang or run out of memory. An adapter is "module:function";
-    its arguments and its result are pickled. `seconds`: limit of each call; None:
+    its arguments and its result are pickled. An error of the adapter on the model
+    begins with the format of the file. `seconds`: limit of each call; None:
     ROBOT_SECONDS.
     """
     seconds = ROBOT_SECONDS if seconds is None else seconds
@@ -63,11 +64,9 @@ def examine_guarded(
             except FourBarError as error:
                 if not isinstance(error, InputError) or error.key != "MJCF":
                     raise
+                value = error.value or file.path.name
                 raise InputError(
-                    error.key,
-                    error.value or mjcf.name,
-                    error.allowed,
-                    str(mjcf),
+                    file.kind, value, error.allowed, str(file.path)
                 ) from None
             except TimeoutError:
                 reason = f"MuJoCo did not come back in {seconds:g} s"
@@ -79,12 +78,7 @@ def examine_guarded(
                 # or the pool would wait for the file to its time limit
                 pool.stop()  # type: ignore[no-untyped-call]
                 raise
-            raise InputError(
-                "MJCF",
-                mjcf.name,
-                reason,
-                str(mjcf),
-            )
+            raise InputError(file.kind, file.path.name, reason, str(file.path))
 
         yield examined
 

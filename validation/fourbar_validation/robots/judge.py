@@ -188,7 +188,7 @@ def judge_file(
     held = replace(options, error=None)
     if options.speed is not None:
         scene = replace(scene, motion=scene.motion.replace(speed=options.speed))
-    with examine_guarded(file.path) as examined:
+    with examine_guarded(file) as examined:
         generated = examined(_EXAMINE, scene, None)
         theirs = examined(_EXAMINE, scene, file, held)
         ours = {

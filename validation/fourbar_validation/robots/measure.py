@@ -112,7 +112,7 @@ def measure_robot(
 ) -> RobotMeasurement:
     """Measure the loops of a robot's file in a guarded process."""
     file = read_robot(path, assets)
-    with examine_guarded(path, MEASURE_SECONDS) as examined:
+    with examine_guarded(file, MEASURE_SECONDS) as examined:
         measurement: RobotMeasurement = examined(_MEASURE, file, options, scene)
     return measurement
 

@@ -92,7 +92,7 @@ def measure_mimic(
         over the motion.
     """
     file = read_robot(path, assets)
-    with examine_guarded(path) as examined:
+    with examine_guarded(file) as examined:
         equality: JointEquality = examined(READ, file, joint, scene)
     positions = np.unique(command(scene).theta_2)
     low = float(positions[0])

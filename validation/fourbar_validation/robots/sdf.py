@@ -179,22 +179,27 @@ class _Edge:
     def rank(self) -> int:
         """Return how early the joint belongs to the tree: the last may close a loop.
 
-        A ball is a connect without loss, and so is a hinge of a planar loop; damping,
-        friction, a spring and a leader are lost.
+        A ball is a connect without loss, and so is a hinge of a planar loop on which
+        nothing acts; a fixed joint is a weld without loss. A range is the least loss.
+        A joint of another kind cannot close a loop.
         """
         if self.kind == "ball":
-            return 4
+            return 5
+        if self.kind == "fixed":
+            return 2 if self.name else 0
         if self.kind not in ("revolute", "continuous"):
-            return 1
-        follows = self.element.find("axis/mimic") is not None
-        return 2 if self.has_dynamics() or follows else 3
+            return 0
+        return {(): 4, ("range",): 3}.get(tuple(self.list_losses()), 1)
 
-    def has_dynamics(self) -> bool:
-        """Tell whether the joint has damping, friction or a spring."""
-        return any(
-            float(_text(self.element, f"axis/dynamics/{name}", "0")) != 0.0
-            for name in ("damping", "friction", "spring_stiffness")
-        )
+    def list_losses(self) -> list[str]:
+        """List what is lost where the joint closes a loop."""
+        axis = self.element.find("axis")
+        if axis is None:
+            return []
+        losses = [
+            word for word in _read_dynamics(axis, self.name) if word != "springref"
+        ]
+        return losses + ["mimic"] * (axis.find("mimic") is not None)
 
     def read_start(self) -> float:
         """Return <initial_position> of a joint with one axis, rad or m; 0 without."""
@@ -569,11 +574,13 @@ class _Conversion:
                 self.left_out.add(f"the {edge.kind} joint {name} of a loop")
             else:
                 self._close("connect", name, ends)
-                lost = "; its damping, friction and spring are lost"
-                self.notes.append(
+                text = (
                     f"{name} closes a loop: it is a <connect>, which holds its point "
-                    f"and not its axis{lost if edge.has_dynamics() else ''}"
+                    "and not its axis"
                 )
+                if losses := edge.list_losses():
+                    text += f"; lost: {', '.join(losses)}"
+                self.notes.append(text)
         for scope, constraint in self.constraints:
             self._add_constraint(scope, constraint)
         for edge in self.edges:

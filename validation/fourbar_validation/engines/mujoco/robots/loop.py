@@ -31,6 +31,8 @@ class RobotFile:
 
     path: Path
     text: str
+    kind: str = "MJCF"
+    """Format of the file: MJCF, SDF or URDF."""
     assets: Mapping[str, bytes] = field(default_factory=dict)
     """Contents of each mesh file, by its name in the text."""
     missing: Mapping[str, str] = field(default_factory=dict)

@@ -75,11 +75,12 @@ def read_joint_equality(
         for tie in list_followers(model, number):
             if tie.joint == joint:
                 return _describe_follower(model, tie, scene)
+    needed = {
+        "MJCF": f'<joint joint1="{name}" joint2="..."> and no equality of a fixed'
+        " tendon over it and one other joint"
+    }.get(file.kind, f"<mimic> in its {name}")
     raise InputError(
-        "--mimic",
-        name,
-        f'follows no other joint: the file has no <joint joint1="{name}" joint2="...">'
-        " and no equality of a fixed tendon over it and one other joint",
+        "--mimic", name, f"follows no other joint: the file has no {needed}"
     )
 
 

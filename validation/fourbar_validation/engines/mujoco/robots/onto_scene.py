@@ -56,6 +56,21 @@ from fourbar_validation.engines.mujoco.robots.scene import (
 )
 from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
 
+_NOTHING_CLOSES = {
+    "MJCF": (
+        "has no equality that closes a loop; where something else does, say where"
+        " pin B is: --name B3=SITE on the coupler, --name B4=SITE on the output"
+    ),
+    "SDF": (
+        "has nothing that closes a loop: a further joint does, or"
+        " <drake:ball_constraint>"
+    ),
+    "URDF": (
+        "has no loop that pins close: its mimic joints stand for loops, and --mimic"
+        " JOINT judges one"
+    ),
+}
+"""Why a file of each format has no loop, and what to do."""
 _MOST_SITES = 12
 """Sites of which two are tried as the pin that closes a loop."""
 ALIKE = 1e-6
@@ -146,12 +161,7 @@ def _list_variants(
         ET.SubElement(equality, "connect", name="B", site1=first, site2=second)
         yield replace(file, text=ET.tostring(closed, encoding="unicode"))
     if not tried:
-        raise InputError(
-            "MJCF",
-            None,
-            "has no equality that closes a loop; where something else does, say where"
-            " pin B is: --name B3=SITE on the coupler, --name B4=SITE on the output",
-        )
+        raise InputError("MJCF", None, _NOTHING_CLOSES[file.kind])
 
 
 def _fit(
