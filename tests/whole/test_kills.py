@@ -5,7 +5,6 @@ Whatever dies, finished scenes stay, and a rerun ends with the same bytes.
 
 import math
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -21,7 +20,7 @@ import numpy as np
 import pytest
 
 import fourbar_validation.run.plan
-from fourbar.errors import BROKEN, DependencyError, FourBarError, InputError
+from fourbar.errors import BROKEN, FourBarError, InputError
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
@@ -30,13 +29,13 @@ from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines import workers
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.engines.table import choose_engines
-from fourbar_validation.report.machine import CODE, build, hash_modules, name_code
+from fourbar_validation.report.machine import CODE, build, hash_modules
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.run import pool
 from fourbar_validation.run.plan import COLLECTING, Plan, RunOptions
 from fourbar_validation.run.run import run
-from fourbar_validation.run.store import RunningError, Store
+from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import (
     AS_LONG_AS,
@@ -209,57 +208,12 @@ def test_a_clock_that_jumps_forward_ends_nothing(
     assert len(starts.read_text().splitlines()) > 1
 
 
-@pytest.mark.slow
-def test_the_bytes_do_not_depend_on_the_workers(
-    tmp_path: Path,
-    undisturbed: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """None, in order, or two."""
-    monkeypatch.setattr(
-        fourbar_validation.run.plan, "SCENES_OF_A_QUICK_TASK", IN_A_TASK
-    )
-    judge_all(Random(COUNT, 0, TYPES), tmp_path, workers=2)
-    for name in ("results.csv", "results.parquet"):
-        assert (tmp_path / name).read_bytes() == (undisturbed / name).read_bytes()
-
-
 def test_random_scenes_depend_on_seed_and_index_alone() -> None:
     short, long = Random(3, SEED, TYPES), Random(30, SEED, TYPES)
     assert short.scene(2).linkage == long.scene(2).linkage
     assert short.scene(2).linkage != Random(3, SEED + 1, TYPES).scene(2).linkage
     names = [long.name(index) for index in range(len(long))]
     assert names == sorted(names)
-
-
-def test_two_runs_into_one_folder_refuse_each_other(tmp_path: Path) -> None:
-    with (
-        Store(tmp_path, {}).held(),
-        pytest.raises(RunningError),
-        Store(tmp_path, {}).held(),
-    ):
-        pass
-    with Store(tmp_path, {}).held():
-        pass
-
-
-def test_another_suite_or_code_does_not_resume_the_parts_of_this_one(
-    tmp_path: Path,
-) -> None:
-    one = {"scenes": "one", **name_code()}
-    for identity, kept, note in (
-        (one, 0, []),
-        (one, 1, []),
-        (one | {"scenes": "two"}, 0, ["made again: the parts of another run (scenes)"]),
-        (
-            one | {"code": "changed"},
-            0,
-            ["made again: the parts of another run (code, scenes)"],
-        ),
-    ):
-        with Store(tmp_path, identity).held() as store:
-            assert (len(store.done()), store.notes) == (kept, note)
-            store.put(0, [])
 
 
 def test_the_hash_of_the_code_is_that_of_its_modules(tmp_path: Path) -> None:
@@ -289,50 +243,13 @@ def test_the_hash_of_the_code_is_that_of_its_modules(tmp_path: Path) -> None:
     assert build("numpy") and build("no-such-package") == ""
 
 
-def test_damaged_swapped_and_foreign_parts_are_made_again_and_named(
-    tmp_path: Path,
-) -> None:
-    row = Row(
-        "a",
-        "engine",
-        "exact",
-        "torque",
-        math.nan,
-        math.inf,
-        REFUSES,
-        "a limit",
-        -0.0,
-        1e-300,
-    )
-    record = Record("a", title="A", rows=[row])
-    with Store(tmp_path / "foreign", {"scenes": "two"}).held() as foreign:
-        foreign.put(4, [record.kept_all()])
-    with Store(tmp_path / "run", {"scenes": "one"}).held() as store:
-        for task in range(6):
-            store.put(task, [record.kept_all()])
-        assert store.done() == set(range(6)) and repr(
-            [Record.restore(kept) for kept in store.read(5)]
-        ) == repr([record])
-        first = store.parts / "000000"
-        first.write_bytes(first.read_bytes()[:-1])
-        (store.parts / "000001").write_bytes(b"")
-        (store.parts / "000002").rename(store.parts / "swap")
-        (store.parts / "000003").rename(store.parts / "000002")
-        (store.parts / "swap").rename(store.parts / "000003")
-        shutil.copy(tmp_path / "foreign" / "parts" / "000004", store.parts / "000004")
-        assert store.done() == {5}
-        assert [note.rpartition(": ")[2] for note in store.notes] == [
-            *(
-                "is damaged",
-                "is damaged",
-                "is another part",
-                "is another part",
-                "is of another run",
-            )
-        ]
-        (store.parts / "000005").write_bytes(b"{}")
-        with pytest.raises(DependencyError, match="is damaged; run it again"):
-            store.read(5)
+def test_a_record_is_read_from_its_part_as_it_was(tmp_path: Path) -> None:
+    errors = (math.nan, math.inf, REFUSES, "a limit", -0.0, 1e-300)
+    record = Record("a", title="A", rows=[Row("a", "engine", "exact", "F12", *errors)])
+    with Store(tmp_path, {}).held() as store:
+        store.put(5, [record.kept_all()])
+        (kept,) = store.read(5)
+    assert repr(Record.restore(kept)) == repr(record)
 
 
 LIMIT = (
@@ -413,8 +330,8 @@ def test_whatever_ended_it_a_rerun_goes_on_and_ends_with_the_same_bytes(
     tmp_path: Path,
     undisturbed: Path,
 ) -> None:
-    """A run is interrupted, killed at random moments and met with a full disk, one
-    after the other in one folder.
+    """A run with one worker is interrupted, killed at random moments and met with a
+    full disk, one after the other in one folder.
     """
     process = start(tmp_path, COUNT)
     wait_for_parts(tmp_path, process, at_least=1)
@@ -515,61 +432,46 @@ def guests_of(mark: str, program: str) -> list[int]:
     return guests
 
 
-@pytest.fixture(scope="module")
-def guest(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """The option that has a program judged too."""
-    return f"--guest={write_program(tmp_path_factory.mktemp('guest'), 'plain')}"
-
-
-@pytest.fixture(scope="module")
-def undisturbed_with_guest(
-    guest: str,
-    tmp_path_factory: pytest.TempPathFactory,
-) -> bytes:
-    """The results of a run with that program that nothing disturbed."""
-    out = tmp_path_factory.mktemp("undisturbed")
-    assert start(out, COUNT, more=[guest]).wait(timeout=100) == 0
-    return (out / "results.csv").read_bytes()
-
-
 @pytest.mark.slow
 @pytest.mark.linux
 @pytest.mark.timeout(200 + 120 * KILLS)
-@pytest.mark.parametrize("kind", ["guest", "worker", "run"])
-def test_any_process_of_a_run_with_a_guest_killed_changes_no_byte(
+def test_a_guest_its_worker_and_its_run_killed_in_turn_change_no_byte(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    guest: str,
-    undisturbed_with_guest: bytes,
-    kind: str,
 ) -> None:
-    """Killed in the middle, with questions left to ask.
-
-    A run that ended early is resumed.
-    """
+    """Each is killed in the middle, with questions left to ask."""
+    guest = [f"--guest={write_program(tmp_path, 'plain')}"]
+    undisturbed = tmp_path / "undisturbed"
+    assert start(undisturbed, COUNT, more=guest).wait(timeout=100) == 0
     mark = f"MARK_OF_TEST={tmp_path}"
     monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
-    rng = np.random.default_rng(SEED + 2)
     for kill in range(KILLS):
         out = tmp_path / str(kill)
-        process = start(out, COUNT, more=[guest])
-        wait_for_parts(out, process, at_least=1)
-        victims: list[int] = []
-        while not victims:
-            assert process.poll() is None, "it ended before anything was killed"
-            victims = {
-                "guest": guests_of(mark, "plain.py"),
-                "worker": workers_of(process),
-                "run": [process.pid],
-            }[kind]
-        os.kill(victims[int(rng.integers(len(victims)))], signal.SIGKILL)
-        status = process.wait(timeout=200)
-        if kind == "run" or status == BROKEN:
-            assert_unfinished(out)
-            status = start(out, COUNT, more=[guest]).wait(timeout=100)
-        assert status == 0
-        assert (out / "results.csv").read_bytes() == undisturbed_with_guest
-    time.sleep(2.0)
+        process = start(out, COUNT, more=guest)
+        for victim in ("guest", "worker", "run"):
+            parts = len(list(out.glob("parts/0*")))
+            wait_for_parts(out, process, at_least=parts + 1)
+            victims: list[int] = []
+            while not victims and process.poll() is None:
+                time.sleep(0.01)
+                victims = {
+                    "guest": guests_of(mark, "plain.py"),
+                    "worker": workers_of(process),
+                    "run": [process.pid],
+                }[victim]
+            if process.poll() == BROKEN:  # its worker was killed when it had no task
+                break
+            os.kill(victims[0], signal.SIGKILL)
+        process.wait()
+        assert_unfinished(out)
+        assert start(out, COUNT, more=guest).wait(timeout=100) == 0
+        expected, killed = (
+            (folder / "results.csv").read_bytes() for folder in (undisturbed, out)
+        )
+        assert killed == expected
+    latest = time.monotonic() + 30.0
+    while list_processes(mark) and time.monotonic() < latest:
+        time.sleep(0.1)
     assert not list_processes(mark)
 
 
