@@ -115,6 +115,10 @@ def test_two_copies_of_a_part_are_one_only_if_their_rows_are_the_same(
     assert status(again) == HOLDS  # in other times
     out = ["-o", str(tmp_path / "all")]
     assert status(["collect", *parts, copy, *out]) == HOLDS
+    (task,) = Path(copy, "parts").iterdir()
+    task.write_bytes(task.read_bytes()[:-3])
+    said = refusal(["collect", *parts, copy, *out], capsys)
+    assert "is damaged" in said and "differs from another folder's" in said
     shutil.rmtree(copy)
     monkeypatch.setattr(Store, "put", worsen(Store.put))
     assert status(again) == HOLDS

@@ -108,9 +108,9 @@ def report_differences(
         raise InputError(
             "OLD",
             str(old),
-            f"shares {differences.shared} of {differences.rows} rows with the new run, "
-            "fewer than half: name a run of the same suite, or compare a part of it "
-            "with --only and --engines",
+            f"shares {differences.shared} of {differences.rows} rows with the new run,"
+            " fewer than half of what it was asked for: name a run of the same suite,"
+            " or compare a part of it with --only and --engines",
         )
     return differences.status
 
@@ -171,7 +171,7 @@ def compare_command(
     another question (a scene that changed, other settings or positions) are named and
     not compared; what the new run was not asked for is "not run". Exit status 1 on a
     regression or if nothing was compared, 2 where the runs share fewer than half of
-    their rows.
+    the rows that both were asked for.
     """
     return report_differences(
         find_baseline(old),

@@ -81,10 +81,8 @@ class Kind(StrEnum):
 
 WHOLE = (Kind.ENGINE_GONE, Kind.SCENE_GONE, Kind.REFUSED)
 """Kinds of what is missing as a whole, which is named once and not row by row."""
-REGRESSIONS = (
-    *WHOLE,
-    *(Kind.VERDICT_WORSE, Kind.NEW_FAILURE, Kind.WORSE, Kind.GONE),
-)
+_DISAGREEING = (Kind.VERDICT_WORSE, Kind.NEW_FAILURE, Kind.WORSE)
+REGRESSIONS = (*WHOLE, *_DISAGREEING, Kind.GONE)
 _OF_ONE_RUN = (
     *(Kind.ENGINE_GONE, Kind.SCENE_GONE, Kind.GONE, Kind.NOT_RUN),
     *(Kind.GONE_FAILURE, Kind.NEW, Kind.NEW_FAILURE),
@@ -203,11 +201,11 @@ class Differences:
 
     @property
     def strange(self) -> bool:
-        """Return whether the runs share fewer than half of their rows.
+        """Return whether the runs share fewer than half of what both were asked for.
 
-        The old one is then of another suite, or holds far more than the new one.
+        The old one is then of another suite.
         """
-        return 2 * self.shared < self.rows
+        return 2 * self.shared < self.rows - self.kinds[Kind.NOT_RUN]
 
     @property
     def status(self) -> int:
@@ -287,7 +285,7 @@ class Differences:
         exact &= lines.verdict_old.isin(COMPARED_VERDICTS) | lines.verdict_new.isin(
             COMPARED_VERDICTS
         )
-        worse = lines[lines.kind.isin(REGRESSIONS)].groupby("scene").engine.agg(set)
+        worse = lines[lines.kind.isin(_DISAGREEING)].groupby("scene").engine.agg(set)
         of_scene = lines[exact].groupby("scene").engine.agg(set)
         counts = Counter(
             write_fault_sentence(engines, of_scene.get(scene, set()))
@@ -504,11 +502,10 @@ def _classify_missing(
         without_scene = Kind.SCENE_GONE
     else:
         without_scene = Kind.NOT_RUN
-    optional = after.settings.get("chosen") != ""
-    unable = after.settings.get("missing", "").split(", ")
-    without_engine = np.where(
-        optional | table.engine.isin(unable), Kind.NOT_RUN, Kind.ENGINE_GONE
-    )
+    if after.settings.get("chosen") == "":
+        without_engine = Kind.ENGINE_GONE
+    else:
+        without_engine = Kind.NOT_RUN
     return np.select(
         [~table.scene.isin(scenes), ~table.engine.isin(engines), mended],
         [without_scene, without_engine, Kind.GONE_FAILURE],
@@ -516,7 +513,7 @@ def _classify_missing(
     )
 
 
-_NOT_SURROUNDINGS = ("suite", "scenes of", "chosen", "missing", "guests")
+_NOT_SURROUNDINGS = ("suite", "scenes of", "chosen", "guests")
 """Settings that say what was asked for, and not with what."""
 
 

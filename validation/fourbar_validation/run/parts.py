@@ -74,9 +74,16 @@ class _Gathered:
                 _require_alike(task, first, store)
 
     def _require_all(self) -> None:
-        """Raise InputError that names the parts with missing or damaged tasks."""
+        """Raise InputError that names the parts with missing or damaged tasks.
+
+        A damaged task is no copy of the one that another folder holds.
+        """
         tasks = range(len(self._plan.tasks))
         missing = [task for task in tasks if task not in self._stores]
+        damaged = "; ".join(self._damaged[:_MOST_NAMED]) or None
+        if damaged and not missing:
+            why = "differs from another folder's: leave it out, or judge its part again"
+            raise InputError("DIR", damaged, why)
         if not missing:
             return
         numbers = sorted({task % self._parts + 1 for task in missing})
@@ -86,7 +93,7 @@ class _Gathered:
             f" and {further} more" if further > 0 else ""
         )
         why = f"{len(missing)} of {len(tasks)} tasks are missing: run {words} again"
-        raise InputError("DIR", "; ".join(self._damaged[:_MOST_NAMED]) or None, why)
+        raise InputError("DIR", damaged, why)
 
     def read(self, task: int) -> list[Any]:
         """Read the results of a task."""

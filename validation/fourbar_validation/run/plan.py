@@ -116,7 +116,6 @@ class Plan:
         return {
             "chosen": self.chosen,
             "scenes of": self.suite_name,
-            "missing": ", ".join(name for name, _ in self.missing),
         }
 
     @property
