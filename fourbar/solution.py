@@ -3,7 +3,7 @@
 import csv
 import io
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
@@ -111,6 +111,12 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
     """Instants of a free motion, and those between at which an angle of it is largest
     or smallest.
     """
+    command_at: Callable[[Array], Command] | None = field(
+        default=None, compare=False, kw_only=True
+    )
+    """Function that returns a free motion at other times, (n,) rising from 0, s,
+    without integrating it again.
+    """
 
     at: Command = field(default=None, kw_only=True)  # type: ignore[assignment]  # by `solve`
     """Positions that were solved, with what is commanded."""
@@ -152,6 +158,7 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
         return all(
             _is_equal(getattr(self, part.name), getattr(other, part.name))
             for part in fields(self)
+            if part.compare
         )
 
     def __repr__(self) -> str:

@@ -114,6 +114,7 @@ def solve(
         commanded = released.command
         of_release["change_points"] = released.change_points
         of_release["with_extremes"] = released.with_extremes
+        of_release["command_at"] = released.command_at
     else:
         commanded = command(scene)
     request = SolveRequest.of(scene, commanded, stage, out)
@@ -443,7 +444,8 @@ def make_solution(
     Parameters
     ----------
     solved : the scene, or None for a study, whose numbers are arrays.
-    of_release : what a free motion passed: `change_points` and `with_extremes`.
+    of_release : fields of a free motion: `change_points`, `with_extremes` and
+        `command_at`.
     """
     codes = results.codes
     quantities_by_name = results.arrays

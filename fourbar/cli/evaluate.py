@@ -375,7 +375,7 @@ def _write_summary(
 
     if not asked:
         block = write_block(scene, solution, units, pressure=pressure, width=width)
-        return "\n".join([*block, *write_paths(scene, units), ""])
+        return "\n".join([*block, *write_paths(solution, units), ""])
     lines: list[str] = []
     headed = True
     for text, at in asked.items():
@@ -415,7 +415,7 @@ def _write_positions(
     if form == "json":
         motor = write_motor(scene, solution, units)
         notes = [*list_arm_notes(scene), *list_spring_notes(scene, solution, units)]
-        paths = collect_paths(scene, units)
+        paths = collect_paths(solution, units)
         return write_json(solution, units, motor=motor, notes=notes, paths=paths)
     if form == "csv":
         chosen = _list_chosen(columns, units) if columns else None

@@ -14,8 +14,8 @@ is possible.
 
 import cmath
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, NamedTuple, Self
 
@@ -82,6 +82,12 @@ class Released:
     """The same command with more instants between: those at which the angle of a bar or
     the sine of the transmission angle is largest or smallest.
     """
+    run: "_Run" = field(repr=False, init=False)
+    """Integration that the motion is read from."""
+
+    def command_at(self, times: Array) -> Command:
+        """Return the command at other times, (n,) rising from 0, s, of the same run."""
+        return self.run.report(times).command
 
     @property
     def time(self) -> Array:
@@ -150,7 +156,7 @@ def release_at(scene: Scene, times: Array) -> Released:
             "a free motion is released at one angle",
         )
     placed = scene.settled()
-    released = integrate(
+    return integrate(
         scene.linkage,
         (*placed.loads, *placed.effects),
         float(start.angle[0]),
@@ -158,21 +164,8 @@ def release_at(scene: Scene, times: Array) -> Released:
         int(start.branch[0]),
         times,
         bar=start.bar,
+        wound=Case.of(scene) if scene.counts_turns else None,
     )
-    if scene.counts_turns:
-        motion = released.command
-        with np.errstate(all="ignore"):
-            begun = Case.of(scene).begin_with(motion.part(slice(0, 1)))
-            state = begun.at(motion)
-            for term in begun.terms:
-                codes = term.status(state, motion.branch) if term.counts_turns else None
-                if codes is not None and codes.any():
-                    raise LimitError(
-                        f"effects.{term.key}: at {released.time[np.argmax(codes)]:.6g}"
-                        " s the free motion has turned a pin by more than half a turn"
-                        " from the rest of its spring, which is not modelled"
-                    )
-    return released
 
 
 def _convert_to_floats(numbers: Any) -> Any:
@@ -244,6 +237,7 @@ def integrate(
     times: Array,
     *,
     bar: int = 2,
+    wound: Case | None = None,
 ) -> Released:
     """Integrate the motion from theta_2 with omega_2, without a driving torque.
 
@@ -257,6 +251,7 @@ def integrate(
         or -1.
     times : (n,) rising from 0, s.
     bar : 2, or 3 or 4.
+    wound : whose springs are not to be wound beyond half a turn from their rest.
 
     Raises
     ------
@@ -271,39 +266,64 @@ def integrate(
         raise LimitError(
             "a free motion cannot carry friction that depends on the pin forces"
         )
+    run = _Run(linkage, terms, times, float(branch), wound)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore", under="ignore"):
-        run = _Run(linkage, terms, times)
-        return run.begin(theta, omega, float(branch), bar)
+        run.begin(theta, omega, bar)
+    return run.report(times)
+
+
+class _Stretch(NamedTuple):
+    """Part of a motion that is read in one angle, and on one side of dry friction."""
+
+    reading: _Reading
+    stop: float
+    """Time of its end, s; inf where the linkage stands from then on."""
+    extremes: Array
+    """Times at which an angle or sin(mu) turns back, s."""
+    instants: Array
+    """Times at which the angles of both bars are kept, s."""
+    angles: dict[int, Array]
+    """Angles of bars 2 and 4 at these times, continuous over the turns."""
+    energies: Array
+    """Kinetic energy and work at these times, (2, n), J."""
+    solve: Callable[[Array], Array]
+    """Angle, speed and work at times, (3, n)."""
+    side: float
+    moves: bool
+
+
+def _stand_at(y: Array) -> Callable[[Array], Array]:
+    """Return a motion that stays where it is."""
+    return lambda times: np.repeat(y[:, np.newaxis], times.size, axis=1)
 
 
 class _Run:
-    """Integration of a motion: the linkage, what acts on it, and what is reported."""
+    """Integration of a motion: the linkage, what acts on it, and its stretches."""
 
     def __init__(
         self,
         linkage: FourBar,
         terms: tuple[Effect, ...],
         times: Array,
+        branch: float,
+        wound: Case | None,
     ) -> None:
         self.linkage = linkage
         self.terms = terms
         self.times = times
+        self.branch = branch
+        self.wound = wound
         self.lengths = _convert_to_floats(loop(*linkage.lengths))
         two, three, four = map(_convert_to_floats, list_bodies(linkage, terms))
         self.bodies: tuple[Body, Body, Body] = two, three, four
         self.is_dry = any(term.dry for term in terms)
         self.steps = 0
-        self.energies: list[Array] = []
-        """Kinetic energy and work at the instants of each stretch, (2, n), J."""
-        self.reported: list[Array] = []
-        """Reported times of each stretch, s."""
-        self.rows: list[Array] = []
-        """Reported instants of each stretch, (n, 10), as `_conclude` reads them."""
+        self.stretches: list[_Stretch] = []
         self.change_points: list[float] = []
 
-    def begin(self, theta: float, omega: float, branch: float, bar: int) -> Released:
-        """Follow the motion from an angle and a speed of a bar, and report it."""
-        reading = _Reading.of(self.linkage, bar, branch)
+    def begin(self, theta: float, omega: float, bar: int) -> None:
+        """Follow the motion from an angle and a speed of a bar."""
+        reading = _Reading.of(self.linkage, bar, self.branch)
         position, k = reading.close(theta)
         if not np.isfinite(position.u3):
             key = f"motion.theta_{bar}"
@@ -325,7 +345,6 @@ class _Run:
         if reading.measure_room(position) < 0.0:
             reading, y = self._change_over(reading, angles, y)
         self._follow(reading, angles, y)
-        return self._conclude(branch)
 
     def _compute_inertia(self, position: Position, k: Coefficients) -> Any:
         return sum(inertia(self.lengths.a, self.bodies, position, k))
@@ -406,22 +425,19 @@ class _Run:
         """
         start = 0.0
         end = float(self.times[-1])
-        due = self.times
-        while due.size:
+        while True:
             side, moves = self._find_side(reading, y)
             if not moves or start == end:
-                still = np.repeat(y[:, np.newaxis], due.size, axis=1)
-                self._report(reading, angles, due, still, due, side, moves)
+                here = np.empty(0), np.array([start])
+                self._keep(reading, angles, here, _stand_at(y), side, moves)
                 break
             solved = self._integrate(reading, start, y, side)
+            extremes = self._find_extremes(reading, solved)
+            times = extremes, solved.t
+            angles = self._keep(reading, angles, times, solved.sol, side, moves)
             start = float(solved.t[-1])
-            now = due[due <= start]
-            due = due[now.size :]
-            extremes = np.setdiff1d(self._find_extremes(reading, solved), now)
-            now = np.sort(np.concatenate([now, extremes]))
-            instants = np.union1d(solved.t, now)
-            motion = solved.sol(instants)
-            angles = self._report(reading, angles, instants, motion, now, side, moves)
+            if start == end:
+                break
             y = np.array(solved.y[:, -1])
             if not solved.t_events[0].size:
                 y[1] = 0.0
@@ -533,37 +549,58 @@ class _Run:
                     time = brentq(lambda t, n, f: f(t) - n, low, high, (turn, count))
                     self.change_points.append(time)
 
-    def _report(
+    def _keep(
         self,
         reading: _Reading,
         angles: Mapping[int, float],
-        instants: Array,
-        motion: Array,
-        due: Array,
+        times: tuple[Array, Array],
+        solve: Callable[[Array], Array],
         side: float,
         moves: bool,
     ) -> dict[int, float]:
-        """Report a stretch, and return the angles of bars 2 and 4 at its end.
+        """Keep a stretch, and return the angles of bars 2 and 4 at its end.
 
         Parameters
         ----------
-        angles : of both bars at its beginning; they are continuous over the turns.
-        instants, motion : its steps and those that are due, s, with (3, n) there.
-        due : those to report.
+        angles : of both bars at its beginning.
+        times : those at which an angle or sin(mu) turns back, and its steps, s.
+        solve : angle, speed and work at times, (3, n).
         """
-        q, rate, work = motion
+        extremes, steps = times
+        stop = float(steps[-1]) if moves else np.inf
+        due = self.times[(self.times >= steps[0]) & (self.times <= stop)]
+        instants = np.unique(np.concatenate([extremes, steps, due]))
+        q, rate, work = solve(instants)
         position, k = reading.close(q)
         energy = 0.5 * self._compute_inertia(position, k) * rate * rate
-        self.energies.append(np.array([energy, work]))
         turned = {}
         for bar, u in ((2, position.u2), (4, position.u4)):
             phase = np.unwrap(np.broadcast_to(angle(u), q.shape))
             turned[bar] = phase + TURN * round((angles[bar] - phase[0]) / TURN)
         turned[reading.path.bar] = q
-        growth = self._compute_rates(reading, motion, side)[1] if moves else 0.0 * q
+        energies = np.array([energy, work])
+        stretch = _Stretch(
+            reading, stop, extremes, instants, turned, energies, solve, side, moves
+        )
+        self.stretches.append(stretch)
+        return {bar: float(values[-1]) for bar, values in turned.items()}
+
+    def _read(self, stretch: _Stretch, times: Array) -> Array:
+        """Read instants of a stretch, (n, 10), as `report` needs them."""
+        reading = stretch.reading
+        q, rate, _ = motion = stretch.solve(times)
+        position, k = reading.close(q)
+        theta_2 = q
+        if reading.path.bar != 2:
+            theta_2 = np.broadcast_to(angle(position.u2), q.shape)
+            near = np.interp(times, stretch.instants, stretch.angles[2])
+            theta_2 = theta_2 + TURN * np.round((near - theta_2) / TURN)
+        growth = 0.0 * q
+        if stretch.moves:
+            growth = self._compute_rates(reading, motion, stretch.side)[1]
         moving = rates(k, rate, growth)
         columns = (
-            turned[2],
+            theta_2,
             moving.omega_2,
             moving.alpha_2,
             drive_sine(position, 2),
@@ -572,38 +609,70 @@ class _Run:
             rate,
             growth,
             reading.branch,
-            np.where(rate == 0.0, side, 0.0),
+            np.where(rate == 0.0, stretch.side, 0.0),
         )
-        rows = np.stack(np.broadcast_arrays(*columns), axis=1)
-        self.rows.append(rows[np.searchsorted(instants, due)])
-        self.reported.append(due)
-        return {bar: float(values[-1]) for bar, values in turned.items()}
+        return np.stack(np.broadcast_arrays(*columns), axis=1)
 
-    def _conclude(self, branch: float) -> Released:
+    def report(self, times: Array) -> Released:
+        """Report the motion at times, (n,) rising from 0, s."""
+        reported = []
+        rows = []
+        due = times
+        with np.errstate(all="ignore"):
+            for stretch in self.stretches:
+                now = due[due <= stretch.stop]
+                due = due[now.size :]
+                now = np.union1d(now, stretch.extremes[stretch.extremes <= times[-1]])
+                if now.size:
+                    reported.append(now)
+                    rows.append(self._read(stretch, now))
+        released = self._conclude(times, np.concatenate(reported), np.concatenate(rows))
+        if self.wound is not None:
+            self._require_unwound(self.wound, released.command)
+        return released
+
+    def _require_unwound(self, case: Case, motion: Command) -> None:
+        """Raise LimitError where a spring is beyond half a turn from its rest."""
+        with np.errstate(all="ignore"):
+            begun = case.begin_with(motion.part(slice(0, 1)))
+            state = begun.at(motion)
+            for term in begun.terms:
+                codes = term.status(state, motion.branch) if term.counts_turns else None
+                if codes is not None and codes.any():
+                    assert motion.time is not None
+                    raise LimitError(
+                        f"effects.{term.key}: at {motion.time[np.argmax(codes)]:.6g}"
+                        " s the free motion has turned a pin by more than half a turn"
+                        " from the rest of its spring, which is not modelled"
+                    )
+
+    def _conclude(self, times: Array, reported: Array, rows: Array) -> Released:
         """Put the reported instants together; the branch is that of the start."""
-        rows = np.concatenate(self.rows)
         theta_2, omega_2, alpha_2, sine, bar, *independent = rows.T
-        path = _Reading.of(self.linkage, 2, branch).path
+        path = _Reading.of(self.linkage, 2, self.branch).path
         signs = np.array(path.sign(theta_2, np.copysign(1.0, sine)))
         # at a limit of theta_2 both branches meet, and the last one goes on
         is_sure = np.abs(sine) > NO_DIGIT_LEFT
         last = np.maximum.accumulate(np.where(is_sure, np.arange(sine.size), -1))
-        signs = np.where(last < 0, branch, signs[last])
-        times = np.concatenate(self.reported)
+        signs = np.where(last < 0, self.branch, signs[last])
         command = Command(
             theta_2,
             signs.astype(np.int8),
             omega_2,
             alpha_2,
-            time=times,
+            time=reported,
             origin=ReleaseOrigin(bar.astype(np.int8), *independent),
         )
-        energy, work = np.concatenate(self.energies, axis=1)
+        energies = [stretch.energies for stretch in self.stretches]
+        energy, work = np.concatenate(energies, axis=1)
         largest = float(np.max(np.abs([energy, work])))
         drift = float(np.max(np.abs(energy - energy[0] - work)))
-        return Released(
-            command.part(np.isin(times, self.times)),
+        released = Released(
+            command.part(np.isin(reported, times)),
             drift / largest if largest else 0.0,
-            tuple(sorted(set(self.change_points))),  # two may lie within one step
+            # two may lie within one step
+            tuple(sorted({time for time in self.change_points if time <= times[-1]})),
             command,
         )
+        released.run = self
+        return released

@@ -62,8 +62,9 @@ def has_growing_forces(scene: Scene, solution: Solution) -> bool:
     `solution`: of the release, over time.
     """
     assert solution.time is not None
+    assert solution.command_at is not None
     instants = np.array([0.0, *(solution.change_points or ())])
-    speed = np.asarray(release_at(scene, instants).command.speed, dtype=float)
+    speed = np.asarray(solution.command_at(instants).speed, dtype=float)
     # a motion that comes to rest before it meets the last of them has fewer instants
     instants = instants[: len(speed)]
     moving = speed != 0.0
@@ -73,7 +74,7 @@ def has_growing_forces(scene: Scene, solution: Solution) -> bool:
     times = times[within_motion.all(axis=1)]
     # the release begins at time 0, which is the first row
     rising, rows = np.unique([0.0, *times.ravel()], return_inverse=True)
-    beside = solve(scene, "force", at=release_at(scene, rising).command)
+    beside = solve(scene, "force", at=solution.command_at(rising))
     for rows_of_one in rows[1:].reshape(times.shape):
         limits = _extrapolate_forces(beside, rows_of_one)
         if np.isnan([*limits.values()]).any():

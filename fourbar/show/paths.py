@@ -5,22 +5,23 @@ from typing import Any
 import numpy as np
 
 from fourbar.errors import clean_line
-from fourbar.scene import Scene
 from fourbar.show.units import choose_unit, drop_rounding
-from fourbar.solution import Conversion, find_unit_in
+from fourbar.solution import Conversion, Solution, find_unit_in
 from fourbar.studies.paths import measure_paths
 
 _INDENT = " " * 4
 
 
-def write_paths(scene: Scene, units: Conversion) -> list[str]:
-    """Write two lines for each point: its extent, and how straight its path is."""
+def write_paths(solution: Solution, units: Conversion) -> list[str]:
+    """Write three lines for each point: its extent, and how straight its path is."""
+    scene = solution.scene
+    assert scene is not None
     lines = []
     name = scene.motion.commanded
     unit = "rad" if scene.motion.stroke is None else "m"
     if scene.motion.law is not None or scene.motion.free is not None:
         name, unit = "t", "s"
-    for point, path in measure_paths(scene).items():
+    for point, path in measure_paths(solution).items():
         largest = max(path.stroke, *map(abs, (*path.x, *path.y)))
         factor, length = choose_unit(largest, "m", units)
         x, y, (across, along) = (
@@ -43,8 +44,10 @@ def write_paths(scene: Scene, units: Conversion) -> list[str]:
     return lines
 
 
-def collect_paths(scene: Scene, units: Conversion) -> dict[str, Any]:
+def collect_paths(solution: Solution, units: Conversion) -> dict[str, Any]:
     """Collect the paths as the JSON has them, by the name of the point."""
+    scene = solution.scene
+    assert scene is not None
     length, angle = (find_unit_in(unit, units)[1] for unit in ("m", "rad"))
     over_time = scene.motion.law is not None or scene.motion.free is not None
     place = 1.0 if over_time else length if scene.motion.stroke is not None else angle
@@ -57,5 +60,5 @@ def collect_paths(scene: Scene, units: Conversion) -> dict[str, Any]:
             "direction": angle * path.direction,
             "ends": [place * end for end in path.ends],
         }
-        for name, path in measure_paths(scene).items()
+        for name, path in measure_paths(solution).items()
     }

@@ -46,11 +46,21 @@ class MotionCourse:
     """Motion of a scene, of which any place can be solved.
 
     A scene that states single positions has the range that holds the first of them.
+
+    `released`: solution of the scene's free motion, which is then not integrated again.
     """
 
-    def __init__(self, scene: Scene, stage: str) -> None:
+    def __init__(
+        self, scene: Scene, stage: str, released: Solution | None = None
+    ) -> None:
         self.scene = scene
         self.stage = stage
+        self.command_at = None if released is None else released.command_at
+        """Function that returns the command of a free motion at other times."""
+        if scene.motion.free is not None and self.command_at is None:
+            released = solve(scene, "position")
+            self.command_at = released.command_at
+        self.released = released
         self.places = self._list_places()
         """Commanded angles or strokes, or times, in the order of the motion, (n,)."""
         self.solution = self.solve(self.places)
@@ -75,12 +85,10 @@ class MotionCourse:
 
     def command(self, places: Array) -> Command:
         """Return the command at some places of the motion."""
-        if self.scene.motion.free is None:
+        if self.command_at is None:
             return command_at(self.scene, places)
-        from fourbar.evaluation.free_motion import release_at
-
         times, rows = np.unique(np.append(0.0, places), return_inverse=True)
-        return release_at(self.scene, times).command.part(rows[1:])
+        return self.command_at(times).part(rows[1:])
 
     def solve(self, places: Array) -> Solution:
         """Solve some places of the motion."""
@@ -89,10 +97,8 @@ class MotionCourse:
     def _list_places(self) -> Array:
         """List the places that the scene states, with others between them."""
         motion = self.scene.motion
-        if motion.free is not None:
-            from fourbar.evaluation.free_motion import release
-
-            stated = release(self.scene).command.places
+        if self.released is not None and motion.free is not None:
+            stated = self.released.at.places
         else:
             stated = command(self.scene).places
         over_time = motion.free is not None or motion.law is not None

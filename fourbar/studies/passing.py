@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError, NotAssembledError, write_in_units
+from fourbar.evaluation.free_motion import Released, release
 from fourbar.formulas.mobility import TURN, find_intervals
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at
@@ -273,29 +274,21 @@ def _write_position(name: str, value: float, digits: int = 6) -> str:
 
 def _find_released(scene: Scene, name: str, value: float) -> Command:
     """Find the instant at which a released motion first passes a value."""
-    from fourbar.evaluation.free_motion import release
-
     free = scene.motion.free
     assert free is not None
 
-    def run(duration: float, steps: int) -> Command:
-        shorter = replace(free, duration=duration, steps=steps)
-        return release(
-            replace(scene, motion=scene.motion.replace(free=shorter))
-        ).command
+    released = release(scene)
+    whole = released.command
 
     def read(at: Command) -> Array:
         return _require_values(getattr(solve(scene, "position", at=at), name), name)
 
     if name == "time":
-        if value == 0.0:
-            return run(free.duration, 1).part(slice(0, 1))
-        if not 0.0 < value <= free.duration:
+        if not 0.0 <= value <= free.duration:
             raise NotAssembledError(
                 f"{_say_position(name, value)}: the release lasts {free.duration:.6g} s"
             )
-        return _take_last(run(value, 1), value)
-    whole = run(free.duration, free.steps)
+        return _take_instant(released, value)
     times = whole.time
     assert times is not None
     values = read(whole)
@@ -305,30 +298,21 @@ def _find_released(scene: Scene, name: str, value: float) -> Command:
     rows = _find_crossings(name, gaps)
     if len(rows) == 0:
         raise _never_passed(name, value, values)
-    first = int(rows[0])
-    if gaps[first + 1] == 0.0:
-        return whole.part(slice(first + 1, first + 2))
+    low, high = times[rows[0] : rows[0] + 2].tolist()
 
     def gap(time: float) -> float:
-        if time == times[0]:
-            return float(gaps[0])
-        return float(_measure_gaps(name, read(run(time, 1))[-1:], value)[0])
+        here = read(_take_instant(released, time))
+        return float(_measure_gaps(name, here, value)[0])
 
     from scipy.optimize import brentq
 
-    low, high = times[first : first + 2].tolist()
     time = float(brentq(gap, low, high, xtol=LAST_DIGIT * high, rtol=LAST_DIGIT))
-    return _take_last(run(time, 1), time)
+    return _take_instant(released, time)
 
 
-def _take_last(motion: Command, time: float) -> Command:
-    """Take the last instant; NotAssembledError where the motion had stopped before."""
-    assert motion.time is not None
-    if motion.time[-1] != time:
-        raise NotAssembledError(
-            f"{_say_position('time', time)}: the motion has stopped before"
-        )
-    return motion.part(slice(-1, None))
+def _take_instant(released: Released, time: float) -> Command:
+    """Take one instant of a free motion."""
+    return released.command_at(np.unique([0.0, time])).part(slice(-1, None))
 
 
 def join_commands(commands: list[Command]) -> Command:

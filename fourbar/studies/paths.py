@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from fourbar.formulas.mobility import TURN
 from fourbar.quantities import Array
-from fourbar.scene import Scene
 from fourbar.scene.motion import Sweep
-from fourbar.solution import shift_to_drawing
+from fourbar.solution import Solution, shift_to_drawing
 from fourbar.studies.course import MotionCourse
 
 ROUNDS = 3
@@ -45,16 +44,18 @@ class Path(NamedTuple):
     """Corners of the rectangle of stroke and straightness, (4, 2)."""
 
 
-def measure_paths(scene: Scene) -> dict[str, Path]:
-    """Measure the path of each point over the scene's motion.
+def measure_paths(solution: Solution) -> dict[str, Path]:
+    """Measure the path of each point over the motion of a solved scene.
 
     Nothing is measured of a scene that states single positions.
     """
+    scene = solution.scene
+    assert scene is not None
     motion = scene.motion
     moves = motion.law is not None or motion.free is not None
     if not scene.points or not (moves or isinstance(motion.angle, Sweep | None)):
         return {}
-    course = MotionCourse(scene, "position")
+    course = MotionCourse(scene, "position", solution)
     if not course.solution.assembled.any():
         return {}
     return {point.name: _measure_path(course, point.name) for point in scene.points}

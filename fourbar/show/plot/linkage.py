@@ -395,7 +395,7 @@ def draw_linkage(
 def _mark_paths(axes: "Axes", view: View) -> None:
     """Draw stroke and straightness of the points' paths as rectangles about them."""
     factor, _, _ = choose_drawing_scale(view)
-    for path in measure_paths(view.scene).values():
+    for path in measure_paths(view.sweep).values():
         corners = factor * (path.corners - view.scene.origin)
         x, y = np.append(corners, corners[:1], axis=0).T
         axes.plot(x, y, color=POINT, lw=0.6, zorder=2)

@@ -1,14 +1,17 @@
 """Extents of paths, against closed forms and a scan of directions."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from fourbar.evaluation import free_motion
 from fourbar.files import loads
 from fourbar.show.paths import write_paths
 from fourbar.show.units import units
+from fourbar.solving import solve
 from fourbar.studies.paths import measure_paths
 
 LENGTHS = (22.114772314, 4.188803, 12.010892, 18.925111)
@@ -61,7 +64,7 @@ def test_straightness_is_the_distance_of_the_nearest_two_lines(
     """Whatever the ground's angle, and however coarse the steps are."""
     sweep = f'theta_2 = {{ from = "0 deg", to = "360 deg", steps = {steps} }}'
     scene = loads(DRIVE.format(angle=ANGLE + turned, motion=sweep))
-    (path,) = measure_paths(scene).values()
+    (path,) = measure_paths(solve(scene)).values()
     assert 1e3 * path.stroke == pytest.approx(10.0, abs=1e-6)
     assert 1e3 * path.straightness == pytest.approx(0.1, abs=1e-7)
     width, length, direction = scan(close(2000), np.linspace(0.0, np.pi, 181))
@@ -103,7 +106,7 @@ def test_the_arc_of_a_crank_has_its_chord_and_its_sagitta(
     ends: tuple[float, float] | None,
 ) -> None:
     """Over 80 deg: chord 2 r sin 40 deg, sagitta r (1 - cos 40 deg), y to 80 mm."""
-    (path,) = measure_paths(loads(CRANK + motion)).values()
+    (path,) = measure_paths(solve(loads(CRANK + motion))).values()
     half = math.radians(40.0)
     assert path.stroke == pytest.approx(0.16 * math.sin(half), abs=1e-12)
     assert path.straightness == pytest.approx(0.08 * (1.0 - math.cos(half)), abs=1e-12)
@@ -135,7 +138,7 @@ def test_a_wide_curve_is_no_narrower_than_by_a_scan(
     text = "".join(f'{bar} = "{length} m"\n' for bar, length in bars)
     text = f"[lengths]\n{text}[motion]\n[points]\n"
     text += f'P = {{ bar = 3, from_pin = ["{distance} m", "{angle} deg"] }}'
-    (path,) = measure_paths(loads(text)).values()
+    (path,) = measure_paths(solve(loads(text))).values()
     A = crank * np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 7201))
     side = np.abs(ground - A)
     at_A = np.arccos((coupler**2 + side**2 - output**2) / (2.0 * coupler * side))
@@ -149,16 +152,14 @@ def test_a_wide_curve_is_no_narrower_than_by_a_scan(
 @pytest.mark.slow
 def test_a_circle_is_as_wide_in_every_direction() -> None:
     """The polygon of the steps would be narrower by 1e-6 of it."""
-    (path,) = measure_paths(loads(CRANK + 'omega_2 = "1 rad/s"\n')).values()
+    (path,) = measure_paths(solve(loads(CRANK + 'omega_2 = "1 rad/s"\n'))).values()
     extents = [path.straightness, path.stroke, np.ptp(path.x), np.ptp(path.y)]
     assert extents == pytest.approx([0.16] * 4, rel=1e-8)
 
 
 def test_paths_are_printed_and_none_of_single_positions() -> None:
-    (first, *more) = write_paths(
-        loads(CRANK + 'theta_2 = { from = "20 deg", to = "100 deg", steps = 3 }'),
-        units("mm deg"),
-    )
+    motion = 'theta_2 = { from = "20 deg", to = "100 deg", steps = 3 }'
+    (first, *more) = write_paths(solve(loads(CRANK + motion)), units("mm deg"))
     assert (
         first
         == "path of P: x from -13.8919 to 75.1754 mm, y from 27.3616 to 80.0000 mm"
@@ -167,11 +168,33 @@ def test_paths_are_printed_and_none_of_single_positions() -> None:
         "    straightness 18.7164 mm, stroke 102.846 mm along -30 deg,",
         "    from theta_2 = 20 to 100 deg",
     ]
-    assert measure_paths(loads(CRANK + 'theta_2 = ["20 deg", "100 deg"]')) == {}
+    assert measure_paths(solve(loads(CRANK + 'theta_2 = ["20 deg", "100 deg"]'))) == {}
 
 
 def test_the_rounding_of_a_path_is_printed_as_zero() -> None:
     """The crank begins upright: its end has an x of 5e-18 m there."""
     motion = 'theta_2 = { from = "90 deg", to = "100 deg", steps = 3 }'
-    first, *_ = write_paths(loads(CRANK + motion), units("mm deg"))
+    first, *_ = write_paths(solve(loads(CRANK + motion)), units("mm deg"))
     assert first.startswith("path of P: x from -13.8919 to 0.00000 mm, ")
+
+
+def test_a_release_is_integrated_once_for_its_path(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The crank swings as far beyond the rest of its spring as it is let go before."""
+    runs = []
+    begin = free_motion._Run.begin
+
+    def count(*arguments: Any) -> None:
+        runs.append(arguments)
+        begin(*arguments)
+
+    monkeypatch.setattr(free_motion._Run, "begin", count)
+    motion = 'theta_2 = "20 deg"\nomega_2 = "0 rad/s"\n'
+    free = 'free = { duration = "1.5 s", steps = 15 }\n'
+    spring = f'{{ stiffness = "1 N m/rad", rest = "{20.0 + math.degrees(0.5)} deg" }}'
+    acts = f'[bars.input]\nmass = "1 kg"\n[effects]\ntorsion = {{ O2 = {spring} }}\n'
+    solution = solve(loads(CRANK + motion + free + acts))
+    (path,) = measure_paths(solution).values()
+    assert len(runs) == 1
+    assert path.stroke == pytest.approx(0.16 * math.sin(0.5), abs=1e-9)
