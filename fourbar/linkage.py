@@ -273,6 +273,8 @@ class Bar:
     section : (height, thickness) of a rectangular cross-section, m: the height lies in
         the plane of motion.
     diameter : of a round cross-section, m, in place of `section`.
+    mass_per_length : kg/m, > 0, in place of `mass` as a density is, and without a
+        cross-section.
 
     >>> bar = Bar("0.4 m", density="7850 kg/m^3", section=("20 mm", "5 mm"))
     >>> round(bar.mass, 6)
@@ -286,9 +288,11 @@ class Bar:
     density: float | None = None
     section: tuple[float, float] | None = None
     diameter: float | None = None
+    mass_per_length: float | None = None
     numbers: ClassVar[dict[str, Declared]] = {
         "length": Declared("m", POSITIVE),
         "mass": Declared("kg", AT_LEAST_ZERO, 0.0),
+        "mass_per_length": Declared("kg/m", POSITIVE, None),
         "density": Declared("kg/m^3", POSITIVE, None),
         "section": Declared("m", POSITIVE, None, pair="m"),
         "diameter": Declared("m", POSITIVE, None),
@@ -314,13 +318,17 @@ class Bar:
                 "is no size of a bar: the cube of it must be a positive double",
                 unit="m",
             )
-        if self.density is None:
-            return
-        if self.area is None:
+        if self.density is not None and self.area is None:
             raise InputError(
                 "density",
                 self.density,
                 "needs the cross-section: section or diameter",
+            )
+        if self.density is not None and self.mass_per_length is not None:
+            raise InputError(
+                "density",
+                self.density,
+                "must be left out beside mass_per_length",
             )
         stated = self.mass
         object.__setattr__(self, "mass", self.weigh())
@@ -328,7 +336,7 @@ class Bar:
             raise InputError(
                 "mass",
                 stated,
-                "must be left out: density and cross-section state it",
+                "must be left out: density or mass_per_length states it",
             )
 
     @property
@@ -357,16 +365,18 @@ class Bar:
     def weigh(self) -> Any:
         """Return the mass of the bar, kg.
 
-        Density and cross-section state it from pin to pin; without a density it is
-        `mass`.
+        Density and cross-section, or the mass per length, state it from pin to pin;
+        without these it is `mass`.
         """
+        if self.mass_per_length is not None:
+            return self.mass_per_length * self.length
         if self.density is None:
             return self.mass
         return self.density * self.area * self.length
 
     def with_mass(self, mass: float) -> "Bar":
-        """Return the bar with a stated mass, kg, in place of its density."""
-        return replace(self, mass=mass, density=None)
+        """Return the bar with a stated mass, kg, in place of what it follows from."""
+        return replace(self, mass=mass, density=None, mass_per_length=None)
 
     @property
     def moment_of_inertia(self) -> float:

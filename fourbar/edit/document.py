@@ -38,6 +38,7 @@ EXAMPLES = {
     "kg": "0.2 kg",
     "kg m^2": "2 kg cm^2",
     "kg/m^3": "7850 kg/m^3",
+    "kg/m": "1 kg/m",
 }
 """Examples of the numbers of a bar by their SI unit."""
 _SECTION = ("20 mm", "5 mm")

@@ -220,6 +220,8 @@ class Reader:
             elif str(error) == UNIT_MISSING:
                 likely = self._find_likely_unit(key, unit)
                 hint = f'did you mean "{value.strip()} {likely}"? '
+            elif unit == "kg" and converts(find_unit(value, "m"), "kg/m"):
+                hint = f'did you mean mass_per_length = "{value.strip()}"? '
             raise self.refuse(key, value, f"{error}; {hint}{wanted}") from None
 
     def _find_likely_unit(self, key: str, unit: str) -> str:

@@ -61,7 +61,7 @@ _SAME_FOR_ALL = (
 """Parts of keys that name no number. They name a word, a whole number, or what has
 another form in a study.
 """
-_BY_MATERIAL = ("density", "section", "diameter")
+_BY_MATERIAL = ("density", "section", "diameter", "mass_per_length")
 """Numbers of a bar that are varied only where the scene states them."""
 _MASS_CENTRE = "centre"
 _NUMBERS_OF_BARS = {name: bar for bar, name in BAR_NAMES.items()}
@@ -142,11 +142,11 @@ def _list_entries(key: str, path: NumberPath, described: Any) -> dict[str, Scene
 def _list_bar(bar: Bar, number: int) -> dict[str, SceneNumber]:
     """List the entries of a moving bar as it is stated.
 
-    A bar with a density has no entry for its mass.
+    A bar whose mass follows from its length has no entry for it.
     """
     entries = _list_entries("", ("linkage", BAR_NAMES[number]), Bar)
     absent = {name for name in _BY_MATERIAL if getattr(bar, name) is None}
-    if bar.density is not None:
+    if bar.density is not None or bar.mass_per_length is not None:
         absent.add("mass")
     return {
         key: entry for key, entry in entries.items() if entry.place[2] not in absent

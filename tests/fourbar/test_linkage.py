@@ -15,9 +15,13 @@ CLOSE = 1e-6
 """Relative: a difference quotient of second order against the derivative."""
 
 
-def make_scene(*, diameter: float = 0.02) -> fourbar.Scene:
+ROD = {"density": STEEL, "diameter": 0.02}
+PER_LENGTH = {"mass_per_length": 4.2}
+
+
+def make_scene(stated: dict[str, float] = ROD) -> fourbar.Scene:
     d, *moving = LENGTHS
-    bars = (Bar(length, density=STEEL, diameter=diameter) for length in moving)
+    bars = (Bar(length, **stated) for length in moving)
     motion = fourbar.Motion(np.linspace(0.1, 6.0, 5), 2.0)
     return fourbar.Scene(fourbar.FourBar(d, *bars), motion)
 
@@ -27,6 +31,7 @@ def test_density_and_cross_section_give_the_mass_of_a_uniform_bar():
     flat = Bar("0.4 m", density="7850 kg/m^3", section=("20 mm", "5 mm"))
     assert round_bar.mass == pytest.approx(STEEL * math.pi * 0.01**2 * 0.4, rel=1e-15)
     assert flat.mass == pytest.approx(0.314, rel=1e-15)
+    assert Bar("0.66 m", mass_per_length="4.2 kg/m").mass == pytest.approx(2.772)
     assert flat.moment_of_inertia == pytest.approx(0.314 * 0.4**2 / 12.0, rel=1e-15)
 
 
@@ -52,8 +57,11 @@ def test_the_section_modulus_is_that_of_the_second_moment_of_area():
     ("stated", "key"),
     [
         ({"density": STEEL}, "density"),
-        ({"density": STEEL, "diameter": 0.02, "mass": 1.0}, "mass"),
-        ({"density": STEEL, "diameter": 0.02, "section": (0.02, 0.01)}, "diameter"),
+        (ROD | {"mass": 1.0}, "mass"),
+        (PER_LENGTH | {"mass": 1.0}, "mass"),
+        (PER_LENGTH | ROD, "density"),
+        ({"mass_per_length": 0.0}, "mass_per_length"),
+        (ROD | {"section": (0.02, 0.01)}, "diameter"),
         ({"section": (0.02, 0.0)}, "section"),
         ({"section": "20 mm"}, "section"),
         ({"section": (1e-150, 1e-150)}, "section"),
@@ -83,6 +91,9 @@ density = "7850 kg/m^3"
 """
     with pytest.raises(InputError, match=r"bars\.coupler\.density = '7850 kg/m"):
         loads(text)
+    per_length = text.replace('density = "7850 kg/m^3"', 'mass = "0.25 lb/in"')
+    with pytest.raises(InputError, match=r'mass_per_length = "0\.25 lb'):
+        loads(per_length)
 
 
 def test_the_mass_follows_length_and_cross_section_in_a_study():
@@ -99,9 +110,17 @@ def test_the_mass_follows_length_and_cross_section_in_a_study():
         assert np.array_equal(members[0], getattr(fourbar.solve(scene), name))
 
 
-@pytest.mark.parametrize("key", ["lengths.coupler", "bars.coupler.diameter"])
-def test_the_sensitivity_to_a_length_counts_the_mass_that_follows(key):
-    scene, step = make_scene(), 1e-6
+@pytest.mark.parametrize(
+    ("key", "stated"),
+    [
+        ("lengths.coupler", ROD),
+        ("bars.coupler.diameter", ROD),
+        ("lengths.coupler", PER_LENGTH),
+        ("bars.coupler.mass_per_length", PER_LENGTH),
+    ],
+)
+def test_the_sensitivity_to_a_length_counts_the_mass_that_follows(key, stated):
+    scene, step = make_scene(stated), 1e-6
     derived = fourbar.sensitivity(scene)
     row = list(derived.keys).index(key)
     nominal = derived.numbers[row]
@@ -111,14 +130,15 @@ def test_the_sensitivity_to_a_length_counts_the_mass_that_follows(key):
     assert derived.by["torque"][row] == pytest.approx(quotient, rel=CLOSE)
 
 
-def test_a_file_keeps_the_material_and_an_engine_is_told_the_mass():
-    scene = make_scene()
+@pytest.mark.parametrize("stated", [ROD, PER_LENGTH])
+def test_a_file_keeps_the_material_and_an_engine_is_told_the_mass(stated):
+    scene = make_scene(stated)
     assert loads(fourbar.dump(scene)).linkage == scene.linkage
     bars = scene_to_json(scene)["bars"]
     assert bars["input"] == {"mass": scene.linkage.input.mass}
 
 
-def test_a_stated_mass_takes_the_place_of_the_density():
-    bar = make_scene().linkage.input
-    heavier = bar.with_mass(3.0)
-    assert (heavier.mass, heavier.density, heavier.diameter) == (3.0, None, 0.02)
+def test_a_stated_mass_takes_the_place_of_what_it_followed_from():
+    heavier = make_scene().linkage.input.with_mass(3.0)
+    assert heavier == Bar(0.4, mass=3.0, diameter=0.02)
+    assert make_scene(PER_LENGTH).linkage.input.with_mass(3.0) == Bar(0.4, mass=3.0)

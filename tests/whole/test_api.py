@@ -356,6 +356,7 @@ def calls_by_name() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
         ("Bar", partial(bar, diameter=0.02), {"density": 7850.0}),
         ("Bar", partial(bar, density=7850.0), {"section": (0.02, 0.01)}),
         ("Bar", partial(bar, density=7850.0), {"diameter": 0.02}),
+        ("Bar", bar, {"mass_per_length": 4.2}),
         *(("Point", name, {"from_centre": pair}), ("Place", pull, {"point": "P"})),
         ("Place", pull, {"from_centre": pair}),
         *(("Rise", rise, {"theta_3": 0.4}), ("Rise", rise, {"theta_4": 1.9})),

@@ -357,6 +357,33 @@ def test_steel_rods_by_their_density(ask: Steps, tmp_path: Path) -> None:
     assert max(rows)[0] == pytest.approx(12.7176, rel=1e-4)
 
 
+PER_LENGTH = """\
+[lengths]
+ground = "1000 mm"
+input = "500 mm"
+coupler = "660 mm"
+output = "560 mm"
+[bars]
+input = { mass = "3.54 kg", inertia = "88500 kg mm^2", centre = ["200 mm", "0 deg"] }
+coupler = { mass_per_length = "4.2 kg/m" }
+output = { mass_per_length = "4.2 kg/m" }
+[motion]
+theta_2 = "60 deg"
+omega_2 = "10.5 rad/s"
+alpha_2 = "-26 rad/s^2"
+"""
+
+
+def test_an_exercise_that_states_masses_per_length(ask: Steps, tmp_path: Path) -> None:
+    """Nine equations of the free bodies, solved apart from fourbar, are the oracle."""
+    (tmp_path / "exercise.toml").write_text(PER_LENGTH)
+    text = ask("analyze", "exercise.toml")
+    assert row_of(text, "torque") == pytest.approx([24.0736], rel=PRINTED)
+    pins = {"F12 at O2": 211.656, "F43 at B": 60.2987, "F14 at O4": 85.2365}
+    for pin, size in pins.items():
+        assert row_of(text, pin)[-1] == pytest.approx(size, rel=PRINTED)
+
+
 MASSLESS = """\
 title = "Massless rocker"
 [lengths]

@@ -127,27 +127,30 @@ def test_each_part_that_is_offered_is_one_that_the_file_takes():
         loads(document.text())
 
 
-@pytest.mark.parametrize("in_place", ["density", "mass"])
-def test_each_field_that_is_offered_is_one_that_the_file_takes(in_place):
-    """A density stands in place of a mass.
+MASS_PER_METRE = {
+    "mass": None,
+    "density": 7850.0 * math.pi * 0.025**2,
+    "mass_per_length": 1.0,
+}
+"""Numbers of which a bar states one, with its mass per metre by the offered fields."""
 
-    Each field is set in one of two documents.
-    """
+
+@pytest.mark.parametrize("stated", MASS_PER_METRE)
+def test_each_field_that_is_offered_is_one_that_the_file_takes(stated):
     fields = dict(leaves(list_offers()["fields"]))
     document = SceneDocument(CRANK_ROCKER.read_text())
-    bars = ("input", "coupler", "output")
-    if in_place == "mass":
-        for bar in bars:
-            document.remove(["bars", bar, "mass"])
+    for bar in ("input", "coupler", "output"):
+        document.remove(["bars", bar, "mass"])
     for place, value in fields.items():
-        if place[-1] != in_place:
+        if place[-1] == stated or place[-1] not in MASS_PER_METRE:
             document.set(place, str(value))
     scene = loads(document.text())
     assert scene.title == "of the drawing"
     for bar in scene.linkage.moving:
-        steel = 7850.0 * math.pi * 0.025**2 * bar.length
+        per_metre = MASS_PER_METRE[stated]
+        expected = 0.2 if per_metre is None else per_metre * bar.length
         assert bar.inertia == pytest.approx(2e-4)
-        assert bar.mass == pytest.approx(0.2 if in_place == "density" else steel)
+        assert bar.mass == pytest.approx(expected)
 
 
 def test_what_a_pair_consists_of_is_read_from_the_declarations():
