@@ -25,9 +25,9 @@ LONGEST_VALUE = 160
 LONGEST_MESSAGE = 400
 """Characters of the line that a command prints of an error."""
 ELSEWHERE = (
-    "this is a planar four-bar linkage with pins alone: synthesis is in pylinkage and "
-    "MotionGen, sliders and several loops (six bars) in PMKS+, any mechanism in "
-    "MuJoCo, Drake or Exudyn"
+    "this is a planar four-bar linkage with pins alone: synthesis of paths is in "
+    "pylinkage and MotionGen, sliders and several loops (six bars) in PMKS+, any "
+    "mechanism in MuJoCo, Drake or Exudyn"
 )
 """Address for people with another mechanism."""
 _OF_OTHER_MECHANISM = re.compile(

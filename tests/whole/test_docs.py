@@ -152,7 +152,7 @@ def test_the_readme_goes_on_from_its_first_scene(
     ("name", "count"),
     [
         ("docs/theory.md", 2),
-        ("docs/guide-designer.md", 1),
+        ("docs/guide-designer.md", 3),
         ("docs/guide-roboticist.md", 4),
     ],
 )

@@ -384,6 +384,39 @@ def test_an_exercise_that_states_masses_per_length(ask: Steps, tmp_path: Path) -
         assert row_of(text, pin)[-1] == pytest.approx(size, rel=PRINTED)
 
 
+GUIDED = """\
+[lengths]
+ground = "4 ft"
+input = "4 ft"
+coupler = "4 ft"
+output = "4 ft"
+[bars]
+input = { mass = "20 lb" }
+coupler = { mass = "20 lb" }
+output = { mass = "20 lb" }
+[motion]
+theta_2 = { from = "10 deg", to = "170 deg", steps = 160 }
+[effects]
+gravity = ["1 g_0", "-90 deg"]
+[[effects.springs]]
+from = { bar = 1, from_pin = { x = "-1e6 ft", y = "2 ft" } }
+to = { bar = 2, from_pin = ["2 ft", "0 deg"] }
+stiffness = "50 lbf/ft"
+length = "1e6 ft"
+"""
+
+
+def test_a_frame_with_a_spring_on_a_roller(ask: Steps, tmp_path: Path) -> None:
+    """V = 160 sin(theta) + 100 cos^2(theta) lbf ft: sin(theta) = 0.8, or upright."""
+    (tmp_path / "frame.toml").write_text(GUIDED)
+    text = ask("equilibrium", "frame.toml")
+    tilt = np.degrees(np.arcsin(0.8))
+    rows = re.findall(r"^ *([0-9.]+) +[0-9.]+ open +(\w+)", text, re.MULTILINE)
+    angles = [float(angle) for angle, _ in rows]
+    assert angles == pytest.approx([tilt, 90.0, 180.0 - tilt], abs=PRINTED * 90.0)
+    assert [kind for _, kind in rows] == ["unstable", "stable", "unstable"]
+
+
 MASSLESS = """\
 title = "Massless rocker"
 [lengths]
