@@ -19,7 +19,10 @@ from numpy.typing import NDArray
 from fourbar.errors import InputError, write_in_units
 from fourbar.quantities import PIN_FORCES
 
+Lengths = tuple[float, float, float, float]
+"""Of ground, input, coupler and output, m."""
 BAR_NAMES = {1: "ground", 2: "input", 3: "coupler", 4: "output"}
+BAR_NUMBERS = {name: bar for bar, name in BAR_NAMES.items()}
 MOVING_BARS = (2, 3, 4)
 PINS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
 PIN_FORCE = dict(zip(PINS, PIN_FORCES, strict=True))

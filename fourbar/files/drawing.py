@@ -13,11 +13,25 @@ from fourbar.effects import ForceDrive, LinearDrive
 from fourbar.errors import InputError
 from fourbar.files.fields import Reader
 from fourbar.formulas.mobility import count_equalities, meet_change_points
-from fourbar.linkage import BAR_NAMES, ENDS, MOVING_BARS, PINS, Bar, FourBar
+from fourbar.linkage import (
+    BAR_NAMES,
+    BAR_NUMBERS,
+    ENDS,
+    MOVING_BARS,
+    PINS,
+    Bar,
+    FourBar,
+)
 from fourbar.quantities.units import half_unit_of_text
 from fourbar.scene import Scene, command_at
 from fourbar.scene.drawing import DRAWN_WORD, DrawnPins
-from fourbar.scene.motion import BRANCH_NAMES, COMMAND_NAMES, STROKE_COMMAND, Motion
+from fourbar.scene.motion import (
+    BAR_OF_ANGLE,
+    BRANCH_NAMES,
+    COMMAND_NAMES,
+    STROKE_COMMAND,
+    Motion,
+)
 from fourbar.scene.scene import require_cylinder
 from fourbar.solving import solve
 
@@ -26,9 +40,6 @@ PINS_APART = 0.05
 """Distance of the pins from the drawing above which no motion has that assembly. It is
 a part of the longest bar.
 """
-BAR_OF_ANGLE = {names[0]: bar for bar, names in COMMAND_NAMES.items()}
-"""Bars by the names of their angles."""
-_NUMBERS_OF_BARS = {name: bar for bar, name in BAR_NAMES.items()}
 
 
 def from_pins(
@@ -94,7 +105,7 @@ def state_lengths(
     drawn = tuple(drawing.length(bar) for bar in ENDS)
     if met != drawn:
         read.stated_lengths = drawn
-    lengths = {name: f"{met[bar - 1]!r} m" for name, bar in _NUMBERS_OF_BARS.items()}
+    lengths = {name: f"{met[bar - 1]!r} m" for name, bar in BAR_NUMBERS.items()}
     lengths["ground_angle"] = f"{drawing.angle(1)!r} rad"
     stated = {}
     for key, value in top.items():
@@ -159,7 +170,7 @@ def _state_places(
     for name, entry in value.items():
         bar_of_entry = bar
         if key == "bars":
-            bar_of_entry = _NUMBERS_OF_BARS.get(name, bar)
+            bar_of_entry = BAR_NUMBERS.get(name, bar)
         stated[name] = _state_places(
             read,
             f"{key}.{name}",

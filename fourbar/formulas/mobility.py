@@ -22,9 +22,8 @@ from numpy.typing import NDArray
 from fourbar.errors import expect
 from fourbar.formulas.path import ROLES_OF_BARS, prepare_path
 from fourbar.formulas.position import TOUCHING, find_parallel_pairs
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar, require_bar
-
-Array = NDArray[np.float64]
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar, Lengths, require_bar
+from fourbar.quantities import Array
 
 TURN = 2.0 * math.pi
 ANGLE_FROM_LIMITS = math.radians(1.0)
@@ -523,7 +522,7 @@ def _find_gaps(lengths: tuple[float, ...]) -> list[float]:
     return [abs(math.fsum(map(mul, signs, lengths))) for signs in _EQUALITIES]
 
 
-def count_equalities(lengths: tuple[float, float, float, float]) -> int:
+def count_equalities(lengths: Lengths) -> int:
     """Count the equalities of change points that hold.
 
     Two hold for a parallelogram or a kite, three for a rhombus.
@@ -567,10 +566,10 @@ def list_met_equalities(
 
 
 def meet_change_points(
-    lengths: tuple[float, float, float, float],
-    roundings: tuple[float, float, float, float],
-    decimals: tuple[float, float, float, float] | None = None,
-) -> tuple[float, float, float, float]:
+    lengths: Lengths,
+    roundings: Lengths,
+    decimals: Lengths | None = None,
+) -> Lengths:
     """Return the four lengths with the equalities that they miss by rounding.
 
     The lengths are those of ground, input, coupler and output.

@@ -47,6 +47,7 @@ COMMAND_NAMES = {
     bar: (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}") for bar in MOVING_BARS
 }
 """Names of the commanded angle, speed and acceleration by bar."""
+BAR_OF_ANGLE = {names[0]: bar for bar, names in COMMAND_NAMES.items()}
 STROKE_COMMAND = ("stroke", "stroke_speed", "stroke_acceleration")
 """Names of the commanded stroke, speed and acceleration of a cylinder."""
 SIDES = {"left": 1.0, "right": -1.0}

@@ -26,6 +26,7 @@ from fourbar.linkage import (
     ANY_NUMBER,
     AT_LEAST_ZERO,
     BAR_NAMES,
+    BAR_NUMBERS,
     ENDS,
     FIRST_PIN,
     MOVING_BARS,
@@ -64,7 +65,6 @@ another form in a study.
 _BY_MATERIAL = ("density", "section", "diameter", "mass_per_length")
 """Numbers of a bar that are varied only where the scene states them."""
 _MASS_CENTRE = "centre"
-_NUMBERS_OF_BARS = {name: bar for bar, name in BAR_NAMES.items()}
 _LENGTH_OF_BAR = {bar: f"lengths.{name}" for bar, name in BAR_NAMES.items()}
 _GROUND_ANGLE = "lengths.ground_angle"
 NumberPath = tuple[str | int, ...]
@@ -436,7 +436,7 @@ def _find_stated_place(scene: Scene, holder: NumberPath) -> Place:
     if isinstance(stated, Place):
         return stated
     if isinstance(stated, Bar):
-        return Place(_NUMBERS_OF_BARS[str(holder[-1])], stated.mass_centre)
+        return Place(BAR_NUMBERS[str(holder[-1])], stated.mass_centre)
     place: Place = stated.place
     return place
 

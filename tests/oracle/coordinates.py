@@ -9,7 +9,7 @@ import cmath
 from collections.abc import Mapping
 from typing import Any
 
-from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN
+from fourbar.linkage import BAR_NAMES, BAR_NUMBERS, ENDS, FIRST_PIN
 from fourbar.scene.drawing import DrawnPins
 
 DRAWN_SETTING = "drawn"
@@ -18,7 +18,6 @@ _OF_PINS = "pins."
 _OF_PLACES = ".drawn"
 _MASS_CENTRE = ".centre"
 _FORM_OF_PLACES = ".from_pin"
-_NUMBERS_OF_BARS = {name: bar for bar, name in BAR_NAMES.items()}
 _ALONG_AXES = (1.0, 1.0j)
 """A coordinate's direction in the plane, by its index."""
 
@@ -128,7 +127,7 @@ class Coordinates:
         holder, last = find_entry(self._document, _name_pair(name))
         distance, angle = (float(text.partition(" ")[0]) for text in holder[last])
         if name.endswith(_MASS_CENTRE):
-            bar = _NUMBERS_OF_BARS[name.split(".")[1]]
+            bar = BAR_NUMBERS[name.split(".")[1]]
         else:
             bar = holder["bar"]
         return bar, distance, angle

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from fourbar.quantities import OK, Array
 from fourbar.scene import Command, Scene
-from fourbar.solution import Solution
 from fourbar.solving import solve
-from fourbar_validation.compare.compare import mark_turning
+from fourbar_validation.compare.compare import mark_moving_drive
 from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import find_error
-from fourbar_validation.engines.description import list_speeds, name_driving
+from fourbar_validation.engines.description import name_driving
 
 
 class WorstErrors(NamedTuple):
@@ -60,11 +59,11 @@ def compute_errors(
     if not np.isfinite(command.theta_2).all():
         return INFINITE_ERRORS
     formulas = solve(scene, "force", at=command)
-    judged = (formulas.status_code == OK) & _mark_far(scene, formulas)
+    judged = (formulas.status_code == OK) & mark_moving_drive(scene, formulas)
     if not judged.any():
         return INFINITE_ERRORS
     if not judged.all():
-        command = _take_positions(command, judged)
+        command = command.part(judged)
         formulas = solve(scene, "force", at=command)
     worst = {}
     for field in ERROR_NAMES:
@@ -84,30 +83,7 @@ def mark_far_from_poles(scene: Scene, command: Command) -> NDArray[np.bool_]:
 
     The driven bar, or the stroke, moves fast enough there.
     """
-    return _mark_far(scene, solve(scene, "velocity", at=command))
-
-
-def _mark_far(scene: Scene, formulas: Solution) -> NDArray[np.bool_]:
-    if scene.drive_bar == 2:
-        return np.ones(len(formulas), dtype=bool)
-    speeds = {3: formulas.omega_3, 4: formulas.omega_4}
-    speed = speeds.get(scene.drive_bar, formulas.stroke_speed)
-    assert speed is not None
-    return mark_turning(speed)
-
-
-def _take_positions(command: Command, rows: NDArray[np.bool_]) -> Command:
-    """Return the command at some of its positions."""
-    n = len(command.theta_2)
-    speed, acceleration = (
-        np.broadcast_to(values, n)[rows] for values in list_speeds(command)
-    )
-    return Command(
-        command.theta_2[rows],
-        command.branch[rows],
-        speed,
-        acceleration,
-    )
+    return mark_moving_drive(scene, solve(scene, "velocity", at=command))
 
 
 def find_greatest(errors: Array | Sequence[float]) -> float:

@@ -10,7 +10,7 @@ from fourbar.errors import InputError, LimitError
 from fourbar.formulas.mobility import TURN
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, find_signs
-from fourbar.scene.motion import COMMAND_NAMES
+from fourbar.scene.motion import BAR_OF_ANGLE
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.check.theirs import TheirTable
@@ -173,14 +173,9 @@ def _command_other_bar(
 ) -> Solution:
     """Solve the positions at which the bar by which rows are found has these angles."""
     assembly = np.broadcast_to(np.asarray(branch, dtype=np.int8), places.shape)
-    bar = _find_bar(table.found_by)
+    bar = BAR_OF_ANGLE[table.found_by]
     at = Command(places, assembly, None, 0.0, bar=bar)
     return solve(scene, "position", at=at)
-
-
-def _find_bar(angle: str) -> int:
-    """Return the bar of an angle by its name."""
-    return next(bar for bar, names in COMMAND_NAMES.items() if names[0] == angle)
 
 
 def _turn_into(motion: Array, angle: Array) -> Array:

@@ -373,9 +373,9 @@ class Comparison:
         masks: Mask = self._closed & stated
         closed = int(np.count_nonzero(self._closed))
         counts = masks.sum(axis=1).tolist()
-        if self.demands.tolerance.in_time and self.scene.drive_bar != 2:
+        if self.demands.tolerance.in_time:
             forces = [pair.quantity in FORCE_NAMES for pair in pairs]
-            masks[forces] &= _mark_moving_drive(self.scene, formulas)
+            masks[forces] &= mark_moving_drive(self.scene, formulas)
         # at a reversal the forces of either side are right
         at_reversals = np.zeros(masks.shape, dtype=bool)
         reversible = self._reversible
@@ -697,8 +697,10 @@ def _count(codes: NDArray[np.uint8]) -> str:
     )
 
 
-def _mark_moving_drive(scene: Scene, formulas: Solution) -> Mask:
-    """Mark where an engine that runs through time is not near a pole of the drive."""
+def mark_moving_drive(scene: Scene, formulas: Solution) -> Mask:
+    """Mark where no pole of the drive is near, (n,): the input has none."""
+    if scene.drive_bar == 2:
+        return np.ones(len(formulas), dtype=bool)
     speed = {3: formulas.omega_3, 4: formulas.omega_4}.get(
         scene.drive_bar, formulas.stroke_speed
     )

@@ -30,7 +30,13 @@ from fourbar.scene import (
     with_signs,
 )
 from fourbar.scene import command as command_of
-from fourbar.scene.motion import COMMAND_NAMES, STROKE_COMMAND, Free, Motion
+from fourbar.scene.motion import (
+    BAR_OF_ANGLE,
+    COMMAND_NAMES,
+    STROKE_COMMAND,
+    Free,
+    Motion,
+)
 from fourbar_validation.compare.answer import Answer, EngineError, ReleasedAnswer
 from fourbar_validation.compare.pins import find_mass, state_from_pins
 from fourbar_validation.compare.rows import write_one_line
@@ -524,11 +530,7 @@ def read_answered_motion(data: Any, command: Command) -> Command:
             sorted(data),
             f"must have {command.commanded}, or for a stroke an angle of its bar",
         )
-    bar = next(
-        bar
-        for bar, commanded_names in COMMAND_NAMES.items()
-        if commanded_names == names
-    )
+    bar = BAR_OF_ANGLE[names[0]]
     if "branch" in data:
         branch = _read_branch(data["branch"], n)
     else:

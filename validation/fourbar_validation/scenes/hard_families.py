@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from fourbar.effects import Gravity, Load
-from fourbar.linkage import Bar, FourBar
+from fourbar.linkage import Bar, FourBar, Lengths
 from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES, Free, Motion, Sweep
@@ -27,8 +27,6 @@ from fourbar_validation.scenes.random import (
     draw_uniform,
 )
 
-Lengths = tuple[float, float, float, float]
-"""(ground, input, coupler, output), m."""
 HEAVY_BARS = Ranges(
     mass=draw_uniform(0.2, 2.0),
     inertia=draw_uniform(0.05, 0.2),

@@ -27,7 +27,7 @@ from fourbar.effects import (
 )
 from fourbar.effects.load import FRAMES
 from fourbar.formulas.mobility import choose_range
-from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
+from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar, Lengths
 from fourbar.scene import Scene
 from fourbar.scene.motion import CROSSED, OPEN, Motion, Sweep
 
@@ -313,7 +313,7 @@ of the longest bar.
 def draw_lengths(
     rng: np.random.Generator,
     kind: DrawnType,
-) -> tuple[float, float, float, float]:
+) -> Lengths:
     """Draw (ground, input, coupler, output) of the given type.
 
     The longest bar is 1, and change points are kept away from.

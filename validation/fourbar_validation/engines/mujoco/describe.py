@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 import mujoco
 import numpy as np
 
-from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS
+from fourbar.linkage import BAR_NAMES, BAR_NUMBERS, FIRST_PIN, MOVING_BARS, PINS
 from fourbar.quantities import Array
 from fourbar_validation.engines.description import ModelEntry, Value
 from fourbar_validation.engines.mujoco.robots.ancestry import (
@@ -731,8 +731,7 @@ def mend_entry(
     if key == "contacts":
         model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     elif subject == "lift":
-        (bar,) = (bar for bar, name in BAR_NAMES.items() if name == rest)
-        model.body_gravcomp[seen.list_parts(bar)] = 0.0
+        model.body_gravcomp[seen.list_parts(BAR_NUMBERS[rest])] = 0.0
     elif subject == "pins" and what == "range":
         model.jnt_limited[seen.hinge[pin]] = 0
     elif subject == "pins" and what == "motor":

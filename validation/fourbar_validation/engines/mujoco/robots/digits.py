@@ -18,6 +18,7 @@ from fourbar.formulas.mobility import (
     count_equalities,
     meet_change_points,
 )
+from fourbar.linkage import Lengths
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     climb,
     find_common,
@@ -28,7 +29,6 @@ from fourbar_validation.engines.mujoco.robots.loop import RobotLoop
 
 _TURN_OF_A_QUATERNION = 2.0
 """Angle by which a rotation changes over the change of its unit quaternion."""
-Lengths = tuple[float, float, float, float]
 
 
 def meet_lengths(compiled: CompiledRobot, loop: RobotLoop, lengths: Lengths) -> Lengths:
