@@ -85,10 +85,10 @@ def write_in_units(
     return f"{numbers} {name}".rstrip()
 
 
-def shorten(text: str, longest: int) -> str:
+def abbreviate(text: str, longest: int) -> str:
     """Return a text of at most `longest` characters: its beginning and its end.
 
-    >>> shorten("a name that goes on and on", 13)
+    >>> abbreviate("a name that goes on and on", 13)
     'a nam...nd on'
     """
     if len(text) <= longest:
@@ -140,7 +140,7 @@ class InputError(FourBarError):
             else:
                 numbers = (value,)
             shown = write_in_units(unit, *map(float, numbers))
-        shown = shorten(shown, LONGEST_VALUE)  # of a long path the end says which
+        shown = abbreviate(shown, LONGEST_VALUE)  # of a long path the end says which
         prefix = f"{file}: " if file else ""
         super().__init__(
             f"{prefix}{key}{'' if value is None else f' = {shown}'}: {allowed}"
@@ -343,7 +343,7 @@ def _flush() -> None:
 def _print_error(message: str, status: int) -> int:
     import click
 
-    line = shorten(f"error: {clean_line(message)}", LONGEST_MESSAGE)
+    line = abbreviate(f"error: {clean_line(message)}", LONGEST_MESSAGE)
     click.echo(line, err=True)
     return status
 

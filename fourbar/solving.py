@@ -162,7 +162,7 @@ class SolveRequest(NamedTuple):
             if not isinstance(stage, str) or stage not in STAGES:
                 raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
             last_stage = STAGES.index(stage)
-            wanted = _list_wanted(last_stage, _list_absent(scene), points)
+            wanted = _list_quantities(last_stage, _list_absent(scene), points)
         else:
             foreign = _list_foreign(scene)
             stages = _list_stages(points)
@@ -417,7 +417,7 @@ def _list_stages(points: tuple[str, ...]) -> dict[str, str]:
 
 
 @cache
-def _list_wanted(
+def _list_quantities(
     last_stage: int,
     absent: tuple[str, ...],
     points: tuple[str, ...],
@@ -477,7 +477,7 @@ def make_solution(
         }
     branch = commanded.branch
     if results.sign_may_differ:
-        branch = _find_signs(scene, commanded, quantities.get("sin_mu"))
+        branch = _read_signs(scene, commanded, quantities.get("sin_mu"))
     return Solution.of(
         title=scene.title,
         drive_bar=scene.drive_bar,
@@ -499,7 +499,7 @@ def make_solution(
     )
 
 
-def _find_signs(scene: Scene, commanded: Command, sine: Array | None) -> Any:
+def _read_signs(scene: Scene, commanded: Command, sine: Array | None) -> Any:
     """Return the sign of sin(theta_4 - theta_3) at each position.
 
     The branch replaces the sign where the sine is zero or NaN. `sine`: None if it was

@@ -238,7 +238,7 @@ def read_positions(scene: Scene, text: str) -> Command:
     those that the linkage can have, any other column has its value in the scene's
     motion.
     """
-    from fourbar.show.located import SIDES, locate
+    from fourbar.show.located import EXTREMES, locate
     from fourbar.studies.passing import STATED_POSITIONS, find_positions
 
     name, equals, value = (part.strip() for part in text.rpartition("="))
@@ -248,7 +248,7 @@ def read_positions(scene: Scene, text: str) -> Command:
         name = "time"
     if value == "drawn":
         return find_positions(scene, [(name, _read_drawn(scene, name, text))])
-    if name not in STATED_POSITIONS or value in SIDES:
+    if name not in STATED_POSITIONS or value in EXTREMES:
         return locate(scene, name, value)
     unit = {"stroke": "m", "time": "s"}.get(name, "rad")
     likely = {"stroke": "mm", "time": "s"}.get(name, "deg")

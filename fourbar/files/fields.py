@@ -36,7 +36,7 @@ DIRECTION_WORDS = {
     "right": "0 deg",
 }
 """Words for directions, as the suggestions of an error know them."""
-_OTHER_PIN = re.compile(r"[C-F]|O_?[5-9]")
+_FURTHER_PIN = re.compile(r"[C-F]|O_?[5-9]")
 """Pins of more than four bars, as they are usually named."""
 _MEANT = {
     **{"weight": "mass", "torque": "moment", "couple": "moment"},
@@ -382,7 +382,7 @@ def _is_elsewhere(key: str, table: dict[str, Any], names: list[str]) -> bool:
         for name in unknown:
             if is_length(table[name]) and not _suggest_word(name, names):
                 return True
-    of_pins = names == [*PINS] and any(_OTHER_PIN.fullmatch(name) for name in unknown)
+    of_pins = names == [*PINS] and any(_FURTHER_PIN.fullmatch(name) for name in unknown)
     return of_pins or any(
         names_other_mechanism(name) and _MEANT.get(name) not in names
         for name in unknown

@@ -194,7 +194,7 @@ def write_exactly(*numbers: float) -> str:
     return " ".join(repr(float(number)).removesuffix(".0") for number in numbers)
 
 
-def _find_body(root: ET.Element, bar: int) -> ET.Element:
+def _find_bar_element(root: ET.Element, bar: int) -> ET.Element:
     body = root.find(f".//body[@name='{BAR_NAMES[bar]}']")
     assert body is not None
     return body
@@ -568,14 +568,14 @@ class Model:
                     math.sin(self.linkage.ground_angle),
                 )
                 x, y = cos * x - sin * y, sin * x + cos * y
-            self._add_site(_find_body(root, point.bar), f"{name}_{which}", x, y)
+            self._add_site(_find_bar_element(root, point.bar), f"{name}_{which}", x, y)
         return tendon
 
     def add_load_sites(self, root: ET.Element) -> None:
         """Add the point at which each load acts; an arm becomes a couple at G."""
         for index, load in enumerate(self.loads, 1):
             z = load.foot(self.linkage.bar(load.bar).to_centre)
-            body = _find_body(root, load.bar)
+            body = _find_bar_element(root, load.bar)
             self._add_site(body, f"load_{index}", z.real, z.imag)
 
     def add_actuators(

@@ -21,7 +21,7 @@ from fourbar.errors import InputError
 _TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 DEFINITIONS: str = _TABLES["definitions"]
 """Unit definitions in the form of the units library."""
-COMMON: dict[str, str] = _TABLES["common"]
+PARSED_UNITS: dict[str, str] = _TABLES["common"]
 """What the library makes of the commonest texts. Loading it takes longer than NumPy."""
 _JOINED = re.compile(r"(?<=[A-Za-z])[.-](?=[A-Za-z])")
 """N.mm, lbf-in: a product."""
@@ -112,7 +112,7 @@ def to_si(text: str, unit: str) -> float:
     number_text = _FRACTION.match(text) or NUMBER_TEXT.match(text)
     if number_text is None:
         raise UnitError("there is no finite number")
-    name = _spell(text[number_text.end() :])
+    name = _spell_unit(text[number_text.end() :])
     if name.startswith(","):
         hint = (
             f'; did you mean "{number_text[0]}.{name[1:]}"?'
@@ -136,13 +136,12 @@ def to_si(text: str, unit: str) -> float:
     try:
         factor, dimension = _find_factor(name)
     except UnitError as error:
-        raise UnitError(f"{error}{_suggest(number_text[0], name, unit)}") from None
+        raise UnitError(f"{error}{_suggest_unit(number_text[0], name, unit)}") from None
     if dimension != wanted_dimension:
-        raise UnitError(
-            f'"{name}" does not convert to {unit}{_suggest(number_text[0], name, unit)}'
-        )
+        suggestion = _suggest_unit(number_text[0], name, unit)
+        raise UnitError(f'"{name}" does not convert to {unit}{suggestion}')
     try:
-        number = _read_number(number_text)
+        number = _read_fraction(number_text)
         if feet:
             inches = 12 * int(feet[2]) + number
             number = -inches if feet[1] == "-" else inches
@@ -169,7 +168,7 @@ def write_pint_quantity(quantity: Any) -> Any:
     return f"{numbers!r} {unit}"
 
 
-def _read_number(text: re.Match[str]) -> Fraction:
+def _read_fraction(text: re.Match[str]) -> Fraction:
     """Return the number that `NUMBER_TEXT` or `_FRACTION` matched."""
     if text.re is NUMBER_TEXT:
         return Fraction(text[0])
@@ -215,7 +214,7 @@ def find_factor(unit: str, given: str) -> float:
         raise InputError("unit", given, f"{error}; must convert to {unit}") from None
 
 
-def _spell(name: str) -> str:
+def _spell_unit(name: str) -> str:
     """Return the name of a unit with the signs and powers that the library knows."""
     return RAISED_TEXT.sub(
         lambda power: f"^{power[0].translate(SUPERSCRIPT_DIGITS)}",
@@ -225,14 +224,14 @@ def _spell(name: str) -> str:
 
 def converts(name: str, unit: str) -> bool:
     """Return True if a name is a unit of the dimension of another unit."""
-    name = _GLUED.sub(r"\1 \2", _spell(name))
+    name = _GLUED.sub(r"\1 \2", _spell_unit(name))
     try:
         return _find_factor(name)[1] == _find_factor(unit)[1]
     except UnitError:
         return False
 
 
-def _suggest(number: str, name: str, unit: str) -> str:
+def _suggest_unit(number: str, name: str, unit: str) -> str:
     """Suggest the unit that may have been meant.
 
     The unit stated is unknown, or of another dimension than `unit`.
@@ -287,8 +286,8 @@ def _load_registry() -> Any:
 @cache
 def _find_factor(name: str) -> tuple[Fraction, dict[str, Fraction]]:
     """Return what one of the unit is in base units, and its dimension."""
-    if name in COMMON:
-        number, *powers = COMMON[name].split()
+    if name in PARSED_UNITS:
+        number, *powers = PARSED_UNITS[name].split()
         bases = (power.partition("^") for power in powers)
         return Fraction(number), {
             f"[{base}]": Fraction(power or 1) for base, _, power in bases

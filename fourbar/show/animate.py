@@ -24,7 +24,7 @@ from fourbar.files import dump
 from fourbar.files.scene_text import BAR_NUMBERS
 from fourbar.formulas.mobility import classify
 from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import ANGLES, DERIVED_NAMES, OK, PIN_FORCES, Array
+from fourbar.quantities import ANGLES, DERIVED_NAMES, OK, PIN_FORCES, RATES, Array
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.pictures import encode_picture
 from fourbar.show.derived import derive
@@ -51,7 +51,6 @@ is thinned out evenly.
 """
 _WATCHED = (1.5, 60.0)
 """A motion through time that lasts between these, s, is shown in real time."""
-RATES = tuple(f"{letter}_{bar}" for letter in ("omega", "alpha") for bar in MOVING_BARS)
 CENTRES = ("I13", "I24")
 """Places that lie at infinity now and then: a figure has them, no curve."""
 ANIMATED_SCALARS = (

@@ -52,9 +52,9 @@ from fourbar.show.units import (
 )
 from fourbar.solution import Conversion, Solution, find_unit_in
 
-_UNBOUNDED = "unbounded"
+_NO_LARGEST = "unbounded"
 """Stands in place of a largest value that there is none of."""
-_TIED = "\u00a0"
+_NBSP = "\u00a0"
 """Stands between a number and its unit until the lines are broken."""
 LEAST_COLUMN = 12
 """Least width of a column."""
@@ -158,7 +158,7 @@ class _SceneBlock:
                 lines.append("")
             for line in paragraph:
                 lines += wrap_line(line, self.width)
-        return [line.replace(_TIED, " ") for line in lines]
+        return [line.replace(_NBSP, " ") for line in lines]
 
     def _write_loads(self, pressure: float | None) -> list[str]:
         """Write the drive, the loads of pins and bars, and remarks.
@@ -232,7 +232,7 @@ class _SceneBlock:
         `largest`: of its kind, which then chooses the prefix; None: the quantity does.
         """
         text = write_short(value, unit, self.units, largest, self.digits)
-        return text.replace(" ", _TIED)
+        return text.replace(" ", _NBSP)
 
     def _place(self, place: float, *, named: bool = True) -> str:
         """Write a place as "theta_2 = 22.8 deg", or without its name."""
@@ -245,7 +245,7 @@ class _SceneBlock:
             {"m": self.longest, "s": 1.0}.get(self.unit),
         )
         if named:
-            return f"{self.symbol}{_TIED}={_TIED}{text}"
+            return f"{self.symbol}{_NBSP}={_NBSP}{text}"
         return text
 
     def _angle(self, angle: float) -> str:
@@ -454,13 +454,13 @@ class _SceneBlock:
             return f"from {self._angle(low.value)} to {self._angle(high.value)}"
         places = [self._place(end.place, named=False) for end in (low, high)]
         if self.unit == "rad":  # the unit stands next to it
-            places = [place.split(_TIED)[0] for place in places]
+            places = [place.split(_NBSP)[0] for place in places]
         width, start, stop = (
             self._angle(angle)
             for angle in (high.value - low.value, low.value, high.value)
         )
         return (
-            f"swings {width}, from {start} ({self.symbol}{_TIED}={_TIED}{places[0]}) to"
+            f"swings {width}, from {start} ({self.symbol}{_NBSP}={_NBSP}{places[0]}) to"
             f" {stop} ({places[1]})"
         )
 
@@ -802,7 +802,7 @@ class _SceneBlock:
     def _cells_of_peaks(self, peaks: list[Peak | None], unit: str) -> list[str]:
         """Write largest values of one kind, and which have no bound."""
         sizes = self._without_small([peak and peak.value for peak in peaks])
-        return self._cells(sizes, unit, _UNBOUNDED)
+        return self._cells(sizes, unit, _NO_LARGEST)
 
     def _places_of_peaks(
         self,

@@ -28,9 +28,9 @@ LOCATED = 1e-11
 """Part of the motion within which an extreme is located."""
 CONSTANT = 1e-12
 """Part of a column's usual value within which two values are one."""
-UNBOUNDED = 1e6
+BESIDE_A_POLE = 1e6
 """Times its usual size beyond which a column's largest value stands beside a pole."""
-SIDES = {"min": 1.0, "max": -1.0}
+EXTREMES = {"min": 1.0, "max": -1.0}
 """Signs by which the least or the greatest value of a column is its least."""
 USUAL = 90.0
 """Percentile of a column's sizes, and of its distances from the median."""
@@ -78,7 +78,7 @@ class _LocatedSearch:
         self.commanded = self.course.commanded
         self._located = {"xatol": LOCATED * self.course.span, "xrtol": 0.0}
         column = read_column(scene, self.course.solution, name)
-        self.unit = _find_unit(column)
+        self.unit = _find_column_unit(column)
         self.values = column.values
 
     def _measure_gaps(self, values: Array) -> Array:
@@ -100,7 +100,7 @@ class _LocatedSearch:
 
     def locate(self, text: str) -> Command:
         """Locate the positions that have a value, in the order of the motion."""
-        self.value = 0.0 if text in SIDES else self._read_value(text)
+        self.value = 0.0 if text in EXTREMES else self._read_value(text)
         finite = self.values[np.isfinite(self.values)]
         if not finite.size:
             raise NotAssembledError(f"--at {self.name}: it has no value in this motion")
@@ -108,9 +108,9 @@ class _LocatedSearch:
             raise self._refuse(text, "it is constant", finite)
         # the largest value may stand beside a pole
         usual = float(np.percentile(np.abs(finite), USUAL))
-        if text in SIDES:
-            place, value = self._find_extreme(SIDES[text])
-            if abs(value) > UNBOUNDED * usual:
+        if text in EXTREMES:
+            place, value = self._find_extreme(EXTREMES[text])
+            if abs(value) > BESIDE_A_POLE * usual:
                 raise self._refuse(text, "it has none", finite)
             return self.course.command(np.array([place]))
         gaps = self._measure_gaps(self.values)
@@ -229,7 +229,7 @@ class _LocatedSearch:
         """Make the error of a value that no position has, with the column's range."""
         ends = dict.fromkeys(self._find_extent(values))
         usual = float(np.percentile(np.abs(values), USUAL))
-        if max(map(abs, ends)) > UNBOUNDED * usual:
+        if max(map(abs, ends)) > BESIDE_A_POLE * usual:
             return NotAssembledError(
                 f"--at {self.name} = {text}: {why}, and grows without bound"
             )
@@ -245,7 +245,7 @@ class _LocatedSearch:
 
         `values`: those that are finite.
         """
-        ends = [self._find_extreme(side)[1] for side in SIDES.values()]
+        ends = [self._find_extreme(side)[1] for side in EXTREMES.values()]
         largest = float(np.abs(values).max())
         cleaned: list[float] = drop_rounding(np.array(ends), largest).tolist()
         return cleaned
@@ -253,7 +253,7 @@ class _LocatedSearch:
     def _find_extreme(self, side: float) -> tuple[float, float]:
         """Find the place and the value of the column's extreme on this side.
 
-        `side`: one of `SIDES`.
+        `side`: one of `EXTREMES`.
         """
         from scipy.optimize.elementwise import find_minimum
 
@@ -270,7 +270,7 @@ class _LocatedSearch:
         return float(place), float(value)
 
 
-def _find_unit(column: Column) -> str:
+def _find_column_unit(column: Column) -> str:
     """Return the SI unit of a column; that of a pure number is 1."""
     if not column.label({}):
         return "1"

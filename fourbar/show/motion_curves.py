@@ -15,7 +15,7 @@ import numpy as np
 from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK, compute_shown_state
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
-from fourbar.quantities import NO_LEVER, NO_TORQUE, PIN_FORCES, Array
+from fourbar.quantities import NO_LEVER, NO_TORQUE, PIN_FORCES, RATES, Array
 from fourbar.scene import ReleaseOrigin, Scene, command_at
 from fourbar.show.driving import is_once_round, read_drive_demand
 from fourbar.show.panels import SHALLOW, Panels, Wanted, fit_panels
@@ -34,7 +34,7 @@ _BESIDE_A_POLE = 1e-4
 """Distance from a listed position without a lever at which its forces are compared with
 those at a quarter of it, rad. Positions have some 12 digits there.
 """
-_ANGLES = ("theta_2", "theta_3", "theta_4", "sin_mu")
+_POSITION_CURVES = ("theta_2", "theta_3", "theta_4", "sin_mu")
 _NO_BENDING = 1e-13
 """Bending moment that is round-off, over the pin forces times the longest bar."""
 _AS_WIDE = 1e-6
@@ -169,7 +169,7 @@ def _fit_curves(solution: Solution) -> MotionCurves:
         extremes = solution
         if solution.with_extremes is not None:
             extremes = solve(scene, "position", at=solution.with_extremes)
-        curves = _list_positions(scene, extremes)
+        curves = _list_position_curves(scene, extremes)
         positions = _take_positions(extremes, curves, np.ones(len(extremes)))
         _mark_poles(scene, solution, panels)
         return MotionCurves(scene, solution, positions, panels, [], np.zeros(0))
@@ -182,7 +182,7 @@ def _fit_curves(solution: Solution) -> MotionCurves:
 
     def compute_positions(places: Array) -> dict[str, Array]:
         there = solve(scene, "position", at=command_at(scene, places))
-        return _list_positions(scene, there)
+        return _list_position_curves(scene, there)
 
     def compute(places: Array) -> dict[str, Array]:
         return _list_curves(scene, solve(scene, stage, at=command_at(scene, places)))
@@ -315,13 +315,10 @@ def _locate_breaks(
 def _list_wanted(scene: Scene, solution: Solution) -> dict[str, Wanted]:
     """List what is asked of each curve, with the size of its rounding."""
     longest = max(scene.linkage.lengths)
-    roundings = dict.fromkeys(_ANGLES, SHOWN_AS_ZERO)
+    roundings = dict.fromkeys(_POSITION_CURVES, SHOWN_AS_ZERO)
     roundings["stroke"] = SHOWN_AS_ZERO * longest
     wanted = {name: Wanted(size, ranged=True) for name, size in roundings.items()}
-    of_bars = (
-        f"{letter}_{bar}" for letter in ("omega", "alpha") for bar in MOVING_BARS
-    )
-    wanted |= dict.fromkeys(of_bars, Wanted())
+    wanted |= dict.fromkeys(RATES, Wanted())
     if solution.F12 is None:
         return wanted
     drive = read_drive_demand(solution)
@@ -340,9 +337,9 @@ def _list_wanted(scene: Scene, solution: Solution) -> dict[str, Wanted]:
     return wanted
 
 
-def _list_positions(scene: Scene, solution: Solution) -> dict[str, Array]:
+def _list_position_curves(scene: Scene, solution: Solution) -> dict[str, Array]:
     """List the curves of the positions alone, by name."""
-    curves = {name: getattr(solution, name) for name in _ANGLES}
+    curves = {name: getattr(solution, name) for name in _POSITION_CURVES}
     if solution.stroke is not None:
         curves["stroke"] = solution.stroke
     return curves
@@ -369,7 +366,7 @@ def _list_curves(scene: Scene, solution: Solution) -> dict[str, Array]:
         return curves
     # what a balanced linkage leaves of a load is rounding, and has no peak
     assert drive.values is not None
-    idle = np.abs(drive.values) <= SHOWN_AS_ZERO * largest * _find_lever(solution)
+    idle = np.abs(drive.values) <= SHOWN_AS_ZERO * largest * _find_longest_arm(solution)
     curves["speed"] = getattr(solution, drive.speed_key)
     for name in (drive.keys.value, "power"):
         curves[name] = np.where(idle, 0.0, getattr(solution, name))
@@ -448,10 +445,10 @@ def find_drive_rounding(solution: Solution) -> float:
     for load in compute_pin_loads(solution).values():
         if np.isfinite(load).any():
             usual = max(usual, float(np.nanmedian(load)))
-    return SHOWN_AS_ZERO * max(inertial, usual) * _find_lever(solution)
+    return SHOWN_AS_ZERO * max(inertial, usual) * _find_longest_arm(solution)
 
 
-def _find_lever(solution: Solution) -> float:
+def _find_longest_arm(solution: Solution) -> float:
     """Return the arm at which pin forces load the drive: the longest bar, m.
 
     The arm is 1 for a drive that exerts a force itself.

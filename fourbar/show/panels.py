@@ -28,7 +28,7 @@ SETTLED = 1e-10
 the motion that the panel is, times the last terms of the polynomial over the size of
 the curve.
 """
-LOCATED = 1e-9
+EXTREME_ERROR = 1e-9
 """Error of a panel that may hold an extreme value below which it is not halved, over
 the largest value.
 """
@@ -70,7 +70,7 @@ Evaluated there, a curve that jumps at the end has the value of this side.
 """
 _FLAT = 1e-13
 """Part of the largest value by which values of one polynomial differ by rounding."""
-_PARTS, _ROUNDS = 64, 4
+_SEARCH_PARTS, _SEARCH_ROUNDS = 64, 4
 """Parts in which a panel is cut where an extreme value is searched, and how often. The
 place is then within 2e-6 of a panel, and the value within the square of that.
 """
@@ -241,7 +241,7 @@ class Panels:
         totals = np.cumsum(widths * series[:, 0])
         integrals = [np.zeros(1)]
         for panel in range(len(totals)):
-            if (zeros := _find_zeros(series[panel])).size:
+            if (zeros := _find_roots(series[panel])).size:
                 until = Legendre(series[panel]).integ(lbnd=-1.0)(zeros)
                 begin = totals[panel] - widths[panel] * series[panel, 0]
                 integrals.append(begin + 0.5 * widths[panel] * until)
@@ -264,7 +264,7 @@ class Panels:
                 continue
             panel, point = divmod(before + 1, len(_GRID))
             if after == before + 1 and point > 0:
-                roots = _find_zeros(series[panel])
+                roots = _find_roots(series[panel])
                 root = roots[np.searchsorted(roots, _GRID[point - 1])]
                 zeros.append(self._place(panel, root))
                 continue
@@ -307,7 +307,7 @@ class Panels:
         values = sizes[rows, node]
         may_exceed = smooth & (best + 2.0 * terms >= best.max())
         for panel in np.flatnonzero(may_exceed).tolist():
-            x[panel], values[panel] = _search(curve.series[panel], rank)
+            x[panel], values[panel] = _search_extreme(curve.series[panel], rank)
         ranks = np.where(np.isfinite(values), rank(values), -np.inf)
         first = int(np.argmax(ranks >= ranks.max() - TIED * scale))
         for after in range(first + 1, len(ranks)):
@@ -329,27 +329,29 @@ def _measure(values: Array) -> Array:
     return np.asarray(np.hypot.reduce(values, axis=-1))
 
 
-def _evaluate(series: Array, x: Array) -> Array:
+def _evaluate_panel(series: Array, x: Array) -> Array:
     """Return the polynomial of a panel, or the size of a vector of them, at places."""
     return _measure(legvander(x, NODES - 1) @ series)
 
 
-def _search(series: Array, rank: Callable[[Array], Array]) -> tuple[float, float]:
+def _search_extreme(
+    series: Array, rank: Callable[[Array], Array]
+) -> tuple[float, float]:
     """Find the first place at which a polynomial ranks highest, and its value."""
     low = -1.0 + _INSIDE
     high = 1.0 - _INSIDE
-    for _ in range(_ROUNDS):
-        x = np.linspace(low, high, _PARTS + 1)
-        values = _evaluate(series, x)
+    for _ in range(_SEARCH_ROUNDS):
+        x = np.linspace(low, high, _SEARCH_PARTS + 1)
+        values = _evaluate_panel(series, x)
         ranks = rank(values)
         slack = _FLAT * np.abs(values).max()
         best = int(np.argmax(ranks >= ranks.max() - slack))
         low = x[max(best - 1, 0)]
-        high = x[min(best + 1, _PARTS)]
+        high = x[min(best + 1, _SEARCH_PARTS)]
     return float(x[best]), float(values[best])
 
 
-def _find_zeros(series: Array) -> Array:
+def _find_roots(series: Array) -> Array:
     """Find where in its panel, from -1 to 1 in order, a polynomial is zero."""
     if abs(series[0]) > np.abs(series[1:]).sum():
         return np.zeros(0)
@@ -393,7 +395,7 @@ def fit_panels(
     start = edges[:-1]
     stop = edges[1:]
     length = edges[-1] - edges[0]
-    fits = _fit(compute, start, stop)
+    fits = _fit_panels(compute, start, stop)
     usual = {name: _find_usual_size(first.values) for name, first in fits.items()}
     settled = dict.fromkeys(fits, (-np.inf, np.inf))
     ends: list[tuple[Array, Array]] = []
@@ -425,8 +427,8 @@ def fit_panels(
             np.concatenate((start[is_open], middle)),
             np.concatenate((middle, stop[is_open])),
         )
-        fits = _fit(compute, start, stop)
-    return _join(ends, fitted, kept, opens)
+        fits = _fit_panels(compute, start, stop)
+    return _join_panels(ends, fitted, kept, opens)
 
 
 def _find_usual_size(values: Array) -> float:
@@ -456,13 +458,13 @@ def _find_open(
         may_exceed |= lowest <= least
     else:
         may_exceed |= -lowest >= scale
-    is_open = may_exceed & ~(fit.error <= LOCATED * scale + wanted.rounding)
+    is_open = may_exceed & ~(fit.error <= EXTREME_ERROR * scale + wanted.rounding)
     if wanted.integrated:
         is_open |= ~(share * fit.error <= SETTLED * usual + wanted.rounding)
     return is_open
 
 
-def _join(
+def _join_panels(
     ends: list[tuple[Array, Array]],
     fitted: dict[str, list[_Fit]],
     kept: list[NDArray[np.bool_]],
@@ -509,7 +511,7 @@ def _find_poles(curve: PanelCurve, unsettled: NDArray[np.bool_]) -> list[int]:
     return poles
 
 
-def _fit(compute: ComputeCurves, start: Array, stop: Array) -> dict[str, _Fit]:
+def _fit_panels(compute: ComputeCurves, start: Array, stop: Array) -> dict[str, _Fit]:
     """Fit the polynomials of panels to curves, and estimate their errors.
 
     An error is that of the last two terms, of which one is even and the other odd, or

@@ -25,7 +25,7 @@ from fourbar.show.motion_curves import (
     describe_motion,
 )
 from fourbar.show.panels import (
-    LOCATED,
+    EXTREME_ERROR,
     TIED,
     PanelCurve,
     Peak,
@@ -163,7 +163,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
         low, high = (motion.positions.find_peak(name, sense) for sense in (-1, 1))
         return low, high
 
-    kind = _find_kind(scene, solution, motion)
+    kind = _classify_motion(scene, solution, motion)
     drive = None
     if scene.motion.free is None and solution.F12 is not None:
         drive = read_drive_demand(solution)
@@ -197,7 +197,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
     )
 
 
-def _find_kind(scene: Scene, solution: Solution, motion: MotionCurves) -> str:
+def _classify_motion(scene: Scene, solution: Solution, motion: MotionCurves) -> str:
     if len(solution) == 1:
         return "position"
     if scene.motion.free is not None:
@@ -333,7 +333,7 @@ def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]
     panels = fit_panels(compute, edges, {"stroke": Wanted(ranged=True)})
     least, most = (panels.find_peak("stroke", sense).value for sense in (-1, 1))
     # a cylinder whose ends meet has a corner there
-    return 0.0 if least <= LOCATED * most else least, most
+    return 0.0 if least <= EXTREME_ERROR * most else least, most
 
 
 def _find_period(scene: Scene, solution: Solution) -> float | None:

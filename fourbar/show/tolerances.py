@@ -38,7 +38,7 @@ PAGE_SAMPLES = 2048
 """Samples behind the bands of a page. They take seconds, and give a percentile to a
 fiftieth of the deviation.
 """
-_MOST_DIGITS, _FEWEST_DIGITS = 6, 3
+_MOST_SHOWN, _FEWEST_SHOWN = 6, 3
 """Significant digits of the table; fewer than the most where it would be wider than a
 block.
 """
@@ -101,15 +101,15 @@ def write_spreads(
         if most := _name_largest(spreads, spreads.spreads[part], worst):
             lines.append(f"  {part}: {most}")
     title = spreads.scene.title
-    for digits in range(_MOST_DIGITS, _FEWEST_DIGITS - 1, -1):
-        table = _make_table(spreads, shown, units, digits)
+    for digits in range(_MOST_SHOWN, _FEWEST_SHOWN - 1, -1):
+        table = _tabulate_parts(spreads, shown, units, digits)
         written = write_table("", [], table)
         if max(map(len, written.split("\n"))) <= BLOCK_WIDTH:
             break
     return write_table(title, lines, table, width=width)
 
 
-def _make_table(
+def _tabulate_parts(
     spreads: Tolerances,
     shown: Mapping[str, int],
     units: Conversion,

@@ -36,7 +36,7 @@ FOLLOWING_UNITS = {"m/s": ("m", "{}/s"), "m/s^2": ("m", "{}/s^2"), "J": ("N m", 
 """Units that follow another one if not stated. Energy follows the unit of torque,
 speeds that of length.
 """
-_RATES = ("omega", "alpha")
+_RATE_NAMES = ("omega", "alpha")
 _POUNDS = ("lb", "lbs", "pound", "pounds", "lbm")
 """Names of the pound, a mass; a list that names no force may mean pounds-force."""
 _METRIC = ("mm", "cm", "dm", "m")
@@ -144,7 +144,7 @@ def units_of_scene(document: Mapping[str, Any]) -> Conversion:
         length = str(find_length(document))
         motion = document.get("motion", {})
         rates = tuple(
-            tuple(_first_text(motion.get(f"{rate}_{bar}", "")) for rate in _RATES)
+            tuple(_first_text(motion.get(f"{rate}_{bar}", "")) for rate in _RATE_NAMES)
             for bar in MOVING_BARS
         )
         if "free" in motion:

@@ -53,7 +53,7 @@ _GENTLE = 0.02
 """Value of |alpha_2|/omega_2^2. Over a turn the speed changes by an eighth and never
 vanishes.
 """
-INTERVALS, _DENSER, INTERVALS_SEARCHED = 36, 4, 2
+SCENE_INTERVALS, _DENSER, INTERVALS_SEARCHED = 36, 4, 2
 """Intervals of the scene. The answer is judged at a multiple of them, and the search
 decides at another.
 """
@@ -205,7 +205,9 @@ def draw_advised_scene(seed: int, index: int) -> tuple[Scene, float]:
         half = PART_OF_THE_RANGE * (stop - start) / 2.0
         start = middle - half
         stop = middle + half
-    motion = Motion(Sweep(start, stop, INTERVALS), omega, alpha, scene.motion.branch)
+    motion = Motion(
+        Sweep(start, stop, SCENE_INTERVALS), omega, alpha, scene.motion.branch
+    )
     return replace(scene, motion=motion), float(10.0 ** rng.uniform(*REQUIRED_ERRORS))
 
 

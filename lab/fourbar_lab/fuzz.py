@@ -45,17 +45,17 @@ from fourbar_validation.scenes.random import (
 )
 
 POSITIONS_OF_A_SCENE = 2
-_SIZES = {False: draw_decades(-0.7, 0.7), True: draw_decades(-6.0, 6.0)}
+_DRAWN_SIZES = {False: draw_decades(-0.7, 0.7), True: draw_decades(-6.0, 6.0)}
 """Lengths, masses, speeds and loads: ordinary, adversarial."""
 ORDINARY_RANGES = Ranges(
     pushed=PUSHED,
-    mass=_SIZES[False],
+    mass=_DRAWN_SIZES[False],
     inertia=draw_uniform(0.02, 0.4),
     centre=draw_uniform(-1.0, 2.0),
     centre_angle=draw_chance(0.5, draw_uniform(-3.0, 3.0)),
     load=draw_uniform(-1.0, 1.0),
     without_force=0.2,
-    speed=draw_chance(0.95, _SIZES[False]),
+    speed=draw_chance(0.95, _DRAWN_SIZES[False]),
     viscous=0.2,
     friction=0.1,
 )
@@ -63,7 +63,7 @@ RANGES = {
     False: ORDINARY_RANGES,
     True: replace(
         ORDINARY_RANGES,
-        mass=draw_chance(0.85, _SIZES[True]),
+        mass=draw_chance(0.85, _DRAWN_SIZES[True]),
         inertia=draw_chance(0.85, ORDINARY_RANGES.inertia),
         centre=draw_product(
             ORDINARY_RANGES.centre, draw_chance(0.2, draw_decades(0.0, 3.0), 1.0)
@@ -71,8 +71,8 @@ RANGES = {
         ground_angle=lambda rng: float(
             rng.choice([0.0, math.pi, rng.uniform(-3.2, 3.2)])
         ),
-        load=draw_product(ORDINARY_RANGES.load, _SIZES[True]),
-        speed=draw_chance(0.95, _SIZES[True]),
+        load=draw_product(ORDINARY_RANGES.load, _DRAWN_SIZES[True]),
+        speed=draw_chance(0.95, _DRAWN_SIZES[True]),
     ),
 }
 """Distributions from which the scenes are drawn: ordinary, adversarial."""
@@ -119,7 +119,7 @@ def draw_fuzz_scene(seed: int, index: int) -> Scene:
 
 
 def _draw_fuzzed_linkage(hard: bool, rng: np.random.Generator) -> DrawnLinkage:
-    size = _SIZES[hard](rng)
+    size = _DRAWN_SIZES[hard](rng)
     lengths = tuple(float(x * size) for x in _draw_fuzzed_lengths(rng, hard))
     return (
         lengths,

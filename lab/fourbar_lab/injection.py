@@ -41,7 +41,7 @@ def inject_fault(entry: dict[str, Any]) -> dict[str, str]:
     """
     texts = {}
     for change in (entry, *([entry["also"]] if "also" in entry else [])):
-        text = _find_file(change["file"]).read_text(encoding="utf-8")
+        text = _find_module_file(change["file"]).read_text(encoding="utf-8")
         if text.count(change["old"]) != 1:
             count = text.count(change["old"])
             raise ValueError(
@@ -58,7 +58,7 @@ def inject_fault(entry: dict[str, Any]) -> dict[str, str]:
     return texts
 
 
-def _find_file(name: str) -> Path:
+def _find_module_file(name: str) -> Path:
     """Find a file of a package that is not imported."""
     package, _, rest = name.partition("/")
     spec = importlib.machinery.PathFinder.find_spec(package)

@@ -168,7 +168,7 @@ def _feed_back(scene: Scene, bar: int) -> Scene | None:
     if bar == 2:
         return scene
     solution = solve(scene, "acceleration")
-    theta, omega, alpha, sine = _read_commanded(solution, bar)
+    theta, omega, alpha, sine = _read_bar_motion(solution, bar)
     if solution.status_code[0] != OK or abs(sine) <= NO_DIGIT_LEFT:
         return None
     numbers = {f"theta_{bar}": theta, f"omega_{bar}": omega, f"alpha_{bar}": alpha}
@@ -177,7 +177,7 @@ def _feed_back(scene: Scene, bar: int) -> Scene | None:
     return replace(scene, motion=Motion(branch=branch, **numbers))  # type: ignore[arg-type]
 
 
-def _read_commanded(solution: Solution, bar: int) -> tuple[float, float, float, float]:
+def _read_bar_motion(solution: Solution, bar: int) -> tuple[float, float, float, float]:
     """Return angle, speed and acceleration of a bar at the first position.
 
     The sine whose sign its branch is follows.

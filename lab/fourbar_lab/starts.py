@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from fourbar_validation.places import MODELS
 
 SCENE = MODELS / "crank_rocker.toml"
-_EVERY = 10
+_ROW_STEP = 10
 """Rows of the sweep's table of which `check` gets one: 37 rows, as a table by hand."""
 
 
@@ -25,7 +25,7 @@ def measure_starts(rounds: int = 7) -> dict[str, float]:
         csv = [sys.executable, "-m", "fourbar", "analyze", str(SCENE), "--csv"]
         written = subprocess.run(csv, capture_output=True, check=True, text=True)
         head, *rows = written.stdout.splitlines()
-        table.write_text("\n".join([head, *rows[::_EVERY]]), encoding="utf-8")
+        table.write_text("\n".join([head, *rows[::_ROW_STEP]]), encoding="utf-8")
         commands = {
             "fourbar --help": ("fourbar", "--help"),
             "fourbar-validation --help": ("fourbar_validation", "--help"),

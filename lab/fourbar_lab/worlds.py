@@ -32,7 +32,7 @@ from fourbar_validation.report.templating import render
 _PROBLEM = "crank_rocker"
 """Problem whose positions are repeated over the worlds."""
 _WORLDS = "100,10000,100000"
-_ROUNDS = 20
+_MOST_TIMINGS = 20
 """Timings of a call at most; their median counts."""
 _LONGEST = 2.0
 """Seconds after which a call is not timed once more."""
@@ -91,10 +91,10 @@ def _read_question() -> tuple[dict[str, Any], Scene, Command]:
     return problem, *protocol.command_from_json(scene, problem["command"])
 
 
-def _time_call(call: Callable[[], object]) -> float:
+def _time_wall_clock(call: Callable[[], object]) -> float:
     """Time a call in s of wall-clock time, the median of several."""
     times: list[float] = []
-    while len(times) < _ROUNDS and sum(times) < _LONGEST:
+    while len(times) < _MOST_TIMINGS and sum(times) < _LONGEST:
         began = time.perf_counter()
         call()
         times.append(time.perf_counter() - began)
@@ -113,7 +113,7 @@ def _measure_formulas(worlds: int) -> WorldsCost:
     began = time.perf_counter()
     call()
     first = time.perf_counter() - began
-    seconds = _time_call(call)
+    seconds = _time_wall_clock(call)
     return WorldsCost(FORMULAS_ON_ONE_CORE, worlds, seconds, seconds, first)
 
 
@@ -127,8 +127,8 @@ def measure_worlds(name: str, worlds: int) -> WorldsCost:
     prepared = simulator.in_worlds(scene, worlds, **chosen)
     prepared.evaluate()
     first = time.perf_counter() - began
-    seconds = _time_call(prepared.evaluate)
-    exchanged = _time_call(prepared.exchange)
+    seconds = _time_wall_clock(prepared.evaluate)
+    exchanged = _time_wall_clock(prepared.exchange)
     readings = prepared.read(prepared.exchange())
     rows = np.arange(len(command.angle))
     answer = simulator.make_answer(scene, command, simulator.setting, readings, rows)

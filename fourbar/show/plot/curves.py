@@ -671,7 +671,7 @@ def _list_inside(angles: Array, angle: float, margin: float) -> list[float]:
     return [start + 360.0 * turn for turn in range(first, last + 1)]
 
 
-EVERY = 60.0
+DOT_SPACING = 60.0
 """Dots on a hodograph stand this far apart in the commanded angle, deg ..."""
 MOST_DOTS_OF_A_CURVE = 12
 """... or, over time or a stroke, a round number that gives no more than these."""
@@ -756,7 +756,7 @@ def _choose_spacing(view: View) -> tuple[float, str]:
     """Return the distance of the dots in the axis's unit, and the same in words."""
     axis = view.axis
     if axis.unit == "°":
-        return EVERY, f"{EVERY:g}° of {axis.symbol}"
+        return DOT_SPACING, f"{DOT_SPACING:g}° of {axis.symbol}"
     duration = float(axis.values[-1] - axis.values[0]) or 1.0
     step = 10.0 ** math.floor(math.log10(duration))
     every = next(

@@ -79,8 +79,8 @@ class Stage:
         No free spot is searched: from frame to frame the label would jump.
         """
         key = (label.text, label.colour, label.size)
-        picture = self._take(key, lambda: self._axes.add_artist(_Picture(*key)))
-        assert isinstance(picture, _Picture)
+        picture = self._take(key, lambda: self._axes.add_artist(_LabelPicture(*key)))
+        assert isinstance(picture, _LabelPicture)
         dx, dy = np.subtract(label.at, label.shun)
         away = complex(dx, dy) / max(math.hypot(dx, dy), 1e-300)
         beside = np.add(label.at, (label.ring * away.real, label.ring * away.imag))
@@ -88,7 +88,7 @@ class Stage:
         return picture
 
 
-class _Picture(Artist):
+class _LabelPicture(Artist):
     """A label as a picture, which is drawn once and moved by whole pixels."""
 
     zorder = 9

@@ -212,14 +212,14 @@ class _Room:
     ) -> int:
         """Count the texts and leaders that the leader of a label would cross."""
         end = np.clip(point, np.subtract(centre, half), np.add(centre, half))
-        crossed = sum(_cross(point, end, *leader) for leader in self.leaders)
+        crossed = sum(_lines_cross(point, end, *leader) for leader in self.leaders)
         for left, bottom, right, top in self.boxes:
-            one = _cross(point, end, (left, bottom), (right, top))
-            crossed += one or _cross(point, end, (left, top), (right, bottom))
+            one = _lines_cross(point, end, (left, bottom), (right, top))
+            crossed += one or _lines_cross(point, end, (left, top), (right, bottom))
         return crossed
 
 
-def _cross(p: Any, q: Any, r: Any, s: Any) -> bool:
+def _lines_cross(p: Any, q: Any, r: Any, s: Any) -> bool:
     """Return True if the lines from p to q and from r to s cross."""
 
     def is_left(a: Any, b: Any, c: Any) -> bool:

@@ -64,7 +64,7 @@ SYMBOL_SIZES = {
 RING_RADII.
 """
 RING_RADII = {"viscous": 1.5, "friction": 1.8, "pin_friction": 1.8}
-_NAMED_AT = {
+_NAME_ANGLES = {
     "viscous": -0.4,
     "friction": 0.4,
     "pin_friction": 0.9,
@@ -397,7 +397,7 @@ def _draw_ring(
     ring = centre + radii * np.exp(1j * angles)
     width = 2.2 if kind == "flywheel" else 1.2
     _draw_line(axes, drawn, ring, _colour_of(symbol), width)
-    drawn.away = cmath.rect(1.0, _NAMED_AT.get(kind, _NAME_OF_OTHERS))
+    drawn.away = cmath.rect(1.0, _NAME_ANGLES.get(kind, _NAME_OF_OTHERS))
     drawn.label = split_complex(centre)
     drawn.ring = radius
 

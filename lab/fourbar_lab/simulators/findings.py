@@ -18,7 +18,7 @@ from fourbar_validation.engines.environments import make_environment, read_engin
 from fourbar_validation.engines.processes import Ended, run_to_end
 from fourbar_validation.places import CHECKOUT
 
-FOLDER = None if CHECKOUT is None else CHECKOUT / "docs" / "findings"
+FINDINGS = None if CHECKOUT is None else CHECKOUT / "docs" / "findings"
 FIELDS = ("Engine", "With", "Expected", "Found", "Since", "Until", "Reported")
 """Fields of a script's docstring, after its first sentence and an empty line. Engine:
 the name for pip, in brackets what is imported. A field's further lines are indented.
@@ -81,7 +81,8 @@ def read_docstring(script: Path) -> Reproduction:
 def read_findings() -> list[Reproduction]:
     """Read the scripts of a checkout."""
     return [
-        read_docstring(path) for path in sorted(FOLDER.glob("*.py") if FOLDER else ())
+        read_docstring(path)
+        for path in sorted(FINDINGS.glob("*.py") if FINDINGS else ())
     ]
 
 

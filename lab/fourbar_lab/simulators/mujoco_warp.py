@@ -104,7 +104,7 @@ class MujocoWarp(Simulator):
         state = mjw.put_data(model, data, nworld=worlds)
         state.qpos.assign(q)
         state.qvel.assign(v)
-        launch = partial(_forward, theirs, state, self.settings[self.setting])
+        launch = partial(_evaluate_states, theirs, state, self.settings[self.setting])
         # compiled before a graph of the launches is made
         launch()
         if self.on_gpu:
@@ -180,7 +180,7 @@ class MujocoWarp(Simulator):
         ]
 
 
-def _forward(theirs: Any, state: Any, times: int) -> None:
+def _evaluate_states(theirs: Any, state: Any, times: int) -> None:
     """Evaluate the states so many times, and what every body bears."""
     for _ in range(times):
         mjw.forward(theirs, state)
@@ -193,7 +193,7 @@ def _evaluate_warp(
     state: Any,
     times: int,
 ) -> Instant:
-    _forward(theirs, state, times)
+    _evaluate_states(theirs, state, times)
     arrays = (state.qpos, state.qvel, state.qacc, state.actuator_force, state.cfrc_int)
     q, v, a, drive, on_bodies = (x.numpy()[-1].astype(float) for x in arrays)
     closing = state.efc.force.numpy()[-1, :2].astype(float)

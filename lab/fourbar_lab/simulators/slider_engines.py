@@ -141,7 +141,7 @@ def answer_slider_positions(
                 crank * math.cos(theta) + branch * rod,
             ]
         )
-        _close_gap(tree, q, GAP_AT_THE_END * rod)
+        _close_slider(tree, q, GAP_AT_THE_END * rod)
         tree.set(q, np.zeros(3))
         _, J, _ = tree.gap()
         following = np.linalg.solve(J[:, 1:], -J[:, 0] * omega)
@@ -168,7 +168,7 @@ def answer_slider_positions(
     return {"answers": answers}
 
 
-def _close_gap(tree: _CutLoop, q: Array, least: float) -> None:
+def _close_slider(tree: _CutLoop, q: Array, least: float) -> None:
     """Close the gap by the rod and the slider, in place."""
     for _ in range(NEWTON_STEPS_OF_A_POSITION):
         tree.set(q, np.zeros(3))

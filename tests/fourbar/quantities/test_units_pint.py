@@ -10,7 +10,7 @@ import pytest
 
 import fourbar
 from fourbar.errors import InputError
-from fourbar.quantities.units import COMMON, ask_library
+from fourbar.quantities.units import PARSED_UNITS, ask_library
 
 ureg = pytest.importorskip("pint").UnitRegistry()
 MM, KG, DEG = ureg.millimeter, ureg.kilogram, ureg.degree
@@ -57,11 +57,11 @@ def test_hertz_are_no_speed():
         fourbar.Motion(0.0, 10.0 * ureg.hertz)
 
 
-@pytest.mark.parametrize("unit", COMMON)
+@pytest.mark.parametrize("unit", PARSED_UNITS)
 def test_a_common_unit_is_what_the_library_makes_of_it(unit):
     number, dimension = ask_library(unit)
     # which power comes first hangs on what the library has read before
     powers = {f"{base[1:-1]}^{power}" for base, power in dimension.items()}
-    stated, *bases = COMMON[unit].split()
+    stated, *bases = PARSED_UNITS[unit].split()
     assert stated == str(number)
     assert {base if "^" in base else f"{base}^1" for base in bases} == powers

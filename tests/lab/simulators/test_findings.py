@@ -15,8 +15,8 @@ from fourbar_lab.cli import status
 from fourbar_lab.simulators import findings as module
 from fourbar_lab.simulators.findings import (
     FIELDS,
+    FINDINGS,
     FIXED,
-    FOLDER,
     find_interpreter,
     read_docstring,
     read_findings,
@@ -46,8 +46,8 @@ def test_each_finding_holds_or_says_since_when_not(
 
 
 def test_each_finding_is_a_report_and_stands_in_the_list() -> None:
-    assert FOLDER is not None and len(ALL) >= 8
-    listed = (FOLDER.parent / "findings.md").read_text(encoding="utf-8")
+    assert FINDINGS is not None and len(ALL) >= 8
+    listed = (FINDINGS.parent / "findings.md").read_text(encoding="utf-8")
     for finding in ALL:
         assert set(FIELDS) - {"With"} <= finding.fields.keys(), finding.script
         entry = (
@@ -91,7 +91,7 @@ def test_the_command_says_what_could_not_run(
         '"""It is so.\n\nEngine: nothing-such (nothing_such)\nWith: also=={version},'
         ' more\n"""\n'
     )
-    monkeypatch.setattr(module, "FOLDER", tmp_path)
+    monkeypatch.setattr(module, "FINDINGS", tmp_path)
     done = CliRunner().invoke(module.findings_command)
     assert (
         "one.py: not run: nothing-such is not installed" in done.output

@@ -343,7 +343,7 @@ def test_every_engine_of_a_report_has_a_mark_of_its_own(monkeypatch, tmp_path):
     ]
     assert len(engines) == 4
     names = [engine.name for engine in (*ENGINES, *load_further(), *engines)]
-    svg.STYLE_NUMBERS.update(guests.list_numbers(engines))
+    svg.STYLE_NUMBERS.update(guests.number_guests(engines))
     marks = {
         name: (svg.choose_style(name).symbol, svg.choose_style(name).marker)
         for name in names
@@ -355,7 +355,7 @@ def test_every_engine_of_a_report_has_a_mark_of_its_own(monkeypatch, tmp_path):
     )
     svg.STYLE_NUMBERS.clear()
     svg.STYLE_NUMBERS.update(
-        guests.list_numbers(engines[1:])
+        guests.number_guests(engines[1:])
     )  # a scene in which the first broke down
     assert svg.choose_style(names[-1]).symbol == marks[names[-1]][0]
     assert all(svg.choose_style(name).variable in svg.LIGHT_COLOURS for name in names)

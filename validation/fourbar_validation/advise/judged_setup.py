@@ -13,7 +13,7 @@ from fourbar_validation.engines.mujoco.trial import Build, Trial, TrialSetup
 
 INTERVALS_READ = 180
 """Intervals of the sweep at which a run is read at least."""
-MOST_INTERVALS = 16 * INTERVALS_READ
+DENSEST_INTERVALS = 16 * INTERVALS_READ
 """Intervals beyond which steps are so dense that a curve of degree 7 through them is
 exact to round-off.
 """
@@ -53,7 +53,7 @@ class JudgedSetup(TrialSetup):
         drive: Build | None = None,
     ) -> Trial:
         """Run through the scene with as many positions as there are steps."""
-        if self.intervals > self.steps(settings) or self.intervals >= MOST_INTERVALS:
+        if self.intervals > self.steps(settings) or self.intervals >= DENSEST_INTERVALS:
             return super().try_out(settings, closure, drive)
         if self._denser is None:
             self._denser = JudgedSetup(self.stated, 4 * self.intervals, self.before)

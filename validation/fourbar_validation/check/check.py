@@ -12,7 +12,7 @@ from pathlib import Path
 import click
 import numpy as np
 
-from fourbar.errors import FAILED, HOLDS, LONGEST_MESSAGE, InputError, shorten
+from fourbar.errors import FAILED, HOLDS, LONGEST_MESSAGE, InputError, abbreviate
 from fourbar.files import load
 from fourbar.quantities import UNITS
 from fourbar.scene import Scene
@@ -453,7 +453,7 @@ def show_judgement(
         headings = ", ".join(
             heading for heading, reason in table.left_out.items() if reason == why
         )
-        print_sentence(shorten(f"left out ({why}): {headings}", LONGEST_MESSAGE))
+        print_sentence(abbreviate(f"left out ({why}): {headings}", LONGEST_MESSAGE))
     differing = judgement.differing
     if differing:
         from rich.console import Console

@@ -165,7 +165,7 @@ def _scale_inertial(scene: Scene, command: Command) -> Iterator[Mistake]:
     yield Mistake("I alpha with the wrong sign", scaled(1.0, -1.0))
 
 
-_ACTIONS = {
+_EFFECT_NAMES = {
     "gravity": "gravity",
     "springs": "the springs",
     "torsion": "the torsion springs",
@@ -175,7 +175,7 @@ _ACTIONS = {
     "flywheel": "the flywheel",
 }
 """Names of the effects of the package, by their keys."""
-_PARTS = {
+_PART_FIELDS = {
     "springs": "springs",
     "torsion": "springs",
     "viscous": "coefficients",
@@ -232,7 +232,7 @@ def _list_without(scene: Scene) -> Iterator[tuple[str, Scene]]:
         loads = tuple(one for one in scene.loads if one is not load)
         yield f"load {number} (bar {load.bar})", replace(scene, loads=loads)
     for effect in scene.effects:
-        name = _ACTIONS.get(effect.key, f"effect {effect.key}")
+        name = _EFFECT_NAMES.get(effect.key, f"effect {effect.key}")
         others = tuple(one for one in scene.effects if one is not effect)
         yield name, replace(scene, effects=others)
         for text, changed in _list_without_part(effect, name):
@@ -241,7 +241,7 @@ def _list_without(scene: Scene) -> Iterator[tuple[str, Scene]]:
 
 def _list_without_part(effect: Any, name: str) -> Iterator[tuple[str, Effect]]:
     """List the parts of an effect, each with the effect without it."""
-    field = _PARTS.get(effect.key, "")
+    field = _PART_FIELDS.get(effect.key, "")
     parts = getattr(effect, field, ())
     for i, part in enumerate(parts):
         if len(parts) > 1:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from fourbar.effects import ForceDrive
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
-from fourbar.quantities import COUPLE, LINE, OK, UNITS, Array
+from fourbar.quantities import COUPLE, LINE, OK, RATES, UNITS, Array
 from fourbar.scene import Scene, StrokeOrigin
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
@@ -300,12 +300,6 @@ def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
     return total
 
 
-_RATES = ("omega_2", "omega_3", "omega_4", "alpha_2", "alpha_3", "alpha_4")
-"""Quantities from which the size of a force is computed. An answer without them has
-none.
-"""
-
-
 def has_angles(answer: Answer) -> bool:
     """Return whether an answer has the angles of all moving bars that are not given."""
     theta_2 = (
@@ -470,7 +464,7 @@ def find_scale_of_answer(
     terms need.
     """
     if answered.at.speed is not None:
-        if any(getattr(answered, name) is None for name in _RATES):
+        if any(getattr(answered, name) is None for name in RATES):
             return None
         if answered.a_G2 is None or answered.a_G3 is None or answered.a_G4 is None:
             accelerations = _find_accelerations(scene.linkage, answered)

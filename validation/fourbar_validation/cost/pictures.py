@@ -237,13 +237,15 @@ def draw_work_precision(
     front = find_pareto(list_stepped(curves), quantity)
     broad = {"lw": 8.0, "solid_capstyle": "round", "solid_joinstyle": "round"}
     axes.plot(
-        *_locate(front, quantity),
+        *_take_coordinates(front, quantity),
         **broad,
         zorder=1,
         color=BAND,
         label="cheapest of everything stepped",
     )
-    labels.keep_off(axes, *zip(*_locate(front, quantity), strict=True), width=8.0)
+    labels.keep_off(
+        axes, *zip(*_take_coordinates(front, quantity), strict=True), width=8.0
+    )
     for name, look in METHOD_LOOKS.items():
         label = name
         if look.curve == "recommended":
@@ -255,12 +257,12 @@ def draw_work_precision(
             if getattr(point.errors, quantity) < LARGEST_DRAWN_ERROR
         ]
         if row:
-            _draw_look(axes, *_locate(row, quantity), label, look)
-            places = zip(*_locate(row, quantity), strict=True)
+            _draw_look(axes, *_take_coordinates(row, quantity), label, look)
+            places = zip(*_take_coordinates(row, quantity), strict=True)
             labels.keep_off(axes, *places, width=1.8)
     default = find_default(curves)
     if default is not None and getattr(default.errors, quantity) < LARGEST_DRAWN_ERROR:
-        place = _locate([default], quantity)
+        place = _take_coordinates([default], quantity)
         axes.plot(*place, marker="*", ms=16, color=_ORANGE, mec=INK, mew=0.8, zorder=5)
         _name_point(labels, axes, default, quantity, "Euler, 2 ms")
     _mark_price(labels, axes, curves, quantity)
@@ -279,7 +281,7 @@ def draw_work_precision(
     return figure
 
 
-def _locate(
+def _take_coordinates(
     points: Sequence[CostPoint],
     quantity: str,
 ) -> tuple[list[float], list[float]]:
@@ -308,7 +310,7 @@ def _name_point(
     text: str,
 ) -> None:
     """Write next to a point, where it covers nothing."""
-    (x,), (y,) = _locate([point], quantity)
+    (x,), (y,) = _take_coordinates([point], quantity)
     labels.keep_off(axes, (x, y), (x, y))
     labels.add(Label(axes, text, (x, y), (0.5 * x, y), INK, TEXT))
 
@@ -328,7 +330,7 @@ def _mark_exact(
         return
     marker, colour = marks[point.kind]
     axes.plot(
-        *_locate([point], quantity),
+        *_take_coordinates([point], quantity),
         marker=marker,
         ms=9,
         color=colour,
@@ -399,7 +401,7 @@ def _mark_price(
     if point is None:
         return
     axes.plot(
-        *_locate([point], quantity),
+        *_take_coordinates([point], quantity),
         ls="none",
         marker="o",
         ms=12,

@@ -100,7 +100,7 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
         "c": c,
         "theta_1": link.ground_angle,
     }
-    values |= _collect_motion(scene, angle)
+    values |= _collect_command(scene, angle)
     if scene.drive is not None:
         for name, (_, point) in zip(LINE_ENDS, scene.drive.ends, strict=False):
             values |= _collect_place(scene, point, name, f"{name}_angle")
@@ -118,7 +118,7 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
     return values
 
 
-def _collect_motion(scene: Scene, angle: float) -> dict[str, float]:
+def _collect_command(scene: Scene, angle: float) -> dict[str, float]:
     """Collect what is commanded: a position, its speed and its acceleration."""
     motion = scene.motion
     position, speed, acceleration = motion.names
@@ -263,7 +263,7 @@ def compute_directions(
         D = d e^{i theta_1} - b e^{i theta_3} of bars 2 and 4,
         D = d e^{i theta_1} + c e^{i theta_4} of bars 3 and 2, bar 2 reversed.
     """
-    bar = _find_commanded(x)
+    bar = _find_commanded_bar(x)
     d = x["d"]
     held, b, c = (x[name] for name in COMMANDED_FIRST[bar])
     side = 1 if bar == 4 else -1
@@ -287,7 +287,7 @@ def compute_directions(
     return (-second, first, w)
 
 
-def _find_commanded(x: BallValues) -> int:
+def _find_commanded_bar(x: BallValues) -> int:
     """Return the bar whose angle is among the inputs."""
     return next(bar for bar in MOVING_BARS if f"theta_{bar}" in x)
 
@@ -320,7 +320,7 @@ def compute_outputs(
     if directions is None:
         return None
     w = dict(zip(MOVING_BARS, directions, strict=True))
-    commanded = _find_commanded(x)
+    commanded = _find_commanded_bar(x)
     sines = {
         2: wedge(w[3], w[4]),
         3: wedge(w[2], w[4]),
@@ -340,7 +340,7 @@ def compute_outputs(
     y |= {f"omega_{bar}": bars.omega[bar] for bar in MOVING_BARS}
     y |= {f"alpha_{bar}": bars.alpha[bar] for bar in MOVING_BARS}
     _put_vectors(y, bars.points())
-    drive, speed, drives = _describe_drive(scene, x, bars, sines, y)
+    drive, speed, drives = _evaluate_drive(scene, x, bars, sines, y)
     force, moment = _sum_acting_balls(scene, x, bars)
     try:
         forces, driving = _solve_thirteen_balls(x, bars, force, moment, drives)
@@ -840,7 +840,7 @@ def _find_line(
     )
 
 
-def _describe_drive(
+def _evaluate_drive(
     scene: Scene,
     x: BallValues,
     bars: _BallBars,

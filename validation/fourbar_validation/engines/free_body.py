@@ -45,7 +45,7 @@ from fourbar_validation.engines.linear import solve_refined
 
 NAME = "free-body"
 FORCE_COLUMNS = {"F12": 0, "F32": 2, "F23": 4, "F43": 6, "F34": 8, "F14": 10}
-DRIVE = 12
+DRIVE_COLUMN = 12
 """The torque, or the force along a line."""
 EQUATION_ROWS = {2: (0, "F12", "F32"), 3: (3, "F23", "F43"), 4: (6, "F14", "F34")}
 """First row of a bar, the force at its first pin and that at its second."""
@@ -232,14 +232,16 @@ def _answer_positions(
                 commanded,
             )
             ends.append(
-                balance(scene, motion._replace(beginning=begins.omega))[0][:, DRIVE]
+                balance(scene, motion._replace(beginning=begins.omega))[0][
+                    :, DRIVE_COLUMN
+                ]
             )
         forces |= {drive.low: np.minimum(*ends), drive.high: np.maximum(*ends)}
     if scene.loads or scene.effects:
         forces[f"{drive.value}_inertia"] = balance(
             replace(scene, loads=(), effects=()), motion
-        )[0][:, DRIVE]
-    return forces | {drive.value: unknowns[:, DRIVE]}, residual
+        )[0][:, DRIVE_COLUMN]
+    return forces | {drive.value: unknowns[:, DRIVE_COLUMN]}, residual
 
 
 def _place_line_of_drive(scene: Scene, motion: BodyMotion) -> DriveLine | None:
@@ -344,7 +346,7 @@ def _solve_unit_couples(
         _make_matrix(scene, motion), np.stack(columns, axis=-1)
     )
     if scene.drive is None:
-        unknowns[:, DRIVE] *= motion.linkage.bar(scene.drive_bar).length
+        unknowns[:, DRIVE_COLUMN] *= motion.linkage.bar(scene.drive_bar).length
     first = [FORCE_COLUMNS[FORCE_AT[pin]] for pin in pins]
     loads = unknowns[:, first] + 1j * unknowns[:, [column + 1 for column in first]]
     return unknowns, loads, np.array(list(pins.values())), residual
@@ -442,12 +444,12 @@ def _make_matrix(scene: Scene, motion: BodyMotion) -> Array:
             u.real,
         )
     if (line := _place_line_of_drive(scene, motion)) is None:
-        matrix[:, EQUATION_ROWS[scene.drive_bar][0] + 2, DRIVE] = 1.0
+        matrix[:, EQUATION_ROWS[scene.drive_bar][0] + 2, DRIVE_COLUMN] = 1.0
     else:
         unit = BodyWrenches(len(motion.theta_2))
         for (sense, point), arm in zip(line.drive.ends, line.arms, strict=True):
             unit.push(point.bar, sense * line.unit, arm)
-        matrix[:, :, DRIVE] = -_make_right_sides(motion.linkage, unit)
+        matrix[:, :, DRIVE_COLUMN] = -_make_right_sides(motion.linkage, unit)
     for row, (force, reaction) in ((9, ("F32", "F23")), (11, ("F43", "F34"))):
         for axis in (0, 1):
             matrix[:, row + axis, FORCE_COLUMNS[force] + axis] = matrix[

@@ -224,7 +224,7 @@ def adjust_engines(engines: Sequence[Engine], error: float) -> tuple[Engine, ...
     return tuple(adjusted)
 
 
-def list_numbers(engines: Iterable[Engine]) -> dict[str, int]:
+def number_guests(engines: Iterable[Engine]) -> dict[str, int]:
     """List the numbers of the guests, by name."""
     return {guest.name: guest.number for guest in engines if isinstance(guest, Guest)}
 

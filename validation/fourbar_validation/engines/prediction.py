@@ -43,7 +43,7 @@ from fourbar_validation.engines.description import find_unknown, list_speeds
 if TYPE_CHECKING:
     from fourbar_validation.engines.balls import Ball, BallValues
 
-DRIVING = (COUPLE.value, LINE.value)
+DRIVE_QUANTITIES = (COUPLE.value, LINE.value)
 """Quantities of a drive, of which a scene has one."""
 LARGEST_FIRST_ORDER = 0.1
 """Limit of first-order prediction. Angles uncertain by this part of the sine that
@@ -165,7 +165,7 @@ def _predict_error(
             continue
         first = moved.first_order(quantity, reach, carried)
         errors[i] = min(first, bound)
-        if quantity in DRIVING:
+        if quantity in DRIVE_QUANTITIES:
             turned = max(moved.first_order(f"theta_{bar}", reach) for bar in (3, 4))
             pulled = max(
                 moved.first_order(force, reach, carried) for force in PIN_FORCES
@@ -291,7 +291,7 @@ def _compute_sensitivity(
         for name, most in (("slip", fastest), ("jerk", hardest)):
             for direction in (acb(1), acb(0, 1)):
                 _add_response(loop, base, move(**{name: most * step * direction}))
-    drive = next((name for name in DRIVING if name in base), None)
+    drive = next((name for name in DRIVE_QUANTITIES if name in base), None)
     if drive is not None:
         strongest = max(
             abs(base[name + axis]) for name in PIN_FORCES for axis in ("_x", "_y")

@@ -54,7 +54,7 @@ KINDS_OF_COMMAND = (*COMMAND_NAMES.values(), STROKE_COMMAND)
 _OF_RELEASED = ("theta_2", "omega_2", "energy", "terms")
 
 
-class _Numbers(Reader):
+class _NumberReader(Reader):
     """Reads numbers in SI and radians where a scene file has texts with units."""
 
     QUANTITY = "in {}"
@@ -116,7 +116,7 @@ def scene_from_json(data: Any) -> Scene:
 
     Raises an InputError that names what is wrong.
     """
-    read = _Numbers("scene")
+    read = _NumberReader("scene")
     try:
         return read_scene(read, read.table("", data, DESCRIBED_TABLES), ".")
     except InputError as error:

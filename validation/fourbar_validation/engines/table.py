@@ -32,7 +32,7 @@ HARNESS_ENGINES, LAB_ENGINES, ENGINES_TOML, GUEST = (
 
 
 @dataclass(frozen=True, slots=True)
-class _Listed:
+class _TableEntry:
     """A line of the table."""
 
     source: str
@@ -46,7 +46,7 @@ def fill_table(
     seconds: float | None = None,
     *,
     balls: bool = False,
-) -> dict[str, _Listed]:
+) -> dict[str, _TableEntry]:
     """Fill the table of engines, by name; the first to bear a name keeps it.
 
     Parameters
@@ -58,15 +58,15 @@ def fill_table(
     """
     ours = [BALLS] * balls + list(ENGINES)
     by_source = {HARNESS_ENGINES: ours, LAB_ENGINES: list(load_further())}
-    table: dict[str, _Listed] = {}
+    table: dict[str, _TableEntry] = {}
     for source, engines in by_source.items():
         for engine in engines:
-            table[engine.name] = _Listed(source, partial(_ready, engine))
+            table[engine.name] = _TableEntry(source, partial(_ready, engine))
     for guest in read_guests(guests, list(table), seconds):
-        table[guest.name] = _Listed(GUEST, partial(_ready, guest))
+        table[guest.name] = _TableEntry(GUEST, partial(_ready, guest))
     for name, entry in read_engines(folders).items():
         table.setdefault(
-            name, _Listed(ENGINES_TOML, partial(_start_environment, entry, seconds))
+            name, _TableEntry(ENGINES_TOML, partial(_start_environment, entry, seconds))
         )
     return table
 
@@ -87,7 +87,7 @@ def _start_environment(
 
 def choose_engines(
     names: str | None,
-    table: dict[str, _Listed] | None = None,
+    table: dict[str, _TableEntry] | None = None,
 ) -> tuple[Engine, ...]:
     """Choose the engines named in a comma-separated list, and every guest.
 
@@ -113,7 +113,7 @@ def choose_engines(
     return name_by_versions(chosen, table)
 
 
-def _read_names(text: str, table: dict[str, _Listed]) -> list[str]:
+def _read_names(text: str, table: dict[str, _TableEntry]) -> list[str]:
     names = [name.strip() for name in text.split(",") if name.strip()]
     for name in names or [text]:
         if name not in table:

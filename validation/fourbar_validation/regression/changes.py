@@ -49,8 +49,8 @@ WHOLE_ENGINE = ("all", "watch")
 """Rows of what went wrong with an engine as a whole. Once it is mended they are gone.
 """
 KEY = ["scene", "engine", "setting", "quantity"]
-_WITHOUT_SETTING = ["scene", "engine", "quantity"]
-MOST_NAMED = 50
+WITHOUT_SETTING = ["scene", "engine", "quantity"]
+MOST_LISTED = 50
 """Scenes and engines listed by name that were not run or not compared. The others are
 counted.
 """
@@ -173,7 +173,7 @@ class Differences:
     @property
     def counts(self) -> Counts:
         """Return the rows of the new run by verdict."""
-        return _count(self.table[self.table.verdict_new != ""])
+        return _count_rows(self.table[self.table.verdict_new != ""])
 
     @property
     def _shared(self) -> "DataFrame":
@@ -187,7 +187,7 @@ class Differences:
     @property
     def _counterparts(self) -> Counts:
         answered = (self.table.verdict_old != "") & (self.table.verdict_new != "")
-        return _count(self.table[answered & (self.table.why == "")])
+        return _count_rows(self.table[answered & (self.table.why == "")])
 
     @property
     def compared(self) -> int:
@@ -295,7 +295,7 @@ class Differences:
         return [f"{text}, {n} of {total} scenes" for text, n in counts.most_common()]
 
 
-def _count(lines: "DataFrame") -> Counts:
+def _count_rows(lines: "DataFrame") -> Counts:
     """Count the rows of the new run among lines."""
     counts = Counts()
     counts.add_counted(lines.groupby(["engine", "verdict_new"]).size().to_dict())
@@ -303,13 +303,13 @@ def _count(lines: "DataFrame") -> Counts:
 
 
 def _name(names: "Series[str]") -> list[str]:
-    """Count rows by name; of more than MOST_NAMED names the others are one."""
+    """Count rows by name; of more than MOST_LISTED names the others are one."""
     counts = names.value_counts(sort=False)
     lines = [
         f"{name} ({n} row{'s' if n > 1 else ''})"
-        for name, n in counts[:MOST_NAMED].items()
+        for name, n in counts[:MOST_LISTED].items()
     ]
-    more = counts[MOST_NAMED:]
+    more = counts[MOST_LISTED:]
     return lines + [f"{len(more)} more ({more.sum()} rows)"] * bool(len(more))
 
 
@@ -354,8 +354,8 @@ def compare_runs(
     for column, wanted in chosen.items():
         now = {pairs.get(name, names.get(name, name)) for name in wanted}
         rows = rows[0][rows[0][column].isin(now)], rows[1][rows[1][column].isin(now)]
-    table = _join(*map(_keep_worst, rows))
-    table = _classify(table, changed, before, after)
+    table = _join_runs(*map(_keep_worst, rows))
+    table = _classify_rows(table, changed, before, after)
     surroundings, older = _list_surroundings(before, after)
     known = list_weakened(before.rules, after.rules)
     weakened = [*known, *list_weakened_rows(table, known)]
@@ -377,7 +377,7 @@ def _keep_worst(rows: "DataFrame") -> "DataFrame":
     return by_verdict.drop_duplicates(KEY, keep="last")
 
 
-def _join(old: "DataFrame", new: "DataFrame") -> "DataFrame":
+def _join_runs(old: "DataFrame", new: "DataFrame") -> "DataFrame":
     """Join the rows of both runs by KEY.
 
     Rows that each run has with a single setting of its own are one line, with the new
@@ -386,12 +386,12 @@ def _join(old: "DataFrame", new: "DataFrame") -> "DataFrame":
     keys = old[KEY].merge(new[KEY], how="outer", indicator="runs")
     single = {
         run: keys.loc[(keys.runs == run) & (keys.setting != "-"), KEY].drop_duplicates(
-            _WITHOUT_SETTING, keep=False
+            WITHOUT_SETTING, keep=False
         )
         for run in ("left_only", "right_only")
     }
     moved = single["left_only"].merge(
-        single["right_only"], on=_WITHOUT_SETTING, suffixes=("_old", "_new")
+        single["right_only"], on=WITHOUT_SETTING, suffixes=("_old", "_new")
     )
     new = new.merge(moved.assign(setting=moved.setting_new), how="left", on=KEY)
     new["setting"] = new.pop("setting_old").fillna(new.setting)
@@ -404,7 +404,7 @@ def _join(old: "DataFrame", new: "DataFrame") -> "DataFrame":
     return table.sort_values(KEY, ignore_index=True)
 
 
-def _classify(
+def _classify_rows(
     table: "DataFrame",
     changed: list[SceneChange],
     before: About,

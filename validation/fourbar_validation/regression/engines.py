@@ -25,8 +25,8 @@ def pair_engines(
     gone, added = (
         [name for name in run if name not in other]
         for run, other in (
-            (_list_engines(old), _list_engines(new)),
-            (_list_engines(new), _list_engines(old)),
+            (_list_recorded(old), _list_recorded(new)),
+            (_list_recorded(new), _list_recorded(old)),
         )
     )
     pairs: dict[str, str] = {}
@@ -63,7 +63,7 @@ def pair_engines(
     return pairs, notes
 
 
-def _list_engines(run: tuple[About, "DataFrame"]) -> list[str]:
+def _list_recorded(run: tuple[About, "DataFrame"]) -> list[str]:
     """List the engines of a run in the order of its record."""
     about, rows = run
     return [

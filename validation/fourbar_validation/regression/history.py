@@ -17,6 +17,7 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.writing import write_bytes
 from fourbar_validation.compare.rows import COMPARED_VERDICTS, FAILS, FORMULAS
+from fourbar_validation.regression.changes import WITHOUT_SETTING
 from fourbar_validation.regression.record import Recorded
 from fourbar_validation.report.html import Section, SectionFigure
 from fourbar_validation.report.svg import ALLOWED, choose_style, set_frame, write_svg
@@ -41,7 +42,7 @@ def append(file: Path, run: Recorded) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    table = _make_table(run)
+    table = _tabulate_run(run)
     if file.exists():
         try:
             old = pq.read_table(
@@ -63,7 +64,7 @@ def append(file: Path, run: Recorded) -> None:
     write_bytes(file, sink.getvalue().to_pybytes())
 
 
-def _make_table(run: Recorded) -> Any:
+def _tabulate_run(run: Recorded) -> Any:
     """Return the rows and times of a run; a text that recurs is kept once."""
     import pandas
     import pyarrow as pa
@@ -117,7 +118,6 @@ def _make_table(run: Recorded) -> Any:
 
 RowKey = tuple[str, str, str]
 """Scene, engine and quantity of a row."""
-_KEY = ["scene", "engine", "quantity"]
 
 
 def read_history(before: Recorded) -> "DataFrame":
@@ -128,7 +128,7 @@ def read_history(before: Recorded) -> "DataFrame":
     import pandas
 
     file = before.table.parent / HISTORY
-    columns = ["date", "commit", *_KEY, "verdict", "error", "allowed"]
+    columns = ["date", "commit", *WITHOUT_SETTING, "verdict", "error", "allowed"]
     if not file.is_file():
         about = before.about
         lines = before.frame().assign(date=about.date, commit=about.commit)[columns]
@@ -190,7 +190,7 @@ def draw_row(history: "DataFrame", row: Any) -> str:
 
     `row`: line of the table of differences. Empty if no run has a number.
     """
-    same = [history[name] == getattr(row, name) for name in _KEY]
+    same = [history[name] == getattr(row, name) for name in WITHOUT_SETTING]
     lines = history[np.logical_and.reduce(same)].tail(MOST_RUNS_DRAWN - 1)
     labels = [f"{run.date[:10]}\n{run.commit[:7]}" for run in lines.itertuples()]
     errors = np.array([*lines.error, row.error_new], dtype=float)
@@ -233,7 +233,7 @@ def collect_history(folder: Path) -> list[Section]:
     figure = SectionFigure(
         "Error and time of each engine over the accepted runs",
         caption,
-        svg=_draw(table),
+        svg=_draw_history(table),
     )
     text = f"From {file.name} of the accepted state, to which `accept` appends. "
     return [Section("history", "Over the accepted runs", text, figures=[figure])]
@@ -271,7 +271,7 @@ def summarise(file: Path) -> "DataFrame":
     ).reset_index()
 
 
-def _draw(table: "DataFrame") -> str:
+def _draw_history(table: "DataFrame") -> str:
     """Draw error and time of each engine over the runs, labelled by their commits."""
     from matplotlib.figure import Figure
 

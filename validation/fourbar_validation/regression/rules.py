@@ -127,23 +127,23 @@ def _is_weaker(
 ) -> bool:
     """Return whether an entry that differs makes its rule weaker."""
     if what == FACTOR_CHANGED:
-        return _number(new[what]) > _LOOSER * _number(old[what])
+        return _read_float(new[what]) > _LOOSER * _read_float(old[what])
     if (
         what in (CLASS_CHANGED, _REASON)
         and FACTOR_CHANGED in old
         and FACTOR_CHANGED in new
     ):
-        return not _number(new[FACTOR_CHANGED]) * _LOOSER < _number(old[FACTOR_CHANGED])
+        before = _read_float(old[FACTOR_CHANGED])
+        return not _read_float(new[FACTOR_CHANGED]) * _LOOSER < before
     if what in (_CONDITIONED, _PREDICTED, _IN_TIME):
         return new[what] == _YES
     if what == ANSWERS_CHECK:
-        before = set(old[what].split(", "))
-        after = set(new[what].split(", "))
-        return bool(before - after)
+        asked = set(old[what].split(", "))
+        return bool(asked - set(new[what].split(", ")))
     return True
 
 
-def _number(text: str) -> float:
+def _read_float(text: str) -> float:
     try:
         return float(text)
     except ValueError:

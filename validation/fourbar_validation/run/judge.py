@@ -14,7 +14,7 @@ import numpy as np
 from fourbar.scene import Scene
 from fourbar.scene import command as command_of
 from fourbar_validation.compare.rows import FORMULAS, Row
-from fourbar_validation.engines.guests import list_numbers
+from fourbar_validation.engines.guests import number_guests
 from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.svg import STYLE_NUMBERS
@@ -128,7 +128,7 @@ def judge_for_report(
                 reason=f"{row.reason}; what it printed: {OUTPUT}",
             )
     figure = thumbnail = None
-    STYLE_NUMBERS.update(list_numbers(engines))
+    STYLE_NUMBERS.update(number_guests(engines))
     if draw:
         from fourbar_validation.report.figures import draw_scene_figure
 

@@ -20,7 +20,7 @@ from fourbar_validation.compare.rows import (
     escape_controls,
     write_csv_rows,
 )
-from fourbar_validation.engines.guests import list_numbers
+from fourbar_validation.engines.guests import number_guests
 from fourbar_validation.engines.mujoco.picture import render_pictures
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression.history import (
@@ -161,7 +161,7 @@ def write_outcome(
     )
     if options.against is not None:
         sections += collect_history(before.table.parent)
-    STYLE_NUMBERS.update(list_numbers(engines))
+    STYLE_NUMBERS.update(number_guests(engines))
     page = write_html(
         summary,
         first_lines,

@@ -23,7 +23,7 @@ _MISSED = 1e-9
 """Part of the acceleration sought that a linear solve may leave. Its rounding is 1e-12,
 also near a change point.
 """
-NOISE = 1e-3
+SOLVER_NOISE = 1e-3
 """Part of it that the noise of the file's solver may leave. Where the acceleration
 jumps, all of it is left.
 """
@@ -71,7 +71,7 @@ def find_couple(
         data.qacc_warmstart[:] = start
         return acceleration(size)
 
-    bracketed = bracket_couple(repeatable, wanted, trial, NOISE * sought)
+    bracketed = bracket_couple(repeatable, wanted, trial, SOLVER_NOISE * sought)
     if bracketed is None:
         return math.nan
     return bracketed

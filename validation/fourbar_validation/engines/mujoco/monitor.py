@@ -56,7 +56,7 @@ RESIDUAL_LIMITS = {
     ),
 }
 """Residuals of motion and forces that `ResidualMonitor` measures."""
-_OF_FORCES = ("power_gap", "force_gap")
+_FORCE_RESIDUALS = ("power_gap", "force_gap")
 """Residuals relative to forces, whose terms may cancel."""
 _EXCUSED = 1e-3
 """A solver's residual excuses an error of this part of a force, not more."""
@@ -91,7 +91,7 @@ def list_alarms(
     seen = {**evidence, "closure_gap": evidence["closure_gap_m"] / size}
     alarms = []
     for name, limit in {**_OF_THE_DATA, **RESIDUAL_LIMITS}.items():
-        most = limit.value * factor if name in _OF_FORCES else limit.value
+        most = limit.value * factor if name in _FORCE_RESIDUALS else limit.value
         if name in seen and not seen[name] <= most:
             alarms.append(f"{name} = {seen[name]:.1e} > {most:g}: {limit.reason}")
     return alarms
