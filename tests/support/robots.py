@@ -334,6 +334,18 @@ class Planar:
         x, y = np.subtract(self.pins[self.cut], bar_at).tolist()
         return f'<site name="{name}" pos="{x!r} {y!r} 0"/>'
 
+    def hang(self, bars: list[tuple[str, str]], site: str) -> tuple[str, Point, str]:
+        """Return the last of the bodies that hang on each other, each by its pin, its
+        place, and all of them as text with a site at the cut pin on the last.
+        """
+        places = [(0.0, 0.0), *(self.pins[pin] for pin, _ in bars)]
+        text = self.end(site, places[-1])
+        for (pin, name), before in reversed([*zip(bars, places, strict=False)]):
+            if name == "coupler":
+                text += self.on_coupler
+            text = self.body(name, pin, before, text)
+        return ("ground", *(name for _, name in bars))[-1], places[-1], text
+
     def text(self) -> str:
         """Write the MJCF."""
         p = self.pins
@@ -344,24 +356,15 @@ class Planar:
             bodies += self.body("output", "O4", (0.0, 0.0), half)
             closed = f'<weld body1="coupler" body2="coupler_half" {self.equality}/>'
             return self._wrap(bodies, closed)
-        if self.cut == "B":
-            inside = self.end("one", p["A"]) + self.on_coupler
-            coupler = self.body("coupler", "A", p["O2"], inside)
-            bodies = self.body("input", "O2", (0.0, 0.0), coupler)
-            bodies += self.body("output", "O4", (0.0, 0.0), self.end("two", p["O4"]))
-            first, second, at = "coupler", "output", p["A"]
-        elif self.cut == "A":
-            inside = self.end("one", p["B"]) + self.on_coupler
-            coupler = self.body("coupler", "B", p["O4"], inside)
-            bodies = self.body("output", "O4", (0.0, 0.0), coupler)
-            bodies += self.body("input", "O2", (0.0, 0.0), self.end("two", p["O2"]))
-            first, second, at = "coupler", "input", p["B"]
-        else:  # at O4, on the ground
-            output = self.body("output", "B", p["A"], self.end("one", p["B"]))
-            coupler = self.body("coupler", "A", p["O2"], output + self.on_coupler)
-            bodies = self.body("input", "O2", (0.0, 0.0), coupler)
-            bodies += self.end("two", (0.0, 0.0))
-            first, second, at = "output", "ground", p["B"]
+        ring = [("O2", "input"), ("A", "coupler"), ("B", "output"), ("O4", "ground")]
+        index = [pin for pin, _ in ring].index(self.cut)
+        # behind the cut pin bars hang on the pin at their other end
+        other_way = [
+            (ring[i + 1][0], ring[i][1]) for i in reversed(range(index, len(ring) - 1))
+        ]
+        first, at, one = self.hang(ring[:index], "one")
+        second, _, two = self.hang(other_way, "two")
+        bodies = one + two
         x, y = np.subtract(p[self.cut], at).tolist()
         closed = (
             f'<connect site1="one" site2="two" {self.equality}/>'

@@ -1,12 +1,18 @@
 """Drives of a scene on the loop of a file: couples, cylinders and pushes."""
 
+import math
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fourbar.files import load, loads
+from fourbar.formulas.mobility import find_circuit
 from fourbar.mjcf import write_mjcf
 from fourbar.scene import Scene
+from fourbar.scene.motion import BRANCH_NAMES, Motion
+from fourbar.solving import solve
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.mujoco.robots.answers import (
     LoopMeasurement,
@@ -15,7 +21,10 @@ from fourbar_validation.engines.mujoco.robots.answers import (
 from fourbar_validation.engines.mujoco.robots.examine import examine_file
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
+from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
+from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
 from fourbar_validation.robots.measure import find_left_out, list_errors_by_method
+from tests.support.robots import Planar
 
 SCENE = """
 [lengths]
@@ -97,6 +106,67 @@ def test_every_drive_is_that_of_the_formulas_in_a_file_without_it(drive: str) ->
     for error in errors:
         assert error.median < SOFT, error
     assert loop.through_time is not None and len(loop.through_time.rows) > 10
+
+
+STIFF = 'solref="0.005 1" solimp="0.9999 0.9999 0.001 0.5 2"'
+SOLVER = '<option timestep="0.0002" integrator="RK4" tolerance="0"/>'
+ANGLES = ("theta_2", "theta_3", "theta_4")
+
+
+def command(scene: Scene, bar: int, angles: np.ndarray, branch: int) -> Scene:
+    """Return a scene that commands a bar, on which its drive acts too."""
+    stated = {f"theta_{bar}": angles, f"omega_{bar}": 2.0}
+    return replace(scene, motion=Motion(**stated, branch=branch), drive_bar=bar)
+
+
+def find_circuit_of(scene: Scene) -> int:
+    solution = solve(scene, "position")
+    numbers = find_circuit(scene.linkage, solution.theta_2, solution.branch)
+    return int(numbers[0])
+
+
+def list_ways(scene: Scene) -> np.ndarray:
+    """Return cosine and sine of the angles of the moving bars, (n, 3, 2)."""
+    solution = solve(scene, "position")
+    angles = np.stack([getattr(solution, name) for name in ANGLES], axis=-1)
+    return np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+
+
+@pytest.mark.parametrize("away", [False, True])
+@pytest.mark.parametrize("bar", [2, 3, 4])
+@pytest.mark.parametrize("cut", ["O2", "A", "B", "O4"])
+def test_a_loop_closed_at_any_pin_is_moved_by_any_bar(
+    cut: str, bar: int, away: bool
+) -> None:
+    """Half a turn of the crank away from its pose the loop is in the other assembly of
+    a command of each other bar: it moves there, through a limit of that bar.
+    """
+    text = Planar(base="", drive="", cut=cut, equality=STIFF, more=SOLVER).text()
+    file = RobotFile(Path("cut.xml"), text)
+    made = read_loop_scene(file, PoseOptions(), None, 2.0).scene
+    posed = find_loop_of_scene(file, made, MeasureOptions(PoseOptions()))
+    bars = made.linkage.moving
+    crank = 2 + int(np.argmin([one.length for one in bars]))
+    start = posed.loop.angles[crank - 1] - posed.turned + math.pi * away
+    turn = start + np.linspace(0.0, 0.2, 9)
+    circuit = find_circuit_of(made)
+    in_circuit = next(
+        way
+        for way in (command(made, crank, turn, branch) for branch in BRANCH_NAMES)
+        if find_circuit_of(way) == circuit
+    )
+    there = solve(in_circuit, "position")
+    angles = getattr(there, f"theta_{bar}")
+    scene = min(
+        (command(made, bar, angles, branch) for branch in BRANCH_NAMES),
+        key=lambda way: np.ptp(list_ways(way) - list_ways(in_circuit)),
+    )
+    (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), scene).loops
+    assert find_left_out(loop) < 1e-8
+    for error in list_errors_by_method(loop):
+        assert error.median < SOFT, error
+    moved = any("it is moved there" in remark for remark in loop.remarks)
+    assert moved == (away and bar != crank)
 
 
 @pytest.mark.parametrize(("name", "refusal"), COMMANDS.items())

@@ -963,26 +963,27 @@ def turn_hinges(
     return qpos
 
 
-def reflect(model: mujoco.MjModel, loop: RobotLoop) -> Array | None:
-    """Return the pose of the other assembly at the same angle of bar 2, (nq,).
+def reflect(model: mujoco.MjModel, loop: RobotLoop, bar: int = 2) -> Array | None:
+    """Return the pose of the other assembly at the same angle of a bar, (nq,).
 
-    Bars 3 and 4 are reflected in the line from A to O4, and the gap of the engine is
-    closed from there. None where it does not close.
+    The bars that follow it are reflected in the line that they span together, and the
+    gap of the engine is closed from there. None where it does not close.
     """
-    ground, crank = loop.lengths[:2]
-    theta_1, theta_2, theta_3, theta_4 = loop.angles
-    line = cmath.rect(ground, theta_1) - cmath.rect(crank, theta_2)
-    direction = cmath.phase(line)
-    reflected = (2.0 * direction - theta_3, 2.0 * direction - theta_4)
-    qpos = turn_hinges(model, loop, theta_2, *reflected)
+    line = 0j
+    for still in (1, bar):
+        side = cmath.rect(loop.lengths[still - 1], loop.angles[still - 1])
+        line += _DIRECTIONS[still] * side
+    angles = [2.0 * cmath.phase(line) - angle for angle in loop.angles]
+    angles[bar - 1] = loop.angles[bar - 1]
+    qpos = turn_hinges(model, loop, *angles[1:])
     # put together anew, no spring is wound by more than half a turn
     for pin, joint in loop.hinges.items():
-        if pin == "O2":
+        if pin == DRIVEN_PINS.get(bar):
             continue
         address = model.jnt_qposadr[joint]
         drawn = model.qpos0[address]
         qpos[address] = drawn + math.remainder(qpos[address] - drawn, math.tau)
-    if not LoopInside(model, loop).close_gap(qpos):
+    if not LoopInside(model, loop, bar=bar).close_gap(qpos):
         return None
     return qpos
 

@@ -18,9 +18,10 @@ import numpy as np
 
 from fourbar.effects import Gravity
 from fourbar.errors import InputError
+from fourbar.formulas.mobility import find_circuit
 from fourbar.quantities import Array
 from fourbar.scene import Scene, command
-from fourbar.scene.motion import BRANCH_NAMES
+from fourbar.scene.motion import BRANCH_NAMES, CROSSED, OPEN
 from fourbar_validation.engines.mujoco.robots.ancestry import is_enabled, name_joint
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.closures import (
@@ -262,7 +263,8 @@ def close_onto(
 
     Raises
     ------
-    InputError : gravity tells that the pose is of the other assembly.
+    InputError : gravity tells that the pose is of the other assembly, from which the
+        linkage does not move into that of the scene.
     """
     if loop.is_flat:
         behind = not _fits_gravity(scene, posed, loop) and _fits_gravity(
@@ -272,9 +274,62 @@ def close_onto(
         )
         return _close_flat(scene, posed, loop, pose, behind)
     behind = is_seen_from_behind(scene, loop.angles)
+    sides = (loop, loop.seen_from_behind())
+    if not _fits_gravity(scene, posed, sides[behind]) and _fits_gravity(
+        scene, posed, sides[not behind]
+    ):
+        return _move_over(scene, posed, loop, pose, not behind)
+    return sides[behind], posed
+
+
+def _sample_loop(
+    posed: PosedRobot, loop: RobotLoop, pose: PoseOptions, behind: bool
+) -> RobotLoop:
+    """Return a loop, driven as it is, in another pose and seen from one side."""
+    sampled = choose_loop(find_closures(posed, pose), loop.name)
+    if sampled.hinges.get("O2") != loop.hinges.get("O2"):
+        sampled = sampled.seen_from_other_end()
+    return sampled.seen_from_behind() if behind else sampled
+
+
+def _move_over(
+    scene: Scene,
+    posed: PosedRobot,
+    loop: RobotLoop,
+    pose: PoseOptions,
+    behind: bool,
+) -> tuple[RobotLoop, PosedRobot]:
+    """Return a loop of the other assembly of a scene, moved into that of the scene.
+
+    Raises
+    ------
+    InputError : the linkage does not move from one to the other.
+    """
+    wanted = BRANCH_NAMES[scene.motion.branch]
+    other = BRANCH_NAMES[-scene.motion.branch]
     seen = loop.seen_from_behind() if behind else loop
-    _require_assembly(scene, posed, seen)
-    return seen, posed
+    text = (
+        f"the pose of {loop.name} closes to the {other} assembly and the scene names"
+        f" the {wanted} one (seen so that gravity points as in the scene)"
+    )
+    advice = "state a pose of that one"
+    reflected = reflect(posed.model, seen, command(scene).bar)
+    if reflected is not None:
+        there = move_to(posed, reflected)
+        moved = _sample_loop(there, loop, pose, behind)
+        if _find_circuit(scene, seen) == _find_circuit(scene, moved):
+            remark = f"{text}: it is moved there"
+            return replace(moved, remarks=(*moved.remarks, remark)), there
+        advice = f"give --pose {write_pose(posed.model, seen, reflected)}"
+    raise InputError("--pose", None, f"{text}: {advice}")
+
+
+def _find_circuit(scene: Scene, loop: RobotLoop) -> int:
+    """Return the circuit of a scene's linkage in which a loop stands."""
+    theta_1, theta_2, theta_3, theta_4 = loop.angles
+    angle = np.array([theta_2 - theta_1 + scene.linkage.ground_angle])
+    branch = OPEN if math.sin(theta_3 - theta_4) > 0.0 else CROSSED
+    return int(find_circuit(scene.linkage, angle, branch)[0])
 
 
 def _close_flat(
@@ -285,23 +340,15 @@ def _close_flat(
     behind: bool,
 ) -> tuple[RobotLoop, PosedRobot]:
     """Close a loop whose pose does not tell its assembly onto that of a scene."""
-    driven = loop.hinges.get("O2")
-
-    def sample_loop(at: PosedRobot) -> RobotLoop:
-        sampled = choose_loop(find_closures(at, pose), loop.name)
-        if sampled.hinges.get("O2") != driven:
-            sampled = sampled.seen_from_other_end()
-        return sampled.seen_from_behind() if behind else sampled
-
-    loop = sample_loop(posed)
+    loop = _sample_loop(posed, loop, pose, behind)
     if _measure_sine(loop) <= FLAT:
         posed = move_to(posed, _leave_flat(scene, posed, loop))
-        loop = sample_loop(posed)
+        loop = _sample_loop(posed, loop, pose, behind)
     missed = miss_output(scene, loop.angles)
-    reflected = reflect(posed.model, loop)
+    reflected = reflect(posed.model, loop, command(scene).bar)
     if reflected is not None:
         other_pose = move_to(posed, reflected)
-        other = sample_loop(other_pose)
+        other = _sample_loop(other_pose, loop, pose, behind)
         missed_by_other = miss_output(scene, other.angles)
         if missed_by_other < missed:
             posed = other_pose
@@ -344,30 +391,6 @@ def _leave_flat(
 def _measure_sine(loop: RobotLoop) -> float:
     """Return the sine of the angle between bars 3 and 4 in the pose, by its size."""
     return abs(math.sin(loop.angles[3] - loop.angles[2]))
-
-
-def _require_assembly(
-    scene: Scene,
-    posed: PosedRobot,
-    loop: RobotLoop,
-) -> None:
-    """Refuse a pose that is of the scene's assembly from the wrong side alone."""
-    behind = loop.seen_from_behind()
-    if _fits_gravity(scene, posed, loop) or not _fits_gravity(scene, posed, behind):
-        return
-    wanted = BRANCH_NAMES[scene.motion.branch]
-    other = BRANCH_NAMES[-scene.motion.branch]
-    reflected = reflect(posed.model, loop)
-    if reflected is None:
-        advice = "state a pose of that one"
-    else:
-        advice = f"give --pose {write_pose(posed.model, loop, reflected)}"
-    raise InputError(
-        "--pose",
-        None,
-        f"the pose of {loop.name} closes to the {other} assembly and the scene names"
-        f" the {wanted} one (seen so that gravity points as in the scene): {advice}",
-    )
 
 
 def _fits_gravity(
