@@ -233,7 +233,7 @@ STAGES = tuple(dict.fromkeys(STAGE_OF.values()))
 SCALARS = frozenset(q.name for q in QUANTITIES if q.kind == "scalar")
 VECTORS = tuple(q.name for q in QUANTITIES if q.kind == "vector")
 ANGLES = tuple(q.name for q in QUANTITIES if q.unit == "rad" and q.stage is not None)
-RATES = tuple(q.name for q in QUANTITIES if q.unit in ("rad/s", "rad/s^2"))
+RATES = tuple(q.name for q in QUANTITIES if q.name.startswith(("omega_", "alpha_")))
 """Speeds and accelerations of the bars."""
 PIN_FORCES = tuple(name for name in VECTORS if UNITS[name] == "N")
 """F_ij, of bar i on bar j, in the order of the pins O2, A, B, O4."""

@@ -4,8 +4,12 @@ Read from the page, registered, and judged by the engines.
 """
 
 import math
+import os
 import re
+import shutil
+import subprocess
 import sys
+import textwrap
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -27,6 +31,7 @@ from fourbar_validation.compare import effects as in_scales
 from fourbar_validation.engines import effects as on_trees
 from fourbar_validation.engines import free_body_effects
 from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.registry import HARD_ENGINES
 from fourbar_validation.run.judge import judge
 from tests.validation.engines.test_effects import EXACT, ON_TREES, SIMULATED, failing
 
@@ -245,30 +250,53 @@ def test_each_name_that_the_guide_places_in_a_file_is_there() -> None:
         assert re.search(rf"\b{name}\b", path.read_text(encoding="utf-8")), (name, file)
 
 
-def test_the_places_that_the_guide_to_a_quantity_names_are_there() -> None:
+ADDED = {
+    "fourbar/quantities/__init__.py": "    v_A: Array",
+    "fourbar/evaluation/evaluate.py": '    "alpha_2": lambda',
+    "fourbar_validation/compare/scales.py": "            known |= _find_velocities(",
+    "fourbar_validation/engines/balls.py": '    y |= {f"omega_{bar}"',
+}
+"""Files in which the guide puts a line of its quantity, and the line beside it."""
+JUDGED = """
+from fourbar.files import loads
+from fourbar_validation.engines.registry import HARD_ENGINES
+from fourbar_validation.run.judge import judge
+
+exact = [engine for engine in HARD_ENGINES if not engine.through_time]
+rows = judge("slip", loads(SCENE), exact).rows
+for row in rows:
+    if row.quantity == "slip_B":
+        print(row.engine, row.verdict)
+"""
+
+
+def test_the_example_of_a_quantity_is_judged_by_every_exact_engine(
+    tmp_path: Path,
+) -> None:
+    """The lines of the page stand in a copy of both packages, and nothing else."""
     root = Path(__file__).parents[2]
-    files = set(
-        re.findall(
-            r"`((?:fourbar|fourbar_validation|docs|tests)/[\w/-]+\.\w+)`", QUANTITY
-        )
+    for package in (root / "fourbar", root / "validation" / "fourbar_validation"):
+        shutil.copytree(package, tmp_path / package.name)
+    for number, (file, beside) in enumerate(ADDED.items()):
+        assert f"`{file}`" in QUANTITY
+        path = tmp_path / file
+        lines = path.read_text(encoding="utf-8").splitlines()
+        (index,) = (i for i, line in enumerate(lines) if line.startswith(beside))
+        stated = block("python", QUANTITY, number)
+        indent = " " * (len(beside) - len(beside.lstrip()))
+        lines.insert(index + ("|=" in beside), textwrap.indent(stated, indent))
+        path.write_text("\n".join(lines), encoding="utf-8")
+    loop = tmp_path / "fourbar_validation" / "engines" / "loop.py"
+    text = loop.read_text(encoding="utf-8")
+    loop.write_text(text.replace('*("v_A",', '*("slip_B", "v_A",'), encoding="utf-8")
+    judged = subprocess.run(
+        [sys.executable, "-c", f"SCENE = {SCENE!r}\n{JUDGED}"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=False,
     )
-    texts = {
-        name: (
-            (
-                root / ("validation" if name.startswith("fourbar_v") else ".") / name
-            ).read_text()
-        )
-        for name in files
-    }
-    for name, word in (
-        ("__init__", "_scalar("),
-        ("evaluate", "SCALAR_F"),
-        ("loop", "NOT_ANSWERED"),
-        ("scales", "v_A"),
-        ("balls", "omega[k]"),
-        ("results", "`v_A`"),
-    ):
-        assert any(
-            file.rpartition("/")[2].startswith(name) and word in text
-            for file, text in texts.items()
-        ), name
+    assert judged.returncode == 0, judged.stderr
+    exact = {engine.name for engine in HARD_ENGINES if not engine.through_time}
+    assert {*judged.stdout.splitlines()} == {f"{name} agrees" for name in exact}
