@@ -84,7 +84,9 @@ def signature(thing: Any) -> str:
         return f"({', '.join(fields)})"
     if isinstance(node, ast.ClassDef):
         arguments = [
-            ast.unparse(statement).replace("field(default_factory=", "(")
+            ast.unparse(_without_declaration(statement)).replace(
+                "field(default_factory=", "("
+            )
             for statement in node.body
             if isinstance(statement, ast.AnnAssign)
             and not is_of_class(statement)
@@ -94,6 +96,18 @@ def signature(thing: Any) -> str:
     node.args.args = [argument for argument in node.args.args if argument.arg != "self"]
     returned = "" if node.returns is None else f" -> {ast.unparse(node.returns)}"
     return f"({ast.unparse(node.args)}){returned}"
+
+
+def _without_declaration(statement: ast.stmt) -> ast.stmt:
+    """Return a field without its declaration: of Annotated[int, ...] the int."""
+    match statement:
+        case ast.AnnAssign(
+            annotation=ast.Subscript(
+                value=ast.Name(id="Annotated"), slice=ast.Tuple(elts=[hint, *_])
+            )
+        ):
+            statement.annotation = hint
+    return statement
 
 
 def row(name: str, kind: str, meaning: str) -> str:

@@ -8,15 +8,15 @@ import cmath
 import math
 from collections.abc import Container
 from contextlib import suppress
-from dataclasses import dataclass, fields, replace
+from dataclasses import MISSING, dataclass, fields, replace
 from functools import cache
 from numbers import Integral
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from typing import Any, ClassVar, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import InputError, write_in_units
+from fourbar.errors import InputError, expect, write_in_units
 from fourbar.quantities import PIN_FORCES
 
 Lengths = tuple[float, float, float, float]
@@ -158,9 +158,13 @@ class Declared(NamedTuple):
     unit: str
     bound: str = ANY_NUMBER
     left_out: Any = REQUIRED_NUMBER
-    """Value where a scene file leaves it out."""
+    """Value where a scene file leaves it out; of a field its default."""
     pair: str = ""
     """Unit of the second number of a pair, "rad" for an angle; empty for one number."""
+    key: str = ""
+    """Key in a scene file; empty: the name of the field."""
+    always: bool = False
+    """True if a scene file must state it, although its field has a default."""
 
     @property
     def units(self) -> tuple[str, str]:
@@ -171,6 +175,138 @@ class Declared(NamedTuple):
     def bounds(self) -> tuple[str, str]:
         """Bounds of both numbers of a pair; an angle has none."""
         return self.bound, ANY_NUMBER if self.pair == "rad" else self.bound
+
+    def check(self, key: str, value: Any) -> Any:
+        """Return the number or pair as floats, in its unit; InputError for others."""
+        if self.pair:
+            return require_pair(key, value, self)
+        return require(key, value, self.unit, self.bound)
+
+
+class OneOf(NamedTuple):
+    """Declaration of a word of a scene."""
+
+    words: tuple[str, ...]
+    key: str = ""
+
+    def check(self, key: str, value: Any) -> Any:
+        """Return the word; InputError for another."""
+        expect(key, value, str)
+        if value not in self.words:
+            allowed = " or ".join(f'"{word}"' for word in self.words)
+            raise InputError(key, value, f"must be {allowed}")
+        return value
+
+
+class OfBar(NamedTuple):
+    """Declaration of the number of a bar."""
+
+    bars: tuple[int, ...] = MOVING_BARS
+    reason: str = ""
+    key: str = ""
+
+    def check(self, key: str, value: Any) -> Any:
+        """Return the number of the bar; InputError for another."""
+        *bars, last = self.bars
+        allowed = f"must be {', '.join(map(str, bars))} or {last}"
+        if self.reason:
+            allowed = f"{allowed}, {self.reason}"
+        return require_whole(key, value, self.bars, allowed)
+
+
+class Entries(NamedTuple):
+    """Declaration of a list of descriptions."""
+
+    kind: Any
+    key: str = ""
+    most: int = 1000
+    is_value: bool = False
+    """True if the list is the value of its effect, not an entry in a table."""
+
+    def check(self, key: str, value: Any) -> Any:
+        """Return the descriptions as a tuple; InputError for any of another class."""
+        expect(key, value, tuple, list)
+        for entry in value:
+            expect(key, entry, self.kind)
+        return tuple(value)
+
+
+class DeclaredField(NamedTuple):
+    """Field of a description with its declaration."""
+
+    name: str
+    by: Any
+    """`Declared`, `OneOf`, `OfBar`, `Entries`, or what else has a key and `check`."""
+    key: str
+    """Key in a scene file, below that of the description."""
+    left_out: Any
+    """Value where a scene file leaves it out."""
+    counts: bool
+    """True if descriptions that differ in it differ."""
+
+
+def list_declared(kind: Any) -> tuple[DeclaredField, ...]:
+    """List the declared fields of a class of descriptions, in their order."""
+    return _list_declared(kind)
+
+
+@cache
+def _list_declared(kind: type) -> tuple[DeclaredField, ...]:
+    hints = get_type_hints(kind, include_extras=True)
+    declared = []
+    for one in fields(kind):
+        for by in getattr(hints[one.name], "__metadata__", ()):
+            must = one.default is MISSING or getattr(by, "always", False)
+            left_out = REQUIRED_NUMBER if must else one.default
+            key = "" if getattr(by, "is_value", False) else by.key or one.name
+            declared.append(DeclaredField(one.name, by, key, left_out, one.compare))
+    return tuple(declared)
+
+
+@cache
+def _list_numbers_of(kind: type) -> dict[str, Declared]:
+    return {
+        one.name: one.by._replace(left_out=one.left_out)
+        for one in list_declared(kind)
+        if isinstance(one.by, Declared) and one.counts
+    }
+
+
+class _Numbers:
+    """Attribute of a class: the declarations of its numbers, by the fields' names."""
+
+    def __get__(self, description: object, kind: type) -> dict[str, Declared]:
+        return _list_numbers_of(kind)
+
+
+class Described:
+    """Base class of what a scene states: each field has its declaration as a hint.
+
+    The constructor checks every field by its declaration, and scene files, `vary`,
+    tolerances, the workbench and the list of what acts follow the same.
+
+    >>> from dataclasses import dataclass
+    >>> from typing import Annotated
+    >>> @dataclass(frozen=True)
+    ... class Wheel(Described):
+    ...     radius: Annotated[float, Declared("m", POSITIVE)]
+    >>> Wheel("20 cm")
+    Wheel(radius=0.2)
+    """
+
+    __slots__ = ()
+    section: ClassVar[str] = ""
+    """Key of the description, as errors name it; {0.name} stands for a field."""
+    numbers: ClassVar[Any] = _Numbers()
+
+    def __post_init__(self) -> None:
+        section = self.section.format(self)
+        for one in list_declared(type(self)):
+            value = getattr(self, one.name)
+            if value is None and one.left_out is None:
+                continue
+            checked = one.by.check(f"{section}.{one.key}".strip("."), value)
+            object.__setattr__(self, one.name, checked)
 
 
 def require_pair(key: str, value: Any, by: Declared) -> tuple[float, float]:
@@ -194,11 +330,7 @@ def check_numbers(description: Any, key: str) -> None:
         value = getattr(description, name)
         if value is None and stated.left_out is None:
             continue
-        full_key = f"{key}.{name}".strip(".")
-        if stated.pair:
-            checked: Any = require_pair(full_key, value, stated)
-        else:
-            checked = require(full_key, value, stated.unit, stated.bound)
+        checked = stated.check(f"{key}.{name}".strip("."), value)
         object.__setattr__(description, name, checked)
 
 
@@ -221,11 +353,12 @@ def list_numbers(description: Any) -> list[ListedNumber]:
         return listed
     numbers = []
     for name, by in description.numbers.items():
+        key_of_field = by.key or name
         if not by.pair:
-            numbers.append(ListedNumber(name, (name,), by.unit, by.bound))
+            numbers.append(ListedNumber(key_of_field, (name,), by.unit, by.bound))
             continue
         for index, unit_and_bound in enumerate(zip(by.units, by.bounds, strict=True)):
-            key = f"{name}.{index}"
+            key = f"{key_of_field}.{index}"
             numbers.append(ListedNumber(key, (name, index), *unit_and_bound))
     return numbers
 

@@ -12,13 +12,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fourbar.edit.document import KeyPath, SceneDocument
-from fourbar.effects import ForceDrive, Place, Springs
+from fourbar.effects import Load, Place
+from fourbar.effects.place import states_place
 from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
 from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Command, Scene
 from fourbar.scene.drawing import DRAWN_WORD, DrawnPins
 from fourbar.solving import solve
+from fourbar.studies.keys import list_described
 
 DRAGGED_PINS = ("A", "B", "O4")
 """Pins of a linkage that is stated by lengths; of a drawn one O2 too."""
@@ -60,7 +62,8 @@ class _Handle(NamedTuple):
 def list_handles(scene: Scene) -> list[_Handle]:
     """List everything that can be dragged.
 
-    Mass centres, points, loads, and the ends of what acts on a line can be dragged.
+    Mass centres can be dragged, and each place that a point, a load, the drive or an
+    effect declares.
     """
     handles = []
     for number in MOVING_BARS:
@@ -70,55 +73,49 @@ def list_handles(scene: Scene) -> list[_Handle]:
             path: KeyPath = ("bars", name, "centre")
             mass_centre = f"mass centre of {name}"
             handles.append(_Handle(mass_centre, path, number, 0j, bar.to_centre))
-    for point in scene.points:
-        name = f"point {point.name}"
-        handles.append(_hold_place(name, ("points", point.name), point.place, scene))
-    for n, load in enumerate(scene.loads):
-        if load.arm is None and load.place is None:  # a couple without a place
-            continue
-        name = f"load {n + 1}"
-        path = ("loads", n)
-        if load.arm is not None:
-            G = scene.linkage.bar(load.bar).to_centre
-            arm = cmath.rect(*load.arm)
-            handle = _Handle(name, (*path, "arm"), load.bar, G, arm, turns=False)
-        else:
-            handle = _hold_place(name, path, load.place, scene)
-        if load.force is not None:
-            turns = load.frame == "bar"
-            handle = handle._replace(force=(*path, "force"), force_turns=turns)
-        handles.append(handle)
-    if scene.drive is not None:
-        handles += _hold_drive(scene.drive, scene)
-    for effect in scene.effects:
-        if isinstance(effect, Springs):
-            for n, spring in enumerate(effect.springs):
-                path = ("effects", "springs", n)
-                handles += _hold_ends(f"springs {n + 1}", path, spring, scene)
+    for key, _, one in list_described(scene):
+        path = tuple(int(step) if step.isdigit() else step for step in key.split("."))
+        if isinstance(one, Load):
+            handles += _hold_load(path, one, scene)
+        elif isinstance(one, Place):
+            handles.append(_hold_place(path, one, scene))
+        elif states_place(type(one)):
+            handles.append(_hold_place(path, one.place, scene))
     return handles
 
 
-def _hold_drive(drive: ForceDrive, scene: Scene) -> list[_Handle]:
-    """List the handles of a drive that exerts a force: its ends, or its point."""
-    if drive.has_stroke:
-        return _hold_ends("drive", ("drive",), drive, scene)
-    ((_, place),) = drive.ends
-    return [_hold_place("point of drive", ("drive",), place, scene)]
+def _hold_load(path: KeyPath, load: Load, scene: Scene) -> list[_Handle]:
+    """List the handle of a load and its force; a couple without a place has none."""
+    if load.arm is not None:
+        G = scene.linkage.bar(load.bar).to_centre
+        arm = cmath.rect(*load.arm)
+        of_arm = (*path, "arm")
+        handle = _Handle(_name_handle(path), of_arm, load.bar, G, arm, turns=False)
+    elif load.place is not None:
+        handle = _hold_place(path, load.place, scene)
+    else:
+        return []
+    if load.force is None:
+        return [handle]
+    turns = load.frame == "bar"
+    return [handle._replace(force=(*path, "force"), force_turns=turns)]
 
 
-def _hold_ends(name: str, path: KeyPath, line: Any, scene: Scene) -> list[_Handle]:
-    return [
-        _hold_place(f"{end} of {name}", (*path, end), place, scene)
-        for end, place in (("from", line.start), ("to", line.end))
-    ]
+def _name_handle(path: KeyPath) -> str:
+    """Name what is dragged: "load 1", "point P", "to of springs 2"."""
+    table, *inner = (step + 1 if isinstance(step, int) else step for step in path)
+    if table in ("loads", "points"):
+        return f"{str(table)[:-1]} {inner[0]}"
+    *of, last = inner if table == "effects" else (table, *inner)
+    return f"{last} of {' '.join(map(str, of))}" if of else f"point of {last}"
 
 
-def _hold_place(name: str, path: KeyPath, place: Place | None, scene: Scene) -> _Handle:
+def _hold_place(path: KeyPath, place: Place, scene: Scene) -> _Handle:
     """Make the handle of a place by the form in which it is stated.
 
     The handle of a named point is that of the point.
     """
-    assert place is not None
+    name = _name_handle(path)
     if place.point is not None:
         path = ("points", place.point)
         places = {point.name: point.place for point in scene.points}

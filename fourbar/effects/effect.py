@@ -8,11 +8,12 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.effects.place import Placed
 from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.arithmetic import Number, cross, is_any, polar, select
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Body, MovingBodies, PinForces, Wrenches
-from fourbar.linkage import PINS, Declared, FourBar, ListedNumber, require
+from fourbar.linkage import PINS, FourBar, ListedNumber, require
 from fourbar.quantities import Array
 
 Joints = tuple[float, float, float]
@@ -315,18 +316,15 @@ class SolvedFriction(NamedTuple):
     status: Any = None
 
 
-class Effect:
+class Effect(Placed):
     """Base class of an effect: what it does to the bars, and where it has no value."""
 
     __slots__ = ()
+    section: ClassVar[str] = "effects.{0.key}"
     key: ClassVar[str]
     """Name of the effect under ``[effects]`` and in every table."""
     example: ClassVar[str] = ""
     """One line of a scene file."""
-    numbers: ClassVar[Mapping[str, Declared]] = {}
-    """Declarations of the effect's numbers by name."""
-    entries: ClassVar[str] = ""
-    """Field of an effect that holds a list of descriptions, with numbers and places."""
     dry: ClassVar[bool] = False
     """True if the couples jump where the relative rotation at a pin reverses."""
 
@@ -407,10 +405,6 @@ class Effect:
     def dry_pins(self) -> tuple[str, ...]:
         """Pins at which couples of the effect jump."""
         return ()
-
-    def with_places(self, change: Callable[[Any], Any]) -> Self:
-        """Return the effect with each `Place` of it changed; most have none."""
-        return self
 
     def act(self, actions: Actions, state: State) -> None:
         """Add forces and couples of the effect on the bars; its places are settled."""

@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from fourbar.effects.effect import Effect
-from fourbar.linkage import AT_LEAST_ZERO, Declared, check_numbers, require_whole
+from fourbar.linkage import AT_LEAST_ZERO, Declared, OfBar
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,24 +18,11 @@ class Flywheel(Effect):
     bar : 2 (on pin O2) or 4 (on pin O4).
     """
 
-    inertia: float
-    bar: int = 2
+    inertia: Annotated[float, Declared("kg m^2", AT_LEAST_ZERO)]
+    bar: Annotated[int, OfBar((2, 4), "a bar on a fixed pin")] = 2
     key: ClassVar[str] = "flywheel"
     in_balls: ClassVar[bool] = True
     example: ClassVar[str] = 'flywheel = { bar = 2, inertia = "0.02 kg m^2" }'
-    numbers: ClassVar[dict[str, Declared]] = {
-        "inertia": Declared("kg m^2", AT_LEAST_ZERO)
-    }
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "effects.flywheel")
-        bar = require_whole(
-            "effects.flywheel.bar",
-            self.bar,
-            (2, 4),
-            "must be 2 or 4, a bar on a fixed pin",
-        )
-        object.__setattr__(self, "bar", bar)
 
     @property
     def carried(self) -> Mapping[int, float]:

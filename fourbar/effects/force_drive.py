@@ -13,27 +13,23 @@ for the coefficients h_k, and so is finite where these are not.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 from fourbar.effects.effect import Actions
-from fourbar.effects.place import Place
+from fourbar.effects.place import Place, Placed
 from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Body
-from fourbar.linkage import Declared, FourBar
+from fourbar.linkage import FourBar
 
 MASSLESS = (Body(0.0, 0.0, 0.0j),) * 3
 
 
-class ForceDrive(ABC):
+class ForceDrive(Placed, ABC):
     """A drive that exerts a force, N; a subclass says where and in which direction."""
 
     __slots__ = ()
-    numbers: ClassVar[Mapping[str, Declared]] = {}
-    """Declarations of the drive's numbers by name."""
-    places: ClassVar[Mapping[str, str]] = {}
-    """Fields that hold places, by the keys under which these are stated."""
+    section: ClassVar[str] = "drive"
     has_stroke: ClassVar[bool] = False
     """True if the drive is between two points, whose distance is its stroke."""
 
@@ -52,10 +48,6 @@ class ForceDrive(ABC):
 
         The moments of the other two then give the force between them.
         """
-
-    @abstractmethod
-    def with_places(self, change: Callable[[Place], Place]) -> Self:
-        """Return the same drive with its places changed."""
 
     @abstractmethod
     def require_motion(self, linkage: FourBar) -> None:

@@ -2,38 +2,23 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from fourbar.effects.effect import Actions, Effect
 from fourbar.formulas.arithmetic import is_any, polar, vector
 from fourbar.formulas.motion import State
-from fourbar.linkage import MOVING_BARS, Declared, FourBar, ListedNumber, check_numbers
+from fourbar.linkage import MOVING_BARS, Declared, FourBar
 
 
 @dataclass(frozen=True, slots=True)
 class Gravity(Effect):
     """A uniform field of some magnitude (m/s^2) and direction (rad, from +x, ccw)."""
 
-    magnitude: float = 9.81
-    angle: float = -math.pi / 2
+    magnitude: Annotated[float, Declared("m/s^2", key="0")] = 9.81
+    angle: Annotated[float, Declared("rad", key="1")] = -math.pi / 2
     key: ClassVar[str] = "gravity"
     in_balls: ClassVar[bool] = True
     example: ClassVar[str] = 'gravity = ["9.81 m/s^2", "-90 deg"]'
-    numbers: ClassVar[dict[str, Declared]] = {
-        "magnitude": Declared("m/s^2"),
-        "angle": Declared("rad"),
-    }
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "effects.gravity")
-
-    @classmethod
-    def list_numbers(cls) -> list[ListedNumber]:
-        """List magnitude and angle, which the key of the effect holds as a pair."""
-        return [
-            ListedNumber(str(index), (name,), by.unit, by.bound)
-            for index, (name, by) in enumerate(cls.numbers.items())
-        ]
 
     @property
     def field(self) -> Any:

@@ -1,25 +1,24 @@
 """A drive along the line between two points of two bars, such as a cylinder."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from fourbar.effects.effect import Actions
 from fourbar.effects.force_drive import ForceDrive
-from fourbar.effects.place import ENDS_OF_A_LINE, Place, require_ends
+from fourbar.effects.place import At, Line, Place
 from fourbar.effects.spring import COINCIDENT_POINTS
 from fourbar.errors import InputError, write_in_units
 from fourbar.formulas.arithmetic import Number, is_any
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.linkage import ENDS, MOVING_BARS, PINS, FourBar, copy_with
+from fourbar.linkage import ENDS, MOVING_BARS, PINS, FourBar
 from fourbar.quantities import NO_DIRECTION, NO_LEVER, OK
 
 
 @dataclass(frozen=True, slots=True)
-class LinearDrive(ForceDrive):
+class LinearDrive(Line, ForceDrive):
     """A force along the line between two points, N, positive where it pushes.
 
     Parameters
@@ -27,19 +26,9 @@ class LinearDrive(ForceDrive):
     start, end : points on two different bars, one of them the ground perhaps.
     """
 
-    start: Place
-    end: Place
+    start: Annotated[Place, At("from")]
+    end: Annotated[Place, At("to")]
     has_stroke: ClassVar[bool] = True
-    places: ClassVar[dict[str, str]] = ENDS_OF_A_LINE
-
-    def __post_init__(self) -> None:
-        start, end = require_ends("drive", self.start, self.end)
-        object.__setattr__(self, "start", start)
-        object.__setattr__(self, "end", end)
-
-    def with_places(self, change: Callable[[Place], Place]) -> "LinearDrive":
-        """Return the same drive with its ends changed."""
-        return copy_with(self, start=change(self.start), end=change(self.end))
 
     @property
     def ends(self) -> tuple[tuple[float, Place], tuple[float, Place]]:

@@ -4,15 +4,14 @@ A load is constant or a table over theta_2.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass
 from itertools import pairwise
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from fourbar.effects.effect import Actions, Effect
-from fourbar.effects.place import STATED_PLACES, Place
+from fourbar.effects.place import STATED_PAIR, Place, PointName
 from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.arithmetic import (
     PI_LOW,
@@ -29,9 +28,8 @@ from fourbar.formulas.motion import State
 from fourbar.linkage import (
     Declared,
     FourBar,
-    check_numbers,
-    copy_with,
-    require_bar,
+    OfBar,
+    OneOf,
     require_numbers,
 )
 
@@ -161,30 +159,22 @@ class Load(Effect):
     table : factor of force and couple over theta_2; None: constant.
     """
 
-    bar: int
-    force: tuple[float, float] | None = None
+    bar: Annotated[int, OfBar()]
+    force: Annotated[tuple[float, float] | None, Declared("N", pair="rad")] = None
     _: KW_ONLY
-    from_pin: tuple[float, float] | None = None
-    from_centre: tuple[float, float] | None = None
-    point: str | None = None
-    arm: tuple[float, float] | None = None
-    moment: float = 0.0
-    frame: str = "world"
+    from_pin: Annotated[tuple[float, float] | None, STATED_PAIR] = None
+    from_centre: Annotated[tuple[float, float] | None, STATED_PAIR] = None
+    point: Annotated[str | None, PointName()] = None
+    arm: Annotated[tuple[float, float] | None, STATED_PAIR] = None
+    moment: Annotated[float, Declared("N m")] = 0.0
+    frame: Annotated[str, OneOf(FRAMES)] = "world"
     table: Table | None = None
+    section: ClassVar[str] = "loads"
     key: ClassVar[str] = "load"
-    numbers: ClassVar[dict[str, Declared]] = {
-        "force": Declared("N", left_out=None, pair="rad"),
-        **STATED_PLACES,
-        "arm": Declared("m", left_out=None, pair="rad"),
-        "moment": Declared("N m", left_out=0.0),
-    }
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "bar", require_bar("loads.bar", self.bar))
-        require_frame("loads.frame", self.frame)
-        expect("loads.point", self.point, str, type(None))
+        Effect.__post_init__(self)
         expect("loads.table", self.table, Table, type(None))
-        check_numbers(self, "loads")
         forms = {
             name: value
             for name in PLACES_OF_LOADS
@@ -222,13 +212,6 @@ class Load(Effect):
         if (place := self.place) is not None:
             return place.vector()
         return G if self.arm is not None or self.bar == 3 else 0.0j
-
-    def with_places(self, change: Callable[[Place], Place]) -> "Load":
-        """Return the same load with its place changed."""
-        place = self.place
-        if place is None or (changed := change(place)) is place:
-            return self
-        return copy_with(self, **changed._asdict())
 
     def act(self, actions: Actions, state: State) -> None:
         """Add F at its place, and the couple."""
@@ -284,11 +267,3 @@ class Load(Effect):
     def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
         """Return the greatest force at the longest arm."""
         return self.greatest_force(linkage) * max(linkage.lengths)
-
-
-def require_frame(key: str, frame: object) -> None:
-    """Raise InputError for what is no name of the axes in which a direction is kept."""
-    expect(key, frame, str)
-    if frame not in FRAMES:
-        allowed = " or ".join(f'"{name}"' for name in FRAMES)
-        raise InputError(key, frame, f"must be {allowed}")

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from operator import is_
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from fourbar.errors import InputError
+from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import (
     angle,
     dot,
@@ -17,20 +17,23 @@ from fourbar.formulas.arithmetic import (
 from fourbar.formulas.motion import State
 from fourbar.linkage import (
     BAR_NAMES,
+    MOVING_BARS,
     SECOND_PIN,
     Declared,
+    Described,
+    Entries,
     FourBar,
+    OfBar,
+    copy_with,
+    list_declared,
+    list_fields,
     require_pair,
     require_whole,
 )
 
-STATED_PLACES = {
-    "from_pin": Declared("m", left_out=None, pair="rad"),
-    "from_centre": Declared("m", left_out=None, pair="rad"),
-}
+STATED_PAIR = Declared("m", left_out=None, pair="rad")
+STATED_PLACES = {"from_pin": STATED_PAIR, "from_centre": STATED_PAIR}
 """Forms in which numbers state a place that turns with its bar; `point` is a name."""
-ENDS_OF_A_LINE = {"from": "start", "to": "end"}
-"""Fields of a line between two bars that hold its ends, by their keys."""
 AT_FIRST_PIN = (0.0, 0.0)
 """Place of the bar's first pin, m and rad."""
 
@@ -191,22 +194,73 @@ def _require_mass_centre(key: str, bar: int) -> None:
         )
 
 
-def require_ends(key: str, start: object, end: object) -> tuple[Place, Place]:
-    """Return the ends of a line between two bars, checked.
+class At(NamedTuple):
+    """Declaration of a place: its key, and the bars on which it may be."""
 
-    Raises InputError for a value that is none.
-    """
-    ends = tuple(
-        require_place(f"{key}.{name}", place)
-        for name, place in (("from", start), ("to", end))
-    )
-    if ends[0].bar == ends[1].bar:
-        raise InputError(
-            f"{key}.to.bar",
-            ends[1].bar,
-            "must be another bar than that of `from`",
-        )
-    return ends[0], ends[1]
+    key: str = ""
+    bars: tuple[int, ...] = (1, *MOVING_BARS)
+    is_value: bool = False
+    """True if the place is stated in the description's own table."""
+
+    def check(self, key: str, value: Any) -> Place:
+        """Return the place; InputError for what is none."""
+        place = require_place(key, value)
+        return place._replace(bar=OfBar(self.bars).check(f"{key}.bar", place.bar))
+
+
+class PointName(NamedTuple):
+    """Declaration of the name of a point of the scene."""
+
+    key: str = ""
+
+    def check(self, key: str, value: Any) -> str:
+        """Return the name; InputError for what is no text."""
+        expect(key, value, str)
+        name: str = value
+        return name
+
+
+def states_place(kind: Any) -> bool:
+    """Return True if fields of a class are the forms of its place."""
+    return "from_pin" in list_fields(kind)
+
+
+class Placed(Described):
+    """Base class of descriptions whose places follow from their declared fields."""
+
+    __slots__ = ()
+
+    def with_places(self, change: Callable[[Place], Place]) -> Self:
+        """Return the description with each place changed, itself where none is."""
+        changed: dict[str, Any] = {}
+        description: Any = self
+        kind: Any = type(self)
+        if states_place(kind) and (place := description.place) is not None:
+            forms = change(place)._asdict().items()
+            names = list_fields(kind)
+            changed |= {name: form for name, form in forms if name in names}
+        for field in list_declared(kind):
+            value = getattr(self, field.name)
+            if isinstance(field.by, At):
+                changed[field.name] = change(value)
+            elif isinstance(field.by, Entries):
+                changed[field.name] = change_each(value, change)
+        return copy_with(self, **changed)
+
+
+class Line(Placed):
+    """Base class of lines between two places, `start` and `end`, of different bars."""
+
+    __slots__ = ()
+
+    def __post_init__(self: Any) -> None:
+        Placed.__post_init__(self)
+        if self.start.bar == self.end.bar:
+            raise InputError(
+                f"{self.section}.to.bar",
+                self.end.bar,
+                "must be another bar than that of `from`",
+            )
 
 
 def change_each(terms: Any, change: Callable[[Place], Place]) -> Any:

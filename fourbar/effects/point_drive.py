@@ -5,29 +5,21 @@ direction at the point; ds/dq is the component in that direction of the point's
 derivative by the independent angle.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 
 from fourbar.effects.effect import Actions
 from fourbar.effects.force_drive import ForceDrive
-from fourbar.effects.load import require_frame
-from fourbar.effects.place import Place, require_place
+from fourbar.effects.load import FRAMES
+from fourbar.effects.place import At, Place
 from fourbar.effects.spring import COINCIDENT_POINTS
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import Number, is_any, polar
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.linkage import (
-    MOVING_BARS,
-    Declared,
-    FourBar,
-    check_numbers,
-    copy_with,
-    require_bar,
-)
+from fourbar.linkage import MOVING_BARS, Declared, FourBar, OneOf
 from fourbar.quantities import NO_LEVER, OK
 
 
@@ -43,21 +35,9 @@ class PointDrive(ForceDrive):
         with it.
     """
 
-    place: Place
-    direction: float
-    frame: str = "world"
-    numbers: ClassVar[dict[str, Declared]] = {"direction": Declared("rad")}
-    places: ClassVar[dict[str, str]] = {"": "place"}
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "place", require_place("drive", self.place))
-        require_bar("drive.bar", self.place.bar)
-        check_numbers(self, "drive")
-        require_frame("drive.frame", self.frame)
-
-    def with_places(self, change: Callable[[Place], Place]) -> "PointDrive":
-        """Return the same drive with its place changed."""
-        return copy_with(self, place=change(self.place))
+    place: Annotated[Place, At(bars=MOVING_BARS, is_value=True)]
+    direction: Annotated[float, Declared("rad")]
+    frame: Annotated[str, OneOf(FRAMES)] = "world"
 
     @property
     def ends(self) -> tuple[tuple[float, Place], ...]:

@@ -1,31 +1,23 @@
 """Linear springs, each between two points of two bars, the ground included."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, Effect
-from fourbar.effects.place import (
-    ENDS_OF_A_LINE,
-    STATED_PLACES,
-    Place,
-    change_each,
-    require_ends,
-)
-from fourbar.errors import InputError, expect, write_in_units
+from fourbar.effects.place import At, Line, Place
+from fourbar.errors import InputError, write_in_units
 from fourbar.formulas.arithmetic import Number, is_any, select
 from fourbar.formulas.motion import State
 from fourbar.linkage import (
     AT_LEAST_ZERO,
     POSITIVE,
     Declared,
+    Entries,
     FourBar,
-    check_numbers,
-    copy_with,
-    require,
+    OneOf,
 )
 from fourbar.quantities import NO_DIRECTION, OK
 
@@ -33,15 +25,11 @@ COINCIDENT_POINTS = 16.0 * 2.0**-52
 """Part of the paths from O2, bar by bar, below which two points count as one. There is
 no direction between them.
 """
-STROKE_FIELD = Declared("m", POSITIVE)
-"""By how much a gas spring can be shortened."""
 GAS = {
     "extended": Declared("m", POSITIVE),
-    "stroke": STROKE_FIELD,
-    **dict.fromkeys(
-        ("extended_force", "compressed_force"),
-        Declared("N", AT_LEAST_ZERO),
-    ),
+    "stroke": Declared("m", POSITIVE),
+    "extended_force": Declared("N", AT_LEAST_ZERO),
+    "compressed_force": Declared("N", AT_LEAST_ZERO, None),
 }
 """Numbers of a gas spring, which becomes one of the springs."""
 SENSES = ("push", "pull")
@@ -49,7 +37,7 @@ SENSES = ("push", "pull")
 
 
 @dataclass(frozen=True, slots=True)
-class Spring:
+class Spring(Line):
     """A spring that pulls its two points together.
 
     The pull is preload + stiffness (distance - length), N. Where that is negative it
@@ -68,46 +56,31 @@ class Spring:
     acts : "push" or "pull", the one way in which it acts; None: both.
     """
 
-    start: Place
-    end: Place
-    stiffness: float
-    length: float = 0.0
-    preload: float = 0.0
-    stroke: float | None = field(default=None, compare=False, repr=False)
-    acts: str | None = None
-    numbers: ClassVar[dict[str, Declared]] = {
-        "stiffness": Declared("N/m", AT_LEAST_ZERO),
-        "length": Declared("m", AT_LEAST_ZERO),
-        "preload": Declared("N", left_out=0.0),
-    }
-    places: ClassVar[dict[str, str]] = ENDS_OF_A_LINE
+    start: Annotated[Place, At("from")]
+    end: Annotated[Place, At("to")]
+    stiffness: Annotated[float, Declared("N/m", AT_LEAST_ZERO)]
+    length: Annotated[float, Declared("m", AT_LEAST_ZERO, always=True)] = 0.0
+    preload: Annotated[float, Declared("N")] = 0.0
+    stroke: Annotated[float | None, Declared("m", POSITIVE)] = field(
+        default=None, compare=False, repr=False
+    )
+    acts: Annotated[str | None, OneOf(SENSES)] = None
+    section: ClassVar[str] = "effects.springs"
+    forms: ClassVar[dict[str, dict[str, Declared]]] = {"gas": GAS}
 
     def __post_init__(self) -> None:
-        for name, point in zip(
-            ("start", "end"),
-            require_ends("effects.springs", self.start, self.end),
-            strict=True,
-        ):
-            object.__setattr__(self, name, point)
-        check_numbers(self, "effects.springs")
-        if self.stroke is not None:
+        Line.__post_init__(self)
+        if self.stroke is not None and self.stroke >= self.length:
+            longest = write_in_units("m", self.length)
+            allowed = f"must be less than the length, {longest}"
             key = "effects.springs.stroke"
-            stroke = require(key, self.stroke, *STROKE_FIELD[:2])
-            if stroke >= self.length:
-                longest = write_in_units("m", self.length)
-                allowed = f"must be less than the length, {longest}"
-                raise InputError(key, stroke, allowed, unit="m")
-            object.__setattr__(self, "stroke", stroke)
+            raise InputError(key, self.stroke, allowed, unit="m")
         if self.acts is not None:
             self._require_one_way()
 
     def _require_one_way(self) -> None:
         """Raise InputError unless the force changes its sign at some length."""
         key = "effects.springs.acts"
-        expect(key, self.acts, str)
-        if self.acts not in SENSES:
-            allowed = " or ".join(f'"{name}"' for name in SENSES)
-            raise InputError(key, self.acts, f"must be {allowed}")
         if self.stiffness == 0.0:
             allowed = "leave it out: the force is constant, and comes off at no length"
             raise InputError(key, self.acts, allowed)
@@ -147,8 +120,7 @@ class Spring:
         last = extended_force if compressed_force is None else compressed_force
         pairs = zip(GAS.items(), (extended, stroke, extended_force, last), strict=True)
         extended, stroke, first, last = (
-            require(f"{key}.{name}", value, *declared[:2])
-            for (name, declared), value in pairs
+            declared.check(f"{key}.{name}", value) for (name, declared), value in pairs
         )
         if stroke >= extended:
             raise InputError(
@@ -168,10 +140,6 @@ class Spring:
             )
         stiffness = (last - first) / stroke
         return cls(start, end, stiffness, extended, -first, stroke, acts)
-
-    def with_places(self, change: Callable[[Place], Place]) -> "Spring":
-        """Return the same spring with its ends changed."""
-        return copy_with(self, start=change(self.start), end=change(self.end))
 
     @property
     def slack(self) -> float:
@@ -219,27 +187,14 @@ class Springs(Effect):
     there; its preload is stiffness times length. So does one that only pulls.
     """
 
-    springs: tuple[Spring, ...]
+    springs: Annotated[tuple[Spring, ...], Entries(Spring, is_value=True)]
     key: ClassVar[str] = "springs"
-    entries: ClassVar[str] = "springs"
     in_balls: ClassVar[bool] = True
     example: ClassVar[str] = (
         'springs = [{ from = { bar = 1, from_pin = ["10 cm", "-90 deg"] }, '
         'to = { bar = 4, from_pin = ["8 cm", "0 deg"] }, '
         'stiffness = "200 N/m", length = "12 cm", preload = "3 N" }]'
     )
-    numbers: ClassVar[dict[str, Declared]] = {**Spring.numbers, **STATED_PLACES}
-
-    def __post_init__(self) -> None:
-        expect("effects.springs", self.springs, tuple, list)
-        for spring in self.springs:
-            expect("effects.springs", spring, Spring)
-        object.__setattr__(self, "springs", tuple(self.springs))
-
-    def with_places(self, change: Callable[[Place], Place]) -> "Springs":
-        """Return the same springs with their ends changed."""
-        springs = change_each(self.springs, change)
-        return copy_with(self, springs=springs)
 
     def act(self, actions: Actions, state: State) -> None:
         """Add the tension at `start` towards `end`, and its opposite at `end`."""

@@ -13,6 +13,7 @@ from fourbar.errors import ELSEWHERE, InputError, name_unit, names_other_mechani
 from fourbar.linkage import (
     ANY_NUMBER,
     BAR_NAMES,
+    MOVING_BARS,
     PINS,
     REQUIRED_NUMBER,
     Declared,
@@ -150,14 +151,10 @@ class Reader:
             )
         return value
 
-    def bar(self, key: str, value: object, least: int = 2) -> int:
-        """Read the number of a bar; 1, the ground, where `least` is 1."""
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, int)
-            or value not in range(least, 5)
-        ):
-            numbers = [f"{bar} ({BAR_NAMES[bar]})" for bar in range(least, 5)]
+    def bar(self, key: str, value: object, bars: tuple[int, ...] = MOVING_BARS) -> int:
+        """Read the number of a bar, one of `bars`."""
+        if isinstance(value, bool) or not isinstance(value, int) or value not in bars:
+            numbers = [f"{bar} ({BAR_NAMES[bar]})" for bar in bars]
             allowed = f"must be {', '.join(numbers[:-1])} or {numbers[-1]}"
             if isinstance(value, int) and value > len(BAR_NAMES):
                 allowed = f"{allowed}: {ELSEWHERE}"

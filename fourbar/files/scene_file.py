@@ -7,7 +7,7 @@ import math
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import MISSING, fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
@@ -17,21 +17,15 @@ from fourbar import writing
 from fourbar.effects import (
     Effect,
     ForceDrive,
-    Gravity,
     LinearDrive,
     Load,
-    Place,
     PointDrive,
-    Spring,
-    Springs,
-    Table,
     list_kinds,
 )
 from fourbar.effects.effect import PinRows
-from fourbar.effects.load import FRAMES
-from fourbar.effects.place import AT_FIRST_PIN, STATED_PLACES, settler
-from fourbar.effects.spring import GAS, SENSES, STROKE_FIELD
+from fourbar.effects.place import settler
 from fourbar.errors import InputError, expect
+from fourbar.files.described import PLACES_OF_ENDS, list_keys, read_described
 from fourbar.files.drawing import (
     choose_assembly,
     read_drawing,
@@ -39,10 +33,6 @@ from fourbar.files.drawing import (
     state_motion,
 )
 from fourbar.files.fields import BARE_KEY, Reader
-from fourbar.files.place import (
-    PLACES_OF_ENDS,
-    read_stated_place,
-)
 from fourbar.files.scene_text import BAR_NUMBERS, BRANCH_OF_NAME, SIGMA
 from fourbar.formulas.mobility import meet_change_points
 from fourbar.linkage import BAR_NAMES, MOST_INTERVALS, PINS, POSITIVE, Bar, FourBar
@@ -84,7 +74,6 @@ LONGEST_SHOWN_LINE = 60
 """Characters shown of a line that cannot be read."""
 _MOST_LOADS = 1000
 """Limit of the loads, each of which is a term at every position."""
-_MOST_SPRINGS = 1000
 SCENE_TABLES = (
     "title",
     "source",
@@ -289,27 +278,24 @@ def _read_drive(
     bars: Mapping[str, int],
 ) -> tuple[int | None, ForceDrive | None]:
     """Read the bar on which a couple acts, or a force along a line or at a place."""
-    allowed = ("bar", "from", "to", *PLACES_OF_ENDS, "direction", "frame")
     if isinstance(value, dict):
         for name in ("torque", "moment", "force"):
             if name in value:
                 raise read.refuse(f"drive.{name}", value[name], _A_GIVEN_DRIVE)
-    entry = read.table("drive", value, allowed)
+    on_line = list_keys(LinearDrive)
+    at_point = list_keys(PointDrive)
+    entry = read.table("drive", value, dict.fromkeys(("bar", *on_line, *at_point)))
     stated = entry.keys()
-    if "from" in stated or "to" in stated:
-        for name in stated - {"from", "to"}:
+    if not stated.isdisjoint(on_line):
+        for name in stated - {*on_line}:
             raise read.refuse(f"drive.{name}", entry[name], _A_LINE)
-        start, end = _read_ends(read, "drive", entry, bars)
-        return None, LinearDrive(start, end)
-    is_couple = stated.isdisjoint({*PLACES_OF_ENDS, "direction", "frame"})
-    if is_couple:
+        return None, read_described(read, "drive", entry, LinearDrive, bars)
+    if stated <= {"bar"}:
         return read.bar("drive.bar", entry.get("bar", 2)), None
-    place = read_stated_place(read, "drive", entry, bars, 2)
-    if place == Place(place.bar):
+    if stated.isdisjoint(PLACES_OF_ENDS):
+        read.bar("drive.bar", entry.get("bar"))
         raise read.refuse("drive.point", None, _A_POINT)
-    direction = read.quantity("drive.direction", entry.get("direction"), "rad")
-    frame = read.choice("drive.frame", entry.get("frame", FRAMES[0]), FRAMES)
-    return None, PointDrive(place, direction, frame)
+    return None, read_described(read, "drive", entry, PointDrive, bars)
 
 
 def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
@@ -322,9 +308,7 @@ def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
     points = []
     for name, point in value.items():
         key = f"points.{name}" if BARE_KEY.fullmatch(name) else "points"
-        entry = read.table(key, point, ("bar", *STATED_PLACES))
-        place = read_stated_place(read, key, entry, {})
-        points.append(Point(name, place.bar, place.from_pin, place.from_centre))
+        points.append(read_described(read, key, point, Point, {}, name=name))
     return tuple(points)
 
 
@@ -596,145 +580,35 @@ def _read_commanded(
     return Sweep(start, stop, _read_steps(read, key, sweep))
 
 
-def _read_load_table(read: Reader, key: str, value: object) -> Table:
-    """Read the factors of a load over theta_2."""
-    if isinstance(value, dict) and "time" in value:
-        allowed = (
-            "a load follows theta_2, not time: at one speed theta_2 is omega_2 t; a"
-            " torque over time that moves the linkage is for a simulator (fourbar mjcf"
-            " SCENE --drive motor)"
-        )
-        raise read.refuse(f"{key}.time", value["time"], allowed)
-    columns = read.table(key, value, ("theta_2", "factor"))
-    stated = columns.get("factor")
-    if not isinstance(stated, list):
-        allowed = "must be a list of numbers without a unit"
-        raise read.refuse(f"{key}.factor", stated, allowed)
-    angles = read.quantities(f"{key}.theta_2", columns.get("theta_2"), "rad")
-    factors = []
-    for index, factor in enumerate(stated):
-        factors.append(read.number(f"{key}.factor[{index}]", factor))
-    return Table(angles, tuple(factors))
-
-
 def _read_load(read: Reader, key: str, value: object, bars: Mapping[str, int]) -> Load:
-    allowed = ("bar", *Load.numbers, "point", "frame", "table")
-    entry = read.table(key, value, allowed)
-    table = None
-    if "table" in entry:
-        table = _read_load_table(read, f"{key}.table", entry["table"])
-    if "force" not in entry and "moment" not in entry:
+    if isinstance(value, dict) and value.keys().isdisjoint(("force", "moment")):
+        read.table(key, value, list_keys(Load))
         raise read.refuse(key, value, "must have a force, a moment or both")
-    place = read_stated_place(read, key, entry, bars, 2)
-    numbers = {name: Load.numbers[name] for name in ("force", "arm", "moment")}
-    stated = read.numbers(key, entry, numbers)
-    frame = read.choice(f"{key}.frame", entry.get("frame", FRAMES[0]), FRAMES)
-    try:
-        return Load(**place._asdict(), **stated, frame=frame, table=table)
-    except InputError as error:  # which knows of one load alone
-        raise error.moved_to(error.key.replace("loads", key), read.file) from None
+    load: Load = read_described(read, key, value, Load, bars)
+    return load
 
 
 def _read_effect(
     read: Reader,
-    key: str,
+    name: str,
     value: object,
-    bar_of_point: Mapping[str, int],
+    bars: Mapping[str, int],
 ) -> Effect:
     """Read an effect from the value under its key."""
-    kind: Any = list_kinds()[key]
-    path = f"effects.{key}"
+    kind: Any = list_kinds()[name]
+    key = f"effects.{name}"
     if kind.example and not isinstance(value, dict | list):
-        raise read.refuse(path, value, f"must be like {kind.example}")
-    if kind is Gravity:
-        return Gravity(*read.polar(path, value, kind.numbers["magnitude"].unit))
-    if kind is Springs:
-        return _read_springs(read, path, value, bar_of_point)
-    if issubclass(kind, PinRows):
-        rows = []
-        for pin, entry in read.table(path, value, PINS).items():
-            if "" in kind.numbers:
-                stated = {"": entry}
-            else:
-                stated = read.table(f"{path}.{pin}", entry, kind.numbers)
-            rows.append(
-                (pin, *read.numbers(f"{path}.{pin}", stated, kind.numbers).values())
-            )
-        return kind(tuple(rows))  # type: ignore[no-any-return]
-    bars = {field.name: field.default for field in fields(kind) if field.name == "bar"}
-    stated = read.table(path, value, (*bars, *kind.numbers))
-    bar = {
-        name: read.whole(
-            f"{path}.{name}",
-            stated.get(name, None if default is MISSING else default),
-            2,
-            4,
-        )
-        for name, default in bars.items()
-    }
-    return kind(**bar, **read.numbers(path, stated, kind.numbers))  # type: ignore[no-any-return]
-
-
-def _read_springs(
-    read: Reader,
-    key: str,
-    value: object,
-    bars: Mapping[str, int],
-) -> Springs:
-    """Read springs and gas springs."""
-    if not isinstance(value, list) or not 1 <= len(value) <= _MOST_SPRINGS:
-        raise read.refuse(key, value, f"must be a list of 1 to {_MOST_SPRINGS} springs")
-    springs = []
-    for index, entry in enumerate(value):
-        path = f"{key}[{index}]"
-        keys = ("from", "to", *Spring.numbers, "stroke", "gas", "acts")
-        row = read.table(path, entry, keys)
-        start, end = _read_ends(read, path, row, bars)
-        acts = None
-        if "acts" in row:
-            acts = read.choice(f"{path}.acts", row["acts"], SENSES)
-        if gas := "gas" in row:
-            read.table(path, entry, ("from", "to", "gas", "acts"))
-            words = read.table(f"{path}.gas", row["gas"], GAS)
-            stated = read.numbers(
-                f"{path}.gas",
-                {"compressed_force": words.get("extended_force"), **words},
-                GAS,
-            )
+        raise read.refuse(key, value, f"must be like {kind.example}")
+    if not issubclass(kind, PinRows):
+        return read_described(read, key, value, kind, bars)  # type: ignore[no-any-return]
+    rows = []
+    for pin, entry in read.table(key, value, PINS).items():
+        if "" in kind.numbers:
+            stated = {"": entry}
         else:
-            stated = read.numbers(path, row, Spring.numbers)
-            if "stroke" in row:
-                stroke = read.declared(f"{path}.stroke", row["stroke"], STROKE_FIELD)
-                stated["stroke"] = stroke
-        try:
-            springs.append(
-                Spring.gas(start, end, **stated, acts=acts)
-                if gas
-                else Spring(start, end, **stated, acts=acts)
-            )
-        except InputError as error:  # which knows of one spring alone
-            raise error.moved_to(error.key.replace(key, path), read.file) from None
-    return Springs(tuple(springs))
-
-
-def _read_ends(
-    read: Reader,
-    key: str,
-    row: dict[str, Any],
-    bars: Mapping[str, int],
-) -> tuple[Place, Place]:
-    """Read the entries `from` and `to` of a line between two bars.
-
-    An end without a place is at its bar's first pin.
-    """
-    ends = []
-    for name in ("from", "to"):
-        path = f"{key}.{name}"
-        allowed = ("bar", *PLACES_OF_ENDS)
-        entry = read.table(path, row.get(name), allowed)
-        end = read_stated_place(read, path, entry, bars)
-        ends.append(Place(end.bar, AT_FIRST_PIN) if end == Place(end.bar) else end)
-    return ends[0], ends[1]
+            stated = read.table(f"{key}.{pin}", entry, kind.numbers)
+        rows.append((pin, *read.numbers(f"{key}.{pin}", stated, kind.numbers).values()))
+    return kind(tuple(rows))  # type: ignore[no-any-return]
 
 
 def _read_tolerances(

@@ -13,12 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.effects import (
-    Effect,
-    Springs,
-    list_kinds,
-)
+from fourbar.effects import Effect, list_kinds
 from fourbar.errors import InputError, expect
+from fourbar.files.described import write_described
 from fourbar.files.drawing import choose_assembly, meet_lengths, read_point
 from fourbar.files.fields import (
     Reader,
@@ -42,12 +39,7 @@ from fourbar.scene.motion import (
     Sweep,
 )
 from fourbar.scene.pictures import TracedPicture
-from fourbar.studies.keys import (
-    find_misfit,
-    list_described,
-    list_entries,
-    read_numbers,
-)
+from fourbar.studies.keys import find_misfit, list_entries
 from fourbar.writing import write_text
 
 BRANCH_OF_NAME = {name: branch for branch, name in BRANCH_NAMES.items()}
@@ -87,7 +79,6 @@ def dump(scene: Scene) -> str:
     described = list_scene_tables(scene)
     motion = _write_motion(scene.motion)
     bars = described["bars"]
-    _add_strokes(described["effects"], scene)
     for picture in scene.pictures:
         bars.setdefault(BAR_NAMES[picture.bar], {})["picture"] = picture.name
     _restore_coordinates(described, scene.coordinates)
@@ -127,19 +118,6 @@ def _write_traced(picture: TracedPicture | None) -> dict[str, Any]:
         entries["scale"] = write_quantity(picture.scale, "m")
     angle = write_quantity(picture.angle, "rad")
     return entries | {"angle": angle, "opacity": picture.opacity}
-
-
-def _add_strokes(effects: dict[str, Any], scene: Scene) -> None:
-    """Add the strokes of gas springs, which a guest's scene leaves out.
-
-    A guest is told of forces alone, and strokes change no force.
-    """
-    for effect in scene.effects:
-        if not isinstance(effect, Springs):
-            continue
-        for entry, spring in zip(effects[effect.key], effect.springs, strict=True):
-            if spring.stroke is not None:
-                entry["stroke"] = write_quantity(spring.stroke, "m")
 
 
 def _write_lengths(
@@ -195,57 +173,33 @@ def list_scene_tables(scene: Scene) -> dict[str, Any]:
     Raises InputError where a file cannot hold the effects.
     """
     _require_writable(scene.effects)
-    described = list_described(scene)
-    bars = {key: one.bar for key, _, one in described if hasattr(one, "bar")}
-    if scene.drive is None:
-        bars["drive"] = scene.drive_bar
-    entries = list_entries(scene)
-    numbers = {
-        key: write_quantity(number, entries[key].unit)
-        for key, number in read_numbers(scene).items()
-        if number is not None and not entries[key].is_coordinate
+    linkage = scene.linkage
+    lengths = zip(BAR_NAMES.values(), linkage.lengths, strict=True)
+    drive = {"bar": scene.drive_bar}
+    return {
+        "lengths": {
+            **{name: write_quantity(length, "m") for name, length in lengths},
+            "ground_angle": write_quantity(linkage.ground_angle, "rad"),
+        },
+        "bars": {
+            name: _write_bar(linkage.bar(bar))
+            for name, bar in BAR_NUMBERS.items()
+            if linkage.bar(bar) != Bar(linkage.bar(bar).length)
+        },
+        "drive": drive if scene.drive is None else write_described(scene.drive),
+        "points": {point.name: write_described(point) for point in scene.points},
+        "loads": [write_described(load) for load in scene.loads],
+        "effects": {effect.key: write_described(effect) for effect in scene.effects},
     }
-    words = {
-        f"{key}.{name}": word
-        for key, _, one in described
-        for name in _WORDS
-        if (word := getattr(one, name, None)) is not None
-    }
-    tables: dict[str, Any] = {name: {} for name in _WRITTEN}
-    stated: dict[str, Any] = {f"effects.{effect.key}": {} for effect in scene.effects}
-    stated |= {f"{key}.bar": bar for key, bar in bars.items()}
-    for key, value in (stated | numbers | words).items():
-        *path, last = key.split(".")
-        holder = tables
-        for name in path:
-            holder = holder.setdefault(name, {})
-        holder[last] = value
-    for name, bar in BAR_NUMBERS.items():
-        stated_bar = scene.linkage.bar(bar)
-        if stated_bar == Bar(stated_bar.length):
-            del tables["bars"][name]
-    written = {name: _make_lists(tables[name]) for name in _WRITTEN}
-    written["loads"] = written["loads"] or []
-    for entry, load in zip(written["loads"], scene.loads, strict=True):
-        if load.table is not None:
-            angles = [write_quantity(angle, "rad") for angle in load.table.theta_2]
-            entry["table"] = {"theta_2": angles, "factor": list(load.table.factor)}
-    return written
 
 
-_WRITTEN = ("lengths", "bars", "drive", "points", "loads", "effects")
-"""Tables of what a scene describes, in the order of a file."""
-_WORDS = ("frame", "point", "acts")
-"""Words that may describe a load, a place, a spring or a drive."""
-
-
-def _make_lists(value: Any) -> Any:
-    """Return a table by numbers 0, 1, ... as a list, and so those within it."""
-    if not isinstance(value, dict):
-        return value
-    entries = {key: _make_lists(entry) for key, entry in value.items()}
-    is_list = bool(entries) and all(map(str.isdigit, entries))
-    return [*entries.values()] if is_list else entries
+def _write_bar(bar: Bar) -> dict[str, Any]:
+    """Write the numbers of a bar; a density states its mass, the pins its length."""
+    numbers = write_numbers(bar)
+    del numbers["length"]
+    if bar.density is not None:
+        del numbers["mass"]
+    return numbers
 
 
 def _require_writable(effects: tuple[Effect, ...]) -> None:

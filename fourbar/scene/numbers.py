@@ -4,12 +4,18 @@ Units are declared where the numbers belong.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, Any, ClassVar
 
 from fourbar import effects
-from fourbar.effects.place import STATED_PLACES, Place, require_place
+from fourbar.effects.place import (
+    STATED_PAIR,
+    STATED_PLACES,
+    At,
+    Place,
+    Placed,
+    require_place,
+)
 from fourbar.errors import InputError, expect
 from fourbar.linkage import (
     BAR_NAMES,
@@ -18,11 +24,11 @@ from fourbar.linkage import (
     POSITIVE,
     Bar,
     Declared,
+    Entries,
     FourBar,
-    check_numbers,
-    copy_with,
+    OfBar,
+    list_declared,
     require,
-    require_whole,
 )
 from fourbar.quantities import DERIVED_NAMES, UNITS, find_derived
 from fourbar.scene.drawing import DRAWN_WORD
@@ -34,7 +40,7 @@ POINT_STAGES = {"": "position", "v_": "velocity", "a_": "acceleration"}
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class Point(Placed):
     """A point of a bar.
 
     Parameters
@@ -47,10 +53,10 @@ class Point:
     """
 
     name: str
-    bar: int
-    from_pin: tuple[float, float] | None = None
-    from_centre: tuple[float, float] | None = None
-    numbers: ClassVar[dict[str, Declared]] = STATED_PLACES
+    bar: Annotated[int, OfBar((1, *MOVING_BARS))]
+    from_pin: Annotated[tuple[float, float] | None, STATED_PAIR] = None
+    from_centre: Annotated[tuple[float, float] | None, STATED_PAIR] = None
+    section: ClassVar[str] = "points.{0.name}"
 
     def __post_init__(self) -> None:
         plain = (
@@ -76,27 +82,13 @@ class Point:
                 self.name,
                 "is the name of a quantity; a point needs another",
             )
-        bar = require_whole(
-            f"{self.key}.bar",
-            self.bar,
-            BAR_NAMES,
-            "must be 1, 2, 3 or 4",
-        )
-        object.__setattr__(self, "bar", bar)
-        check_numbers(self, self.key)
+        Placed.__post_init__(self)
         require_place(self.key, self.place)
 
     @property
     def place(self) -> Place:
         """Place of the point on its bar."""
         return Place(self.bar, self.from_pin, self.from_centre)
-
-    def with_places(self, change: Callable[[Place], Place]) -> "Point":
-        """Return the same point with its place changed."""
-        stated = self.place
-        if (place := change(stated)) is stated:
-            return self
-        return copy_with(self, from_pin=place.from_pin, from_centre=place.from_centre)
 
     @property
     def key(self) -> str:
@@ -146,26 +138,43 @@ def find_unit_of_key(key: str) -> str | None:
     if names[-2:-1] == [DRAWN_WORD]:
         is_known = table in _TABLES_OF_PLACES and names[-1] in ("0", "1")
         return PIN_COORDINATE.unit if is_known else None
-    tables = {
-        "lengths": LENGTH_NUMBERS,
-        "bars": Bar.numbers,
-        "motion": Motion.numbers,
-        "points": Point.numbers,
-    }
-    numbers = tables.get(table, {})
-    if table == "loads":
-        numbers = effects.Load.numbers
-    elif table == "drive":
-        numbers = {**STATED_PLACES, "direction": Declared("rad")}
-    elif table == "effects" and names and (kind := effects.list_kinds().get(names[0])):
-        numbers = {**kind.numbers, "gravity": effects.Gravity.numbers["magnitude"]}
-    part = names.pop() if names and names[-1] in ("0", "1") else ""
-    stated = numbers.get(names[-1] if names else "", numbers.get(""))
-    if stated is None:
-        return None
-    if part == "1":
-        return "rad"
-    return stated.unit
+    numbers: dict[str, Declared]
+    if table in (tables := {"lengths": LENGTH_NUMBERS, "motion": Motion.numbers}):
+        numbers = tables[table]
+    else:
+        kinds: dict[str, Any] = {
+            "bars": Bar,
+            "points": Point,
+            "loads": effects.Load,
+            "drive": effects.PointDrive,
+        }
+        if table == "effects" and names:
+            kinds |= {table: effects.list_kinds().get(names[0])}
+        numbers = _collect_numbers(kinds.get(table))
+    *_, before, last = ("", *names) if names else ("", "")
+    stated = numbers.get(last)
+    if stated is None and last in ("0", "1"):
+        stated = numbers.get(before)
+        if stated is not None and last == "1":
+            return "rad"
+    stated = stated or numbers.get("")
+    return None if stated is None else stated.unit
+
+
+def _collect_numbers(kind: Any) -> dict[str, Declared]:
+    """Collect the numbers of a description, its places and its entries, by their keys.
+
+    Numbers whose names differ may be of one unit; a key needs no more.
+    """
+    if kind is None:
+        return {}
+    numbers = {by.key or name: by for name, by in kind.numbers.items()}
+    for field in list_declared(kind):
+        if isinstance(field.by, At):
+            numbers |= STATED_PLACES
+        elif isinstance(field.by, Entries):
+            numbers |= _collect_numbers(field.by.kind)
+    return numbers
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects.place import STATED_PLACES, Place
+from fourbar.effects.place import STATED_PLACES, At, Place
 from fourbar.errors import (
     ELSEWHERE,
     InputError,
@@ -33,8 +33,10 @@ from fourbar.linkage import (
     PINS,
     POSITIVE,
     Bar,
+    Entries,
     FourBar,
     copy_with,
+    list_declared,
     list_numbers,
 )
 from fourbar.scene import Scene
@@ -99,23 +101,23 @@ class SceneNumber(NamedTuple):
 def list_described(scene: Scene) -> list[tuple[str, NumberPath, Any]]:
     """List drive, loads, points and effects with their keys, each before its places.
 
-    Entries of an effect that holds a list stand in its place. Between key and
-    description are the attributes and indices that lead to it.
+    Entries of an effect that holds a list follow it. Between key and description are
+    the attributes and indices that lead to it.
     """
     described: list[tuple[str, NumberPath, Any]] = []
 
     def add(key: str, path: NumberPath, holder: Any) -> None:
-        if field := getattr(holder, "entries", ""):
-            for index, entry in enumerate(getattr(holder, field)):
-                add(f"{key}.{index}", (*path, field, index), entry)
-            return
         described.append((key, path, holder))
-        for name, attribute in getattr(holder, "places", {}).items():
-            place = (*path, attribute), getattr(holder, attribute)
-            if name:
-                described.append((f"{key}.{name}", *place))
-            else:  # in the holder's own table, of whose numbers it is the first
-                described.insert(-1, (key, *place))
+        for field in list_declared(type(holder)):
+            value = getattr(holder, field.name)
+            inner = f"{key}.{field.key}".rstrip("."), (*path, field.name)
+            if isinstance(field.by, At):
+                # in the holder's own table it is the first of the numbers
+                index = -1 if field.by.is_value else len(described)
+                described.insert(index, (*inner, value))
+            elif isinstance(field.by, Entries):
+                for index, entry in enumerate(value):
+                    add(f"{inner[0]}.{index}", (*inner[1], index), entry)
 
     if scene.drive is not None:
         add("drive", ("drive",), scene.drive)

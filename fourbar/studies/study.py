@@ -176,7 +176,9 @@ def _find_pin_turns(effects: Iterable[Effect]) -> dict[int, Any]:
     Only effects that depend on where the motion begins count turns.
     """
     turns_of = {
-        index: getattr(effect, "turns", None) for index, effect in enumerate(effects)
+        index: getattr(effect, "turns", None)
+        for index, effect in enumerate(effects)
+        if effect.counts_turns
     }
     return {index: turns for index, turns in turns_of.items() if turns is not None}
 

@@ -104,7 +104,7 @@ function drawActing(p, i) {
       keepOff(ring(at, 2.1 * S, 0, TURN, 9));
       make(parts.under, "path", { class: "act act-spring", d: pathOf(Array.from({ length: 80 }, (_, n) => ring(at, S * (0.6 + 1.5 * n / 79), n / 79 * 2.5 * TURN, 0, 2)[0])) });
     } else {
-      const at = toScreen(p[one.pin]);
+      const at = toScreen(one.pin ? p[one.pin] : framed(p, one.bar, one.at));
       keepOff(ring(at, (RINGS[one.kind] ?? 2.1) * S, 0, TURN, 9));
       make(parts.under, "circle", { class: `act act-${one.kind === "flywheel" ? "flywheel" : "pin"}`, cx: at[0], cy: at[1], r: (RINGS[one.kind] ?? 2.1) * S });
     }

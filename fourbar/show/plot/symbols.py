@@ -14,17 +14,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects import (
-    Flywheel,
-    ForceDrive,
-    Gravity,
-    LinearDrive,
-    PointDrive,
-    Spring,
-    Springs,
-)
+from fourbar.effects import ForceDrive, Gravity, LinearDrive, PointDrive
 from fourbar.effects.effect import PinRows
-from fourbar.linkage import FIRST_PIN, FourBar
+from fourbar.effects.place import At, Line
+from fourbar.linkage import FIRST_PIN, Entries, FourBar, OfBar, list_declared
 from fourbar.scene import Scene
 from fourbar.show.plot.curves import choose_limit
 from fourbar.show.plot.labels import DrawnPoint
@@ -179,21 +172,33 @@ def list_acting(scene: Scene) -> list[Symbol]:
                 )
             )
     for effect in scene.effects:
-        if isinstance(effect, PinRows):
-            symbols += [
-                Symbol(effect.key, effect.key.replace("_", " "), pin=pin)
-                for pin, *_ in effect.rows
-            ]
-        elif isinstance(effect, Gravity):
-            symbols.append(Symbol("gravity", "g", vector=complex(*effect.vector)))
-        elif isinstance(effect, Flywheel):
-            symbols.append(
-                Symbol("flywheel", "flywheel", effect.bar, pin=FIRST_PIN[effect.bar])
-            )
-        elif isinstance(effect, Springs):
-            symbols += [
-                _join_ends("spring", "spring", spring) for spring in effect.springs
-            ]
+        symbols += _list_symbols(effect.key, effect)
+    return symbols
+
+
+def _list_symbols(kind: str, one: Any) -> list[Symbol]:
+    """List the symbols of an effect, or of one entry of it, by its declared fields.
+
+    A line between two places is drawn as a spring, what acts at a pin, about the first
+    pin of a bar or at a place as a ring.
+    """
+    name = kind.replace("_", " ")
+    if isinstance(one, PinRows):
+        return [Symbol(kind, name, pin=pin) for pin, *_ in one.rows]
+    if isinstance(one, Gravity):
+        return [Symbol("gravity", "g", vector=complex(*one.vector))]
+    if isinstance(one, Line):
+        return [_join_ends("spring", type(one).__name__.lower(), one)]
+    symbols = list[Symbol]()
+    for declared in list_declared(type(one)):
+        value = getattr(one, declared.name)
+        if isinstance(declared.by, OfBar):
+            symbols.append(Symbol(kind, name, value, pin=FIRST_PIN[value]))
+        elif isinstance(declared.by, At):
+            symbols.append(Symbol(kind, name, value.bar, value.vector()))
+        elif isinstance(declared.by, Entries):
+            for entry in value:
+                symbols += _list_symbols(kind, entry)
     return symbols
 
 
@@ -209,7 +214,7 @@ def _make_drive(drive: ForceDrive) -> Symbol:
     return Symbol("push", "F", bar, at, vector=direction, turns=turns)
 
 
-def _join_ends(kind: str, name: str, line: LinearDrive | Spring) -> Symbol:
+def _join_ends(kind: str, name: str, line: Any) -> Symbol:
     """Make the symbol of a line between two points."""
     start = line.start
     end = line.end
@@ -382,10 +387,11 @@ def _draw_ring(
     size: float,
     drawn: _DrawnSymbol,
 ) -> None:
-    """Draw what acts at a pin as a ring around it; a torsion spring is a spiral."""
-    centre = place.pins[symbol.pin]
+    """Draw what acts at a pin or a place as a ring; a torsion spring is a spiral."""
+    at_place = place.point(symbol.bar, symbol.at)
+    centre = place.pins[symbol.pin] if symbol.pin else at_place
     kind = symbol.kind
-    size = place.small(symbol.pin, size)
+    size = place.small(symbol.pin or FIRST_PIN[symbol.bar], size)
     relative = RING_RADII.get(kind) or SYMBOL_SIZES.get(kind, _RING_OF_OTHERS)
     radius = size * relative
     radii: Any = radius

@@ -191,7 +191,7 @@ MISTAKES = [
         "gas and coil",
         "viscous =",
         SPRINGS.format('1 m", gas = "', 3),
-        ["springs[1].stiffness", "from, to, gas"],
+        ["springs[1].stiffness", "from, to, acts, gas"],
     ),
     (
         "gas without a stroke",

@@ -4,9 +4,8 @@ The oracle of coordinates moves the drawing and states the file anew.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -14,11 +13,9 @@ import pytest
 import fourbar
 from fourbar import InputError, Tolerance
 from fourbar.cli import status
-from fourbar.effects import Effect, Place
-from fourbar.files import dump, loads, scene_text
-from fourbar.linkage import PINS, Declared
+from fourbar.files import dump, loads
+from fourbar.linkage import PINS
 from fourbar.scene import Scene
-from fourbar.studies.keys import list_entries, read_number
 from fourbar.studies.spread import tolerances
 from tests.oracle.coordinates import DRAWN_SETTING, is_coordinate
 from tests.oracle.oracles import judge_by
@@ -492,50 +489,3 @@ def test_the_table_of_tolerances_fits_a_terminal_and_shows_no_rounding(
     assert max(map(len, shown)) <= 80
     (row,) = (line.split() for line in shown if line.startswith("patch_y  "))
     assert row[3] == "0"
-
-
-@dataclass(frozen=True)
-class Magnet:
-    """A force at a place, of an effect that the package lacks."""
-
-    pull: float
-    at: Place
-    numbers: ClassVar[dict[str, Declared]] = {"pull": Declared("N")}
-    places: ClassVar[dict[str, str]] = {"at": "at"}
-
-
-@dataclass(frozen=True)
-class Magnets(Effect):
-    """An effect that holds a list."""
-
-    magnets: tuple[Magnet, ...]
-    key: ClassVar[str] = "magnets"
-    entries: ClassVar[str] = "magnets"
-
-
-def test_an_effect_that_holds_a_list_is_varied_and_written_by_its_declaration(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    magnets = Magnets(
-        (Magnet(2.0, Place(3, (0.1, 0.5))), Magnet(3.0, Place(4, point="P")))
-    )
-    point = fourbar.Point("P", 4, (0.2, 0.0))
-    scene = fourbar.Scene(
-        fourbar.uniform(0.3, 0.1, 0.25, 0.22), effects=(magnets,), points=(point,)
-    )
-    numbers = {
-        key: (read_number(scene, entry), entry.unit)
-        for key, entry in list_entries(scene).items()
-        if key.startswith("effects.")
-    }
-    assert numbers == {
-        "effects.magnets.0.pull": (2.0, "N"),
-        "effects.magnets.0.at.from_pin.0": (0.1, "m"),
-        "effects.magnets.0.at.from_pin.1": (0.5, "rad"),
-        "effects.magnets.1.pull": (3.0, "N"),
-    }
-    monkeypatch.setattr(scene_text, "list_kinds", lambda: {"magnets": Magnets})
-    assert scene_text.list_scene_tables(scene)["effects"]["magnets"] == [
-        {"pull": "2.0 N", "at": {"bar": 3, "from_pin": ["0.1 m", "0.5 rad"]}},
-        {"pull": "3.0 N", "at": {"bar": 4, "point": "P"}},
-    ]

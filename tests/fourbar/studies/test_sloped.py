@@ -5,7 +5,7 @@ Every function of NumPy is followed as differences say, or refused by its name.
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ import fourbar
 from fourbar.effects.effect import Actions, Effect
 from fourbar.errors import LimitError
 from fourbar.formulas.motion import State
+from fourbar.linkage import Declared
 from fourbar.studies.sloped import Sloped
 from tests.support.scenes import crank_rocker
 
@@ -110,12 +111,9 @@ def test_what_slopes_cannot_follow_raises(change: Any) -> None:
 class Drag(Effect):
     """A couple on the input that grows with its speed squared, written in two ways."""
 
-    strength: float
+    strength: Annotated[float, Declared("N m s^2/rad^2")]
     form: str
     key: ClassVar[str] = "drag"
-    numbers: ClassVar[dict[str, Any]] = {
-        "strength": fourbar.effects.effect.Declared("N m s^2/rad^2")
-    }
 
     def act(self, actions: Actions, state: State) -> None:
         omega = state.omega(2)

@@ -81,7 +81,8 @@ def scene_to_json(scene: Scene) -> dict[str, Any]:
 
     Raises InputError for an effect that no scene file holds. Every place is a pair from
     its bar's first pin, but for the arm of a load. A bar has its mass, whatever states
-    it. Points and the place of a moment alone, which change no answer, are left out.
+    it. Points, the place of a moment alone and strokes of gas springs, which change no
+    answer, are left out.
     """
     bars: dict[str, Any] = {
         BAR_NAMES[number]: Bar(
@@ -97,6 +98,8 @@ def scene_to_json(scene: Scene) -> dict[str, Any]:
     for load in tables["loads"]:
         if "force" not in load:
             load.pop("from_pin", None)
+    for spring in tables["effects"].get("springs", ()):
+        spring.pop("stroke", None)
     del tables["points"]
     return {name: table for name, table in tables.items() if table}
 

@@ -1,0 +1,271 @@
+"""Descriptions in scene files: loads, points, drives, springs and effects.
+
+Each is read and written by the declarations of its fields. A place is stated by
+`from_pin`, `from_centre` or `point`, in polar form or by x and y.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from fourbar.effects import Load, Table
+from fourbar.effects.effect import PinRows
+from fourbar.effects.load import PLACES_OF_LOADS
+from fourbar.effects.place import (
+    AT_FIRST_PIN,
+    STATED_PLACES,
+    At,
+    Place,
+    states_place,
+)
+from fourbar.errors import InputError
+from fourbar.files.fields import Reader, write_declared, write_quantity
+from fourbar.linkage import (
+    REQUIRED_NUMBER,
+    Declared,
+    DeclaredField,
+    Entries,
+    OfBar,
+    OneOf,
+    list_declared,
+)
+
+PLACES_OF_ENDS = (*STATED_PLACES, "point")
+"""Keys of which one states an end of a spring or cylinder, or the point of a force."""
+_PAIR = ["0", "1"]
+"""Keys of two numbers that are written as a pair [magnitude, angle]."""
+
+
+def list_keys(kind: Any) -> tuple[str, ...]:
+    """List the keys in which a scene file states a description of a class."""
+    keys = list[str]()
+    for field in list_declared(kind):
+        keys += _KEYS_OF_PLACE if field.key == "" else [field.key]
+    if kind is Load:
+        keys.append("table")
+    return (*keys, *getattr(kind, "forms", ()))
+
+
+_KEYS_OF_PLACE = ("bar", *PLACES_OF_ENDS)
+
+
+def read_described(
+    read: Reader,
+    key: str,
+    value: object,
+    kind: Any,
+    bars: Mapping[str, int],
+    **stated: Any,
+) -> Any:
+    """Read a description of a class by the declarations of its fields.
+
+    Parameters
+    ----------
+    bars : the bar of each named point.
+    stated : fields that stand elsewhere.
+    """
+    declared = list_declared(kind)
+    if [field.key for field in declared] == _PAIR:
+        first, *_ = kind.numbers.values()
+        return kind(*read.polar(key, value, first.unit))
+    if [field.key for field in declared if isinstance(field.by, Entries)] == [""]:
+        return kind(_read_entries(read, key, value, declared[0], bars))
+    entry = read.table(key, value, list_keys(kind))
+    make = kind
+    left = [field for field in declared if field.name not in stated]
+    for form, numbers in getattr(kind, "forms", {}).items():
+        if form in entry:
+            make = getattr(kind, form)
+            left = [field for field in left if not isinstance(field.by, Declared)]
+            read.table(key, entry, (*(field.key for field in left), form))
+            stated |= _read_form(read, f"{key}.{form}", entry[form], numbers)
+    if states_place(kind):
+        by = next(field.by for field in left if field.name == "bar")
+        place = read_stated_place(read, key, entry, bars, by.bars)
+        forms = place._asdict()
+        stated |= {f.name: forms[f.name] for f in left if f.name in forms}
+        left = [field for field in left if field.name not in forms]
+    for field in left:
+        stated[field.name] = _read_field(read, key, entry, field, bars)
+    if kind is Load and "table" in entry:
+        stated["table"] = _read_load_table(read, f"{key}.table", entry["table"])
+    try:
+        return make(**stated)
+    except InputError as error:  # which knows of one description alone
+        section = kind.section
+        if error.file or "{" in section:
+            raise
+        inner = error.key.removeprefix(section).removeprefix(".")
+        raise error.moved_to(f"{key}.{inner}".strip("."), read.file) from None
+
+
+def _read_field(
+    read: Reader,
+    key: str,
+    entry: Mapping[str, Any],
+    field: DeclaredField,
+    bars: Mapping[str, int],
+) -> Any:
+    """Read one field of a description from the entries of its table."""
+    path = f"{key}.{field.key}".rstrip(".")
+    value = entry.get(field.key)
+    by = field.by
+    if isinstance(by, At):
+        if by.is_value:
+            return read_stated_place(read, key, entry, bars, by.bars)
+        table = read.table(path, value, _KEYS_OF_PLACE)
+        end = read_stated_place(read, path, table, bars, by.bars)
+        return Place(end.bar, AT_FIRST_PIN) if end == Place(end.bar) else end
+    if value is None and field.left_out is not REQUIRED_NUMBER:
+        return field.left_out
+    if isinstance(by, Entries):
+        return _read_entries(read, path, value, field, bars)
+    if isinstance(by, OneOf):
+        return read.choice(path, value, by.words)
+    if isinstance(by, OfBar):
+        return read.bar(path, value, by.bars)
+    return read.declared(path, value, by)
+
+
+def _read_entries(
+    read: Reader,
+    key: str,
+    value: object,
+    field: DeclaredField,
+    bars: Mapping[str, int],
+) -> tuple[Any, ...]:
+    """Read a list of descriptions."""
+    most = field.by.most
+    if not isinstance(value, list) or not 1 <= len(value) <= most:
+        raise read.refuse(key, value, f"must be a list of 1 to {most} {field.name}")
+    return tuple(
+        read_described(read, f"{key}[{index}]", entry, field.by.kind, bars)
+        for index, entry in enumerate(value)
+    )
+
+
+def _read_form(
+    read: Reader,
+    key: str,
+    value: object,
+    numbers: Mapping[str, Declared],
+) -> dict[str, Any]:
+    """Read the numbers of another form of a description, such as a gas spring."""
+    stated = read.table(key, value, numbers)
+    return read.numbers(key, stated, numbers)
+
+
+def write_described(description: Any) -> Any:
+    """Write a description by the declarations of its fields.
+
+    A table is returned, or the list that is the value of an effect.
+    """
+    kind = type(description)
+    if isinstance(description, PinRows):
+        return _write_rows(description)
+    table = dict[str, Any]()
+    for field in list_declared(kind):
+        value = getattr(description, field.name)
+        by = field.by
+        if value is None:
+            continue
+        if isinstance(by, Declared):
+            table[field.key] = write_declared(value, by)
+        elif isinstance(by, At) and by.is_value:
+            table |= _write_place(value)
+        elif isinstance(by, At):
+            table[field.key] = _write_place(value)
+        elif isinstance(by, Entries):
+            table[field.key] = [write_described(entry) for entry in value]
+        else:
+            table[field.key] = value
+    if kind is Load and description.table is not None:
+        angles = [write_quantity(x, "rad") for x in description.table.theta_2]
+        factors = list(description.table.factor)
+        table["table"] = {"theta_2": angles, "factor": factors}
+    if [*table] == _PAIR:
+        return [*table.values()]
+    return table[""] if [*table] == [""] else table
+
+
+def _write_place(place: Place) -> dict[str, Any]:
+    pairs = {
+        name: write_declared(getattr(place, name), by)
+        for name, by in STATED_PLACES.items()
+        if getattr(place, name) is not None
+    }
+    by_name = {} if place.point is None else {"point": place.point}
+    return {"bar": place.bar, **pairs, **by_name}
+
+
+def _write_rows(rows: PinRows) -> dict[str, Any]:
+    """Write what each pin has: one number, or a table of several."""
+    table = dict[str, Any]()
+    for pin, *numbers in rows.rows:
+        written = {
+            name: write_declared(number, by)
+            for (name, by), number in zip(rows.numbers.items(), numbers, strict=True)
+        }
+        table[pin] = written.get("", written)
+    return table
+
+
+def _read_load_table(read: Reader, key: str, value: object) -> Table:
+    """Read the factors of a load over theta_2."""
+    if isinstance(value, dict) and "time" in value:
+        allowed = (
+            "a load follows theta_2, not time: at one speed theta_2 is omega_2 t; a"
+            " torque over time that moves the linkage is for a simulator (fourbar mjcf"
+            " SCENE --drive motor)"
+        )
+        raise read.refuse(f"{key}.time", value["time"], allowed)
+    columns = read.table(key, value, ("theta_2", "factor"))
+    stated = columns.get("factor")
+    if not isinstance(stated, list):
+        allowed = "must be a list of numbers without a unit"
+        raise read.refuse(f"{key}.factor", stated, allowed)
+    angles = read.quantities(f"{key}.theta_2", columns.get("theta_2"), "rad")
+    factors = []
+    for index, factor in enumerate(stated):
+        factors.append(read.number(f"{key}.factor[{index}]", factor))
+    return Table(angles, tuple(factors))
+
+
+def read_stated_place(
+    read: Reader,
+    key: str,
+    entry: Mapping[str, Any],
+    bars: Mapping[str, int],
+    allowed_bars: tuple[int, ...],
+) -> Place:
+    """Read the bar of an entry and its place on it, which one key states.
+
+    An entry without such a key is at the bar's first pin.
+
+    Parameters
+    ----------
+    bars : the bar of each named point, which the entry need not state again.
+    allowed_bars : numbers of the bars that it may be on.
+    """
+    stated = [name for name in PLACES_OF_LOADS if name in entry]
+    if len(stated) > 1:
+        allowed = f"{stated[0]} states the place already; state one of them"
+        raise read.refuse(f"{key}.{stated[1]}", entry[stated[1]], allowed)
+    name = entry.get("point") if "point" in stated else None
+    if name is not None:
+        read.choice(f"{key}.point", name, bars)
+        bar = entry.get("bar", bars[name])
+    else:
+        bar = entry.get("bar")
+    place = Place(read.bar(f"{key}.bar", bar, allowed_bars))
+    if name is not None:
+        if place.bar != bars[name]:
+            allowed = f"the point {name} is on bar {bars[name]}"
+            raise read.refuse(f"{key}.bar", bar, allowed)
+        return place._replace(point=name)
+    for form in set(stated) & STATED_PLACES.keys():
+        if form == "from_centre" and place.bar == 1:
+            allowed = "the ground has no mass centre: write from_pin"
+            raise read.refuse(f"{key}.{form}", entry[form], allowed)
+        stated_pair: Any = {form: read.polar(f"{key}.{form}", entry[form], "m")}
+        place = place._replace(**stated_pair)
+    return place

@@ -1,0 +1,232 @@
+"""An effect of one file is read, written, varied, drawn and dragged by its fields."""
+
+import cmath
+import math
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import fourbar
+from fourbar import effects
+from fourbar.edit.document import SceneDocument
+from fourbar.edit.dragging import Dragged, drag, list_handles
+from fourbar.errors import InputError
+from fourbar.files import dump, loads
+from fourbar.scene.numbers import find_unit_of_key
+from fourbar.show import animate
+from fourbar.show.plot.symbols import list_acting
+from fourbar.studies.keys import list_entries, read_number
+from tests.fourbar.show.test_animate import embedded
+
+FILE = '''
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+from fourbar.effects.effect import Effect
+from fourbar.effects.place import At, Line, Place
+from fourbar.linkage import AT_LEAST_ZERO, Declared, Entries, OfBar, OneOf
+
+
+@dataclass(frozen=True, slots=True)
+class Magnet(Line):
+    """A force between two places."""
+
+    start: Annotated[Place, At("from")]
+    end: Annotated[Place, At("to")]
+    pull: Annotated[float, Declared("N", AT_LEAST_ZERO)]
+    pole: Annotated[str, OneOf(("north", "south"))] = "north"
+
+
+@dataclass(frozen=True, slots=True)
+class Magnets(Effect):
+    """Magnets, and a coil at a place of a bar."""
+
+    bar: Annotated[int, OfBar((2, 4))]
+    turns: Annotated[float, Declared("1")]
+    coil: Annotated[Place, At()]
+    gap: Annotated[float, Declared("m")] = 0.001
+    rows: Annotated[tuple[Magnet, ...], Entries(Magnet)] = ()
+    key: ClassVar[str] = "magnets"
+    example: ClassVar[str] = (
+        'magnets = { bar = 2, turns = 3.0, coil = { bar = 3 } }'
+    )
+
+    def act(self, actions, state):
+        for row in self.rows:
+            across = row.end.locate(state) - row.start.locate(state)
+            actions.pull(row.start, row.end, row.pull * across / abs(across))
+'''
+TEXT = """
+[lengths]
+ground = "300 mm"
+input = "100 mm"
+coupler = "250 mm"
+output = "220 mm"
+[motion]
+theta_2 = "60 deg"
+omega_2 = "1 rad/s"
+[points]
+P = { bar = 4, from_pin = ["2 cm", "0 deg"] }
+[effects.magnets]
+bar = 4
+turns = 12.0
+gap = "2 mm"
+coil = { bar = 3, from_pin = ["5 cm", "0.5 rad"] }
+[[effects.magnets.rows]]
+from = { point = "P" }
+to = { bar = 1 }
+pull = "2 lbf"
+[[effects.magnets.rows]]
+from = { bar = 2 }
+to = { bar = 3, from_centre = ["1 cm", "0 deg"] }
+pull = "3 N"
+pole = "south"
+"""
+
+
+@pytest.fixture
+def kind(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Any]:
+    (tmp_path / "magnets.py").write_text(FILE, encoding="utf-8")
+    monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
+    effects.list_further.cache_clear()
+    yield effects.Magnets
+    effects.list_further.cache_clear()
+    sys.modules.pop("fourbar.effects.magnets")
+    del effects.Magnets
+
+
+@pytest.fixture
+def scene(kind: Any) -> fourbar.Scene:
+    return loads(TEXT)
+
+
+def test_it_is_read_and_written(scene: fourbar.Scene) -> None:
+    (magnets,) = scene.effects
+    assert (magnets.bar, magnets.turns, magnets.gap) == (4, 12.0, 0.002)
+    assert magnets.coil == fourbar.Place(3, (0.05, 0.5))
+    first, second = magnets.rows
+    assert (first.pull, first.pole) == (2.0 * 4.4482216152605, "north")
+    assert first.start == fourbar.Place(4, point="P")
+    assert first.end == fourbar.Place(1, (0.0, 0.0))
+    assert (second.pull, second.pole) == (3.0, "south")
+    assert loads(dump(scene)).effects == scene.effects
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ("bar = 4\nturns", "bar = 3\nturns", "magnets.bar = 3: must be 2 (in"),
+        ('"2 mm"', "2", "effects.magnets.gap = 2: the unit is missing"),
+        ("turns = 12.0", "", "effects.magnets.turns: is missing"),
+        (
+            "gap =",
+            "gab =",
+            "magnets.gab = '2 mm': unknown key",
+        ),
+        (
+            '"2 lbf"',
+            '"-2 lbf"',
+            "rows[0].pull = '-2 lbf': must be a fini",
+        ),
+        (
+            '"south"',
+            '"west"',
+            "rows[1].pole = 'west': must be \"north\" o",
+        ),
+        (
+            "to = { bar = 1 }",
+            "to = { bar = 4 }",
+            "magnets.rows[0].to.bar = 4: mu",
+        ),
+        ("from_centre", "at", "rows[1].to.at = ["),
+    ],
+)
+def test_a_mistake_is_named_with_its_key(
+    kind: Any, old: str, new: str, line: str
+) -> None:
+    assert TEXT.count(old) == 1
+    with pytest.raises(InputError) as caught:
+        loads(TEXT.replace(old, new))
+    assert line in str(caught.value)
+
+
+def test_its_numbers_vary_by_their_keys(scene: fourbar.Scene) -> None:
+    entries = list_entries(scene)
+    numbers = {
+        key.removeprefix("effects.magnets."): (read_number(scene, entry), entry.unit)
+        for key, entry in entries.items()
+        if key.startswith("effects.")
+    }
+    pull = 2.0 * 4.4482216152605
+    assert numbers == {
+        "turns": (12.0, "1"),
+        "gap": (0.002, "m"),
+        "coil.from_pin.0": (0.05, "m"),
+        "coil.from_pin.1": (0.5, "rad"),
+        "rows.0.pull": (pull, "N"),
+        "rows.0.to.from_pin.0": (0.0, "m"),
+        "rows.0.to.from_pin.1": (0.0, "rad"),
+        "rows.1.pull": (3.0, "N"),
+        "rows.1.from.from_pin.0": (0.0, "m"),
+        "rows.1.from.from_pin.1": (0.0, "rad"),
+        "rows.1.to.from_centre.0": (0.01, "m"),
+        "rows.1.to.from_centre.1": (0.0, "rad"),
+    }
+    for name, (_, unit) in numbers.items():
+        assert find_unit_of_key(f"effects.magnets.{name}") == unit
+    key = "effects.magnets.rows.1.pull"
+    study = fourbar.vary(scene, {key: [3.0, 4.0, 6.0]})
+    three, four, six = fourbar.solve(study).torque.ravel()
+    assert three == fourbar.solve(scene).torque != four
+    assert six - four == pytest.approx(2.0 * (four - three), rel=1e-12)
+
+
+def test_its_places_are_handles_and_symbols(scene: fourbar.Scene) -> None:
+    handles = {handle.name: handle for handle in list_handles(scene)}
+    assert handles.keys() == {
+        "point P",
+        "coil of magnets",
+        *(f"{end} of magnets rows {row}" for row in (1, 2) for end in ("from", "to")),
+    }
+    coil = handles["coil of magnets"]
+    assert coil.path == ("effects", "magnets", "coil", "from_pin")
+    assert (coil.bar, coil.beyond) == (3, cmath.rect(0.05, 0.5))
+    point = handles["from of magnets rows 1"]
+    assert (point.path, point.bar) == (("points", "P", "from_pin"), 4)
+    far = handles["to of magnets rows 2"].path
+    assert far == ("effects", "magnets", "rows", 1, "to", "from_centre")
+    _, *acting = list_acting(scene)
+    assert [(symbol.kind, symbol.name, symbol.pin) for symbol in acting] == [
+        ("magnets", "magnets", "O4"),
+        ("magnets", "magnets", ""),
+        ("spring", "magnet", ""),
+        ("spring", "magnet", ""),
+    ]
+    assert (acting[1].bar, acting[1].at) == (3, cmath.rect(0.05, 0.5))
+    assert acting[2].end == (1, 0.0)
+
+
+def test_a_drag_changes_the_numbers_of_an_entry(
+    scene: fourbar.Scene,
+) -> None:
+    document = SceneDocument(TEXT)
+    theta_2 = math.radians(60.0)
+    (end,) = (h for h in list_handles(scene) if h.name == "to of magnets rows 2")
+    shown = fourbar.solve(scene)
+    along = cmath.rect(1.0, float(shown.theta_3[0]))
+    wanted = 0.03 + 0.01j
+    to = complex(*shown.A[0]) + along * (scene.linkage.coupler.to_centre + wanted)
+    dragged = Dragged([*end.path], to, 1e-6, theta_2, 1)
+    drag(document, scene, {}, dragged)
+    second = loads(document.text()).effects[0].rows[1]
+    assert cmath.rect(*second.end.from_centre) == pytest.approx(wanted, abs=1e-6)
+
+
+def test_a_figure_draws_it(scene: fourbar.Scene) -> None:
+    scene.plot("linkage")
+    data = embedded(animate.write_page(scene))
+    kinds = [one["kind"] for one in data["acting"]]
+    assert kinds == ["drive", "magnets", "magnets", "spring", "spring"]
