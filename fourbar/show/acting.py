@@ -1,5 +1,6 @@
 """Remarks on what acts: couples without a place, and springs that go on too far."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -7,13 +8,15 @@ from numpy.typing import NDArray
 
 from fourbar.effects import Spring, Springs
 from fourbar.evaluation.case import compute_shown_state
+from fourbar.formulas.mobility import TURN
 from fourbar.linkage import FIRST_PIN
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command_at
-from fourbar.scene.motion import FEWEST_POINTS, Law
+from fourbar.scene.motion import FEWEST_POINTS, Law, Sweep
 from fourbar.show.units import write_short
 from fourbar.solution import Conversion, Solution
 from fourbar.studies.equilibrium import bisect
+from fourbar.studies.passing import SAME_POSITION
 
 _INSTANTS_OF_AN_END = 33
 """Instants of an interval of a table at which two choices of its ends are compared. The
@@ -49,6 +52,32 @@ def list_arm_notes(scene: Scene) -> list[str]:
         if load.arm is not None
         and scene.linkage.bar(load.bar).mass == 0.0
         and scene.linkage.bar(load.bar).centre is None
+    ]
+
+
+def list_drawn_notes(scene: Scene, units: Conversion) -> list[str]:
+    """Say where a sweep to or from the drawn angle goes by more than half a turn.
+
+    The direction of a drawn bar leaves open which of its angles was meant.
+    """
+    sweep = scene.motion.angle
+    if scene.drawing is None or not isinstance(sweep, Sweep):
+        return []
+    drawn = scene.drawing.angle(scene.motion.bar)
+    if drawn not in (sweep.start, sweep.stop):
+        return []
+    key, other = ("to", sweep.stop) if drawn == sweep.start else ("from", sweep.start)
+    away = math.remainder(other - drawn, TURN)
+    width = abs(other - drawn)
+    if width - abs(away) < SAME_POSITION or abs(away) < SAME_POSITION:
+        return []
+    swept, start, stop, nearer, gap = (
+        write_short(angle, "rad", units)
+        for angle in (width, sweep.start, sweep.stop, drawn + away, abs(away))
+    )
+    return [
+        f"{scene.motion.commanded} goes by {swept} from {start} to {stop}; {key} ="
+        f' "{nearer}" is the same direction, {gap} from the drawn one'
     ]
 
 
@@ -179,35 +208,39 @@ def _locate_crossings(
     """Find where a spring reaches a length in the steps that begin at rows.
 
     A step in which nothing lies between the two positions gives the known one of them:
-    steps of a release or a list, and those where the loop does not close.
+    steps of a list, and those where the loop does not close.
     """
     at = solution.at
     places = np.array(at.places[known], dtype=float)
     assembled = solution.assembled[rows] & solution.assembled[rows + 1]
-    if scene.motion.free is not None or isinstance(scene.motion.angle, np.ndarray):
+    if isinstance(scene.motion.angle, np.ndarray):
         assembled[:] = False
     if not assembled.any():
         return places
     rows = rows[assembled]
     low = at.places[rows]
     high = at.places[rows + 1]
-    before = measure_end_distance(scene, spring, _command_between(scene, at, low)) > end
+
+    def is_longer(there: Array) -> NDArray[np.bool_]:
+        between = _command_between(scene, solution, there)
+        return np.greater(measure_end_distance(scene, spring, between), end)
+
+    before = is_longer(low)
 
     def is_as_before(middle: Array) -> NDArray[np.bool_]:
-        distance = measure_end_distance(
-            scene,
-            spring,
-            _command_between(scene, at, middle),
-        )
-        return np.equal(distance > end, before)
+        return np.equal(is_longer(middle), before)
 
     low, high = bisect(is_as_before, low, high)
     places[assembled] = 0.5 * (low + high)
     return places
 
 
-def _command_between(scene: Scene, at: Command, places: Array) -> Command:
-    """Return the command at places between its own."""
+def _command_between(scene: Scene, solution: Solution, places: Array) -> Command:
+    """Return the command at places between those of a solution."""
+    at = solution.at
+    if solution.command_at is not None:
+        times, rows = np.unique(np.append(0.0, places), return_inverse=True)
+        return solution.command_at(times).part(rows[1:])
     if at.time is not None or at.moves_stroke:
         return command_at(scene, places)
     branch = np.full(places.shape, at.branch[0])

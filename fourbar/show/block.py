@@ -29,6 +29,7 @@ from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.acting import (
     list_arm_notes,
     list_couple_notes,
+    list_drawn_notes,
     list_law_notes,
     list_spring_notes,
 )
@@ -84,6 +85,8 @@ LOCATED = 1e-6
 """Part of the motion within which the place of a flat maximum is located. A place
 nearer to zero than that is zero.
 """
+_IN_LINE = 1e-9
+"""Sine below which two bars are in line: places are located to some 1e-12."""
 _NO_ANGLE = 1e-14
 """rad; rounding of an angle of a turn."""
 BARS_IN_LINE = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
@@ -222,9 +225,27 @@ class _SceneBlock:
         name = one.commanded
         place = float(one.at.stated[0][0])
         text = f"at {name} = {self._value(place, one.at.unit)}"
-        if one.time is None:
-            return text
-        return f"{text}, t = {self._value(float(one.time[0]), 's', 1.0)}"
+        if one.time is not None:
+            text += f", t = {self._value(float(one.time[0]), 's', 1.0)}"
+        return f"{text}{self._write_limit()}"
+
+    def _write_limit(self) -> str:
+        """Write which bar is at a limit of its own at the position."""
+        one = self.facts.solution
+        lines = {2: one.theta_4 - one.theta_3, 3: one.theta_4 - one.theta_2}
+        lines[4] = one.theta_3 - one.theta_2
+        in_line = [
+            bar
+            for bar, gap in lines.items()
+            if bar != one.at.bar and abs(math.sin(gap[0])) <= _IN_LINE
+        ]
+        # at a change point all are in line, and each bar moves on
+        if len(in_line) != 1 or one.status_code[0] != OK:
+            return ""
+        bar = in_line[0]
+        return (
+            f", where theta_{bar} is at a limit: bars {BARS_IN_LINE[bar]} are in line"
+        )
 
     def _value(self, value: float, unit: str, largest: float | None = None) -> str:
         """Write a quantity of an SI unit, with a prefix that suits it.
@@ -866,6 +887,7 @@ class _SceneBlock:
                 f"dry friction reverses, and the pin forces jump, at {name} = {places}"
             )
         lines += self._warn()
+        lines += list_drawn_notes(facts.scene, self.units)
         lines += list_arm_notes(facts.scene)
         lines += list_law_notes(facts.scene, self.units)
         lines += list_spring_notes(facts.scene, facts.solution, self.units)

@@ -31,6 +31,8 @@ STATED_POSITIONS = (*COMMANDED_ANGLES, STROKE_COMMAND[0], "time")
 """Names by which a position may be stated."""
 SAME_POSITION = 1e-6
 """rad, or part of a length: two places that the formulas give in two ways are one."""
+INSIDE_LIMIT = 1e-12
+"""rad; distance from a limit at which a linkage assembles as doubles."""
 _GRID_DIGITS = 4
 """Digits of an end of a range that is read from the positions of the default sweep."""
 LAW_INSTANTS = 2000
@@ -154,6 +156,9 @@ def _list_candidates(scene: Scene, name: str, value: float) -> list[float]:
     """
     commanded = scene.motion.commanded
     candidates: list[float] = []
+    is_limit = False
+    if name in COMMANDED_ANGLES:
+        value, is_limit = _move_inside(scene, int(name[-1]), value)
     for branch in (1, -1):
         for side in SIDES if name == STROKE_COMMAND[0] else (None,):
             stated: dict[str, Any] = {name: value, "branch": branch, "side": side}
@@ -162,6 +167,12 @@ def _list_candidates(scene: Scene, name: str, value: float) -> list[float]:
             place = getattr(found, commanded)
             if place is not None and math.isfinite(place[0]):
                 candidates.append(float(place[0]))
+    if is_limit and len(candidates) > 1:
+        first, second = candidates
+        apart = second - first
+        if commanded in COMMANDED_ANGLES:
+            apart = math.remainder(apart, TURN)
+        candidates = [first + 0.5 * apart]
     if commanded not in COMMANDED_ANGLES:
         return candidates
     # with one change point an assembly repeats after two turns; the sweep's own turn
@@ -171,6 +182,19 @@ def _list_candidates(scene: Scene, name: str, value: float) -> list[float]:
     low = float(sweep.min()) - SAME_POSITION
     high = float(sweep.max()) + SAME_POSITION
     return sorted(turned, key=lambda place: not low <= place <= high)
+
+
+def _move_inside(scene: Scene, bar: int, angle: float) -> tuple[float, bool]:
+    """Move the angle of a bar from its limit inside, and return True if it was there.
+
+    Both assemblies meet at a limit, and lie as far from it on both sides beside it.
+    """
+    for low, high in find_intervals(scene.linkage, bar):
+        for end, inwards in ((low, INSIDE_LIMIT), (high, -INSIDE_LIMIT)):
+            is_limit = abs(math.remainder(angle - end, TURN)) <= SAME_POSITION
+            if is_limit and high - low < TURN:
+                return end + inwards, True
+    return angle, False
 
 
 def is_same_position(name: str, first: float, second: float) -> bool:

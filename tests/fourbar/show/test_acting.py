@@ -10,7 +10,11 @@ import pytest
 
 import fourbar
 from fourbar.cli import status
+from fourbar.files import loads
+from fourbar.show.acting import list_drawn_notes, list_spring_notes
 from fourbar.show.block import write_block
+from fourbar.solution import DEGREES
+from tests.support.scenes import bare
 
 HATCH = """
 [lengths]
@@ -203,3 +207,53 @@ def test_a_table_and_the_json_say_from_where_an_arm_counts(tmp_path, capsys):
     for option in ("--columns=theta_2,torque", "--table", "--json"):
         assert status(["analyze", str(file), option]) == 0
         assert said in " ".join(capsys.readouterr().out.split())
+
+
+DRAWN = """
+[pins]
+O2 = ["0 mm", "0 mm"]
+A = ["-98 mm", "ACROSS mm"]
+B = ["-450 mm", "200 mm"]
+O4 = ["-300 mm", "0 mm"]
+[motion]
+theta_2 = { from = "FROM", to = "TO", steps = 4 }
+omega_2 = "1 rad/s"
+[bars.input]
+mass = "1 kg"
+"""
+
+
+@pytest.mark.parametrize(
+    ("start", "stop", "told"),
+    [
+        ("drawn", "-170 deg", 'to = "190 deg" is the same direction, 20 deg from'),
+        ("-170 deg", "drawn", 'from = "190 deg" is the same direction, 20 deg from'),
+        ("drawn", "190 deg", ""),
+        ("drawn", "530 deg", ""),
+        ("169.9 deg", "-170 deg", ""),
+    ],
+)
+def test_a_sweep_from_a_drawing_that_goes_the_long_way_is_told(start, stop, told):
+    """The input is drawn at 170 deg, or at -190 deg, to a ground at 180 deg."""
+    text = DRAWN.replace("FROM", start).replace("TO", stop)
+    across = 98.0 * math.tan(math.radians(10.0))
+    scene = loads(text.replace("ACROSS", repr(across)))
+    (note,) = list_drawn_notes(scene, DEGREES) or [""]
+    assert told in note and bool(told) == note.startswith("theta_2 goes by 340 deg")
+
+
+def test_a_spring_pulls_in_a_release_from_between_its_instants():
+    """The crank swings about the rest of a spring at O2: theta = 1 - cos(w t)/2."""
+    linkage = bare(0.3, 0.1, 0.25, 0.22)
+    ends = fourbar.Place(1, (0.3, 0.0)), fourbar.Place(2, (0.1, 0.0))
+    length = math.sqrt(0.1 - 0.06 * math.cos(1.1))  # at 1.1 rad
+    effects = (
+        fourbar.Flywheel(0.01, 2),
+        fourbar.Torsion((("O2", 1.0, 1.0, 0.0),)),
+        fourbar.Springs((fourbar.Spring(*ends, 1e-12, length),)),
+    )
+    motion = fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.3, 3))
+    scene = fourbar.Scene(linkage, motion, effects=effects)
+    time = 1e3 * math.acos(-0.2) / 10.0
+    (note,) = list_spring_notes(scene, fourbar.solve(scene), DEGREES)
+    assert f"pulls from t = {time:.4g} ms on" in note

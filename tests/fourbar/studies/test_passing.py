@@ -14,6 +14,7 @@ import pytest
 import fourbar
 from fourbar.errors import InputError, NotAssembledError, state_messages_in
 from fourbar.files import loads
+from fourbar.show.block import write_block
 from fourbar.show.units import units
 from fourbar.studies.passing import find_positions, say_nowhere, say_range
 from tests.support.scenes import crank_rocker, thesis
@@ -44,6 +45,28 @@ def test_every_position_of_the_assembly_with_that_output_angle_is_found() -> Non
     solved = fourbar.solve(scene, "position", at=found)
     assert solved.theta_4 == pytest.approx(value, abs=LOCATED)
     assert np.abs(found.angle - sweep.theta_2[100]).min() < LOCATED
+
+
+@pytest.mark.parametrize("beside", [0.0, 5e-7, -5e-7])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_limit_of_the_output_is_one_position(side: float, beside: float) -> None:
+    """Input and coupler are in line: O2 B is their sum, or their difference."""
+    scene = crank_rocker()
+    d, a, b, c = scene.linkage.lengths
+    reach = b + side * a
+    theta_1 = scene.linkage.ground_angle
+    at_O2 = math.acos((d**2 + reach**2 - c**2) / (2.0 * d * reach))
+    at_O4 = math.acos((d**2 + c**2 - reach**2) / (2.0 * d * c))
+    theta_4 = theta_1 + math.pi - at_O4 + beside
+    found = find_positions(scene, [("theta_4", theta_4)])
+    theta_2 = theta_1 + (at_O2 if side > 0.0 else at_O2 + math.pi)
+    assert found.angle == pytest.approx([theta_2], abs=10.0 * LOCATED)
+    (line,) = [
+        line
+        for line in write_block(scene, fourbar.solve(scene, at=found))
+        if line.startswith("at theta_2")
+    ]
+    assert line.endswith("deg, where theta_4 is at a limit: bars 2 and 3 are in line")
 
 
 def test_places_lie_in_the_turn_of_the_sweep_in_rising_order() -> None:
