@@ -162,7 +162,7 @@ class SolveRequest(NamedTuple):
             if not isinstance(stage, str) or stage not in STAGES:
                 raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
             last_stage = STAGES.index(stage)
-            wanted = _list_quantities(last_stage, _list_absent(scene), points)
+            wanted = _list_evaluated(last_stage, _list_absent(scene), points)
         else:
             foreign = _list_foreign(scene)
             stages = _list_stages(points)
@@ -417,7 +417,7 @@ def _list_stages(points: tuple[str, ...]) -> dict[str, str]:
 
 
 @cache
-def _list_quantities(
+def _list_evaluated(
     last_stage: int,
     absent: tuple[str, ...],
     points: tuple[str, ...],

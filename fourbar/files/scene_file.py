@@ -33,7 +33,7 @@ from fourbar.files.drawing import (
     state_motion,
 )
 from fourbar.files.fields import BARE_KEY, Reader
-from fourbar.files.scene_text import BAR_NUMBERS, BRANCH_OF_NAME, SIGMA
+from fourbar.files.scene_text import BRANCH_OF_NAME, MOVING_BAR_NUMBERS, SIGMA
 from fourbar.formulas.mobility import meet_change_points
 from fourbar.linkage import BAR_NAMES, MOST_INTERVALS, PINS, POSITIVE, Bar, FourBar
 from fourbar.quantities import Array
@@ -327,7 +327,7 @@ def _read_pictures(
             read.text(f"bars.{name}.picture", bars[name]["picture"]),
             folder,
         )
-        for name, number in BAR_NUMBERS.items()
+        for name, number in MOVING_BAR_NUMBERS.items()
         if "picture" in bars.get(name, {})
     )
 
@@ -375,10 +375,10 @@ def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
     if met != length:
         read.stated_lengths = tuple(length[name] for name in BAR_NAMES.values())
     length = met
-    tables = read.table("bars", top.get("bars", {}), BAR_NUMBERS)
+    tables = read.table("bars", top.get("bars", {}), MOVING_BAR_NUMBERS)
     bars = {
         name: _read_bar(read, f"bars.{name}", tables.get(name, {}), length[name])
-        for name in BAR_NUMBERS
+        for name in MOVING_BAR_NUMBERS
     }
     ground = read.numbers("lengths", lengths, FourBar.numbers)
     return FourBar(

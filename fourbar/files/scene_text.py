@@ -45,7 +45,7 @@ from fourbar.writing import write_text
 BRANCH_OF_NAME = {name: branch for branch, name in BRANCH_NAMES.items()}
 SIGMA = "sigma"
 """Word of a tolerance that is a standard deviation."""
-BAR_NUMBERS = {BAR_NAMES[number]: number for number in MOVING_BARS}
+MOVING_BAR_NUMBERS = {BAR_NAMES[number]: number for number in MOVING_BARS}
 
 
 def save(scene: Scene, path: str | Path) -> None:
@@ -87,7 +87,7 @@ def dump(scene: Scene) -> str:
     if "lengths" in dict(pins_or_lengths):
         read_back = replace(scene, drawing=None)
     tables_of_bars = [
-        (f"bars.{name}", bars[name]) for name in BAR_NUMBERS if name in bars
+        (f"bars.{name}", bars[name]) for name in MOVING_BAR_NUMBERS if name in bars
     ]
     loads = [("[loads]", load) for load in described["loads"]]
     tables: list[tuple[str, dict[str, Any]]] = [
@@ -183,7 +183,7 @@ def list_scene_tables(scene: Scene) -> dict[str, Any]:
         },
         "bars": {
             name: _write_bar(linkage.bar(bar))
-            for name, bar in BAR_NUMBERS.items()
+            for name, bar in MOVING_BAR_NUMBERS.items()
             if linkage.bar(bar) != Bar(linkage.bar(bar).length)
         },
         "drive": drive if scene.drive is None else write_described(scene.drive),

@@ -21,7 +21,7 @@ import numpy as np
 
 from fourbar.errors import InputError, NotAssembledError
 from fourbar.files import dump
-from fourbar.files.scene_text import BAR_NUMBERS
+from fourbar.files.scene_text import MOVING_BAR_NUMBERS
 from fourbar.formulas.mobility import classify
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import ANGLES, DERIVED_NAMES, OK, PIN_FORCES, RATES, Array
@@ -358,13 +358,13 @@ def _encode_pictures(
     """
     encoded = {}
     for name, path in pictures.items():
-        if name not in BAR_NUMBERS:
+        if name not in MOVING_BAR_NUMBERS:
             raise InputError(
                 "picture",
                 name,
-                "must name one of " + ", ".join(BAR_NUMBERS),
+                "must name one of " + ", ".join(MOVING_BAR_NUMBERS),
             )
-        encoded[BAR_NUMBERS[name]] = encode_picture(f"picture.{name}", path)
+        encoded[MOVING_BAR_NUMBERS[name]] = encode_picture(f"picture.{name}", path)
     by_bar = {
         picture.bar: picture for picture in scene.pictures if picture.bar not in encoded
     }

@@ -28,7 +28,7 @@ LOCATED = 1e-11
 """Part of the motion within which an extreme is located."""
 CONSTANT = 1e-12
 """Part of a column's usual value within which two values are one."""
-BESIDE_A_POLE = 1e6
+UNBOUNDED_BEYOND = 1e6
 """Times its usual size beyond which a column's largest value stands beside a pole."""
 EXTREMES = {"min": 1.0, "max": -1.0}
 """Signs by which the least or the greatest value of a column is its least."""
@@ -110,7 +110,7 @@ class _LocatedSearch:
         usual = float(np.percentile(np.abs(finite), USUAL))
         if text in EXTREMES:
             place, value = self._find_extreme(EXTREMES[text])
-            if abs(value) > BESIDE_A_POLE * usual:
+            if abs(value) > UNBOUNDED_BEYOND * usual:
                 raise self._refuse(text, "it has none", finite)
             return self.course.command(np.array([place]))
         gaps = self._measure_gaps(self.values)
@@ -229,7 +229,7 @@ class _LocatedSearch:
         """Make the error of a value that no position has, with the column's range."""
         ends = dict.fromkeys(self._find_extent(values))
         usual = float(np.percentile(np.abs(values), USUAL))
-        if max(map(abs, ends)) > BESIDE_A_POLE * usual:
+        if max(map(abs, ends)) > UNBOUNDED_BEYOND * usual:
             return NotAssembledError(
                 f"--at {self.name} = {text}: {why}, and grows without bound"
             )

@@ -241,7 +241,7 @@ class Panels:
         totals = np.cumsum(widths * series[:, 0])
         integrals = [np.zeros(1)]
         for panel in range(len(totals)):
-            if (zeros := _find_roots(series[panel])).size:
+            if (zeros := _find_panel_zeros(series[panel])).size:
                 until = Legendre(series[panel]).integ(lbnd=-1.0)(zeros)
                 begin = totals[panel] - widths[panel] * series[panel, 0]
                 integrals.append(begin + 0.5 * widths[panel] * until)
@@ -264,7 +264,7 @@ class Panels:
                 continue
             panel, point = divmod(before + 1, len(_GRID))
             if after == before + 1 and point > 0:
-                roots = _find_roots(series[panel])
+                roots = _find_panel_zeros(series[panel])
                 root = roots[np.searchsorted(roots, _GRID[point - 1])]
                 zeros.append(self._place(panel, root))
                 continue
@@ -351,7 +351,7 @@ def _search_extreme(
     return float(x[best]), float(values[best])
 
 
-def _find_roots(series: Array) -> Array:
+def _find_panel_zeros(series: Array) -> Array:
     """Find where in its panel, from -1 to 1 in order, a polynomial is zero."""
     if abs(series[0]) > np.abs(series[1:]).sum():
         return np.zeros(0)
@@ -486,13 +486,13 @@ def _join_panels(
         late = np.zeros(len(order), dtype=bool)
         late[-kept[-1].sum() :] = unsettled[name][kept[-1]]
         curve = PanelCurve(values, error, [])
-        curve.poles = _find_poles(curve, late[order])
+        curve.poles = _find_panels_at_poles(curve, late[order])
         curves[name] = curve
     share = (stop - start) / (stop - start).sum()
     return Panels(start, stop, share, curves)
 
 
-def _find_poles(curve: PanelCurve, unsettled: NDArray[np.bool_]) -> list[int]:
+def _find_panels_at_poles(curve: PanelCurve, unsettled: NDArray[np.bool_]) -> list[int]:
     """Find the panels that no halving settles and towards which a curve grows.
 
     The panels beside them have two, four and eight times their width. At a jump and in

@@ -75,7 +75,7 @@ def units(text: str) -> Conversion:
     for name in _PRESETS.get(text.casefold(), text).replace(",", " ").split():
         unit = next((unit for unit in STATABLE_UNITS if converts(name, unit)), None)
         if unit is None:
-            reason = f"is no unit of a result{_suggest_unit(name)}"
+            reason = f"is no unit of a result{_hint_at_unit(name)}"
             raise InputError("units", name, f"{reason}; {ALLOWED_UNITS}")
         if unit in stated:
             reason = f"is the second unit for {unit}"
@@ -97,7 +97,7 @@ def units(text: str) -> Conversion:
     } or SI
 
 
-def _suggest_unit(name: str) -> str:
+def _hint_at_unit(name: str) -> str:
     """Suggest the unit that a name may stand for; empty if none is near."""
     from fourbar.quantities.units import UnitError, to_si
 

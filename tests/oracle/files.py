@@ -15,7 +15,7 @@ import numpy as np
 
 from fourbar.effects import Effect, Friction, Gravity, Viscous
 from fourbar.errors import InputError, LimitError
-from fourbar.files.scene_text import BAR_NUMBERS
+from fourbar.files.scene_text import MOVING_BAR_NUMBERS
 from fourbar.linkage import Bar, FourBar
 from fourbar.mjcf.assembly import write_sdf as sdf_text
 from fourbar.mjcf.assembly import write_usd as usd_text
@@ -101,7 +101,7 @@ def _judge_file(
                 )
             )
             answer.quantities |= {
-                f"theta_{BAR_NUMBERS[bar]}": np.array([turns[bar]])
+                f"theta_{MOVING_BAR_NUMBERS[bar]}": np.array([turns[bar]])
                 for bar in ("coupler", "output")
             }
             rows += hold_to(question, engine, opened, solve(opened), answer)
@@ -198,7 +198,7 @@ def _read_usd(text: str) -> Contents:
         )
     )
     bodies = {"ground": _FileBody(0j, 0.0, math.nan, math.nan, 0j)}
-    for bar in BAR_NUMBERS:
+    for bar in MOVING_BAR_NUMBERS:
         block = blocks[bar]
         place, centre = (
             complex(*numbers(block, f"{key}")[:2])
@@ -253,6 +253,6 @@ def _read_noted(text: str) -> dict[str, float]:
     """Read the angles that the file states in words."""
     return {
         bar: float(match[1])
-        for bar, number in BAR_NUMBERS.items()
+        for bar, number in MOVING_BAR_NUMBERS.items()
         if (match := re.search(f"theta_{number} = ({NUMBER_IN_A_FILE})", text))
     }

@@ -19,7 +19,7 @@ from fourbar_validation.advise.worst_errors import WorstErrors, compute_errors
 from fourbar_validation.cost import pictures, study
 from fourbar_validation.cost.conclusion import DEFAULT
 from fourbar_validation.cost.cost import write_subtitle
-from fourbar_validation.cost.series import BEST, DEFAULT_TIMESTEP, design_curves
+from fourbar_validation.cost.series import BEST, MUJOCO_TIMESTEP, design_curves
 from fourbar_validation.engines.mujoco import drives
 from fourbar_validation.engines.mujoco.trial import TrialSetup, make_settings
 from fourbar_validation.report.svg import write_alone
@@ -63,7 +63,7 @@ def compute_row(text: str, steps: float, folder: Path) -> WorstErrors:
         setup = TrialSetup(SCENE, command(SCENE))
         return judge_trial(SCENE, setup.try_out(read_settings(text, steps)))
     if "Euler" in text:
-        steps = 2.0 * math.pi / float(SCENE.motion.omega_2) / DEFAULT_TIMESTEP  # type: ignore[arg-type]
+        steps = 2.0 * math.pi / float(SCENE.motion.omega_2) / MUJOCO_TIMESTEP  # type: ignore[arg-type]
     integrator = text.partition(",")[0]
     settings = replace(
         BEST,

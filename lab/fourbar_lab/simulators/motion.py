@@ -94,7 +94,7 @@ class Readings:
                 forces,
             )
         )
-        gap = compute_gap(scene, theta)
+        gap = compute_gap_at_B(scene, theta)
         self.gap = float(np.maximum(self.gap, gap))  # NaN stays NaN
 
 
@@ -385,7 +385,7 @@ def write_temp(text: str, name: str) -> Iterator[str]:
         yield str(file)
 
 
-def compute_gap(scene: Scene, theta: tuple[float, float, float]) -> float:
+def compute_gap_at_B(scene: Scene, theta: tuple[float, float, float]) -> float:
     """Compute the distance of B on bar 3 from B on bar 4 at the bars' directions, m."""
     linkage = scene.linkage
     a, b, c = (

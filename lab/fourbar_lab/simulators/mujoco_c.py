@@ -82,7 +82,7 @@ def reading(
     )
 
 
-def find_bars(model: Any) -> list[int]:
+def find_bar_bodies(model: Any) -> list[int]:
     """Find the bodies of input, coupler and output."""
     return [model.body(bar).id for bar in ("input", "coupler", "output")]
 
@@ -128,7 +128,7 @@ def read_last(
     if not all(np.isfinite(array).all() for array in results):
         raise ArithmeticError("a world diverged")
     drive = model.actuator("drive").id
-    bars = find_bars(model)
+    bars = find_bar_bodies(model)
     count = len(command(scene).theta_2)
     last = [array[-count:].astype(float) for array in results]
     readings = Readings()
@@ -212,5 +212,5 @@ def _evaluate_mujoco(model: Any, data: Any) -> Instant:
         data.qacc,
         drive,
         data.efc_force[:2],
-        data.cfrc_int[find_bars(model)],
+        data.cfrc_int[find_bar_bodies(model)],
     )

@@ -22,7 +22,7 @@ from fourbar_lab.simulators.motion import (
     run_through,
 )
 from fourbar_lab.simulators.mujoco_c import (
-    find_bars,
+    find_bar_bodies,
     read_last,
     reading,
     repeat_states,
@@ -189,7 +189,7 @@ def _evaluate_mjx(model: Any, state: Any) -> Instant:
         a,
         drive[model.actuator("drive").id],
         closing,
-        on_bodies[find_bars(model)],
+        on_bodies[find_bar_bodies(model)],
     )
 
 

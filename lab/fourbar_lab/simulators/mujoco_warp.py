@@ -24,7 +24,7 @@ from fourbar_lab.simulators.motion import (
     run_through,
 )
 from fourbar_lab.simulators.mujoco_c import (
-    find_bars,
+    find_bar_bodies,
     read_last,
     reading,
     repeat_states,
@@ -204,5 +204,5 @@ def _evaluate_warp(
         a,
         drive[model.actuator("drive").id],
         closing,
-        on_bodies[find_bars(model)],
+        on_bodies[find_bar_bodies(model)],
     )

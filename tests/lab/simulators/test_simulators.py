@@ -113,7 +113,7 @@ def test_a_simulator_starts_from_its_own_assembly_without_the_formulas() -> None
         ) == 1 and "coupler" in write_sdf(scene, "drake", begin)
         theta = (begin.qpos[0], begin.qpos[0] + begin.qpos[1], begin.qpos[2])
         assert (
-            motion.compute_gap(scene, theta) < 1e-15
+            motion.compute_gap_at_B(scene, theta) < 1e-15
             and np.sin(theta[2] - theta[1]) * branch > 0.0
         )
         assert (

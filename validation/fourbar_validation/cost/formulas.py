@@ -21,7 +21,7 @@ from fourbar.scene import Command, Scene, with_signs
 from fourbar.solving import solve
 from fourbar_validation.advise.worst_errors import WorstErrors, find_greatest
 from fourbar_validation.compare.scales import scale_of
-from fourbar_validation.compare.tolerance import divide
+from fourbar_validation.compare.tolerance import divide, join_components
 from fourbar_validation.published import thirteen
 
 FIFTY_DIGITS = 167 + 30
@@ -74,7 +74,7 @@ def evaluate_single(scene: Scene, command: Command) -> QuantityValues:
     return {
         "torque": dynamics.effort,
         **{
-            name: _stack_components(getattr(dynamics.pins, name), len(theta_2))
+            name: _broadcast_vector(getattr(dynamics.pins, name), len(theta_2))
             for name in PIN_FORCES
         },
     }
@@ -87,10 +87,10 @@ def _round_single(value: Any) -> Any:
     )[()]
 
 
-def _stack_components(vector: Any, n: int) -> Array:
+def _broadcast_vector(vector: Any, n: int) -> Array:
     """Stack the components of a complex vector, (n, 2)."""
     values = np.broadcast_to(vector, (n,))
-    return np.stack([values.real, values.imag], axis=1)
+    return join_components(values.real, values.imag)
 
 
 def solve_thirteen_equations(scene: Scene, command: Command) -> QuantityValues:
@@ -127,10 +127,10 @@ def make_bodies(scene: Scene, command: Command) -> thirteen.EquationTerms:
         centre = body.z * direction
         # the thesis's order: bar 4's second pin is B as well, and its first is O4
         tip = scene.linkage.bar(k).length * direction
-        first[k] = _stack_components(-centre, n)
-        second[k] = _stack_components(tip - centre, n)
+        first[k] = _broadcast_vector(-centre, n)
+        second[k] = _broadcast_vector(tip - centre, n)
         R, M = acting.on(k)
-        force[k] = _stack_components(body.m * state.acceleration(k, body.z) - R, n)
+        force[k] = _broadcast_vector(body.m * state.acceleration(k, body.z) - R, n)
         about_G = M - cross(centre, R + 0.0j)
         inertial = body.I * np.asarray(state.alpha(k))
         moment[k] = np.broadcast_to(inertial, (n,)) - about_G

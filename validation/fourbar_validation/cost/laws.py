@@ -27,7 +27,7 @@ by about a quarter.
 """
 FEWEST_FITTED = 3
 """Points of a fit."""
-_OUTLIER = 10.0
+_LAWLESS_RISE = 10.0
 """An error so many times larger than at either of the two coarser settings is no part
 of a law, where it has met no floor: between neighbours of a ladder the laws here change
 it by 10 or less, and downwards.
@@ -180,7 +180,7 @@ def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
         ]
         # two sources that cancel make a dip, and its far side is no jump; a motion that
         # is lost again is one
-        if before[-1] < LARGEST_LAWFUL_ERROR and not value <= _OUTLIER * (
+        if before[-1] < LARGEST_LAWFUL_ERROR and not value <= _LAWLESS_RISE * (
             max(before) if value < LARGEST_LAWFUL_ERROR else before[-1]
         ):
             jumps.append(point)

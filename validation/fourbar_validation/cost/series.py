@@ -32,7 +32,7 @@ _REGULARISATIONS = (1.0, 1e-2, 1e-4, 1e-6, 1e-8)
 _PADS = (None, 1e-1, 1e-2, 1e-3, 1e-4)
 SLOW = 0.1
 """rad/s at which gravity and loads outweigh inertia, and the loop sags under them."""
-DEFAULT_TIMESTEP = 0.002
+MUJOCO_TIMESTEP = 0.002
 """s, of MuJoCo."""
 _PART_OF_TURN = 0.25
 """Time constant, as a part of a revolution, that stays the same while the timestep
@@ -173,7 +173,7 @@ def _vary_default_closure(integrator: str, speed: float) -> Curve:
     )
     spots = list(curve.spots)
     if integrator == "Euler":
-        n = 2.0 * math.pi / speed / DEFAULT_TIMESTEP
+        n = 2.0 * math.pi / speed / MUJOCO_TIMESTEP
         spots.append(
             Spot(
                 "MuJoCo's defaults",

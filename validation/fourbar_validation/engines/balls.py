@@ -100,7 +100,7 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
         "c": c,
         "theta_1": link.ground_angle,
     }
-    values |= _collect_command(scene, angle)
+    values |= _list_commanded(scene, angle)
     if scene.drive is not None:
         for name, (_, point) in zip(LINE_ENDS, scene.drive.ends, strict=False):
             values |= _collect_place(scene, point, name, f"{name}_angle")
@@ -118,7 +118,7 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
     return values
 
 
-def _collect_command(scene: Scene, angle: float) -> dict[str, float]:
+def _list_commanded(scene: Scene, angle: float) -> dict[str, float]:
     """Collect what is commanded: a position, its speed and its acceleration."""
     motion = scene.motion
     position, speed, acceleration = motion.names
@@ -222,7 +222,7 @@ def _place_from_pin(
     return centre[stated.bar] + arm
 
 
-def state_lengths(linkage: FourBar) -> BallValues:
+def make_ball_lengths(linkage: FourBar) -> BallValues:
     """Return the lengths d, a, b, c as they were stated, as balls.
 
     Lengths that are balls already, as those of a study of slopes, stay.
@@ -244,7 +244,7 @@ def make_balls(scene: Scene, angle: float, **motion: float) -> BallValues:
     ctx.prec = BITS
     stored = collect_inputs(scene, angle) | motion
     balls = {name: arb(value) for name, value in stored.items()}
-    return balls | state_lengths(scene.linkage)
+    return balls | make_ball_lengths(scene.linkage)
 
 
 def compute_directions(

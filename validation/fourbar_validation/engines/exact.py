@@ -94,12 +94,12 @@ def compute_exact_sines(linkage: FourBar, command: Command) -> Array:
     from fourbar_validation.engines.balls import (
         BITS,
         compute_directions,
-        state_lengths,
+        make_ball_lengths,
         wedge,
     )
 
     ctx.prec = BITS
-    x = state_lengths(linkage)
+    x = make_ball_lengths(linkage)
     x["theta_1"] = arb(linkage.ground_angle)
     sines = np.full(len(command.theta_2), np.nan)
     for i, (theta_2, branch) in enumerate(

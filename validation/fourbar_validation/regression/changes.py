@@ -50,7 +50,7 @@ WHOLE_ENGINE = ("all", "watch")
 """
 KEY = ["scene", "engine", "setting", "quantity"]
 WITHOUT_SETTING = ["scene", "engine", "quantity"]
-MOST_LISTED = 50
+MOST_ONE_BY_ONE = 50
 """Scenes and engines listed by name that were not run or not compared. The others are
 counted.
 """
@@ -173,7 +173,7 @@ class Differences:
     @property
     def counts(self) -> Counts:
         """Return the rows of the new run by verdict."""
-        return _count_rows(self.table[self.table.verdict_new != ""])
+        return _count_new_rows(self.table[self.table.verdict_new != ""])
 
     @property
     def _shared(self) -> "DataFrame":
@@ -187,7 +187,7 @@ class Differences:
     @property
     def _counterparts(self) -> Counts:
         answered = (self.table.verdict_old != "") & (self.table.verdict_new != "")
-        return _count_rows(self.table[answered & (self.table.why == "")])
+        return _count_new_rows(self.table[answered & (self.table.why == "")])
 
     @property
     def compared(self) -> int:
@@ -295,7 +295,7 @@ class Differences:
         return [f"{text}, {n} of {total} scenes" for text, n in counts.most_common()]
 
 
-def _count_rows(lines: "DataFrame") -> Counts:
+def _count_new_rows(lines: "DataFrame") -> Counts:
     """Count the rows of the new run among lines."""
     counts = Counts()
     counts.add_counted(lines.groupby(["engine", "verdict_new"]).size().to_dict())
@@ -303,13 +303,13 @@ def _count_rows(lines: "DataFrame") -> Counts:
 
 
 def _name(names: "Series[str]") -> list[str]:
-    """Count rows by name; of more than MOST_LISTED names the others are one."""
+    """Count rows by name; of more than MOST_ONE_BY_ONE names the others are one."""
     counts = names.value_counts(sort=False)
     lines = [
         f"{name} ({n} row{'s' if n > 1 else ''})"
-        for name, n in counts[:MOST_LISTED].items()
+        for name, n in counts[:MOST_ONE_BY_ONE].items()
     ]
-    more = counts[MOST_LISTED:]
+    more = counts[MOST_ONE_BY_ONE:]
     return lines + [f"{len(more)} more ({more.sum()} rows)"] * bool(len(more))
 
 

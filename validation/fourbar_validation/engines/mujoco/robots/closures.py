@@ -167,7 +167,7 @@ def name_body(model: mujoco.MjModel, body: int) -> str:
     return model.body(body).name or f"body {body}"
 
 
-def _write_count(number: int, most: int = 7) -> str:
+def _spell_count(number: int, most: int = 7) -> str:
     """Write a number as a word up to a largest one."""
     return NUMBERS[number] if number <= most else str(number)
 
@@ -445,7 +445,7 @@ class _Finder:
     ) -> str:
         """Say what another number of hinges makes, and what makes it a four-bar."""
         freedoms = hinges - 3
-        count = f"{_write_count(hinges)} hinge{'s' if hinges > 1 else ''}"
+        count = f"{_spell_count(hinges)} hinge{'s' if hinges > 1 else ''}"
         if freedoms <= 0:
             if is_pin:
                 return f"{count} in a plane cannot move"
@@ -458,7 +458,7 @@ class _Finder:
         holds = self._list_holds(chain, motors, coupled, freedoms - 1)
         if not holds:
             return self._explain_coupling(number, chain, coupled)
-        text = f"{count} and {_write_count(freedoms, 3)} freedoms"
+        text = f"{count} and {_spell_count(freedoms, 3)} freedoms"
         if len(motors) > 1:
             motor_names = ", ".join(self._name_motor(*motor) for motor in motors)
             text += f", driven by {len(motors)} motors ({motor_names})"
@@ -528,11 +528,11 @@ class _Finder:
         bars = len(joints) + 1 - max(freedoms - 1, 0)
         which = NAMES_OF_LINKAGES.get(bars, f"a linkage of {bars} bars")
         if freedoms > 1:
-            held = _write_count(freedoms - 1, 3)
+            held = _spell_count(freedoms - 1, 3)
             which += f" once {held} of its freedoms is held"
         text = (
             f"with {names}, which moves its bars too, {len(joints)} hinges,"
-            f" {len(coupled) + 1} loops and {_write_count(freedoms, 3)}"
+            f" {len(coupled) + 1} loops and {_spell_count(freedoms, 3)}"
             f" {'freedom' if freedoms == 1 else 'freedoms'}: {which}"
             f" ({_SERVE_PLANAR})"
         )
