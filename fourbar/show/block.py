@@ -52,6 +52,7 @@ from fourbar.show.units import (
     write_short,
 )
 from fourbar.solution import Conversion, Solution, find_unit_in
+from fourbar.studies.passing import move_inside_limit
 
 _NO_LARGEST = "unbounded"
 """Stands in place of a largest value that there is none of."""
@@ -232,20 +233,20 @@ class _SceneBlock:
     def _write_limit(self) -> str:
         """Write which bar is at a limit of its own at the position."""
         one = self.facts.solution
-        lines = {2: one.theta_4 - one.theta_3, 3: one.theta_4 - one.theta_2}
-        lines[4] = one.theta_3 - one.theta_2
-        in_line = [
-            bar
-            for bar, gap in lines.items()
-            if bar != one.at.bar and abs(math.sin(gap[0])) <= _IN_LINE
-        ]
-        # at a change point all are in line, and each bar moves on
-        if len(in_line) != 1 or one.status_code[0] != OK:
-            return ""
-        bar = in_line[0]
-        return (
-            f", where theta_{bar} is at a limit: bars {BARS_IN_LINE[bar]} are in line"
-        )
+        gaps = {2: one.theta_4 - one.theta_3, 3: one.theta_4 - one.theta_2}
+        gaps[4] = one.theta_3 - one.theta_2
+        scene = self.facts.scene
+        for bar, gap in gaps.items():
+            theta = f"theta_{bar}"
+            _, is_limit = move_inside_limit(scene, bar, float(one[theta][0]))
+            # at a change point each bar moves on
+            is_alone = bar != one.at.bar and one.status_code[0] == OK
+            if is_limit and is_alone and abs(math.sin(gap[0])) <= _IN_LINE:
+                bars = (
+                    f"bars {BARS_IN_LINE[bar]} are {_name_meeting(BARS_IN_LINE[bar])}"
+                )
+                return f", where {theta} is at a limit: {bars}"
+        return ""
 
     def _value(self, value: float, unit: str, largest: float | None = None) -> str:
         """Write a quantity of an SI unit, with a prefix that suits it.
@@ -956,11 +957,17 @@ class _SceneBlock:
         bars = min(sines, key=lambda pair: sines[pair])
         gap = math.asin(min(sines[bars], 1.0))
         apart = write_short(gap, "rad", self.units, digits=2)
-        return [f"{start}: bars {bars} are {apart} from being in line"]
+        meeting = _name_meeting(bars)
+        return [f"{start}: bars {bars} are {apart} from being {meeting}"]
 
     @staticmethod
     def _row(label: str, text: str) -> str:
         return f"  {label:<{INDENT - 2}}{text}"
+
+
+def _name_meeting(bars: str) -> str:
+    """Name what two bars of `BARS_IN_LINE` are; bars 2 and 4 share no pin."""
+    return "parallel" if bars == BARS_IN_LINE[3] else "in line"
 
 
 def _align(rows: list[tuple[str, list[str]]], most: int) -> list[str]:

@@ -158,7 +158,7 @@ def _list_candidates(scene: Scene, name: str, value: float) -> list[float]:
     candidates: list[float] = []
     is_limit = False
     if name in COMMANDED_ANGLES:
-        value, is_limit = _move_inside(scene, int(name[-1]), value)
+        value, is_limit = move_inside_limit(scene, int(name[-1]), value)
     for branch in (1, -1):
         for side in SIDES if name == STROKE_COMMAND[0] else (None,):
             stated: dict[str, Any] = {name: value, "branch": branch, "side": side}
@@ -184,7 +184,7 @@ def _list_candidates(scene: Scene, name: str, value: float) -> list[float]:
     return sorted(turned, key=lambda place: not low <= place <= high)
 
 
-def _move_inside(scene: Scene, bar: int, angle: float) -> tuple[float, bool]:
+def move_inside_limit(scene: Scene, bar: int, angle: float) -> tuple[float, bool]:
     """Move the angle of a bar from its limit inside, and return True if it was there.
 
     Both assemblies meet at a limit, and lie as far from it on both sides beside it.

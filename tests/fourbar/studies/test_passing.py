@@ -14,16 +14,19 @@ import pytest
 import fourbar
 from fourbar.errors import InputError, NotAssembledError, state_messages_in
 from fourbar.files import loads
+from fourbar.formulas.mobility import find_intervals
 from fourbar.show.block import write_block
 from fourbar.show.units import units
-from fourbar.studies.passing import find_positions, say_nowhere, say_range
-from tests.support.scenes import crank_rocker, thesis
+from fourbar.studies.passing import INSIDE_LIMIT, find_positions, say_nowhere, say_range
+from tests.support.scenes import bare, crank_rocker, thesis
 
 MODELS = Path(__file__).parents[3] / "models"
 LOCATED = 1e-12
 """rad, m or s: a place is found to its last digits, and solved back with a few
 eps/condition.
 """
+AT_LIMIT = 10.0 * INSIDE_LIMIT
+"""rad: the other bars turn by about as much as the bar from its limit, on average."""
 LAW = crank_rocker(
     motion=fourbar.Motion(
         law=fourbar.Law((0.0, 1.0, 2.0), (0.3, 2.0, 0.5), steps=20, ends="rest")
@@ -60,13 +63,28 @@ def test_a_limit_of_the_output_is_one_position(side: float, beside: float) -> No
     theta_4 = theta_1 + math.pi - at_O4 + beside
     found = find_positions(scene, [("theta_4", theta_4)])
     theta_2 = theta_1 + (at_O2 if side > 0.0 else at_O2 + math.pi)
-    assert found.angle == pytest.approx([theta_2], abs=10.0 * LOCATED)
+    assert found.angle == pytest.approx([theta_2], abs=AT_LIMIT)
     (line,) = [
         line
         for line in write_block(scene, fourbar.solve(scene, at=found))
         if line.startswith("at theta_2")
     ]
     assert line.endswith("deg, where theta_4 is at a limit: bars 2 and 3 are in line")
+
+
+def test_at_a_limit_of_the_coupler_input_and_output_are_parallel() -> None:
+    scene = fourbar.Scene(bare(0.42, 0.6, 0.56, 0.45))
+    ((_, limit),) = find_intervals(scene.linkage, 3)
+    there = fourbar.solve(scene, at=find_positions(scene, [("theta_3", limit)]))
+    between = there.theta_4 - there.theta_2
+    assert np.sin(between) == pytest.approx([0.0], abs=AT_LIMIT)
+    told = "theta_3 is at a limit: bars 2 and 4 are parallel"
+    assert told in " ".join(write_block(scene, there))
+
+
+def test_a_parallelogram_whose_coupler_does_not_turn_is_at_no_limit() -> None:
+    scene = fourbar.Scene(bare(0.3, 0.1, 0.3, 0.1), fourbar.Motion(0.7))
+    assert "limit" not in " ".join(write_block(scene, fourbar.solve(scene)))
 
 
 def test_places_lie_in_the_turn_of_the_sweep_in_rising_order() -> None:
