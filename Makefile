@@ -38,7 +38,7 @@ check: setup
 # two cores. Minutes of two idle cores: kills at most 16, suites 6, package 3, oldest
 # and prereleases 8 each; from the processor's time of a share: machines 7 for each
 # kernel that the processor has, free 15, fuzz 14, accuracy 12, faults 6,
-# oracles 5; the others below 5
+# oracles 7; the others below 5
 long-test: $(LONG:%=long-%)
 $(LONG:%=long-%): setup
 

@@ -3,7 +3,7 @@
 An oracle takes a question of the harness and yields its rows. No run makes them.
 """
 
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from fourbar.scene import Scene
 from fourbar_validation.compare.rows import Row
@@ -45,20 +45,16 @@ def ask(oracle: Oracle, question: Question) -> Iterator[Row]:
     yield from oracle(question)
 
 
-def judge_by(
-    scene: Scene,
-    *names: str,
-    without: Collection[str] = (),
-) -> list[Row]:
+def judge_by(scene: Scene, *names: str) -> list[Row]:
     """Return the rows of some oracles, or of all that the scene has something for.
 
-    `without`: oracles that are not asked.
+    Raises NotAskedError where the scene has nothing for one of the named oracles.
     """
     if scene.motion.free is not None:
         return []
     question = make_question("", scene, ())
     rows: list[Row] = []
-    for name in names or [name for name in ORACLES if name not in without]:
+    for name in names or ORACLES:
         try:
             rows += ask(ORACLES[name], question)
         except NotAskedError:

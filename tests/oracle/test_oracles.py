@@ -4,10 +4,12 @@
 """
 
 import os
+from contextlib import suppress
 
 import pytest
 
 from fourbar_validation.compare.rows import Row
+from fourbar_validation.run.question import NotAskedError
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from fourbar_validation.scenes.suites import read_default_suite
 from tests.oracle.oracles import ORACLES, judge_by
@@ -15,9 +17,9 @@ from tests.oracle.scenes import take_scene
 
 SHIPPED = read_default_suite()
 RANDOM_SCENES = 200
-SHARE = int(os.environ.get("ORACLE_SHARE", "5"))
+SHARE = int(os.environ.get("ORACLE_SHARE", "21"))
 """Each oracle is asked about one random scene in so many: all of them about all scenes
-take four minutes.
+take six minutes. No multiple of five, in which the types of linkages take turns.
 """
 SEED = 68
 SAMPLE = {
@@ -64,10 +66,15 @@ def test_every_shipped_scene_holds(number: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", range(RANDOM_SCENES))
-def test_random_scenes_hold(number: int) -> None:
+@pytest.mark.parametrize(
+    ("number", "oracle"),
+    [
+        (number, oracle)
+        for place, oracle in enumerate(ORACLES)
+        for number in range(place % SHARE, RANDOM_SCENES, SHARE)
+    ],
+)
+def test_random_scenes_hold(number: int, oracle: str) -> None:
     scene = draw_random_scene(SEED, number, tuple(DrawnType))
-    others = {
-        name for place, name in enumerate(ORACLES) if (number + place) % SHARE != 0
-    }
-    assert not find_failing(judge_by(scene, without=others))
+    with suppress(NotAskedError):
+        assert not find_failing(judge_by(scene, oracle))
