@@ -31,7 +31,6 @@ JUDGED_BY = {
     "whole/test_results_format.py": "validation/compare: columns",
     # one table or one evaluation, whose rows are no use alone
     "fourbar/effects/test_effects.py": "fourbar/effects: *",
-    "fourbar/effects/test_place.py": "fourbar/files: place",
     "fourbar/edit/test_session.py": "fourbar/edit: document dragging exports",
     "fourbar/edit/test_server.py": "fourbar/edit: redirect",
     "fourbar/files/test_files.py": "fourbar/files: fields scene_text",
