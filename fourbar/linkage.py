@@ -214,6 +214,43 @@ class OfBar(NamedTuple):
         return require_whole(key, value, self.bars, allowed)
 
 
+class Whole(NamedTuple):
+    """Declaration of an integer from `least` to `most`."""
+
+    least: int
+    most: int
+    key: str = ""
+
+    def check(self, key: str, value: Any) -> Any:
+        """Return the integer; InputError for what is none."""
+        among = range(self.least, self.most + 1)
+        allowed = f"must be a whole number from {self.least} to {self.most}"
+        return require_whole(key, value, among, allowed)
+
+
+class Listed(NamedTuple):
+    """Declaration of a list of numbers of a unit."""
+
+    unit: str
+    key: str = ""
+
+    def check(self, key: str, value: Any) -> Any:
+        """Return the numbers as a tuple of floats; InputError for others."""
+        return tuple(require_numbers(key, value, unit=self.unit).ravel().tolist())
+
+
+class Part(NamedTuple):
+    """Declaration of a description within another."""
+
+    kind: Any
+    key: str = ""
+
+    def check(self, key: str, value: Any) -> Any:
+        """Return the description; InputError for one of another class."""
+        expect(key, value, self.kind)
+        return value
+
+
 class Entries(NamedTuple):
     """Declaration of a list of descriptions."""
 
@@ -236,7 +273,7 @@ class DeclaredField(NamedTuple):
 
     name: str
     by: Any
-    """`Declared`, `OneOf`, `OfBar`, `Entries`, or what else has a key and `check`."""
+    """One of the declarations above, or what else has a key and `check`."""
     key: str
     """Key in a scene file, below that of the description."""
     left_out: Any

@@ -13,26 +13,29 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import AoT, InlineTable, Item, Table, Whitespace
 
-from fourbar.effects import Load, list_kinds
-from fourbar.effects.load import FRAMES
-from fourbar.effects.spring import SENSES
+from fourbar.effects import Load, PointDrive, list_kinds
 from fourbar.errors import InputError
 from fourbar.files.scene_text import BRANCH_OF_NAME
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, REQUIRED_NUMBER, Bar
+from fourbar.linkage import (
+    BAR_NAMES,
+    MOVING_BARS,
+    PINS,
+    REQUIRED_NUMBER,
+    Bar,
+    Entries,
+    OneOf,
+    list_declared,
+)
 from fourbar.scene.motion import COMMAND_NAMES, SIDES, SPLINES, STROKE_COMMAND, Motion
 from fourbar.scene.numbers import Point
 
 KeyPath = Sequence[str | int]
-WORDS_OF_ENTRIES = {
-    **{
-        "branch": [*BRANCH_OF_NAME],
-        "side": [*SIDES],
-        "ends": [*SPLINES],
-    },
-    "frame": [*FRAMES],
-    "acts": [*SENSES],
+WORDS_OF_MOTION = {
+    "branch": [*BRANCH_OF_NAME],
+    "side": [*SIDES],
+    "ends": [*SPLINES],
 }
-"""Entries that are one of a few words."""
+"""Entries of a motion that are one of a few words."""
 EXAMPLES = {
     "m": "50 mm",
     "kg": "0.2 kg",
@@ -71,7 +74,9 @@ def list_offers() -> dict[str, Any]:
             elif number.pair:
                 pairs[name] = ["height", "thickness"]
     _offer_bars(offers)
+    words = WORDS_OF_MOTION | _collect_words(Load) | _collect_words(PointDrive)
     for key, effect in list_kinds().items():
+        words |= _collect_words(effect)
         value = tomllib.loads(effect.example)[key]
         parts.append({"at": ["effects", key], "value": value})
         if isinstance(value, dict) and set(value) <= set(PINS):
@@ -86,10 +91,21 @@ def list_offers() -> dict[str, Any]:
     bars = {number: f"{number} {name}" for number, name in BAR_NAMES.items()}
     return offers | {
         "commands": _offer_commands(),
-        "words": WORDS_OF_ENTRIES,
+        "words": words,
         "pairs": pairs,
         "bars": bars,
     }
+
+
+def _collect_words(kind: Any) -> dict[str, list[str]]:
+    """Collect the entries of a description, and of its lists, that are one of words."""
+    words = dict[str, list[str]]()
+    for field in list_declared(kind):
+        if isinstance(field.by, OneOf):
+            words[field.key] = [*field.by.words]
+        elif isinstance(field.by, Entries):
+            words |= _collect_words(field.by.kind)
+    return words
 
 
 def _offer_bars(offers: dict[str, Any]) -> None:

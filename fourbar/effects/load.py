@@ -12,7 +12,7 @@ import numpy as np
 
 from fourbar.effects.effect import Actions, Effect
 from fourbar.effects.place import STATED_PAIR, Place, PointName
-from fourbar.errors import InputError, LimitError, expect
+from fourbar.errors import InputError, LimitError
 from fourbar.formulas.arithmetic import (
     PI_LOW,
     Number,
@@ -27,10 +27,12 @@ from fourbar.formulas.mobility import TURN
 from fourbar.formulas.motion import State
 from fourbar.linkage import (
     Declared,
+    Described,
     FourBar,
+    Listed,
     OfBar,
     OneOf,
-    require_numbers,
+    Part,
 )
 
 _BEYOND_TURN = 2.0 * PI_LOW
@@ -42,7 +44,7 @@ PLACES_OF_LOADS = ("from_pin", "from_centre", "point", "arm")
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class Table(Described):
     """Factor of a load over theta_2, linear between its points, modulo a turn.
 
     Parameters
@@ -51,17 +53,17 @@ class Table:
     factor : one for each angle; over a whole turn the last equals the first.
     """
 
-    theta_2: tuple[float, ...]
-    factor: tuple[float, ...]
+    theta_2: Annotated[tuple[float, ...], Listed("rad")]
+    factor: Annotated[tuple[float, ...], Listed("1")]
+    section: ClassVar[str] = "loads.table"
     as_given: ClassVar[bool] = True
     """Error bars leave its numbers alone: they are looked up."""
 
     def __post_init__(self) -> None:
-        key = "loads.table"
-        angles = tuple(
-            require_numbers(f"{key}.theta_2", self.theta_2, unit="rad").ravel().tolist()
-        )
-        factors = tuple(require_numbers(f"{key}.factor", self.factor).ravel().tolist())
+        Described.__post_init__(self)
+        key = self.section
+        angles = self.theta_2
+        factors = self.factor
         if len(angles) < 2 or len(angles) != len(factors):
             raise InputError(
                 key,
@@ -70,8 +72,6 @@ class Table:
             )
         if any(b <= a for a, b in pairwise(angles)):
             raise InputError(f"{key}.theta_2", angles, "must rise", unit="rad")
-        object.__setattr__(self, "theta_2", angles)
-        object.__setattr__(self, "factor", factors)
         if angles[-1] - angles[0] > TURN and not self.covers_a_turn:
             allowed = "must not exceed one turn"
             raise InputError(f"{key}.theta_2", angles, allowed, unit="rad")
@@ -168,13 +168,12 @@ class Load(Effect):
     arm: Annotated[tuple[float, float] | None, STATED_PAIR] = None
     moment: Annotated[float, Declared("N m")] = 0.0
     frame: Annotated[str, OneOf(FRAMES)] = "world"
-    table: Table | None = None
+    table: Annotated[Table | None, Part(Table)] = None
     section: ClassVar[str] = "loads"
     key: ClassVar[str] = "load"
 
     def __post_init__(self) -> None:
         Effect.__post_init__(self)
-        expect("loads.table", self.table, Table, type(None))
         forms = {
             name: value
             for name in PLACES_OF_LOADS

@@ -7,7 +7,6 @@ Each is read and written by the declarations of its fields. A place is stated by
 from collections.abc import Mapping
 from typing import Any
 
-from fourbar.effects import Load, Table
 from fourbar.effects.effect import PinRows
 from fourbar.effects.load import PLACES_OF_LOADS
 from fourbar.effects.place import (
@@ -24,8 +23,11 @@ from fourbar.linkage import (
     Declared,
     DeclaredField,
     Entries,
+    Listed,
     OfBar,
     OneOf,
+    Part,
+    Whole,
     list_declared,
 )
 
@@ -40,8 +42,6 @@ def list_keys(kind: Any) -> tuple[str, ...]:
     keys = list[str]()
     for field in list_declared(kind):
         keys += _KEYS_OF_PLACE if field.key == "" else [field.key]
-    if kind is Load:
-        keys.append("table")
     return (*keys, *getattr(kind, "forms", ()))
 
 
@@ -77,7 +77,8 @@ def read_described(
             make = getattr(kind, form)
             left = [field for field in left if not isinstance(field.by, Declared)]
             read.table(key, entry, (*(field.key for field in left), form))
-            stated |= _read_form(read, f"{key}.{form}", entry[form], numbers)
+            table = read.table(f"{key}.{form}", entry[form], numbers)
+            stated |= read.numbers(f"{key}.{form}", table, numbers)
     if states_place(kind):
         by = next(field.by for field in left if field.name == "bar")
         place = read_stated_place(read, key, entry, bars, by.bars)
@@ -86,8 +87,6 @@ def read_described(
         left = [field for field in left if field.name not in forms]
     for field in left:
         stated[field.name] = _read_field(read, key, entry, field, bars)
-    if kind is Load and "table" in entry:
-        stated["table"] = _read_load_table(read, f"{key}.table", entry["table"])
     try:
         return make(**stated)
     except InputError as error:  # which knows of one description alone
@@ -119,6 +118,12 @@ def _read_field(
         return field.left_out
     if isinstance(by, Entries):
         return _read_entries(read, path, value, field, bars)
+    if isinstance(by, Part):
+        return read_described(read, path, value, by.kind, bars)
+    if isinstance(by, Listed):
+        return read.quantities(path, value, by.unit)
+    if isinstance(by, Whole):
+        return read.whole(path, value, by.least, by.most)
     if isinstance(by, OneOf):
         return read.choice(path, value, by.words)
     if isinstance(by, OfBar):
@@ -143,17 +148,6 @@ def _read_entries(
     )
 
 
-def _read_form(
-    read: Reader,
-    key: str,
-    value: object,
-    numbers: Mapping[str, Declared],
-) -> dict[str, Any]:
-    """Read the numbers of another form of a description, such as a gas spring."""
-    stated = read.table(key, value, numbers)
-    return read.numbers(key, stated, numbers)
-
-
 def write_described(description: Any) -> Any:
     """Write a description by the declarations of its fields.
 
@@ -175,13 +169,14 @@ def write_described(description: Any) -> Any:
         elif isinstance(by, At):
             table[field.key] = _write_place(value)
         elif isinstance(by, Entries):
-            table[field.key] = [write_described(entry) for entry in value]
+            if value or by.is_value:
+                table[field.key] = [write_described(entry) for entry in value]
+        elif isinstance(by, Part):
+            table[field.key] = write_described(value)
+        elif isinstance(by, Listed):
+            table[field.key] = [write_quantity(number, by.unit) for number in value]
         else:
             table[field.key] = value
-    if kind is Load and description.table is not None:
-        angles = [write_quantity(x, "rad") for x in description.table.theta_2]
-        factors = list(description.table.factor)
-        table["table"] = {"theta_2": angles, "factor": factors}
     if [*table] == _PAIR:
         return [*table.values()]
     return table[""] if [*table] == [""] else table
@@ -207,27 +202,6 @@ def _write_rows(rows: PinRows) -> dict[str, Any]:
         }
         table[pin] = written.get("", written)
     return table
-
-
-def _read_load_table(read: Reader, key: str, value: object) -> Table:
-    """Read the factors of a load over theta_2."""
-    if isinstance(value, dict) and "time" in value:
-        allowed = (
-            "a load follows theta_2, not time: at one speed theta_2 is omega_2 t; a"
-            " torque over time that moves the linkage is for a simulator (fourbar mjcf"
-            " SCENE --drive motor)"
-        )
-        raise read.refuse(f"{key}.time", value["time"], allowed)
-    columns = read.table(key, value, ("theta_2", "factor"))
-    stated = columns.get("factor")
-    if not isinstance(stated, list):
-        allowed = "must be a list of numbers without a unit"
-        raise read.refuse(f"{key}.factor", stated, allowed)
-    angles = read.quantities(f"{key}.theta_2", columns.get("theta_2"), "rad")
-    factors = []
-    for index, factor in enumerate(stated):
-        factors.append(read.number(f"{key}.factor[{index}]", factor))
-    return Table(angles, tuple(factors))
 
 
 def read_stated_place(

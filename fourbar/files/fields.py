@@ -279,8 +279,10 @@ class Reader:
     def quantities(self, key: str, value: object, unit: str) -> tuple[float, ...]:
         """Read a list of numbers with units, in `unit`."""
         if not isinstance(value, list):
-            form = self.QUANTITIES.format(name_unit(unit))
-            raise self.refuse(key, value, f"must be a list like {form}")
+            form = f"like {self.QUANTITIES.format(name_unit(unit))}"
+            if unit == "1":
+                form = "of numbers without a unit"
+            raise self.refuse(key, value, f"must be a list {form}")
         return tuple(
             self.quantity(f"{key}[{index}]", entry, unit)
             for index, entry in enumerate(value)

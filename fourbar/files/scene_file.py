@@ -92,6 +92,10 @@ _A_GIVEN_DRIVE = (
     "a drive is what is solved for; a torque or force that is given is a load"
     " ([[loads]]), which moves the linkage with motion.free"
 )
+_OVER_THETA_2 = (
+    "a load follows theta_2, not time: at one speed theta_2 is omega_2 t; a torque over"
+    " time that moves the linkage is for a simulator (fourbar mjcf SCENE --drive motor)"
+)
 _LIKE_A_SWEEP = re.compile(r"\d[^\d]*(\bto\b|\.\.|:|;)\s*-?\d")
 _A_LINE = "a drive along a line has from and to alone"
 _A_POINT = "a force acts at a place: state point, from_pin or from_centre"
@@ -476,17 +480,8 @@ def _read_motion(read: Reader, value: object) -> Motion:
             reading: Any = read.quantities if is_list else read.quantity
             arguments[name] = reading(f"motion.{name}", entry[name], f"{unit}/{per}")
     if "free" in entry:
-        released = read.table("motion.free", entry["free"], ("duration", "steps"))
-        duration = read.quantity(
-            "motion.free.duration",
-            released.get("duration"),
-            "s",
-            POSITIVE,
-        )
-        arguments["free"] = Free(
-            duration,
-            read.whole("motion.free.steps", released.get("steps"), 1, MOST_INTERVALS),
-        )
+        free = read_described(read, "motion.free", entry["free"], Free, {})
+        arguments["free"] = free
     if "law" in entry:
         arguments["law"] = _read_law(read, entry["law"])
     return Motion(**arguments)
@@ -534,12 +529,10 @@ def _read_standard_law(read: Reader, key: str, value: Mapping[str, Any]) -> Rise
     """Read a sine, or a rise, a dwell, a fall and a rest by a standard law."""
     kind = read.choice(f"{key}.kind", value["kind"], LAW_KINDS)
     law: Any = Sine if kind == SINE_LAW else Rise
-    entry = read.table(key, value, ("kind", *law.numbers, "steps"))
-    steps = _read_steps(read, key, entry)
-    numbers = read.numbers(key, entry, law.numbers)
+    entry = dict(value)
     if law is Sine:
-        return Sine(steps=steps, **numbers)
-    return Rise(kind, steps=steps, **numbers)
+        del entry["kind"]
+    return read_described(read, key, entry, law, {})  # type: ignore[no-any-return]
 
 
 def _read_commanded(
@@ -580,10 +573,14 @@ def _read_commanded(
     return Sweep(start, stop, _read_steps(read, key, sweep))
 
 
-def _read_load(read: Reader, key: str, value: object, bars: Mapping[str, int]) -> Load:
+def _read_load(read: Reader, key: str, value: Any, bars: Mapping[str, int]) -> Load:
     if isinstance(value, dict) and value.keys().isdisjoint(("force", "moment")):
         read.table(key, value, list_keys(Load))
         raise read.refuse(key, value, "must have a force, a moment or both")
+    if isinstance(value, dict):
+        table = value.get("table")
+        if isinstance(table, dict) and "time" in table:
+            raise read.refuse(f"{key}.table.time", table["time"], _OVER_THETA_2)
     load: Load = read_described(read, key, value, Load, bars)
     return load
 

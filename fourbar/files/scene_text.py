@@ -246,11 +246,7 @@ def _write_motion(motion: Motion) -> dict[str, Any]:
         "law": None if law is None else _write_law(law),
         "branch": BRANCH_NAMES[motion.branch],
         "side": motion.side,
-        "free": (
-            None
-            if free is None
-            else {"duration": write_quantity(free.duration, "s"), "steps": free.steps}
-        ),
+        "free": None if free is None else write_described(free),
     }
     return {key: value for key, value in entry.items() if value is not None}
 
@@ -264,7 +260,7 @@ def _write_quantities(numbers: float | Array, unit: str) -> Any:
 
 def _write_law(law: Law | Rise | Sine) -> dict[str, Any]:
     if not isinstance(law, Law):
-        return {"kind": law.kind, **write_numbers(law), "steps": law.steps}
+        return {"kind": law.kind, **write_described(law)}
     columns = {
         "time": (law.time, "s"),
         f"theta_{law.bar}": (law.angle, "rad"),

@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import accumulate
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -29,7 +29,9 @@ from fourbar.linkage import (
     MOVING_BARS,
     POSITIVE,
     Declared,
-    check_numbers,
+    Described,
+    OneOf,
+    Whole,
     require,
     require_numbers,
     require_whole,
@@ -56,11 +58,8 @@ bar's pivot to the end on the ground, and is seen towards the latter.
 """
 DEFAULT_STEPS = 360
 """Number of steps of the default range, which is swept if a motion names no angle."""
-ALLOWED_STEPS = (
-    range(1, MOST_INTERVALS + 1),
-    f"must be a whole number from 1 to {MOST_INTERVALS}",
-)
-"""Allowed numbers of intervals of any motion, and how an error says so."""
+STEPS = Whole(1, MOST_INTERVALS)
+"""Declaration of the number of intervals of any motion."""
 SPLINES = {"free": "not-a-knot", "rest": "clamped", "periodic": "periodic"}
 """End conditions of a law's spline: none, at rest, or one period of a motion."""
 FEWEST_POINTS = {"free": 4, "rest": 2, "periodic": 3}
@@ -97,7 +96,7 @@ class Sweep:
         if not math.isfinite(self.stop - self.start):
             allowed = f"must be within the range of doubles from {self.start!r}"
             raise InputError("motion.theta_2.to", self.stop, allowed)
-        steps = require_whole("motion.theta_2.steps", self.steps, *ALLOWED_STEPS)
+        steps = STEPS.check("motion.theta_2.steps", self.steps)
         set_field(self, "steps", steps)
 
 
@@ -124,20 +123,15 @@ class FromLimit:
 
 
 @dataclass(frozen=True, slots=True)
-class Free:
+class Free(Described):
     """Released motion for `duration` (s), reported at `steps` equal intervals.
 
     Loads and effects alone move the linkage.
     """
 
-    duration: float
-    steps: int
-
-    def __post_init__(self) -> None:
-        duration = require("motion.free.duration", self.duration, "s", POSITIVE)
-        object.__setattr__(self, "duration", duration)
-        steps = require_whole("motion.free.steps", self.steps, *ALLOWED_STEPS)
-        object.__setattr__(self, "steps", steps)
+    duration: Annotated[float, Declared("s", POSITIVE)]
+    steps: Annotated[int, STEPS]
+    section: ClassVar[str] = "motion.free"
 
 
 def _find_bar(key: str, numbers: Mapping[int, tuple[Any, ...]]) -> int | None:
@@ -169,11 +163,6 @@ class _OverTime:
     """A law over time: its bar, and the times at which it is evaluated."""
 
     __slots__ = ()
-
-    def _require_steps(self: Any) -> None:
-        """Check the number of intervals; InputError for what is none."""
-        steps = require_whole("motion.law.steps", self.steps, *ALLOWED_STEPS)
-        object.__setattr__(self, "steps", steps)
 
     @property
     def bar(self: Any) -> int:
@@ -241,7 +230,8 @@ class Law(_OverTime):
         if (np.diff(time) <= 0.0).any():
             times = tuple(time.tolist())
             raise InputError(f"{key}.time", times, "must rise", unit="s")
-        self._require_steps()
+        steps = STEPS.check(f"{key}.steps", self.steps)
+        object.__setattr__(self, "steps", steps)
         object.__setattr__(self, "time", tuple(time.tolist()))
         object.__setattr__(self, theta, tuple(angles.tolist()))
 
@@ -335,7 +325,7 @@ def _compute_law(kind: str, u: Array) -> tuple[Array, Array, Array]:
 
 
 @dataclass(frozen=True, slots=True)
-class Rise(_OverTime):
+class Rise(Described, _OverTime):
     """An angle that rises by a standard law, dwells, falls and rests.
 
     Parameters
@@ -354,31 +344,20 @@ class Rise(_OverTime):
     (0.0, 0.5, 0.7)
     """
 
-    kind: str
-    rise: tuple[float, float]
-    theta_2: float | None = None
-    dwell: float = 0.0
-    fall: float | None = None
-    rest: float = 0.0
-    steps: int = 360
-    theta_3: float | None = None
-    theta_4: float | None = None
-    numbers: ClassVar[dict[str, Declared]] = {
-        **{
-            names[0]: Declared("rad", left_out=None) for names in COMMAND_NAMES.values()
-        },
-        "rise": Declared("rad", pair="s"),
-        "dwell": Declared("s", AT_LEAST_ZERO, 0.0),
-        "fall": Declared("s", POSITIVE, None),
-        "rest": Declared("s", AT_LEAST_ZERO, 0.0),
-    }
+    kind: Annotated[str, OneOf(RISE_LAWS)]
+    rise: Annotated[tuple[float, float], Declared("rad", pair="s")]
+    theta_2: Annotated[float | None, Declared("rad")] = None
+    dwell: Annotated[float, Declared("s", AT_LEAST_ZERO)] = 0.0
+    fall: Annotated[float | None, Declared("s", POSITIVE)] = None
+    rest: Annotated[float, Declared("s", AT_LEAST_ZERO)] = 0.0
+    steps: Annotated[int, STEPS] = 360
+    theta_3: Annotated[float | None, Declared("rad")] = None
+    theta_4: Annotated[float | None, Declared("rad")] = None
+    section: ClassVar[str] = "motion.law"
 
     def __post_init__(self) -> None:
-        key = "motion.law"
-        if not isinstance(self.kind, str) or self.kind not in RISE_LAWS:
-            allowed = "must be " + " or ".join(f'"{kind}"' for kind in RISE_LAWS)
-            raise InputError(f"{key}.kind", self.kind, allowed)
-        check_numbers(self, key)
+        Described.__post_init__(self)
+        key = self.section
         if getattr(self, f"theta_{self.bar}") is None:
             raise InputError(f"{key}.theta_2", None, "the first angle is missing")
         if not self.rise[1] > 0.0:
@@ -387,7 +366,6 @@ class Rise(_OverTime):
         if self.rest > 0.0 and self.fall is None:
             allowed = "needs a fall before it"
             raise InputError(f"{key}.rest", self.rest, allowed, unit="s")
-        self._require_steps()
 
     @property
     def time(self) -> tuple[float, ...]:
@@ -416,7 +394,7 @@ class Rise(_OverTime):
 
 
 @dataclass(frozen=True, slots=True)
-class Sine(_OverTime):
+class Sine(Described, _OverTime):
     """theta_2 = mean + amplitude sin(frequency t + phase), from t = 0 on.
 
     Parameters
@@ -432,25 +410,15 @@ class Sine(_OverTime):
     [1.523599, 0.0, -5.167713]
     """
 
-    mean: float
-    amplitude: float
-    frequency: float
-    duration: float
-    phase: float = 0.0
-    steps: int = 360
+    mean: Annotated[float, Declared("rad")]
+    amplitude: Annotated[float, Declared("rad")]
+    frequency: Annotated[float, Declared("rad/s", POSITIVE)]
+    duration: Annotated[float, Declared("s", POSITIVE)]
+    phase: Annotated[float, Declared("rad")] = 0.0
+    steps: Annotated[int, STEPS] = 360
+    section: ClassVar[str] = "motion.law"
     kind: ClassVar[str] = SINE_LAW
     bar: ClassVar[int] = 2
-    numbers: ClassVar[dict[str, Declared]] = {
-        "mean": Declared("rad"),
-        "amplitude": Declared("rad"),
-        "frequency": Declared("rad/s", POSITIVE),
-        "duration": Declared("s", POSITIVE),
-        "phase": Declared("rad", left_out=0.0),
-    }
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "motion.law")
-        self._require_steps()
 
     @property
     def time(self) -> tuple[float, float]:

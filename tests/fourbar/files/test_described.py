@@ -4,6 +4,7 @@ import cmath
 import math
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 
 import fourbar
 from fourbar import effects
-from fourbar.edit.document import SceneDocument
+from fourbar.edit.document import SceneDocument, list_offers
 from fourbar.edit.dragging import Dragged, drag, list_handles
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
@@ -91,9 +92,11 @@ pole = "south"
 def kind(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Any]:
     (tmp_path / "magnets.py").write_text(FILE, encoding="utf-8")
     monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
-    effects.list_further.cache_clear()
+    for cached in (effects.list_further, list_offers):
+        cached.cache_clear()
     yield effects.Magnets
-    effects.list_further.cache_clear()
+    for cached in (effects.list_further, list_offers):
+        cached.cache_clear()
     sys.modules.pop("fourbar.effects.magnets")
     del effects.Magnets
 
@@ -113,6 +116,9 @@ def test_it_is_read_and_written(scene: fourbar.Scene) -> None:
     assert first.end == fourbar.Place(1, (0.0, 0.0))
     assert (second.pull, second.pole) == (3.0, "south")
     assert loads(dump(scene)).effects == scene.effects
+    without = replace(scene, effects=(replace(magnets, rows=()),))
+    assert loads(dump(without)).effects == without.effects
+    assert list_offers()["words"]["pole"] == ["north", "south"]
 
 
 @pytest.mark.parametrize(
