@@ -93,7 +93,8 @@ def in_degrees(numbers, at):
 
 def turn_into_bars(numbers, at):
     """Give each force in the frame of the bar on which it acts."""
-    bars = {"F12": at.angle, "F32": at.angle, "F43": None, "F14": None}
+    theta_2 = numbers.get("theta_2", at.angle)
+    bars = {"F12": theta_2, "F32": theta_2}
     bars |= {"F43": numbers["theta_3"], "F14": numbers["theta_4"]}
     for name, theta in bars.items():
         (x, y), c, s = numbers[name].T, np.cos(theta), np.sin(theta)
@@ -454,6 +455,36 @@ def test_a_sign_is_named_under_every_command_and_at_change_points(name):
     scene = fourbar.load(CAPABILITIES / f"{name}.toml")
     causes = find_causes(partial(Altered, reverse_F43), scene)
     assert causes == ["sign reversed, or F_ij given for F_ji: F43"]
+
+
+LINE_DRIVEN = ("stroke_output", "cylinder_2_3", "push_output")
+
+
+@pytest.mark.parametrize("name", LINE_DRIVEN)
+def test_the_force_of_a_drive_takes_part_in_the_balance_that_is_wrong(name):
+    """The weight of the coupler is what the balances with and without it differ by."""
+    scene = fourbar.load(CAPABILITIES / f"{name}.toml")
+    scene = replace(scene, effects=(fourbar.Gravity(),))
+    coupler = scene.linkage.coupler
+    massless = replace(coupler, mass=0.0, density=None, inertia=0.0)
+    light = replace(scene, linkage=replace(scene.linkage, coupler=massless))
+
+    def leave_out_weight(numbers, at):
+        parts = {
+            1.0: (replace(scene, effects=()), light),
+            -1.0: (replace(light, effects=()),),
+        }
+        for quantity in ("F12", "F32", "F43", "F14", "drive_force"):
+            numbers[quantity] = sum(
+                sign * FreeBody().answer(one, at).quantities[quantity]
+                for sign, scenes in parts.items()
+                for one in scenes
+            )
+
+    causes = find_causes(partial(Altered, leave_out_weight), scene)
+    assert "the weight of bar 3 is missing" in causes
+    causes = find_causes(partial(Altered, turn_F32_alone), scene)
+    assert causes[0] == "F32 is in the frame of bar 2, not in world axes: F32"
 
 
 class Scaled:

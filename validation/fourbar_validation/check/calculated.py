@@ -28,8 +28,10 @@ from fourbar.solving import solve
 from fourbar_validation.check.judge import Judge
 from fourbar_validation.check.theirs import name_quantity
 from fourbar_validation.check.variants import Mistake
+from fourbar_validation.compare.line import place_line
 from fourbar_validation.compare.tolerance import EPS
-from fourbar_validation.engines.description import FORCE_BETWEEN
+from fourbar_validation.engines.description import FORCE_BETWEEN, name_driving
+from fourbar_validation.engines.free_body import solve_system
 
 MistakenNumbers = dict[str, Array]
 """Numbers that a mistake leads to, by quantity; others stay right."""
@@ -73,6 +75,12 @@ class _BarWrenches(NamedTuple):
     q: dict[int, Array]
     drive_bar: int
     """Bar on which the ground's couple acts."""
+    driving: str
+    """Name of what is solved for: the torque, or the force of the drive."""
+    push: dict[int, Array]
+    """Force of 1 N of a drive that exerts a force, (n, 2); zero for a couple."""
+    twist: dict[int, Array]
+    """Its moment about the bar's first pin, or 1 for a couple, (n,)."""
 
     def changed(
         self,
@@ -93,30 +101,36 @@ class _BarWrenches(NamedTuple):
     def solve(self) -> MistakenNumbers:
         """Solve the three free bodies.
 
-        Moments about the first pins of bars 2, 3 and 4, where T_k is the drive's couple
-        on bar k:
+        Moments about the first pins of bars 2, 3 and 4, where a drive of size s exerts
+        s f_k and the moment s m_k on bar k:
 
-            a x F43 + T_2 = moment of bar 2 + a x p3
-            b x F43 + T_3 = moment of bar 3
-           -c x F43 + T_4 = moment of bar 4
+            a x F43 + s (m2 + a x f3) = moment of bar 2 + a x p3
+            b x F43 + s m3            = moment of bar 3
+           -c x F43 + s m4            = moment of bar 4
         """
         a, b, c = (self.bars[bar] for bar in MOVING_BARS)
-        lever = {2: a, 3: b, 4: -c}
+        twist = {**self.twist, 2: self.twist[2] + cross_vectors(a, self.push[3])}
         moment = {bar: self.about_pin(bar) for bar in MOVING_BARS}
         moment[2] = moment[2] + cross_vectors(a, self.p[3])
-        one, other = (bar for bar in MOVING_BARS if bar != self.drive_bar)
-        det = cross_vectors(lever[one], lever[other])[:, None]
-        by_one = moment[one][:, None] * lever[other]
-        by_other = moment[other][:, None] * lever[one]
-        F43 = (by_one - by_other) / det
-        F32 = F43 - self.p[3]
-        driven = self.drive_bar
+        matrix = np.stack(
+            [
+                np.stack((-lever[:, 1], lever[:, 0], twist[bar]), axis=1)
+                for bar, lever in {2: a, 3: b, 4: -c}.items()
+            ],
+            axis=1,
+        )
+        right = np.stack([moment[bar] for bar in MOVING_BARS], axis=1)
+        x = solve_system(matrix, right[:, :, None])[0][:, :, 0]
+        F43 = x[:, :2]
+        size = x[:, 2]
+        f2, f3, f4 = (size[:, None] * self.push[bar] for bar in MOVING_BARS)
+        F32 = F43 - self.p[3] + f3
         return {
             "F43": F43,
             "F32": F32,
-            "F12": self.p[2] - F32,
-            "F14": self.p[4] + F43,
-            "torque": moment[driven] - cross_vectors(lever[driven], F43),
+            "F12": self.p[2] - F32 - f2,
+            "F14": self.p[4] + F43 - f4,
+            self.driving: size,
         }
 
     def cut(self, pin: str) -> MistakenNumbers:
@@ -215,8 +229,34 @@ def find_wrenches(scene: Scene, right: Solution) -> _BarWrenches:
         about_first = cross_vectors(first[bar] - G, at_first)
         about_second = cross_vectors(second[bar] - G, at_second)
         q[bar] = about_first + about_second
-    q[scene.drive_bar] = q[scene.drive_bar] + np.asarray(right.torque)
-    return _BarWrenches(arms, bars, p, q, scene.drive_bar)
+    driving = name_driving(scene)
+    push, twist = _place_drive(scene, right)
+    size = np.asarray(getattr(right, driving))
+    for bar in MOVING_BARS:
+        about_G = twist[bar] - cross_vectors(arms[bar], push[bar])
+        p[bar] = p[bar] + size[:, None] * push[bar]
+        q[bar] = q[bar] + size * about_G
+    return _BarWrenches(arms, bars, p, q, scene.drive_bar, driving, push, twist)
+
+
+def _place_drive(
+    scene: Scene,
+    right: Solution,
+) -> tuple[dict[int, Array], dict[int, Array]]:
+    """Return force and moment about its first pin of each bar by a drive of size 1."""
+    push = {bar: np.zeros((len(right), 2)) for bar in MOVING_BARS}
+    twist = {bar: np.zeros(len(right)) for bar in MOVING_BARS}
+    if scene.drive is None:
+        twist[scene.drive_bar] += 1.0
+        return push, twist
+    theta = {bar: getattr(right, f"theta_{bar}") for bar in MOVING_BARS}
+    line = place_line(scene.linkage, scene.drive, theta)
+    for (sense, point), arm in zip(scene.drive.ends, line.arms, strict=True):
+        if point.bar in MOVING_BARS:
+            force = sense * line.unit
+            push[point.bar] += np.stack((force.real, force.imag), axis=1)
+            twist[point.bar] += (np.conj(arm) * force).imag
+    return push, twist
 
 
 @dataclass(frozen=True)
@@ -233,9 +273,13 @@ class _Calculation:
 
     def mistakes(self) -> Iterator[Mistake]:
         """List the mistakes that this calculation can have, the simplest first."""
-        yield from self._open_tree()
+        scene = self.judge.scene
+        if scene.drive is None:
+            yield from self._open_tree()
         yield from self._frames()
         yield from self._equal_forces()
+        if any(effect.loaded_pins for effect in scene.effects):
+            return  # what acts follows the pin forces
         yield from self._velocity_terms()
         yield from self._accelerations_of_centres()
         yield from self._inertias()
@@ -448,14 +492,11 @@ class _Calculation:
 
 def find_miscalculated(judge: Judge) -> Iterator[Mistake]:
     """List the mistakes of a calculation, or of a simulation, that a table can show."""
-    scene = judge.scene
-    loaded = any(effect.loaded_pins for effect in scene.effects)
-    by_couple = scene.drive is None and not loaded
-    if judge.stage == "force" and by_couple:
+    if judge.stage == "force":
         mistakes: list[Mistake] = []
         with np.errstate(all="ignore"), suppress(FourBarError):
             # a scene without one of its loads may be none
-            wrenches = find_wrenches(scene, judge.right)
+            wrenches = find_wrenches(judge.scene, judge.right)
             mistakes.extend(_Calculation(judge, wrenches).mistakes())
         yield from mistakes
     if judge.stage == "force":
