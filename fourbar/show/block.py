@@ -34,6 +34,7 @@ from fourbar.show.acting import (
     list_spring_notes,
 )
 from fourbar.show.change_point import has_growing_forces
+from fourbar.show.columns import explain_static
 from fourbar.show.driving import describe_drive
 from fourbar.show.duty import DUTY_UNITS, MotorDuty, bearing_load, motor_duty
 from fourbar.show.lines import find_block_width, wrap_line
@@ -983,16 +984,6 @@ def _align(rows: list[tuple[str, list[str]]], most: int) -> list[str]:
         for label, cells in rows
         if (part := cells[first : first + fitting])
     ]
-
-
-def explain_static(scene: Scene) -> str:
-    """Say what asks for forces where a scene states positions alone."""
-    unit, what = (
-        ("rad/s", "torque") if scene.motion.stroke is None else ("m/s", "force")
-    )
-    return (
-        f'{scene.motion.names[1]} = "0 {unit}" gives the static {what} and pin forces'
-    )
 
 
 def write_motor(

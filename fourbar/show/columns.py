@@ -169,9 +169,13 @@ def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
     stem, axis = _split_axis(name)
     quantities = _list_column_quantities(solution)
     if not _is_number(solution, name):
-        close = get_close_matches(name, ["time", *quantities], 1)
+        with_speed = _solve_at_rest(solution)
+        known = ["time", *_list_column_quantities(with_speed)]
+        close = get_close_matches(name, known, 1)
         if names_other_mechanism(stem):
             raise InputError("--columns", name, f"unknown; {ELSEWHERE}")
+        if _is_number(with_speed, name):
+            raise _ask_for_speed(solution.scene, name)
         hint = f'did you mean "{close[0]}"? ' if close else ""
         raise InputError(
             "--columns",
@@ -186,11 +190,7 @@ def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
     else:
         values = find_values(solution, stem)
     if values is None:
-        raise InputError(
-            "--columns",
-            name,
-            "was not evaluated: the scene states no speed",
-        )
+        raise _ask_for_speed(solution.scene, name)
     if axis is not None:
         return find_unit_of_quantity(stem), values[..., axis]
     if is_scalar(stem):
@@ -241,6 +241,32 @@ def _is_velocity(name: str) -> bool:
 def _is_force_along_path(solution: Solution, name: str) -> bool:
     """Return True for "F_handle": the force along the path of a point of the scene."""
     return name.startswith(_ALONG) and name.removeprefix(_ALONG) in solution.points
+
+
+def explain_static(scene: Scene) -> str:
+    """Say what asks for forces where a scene states positions alone."""
+    unit, what = (
+        ("rad/s", "torque") if scene.motion.stroke is None else ("m/s", "force")
+    )
+    return (
+        f'{scene.motion.names[1]} = "0 {unit}" gives the static {what} and pin forces'
+    )
+
+
+def _ask_for_speed(scene: Scene, name: str) -> InputError:
+    return InputError(
+        "--columns",
+        name,
+        f"needs a speed, and the scene states none; {explain_static(scene)}",
+    )
+
+
+def _solve_at_rest(solution: Solution) -> Solution:
+    """Solve a scene that states positions alone with the speed 0; others as they are."""
+    scene = solution.scene
+    if solution.at.speed is not None:
+        return solution
+    return solve(replace(scene, motion=scene.motion.replace(speed=0.0)))
 
 
 def _solve_at_unit_speed(scene: Scene, solution: Solution) -> Solution:

@@ -11,7 +11,7 @@ from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene
-from fourbar.show.block import explain_static
+from fourbar.show.columns import explain_static
 from fourbar.show.motion_curves import describe_motion
 from fourbar.show.plot import curves, derived, freebody, linkage, studies
 from fourbar.show.plot.curves import draw_transmission

@@ -70,9 +70,15 @@ def test_an_unknown_column_is_refused_with_those_there_are(
 
 def test_a_column_that_needs_a_speed_says_so() -> None:
     still = replace(TURN, motion=TURN.motion.replace(speed=None))
-    for name in ("shaking_moment", "time"):
-        with pytest.raises(InputError, match=r"no speed|no one speed"):
+    for name in ("shaking_moment", "torque", "omega_4", "a_P_y", "F12/F14"):
+        with pytest.raises(InputError, match='"0 rad/s" gives the static torque'):
             columns(still, name)
+    with pytest.raises(InputError, match="no one speed"):
+        columns(still, "time")
+    law = fourbar.Motion(law=fourbar.Sine(1.0, 0.5, 2.0, duration=3.0))
+    for scene in (still, replace(TURN, motion=law)):
+        with pytest.raises(InputError, match='unknown; did you mean "torque"'):
+            columns(scene, "tork")
 
 
 def test_a_steady_command_of_another_bar_or_a_stroke_has_a_time() -> None:
