@@ -262,7 +262,7 @@ def _ask_for_speed(scene: Scene, name: str) -> InputError:
 
 
 def _solve_at_rest(solution: Solution) -> Solution:
-    """Solve a scene that states positions alone with the speed 0; others as they are."""
+    """Solve with speed 0 a scene that states positions alone; no other is changed."""
     scene = solution.scene
     if solution.at.speed is not None:
         return solution

@@ -300,6 +300,28 @@ def test_a_follower_on_the_crank_turns_the_coupler(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("ground", [0.03, 0.04])
+def test_the_zero_of_a_follower_on_the_crank_is_read_at_the_rocker(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    ground: float,
+) -> None:
+    """A coupler that stays parallel turns by -theta_2 on the crank.
+
+    In a rhombus its hinge is as far from the crank's as the rocker's is.
+    """
+    path = write_upright(tmp_path)
+    follow = '<joint joint1="pad" joint2="drive" polycoef="0 -1 0 0 0"/></equality>'
+    text = path.read_text().replace("</equality>", follow)
+    path.write_text(text.replace('pos="0.03 0 0"', f'pos="{ground} 0 0"'))
+    bars = FourBar(ground, Bar(0.04, 0.02), Bar(ground, 0.02), Bar(0.04, 0.02))
+    report = measure_mimic(path, "pad", replace(GRIPPER, linkage=bars))
+    assert report.file.angle <= ROUND_OFF
+    show_mimic(report)
+    assert "theta_2 is 90 deg + drive, from 60 to 120 deg" in capsys.readouterr().out
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("tree", "bars"),
     [

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 import mujoco
 import numpy as np
@@ -143,21 +144,34 @@ def _measure_input(
     linkage = scene.linkage
     ground, input_length, _, output_length = linkage.lengths
     normal = data.xaxis[leader]
-    line = data.xanchor[follower] - data.xanchor[leader]
-    line = line - (line @ normal) * normal
-    if not _is_same_number(float(np.linalg.norm(line)), ground):
+    across = np.eye(3) - np.outer(normal, normal)
+    for rocker in _list_rockers(model, leader, follower):
+        line = across @ (data.xanchor[rocker] - data.xanchor[leader])
+        if _is_same_number(float(np.linalg.norm(line)), ground):
+            break
+    else:
         return None, 1.0
     x = line / np.linalg.norm(line)
     y = np.cross(normal, x)
     input_angle = _find_angle_of_bar(model, data, leader, input_length, (x, y))
     if input_angle is None:
         return None, 1.0
-    output_angle = _find_angle_of_bar(model, data, follower, output_length, (x, y))
+    output_angle = _find_angle_of_bar(model, data, rocker, output_length, (x, y))
     behind = output_angle is not None and is_seen_from_behind(
         scene, (0.0, input_angle, math.nan, output_angle)
     )
     side = -1.0 if behind else 1.0
     return linkage.ground_angle + side * input_angle, side
+
+
+def _list_rockers(model: mujoco.MjModel, leader: int, follower: int) -> list[int]:
+    """List the joints that may bear the output on the ground.
+
+    The follower itself is the first, then all joints that follow the same leader.
+    """
+    ties = chain.from_iterable(list_followers(model, n) for n in range(model.neq))
+    joints = [follower, *(tie.joint for tie in ties if tie.leader == leader)]
+    return [joint for joint in joints if _find_bars(model, leader, joint) == (4, 1)]
 
 
 def _find_angle_of_bar(
