@@ -97,7 +97,7 @@ def read_column(scene: Scene, solution: Solution, name: str) -> Column:
             read_column(scene, solution, second),
         )
     if _is_number(solution, name) or "/" not in name:
-        return Column(name, *_find_number(solution, name))
+        return Column(name, *_find_number(scene, solution, name))
     above, _, below = (part.strip() for part in name.partition("/"))
     if _is_force_along_path(solution, above) and _is_force_along_path(solution, below):
         # by virtual work the forces are as the speeds, the other way round
@@ -105,8 +105,8 @@ def read_column(scene: Scene, solution: Solution, name: str) -> Column:
     of = solution
     if _is_velocity(above) and _is_velocity(below):
         of = _solve_at_unit_speed(scene, solution)
-    unit, numerator = _find_number(of, above)
-    divisor, denominator = _find_number(of, below)
+    unit, numerator = _find_number(scene, of, above)
+    divisor, denominator = _find_number(scene, of, below)
     with np.errstate(all="ignore"):
         ratio = numerator / denominator
     ratio = np.where(np.isfinite(ratio), ratio, np.nan)
@@ -151,7 +151,11 @@ def _subtract(name: str, first: Column, second: Column) -> Column:
     return first._replace(name=name, values=values)
 
 
-def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
+def _find_number(
+    scene: Scene,
+    solution: Solution,
+    name: str,
+) -> tuple[str, Array]:
     """Return the SI unit of a number of each position and its values."""
     values: Array | None
     if name == "time":
@@ -169,13 +173,13 @@ def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
     stem, axis = _split_axis(name)
     quantities = _list_column_quantities(solution)
     if not _is_number(solution, name):
-        with_speed = _solve_at_rest(solution)
+        with_speed = _solve_at_rest(scene, solution)
         known = ["time", *_list_column_quantities(with_speed)]
         close = get_close_matches(name, known, 1)
         if names_other_mechanism(stem):
             raise InputError("--columns", name, f"unknown; {ELSEWHERE}")
         if _is_number(with_speed, name):
-            raise _ask_for_speed(solution.scene, name)
+            raise _ask_for_speed(scene, name)
         hint = f'did you mean "{close[0]}"? ' if close else ""
         raise InputError(
             "--columns",
@@ -190,7 +194,7 @@ def _find_number(solution: Solution, name: str) -> tuple[str, Array]:
     else:
         values = find_values(solution, stem)
     if values is None:
-        raise _ask_for_speed(solution.scene, name)
+        raise _ask_for_speed(scene, name)
     if axis is not None:
         return find_unit_of_quantity(stem), values[..., axis]
     if is_scalar(stem):
@@ -261,9 +265,8 @@ def _ask_for_speed(scene: Scene, name: str) -> InputError:
     )
 
 
-def _solve_at_rest(solution: Solution) -> Solution:
+def _solve_at_rest(scene: Scene, solution: Solution) -> Solution:
     """Solve with speed 0 a scene that states positions alone; no other is changed."""
-    scene = solution.scene
     if solution.at.speed is not None:
         return solution
     return solve(replace(scene, motion=scene.motion.replace(speed=0.0)))
