@@ -15,7 +15,7 @@ from fourbar.scene import Command, Scene, command_at
 from fourbar.scene.motion import FEWEST_POINTS, Law, Sweep
 from fourbar.show.units import write_short
 from fourbar.solution import Conversion, Solution
-from fourbar.studies.equilibrium import bisect
+from fourbar.studies.course import bisect
 from fourbar.studies.passing import SAME_POSITION
 
 _INSTANTS_OF_AN_END = 33

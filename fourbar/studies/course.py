@@ -1,5 +1,7 @@
 """Places of a scene's motion, close to each other, and what is solved between them."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,8 +12,9 @@ from fourbar.scene.motion import Sweep
 from fourbar.scene.scene import default_places
 from fourbar.solution import Solution
 from fourbar.solving import solve
-from fourbar.studies.equilibrium import bisect
 
+HALVINGS_OF_A_STEP = 60
+"""Halvings of the distance between two samples down to its last digits."""
 INTERVALS = 2000
 """Least number of intervals of a motion."""
 LADDER = 0.5 ** np.arange(1, 50)
@@ -108,7 +111,10 @@ class MotionCourse:
         steps = len(stated) - 1
         parts = -(-INTERVALS // max(steps, 1))
         rows = np.linspace(0.0, steps, parts * steps + 1)
-        return np.interp(rows, np.arange(steps + 1), stated)
+        places = np.interp(rows, np.arange(steps + 1), stated)
+        if motion.law is not None:
+            places = np.union1d(places, motion.law.time)
+        return places
 
     def _refine_edges(
         self,
@@ -127,3 +133,20 @@ class MotionCourse:
         more = edge[:, None] + (inside - edge)[:, None] * LADDER
         places = np.unique(np.concatenate([self.places, more.ravel(), edge]))
         return places if self.places[0] <= self.places[-1] else places[::-1]
+
+
+def bisect(
+    holds: Callable[[Array], NDArray[np.bool_]],
+    low: Array,
+    high: Array,
+) -> tuple[Array, Array]:
+    """Narrow each interval to two neighbours between which a condition ends.
+
+    The condition holds at the lower end of each interval alone.
+    """
+    for _ in range(HALVINGS_OF_A_STEP):
+        middle = 0.5 * (low + high)
+        held = holds(middle)
+        low = np.where(held, middle, low)
+        high = np.where(held, high, middle)
+    return low, high

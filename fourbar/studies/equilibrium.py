@@ -51,6 +51,7 @@ from fourbar.studies.circuit_curve import (
     of_input,
     transmission,
 )
+from fourbar.studies.course import bisect
 
 _A_JUMP = 1e-6
 """Fraction of the sum of the absolute terms above which a sign change is a jump. A
@@ -70,8 +71,6 @@ _A_RANGE = 3
 """Samples in a row where Q is nothing: fewer may be a zero that falls on one."""
 _AT_CHANGE_POINT = 1e-4
 """rad; nearer to a change point nothing is decided: the curve crosses itself there."""
-HALVINGS_OF_A_STEP = 60
-"""Halvings of the distance between two samples down to its last digits."""
 
 
 class _CircuitRange(NamedTuple):
@@ -555,20 +554,3 @@ def _find_edge(
     """
     inside, _ = bisect(lambda away: held(tau + away), np.zeros(tau.shape), gap)
     return tau + inside
-
-
-def bisect(
-    holds: Callable[[Array], NDArray[np.bool_]],
-    low: Array,
-    high: Array,
-) -> tuple[Array, Array]:
-    """Narrow each interval to two neighbours between which a condition ends.
-
-    The condition holds at the lower end of each interval alone.
-    """
-    for _ in range(HALVINGS_OF_A_STEP):
-        middle = 0.5 * (low + high)
-        held = holds(middle)
-        low = np.where(held, middle, low)
-        high = np.where(held, high, middle)
-    return low, high

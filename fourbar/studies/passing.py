@@ -4,15 +4,13 @@ The quantity is an angle, the stroke or the time.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import InputError, NotAssembledError, write_in_units
-from fourbar.evaluation.free_motion import Released, release
 from fourbar.formulas.mobility import TURN, find_intervals
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at
@@ -23,8 +21,9 @@ from fourbar.scene.motion import (
     Motion,
 )
 from fourbar.scene.scene import default_places, write_stroke_ranges
-from fourbar.solution import compute_times
+from fourbar.solution import Solution, compute_times
 from fourbar.solving import solve
+from fourbar.studies.course import MotionCourse, bisect
 
 COMMANDED_ANGLES = tuple(names[0] for names in COMMAND_NAMES.values())
 STATED_POSITIONS = (*COMMANDED_ANGLES, STROKE_COMMAND[0], "time")
@@ -35,12 +34,6 @@ INSIDE_LIMIT = 1e-12
 """rad; distance from a limit at which a linkage assembles as doubles."""
 _GRID_DIGITS = 4
 """Digits of an end of a range that is read from the positions of the default sweep."""
-LAW_INSTANTS = 2000
-"""Instants of a motion by a law among which passings are looked for."""
-LAST_DIGIT = 1e-15
-"""Relative width at which a time is located."""
-HALVINGS_OF_A_PASSING = 60
-"""Halvings of an interval: each passing is located to the last digits."""
 
 
 def find_positions(scene: Scene, wanted: list[tuple[str, float]]) -> Command:
@@ -58,10 +51,9 @@ def find_positions(scene: Scene, wanted: list[tuple[str, float]]) -> Command:
     InputError : a name that the motion has not.
     NotAssembledError : no position has the value; the message says the range.
     """
-    if scene.motion.free is not None:
-        return join_commands([_find_released(scene, *entry) for entry in wanted])
-    find = _find_places if scene.motion.law is None else _find_times
-    places = [place for entry in wanted for place in find(scene, *entry)]
+    if scene.motion.free is not None or scene.motion.law is not None:
+        return join_commands([_find_times(scene, *entry) for entry in wanted])
+    places = [place for entry in wanted for place in _find_places(scene, *entry)]
     return command_at(scene, np.array(places))
 
 
@@ -204,75 +196,48 @@ def is_same_position(name: str, first: float, second: float) -> bool:
     return abs(first - second) <= SAME_POSITION * abs(second)
 
 
-def _find_times(scene: Scene, name: str, value: float) -> list[float]:
-    """Find the times at which a motion by a law passes a value."""
-    law = scene.motion.law
-    assert law is not None
-    start = law.time[0]
-    stop = law.time[-1]
+def _find_times(scene: Scene, name: str, value: float) -> Command:
+    """Find the instants at which a motion over time passes a value."""
+    course = MotionCourse(scene, "position")
+    start, stop = course.places[[0, -1]].tolist()
     if name == "time":
         if not start <= value <= stop:
             raise NotAssembledError(
-                f"{_say_position(name, value)}:"
-                f" the law goes from {start:.6g} to {stop:.6g} s"
+                f"{_say_position(name, value)}: the motion goes from {start:.6g} to"
+                f" {stop:.6g} s"
             )
-        return [value]
+        return course.command(np.array([value]))
 
-    def read(times: Array) -> Array:
-        solution = solve(scene, "position", at=command_at(scene, times))
-        return _require_values(getattr(solution, name), name)
+    def measure_gaps(solution: Solution) -> Array:
+        gaps = _require_values(getattr(solution, name), name) - value
+        if name in COMMANDED_ANGLES:
+            gaps = np.angle(np.exp(1j * gaps))
+        return np.asarray(gaps)
 
-    grid = np.unique([*np.linspace(start, stop, LAW_INSTANTS + 1), *law.time])
-    gaps = _measure_gaps(name, read(grid), value)
-
-    def gap(time: float) -> float:
-        return float(_measure_gaps(name, read(np.array([time])), value)[0])
-
-    times = [float(start)] if gaps[0] == 0.0 else []
-    times += [
-        _bisect_gap(gap, *grid[row : row + 2]) for row in _find_crossings(name, gaps)
-    ]
-    if not times:
-        raise _never_passed(name, value, read(grid))
-    return times
-
-
-def _measure_gaps(name: str, values: Array, value: float) -> Array:
-    """Return how far values lie from one, of angles within half a turn."""
-    if name in COMMANDED_ANGLES:
-        return np.asarray(np.angle(np.exp(1j * (values - value))))
-    return values - value
-
-
-def _find_crossings(name: str, gaps: Array) -> NDArray[np.intp]:
-    """Return the index before each change of sign; a jump by a turn is none.
-
-    A zero counts once, with the step that ends there.
-    """
+    gaps = measure_gaps(course.solution)
     before = gaps[:-1]
     after = gaps[1:]
+    # half a turn away an angle changes its side, too
     near = name not in COMMANDED_ANGLES or np.abs(after - before) < 0.5 * math.pi
-    return np.flatnonzero((before != 0.0) & (before * after <= 0.0) & near)
-
-
-def _bisect_gap(gap: Callable[[float], float], low: float, high: float) -> float:
-    """Bisect an interval in which a gap changes its sign."""
-    start = gap(low)
-    for _ in range(HALVINGS_OF_A_PASSING):
-        middle = 0.5 * (low + high)
-        if gap(middle) * start > 0.0:
-            low = middle
-        else:
-            high = middle
-    return high
-
-
-def _never_passed(name: str, value: float, values: Array) -> NotAssembledError:
-    low, high = _find_extent(values)
-    return NotAssembledError(
-        f"{_say_position(name, value)}: the motion does not pass it; it stays within "
-        f"{_write_position(name, low)} and {_write_position(name, high)}"
-    )
+    rows = np.flatnonzero((before != 0.0) & (before * after <= 0.0) & near)
+    times = course.places[:1][gaps[:1] == 0.0]
+    if scene.motion.free is not None:
+        rows = rows[: 1 - times.size]
+    if rows.size:
+        sides = before[rows]
+        _, passed = bisect(
+            lambda there: measure_gaps(course.solve(there)) * sides > 0.0,
+            course.places[rows],
+            course.places[rows + 1],
+        )
+        times = np.concatenate([times, passed])
+    if not times.size:
+        low, high = _find_extent(getattr(course.solution, name))
+        raise NotAssembledError(
+            f"{_say_position(name, value)}: the motion does not pass it; it stays"
+            f" within {_write_position(name, low)} and {_write_position(name, high)}"
+        )
+    return course.command(times)
 
 
 def _find_extent(values: Array) -> tuple[float, float]:
@@ -294,49 +259,6 @@ def _write_position(name: str, value: float, digits: int = 6) -> str:
     if name in COMMANDED_ANGLES:
         return f"{math.degrees(value):.{digits}g} deg"
     return write_in_units("s" if name == "time" else "m", value, digits=digits)
-
-
-def _find_released(scene: Scene, name: str, value: float) -> Command:
-    """Find the instant at which a released motion first passes a value."""
-    free = scene.motion.free
-    assert free is not None
-
-    released = release(scene)
-    whole = released.command
-
-    def read(at: Command) -> Array:
-        return _require_values(getattr(solve(scene, "position", at=at), name), name)
-
-    if name == "time":
-        if not 0.0 <= value <= free.duration:
-            raise NotAssembledError(
-                f"{_say_position(name, value)}: the release lasts {free.duration:.6g} s"
-            )
-        return _take_instant(released, value)
-    times = whole.time
-    assert times is not None
-    values = read(whole)
-    gaps = _measure_gaps(name, values, value)
-    if gaps[0] == 0.0:
-        return whole.part(slice(0, 1))
-    rows = _find_crossings(name, gaps)
-    if len(rows) == 0:
-        raise _never_passed(name, value, values)
-    low, high = times[rows[0] : rows[0] + 2].tolist()
-
-    def gap(time: float) -> float:
-        here = read(_take_instant(released, time))
-        return float(_measure_gaps(name, here, value)[0])
-
-    from scipy.optimize import brentq
-
-    time = float(brentq(gap, low, high, xtol=LAST_DIGIT * high, rtol=LAST_DIGIT))
-    return _take_instant(released, time)
-
-
-def _take_instant(released: Released, time: float) -> Command:
-    """Take one instant of a free motion."""
-    return released.command_at(np.unique([0.0, time])).part(slice(-1, None))
 
 
 def join_commands(commands: list[Command]) -> Command:

@@ -114,7 +114,7 @@ def test_a_place_out_of_range_is_refused_with_the_range() -> None:
         find_positions(LAW, [("theta_2", 3.0)])
     with pytest.raises(NotAssembledError, match="goes from 0 to 2 s"):
         find_positions(LAW, [("time", 3.0)])
-    with pytest.raises(NotAssembledError, match="lasts 1 s"):
+    with pytest.raises(NotAssembledError, match="goes from 0 to 1 s"):
         find_positions(DROPPED, [("time", 3.0)])
 
 
