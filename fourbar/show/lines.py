@@ -19,11 +19,17 @@ def find_block_width(width: int | None) -> int:
 
 
 def wrap_line(line: str, width: int | None = None) -> list[str]:
-    """Break a line that is wider than a block; what follows is indented.
+    """Break a line that is wider than a block between words; what follows is indented.
 
     `width`: that of a terminal.
     """
     most = find_block_width(width)
     if len(line) <= most:
         return [line]
-    return wrap(line, most, subsequent_indent="    ", break_on_hyphens=False)
+    return wrap(
+        line,
+        most,
+        subsequent_indent="    ",
+        break_on_hyphens=False,
+        break_long_words=False,
+    )

@@ -94,7 +94,9 @@ def _write_scene(made: LoopScene) -> str:
     lines = [
         part
         for line in (*made.parts, *made.remarks, *made.notes)
-        for part in wrap(escape_controls(line), _COLUMNS_OF_A_COMMENT)
+        for part in wrap(
+            escape_controls(line), _COLUMNS_OF_A_COMMENT, break_long_words=False
+        )
     ]
     comments = "".join(f"# {line}\n" for line in lines)
     return f"{comments}\n{dump(made.scene)}"
