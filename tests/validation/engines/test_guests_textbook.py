@@ -63,6 +63,6 @@ def test_it_agrees_on_random_scenes():
 
 
 @pytest.mark.slow
-def test_it_agrees_on_three_hundred_random_scenes():
-    drawn = (draw_random_scene(993, i, tuple(DrawnType)) for i in range(300))
-    assert sum(map(check, drawn)) >= 200
+def test_it_agrees_on_a_hundred_random_scenes():
+    drawn = (draw_random_scene(993, i, tuple(DrawnType)) for i in range(100))
+    assert sum(map(check, drawn)) >= 65
