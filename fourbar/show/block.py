@@ -83,7 +83,7 @@ _MOST_POLES = 4
 """Number of places at which a quantity grows without bound that are listed."""
 _MOST_HELD = 4
 """Number of places at which dry friction holds a pin that are listed."""
-LOCATED = 1e-6
+PLACE_ROUNDING = 1e-6
 """Part of the motion within which the place of a flat maximum is located. A place
 nearer to zero than that is zero.
 """
@@ -260,7 +260,7 @@ class _SceneBlock:
     def _place(self, place: float, *, named: bool = True) -> str:
         """Write a place as "theta_2 = 22.8 deg", or without its name."""
         first, last = self.facts.commanded
-        if abs(place) <= LOCATED * abs(last - first):
+        if abs(place) <= PLACE_ROUNDING * abs(last - first):
             place = 0.0
         text = self._value(
             place,

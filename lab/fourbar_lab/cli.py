@@ -6,59 +6,59 @@ import click
 
 from fourbar import __version__
 from fourbar.errors import run
-from fourbar_validation.cli import LazyGroup, Listed
+from fourbar_validation.cli import LazyCommand, LazyGroup
 
 LAB_PROGRAM = "python -m fourbar_lab"
 LAB_COMMANDS = {
-    "stability": Listed(
+    "stability": LazyCommand(
         "fourbar_lab.stability:stability",
         "Measure the error of every output against 50-digit arithmetic.",
     ),
-    "bench": Listed(
+    "bench": LazyCommand(
         "fourbar_lab.bench:bench",
         "Time NumPy, C and the 13x13 system side by side; ratios that must hold.",
     ),
-    "effects": Listed(
+    "effects": LazyCommand(
         "fourbar_lab.effects:effects",
         "Time each effect in each engine, and each flag of MuJoCo; a minute.",
     ),
-    "worlds": Listed(
+    "worlds": LazyCommand(
         "fourbar_lab.worlds:worlds_command",
         "Time torque and pin forces of many positions at once, on a GPU.",
     ),
-    "advice": Listed(
+    "advice": LazyCommand(
         "fourbar_lab.advice:advice_command",
         "Measure the advice on random linkages.",
     ),
-    "fuzz": Listed(
+    "fuzz": LazyCommand(
         "fourbar_lab.fuzz:fuzz",
         "Put random scenes through files, formulas and exact engines.",
     ),
-    "fuzz-files": Listed(
+    "fuzz-files": LazyCommand(
         "fourbar_lab.fuzz_files:fuzz_files",
         "Read mutated scene files.",
     ),
-    "faults": Listed(
+    "faults": LazyCommand(
         "fourbar_lab.faults:faults_command",
         "Make each fault of faults.toml, one at a time; each must be caught.",
     ),
-    "mutants": Listed(
+    "mutants": LazyCommand(
         "fourbar_lab.mutants:mutants_command",
         "Change operators and numbers of the formulas, one at a time.",
     ),
-    "findings": Listed(
+    "findings": LazyCommand(
         "fourbar_lab.simulators.findings:findings_command",
         "Run the scripts of docs/findings where their simulators are installed.",
     ),
-    "write": Listed(
+    "write": LazyCommand(
         "fourbar_lab.write:write_command",
         "Write the MJCF of every scene in models/ for which it is stale.",
     ),
-    "problems": Listed(
+    "problems": LazyCommand(
         "fourbar_lab.simulators.problems:problems_command",
         "Write the problems of models/problems and their answers as JSON.",
     ),
-    "benchmark": Listed(
+    "benchmark": LazyCommand(
         "fourbar_lab.benchmark:benchmark_command",
         "Ask every engine every problem of models/problems.",
     ),

@@ -56,7 +56,7 @@ def test_the_last_worlds_are_judged_and_every_world_has_a_state() -> None:
     check_errors(MUJOCO, cost.torque, cost.force)
     assert cost.first > 0.5 * cost.seconds and cost.exchanged > 0.5 * cost.seconds
     scene, command = ask_position()
-    written = mujoco_c.text(scene, 100, "mujoco")
+    written = mujoco_c.write_opened_mjcf(scene, 100, "mujoco")
     q, v = repeat_states(written, scene, TWO_TURNS)
     turned = np.remainder(q[:, 0] - np.resize(command.theta_2, TWO_TURNS), math.tau)
     assert np.minimum(turned, math.tau - turned).max() < 1e-12

@@ -13,7 +13,7 @@ from fourbar.errors import run
 from fourbar_validation.places import HARNESS_PROGRAM
 
 
-class Listed(NamedTuple):
+class LazyCommand(NamedTuple):
     """A command as the help lists it, which imports nothing."""
 
     target: str
@@ -25,47 +25,47 @@ class Listed(NamedTuple):
 
 
 COMMANDS = {
-    "run": Listed(
+    "run": LazyCommand(
         "fourbar_validation.run.command:run_command",
         "Judge scenes and write a report.",
         "filelock",
     ),
-    "collect": Listed(
+    "collect": LazyCommand(
         "fourbar_validation.run.parts:collect_command",
         "Put together the parts of a run.",
         "filelock",
     ),
-    "accept": Listed(
+    "accept": LazyCommand(
         "fourbar_validation.regression.accept:accept_command",
         "Record a run as the accepted state.",
     ),
-    "compare": Listed(
+    "compare": LazyCommand(
         "fourbar_validation.regression.accept:compare_command",
         "Say what changed from OLD to NEW.",
     ),
-    "check": Listed(
+    "check": LazyCommand(
         "fourbar_validation.check:check_command",
         "Judge your own torques and forces.",
     ),
-    "loops": Listed(
+    "loops": LazyCommand(
         "fourbar_validation.robots.command:robot_command",
         "List the closed loops of a robot's MJCF or SDF.",
     ),
-    "check-mjcf": Listed(
+    "check-mjcf": LazyCommand(
         "fourbar_validation.robots.check:check_mjcf_command",
         "Measure the loops of your own MJCF or SDF in MuJoCo, or judge one by a scene.",
         "mujoco",
     ),
-    "published": Listed(
+    "published": LazyCommand(
         "fourbar_validation.published.comparison:published",
         "Compare the figures of the sources with ours.",
     ),
-    "cost": Listed(
+    "cost": LazyCommand(
         "fourbar_validation.cost.cost:cost",
         "Measure what accuracy costs in time.",
         "mujoco",
     ),
-    "advise": Listed(
+    "advise": LazyCommand(
         "fourbar_validation.advise.advise:advise_command",
         "Find the cheapest MuJoCo settings.",
         "mujoco",
@@ -77,7 +77,7 @@ COMMANDS = {
 class LazyGroup(click.Group):
     """A group that imports a command only when it is called."""
 
-    def __init__(self, *, listed: Mapping[str, Listed], **settings: Any) -> None:
+    def __init__(self, *, listed: Mapping[str, LazyCommand], **settings: Any) -> None:
         super().__init__(**settings)
         self.listed = listed
 

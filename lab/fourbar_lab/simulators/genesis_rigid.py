@@ -18,7 +18,7 @@ from fourbar_lab.simulators.motion import (
     start,
     write_temp,
 )
-from fourbar_lab.simulators.mujoco_c import text
+from fourbar_lab.simulators.mujoco_c import write_opened_mjcf
 
 GENESIS_FLYWHEEL = 1e5
 """Inertia of the flywheel relative to the linkage's; beside 1e8 its solver leaves
@@ -70,7 +70,9 @@ class GenesisRigid(Simulator):
             show_viewer=False,
         )
         with write_temp(
-            text(scene, course.steps, "genesis", flywheel=GENESIS_FLYWHEEL),
+            write_opened_mjcf(
+                scene, course.steps, "genesis", flywheel=GENESIS_FLYWHEEL
+            ),
             "four_bar.xml",
         ) as file:
             bars = world.add_entity(genesis.morphs.MJCF(file=file, **of_morph))

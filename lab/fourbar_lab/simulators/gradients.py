@@ -14,7 +14,7 @@ from fourbar.quantities import Array
 from fourbar.scene import Scene, find_signs
 from fourbar.studies.keys import command_key, list_entries, read_number, replace_numbers
 from fourbar_lab.simulators.motion import start
-from fourbar_lab.simulators.mujoco_c import text
+from fourbar_lab.simulators.mujoco_c import write_opened_mjcf
 from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop, open_model
 
@@ -42,7 +42,7 @@ def compile_and_assemble(
 
     The state has the scene's speed.
     """
-    written = text(scene, STEPS_OF_A_TURN, reader)
+    written = write_opened_mjcf(scene, STEPS_OF_A_TURN, reader)
     loop = ClosedLoop(written)
     model, data = open_model(written)
     signs = find_signs(scene.linkage, np.array([theta_2]), scene.motion.branch)

@@ -36,7 +36,9 @@ _BY_DEFAULT = {
 """Attributes that "its defaults" leaves to MuJoCo."""
 
 
-def text(scene: Scene, steps: int, simulator: str | None, **settings: Any) -> str:
+def write_opened_mjcf(
+    scene: Scene, steps: int, simulator: str | None, **settings: Any
+) -> str:
     """Return the MJCF of a scene that opens at the simulators' common start.
 
     Parameters
@@ -155,7 +157,9 @@ class MujocoFile(Simulator):
 
     def through(self, scene: Scene, course: Course) -> Readings:
         """Run through a course."""
-        model, data = open_model(text(scene, course.steps, self.settings[self.setting]))
+        model, data = open_model(
+            write_opened_mjcf(scene, course.steps, self.settings[self.setting])
+        )
         advance = partial(mujoco.mj_step, model, data)
         return run_through(
             scene,
@@ -166,7 +170,9 @@ class MujocoFile(Simulator):
 
     def states(self, scene: Scene) -> Readings:
         """Evaluate single states, each set by itself."""
-        written = text(scene, DEFAULT_STEPS_OF_A_TURN, self.settings[self.setting])
+        written = write_opened_mjcf(
+            scene, DEFAULT_STEPS_OF_A_TURN, self.settings[self.setting]
+        )
         model, data = open_model(written)
         readings = Readings()
         for q, v in states_of(written, scene):
@@ -176,7 +182,9 @@ class MujocoFile(Simulator):
 
     def in_worlds(self, scene: Scene, worlds: int) -> Worlds:
         """Prepare single states of many worlds, one after the other on one core."""
-        written = text(scene, DEFAULT_STEPS_OF_A_TURN, self.settings[self.setting])
+        written = write_opened_mjcf(
+            scene, DEFAULT_STEPS_OF_A_TURN, self.settings[self.setting]
+        )
         model, data = open_model(written)
         q, v = repeat_states(written, scene, worlds)
         shapes = ((model.nv,), (model.nu,), (2,), (model.nbody, 6))

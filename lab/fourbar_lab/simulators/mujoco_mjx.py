@@ -27,7 +27,7 @@ from fourbar_lab.simulators.mujoco_c import (
     reading,
     repeat_states,
     states_of,
-    text,
+    write_opened_mjcf,
 )
 from fourbar_validation.engines.mujoco.closed_loop import open_model
 
@@ -79,7 +79,9 @@ class MujocoMjx(Simulator):
 
     def through(self, scene: Scene, course: Course) -> Readings:
         """Run through a course."""
-        model, data = open_model(text(scene, course.steps, self.settings[self.setting]))
+        model, data = open_model(
+            write_opened_mjcf(scene, course.steps, self.settings[self.setting])
+        )
         theirs = mjx.put_model(model)
         state = mjx.put_data(model, data)
         jax.block_until_ready(
@@ -101,7 +103,9 @@ class MujocoMjx(Simulator):
 
     def states(self, scene: Scene) -> Readings:
         """Evaluate single states, each set by itself."""
-        written = text(scene, DEFAULT_STEPS_OF_A_TURN, self.settings[self.setting])
+        written = write_opened_mjcf(
+            scene, DEFAULT_STEPS_OF_A_TURN, self.settings[self.setting]
+        )
         model, data = open_model(written)
         theirs = mjx.put_model(model)
         state = mjx.put_data(model, data)
@@ -125,7 +129,7 @@ class MujocoMjx(Simulator):
         reader = "warp"
         if double:
             reader = self.settings[self.setting]
-        written = text(scene, DEFAULT_STEPS_OF_A_TURN, reader)
+        written = write_opened_mjcf(scene, DEFAULT_STEPS_OF_A_TURN, reader)
         model, data = open_model(written)
         q, v = repeat_states(written, scene, worlds)
         with jax.enable_x64(double):

@@ -29,7 +29,7 @@ from fourbar_lab.simulators.mujoco_c import (
     reading,
     repeat_states,
     states_of,
-    text,
+    write_opened_mjcf,
 )
 from fourbar_validation.engines.mujoco.closed_loop import open_model
 
@@ -55,7 +55,7 @@ class MujocoWarp(Simulator):
 
     def through(self, scene: Scene, course: Course) -> Readings:
         """Run through a course."""
-        model, data = open_model(text(scene, course.steps, "warp"))
+        model, data = open_model(write_opened_mjcf(scene, course.steps, "warp"))
         times = self.settings[self.setting]
         theirs = mjw.put_model(model)
         state = mjw.put_data(model, data)
@@ -77,7 +77,7 @@ class MujocoWarp(Simulator):
 
     def states(self, scene: Scene) -> Readings:
         """Evaluate single states, each set by itself."""
-        written = text(scene, DEFAULT_STEPS_OF_A_TURN, "warp")
+        written = write_opened_mjcf(scene, DEFAULT_STEPS_OF_A_TURN, "warp")
         model, data = open_model(written)
         theirs = mjw.put_model(model)
         state = mjw.put_data(model, data)
@@ -95,7 +95,7 @@ class MujocoWarp(Simulator):
 
         On a GPU the kernels are launched as one graph.
         """
-        written = text(scene, DEFAULT_STEPS_OF_A_TURN, "warp")
+        written = write_opened_mjcf(scene, DEFAULT_STEPS_OF_A_TURN, "warp")
         model, data = open_model(written)
         q, v = (
             array.astype(np.float32) for array in repeat_states(written, scene, worlds)

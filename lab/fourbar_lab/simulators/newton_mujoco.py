@@ -18,7 +18,7 @@ from fourbar_lab.simulators.motion import (
     start,
     write_temp,
 )
-from fourbar_lab.simulators.mujoco_c import reading, text
+from fourbar_lab.simulators.mujoco_c import reading, write_opened_mjcf
 
 
 class NewtonMujoco(Simulator):
@@ -37,7 +37,9 @@ class NewtonMujoco(Simulator):
     def through(self, scene: Scene, course: Course) -> Readings:
         """Run through a course."""
         builder = newton.ModelBuilder(gravity=gravity_field(scene))
-        with write_temp(text(scene, course.steps, "newton"), "four_bar.xml") as file:
+        with write_temp(
+            write_opened_mjcf(scene, course.steps, "newton"), "four_bar.xml"
+        ) as file:
             builder.add_mjcf(file)
         model = builder.finalize(device=warp.get_preferred_device())
         solver = newton.solvers.SolverMuJoCo(model)

@@ -18,8 +18,8 @@ from fourbar.quantities import Array
 from fourbar_validation.compare.tolerance import EPS
 from fourbar_validation.published.thirteen import EquationTerms, assemble_equations
 
-_PINS = ("F12", "F32", "F23", "F43", "F14", "F34")
-PRINTED_UNKNOWNS = (*(f"{pin}{axis}" for pin in _PINS for axis in "xy"), "T4")
+_PRINTED_FORCES = ("F12", "F32", "F23", "F43", "F14", "F34")
+PRINTED_UNKNOWNS = (*(f"{pin}{axis}" for pin in _PRINTED_FORCES for axis in "xy"), "T4")
 BAR_LENGTHS = (20.0, 48.0, 55.0, 20.0)
 """Bars 1 to 4, cm."""
 MASSES = {2: 57.0, 3: 0.544, 4: 0.2}
