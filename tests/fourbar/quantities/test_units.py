@@ -4,9 +4,7 @@ The same numbers as SI gives, and one line for a mistake.
 """
 
 import math
-from collections.abc import Callable
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +16,7 @@ from fourbar.files import loads
 from fourbar.quantities.units import DEFINITIONS, UnitError, half_unit_of_text, to_si
 
 ENDS = Place(1, (0.1, 0.0)), Place(4, (0.2, np.pi))
-SAME: list[tuple[Callable[..., Any], tuple[Any, ...], tuple[Any, ...]]] = [
+SAME = [
     (
         fourbar.Bar,
         ("10 cm", "200 g", "2 kg cm^2", ("5 cm", "180 deg")),
@@ -36,10 +34,7 @@ SAME: list[tuple[Callable[..., Any], tuple[Any, ...], tuple[Any, ...]]] = [
     (fourbar.Point, ("P", 3, ("5 cm", "180 deg")), ("P", 3, (0.05, np.pi))),
     (
         lambda bar, force, at, moment: fourbar.Load(
-            bar,
-            force,
-            from_pin=at,
-            moment=moment,
+            bar, force, from_pin=at, moment=moment
         ),
         (4, ("2 kN", "180 deg"), ("5 cm", 0), "3 N cm"),
         (4, (2000.0, np.pi), (0.05, 0.0), 0.03),
@@ -63,7 +58,7 @@ SAME: list[tuple[Callable[..., Any], tuple[Any, ...], tuple[Any, ...]]] = [
             "2 N/mm",
             "5 cm",
             "3 N",
-        ),  # type: ignore[arg-type]
+        ),
         (*ENDS, 2000.0, 0.05, 3.0),
     ),
     (
@@ -75,23 +70,19 @@ SAME: list[tuple[Callable[..., Any], tuple[Any, ...], tuple[Any, ...]]] = [
 
 
 @pytest.mark.parametrize(("make", "texts", "numbers"), SAME)
-def test_a_text_with_a_unit_is_its_number(
-    make,
-    texts,
-    numbers,
-):
+def test_a_text_with_a_unit_is_its_number(make, texts, numbers):
     assert make(*texts) == make(*numbers)
 
 
 def test_a_motion_is_written_as_in_the_file():
-    stated = fourbar.Motion(["10 deg", 1.0], "60 rpm", "30 deg/s^2", branch="crossed")  # type: ignore[arg-type]
+    stated = fourbar.Motion(["10 deg", 1.0], "60 rpm", "30 deg/s^2", branch="crossed")
     read = loads(
         '[lengths]\nground = "6 in"\ninput = "2 in"\n'
         'coupler = "5 in"\noutput = "4 in"\n'
         '[motion]\ntheta_2 = ["10 deg", "1 rad"]\nomega_2 = "60 rpm"\n'
         'alpha_2 = "30 deg/s^2"\nbranch = "crossed"\n'
     ).motion
-    assert np.array_equal(stated.theta_2, read.theta_2)  # type: ignore[arg-type]
+    assert np.array_equal(stated.theta_2, read.theta_2)
     assert (stated.omega_2, stated.alpha_2, stated.branch) == (
         read.omega_2,
         read.alpha_2,
@@ -141,7 +132,7 @@ FOOT, POUND, GRAVITY = (
     Fraction(980_665, 100_000),
 )
 """m; kg; m/s^2: exact by definition."""
-UNITS: dict[str, tuple[str, Fraction | int]] = {
+UNITS = {
     **dict.fromkeys(("meter", "m", "metre"), ("m", 1)),
     **dict.fromkeys(("inch", "in", "inches"), ("m", FOOT / 12)),
     **dict.fromkeys(("foot", "ft", "feet"), ("m", FOOT)),
@@ -181,7 +172,7 @@ UNITS: dict[str, tuple[str, Fraction | int]] = {
 SP 811 (2008), tables 1 to 8 and
 appendix B.8; slug, hp and PS by their definitions there.
 """
-PREFIXES: dict[str, int] = {
+PREFIXES = {
     **dict.fromkeys(("nano", "n"), -9),
     **dict.fromkeys(("micro", "\u00b5", "\u03bc", "u"), -6),
     **dict.fromkeys(("milli", "m"), -3),
@@ -271,11 +262,7 @@ def test_the_tables_name_every_unit_and_prefix():
         ("3 Nm", "N m", 3.0),
     ],
 )
-def test_units_are_read_as_people_write_them(
-    text,
-    unit,
-    value,
-):
+def test_units_are_read_as_people_write_them(text, unit, value):
     assert to_si(text, unit) == value
 
 

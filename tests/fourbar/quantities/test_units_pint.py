@@ -48,7 +48,7 @@ def test_effects_and_loads_take_them():
 )
 def test_what_is_no_length_is_refused(quantity, sentence):
     with pytest.raises(InputError, match=sentence):
-        fourbar.Bar(quantity)  # type: ignore[arg-type]
+        fourbar.Bar(quantity)
 
 
 def test_hertz_are_no_speed():

@@ -38,13 +38,13 @@ gas = { extended = "EXTENDED", stroke = "STROKE", extended_force = "300 N" }
 distance^2 = 0.2^2 + 0.3^2 + 2 0.2 0.3 sin(theta_2)."""
 
 
-def reach(distance: float) -> str:
+def reach(distance):
     """Return the angle at which the ends are so far apart, as it is printed."""
     sine = (distance**2 - 0.2**2 - 0.3**2) / (2.0 * 0.2 * 0.3)
     return f"{math.degrees(math.asin(sine)):.4g} deg"
 
 
-def write(folder: Path, extended: str, stroke: str) -> str:
+def write(folder, extended, stroke):
     file = folder / "hatch.toml"
     text = HATCH.replace("EXTENDED", extended).replace("STROKE", stroke)
     file.write_text(text, encoding="utf-8")
@@ -118,11 +118,7 @@ MOTIONS = {
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
-def test_ends_are_found_whatever_is_commanded(
-    motion: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_ends_are_found_whatever_is_commanded(motion, tmp_path, capsys):
     file = Path(write(tmp_path, "400 mm", "150 mm"))
     text = file.read_text(encoding="utf-8").replace(SWEEP, MOTIONS[motion])
     if motion == "a stroke":
@@ -141,10 +137,7 @@ def test_ends_are_found_whatever_is_commanded(
     assert f"extended length of 400 mm {expected[motion]}" in printed
 
 
-def test_between_the_positions_of_a_list_nothing_is_located(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_between_the_positions_of_a_list_nothing_is_located(tmp_path, capsys):
     file = Path(write(tmp_path, "400 mm", "150 mm"))
     listed = 'theta_2 = ["10 deg", "80 deg", "12 deg", "50 deg"]\n'
     text = file.read_text(encoding="utf-8").replace(SWEEP, listed)
@@ -154,7 +147,7 @@ def test_between_the_positions_of_a_list_nothing_is_located(
     assert "at theta_2 = 80 deg and from theta_2 = 50 deg on" in printed
 
 
-def told(text: str) -> str:
+def told(text):
     """Return the block of a scene in one line."""
     scene = fourbar.files.loads(text)
     return " ".join(" ".join(write_block(scene, fourbar.solve(scene))).split())
@@ -162,7 +155,7 @@ def told(text: str) -> str:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("length", ["400 mm", "600 mm"])
-def test_a_spring_that_changes_its_sense_is_told_where(length: str) -> None:
+def test_a_spring_that_changes_its_sense_is_told_where(length):
     """It pulls from where its ends are farther apart than its length."""
     spring = f'stiffness = "500 N/m"\nlength = "{length}"'
     text = re.sub(r"gas = .*", spring, HATCH)
@@ -191,7 +184,7 @@ def test_a_spring_that_changes_its_sense_is_told_where(length: str) -> None:
         ('bar = 2\nforce = ["1 N", "0 deg"]\narm = ["1 mm", "0 deg"]', ""),
     ],
 )
-def test_a_place_that_is_taken_is_named(load: str, said: str) -> None:
+def test_a_place_that_is_taken_is_named(load, said):
     """Bar 2 has a mass, whose centre the arm counts from."""
     block = told(f"{HATCH.partition('[effects]')[0]}[[loads]]\n{load}\n")
     assert said in block

@@ -13,7 +13,6 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from importlib.util import find_spec
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -42,25 +41,25 @@ PNG = base64.b64decode(
 class Tags(HTMLParser):
     """Every tag with its attributes, and the text of script elements."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text):
         super().__init__()
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self.scripts: list[str] = []
+        self.tags = []
+        self.scripts = []
         self.feed(text)
 
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+    def handle_starttag(self, tag, attrs):
         self.tags.append((tag, dict(attrs)))
 
-    def handle_data(self, data: str) -> None:
+    def handle_data(self, data):
         if self.tags and self.tags[-1][0] == "script":
             self.scripts.append(data)
 
 
-def embedded(page: str) -> dict:
+def embedded(page):
     return json.loads(Tags(page).scripts[0])
 
 
-def test_embedded_numbers_are_those_of_solve_on_both_branches() -> None:
+def test_embedded_numbers_are_those_of_solve_on_both_branches():
     scene = crank_rocker()
     data = embedded(animate.write_page(scene))
     for sign in (1, -1):
@@ -86,7 +85,7 @@ def test_embedded_numbers_are_those_of_solve_on_both_branches() -> None:
     np.testing.assert_array_equal(data["theta_2"], fourbar.solve(scene).theta_2)
 
 
-def test_a_single_position_is_one_of_the_rows_and_the_first_shown() -> None:
+def test_a_single_position_is_one_of_the_rows_and_the_first_shown():
     theta_2 = math.radians(123.456)
     data = embedded(animate.write_page(thesis(theta_2)))
     assert data["theta_2"][data["start"]] == theta_2
@@ -98,8 +97,7 @@ def test_a_single_position_is_one_of_the_rows_and_the_first_shown() -> None:
 
 
 RELEASED = crank_rocker(
-    motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(1.8, 90)),
-    drive_bar=2,
+    motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(1.8, 90)), drive_bar=2
 )
 
 
@@ -109,7 +107,7 @@ RELEASED = crank_rocker(
     [fourbar.Sweep(0.0, 2.0 * math.pi, 12), fourbar.Sweep(3.0, 1.0, 12), 1.0],
     ids=["turn", "backwards", "one position"],
 )
-def test_what_is_solved_already_changes_no_number(angles: object) -> None:
+def test_what_is_solved_already_changes_no_number(angles):
     scene = crank_rocker(motion=fourbar.Motion(angles, 10.0))
     plain = animate.collect_live_data(scene, signs=(1, -1))
     solved = fourbar.solve(scene)
@@ -118,7 +116,7 @@ def test_what_is_solved_already_changes_no_number(angles: object) -> None:
 
 
 @pytest.mark.slow
-def test_a_free_motion_is_embedded_instant_by_instant() -> None:
+def test_a_free_motion_is_embedded_instant_by_instant():
     data, solution = embedded(animate.write_page(RELEASED)), fourbar.solve(RELEASED)
     (columns,) = data["branches"].values()
     np.testing.assert_array_equal(data["time"], solution.time)
@@ -135,10 +133,7 @@ def test_a_free_motion_is_embedded_instant_by_instant() -> None:
     ("duration", "rate"),
     [(0.2, 0.1), (1.4e-3, 1e-4), (30.0, 1.0), (6e3, 100.0), (6.1e3, 1e3)],
 )
-def test_what_is_too_quick_to_see_is_slowed_down_by_a_power_of_ten(
-    duration: float,
-    rate: float,
-) -> None:
+def test_what_is_too_quick_to_see_is_slowed_down_by_a_power_of_ten(duration, rate):
     law = Law((0.0, 0.5 * duration, duration), (0.0, 1.0, 2.0), ends="rest")
     data = embedded(animate.write_page(crank_rocker(motion=fourbar.Motion(law=law))))
     assert data["rate"] == pytest.approx(rate)
@@ -146,7 +141,7 @@ def test_what_is_too_quick_to_see_is_slowed_down_by_a_power_of_ten(
     assert len(data["branches"]["1"]["torque"]) == 361
 
 
-def test_positions_that_do_not_assemble_are_null() -> None:
+def test_positions_that_do_not_assemble_are_null():
     data = embedded(animate.write_page(thesis(fourbar.Sweep(0.0, 2 * math.pi, 360))))
     solution = fourbar.solve(
         replace(thesis(), motion=fourbar.Motion(np.array(data["theta_2"]), 0.2244))
@@ -157,7 +152,7 @@ def test_positions_that_do_not_assemble_are_null() -> None:
     assert data["branches"]["1"]["F12"][30] == [None, None]
 
 
-def test_a_fine_sweep_is_thinned_evenly_and_says_so() -> None:
+def test_a_fine_sweep_is_thinned_evenly_and_says_so():
     scene = crank_rocker(
         motion=fourbar.Motion(fourbar.Sweep(0.0, 2 * math.pi, 36_000), 1.0)
     )
@@ -169,7 +164,7 @@ def test_a_fine_sweep_is_thinned_evenly_and_says_so() -> None:
     assert data["positions"] == 36_001
 
 
-def test_nothing_is_fetched_and_hostile_text_stays_text() -> None:
+def test_nothing_is_fetched_and_hostile_text_stays_text():
     page = animate.write_page(replace(crank_rocker(), title=HOSTILE, source=HOSTILE))
     tags = Tags(page).tags
     assert [name for name, _ in tags].count("script") == 2
@@ -186,12 +181,11 @@ def test_nothing_is_fetched_and_hostile_text_stays_text() -> None:
     assert loads(embedded(page)["toml"]).title == HOSTILE
 
 
-def test_the_policy_of_the_page_allows_its_own_script_and_nothing_else() -> None:
+def test_the_policy_of_the_page_allows_its_own_script_and_nothing_else():
     import hashlib
 
     page = animate.write_page(crank_rocker())
     policy = next(a["content"] for name, a in Tags(page).tags if a.get("http-equiv"))
-    assert policy is not None
     assert "default-src 'none'" in policy
     assert "unsafe" not in policy
     script = page[page.rindex("<script>") + len("<script>") : page.rindex("</script>")]
@@ -209,25 +203,18 @@ def test_the_policy_of_the_page_allows_its_own_script_and_nothing_else() -> None
         ("wheel", PNG, "must name one of input, coupler, output"),
     ],
 )
-def test_what_is_no_picture_is_refused(
-    tmp_path: Path,
-    bar: str,
-    content: bytes | None,
-    message: str,
-) -> None:
+def test_what_is_no_picture_is_refused(tmp_path, bar, content, message):
     path = tmp_path / "picture.png"
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(InputError, match=message):
         animate.write_animation(
-            crank_rocker(),
-            tmp_path / "page.html",
-            pictures={bar: path},
+            crank_rocker(), tmp_path / "page.html", pictures={bar: path}
         )
     assert not (tmp_path / "page.html").exists()
 
 
-def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
+def test_what_cannot_be_shown_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"\.html, \.gif, \.mp4"):
         animate.write_animation(crank_rocker(), tmp_path / "a.avi")
     with pytest.raises(NotAssembledError):
@@ -239,15 +226,13 @@ def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
         animate.write_animation(crank_rocker(), tmp_path / "a.gif", seconds=math.nan)
     with pytest.raises(InputError, match="html page only"):
         animate.write_animation(
-            crank_rocker(),
-            tmp_path / "a.gif",
-            pictures={"input": tmp_path / "x.png"},
+            crank_rocker(), tmp_path / "a.gif", pictures={"input": tmp_path / "x.png"}
         )
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow
-def test_a_gif_moves_the_linkage(tmp_path: Path) -> None:
+def test_a_gif_moves_the_linkage(tmp_path):
     from PIL import Image
 
     animate.write_animation(crank_rocker(), tmp_path / "a.gif", seconds=0.2)
@@ -265,20 +250,16 @@ def test_a_gif_moves_the_linkage(tmp_path: Path) -> None:
     shutil.which("ffmpeg") is None and find_spec("imageio_ffmpeg") is None,
     reason="neither ffmpeg nor imageio-ffmpeg",
 )
-def test_an_mp4_is_written(tmp_path: Path) -> None:
+def test_an_mp4_is_written(tmp_path):
     animate.write_animation(thesis(), tmp_path / "a.mp4", seconds=0.2)
     assert (tmp_path / "a.mp4").read_bytes()[4:8] == b"ftyp"
 
 
-def test_without_ffmpeg_an_mp4_is_refused_in_one_line(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_without_ffmpeg_an_mp4_is_refused_in_one_line(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(
-        DependencyError,
-        match=r"^an \.mp4 film needs the program ffmpeg[^\n]*$",
+        DependencyError, match=r"^an \.mp4 film needs the program ffmpeg[^\n]*$"
     ):
         animate.write_animation(crank_rocker(), tmp_path / "a.mp4")
     assert not list(tmp_path.iterdir())
@@ -286,10 +267,7 @@ def test_without_ffmpeg_an_mp4_is_refused_in_one_line(
 
 @pytest.mark.slow
 @pytest.mark.posix
-def test_an_ffmpeg_without_the_encoder_is_named(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_ffmpeg_without_the_encoder_is_named(tmp_path, monkeypatch):
     program = tmp_path / "bin" / "ffmpeg"
     program.parent.mkdir()
     program.write_text("#!/bin/sh\nexit 1\n")
@@ -302,9 +280,8 @@ def test_an_ffmpeg_without_the_encoder_is_named(
 
 @pytest.mark.slow
 def test_a_film_of_a_free_motion_runs_forward_and_as_long_as_it_does(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    tmp_path, monkeypatch
+):
     from PIL import Image
 
     shown = make_view(RELEASED)
@@ -327,9 +304,8 @@ under it.
 @pytest.mark.slow
 @pytest.mark.parametrize("moving", [False, True])
 def test_a_frame_is_the_whole_figure_though_what_stands_still_is_drawn_once(
-    monkeypatch: pytest.MonkeyPatch,
-    moving: bool,
-) -> None:
+    monkeypatch, moving
+):
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     drawn = []
@@ -354,7 +330,7 @@ def test_a_frame_is_the_whole_figure_though_what_stands_still_is_drawn_once(
             assert differs.mean() < OTHER_ORDER, index
 
 
-def test_instant_centres_are_no_curves_of_the_page() -> None:
+def test_instant_centres_are_no_curves_of_the_page():
     columns = animate._collect_columns(fourbar.solve(crank_rocker()))
     assert "torque" in columns and "theta_4" in columns
     assert columns.keys().isdisjoint(animate.CENTRES)

@@ -25,23 +25,23 @@ D, A, B, C = 0.3, 0.1, 0.25, 0.22
 TURN = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, math.tau, 360), 10.0))
 
 
-def block(scene: fourbar.Scene, **options: object) -> str:
-    lines = write_block(scene, fourbar.solve(scene, find_last_stage(scene)), **options)  # type: ignore[arg-type]
+def block(scene, **options):
+    lines = write_block(scene, fourbar.solve(scene, find_last_stage(scene)), **options)
     assert max(map(len, lines)) <= BLOCK_WIDTH, lines
     return "\n".join(lines)
 
 
-def plain(text: str) -> str:
+def plain(text):
     """One line, for phrases that the width of the block breaks."""
     return " ".join(text.split())
 
 
-def opposite(side: float, first: float, second: float) -> float:
+def opposite(side, first, second):
     return math.acos((first**2 + second**2 - side**2) / (2.0 * first * second))
 
 
 @pytest.mark.slow
-def test_where_the_assembly_ends_is_the_limit_of_the_commanded_bar() -> None:
+def test_where_the_assembly_ends_is_the_limit_of_the_commanded_bar():
     text, scene = plain(block(thesis(fourbar.Sweep(0.0, math.tau, 360)))), thesis()
     limits = fourbar.limit_positions(scene.linkage, 2)
     ends = sorted({f"{math.degrees(limit.theta_2) % 360.0:.4g}" for limit in limits})
@@ -52,8 +52,7 @@ def test_where_the_assembly_ends_is_the_limit_of_the_commanded_bar() -> None:
         end for stretch in facts.motion.stretches for end in stretch if end is not None
     ]
     assert sorted(bounds) == pytest.approx(
-        sorted(limit.theta_2 % math.tau for limit in limits),
-        abs=1e-12,
+        sorted(limit.theta_2 % math.tau for limit in limits), abs=1e-12
     )
     assert (
         f"assembles up to theta_2 = {ends[0]} deg, and from theta_2 = {ends[1]} deg"
@@ -66,14 +65,12 @@ def test_where_the_assembly_ends_is_the_limit_of_the_commanded_bar() -> None:
     assert re.search(r"361 positions: \d+ ok, \d+ not assembled", text)
 
 
-def test_the_block_has_the_numbers_of_the_facts() -> None:
+def test_the_block_has_the_numbers_of_the_facts():
     facts = summarize(TURN, fourbar.solve(TURN, "error"))
     text = "\n".join(write_facts(facts))
     duty, peak = facts.duty, facts.peak
-    assert duty is not None and peak is not None
 
-    def write(number: float | None, factor: float = 1e3) -> str:
-        assert number is not None
+    def write(number, factor=1e3):
         return f"{factor * number:.4g}"
 
     degrees = 180.0 / math.pi
@@ -101,7 +98,7 @@ def test_the_block_has_the_numbers_of_the_facts() -> None:
 
 
 @pytest.mark.slow
-def test_each_kind_of_motion_shows_what_it_has_and_nothing_else() -> None:
+def test_each_kind_of_motion_shows_what_it_has_and_nothing_else():
     block_of = lambda **motion: block(crank_rocker(motion=fourbar.Motion(**motion)))  # noqa: E731
     positions = block_of(theta_2=fourbar.Sweep(0.0, math.tau, 36))
     assert (
@@ -149,7 +146,7 @@ def test_each_kind_of_motion_shows_what_it_has_and_nothing_else() -> None:
     assert re.search(r"^  at       0?\S+ s", released, re.MULTILINE)
 
 
-def test_friction_at_rest_gives_the_range_that_it_holds() -> None:
+def test_friction_at_rest_gives_the_range_that_it_holds():
     scene = crank_rocker(
         motion=fourbar.Motion(1.0, 0.0),
         effects=(fourbar.Gravity(), fourbar.Friction.at(O2=0.5)),
@@ -159,20 +156,16 @@ def test_friction_at_rest_gives_the_range_that_it_holds() -> None:
         r"at rest  (\S+) mN m to (\S+) mN m: dry friction holds it between them",
         block(scene),
     )
-    assert row is not None
     assert [float(x) for x in row.groups()] == pytest.approx(
-        [1e3 * s.torque_low[0], 1e3 * s.torque_high[0]],
-        rel=6e-4,
+        [1e3 * s.torque_low[0], 1e3 * s.torque_high[0]], rel=6e-4
     )
     assert s.torque_high[0] - s.torque_low[0] == pytest.approx(1.0)
 
 
-def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore() -> None:
+def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore():
     """A cylinder can have difference and sum of its ends' distances from the pivot."""
     motion = fourbar.Motion(
-        stroke=fourbar.Sweep(0.17, 0.33, 40),
-        stroke_speed=0.2,
-        side="left",
+        stroke=fourbar.Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left"
     )
     scene = crank_rocker(motion=motion, drive=CYLINDER)
     text, s = plain(block(scene, pressure=210e5)), fourbar.solve(scene)
@@ -191,19 +184,18 @@ def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore() -> None:
     )
     right = replace(scene, motion=motion.replace(side="right"))
     assert summarize(right, fourbar.solve(right)).stroke_limits == pytest.approx(
-        (0.16, 0.34),
-        abs=1e-6,
+        (0.16, 0.34), abs=1e-6
     )
 
 
-def test_a_cylinder_that_nothing_loads_has_its_range_too() -> None:
+def test_a_cylinder_that_nothing_loads_has_its_range_too():
     motion = fourbar.Motion(stroke=fourbar.Sweep(0.17, 0.33, 40), side="left")
     bars = fourbar.FourBar(0.3, *map(fourbar.Bar, (0.1, 0.25, 0.22)))
     text = plain(block(fourbar.Scene(bars, motion, drive=CYLINDER)))
     assert "stroke 170 mm to 330 mm; assembles from 160 mm to 340 mm" in text
 
 
-def test_a_bore_is_that_of_the_motion_and_not_of_its_positions() -> None:
+def test_a_bore_is_that_of_the_motion_and_not_of_its_positions():
     """The couple on the crank is largest at 101.3 deg, between two positions."""
     corners = tuple(np.radians((0.0, 95.0, 101.3, 107.0, 360.0)))
     table = fourbar.Table(corners, (1.0, 1.0, 50.0, 1.0, 1.0))
@@ -223,7 +215,7 @@ def test_a_bore_is_that_of_the_motion_and_not_of_its_positions() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("bar", (2, 3))
-def test_a_cylinder_assembles_from_where_its_ends_meet(bar: int) -> None:
+def test_a_cylinder_assembles_from_where_its_ends_meet(bar):
     """The ends lie as far from O2, or the ground's end is on the path of the other,
     which passes it at theta_2 = 40 deg.
     """
@@ -241,14 +233,13 @@ def test_a_cylinder_assembles_from_where_its_ends_meet(bar: int) -> None:
         moving = fourbar.Place(3, (0.1, 0.0))
     pushed = replace(scene, drive_bar=None, drive=fourbar.LinearDrive(ground, moving))
     limits = summarize(pushed, fourbar.solve(pushed)).stroke_limits
-    assert limits is not None
     assert limits[0] == 0.0
     assert "assembles from 0 mm to" in block(pushed)
     if bar == 2:
         assert limits[1] == pytest.approx(0.2, rel=1e-12)
 
 
-def test_the_command_line_states_the_bore(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line_states_the_bore(capsys):
     path = Path(__file__).parents[3] / "models" / "gallery" / "excavator_bucket.toml"
     assert status(["analyze", str(path), "--pressure", "3000 psi"]) == 0
     force = np.nanmax(fourbar.solve(fourbar.load(path)).drive_force)
@@ -256,10 +247,7 @@ def test_the_command_line_states_the_bore(capsys: pytest.CaptureFixture[str]) ->
     assert f"  bore     at least {bore:.4g} mm to push" in capsys.readouterr().out
 
 
-def test_units_follow_the_file(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_units_follow_the_file(tmp_path, capsys):
     for length, shown in (("12 in", "lbf in"), ("1.5ft", "lbf in"), ("300 mm", "mN m")):
         assert ("in" in dict(suit_units(length)).get("m", ("",))) == (shown == "lbf in")
     assert (
@@ -283,10 +271,7 @@ def test_units_follow_the_file(
     )
 
 
-def test_a_new_scene_has_weight_and_sixty_turns_a_minute(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_new_scene_has_weight_and_sixty_turns_a_minute(tmp_path, capsys):
     assert (
         status(
             [
@@ -310,9 +295,7 @@ def test_a_new_scene_has_weight_and_sixty_turns_a_minute(
     assert 12 <= len(capsys.readouterr().out.splitlines()) <= 19
 
 
-def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held() -> (
-    None
-):
+def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held():
     """A friction couple of 0.5 N m at O2 holds the static torque within as much."""
     sweep = fourbar.Motion(fourbar.Sweep(0.2, 1.4, 6), 0.0)
     bare = crank_rocker(motion=sweep, effects=(fourbar.Gravity(),))
@@ -329,7 +312,7 @@ def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held()
 
 
 @pytest.mark.slow
-def test_each_position_at_rest_has_its_own_range() -> None:
+def test_each_position_at_rest_has_its_own_range():
     """Pin B stands against the coupler at 0 and 180 deg, pin O4 between positions.
 
     The torque jumps by each range while B reverses.
@@ -348,7 +331,6 @@ def test_each_position_at_rest_has_its_own_range() -> None:
         beside = held.ends[0] + np.array([-1e-9, 1e-9])
         motion = fourbar.Motion(beside, math.tau)
         torque = fourbar.solve(replace(scene, motion=motion)).torque
-        assert torque is not None
         assert sorted(torque) == pytest.approx([held.low, held.high], rel=1e-6)
     text = plain(block(scene))
     first, second = ([f"{held.low:.4g}", f"{held.high:.4g}"] for held in facts.held)
@@ -360,7 +342,7 @@ def test_each_position_at_rest_has_its_own_range() -> None:
     assert "of these positions" not in text and "without bound" not in text
 
 
-def test_a_reversal_of_a_motion_law_is_named_by_its_angle() -> None:
+def test_a_reversal_of_a_motion_law_is_named_by_its_angle():
     """Half of A (1 - cos) swings from 0.3 to 2.0 rad and back.
 
     O2 reverses at the far end, at t = 1 s.
@@ -369,8 +351,7 @@ def test_a_reversal_of_a_motion_law_is_named_by_its_angle() -> None:
     angle = 0.3 + 0.85 * (1.0 - np.cos(math.pi * time))
     law = Law(tuple(time), tuple(angle), steps=30, ends="rest")
     scene = crank_rocker(
-        motion=fourbar.Motion(law=law),
-        effects=(fourbar.Friction.at(O2=0.05),),
+        motion=fourbar.Motion(law=law), effects=(fourbar.Friction.at(O2=0.05),)
     )
     facts = summarize(scene, fourbar.solve(scene))
     ((place, pin),) = facts.motion.reversals
@@ -380,7 +361,7 @@ def test_a_reversal_of_a_motion_law_is_named_by_its_angle() -> None:
     )
 
 
-def test_digits_left_are_those_that_the_error_bar_leaves() -> None:
+def test_digits_left_are_those_that_the_error_bar_leaves():
     """A torque on bar 4 beside its dead centre.
 
     The whole digits of value over error bar.
@@ -407,9 +388,7 @@ def test_digits_left_are_those_that_the_error_bar_leaves() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("lengths", [(0.3, 0.4, 0.2, 0.25), (0.2, 0.25, 0.21, 0.22)])
 @pytest.mark.parametrize("bar", [2, 4])
-def test_a_range_that_is_left_out_is_printed_with_the_limits(
-    lengths: tuple[float, float, float, float], bar: int
-) -> None:
+def test_a_range_that_is_left_out_is_printed_with_the_limits(lengths, bar):
     """The program chooses one degree less at each end, which is no limit."""
     motion = fourbar.Motion(**{f"omega_{bar}": 1.0})
     scene = fourbar.Scene(fourbar.uniform(*lengths), motion)
@@ -426,7 +405,7 @@ def test_a_range_that_is_left_out_is_printed_with_the_limits(
     assert "inside its limits" not in plain(block(replace(scene, motion=motion)))
 
 
-def test_a_spring_that_the_cylinder_holds_end_to_end_loads_no_pin() -> None:
+def test_a_spring_that_the_cylinder_holds_end_to_end_loads_no_pin():
     """Massless bars, and both ends in common: what is left at the pins is rounding."""
     spring = fourbar.effects.Spring(CYLINDER.start, CYLINDER.end, 1e5, 0.5)
     at = fourbar.Motion([0.1, 0.4, 0.7], 1.0)
@@ -444,7 +423,7 @@ def test_a_spring_that_the_cylinder_holds_end_to_end_loads_no_pin() -> None:
     assert "bending" not in text and "rounding changes none" in text
 
 
-def test_rates_stand_in_place_of_zeros_where_nothing_acts() -> None:
+def test_rates_stand_in_place_of_zeros_where_nothing_acts():
     lengths = (0.1, 0.25, 0.22)
     bare = fourbar.FourBar(0.3, *map(fourbar.Bar, lengths))
     for linkage in (bare, fourbar.uniform(0.3, *lengths)):
@@ -462,7 +441,7 @@ def test_rates_stand_in_place_of_zeros_where_nothing_acts() -> None:
             assert rows["alpha"].endswith(f"{growth.value:.4g} rad/s²")
 
 
-def test_a_cell_that_is_rounding_of_its_column_is_zero_without_a_sign() -> None:
+def test_a_cell_that_is_rounding_of_its_column_is_zero_without_a_sign():
     values = np.array([0.0392, -1.7e-16, -0.0, np.nan, 0.02])
     assert write_cells(values) == ["0.0392", "0", "0", "-", "0.02"]
     assert write_cells(np.array([12.0, -1e-5, 30.0]), ".4f")[1] == "0.0000"

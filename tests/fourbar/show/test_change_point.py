@@ -22,10 +22,7 @@ PARALLELOGRAM = fourbar.FourBar(
 
 
 @pytest.mark.parametrize(("theta_2", "sense"), ((0.0, 1.0), (np.pi, -1.0)))
-def test_pin_forces_that_are_bounded_on_a_change_point_have_their_limit(
-    theta_2: float,
-    sense: float,
-) -> None:
+def test_pin_forces_that_are_bounded_on_a_change_point_have_their_limit(theta_2, sense):
     """Weights along the line of all bars ask for no moment there.
 
     On the frame the bars then act with their weights less m a, and each side has the
@@ -50,7 +47,7 @@ def test_pin_forces_that_are_bounded_on_a_change_point_have_their_limit(
         assert numbers(row)[:2] == pytest.approx(mean, rel=SIX_DIGITS, abs=1e-8)
 
 
-def test_pin_forces_that_have_no_bound_on_a_change_point_have_no_value() -> None:
+def test_pin_forces_that_have_no_bound_on_a_change_point_have_no_value():
     scene = fourbar.Scene(
         PARALLELOGRAM,
         fourbar.Motion(0.0, 6.0),
@@ -61,14 +58,14 @@ def test_pin_forces_that_have_no_bound_on_a_change_point_have_no_value() -> None
     assert rows[-1] == "on the change point no pin force has a limit"
 
 
-def ask_forces(scene: fourbar.Scene, name: str, value: float) -> list[str]:
+def ask_forces(scene, name, value):
     """Return the rows of pin forces where a named quantity has a value."""
     solution = fourbar.solve(scene, at=find_positions(scene, [(name, value)]))
     assert solution.status == ["change_point"]
     return PositionSheet(scene, solution, units("N m")).write_pin_forces()
 
 
-def test_a_commanded_stroke_has_the_limits_of_the_angle_that_it_commands() -> None:
+def test_a_commanded_stroke_has_the_limits_of_the_angle_that_it_commands():
     """At rest, along a cylinder at right angles to the line of all bars.
 
     Weights along the line ask for no force of the cylinder.
@@ -78,10 +75,7 @@ def test_a_commanded_stroke_has_the_limits_of_the_angle_that_it_commands() -> No
     swept = fourbar.Sweep(0.19, 0.22, 6)
     motion = fourbar.Motion(stroke=swept, side="right", stroke_speed=0.0)
     scene = fourbar.Scene(
-        PARALLELOGRAM,
-        motion,
-        drive=fourbar.LinearDrive(*ends),
-        effects=(along,),
+        PARALLELOGRAM, motion, drive=fourbar.LinearDrive(*ends), effects=(along,)
     )
     rows = ask_forces(scene, "stroke", float(np.hypot(0.2, 0.06)))
     assert rows[-1] == "on the change point: the limits from both sides"
@@ -91,7 +85,7 @@ def test_a_commanded_stroke_has_the_limits_of_the_angle_that_it_commands() -> No
 
 @pytest.mark.slow
 @pytest.mark.parametrize("direction", [0.0, -0.5 * np.pi])
-def test_a_release_has_the_limits_of_its_own_motion(direction: float) -> None:
+def test_a_release_has_the_limits_of_its_own_motion(direction):
     """No torque acts: forces are bounded under any weight.
 
     On the frame the bars act with their weights less m a. Each arm turns about the
@@ -113,18 +107,14 @@ def test_a_release_has_the_limits_of_its_own_motion(direction: float) -> None:
     shaking = numbers(rows[5])[:2]
     assert shaking == pytest.approx(weight - lost, rel=SIX_DIGITS, abs=1e-6)
     assert numbers(rows[1])[:2] == pytest.approx(
-        [-0.5 * x for x in shaking],
-        rel=SIX_DIGITS,
-        abs=1e-6,
+        [-0.5 * x for x in shaking], rel=SIX_DIGITS, abs=1e-6
     )
 
 
-def test_the_reason_is_said_where_a_law_begins() -> None:
+def test_the_reason_is_said_where_a_law_begins():
     law = fourbar.Rise("cycloidal", (1.0, 1.0), theta_2=0.0)
     scene = fourbar.Scene(
-        PARALLELOGRAM,
-        fourbar.Motion(law=law),
-        effects=(fourbar.Gravity(9.81, 0.0),),
+        PARALLELOGRAM, fourbar.Motion(law=law), effects=(fourbar.Gravity(9.81, 0.0),)
     )
     start = fourbar.solve(scene, at=command_at(scene, np.array([0.0])))
     assert start.status == ["change_point"]
@@ -142,7 +132,7 @@ def test_the_reason_is_said_where_a_law_begins() -> None:
         (0.0, "the release stands still there"),
     ],
 )
-def test_the_reason_is_said_where_a_release_begins(omega: float, why: str) -> None:
+def test_the_reason_is_said_where_a_release_begins(omega, why):
     scene = fourbar.Scene(
         PARALLELOGRAM,
         fourbar.Motion(0.0, omega, free=fourbar.Free(1.0, 10)),

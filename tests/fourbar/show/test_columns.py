@@ -15,12 +15,12 @@ from tests.support.scenes import TURN
 MODELS = Path(__file__).parents[3] / "models"
 
 
-def columns(scene: fourbar.Scene, names: str) -> dict[str, np.ndarray]:
+def columns(scene, names):
     read = choose_columns(scene, fourbar.solve(scene), names)
     return {column.name: column.values for column in read}
 
 
-def test_a_vector_is_its_size_and_a_place_two_coordinates() -> None:
+def test_a_vector_is_its_size_and_a_place_two_coordinates():
     s = fourbar.solve(TURN)
     read = columns(TURN, "theta_2, torque,F12,F12_x,P,v_P,a_P_y,I13")
     assert list(read) == [
@@ -34,7 +34,7 @@ def test_a_vector_is_its_size_and_a_place_two_coordinates() -> None:
     assert np.array_equal(read["a_P_y"], s.acceleration["P"][:, 1])
 
 
-def test_a_ratio_of_speeds_does_not_ask_for_a_speed() -> None:
+def test_a_ratio_of_speeds_does_not_ask_for_a_speed():
     """At rest, with the positions alone, and at any speed it is the same."""
     moving = columns(TURN, "omega_4/omega_2,v_P/v_J,v_B_x/omega_2")
     for speed in (None, 0.0, -3.0):
@@ -43,7 +43,7 @@ def test_a_ratio_of_speeds_does_not_ask_for_a_speed() -> None:
             assert values == pytest.approx(moving[name], rel=1e-12, abs=1e-13), name
 
 
-def test_a_ratio_of_forces_has_a_unit_where_the_two_differ() -> None:
+def test_a_ratio_of_forces_has_a_unit_where_the_two_differ():
     torque, ratio = choose_columns(TURN, fourbar.solve(TURN), "torque/F12,F12/F14")
     assert torque.label({}) == "N m/N" and ratio.label({}) == ""
     shown = torque.shown({"N m": ("N mm", 1e3)})
@@ -60,15 +60,12 @@ def test_a_ratio_of_forces_has_a_unit_where_the_two_differ() -> None:
         ("drive_force", "unknown"),
     ],
 )
-def test_an_unknown_column_is_refused_with_those_there_are(
-    name: str,
-    says: str,
-) -> None:
+def test_an_unknown_column_is_refused_with_those_there_are(name, says):
     with pytest.raises(InputError, match=says):
         columns(TURN, name)
 
 
-def test_a_column_that_needs_a_speed_says_so() -> None:
+def test_a_column_that_needs_a_speed_says_so():
     still = replace(TURN, motion=TURN.motion.replace(speed=None))
     for name in ("shaking_moment", "torque", "omega_4", "a_P_y", "F12/F14"):
         with pytest.raises(InputError, match='"0 rad/s" gives the static torque'):
@@ -81,10 +78,9 @@ def test_a_column_that_needs_a_speed_says_so() -> None:
             columns(scene, "tork")
 
 
-def test_a_steady_command_of_another_bar_or_a_stroke_has_a_time() -> None:
+def test_a_steady_command_of_another_bar_or_a_stroke_has_a_time():
     rocker = replace(
-        TURN,
-        motion=fourbar.Motion(theta_4=fourbar.Sweep(2.0, 1.7, 3), omega_4=-2.0),
+        TURN, motion=fourbar.Motion(theta_4=fourbar.Sweep(2.0, 1.7, 3), omega_4=-2.0)
     )
     assert columns(rocker, "time")["time"] == pytest.approx([0.0, 0.05, 0.1, 0.15])
     growing = fourbar.Motion(fourbar.Sweep(0.0, 1.0, 3), 1.0, 0.5)
@@ -100,7 +96,7 @@ def test_a_steady_command_of_another_bar_or_a_stroke_has_a_time() -> None:
     assert time == pytest.approx(passed, rel=1e-9, abs=1e-9)
 
 
-def test_a_difference_of_angles_goes_on_from_its_first_position() -> None:
+def test_a_difference_of_angles_goes_on_from_its_first_position():
     """Over two turns bar 2 gains them on the rocker; the first is within half a turn.
 
     theta_4 - theta_2 is -1.4 turns of bar 2 at first where that is commanded so.

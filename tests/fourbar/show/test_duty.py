@@ -21,9 +21,7 @@ ROUND_OFF = 1e-11
 
 
 @pytest.mark.parametrize("drive", [None, CYLINDER], ids=("couple", "cylinder"))
-def test_shaking_is_the_momentum_that_the_bars_lose(
-    drive: fourbar.LinearDrive | None,
-) -> None:
+def test_shaking_is_the_momentum_that_the_bars_lose(drive):
     scene = crank_rocker(loads=(), effects=(), drive=drive)
     s = fourbar.solve(scene)
     force, moment = np.zeros((61, 2)), np.zeros(61)
@@ -42,7 +40,7 @@ def test_shaking_is_the_momentum_that_the_bars_lose(
     assert np.abs(shaking_moment(s) - moment).max() < ROUND_OFF * np.abs(moment).max()
 
 
-def test_bearing_load() -> None:
+def test_bearing_load():
     listed = fourbar.Motion(np.linspace(0.1, 0.1 + math.tau, 61), 10.0)
     s = fourbar.solve(crank_rocker(motion=listed))
     load = np.hypot(s.F43[:-1, 0], s.F43[:-1, 1])
@@ -53,7 +51,7 @@ def test_bearing_load() -> None:
     )
 
 
-def test_what_damping_turns_into_heat_is_what_the_drive_gives_over_a_turn() -> None:
+def test_what_damping_turns_into_heat_is_what_the_drive_gives_over_a_turn():
     pins = {"O2": 0.004, "B": 0.02}
     damped = (fourbar.Gravity(), fourbar.Viscous.at(**pins))
     sweep = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 360), 10.0)
@@ -68,14 +66,14 @@ def test_what_damping_turns_into_heat_is_what_the_drive_gives_over_a_turn() -> N
     assert duty.mean_torque == pytest.approx(heat / math.tau, rel=1e-9)
 
 
-def test_a_drive_at_rest_has_no_energies_and_positions_alone_have_no_duty() -> None:
+def test_a_drive_at_rest_has_no_energies_and_positions_alone_have_no_duty():
     still = motor_duty(fourbar.solve(crank_rocker(motion=fourbar.Motion(1.0, 0.0))))
     assert still is not None and still.peak_power == 0.0 and not still.closed
     assert still.energy_in is still.mean_torque is still.energy_swing is None
     assert motor_duty(fourbar.solve(crank_rocker(), "position")) is None
 
 
-def test_the_swing_of_the_energy_of_a_balanced_weight_is_known_by_hand() -> None:
+def test_the_swing_of_the_energy_of_a_balanced_weight_is_known_by_hand():
     """A weight at the crank's end, T = m g a cos(theta_2), and a constant couple.
 
     The energy about the mean goes from -m g a to m g a, whichever way the crank turns.
@@ -90,18 +88,16 @@ def test_the_swing_of_the_energy_of_a_balanced_weight_is_known_by_hand() -> None
             linkage, turn, loads=(couple,), effects=(fourbar.Gravity(),)
         )
         duty = motor_duty(fourbar.solve(scene))
-        assert duty is not None
         assert duty.mean_torque == pytest.approx(0.7, rel=1e-9)
         assert duty.energy_swing == pytest.approx(2.0 * 2.0 * 9.81 * 0.1, rel=1e-9)
 
 
-def test_the_json_holds_the_duty() -> None:
+def test_the_json_holds_the_duty():
     scene = crank_rocker(
         motion=fourbar.Motion(np.linspace(0.0, math.tau, 61), 10.0)
     )  # between which nothing stands
     s = fourbar.solve(scene)
     duty, entry = motor_duty(s), write_motor(scene, s, units("imperial"))
-    assert duty is not None and entry is not None and duty.energy_out is not None
     inch_pound = 0.0254 * 0.45359237 * 9.80665
     assert (
         entry["units"]["rms_power"] == "hp" and entry["units"]["energy_out"] == "lbf in"
@@ -120,7 +116,7 @@ def test_the_json_holds_the_duty() -> None:
     )
 
 
-def test_a_study_has_what_each_of_its_members_has() -> None:
+def test_a_study_has_what_each_of_its_members_has():
     """Closed and open sweeps, with members that differ.
 
     One has another ground, and one never closes.
@@ -151,21 +147,16 @@ def test_a_study_has_what_each_of_its_members_has() -> None:
             )
         )
         assert moment[member] == pytest.approx(
-            shaking_moment(alone),
-            rel=1e-12,
-            abs=1e-12,
+            shaking_moment(alone), rel=1e-12, abs=1e-12
         )
         assert force[member] == pytest.approx(
-            shaking_force(alone),
-            rel=1e-12,
-            abs=1e-12,
+            shaking_force(alone), rel=1e-12, abs=1e-12
         )
         for of_study, one in (
             (duty, motor_duty(alone)),
             (load, bearing_load(alone, "A")),
         ):
-            assert one is not None
-            for array, number in zip(of_study, one, strict=True):  # type: ignore[arg-type]
+            for array, number in zip(of_study, one, strict=True):
                 if number is None:  # a member of a study without a number has NaN
                     assert array is None or np.isnan(array[member])
                 else:
@@ -174,15 +165,15 @@ def test_a_study_has_what_each_of_its_members_has() -> None:
         np.isnan(load.largest[3])
         and np.isnan(duty.rms_power[3])
         and np.isnan(moment[3]).all()
-    )  # type: ignore[index]
-    assert np.isnan([duty.energy_in[3], duty.energy_out[3]]).all()  # type: ignore[index]
-    assert duty.closed.tolist()[:3] == [True, True, False]  # type: ignore[attr-defined]
+    )
+    assert np.isnan([duty.energy_in[3], duty.energy_out[3]]).all()
+    assert duty.closed.tolist()[:3] == [True, True, False]
     speeds = {"motion.omega_2": np.array([0.0, 3.0]), "motion.theta_2": turn}
     rest = motor_duty(fourbar.solve(fourbar.vary(scene, speeds)))
-    assert rest is not None and np.isfinite(rest.energy_in).tolist() == [False, True]  # type: ignore[arg-type]
+    assert rest is not None and np.isfinite(rest.energy_in).tolist() == [False, True]
 
 
-def test_a_study_of_a_motion_law_keeps_its_time() -> None:
+def test_a_study_of_a_motion_law_keeps_its_time():
     """Its energies are integrals over time, as those of each member alone.
 
     Speeds are zero at both ends.
@@ -190,14 +181,11 @@ def test_a_study_of_a_motion_law_keeps_its_time() -> None:
     law = Law((0.0, 0.5, 1.0, 1.5, 2.0), (0.0, 0.0, 2.0, 2.0, 0.0), 20, "rest")
     linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
     scene = fourbar.Scene(
-        linkage,
-        fourbar.Motion(law=law),
-        effects=(fourbar.Gravity(),),
+        linkage, fourbar.Motion(law=law), effects=(fourbar.Gravity(),)
     )
     study = fourbar.solve(fourbar.vary(scene, {"bars.input.mass": [0.1, 0.1]}))
     alone, duty = fourbar.solve(scene), motor_duty(study)
     assert np.array_equal(study.time, [alone.time, alone.time])
-    assert duty is not None
     assert np.round(duty.energy_in, 4).tolist() == [0.4655, 0.4655]
     by_hand = np.trapezoid(np.maximum(alone.power, 0.0), alone.time)
     assert duty.energy_in == pytest.approx([by_hand] * 2, rel=1e-12)
@@ -206,7 +194,7 @@ def test_a_study_of_a_motion_law_keeps_its_time() -> None:
     assert rows.splitlines()[0].split(",").count("time") == 1
 
 
-def test_a_law_over_one_turn_is_closed_where_speed_and_acceleration_repeat() -> None:
+def test_a_law_over_one_turn_is_closed_where_speed_and_acceleration_repeat():
     """The last position counts once only if its angle, speed and acceleration
     repeat.
     """
@@ -219,12 +207,11 @@ def test_a_law_over_one_turn_is_closed_where_speed_and_acceleration_repeat() -> 
             fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
         )
         duty = motor_duty(solution)
-        assert duty is not None and solution.torque is not None
         closed[ends] = duty.closed
     assert closed == {"free": False, "rest": False, "periodic": True}
 
 
-def test_a_law_of_one_turn_is_not_closed_where_the_assembly_needs_two() -> None:
+def test_a_law_of_one_turn_is_not_closed_where_the_assembly_needs_two():
     linkage = fourbar.uniform(4.0, 1.0, 2.0, 3.0)
     closed = []
     for turns in (1, 2):
@@ -232,15 +219,12 @@ def test_a_law_of_one_turn_is_not_closed_where_the_assembly_needs_two() -> None:
         law = Law((0.0, 0.5, 1.0), angles, 24, "periodic")
         scene = fourbar.Scene(linkage, fourbar.Motion(law=law))
         duty = motor_duty(fourbar.solve(scene))
-        assert duty is not None
         closed.append(duty.closed)
     assert closed == [False, True]
 
 
 @pytest.mark.parametrize("speed", (10.0, -10.0))
-def test_the_energy_of_a_backward_sweep_is_that_of_the_work_of_the_loads(
-    speed: float,
-) -> None:
+def test_the_energy_of_a_backward_sweep_is_that_of_the_work_of_the_loads(speed):
     """What the drive gives and takes back differs by the weight's rise.
 
     Without mass but one, (m g z) at the ends.
@@ -253,8 +237,6 @@ def test_the_energy_of_a_backward_sweep_is_that_of_the_work_of_the_loads(
     )
     solution = fourbar.solve(scene)
     duty, heights = motor_duty(solution), solution.G4[:, 1]
-    assert duty is not None and duty.energy_in is not None
-    assert duty.energy_out is not None
     speeds = np.hypot(0.5 * 0.22, 0.22 / math.sqrt(12.0)) * solution.omega_4
     energy = 0.4 * (9.81 * heights + 0.5 * speeds**2)
     # with a speed against its steps the sweep is run from its end
@@ -264,11 +246,11 @@ def test_the_energy_of_a_backward_sweep_is_that_of_the_work_of_the_loads(
     assert duty.energy_in - duty.energy_out == pytest.approx(gained, rel=1e-5)
 
 
-def test_a_position_without_forces_is_not_where_a_light_load_is_largest() -> None:
+def test_a_position_without_forces_is_not_where_a_light_load_is_largest():
     """Loads below 1 N, in a sweep that begins where the linkage does not assemble."""
     bars = (fourbar.Bar(length, 1e-3) for length in (0.25, 0.1, 0.22))
     scene = fourbar.Scene(
-        fourbar.FourBar(0.3, *bars),  # type: ignore[arg-type]
+        fourbar.FourBar(0.3, *bars),
         fourbar.Motion(fourbar.Sweep(-math.pi, math.pi, 90), 1.0),
         effects=(fourbar.Gravity(),),
     )
@@ -282,7 +264,7 @@ def test_a_position_without_forces_is_not_where_a_light_load_is_largest() -> Non
     assert load.where == s.theta_2[np.nanargmax(size)]
 
 
-def test_a_turn_on_a_part_of_which_a_spring_is_wound_has_no_energies() -> None:
+def test_a_turn_on_a_part_of_which_a_spring_is_wound_has_no_energies():
     """A spring keeps what it is given: the energies of the rest would be no turn's."""
     torsion = fourbar.effects.Torsion((("A", 2.0, math.radians(86.0), 0.0),))
     turn = fourbar.Sweep(0.0, math.tau, 120)

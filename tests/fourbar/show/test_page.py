@@ -19,8 +19,7 @@ from tests.fourbar.show.test_animate import HOSTILE, PNG, RELEASED, embedded
 from tests.support.scenes import CYLINDER, crank_rocker, thesis
 
 pytest.importorskip(
-    "selenium",
-    reason="pages are driven by selenium: pip install selenium",
+    "selenium", reason="pages are driven by selenium: pip install selenium"
 )
 
 PRINTED = 6e-5
@@ -41,15 +40,15 @@ below what is seen.
 """
 
 
-def number(text: str) -> float:
+def number(text):
     return float(text.replace("−", "-"))
 
 
-def shown(driver, *ids: str) -> list[float]:
+def shown(driver, *ids):
     return [number(driver.find_element("id", name).text) for name in ids]
 
 
-def pins(driver) -> dict[str, np.ndarray]:
+def pins(driver):
     """The pins as drawn, in lengths of the ground from O2 and in the plane's axes."""
     script = """
         const place = name => {
@@ -64,19 +63,18 @@ def pins(driver) -> dict[str, np.ndarray]:
     return {name: point - points["O2"] for name, point in points.items()}
 
 
-def state_of(driver, expression: str):
+def state_of(driver, expression):
     return driver.execute_script(f"return {expression};")
 
 
 @pytest.mark.slow
-def test_numbers_are_shown_in_the_units_of_the_page(browse) -> None:
+def test_numbers_are_shown_in_the_units_of_the_page(browse):
     scene = crank_rocker()
     driver = browse(animate.write_page(scene, units=fourbar.units("mm kN N.mm rpm")))
     s = fourbar.solve(scene)
     expected = [s.torque[0] * 1e3, s.F43[0, 0] * 1e-3, s.omega_4[0] * 30.0 / math.pi]
     assert shown(driver, "torque", "F43_x", "omega_4") == pytest.approx(
-        expected,
-        rel=PRINTED,
+        expected, rel=PRINTED
     )
     text = driver.find_element("tag name", "body").text
     assert "N mm" in text and "kN" in text and "rpm" in text and "rad/s²" in text
@@ -103,14 +101,13 @@ def turning(browse):
 
 
 @pytest.mark.slow
-def test_each_step_shows_the_numbers_of_its_position(turning) -> None:
+def test_each_step_shows_the_numbers_of_its_position(turning):
     driver, s = turning
     assert driver.title == "crank-rocker"
     for row in (0, 1, 2, 3):
         angles = np.degrees([s.theta_2[row], s.theta_3[row], s.theta_4[row]])
         assert shown(driver, "theta_2", "theta_3", "theta_4") == pytest.approx(
-            angles,
-            abs=PRINTED_DEG,
+            angles, abs=PRINTED_DEG
         )
         rest = [
             s.omega_3[row],
@@ -129,7 +126,7 @@ def test_each_step_shows_the_numbers_of_its_position(turning) -> None:
 
 
 @pytest.mark.slow
-def test_play_moves_the_linkage_and_pause_leaves_true_numbers(turning) -> None:
+def test_play_moves_the_linkage_and_pause_leaves_true_numbers(turning):
     driver, s = turning
     start = pins(driver)["A"]
     driver.find_element("id", "play").click()
@@ -141,8 +138,7 @@ def test_play_moves_the_linkage_and_pause_leaves_true_numbers(turning) -> None:
     row = state_of(driver, "row")
     assert np.hypot(*(pins(driver)["A"] - start)) > 10
     assert shown(driver, "torque", "omega_4") == pytest.approx(
-        [s.torque[row], s.omega_4[row]],
-        rel=PRINTED,
+        [s.torque[row], s.omega_4[row]], rel=PRINTED
     )
     drawn = pins(driver)
     scale = np.hypot(*drawn["O4"]) / 0.3
@@ -150,7 +146,7 @@ def test_play_moves_the_linkage_and_pause_leaves_true_numbers(turning) -> None:
     np.testing.assert_allclose(drawn["B"], scale * s.B[row], atol=PIXEL)
 
 
-def clockwork(driver, ticks: int) -> list[int]:
+def clockwork(driver, ticks):
     """Play without waiting: frames 50 ms apart, and the row after each."""
     script = """
         window.requestAnimationFrame = () => 0;
@@ -167,9 +163,7 @@ def clockwork(driver, ticks: int) -> list[int]:
 
 
 @pytest.mark.slow
-def test_an_input_that_turns_fully_goes_round_and_one_that_does_not_swings(
-    browse,
-) -> None:
+def test_an_input_that_turns_fully_goes_round_and_one_that_does_not_swings(browse):
     driver = browse(animate.write_page(crank_rocker()))
     rows = clockwork(driver, 241)  # 12 s: two sweeps
     assert set(rows) == set(range(61)) or set(rows) == set(range(60))
@@ -191,7 +185,7 @@ def test_an_input_that_turns_fully_goes_round_and_one_that_does_not_swings(
 
 
 @pytest.mark.slow
-def test_a_free_motion_plays_once_in_its_own_time(browse) -> None:
+def test_a_free_motion_plays_once_in_its_own_time(browse):
     driver = browse(animate.write_page(RELEASED))
     s = fourbar.solve(RELEASED)
     assert not driver.find_element("id", "branch").is_displayed()
@@ -202,9 +196,7 @@ def test_a_free_motion_plays_once_in_its_own_time(browse) -> None:
     assert state_of(driver, "branch") == 1
     rows = clockwork(driver, 20)  # 0.95 s: the first frame starts the clock
     np.testing.assert_allclose(
-        s.time[rows],
-        0.05 * np.arange(20),
-        atol=0.011,
+        s.time[rows], 0.05 * np.arange(20), atol=0.011
     )  # half a row
     assert clockwork(driver, 41)[-1] == 90 and not state_of(driver, "playing")
     driver.execute_script("go(37)")
@@ -214,23 +206,18 @@ def test_a_free_motion_plays_once_in_its_own_time(browse) -> None:
         == "0.740 seconds"
     )
     assert shown(driver, "omega_2", "alpha_4") == pytest.approx(
-        [s.omega_2[37], s.alpha_4[37]],
-        rel=PRINTED,
+        [s.omega_2[37], s.alpha_4[37]], rel=PRINTED
     )
     kinetic = embedded(animate.write_page(RELEASED))["branches"]["1"]["energy"][37]
     assert shown(driver, "energy") == pytest.approx([kinetic], rel=PRINTED)
     drawn = pins(driver)
     np.testing.assert_allclose(
-        drawn["B"],
-        np.hypot(*drawn["O4"]) / 0.3 * s.B[37],
-        atol=PIXEL,
+        drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[37], atol=PIXEL
     )
 
 
 STROKES = fourbar.Motion(
-    stroke=fourbar.Sweep(0.17, 0.33, 40),
-    stroke_speed=0.2,
-    side="left",
+    stroke=fourbar.Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left"
 )
 OUTPUT = fourbar.Motion(theta_4=fourbar.Sweep(1.75, 2.95, 40), omega_4=4.0)
 """Its ends do not assemble."""
@@ -257,13 +244,8 @@ OUTPUT = fourbar.Motion(theta_4=fourbar.Sweep(1.75, 2.95, 40), omega_4=4.0)
     ],
 )
 def test_another_command_is_the_axis_and_the_linkage_follows(
-    browse,
-    motion,
-    name,
-    place,
-    over,
-    pace,
-) -> None:
+    browse, motion, name, place, over, pace
+):
     scene = crank_rocker(motion=motion, drive=CYLINDER)
     driver, s = browse(animate.write_page(scene)), fourbar.solve(scene)
     driver.execute_script("go(20)")
@@ -275,22 +257,17 @@ def test_another_command_is_the_axis_and_the_linkage_follows(
     assert not driver.find_element("id", "branch").is_displayed()
     names = ("theta_2", "theta_3", "theta_4")
     assert shown(driver, *names) == pytest.approx(
-        [math.degrees(getattr(s, n)[20]) for n in names],
-        abs=PRINTED_DEG,
+        [math.degrees(getattr(s, n)[20]) for n in names], abs=PRINTED_DEG
     )
     assert shown(driver, "drive_force", "condition") == pytest.approx(
-        [s.drive_force[20], s.condition[20]],
-        rel=PRINTED,
+        [s.drive_force[20], s.condition[20]], rel=PRINTED
     )
     assert shown(driver, "stroke") == pytest.approx(
-        [1000.0 * s.stroke[20]],
-        rel=PRINTED,
+        [1000.0 * s.stroke[20]], rel=PRINTED
     )
     drawn = pins(driver)
     np.testing.assert_allclose(
-        drawn["B"],
-        np.hypot(*drawn["O4"]) / 0.3 * s.B[20],
-        atol=PIXEL,
+        drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[20], atol=PIXEL
     )
     assert state_of(driver, "plotted.over") == pytest.approx(s.at.places)
     driver.find_element("id", "chart").click()  # its middle
@@ -307,16 +284,13 @@ def test_another_command_is_the_axis_and_the_linkage_follows(
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [360, 400, 480, 1280])
 def test_the_numbers_of_an_axis_stand_clear_and_a_stroke_stays_in_its_column(
-    browse,
-    width: int,
-) -> None:
+    browse, width
+):
     drive = fourbar.LinearDrive(
         Place(1, (1.45, math.radians(-160.0))), Place(2, (0.29, 0.17))
     )
     motion = fourbar.Motion(
-        stroke=fourbar.Sweep(1.2, 1.7, 40),
-        stroke_speed=0.2,
-        side="left",
+        stroke=fourbar.Sweep(1.2, 1.7, 40), stroke_speed=0.2, side="left"
     )
     scene = fourbar.Scene(fourbar.uniform(0.9, 0.3, 0.75, 0.66), motion, drive=drive)
     driver = browse(animate.write_page(scene), width)
@@ -335,9 +309,7 @@ def test_the_numbers_of_an_axis_stand_clear_and_a_stroke_stays_in_its_column(
 
 
 @pytest.mark.slow
-def test_the_page_replays_the_positions_speeds_and_accelerations_of_fourbar(
-    browse,
-) -> None:
+def test_the_page_replays_the_positions_speeds_and_accelerations_of_fourbar(browse):
     """A linkage of three bars that swing, on both branches.
 
     Some of its positions do not assemble.
@@ -366,21 +338,14 @@ def test_the_page_replays_the_positions_speeds_and_accelerations_of_fourbar(
         )
         for k, vectors in enumerate((s.v_G3, s.a_G3)):
             np.testing.assert_allclose(
-                [moved[i][k] for i in here],
-                vectors[here],
-                rtol=1e-9,
-                atol=1e-9,
+                [moved[i][k] for i in here], vectors[here], rtol=1e-9, atol=1e-9
             )
 
 
 @pytest.mark.slow
-def test_what_is_downloaded_is_the_scene_on_the_branch_shown(
-    browse,
-    tmp_path: Path,
-) -> None:
+def test_what_is_downloaded_is_the_scene_on_the_branch_shown(browse, tmp_path):
     scene = crank_rocker(
-        title="a\\nb",
-        motion=fourbar.Motion(np.array([0.1, 0.2, 0.3, 0.4]), 10.0, 5.0),
+        title="a\\nb", motion=fourbar.Motion(np.array([0.1, 0.2, 0.3, 0.4]), 10.0, 5.0)
     )
     driver = browse(animate.write_page(scene))
     assert (
@@ -413,12 +378,11 @@ def test_what_is_downloaded_is_the_scene_on_the_branch_shown(
     )
 
 
-def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> None:
+def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse):
     spring = fourbar.Spring(Place(1, (0.1, -0.5)), Place(4, (0.08, 0.0)), 20.0, 0.1)
     load = fourbar.Load(3, (2.0, 0.5), from_centre=(0.03, 1.0), frame="bar")
     scene = crank_rocker(
-        loads=(load,),
-        effects=(fourbar.Springs((spring,)), fourbar.Gravity()),
+        loads=(load,), effects=(fourbar.Springs((spring,)), fourbar.Gravity())
     )
     driver = browse(animate.write_page(scene))
     driver.execute_script("go(20)")
@@ -443,8 +407,7 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> No
     )
     towards = np.subtract(arrow[1], arrow[0])
     assert math.atan2(towards[1], towards[0]) == pytest.approx(
-        s.theta_3[20] + 0.5,
-        abs=0.01,
+        s.theta_3[20] + 0.5, abs=0.01
     )
     assert acting.keys() >= {"act act-drive", "act act-gravity"}
     names = (
@@ -470,27 +433,21 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> No
     assert not driver.find_elements("css selector", "#acting *, #under .act")
 
 
-def test_the_branch_switches_the_picture_and_the_numbers(turning) -> None:
+def test_the_branch_switches_the_picture_and_the_numbers(turning):
     driver, scene = turning[0], crank_rocker()
     driver.execute_script("chooseBranch(-1)")
     s = fourbar.solve(replace(scene, motion=scene.motion.replace(branch=-1)))
     assert shown(driver, "torque", "F32_y") == pytest.approx(
-        [s.torque[0], s.F32[0, 1]],
-        rel=PRINTED,
+        [s.torque[0], s.F32[0, 1]], rel=PRINTED
     )
     drawn = pins(driver)
     np.testing.assert_allclose(
-        drawn["B"],
-        np.hypot(*drawn["O4"]) / 0.3 * s.B[0],
-        atol=PIXEL,
+        drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[0], atol=PIXEL
     )
 
 
 @pytest.mark.parametrize("scaling", ("sweep", "position"))
-def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(
-    turning,
-    scaling: str,
-) -> None:
+def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(turning, scaling):
     driver, s = turning
     choose = """
         const e = document.getElementById("arrow-scale");
@@ -514,9 +471,7 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(
     for name in ("F12", "F32", "F43", "F14"):
         drawn = np.array(driver.execute_script(script, name))
         np.testing.assert_allclose(
-            drawn,
-            getattr(s, name)[50] * bar / newtons,
-            atol=PIXEL,
+            drawn, getattr(s, name)[50] * bar / newtons, atol=PIXEL
         )
 
 
@@ -525,11 +480,7 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(
     ("width", "scaling"),
     [(360, "position"), (1100, "position"), (360, "sweep"), (1100, "sweep")],
 )
-def test_no_arrow_and_no_name_of_one_leaves_the_picture(
-    browse,
-    width: int,
-    scaling: str,
-) -> None:
+def test_no_arrow_and_no_name_of_one_leaves_the_picture(browse, width, scaling):
     driver = browse(
         animate.write_page(thesis() if scaling == "position" else crank_rocker()), width
     )
@@ -556,7 +507,7 @@ def test_no_arrow_and_no_name_of_one_leaves_the_picture(
 
 
 @pytest.mark.slow
-def test_keyboard_drives_it(turning) -> None:
+def test_keyboard_drives_it(turning):
     from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.keys import Keys
 
@@ -596,7 +547,7 @@ def test_keyboard_drives_it(turning) -> None:
 
 
 @pytest.mark.slow
-def test_every_control_has_a_name(turning) -> None:
+def test_every_control_has_a_name(turning):
     driver, _ = turning
     controls = driver.find_elements("css selector", "button, select, input, [role=img]")
     assert len(controls) > 15
@@ -613,15 +564,9 @@ def test_every_control_has_a_name(turning) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("dark", (False, True))
 @pytest.mark.parametrize(
-    "scene",
-    (crank_rocker(), thesis()),
-    ids=("crank-rocker", "thesis"),
+    "scene", (crank_rocker(), thesis()), ids=("crank-rocker", "thesis")
 )
-def test_at_360_pixels_nothing_sticks_out_and_all_text_is_readable(
-    browse,
-    scene: fourbar.Scene,
-    dark: bool,
-) -> None:
+def test_at_360_pixels_nothing_sticks_out_and_all_text_is_readable(browse, scene, dark):
     driver = browse(animate.write_page(scene), 360, dark=dark)
     assert state_of(driver, "document.documentElement.scrollWidth") <= 360
     assert (
@@ -662,7 +607,7 @@ def test_at_360_pixels_nothing_sticks_out_and_all_text_is_readable(
     assert page < 0.05 if dark else page > 0.9
 
 
-def luminance(colour: str) -> float:
+def luminance(colour):
     parts = [int(v) / 255 for v in colour[colour.index("(") + 1 : -1].split(",")[:3]]
     linear = [
         v / 12.92 if v <= 0.03928 else ((v + 0.055) / 1.055) ** 2.4 for v in parts
@@ -670,7 +615,7 @@ def luminance(colour: str) -> float:
     return float(np.dot([0.2126, 0.7152, 0.0722], linear))
 
 
-def contrast(first: str, second: str) -> float:
+def contrast(first, second):
     low, high = sorted((luminance(first), luminance(second)))
     return (high + 0.05) / (low + 0.05)
 
@@ -695,10 +640,7 @@ CROWDED = (ROOT / "models" / "thesis.toml", ROOT / "models" / "crank_rocker.toml
 
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [400, 1024, 1440])
-def test_no_label_of_the_gallery_covers_another_one_or_a_symbol(
-    browse,
-    width: int,
-) -> None:
+def test_no_label_of_the_gallery_covers_another_one_or_a_symbol(browse, width):
     for path in (*GALLERY, *CROWDED):
         driver = browse(animate.write_page(fourbar.load(path), vectors=True), width)
         driver.execute_script("byId('show-dimensions').click()")
@@ -712,14 +654,14 @@ def test_no_label_of_the_gallery_covers_another_one_or_a_symbol(
             assert "none" not in shown, (path.stem, sixth)
 
 
-def test_hostile_titles_do_nothing_but_appear(browse) -> None:
+def test_hostile_titles_do_nothing_but_appear(browse):
     driver = browse(animate.write_page(replace(crank_rocker(), title=HOSTILE)))
     assert "<script>alert(1)</script>" in driver.find_element("css selector", "h1").text
     driver.find_element("id", "forward").click()
     assert state_of(driver, "row") == 1
 
 
-def test_a_picture_lies_along_its_bar(browse, tmp_path: Path) -> None:
+def test_a_picture_lies_along_its_bar(browse, tmp_path):
     (tmp_path / "bar.png").write_bytes(PNG)
     driver = browse(
         animate.write_page(crank_rocker(), {"output": tmp_path / "bar.png"})
@@ -737,7 +679,7 @@ def test_a_picture_lies_along_its_bar(browse, tmp_path: Path) -> None:
     ) == pytest.approx(0, abs=1e-6)
 
 
-def test_with_reduced_motion_it_moves_twice_a_second(browse) -> None:
+def test_with_reduced_motion_it_moves_twice_a_second(browse):
     driver = browse(animate.write_page(crank_rocker()), still=True)
     script = """
         window.requestAnimationFrame = () => 0;
@@ -754,7 +696,7 @@ def test_with_reduced_motion_it_moves_twice_a_second(browse) -> None:
     assert 4 <= driver.execute_script(script) <= 8  # 3 s
 
 
-def test_positions_alone_show_no_dynamics(browse) -> None:
+def test_positions_alone_show_no_dynamics(browse):
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 2 * math.pi, 36)))
     driver = browse(animate.write_page(scene))
     assert not driver.find_element("id", "forces").is_displayed()
@@ -763,7 +705,7 @@ def test_positions_alone_show_no_dynamics(browse) -> None:
     assert shown(driver, "theta_2") == pytest.approx([10.0], abs=PRINTED_DEG)
 
 
-def test_it_says_why_a_position_has_no_forces(browse) -> None:
+def test_it_says_why_a_position_has_no_forces(browse):
     """T3 of a parallelogram exists nowhere.
 
     On its input the drive has forces everywhere, and no remark is shown.
@@ -779,7 +721,7 @@ def test_it_says_why_a_position_has_no_forces(browse) -> None:
 
 
 @pytest.mark.slow
-def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse) -> None:
+def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse):
     loose = (
         fourbar.Tolerance("lengths.input", 5e-5),
         fourbar.Tolerance("bars.coupler.mass", 0.001, True),
@@ -813,8 +755,7 @@ def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse) -> No
         )
     shares = study.spreads["torque"].shares[:, 20]
     assert [rows[tolerance.key][0] for tolerance in loose] == pytest.approx(
-        100 * shares / shares.sum(),
-        abs=0.51,
+        100 * shares / shares.sum(), abs=0.51
     )
     assert state_of(driver, "document.documentElement.scrollWidth") <= 360
     box = driver.find_element("css selector", "#bands .band").rect
@@ -828,7 +769,7 @@ def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse) -> No
 
 
 @pytest.mark.slow
-def test_a_scene_without_bands_says_why_or_shows_nothing(browse) -> None:
+def test_a_scene_without_bands_says_why_or_shows_nothing(browse):
     driver = browse(
         animate.write_page(
             replace(RELEASED, tolerances=(fourbar.Tolerance("lengths.input", 5e-5),))
@@ -852,12 +793,8 @@ def test_a_scene_without_bands_says_why_or_shows_nothing(browse) -> None:
     ],
 )
 def test_the_bars_of_the_sheet_have_the_units_of_its_heads(
-    browse,
-    names: str,
-    head: str,
-    mass: float,
-    inertia: float,
-) -> None:
+    browse, names, head, mass, inertia
+):
     """`mass`, `inertia`: the units of the heads in kg and kg m^2."""
     scene = crank_rocker()
     driver = browse(animate.write_page(scene, units=fourbar.units(names)))
@@ -889,9 +826,7 @@ return least;
 
 
 @pytest.mark.slow
-def test_a_printed_page_is_one_sheet_with_lengths_bars_and_the_chart_s_name(
-    browse,
-) -> None:
+def test_a_printed_page_is_one_sheet_with_lengths_bars_and_the_chart_s_name(browse):
     scene = crank_rocker()
     driver = browse(animate.write_page(scene), dark=True)
     assert not driver.find_element("id", "bars").is_displayed()
@@ -919,9 +854,7 @@ def test_a_printed_page_is_one_sheet_with_lengths_bars_and_the_chart_s_name(
         along, off = (number(part) for part in row[3].text.split(", "))
         centre = 1e3 * bar.to_centre
         assert (along, off) == pytest.approx(
-            (centre.real, centre.imag),
-            rel=PRINTED,
-            abs=PRINTED,
+            (centre.real, centre.imag), rel=PRINTED, abs=PRINTED
         )
     background = "return getComputedStyle(document.body).backgroundColor"
     assert driver.execute_script(background) == "rgb(255, 255, 255)"

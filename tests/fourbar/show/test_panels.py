@@ -5,26 +5,25 @@ import math
 import numpy as np
 import pytest
 
-from fourbar.quantities import Array
-from fourbar.show.panels import Panels, Wanted, fit_panels
+from fourbar.show.panels import Wanted, fit_panels
 
 EDGES = np.linspace(0.0, 2.0, 6)
 SETTLED = 1e-9
 """Some panels of 1e-10 each."""
 
 
-def fit(curve: Array | object, edges: Array = EDGES, rounding: float = 0.0) -> Panels:
-    def compute(places: Array) -> dict[str, Array]:
-        return {"curve": curve(places)}  # type: ignore[operator]
+def fit(curve, edges=EDGES, rounding=0.0):
+    def compute(places):
+        return {"curve": curve(places)}
 
     return fit_panels(compute, edges, {"curve": Wanted(rounding, integrated=True)})
 
 
-def test_the_mean_square_of_a_smooth_curve_is_that_of_its_antiderivative() -> None:
+def test_the_mean_square_of_a_smooth_curve_is_that_of_its_antiderivative():
     """The integral of (e^{-x} cos 20 x)^2 is known, here by its complex exponents."""
     panels = fit(lambda x: np.exp(-x) * np.cos(20.0 * x))
 
-    def primitive(x: float) -> float:
+    def primitive(x):
         slow = -0.25 * math.exp(-2.0 * x)
         exponent = complex(-2.0, 40.0)
         fast = 0.5 * (np.exp(exponent * x) / exponent).real
@@ -34,7 +33,7 @@ def test_the_mean_square_of_a_smooth_curve_is_that_of_its_antiderivative() -> No
     assert panels.find_rms("curve") ** 2 == pytest.approx(right, rel=SETTLED)
 
 
-def test_a_vector_has_the_sum_of_its_components() -> None:
+def test_a_vector_has_the_sum_of_its_components():
     panels = fit(lambda x: np.stack((3.0 * np.cos(x), 4.0 * np.sin(x)), axis=-1))
     # 9 cos^2 + 16 sin^2 = 12.5 - 3.5 cos 2x
     right = 12.5 - 3.5 * math.sin(4.0) / 4.0
@@ -42,7 +41,7 @@ def test_a_vector_has_the_sum_of_its_components() -> None:
 
 
 @pytest.mark.parametrize("place", (0.4, 1.0 / 3.0, 1.999))
-def test_a_jump_costs_no_digits(place: float) -> None:
+def test_a_jump_costs_no_digits(place):
     """On an edge or anywhere else: 2 before it and -1 after it."""
     panels = fit(lambda x: np.where(x < place, 2.0, -1.0))
     right = 2.0 * place - (2.0 - place)
@@ -52,7 +51,7 @@ def test_a_jump_costs_no_digits(place: float) -> None:
     assert not panels.growing
 
 
-def test_a_curve_is_integrated_from_zero_to_zero() -> None:
+def test_a_curve_is_integrated_from_zero_to_zero():
     """The sine of 3 x gives 2/3 in each half wave, wherever the panels end."""
     panels = fit(lambda x: np.sin(3.0 * x), np.array([0.0, 1.3, 2.0]))
     steps = np.diff(panels.accumulate("curve"))
@@ -62,7 +61,7 @@ def test_a_curve_is_integrated_from_zero_to_zero() -> None:
     assert -steps[steps < 0.0].sum() == pytest.approx(down, rel=SETTLED)
 
 
-def test_the_range_of_the_integral_about_a_level() -> None:
+def test_the_range_of_the_integral_about_a_level():
     """Of 1/2 + sin(pi x) less its mean it is that of -cos(pi x)/pi."""
     panels = fit(lambda x: 0.5 + np.sin(math.pi * x), np.array([0.0, 0.7, 2.0]))
     assert panels.integrate("curve") == pytest.approx(1.0, rel=SETTLED)
@@ -70,7 +69,7 @@ def test_the_range_of_the_integral_about_a_level() -> None:
     assert np.ptp(about_mean) == pytest.approx(2.0 / math.pi, rel=SETTLED)
 
 
-def draw_noise(places: Array) -> Array:
+def draw_noise(places):
     return np.random.default_rng(len(places)).normal(size=len(places))
 
 
@@ -78,8 +77,8 @@ POLE = math.sqrt(0.5)
 
 
 @pytest.mark.parametrize("power", (1.0, 2.0, 0.5))
-def test_what_grows_without_bound_is_said_to_and_where(power: float) -> None:
-    def compute(places: Array) -> dict[str, Array]:
+def test_what_grows_without_bound_is_said_to_and_where(power):
+    def compute(places):
         curve = np.abs(places - POLE) ** -power
         return {"curve": curve, "other": np.exp(places)}
 
@@ -104,11 +103,7 @@ def test_what_grows_without_bound_is_said_to_and_where(power: float) -> None:
     ],
     ids=("gap", "jump", "corner", "root", "spike", "waves", "constant"),
 )
-def test_the_largest_size_is_the_first_of_equal_ones(
-    curve: object,
-    peak: float,
-    place: float,
-) -> None:
+def test_the_largest_size_is_the_first_of_equal_ones(curve, peak, place):
     """Of four equal waves the first is named, of a constant its beginning."""
     panels = fit(curve)
     assert not panels.growing
@@ -118,12 +113,10 @@ def test_the_largest_size_is_the_first_of_equal_ones(
 
 
 @pytest.mark.parametrize("edges", (EDGES, EDGES[::-1]))
-def test_a_flat_maximum_at_the_pole_of_another_curve_is_where_the_rise_ends(
-    edges: Array,
-) -> None:
+def test_a_flat_maximum_at_the_pole_of_another_curve_is_where_the_rise_ends(edges):
     """Panels beside a pole are so short that in many the values are nearly equal."""
 
-    def compute(places: Array) -> dict[str, Array]:
+    def compute(places):
         return {"flat": np.cos(places - POLE), "pole": 1.0 / np.abs(places - POLE)}
 
     wanted = dict.fromkeys(("flat", "pole"), Wanted())
@@ -131,7 +124,7 @@ def test_a_flat_maximum_at_the_pole_of_another_curve_is_where_the_rise_ends(
     assert peak.place == pytest.approx(POLE, abs=2e-6)
 
 
-def test_both_ends_of_a_range_are_found_and_the_way_back_begins_at_its_end() -> None:
+def test_both_ends_of_a_range_are_found_and_the_way_back_begins_at_its_end():
     forwards, backwards = (fit(np.sin, edges) for edges in (EDGES, EDGES[::-1]))
     for panels in (forwards, backwards):
         assert panels.find_peak("curve", 1).place == pytest.approx(
@@ -143,25 +136,25 @@ def test_both_ends_of_a_range_are_found_and_the_way_back_begins_at_its_end() -> 
     assert places == pytest.approx([0.0, 2.0], abs=1e-8)
 
 
-def test_zeros_are_changes_of_sign_on_and_off_the_ends_of_panels() -> None:
+def test_zeros_are_changes_of_sign_on_and_off_the_ends_of_panels():
     right = [0.3, 0.8, 1.7]
 
-    def curve(x: Array) -> Array:
+    def curve(x):
         return np.prod([x - zero for zero in right], axis=0)
 
-    def touch(x: Array) -> Array:
+    def touch(x):
         return np.square(x - 0.8) * (x - 1.1)
 
     for edges in (EDGES, np.array([0.0, 0.31, 2.0])):
         for of, zeros in ((curve, right), (touch, [1.1])):
 
-            def compute(x: Array, of: object = of) -> dict[str, Array]:
-                return {"curve": of(x)}  # type: ignore[operator]
+            def compute(x, of=of):
+                return {"curve": of(x)}
 
             panels = fit_panels(compute, edges, {"curve": Wanted(zeros=True)})
             assert panels.find_zeros("curve") == pytest.approx(zeros, abs=1e-9)
 
 
-def test_rounding_need_not_settle() -> None:
+def test_rounding_need_not_settle():
     panels = fit(lambda x: 1e-13 * draw_noise(x), rounding=1e-12)
     assert panels.find_rms("curve") < 1e-12

@@ -19,16 +19,15 @@ from tests.support.texts import PLIERS
 
 SIX_DIGITS = 6e-6
 ONE = crank_rocker(
-    motion=fourbar.Motion(1.0, 10.0, 3.0),
-    points=(fourbar.Point("P", 3, (0.1, 0.7)),),
+    motion=fourbar.Motion(1.0, 10.0, 3.0), points=(fourbar.Point("P", 3, (0.1, 0.7)),)
 )
 
 
-def numbers(line: str) -> list[float]:
+def numbers(line):
     return [float(x) for x in re.findall(r"(?<!\S)-?[\d.]+(?:e[-+]\d+)?(?!\S)", line)]
 
 
-def test_bars_points_and_forces_are_those_of_the_solution() -> None:
+def test_bars_points_and_forces_are_those_of_the_solution():
     s = fourbar.solve(ONE)
     shown = {**COMMON, **units("m N N.m rad/s")}
     sheet = PositionSheet(ONE, s, shown)
@@ -49,12 +48,11 @@ def test_bars_points_and_forces_are_those_of_the_solution() -> None:
         vector = getattr(s, name)[0]
         assert line.startswith(name)
         assert numbers(line) == pytest.approx(
-            [*vector, np.hypot(*vector)],
-            rel=SIX_DIGITS,
+            [*vector, np.hypot(*vector)], rel=SIX_DIGITS
         )
 
 
-def test_what_a_scene_has_not_is_left_out() -> None:
+def test_what_a_scene_has_not_is_left_out():
     still = replace(ONE, motion=fourbar.Motion(1.0), points=())
     sheet = PositionSheet(still, fourbar.solve(still), COMMON)
     assert "omega" not in sheet.write_bars()[0]
@@ -62,7 +60,7 @@ def test_what_a_scene_has_not_is_left_out() -> None:
     assert not any(line.startswith("F_") for line in sheet.write_ratios())
 
 
-def test_a_static_position_shows_no_rates() -> None:
+def test_a_static_position_shows_no_rates():
     still = replace(ONE, motion=fourbar.Motion(1.0, 0.0))
     sheet = PositionSheet(still, fourbar.solve(still), COMMON)
     assert "theta" in sheet.write_bars()[0]
@@ -73,7 +71,7 @@ def test_a_static_position_shows_no_rates() -> None:
     assert "alpha" in sheet.write_bars()[0]
 
 
-def test_rounding_is_shown_as_zero_and_a_far_centre_by_a_word() -> None:
+def test_rounding_is_shown_as_zero_and_a_far_centre_by_a_word():
     lift = fourbar.Scene(
         fourbar.uniform(0.3, 0.1, 0.3, 0.1), fourbar.Motion(np.pi / 2.0, 1.0)
     )
@@ -87,7 +85,7 @@ def test_rounding_is_shown_as_zero_and_a_far_centre_by_a_word() -> None:
 
 
 @pytest.mark.parametrize("turns", [0, 2777777777, 10**16])
-def test_columns_of_an_angle_of_many_turns_stay_apart(turns: int) -> None:
+def test_columns_of_an_angle_of_many_turns_stay_apart(turns):
     angle = 1.0 + math.tau * turns
     scene = replace(ONE, motion=fourbar.Motion(angle, 10.0, 3.0))
     solution = fourbar.solve(scene)
@@ -110,7 +108,7 @@ frame = "bar"
 )
 
 
-def test_the_force_of_a_drive_is_related_to_that_of_a_point() -> None:
+def test_the_force_of_a_drive_is_related_to_that_of_a_point():
     """Pliers with 31.969 across the handle: at 60 deg from it sin 60 deg of that.
 
     The work of a pull of 1 lbf against the jaw's path says the same.

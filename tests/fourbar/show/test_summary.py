@@ -15,12 +15,11 @@ from scipy.special import ellipk
 import fourbar
 from fourbar.files import loads
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
-from fourbar.quantities import Array
 from fourbar.scene import command_at
 from fourbar.scene.motion import Law, Rise
 from fourbar.show.block import write_motor
 from fourbar.show.motion_curves import acts, describe_motion
-from fourbar.show.summary import Facts, summarize
+from fourbar.show.summary import summarize
 from fourbar.studies.internal_forces import largest_bending
 from tests.support.scenes import CYLINDER, crank_rocker
 
@@ -41,13 +40,13 @@ SWING = 1e-2
 """Relative, of an integral that is known at the ends of steps of 1/100."""
 
 
-def fall(duration: float) -> fourbar.Motion:
+def fall(duration):
     return fourbar.Motion(
         law=Rise("cycloidal", (1.0, 0.5), 0.3, 0.2, duration, 0.1, 12)
     )
 
 
-def rub(**torques: float) -> fourbar.Friction:
+def rub(**torques):
     return fourbar.Friction.at(**torques)
 
 
@@ -67,10 +66,7 @@ SCENES = {
     "turn": (crank_rocker(motion=TURN), ""),
     "turn backwards": (crank_rocker(motion=TURN.replace(speed=-10.0)), ""),
     "accelerated": (crank_rocker(motion=TURN.replace(acceleration=5.0)), ""),
-    "wiper": (
-        replace(WIPER, motion=WIPER.motion.replace(angle=TURN.angle)),
-        "O4",
-    ),
+    "wiper": (replace(WIPER, motion=WIPER.motion.replace(angle=TURN.angle)), "O4"),
     "part of a turn": (crank_rocker(motion=BACK, drive_bar=4), ""),
     "load with corners": (crank_rocker(motion=TURN, loads=(SPIKE,)), ""),
     "fall in 5 ms": (crank_rocker(motion=fall(0.005)), ""),
@@ -102,7 +98,7 @@ SCENES = {
 """Scenes, and the pin at which dry friction acts."""
 
 
-def list_sizes(scene: fourbar.Scene, s: fourbar.Solution) -> dict[str, Array]:
+def list_sizes(scene, s):
     """List the sizes of what a summary has the peaks of, by name."""
     drive, speed = "drive_force", s.stroke_speed
     if s.drive is None:
@@ -117,14 +113,14 @@ def list_sizes(scene: fourbar.Scene, s: fourbar.Solution) -> dict[str, Array]:
     return {name: np.abs(values) for name, values in curves.items()}
 
 
-def find_slip(s: fourbar.Solution, pin: str) -> Array:
+def find_slip(s, pin):
     """Return the relative speed of the two bars at a pin, rad/s."""
     first, second = PINS[pin]
     turned = getattr(s, f"omega_{second}")
     return turned if first == 1 else turned - getattr(s, f"omega_{first}")
 
 
-def scan(scene: fourbar.Scene, ends: Array, *corners: float) -> tuple[Array, Array]:
+def scan(scene, ends, *corners):
     """Return places in the pieces between corners, and weights that integrate."""
     low, high = np.sort(ends)
     edges = np.unique([low, high, *(x for x in corners if low < x < high)])
@@ -135,7 +131,7 @@ def scan(scene: fourbar.Scene, ends: Array, *corners: float) -> tuple[Array, Arr
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_facts_are_those_of_a_dense_scan(name: str) -> None:
+def test_facts_are_those_of_a_dense_scan(name):
     scene, pin = SCENES[name]
     solution = fourbar.solve(scene)
     facts = summarize(scene, solution)
@@ -192,12 +188,9 @@ def test_facts_are_those_of_a_dense_scan(name: str) -> None:
     check_entry(scene, facts, dense, weights)
 
 
-def check_entry(
-    scene: fourbar.Scene, facts: Facts, dense: fourbar.Solution, weights: Array
-) -> None:
+def check_entry(scene, facts, dense, weights):
     """Check the numbers of the JSON against sums over the positions of a scan."""
     entry = write_motor(scene, facts.solution, {})
-    assert entry is not None
     panels = facts.motion.panels
     drive, *_ = sizes = list_sizes(scene, dense)
     kind = "torque" if drive == "torque" else "force"
@@ -245,21 +238,18 @@ def check_entry(
     assert entry["energy_swing"] == pytest.approx(np.ptp(surplus), rel=SWING, abs=1e-12)
 
 
-def test_a_list_has_its_own_peaks_and_means() -> None:
+def test_a_list_has_its_own_peaks_and_means():
     angles = np.array([0.3, 2.5, 0.4])
     scene = crank_rocker(motion=fourbar.Motion(angles, 10.0))
     solution = fourbar.solve(scene)
     assert describe_motion(solution).solve_with_peaks() is solution
     entry = write_motor(scene, solution, {})
-    assert entry is not None and solution.torque is not None
     assert entry["peak_torque"] == np.abs(solution.torque).max()
     rms = math.sqrt(np.square(solution.torque).mean())
     assert entry["rms_torque"] == pytest.approx(rms, rel=EXACT)
 
 
-def test_forces_whose_squares_overflow_have_the_peaks_and_means_of_smaller_ones() -> (
-    None
-):
+def test_forces_whose_squares_overflow_have_the_peaks_and_means_of_smaller_ones():
     """Nothing acts but one force, so that everything is in proportion to it."""
     small, huge = (
         summarize(scene, fourbar.solve(scene))
@@ -267,7 +257,6 @@ def test_forces_whose_squares_overflow_have_the_peaks_and_means_of_smaller_ones(
         for load in [fourbar.Load(3, (force, 0.4), from_pin=(0.05, 0.0))]
         for scene in [fourbar.Scene(MASSLESS, TURN, loads=(load,))]
     )
-    assert small.duty is not None and huge.duty is not None
     names = ("peak_torque", "rms_torque", "peak_power", "rms_power", "energy_in")
     pairs = [(getattr(huge.duty, n), getattr(small.duty, n)) for n in names]
     pairs += [(huge.pins[pin].rms, load.rms) for pin, load in small.pins.items()]
@@ -300,7 +289,7 @@ FRICTION = f"pin_friction = {{ A = {PIN}, B = {PIN} }}\n"
 
 
 @pytest.mark.slow
-def test_the_summary_beside_a_dead_point_is_as_quick_with_pin_friction() -> None:
+def test_the_summary_beside_a_dead_point_is_as_quick_with_pin_friction():
     """From 44 in on the linkage does not assemble at first.
 
     Many couples jam beside the dead point where it begins.
@@ -323,9 +312,7 @@ INERTIA = 2.0 * CRANK * ARM**2 / 3.0 + COUPLER * ARM**2
 WEIGHT = 9.8 * (CRANK + COUPLER) * ARM
 
 
-def release_pendulum(
-    omega: float, duration: float, *effects: fourbar.effects.Effect
-) -> Facts:
+def release_pendulum(omega, duration, *effects):
     """Release a parallelogram, which is one pendulum: its coupler does not turn.
 
     The seven instants that it states are never extreme.
@@ -338,7 +325,7 @@ def release_pendulum(
     return summarize(scene, fourbar.solve(scene))
 
 
-def test_a_released_swing_has_its_period_and_the_first_of_equal_extremes() -> None:
+def test_a_released_swing_has_its_period_and_the_first_of_equal_extremes():
     """The period of a pendulum is an elliptic integral."""
     facts = release_pendulum(0.0, 1.7)
     slow = math.sqrt(INERTIA / WEIGHT)
@@ -352,11 +339,11 @@ def test_a_released_swing_has_its_period_and_the_first_of_equal_extremes() -> No
     assert damped.period is None
 
 
-def test_a_released_turn_has_its_period() -> None:
+def test_a_released_turn_has_its_period():
     """The time of a turn is the integral of 1/omega, by the energy."""
     energy = 0.5 * INERTIA * 30.0**2 - WEIGHT * math.cos(AWAY)
 
-    def compute_slowness(theta: float) -> float:
+    def compute_slowness(theta):
         return math.sqrt(0.5 * INERTIA / (energy + WEIGHT * math.cos(theta)))
 
     period, _ = quad(compute_slowness, 0.0, 2.0 * math.pi, epsabs=1e-13)
@@ -364,7 +351,7 @@ def test_a_released_turn_has_its_period() -> None:
     assert facts.period == pytest.approx(period, rel=EXTREME)
 
 
-def test_transmission_angle_is_the_least_of_all_stretches() -> None:
+def test_transmission_angle_is_the_least_of_all_stretches():
     """The coupler rocks in two stretches; the sine of mu is positive in one of them and
     negative in the other.
     """
@@ -372,7 +359,7 @@ def test_transmission_angle_is_the_least_of_all_stretches() -> None:
     bars = [fourbar.Bar(length * inch) for length in (0.2906, 1.203, 1.152)]
     linkage = fourbar.FourBar(1.102 * inch, *bars)
 
-    def sweep(steps: int) -> fourbar.Scene:
+    def sweep(steps):
         angle = fourbar.Sweep(0.0, math.tau, steps)
         return fourbar.Scene(linkage, fourbar.Motion(theta_3=angle, omega_3=1.0))
 

@@ -16,7 +16,7 @@ from fourbar.linkage import PIN_FORCE
 from fourbar.scene import command_at
 from fourbar.show.block import write_facts, write_motor
 from fourbar.show.motion_curves import describe_motion
-from fourbar.show.summary import Facts, summarize
+from fourbar.show.summary import summarize
 from tests.fourbar.show.test_summary import list_sizes
 from tests.support.scenes import CYLINDER, crank_rocker
 
@@ -35,44 +35,36 @@ CRANK_ROCKER = (0.3, 0.1, 0.25, 0.22)
 PARALLELOGRAM = (0.3, 0.1, 0.3, 0.1)
 
 
-def sweep(
-    lengths: tuple[float, float, float, float],
-    start: float,
-    stop: float,
-    bar: int = 2,
-    **parts: object,
-) -> fourbar.Scene:
+def sweep(lengths, start, stop, bar=2, **parts):
     """Make a scene of bars of 1 kg/m under gravity, between two angles of a bar."""
     rates = {f"theta_{bar}": fourbar.Sweep(start, stop, 20), f"omega_{bar}": 10.0}
     scene = fourbar.Scene(
-        fourbar.uniform(*lengths),
-        fourbar.Motion(**rates),  # type: ignore[arg-type]
-        effects=(GRAVITY,),
+        fourbar.uniform(*lengths), fourbar.Motion(**rates), effects=(GRAVITY,)
     )
     return replace(scene, **parts)
 
 
-def find_facts(scene: fourbar.Scene) -> Facts:
+def find_facts(scene):
     return summarize(scene, fourbar.solve(scene))
 
 
-def write(facts: Facts, **options: object) -> str:
-    lines = write_facts(facts, **options)  # type: ignore[arg-type]
+def write(facts, **options):
+    lines = write_facts(facts, **options)
     return " ".join(" ".join(lines).split())
 
 
-def find_angle(side: float, first: float, second: float) -> float:
+def find_angle(side, first, second):
     """Return the angle between two sides of a triangle, opposite to the third."""
     return math.acos((first**2 + second**2 - side**2) / (2.0 * first * second))
 
 
-def find_dead(lengths: tuple[float, float, float, float]) -> list[float]:
+def find_dead(lengths):
     """List the angles of bar 2 at which bars 2 and 3 are in line."""
     d, a, b, c = lengths
     return [find_angle(c, d, b + a), find_angle(c, d, b - a) + math.pi]
 
 
-def clamp(last: float) -> fourbar.Scene:
+def clamp(last):
     """Make a toggle clamp whose bars 2 and 3 would be in line at -6e-5 deg."""
     scene = fourbar.from_pins((0.0, 0.0), (0.04, 0.002), (0.08, 0.0), (0.08, -0.06))
     angle = fourbar.Sweep(math.atan2(2.0, 40.0), math.radians(last), 20)
@@ -85,10 +77,9 @@ def clamp(last: float) -> fourbar.Scene:
     )
 
 
-def find_stroke_speed(scene: fourbar.Scene, angle: float) -> float:
+def find_stroke_speed(scene, angle):
     at = command_at(scene, np.array([angle]))
     speed = fourbar.solve(scene, "velocity", at=at).stroke_speed
-    assert speed is not None
     return float(speed[0])
 
 
@@ -118,10 +109,7 @@ POLES = {
         sweep(PARALLELOGRAM, 5.0, 5.0 + math.tau),
         [math.tau, 3 * math.pi],
     ),
-    "change points, backwards": (
-        sweep(PARALLELOGRAM, 6.3, 0.5),
-        [math.tau, math.pi],
-    ),
+    "change points, backwards": (sweep(PARALLELOGRAM, 6.3, 0.5), [math.tau, math.pi]),
     "change point of the output": (
         sweep(
             (0.36419445229114195, 0.3900709389998438) * 2, 0.09, 4.489191916441563, 4
@@ -141,7 +129,7 @@ POLES = {
 
 
 @pytest.mark.parametrize("name", POLES)
-def test_what_grows_without_bound_is_no_number_anywhere(name: str) -> None:
+def test_what_grows_without_bound_is_no_number_anywhere(name):
     scene, places = POLES[name]
     facts = find_facts(scene)
     panels = facts.motion.panels
@@ -161,7 +149,6 @@ def test_what_grows_without_bound_is_no_number_anywhere(name: str) -> None:
         poles = panels.list_poles(quantity)
         assert np.abs(np.subtract.outer(poles, places)).min(axis=1).max() < LOCATED
     entry = write_motor(scene, facts.solution, {})
-    assert entry is not None
     for pin, force in PIN_FORCE.items():
         peaks = facts.pins[pin].peak, facts.pins[pin].rms, entry["pins"][pin]["peak"]
         assert [peak is None for peak in peaks] == [force in growing] * 3
@@ -181,41 +168,36 @@ def test_what_grows_without_bound_is_no_number_anywhere(name: str) -> None:
         assert ("none is enough, as the" in text) == sized
 
 
-def test_a_torque_is_largest_where_pin_forces_have_a_pole() -> None:
+def test_a_torque_is_largest_where_pin_forces_have_a_pole():
     """T2 = (0.05 + 0.3 + 0.05) kg g 0.1 m cos(theta_2), largest at change points."""
     for start, stop in ((-1.0, 1.0), (1.0, -1.0), (2.0, 4.0)):
         facts = find_facts(sweep(PARALLELOGRAM, start, stop))
-        assert facts.peak is not None
         weight = math.copysign(0.4 * 9.81 * 0.1, facts.peak.value)
         assert facts.peak.value == pytest.approx(weight, rel=PEAK)
         assert abs(math.sin(facts.peak.place)) < LOCATED
         assert facts.motion.panels.growing == {*PIN_FORCE.values()}
 
 
-def test_power_beside_a_pole_of_the_torque_has_its_peak_and_mean() -> None:
+def test_power_beside_a_pole_of_the_torque_has_its_peak_and_mean():
     """Whichever bar is driven, it gives the same power."""
     scene, _ = POLES["torque on the output"]
     duty, right = (
         fourbar.motor_duty(fourbar.solve(replace(scene, drive_bar=bar)))
         for bar in (4, 2)
     )
-    assert duty is not None and right is not None
     for name in ("peak_power", "rms_power", "energy_in", "energy_out"):
         number = pytest.approx(getattr(right, name), rel=LOCATED)
         assert getattr(duty, name) == number, name
     scene, _ = POLES["cylinder in line with the crank"]
     facts = find_facts(scene)
-    assert facts.duty is not None
     assert facts.duty.peak_speed == pytest.approx(10.0 * LEVER[0], rel=PEAK)
     assert "speed peak 0.9 m/s power" in write(facts)
 
 
 @pytest.mark.parametrize("speed", (10.0, np.array([10.0, 5.0])))
-def test_a_listed_position_without_a_lever_is_one_at_which_the_force_grows(
-    speed: object,
-) -> None:
+def test_a_listed_position_without_a_lever_is_one_at_which_the_force_grows(speed):
     """Ends of the cylinder and O2 are in line; another position has a force."""
-    motion = fourbar.Motion(np.array([1.0, IN_LINE]), speed)  # type: ignore[arg-type]
+    motion = fourbar.Motion(np.array([1.0, IN_LINE]), speed)
     scene = crank_rocker(motion=motion, drive=CYLINDER)
     assert list(fourbar.solve(scene).status) == ["ok", "no_lever"]
     facts = find_facts(scene)
@@ -227,9 +209,7 @@ def test_a_listed_position_without_a_lever_is_one_at_which_the_force_grows(
 
 
 @pytest.mark.parametrize("lengths", ((0.37, 0.09, 0.09, 0.37), (0.2, 0.25, 0.21, 0.22)))
-def test_ranges_over_change_points_and_gaps_are_those_of_the_angles(
-    lengths: tuple[float, float, float, float],
-) -> None:
+def test_ranges_over_change_points_and_gaps_are_those_of_the_angles(lengths):
     """Both circuits are one for the last lengths.
 
     Over the gap the output goes on from the other end of its range, which is counted
@@ -252,7 +232,7 @@ def test_ranges_over_change_points_and_gaps_are_those_of_the_angles(
         assert widths[0] <= fourbar.swing(fourbar.uniform(*lengths)) + LOCATED
 
 
-def test_a_gap_within_a_step_is_no_full_turn() -> None:
+def test_a_gap_within_a_step_is_no_full_turn():
     """The longest bar exceeds what lets bar 2 turn by 1 um.
 
     No position of the sweep lies in the gap.
@@ -268,15 +248,9 @@ def test_a_gap_within_a_step_is_no_full_turn() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("start", "steps", "pins"),
-    [
-        (0.0, 36, ("O2", "A", "B", "O4")),
-        (-math.pi, 97, ("B",)),
-        (0.3, 36, ("B",)),
-    ],
+    [(0.0, 36, ("O2", "A", "B", "O4")), (-math.pi, 97, ("B",)), (0.3, 36, ("B",))],
 )
-def test_a_jump_where_pin_friction_reverses_is_no_pole(
-    start: float, steps: int, pins: tuple[str, ...]
-) -> None:
+def test_a_jump_where_pin_friction_reverses_is_no_pole(start, steps, pins):
     """Coupler and output turn alike where the diagonal is shortest and longest.
 
     Pin B reverses there, at positions of some sweeps and at the ends of some turns.

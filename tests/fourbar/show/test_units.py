@@ -48,9 +48,7 @@ IN_SI = {
 """Size of each unit that a result of the model has in imperial units, by definition."""
 
 
-def test_every_number_is_in_the_unit_that_is_named(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_every_number_is_in_the_unit_that_is_named(capsys):
     solution = fourbar.solve(fourbar.load(MODEL), "error")
     for form in ("--json", "--csv"):
         assert status(["analyze", str(MODEL), form, "--units", "imperial"]) == HOLDS
@@ -75,9 +73,8 @@ def test_every_number_is_in_the_unit_that_is_named(
                 and "condition" in header
             )
             assert float(rows[90][column]) * POUND == pytest.approx(
-                solution.F12[90, 1],
-                rel=1e-14,
-            )  # type: ignore[index]
+                solution.F12[90, 1], rel=1e-14
+            )
     for name, (values, unit) in printed.items():
         if UNITS[name] != unit or unit in ("rad/s^2", "1"):
             expected = getattr(solution, name)
@@ -99,9 +96,7 @@ def test_every_number_is_in_the_unit_that_is_named(
     }
 
 
-def test_a_spreadsheet_of_decimal_commas_has_magnitudes_power_and_time(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_spreadsheet_of_decimal_commas_has_magnitudes_power_and_time(capsys):
     scene = fourbar.load(MODEL)
     assert status(["analyze", str(MODEL), "--csv-comma", "--units", "mm kW"]) == HOLDS
     header, *rows = csv.reader(io.StringIO(capsys.readouterr().out), delimiter=";")
@@ -125,7 +120,7 @@ def test_a_spreadsheet_of_decimal_commas_has_magnitudes_power_and_time(
 
 
 @pytest.mark.slow
-def test_the_table_names_its_units(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_table_names_its_units(capsys):
     assert (
         status(["analyze", str(MODEL), "--units", "mm kN N.mm", "--table", "--all"])
         == HOLDS
@@ -157,23 +152,19 @@ def test_the_table_names_its_units(capsys: pytest.CaptureFixture[str]) -> None:
     ]
     torque = [float(line.split()[1]) for line in lines[heading + 3 :]]
     assert torque == pytest.approx(
-        list(1000.0 * fourbar.solve(fourbar.load(MODEL)).torque),
-        rel=1e-4,
+        list(1000.0 * fourbar.solve(fourbar.load(MODEL)).torque), rel=1e-4
     )
 
 
 @pytest.mark.parametrize("text", ["furlong", "mm in", "N.mm J", "m^2"])
-def test_what_is_no_list_of_units_is_refused(
-    text: str,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_is_no_list_of_units_is_refused(text, capsys):
     with pytest.raises(InputError):
         units(text)
     assert status(["analyze", str(MODEL), "--units", text]) == 2
     assert "units" in capsys.readouterr().err
 
 
-def test_units_are_read_as_people_write_them() -> None:
+def test_units_are_read_as_people_write_them():
     assert (
         units("mm, N,lbf-in") == units("mm N lbf-in")
         and units("Imperial") == units("imperial")
@@ -184,10 +175,9 @@ def test_units_are_read_as_people_write_them() -> None:
 
 
 @pytest.mark.slow
-def test_plots_and_notebooks_say_theirs() -> None:
+def test_plots_and_notebooks_say_theirs():
     pytest.importorskip(
-        "matplotlib",
-        reason="drawing needs matplotlib: pip install matplotlib",
+        "matplotlib", reason="drawing needs matplotlib: pip install matplotlib"
     )
     from fourbar.show.plot.figures import draw_figure
 
@@ -199,8 +189,7 @@ def test_plots_and_notebooks_say_theirs() -> None:
             torque = fourbar.solve(scene).torque
             curve = max((np.asarray(line.get_ydata()) for line in axes.lines), key=len)
             assert np.nanmax(curve) == pytest.approx(
-                np.max(torque) / (POUND * INCH),
-                rel=0.01,
+                np.max(torque) / (POUND * INCH), rel=0.01
             )
     assert " in" in notebook.in_units(scene, "imperial")._repr_html_()
     table = notebook.in_units(fourbar.solve(scene), "imperial")._repr_html_()
@@ -208,9 +197,7 @@ def test_plots_and_notebooks_say_theirs() -> None:
 
 
 @pytest.mark.parametrize("text", ["inches pounds", "in lb", "mm lbs deg"])
-def test_pounds_without_a_unit_of_force_are_one_line_that_says_what_to_write(
-    text: str,
-) -> None:
+def test_pounds_without_a_unit_of_force_are_one_line_that_says_what_to_write(text):
     with pytest.raises(InputError, match="write lbf for pounds-force"):
         units(text)
     assert units("in lb lbf")["N"][0] == "lbf"
@@ -222,10 +209,8 @@ def test_pounds_without_a_unit_of_force_are_one_line_that_says_what_to_write(
 )
 @pytest.mark.parametrize("length", ("300 mm", "12 in"))
 def test_a_released_motion_has_speeds_that_suit_its_accelerations(
-    stated: dict[str, str],
-    shown: str,
-    length: str,
-) -> None:
+    stated, shown, length
+):
     motion = {"theta_2": "0 deg", "free": {"duration": "1 s"}, **stated}
     of_scene = units_of_scene({"lengths": {"ground": length}, "motion": motion})
     assert of_scene["rad/s"][0] == shown
@@ -234,5 +219,5 @@ def test_a_released_motion_has_speeds_that_suit_its_accelerations(
 @pytest.mark.parametrize(
     ("value", "text"), [(-0.0, "0"), (-1e-3, "-0.001"), (123456.7, "123500")]
 )
-def test_a_number_has_four_digits_and_zero_no_sign(value: float, text: str) -> None:
+def test_a_number_has_four_digits_and_zero_no_sign(value, text):
     assert write_digits(value) == text

@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -34,10 +33,7 @@ the number.
 
 
 @pytest.mark.parametrize(("effects", "drive"), [(DRIVEN, 4), (RUBBING, 2)])
-def test_every_effect_has_the_slopes_of_files_with_a_number_moved(
-    effects: tuple[Any, ...],
-    drive: int,
-) -> None:
+def test_every_effect_has_the_slopes_of_files_with_a_number_moved(effects, drive):
     case = scene(effects, drive)
     points = (fourbar.Point("P", 3, (0.1, 0.4)),)
     case = replace(case, loads=(*LOADS, TABLED), points=points)
@@ -46,7 +42,7 @@ def test_every_effect_has_the_slopes_of_files_with_a_number_moved(
     assert not failing(rows)
 
 
-def test_a_drawn_coordinate_counts_by_a_hundredth_of_the_longest_bar() -> None:
+def test_a_drawn_coordinate_counts_by_a_hundredth_of_the_longest_bar():
     """Others count by a hundredth of themselves, angles by a degree."""
     slopes = sensitivity(fourbar.load(MODELS / "capabilities" / "drawn.toml"))
     longest = max(slopes.solution.scene.linkage.lengths)
@@ -61,7 +57,7 @@ def test_a_drawn_coordinate_counts_by_a_hundredth_of_the_longest_bar() -> None:
         assert abs(change) == pytest.approx(step * np.nanmax(size), rel=EXACT)
 
 
-def test_where_there_is_no_derivative_a_status_says_why() -> None:
+def test_where_there_is_no_derivative_a_status_says_why():
     rest = sensitivity(scene((Friction.at(B=0.05),), 2, omega_2=0.0))
     assert rest.status == ["at_rest"] * len(ANGLES)
     assert np.isnan(rest.by["torque"]).all() and np.isfinite(rest.by["a_G3"]).all()
@@ -81,7 +77,7 @@ def test_where_there_is_no_derivative_a_status_says_why() -> None:
         assert np.isnan(rows[:, lost]).all() and np.isfinite(rows[:, ~lost]).all(), name
 
 
-def test_past_a_change_point_derivatives_are_of_the_same_assembly() -> None:
+def test_past_a_change_point_derivatives_are_of_the_same_assembly():
     """Those of the first half of the turn, of a parallelogram on the other half too."""
     theta_2 = np.array([1.0, 4.0, 5.5, 8.0])
     parallelogram = Scene(fourbar.uniform(0.3, 0.1, 0.3, 0.1), Motion(theta_2, 1.0))
@@ -97,7 +93,7 @@ def test_past_a_change_point_derivatives_are_of_the_same_assembly() -> None:
     assert "torque" not in alone.by and "bars.input.mass" not in alone.keys
 
 
-def differ_by_a_study(nominal: Scene, key: str) -> Any:
+def differ_by_a_study(nominal, key):
     """Difference theta_3 of the members of a study on both sides of a number."""
     step = 1e-6
     number = read_place(nominal, list_entries(nominal)[key].place)
@@ -116,20 +112,15 @@ KITE = (0.3, 0.1, 0.1, 0.3)
     [(PARALLELOGRAM, "theta_2"), (PARALLELOGRAM, "theta_4"), (KITE, "theta_2")],
 )
 def test_derivatives_are_the_differences_of_a_study_at_change_points(
-    lengths: tuple[float, ...],
-    branch: int,
-    command: str,
-) -> None:
+    lengths, branch, command
+):
     angles = np.array([0.7, 2.4, 4.0, 5.5])
     motion = Motion(**{command: angles}, branch=branch)
     nominal = Scene(fourbar.uniform(*lengths), motion)
     of = sensitivity(nominal).of
     for key in ("lengths.ground", "lengths.input", "lengths.coupler"):
         np.testing.assert_allclose(
-            of("theta_3", key),
-            differ_by_a_study(nominal, key),
-            rtol=1e-6,
-            atol=1e-6,
+            of("theta_3", key), differ_by_a_study(nominal, key), rtol=1e-6, atol=1e-6
         )
 
 
@@ -140,12 +131,12 @@ def test_derivatives_are_the_differences_of_a_study_at_change_points(
         ({"theta_2": 1.0, "free": Free(1.0, 2)}, "free motion"),
     ],
 )
-def test_what_has_no_sensitivities(motion: dict[str, Any], word: str) -> None:
+def test_what_has_no_sensitivities(motion, word):
     with pytest.raises(fourbar.InputError, match=word):
         sensitivity(Scene(LINK, fourbar.Motion(**motion, omega_2=1.0)))
 
 
-def test_an_unknown_name_is_refused() -> None:
+def test_an_unknown_name_is_refused():
     slopes = sensitivity(scene())
     for quantity, key in (("torque", "lengths.inptu"), ("torqe", "lengths.input")):
         with pytest.raises(fourbar.InputError, match="is not known here"):
@@ -153,10 +144,7 @@ def test_an_unknown_name_is_refused() -> None:
 
 
 @pytest.mark.slow
-def test_the_command_ranks_the_numbers_and_writes_them_all(
-    capsys: pytest.CaptureFixture[str],
-    tmp_path: Path,
-) -> None:
+def test_the_command_ranks_the_numbers_and_writes_them_all(capsys, tmp_path):
     models, out = Path(__file__).parents[3] / "models", tmp_path / "s.json"
     assert status(["analyze", str(models / "crank_rocker.toml"), "--sensitivity"]) == 0
     text = capsys.readouterr().out
@@ -198,17 +186,14 @@ def test_the_command_ranks_the_numbers_and_writes_them_all(
     [(0.0, np.pi), (-0.4, np.pi - 0.4), (0.3, np.pi), (0.0, -np.pi)],
 )
 def test_half_a_turn_from_the_ground_the_first_derivative_is_the_ratio_of_the_speeds(
-    ground_angle: float,
-    theta_2: float,
-) -> None:
+    ground_angle, theta_2
+):
     """There the tangent of the half angle is 1e16, of whose slope no digit is left."""
     link = replace(LINK, ground_angle=ground_angle)
     slopes = sensitivity(Scene(link, Motion(theta_2, 10.0, 3.0), effects=(Gravity(),)))
     solution = slopes.solution
     np.testing.assert_allclose(
-        slopes.of("theta_3", "motion.theta_2"),
-        solution.omega_3 / 10.0,
-        rtol=1e-13,
+        slopes.of("theta_3", "motion.theta_2"), solution.omega_3 / 10.0, rtol=1e-13
     )
     turned = (
         slopes.of("omega_3", "motion.theta_2") * 10.0
@@ -219,13 +204,11 @@ def test_half_a_turn_from_the_ground_the_first_derivative_is_the_ratio_of_the_sp
         "theta_3", "lengths.ground_angle"
     )
     np.testing.assert_allclose(
-        with_ground,
-        1.0,
-        rtol=1e-13,
+        with_ground, 1.0, rtol=1e-13
     )  # a linkage turned as a whole
 
 
-def test_a_kite_whose_halves_meet_has_derivatives() -> None:
+def test_a_kite_whose_halves_meet_has_derivatives():
     """With a = d and b = c the product in Heron's factor is a constant."""
     slopes = sensitivity(Scene(fourbar.uniform(0.3, 0.3, 0.2, 0.2), Motion(1.0, 10.0)))
     np.testing.assert_allclose(

@@ -9,7 +9,6 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -36,7 +35,7 @@ from fourbar.scene.motion import Free
 from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.studies import write_equilibria
 from fourbar.studies.circuit_curve import POSITIONS_OF_A_BRANCH, CircuitCurve
-from fourbar.studies.equilibrium import Equilibria, equilibrium
+from fourbar.studies.equilibrium import equilibrium
 from tests.support.scenes import CYLINDER, bare, crank_rocker
 
 ROOT = Path(__file__).parents[3]
@@ -53,13 +52,11 @@ Run = Callable[..., str]
 
 
 @pytest.fixture
-def run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Run:
+def run(tmp_path, monkeypatch, capsys):
     """Runs `fourbar equilibrium`, which must hold, and returns what it prints."""
     monkeypatch.chdir(tmp_path)
 
-    def call(*arguments: str) -> str:
+    def call(*arguments):
         assert status(["equilibrium", *arguments]) == 0
         printed = capsys.readouterr().out
         if "--json" not in arguments:
@@ -69,20 +66,15 @@ def run(
     return call
 
 
-def crank_as_pendulum(
-    *effects: object, loads: tuple[Load, ...] = (), **motion: object
-) -> Scene:
+def crank_as_pendulum(*effects, loads=(), **motion):
     """A crank-rocker of which the crank alone has mass.
 
     theta_2 swings as one body about O2.
     """
     linkage = FourBar(0.3, Bar(0.1, M, INERTIA, (R, 0.3)), Bar(0.25), Bar(0.22), 0.2)
     return Scene(
-        linkage,
-        Motion(**{"theta_2": 0.7, **motion}),
-        loads=loads,
-        effects=effects,
-    )  # type: ignore[arg-type]
+        linkage, Motion(**{"theta_2": 0.7, **motion}), loads=loads, effects=effects
+    )
 
 
 J = INERTIA + M * R * R
@@ -93,7 +85,7 @@ GRID = TURN / POSITIONS_OF_A_BRANCH
 SAMPLE = 0.2 + 700.5 * GRID
 
 
-def pendulum_under_moment(excess: float) -> Scene:
+def pendulum_under_moment(excess):
     """Q = 0.5 (1 + excess) - 0.5 sin(theta_2 - 0.1)."""
     moment = Load(2, moment=0.5 * (1.0 + excess))
     scene = crank_as_pendulum(Gravity(8.0, 0.0), loads=(moment,))
@@ -101,7 +93,7 @@ def pendulum_under_moment(excess: float) -> Scene:
     return replace(scene, linkage=replace(scene.linkage, input=crank))
 
 
-def apart(excess: float) -> float:
+def apart(excess):
     """Half the distance of its two zeros, a sixth of the grid's step at -1e-8."""
     return math.acos(1.0 + excess)
 
@@ -160,7 +152,7 @@ PENDULUMS = {
 
 
 @pytest.mark.parametrize("name", PENDULUMS)
-def test_a_crank_with_mass_alone_is_a_pendulum(name: str) -> None:
+def test_a_crank_with_mass_alone_is_a_pendulum(name):
     scene, expected, close = PENDULUMS[name]
     equilibria = equilibrium(scene)
     assert equilibria.samples >= POSITIONS_OF_A_BRANCH or "sweep" in name
@@ -181,7 +173,7 @@ def test_a_crank_with_mass_alone_is_a_pendulum(name: str) -> None:
             assert rest.frequency is None
 
 
-def test_the_frequency_at_a_limit_is_that_of_the_output_as_a_pendulum() -> None:
+def test_the_frequency_at_a_limit_is_that_of_the_output_as_a_pendulum():
     linkage = FourBar(0.3, Bar(0.4), Bar(0.2), Bar(0.25, M, INERTIA, (R, 0.0)), 0.5)
     limit = fourbar.limit_positions(linkage)[0]
     beside = Motion(np.array([limit.theta_2 + off for off in (0.01, -0.01)]))
@@ -192,9 +184,7 @@ def test_the_frequency_at_a_limit_is_that_of_the_output_as_a_pendulum() -> None:
     assert hanging.frequency == pytest.approx(pendulum, rel=1e-9)
 
 
-def test_a_slope_that_is_no_number_is_neither_stable_nor_unstable(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_slope_that_is_no_number_is_neither_stable_nor_unstable(monkeypatch):
     nothing = np.full(1, np.nan)
     monkeypatch.setattr(CircuitCurve, "slope", lambda _, points: nothing * points[:, 0])
     found = equilibrium(crank_as_pendulum(DOWN)).found
@@ -203,7 +193,7 @@ def test_a_slope_that_is_no_number_is_neither_stable_nor_unstable(
     ] * 2
 
 
-def test_friction_holds_a_pendulum_within_the_angle_that_it_can() -> None:
+def test_friction_holds_a_pendulum_within_the_angle_that_it_can():
     f = 0.2
     away = math.asin(f / (M * 9.81 * R))
     equilibria = equilibrium(crank_as_pendulum(DOWN, Friction.at(O2=f)))
@@ -221,7 +211,7 @@ def test_friction_holds_a_pendulum_within_the_angle_that_it_can() -> None:
 
 
 @pytest.mark.slow
-def test_loaded_friction_holds_up_to_where_no_torque_is_needed_to_move() -> None:
+def test_loaded_friction_holds_up_to_where_no_torque_is_needed_to_move():
     friction = PinFriction.at(O2=(0.2, 0.01), A=(0.1, 0.01), O4=(0.2, 0.02))
     scene = load(MODELS / "crank_rocker.toml")
     scene = replace(scene, loads=(), effects=(DOWN, friction))
@@ -241,9 +231,7 @@ def test_loaded_friction_holds_up_to_where_no_torque_is_needed_to_move() -> None
 @pytest.mark.parametrize(
     "lengths", [(3.0, 3.0, 4.0, 4.0), (4.0, 4.0, 3.0, 3.0), (1.0, 1.0, 3.0, 3.0)]
 )
-def test_beside_a_change_point_nothing_is_taken_for_a_rest(
-    lengths: tuple[float, ...],
-) -> None:
+def test_beside_a_change_point_nothing_is_taken_for_a_rest(lengths):
     """A kite in which A comes to O4, turned with its gravity.
 
     As many equilibria, and as many undecided, none.
@@ -274,8 +262,8 @@ BACK = Sweep(math.radians(500.0), math.radians(-100.0), 300)
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize("lengths", ONE_CHANGE_POINT)
 def test_past_one_change_point_the_angle_is_that_of_the_scenes_assembly(
-    lengths: tuple[float, ...], branch: int, motion: Sweep | None
-) -> None:
+    lengths, branch, motion
+):
     """An assembly repeats after two turns of the input.
 
     The scene needs no torque at any angle that is found, and changes the sign of its
@@ -296,7 +284,7 @@ def test_past_one_change_point_the_angle_is_that_of_the_scenes_assembly(
     assert (np.diff(angles) > 0.0).all()
     swept = FULL if motion is None else motion
 
-    def solve_at(angles: np.ndarray) -> np.ndarray:
+    def solve_at(angles):
         at = Motion(theta_2=angles, omega_2=0.0, alpha_2=0.0, branch=branch)
         return np.asarray(fourbar.solve(replace(scene, motion=at)).torque)
 
@@ -307,7 +295,7 @@ def test_past_one_change_point_the_angle_is_that_of_the_scenes_assembly(
     assert len(angles) == np.sum(signs[1:] != signs[:-1]) > 0
 
 
-def test_friction_holds_on_past_the_one_change_point() -> None:
+def test_friction_holds_on_past_the_one_change_point():
     """Bars in line hold on both sides of it, in one range of the assembly."""
     linkage = FourBar(1.0, Bar(1.0, 10.0), Bar(2.0, 20.0), Bar(2.0, 20.0))
     scene = Scene(linkage, Motion(), effects=(DOWN, Friction.at(O2=40.0, O4=40.0)))
@@ -323,7 +311,7 @@ def test_friction_holds_on_past_the_one_change_point() -> None:
         assert (at_rest.torque_high[solved] >= 0.0).all()
 
 
-def test_a_balanced_linkage_is_indifferent_over_its_sweep_as_it_is_stated() -> None:
+def test_a_balanced_linkage_is_indifferent_over_its_sweep_as_it_is_stated():
     """A parallelogram lamp and a spring of no free length: k = m g l/(r h)."""
     arms = Bar(0.3), Bar(0.06, 2.0), Bar(0.3)
     linkage = FourBar(0.06, *arms, 0.5 * math.pi)
@@ -340,7 +328,7 @@ def test_a_balanced_linkage_is_indifferent_over_its_sweep_as_it_is_stated() -> N
     assert ends == pytest.approx((-40.0, 60.0), abs=1e-9)
 
 
-def test_nothing_that_acts_and_a_balanced_crank_are_indifferent_all_round() -> None:
+def test_nothing_that_acts_and_a_balanced_crank_are_indifferent_all_round():
     scene = crank_as_pendulum(DOWN)
     centred = replace(scene.linkage, input=Bar(0.1, M, INERTIA, (0.0, 0.0)))
     for balanced in (crank_as_pendulum(), replace(scene, linkage=centred)):
@@ -350,7 +338,7 @@ def test_nothing_that_acts_and_a_balanced_crank_are_indifferent_all_round() -> N
         assert last.theta_2 - first.theta_2 == pytest.approx(TURN)
 
 
-def test_a_load_on_a_bar_that_rests_is_indifferent_in_one_way_of_moving_alone() -> None:
+def test_a_load_on_a_bar_that_rests_is_indifferent_in_one_way_of_moving_alone():
     """A rhombus: in its crossed assembly bar 4 rests."""
     scene = load(MODELS / "textbook" / "gtdynamics_square.toml")
     crossed = replace(scene, motion=scene.motion.replace(branch=-1))
@@ -376,9 +364,7 @@ B = { stiffness = "10 N m/rad", rest = "-90 deg" }
 
 
 @pytest.mark.parametrize(("start", "count"), [("60 deg", 0), ("160 deg", 1)])
-def test_a_torsion_spring_is_followed_from_the_start_of_the_sweep(
-    start: str, count: int
-) -> None:
+def test_a_torsion_spring_is_followed_from_the_start_of_the_sweep(start, count):
     """Two circles close the loop at 5000 angles, along which the pins are followed.
 
     From the first that closes the spring at B is wound by 254.5 deg where the work of
@@ -415,19 +401,19 @@ def test_a_torsion_spring_is_followed_from_the_start_of_the_sweep(
     assert np.any(np.diff(np.sign(np.diff(energy[within])))) == bool(count)
 
 
-def springy_table(**motion: object) -> Scene:
+def springy_table(**motion):
     """A folding table on two legs, pressed up by torsion springs: a double rocker."""
     bars = Bar(0.35, 0.6), Bar(0.45, 8.0), Bar(0.35, 0.6)
     leg = 12.0, math.radians(120.0), 0.0
     springs = Torsion.at(O2=leg, O4=leg)
-    return Scene(FourBar(0.5, *bars), Motion(**motion), effects=(DOWN, springs))  # type: ignore[arg-type]
+    return Scene(FourBar(0.5, *bars), Motion(**motion), effects=(DOWN, springs))
 
 
 SWEPT = Sweep(math.radians(20.0), math.radians(140.0), 60)
 
 
 @pytest.mark.parametrize("branch", [1, -1])
-def test_what_a_sweep_does_not_reach_is_told_apart(branch: int) -> None:
+def test_what_a_sweep_does_not_reach_is_told_apart(branch):
     """The other assembly has the same angles and an equilibrium among them."""
     (rest,) = equilibrium(springy_table(theta_2=SWEPT, branch=branch)).found
     assert rest.place.branch == -1
@@ -436,7 +422,7 @@ def test_what_a_sweep_does_not_reach_is_told_apart(branch: int) -> None:
     assert all(rest.reached for rest in everywhere)
 
 
-def points_of(scene: Scene, low: float, high: float) -> np.ndarray:
+def points_of(scene, low, high):
     """Return psi and mu where bar 4 turns between two angles, deg."""
     sweep = Sweep(math.radians(low), math.radians(high), 977)
     solution = fourbar.solve(replace(scene, motion=Motion(theta_4=sweep)), "position")
@@ -444,7 +430,7 @@ def points_of(scene: Scene, low: float, high: float) -> np.ndarray:
     return np.stack([solution.theta_2, solution.theta_4 - solution.theta_3], axis=1)
 
 
-def test_a_sweep_of_another_bar_reaches_both_sides_of_a_limit_and_no_more() -> None:
+def test_a_sweep_of_another_bar_reaches_both_sides_of_a_limit_and_no_more():
     """Bar 2 turns back at its limit, theta_4 = 196.4 deg, within the sweep."""
     sweep = Sweep(math.radians(150.0), math.radians(230.0), 60)
     scene = springy_table(theta_4=sweep)
@@ -456,7 +442,7 @@ def test_a_sweep_of_another_bar_reaches_both_sides_of_a_limit_and_no_more() -> N
     assert not curve.reached(points_of(scene, 230.1, 300.0)).any()
 
 
-def test_the_other_assembly_stands_apart_in_the_print(run: Run) -> None:
+def test_the_other_assembly_stands_apart_in_the_print(run):
     fourbar.save(springy_table(theta_2=SWEPT), "table.toml")
     first, second, _ = run("table.toml").split("\n\n")
     assert first.startswith("0 equilibria in this sweep without friction,")
@@ -464,7 +450,7 @@ def test_the_other_assembly_stands_apart_in_the_print(run: Run) -> None:
     assert "138.3165" in second and "crossed" in second
 
 
-def test_equilibria_are_printed_in_the_units_of_the_file(run: Run) -> None:
+def test_equilibria_are_printed_in_the_units_of_the_file(run):
     text, pound, inch = fourbar.dump(crank_as_pendulum(DOWN)), 0.45359237, 0.0254
     assert 'ground = "0.3 m"' in text
     stated = text.replace('ground = "0.3 m"', f'ground = "{0.3 / inch!r} in"')
@@ -478,7 +464,7 @@ def test_equilibria_are_printed_in_the_units_of_the_file(run: Run) -> None:
         assert words in printed
 
 
-def test_released_ones_begin_to_move_as_stated() -> None:
+def test_released_ones_begin_to_move_as_stated():
     scene = load(MODELS / "crank_rocker.toml")
     scene = replace(scene, effects=(*scene.effects, Friction.at(O2=0.2)))
     equilibria = equilibrium(scene)
@@ -493,7 +479,7 @@ def test_released_ones_begin_to_move_as_stated() -> None:
 
 
 @pytest.mark.slow
-def test_at_a_change_point_a_released_parallelogram_has_two_ways_to_move() -> None:
+def test_at_a_change_point_a_released_parallelogram_has_two_ways_to_move():
     """Elsewhere it falls: the height of its mass centres grows with sin(theta_2)."""
     arm = Bar(0.5, 21.0)
     scene = Scene(FourBar(0.6, arm, Bar(0.6, 25.0), arm), Motion(0.0), effects=(DOWN,))
@@ -507,7 +493,7 @@ def test_at_a_change_point_a_released_parallelogram_has_two_ways_to_move() -> No
     assert [words[angle] for angle in ("0", "180", "360")] == ["change_point"] * 3
 
 
-def test_the_command_prints_what_python_finds(run: Run) -> None:
+def test_the_command_prints_what_python_finds(run):
     file = MODELS / "problems" / "gz_physics_987.toml"
     printed = run(str(file))
     for words in ("0.759439193", "found between 3600 positions", "stable"):
@@ -524,17 +510,17 @@ def test_the_command_prints_what_python_finds(run: Run) -> None:
     assert kite["not_decided"][0]["theta_4"] is None  # which it has not there
 
 
-def test_what_assembles_nowhere_is_refused() -> None:
+def test_what_assembles_nowhere_is_refused():
     scene = Scene(fourbar.uniform(1.0, 1.5, 1.0, 0.2), Motion(math.pi))
     with pytest.raises(fourbar.NotAssembledError, match="assembles at none"):
         equilibrium(scene)
 
 
 @pytest.mark.parametrize("unit", [1e-9, 1e120])
-def test_no_unit_of_length_changes_an_equilibrium(unit: float) -> None:
-    def find(unit: float) -> Equilibria:
+def test_no_unit_of_length_changes_an_equilibrium(unit):
+    def find(unit):
         bars = [Bar(x * unit, M, 1e-3 * unit * unit) for x in (0.1, 0.25, 0.22)]
-        linkage = FourBar(0.3 * unit, *bars, 0.2)  # type: ignore[misc]
+        linkage = FourBar(0.3 * unit, *bars, 0.2)
         return equilibrium(Scene(linkage, Motion(0.7), effects=(DOWN,)))
 
     found, same = find(unit).found, find(1.0).found
@@ -554,8 +540,8 @@ def test_no_unit_of_length_changes_an_equilibrium(unit: float) -> None:
     ],
 )
 def test_another_command_has_the_equilibria_of_the_positions_that_it_passes(
-    name: str, swept: tuple[float, float], side: dict[str, Any]
-) -> None:
+    name, swept, side
+):
     """Those of the input swept over the same.
 
     A single position has those of its circuit.
@@ -565,7 +551,7 @@ def test_another_command_has_the_equilibria_of_the_positions_that_it_passes(
     theta_2 = fourbar.solve(commanded).theta_2
     same = Sweep(float(theta_2.min()), float(theta_2.max()), 90)
 
-    def compare(by_name: Motion, by_input: Motion) -> None:
+    def compare(by_name, by_input):
         one, other = (
             equilibrium(replace(commanded, motion=motion)).found
             for motion in (by_name, by_input)
@@ -579,7 +565,7 @@ def test_another_command_has_the_equilibria_of_the_positions_that_it_passes(
     compare(Motion(**{name: swept[0]}, **side), Motion(float(theta_2[0])))
 
 
-def test_what_stands_at_a_limit_has_no_inertia_and_no_frequency() -> None:
+def test_what_stands_at_a_limit_has_no_inertia_and_no_frequency():
     """Bar 4 alone has mass and stands still to first order at its limits."""
     bars = Bar(0.4), Bar(0.2), Bar(0.25, 1.0, 0.002, (0.1, 0.0))
     found = equilibrium(Scene(FourBar(0.3, *bars, 0.5), effects=(DOWN,))).found

@@ -5,7 +5,6 @@ Beams of the textbook, equilibrium at the far end, and V as the slope of M.
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,20 +23,17 @@ BARE = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.2
 AT = fourbar.Motion(1.0, 0.0)
 
 
-def solved(scene: fourbar.Scene, bar: int, stations: object = None) -> object:
-    return fourbar.internal_forces(scene, fourbar.solve(scene), bar, stations)  # type: ignore[arg-type]
+def solved(scene, bar, stations=None):
+    return fourbar.internal_forces(scene, fourbar.solve(scene), bar, stations)
 
 
-def test_a_force_across_the_coupler_bends_it_as_a_beam_on_two_supports() -> None:
+def test_a_force_across_the_coupler_bends_it_as_a_beam_on_two_supports():
     """P a b/L under a load P at a from one end.
 
     Sagging to the right of the bar, which is clockwise before it.
     """
     load = fourbar.Load(
-        3,
-        (8.0, math.radians(-90.0)),
-        from_centre=(0.05, math.pi),
-        frame="bar",
+        3, (8.0, math.radians(-90.0)), from_centre=(0.05, math.pi), frame="bar"
     )  # 75 mm from A
     internal = solved(
         fourbar.Scene(BARE, AT, loads=(load,)), 3, [0.0, 0.03, 0.08, 0.1, 0.25]
@@ -66,9 +62,7 @@ def test_a_force_across_the_coupler_bends_it_as_a_beam_on_two_supports() -> None
     ],
     ids=str,
 )
-def test_a_couple_bends_its_bar_from_its_place_on(
-    bar: int, load: dict[str, Any], foot: float
-) -> None:
+def test_a_couple_bends_its_bar_from_its_place_on(bar, load, foot):
     """M(x) = T x/L before the place and T (x/L - 1) behind it, on two supports.
 
     Without a place the couple enters the output at O4 and the coupler at G.
@@ -88,7 +82,7 @@ def test_a_couple_bends_its_bar_from_its_place_on(
     assert fourbar.solve(elsewhere).torque[0] == fourbar.solve(scene).torque[0]
 
 
-def test_a_bar_that_hangs_in_its_pins_bends_by_its_own_weight() -> None:
+def test_a_bar_that_hangs_in_its_pins_bends_by_its_own_weight():
     """w L^2/8 in the middle of a uniform bar on two pins.
 
     w is its weight per metre across the bar.
@@ -111,7 +105,7 @@ def test_a_bar_that_hangs_in_its_pins_bends_by_its_own_weight() -> None:
     )
 
 
-def test_a_crank_that_turns_is_pulled_by_its_own_mass() -> None:
+def test_a_crank_that_turns_is_pulled_by_its_own_mass():
     """N = m omega^2 (L^2 - x^2)/(2 L), and nothing bends it where nothing else acts."""
     scene = fourbar.Scene(
         replace(BARE, input=fourbar.Bar(0.1, 3.0)), fourbar.Motion(1.0, 20.0)
@@ -122,7 +116,7 @@ def test_a_crank_that_turns_is_pulled_by_its_own_mass() -> None:
     assert np.abs(internal.M).max() < 1e-13
 
 
-def test_a_bar_that_speeds_up_bends_by_its_inertia() -> None:
+def test_a_bar_that_speeds_up_bends_by_its_inertia():
     """The torque of the drive at O2 is the moment there.
 
     M L^2 alpha/3, and V falls to nothing at A.
@@ -160,9 +154,7 @@ EVERYTHING = (
     [{"drive_bar": 2}, {"drive_bar": 3}, {"drive_bar": 4}, {"drive": ON_COUPLER}],
     ids=str,
 )
-def test_each_part_of_a_bar_up_to_a_cut_is_in_balance_under_all_that_acts(
-    drive: dict[str, object],
-) -> None:
+def test_each_part_of_a_bar_up_to_a_cut_is_in_balance_under_all_that_acts(drive):
     """As a run judges it, which asks free bodies for the forces.
 
     Where friction jams there are none.
@@ -181,16 +173,16 @@ def test_each_part_of_a_bar_up_to_a_cut_is_in_balance_under_all_that_acts(
     assert all(row.compared and not row.failed and row.error <= ROUNDED for row in rows)
 
 
-def test_what_cannot_be_is_refused_and_what_has_no_forces_is_nan() -> None:
+def test_what_cannot_be_is_refused_and_what_has_no_forces_is_nan():
     scene = crank_rocker(motion=fourbar.Motion(np.radians([30.0, 60.0])))
     with pytest.raises(InputError, match="solve up to the stage 'force'"):
         fourbar.internal_forces(scene, fourbar.solve(scene), 2)
     moving = crank_rocker()
     for bar in (1, 5, "3"):
         with pytest.raises(InputError, match="bar"):
-            fourbar.internal_forces(moving, fourbar.solve(moving), bar)  # type: ignore[arg-type]
+            fourbar.internal_forces(moving, fourbar.solve(moving), bar)
     with pytest.raises(InputError, match="stations"):
-        fourbar.internal_forces(moving, fourbar.solve(moving), 2, [math.inf])  # type: ignore[arg-type]
+        fourbar.internal_forces(moving, fourbar.solve(moving), 2, [math.inf])
     open_ = crank_rocker(
         motion=fourbar.Motion(theta_4=np.array([0.2, 2.0]), omega_4=1.0)
     )
@@ -201,7 +193,7 @@ def test_what_cannot_be_is_refused_and_what_has_no_forces_is_nan() -> None:
     )
 
 
-def test_feet_that_differ_by_rounding_are_one() -> None:
+def test_feet_that_differ_by_rounding_are_one():
     """A load and the inertia act at G, each by its own roundings.
 
     Between them no part of both bends the bar.
@@ -211,9 +203,7 @@ def test_feet_that_differ_by_rounding_are_one() -> None:
     load = fourbar.Load(3, (3.0, 0.7), moment=20.0)
     sweep = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 200), 10.0)
     scene = replace(
-        crank_rocker(motion=sweep, effects=()),
-        linkage=linkage,
-        loads=(load,),
+        crank_rocker(motion=sweep, effects=()), linkage=linkage, loads=(load,)
     )
     s = fourbar.solve(scene)
     largest = fourbar.internal_forces(scene, s, 3).largest
@@ -226,7 +216,7 @@ def test_feet_that_differ_by_rounding_are_one() -> None:
     assert np.abs(largest.moment) == pytest.approx(beside, rel=1e-4)
 
 
-def test_beyond_its_second_pin_a_uniform_bar_bends_as_a_cantilever() -> None:
+def test_beyond_its_second_pin_a_uniform_bar_bends_as_a_cantilever():
     """The mass of a uniform bar ends at its pin.
 
     Beyond, P (a - x) of the load alone, and nothing beyond the load.

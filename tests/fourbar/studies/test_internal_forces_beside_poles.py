@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.quantities import Array
 from fourbar.show.summary import summarize
 
 SCENE = fourbar.load(
@@ -29,16 +28,16 @@ LOCATED = 1e-9
 
 
 @pytest.fixture(autouse=True)
-def many_digits() -> object:
+def many_digits():
     with mp.workdps(40):
         yield
 
 
-def solve_at(places: Array) -> fourbar.Solution:
+def solve_at(places):
     return fourbar.solve(replace(SCENE, motion=SCENE.motion.replace(angle=places)))
 
 
-def move_output(theta_2: mp.mpf) -> tuple[mp.mpf, mp.mpf]:
+def move_output(theta_2):
     """Speed and acceleration of bar 4, where the circles about A and O4 meet."""
     d, a, b, c = (mp.mpf(length) for length in SCENE.linkage.lengths)
     omega_2 = mp.mpf(SCENE.motion.omega_2)
@@ -62,7 +61,7 @@ def move_output(theta_2: mp.mpf) -> tuple[mp.mpf, mp.mpf]:
     return omega_4, along_bar_3 / lever
 
 
-def bend(bar: fourbar.Bar, omega: mp.mpf, alpha: mp.mpf) -> mp.mpf:
+def bend(bar, omega, alpha):
     """Largest |M| of a bar about a ground pin that its inertia alone bends.
 
     The force across it at its second pin gives it its whole moment,
@@ -78,16 +77,16 @@ def bend(bar: fourbar.Bar, omega: mp.mpf, alpha: mp.mpf) -> mp.mpf:
     return max(abs(first * foot), abs(second * (length - foot)))
 
 
-def bend_input() -> float:
+def bend_input():
     omega_2, alpha_2 = SCENE.motion.omega_2, SCENE.motion.alpha_2
     return float(bend(SCENE.linkage.input, omega_2, alpha_2))
 
 
-def bend_output(theta_2: float) -> float:
+def bend_output(theta_2):
     return float(bend(SCENE.linkage.output, *move_output(mp.mpf(theta_2))))
 
 
-def find_pole(low: float, high: float) -> float:
+def find_pole(low, high):
     """Place at which the force of the drive changes its sign."""
     for _ in range(6):
         places = np.linspace(low, high, 101)
@@ -98,9 +97,7 @@ def find_pole(low: float, high: float) -> float:
 
 
 @pytest.mark.parametrize(("low", "high"), [(1.0, 1.1), (3.7, 3.8)])
-def test_the_rounding_of_a_pole_bends_no_bar_without_drive(
-    low: float, high: float
-) -> None:
+def test_the_rounding_of_a_pole_bends_no_bar_without_drive(low, high):
     distances = np.logspace(-2, -12, 11)
     places = find_pole(low, high) + np.concatenate([-distances, distances])
     solution = solve_at(places)
@@ -115,7 +112,7 @@ def test_the_rounding_of_a_pole_bends_no_bar_without_drive(
 
 
 @pytest.mark.slow
-def test_the_largest_moments_are_those_of_many_digits() -> None:
+def test_the_largest_moments_are_those_of_many_digits():
     """That of the input is the same everywhere, that of the output has a maximum."""
     facts = summarize(SCENE, fourbar.solve(SCENE))
     assert "drive_force" in facts.motion.panels.growing

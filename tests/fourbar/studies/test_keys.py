@@ -5,7 +5,6 @@ The oracle of coordinates moves the drawing and states the file anew.
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -108,7 +107,7 @@ mass = "1 kg"
 )
 
 
-def push(bar: str, stroke: str, start: str, end: str) -> str:
+def push(bar, stroke, start, end):
     parts = {"BAR": bar, "STROKE": stroke, "FROM": start, "TO": end}
     text = PUSHED
     for name, part in parts.items():
@@ -143,7 +142,7 @@ COORDINATES = {"pins": 14, "pins,": 14, "places": 30, "cylinder": 12}
 @pytest.mark.slow
 @pytest.mark.parametrize("check", ["sensitivity", "study"])
 @pytest.mark.parametrize("name", STATED)
-def test_coordinates_move_as_in_files_with_them_moved(name: str, check: str) -> None:
+def test_coordinates_move_as_in_files_with_them_moved(name, check):
     scene = loads(STATED[name])
     rows = [row for row in judge_by(scene, check) if row.setting == DRAWN_SETTING]
     assert {"theta_4", "F12"} <= {row.quantity for row in rows if row.compared}
@@ -153,7 +152,7 @@ def test_coordinates_move_as_in_files_with_them_moved(name: str, check: str) -> 
     assert len(coordinates) == COORDINATES[name.split(maxsplit=1)[0]]
 
 
-def test_places_of_a_table_are_those_of_each_members_drawing() -> None:
+def test_places_of_a_table_are_those_of_each_members_drawing():
     """O2 moves in the drawing, and O4 does not."""
     scene = loads(DRAWING + ACTS)
     table = fourbar.solve(
@@ -170,7 +169,7 @@ def test_places_of_a_table_are_those_of_each_members_drawing() -> None:
         )
 
 
-def test_a_drawn_place_and_angle_stay_as_they_were_built() -> None:
+def test_a_drawn_place_and_angle_stay_as_they_were_built():
     """The place keeps its distance and angle on the bar, the command its angle."""
     text = (
         DRAWING
@@ -209,7 +208,7 @@ gravity = ["9.81 m/s^2", "-90 deg"]
 """
 
 
-def test_a_drawn_parallelogram_stays_one_on_both_halves_of_the_turn() -> None:
+def test_a_drawn_parallelogram_stays_one_on_both_halves_of_the_turn():
     stated = "".join(f'"{key}" = "0.01 mm"\n' for key in PIN_KEYS)
     scene = loads(f"{PARALLELOGRAM}[tolerances]\n{stated}")
     study = tolerances(scene, 512)
@@ -222,7 +221,7 @@ def test_a_drawn_parallelogram_stays_one_on_both_halves_of_the_turn() -> None:
     np.testing.assert_allclose(torque.deviation, torque.first_order, rtol=0.1)
 
 
-def test_slopes_of_a_drawn_parallelogram_are_differences_of_its_members() -> None:
+def test_slopes_of_a_drawn_parallelogram_are_differences_of_its_members():
     scene = loads(PARALLELOGRAM)
     slopes = fourbar.sensitivity(scene)
     for key in PIN_KEYS:
@@ -238,7 +237,7 @@ def test_slopes_of_a_drawn_parallelogram_are_differences_of_its_members() -> Non
 
 
 @pytest.mark.parametrize("name", ["A", "P"])
-def test_the_value_of_a_place_is_what_its_slopes_are_of(name: str) -> None:
+def test_the_value_of_a_place_is_what_its_slopes_are_of(name):
     """The drawing's coordinates, whose origin a moved O2 leaves; `solve` has O2's."""
     scene = loads(DRAWING + ACTS)
     slopes = fourbar.sensitivity(scene)
@@ -255,7 +254,7 @@ def test_the_value_of_a_place_is_what_its_slopes_are_of(name: str) -> None:
         np.testing.assert_allclose(slopes.of(name, key), difference, atol=1e-5)
 
 
-def test_first_order_and_samples_of_pins_agree() -> None:
+def test_first_order_and_samples_of_pins_agree():
     scene = loads(DRAWING + ACTS)
     stated = (
         Tolerance("pins.O2.0", "0.05 mm"),
@@ -274,7 +273,7 @@ def test_first_order_and_samples_of_pins_agree() -> None:
     assert tolerances(replace(scene, tolerances=beside), 8).invalid == 0
 
 
-def test_a_member_with_two_pins_in_one_place_is_invalid() -> None:
+def test_a_member_with_two_pins_in_one_place_is_invalid():
     scene = loads(DRAWING + ACTS)
     values = {"pins.A.0": [0.0, -0.010], "pins.A.1": [0.100, -0.010]}
     study = fourbar.solve(fourbar.vary(scene, values))
@@ -289,7 +288,7 @@ def test_a_member_with_two_pins_in_one_place_is_invalid() -> None:
         ("pins.A", "is more than one number; vary pins.A.0, pins.A.1"),
     ],
 )
-def test_a_key_that_names_no_coordinate_gets_one_line(key: str, line: str) -> None:
+def test_a_key_that_names_no_coordinate_gets_one_line(key, line):
     text = DRAWING + ACTS
     for make in (
         lambda: fourbar.vary(loads(text), {key: [0.0]}),
@@ -300,7 +299,7 @@ def test_a_key_that_names_no_coordinate_gets_one_line(key: str, line: str) -> No
         assert line in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_a_scene_stated_by_lengths_has_no_pins() -> None:
+def test_a_scene_stated_by_lengths_has_no_pins():
     scene = Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22))
     with pytest.raises(InputError, match=r"no \[pins\]; it states lengths: lengths\."):
         fourbar.vary(scene, {"pins.A.0": [0.0, 0.1]})
@@ -309,7 +308,7 @@ def test_a_scene_stated_by_lengths_has_no_pins() -> None:
         loads(text)
 
 
-def test_a_length_beside_a_pin_by_which_it_follows_is_refused() -> None:
+def test_a_length_beside_a_pin_by_which_it_follows_is_refused():
     scene = loads(DRAWING + ACTS)
     for length, pin in (("coupler", "pins.B.1"), ("ground_angle", "pins.O2.0")):
         values = {pin: [0.0, 0.01], f"lengths.{length}": 0.1}
@@ -321,10 +320,7 @@ def test_a_length_beside_a_pin_by_which_it_follows_is_refused() -> None:
         loads(text + table)
 
 
-def test_tolerances_of_pins_are_written_and_shown(
-    capsys: pytest.CaptureFixture[str],
-    tmp_path: Path,
-) -> None:
+def test_tolerances_of_pins_are_written_and_shown(capsys, tmp_path):
     text = DRAWING + ACTS
     scene = loads(f'{text}[tolerances]\npins.O2.0 = "0.05 mm"\n')
     assert loads(dump(scene)) == scene
@@ -344,7 +340,7 @@ def test_tolerances_of_pins_are_written_and_shown(
     assert any(line.startswith("pins.A.0") for line in lines)
 
 
-def test_a_drawn_place_and_its_pins_move_independently_of_each_other() -> None:
+def test_a_drawn_place_and_its_pins_move_independently_of_each_other():
     """The place moves on its bar as it was drawn, and then goes with the bar."""
     scene = loads(PLACED)
     together = {
@@ -388,7 +384,7 @@ force = ["3000 N", "90 deg"]
 """
 
 
-def test_the_tolerance_of_a_drawn_point_is_that_of_its_coordinate() -> None:
+def test_the_tolerance_of_a_drawn_point_is_that_of_its_coordinate():
     """A double wishbone: 3 kN at the tyre's patch, which the coupler carries.
 
     The force in the upper bar is that of the moment about A, 3000 N (x - 700 mm), over
@@ -426,7 +422,7 @@ def test_the_tolerance_of_a_drawn_point_is_that_of_its_coordinate() -> None:
         ("points.P.from_pn.1", 'did you mean "points.P.from_pin.1"?'),
     ],
 )
-def test_no_hint_names_a_number_of_another_meaning(key: str, line: str) -> None:
+def test_no_hint_names_a_number_of_another_meaning(key, line):
     lengths = """[lengths]
 ground = "0.3 m"
 input = "0.1 m"
@@ -447,13 +443,13 @@ output = "0.22 m"
         ("points.P.drawn", "is more than one number; vary points.P.drawn.0, points.P."),
     ],
 )
-def test_a_hint_of_a_drawing_names_the_coordinate(key: str, line: str) -> None:
+def test_a_hint_of_a_drawing_names_the_coordinate(key, line):
     with pytest.raises(InputError) as caught:
         fourbar.vary(loads(PLACED), {key: [0.0]})
     assert line in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_distance_and_coordinate_of_one_place_do_not_vary_together() -> None:
+def test_distance_and_coordinate_of_one_place_do_not_vary_together():
     scene = loads(PLACED)
     for number, place in (
         ("points.P.from_pin.0", "points.P"),
@@ -464,7 +460,7 @@ def test_distance_and_coordinate_of_one_place_do_not_vary_together() -> None:
             fourbar.vary(scene, values)
 
 
-def test_a_mass_centre_on_its_pin_has_no_coordinates() -> None:
+def test_a_mass_centre_on_its_pin_has_no_coordinates():
     text = DRAWING + (
         '[bars.input]\nmass = "1 kg"\ncentre = { drawn = ["-10 mm", "-10 mm"] }\n'
     )
@@ -474,14 +470,12 @@ def test_a_mass_centre_on_its_pin_has_no_coordinates() -> None:
 
 
 def test_the_table_of_tolerances_fits_a_terminal_and_shows_no_rounding(
-    capsys: pytest.CaptureFixture[str],
-    tmp_path: Path,
-) -> None:
+    capsys, tmp_path
+):
     """At the drawn position the patch is at y = 0, within the rounding of doubles."""
     path = tmp_path / "wishbone.toml"
     text = WISHBONE.replace(
-        'theta_2 = "drawn"',
-        'theta_2 = { from = "drawn", to = "-8 deg", steps = 4 }',
+        'theta_2 = "drawn"', 'theta_2 = { from = "drawn", to = "-8 deg", steps = 4 }'
     )
     path.write_text(text.replace("drawn.0", "drawn.1"), encoding="utf-8")
     assert status(["tolerance", str(path), "--samples", "64"]) == 0

@@ -39,7 +39,7 @@ DROPPED = crank_rocker(
 )
 
 
-def test_every_position_of_the_assembly_with_that_output_angle_is_found() -> None:
+def test_every_position_of_the_assembly_with_that_output_angle_is_found():
     scene = crank_rocker()
     sweep = fourbar.solve(replace(scene, motion=fourbar.Motion()))
     value = float(sweep.theta_4[100])
@@ -52,7 +52,7 @@ def test_every_position_of_the_assembly_with_that_output_angle_is_found() -> Non
 
 @pytest.mark.parametrize("beside", [0.0, 5e-7, -5e-7])
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_limit_of_the_output_is_one_position(side: float, beside: float) -> None:
+def test_a_limit_of_the_output_is_one_position(side, beside):
     """Input and coupler are in line: O2 B is their sum, or their difference."""
     scene = crank_rocker()
     d, a, b, c = scene.linkage.lengths
@@ -72,7 +72,7 @@ def test_a_limit_of_the_output_is_one_position(side: float, beside: float) -> No
     assert line.endswith("deg, where theta_4 is at a limit: bars 2 and 3 are in line")
 
 
-def test_at_a_limit_of_the_coupler_input_and_output_are_parallel() -> None:
+def test_at_a_limit_of_the_coupler_input_and_output_are_parallel():
     scene = fourbar.Scene(bare(0.42, 0.6, 0.56, 0.45))
     ((_, limit),) = find_intervals(scene.linkage, 3)
     there = fourbar.solve(scene, at=find_positions(scene, [("theta_3", limit)]))
@@ -82,19 +82,19 @@ def test_at_a_limit_of_the_coupler_input_and_output_are_parallel() -> None:
     assert told in " ".join(write_block(scene, there))
 
 
-def test_a_parallelogram_whose_coupler_does_not_turn_is_at_no_limit() -> None:
+def test_a_parallelogram_whose_coupler_does_not_turn_is_at_no_limit():
     scene = fourbar.Scene(bare(0.3, 0.1, 0.3, 0.1), fourbar.Motion(0.7))
     assert "limit" not in " ".join(write_block(scene, fourbar.solve(scene)))
 
 
-def test_places_lie_in_the_turn_of_the_sweep_in_rising_order() -> None:
+def test_places_lie_in_the_turn_of_the_sweep_in_rising_order():
     scene = replace(crank_rocker(), motion=fourbar.Motion())
     value = float(fourbar.solve(scene).theta_4[100])
     found = find_positions(scene, [("theta_4", value)]).angle
     assert 0.0 <= found[0] < found[1] <= 2.0 * math.pi
 
 
-def test_a_release_has_a_state_at_its_start() -> None:
+def test_a_release_has_a_state_at_its_start():
     found = find_positions(DROPPED, [("time", 0.0)])
     assert found.time.tolist() == [0.0]
     start = fourbar.solve(DROPPED, at=found)
@@ -102,7 +102,7 @@ def test_a_release_has_a_state_at_its_start() -> None:
     assert start.omega_2[0] == 0.0
 
 
-def test_a_place_out_of_range_is_refused_with_the_range() -> None:
+def test_a_place_out_of_range_is_refused_with_the_range():
     with pytest.raises(NotAssembledError, match=r"theta_2 goes from 84\.6\d* to 365"):
         find_positions(thesis(), [("theta_2", math.radians(30.0))])
     with pytest.raises(NotAssembledError, match="no position of this assembly"):
@@ -119,7 +119,7 @@ def test_a_place_out_of_range_is_refused_with_the_range() -> None:
 
 
 @pytest.mark.parametrize("omega", [0.5, -0.5])
-def test_a_steady_sweep_has_a_place_at_each_time(omega: float) -> None:
+def test_a_steady_sweep_has_a_place_at_each_time(omega):
     """A backward sweep begins at its other end, as its column of times has it."""
     scene = replace(crank_rocker(), motion=fourbar.Motion(SWEPT, omega))
     found = find_positions(scene, [("time", 1.3)])
@@ -129,7 +129,7 @@ def test_a_steady_sweep_has_a_place_at_each_time(omega: float) -> None:
         find_positions(scene, [("time", 2.1)])
 
 
-def test_a_law_passes_an_angle_up_and_down() -> None:
+def test_a_law_passes_an_angle_up_and_down():
     found = find_positions(LAW, [("theta_2", 1.5), ("time", 0.5)])
     assert len(found.angle) == 3 and found.time is not None
     assert found.angle[:2] == pytest.approx(1.5, abs=LOCATED)
@@ -139,7 +139,7 @@ def test_a_law_passes_an_angle_up_and_down() -> None:
 
 
 @pytest.mark.slow
-def test_a_release_is_met_when_it_first_passes() -> None:
+def test_a_release_is_met_when_it_first_passes():
     """By a much finer release: the angle lies between two of its instants."""
     fine = fourbar.release(
         replace(DROPPED, motion=DROPPED.motion.replace(free=fourbar.Free(1.0, 20000)))
@@ -158,9 +158,8 @@ def test_a_release_is_met_when_it_first_passes() -> None:
     assert len(timed.angle) == 2 and timed.time[1] == found.time[0]
 
 
-def test_a_stroke_is_found_where_an_angle_is_commanded() -> None:
+def test_a_stroke_is_found_where_an_angle_is_commanded():
     scene = fourbar.load(MODELS / "capabilities" / "stroke_input.toml")
-    assert scene.drive is not None
     commanded = replace(scene, motion=fourbar.Motion(), tolerances=())
     stroke = fourbar.solve(commanded, "position").stroke
     value = float(np.nanmean(stroke))
@@ -171,7 +170,7 @@ def test_a_stroke_is_found_where_an_angle_is_commanded() -> None:
     assert len(back.stated[0]) >= 1
 
 
-def test_the_range_of_a_refusal_is_that_of_the_motion_and_not_the_other_one() -> None:
+def test_the_range_of_a_refusal_is_that_of_the_motion_and_not_the_other_one():
     """Bar 2 has two ranges; the extent of bar 4 is that of the second, which moves."""
     linkage = fourbar.FourBar(
         0.3, fourbar.Bar(0.2), fourbar.Bar(0.25), fourbar.Bar(0.1)
@@ -205,7 +204,7 @@ to = { bar = 2, from_pin = ["1 in", "0 deg"] }
 """
 
 
-def test_strokes_that_assemble_are_named_where_none_requested_does() -> None:
+def test_strokes_that_assemble_are_named_where_none_requested_does():
     """The input's limits by cosines, and the cylinder from them by cosines.
 
     From the line of the cylinder's ground pin bar 2 turns clockwise to the one limit

@@ -1,7 +1,6 @@
 """Extents of paths, against closed forms and a scan of directions."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -36,7 +35,7 @@ AT_REST = 1e-5
 """s: at its ends a 3-4-5 law stands still to round-off for as long."""
 
 
-def close(steps: int) -> np.ndarray:
+def close(steps):
     """Return the convex hull of the piston's path, mm, by the cosine rule in A B O4."""
     d, a, b, c = LENGTHS
     A = a * np.exp(1j * np.linspace(0.0, 2.0 * np.pi, steps + 1))
@@ -48,7 +47,7 @@ def close(steps: int) -> np.ndarray:
     return np.asarray(path[hull.vertices])
 
 
-def scan(path: np.ndarray, directions: np.ndarray) -> tuple[float, float, float]:
+def scan(path, directions):
     """Return width, length and direction of the narrowest strip, mm."""
     turned = path[:, None] * np.exp(-1j * directions)
     widths = np.ptp(turned.imag, axis=0)
@@ -57,10 +56,7 @@ def scan(path: np.ndarray, directions: np.ndarray) -> tuple[float, float, float]
 
 
 @pytest.mark.parametrize(("turned", "steps"), [(0.0, 36), (20.0, 360)])
-def test_straightness_is_the_distance_of_the_nearest_two_lines(
-    turned: float,
-    steps: int,
-) -> None:
+def test_straightness_is_the_distance_of_the_nearest_two_lines(turned, steps):
     """Whatever the ground's angle, and however coarse the steps are."""
     sweep = f'theta_2 = {{ from = "0 deg", to = "360 deg", steps = {steps} }}'
     scene = loads(DRIVE.format(angle=ANGLE + turned, motion=sweep))
@@ -95,16 +91,10 @@ P = { bar = 2, from_pin = ["80 mm", "0 deg"] }
     [
         ('theta_2 = { from = "20 deg", to = "100 deg", steps = 3 }', (20, 100)),
         ('theta_2 = { from = "100 deg", to = "20 deg", steps = 3 }', (20, 100)),
-        (
-            'law = { kind = "345", theta_2 = "20 deg", rise = ["80 deg", "1 s"] }',
-            None,
-        ),
+        ('law = { kind = "345", theta_2 = "20 deg", rise = ["80 deg", "1 s"] }', None),
     ],
 )
-def test_the_arc_of_a_crank_has_its_chord_and_its_sagitta(
-    motion: str,
-    ends: tuple[float, float] | None,
-) -> None:
+def test_the_arc_of_a_crank_has_its_chord_and_its_sagitta(motion, ends):
     """Over 80 deg: chord 2 r sin 40 deg, sagitta r (1 - cos 40 deg), y to 80 mm."""
     (path,) = measure_paths(solve(loads(CRANK + motion))).values()
     half = math.radians(40.0)
@@ -127,11 +117,7 @@ TRAINER = ((50.0, 8.0, 33.0, 34.0), 12.0, 167.0)
 
 
 @pytest.mark.parametrize(("lengths", "distance", "angle"), [CUTTER, TRAINER])
-def test_a_wide_curve_is_no_narrower_than_by_a_scan(
-    lengths: tuple[float, float, float, float],
-    distance: float,
-    angle: float,
-) -> None:
+def test_a_wide_curve_is_no_narrower_than_by_a_scan(lengths, distance, angle):
     """Of an oval the width turns slowly, and every side of it decides."""
     ground, crank, coupler, output = lengths
     bars = zip(("ground", "input", "coupler", "output"), lengths, strict=True)
@@ -150,14 +136,14 @@ def test_a_wide_curve_is_no_narrower_than_by_a_scan(
 
 
 @pytest.mark.slow
-def test_a_circle_is_as_wide_in_every_direction() -> None:
+def test_a_circle_is_as_wide_in_every_direction():
     """The polygon of the steps would be narrower by 1e-6 of it."""
     (path,) = measure_paths(solve(loads(CRANK + 'omega_2 = "1 rad/s"\n'))).values()
     extents = [path.straightness, path.stroke, np.ptp(path.x), np.ptp(path.y)]
     assert extents == pytest.approx([0.16] * 4, rel=1e-8)
 
 
-def test_paths_are_printed_and_none_of_single_positions() -> None:
+def test_paths_are_printed_and_none_of_single_positions():
     motion = 'theta_2 = { from = "20 deg", to = "100 deg", steps = 3 }'
     (first, *more) = write_paths(solve(loads(CRANK + motion)), units("mm deg"))
     assert (
@@ -171,21 +157,19 @@ def test_paths_are_printed_and_none_of_single_positions() -> None:
     assert measure_paths(solve(loads(CRANK + 'theta_2 = ["20 deg", "100 deg"]'))) == {}
 
 
-def test_the_rounding_of_a_path_is_printed_as_zero() -> None:
+def test_the_rounding_of_a_path_is_printed_as_zero():
     """The crank begins upright: its end has an x of 5e-18 m there."""
     motion = 'theta_2 = { from = "90 deg", to = "100 deg", steps = 3 }'
     first, *_ = write_paths(solve(loads(CRANK + motion)), units("mm deg"))
     assert first.startswith("path of P: x from -13.8919 to 0.00000 mm, ")
 
 
-def test_a_release_is_integrated_once_for_its_path(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_release_is_integrated_once_for_its_path(monkeypatch):
     """The crank swings as far beyond the rest of its spring as it is let go before."""
     runs = []
     begin = free_motion._Run.begin
 
-    def count(*arguments: Any) -> None:
+    def count(*arguments):
         runs.append(arguments)
         begin(*arguments)
 

@@ -10,7 +10,7 @@ from fourbar.errors import InputError
 from tests.support.scenes import TURN
 
 
-def test_centres_of_a_scene_and_of_its_solution_are_those_of_its_linkage() -> None:
+def test_centres_of_a_scene_and_of_its_solution_are_those_of_its_linkage():
     of_scene, of_solution = (
         fourbar.instant_centres(of) for of in (TURN, fourbar.solve(TURN))
     )
@@ -21,7 +21,7 @@ def test_centres_of_a_scene_and_of_its_solution_are_those_of_its_linkage() -> No
         fourbar.instant_centres(TURN.linkage)
 
 
-def test_a_coupler_curve_of_a_scene_passes_through_its_point() -> None:
+def test_a_coupler_curve_of_a_scene_passes_through_its_point():
     curve = fourbar.coupler_curve(TURN, "P", steps=4000)
     path = fourbar.solve(TURN).points["P"]
     away = np.hypot(curve.x[:, None] - path[:, 0], curve.y[:, None] - path[:, 1])

@@ -5,15 +5,14 @@ Every function of NumPy is followed as differences say, or refused by its name.
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects.effect import Actions, Effect
+from fourbar.effects.effect import Effect
 from fourbar.errors import LimitError
-from fourbar.formulas.motion import State
 from fourbar.linkage import Declared
 from fourbar.studies.sloped import Sloped
 from tests.support.scenes import crank_rocker
@@ -28,12 +27,12 @@ POINTS = (-1.7, -0.4, 0.3, 2.6)
 """Arguments off all jumps."""
 
 
-def ufuncs(arguments: int) -> list[Any]:
+def ufuncs(arguments):
     every = {f.__name__: f for f in vars(np).values() if isinstance(f, np.ufunc)}
     return [every[name] for name in sorted(every) if every[name].nin == arguments]
 
 
-def check_against_differences(function: Any, x: float) -> None:
+def check_against_differences(function, x):
     """A function of one number has the slope of its differences, or is refused."""
     try:
         outcome = function(Sloped(np.array([x]), np.array([[1.0]])))
@@ -60,10 +59,7 @@ def check_against_differences(function: Any, x: float) -> None:
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # roots of negative numbers
 @pytest.mark.parametrize("function", ufuncs(1), ids=lambda f: f.__name__)
 @pytest.mark.parametrize("x", POINTS)
-def test_a_function_of_one_number_has_its_slope_or_is_refused(
-    function: Any,
-    x: float,
-) -> None:
+def test_a_function_of_one_number_has_its_slope_or_is_refused(function, x):
     check_against_differences(function, x)
 
 
@@ -71,15 +67,11 @@ def test_a_function_of_one_number_has_its_slope_or_is_refused(
 @pytest.mark.parametrize("function", ufuncs(2), ids=lambda f: f.__name__)
 @pytest.mark.parametrize("x", POINTS)
 @pytest.mark.parametrize("constant", [0.7, -1.1])
-def test_a_function_of_two_numbers_has_its_slopes_or_is_refused(
-    function: Any,
-    x: float,
-    constant: float,
-) -> None:
-    def of_first(x: Any) -> Any:
+def test_a_function_of_two_numbers_has_its_slopes_or_is_refused(function, x, constant):
+    def of_first(x):
         return function(x, constant)
 
-    def of_second(x: Any) -> Any:
+    def of_second(x):
         return function(constant, x)
 
     for one in (of_first, of_second):
@@ -102,7 +94,7 @@ def test_a_function_of_two_numbers_has_its_slopes_or_is_refused(
         bool,
     ],
 )
-def test_what_slopes_cannot_follow_raises(change: Any) -> None:
+def test_what_slopes_cannot_follow_raises(change):
     with pytest.raises(LimitError):
         change(Sloped(np.array([0.3]), np.array([[1.0]])))
 
@@ -115,7 +107,7 @@ class Drag(Effect):
     form: str
     key: ClassVar[str] = "drag"
 
-    def act(self, actions: Actions, state: State) -> None:
+    def act(self, actions, state):
         omega = state.omega(2)
         square = self.strength * omega * omega
         if self.form == "copysign":
@@ -127,8 +119,8 @@ class Drag(Effect):
 
 
 @pytest.mark.parametrize("speed", [-2.0, 2.0])
-def test_an_effect_that_copies_a_sign_keeps_its_derivatives(speed: float) -> None:
-    def torques(form: str, speed: float) -> tuple[fourbar.Scene, Any]:
+def test_an_effect_that_copies_a_sign_keeps_its_derivatives(speed):
+    def torques(form, speed):
         motion = fourbar.Motion(1.0, speed)
         scene = crank_rocker(motion=motion, effects=(Drag(0.5, form),))
         return scene, fourbar.solve(scene).torque
@@ -140,8 +132,7 @@ def test_an_effect_that_copies_a_sign_keeps_its_derivatives(speed: float) -> Non
     other, same = torques("absolute", speed)
     assert torque == pytest.approx(same, rel=1e-14)
     assert by_speed == pytest.approx(
-        fourbar.sensitivity(other).of("torque", "motion.omega_2"),
-        rel=1e-12,
+        fourbar.sensitivity(other).of("torque", "motion.omega_2"), rel=1e-12
     )
     refused, _ = torques("maximum", speed)
     with pytest.raises(LimitError, match=r"cannot follow numpy\.maximum"):
@@ -150,14 +141,14 @@ def test_an_effect_that_copies_a_sign_keeps_its_derivatives(speed: float) -> Non
         fourbar.equilibrium(refused)
 
 
-def test_one_side_of_a_comparison_is_taken_with_its_slopes() -> None:
+def test_one_side_of_a_comparison_is_taken_with_its_slopes():
     x = Sloped(np.array([-0.5, 0.5]), np.array([[1.0, 1.0]]))
     chosen = np.where(x > 0.0, 2.0 * x, 3.0)
     assert chosen.values.tolist() == [3.0, 1.0]
     assert chosen.slopes.tolist() == [[0.0, 2.0]]
 
 
-def test_a_number_is_zero_only_where_its_slopes_are_too() -> None:
+def test_a_number_is_zero_only_where_its_slopes_are_too():
     x = Sloped(np.array([0.0, 0.0, 1.0]), np.array([[0.0, 1.0, 0.0]]))
     assert (x == 0.0).tolist() == [True, False, False]
     assert (x != 0.0).tolist() == [False, True, True]

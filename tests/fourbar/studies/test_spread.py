@@ -8,7 +8,6 @@ import math
 import re
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -34,12 +33,7 @@ by 1/sqrt(2 N) = 0.016.
 """
 
 
-def spread(
-    *stated: Tolerance,
-    samples: int = 2048,
-    seed: Any = 0,
-    **motion: Any,
-) -> Any:
+def spread(*stated, samples=2048, seed=0, **motion):
     linkage = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
     case = Scene(
         linkage,
@@ -49,7 +43,7 @@ def spread(
     return tolerances(case, samples, seed)
 
 
-def test_a_number_that_the_torque_is_proportional_to() -> None:
+def test_a_number_that_the_torque_is_proportional_to():
     omega = Tolerance(
         "motion.omega_2", 0.3
     )  # the torque of inertia alone is proportional to its square
@@ -57,22 +51,18 @@ def test_a_number_that_the_torque_is_proportional_to() -> None:
     torque = study.spreads["torque"]
     size = np.abs(torque.nominal)
     np.testing.assert_allclose(
-        np.fmax(np.abs(torque.least), np.abs(torque.greatest)),
-        1.0609 * size,
-        rtol=1e-4,
+        np.fmax(np.abs(torque.least), np.abs(torque.greatest)), 1.0609 * size, rtol=1e-4
     )
     np.testing.assert_allclose(torque.worst, 2 * 0.03 * size, rtol=1e-12)
     np.testing.assert_allclose(
-        torque.first_order,
-        2 * 0.03 / math.sqrt(3) * size,
-        rtol=1e-12,
+        torque.first_order, 2 * 0.03 / math.sqrt(3) * size, rtol=1e-12
     )
     np.testing.assert_allclose(torque.deviation, torque.first_order, rtol=QUASI)
     np.testing.assert_allclose(study.spreads["theta_4"].deviation, 0.0, atol=1e-14)
     assert not torque.parted.any() and study.apart == study.invalid == 0
 
 
-def test_a_normal_tolerance_is_drawn_as_far_out_as_the_samples_go() -> None:
+def test_a_normal_tolerance_is_drawn_as_far_out_as_the_samples_go():
     """Of n numbers the k-th is the quantile (k + 1/2)/n, within one of n."""
     study = spread(Tolerance("lengths.output", 2e-5, True))
     theta = study.spreads["theta_4"]
@@ -81,9 +71,7 @@ def test_a_normal_tolerance_is_drawn_as_far_out_as_the_samples_go() -> None:
         assert (sigmas > norm.isf(1.0 / 2048)).all()
 
 
-def test_samples_agree_with_first_order_where_it_is_straight_and_so_do_the_shares() -> (
-    None
-):
+def test_samples_agree_with_first_order_where_it_is_straight_and_so_do_the_shares():
     both = Tolerance("lengths.input", 5e-5), Tolerance("lengths.output", 2e-5, True)
     study, alone = spread(*both), [spread(tolerance) for tolerance in both]
     for name in ("torque", "|F12|", "F43_x", "theta_4"):
@@ -91,9 +79,7 @@ def test_samples_agree_with_first_order_where_it_is_straight_and_so_do_the_share
         np.testing.assert_allclose(of_both.deviation, of_both.first_order, rtol=QUASI)
         for share, one in zip(of_both.shares, alone, strict=True):
             np.testing.assert_allclose(
-                np.sqrt(share),
-                one.spreads[name].deviation,
-                rtol=QUASI,
+                np.sqrt(share), one.spreads[name].deviation, rtol=QUASI
             )
         assert (
             (of_both.least <= of_both.low).all()
@@ -102,9 +88,7 @@ def test_samples_agree_with_first_order_where_it_is_straight_and_so_do_the_share
         )
 
 
-def test_the_same_seed_gives_the_same_samples_in_blocks_of_any_size(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_same_seed_gives_the_same_samples_in_blocks_of_any_size(monkeypatch):
     loose = Tolerance("lengths.input", 5e-5), Tolerance("lengths.coupler", 2e-5)
     at_once = spread(*loose, samples=100)
     monkeypatch.setattr(studied, "EVALUATED_AT_ONCE", 200)
@@ -112,15 +96,11 @@ def test_the_same_seed_gives_the_same_samples_in_blocks_of_any_size(
     for name, in_one in at_once.spreads.items():
         for expected, piece in zip(in_one, pieces.spreads[name], strict=True):
             np.testing.assert_allclose(
-                expected,
-                piece,
-                rtol=1e-12,
-                atol=1e-12,
-                err_msg=name,
+                expected, piece, rtol=1e-12, atol=1e-12, err_msg=name
             )
 
 
-def test_a_generator_draws_the_samples_of_its_seed() -> None:
+def test_a_generator_draws_the_samples_of_its_seed():
     loose = Tolerance("lengths.input", 5e-5)
     by_seed = spread(loose, samples=64, seed=7)
     by_generator = spread(loose, samples=64, seed=np.random.default_rng(7))
@@ -131,14 +111,12 @@ def test_a_generator_draws_the_samples_of_its_seed() -> None:
 
 
 @pytest.mark.parametrize("seed", [-1, True, 1.5, "1", None])
-def test_what_is_no_seed_is_refused(seed: Any) -> None:
+def test_what_is_no_seed_is_refused(seed):
     with pytest.raises(InputError, match="Generator"):
         spread(Tolerance("lengths.input", 5e-5), samples=64, seed=seed)
 
 
-def test_members_that_come_apart_are_counted_and_first_order_is_not_trusted_there() -> (
-    None
-):
+def test_members_that_come_apart_are_counted_and_first_order_is_not_trusted_there():
     linkage = uniform(0.2, 0.48, 0.55, 0.2)
     edge = fourbar.formulas.mobility.limit_positions(linkage)[0].theta_2
     theta_2 = edge + 2e-4 * np.sign(
@@ -154,7 +132,7 @@ def test_members_that_come_apart_are_counted_and_first_order_is_not_trusted_ther
     assert study.spreads["torque"].parted.tolist() == [True, False]
 
 
-def test_tolerances_of_a_file_come_back_as_they_were() -> None:
+def test_tolerances_of_a_file_come_back_as_they_were():
     scene = loads(MODEL + TABLE)
     assert scene.tolerances == (
         Tolerance("lengths.input", 5e-5),
@@ -178,14 +156,14 @@ def test_tolerances_of_a_file_come_back_as_they_were() -> None:
         ('"motion.theta_2" = "1 deg"', "a commanded value has no tolerance"),
     ],
 )
-def test_a_bad_tolerance_is_one_line(line: str, words: str) -> None:
+def test_a_bad_tolerance_is_one_line(line, words):
     with pytest.raises(InputError) as error:
         loads(MODEL + "[tolerances]\n" + line, "s.toml")
     text = str(error.value)
     assert words in text and text.startswith("s.toml: tolerances") and "\n" not in text
 
 
-def test_the_positions_at_which_first_order_fails_are_named_each() -> None:
+def test_the_positions_at_which_first_order_fails_are_named_each():
     study = SimpleNamespace(
         theta_2=np.radians(np.arange(0.0, 361.0, 5.0)),
         spreads={
@@ -194,10 +172,10 @@ def test_the_positions_at_which_first_order_fails_are_named_each() -> None:
     )
     assert "at 4 of 73 positions (theta_2 = 0 to 5, 45, 360 deg)" in describe_parted(
         study, "torque"
-    )  # type: ignore[arg-type]
+    )
 
 
-def test_what_the_study_refuses() -> None:
+def test_what_the_study_refuses():
     for stated, words in (
         ((), "states none"),
         ((Tolerance("lengths.x", 1.0),), "did you mean"),
@@ -207,14 +185,11 @@ def test_what_the_study_refuses() -> None:
             spread(*stated)
     for samples in (1, 2.5, 10**9):
         with pytest.raises(InputError, match="whole number"):
-            spread(Tolerance("lengths.input", 1e-5), samples=samples)  # type: ignore[arg-type]
+            spread(Tolerance("lengths.input", 1e-5), samples=samples)
 
 
 @pytest.mark.slow
-def test_the_command_prints_draws_and_writes(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_command_prints_draws_and_writes(tmp_path, capsys):
     scene, plot = tmp_path / "s.toml", tmp_path / "t.png"
     text = MODEL.replace("steps = 360", "steps = 12")
     scene.write_text(text + TABLE)
@@ -255,8 +230,8 @@ def test_the_command_prints_draws_and_writes(
 
 
 @pytest.mark.slow
-def test_the_share_that_is_done_is_told_from_the_start_and_reaches_all_of_it() -> None:
-    told: list[float] = []
+def test_the_share_that_is_done_is_told_from_the_start_and_reaches_all_of_it():
+    told = []
     scene = crank_rocker(tolerances=(Tolerance("lengths.input", 5e-5),))
     tolerances(scene, 16384, progress=told.append)
     assert (
@@ -283,10 +258,7 @@ theta_2 = "drawn"
 """
 
 
-def test_samples_of_a_drawing_have_its_coordinates_and_units(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_samples_of_a_drawing_have_its_coordinates_and_units(tmp_path, capsys):
     """The nominal place is as drawn, and the samples lie about it."""
     (tmp_path / "drawn.toml").write_text(DRAWN)
     assert status(["tolerance", str(tmp_path / "drawn.toml"), "--samples", "64"]) == 0

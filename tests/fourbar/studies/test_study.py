@@ -5,7 +5,6 @@ What no scene takes has a status.
 
 import tomllib
 from importlib import import_module
-from typing import Any
 
 import numpy as np
 import pytest
@@ -41,7 +40,7 @@ from fourbar.scene import command
 from fourbar.scene.motion import Free, FromLimit, Law
 from fourbar.scene.numbers import Point
 from fourbar.studies.keys import list_entries, read_place, replace_place
-from fourbar.studies.study import Study, vary
+from fourbar.studies.study import vary
 
 M, ANGLES = 9, np.array([0.2, 0.9, 2.5, 3.9, 5.6])
 LINK = FourBar(
@@ -70,7 +69,7 @@ otherwise in arrays.
 """
 
 
-def scene(effects: tuple[Any, ...] = (), drive: int = 2, **motion: Any) -> Scene:
+def scene(effects=(), drive=2, **motion):
     return Scene(
         LINK,
         Motion(**({"theta_2": ANGLES, "omega_2": 3.0, "alpha_2": 0.5} | motion)),
@@ -80,7 +79,7 @@ def scene(effects: tuple[Any, ...] = (), drive: int = 2, **motion: Any) -> Scene
     )
 
 
-def spread(case: Scene) -> dict[str, Any]:
+def spread(case):
     """Values about each number that the scene has."""
     random = np.random.default_rng(3)
     return {
@@ -89,7 +88,7 @@ def spread(case: Scene) -> dict[str, Any]:
     }
 
 
-def alone(study: Study, values: dict[str, Any], member: int) -> Scene:
+def alone(study, values, member):
     """The scene of one member, its numbers floats."""
     one, entries = study.scene, list_entries(study.scene)
     for key in entries:
@@ -107,11 +106,7 @@ def alone(study: Study, values: dict[str, Any], member: int) -> Scene:
         ((), 2, "position"),
     ],
 )
-def test_a_member_is_its_linkage_alone(
-    effects: tuple[Any, ...],
-    drive: int,
-    stage: str | None,
-) -> None:
+def test_a_member_is_its_linkage_alone(effects, drive, stage):
     case = scene(effects, drive)
     values = spread(case)
     study = vary(case, values)
@@ -127,22 +122,15 @@ def test_a_member_is_its_linkage_alone(
             )
             if name.endswith("_error"):
                 np.testing.assert_allclose(
-                    array[member],
-                    getattr(single, name),
-                    rtol=BARS,
-                    err_msg=name,
+                    array[member], getattr(single, name), rtol=BARS, err_msg=name
                 )
             else:
                 np.testing.assert_array_equal(
-                    array[member],
-                    getattr(single, name),
-                    err_msg=name,
+                    array[member], getattr(single, name), err_msg=name
                 )
 
 
-def test_blocks_over_members_and_positions_change_no_digit(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_blocks_over_members_and_positions_change_no_digit(monkeypatch):
     case = scene(DRIVEN)
     study = vary(case, spread(case))
     at_once = solve(study)
@@ -153,13 +141,11 @@ def test_blocks_over_members_and_positions_change_no_digit(
         piece = solve(study)
         for name in at_once.evaluated():
             np.testing.assert_array_equal(
-                getattr(piece, name),
-                getattr(at_once, name),
-                err_msg=name,
+                getattr(piece, name), getattr(at_once, name), err_msg=name
             )
 
 
-def test_angles_of_its_own_for_each_member_and_arrays_to_write_into() -> None:
+def test_angles_of_its_own_for_each_member_and_arrays_to_write_into():
     theta_2 = np.array([[0.2, 0.4, 0.6], [1.2, 1.4, 1.6]])
     study = vary(scene(), {"motion.theta_2": theta_2, "lengths.input": [0.1, 0.12]})
     out = {"torque": np.zeros((2, 3)), "a_G3": np.zeros((2, 2, 3)).swapaxes(1, 2)}
@@ -173,7 +159,7 @@ def test_angles_of_its_own_for_each_member_and_arrays_to_write_into() -> None:
         np.testing.assert_array_equal(out["a_G3"][member], single.a_G3)
 
 
-def test_what_the_scene_leaves_out_follows_the_length() -> None:
+def test_what_the_scene_leaves_out_follows_the_length():
     plain = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(1.0, 5.0), effects=(Gravity(),))
     solution = solve(
         vary(plain, {"lengths.coupler": [0.25, 0.28], "bars.coupler.mass": 0.5})
@@ -183,7 +169,7 @@ def test_what_the_scene_leaves_out_follows_the_length() -> None:
     assert solution.torque[1, 0] == pytest.approx(single.torque[0], rel=1e-14)
 
 
-def test_a_bad_member_has_a_status_and_disturbs_no_other() -> None:
+def test_a_bad_member_has_a_status_and_disturbs_no_other():
     plain = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(Sweep(0.0, 6.0, 3), 5.0))
     lengths = [0.1, -0.1, 0.0, np.nan, 3.0, 0.1]
     solution = solve(
@@ -208,17 +194,17 @@ def test_a_bad_member_has_a_status_and_disturbs_no_other() -> None:
             assert np.isnan(getattr(solution, name)[[1, 2, 3, 5]]).all(), name
     np.testing.assert_array_equal(
         solution.torque[0], solve(vary(plain, {"bars.coupler.mass": 1.0})).torque[0]
-    )  # type: ignore[index]
+    )
 
 
-def test_a_law_and_a_path_through_change_points() -> None:
+def test_a_law_and_a_path_through_change_points():
     law = Law((0.0, 0.5, 1.0), (0.0, 2.0, 6.0), 6, "rest")
     values = {"lengths.input": np.array([0.1, 0.11])}
     study = vary(Scene(LINK, Motion(law=law)), values)
     solution = solve(study)
     np.testing.assert_array_equal(
         solution.torque[1], solve(alone(study, values, 1)).torque
-    )  # type: ignore[index]
+    )
     kite = Scene(uniform(0.3, 0.1, 0.3, 0.1), Motion(Sweep(2.0, 8.0, 8), 1.0))
     for values in (
         {"lengths.input": np.array([0.1, 0.09])},
@@ -262,7 +248,7 @@ REFUSED = {
 }
 
 
-def test_a_key_has_the_unit_that_a_scene_file_has() -> None:
+def test_a_key_has_the_unit_that_a_scene_file_has():
     drive = LinearDrive(Place(1, (0.1, -1.5)), Place(3, (0.08, 0.1)))
     linkage = FourBar(
         0.3, *(Bar(size, 0.2, 0.001, (0.04, 0.2)) for size in (0.1, 0.25, 0.22)), 0.4
@@ -281,7 +267,7 @@ def test_a_key_has_the_unit_that_a_scene_file_has() -> None:
     )
     written = tomllib.loads(dump(scene))
     for key, number in list_entries(scene).items():
-        entry: Any = written
+        entry = written
         for name in key.split("."):
             entry = entry[int(name) if isinstance(entry, list) else name]
         assert (
@@ -289,7 +275,7 @@ def test_a_key_has_the_unit_that_a_scene_file_has() -> None:
         ) == number.unit, key
 
 
-def test_texts_with_units_are_the_numbers() -> None:
+def test_texts_with_units_are_the_numbers():
     scene = Scene(LINK, Motion(ANGLES, 2.0), effects=DRIVEN)
     texts = {
         "lengths.input": ["10 cm", "4 in", 0.1],
@@ -297,28 +283,26 @@ def test_texts_with_units_are_the_numbers() -> None:
         "effects.torsion.B.rest": 0.5,
     }
     si = texts | {"lengths.input": [0.1, 0.1016, 0.1], "bars.coupler.centre.1": np.pi}
-    theta: dict[str, Any] = {
-        "motion.theta_2": [["10 deg", "0.5 rev"], [0.1, 0.2], ["1 rad", 0]]
-    }
+    theta = {"motion.theta_2": [["10 deg", "0.5 rev"], [0.1, 0.2], ["1 rad", 0]]}
     from_texts, from_si = vary(scene, texts | theta), vary(scene, si)
     assert all((from_texts.values[key] == from_si.values[key]).all() for key in si)
     assert (
         from_texts.at.angle == [[np.radians(10.0), np.pi], [0.1, 0.2], [1.0, 0.0]]
     ).all()
-    assert Tolerance("lengths.input", "0.1 mm") == Tolerance("lengths.input", 1e-4)  # type: ignore[arg-type]
+    assert Tolerance("lengths.input", "0.1 mm") == Tolerance("lengths.input", 1e-4)
     for key, text, words in (
         ("lengths.input", "1 deg", 'lengths.input = .*"deg" does not convert to m'),
         ("effects.viscous.O2", "1 N m", "does not convert to N m s/rad"),
         ("lengths.x", "1 mm", "unknown key"),
     ):
         with pytest.raises(InputError, match=words):
-            Tolerance(key, text)  # type: ignore[arg-type]
+            Tolerance(key, text)
         with pytest.raises(InputError, match=words):
             vary(scene, {key: [text]})
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_cannot_vary_is_refused_in_one_line(name: str) -> None:
+def test_what_cannot_vary_is_refused_in_one_line(name):
     values, words = REFUSED[name]
     with pytest.raises(InputError) as caught:
         vary(scene(), values)
@@ -333,21 +317,18 @@ def test_what_cannot_vary_is_refused_in_one_line(name: str) -> None:
         (Motion(1.0, free=Free(1.0, 10)), "is integrated for one linkage"),
     ],
 )
-def test_a_motion_of_one_linkage_is_refused_in_one_line(
-    motion: Motion,
-    words: str,
-) -> None:
+def test_a_motion_of_one_linkage_is_refused_in_one_line(motion, words):
     with pytest.raises(InputError, match=words):
         vary(Scene(LINK, motion), {"bars.coupler.mass": [1.0, 2.0]})
 
 
-def test_a_study_is_given_no_other_positions() -> None:
+def test_a_study_is_given_no_other_positions():
     study = vary(scene(), {"bars.coupler.mass": [1.0, 2.0]})
     with pytest.raises(InputError, match="states its own positions"):
         solve(study, at=command(scene()))
 
 
-def test_springs_of_members_count_their_turns_from_where_each_assembles() -> None:
+def test_springs_of_members_count_their_turns_from_where_each_assembles():
     """The sweep begins where the members do not assemble; each is what it is alone."""
     linkage = fourbar.uniform(0.2, 0.25, 0.21, 0.22)
     low, high = fourbar.formulas.mobility.choose_range(linkage)

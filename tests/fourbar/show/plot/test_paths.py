@@ -20,7 +20,7 @@ LONGEST = 2.0 / 150.0
 """Of a chord of a drawn path, as a part of its extent: 2 mm in a figure of 150 mm."""
 
 
-def measure_chords(path: np.ndarray) -> tuple[float, float]:
+def measure_chords(path):
     """Return the longest chord as a part of the extent.
 
     The sharpest turn between two, deg, is returned too.
@@ -31,7 +31,7 @@ def measure_chords(path: np.ndarray) -> tuple[float, float]:
     return float(np.abs(steps).max()) / extent, float(np.degrees(turns.max()))
 
 
-def test_the_whole_circuit_is_traced_without_a_corner() -> None:
+def test_the_whole_circuit_is_traced_without_a_corner():
     """By degrees of the input this path has chords of 40 mm; its extent is 120 mm."""
     view = make_view(loads(COORDINATES))
     traced = trace(view)
@@ -53,7 +53,7 @@ def test_the_whole_circuit_is_traced_without_a_corner() -> None:
         assert np.hypot(*(dense - point).T).min() < apart
 
 
-def test_a_stated_sweep_keeps_its_ends() -> None:
+def test_a_stated_sweep_keeps_its_ends():
     scene = replace(
         crank_rocker(points=(fourbar.Point("P", 3, (0.1, 0.7)),)),
         motion=fourbar.Motion(fourbar.Sweep(0.2, 1.4, 3), 10.0),
@@ -66,7 +66,7 @@ def test_a_stated_sweep_keeps_its_ends() -> None:
     assert measure_chords(path)[0] < LONGEST
 
 
-def test_the_coupler_figure_draws_that_path() -> None:
+def test_the_coupler_figure_draws_that_path():
     scene = loads(COORDINATES)
     figure = draw_figure(scene, "coupler").figure
     (axes,) = (axes for axes in figure.axes if axes.get_title(loc="left"))

@@ -11,7 +11,6 @@ from dataclasses import replace
 from functools import cache
 from itertools import combinations, cycle
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 import numpy as np
@@ -19,15 +18,7 @@ import pytest
 from matplotlib.text import Text
 
 import fourbar
-from fourbar.effects import (
-    Effect,
-    Flywheel,
-    PinFriction,
-    Place,
-    Spring,
-    Springs,
-    Torsion,
-)
+from fourbar.effects import Flywheel, PinFriction, Place, Spring, Springs, Torsion
 from fourbar.effects.effect import list_bodies
 from fourbar.errors import DependencyError, InputError, NotAssembledError
 from fourbar.formulas.mobility import find_intervals
@@ -93,7 +84,7 @@ def compose_both(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("file_format", plot.FORMATS)
-def test_the_same_scene_gives_the_same_bytes(tmp_path: Path, file_format: str) -> None:
+def test_the_same_scene_gives_the_same_bytes(tmp_path, file_format):
     files = [tmp_path / f"{k}.{file_format}" for k in (1, 2)]
     for path in files:
         plot.draw(crank_rocker(), path, "torque")
@@ -126,7 +117,7 @@ def texts_shown(figure):
     return [(t.get_text(), t.get_window_extent(renderer)) for t in shown]
 
 
-def clashes(figure) -> list[tuple[str, str]]:
+def clashes(figure):
     """Texts that cover each other."""
     texts = texts_shown(figure)
     return [
@@ -138,7 +129,7 @@ def clashes(figure) -> list[tuple[str, str]]:
     ]
 
 
-def require_clear_texts(figure) -> None:
+def require_clear_texts(figure):
     """No text covers another one or leaves the page."""
     texts, page = texts_shown(figure), figure.bbox
     assert len(texts) > 5
@@ -150,7 +141,7 @@ def require_clear_texts(figure) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(FIGURES) - {"energy", "stroke"}))
-def test_every_figure_draws_both_branches_alike_and_no_texts_overlap(name: str) -> None:
+def test_every_figure_draws_both_branches_alike_and_no_texts_overlap(name):
     """A position and dimensions show where they are taken; panels share scales."""
     figure = compose_both(name)
     words = " ".join(text for text, _ in texts_shown(figure))
@@ -171,7 +162,7 @@ def test_every_figure_draws_both_branches_alike_and_no_texts_overlap(name: str) 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ("overview", "coupler", "freebody"))
-def test_no_texts_of_a_position_of_three_rockers_overlap(name: str) -> None:
+def test_no_texts_of_a_position_of_three_rockers_overlap(name):
     require_clear_texts(composed(thesis(), name))
 
 
@@ -179,9 +170,7 @@ def test_no_texts_of_a_position_of_three_rockers_overlap(name: str) -> None:
     ("name", "dimensions"),
     [("tailgate", True), ("landing_gear", True), ("double_crank_pump", False)],
 )
-def test_a_leader_crosses_neither_a_text_nor_another_leader(
-    name: str, dimensions: bool
-) -> None:
+def test_a_leader_crosses_neither_a_text_nor_another_leader(name, dimensions):
     gallery = Path(__file__).parents[4] / "models" / "gallery"
     scene = fourbar.load(gallery / f"{name}.toml")
     figure = draw_figure(scene, "linkage", dimensions=dimensions).figure
@@ -197,7 +186,7 @@ def test_a_leader_crosses_neither_a_text_nor_another_leader(
     assert not any(one.intersects_path(two) for one, two in combinations(leaders, 2))
 
 
-def test_no_text_stands_on_a_bar() -> None:
+def test_no_text_stands_on_a_bar():
     scene = fourbar.load(
         Path(__file__).parents[4] / "models" / "gallery" / "hoecken.toml"
     )
@@ -218,7 +207,7 @@ def test_no_text_stands_on_a_bar() -> None:
 
 
 @pytest.mark.slow
-def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit() -> None:
+def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit():
     figure = compose_both("overview")
     flat = [axes for axes in figure.axes if axes.name == "rectilinear"]
     assert len(flat) == 2 * 8
@@ -234,7 +223,7 @@ def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit() -> None
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("figure", "panels"), [("overview", 5), ("kinematics", 1)])
-def test_positions_at_rest_have_no_panel_of_zeros(figure: str, panels: int) -> None:
+def test_positions_at_rest_have_no_panel_of_zeros(figure, panels):
     """With a speed there are speeds, accelerations and power besides."""
     sweep = fourbar.Sweep(1.0, 2.0, 10)
     at_rest = replace(CRANK_ROCKER, motion=fourbar.Motion(sweep, 0.0))
@@ -246,13 +235,13 @@ def test_positions_at_rest_have_no_panel_of_zeros(figure: str, panels: int) -> N
     assert len(composed(moving, figure).axes) > panels
 
 
-def solved(scene: fourbar.Scene) -> fourbar.Solution:
+def solved(scene):
     """At the positions of a scene, and those that a figure shows between them."""
     return describe_motion(fourbar.solve(scene)).solve_with_peaks()
 
 
 @pytest.mark.slow
-def test_drawn_curves_are_those_of_the_solution() -> None:
+def test_drawn_curves_are_those_of_the_solution():
     scene = crank_rocker()
     solution = solved(scene)
     axes = composed(scene, "kinematics").axes
@@ -267,7 +256,7 @@ def test_drawn_curves_are_those_of_the_solution() -> None:
     np.testing.assert_allclose(torque.lines[1].get_ydata(), 1e3 * solution.torque)
 
 
-def test_bars_are_drawn_to_scale_at_the_requested_position() -> None:
+def test_bars_are_drawn_to_scale_at_the_requested_position():
     scene = crank_rocker()
     axes = composed(scene, "linkage", position=1.3).axes[0]
     bars = [line for line in axes.lines if line.get_linewidth() == 4.5]
@@ -282,7 +271,7 @@ def test_bars_are_drawn_to_scale_at_the_requested_position() -> None:
     assert x_scale[0] == pytest.approx(y_scale[1])
 
 
-def test_the_coupler_figure_shows_the_points_of_the_scene() -> None:
+def test_the_coupler_figure_shows_the_points_of_the_scene():
     scene = crank_rocker(
         points=(fourbar.Point("P", 3, (0.15, 0.7)), fourbar.Point("Q", 4, (0.1, 0.0)))
     )
@@ -304,7 +293,7 @@ def test_the_coupler_figure_shows_the_points_of_the_scene() -> None:
 
 
 @pytest.mark.slow
-def test_free_bodies_say_their_position_and_couples_have_an_arrow_and_no_sign() -> None:
+def test_free_bodies_say_their_position_and_couples_have_an_arrow_and_no_sign():
     figure = composed(crank_rocker(), "freebody", position=math.radians(135.0))
     lines = [text for text, _ in texts_shown(figure) if text[0] in "↺↻"]
     assert lines and not any(" = −" in line for line in lines)
@@ -314,14 +303,14 @@ def test_free_bodies_say_their_position_and_couples_have_an_arrow_and_no_sign() 
 
 
 @pytest.mark.slow
-def test_the_sensitivities_have_the_units_asked_for_and_whole_names() -> None:
+def test_the_sensitivities_have_the_units_asked_for_and_whole_names():
     panels = composed(crank_rocker(), "sensitivity", units="imperial").axes
     assert [axes.get_xlabel() for axes in panels[:2]] == ["lbf in", "lbf"]
     largest = np.abs(fourbar.solve(crank_rocker()).torque).max() / 0.112984829
     assert f"{largest:.3g} lbf in" in panels[0].texts[0].get_text()
 
 
-def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line() -> None:
+def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line():
     shown = make_view(thesis(FULL_TURN))
     panel = composed(thesis(FULL_TURN), "torque").axes[0]
     curve = panel.lines[1]
@@ -346,13 +335,13 @@ def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line() -> 
     assert "Torque clipped at" in caption.replace("\n", " ")
 
 
-def test_an_ordinary_curve_is_not_clipped() -> None:
+def test_an_ordinary_curve_is_not_clipped():
     assert choose_limit([np.sin(np.linspace(0, 6, 100))]) is None
     assert choose_limit([1.0 / np.linspace(-1, 1, 100)]) is not None
     assert choose_limit([np.full(3, np.nan)]) is None
 
 
-def test_transmission_angle_marks_limits_and_dead_centres() -> None:
+def test_transmission_angle_marks_limits_and_dead_centres():
     panel = composed(thesis(FULL_TURN), "transmission").axes[0]
     marks = {
         line.get_label().split(":")[0]: np.sort(line.get_xdata())
@@ -370,8 +359,7 @@ def test_transmission_angle_marks_limits_and_dead_centres() -> None:
     assert min(abs(marks["dead centre"][0] - e) for e in expected) < 1e-9
     crossed_scene = thesis(FULL_TURN)
     crossed_scene = replace(
-        crossed_scene,
-        motion=crossed_scene.motion.replace(branch=-1),
+        crossed_scene, motion=crossed_scene.motion.replace(branch=-1)
     )
     panel = composed(crossed_scene, "transmission").axes[0]
     crossed = next(
@@ -412,10 +400,7 @@ BETWEEN_NEIGHBOURS = fourbar.LinearDrive(Place(2, (0.17, -1.1)), Place(3, (0.09,
         *((3, (one,)) for one in EFFECTS),
     ],
 )
-def test_free_bodies_balance(
-    drive: int | fourbar.LinearDrive,
-    effects: tuple[Effect, ...],
-) -> None:
+def test_free_bodies_balance(drive, effects):
     drive_bar, line = (drive, None) if isinstance(drive, int) else (None, drive)
     shown = make_view(crank_rocker(drive_bar=drive_bar, drive=line, effects=effects))
     for bar in (2, 3, 4):
@@ -430,7 +415,7 @@ def test_free_bodies_balance(
 
 
 @pytest.mark.slow
-def test_a_linear_drive_is_drawn_with_its_force_and_the_poles_of_that() -> None:
+def test_a_linear_drive_is_drawn_with_its_force_and_the_poles_of_that():
     scene = crank_rocker(drive=CYLINDER)
     for figure in ("torque", "freebody"):
         assert not clashes(composed(scene, figure))
@@ -440,9 +425,7 @@ def test_a_linear_drive_is_drawn_with_its_force_and_the_poles_of_that() -> None:
 
 
 @pytest.mark.slow
-def test_a_file_has_a_dark_form_and_a_figure_within_a_page_leaves_the_page(
-    tmp_path: Path,
-) -> None:
+def test_a_file_has_a_dark_form_and_a_figure_within_a_page_leaves_the_page(tmp_path):
     drawing = draw_figure(crank_rocker(), "torque")
     drawing.save(tmp_path / "a.svg")
     written = (tmp_path / "a.svg").read_text(encoding="utf-8")
@@ -452,7 +435,7 @@ def test_a_file_has_a_dark_form_and_a_figure_within_a_page_leaves_the_page(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("turned", (False, True), ids=("up", "down"))
-def test_the_peak_of_the_torque_is_marked_with_its_value(turned: bool) -> None:
+def test_the_peak_of_the_torque_is_marked_with_its_value(turned):
     scene = crank_rocker()
     if turned:  # speed changes sign, and so does the angle at which friction acts
         scene = replace(scene, motion=scene.motion.replace(speed=-10.0))
@@ -467,7 +450,7 @@ def test_the_peak_of_the_torque_is_marked_with_its_value(turned: bool) -> None:
     assert any(f"Dashed upright line: θ₂\u00a0=\u00a0{place}" in word for word in words)
 
 
-def test_a_scene_without_velocity_draws_positions_only(tmp_path: Path) -> None:
+def test_a_scene_without_velocity_draws_positions_only(tmp_path):
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 30)))
     assert len(composed(scene, "kinematics").axes) == 1
     with pytest.raises(InputError, match="omega_2"):
@@ -476,11 +459,10 @@ def test_a_scene_without_velocity_draws_positions_only(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_position_drawn_of_both_branches_is_one_and_clear_of_their_poles() -> None:
+def test_the_position_drawn_of_both_branches_is_one_and_clear_of_their_poles():
     alone = make_view(thesis(FULL_TURN)).here
     scenes = [set_branch(thesis(FULL_TURN), sign) for sign in (1, -1)]
     position = choose_common_position(scenes)
-    assert position is not None
     sweeps = [make_view(scene).sweep for scene in scenes]
     both = np.fmin.reduce(
         [quality for s in sweeps for quality in (s.condition, s.drive_condition)]
@@ -502,7 +484,7 @@ def test_the_position_drawn_of_both_branches_is_one_and_clear_of_their_poles() -
     assert len(titles) == 1
 
 
-def test_a_remark_stands_where_the_curve_keeps_away() -> None:
+def test_a_remark_stands_where_the_curve_keeps_away():
     share = np.linspace(0.0, 1.0, 361)
     for mu, low, high in (
         (90.0 * np.sin(np.pi * share), 0.3, 0.7),
@@ -514,7 +496,7 @@ def test_a_remark_stands_where_the_curve_keeps_away() -> None:
 
 
 @pytest.mark.slow
-def test_hostile_titles_are_text(tmp_path: Path) -> None:
+def test_hostile_titles_are_text(tmp_path):
     title = "$\\frac{ <script>alert(1)</script> & \x1b[31m\u2028 %s {0} " + 300 * "x"
     plot.draw(replace(crank_rocker(), title=title), tmp_path / "a.svg", "torque")
     assert "<script" not in (tmp_path / "a.svg").read_text(encoding="utf-8")
@@ -537,18 +519,14 @@ def test_hostile_titles_are_text(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_what_is_not_allowed_is_named(
-    tmp_path: Path,
-    name: str,
-    options: dict[str, Any],
-) -> None:
+def test_what_is_not_allowed_is_named(tmp_path, name, options):
     with pytest.raises(InputError, match="must"):
         plot.draw(crank_rocker(), tmp_path / name, **options)
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow
-def test_threads_draw_what_one_draws_and_leave_the_settings_as_they_were() -> None:
+def test_threads_draw_what_one_draws_and_leave_the_settings_as_they_were():
     drawn, before = (
         crank_rocker().plot("torque")._repr_svg_(),
         dict(matplotlib.rcParams),
@@ -560,16 +538,12 @@ def test_threads_draw_what_one_draws_and_leave_the_settings_as_they_were() -> No
     assert dict(matplotlib.rcParams) == before
 
 
-def test_a_position_that_does_not_assemble_is_refused(tmp_path: Path) -> None:
+def test_a_position_that_does_not_assemble_is_refused(tmp_path):
     with pytest.raises(NotAssembledError, match="45 deg"):
         plot.draw(thesis(), tmp_path / "a.png", "linkage", position=math.radians(45.0))
 
 
-def released(
-    steps: int = 300,
-    duration: float = 0.6,
-    **changes: object,
-) -> fourbar.Scene:
+def released(steps=300, duration=0.6, **changes):
     """The crank-rocker let go from rest under gravity, a load and damping."""
     motion = fourbar.Motion(0.5, 0.0, free=fourbar.Free(duration, steps))
     parts = {
@@ -580,18 +554,16 @@ def released(
     return crank_rocker(**parts)
 
 
-def by_law() -> fourbar.Scene:
+def by_law():
     law = Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), ends="rest")
     return crank_rocker(motion=fourbar.Motion(law=law), drive_bar=4)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "scene",
-    (released(20, 1.2), by_law()),
-    ids=("released", "by law"),
+    "scene", (released(20, 1.2), by_law()), ids=("released", "by law")
 )
-def test_a_motion_through_time_is_drawn_over_time(scene: fourbar.Scene) -> None:
+def test_a_motion_through_time_is_drawn_over_time(scene):
     solution = solved(scene)
     drawn = {
         line.get_label(): line
@@ -615,13 +587,11 @@ def test_a_motion_through_time_is_drawn_over_time(scene: fourbar.Scene) -> None:
 
 
 @pytest.mark.slow
-def test_both_branches_of_a_release_share_their_scales() -> None:
+def test_both_branches_of_a_release_share_their_scales():
     bars = [fourbar.Bar(0.22, 0.5), fourbar.Bar(0.25, 0.8), fourbar.Bar(0.2, 0.4)]
     motion = fourbar.Motion(math.radians(60.0), 0.0, free=fourbar.Free(0.3, 30))
     scene = fourbar.Scene(
-        fourbar.FourBar(0.3, *bars),
-        motion,
-        effects=(fourbar.Gravity(),),
+        fourbar.FourBar(0.3, *bars), motion, effects=(fourbar.Gravity(),)
     )
     fastest = [
         np.abs(fourbar.solve(set_branch(scene, sign)).omega_4).max() for sign in (1, -1)
@@ -641,9 +611,7 @@ def test_both_branches_of_a_release_share_their_scales() -> None:
             )
 
 
-def test_the_position_of_a_motion_through_time_is_one_that_it_passes(
-    tmp_path: Path,
-) -> None:
+def test_the_position_of_a_motion_through_time_is_one_that_it_passes(tmp_path):
     shown = make_view(released(), position=0.3)
     k = int(np.argmin(np.abs(shown.sweep.theta_2 - 0.3)))
     assert shown.here.time[0] == shown.sweep.time[k] and shown.here.F12[
@@ -659,7 +627,7 @@ instants 2 ms apart.
 """
 
 
-def test_the_work_of_what_acts_is_the_kinetic_energy() -> None:
+def test_the_work_of_what_acts_is_the_kinetic_energy():
     scene = released(
         effects=(
             fourbar.Gravity(),
@@ -690,9 +658,7 @@ def test_the_work_of_what_acts_is_the_kinetic_energy() -> None:
     assert panel.get_ylabel() in ("energy (J)", "energy (mJ)")
 
 
-def test_figures_that_a_motion_does_not_have_are_refused_in_one_line(
-    tmp_path: Path,
-) -> None:
+def test_figures_that_a_motion_does_not_have_are_refused_in_one_line(tmp_path):
     for scene, figure in (
         (released(), "torque"),
         (crank_rocker(), "energy"),
@@ -704,9 +670,7 @@ def test_figures_that_a_motion_does_not_have_are_refused_in_one_line(
 
 
 @pytest.mark.slow
-def test_matplotlib_is_loaded_only_to_draw_and_its_absence_is_one_line(
-    tmp_path: Path,
-) -> None:
+def test_matplotlib_is_loaded_only_to_draw_and_its_absence_is_one_line(tmp_path):
     code = (
         "import sys, fourbar.show.plot, fourbar.show.animate\n"
         "assert 'matplotlib' not in sys.modules\n"
@@ -741,11 +705,11 @@ def test_matplotlib_is_loaded_only_to_draw_and_its_absence_is_one_line(
         (-3.12e-14, "−3.12·10⁻¹⁴"),
     ],
 )
-def test_numbers_have_three_digits(value: float, shown: str) -> None:
+def test_numbers_have_three_digits(value, shown):
     assert write_number(value) == shown
 
 
-def test_units_get_the_prefix_that_suits() -> None:
+def test_units_get_the_prefix_that_suits():
     assert choose_unit(0.94, "N m") == (1e3, "mN m")
     assert choose_unit(15218.0, "N m") == (1e-3, "kN m")
     assert choose_unit(0.0, "N") == (1.0, "N")
@@ -754,23 +718,19 @@ def test_units_get_the_prefix_that_suits() -> None:
 BOTTOM, SIDE = Place(1, (0.25, math.radians(-160.0))), Place(2, (0.09, 0.17))
 COMMANDS = {
     r"$\theta_3$ (°)": fourbar.Motion(
-        theta_3=fourbar.Sweep(1.25, 0.67, 40),
-        omega_3=-2.0,
+        theta_3=fourbar.Sweep(1.25, 0.67, 40), omega_3=-2.0
     ),
     r"$\theta_4$ (°)": fourbar.Motion(
-        theta_4=fourbar.Sweep(1.95, 2.78, 40),
-        omega_4=4.0,
+        theta_4=fourbar.Sweep(1.95, 2.78, 40), omega_4=4.0
     ),
     "stroke (mm)": fourbar.Motion(
-        stroke=fourbar.Sweep(0.2, 0.32, 40),
-        stroke_speed=0.2,
-        side="left",
+        stroke=fourbar.Sweep(0.2, 0.32, 40), stroke_speed=0.2, side="left"
     ),
 }
 """Each command and the name of the axis that curves are drawn over."""
 
 
-def commanding(motion: fourbar.Motion) -> fourbar.Scene:
+def commanding(motion):
     return crank_rocker(
         motion=motion,
         drive=fourbar.LinearDrive(BOTTOM, SIDE),
@@ -780,7 +740,7 @@ def commanding(motion: fourbar.Motion) -> fourbar.Scene:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("label", COMMANDS)
-def test_curves_are_drawn_over_what_is_commanded(label: str) -> None:
+def test_curves_are_drawn_over_what_is_commanded(label):
     scene = commanding(COMMANDS[label])
     s, name = fourbar.solve(scene), scene.motion.commanded
     over = getattr(s, name) * (1000.0 if name == "stroke" else 180.0 / math.pi)
@@ -803,10 +763,7 @@ def test_curves_are_drawn_over_what_is_commanded(label: str) -> None:
     )
     usual = np.abs(s.drive_force[order]) < np.percentile(np.abs(s.drive_force), 80.0)
     np.testing.assert_allclose(
-        drawn_at[usual],
-        s.drive_force[order][usual],
-        rtol=2e-2,
-        atol=2e-2,
+        drawn_at[usual], s.drive_force[order][usual], rtol=2e-2, atol=2e-2
     )
     (linkage,) = composed(scene, "linkage").axes
     place = getattr(make_view(scene).here, name)[0]
@@ -829,16 +786,14 @@ def test_curves_are_drawn_over_what_is_commanded(label: str) -> None:
         )
     ],
 )
-def test_figures_take_every_command(figure: str, label: str) -> None:
+def test_figures_take_every_command(figure, label):
     assert not clashes(composed(commanding(COMMANDS[label]), figure))
 
 
 @pytest.mark.parametrize(
-    "scene",
-    (thesis(), *map(commanding, COMMANDS.values())),
-    ids=("thesis", *COMMANDS),
+    "scene", (thesis(), *map(commanding, COMMANDS.values())), ids=("thesis", *COMMANDS)
 )
-def test_a_film_of_what_swings_goes_there_and_back(scene: fourbar.Scene) -> None:
+def test_a_film_of_what_swings_goes_there_and_back(scene):
     shown = make_view(scene)
     order, closes = choose_frames(shown, 40), np.flatnonzero(shown.sweep.assembled)
     assert (np.diff(shown.sweep.at.places) > 0.0).all() and shown.sweep.assembled[
@@ -852,18 +807,17 @@ def test_a_film_of_what_swings_goes_there_and_back(scene: fourbar.Scene) -> None
     assert (np.diff(order[:20]) > 0).all() and (np.diff(order[19:]) < 0).all()
 
 
-def test_a_film_of_what_turns_goes_round() -> None:
+def test_a_film_of_what_turns_goes_round():
     assert np.all(np.diff(choose_frames(make_view(CRANK_ROCKER), 30)) == 2)
 
 
-def test_one_position_of_another_command_stands_in_its_range() -> None:
+def test_one_position_of_another_command_stands_in_its_range():
     single = COMMANDS["stroke (mm)"].replace(angle=0.3)
     shown = make_view(commanding(single))
     triangle = 0.34, 0.16  # the cylinder's longest and shortest stroke
     places = shown.sweep.at.places
     assert shown.at == "stroke = 300 mm" and shown.here.stroke[0] == pytest.approx(
-        0.3,
-        rel=1e-14,
+        0.3, rel=1e-14
     )
     assert (
         places.max() < triangle[0] and places.min() > triangle[1] and len(places) == 362
@@ -878,7 +832,7 @@ def test_one_position_of_another_command_stands_in_its_range() -> None:
     assert shown.at == "θ₄ = 114.6°"
 
 
-def test_dead_centres_stand_where_the_bars_are_in_line_on_every_axis() -> None:
+def test_dead_centres_stand_where_the_bars_are_in_line_on_every_axis():
     """Bars 2 and 3 stretched: cosine rule for O2, B, O4, where theta_3 = theta_2."""
     d, a, b, c = CRANK_ROCKER.linkage.lengths
     stretched = CRANK_ROCKER.linkage.ground_angle + math.acos(
@@ -897,7 +851,7 @@ def test_dead_centres_stand_where_the_bars_are_in_line_on_every_axis() -> None:
         assert mark.get_xdata() == pytest.approx([math.degrees(stretched)])
 
 
-def test_a_cylinder_keeps_its_barrel_and_its_rod_comes_out() -> None:
+def test_a_cylinder_keeps_its_barrel_and_its_rod_comes_out():
     scene, lengths = commanding(COMMANDS["stroke (mm)"]), []
     shown = make_view(scene)
     from matplotlib.figure import Figure
@@ -917,7 +871,7 @@ def test_a_cylinder_keeps_its_barrel_and_its_rod_comes_out() -> None:
     )
 
 
-def test_the_stroke_is_a_figure_where_it_is_not_the_axis() -> None:
+def test_the_stroke_is_a_figure_where_it_is_not_the_axis():
     scene = commanding(COMMANDS[r"$\theta_4$ (°)"])
     (axes,) = composed(scene, "stroke").axes
     curve, s = (
@@ -934,7 +888,7 @@ def test_the_stroke_is_a_figure_where_it_is_not_the_axis() -> None:
             draw_figure(refused, "stroke")
 
 
-def test_the_name_of_a_ring_stands_beyond_it_in_a_film() -> None:
+def test_the_name_of_a_ring_stands_beyond_it_in_a_film():
     from matplotlib.figure import Figure
 
     axes = Figure().subplots(subplot_kw={"xlim": (-10.0, 10.0)})

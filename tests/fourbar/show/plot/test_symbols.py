@@ -17,7 +17,6 @@ from fourbar.effects import Load, list_kinds
 from fourbar.effects.load import Table
 from fourbar.files import loads
 from fourbar.linkage import MOVING_BARS
-from fourbar.scene import Scene
 from fourbar.show import animate
 from fourbar.show.animate import collect_page_data
 from fourbar.show.motion_curves import describe_motion
@@ -39,7 +38,7 @@ TABLED = Load(4, (5.0, 0.2), table=Table((0.0, math.pi, math.tau), (1.0, -1.0, 1
 
 
 @pytest.fixture(scope="module")
-def everything() -> Scene:
+def everything():
     """Every effect that a scene file can name, by its own example.
 
     Loads of both frames are added.
@@ -49,7 +48,7 @@ def everything() -> Scene:
     return crank_rocker(loads=(TURNING, TABLED), effects=described.effects, drive_bar=4)
 
 
-def test_everything_that_acts_has_a_symbol(everything: Scene) -> None:
+def test_everything_that_acts_has_a_symbol(everything):
     kinds = [symbol.kind for symbol in list_acting(everything)]
     for key in list_kinds():
         assert {"springs": "spring"}.get(key, key) in kinds
@@ -58,7 +57,7 @@ def test_everything_that_acts_has_a_symbol(everything: Scene) -> None:
     assert "drive" not in [symbol.kind for symbol in list_acting(released)]
 
 
-def test_symbols_stand_where_the_formulas_let_them_act(everything: Scene) -> None:
+def test_symbols_stand_where_the_formulas_let_them_act(everything):
     """A load's arrow begins at its point and points along it.
 
     A spring joins its two points.
@@ -80,7 +79,7 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything: Scene) -> Non
             and abs(cmath.phase((tip - tail) / cmath.rect(1.0, 0.5 + theta_3))) < 1e-12
         )
         tail, tip = (complex(*point) for point in drawn["load 2"].lines[0])
-        factor = float(TABLED.table.at(solution.theta_2[index]))  # type: ignore[union-attr]
+        factor = float(TABLED.table.at(solution.theta_2[index]))
         assert abs(tail - complex(*solution.G4[index])) < 1e-15
         assert (
             abs(cmath.phase((tip - tail) / cmath.rect(math.copysign(1.0, factor), 0.2)))
@@ -99,8 +98,8 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything: Scene) -> Non
 
 
 def test_nothing_at_a_pin_hides_a_bar_and_what_lies_off_a_bar_is_joined_to_it(
-    everything: Scene,
-) -> None:
+    everything,
+):
     """Rings stay within a crank of a twelfth of the coupler.
 
     A plate goes from pin to point to pin.
@@ -161,17 +160,17 @@ def test_nothing_at_a_pin_hides_a_bar_and_what_lies_off_a_bar_is_joined_to_it(
     )
 
 
-def test_the_page_is_given_the_same_symbols(everything: Scene) -> None:
+def test_the_page_is_given_the_same_symbols(everything):
     data = embedded(animate.write_page(everything))
     assert [one["kind"] for one in data["acting"]] == [
         symbol.kind for symbol in list_acting(everything)
     ]
     factors = next(one["factor"] for one in data["acting"] if one["name"] == "load 2")
-    assert np.allclose(factors, TABLED.table.at(np.array(data["theta_2"])), rtol=1e-15)  # type: ignore[union-attr]
+    assert np.allclose(factors, TABLED.table.at(np.array(data["theta_2"])), rtol=1e-15)
 
 
 @pytest.mark.slow
-def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
+def test_the_points_of_a_scene_are_drawn_where_they_are():
     """Path, speed and mark in the plot, place and columns in the page."""
     scene = crank_rocker(points=(fourbar.Point("P", 3, (0.15, 0.7)),))
     solution = describe_motion(fourbar.solve(scene)).solve_with_peaks()
@@ -191,9 +190,7 @@ def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
     away = np.abs(stated[:, None] - drawn).min(axis=1)
     assert away.max() < steps.max() < 0.01 * np.abs(drawn).max()
     for panel, of_points in zip(
-        panels[1:],
-        (solution.velocity, solution.acceleration),
-        strict=True,
+        panels[1:], (solution.velocity, solution.acceleration), strict=True
     ):
         line = next(line for line in panel.lines if line.get_label() == "P")
         assert np.allclose(line.get_ydata(), np.hypot(*of_points["P"].T), rtol=1e-15)
@@ -205,9 +202,7 @@ def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
 
 
 @pytest.mark.slow
-def test_no_text_covers_another_where_much_acts_and_numbers_are_long(
-    everything: Scene,
-) -> None:
+def test_no_text_covers_another_where_much_acts_and_numbers_are_long(everything):
     pins = (
         fourbar.Viscous((("O2", 0.01), ("A", 0.01))),
         fourbar.Friction((("O2", 0.05), ("A", 0.05))),
@@ -227,7 +222,7 @@ def test_no_text_covers_another_where_much_acts_and_numbers_are_long(
 
 
 @pytest.mark.slow
-def test_a_film_names_and_moves_what_the_plot_does(everything: Scene) -> None:
+def test_a_film_names_and_moves_what_the_plot_does(everything):
     scene = replace(everything, points=(fourbar.Point("P", 3, (0.15, 0.7)),))
     with apply_style():
         figure, move = _make_stage(make_view(scene), moving=True)
