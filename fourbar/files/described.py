@@ -19,6 +19,7 @@ from fourbar.effects.place import (
 from fourbar.errors import InputError
 from fourbar.files.fields import Reader, write_declared, write_quantity
 from fourbar.linkage import (
+    PINS,
     REQUIRED_NUMBER,
     Declared,
     DeclaredField,
@@ -226,6 +227,12 @@ def read_stated_place(
         raise read.refuse(f"{key}.{stated[1]}", entry[stated[1]], allowed)
     name = entry.get("point") if "point" in stated else None
     if name is not None:
+        if name not in [*bars] and (not bars or name in [*PINS]):
+            allowed = (
+                "must be a point of [points]; the first pin of a bar is "
+                'from_pin = ["0 m", "0 deg"], the second has its length in place of 0'
+            )
+            raise read.refuse(f"{key}.point", name, allowed)
         read.choice(f"{key}.point", name, bars)
         bar = entry.get("bar", bars[name])
     else:

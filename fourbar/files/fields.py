@@ -47,9 +47,13 @@ _MEANT = {
         "x": "from_pin",
         "y": "from_pin",
         "at": "from_pin",
-        "speed": "omega_2",
-        "rpm": "omega_2",
+        "pin": "from_pin",
+        **dict.fromkeys(("theta", "angle"), "theta_2"),
+        **dict.fromkeys(("omega", "speed", "rpm"), "omega_2"),
+        "alpha": "alpha_2",
     },
+    **dict.fromkeys(("cg", "cog", "com", "G"), "centre"),
+    **{"I": "inertia", "link": "bar", "start": "from", "stop": "to", "end": "to"},
 }
 """Words that are no keys, and the keys that may be meant by them."""
 _TABLE_OF = {

@@ -93,6 +93,22 @@ MISTAKES = [
         "omega2",
         ["motion.omega2", 'did you mean "omega_2"?'],
     ),
+    *(
+        (f"{word} is meant as {key}", old, f"{word} =", [f'did you mean "{key}"?'])
+        for word, old, key in (
+            ("omega", "omega_2 =", "omega_2"),
+            ("angle", "theta_2 =", "theta_2"),
+            ("pin", "from_pin =", "from_pin"),
+            ("cg", "mass =", "centre"),
+            ("I", "mass =", "inertia"),
+        )
+    ),
+    (
+        "a pin is no point",
+        'from_pin = ["5 cm", "0 deg"]',
+        'point = "B"',
+        ["loads[0].point = 'B'", "a point of [points]", 'from_pin = ["0 m", "0 deg"]'],
+    ),
     (
         "unknown bar",
         "[bars.input]",
