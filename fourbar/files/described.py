@@ -17,7 +17,12 @@ from fourbar.effects.place import (
     states_place,
 )
 from fourbar.errors import InputError
-from fourbar.files.fields import Reader, write_declared, write_quantity
+from fourbar.files.fields import (
+    Reader,
+    write_declared,
+    write_numbers,
+    write_quantity,
+)
 from fourbar.linkage import (
     PINS,
     REQUIRED_NUMBER,
@@ -184,13 +189,8 @@ def write_described(description: Any) -> Any:
 
 
 def _write_place(place: Place) -> dict[str, Any]:
-    pairs = {
-        name: write_declared(getattr(place, name), by)
-        for name, by in STATED_PLACES.items()
-        if getattr(place, name) is not None
-    }
     by_name = {} if place.point is None else {"point": place.point}
-    return {"bar": place.bar, **pairs, **by_name}
+    return {"bar": place.bar, **write_numbers(place), **by_name}
 
 
 def _write_rows(rows: PinRows) -> dict[str, Any]:
@@ -225,7 +225,7 @@ def read_stated_place(
     if len(stated) > 1:
         allowed = f"{stated[0]} states the place already; state one of them"
         raise read.refuse(f"{key}.{stated[1]}", entry[stated[1]], allowed)
-    name = entry.get("point") if "point" in stated else None
+    name: Any = entry.get("point")
     if name is not None:
         if name not in [*bars] and (not bars or name in [*PINS]):
             allowed = (
@@ -234,19 +234,15 @@ def read_stated_place(
             )
             raise read.refuse(f"{key}.point", name, allowed)
         read.choice(f"{key}.point", name, bars)
-        bar = entry.get("bar", bars[name])
-    else:
-        bar = entry.get("bar")
-    place = Place(read.bar(f"{key}.bar", bar, allowed_bars))
-    if name is not None:
-        if place.bar != bars[name]:
-            allowed = f"the point {name} is on bar {bars[name]}"
-            raise read.refuse(f"{key}.bar", bar, allowed)
-        return place._replace(point=name)
-    for form in set(stated) & STATED_PLACES.keys():
-        if form == "from_centre" and place.bar == 1:
-            allowed = "the ground has no mass centre: write from_pin"
-            raise read.refuse(f"{key}.{form}", entry[form], allowed)
-        stated_pair: Any = {form: read.polar(f"{key}.{form}", entry[form], "m")}
-        place = place._replace(**stated_pair)
-    return place
+    bar = read.bar(f"{key}.bar", entry.get("bar", bars.get(name)), allowed_bars)
+    if name is None:
+        pairs: dict[str, Any] = {
+            form: read.polar(f"{key}.{form}", entry[form], "m")
+            for form in STATED_PLACES
+            if form in stated
+        }
+        return Place(bar, **pairs)
+    if bar != bars[name]:
+        allowed = f"the point {name} is on bar {bars[name]}"
+        raise read.refuse(f"{key}.bar", bar, allowed)
+    return Place(bar, point=name)

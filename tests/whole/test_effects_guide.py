@@ -66,7 +66,7 @@ def latch(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Any]:
     """The effect of the page, from its one file in the folder of effects."""
     (tmp_path / "latch.py").write_text(block("python"), encoding="utf-8")
     monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
-    forget = effects.list_further.cache_clear
+    forget = effects.list_classes.cache_clear
     forget()
     yield effects.Latch
     forget()
@@ -167,7 +167,8 @@ def test_without_its_file_a_scene_neither_reads_nor_writes_the_example(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     scene = guide_scene()
-    monkeypatch.setattr(effects, "list_further", dict)
+    classes = {k: v for k, v in effects.list_classes().items() if v is not latch}
+    monkeypatch.setattr(effects, "list_classes", lambda: classes)
     with pytest.raises(InputError, match=r"effects\.latch"):
         guide_scene()
     with pytest.raises(InputError, match=r"effects\.latch"):

@@ -92,10 +92,10 @@ pole = "south"
 def kind(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Any]:
     (tmp_path / "magnets.py").write_text(FILE, encoding="utf-8")
     monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
-    for cached in (effects.list_further, list_offers):
+    for cached in (effects.list_classes, list_offers):
         cached.cache_clear()
     yield effects.Magnets
-    for cached in (effects.list_further, list_offers):
+    for cached in (effects.list_classes, list_offers):
         cached.cache_clear()
     sys.modules.pop("fourbar.effects.magnets")
     del effects.Magnets

@@ -269,5 +269,5 @@ def test_a_place_of_the_coupler_is_read_from_its_other_pin():
 
 def test_every_effect_of_the_package_can_be_stated_otherwise():
     """Without a conversion, scenes with the effect would silently lose the check."""
-    packaged = {getattr(fourbar.effects, name) for name in fourbar.effects.FILE_OF}
+    packaged = fourbar.effects.list_kinds().values()
     assert {*_CONVERTED} == {fourbar.Load, *packaged}
