@@ -57,13 +57,19 @@ def test_every_limit_is_of_a_row_that_is_measured(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.posix
+@pytest.mark.timeout(600)
 def test_commands_start_within_their_limits() -> None:
-    """Two processes that follow one another share what else the machine does."""
-    beyond = {
-        what: ratio
-        for what, ratio in measure_starts().items()
-        if not bench.SPEED_LIMITS[what].holds(ratio)
-    }
+    """Two processes that follow one another share what else the machine does. What is
+    beyond its limit after a few rounds is measured in more.
+    """
+    for rounds in (3, 7):
+        beyond = {
+            what: ratio
+            for what, ratio in measure_starts(rounds).items()
+            if not bench.SPEED_LIMITS[what].holds(ratio)
+        }
+        if not beyond:
+            break
     assert not beyond
 
 

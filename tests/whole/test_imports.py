@@ -5,6 +5,7 @@ import runpy
 import subprocess
 import sys
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -74,13 +75,19 @@ in at a glance.
 """
 
 
+@cache
+def parse(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
 def imported(path: Path, *, types: bool = False) -> set[str]:
     """Full names of all modules that a file imports when it runs, at any depth.
 
     With those of its types if wanted.
     """
     names = set()
-    tree = ast.parse(path.read_text())
+    tree = parse(path)
     typing = (
         set()
         if types
@@ -219,7 +226,7 @@ def test_no_class_name_stands_for_two_things() -> None:
         node.name
         for package in PACKAGES
         for path in modules(package).values()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(parse(path))
         if isinstance(node, ast.ClassDef)
     )
     assert not [name for name, count in names.items() if count > 1]

@@ -16,7 +16,7 @@ from fourbar.errors import BROKEN, HOLDS, LONGEST_MESSAGE, InputError
 from fourbar_validation.regression.record import ACCEPTED, find_baseline, open_run
 
 MODELS = Path(__file__).parents[2] / "models"
-RUN = ["--random", "6", "--engines", "free-body", "--no-pictures", "--workers", "2"]
+RUN = ["--random", "6", "--engines", "free-body", "--no-pictures", "--workers", "1"]
 MUTATIONS = int(os.environ.get("MUTATIONS", "40"))
 CLOCK_THAT_GOES_BACK = r"""
 #define _GNU_SOURCE
