@@ -1,7 +1,9 @@
 """Remarks on what acts: couples without a place, and springs that go on too far."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +13,12 @@ from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import FIRST_PIN
 from fourbar.quantities import Array
-from fourbar.scene import Command, Scene, command_at
+from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.motion import FEWEST_POINTS, Law, Sweep
+from fourbar.show.motion_curves import goes_on_between
 from fourbar.show.units import write_short
 from fourbar.solution import Conversion, Solution
-from fourbar.studies.course import bisect
+from fourbar.studies.course import MotionCourse, bisect
 from fourbar.studies.passing import SAME_POSITION
 
 _INSTANTS_OF_AN_END = 33
@@ -116,8 +119,16 @@ def list_spring_notes(scene: Scene, solution: Solution, units: Conversion) -> li
 
     `units`: units of the numbers; one that is left out is the SI unit with a prefix.
     """
+    springs = list_springs(scene)
+    if not springs:
+        return []
+    command_between: CommandBetween = partial(_command_between, scene, solution.at)
+    if _is_whole_motion(scene, solution):
+        course = MotionCourse(scene, "position", solution)
+        solution = course.solution
+        command_between = course.command
     notes = []
-    for number, spring in enumerate(list_springs(scene), 1):
+    for number, spring in enumerate(springs, 1):
         distance = measure_end_distance(scene, spring, solution.at)
         distance = np.where(solution.assembled, distance, np.nan)
         if spring.stroke is None:
@@ -125,7 +136,9 @@ def list_spring_notes(scene: Scene, solution: Solution, units: Conversion) -> li
                 end = -spring.slack / spring.stiffness
                 pulls = distance > end
                 if pulls.any() and (distance < end).any():
-                    stretches = _list_stretches(scene, solution, spring, end, pulls)
+                    stretches = _list_stretches(
+                        scene, command_between, solution, spring, end, pulls
+                    )
                     where = _write_stretches(solution, stretches, units)
                     notes.append(
                         f"spring {number} pulls {where} and pushes elsewhere: with acts"
@@ -143,7 +156,9 @@ def list_spring_notes(scene: Scene, solution: Solution, units: Conversion) -> li
             room = AT_END_OF_STROKE * spring.length
             with np.errstate(invalid="ignore"):
                 beyond = sign * (distance - end) > room
-            stretches = _list_stretches(scene, solution, spring, end, beyond)
+            stretches = _list_stretches(
+                scene, command_between, solution, spring, end, beyond
+            )
             if not stretches:
                 continue
             length = write_short(end, "m", units)
@@ -153,6 +168,16 @@ def list_spring_notes(scene: Scene, solution: Solution, units: Conversion) -> li
                 " taken to push on, and has no stops"
             )
     return notes
+
+
+def _is_whole_motion(scene: Scene, solution: Solution) -> bool:
+    """Return True for the motion of a scene, which goes on between its positions."""
+    if solution.command_at is not None:
+        return True
+    if not goes_on_between(scene, solution):
+        return False
+    ends = command(scene).places[[0, -1]]
+    return set(ends) == set(solution.at.places[[0, -1]])
 
 
 def list_springs(scene: Scene) -> tuple[Spring, ...]:
@@ -170,12 +195,15 @@ def measure_end_distance(scene: Scene, spring: Spring, at: Command) -> Array:
     return np.broadcast_to(np.abs(across), at.places.shape)
 
 
+CommandBetween = Callable[[Array], Command]
+"""Function that returns the command at places between those of a solution."""
 _Stretch = tuple[float | None, float | None]
 """Places of the start and of the end; None: the motion begins or ends within."""
 
 
 def _list_stretches(
     scene: Scene,
+    command_between: CommandBetween,
     solution: Solution,
     spring: Spring,
     end: float,
@@ -184,7 +212,9 @@ def _list_stretches(
     """List where a spring is beyond a length, from where it is at positions."""
     rows = np.flatnonzero(beyond[1:] != beyond[:-1])
     known = np.where(beyond[rows], rows, rows + 1)
-    crossings = _locate_crossings(scene, solution, spring, end, rows, known)
+    crossings = _locate_crossings(
+        scene, command_between, solution, spring, end, rows, known
+    )
     stretches = list[_Stretch]()
     start = None
     for row, place in zip(rows, crossings, strict=True):
@@ -199,6 +229,7 @@ def _list_stretches(
 
 def _locate_crossings(
     scene: Scene,
+    command_between: CommandBetween,
     solution: Solution,
     spring: Spring,
     end: float,
@@ -222,8 +253,8 @@ def _locate_crossings(
     high = at.places[rows + 1]
 
     def is_longer(there: Array) -> NDArray[np.bool_]:
-        between = _command_between(scene, solution, there)
-        return np.greater(measure_end_distance(scene, spring, between), end)
+        distance = measure_end_distance(scene, spring, command_between(there))
+        return np.greater(distance, end)
 
     before = is_longer(low)
 
@@ -235,13 +266,9 @@ def _locate_crossings(
     return places
 
 
-def _command_between(scene: Scene, solution: Solution, places: Array) -> Command:
-    """Return the command at places between those of a solution."""
-    at = solution.at
-    if solution.command_at is not None:
-        times, rows = np.unique(np.append(0.0, places), return_inverse=True)
-        return solution.command_at(times).part(rows[1:])
-    if at.time is not None or at.moves_stroke:
+def _command_between(scene: Scene, at: Command, places: Array) -> Command:
+    """Return the command at places between its own."""
+    if at.moves_stroke:
         return command_at(scene, places)
     branch = np.full(places.shape, at.branch[0])
     return Command(places, branch, None, 0.0, at.bar)

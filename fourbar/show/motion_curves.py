@@ -161,7 +161,7 @@ def _fit_curves(solution: Solution) -> MotionCurves:
     """Fit the curves of a motion, or take those of its positions."""
     scene = solution.scene
     assert scene is not None
-    if not _goes_on_between(scene, solution):
+    if not goes_on_between(scene, solution):
         share = np.ones(len(solution))
         if is_once_round(solution):
             share[-1] = 0.0  # the first position again
@@ -232,12 +232,14 @@ def _take_positions(
     return Panels.of_positions(places, curves, share)
 
 
-def _goes_on_between(scene: Scene, solution: Solution) -> bool:
+def goes_on_between(scene: Scene, solution: Solution) -> bool:
     """Return True if the scene says what happens between the positions."""
     at = solution.at
     motion = scene.motion
     listed = isinstance(motion.angle, np.ndarray)
     if motion.free is not None or listed or len(solution) < 2:
+        return False
+    if at.commanded != motion.commanded:
         return False
     steps = np.diff(at.places)
     if not (np.all(steps > 0.0) or np.all(steps < 0.0)):

@@ -235,6 +235,22 @@ def test_a_sweep_from_a_drawing_that_goes_the_long_way_is_told(start, stop, told
     assert told in note and bool(told) == note.startswith("theta_2 goes by 340 deg")
 
 
+@pytest.mark.parametrize(("start", "stop"), [(2.0, 2.0 + math.tau), (8.0, 2.0)])
+def test_a_spring_pulls_between_the_positions_of_a_coarse_sweep(start, stop):
+    """It is longest where the crank points away from its end, between two of three."""
+    ends = fourbar.Place(1, (0.3, 0.0)), fourbar.Place(2, (0.1, 0.0))
+    length = math.sqrt(0.1 - 0.06 * math.cos(math.pi - 0.2))
+    springs = fourbar.Springs((fourbar.Spring(*ends, 1.0, length),))
+    motion = fourbar.Motion(fourbar.Sweep(start, stop, 1), 1.0)
+    linkage = bare(0.3, 0.1, 0.25, 0.22)
+    scene = fourbar.Scene(linkage, motion, effects=(springs,))
+    (note,) = list_spring_notes(scene, fourbar.solve(scene), DEGREES)
+    places = [f"theta_2 = {math.degrees(math.pi + x):.4g} deg" for x in (-0.2, 0.2)]
+    if stop < start:
+        places = places[::-1]
+    assert f"pulls from {places[0]} to {places[1]} and" in note
+
+
 def test_a_spring_pulls_in_a_release_from_between_its_instants():
     """The crank swings about the rest of a spring at O2: theta = 1 - cos(w t)/2."""
     linkage = bare(0.3, 0.1, 0.25, 0.22)
