@@ -40,8 +40,8 @@ from fourbar_validation.report.html import write_summary_page
 from fourbar_validation.run import released as free
 from fourbar_validation.run.judge import judge, judge_for_report
 from tests.support.here import judge_here, summary_of
-from tests.support.runs import HERE, compare_rows, save_run
-from tests.support.scenes import crank_rocker
+from tests.support.runs import HERE, compare_rows
+from tests.support.scenes import bare, crank_rocker
 from tests.validation.regression.test_regression import ROW
 from tests.validation.run.test_judge import Echo, Refuses
 
@@ -50,31 +50,18 @@ NAN = math.nan
 
 def rows(**counts):
     """So many rows of each verdict."""
-    names = {
-        "agree": AGREES,
-        "degraded": DEGRADED,
-        "undecided": UNDECIDED,
-        "refuse": REFUSES,
-        "fail": FAILS,
-    }
+    names = ("agree", "degraded", "undecided", "refuse", "fail")
+    verdicts = dict(
+        zip(names, (AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS), strict=True)
+    )
     return [
-        replace(ROW, verdict=names[name])
+        replace(ROW, verdict=verdicts[name])
         for name, many in counts.items()
         for _ in range(many)
     ]
 
 
 def test_a_quantity_that_every_row_calls_degraded_is_counted_and_named():
-    def row(scene, engine, quantity, verdict, allowed):
-        return replace(
-            ROW,
-            scene=scene,
-            engine=engine,
-            quantity=quantity,
-            verdict=verdict,
-            allowed=allowed,
-        )
-
     scenes = {
         "one": [
             ("a", "F12", DEGRADED, 1e-3),
@@ -90,22 +77,30 @@ def test_a_quantity_that_every_row_calls_degraded_is_counted_and_named():
     }
     judged = judge_for_report("", crank_rocker(), (), draw=False)
     records = [
-        replace(judged, name=name, rows=[row(name, *values) for values in many])
-        for name, many in scenes.items()
+        replace(
+            judged,
+            name=scene,
+            rows=[
+                replace(
+                    ROW,
+                    scene=scene,
+                    engine=engine,
+                    quantity=quantity,
+                    verdict=verdict,
+                    allowed=allowed,
+                )
+                for engine, quantity, verdict, allowed in many
+            ],
+        )
+        for scene, many in scenes.items()
     ]
     summary = summary_of(records)
     assert (summary.loose, summary.pairs) == (2, 5)
     stated = "2 of 5 quantities of a scene are at best"
-    for form in (
-        write_summary_page(summary),
-        page_of(summary, dict.fromkeys(scenes, 2)),
-    ):
-        text = html.unescape(form)
-        assert (
-            stated in text
-            and "torque of three (allowed 5.0e-01), F12 of one (allowed 2.0e-04)"
-            in text
-        )
+    named = "torque of three (allowed 5.0e-01), F12 of one (allowed 2.0e-04)"
+    page = page_of(summary, dict.fromkeys(scenes, 2))
+    for form in (write_summary_page(summary), page):
+        assert stated in html.unescape(form) and named in html.unescape(form)
     assert stated not in write_summary_page(summary_of(records[1:2]))
 
 
@@ -152,27 +147,29 @@ def test_all_hold_counts_what_was_compared_alone(rows, sentence, status):
     assert (counts.sentence(), counts.status) == (sentence, status)
 
 
-def test_a_row_passes_where_it_was_compared_and_holds():
-    assert {verdict: replace(ROW, verdict=verdict).passed for verdict in VERDICTS} == {
-        **dict.fromkeys((AGREES, DEGRADED), True),
-        **dict.fromkeys((UNDECIDED, REFUSES, FAILS), False),
-    }
-    for changed in (
-        {"error": NAN},
-        {"verdict": DEGRADED, "error": NAN},
-        {"verdict": "passes"},
-    ):
-        with pytest.raises(ValueError, match="no verdict"):
-            replace(ROW, **changed)  # type: ignore[arg-type]
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_a_row_passes_where_it_was_compared_and_holds(verdict):
+    passes = verdict in (AGREES, DEGRADED)
+    assert replace(ROW, verdict=verdict).passed == passes
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [{"error": NAN}, {"verdict": DEGRADED, "error": NAN}, {"verdict": "passes"}],
+)
+def test_a_row_without_a_number_or_of_another_word_has_no_verdict(changed):
+    with pytest.raises(ValueError, match="no verdict"):
+        replace(ROW, **changed)
 
 
 def test_a_table_cannot_say_that_a_refusal_passed(tmp_path):
-    write_results(rows(refuse=1), tmp_path / "results.csv")
-    text = (tmp_path / "results.csv").read_text()
+    file = tmp_path / "results.csv"
+    write_results(rows(refuse=1), file)
+    text = file.read_text()
     assert ",false,refuses," in text
-    (tmp_path / "results.csv").write_text(text.replace(",false,", ",true,"))
-    assert [row.passed for row in read_columns(tmp_path / "results.csv")] == [False]
-    (tmp_path / "results.csv").write_text(text.replace("refuses", "FAILED"))
+    file.write_text(text.replace(",false,", ",true,"))
+    assert [row.passed for row in read_columns(file)] == [False]
+    file.write_text(text.replace("refuses", "FAILED"))
     assert status(["compare", str(tmp_path), str(tmp_path)]) == 2
 
 
@@ -216,25 +213,21 @@ class SilentWithoutEffects(Echo):
 )
 def test_what_is_wrong_with_the_inertia_alone_is_a_row(adapter, verdict, reason):
     engine = Engine("echo", adapter, EQUIVALENCE)
-    inertial_rows = [
-        row
-        for row in judge("scene", crank_rocker(), [engine]).rows
-        if row.quantity == "torque_inertia"
-    ]
-    assert [(row.verdict, row.reason) for row in inertial_rows] == [(verdict, reason)]
+    rows = judge("scene", crank_rocker(), [engine]).rows
+    (row,) = [row for row in rows if row.quantity == "torque_inertia"]
+    assert (row.verdict, row.reason) == (verdict, reason)
 
 
 def test_where_no_loop_closes_no_identity_is_counted_as_held():
-    apart = fourbar.Motion(
-        fourbar.Sweep(2.0, 4.0, 5), 1.0
-    )  # beyond the limits of this input
+    """Beyond the limits of the input."""
+    apart = fourbar.Motion(fourbar.Sweep(2.0, 4.0, 5), 1.0)
     scene = Scene(fourbar.uniform(0.3, 0.25, 0.1, 0.22), apart)
     assert not fourbar.solve(scene).assembled.any()
-    rows = judge("scene", scene, [w for w in ENGINES if w.name == "free-body"]).rows
+    exact = [engine for engine in ENGINES if engine.name == "free-body"]
+    rows = judge("scene", scene, exact).rows
     verdicts = {(row.engine, row.quantity): row.verdict for row in rows}
-    assert (
-        verdicts["formulas", "closure"] == verdicts["free-body", "torque"] == UNDECIDED
-    )
+    assert verdicts["formulas", "closure"] == UNDECIDED
+    assert verdicts["free-body", "torque"] == UNDECIDED
     assert verdicts["free-body", "assembled"] == AGREES
 
 
@@ -243,9 +236,8 @@ def test_an_identity_that_is_due_nowhere_is_not_counted_as_held(monkeypatch):
         "fourbar_validation.run.question.mark_reversing",
         lambda scene, solution, _: np.ones(len(solution), bool),
     )
-    verdicts = {
-        row.quantity: row.verdict for row in judge("scene", crank_rocker(), []).rows
-    }
+    rows = judge("scene", crank_rocker(), []).rows
+    verdicts = {row.quantity: row.verdict for row in rows}
     expected = {"closure": AGREES, "force_sum": UNDECIDED, "moment_sum": UNDECIDED}
     assert verdicts.items() >= expected.items()
 
@@ -255,78 +247,50 @@ def test_formulas_without_an_answer_fail():
     commanded = command(scene)
     answer = Echo().answer(scene, commanded)
     positions = fourbar.solve(scene, "position", at=commanded)
-    (row,) = [
-        r
-        for r in Comparison(
-            "", scene, answer, positions, Demands(EQUIVALENCE, ("torque",))
-        ).rows()
-        if r.quantity == "torque"
-    ]
+    demands = Demands(EQUIVALENCE, ("torque",))
+    rows = Comparison("", scene, answer, positions, demands).rows()
+    (row,) = [row for row in rows if row.quantity == "torque"]
     assert (row.verdict, row.reason) == (FAILS, "the formulas have no answer")
-
-
-ONE_POSITION = """
-[lengths]
-ground = "4 m"
-input = "1 m"
-coupler = "3 m"
-output = "3 m"
-[motion]
-theta_2 = "10 deg"
-omega_2 = "1 rad/s"
-"""
 
 
 @pytest.mark.slow
 def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
     tmp_path, monkeypatch, capsys
 ):
+    """A simulation needs more than one position."""
     judge_here(monkeypatch)
-    (tmp_path / "scene.toml").write_text(ONE_POSITION)
-    out = tmp_path / "out"
-    arguments = [
-        "run",
-        str(tmp_path / "scene.toml"),
-        "--no-pictures",
-        "--out",
-        str(out),
-    ]
-    assert (
-        status([*arguments, "--engines", "mujoco-simulated"]) == FAILED
-    )  # a simulation needs more than one position
+    file, out = tmp_path / "scene.toml", tmp_path / "out"
+    linkage = bare(4.0, 1.0, 3.0, 3.0)
+    fourbar.save(Scene(linkage, fourbar.Motion(math.radians(10.0), 1.0)), file)
+    line = ["run", str(file), "--no-pictures", "--out", str(out), "--engines"]
+    assert status([*line, "mujoco-simulated"]) == FAILED
     sentence = "Nothing was compared on 1 scene: 9 of the formulas' own identities hold"
     assert sentence in " ".join(capsys.readouterr().out.split())
     assert sentence in (out / "report.md").read_text()
     page = html.unescape((out / "report.html").read_text())
-    assert (
-        f'<h1 class="bad">{sentence}</h1>' in page
-        and '<span class="bad">nothing compared</span>' in page
-    )
-    assert status([*arguments, "--engines", "mujoco-simulated,free-body"]) == HOLDS
+    assert f'<h1 class="bad">{sentence}</h1>' in page
+    assert '<span class="bad">nothing compared</span>' in page
+    assert status([*line, "mujoco-simulated,free-body"]) == HOLDS
 
 
 @pytest.mark.slow
 def test_every_form_of_a_report_says_the_same_counts():
+    """Rows of the formulas themselves are of both scenes, the others of free bodies."""
     refused = Engine("echo", Refuses, EQUIVALENCE)
-    exact = next(w for w in ENGINES if w.name == "free-body")
-    good, bad = (
+    (exact,) = [engine for engine in ENGINES if engine.name == "free-body"]
+    summary = summary_of(
         judge_for_report(name, crank_rocker(title=name), engines, draw=False)
         for name, engines in (("good", (exact, refused)), ("refused", (refused,)))
     )
-    summary = summary_of([good, bad])
-    # the rows of the formulas themselves stand on both scenes; the others are of the
-    # free bodies
     sentence = (
         "All 35 comparisons on 1 of 2 scenes hold: 35 agree; not compared: 2 refuse"
     )
     assert summary.verdict == sentence == summary.counts.sentence() and summary.good
-    assert sentence in write_summary_page(summary)
     page = page_of(summary, {})
-    assert sentence in html.unescape(page)
-    assert (
-        page.count('class="cell refuses"') == 4 and ">nothing compared</span>" in page
-    )
-    assert Counts().status == FAILED
+    for form in (page, write_summary_page(summary)):
+        assert sentence in html.unescape(form)
+    assert page.count('class="cell refuses"') == 4
+    assert ">nothing compared</span>" in page
 
 
 def test_a_free_motion_that_every_engine_refuses_is_not_held(monkeypatch):
@@ -352,126 +316,101 @@ def test_a_free_motion_that_every_engine_refuses_is_not_held(monkeypatch):
 
 
 def junit(old, new):
-    return ET.fromstring(
-        render.write_junit_of_changes(compare_rows((HERE, old), (HERE, new)))
-    )
+    changes = compare_rows((HERE, old), (HERE, new))
+    return ET.fromstring(render.write_junit_of_changes(changes))
 
 
 def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before():
-    def of(quantity, verdict):
-        return replace(
-            ROW,
-            quantity=quantity,
-            verdict=verdict,
-            error=1e-15 if verdict == AGREES else NAN,
+    agrees, *others = (
+        replace(ROW, quantity=quantity, verdict=verdict, error=error)
+        for quantity, verdict, error in (
+            ("torque", AGREES, 1e-15),
+            ("all", REFUSES, NAN),
+            ("F12", UNDECIDED, NAN),
+            ("F14", FAILS, NAN),
         )
-
-    both = [
-        of("torque", AGREES),
-        of("all", REFUSES),
-        of("F12", UNDECIDED),
-        of("F14", FAILS),
-    ]
-    suites = junit(both, both)
-    kinds = {
+    )
+    suites = junit([agrees, *others], [agrees, *others])
+    tags = {
         case.get("name"): [child.tag for child in case]
         for case in suites.iter("testcase")
     }
-    assert kinds == {
+    assert tags == {
         "torque": [],
         "all": ["skipped"],
         "F12": ["skipped"],
         "F14": ["failure"],
     }
-    assert (suites.get("tests"), suites.get("failures"), suites.get("skipped")) == (
-        "4",
-        "1",
-        "2",
+    counts = {name: suites.get(name) for name in ("tests", "failures", "skipped")}
+    assert counts == {"tests": "4", "failures": "1", "skipped": "2"}
+    worse = junit([agrees], [replace(agrees, verdict=REFUSES, error=NAN)])
+    assert next(child.tag for case in worse.iter("testcase") for child in case) == (
+        "failure"
     )
-    worse = junit([of("torque", AGREES)], [of("torque", REFUSES)])
-    assert (
-        next(child.tag for case in worse.iter("testcase") for child in case)
-        == "failure"
-    )
-    nothing = junit(both[1:2], both[1:2])
+    nothing = junit(others[:1], others[:1])
     assert nothing.get("failures") == "1" and nothing.get("skipped") == "1"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new", "sentence", "code"),
     [
         (
-            rows(agree=1),
-            rows(agree=1),
+            {"agree": 1},
+            {"agree": 1},
             "No regression in 1 rows: 1 same. New run: All 1 comparisons hold",
             HOLDS,
         ),
         (
-            rows(refuse=1),
-            rows(refuse=1),
+            {"refuse": 1},
+            {"refuse": 1},
             "Nothing was compared in 1 rows: 1 same",
             FAILED,
         ),
         (
-            rows(fail=1),
-            rows(fail=1),
+            {"fail": 1},
+            {"fail": 1},
             "No regression in 1 rows: 1 fails as before. New run: FAILS: 1 of 1",
             HOLDS,
         ),
         (
-            rows(agree=1),
-            rows(refuse=1),
+            {"agree": 1},
+            {"refuse": 1},
             "1 regression in 1 rows: 1 verdict got worse",
             FAILED,
         ),
     ],
 )
 def test_two_runs_without_a_comparison_in_common_are_no_success(
-    old, new, sentence, code, tmp_path, capsys
+    old, new, sentence, code
 ):
-    folders = [
-        str(save_run(tmp_path / name, rows))
-        for name, rows in (("old", old), ("new", new))
-    ]
-    assert status(["compare", *folders]) == code
-    printed = re.sub(r" against .* in (\d)", r" in \1", capsys.readouterr().out)
-    assert sentence in printed
-    changes = compare_rows((HERE, old), (HERE, new))
-    sentence = render.write_verdict(changes)
-    assert sentence in html.unescape(
-        render.write_differences_page(changes)
-    ) and sentence in render.write_pull_request_comment(changes)
-
-
-def test_of_two_rows_of_one_name_the_worse_one_counts():
-    both = [*rows(fail=1), *rows(agree=1)]
-    assert compare_rows((HERE, rows(agree=1)), (HERE, both)).regressed
+    changes = compare_rows((HERE, rows(**old)), (HERE, rows(**new)))
+    assert changes.status == code
+    verdict = render.write_verdict(changes)
+    assert sentence in re.sub(r" against .* in (\d)", r" in \1", verdict)
+    for write in (
+        render.write_differences,
+        render.write_differences_page,
+        render.write_pull_request_comment,
+    ):
+        assert verdict in html.unescape(write(changes))
 
 
 def test_numbers_without_a_digit_do_not_agree(tmp_path, capsys):
-    # 1e-13 rad from a limit of theta_2 the condition of the accelerations is about
-    # 1e-13
+    """1e-13 rad from a limit of theta_2 that is the condition of the accelerations."""
     rocker = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
     limit = limit_positions(rocker)[0].theta_2
-    near = (
-        Scene(rocker, fourbar.Motion(limit + side * 1e-13, 1.0)) for side in (1.0, -1.0)
+    scene, *_ = (
+        near
+        for side in (1.0, -1.0)
+        for near in [Scene(rocker, fourbar.Motion(limit + side * 1e-13, 1.0))]
+        if fourbar.solve(near).assembled.all()
     )
-    scene = next(
-        candidate for candidate in near if fourbar.solve(candidate).assembled.all()
-    )
-    (tmp_path / "scene.toml").write_text(fourbar.dump(scene))
-    (tmp_path / "theirs.csv").write_text(
-        f"theta_2, torque\n{scene.motion.theta_2!r}, 17.0\n"
-    )
-    assert (
-        status(["check", str(tmp_path / "scene.toml"), str(tmp_path / "theirs.csv")])
-        == FAILED
-    )
-    assert (
-        "Nothing was compared; no digit left to judge 1 more by"
-        in capsys.readouterr().out
-    )
+    file, theirs = tmp_path / "scene.toml", tmp_path / "theirs.csv"
+    fourbar.save(scene, file)
+    theirs.write_text(f"theta_2, torque\n{scene.motion.theta_2!r}, 17.0\n")
+    assert status(["check", str(file), str(theirs)]) == FAILED
+    told = "Nothing was compared; no digit left to judge 1 more by"
+    assert told in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -104,13 +104,9 @@ def unpacked(text):
 @pytest.mark.parametrize("count", [2, ALL_OPEN + 1])
 def test_every_link_leads_to_a_row_and_the_row_says_what_results_csv_says_there(count):
     pages = copies(count, failing=1)
-    _, text = report(pages)
-    text = unpacked(text)
-    lines = list(
-        csv.reader(
-            io.StringIO(write_rows(row for record in pages for row in record.rows))
-        )
-    )
+    text = unpacked(report(pages)[1])
+    table = write_rows(row for record in pages for row in record.rows)
+    lines = list(csv.reader(io.StringIO(table)))
     rows = dict(re.findall(r'<tr id="row-(\d+)"[^>]*>(.*?)</tr>', text))
     assert {int(line) for line in rows} == set(range(2, len(lines) + 1))
     for line, shown in rows.items():
@@ -128,14 +124,10 @@ def test_every_link_leads_to_a_row_and_the_row_says_what_results_csv_says_there(
 @pytest.mark.slow
 def test_the_page_carries_results_csv_to_the_byte():
     pages = copies(3)
-    _, text = report(pages)
-    data = re.search(
-        r'download="results.csv.gz" href="data:application/gzip;base64,([^"]*)"', text
-    )
-    assert data is not None
-    assert gzip.decompress(base64.b64decode(data.group(1))).decode() == write_rows(
-        row for page in pages for row in page.rows
-    )
+    link = r'download="results.csv.gz" href="data:application/gzip;base64,([^"]*)"'
+    (data,) = re.findall(link, report(pages)[1])
+    table = write_rows(row for page in pages for row in page.rows)
+    assert gzip.decompress(base64.b64decode(data)).decode() == table
 
 
 @pytest.mark.slow
@@ -143,27 +135,18 @@ def test_the_verdict_stands_first_and_a_failure_is_named_before_anything_else():
     summary, text = report(copies(3, failing=1))
     assert summary.headline.startswith("FAILS: ")
     body = unescape(text[text.index("<body>") :])
-    assert (
-        body.index(summary.headline)
-        < body.index("What fails</h2>")
-        < body.index("Independent engines</h2>")
-    )
+    parts = (summary.headline, "What fails</h2>", "Independent engines</h2>")
+    places = [body.index(part) for part in parts]
+    assert places == sorted(places)
     assert "What fails</h2>" not in report(copies(3))[1]
 
 
 @pytest.mark.slow
 def test_a_scene_cannot_write_into_the_demo():
-    hostile = replace(
-        demo(),
-        title=HOSTILE,
-        source=HOSTILE,
-        name=HOSTILE,
-        left_out=[HOSTILE],
-    )
-    summary, text = report(
-        [hostile],
-        sections=[Section("more", HOSTILE, HOSTILE, [HOSTILE], [[HOSTILE]])],
-    )
+    words = dict.fromkeys(("title", "source", "name"), HOSTILE)
+    hostile = replace(demo(), **words, left_out=[HOSTILE])
+    section = Section("more", HOSTILE, HOSTILE, [HOSTILE], [[HOSTILE]])
+    summary, text = report([hostile], sections=[section])
     assert "<img src=x" not in text
     assert len(re.findall("<script", text)) == 1
     assert "<img" not in write_summary_page(summary)
@@ -171,11 +154,8 @@ def test_a_scene_cannot_write_into_the_demo():
 
 @pytest.mark.slow
 def test_nothing_is_fetched():
-    _, text = report(
-        copies(2),
-        pictures={"scene-000": "iVBORw0KGgo="},
-        no_pictures="none",
-    )
+    pictures = {"scene-000": "iVBORw0KGgo="}
+    _, text = report(copies(2), pictures=pictures, no_pictures="none")
     text = re.sub(r'xmlns(:xlink)?="[^"]*"', "", text)
     assert not re.search(r'(?:src|href)="(?!#|data:)', text)
     assert "url(" not in re.sub(r"url\(#", "", text) and "@import" not in text
@@ -188,17 +168,10 @@ def test_the_comment_of_a_pull_request_holds_200_scenes_that_all_fail():
 
 @pytest.mark.slow
 def test_a_section_of_another_module_is_shown_and_linked():
-    _, text = report(
-        copies(2),
-        sections=[
-            Section("hard", "Hard cases", "As predicted.", ["family"], [["toggle"]])
-        ],
-    )
-    assert (
-        '<a href="#hard">Hard cases</a>' in text
-        and '<h2 id="hard">' in text
-        and ">toggle</th>" in text
-    )
+    section = Section("hard", "Hard cases", "As predicted.", ["family"], [["toggle"]])
+    _, text = report(copies(2), sections=[section])
+    for part in ('<a href="#hard">Hard cases</a>', '<h2 id="hard">', ">toggle</th>"):
+        assert part in text
 
 
 def test_the_errors_drawn_are_the_largest_of_their_stretches():
@@ -219,47 +192,34 @@ def test_the_times_of_engines_are_those_of_the_run():
 
     Of an engine that refused none, and beside our own consistency that of the formulas.
     """
+    whole, bare = demo(), demo(draw=False)
     scenes = []
     for k in (1.0, 2.0, 8.0):
-        timings = [
-            replace(timing, seconds=k * timing.seconds) for timing in demo().timings
-        ]
-        scenes.append(replace(demo(draw=False), timings=timings))
+        timings = [replace(one, seconds=k * one.seconds) for one in whole.timings]
+        scenes.append(replace(bare, timings=timings))
     lines = {line.name: line for line in summary_of(scenes).engines}
-    of_one = {timing.engine: timing for timing in demo().timings}
-    assert set(of_one) == {
-        "formulas",
-        "pinocchio-inverse",
-        "mujoco-inverse",
-        "free-body",
-    }
-    for engine, timing in of_one.items():
+    seconds = {timing.engine: timing.seconds for timing in whole.timings}
+    exact = {"pinocchio-inverse", "mujoco-inverse", "free-body"}
+    assert set(seconds) == {"formulas", *exact}
+    page = unescape(report(scenes)[1])
+    for engine, taken in seconds.items():
         line = lines[OWN_CONSISTENCY if engine == "formulas" else engine]
-        assert line.microseconds == pytest.approx(
-            2.0 * 1e6 * timing.seconds / 37,
-            rel=1e-12,
-        )
-        assert line.times_formulas == pytest.approx(
-            timing.seconds / of_one["formulas"].seconds,
-            rel=1e-12,
-        )
-        assert WORK[engine] in unescape(report(scenes)[1]) and line.work == WORK[engine]
-    refused = replace(demo().rows[0], engine="free-body", verdict=REFUSES)
-    silent = summary_of([replace(demo(draw=False), rows=[*demo().rows, refused])])
-    assert math.isnan(
-        next(line for line in silent.engines if line.name == "free-body").microseconds
-    )
+        assert line.microseconds == pytest.approx(2.0 * 1e6 * taken / 37, rel=1e-12)
+        times = taken / seconds["formulas"]
+        assert line.times_formulas == pytest.approx(times, rel=1e-12)
+        assert line.work == WORK[engine] and WORK[engine] in page
+    refused = replace(whole.rows[0], engine="free-body", verdict=REFUSES)
+    silent = summary_of([replace(bare, rows=[*whole.rows, refused])])
+    (line,) = [line for line in silent.engines if line.name == "free-body"]
+    assert math.isnan(line.microseconds)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("motion", "pictures"),
     [
-        (
-            fourbar.Motion(fourbar.Sweep(0.0, 6.0, 24)),
-            3,
-        ),  # positions only: angles are drawn
-        (fourbar.Motion(1.0, 5.0), 1),  # one position: the linkage alone
+        (fourbar.Motion(fourbar.Sweep(0.0, 6.0, 24)), 3),
+        (fourbar.Motion(1.0, 5.0), 1),  # the linkage alone
         (fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.2, 20)), 3),
         (fourbar.Motion(fourbar.Sweep(0.0, 6.0, 24), 5.0), 3),
     ],
@@ -268,19 +228,14 @@ def test_the_times_of_engines_are_those_of_the_run():
 def test_every_kind_of_scene_is_drawn(motion, pictures, monkeypatch):
     engines = tuple(w for w in ENGINES if w.name == "free-body")
     made = judge_for_report("kind", crank_rocker(motion=motion), engines)
-    assert made.figure is not None and made.figure.count("<svg") == pictures
-    _, text = report([made])
-    assert "kind: crank-rocker" in text
+    assert made.figure.count("<svg") == pictures
+    assert "kind: crank-rocker" in report([made])[1]
 
 
 def test_an_engine_that_is_missing_is_reported_as_failing():
-    absent = replace(
-        ENGINES[0],
-        start=lambda: import_module("fourbar_validation.engines.absent").Absent(),
-    )
-    summary, text = report(
-        [judge_for_report("demo", crank_rocker(), (absent,), draw=False)]
-    )
+    absent = replace(ENGINES[0], start=lambda: import_module("tests.absent"))
+    record = judge_for_report("demo", crank_rocker(), (absent,), draw=False)
+    summary, text = report([record])
     assert summary.verdict.startswith("FAILS")
     assert "What fails</h2>" in text and "No module named" in text and "∞" in text
 
@@ -295,31 +250,22 @@ def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch):
             f"mujoco-simulated: falls to {number * 1e-3:.1e}; below 0.05 it is not"
             " simulated"
         ]
-        record.evidence = {
-            "sim": {
-                "error_at_4h": 1e-3,
-                "error_at_2h": 1e-4,
-                "observed_order": 3.0 + number,
-            }
-        }
-        record.timings = [
-            *record.timings,
-            replace(record.timings[0], engine="sim", setting=f"RK4 {628 + number}/rev"),
-        ]
+        errors = {"error_at_4h": 1e-3, "error_at_2h": 1e-4}
+        record.evidence = {"sim": {**errors, "observed_order": 3.0 + number}}
+        first = record.timings[0]
+        simulated = replace(first, engine="sim", setting=f"RK4 {628 + number}/rev")
+        record.timings = [*record.timings, simulated]
     summary, text = report(pages)
-    assert [w.row.scene for w in summary.worst[:2]] == ["scene-099", "scene-098"]
-    assert {scene.name for scene in summary.shown} == {
-        f"scene-0{number}" for number in range(80, 100)
-    }
-    assert summary.refusals == [
-        ("mujoco-simulated", "falls to 0.0e+00; below 0.05 it is not simulated", 100)
-    ]
-    assert summary.orders[0][0] == "scene-000"
-    assert (
-        f"the 80 of {summary.judged} scenes and engines" in write_summary_page(summary)
-        and summary.judged == 400
-    )
-    assert write_summary_page(summary).count("\n") < 160
+    assert [worst.row.scene for worst in summary.worst[:2]] == [
+        "scene-099", "scene-098"
+    ]  # fmt: skip
+    shown = {f"scene-0{number}" for number in range(80, 100)}
+    assert {scene.name for scene in summary.shown} == shown
+    refusal = "falls to 0.0e+00; below 0.05 it is not simulated"
+    assert summary.refusals == [("mujoco-simulated", refusal, 100)]
+    assert summary.orders[0][0] == "scene-000" and summary.judged == 400
+    page = write_summary_page(summary)
+    assert "the 80 of 400 scenes and engines" in page and page.count("\n") < 160
     # 20 scenes, each with 30 kB of compressed rows; the table of all of them is
     # compressed too
     assert len(text) < 1.0e6
@@ -366,34 +312,16 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(tmp_path, capsys)
 
     Our own rows are one.
     """
-    row = Row(
-        "first",
-        "mujoco-simulated",
-        "RK4",
-        "F12",
-        2.5e-7,
-        1e-5,
-        AGREES,
-        "",
-        math.radians(40.0),
-        1.0,
-    )
+    simulated = ("first", "mujoco-simulated", "RK4", "F12")
+    row = Row(*simulated, 2.5e-7, 1e-5, AGREES, "", math.radians(40.0), 1.0)
     share = replace(row, quantity="undecided", error=0.4, allowed=0.5, theta_2=math.nan)
     identity = replace(row, engine="formulas", quantity="torque", error=0.0)
-    pages = [
-        replace(
-            demo(draw=False),
-            name="first",
-            rows=[row, share, identity],
-            left_out=["equilibria: too near"],
-        )
-    ]
-    summary = summary_of(pages)
-    assert [line.name for line in summary.engines] == [
-        "mujoco-simulated",
-        "our own consistency",
-    ]
-    assert summary.engines[0].worst == row and summary.engines[0].undecided == 0.4
+    rows, left_out = [row, share, identity], ["equilibria: too near"]
+    record = replace(demo(draw=False), name="first", rows=rows, left_out=left_out)
+    summary = summary_of([record])
+    first, second = summary.engines
+    assert (first.name, second.name) == ("mujoco-simulated", "our own consistency")
+    assert first.worst == row and first.undecided == 0.4
     print_table(summary, tmp_path)
     printed = capsys.readouterr().out
     words = " ".join(printed.split())
@@ -402,24 +330,20 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(tmp_path, capsys)
     assert re.search(row_of_table, words), words
     # the numbers say what they are
     assert "error of allowed torque pin forces motion compared" in words
-    assert (
-        "without an engine: 1 identity of the formulas" in words and "all hold" in words
-    )
+    assert "without an engine: 1 identity of the formulas" in words
+    assert "all hold" in words
     assert "study" not in words, "what is no engine's stands in no row"
     assert "1 not compared: 1 where a check does not apply" in words
     assert words.startswith(summary.headline)
     assert words.endswith(f"Report: {tmp_path / 'report.html'}")
     assert len(printed.splitlines()) <= 25
     print_table(summary, tmp_path, verbose=True)
-    assert "not compared: equilibria in 1 scene: too near" in " ".join(
-        capsys.readouterr().out.split()
-    )
+    words = " ".join(capsys.readouterr().out.split())
+    assert "not compared: equilibria in 1 scene: too near" in words
     text = write_summary_page(summary)
     table = text[text.index("| largest") :].splitlines()
-    assert (
-        table[0]
-        == "| largest error of allowed | torque | pin forces | motion | compared |"
-    )
+    head = "| largest error of allowed | torque | pin forces | motion | compared |"
+    assert table[0] == head
     assert table[2].startswith(f"| MuJoCo {version}, simulated | - | 2.5e-07 of 1e-05")
 
 
@@ -428,17 +352,10 @@ def test_the_picture_shows_the_pin_force_that_fails():
     """Without a failure it shows the largest."""
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))
     solution = fourbar.solve(scene, "force")
-    sizes = {name: magnitude(getattr(solution, name)).max() for name in PIN_FORCES}
-    largest = max(sizes, key=sizes.__getitem__)
-    other = min(sizes, key=sizes.__getitem__)
-    answer = Answer(
-        "free-body",
-        "exact",
-        command(scene),
-        quantities={"torque": solution.torque},
-    )
-    for name in PIN_FORCES:
-        answer.quantities[name] = getattr(solution, name)
+    sizes = {name: magnitude(solution[name]).max() for name in PIN_FORCES}
+    largest, other = max(sizes, key=sizes.get), min(sizes, key=sizes.get)
+    numbers = {name: solution[name] for name in ("torque", *PIN_FORCES)}
+    answer = Answer("free-body", "exact", command(scene), quantities=numbers)
     record = Record("demo", scene, solution=solution, answers=[answer])
     assert f"|{largest}|" in (draw_scene_figure(record) or "")
     record.rows = [
@@ -467,32 +384,18 @@ def test_failures_are_one_line_an_engine_and_cause(tmp_path, capsys):
     chance.
     """
     swapped, sign = "F32 and F43 are exchanged: F32, F43", "sign reversed"
-    scenes = [
-        record_of(
-            f"scene {k:02d}",
-            [
-                replace(OF_MINE, scene=f"scene {k:02d}"),
-                *(
-                    fail(replace(OF_MINE, scene=f"scene {k:02d}", quantity=name))
-                    for name in ("F32", "F43")
-                ),
-            ],
-            causes={"mine": [sign, swapped] if k < 3 else [swapped]},
-        )
-        for k in range(23)
-    ]
-    dead = Row.unmeasured(
-        "scene 00", "theirs", "", "all", FAILS, "exit status 3: Cannot find module 'x'"
-    )
-    scenes[0].rows.append(dead)
+    scenes = []
+    for k in range(23):
+        of_scene = replace(OF_MINE, scene=f"scene {k:02d}")
+        wrong = [fail(replace(of_scene, quantity=name)) for name in ("F32", "F43")]
+        causes = {"mine": [sign, swapped] if k < 3 else [swapped]}
+        scenes.append(record_of(of_scene.scene, [of_scene, *wrong], causes=causes))
+    died = "exit status 3: Cannot find module 'x'"
+    scenes[0].rows.append(Row.unmeasured("scene 00", "theirs", "", "all", FAILS, died))
     summary = summary_of(scenes)
-    lines = [str(cause) for cause in summary.overview.causes]
-    assert lines == [
+    assert [str(cause) for cause in summary.overview.causes] == [
         f"mine: {swapped}, all else agrees: 23 scenes; worst scene 00 120 deg",
-        (
-            "theirs: no answer: exit status 3: Cannot find module 'x': 1 scene; "
-            "worst scene 00"
-        ),
+        f"theirs: no answer: {died}: 1 scene; worst scene 00",
     ]
     assert [line.engine for line in summary.lines] == ["mine", "theirs"]
     assert summary.headline.startswith(f"FAILS: mine is wrong: {swapped}")
@@ -508,13 +411,9 @@ def test_a_red_figure_draws_the_error_and_the_limit_of_the_guest():
     """A reversed force lies on the curve of its size."""
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))
     solution = fourbar.solve(scene, "force")
-    answer = Answer(
-        "mine",
-        "exact",
-        solution.at,
-        np.ones(len(solution), dtype=bool),
-        {"torque": solution.torque, "F43": -solution.F43},
-    )
+    assembled = np.ones(len(solution), dtype=bool)
+    numbers = {"torque": solution.torque, "F43": -solution.F43}
+    answer = Answer("mine", "exact", solution.at, assembled, numbers)
     row = Row("s", "mine", "exact", "F43", 2.0, 1e-6, FAILS, "", 1.0, 1.0)
     largest = int(np.argmax(np.max(np.abs(solution.F43), axis=0)))
     record = Record("s", scene, rows=[row], solution=solution, answers=[answer])
@@ -525,39 +424,29 @@ def test_a_red_figure_draws_the_error_and_the_limit_of_the_guest():
     assert "F43 " not in drawn and "allowed to mine" not in drawn
 
 
+def find_cause(*rows, **parts):
+    """Return what is wrong in a scene with these rows, as the report puts it."""
+    (cause,) = summary_of([record_of("a", rows, **parts)]).overview.causes
+    return cause.text
+
+
 def test_what_no_known_mistake_explains_is_told_by_what_differs_and_what_agrees():
-    rows = [
-        fail(OF_MINE),
-        *(replace(OF_MINE, quantity=name) for name in ("F12", "theta_3")),
-    ]
-    record = replace(record_of("a", rows), causes={"mine": []})
-    (cause,) = summary_of([record]).overview.causes
-    assert (
-        cause.text
-        == "torque differs, pin forces and motion agree; no known mistake explains it"
-    )
-    nothing = replace(OF_MINE, error=math.nan, verdict=FAILS)
-    (cause,) = summary_of([record_of("a", [nothing])]).overview.causes
-    assert cause.text == "no number for torque"
+    right = [replace(OF_MINE, quantity=name) for name in ("F12", "theta_3")]
+    words = "torque differs, pin forces and motion agree; no known mistake explains it"
+    assert find_cause(fail(OF_MINE), *right, causes={"mine": []}) == words
+    assert find_cause(fail(OF_MINE, math.nan)) == "no number for torque"
 
 
 def test_digits_that_are_missing_are_no_missing_term():
     rows = [fail(replace(OF_MINE, quantity=name), 3e-8) for name in ("torque", "F12")]
-    rows.append(replace(OF_MINE, quantity="theta_3"))
-    (cause,) = summary_of([record_of("a", rows)]).overview.causes
-    assert (
-        cause.text
-        == "torque and pin forces differ, motion agrees: the first 7 digits agree"
-    )
+    words = "torque and pin forces differ, motion agrees: the first 7 digits agree"
+    assert find_cause(*rows, replace(OF_MINE, quantity="theta_3")) == words
 
 
 def test_an_engine_that_broke_down_alone_is_named_without_a_quantity():
     dead = Row.unmeasured("a", "theirs", "", "all", FAILS, "exit status 3: no licence")
-    headline = summary_of([record_of("a", [dead])]).headline
-    assert (
-        headline == "FAILS: theirs is wrong: no answer: exit status 3: no licence, in 1"
-        " scene; a."
-    )
+    words = "theirs is wrong: no answer: exit status 3: no licence, in 1 scene; a."
+    assert summary_of([record_of("a", [dead])]).headline == f"FAILS: {words}"
 
 
 def refuse(scene, reason):
@@ -568,23 +457,24 @@ def test_a_reason_keeps_its_numbers_and_counts_those_like_it():
     """Reasons that differ in their numbers alone are one."""
     rows = [refuse(f"s{k}", f"2 of {k} signs were predicted") for k in (7, 8, 9)]
     rows.append(refuse("s", "it reads no cylinder"))
-    overview = summary_of([record_of(row.scene, [row]) for row in rows]).overview
-    assert overview.silent == [
-        "theirs: nothing compared (3 scenes): 2 of 7 signs were predicted (and 2 more"
-        " like it, with other numbers)"
-    ]
-    alike = [record_of(f"s{k}", [refuse(f"s{k}", "4 bars, not 5")]) for k in (1, 2)]
-    assert summary_of(alike).overview.silent == [
-        "theirs: nothing compared (2 scenes): 4 bars, not 5"
-    ]
+    alike = [refuse(f"s{k}", "4 bars, not 5") for k in (1, 2)]
+    for refusals, words in (
+        (
+            rows,
+            "(3 scenes): 2 of 7 signs were predicted (and 2 more like it, with other"
+            " numbers)",
+        ),
+        (alike, "(2 scenes): 4 bars, not 5"),
+    ):
+        summary = summary_of(record_of(row.scene, [row]) for row in refusals)
+        assert summary.overview.silent == [f"theirs: nothing compared {words}"]
 
 
 def test_an_engine_without_an_answer_is_named_with_its_numbers():
     """A failing number beside it does not take the place of the reason."""
     dead = Row.unmeasured("a", "theirs", "", "all", FAILS, "exit status 3 after 4 s")
     beside = fail(replace(OF_MINE, engine="theirs"), error=1e6)
-    (cause,) = summary_of([record_of("a", [beside, dead])]).overview.causes
-    assert cause.text == "no answer: exit status 3 after 4 s"
+    assert find_cause(beside, dead) == "no answer: exit status 3 after 4 s"
 
 
 def test_a_weaker_rule_stands_before_a_verdict_that_holds():
@@ -599,29 +489,21 @@ def test_a_weaker_rule_stands_before_a_verdict_that_holds():
 
 
 def test_two_engines_must_compare_torque_and_all_pin_forces_of_a_scene():
-    names = ("torque", "F12", "F32", "F43", "F14")
-
-    def scene(name, *engines):
-        return record_of(
-            name,
-            [
-                replace(OF_MINE, scene=name, engine=engine, quantity=quantity)
-                for engine, count in engines
-                for quantity in names[:count]
-            ],
-        )
-
-    summary = summary_of(
-        [
-            scene("a", ("one", 5), ("two", 5)),
-            scene("b", ("one", 5), ("two", 4)),
-            scene("c", ("one", 5)),
+    scenes = []
+    for name, counts in (
+        ("a", {"one": 5, "two": 5}),
+        ("b", {"one": 5, "two": 4}),
+        ("c", {"one": 5}),
+    ):
+        rows = [
+            replace(OF_MINE, scene=name, engine=engine, quantity=quantity)
+            for engine, count in counts.items()
+            for quantity in ("torque", *PIN_FORCES)[:count]
         ]
-    )
-    assert any(
-        note.startswith("Torque and pin forces of 1 of 3 scenes:")
-        for note in summary.overview.notes
-    )
+        scenes.append(record_of(name, rows))
+    notes = summary_of(scenes).overview.notes
+    words = "Torque and pin forces of 1 of 3 scenes:"
+    assert any(note.startswith(words) for note in notes)
 
 
 @pytest.mark.parametrize("columns", ["80", "40"])
@@ -629,25 +511,12 @@ def test_a_value_far_beyond_what_is_allowed_leaves_the_numbers_of_the_table_whol
     columns, tmp_path, monkeypatch, capsys
 ):
     monkeypatch.setenv("COLUMNS", columns)
-    row = Row(
-        "thesis_printed_inertias",
-        "mujoco-simulated",
-        "RK4",
-        "limit_positions",
-        3.14,
-        1e-9,
-        FAILS,
-        "",
-        0.5,
-        0.3,
-    )
+    simulated = ("thesis_printed_inertias", "mujoco-simulated", "RK4")
+    row = Row(*simulated, "limit_positions", 3.14, 1e-9, FAILS, "", 0.5, 0.3)
     for theta_2, at in ((0.5, "28.6"), (float("nan"), "-")):
-        placed = replace(row, theta_2=theta_2)
-        print_table(
-            summary_of([replace(demo(draw=False), name=row.scene, rows=[placed])]),
-            tmp_path,
-            verbose=True,
-        )
+        placed = [replace(row, theta_2=theta_2)]
+        record = replace(demo(draw=False), name=row.scene, rows=placed)
+        print_table(summary_of([record]), tmp_path, verbose=True)
         rows = [
             line.split()
             for line in capsys.readouterr().out.splitlines()
