@@ -42,7 +42,7 @@ def test_a_workload_with_twice_the_work_costs_twice_as_much(
         return lambda amount: sum(range((1 + (effect == "twice")) * 1000 * amount))
 
     monkeypatch.setitem(effects.WORKLOADS, "formulas", prepare)
-    measured = effects.measure_effect("formulas", "twice", 5)
+    measured = effects.measure_effect("formulas", "twice", 25)
     assert (
         1.5 < measured.median < 2.5
         and measured.low <= measured.median <= measured.high
