@@ -41,3 +41,5 @@ DRAKE = _exact(
     Later("fourbar_lab.engines.drake:DrakeInverse"),
     library="pydrake",
 )
+ENGINES = (EXUDYN, OPENSIM, DRAKE)
+"""What a run offers besides the engines of the harness, in this order."""

@@ -3,12 +3,10 @@
 The line says what starts the engine, what it needs, and how it is judged.
 """
 
-import tomllib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, PackageNotFoundError, distribution
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -46,7 +44,6 @@ from fourbar_validation.engines.prediction import (
     predict_from_data,
     predict_in_world_axes,
 )
-from fourbar_validation.places import CHECKOUT
 
 Predictor = Callable[[Scene, Command, str, Mask], Array]
 """Predicts the absolute error of a quantity at the positions of a mask, (n,)."""
@@ -284,43 +281,21 @@ def hold_fully(engine: Engine) -> Engine:
 
 
 HARD_ENGINES = tuple(hold_fully(engine) for engine in (BALLS, *ENGINES))
-LAB_DISTRIBUTION, GROUP = "fourbar-lab", "fourbar.engines"
-"""Distribution and group of its entry points. No other distribution adds an engine to
+LAB = find_spec("fourbar_lab")
+"""The lab, if it is installed or lies on the path. No other package adds an engine to
 the judge's process.
 """
+LAB_FOLDERS = tuple(map(Path, LAB.submodule_search_locations or ())) if LAB else ()
+"""Folder of the lab, whose engines.toml a run reads too. Empty without the lab."""
 
 
 @cache
 def load_further() -> tuple[Engine, ...]:
-    """Load the engines that the lab registers; none if it is not installed."""
-    try:
-        registered: Iterable[EntryPoint] = distribution(
-            LAB_DISTRIBUTION
-        ).entry_points.select(group=GROUP)
-    except (
-        PackageNotFoundError
-    ):  # the environment of one engine has the lab of a checkout on its path alone
-        if CHECKOUT is None or find_spec(LAB_DISTRIBUTION.replace("-", "_")) is None:
-            return ()
-        project = tomllib.loads(
-            (CHECKOUT / "lab" / "pyproject.toml").read_text(encoding="utf-8")
-        )["project"]
-        registered = [
-            EntryPoint(name, value, GROUP)
-            for name, value in project["entry-points"][GROUP].items()
-        ]
-    return tuple(entry.load() for entry in sorted(registered))
-
-
-LAB_FOLDERS = tuple(
-    Path(folder)
-    for spec in [find_spec(LAB_DISTRIBUTION.replace("-", "_"))]
-    if spec is not None
-    for folder in spec.submodule_search_locations or ()
-)
-"""Folder of the lab, whose engines.toml a run reads too. Empty if the lab is not
-installed.
-"""
+    """Load the engines that the lab lists in its `engines`; none without the lab."""
+    if LAB is None:
+        return ()
+    engines: tuple[Engine, ...] = import_module(f"{LAB.name}.engines").ENGINES
+    return engines
 
 
 def make_demands(

@@ -1,7 +1,7 @@
 """The one table of engines: their names, and how each is made ready.
 
-Four sources fill it: the harness (`registry`), the lab where it is installed (its entry
-points), the files engines.toml, and the guests that the command line names.
+Four sources fill it: `ENGINES` of the harness (`registry`) and of the lab where it is
+there, the files engines.toml, and the guests that the command line names.
 """
 
 from collections.abc import Callable, Collection, Iterable, Sequence
