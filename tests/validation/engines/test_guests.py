@@ -180,6 +180,10 @@ PROGRAMS = {
     ),
     "booleans": ((TORQUE, '"torque": theta > 2'), "answers.torque, entry 0 = False"),
     "long integers": ((TORQUE, '"torque": 10**400'), "answers.torque, entry 0 = 1000"),
+    "a text in the third pair": (
+        ("force.imag)", "force.imag if theta < 1.2 else 'y')"),
+        "answers.F12, entry 2 = 'y': must be a finite number or null",
+    ),
     "repeated key": (
         say("text = text[:-1] + ', \"id\": 1}'", SAY),
         f"{NO_JSON} (a key",
