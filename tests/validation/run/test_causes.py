@@ -525,6 +525,26 @@ def test_two_engines_that_agree_with_each_other_blame_the_formulas_alone():
     assert name_wrong({"one": reverse_F43, "two": reverse_y}).keys() == twice.keys()
 
 
+def test_what_differs_from_two_engines_is_listed_and_shown_first():
+    """The identity that fails with it has the larger error, and is a consequence."""
+    names = ("torque", "F12", "F32", "F43", "F14", "theta_3")
+    rows = [
+        Row("s", engine, "exact", name, error, 1e-14, FAILS, "", 1.0, 1.0)
+        for engine, name, error in (
+            (FORMULAS, "power", 0.9),
+            ("one", "torque", 0.3),
+            ("one", "torque_inertia", 0.2),
+        )
+    ]
+    overview = Overview()
+    against = dict.fromkeys(names, ["one", "two"])
+    overview.add(Record("s", rows=rows, against=against))
+    (cause,) = overview.causes
+    words = "one, two agree with each other, and differ from it in"
+    assert (cause.engine, cause.worst.quantity) == (FORMULAS, "torque")
+    assert cause.text == f"{words} torque, F12, F32, F43, F14, ..."
+
+
 def test_what_differs_is_what_the_engine_itself_has_wrong():
     closure, inertia = (
         Row("s", "wg", "exact", name, 0.3, 1e-14, FAILS, "", 1.0, 1.0)

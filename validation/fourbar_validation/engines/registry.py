@@ -281,9 +281,10 @@ def hold_fully(engine: Engine) -> Engine:
 
 
 HARD_ENGINES = tuple(hold_fully(engine) for engine in (BALLS, *ENGINES))
-LAB = find_spec("fourbar_lab")
-"""The lab, if it is installed or lies on the path. No other package adds an engine to
-the judge's process.
+LAB_DISTRIBUTION = "fourbar-lab"
+LAB = find_spec(LAB_DISTRIBUTION.replace("-", "_"))
+"""Its package, if it is installed or lies on the path. No other adds an engine to the
+judge's process.
 """
 LAB_FOLDERS = tuple(map(Path, LAB.submodule_search_locations or ())) if LAB else ()
 """Folder of the lab, whose engines.toml a run reads too. Empty without the lab."""
