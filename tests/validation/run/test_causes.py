@@ -537,7 +537,7 @@ def test_what_differs_from_two_engines_is_listed_and_shown_first():
         )
     ]
     overview = Overview()
-    against = dict.fromkeys(names, ["one", "two"])
+    against = {name: ["one", "two"] for name in names}
     overview.add(Record("s", rows=rows, against=against))
     (cause,) = overview.causes
     words = "one, two agree with each other, and differ from it in"
