@@ -57,7 +57,7 @@ ROTOR = Scene(
     title="a rotor",
 )
 BARE = replace(DRY, effects=())
-FAST = fourbar.Motion(np.radians(np.linspace(0.0, 3600.0, 61)), 10.0)
+FAST = fourbar.Motion(np.radians(np.linspace(0.0, 360.0, 25)), 10.0)
 TURNED = -4.0
 """Zero of a joint whose file counts from elsewhere, rad."""
 SOFT_FRICTION = 4e-6

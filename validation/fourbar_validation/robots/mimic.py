@@ -14,8 +14,8 @@ from fourbar.errors import InputError
 from fourbar.quantities import CHANGE_POINT, OK, Array
 from fourbar.scene import Command, Scene, command
 from fourbar.solving import solve
-from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.engines.mujoco.robots.mimic import JointEquality
+from fourbar_validation.report.sentences import print_sentence
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.guard import examine_guarded
 
@@ -253,19 +253,19 @@ def show_mimic(report: _MimicReport) -> None:
     equality = report.equality
     own = report.file
     low, high = (f"{math.degrees(angle):.6g}" for angle in report.swing)
-    _print_sentence(
+    print_sentence(
         f"{equality.follower} ({_write_angle('theta', equality)}) follows"
         f" {equality.leader} by polycoef"
         f" {_write_coefficients(equality.coefficients)};"
         f" theta_2 is {_write_theta_2(equality)}, from {low} to {high} deg"
     )
-    _print_sentence(
+    print_sentence(
         f"largest error of the angle: {_deg(own.angle)} deg through the zero of the "
         f"file; {_deg(report.shifted)} deg with the constant of least squares, "
         f"{_deg(report.centred)} deg with the best one; "
         f"of the ratio {_write_ratio(equality)}: {own.ratio:.4g}"
     )
-    _print_sentence(ROW.format(*FIT_HEADINGS))
+    click.echo(ROW.format(*FIT_HEADINGS))
     for degree, *errors in zip(
         POLYNOMIAL_DEGREES,
         report.squares,
@@ -276,9 +276,7 @@ def show_mimic(report: _MimicReport) -> None:
             missing = max(POLYNOMIAL_DEGREES) - degree
             polycoef = _write_coefficients((*error.coefficients, *[0.0] * missing))
             ratio = f"{error.ratio:.4g}"
-            _print_sentence(
-                ROW.format(str(degree), fit, _deg(error.angle), ratio, polycoef)
-            )
+            click.echo(ROW.format(str(degree), fit, _deg(error.angle), ratio, polycoef))
 
 
 def _write_angle(symbol: str, equality: JointEquality) -> str:
@@ -308,7 +306,3 @@ def _deg(angle: float) -> str:
 
 def _write_coefficients(coefficients: tuple[float, ...]) -> str:
     return " ".join(f"{number:.7g}" for number in coefficients)
-
-
-def _print_sentence(text: str) -> None:
-    click.echo(escape_controls(text))

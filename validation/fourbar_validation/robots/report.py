@@ -156,7 +156,7 @@ def _write_heading(loop: LoopMeasurement, *, judged: bool, stated: str) -> str:
         how = "in the whole robot against the formulas"
         if loop.as_it_is:
             how = "with the file as it is against the formulas"
-    given = f" (not as in the scene: {stated})" if stated else ""
+    given = f" (stated by {stated})" if stated else ""
     return (
         f"{loop.name}: {loop.joint} from {first} to {last} deg at {speed}"
         f" rad/s{given}, MuJoCo {how}"
