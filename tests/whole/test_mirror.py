@@ -27,7 +27,7 @@ JUDGED_BY = {
         "validation: cli; validation/report: sentences terminal; lab: cli fuzz_files"
     ),
     "whole/test_kills.py": "validation/run: pool",
-    "whole/test_narrow_terminal.py": "fourbar/show: folded lines",
+    "whole/test_narrow_terminal.py": "fourbar/show: folded",
     "whole/test_results_format.py": "validation/compare: columns",
     # one table or one evaluation, whose rows are no use alone
     "fourbar/effects/test_effects.py": "fourbar/effects: *",
