@@ -93,7 +93,6 @@ def test_tests_that_do_not_fail_or_take_long_let_a_fault_survive(
 @pytest.mark.parametrize(
     "chosen",
     [
-        pytest.param(IN_FORCES[:1], id="one"),
         *(
             pytest.param(chosen, id=name, marks=pytest.mark.slow)
             for name, chosen in CHOSEN.items()

@@ -290,6 +290,7 @@ gravity = ["9.81 m/s^2", "-90 deg"]
 """
 
 
+@pytest.mark.slow
 def test_a_given_couple_moves_two_parallel_links_from_rest(
     ask: Steps,
     tmp_path: Path,
