@@ -245,11 +245,12 @@ def goes_on_between(scene: Scene, solution: Solution) -> bool:
     if not (np.all(steps > 0.0) or np.all(steps < 0.0)):
         return False
     stated = command_at(scene, at.places)
-    names = ["angle", "acceleration", "branch"]
+    names = ["angle", "branch"]
     if at.speed is not None:
-        names.append("speed")
+        names += ["speed", "acceleration"]
     return all(
-        np.array_equal(getattr(at, name), getattr(stated, name), equal_nan=True)
+        getattr(stated, name) is not None
+        and np.array_equal(getattr(at, name), getattr(stated, name), equal_nan=True)
         for name in names
     )
 
