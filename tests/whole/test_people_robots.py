@@ -111,14 +111,16 @@ def ask(
 ) -> Steps:
     """Run one command line in an empty folder.
 
-    Return what it prints in one line.
+    Return what it prints in one line, which fits in a terminal of 80 columns.
     """
     monkeypatch.chdir(tmp_path)
 
     def run(line: str, code: int = 0) -> str:
         command, *words = line.split()
         assert COMMANDS[command](words) == code, capsys.readouterr()
-        return " ".join(capsys.readouterr().out.split())
+        printed = capsys.readouterr().out
+        assert max(map(len, printed.splitlines()), default=0) <= 80
+        return " ".join(printed.split())
 
     return run
 

@@ -30,11 +30,11 @@ FEWEST_POSITIONS = 6
 """Least positions of the scene from which a polynomial of degree 4 is fitted by least
 squares with an error to tell.
 """
-FIT_HEADINGS = ("degree", "fit", "angle, deg", "ratio", "polycoef")
+FIT_HEADINGS = ("degree", "fit", "angle, deg", "ratio")
 _FITS = ("least squares", "smallest largest error")
 """Names of the fits of `_MimicReport.squares` and `_MimicReport.fitted`."""
-ROW = "{:6}  {:22}  {:>10}  {:>8}  {}"
-"""Format of a row under FIT_HEADINGS."""
+ROW = "{:6}  {:22}  {:>10}  {:>8}"
+"""Format of a row under FIT_HEADINGS; its polycoef stands on a line below it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,7 +276,8 @@ def show_mimic(report: _MimicReport) -> None:
             missing = max(POLYNOMIAL_DEGREES) - degree
             polycoef = _write_coefficients((*error.coefficients, *[0.0] * missing))
             ratio = f"{error.ratio:.4g}"
-            click.echo(ROW.format(str(degree), fit, _deg(error.angle), ratio, polycoef))
+            click.echo(ROW.format(str(degree), fit, _deg(error.angle), ratio))
+            click.echo(f"{'':8}polycoef {polycoef}")
 
 
 def _write_angle(symbol: str, equality: JointEquality) -> str:
