@@ -53,6 +53,7 @@ NOT_QUANTITIES = (
         "ground",
         "change_points",
         "with_extremes",
+        "command_at",
         "lengths",
         "origin",
         "at",
