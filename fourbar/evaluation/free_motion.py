@@ -16,6 +16,7 @@ import cmath
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple, Self
 
@@ -292,9 +293,9 @@ class _Stretch(NamedTuple):
     moves: bool
 
 
-def _stand_at(y: Array) -> Callable[[Array], Array]:
-    """Return a motion that stays where it is."""
-    return lambda times: np.repeat(y[:, np.newaxis], times.size, axis=1)
+def _stand_at(y: Array, times: Array) -> Array:
+    """Return angle, speed and work of a linkage that stays where it is, (3, n)."""
+    return np.repeat(y[:, np.newaxis], times.size, axis=1)
 
 
 class _Run:
@@ -429,7 +430,7 @@ class _Run:
             side, moves = self._find_side(reading, y)
             if not moves or start == end:
                 here = np.empty(0), np.array([start])
-                self._keep(reading, angles, here, _stand_at(y), side, moves)
+                self._keep(reading, angles, here, partial(_stand_at, y), side, moves)
                 break
             solved = self._integrate(reading, start, y, side)
             extremes = self._find_extremes(reading, solved)

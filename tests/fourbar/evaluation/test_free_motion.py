@@ -4,6 +4,7 @@ test_free_motion_reference.py has the digits.
 """
 
 import math
+import pickle
 from dataclasses import replace
 from typing import Any
 
@@ -101,6 +102,14 @@ def test_dry_friction_holds():
     m = integrate(HANGING, terms, 0.3, 1.0, 1, np.linspace(0.0, 5.0, 51)).command
     assert m.omega_2[-1] == m.alpha_2[-1] == 0.0
     assert m.theta_2[-1] == m.theta_2[-2]
+
+
+def test_a_motion_that_has_stopped_is_handed_to_another_process():
+    terms = DOWN, fourbar.Friction.at(O2=0.3)
+    s = solve(let_go(0.3, 1.0, 5.0, 50, *terms, linkage=HANGING))
+    again = pickle.loads(pickle.dumps(s))
+    here, there = (one.command_at(np.array([0.0, 4.0])) for one in (s, again))
+    assert there.speed[-1] == 0.0 and there.angle.tolist() == here.angle.tolist()
 
 
 def test_a_scene_reports_its_times():
