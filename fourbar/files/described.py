@@ -69,6 +69,8 @@ def read_described(
     bars : the bar of each named point.
     stated : fields that stand elsewhere.
     """
+    if issubclass(kind, PinRows):
+        return kind(_read_rows(read, key, value, kind))
     declared = list_declared(kind)
     if [field.key for field in declared] == _PAIR:
         first, *_ = kind.numbers.values()
@@ -152,6 +154,19 @@ def _read_entries(
         read_described(read, f"{key}[{index}]", entry, field.by.kind, bars)
         for index, entry in enumerate(value)
     )
+
+
+def _read_rows(read: Reader, key: str, value: object, kind: Any) -> tuple[Any, ...]:
+    """Read what each pin has: one number, or a table of several."""
+    rows = []
+    for pin, entry in read.table(key, value, PINS).items():
+        path = f"{key}.{pin}"
+        if "" in kind.numbers:
+            stated = {"": entry}
+        else:
+            stated = read.table(path, entry, kind.numbers)
+        rows.append((pin, *read.numbers(path, stated, kind.numbers).values()))
+    return tuple(rows)
 
 
 def write_described(description: Any) -> Any:

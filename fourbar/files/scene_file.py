@@ -22,7 +22,6 @@ from fourbar.effects import (
     PointDrive,
     list_kinds,
 )
-from fourbar.effects.effect import PinRows
 from fourbar.effects.place import settler
 from fourbar.errors import InputError, expect
 from fourbar.files.described import PLACES_OF_ENDS, list_keys, read_described
@@ -35,7 +34,7 @@ from fourbar.files.drawing import (
 from fourbar.files.fields import BARE_KEY, Reader
 from fourbar.files.scene_text import BRANCH_OF_NAME, MOVING_BAR_NUMBERS, SIGMA
 from fourbar.formulas.mobility import meet_change_points
-from fourbar.linkage import BAR_NAMES, MOST_INTERVALS, PINS, POSITIVE, Bar, FourBar
+from fourbar.linkage import BAR_NAMES, MOST_INTERVALS, POSITIVE, Bar, FourBar
 from fourbar.quantities import Array
 from fourbar.quantities.units import half_unit_of_text
 from fourbar.scene import Scene
@@ -596,16 +595,7 @@ def _read_effect(
     key = f"effects.{name}"
     if kind.example and not isinstance(value, dict | list):
         raise read.refuse(key, value, f"must be like {kind.example}")
-    if not issubclass(kind, PinRows):
-        return read_described(read, key, value, kind, bars)  # type: ignore[no-any-return]
-    rows = []
-    for pin, entry in read.table(key, value, PINS).items():
-        if "" in kind.numbers:
-            stated = {"": entry}
-        else:
-            stated = read.table(f"{key}.{pin}", entry, kind.numbers)
-        rows.append((pin, *read.numbers(f"{key}.{pin}", stated, kind.numbers).values()))
-    return kind(tuple(rows))  # type: ignore[no-any-return]
+    return read_described(read, key, value, kind, bars)  # type: ignore[no-any-return]
 
 
 def _read_tolerances(
