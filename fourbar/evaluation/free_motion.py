@@ -83,12 +83,12 @@ class Released:
     """The same command with more instants between: those at which the angle of a bar or
     the sine of the transmission angle is largest or smallest.
     """
-    run: "_Run" = field(repr=False, init=False)
+    _run: "_Run" = field(repr=False, init=False)
     """Integration that the motion is read from."""
 
     def command_at(self, times: Array) -> Command:
         """Return the command at other times, (n,) rising from 0, s, of the same run."""
-        return self.run.report(times).command
+        return self._run.report(times).command
 
     @property
     def time(self) -> Array:
@@ -675,5 +675,5 @@ class _Run:
             tuple(sorted({time for time in self.change_points if time <= times[-1]})),
             command,
         )
-        released.run = self
+        released._run = self
         return released
