@@ -31,13 +31,16 @@ def list_public() -> set[str]:
 def list_unknown() -> Iterator[str]:
     """Yield a line for each public symbol whose type is unknown or only inferred."""
     path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
+    # pyright reads the libraries of the first Python on PATH: that is this one, also
+    # where another environment is active
+    programs = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     done = subprocess.run(
         [
             *(sys.executable, "-m", "pyright", "--outputjson"),
             *("--verifytypes", "fourbar", "--ignoreexternal"),
         ],
         cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": path},
+        env=os.environ | {"PYTHONPATH": path, "PATH": programs},
         capture_output=True,
         text=True,
         check=False,
