@@ -10,7 +10,7 @@ from fourbar.errors import InputError, name_unit, state_messages_in, write_in_un
 
 
 @pytest.mark.parametrize(
-    ("value", "shown"),
+    "value, shown",
     [
         (np.float64(0.21), "0.21"),
         (np.int64(3), "3"),

@@ -35,7 +35,6 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.show.animate import collect_page_data
 from fourbar.show.plot import draw
-from fourbar.solution import Solution
 from fourbar.solving import solve
 from tests.support.scenes import bare, crank_rocker
 
@@ -49,14 +48,14 @@ EXAMPLES = settings(
 FORCES = ("F12", "F32", "F43", "F14", "torque", "torque_error", "force_error")
 
 
-def solved(scene: Scene, stage: str | None = "error") -> Solution:
+def solved(scene, stage="error"):
     """Solved, with every warning an error."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         return solve(scene, stage)
 
 
-def without_value(solution: Solution) -> dict[str, list[str]]:
+def without_value(solution):
     """Return what stands at positions whose status is ok and is no number."""
     ok, missing = solution.status_code == OK, {}
     for name in STAGE_OF:
@@ -66,11 +65,11 @@ def without_value(solution: Solution) -> dict[str, list[str]]:
     return missing
 
 
-def lost(solution: Solution, *names: str) -> bool:
+def lost(solution, *names):
     return all(np.isnan(getattr(solution, name)).all() for name in names)
 
 
-def finite(solution: Solution, *names: str) -> bool:
+def finite(solution, *names):
     return all(np.isfinite(getattr(solution, name)).all() for name in names)
 
 
@@ -87,7 +86,7 @@ per_pin = st.dictionaries(st.sampled_from(list(PINS)), sizes, min_size=1)
 
 
 @st.composite
-def linkages(draw: st.DrawFn) -> fourbar.FourBar:
+def linkages(draw):
     """Lengths that close somewhere.
 
     Of a few round numbers, so that bars are equal, or of any size.
@@ -122,7 +121,7 @@ def linkages(draw: st.DrawFn) -> fourbar.FourBar:
 
 
 @st.composite
-def scenes(draw: st.DrawFn) -> Scene:
+def scenes(draw):
     """Every drive bar and every effect.
 
     Magnitudes go from the least double to the greatest.
@@ -181,10 +180,7 @@ def scenes(draw: st.DrawFn) -> Scene:
 @pytest.mark.slow
 @EXAMPLES
 @given(scenes(), st.sampled_from(STAGES))
-def test_where_the_status_is_ok_every_requested_quantity_is_a_number(
-    scene,
-    stage,
-):
+def test_where_the_status_is_ok_every_requested_quantity_is_a_number(scene, stage):
     solution = solved(scene, stage)
     assert without_value(solution) == {}
     infinite = [
@@ -203,13 +199,9 @@ CRANK_ROCKER = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
 
 
 @pytest.mark.parametrize(
-    ("linkage", "branch", "drive_bar"), [(PARALLELOGRAM, 1, 3), (KITE, -1, 4)]
+    "linkage, branch, drive_bar", [(PARALLELOGRAM, 1, 3), (KITE, -1, 4)]
 )
-def test_a_bar_that_does_not_turn_takes_no_torque(
-    linkage,
-    branch,
-    drive_bar,
-):
+def test_a_bar_that_does_not_turn_takes_no_torque(linkage, branch, drive_bar):
     """T3 of a parallelogram and T4 of a folded kite would have a pole at every
     position.
     """
@@ -239,7 +231,7 @@ def test_on_a_change_point_the_pin_forces_alone_have_no_value():
         assert at_all == [expected, "change_point", expected]
 
 
-def heavy(mass: float) -> fourbar.FourBar:
+def heavy(mass):
     bars = fourbar.Bar(1.0, 1.0), fourbar.Bar(2.5, mass, 1.0), fourbar.Bar(2.2, 1.0)
     return fourbar.FourBar(3.0, *bars)
 
@@ -299,7 +291,7 @@ def test_an_angle_that_is_no_number_is_not_reported_as_not_closing():
 def test_what_is_beyond_the_range_of_doubles_is_nan_also_where_the_loop_is_open():
     rocker = fourbar.uniform(40.0, 25.0, 25.0, 28.0)
     solution = solved(Scene(rocker, Motion(np.array([2.5]), 1.0, 1e308)))
-    assert solution.status == ["not_assembled"] and np.isnan(solution.a_A).all()  # type: ignore[arg-type]
+    assert solution.status == ["not_assembled"] and np.isnan(solution.a_A).all()
 
 
 def test_where_friction_jams_the_motion_that_would_begin_the_status_says_so():
@@ -312,8 +304,8 @@ def test_where_friction_jams_the_motion_that_would_begin_the_status_says_so():
     scene = Scene(CRANK_ROCKER, motion, 4, effects=(Gravity(), friction))
     solution = solved(scene)
     jammed = solution.status_code == JAMMED
-    assert jammed.any() and np.isfinite(solution.torque).all()  # type: ignore[arg-type]
-    lost = np.isnan(solution.torque_low) | np.isnan(solution.torque_high)  # type: ignore[arg-type]
+    assert jammed.any() and np.isfinite(solution.torque).all()
+    lost = np.isnan(solution.torque_low) | np.isnan(solution.torque_high)
     assert np.array_equal(lost, jammed)
 
 
@@ -335,23 +327,18 @@ bar = {drive_bar}
 
 
 @pytest.mark.parametrize(
-    ("changes", "words"),
+    "changes, words",
     [
         ({"drive_bar": 3}, "no torque"),
         ({"mass": "1e308 kg", "omega": "100 rad/s"}, "overflow"),
     ],
 )
-def test_analyze_says_it_in_every_form(
-    changes,
-    words,
-    tmp_path,
-    capfd,
-):
+def test_analyze_says_it_in_every_form(changes, words, tmp_path, capfd):
     file, name = tmp_path / "scene.toml", words.replace(" ", "_")
     stated = {"mass": "1 kg", "omega": "1 rad/s", "drive_bar": 2} | changes
     file.write_text(SCENE.format(**stated))
 
-    def analyze(*form: str) -> str:
+    def analyze(*form):
         assert status(["analyze", str(file), *form]) == HOLDS
         printed, errors = capfd.readouterr()
         assert errors == ""
@@ -368,10 +355,7 @@ def test_analyze_says_it_in_every_form(
         assert page["status"].count(name) >= 5
 
 
-def test_analyze_refuses_a_speed_without_a_square_in_one_line(
-    tmp_path,
-    capfd,
-):
+def test_analyze_refuses_a_speed_without_a_square_in_one_line(tmp_path, capfd):
     file = tmp_path / "scene.toml"
     file.write_text(SCENE.format(mass="1 kg", omega="1e200 rad/s", drive_bar=2))
     assert status(["analyze", str(file)]) == 2
@@ -382,10 +366,7 @@ def test_analyze_refuses_a_speed_without_a_square_in_one_line(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("figure", ["overview", "torque", "forces", "hodograph"])
-def test_figures_without_a_single_force_are_drawn_without_a_word(
-    figure,
-    tmp_path,
-):
+def test_figures_without_a_single_force_are_drawn_without_a_word(figure, tmp_path):
     scene = Scene(PARALLELOGRAM, Motion(np.linspace(0.3, 2.0, 5), 1.0), 3)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

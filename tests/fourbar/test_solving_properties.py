@@ -4,8 +4,6 @@ Scenes that are mirrored, turned or read from the other end are judged with the 
 a run that states them so.
 """
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -53,15 +51,15 @@ def test_loop_forces_moments_and_power_balance(name):
 
 
 def in_units(
-    length: float = 1.0,
-    mass: float = 1.0,
-    time: float = 1.0,
+    length=1.0,
+    mass=1.0,
+    time=1.0,
     *,
-    speed: float = 9.0,
-    acceleration: float = 30.0,
-    branch: int = 1,
-    bare: bool = False,
-) -> fourbar.Scene:
+    speed=9.0,
+    acceleration=30.0,
+    branch=1,
+    bare=False,
+):
     """Make a linkage with loads, its numbers in units of so many metres, kg and s."""
     force = mass * length / time**2
     couple = force * length
@@ -83,7 +81,7 @@ def in_units(
         np.linspace(0.1, 6.0, 24), speed / time, acceleration / time**2, branch=branch
     )
     linkage = fourbar.FourBar(0.3 * length, *bars, 0.2)
-    acts: dict[str, Any] = {} if bare else {"loads": loads, "effects": (weight,)}
+    acts = {} if bare else {"loads": loads, "effects": (weight,)}
     return fourbar.Scene(linkage, motion, 3, **acts)
 
 

@@ -16,14 +16,13 @@ CRANK_ROCKER = Path(__file__).parents[2] / "models" / "crank_rocker.toml"
 pytestmark = pytest.mark.posix
 
 
-def mode(path: Path) -> int:
+def mode(path):
     return stat.S_IMODE(path.stat().st_mode)
 
 
 @pytest.mark.parametrize("before", [0o600, 0o640, 0o664, 0o755], ids=oct)
 def test_an_existing_file_keeps_its_mode_and_a_new_one_is_an_ordinary_file(
-    tmp_path,
-    before,
+    tmp_path, before
 ):
     path = tmp_path / "a"
     write_bytes(path, b"new")
@@ -37,9 +36,7 @@ def test_an_existing_file_keeps_its_mode_and_a_new_one_is_an_ordinary_file(
     assert mode(path) == 0o600
 
 
-def test_a_symbolic_link_stays_and_the_file_that_it_names_is_written(
-    tmp_path,
-):
+def test_a_symbolic_link_stays_and_the_file_that_it_names_is_written(tmp_path):
     (tmp_path / "far").mkdir()
     real, link, chain = tmp_path / "far" / "real", tmp_path / "link", tmp_path / "chain"
     link.symlink_to("far/real")

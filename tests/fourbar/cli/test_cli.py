@@ -46,13 +46,11 @@ Fourbar = Callable[..., Ended]
 
 
 @pytest.fixture
-def run(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Fourbar:
+def run(capsys, tmp_path, monkeypatch):
     """Runs a command in this process: exit status, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
 
-    def call(*arguments: object) -> Ended:
+    def call(*arguments):
         code = status([str(argument) for argument in arguments])
         printed = capsys.readouterr()
         return code, printed.out, printed.err
@@ -60,10 +58,10 @@ def run(
     return call
 
 
-def strict(ended: Ended) -> dict[str, object]:
+def strict(ended):
     """JSON without the NaN and Infinity that Python would let pass."""
 
-    def refuse(name: str) -> float:
+    def refuse(name):
         raise AssertionError(name)
 
     code, out, err = ended
@@ -71,7 +69,7 @@ def strict(ended: Ended) -> dict[str, object]:
     return json.loads(out, parse_constant=refuse)
 
 
-def read_csv(ended: Ended) -> list[dict[str, str]]:
+def read_csv(ended):
     code, out, err = ended
     assert (code, err) == (HOLDS, "")
     return list(csv.DictReader(io.StringIO(out)))
@@ -114,9 +112,7 @@ def test_null_where_there_is_no_value(run):
         assert first == nothing and second not in (None, [None, None]), quantity
 
 
-def test_one_position_is_an_array_and_has_no_forces_without_a_speed(
-    run,
-):
+def test_one_position_is_an_array_and_has_no_forces_without_a_speed(run):
     save(crank_rocker(motion=fourbar.Motion(1.0)), "scene.toml")
     document = strict(run("analyze", "scene.toml", "--json"))
     assert set(CONTRACT) <= set(document) and np.shape(document["theta_3"]) == (1,)
@@ -156,7 +152,7 @@ def test_every_command_can_write_what_it_prints():
         assert any(wanted in option.opts for option in command.params), name
 
 
-@pytest.mark.parametrize(("command", "ending"), [("sdf", "sdf"), ("usd", "usda")])
+@pytest.mark.parametrize("command, ending", [("sdf", "sdf"), ("usd", "usda")])
 def test_sdf_and_usd_are_written_of_four_lengths_and_name_what_they_leave_out(
     command, ending, run
 ):
@@ -263,16 +259,14 @@ def test_every_thins_the_table_and_keeps_its_last_position(run):
 
 
 @pytest.mark.parametrize("width", [40, 80, 120, 400])
-def test_a_narrow_terminal_gets_whole_columns_and_the_names_of_what_is_missing(
-    width,
-):
+def test_a_narrow_terminal_gets_whole_columns_and_the_names_of_what_is_missing(width):
     text = print_positions(crank_rocker(), width)
     table = [line for line in text.split("\n") if not line.startswith("not shown")]
     assert max(map(len, table)) <= width and "…" not in text and "T2" in text
     assert ("not shown: " in text) == (width < 400)
 
 
-def print_positions(scene: fourbar.Scene, width: int) -> str:
+def print_positions(scene, width):
     return tables.print_positions(fourbar.solve(scene), width)
 
 
@@ -309,7 +303,7 @@ def test_the_shell_completes(run, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("lengths", "line"),
+    "lengths, line",
     [
         # 0.3 + 0.1 and 0.2 + 0.2 differ as doubles
         ("0.3 0.1 0.2 0.2", "change-point crank-rocker"),
@@ -329,7 +323,7 @@ def test_classify(lengths, line, run):
 def test_classify_says_what_turns_and_how_far(run):
     """By the law of cosines where two bars are collinear."""
 
-    def angle(opposite: float, first: float, second: float) -> float:
+    def angle(opposite, first, second):
         cosine = (first**2 + second**2 - opposite**2) / (2.0 * first * second)
         return math.degrees(math.acos(cosine))
 
@@ -367,7 +361,7 @@ def test_classify_says_what_turns_and_how_far(run):
 
 
 @pytest.mark.parametrize(
-    ("texts", "lengths"),
+    "texts, lengths",
     [
         (("300", "100", "25cm", "220", "--unit", "mm"), (0.3, 0.1, 0.25, 0.22)),
         (('12"', '4"', '10"', '9"'), (0.3048, 0.1016, 0.254, 0.2286)),
@@ -400,9 +394,7 @@ def test_who_asks_for_positions_only_is_told_no_force(bars, run):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("units", "unit"), [((), "lbf in"), (("--units", "SI"), "N m")]
-)
+@pytest.mark.parametrize("units, unit", [((), "lbf in"), (("--units", "SI"), "N m")])
 def test_plot_and_animate_show_the_units_of_the_scene(units, unit, run):
     run("new", "inches.toml", "--lengths", "12 in", "4 in", "10 in", "9 in")
     assert run("plot", "inches.toml", *units, "-o", "a.svg")[0] == HOLDS
@@ -414,7 +406,7 @@ def test_plot_and_animate_show_the_units_of_the_scene(units, unit, run):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("arguments", "said", "holds"),
+    "arguments, said, holds",
     [
         (("plot", "--figure", "linkage", "--at", "30 deg", "-o", "a.svg"), "", "<svg"),
         (("animate", "-o", "a.html"), "", "<html"),
@@ -430,7 +422,7 @@ def test_plot_and_animate_write_what_their_ending_says(arguments, said, holds, r
 
 
 @pytest.mark.parametrize(
-    ("error", "code"),
+    "error, code",
     [
         (RuntimeError("two\nlines"), BROKEN),
         (MemoryError(), BROKEN),
@@ -441,7 +433,7 @@ def test_plot_and_animate_write_what_their_ending_says(arguments, said, holds, r
 def test_what_goes_wrong_is_one_line_and_a_status(error, code, run, monkeypatch):
     """After an interrupt click ends the line that the terminal has started with ^C."""
 
-    def broken(*_: object) -> None:
+    def broken(*_):
         raise error
 
     monkeypatch.setattr(Case, "of", broken)
@@ -456,7 +448,7 @@ def test_what_goes_wrong_is_one_line_and_a_status(error, code, run, monkeypatch)
 
 
 def test_a_full_disk_leaves_the_old_file(run, monkeypatch, tmp_path):
-    def full(_: int) -> None:
+    def full(_):
         raise OSError(28, "No space left on device")
 
     Path("out").write_text("old")
@@ -490,10 +482,10 @@ def test_a_title_does_not_steer_the_terminal(run):
     assert strict(run("analyze", "scene.toml", "--json"))["title"] == title
 
 
-def start(*arguments: str, **streams: object) -> "subprocess.CompletedProcess[str]":
+def start(*arguments, **streams):
     streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | streams
     command = [sys.executable, *arguments]
-    return subprocess.run(command, cwd=ROOT, text=True, check=False, **streams)  # type: ignore[call-overload]
+    return subprocess.run(command, cwd=ROOT, text=True, check=False, **streams)
 
 
 @pytest.mark.slow
@@ -620,13 +612,13 @@ REFUSED_FILES = [  # text of a scene file, words of the line that refuses it
 ]
 
 
-@pytest.mark.parametrize(("text", "words"), REFUSED_FILES)
+@pytest.mark.parametrize("text, words", REFUSED_FILES)
 def test_a_file_is_refused_in_its_own_units_and_points_on(text, words, run):
     Path("scene.toml").write_text(text)
     refuses(run("analyze", "scene.toml"), words)
 
 
-def refuses(ended: Ended, words: str) -> None:
+def refuses(ended, words):
     code, out, err = ended
     assert (code, out) == (BAD_INPUT, "") and words in err and err.count("\n") == 1, err
 
@@ -681,7 +673,7 @@ REFUSED = [  # arguments, words of the line that refuses them
 ]
 
 
-@pytest.mark.parametrize(("arguments", "words"), REFUSED)
+@pytest.mark.parametrize("arguments, words", REFUSED)
 def test_arguments_are_refused_in_one_line_and_nothing_is_written(
     arguments, words, run, tmp_path
 ):
@@ -703,7 +695,7 @@ def test_what_is_no_other_mechanism_does_not_point_on(arguments, run):
 
 
 @pytest.mark.parametrize(
-    ("out", "why"),
+    "out, why",
     [
         ("no/out", "no such folder"),
         (".", "a file, not a folder"),

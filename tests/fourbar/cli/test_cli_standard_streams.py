@@ -14,13 +14,14 @@ from fourbar.errors import BAD_INPUT
 
 ROOT = Path(__file__).parents[3]
 SCENE = ROOT / "models" / "crank_rocker.toml"
+TEXT = SCENE.read_bytes()
 
 
 def call_fourbar(
-    folder: Path,
-    *arguments: str,
-    scene: bytes = SCENE.read_bytes(),
-) -> subprocess.CompletedProcess[bytes]:
+    folder,
+    *arguments,
+    scene=TEXT,
+):
     """Run the command line in a folder, with a scene on a pipe.
 
     The pipe is its standard input.
@@ -64,7 +65,7 @@ def test_a_mistake_on_standard_input_is_one_line(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("arguments", "start"),
+    "arguments, start",
     [
         (("analyze", "-", "--csv", "-o", "-"), b"status,"),
         (("analyze", "-", "--json", "-o", "-"), b"{"),
@@ -76,11 +77,7 @@ def test_a_mistake_on_standard_input_is_one_line(tmp_path):
     ],
     ids=lambda value: value[0] if isinstance(value, tuple) else "",
 )
-def test_a_file_is_written_to_standard_output(
-    arguments,
-    start,
-    tmp_path,
-):
+def test_a_file_is_written_to_standard_output(arguments, start, tmp_path):
     written = call_fourbar(tmp_path, *arguments)
     assert written.returncode == 0, written.stderr
     assert written.stdout.lower().startswith(start.lower())

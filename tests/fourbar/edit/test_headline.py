@@ -29,7 +29,7 @@ LAST_DIGIT = 5e-4
 """Relative: the headline and the block have four digits."""
 
 
-def load_coarse(name: str) -> fourbar.Scene:
+def load_coarse(name):
     """Load a scene with a tenth of its positions, between which its peaks lie."""
     scene = fourbar.load(MODELS / f"{name}.toml")
     steps = max(len(fourbar.solve(scene, "position")) // 10, 12)
@@ -50,9 +50,7 @@ def test_at_rest_the_headline_has_the_numbers_of_analyze(name):
 
 
 @pytest.mark.parametrize("name", BOUNDED)
-def test_while_one_drags_the_numbers_of_the_positions_are_reached_at_least(
-    name,
-):
+def test_while_one_drags_the_numbers_of_the_positions_are_reached_at_least(name):
     scene = load_coarse(name)
     solution = fourbar.solve(scene)
     headline = evaluate_scene(scene, COMMON)["headline"]

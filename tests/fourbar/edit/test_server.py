@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -48,38 +48,38 @@ from fourbar.errors import InputError
 CRANK_ROCKER = Path(__file__).parents[3] / "models" / "crank_rocker.toml"
 HUGE = 100_000_000
 """Bytes of a request that is not taken."""
-OPEN: list = []
+OPEN = []
 """Pages to be closed when a test ends."""
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_bytes(CRANK_ROCKER.read_bytes())
     return path
 
 
-def start(path: Path, *options: str, **environment: str) -> subprocess.Popen:
+def start(path, *options, **environment):
     """The command, in a process of its own; its first line is the address."""
     command = [sys.executable, "-m", "fourbar", "edit", str(path), *options]
     streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     return subprocess.Popen(command, env=os.environ | environment, **streams)
 
 
-def wait_until(happened: Callable[[], object]) -> None:
+def wait_until(happened):
     deadline = time.monotonic() + 20
     while not happened() and time.monotonic() < deadline:
         time.sleep(0.05)
 
 
 @pytest.fixture
-def bench(path: Path, monkeypatch: pytest.MonkeyPatch, capsys):
+def bench(path, monkeypatch, capsys):
     """Return a function that runs a coroutine with a listening workbench and its
     address.
     """
     monkeypatch.setattr(server, "GONE", 0.3)
 
-    def run(what: Callable[[Workbench, str], Awaitable[None]]) -> Session:
+    def run(what):
         session = Session(path, path.parent / "exports")
 
         async def both() -> None:
@@ -105,7 +105,7 @@ def bench(path: Path, monkeypatch: pytest.MonkeyPatch, capsys):
     return run
 
 
-def port_of(address: str) -> str:
+def port_of(address):
     return address.split("/")[2].rpartition(":")[2]
 
 
@@ -232,9 +232,7 @@ def test_a_request_of_a_hundred_megabytes_is_not_read(bench):
 
 
 @pytest.mark.slow
-def test_a_hundred_requests_at_once_are_answered_and_of_a_drag_only_the_latest(
-    bench,
-):
+def test_a_hundred_requests_at_once_are_answered_and_of_a_drag_only_the_latest(bench):
     async def ask(made: Workbench, address: str) -> None:
         assert await asyncio.gather(*(status(address) for _ in range(30))) == [200] * 30
         line = await page(address)
@@ -334,8 +332,7 @@ def test_it_ends_when_the_last_page_has_gone_and_not_before(bench):
 
 
 def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
-    bench,
-    monkeypatch,
+    bench, monkeypatch
 ):
     program = (
         "import sys, time, pathlib; print('agrees', flush=True); out ="
@@ -380,10 +377,7 @@ def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
 
 
 @pytest.mark.slow
-def test_a_change_overtakes_a_summary_that_is_being_computed(
-    bench,
-    monkeypatch,
-):
+def test_a_change_overtakes_a_summary_that_is_being_computed(bench, monkeypatch):
     evaluate, asked_for, released, summaries = (
         session.evaluate_scene,
         threading.Event(),
@@ -465,11 +459,7 @@ def test_a_page_that_closes_while_answers_wait_leaves_no_trace(bench, caplog):
     assert not caplog.records
 
 
-def test_the_line_of_a_page_that_does_not_read_is_dropped(
-    bench,
-    caplog,
-    monkeypatch,
-):
+def test_the_line_of_a_page_that_does_not_read_is_dropped(bench, caplog, monkeypatch):
     """One page changes the scene, another one that reads nothing is told each time."""
     monkeypatch.setattr(server, "MOST_UNREAD", 100_000)
     frame = {"note": "x" * 60_000}
@@ -513,7 +503,7 @@ def test_the_picture_is_served_as_an_image_alone(bench, path):
     bench(ask)
 
 
-def half_open(address: str, number: int) -> list[socket.socket]:
+def half_open(address, number):
     """Connections that begin a request and say no more."""
     made = []
     for _ in range(number):
@@ -524,7 +514,7 @@ def half_open(address: str, number: int) -> list[socket.socket]:
     return made
 
 
-def processor_time(process: subprocess.Popen) -> float:
+def processor_time(process):
     """User and system time of a process so far, s."""
     fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
@@ -537,10 +527,7 @@ def processor_time(process: subprocess.Popen) -> float:
     [256, 40],
     ids=["within its limit of files", "beyond its limit of files"],
 )
-def test_half_open_connections_neither_stop_the_server_nor_stay(
-    path,
-    files,
-):
+def test_half_open_connections_neither_stop_the_server_nor_stay(path, files):
     import resource
 
     # imported before the limit holds: the server alone is tried
@@ -553,7 +540,7 @@ server.edit(Path(sys.argv[1]), Path(sys.argv[1] + "_exports"), browse=False)
 """
     most = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(4096, most), most))
-    idle: list[socket.socket] = []
+    idle = []
     with ExitStack() as stack:
         command = [sys.executable, "-c", program, str(path)]
         process = stack.enter_context(
@@ -663,8 +650,7 @@ def test_a_second_workbench_on_one_file_leads_to_the_first(path):
 
 @pytest.mark.posix
 def test_a_file_that_another_one_locks_and_gives_no_address_for_is_named(
-    tmp_path,
-    monkeypatch,
+    tmp_path, monkeypatch
 ):
     from fourbar.edit import redirect
 
@@ -681,9 +667,7 @@ def test_a_file_that_another_one_locks_and_gives_no_address_for_is_named(
 @pytest.mark.posix
 @pytest.mark.parametrize("how", ["linked", "another's", "written by hand", "longer"])
 def test_a_file_of_the_page_s_name_that_is_somebody_else_s_stays_as_it_is(
-    tmp_path,
-    monkeypatch,
-    how,
+    tmp_path, monkeypatch, how
 ):
     ours = REDIRECT_PAGE.format(address="http://127.0.0.1:4000/token/")
     content = {"written by hand": "<html>", "longer": ours + "<p>"}.get(how, ours)
@@ -701,10 +685,7 @@ def test_a_file_of_the_page_s_name_that_is_somebody_else_s_stays_as_it_is(
 
 @pytest.mark.posix
 @pytest.mark.parametrize("left", ["", REDIRECT_PAGE.format(address="http://x/")])
-def test_an_empty_page_and_one_of_a_killed_server_are_written_over(
-    tmp_path,
-    left,
-):
+def test_an_empty_page_and_one_of_a_killed_server_are_written_over(tmp_path, left):
     page = tmp_path / f"a.toml{REDIRECT_ENDING}"
     page.write_text(left)
     redirect = Redirect(tmp_path / "a.toml")
@@ -718,9 +699,7 @@ def test_an_empty_page_and_one_of_a_killed_server_are_written_over(
 
 @pytest.mark.slow
 @pytest.mark.posix
-def test_the_command_prints_the_address_alone_and_ends_by_an_interrupt(
-    path,
-):
+def test_the_command_prints_the_address_alone_and_ends_by_an_interrupt(path):
     began = time.monotonic()
     with start(path, "--no-browser") as process:
         address = process.stdout.readline()

@@ -9,9 +9,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -84,48 +82,48 @@ MODELS = Path(__file__).parents[3] / "models"
 class Page:
     """A page of the workbench in the browser, and the servers of its files."""
 
-    def __init__(self, driver: Any) -> None:
+    def __init__(self, driver):
         self.driver = driver
-        self.servers: list[subprocess.Popen[str]] = []
+        self.servers = []
 
-    def serve(self, path: Path, port: str = "0") -> str:
+    def serve(self, path, port="0"):
         """Serve a scene file, and return the address of its page."""
         self.servers.append(start(path, "--no-browser", "--port", port))
         return str(self.servers[-1].stdout.readline().strip())
 
-    def end(self) -> None:
+    def end(self):
         while self.servers:
             server = self.servers.pop()
             server.terminate()
             server.communicate(timeout=20)
 
-    def is_quiet(self) -> None:
+    def is_quiet(self):
         assert not self.driver.get_log("browser")
 
-    def resize(self, width: int, height: int = 900) -> None:
+    def resize(self, width, height=900):
         size = {"width": width, "height": height, "mobile": False}
         override = "Emulation.setDeviceMetricsOverride"
         self.driver.execute_cdp_cmd(override, size | {"deviceScaleFactor": 1})
 
-    def run(self, script: str, *arguments: object) -> Any:
+    def run(self, script, *arguments):
         return self.driver.execute_script(script, *arguments)
 
-    def value(self, expression: str, *arguments: object) -> Any:
+    def value(self, expression, *arguments):
         return self.run(f"return {expression}", *arguments)
 
-    def wait(self, expression: str) -> Any:
+    def wait(self, expression):
         deadline = time.monotonic() + WAIT
         while not (value := self.value(expression)):
             assert time.monotonic() < deadline, f"{expression} stays {value!r}"
             time.sleep(0.02)
         return value
 
-    def get(self, path: Path) -> str:
+    def get(self, path):
         address = self.serve(path)
         self.driver.get(address)
         return address
 
-    def open(self, path: Path) -> str:
+    def open(self, path):
         """Open a file; where it is new, with the linkage that it begins with."""
         address = self.get(path)
         self.wait("offers && document.getElementById('field:lengths/input')")
@@ -133,36 +131,36 @@ class Page:
             self.click("no-sketch")
         return address
 
-    def element(self, name: str) -> Any:
+    def element(self, name):
         return self.driver.find_element("id", name)
 
-    def all(self, selector: str) -> list[Any]:
+    def all(self, selector):
         return list(self.driver.find_elements("css selector", selector))
 
-    def choose_stroke(self) -> None:
+    def choose_stroke(self):
         self.all("#command option[value=stroke]")[0].click()
 
-    def wait_for_text(self, name: str, text: str) -> None:
+    def wait_for_text(self, name, text):
         words = json.dumps(text)
         self.wait(f"document.getElementById('{name}').textContent.includes({words})")
 
-    def click(self, name: str) -> None:
+    def click(self, name):
         self.element(name).click()
 
-    def text(self, name: str) -> str:
+    def text(self, name):
         return str(self.element(name).text)
 
-    def shows(self, name: str) -> bool:
+    def shows(self, name):
         return bool(self.element(name).is_displayed())
 
-    def type(self, field: str, text: str) -> None:
+    def type(self, field, text):
         self.element(field).send_keys(Keys.CONTROL, "a")
         self.element(field).send_keys(text)
 
-    def press_button(self, text: str) -> None:
+    def press_button(self, text):
         self.driver.find_element("xpath", f"//button[.='{text}']").click()
 
-    def click_at(self, x: float, y: float, *held: str) -> None:
+    def click_at(self, x, y, *held):
         """Click a pixel of the picture."""
         picture = self.element("picture")
         off = x - picture.size["width"] / 2, y - picture.size["height"] / 2
@@ -174,17 +172,17 @@ class Page:
             chain.key_up(key)
         chain.perform()
 
-    def click_pins(self, width: str, *pixels: tuple[float, float]) -> None:
+    def click_pins(self, width, *pixels):
         """Draw O2, A, B and O4 in an empty drawing of a width, off the grid."""
         self.type("sketch-width", width)
         for x, y in pixels:
             self.click_at(x, y, Keys.SHIFT)
 
-    def save(self) -> None:
+    def save(self):
         self.click("save")
         self.wait(SAVED)
 
-    def drag_pin_B(self) -> None:
+    def drag_pin_B(self):
         """Drag it by 20 px; the scale stays, as while something is dragged."""
         self.run("window.scrollTo(0, 0); go(40); held = true")
         before = self.value("at(row).B")
@@ -199,12 +197,12 @@ class Page:
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path):
     return tmp_path / "mine.toml"
 
 
 @pytest.fixture
-def page(chromium: Any) -> Iterator[Page]:
+def page(chromium):
     """The one browser, whose console must be empty but where a line was cut."""
     page = Page(chromium)
     page.resize(1280)
@@ -436,15 +434,15 @@ def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(page, path):
     page.get(path)
     page.wait("offers && sketch && document.activeElement === picture")
 
-    def press(*keys: str) -> None:
+    def press(*keys):
         ActionChains(page.driver).send_keys(*keys).perform()
 
-    def with_control(key: str) -> None:
+    def with_control(key):
         ActionChains(page.driver).key_down(Keys.CONTROL).send_keys(key).key_up(
             Keys.CONTROL
         ).perform()
 
-    def tab_to(goal: str) -> None:
+    def tab_to(goal):
         for _ in range(200):
             if page.value(f"document.activeElement.matches({goal!r})"):
                 return
@@ -734,11 +732,11 @@ def test_a_photo_is_traced_to_a_scene(page, path):
     page.wait("data.traced && tracedSize && sketch")
     share = page.value("tracedSize[0]") / 3000.0
 
-    def click(pin: str) -> None:
+    def click(pin):
         pixel = [share * x for x in (PHOTO | MORE)[pin]]
         page.click_at(*page.value("toScreen(ofPixel(arguments[0]))", pixel))
 
-    def place(what: str, pixel: str) -> None:
+    def place(what, pixel):
         Select(page.element("place")).select_by_value(what)
         click(pixel)
         page.wait("!aimed && !inFlight && !waiting.length")
@@ -813,7 +811,7 @@ def test_a_path_stays_as_a_target_with_the_dead_centres_of_both(page, path):
     page.get(path)
     page.wait("offers && document.getElementById('field:lengths/input')")
 
-    def list_marks(kind: str) -> list[list[float]]:
+    def list_marks(kind):
         return page.value(
             "[...document.querySelectorAll(arguments[0])].map(e => ["
             "(e.getBBox().x + e.getBBox().width / 2 - view.x) / view.k,"
@@ -821,7 +819,7 @@ def test_a_path_stays_as_a_target_with_the_dead_centres_of_both(page, path):
             kind,
         )
 
-    def find_dead_centres() -> list[tuple[float, float]]:
+    def find_dead_centres():
         """Middles of the coupler where it lies in line with the input."""
         d, a, b, c = page.value("data.lengths")
         middles = []

@@ -46,11 +46,11 @@ second.
 
 
 @pytest.fixture
-def session(tmp_path: Path) -> Session:
+def session(tmp_path):
     return start(tmp_path, CRANK_ROCKER)
 
 
-def start(folder: Path, model: Path) -> Session:
+def start(folder, model):
     path = folder / "scene.toml"
     path.write_bytes(model.read_bytes())
     return Session(path, folder / "exports")
@@ -69,7 +69,7 @@ def accepted(told):
     return told
 
 
-def count_alike(text: str, other: str) -> int:
+def count_alike(text, other):
     pairs = zip(text, other, strict=False)
     return next((n for n, (a, b) in enumerate(pairs) if a != b), len(text))
 
@@ -85,9 +85,7 @@ def leaves(value, path=()):
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
-def test_a_file_is_unchanged_on_a_round_trip_and_one_number_changes_one_place(
-    path,
-):
+def test_a_file_is_unchanged_on_a_round_trip_and_one_number_changes_one_place(path):
     text = path.read_bytes().decode()
     assert SceneDocument(text).text() == text
     document, numbers = SceneDocument(text), 0
@@ -205,7 +203,7 @@ def test_a_gesture_is_one_step_back(session):
     assert "refused" in ask(session, "redo")
 
 
-def drag(session, what, to: complex, **more) -> fourbar.Solution:
+def drag(session, what, to, **more):
     """Drag something at theta_2 = 50 deg, and return that position afterwards."""
     shown = {"theta_2": math.radians(50.0), "branch": 1, "grain": PIXEL} | more
     accepted(ask(session, "drag", what=what, to=[to.real, to.imag], **shown))
@@ -215,7 +213,7 @@ def drag(session, what, to: complex, **more) -> fourbar.Solution:
     return fourbar.solve(session.now.scene, at=at_50_deg)
 
 
-def on_bar(s: fourbar.Solution, bar: int, vector: complex) -> complex:
+def on_bar(s, bar, vector):
     """Return where a vector from the first pin of a bar ends."""
     d, theta_1 = s.scene.linkage.ground, s.scene.linkage.ground_angle
     first = {1: 0.0, 3: complex(*s.A[0]), 4: cmath.rect(d, theta_1)}[bar]
@@ -240,7 +238,7 @@ SPRING = ENDS | {"stiffness": "9 N/m", "length": "1 mm"}
 
 
 @pytest.fixture
-def loaded(session: Session) -> Session:
+def loaded(session):
     """A session with a point, a spring, a couple, and a place by coordinates."""
     session.document.put(["effects", "springs"], [SPRING])
     accepted(ask(session, "text", text=session.document.text() + LOADED))
@@ -334,10 +332,7 @@ BUCKET = ROOT / "models" / "gallery" / "excavator_bucket.toml"
 
 
 @pytest.mark.parametrize("command", ["theta_3", "theta_4", "stroke"])
-def test_another_command_goes_over_the_same_motion(
-    tmp_path,
-    command,
-):
+def test_another_command_goes_over_the_same_motion(tmp_path, command):
     session = start(tmp_path, BUCKET)
     before = fourbar.solve(session.now.scene)
     accepted(ask(session, "command", command=command))
@@ -365,9 +360,7 @@ def test_what_cannot_be_commanded_is_one_line(session):
     assert "does not move" in ask(session, "command", command="theta_4")["refused"]
 
 
-def test_a_stroke_out_of_range_is_refused_in_the_units_of_the_file(
-    tmp_path,
-):
+def test_a_stroke_out_of_range_is_refused_in_the_units_of_the_file(tmp_path):
     """The range shows on solving, when the file has been read."""
     session = start(tmp_path, STROKE_INPUT)
     units = session.now.units
@@ -382,9 +375,7 @@ def test_a_stroke_out_of_range_is_refused_in_the_units_of_the_file(
         state.evaluate(units, settled=True)
 
 
-def test_a_state_that_assembles_nowhere_names_what_it_commands(
-    session,
-):
+def test_a_state_that_assembles_nowhere_names_what_it_commands(session):
     """The output of this linkage rocks, and does not come to 0 deg."""
     scene = replace(session.now.scene, motion=fourbar.Motion(theta_4=0.0))
     with pytest.raises(
@@ -400,10 +391,7 @@ PINS_DRAWN = [[0.0, 0.0], [3.0, 4.0], [14.0, 9.0], [12.0, -5.0]]
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
-def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(
-    tmp_path,
-    mirrored,
-):
+def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(tmp_path, mirrored):
     session = Session(tmp_path / "new.toml", tmp_path / "exports")
     assert ask(session, "hello")["fresh"]
     pins = [[x, -y if mirrored else y] for x, y in PINS_DRAWN]
@@ -448,7 +436,7 @@ def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(
 
 
 @pytest.mark.parametrize(
-    ("length", "force"),
+    "length, force",
     [
         ("12 in", "lbf"),
         ('12 1/2"', "lbf"),
@@ -458,9 +446,7 @@ def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(
     ],
 )
 def test_results_have_the_units_of_the_file_until_others_are_chosen(
-    session,
-    length,
-    force,
+    session, length, force
 ):
     text = session.now.text.replace('ground = "300 mm"', f"ground = '''{length}'''")
     told = ask(session, "text", text=text)
@@ -485,7 +471,7 @@ def test_numbers_get_the_digits_of_a_pixel_and_keep_their_unit():
     )
 
 
-def unpacked(data: bytes) -> dict:
+def unpacked(data):
     long = struct.unpack("<I", data[:4])[0]
     about, place = json.loads(data[4 : 4 + long]), 4 + long
     for sign, name, count, vector in about["columns"]:
@@ -498,7 +484,7 @@ def unpacked(data: bytes) -> dict:
     return about
 
 
-def settled(session: Session) -> dict:
+def settled(session):
     now = session.now
     return session.describe(
         evaluate_scene(now.scene, session.units, settled=True),
@@ -560,9 +546,7 @@ def test_an_answer_takes_ten_bare_solves_at_most(session):
     assert best["answer"] < BARE_SOLVES * best["bare"], best
 
 
-def test_save_keeps_the_rest_and_asks_before_it_overwrites_what_changed(
-    session,
-):
+def test_save_keeps_the_rest_and_asks_before_it_overwrites_what_changed(session):
     put(session, "lengths/input", "105 mm")
     assert ask(session, "save")["saved"] and session.saved
     assert session.path.read_text() == CRANK_ROCKER.read_text().replace(
@@ -654,8 +638,7 @@ def test_a_damaged_state_file_is_one_line(session, name):
 
 @pytest.mark.slow
 def test_the_history_of_a_large_scene_stays_within_what_the_next_start_reads(
-    session,
-    monkeypatch,
+    session, monkeypatch
 ):
     """Both limits and the scene are a tenth as large.
 
@@ -686,9 +669,7 @@ def test_the_history_of_a_large_scene_stays_within_what_the_next_start_reads(
 
 
 @pytest.mark.posix
-def test_a_scene_behind_a_link_is_saved_where_it_is_and_keeps_its_mode(
-    session,
-):
+def test_a_scene_behind_a_link_is_saved_where_it_is_and_keeps_its_mode(session):
     session.path.chmod(0o600)
     link = session.path.with_name("link.toml")
     link.symlink_to(session.path)
@@ -715,9 +696,7 @@ def test_a_new_scene_begins_where_there_is_no_file(tmp_path):
     assert fourbar.load(session.path).linkage.ground == 0.3
 
 
-def test_a_slip_of_the_finger_on_the_steps_does_not_fill_the_memory(
-    session,
-):
+def test_a_slip_of_the_finger_on_the_steps_does_not_fill_the_memory(session):
     from fourbar.edit.session import MOST_SOLVED_ANEW
 
     path = ["motion", "theta_2", "steps"]
@@ -775,7 +754,7 @@ def test_new_entries_and_limits_have_the_units_of_the_scene(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("kind", "content", "name"),
+    "kind, content, name",
     [
         ("png", b"\x89PNG\r\n\x1a\n...", "scene.png"),
         ("jpeg", b"\xff\xd8\xff...", "scene-2.jpg"),
@@ -783,10 +762,7 @@ def test_new_entries_and_limits_have_the_units_of_the_scene(tmp_path):
     ],
 )
 def test_a_picture_is_kept_beside_the_scene_and_over_no_file(
-    session,
-    kind,
-    content,
-    name,
+    session, kind, content, name
 ):
     taken = session.path.with_name("scene.jpg")
     taken.write_bytes(b"somebody's")
@@ -823,10 +799,7 @@ def test_a_picture_alone_leaves_a_new_scene_without_a_linkage(tmp_path):
     "data",
     ["data:text/html;base64,PHN2Zz4=", "data:image/png;base64,PGh0bWw+", "photo.png"],
 )
-def test_what_is_no_picture_is_refused_and_leaves_no_file(
-    session,
-    data,
-):
+def test_what_is_no_picture_is_refused_and_leaves_no_file(session, data):
     before = {*session.path.parent.iterdir()}
     answer = ask(session, "picture", data=data)
     assert "must be a PNG, JPEG or SVG picture" in answer["refused"]

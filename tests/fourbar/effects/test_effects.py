@@ -38,7 +38,7 @@ LAST_DIGITS = 64 * 2.0**-52
 """The roundings of one evaluation."""
 
 
-def alone(*effects: object, **motion: object) -> Scene:
+def alone(*effects, **motion):
     """Static, so that only the effects act."""
     stated = {"theta_2": np.linspace(0.2, 6.0, 9), "omega_2": 0.0, **motion}
     return crank_rocker(motion=Motion(**stated), loads=(), effects=effects)
@@ -59,21 +59,21 @@ OF_NO_LENGTH = Spring(Place(2, (0.1, 0.0)), Place(3, (0.0, 0.0)), 100.0)
 """Both of its ends lie on A: it has a force, which is zero."""
 
 
-def energy_of_coil(s: fourbar.Solution) -> np.ndarray:
+def energy_of_coil(s):
     ground = 0.1 * np.exp(1j * (0.2 - 1.5))
     end = s.A @ [1, 1j] + 0.08 * np.exp(1j * (s.theta_3 + 0.2))
     distance = np.abs(end - ground)
     return 3.0 * distance + 100.0 * (distance - 0.05) ** 2
 
 
-def energy_of_gas(s: fourbar.Solution) -> np.ndarray:
+def energy_of_gas(s):
     """Pushed in by s it has taken F1 s + (F2 - F1) s^2/(2 stroke)."""
     first, last = FORCES
     pushed = 0.5 - np.abs(s.B @ [1, 1j] - 0.2 * np.exp(2.2j))
     return first * pushed + (last - first) / 0.6 * pushed**2
 
 
-def energy_of_torsion(s: fourbar.Solution) -> np.ndarray:
+def energy_of_torsion(s):
     theta = {1: 0.2, 2: s.theta_2, 3: s.theta_3, 4: s.theta_4}
     energy = np.zeros(len(s))
     for pin, (k, rest, preload) in WOUND.items():
@@ -83,12 +83,12 @@ def energy_of_torsion(s: fourbar.Solution) -> np.ndarray:
     return energy
 
 
-def energy_of_weights(s: fourbar.Solution) -> np.ndarray:
+def energy_of_weights(s):
     return 9.81 * (0.2 * s.G2 + 0.5 * s.G3 + 0.4 * s.G4)[:, 1]
 
 
 @pytest.mark.parametrize(
-    ("effect", "energy"),
+    "effect, energy",
     [
         (Springs((COIL,)), energy_of_coil),
         (Springs((Spring.gas(*GAS, 0.5, 0.3, *FORCES),)), energy_of_gas),
@@ -113,7 +113,7 @@ def test_a_gas_spring_of_one_force_pushes_with_it_everywhere():
     assert Spring.gas(*GAS, 0.5, 0.3, FORCES[0]) == constant
 
 
-@pytest.mark.parametrize(("bar", "name"), [(2, "input"), (4, "output")])
+@pytest.mark.parametrize("bar, name", [(2, "input"), (4, "output")])
 def test_a_flywheel_is_inertia_of_the_bar(bar, name):
     scene = crank_rocker(effects=(Gravity(), Flywheel(0.02, bar)), drive_bar=bar)
     plain = scene.linkage.bar(bar)
@@ -141,7 +141,7 @@ CONES = [  # (F, C), then x and the distance from jamming, by hand
 ]
 
 
-@pytest.mark.parametrize(("F", "C", "number", "x", "far"), CONES)
+@pytest.mark.parametrize("F, C, number, x, far", CONES)
 def test_one_cone_has_one_none_or_two_solutions(F, C, number, x, far):
     """On a line F = 1, C = c: x = k (1 + c x), x = k |1 - c x|.
 
@@ -156,7 +156,7 @@ def test_one_cone_has_one_none_or_two_solutions(F, C, number, x, far):
 
 
 @pytest.mark.parametrize(
-    ("c1", "c2", "number"),
+    "c1, c2, number",
     [
         (0.5, 0.3, ONE_SOLUTION),
         (2.0, 0.3, NO_SOLUTION),
@@ -271,7 +271,7 @@ SAME_BAR = Place(2, (0.1, 0.0)), Place(2, (0.2, 0.0))
 
 
 @pytest.mark.parametrize(
-    ("make", "key"),
+    "make, key",
     [
         (lambda: Flywheel(1.0, 3), "effects.flywheel.bar"),
         (lambda: Spring(*SAME_BAR, 1.0), "effects.springs.to.bar"),

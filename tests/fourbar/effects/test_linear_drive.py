@@ -6,7 +6,6 @@ Against free bodies in balls, limiting cases, symmetry, power, and what is refus
 import math
 from dataclasses import replace
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 import pytest
@@ -42,22 +41,20 @@ WIDE, SHORT, KITE = (
 )
 
 
-def ends(start_bar: int, end_bar: int) -> fourbar.LinearDrive:
+def ends(start_bar, end_bar):
     return fourbar.LinearDrive(
         Place(start_bar, (0.17, -1.1)), Place(end_bar, (0.09, 0.7))
     )
 
 
-def driven(start_bar: int, end_bar: int, **changes: Any) -> fourbar.Scene:
+def driven(start_bar, end_bar, **changes):
     return crank_rocker(drive=ends(start_bar, end_bar), **changes)
 
 
 @pytest.mark.parametrize("lengths", [WIDE, SHORT, KITE])
-@pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
+@pytest.mark.parametrize("start_bar, end_bar", PAIRS)
 def test_forces_are_those_of_thirteen_equations_in_balls_within_their_error_bars(
-    start_bar,
-    end_bar,
-    lengths,
+    start_bar, end_bar, lengths
 ):
     d, *moving = lengths
     scene = driven(start_bar, end_bar)
@@ -85,11 +82,7 @@ def test_forces_are_those_of_thirteen_equations_in_balls_within_their_error_bars
         )  # no bar is wide enough to hide anything
 
 
-def compare_with_balls(
-    scene: fourbar.Scene,
-    s: fourbar.Solution,
-    ok: np.ndarray,
-) -> dict[str, np.ndarray]:
+def compare_with_balls(scene, s, ok):
     """Compare forces with those in balls by their error bars.
 
     Return all that the balls give.
@@ -105,10 +98,9 @@ def compare_with_balls(
     return exact
 
 
-@pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
+@pytest.mark.parametrize("start_bar, end_bar", PAIRS)
 def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
-    start_bar,
-    end_bar,
+    start_bar, end_bar
 ):
     """At rest forces grow without end only for a line to bar 2, without lever there."""
     link = fourbar.uniform(0.2, 0.48, 0.55, 0.2)
@@ -130,7 +122,7 @@ def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
         )  # of bars 3 and 4, so nearly in line, 1e-11 would be left
 
 
-@pytest.mark.parametrize(("bar", "pin"), [(2, "F12"), (4, "F14")])
+@pytest.mark.parametrize("bar, pin", [(2, "F12"), (4, "F14")])
 def test_from_the_ground_to_a_bar_only_the_pin_there_bears_the_push(bar, pin):
     torque, s = (
         fourbar.solve(crank_rocker(drive_bar=bar)),
@@ -145,7 +137,7 @@ def test_from_the_ground_to_a_bar_only_the_pin_there_bears_the_push(bar, pin):
         assert np.array_equal(getattr(s, name), getattr(torque, name)), name
 
 
-@pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
+@pytest.mark.parametrize("start_bar, end_bar", PAIRS)
 def test_its_line_has_no_sense(start_bar, end_bar):
     s = fourbar.solve(driven(start_bar, end_bar))
     back = fourbar.solve(
@@ -175,10 +167,9 @@ def test_its_line_has_no_sense(start_bar, end_bar):
     assert torque.drive_force is None and torque.stroke is None
 
 
-@pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
+@pytest.mark.parametrize("start_bar, end_bar", PAIRS)
 def test_the_condition_is_the_slope_of_the_stroke_over_what_its_ends_could_move(
-    start_bar,
-    end_bar,
+    start_bar, end_bar
 ):
     """In [0, 1] for linkages of every type.
 
@@ -260,7 +251,7 @@ def test_where_it_has_no_lever_or_no_direction_there_are_no_forces():
 
 
 @pytest.mark.parametrize(
-    ("start", "end"),
+    "start, end",
     [
         ((1, 0.0, 0.0), (2, 0.05, 0.3)),  # O2
         ((1, 0.3, 0.0), (4, 0.05, 0.3)),  # O4
@@ -272,10 +263,7 @@ def test_where_it_has_no_lever_or_no_direction_there_are_no_forces():
         ((2, 0.0, 0.0), (4, 0.0, 0.0)),
     ],
 )
-def test_ends_that_keep_their_distance_are_refused_in_one_line(
-    start,
-    end,
-):
+def test_ends_that_keep_their_distance_are_refused_in_one_line(start, end):
     drive = fourbar.LinearDrive(Place(start[0], start[1:]), Place(end[0], end[1:]))
     with pytest.raises(
         fourbar.InputError,
@@ -301,7 +289,7 @@ FROM, TO = (
 
 
 @pytest.mark.parametrize(
-    ("drive", "says"),
+    "drive, says",
     [
         (
             "bar = 4\n" + FROM + TO,
@@ -317,10 +305,7 @@ FROM, TO = (
         (FROM + TO + "force = 1\n", r"drive\.force"),
     ],
 )
-def test_a_file_with_a_wrong_drive_is_refused_in_one_line(
-    drive,
-    says,
-):
+def test_a_file_with_a_wrong_drive_is_refused_in_one_line(drive, says):
     with pytest.raises(fourbar.InputError, match=says) as caught:
         loads(TEXT + drive, "scene.toml")
     assert "\n" not in str(caught.value) and str(caught.value).startswith(
@@ -360,11 +345,8 @@ def test_its_duty_has_a_peak_force_and_no_peak_torque():
     assert entry["units"]["peak_speed"] == "m/s"
 
 
-@pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
-def test_friction_at_rest_holds_as_much_force_as_its_work(
-    start_bar,
-    end_bar,
-):
+@pytest.mark.parametrize("start_bar, end_bar", PAIRS)
+def test_friction_at_rest_holds_as_much_force_as_its_work(start_bar, end_bar):
     motion = fourbar.Motion(np.array([0.4, 1.3, 2.0, 4.5]), 10.0)
     scene = driven(start_bar, end_bar, motion=motion)
     speeds = fourbar.solve(scene).stroke_speed / 10.0

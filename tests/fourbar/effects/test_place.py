@@ -6,7 +6,6 @@ Places of bars in every form, loads at them, and the cases that people brought.
 import cmath
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ import fourbar
 from fourbar.effects import Load, Place
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
-from fourbar.scene import Scene
 from tests.support.scenes import crank_rocker
 from tests.support.texts import HUNG, PULL
 
@@ -37,7 +35,7 @@ def test_a_pull_at_the_tip_of_massless_bars():
     assert torque[0] == pytest.approx(1.656231, abs=PRINTED)
 
 
-PLACES: dict[str, dict[str, Any]] = {
+PLACES = {
     "from_pin": {"from_pin": (0.17, 0.4)},
     "from_centre": {"from_centre": (0.06, -0.7)},
     "point": {"point": "P"},
@@ -45,7 +43,7 @@ PLACES: dict[str, dict[str, Any]] = {
 }
 
 
-def find_place(scene: Scene, load: Load, s: fourbar.Solution) -> np.ndarray:
+def find_place(scene, load, s):
     """Compute where a load acts at each position, x + i y.
 
     Points and angles of the solution are all that is used.
@@ -67,11 +65,7 @@ def find_place(scene: Scene, load: Load, s: fourbar.Solution) -> np.ndarray:
 @pytest.mark.parametrize("frame", ["world", "bar"])
 @pytest.mark.parametrize("bar", [3, 4])
 @pytest.mark.parametrize("form", PLACES)
-def test_a_force_does_the_work_of_its_place_and_its_direction(
-    form,
-    bar,
-    frame,
-):
+def test_a_force_does_the_work_of_its_place_and_its_direction(form, bar, frame):
     """T2 dtheta_2 = -F . dr of a massless linkage at rest.
 
     dr is a central difference of the place.
@@ -81,7 +75,7 @@ def test_a_force_does_the_work_of_its_place_and_its_direction(
     point = fourbar.Point("P", bar, from_centre=(0.05, 1.1))
     base = crank_rocker(effects=(), loads=(force,), points=(point,))
 
-    def at(shift: float) -> fourbar.Solution:
+    def at(shift):
         motion = fourbar.Motion(theta_2 + shift, 0.0)
         return fourbar.solve(replace(base, motion=motion))
 
@@ -134,7 +128,7 @@ def test_one_place_in_three_forms_is_one_load_one_spring_and_one_cylinder():
     place = cmath.rect(0.19, -0.4)
     point = fourbar.Point("P", 3, cmath.polar(place))
     ground = Place(1, (0.2, 2.0))
-    forms: tuple[dict[str, Any], ...] = (
+    forms = (
         {"from_pin": cmath.polar(place)},
         {"from_centre": cmath.polar(place - crank_rocker().linkage.coupler.to_centre)},
         {"point": "P"},
@@ -199,7 +193,7 @@ def test_every_form_reads_back_as_it_was_written():
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "words"),
+    "old, new, words",
     [
         ("arm = ", "at = ", 'unknown key; did you mean "from_pin"?'),
         ("from_pin = { x", "at = { x", "points.Q.at = a table"),
@@ -218,11 +212,7 @@ def test_every_form_reads_back_as_it_was_written():
         ("arm = ", 'frame = "bar"\narm = ', "loads[2].arm"),
     ],
 )
-def test_a_place_that_is_stated_wrongly_is_refused_with_what_to_write(
-    old,
-    new,
-    words,
-):
+def test_a_place_that_is_stated_wrongly_is_refused_with_what_to_write(old, new, words):
     with pytest.raises(InputError) as refused:
         loads(EVERY_FORM.replace(old, new, 1))
     assert words in str(refused.value) and "\n" not in str(refused.value)
@@ -254,7 +244,7 @@ def test_python_refuses_what_is_no_place(make):
 
 def test_places_of_loads_are_given_by_keyword():
     with pytest.raises(TypeError):
-        Load(3, (1.0, 0.0), (0.1, 0.0))  # type: ignore[misc]
+        Load(3, (1.0, 0.0), (0.1, 0.0))
 
 
 def test_the_error_bar_covers_a_place_from_the_centre():

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from fourbar.effects import Place, PointDrive
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
 from fourbar.quantities import PIN_FORCES
-from fourbar.scene import Scene
 from fourbar_validation.engines.free_body import FreeBody
 from tests.support.scenes import crank_rocker
 from tests.support.texts import PLIERS
@@ -49,7 +47,7 @@ def test_pliers_multiply_the_force_of_the_hand():
     assert grip / s.drive_force[0] == pytest.approx(ratio, rel=1e-12)
 
 
-def driven(bar: int, frame: str, **changes: Any) -> Scene:
+def driven(bar, frame, **changes):
     return crank_rocker(
         drive=PointDrive(Place(bar, (0.15, 0.3)), DIRECTION, frame),
         **changes,
@@ -58,10 +56,7 @@ def driven(bar: int, frame: str, **changes: Any) -> Scene:
 
 @pytest.mark.parametrize("frame", ["world", "bar"])
 @pytest.mark.parametrize("bar", [2, 3, 4])
-def test_the_power_of_the_force_is_that_of_a_couple_on_the_input(
-    bar,
-    frame,
-):
+def test_the_power_of_the_force_is_that_of_a_couple_on_the_input(bar, frame):
     """F (e . v_P) = T2 omega_2.
 
     v_P is the velocity of the point as the solution has it.
@@ -128,7 +123,7 @@ def test_a_study_and_a_file_carry_it():
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "words"),
+    "old, new, words",
     [
         ('direction = "90 deg"\n', "", "drive.direction"),
         ('point = "handle"\n', "bar = 2\n", "drive.point"),
@@ -140,11 +135,7 @@ def test_a_study_and_a_file_carry_it():
         ('point = "handle"\n', 'bar = 2\nfrom_pin = ["0 m", "0 deg"]\n', "fixed pin"),
     ],
 )
-def test_a_drive_that_is_stated_wrongly_is_refused_in_one_line(
-    old,
-    new,
-    words,
-):
+def test_a_drive_that_is_stated_wrongly_is_refused_in_one_line(old, new, words):
     with pytest.raises(InputError) as refused:
         loads(HELD.replace(old, new, 1))
     assert words in str(refused.value) and "\n" not in str(refused.value)

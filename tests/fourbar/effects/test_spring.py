@@ -30,17 +30,14 @@ LINKAGES = {
 """Ground, input, coupler, output, m."""
 
 
-def linkage(name: str) -> fourbar.FourBar:
+def linkage(name):
     return fourbar.uniform(*LINKAGES[name])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("pin", ["A", "B"])
 @pytest.mark.parametrize("name", ["crank-rocker", "drag link"])
-def test_a_spring_with_both_ends_in_one_pin_has_no_direction(
-    name,
-    pin,
-):
+def test_a_spring_with_both_ends_in_one_pin_has_no_direction(name, pin):
     link = linkage(name)
     ends = {
         "A": (Place(2, (link.input.length, 0.0)), Place(3, (0.0, 0.0))),
@@ -87,7 +84,7 @@ def test_a_spring_whose_ends_meet_once_loses_that_position_alone():
         assert list(np.isnan(solution.torque)) == [False, True, False, False]
 
 
-def continuous(scene: Scene, pin: str) -> np.ndarray:
+def continuous(scene, pin):
     """theta_j - theta_i along a sweep, each position from the one before."""
     solution = solve(scene, "position")
     angle = {1: np.full(len(solution), scene.linkage.ground_angle), 2: solution.theta_2}
@@ -167,11 +164,7 @@ COUNTED = LINKAGES | {
 @pytest.mark.parametrize("bar", (2, 3, 4))
 @pytest.mark.parametrize("branch", (1, -1))
 @pytest.mark.parametrize("name", COUNTED)
-def test_turns_are_counted_whichever_bar_is_commanded(
-    name,
-    branch,
-    bar,
-):
+def test_turns_are_counted_whichever_bar_is_commanded(name, branch, bar):
     """A spring winds as its pin turns along an assembly, in any order of positions."""
     link = replace(fourbar.uniform(*COUNTED[name]), ground_angle=0.4)
     least, most = choose_range(link, bar)

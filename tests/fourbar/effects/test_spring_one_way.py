@@ -52,11 +52,11 @@ ACTS
 """
 
 
-def make_door(motion: str, acts: str = 'acts = "push"') -> fourbar.Scene:
+def make_door(motion, acts='acts = "push"'):
     return loads(DOOR.replace("MOTION", motion).replace("ACTS", acts))
 
 
-def close(theta: float) -> tuple[complex, complex]:
+def close(theta):
     """Return A and B of the door, m, by the intersection of two circles."""
     A = 0.025 * np.exp(1j * theta)
     to_O4 = 0.06 - A
@@ -66,7 +66,7 @@ def close(theta: float) -> tuple[complex, complex]:
     return A, A + (along + 1j * across) * to_O4 / d
 
 
-def energy_of_door(theta: float) -> float:
+def energy_of_door(theta):
     """Return weights, load, torsion spring and the spring that only pushes, J."""
     A, B = close(theta)
     line = (B - A) / 0.07
@@ -79,7 +79,7 @@ def energy_of_door(theta: float) -> float:
     )
 
 
-def inertia_of_door(theta: float) -> float:
+def inertia_of_door(theta):
     """Return the equivalent inertia at bar 2, kg m^2, by differences of positions."""
     step = 1e-5
     (A, B), (A_1, B_1) = close(theta - step), close(theta + step)
@@ -130,7 +130,7 @@ def test_a_released_door_arrives_as_its_energy_says():
     row = int(np.argmax(s.theta_2 <= math.radians(40.0)))
     start = math.radians(150.0)
 
-    def speed(theta: float) -> float:
+    def speed(theta):
         lost = energy_of_door(start) - energy_of_door(theta)
         return math.sqrt(2.0 * lost / inertia_of_door(theta))
 
@@ -148,7 +148,7 @@ ENDS = Place(1, (0.1, 0.5)), Place(2, (0.1, 0.0))
 """They meet at 0.7 rad: the ground lies at 0.2 rad."""
 
 
-@pytest.mark.parametrize(("acts", "status"), [("push", NO_DIRECTION), ("pull", 0)])
+@pytest.mark.parametrize("acts, status", [("push", NO_DIRECTION), ("pull", 0)])
 def test_where_its_ends_meet_a_spring_that_only_pulls_is_off(acts, status):
     spring = Spring(*ENDS, 200.0, 0.05, acts=acts)
     scene = crank_rocker(
@@ -175,7 +175,7 @@ def test_a_sensitivity_is_null_where_a_spring_comes_off_and_nowhere_else():
 
 
 @pytest.mark.parametrize(
-    ("acts", "numbers", "words"),
+    "acts, numbers, words",
     [
         ("both", {}, '"push" or "pull"'),
         ("push", {"stiffness": 0.0, "preload": -3.0}, "constant"),

@@ -35,7 +35,7 @@ from tests.oracle import printed
 TURNS = 2000.0 * np.pi
 
 
-def sized(k: float = 1.0, turns: float = 0.0) -> Scene:
+def sized(k=1.0, turns=0.0):
     """A crank-rocker with lengths times k under what grows with them.
 
     Mass centres at angles of so many rad more.
@@ -61,7 +61,7 @@ def sized(k: float = 1.0, turns: float = 0.0) -> Scene:
     )
 
 
-def near_a_limit(effect: Springs | Torsion) -> Scene:
+def near_a_limit(effect):
     """Scene near a limit whose springs alone act: their pull is as uncertain as the
     directions of bars 3 and 4, which are nearly in line.
     """
@@ -71,7 +71,7 @@ def near_a_limit(effect: Springs | Torsion) -> Scene:
     return Scene(linkage, Motion(angles, 1.0), effects=(effect,))
 
 
-def exactly_one() -> Scene:
+def exactly_one():
     """Force and couple of 1 at the crank's own pin.
 
     Nothing is rounded but the result.
@@ -84,7 +84,7 @@ def exactly_one() -> Scene:
     )
 
 
-def far_away(angle: float, ground_angle: float) -> Scene:
+def far_away(angle, ground_angle):
     """Move the angles of a crank-rocker; less a ground at 0 rad they are exact."""
     scene = sized()
     linkage = replace(scene.linkage, ground_angle=ground_angle)
@@ -110,11 +110,7 @@ SCENES |= {
 
 @pytest.mark.parametrize("kind", ["long doubles", "pairs of doubles"])
 @pytest.mark.parametrize("name", SCENES)
-def test_error_bars_are_of_the_size_of_the_error(
-    name,
-    kind,
-    monkeypatch,
-):
+def test_error_bars_are_of_the_size_of_the_error(name, kind, monkeypatch):
     scene = SCENES[name]
     if kind == "pairs of doubles":
         monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
@@ -142,10 +138,7 @@ def test_error_bars_are_of_the_size_of_the_error(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILY_DRAWERS)
-def test_error_bars_hold_with_pairs_of_doubles(
-    family,
-    monkeypatch,
-):
+def test_error_bars_hold_with_pairs_of_doubles(family, monkeypatch):
     """The numbers of a machine whose long doubles are no longer than doubles."""
     monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
     tally = judge_samples(family, range(3))
@@ -153,9 +146,7 @@ def test_error_bars_hold_with_pairs_of_doubles(
     assert not any(tally.too_large.values()) and not tally.warned
 
 
-def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(
-    monkeypatch,
-):
+def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(monkeypatch):
     ends = fourbar.Point("P", 1, (0.2, 0.6)), fourbar.Point("Q", 3, (0.15, -0.4))
     spring = Spring(Place(1, (0.2, 0.6)), Place(3, (0.15, -0.4)), 80.0, 0.2)
     table = Table((0.0, 1.0, 4.0, 6.2), (1.0, 1.0, -2.0, -2.0))  # 0 at 2 rad
@@ -172,7 +163,7 @@ def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(
         swept.theta_4 - swept.theta_3 - 0.7,
         swept.theta_2 - 2.0,
     ]
-    seen: list[np.ndarray] = []
+    seen = []
     true = fourbar.solve
     question = Question("", scene, command(scene))
     assert question.solution is not None
@@ -210,9 +201,7 @@ def test_a_bar_is_as_wide_as_what_a_position_loses():
     assert [row.verdict for row in rows] == ["agrees", "agrees"]
 
 
-def test_a_long_sweep_searches_for_friction_at_its_ends_alone(
-    monkeypatch,
-):
+def test_a_long_sweep_searches_for_friction_at_its_ends_alone(monkeypatch):
     """Eight thousand positions of several loaded pins took eight minutes.
 
     Each was searched from many starts.
@@ -254,7 +243,7 @@ def test_what_gravity_drops_of_its_direction_shows_in_the_error_bar():
     assert (error <= printed.ERROR_BARS * solution.torque_error).all()
 
 
-def near_a_limit_of_bar_3() -> fourbar.Scene:
+def near_a_limit_of_bar_3():
     """A position 1e-9 rad from a limit of theta_3."""
     lengths = (
         0.17339921633840288,
@@ -270,7 +259,7 @@ def near_a_limit_of_bar_3() -> fourbar.Scene:
     )
 
 
-def beside_a_free_length() -> fourbar.Scene:
+def beside_a_free_length():
     """A position 6e-6 rad beside that at which a spring does not pull."""
     spring = fourbar.Spring(
         fourbar.Place(1, (0.1, -1.5)),
@@ -291,10 +280,7 @@ def beside_a_free_length() -> fourbar.Scene:
     reason="what these scenes show is of long doubles of 64 bits",
 )
 @pytest.mark.parametrize("make", (near_a_limit_of_bar_3, beside_a_free_length))
-def test_an_error_bar_holds_what_long_doubles_do_not_resolve(
-    make,
-    monkeypatch,
-):
+def test_an_error_bar_holds_what_long_doubles_do_not_resolve(make, monkeypatch):
     """Double and long double agree here and are both wrong.
 
     Pairs of doubles have 32 digits.

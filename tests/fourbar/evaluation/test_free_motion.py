@@ -6,7 +6,6 @@ test_free_motion_reference.py has the digits.
 import math
 import pickle
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -29,14 +28,7 @@ NO_TORQUE = 1e-12 * 9.81 * 1.1
 """N m: of all the weights of HANGING at one metre."""
 
 
-def let_go(
-    theta_2: float,
-    omega_2: float,
-    duration: float,
-    steps: int,
-    *effects: Any,
-    linkage: fourbar.FourBar = HANGING,
-) -> fourbar.Scene:
+def let_go(theta_2, omega_2, duration, steps, *effects, linkage=HANGING):
     motion = fourbar.Motion(theta_2, omega_2, free=fourbar.Free(duration, steps))
     return fourbar.Scene(linkage, motion, effects=effects)
 
@@ -136,7 +128,7 @@ bend little within one.
 """
 
 
-def forces_by_energy(theta: np.ndarray, start: np.ndarray) -> np.ndarray:
+def forces_by_energy(theta, start):
     """Compute F12, F32, F43 and F14 of ROCKER, (4, 2), at other angles of its bars.
 
     Speeds follow from the conservation of energy, along the one direction that the loop
@@ -148,7 +140,7 @@ def forces_by_energy(theta: np.ndarray, start: np.ndarray) -> np.ndarray:
     m = np.array([bar.mass for bar in ROCKER.moving])
     inertia = np.array([bar.moment_of_inertia for bar in ROCKER.moving])
 
-    def height(angles: np.ndarray) -> float:
+    def height(angles):
         y = np.sin(angles)
         return float(m @ (half * y)) + m[1] * a * float(y[0])
 
@@ -207,7 +199,7 @@ def test_a_release_is_computed_once_and_solved_as_any_command():
 
 
 @pytest.mark.parametrize(
-    ("motion", "says"),
+    "motion, says",
     [
         (fourbar.Motion(1.0, 2.0), "motion.free"),
         (SWING.motion.replace(angle=np.array([1.0, 2.0])), "at one angle"),
@@ -218,7 +210,7 @@ def test_what_is_not_released_is_refused(motion, says):
         fourbar.release(replace(SWING, motion=motion))
 
 
-def integrate_to_line(scene: fourbar.Scene) -> float:
+def integrate_to_line(scene):
     """Find when bars 3 and 4 of a released scene are first collinear, s.
 
     The search is a bisection.
@@ -248,9 +240,7 @@ def integrate_to_line(scene: fourbar.Scene) -> float:
 
 
 @pytest.mark.slow
-def test_pin_forces_pass_a_limit_position_smoothly(
-    monkeypatch,
-):
+def test_pin_forces_pass_a_limit_position_smoothly(monkeypatch):
     """theta_2, omega_2, alpha_2 as doubles do not hold the forces there.
 
     The angle of bar 4 does.
@@ -278,11 +268,8 @@ def test_pin_forces_pass_a_limit_position_smoothly(
     assert np.all(change <= STEEPER * even * steps + BY_ENERGY * size)
 
 
-@pytest.mark.parametrize(("pin", "bar"), [("O2", 2), ("O4", 4)])
-def test_friction_that_holds_at_the_ground_loads_the_pins_as_a_drive_there(
-    pin,
-    bar,
-):
+@pytest.mark.parametrize("pin, bar", [("O2", 2), ("O4", 4)])
+def test_friction_that_holds_at_the_ground_loads_the_pins_as_a_drive_there(pin, bar):
     """The ground's couple on a bar is that of a drive on it.
 
     A drive holds a linkage still just as well.
@@ -307,9 +294,7 @@ def test_what_begins_to_move_against_friction_does_so_at_once():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("preload", (0.0, 5.0))
-def test_a_spring_between_places_that_are_one_is_refused_where_it_is_released(
-    preload,
-):
+def test_a_spring_between_places_that_are_one_is_refused_where_it_is_released(preload):
     """Rounding gives its pull a direction that differs at each step.
 
     The integration would never end.
@@ -351,21 +336,17 @@ def test_a_released_spring_is_followed_up_to_half_a_turn_and_no_further():
 
 
 @pytest.mark.parametrize(
-    ("omega", "gain", "power", "drift"),
+    "omega, gain, power, drift",
     # from rest all kinetic energy E is work, and 1.01 E the largest of both
     [(0.0, 1.01, 0.0, 0.01 / 1.01), (5.0, 1.0, 1e-6, None)],
 )
 def test_the_drift_is_a_part_of_the_largest_energy_or_work(
-    monkeypatch,
-    omega,
-    gain,
-    power,
-    drift,
+    monkeypatch, omega, gain, power, drift
 ):
     """Work is counted wrongly by a known part, which the drift then is."""
     true = free_motion._Run._compute_rates
 
-    def count_wrongly(*arguments: Any) -> list[Any]:
+    def count_wrongly(*arguments):
         rate, growth, of_work = true(*arguments)
         return [rate, growth, gain * of_work + power]
 

@@ -6,7 +6,6 @@ The linkages are random ones of every type.
 """
 
 import os
-from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +13,6 @@ import pytest
 
 import fourbar
 from fourbar.evaluation import free_motion
-from fourbar.evaluation.free_motion import Released as OurMotion
 from fourbar.evaluation.free_motion import integrate
 from fourbar.scene import Command, with_signs
 from tests.support.released_reference import released
@@ -46,7 +44,7 @@ class Released(NamedTuple):
     """Sign of sin(theta_4 - theta_3) at the start."""
 
 
-def four_lengths(rng: np.random.Generator, grashof: bool) -> list[float]:
+def four_lengths(rng, grashof):
     """Shortest to longest, m, away from the change points."""
     while True:
         x = sorted(rng.uniform(0.1, 0.6, 4))
@@ -59,16 +57,13 @@ def four_lengths(rng: np.random.Generator, grashof: bool) -> list[float]:
             return [float(v) for v in x]
 
 
-def with_extreme(
-    place: int,
-    grashof: bool,
-) -> Callable[[np.random.Generator], list[float]]:
+def with_extreme(place, grashof):
     """Linkages by the place of the shortest bar (Grashof) or of the longest.
 
     The places are ground, input, coupler and output.
     """
 
-    def lengths(rng: np.random.Generator) -> list[float]:
+    def lengths(rng):
         others = four_lengths(rng, grashof)
         extreme = others.pop(0 if grashof else -1)
         rng.shuffle(others)
@@ -77,7 +72,7 @@ def with_extreme(
     return lengths
 
 
-def at_change_point(rng: np.random.Generator) -> list[float]:
+def at_change_point(rng):
     """s + l = p + q exactly: multiples of 2^-10."""
     while True:
         s, p, q = (
@@ -89,13 +84,13 @@ def at_change_point(rng: np.random.Generator) -> list[float]:
             return x
 
 
-def parallelogram(rng: np.random.Generator) -> list[float]:
+def parallelogram(rng):
     """Opposite bars equal."""
     x, y = rng.uniform(0.1, 0.5, 2)
     return [float(x), float(y), float(x), float(y)]
 
 
-KINDS: dict[str, Callable[[np.random.Generator], list[float]]] = {
+KINDS = {
     "double-crank": with_extreme(0, grashof=True),
     "crank-rocker": with_extreme(1, grashof=True),
     "double-rocker": with_extreme(2, grashof=True),
@@ -117,7 +112,7 @@ PLACES = {
 """
 
 
-def motion(kind: str, number: int) -> Released:
+def motion(kind, number):
     """One motion at random; it depends on its kind and number alone."""
     rng = np.random.default_rng([list(KINDS).index(kind), number])
     lengths = KINDS[kind](rng)
@@ -138,7 +133,7 @@ def motion(kind: str, number: int) -> Released:
         ground_angle=float(rng.uniform(-3.0, 3.0)),
     )
     weight = 9.81 * sum(bar.mass * bar.length for bar in bars)
-    terms: list[Any] = [fourbar.Gravity()]
+    terms = [fourbar.Gravity()]
     if rng.random() < 0.6:
         damping = {
             pin: 0.01 * weight * float(rng.uniform(0, 1))
@@ -162,7 +157,7 @@ def motion(kind: str, number: int) -> Released:
     chosen = rng.random()
     for bar, force, frame in forces:
         places = PLACES[frame]
-        place: Any = {places[int(chosen * len(places))]: (0.1, 1.0)}
+        place = {places[int(chosen * len(places))]: (0.1, 1.0)}
         terms.append(fourbar.Load(bar, force, frame=frame, **place))
     while True:
         theta_2 = float(rng.uniform(-3.0, 3.0))
@@ -173,7 +168,7 @@ def motion(kind: str, number: int) -> Released:
             return Released(linkage, tuple(terms), theta_2, omega_2, branch)
 
 
-def ours(case: Released, nudge: Sequence[float] = (0.0, 0.0)) -> OurMotion:
+def ours(case, nudge=(0.0, 0.0)):
     """The motion of the formulas."""
     start = (case.theta_2 + nudge[0], case.omega_2 + nudge[1])
     signs = np.array([case.branch], dtype=np.int8)
@@ -186,7 +181,7 @@ def ours(case: Released, nudge: Sequence[float] = (0.0, 0.0)) -> OurMotion:
     return integrate(case.linkage, terms, *start, assembly, TIMES)
 
 
-def amplification(case: Released) -> float:
+def amplification(case):
     """Largest change of theta_2 over that of the start, by finite differences."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(free_motion, "RELATIVE", LOOSE)
@@ -226,7 +221,7 @@ MANY = [
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize(("kind", "number"), list(dict.fromkeys([*SHOWN, *MANY])))
+@pytest.mark.parametrize("kind, number", list(dict.fromkeys([*SHOWN, *MANY])))
 def test_nine_digits_over_five_seconds(kind, number):
     case = motion(kind, number)
     m, theirs = ours(case), released(*case[:5], TIMES)

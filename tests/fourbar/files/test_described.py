@@ -3,10 +3,7 @@
 import cmath
 import math
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -89,7 +86,7 @@ pole = "south"
 
 
 @pytest.fixture
-def kind(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Any]:
+def kind(monkeypatch, tmp_path):
     (tmp_path / "magnets.py").write_text(FILE, encoding="utf-8")
     monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
     for cached in (effects.list_classes, list_offers):
@@ -102,11 +99,11 @@ def kind(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Any]:
 
 
 @pytest.fixture
-def scene(kind: Any) -> fourbar.Scene:
+def scene(kind):
     return loads(TEXT)
 
 
-def test_it_is_read_and_written(scene: fourbar.Scene) -> None:
+def test_it_is_read_and_written(scene):
     (magnets,) = scene.effects
     assert (magnets.bar, magnets.turns, magnets.gap) == (4, 12.0, 0.002)
     assert magnets.coil == fourbar.Place(3, (0.05, 0.5))
@@ -122,7 +119,7 @@ def test_it_is_read_and_written(scene: fourbar.Scene) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "line"),
+    "old, new, line",
     [
         ("bar = 4\nturns", "bar = 3\nturns", "magnets.bar = 3: must be 2 (in"),
         ('"2 mm"', "2", "effects.magnets.gap = 2: the unit is missing"),
@@ -150,16 +147,14 @@ def test_it_is_read_and_written(scene: fourbar.Scene) -> None:
         ("from_centre", "at", "rows[1].to.at = ["),
     ],
 )
-def test_a_mistake_is_named_with_its_key(
-    kind: Any, old: str, new: str, line: str
-) -> None:
+def test_a_mistake_is_named_with_its_key(kind, old, new, line):
     assert TEXT.count(old) == 1
     with pytest.raises(InputError) as caught:
         loads(TEXT.replace(old, new))
     assert line in str(caught.value)
 
 
-def test_its_numbers_vary_by_their_keys(scene: fourbar.Scene) -> None:
+def test_its_numbers_vary_by_their_keys(scene):
     entries = list_entries(scene)
     numbers = {
         key.removeprefix("effects.magnets."): (read_number(scene, entry), entry.unit)
@@ -190,7 +185,7 @@ def test_its_numbers_vary_by_their_keys(scene: fourbar.Scene) -> None:
     assert six - four == pytest.approx(2.0 * (four - three), rel=1e-12)
 
 
-def test_its_places_are_handles_and_symbols(scene: fourbar.Scene) -> None:
+def test_its_places_are_handles_and_symbols(scene):
     handles = {handle.name: handle for handle in list_handles(scene)}
     assert handles.keys() == {
         "point P",
@@ -215,9 +210,7 @@ def test_its_places_are_handles_and_symbols(scene: fourbar.Scene) -> None:
     assert acting[2].end == (1, 0.0)
 
 
-def test_a_drag_changes_the_numbers_of_an_entry(
-    scene: fourbar.Scene,
-) -> None:
+def test_a_drag_changes_the_numbers_of_an_entry(scene):
     document = SceneDocument(TEXT)
     theta_2 = math.radians(60.0)
     (end,) = (h for h in list_handles(scene) if h.name == "to of magnets rows 2")
@@ -231,7 +224,7 @@ def test_a_drag_changes_the_numbers_of_an_entry(
     assert cmath.rect(*second.end.from_centre) == pytest.approx(wanted, abs=1e-6)
 
 
-def test_a_figure_draws_it(scene: fourbar.Scene) -> None:
+def test_a_figure_draws_it(scene):
     scene.plot("linkage")
     data = embedded(animate.write_page(scene))
     kinds = [one["kind"] for one in data["acting"]]

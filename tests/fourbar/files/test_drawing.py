@@ -2,8 +2,6 @@
 
 import math
 import os
-from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,7 +27,7 @@ O4 = ["250 mm", "50 mm"]
 """
 
 
-def random_pins(random: np.random.Generator, kind: str) -> list[complex]:
+def random_pins(random, kind):
     """Draw O2, A, B, O4 at a random place and scale.
 
     Any four, a parallelogram or a kite.
@@ -45,7 +43,7 @@ def random_pins(random: np.random.Generator, kind: str) -> list[complex]:
     return [complex(scale * (pin + shift)) for pin in (O2, A, B, O4)]
 
 
-def write_pins(pins: Sequence[complex]) -> str:
+def write_pins(pins):
     """Write O2, A, B, O4 as a scene file has them, to a tenth of a millimetre."""
     rows = ["[pins]"]
     for name, pin in zip(("O2", "A", "B", "O4"), pins, strict=True):
@@ -53,7 +51,7 @@ def write_pins(pins: Sequence[complex]) -> str:
     return "\n".join(rows) + "\n"
 
 
-def find_gap(pins: list[complex]) -> float:
+def find_gap(pins):
     """Return how far a linkage stands from its drawing, eps of its bars and
     condition.
     """
@@ -67,9 +65,9 @@ def find_gap(pins: list[complex]) -> float:
 
 
 @pytest.mark.parametrize(
-    ("kind", "count"), [("any", 60), ("parallelogram", 20), ("kite", 20)]
+    "kind, count", [("any", 60), ("parallelogram", 20), ("kite", 20)]
 )
-def test_a_drawing_turned_into_lengths_comes_back(kind: str, count: int) -> None:
+def test_a_drawing_turned_into_lengths_comes_back(kind, count):
     random = np.random.default_rng(5)
     gaps = [find_gap(random_pins(random, kind)) for _ in range(count)]
     assert max(gaps) < K
@@ -82,7 +80,7 @@ DRAWINGS = int(os.environ.get("DRAWINGS", "1000"))
 
 
 @pytest.mark.slow
-def test_thousands_of_drawings_come_back() -> None:
+def test_thousands_of_drawings_come_back():
     random = np.random.default_rng(6)
     with_change_points = DRAWINGS // 20
     kinds = ["any"] * (DRAWINGS - 2 * with_change_points)
@@ -91,7 +89,7 @@ def test_thousands_of_drawings_come_back() -> None:
     assert len(gaps) == DRAWINGS and gaps.max() < K
 
 
-def test_lengths_angles_and_assembly_are_those_of_the_pins() -> None:
+def test_lengths_angles_and_assembly_are_those_of_the_pins():
     scene = loads(DRAWN + '[motion]\ntheta_2 = "drawn"\n')
     d, a, b, c = scene.linkage.lengths
     assert (d, a) == (math.hypot(0.25, 0.05), 0.1)
@@ -102,14 +100,14 @@ def test_lengths_angles_and_assembly_are_those_of_the_pins() -> None:
 
 
 @pytest.mark.parametrize("bar", (2, 3, 4))
-def test_every_command_is_on_the_assembly_that_is_drawn(bar: int) -> None:
+def test_every_command_is_on_the_assembly_that_is_drawn(bar):
     scene = loads(f'{DRAWN}[motion]\n{COMMAND_NAMES[bar][0]} = "drawn"\n')
     here = fourbar.solve(scene)
     assert here.A[0] == pytest.approx([0.0, 0.1], abs=1e-15)
     assert here.B[0] == pytest.approx([0.175, 0.05], abs=1e-14)
 
 
-def test_places_of_the_drawing_are_where_they_are_drawn() -> None:
+def test_places_of_the_drawing_are_where_they_are_drawn():
     """Away from the origin.
 
     Points of all bars, a mass centre, and coordinates as they are printed.
@@ -132,7 +130,7 @@ def test_places_of_the_drawing_are_where_they_are_drawn() -> None:
     assert loads(dump(scene)) == scene and "[pins]" in dump(scene)
 
 
-def test_a_place_of_the_drawing_stands_beside_its_bar_wherever_a_place_stands() -> None:
+def test_a_place_of_the_drawing_stands_beside_its_bar_wherever_a_place_stands():
     acts = """
 [motion]
 theta_2 = "drawn"
@@ -171,7 +169,7 @@ side = "drawn"
 """
 
 
-def test_the_stroke_and_the_side_of_a_cylinder_are_drawn() -> None:
+def test_the_stroke_and_the_side_of_a_cylinder_are_drawn():
     scene = loads(DRAWN + CYLINDER)
     here = fourbar.solve(scene)
     assert scene.motion.stroke == pytest.approx(math.hypot(0.09, 0.11), rel=4 * EPS)
@@ -179,7 +177,7 @@ def test_the_stroke_and_the_side_of_a_cylinder_are_drawn() -> None:
     assert here.B[0] == pytest.approx([0.175, 0.05], abs=1e-13)
 
 
-def test_a_side_that_is_left_out_is_the_drawn_one() -> None:
+def test_a_side_that_is_left_out_is_the_drawn_one():
     text = (DRAWN + CYLINDER).replace('side = "drawn"\n', "")
     assert "side" not in text
     assert loads(text).motion.side == loads(DRAWN + CYLINDER).motion.side
@@ -198,14 +196,14 @@ to = { bar = 4, from_pin = { drawn = ["200 mm", "50 mm"] } }
     ],
 )
 @pytest.mark.parametrize("side", ["", 'side = "drawn"\n'])
-def test_a_drawn_stroke_without_its_cylinder_is_refused(drive: str, side: str) -> None:
+def test_a_drawn_stroke_without_its_cylinder_is_refused(drive, side):
     """The drive is wrong, and not a side that the file need not state."""
     with pytest.raises(InputError, match=r"is of a cylinder \(\[drive\]\)") as raised:
         loads(DRAWN + drive + '[motion]\nstroke = "drawn"\n' + side)
     assert raised.value.key == "motion.stroke"
 
 
-def test_a_scene_that_was_changed_since_is_written_by_its_lengths() -> None:
+def test_a_scene_that_was_changed_since_is_written_by_its_lengths():
     scene = loads(DRAWN)
     crossed = fourbar.Scene(
         scene.linkage,
@@ -215,7 +213,7 @@ def test_a_scene_that_was_changed_since_is_written_by_its_lengths() -> None:
     assert "[lengths]" in dump(crossed) and "[pins]" not in dump(crossed)
 
 
-def test_the_default_sweep_holds_the_drawn_position() -> None:
+def test_the_default_sweep_holds_the_drawn_position():
     """A rocker with two ranges, mirror images in the ground.
 
     The one in which it is drawn.
@@ -238,7 +236,7 @@ def test_the_default_sweep_holds_the_drawn_position() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "says"),
+    "change, says",
     [
         (("[pins]", '[lengths]\nground = "1 m"\n[pins]'), "the pins state the lengths"),
         (('A = ["0 mm", "100 mm"]\n', ""), "pins.A: is missing"),
@@ -251,17 +249,17 @@ def test_the_default_sweep_holds_the_drawn_position() -> None:
         ),
     ],
 )
-def test_a_drawing_that_is_none_is_refused(change: tuple[str, str], says: str) -> None:
+def test_a_drawing_that_is_none_is_refused(change, says):
     with pytest.raises(InputError, match=says):
         loads(DRAWN.replace(*change))
 
 
-def test_a_drawing_on_a_change_point_is_refused() -> None:
+def test_a_drawing_on_a_change_point_is_refused():
     with pytest.raises(InputError, match="lie in one line: at a change point"):
         fourbar.from_pins((0, 0), (1, 0), (4, 0), (3, 0))
 
 
-def test_the_word_needs_a_drawing() -> None:
+def test_the_word_needs_a_drawing():
     lengths = (
         '[lengths]\nground = "3 m"\ninput = "1 m"\ncoupler = "3 m"\noutput = "2 m"\n'
     )
@@ -269,7 +267,7 @@ def test_the_word_needs_a_drawing() -> None:
         loads(lengths + '[motion]\ntheta_2 = "drawn"\n')
 
 
-def test_a_number_without_a_unit_is_refused_with_the_likely_one() -> None:
+def test_a_number_without_a_unit_is_refused_with_the_likely_one():
     lengths = (
         '[lengths]\nground = "3 m"\ninput = "1 m"\ncoupler = "3 m"\noutput = "2 m"\n'
     )
@@ -277,7 +275,7 @@ def test_a_number_without_a_unit_is_refused_with_the_likely_one() -> None:
         loads(lengths + "[motion]\ntheta_2 = 45\n")
 
 
-def test_mjcf_stands_where_the_drawing_has_it(tmp_path: Path) -> None:
+def test_mjcf_stands_where_the_drawing_has_it(tmp_path):
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo is optional")
     masses = "".join(
         f'[bars.{bar}]\nmass = "1 kg"\n' for bar in ("input", "coupler", "output")
@@ -301,7 +299,7 @@ def test_mjcf_stands_where_the_drawing_has_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_parallelogram_drawn_on_a_grid_is_one() -> None:
+def test_a_parallelogram_drawn_on_a_grid_is_one():
     """To a tenth of a millimetre the lengths of opposite bars differ.
 
     The sum of all is above 500 mm.
@@ -328,7 +326,7 @@ def test_a_parallelogram_drawn_on_a_grid_is_one() -> None:
     assert recognised == tried
 
 
-def test_a_drawing_that_nearly_has_one_change_point_stays_as_it_is() -> None:
+def test_a_drawing_that_nearly_has_one_change_point_stays_as_it_is():
     """d + a = b + c but for 0.03 mm, within the decimals.
 
     By chance, and nobody draws that.
@@ -348,7 +346,7 @@ O4 = ["300.0 mm", "30.0 mm"]
     assert scene.linkage.lengths == drawn
 
 
-def test_sdf_and_usd_stand_where_the_drawing_has_them() -> None:
+def test_sdf_and_usd_stand_where_the_drawing_has_them():
     """The frame of a model file is the drawing's.
 
     O2 at its place there, moved on by --origin.
@@ -365,7 +363,7 @@ def test_sdf_and_usd_stand_where_the_drawing_has_them() -> None:
 
 
 @pytest.mark.parametrize("bar", [2, 4])
-def test_a_commanded_bar_that_stands_still_as_drawn_is_refused(bar: int) -> None:
+def test_a_commanded_bar_that_stands_still_as_drawn_is_refused(bar):
     """A kite folded onto one pin.
 
     Two bars turn together about it, and the others rest.

@@ -26,7 +26,7 @@ from tests.support.texts import LENGTHS
 MODELS = sorted((Path(__file__).parents[3] / "models").glob("*.toml"))
 
 
-def facts(scene: fourbar.Scene) -> tuple[object, ...]:
+def facts(scene):
     """Every number of a scene, in a form that compares bit for bit.
 
     repr tells -0.0 from 0.0.
@@ -43,14 +43,14 @@ def facts(scene: fourbar.Scene) -> tuple[object, ...]:
 
 
 @pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
-def test_models_read_back_and_assemble_everywhere(path: Path) -> None:
+def test_models_read_back_and_assemble_everywhere(path):
     scene = load(path)
     assert facts(loads(dump(scene))) == facts(scene)
     assert scene.title and scene.source
     assert set(fourbar.solve(scene).status) == {"ok"}
 
 
-def test_the_named_mechanisms_are_among_the_models() -> None:
+def test_the_named_mechanisms_are_among_the_models():
     drives = {path.stem: load(path).drive_bar for path in MODELS}
     assert {
         "thesis",
@@ -64,7 +64,7 @@ def test_the_named_mechanisms_are_among_the_models() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "unit", "value"),
+    "text, unit, value",
     [
         ("48 cm", "m", Fraction(48, 100)),
         ("1 in", "m", Fraction(254, 10000)),
@@ -98,18 +98,14 @@ def test_the_named_mechanisms_are_among_the_models() -> None:
         ("1 kp", "N", Fraction("9.80665")),
     ],
 )
-def test_units_are_converted_exactly_and_rounded_once(
-    text: str,
-    unit: str,
-    value: Fraction,
-) -> None:
+def test_units_are_converted_exactly_and_rounded_once(text, unit, value):
     assert to_si(text, unit) == float(value)
 
 
 @pytest.mark.parametrize(
-    ("degrees", "turns"), [("360", 1.0), ("45", 0.125), ("-90", -0.25), ("1080", 3.0)]
+    "degrees, turns", [("360", 1.0), ("45", 0.125), ("-90", -0.25), ("1080", 3.0)]
 )
-def test_degrees_are_the_nearest_doubles(degrees: str, turns: float) -> None:
+def test_degrees_are_the_nearest_doubles(degrees, turns):
     # 2 pi times a power of two, or three, of the double nearest to pi: math.tau itself
     # is correctly rounded
     assert to_si(f"{degrees} deg", "rad") == turns * math.tau
@@ -147,19 +143,19 @@ def test_degrees_are_the_nearest_doubles(degrees: str, turns: float) -> None:
         "1e9999999 m",
     ],
 )
-def test_what_is_no_length_is_refused(text: str) -> None:
+def test_what_is_no_length_is_refused(text):
     with pytest.raises(UnitError):
         to_si(text, "m")
 
 
 @pytest.mark.parametrize("text", ["1 Hz", "1 1/s", "1 s^-1", "1 rad", "1 deg"])
-def test_an_angle_is_a_dimension(text: str) -> None:
+def test_an_angle_is_a_dimension(text):
     with pytest.raises(UnitError):
         to_si(text, "rad/s")
 
 
 @pytest.mark.parametrize(
-    ("text", "unit", "meant"),
+    "text, unit, meant",
     [
         ("5 lb", "N", "5 lbf"),
         ("5 lbf", "kg", "5 lb"),
@@ -178,13 +174,13 @@ def test_an_angle_is_a_dimension(text: str) -> None:
         ("0,3 m", "m", "0.3 m"),
     ],
 )
-def test_what_may_have_been_meant_is_one(text: str, unit: str, meant: str) -> None:
+def test_what_may_have_been_meant_is_one(text, unit, meant):
     with pytest.raises(UnitError, match=re.escape(f'did you mean "{meant}"?')):
         to_si(text, unit)
     assert to_si(meant, unit) > 0.0
 
 
-def test_defaults_are_those_of_the_contract() -> None:
+def test_defaults_are_those_of_the_contract():
     scene = loads(LENGTHS)
     assert scene.linkage == fourbar.FourBar(
         0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22), 0.0
@@ -205,8 +201,8 @@ def test_defaults_are_those_of_the_contract() -> None:
     ) and bar.mass_centre == (0.125, 0.0)
 
 
-def test_every_form_of_theta_2() -> None:
-    def motion(text: str) -> fourbar.Motion:
+def test_every_form_of_theta_2():
+    def motion(text):
         return loads(f'{LENGTHS}[motion]\ntheta_2 = {text}\nbranch = "crossed"').motion
 
     assert motion('"180 deg"').theta_2 == math.pi and motion('"0 rad"').branch == -1
@@ -216,10 +212,10 @@ def test_every_form_of_theta_2() -> None:
     assert motion('{ limit = 2, offset = "1e-9 rad" }').theta_2 == fourbar.FromLimit(
         2, 1e-9
     )
-    assert np.array_equal(motion('["0 deg", "180 deg"]').theta_2, [0.0, math.pi])  # type: ignore[arg-type]
+    assert np.array_equal(motion('["0 deg", "180 deg"]').theta_2, [0.0, math.pi])
 
 
-def test_free_motion_and_frames_are_read() -> None:
+def test_free_motion_and_frames_are_read():
     text = (
         LENGTHS
         + """
@@ -262,11 +258,7 @@ compressed_force = "520 N"
     assert facts(loads(dump(scene))) == facts(scene)
 
 
-def numbers(
-    least: float = -1e300,
-    most: float = 1e300,
-    **more: bool,
-) -> st.SearchStrategy[float]:
+def numbers(least=-1e300, most=1e300, **more):
     return st.floats(least, most, allow_nan=False, allow_infinity=False, **more)
 
 
@@ -328,7 +320,7 @@ SCENE = st.builds(
 @pytest.mark.slow
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(SCENE)
-def test_any_scene_reads_back_bit_for_bit(scene: fourbar.Scene) -> None:
+def test_any_scene_reads_back_bit_for_bit(scene):
     assert facts(loads(dump(scene))) == facts(scene)
 
 
@@ -347,8 +339,8 @@ PLACES = {
 
 @pytest.mark.parametrize("key", PLACES)
 def test_a_place_by_coordinates_is_the_polar_one_and_is_written_back_as_it_was_read(
-    key: str,
-) -> None:
+    key,
+):
     x, y = "3 in", "-5 in"
     by_coordinates = loads(LENGTHS + PLACES[key].format(f'{{ x = "{x}", y = "{y}" }}'))
     distance, angle = (
@@ -381,22 +373,19 @@ def test_a_place_by_coordinates_is_the_polar_one_and_is_written_back_as_it_was_r
         )
 
 
-def test_every_letter_of_a_title_reads_back() -> None:
+def test_every_letter_of_a_title_reads_back():
     title = "".join(map(chr, range(0x180))) + "\u2028\ufeff\U0001f980"
     assert loads(dump(replace(load(MODELS[0]), title=title))).title == title
 
 
-def test_save_is_whole_or_not_at_all(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_save_is_whole_or_not_at_all(tmp_path, monkeypatch):
     scene = load(MODELS[0])
     target = tmp_path / "scene.toml"
     save(scene, target)
     before = target.read_bytes()
     assert facts(load(target)) == facts(scene)
 
-    def full(_: int) -> None:
+    def full(_):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("os.fsync", full)
@@ -405,7 +394,7 @@ def test_save_is_whole_or_not_at_all(
     assert target.read_bytes() == before and list(tmp_path.iterdir()) == [target]
 
 
-def test_what_a_file_cannot_hold_is_refused() -> None:
+def test_what_a_file_cannot_hold_is_refused():
     scene = load(MODELS[0])
     with pytest.raises(InputError, match="one effect of each kind"):
         dump(replace(scene, effects=(fourbar.Gravity(), fourbar.Gravity())))
@@ -414,7 +403,7 @@ def test_what_a_file_cannot_hold_is_refused() -> None:
 
 
 @pytest.mark.parametrize("length", [0.05, 0.4])
-def test_what_a_bar_leaves_out_follows_its_length(length: float) -> None:
+def test_what_a_bar_leaves_out_follows_its_length(length):
     """A bar that was read gets another length: m L^2/12 and mid-bar follow.
 
     What is stated stays.
@@ -452,7 +441,7 @@ WIDTHS = {
 
 @given(st.permutations(list(WIDTHS)))
 @settings(max_examples=10, deadline=None, database=None)
-def test_tolerances_read_back_in_their_order(keys: list[str]) -> None:
+def test_tolerances_read_back_in_their_order(keys):
     tolerances = tuple(
         fourbar.Tolerance(key, WIDTHS[key], key.endswith("mass")) for key in keys
     )
@@ -461,7 +450,7 @@ def test_tolerances_read_back_in_their_order(keys: list[str]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("key", "width", "why"),
+    "key, width, why",
     [
         ("bars.input.inertia", 1e-6, "follows the length; state it"),
         ("bars.input.centre.0", 1e-3, "follows the length; state it"),
@@ -470,18 +459,14 @@ def test_tolerances_read_back_in_their_order(keys: list[str]) -> None:
         ("motion.theta_2", 1e-3, "no number of the scene has this key"),
     ],
 )
-def test_no_tolerance_is_written_that_reading_refuses(
-    key: str,
-    width: float,
-    why: str,
-) -> None:
+def test_no_tolerance_is_written_that_reading_refuses(key, width, why):
     scene = crank_rocker(tolerances=(fourbar.Tolerance(key, width),))
     with pytest.raises(InputError, match=why) as refused:
         dump(scene)
     assert key in str(refused.value)
 
 
-def test_three_sigma_less_than_the_number_are_written_and_more_are_not() -> None:
+def test_three_sigma_less_than_the_number_are_written_and_more_are_not():
     for width, written in ((0.033, True), (0.034, False)):
         tolerance = fourbar.Tolerance("lengths.input", width, sigma=True)
         scene = crank_rocker(tolerances=(tolerance,))
@@ -492,7 +477,7 @@ def test_three_sigma_less_than_the_number_are_written_and_more_are_not() -> None
                 dump(scene)
 
 
-def test_the_stroke_of_a_gas_spring_is_saved() -> None:
+def test_the_stroke_of_a_gas_spring_is_saved():
     ends = Place(1, (0.03, -1.0)), Place(3, (0.02, 0.3))
     spring = fourbar.Spring.gas(*ends, 0.35, 0.1, 100.0, 151.0)
     scene = replace(crank_rocker(), effects=(fourbar.Springs((spring,)),))
@@ -501,7 +486,7 @@ def test_the_stroke_of_a_gas_spring_is_saved() -> None:
     assert (read.springs[0], read.springs[0].stroke) == (spring, 0.1)
 
 
-def test_a_stroke_is_less_than_the_spring_is_long() -> None:
+def test_a_stroke_is_less_than_the_spring_is_long():
     ends = Place(1, (0.03, -1.0)), Place(3, (0.02, 0.3))
     with pytest.raises(InputError, match=r"stroke = 0\.3 m: must be less than the"):
         fourbar.Spring(*ends, 10.0, 0.3, stroke=0.3)
@@ -513,7 +498,7 @@ def test_a_stroke_is_less_than_the_spring_is_long() -> None:
 
 
 @pytest.mark.parametrize(
-    ("length", "units", "gravity"),
+    "length, units, gravity",
     [
         ("4 in", {"lb", "in", "lb in^2", "lbf", "lbf in"}, 386.09 * 0.0254),
         ("300 mm", {"kg", "mm", "kg m^2", "N", "N mm"}, 9.81),
@@ -522,10 +507,8 @@ def test_a_stroke_is_less_than_the_spring_is_long() -> None:
     ],
 )
 def test_the_comments_of_a_new_file_have_its_units_and_can_be_used(
-    length: str,
-    units: set[str],
-    gravity: float,
-) -> None:
+    length, units, gravity
+):
     comment = re.compile(r"^# (?=\w+ = |\[)", re.MULTILINE)
     positions = loads(comment.sub("", write_new_scene([length] * 4, NEW_POSITIONS)))
     assert positions.points and positions.motion.speed and not positions.effects

@@ -4,9 +4,6 @@ import io
 import os
 import random
 import time
-from collections.abc import Callable
-from pathlib import Path
-from typing import IO, Any
 
 import numpy as np
 import pytest
@@ -58,10 +55,7 @@ things too.
 """
 
 
-def test_the_file_that_the_mistakes_are_made_in_is_good(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_file_that_the_mistakes_are_made_in_is_good(tmp_path, capsys):
     (tmp_path / "good.toml").write_text(GOOD)
     assert status(["analyze", str(tmp_path / "good.toml")]) == 0
     assert capsys.readouterr().err == ""
@@ -449,29 +443,18 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "words"),
+    "old, new, words",
     [case[1:] for case in MISTAKES],
     ids=[case[0] for case in MISTAKES],
 )
-def test_a_mistake_in_a_scene_file(
-    old: str,
-    new: str,
-    words: list[str],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_mistake_in_a_scene_file(old, new, words, tmp_path, capsys):
     assert GOOD.count(old) >= 1
     file = tmp_path / "scene.toml"
     file.write_text(GOOD.replace(old, new, 1), encoding="utf-8")
     refused(["analyze", str(file)], [str(file), *words], tmp_path, capsys)
 
 
-def refused(
-    arguments: list[str],
-    words: list[str],
-    folder: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def refused(arguments, words, folder, capsys):
     """The command is refused with these words, and writes nothing into the folder."""
     before = sorted(folder.rglob("*"))
     started = time.process_time()
@@ -492,11 +475,7 @@ def refused(
 
 
 @pytest.mark.parametrize("command", ["analyze", "mjcf", "plot", "animate"])
-def test_every_command_refuses_a_bad_file(
-    command: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_every_command_refuses_a_bad_file(command, tmp_path, capsys):
     refused(
         [command, str(tmp_path / "missing.toml")],
         ["missing.toml", "file not found"],
@@ -508,14 +487,11 @@ def test_every_command_refuses_a_bad_file(
     refused([command, str(bad)], [str(bad), "motion.branch", "opne"], tmp_path, capsys)
 
 
-def test_a_directory(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_directory(tmp_path, capsys):
     refused(["analyze", str(tmp_path)], [str(tmp_path), "directory"], tmp_path, capsys)
 
 
-def test_a_huge_file_is_not_read(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_huge_file_is_not_read(tmp_path, capsys):
     huge = tmp_path / "huge.toml"
     with huge.open("wb") as file:
         file.truncate(100_000_000)
@@ -531,27 +507,23 @@ def test_a_huge_file_is_not_read(
 @pytest.mark.parametrize(
     "encode", [io.StringIO, lambda text: io.BytesIO(text.encode())]
 )
-def test_an_open_file_is_read(encode: Callable[[str], IO[Any]], tmp_path: Path) -> None:
+def test_an_open_file_is_read(encode, tmp_path):
     (tmp_path / "scene.toml").write_text(GOOD)
     assert load(encode(GOOD)) == load(tmp_path / "scene.toml")
 
 
 @pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"x" * (LARGEST_SCENE_FILE + 1)])
-def test_a_stream_that_holds_no_scene_is_refused(content: bytes) -> None:
+def test_a_stream_that_holds_no_scene_is_refused(content):
     with pytest.raises(InputError, match="scene file = 'stream'"):
         load(io.BytesIO(content))
 
 
 @pytest.mark.parametrize("name", ["a\nb\x1b[31m.toml", "n" * 300])
-def test_hostile_names(
-    name: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_hostile_names(name, tmp_path, capsys):
     refused(["analyze", str(tmp_path / name)], [], tmp_path, capsys)
 
 
-def test_a_name_that_no_file_can_have() -> None:
+def test_a_name_that_no_file_can_have():
     with pytest.raises(InputError, match="cannot be read"):
         read_scene_text("nul\0.toml")
 
@@ -560,25 +532,18 @@ def test_a_name_that_no_file_can_have() -> None:
     "data",
     [b"\xff\xfe\x00", GOOD.encode() + b"\n# \xe9\n", b"\x89PNG\r\n\x1a\n" + bytes(100)],
 )
-def test_what_is_not_text(
-    data: bytes,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_is_not_text(data, tmp_path, capsys):
     (tmp_path / "scene.toml").write_bytes(data)
     refused(["analyze", str(tmp_path / "scene.toml")], ["UTF-8"], tmp_path, capsys)
 
 
-def rocker(theta_2: str) -> str:
+def rocker(theta_2):
     """A linkage that closes for theta_2 between 22.3 and 71.7 deg."""
     text = GOOD.replace('"0.1 m"', '"0.24 m"').replace('"0.25 m"', '"0.1 m"')
     return text.replace('"60 deg"', theta_2)
 
 
-def test_no_position_assembles(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_no_position_assembles(tmp_path, capsys):
     (tmp_path / "scene.toml").write_text(rocker('"180 deg"'))
     refused(
         ["analyze", str(tmp_path / "scene.toml")],
@@ -588,10 +553,7 @@ def test_no_position_assembles(
     )
 
 
-def test_some_positions_do_not_assemble(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_some_positions_do_not_assemble(tmp_path, capsys):
     (tmp_path / "scene.toml").write_text(
         rocker('{ from = "0 deg", to = "90 deg", steps = 9 }')
     )
@@ -601,7 +563,7 @@ def test_some_positions_do_not_assemble(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    "arguments, words",
     [
         (["mjcf"], ["scene file or --lengths"]),
         (["mjcf", "x.toml", "--lengths", "1", "1", "1", "1"], ["one of the two"]),
@@ -639,12 +601,7 @@ def test_some_positions_do_not_assemble(
         (["analyze", "x.toml", "--xml"], ["--xml"]),
     ],
 )
-def test_bad_arguments(
-    arguments: list[str],
-    words: list[str],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_bad_arguments(arguments, words, tmp_path, capsys):
     refused(arguments, words, tmp_path, capsys)
 
 
@@ -667,7 +624,7 @@ def test_bad_arguments(
         "a" * 99 + "\n",
     ],
 )
-def test_large_nonsense_is_answered_soon(pattern: str) -> None:
+def test_large_nonsense_is_answered_soon(pattern):
     text = pattern * (LARGEST_SCENE_FILE // len(pattern))
     started = time.process_time()
     with pytest.raises(FourBarError):
@@ -679,7 +636,7 @@ def test_large_nonsense_is_answered_soon(pattern: str) -> None:
 @pytest.mark.parametrize(
     "pattern", ["a{n}." + "a." * 98 + "a=1\n", "[a{n}]\nb=1\n", "[[a]]\nb={n}\n"]
 )
-def test_large_files_without_a_repeated_key_are_answered_soon(pattern: str) -> None:
+def test_large_files_without_a_repeated_key_are_answered_soon(pattern):
     text = "".join(
         pattern.format(n=n) for n in range(LARGEST_SCENE_FILE // (len(pattern) + 3))
     )
@@ -690,7 +647,7 @@ def test_large_files_without_a_repeated_key_are_answered_soon(pattern: str) -> N
 
 
 @pytest.mark.slow
-def test_mutated_files_end_in_a_scene_or_in_one_line() -> None:
+def test_mutated_files_end_in_a_scene_or_in_one_line():
     """2000 seeded mutations of a good file.
 
     Any other exception than ours fails the test.
@@ -738,7 +695,7 @@ def test_mutated_files_end_in_a_scene_or_in_one_line() -> None:
     assert 50 < answered < 1950  # the mutations reach both ends
 
 
-def test_forces_and_gravity_by_components_are_written_so_again() -> None:
+def test_forces_and_gravity_by_components_are_written_so_again():
     text = """\
 [lengths]
 ground = "300 mm"
@@ -796,7 +753,7 @@ viscous = { O2 = "0.01 N cm s/deg", A = "3 N cm s/deg" }
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "meant"),
+    "old, new, meant",
     [
         ('coupler = "40 in"', "coupler = 40", "40 in"),
         ('coupler = "40 in"', 'coupler = "40"', "40 in"),
@@ -816,8 +773,8 @@ viscous = { O2 = "0.01 N cm s/deg", A = "3 N cm s/deg" }
     ],
 )
 def test_a_number_without_a_unit_is_suggested_in_that_of_its_neighbours(
-    old: str, new: str, meant: str
-) -> None:
+    old, new, meant
+):
     assert IN_OTHER_UNITS.count(old) == 1
     loads(IN_OTHER_UNITS)
     with pytest.raises(InputError) as caught:
@@ -825,6 +782,6 @@ def test_a_number_without_a_unit_is_suggested_in_that_of_its_neighbours(
     assert f'the unit is missing; did you mean "{meant}"?' in str(caught.value)
 
 
-def test_lengths_of_a_new_scene_without_a_unit_are_suggested_alike() -> None:
+def test_lengths_of_a_new_scene_without_a_unit_are_suggested_alike():
     with pytest.raises(InputError, match='did you mean "4 in"'):
         write_new_scene(["12 in", "4", "10 in", "9 in"])

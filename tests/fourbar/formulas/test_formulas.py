@@ -65,7 +65,7 @@ class Carrying(float):
 
 
 @pytest.mark.parametrize(
-    ("computed", "value", "kind"),
+    "computed, value, kind",
     [
         (vector(1.0, 2.0), 1.0 + 2.0j, complex),
         (vector(Carrying(1.0), 2.0), 1.0 + 2.0j, complex),
@@ -92,12 +92,12 @@ def test_arrays_broadcast():
     assert np.array_equal(power_of_two(np.array([0.7, 1.0, 3.0])), [1.0, 2.0, 4.0])
 
 
-def hard_doubles(seed: int, count: int) -> list[tuple[float, float, float, float]]:
+def hard_doubles(seed, count):
     """p, q, r, s > 0 with p + q and r + s equal, or apart by a rounding or a few."""
     rng = np.random.default_rng(seed)
     tight = (1.0, 1.5, 2.0 - 2.0**-52, 1.0 + 2.0**-52)
 
-    def draw() -> float:
+    def draw():
         significand = rng.choice(tight) if rng.random() < 0.4 else rng.uniform(1.0, 2.0)
         exponent = rng.integers(-60, 5) if rng.random() < 0.5 else rng.integers(-3, 3)
         return float(significand) * 2.0 ** int(exponent)
@@ -136,7 +136,7 @@ def test_a_difference_of_two_sums_is_zero_where_it_is_zero_and_nowhere_else():
     assert zeros > 400
 
 
-def list_bounds(lengths: tuple[Fraction, ...], diagonal: Fraction) -> list[Fraction]:
+def list_bounds(lengths, diagonal):
     """Return what a difference of lengths may be and be no more than a rounding."""
     of_bars = [Fraction(SEEN_OF_A_BAR) * length for length in lengths]
     of_diagonal = Fraction(SEEN_OF_THE_DIAGONAL) * abs(diagonal)
@@ -176,7 +176,7 @@ def test_the_constants_of_the_loop_vanish_within_rounding_alone():
 
 
 @pytest.mark.parametrize(
-    ("lengths", "touches"),
+    "lengths, touches",
     [
         # of a sum of 1.875, where d - a = b - c, those touch that miss by 7.5 U
         ((0.6875, 0.3125, 0.625 + 6.0 * U, 0.25), True),
@@ -213,7 +213,7 @@ ANGLES = np.array([-2.5, -1e-7, 0.0, 0.3, 1.0, 2.0, math.pi, 4.0, 7.0])
 
 
 @pytest.mark.parametrize("bar", MOVING_BARS)
-@pytest.mark.parametrize(("theta_1", "branch"), [(0.0, 1), (0.4, -1)])
+@pytest.mark.parametrize("theta_1, branch", [(0.0, 1), (0.4, -1)])
 def test_numbers_arrays_and_many_linkages_at_once_are_the_same_formulas(
     theta_1, branch, bar
 ):
@@ -251,7 +251,7 @@ def test_numbers_arrays_and_many_linkages_at_once_are_the_same_formulas(
     assert 15 < regular < len(LINKAGES) * len(ANGLES)
 
 
-def five(bars: FourBar, psi: mp.mpf) -> list[mp.mpf]:
+def five(bars, psi):
     """sin^2 h, cos^2 h, sin h cos h and the factors, from A and O4 in the complex
     plane.
     """
@@ -310,7 +310,7 @@ def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle():
                     )
 
 
-def exact_limit(bars: FourBar, stretched: bool) -> mp.mpf:
+def exact_limit(bars, stretched):
     """theta_2 of a limit position by Heron's factors of the sides ground, input and
     e.
     """
@@ -332,12 +332,8 @@ LIMITS = [
 
 
 @pytest.mark.parametrize("size", [1e-6, 1e-12, 1e-20, 1e-30, 1e-40])
-@pytest.mark.parametrize(("bars", "stretched"), LIMITS)
-def test_an_offset_from_a_limit_in_many_digits(
-    bars,
-    stretched,
-    size,
-):
+@pytest.mark.parametrize("bars, stretched", LIMITS)
+def test_an_offset_from_a_limit_in_many_digits(bars, stretched, size):
     first = next(
         limit.theta_2 for limit in limit_positions(bars) if limit.stretched == stretched
     )
@@ -402,7 +398,7 @@ def test_positions_decided_in_many_digits_replace_their_own_alone(offset, bar):
 
 
 @pytest.mark.parametrize(
-    ("psi", "lengths"),
+    "psi, lengths",
     [
         (3.141, (0.75, 0.75, 1.5, 1e-6)),
         (1e-3, (0.75, 0.75 + 1.4e-3, 2e-6, 1.4e-3)),

@@ -35,11 +35,7 @@ five digits of nineteen.
 """
 
 
-def intersect_circles(
-    linkage: fourbar.FourBar,
-    bar: int,
-    q: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
+def intersect_circles(linkage, bar, q):
     """The two places of the free pin at each angle of a bar, complex (n, 2).
 
     The angles of the other two bars are returned too. The bar's far end P and the far
@@ -74,7 +70,7 @@ def intersect_circles(
     return meet, np.angle(np.stack(others).astype(complex))
 
 
-def follow(places: np.ndarray, start: int) -> np.ndarray:
+def follow(places, start):
     """Follow one of two points through a table (n, 2) by linear extrapolation.
 
     The index in each row.
@@ -86,7 +82,7 @@ def follow(places: np.ndarray, start: int) -> np.ndarray:
     return np.array(chosen)
 
 
-def list_angles(linkage: fourbar.FourBar, bar: int) -> np.ndarray:
+def list_angles(linkage, bar):
     """Angles over three turns from the first quarter, between all change points."""
     first = linkage.ground_angle + (math.pi if bar == 4 else 0.0) + math.radians(45.7)
     return first + STEP * np.arange(round(TURNS * 2 * math.pi / STEP))
@@ -94,10 +90,7 @@ def list_angles(linkage: fourbar.FourBar, bar: int) -> np.ndarray:
 
 @pytest.mark.parametrize("bar", [2, 3, 4])
 @pytest.mark.parametrize("lengths", LINKAGES.values(), ids=LINKAGES)
-def test_an_assembly_goes_on_smoothly_through_change_points(
-    lengths,
-    bar,
-):
+def test_an_assembly_goes_on_smoothly_through_change_points(lengths, bar):
     bars = uniform(*lengths)
     linkage = fourbar.FourBar(
         bars.ground, bars.input, bars.coupler, bars.output, GROUND_ANGLE

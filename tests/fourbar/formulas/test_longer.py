@@ -3,9 +3,6 @@
 Every function that the formulas call keeps some 30 of them.
 """
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import pytest
 from mpmath import mp
@@ -17,20 +14,20 @@ DIGITS = 2.0**-98
 """
 
 
-def draw(seed: int, size: float = 3.0) -> Pair:
+def draw(seed, size=3.0):
     random = np.random.default_rng(seed)
     high = random.normal(0.0, size, 50)
     return Pair(high, high * random.uniform(-1.0, 1.0, 50) * 2.0**-54)
 
 
-def exact(pair: Pair) -> list[Any]:
+def exact(pair):
     return [
         mp.mpmathify(complex(h)) + mp.mpmathify(complex(low))
         for h, low in zip(pair.high, pair.low, strict=True)
     ]
 
 
-ALIKE: list[Callable[..., Any]] = [
+ALIKE = [
     lambda x, y: x + y,
     lambda x, y: x - 1j * y,
     lambda x, y: 2.5 - x * y,
@@ -42,7 +39,7 @@ ALIKE: list[Callable[..., Any]] = [
 
 
 @pytest.mark.parametrize(
-    ("function", "reference"),
+    "function, reference",
     [
         *zip(ALIKE, ALIKE, strict=True),
         (lambda x, y: np.sqrt(np.abs(x)), lambda x, y: mp.sqrt(abs(x))),
@@ -62,10 +59,7 @@ ALIKE: list[Callable[..., Any]] = [
         ),
     ],
 )
-def test_a_function_keeps_the_digits_of_a_pair(
-    function,
-    reference,
-):
+def test_a_function_keeps_the_digits_of_a_pair(function, reference):
     with mp.workdps(60):
         x, y = draw(1), draw(2)
         expected = [

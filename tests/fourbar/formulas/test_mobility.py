@@ -23,7 +23,7 @@ from fourbar.formulas.mobility import (
     turns_fully,
 )
 from fourbar.formulas.path import compute_state
-from fourbar.linkage import MOVING_BARS, FourBar, uniform
+from fourbar.linkage import MOVING_BARS, uniform
 from tests.support.scenes import bare, draw_linkage
 
 EPS = 2.0**-52
@@ -42,16 +42,16 @@ MISSED = 20.0 * math.pi / GRID
 OTHERS = {2: (3, 4), 3: (2, 4), 4: (2, 3)}
 
 
-def random_linkages(seed: int, count: int) -> list[FourBar]:
+def random_linkages(seed, count):
     """Draw lengths and theta_1, a third integers: change points are common there."""
     rng = np.random.default_rng(seed)
     return [draw_linkage(rng, integers=n % 3 == 0) for n in range(count)]
 
 
-def nearly_special(seed: int, count: int) -> list[FourBar]:
+def nearly_special(seed, count):
     """Linkages whose longest bar misses an equal sum by 1e-14..1e-1 of their size."""
     rng = np.random.default_rng(seed)
-    linkages: list[FourBar] = []
+    linkages = []
     while len(linkages) < count:
         p, q, s = rng.uniform(0.1, 1.0, 3)
         gap = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-14, -1))
@@ -62,22 +62,22 @@ def nearly_special(seed: int, count: int) -> list[FourBar]:
     return linkages
 
 
-def closes(bars: FourBar, theta_2: np.ndarray) -> np.ndarray:
+def closes(bars, theta_2):
     """Return how far circles of radii b, c about A, O4 are from missing, m."""
     d, a, b, c = bars.lengths
     distance = np.abs(a * np.exp(1j * theta_2) - d * np.exp(1j * bars.ground_angle))
     return np.minimum(b + c - distance, distance - abs(b - c))
 
 
-def scan(bars: FourBar) -> np.ndarray:
+def scan(bars):
     return bars.ground_angle + (np.arange(GRID) + 0.5) * (math.tau / GRID)
 
 
-def angle(bars: FourBar, theta_2: np.ndarray, branch: int, bar: int) -> np.ndarray:
+def angle(bars, theta_2, branch, bar):
     return np.angle(compute_state(bars, theta_2, branch).direction(bar))
 
 
-def inside(angle: np.ndarray, ranges: tuple[tuple[float, float], ...]) -> np.ndarray:
+def inside(angle, ranges):
     within = [(angle - start) % math.tau <= stop - start for start, stop in ranges]
     return np.any(within, axis=0)
 
@@ -88,7 +88,7 @@ deg."""
 
 
 @pytest.mark.parametrize(
-    ("bar", "theta_2", "theta_4"),
+    "bar, theta_2, theta_4",
     [
         (
             2,
@@ -121,7 +121,7 @@ def test_range_swing_and_class_of_the_thesis():
 
 
 @pytest.mark.parametrize(
-    ("lengths", "barker", "code", "name"),
+    "lengths, barker, code, name",
     [
         ((1, 3, 2.5, 3.2), 1, "GCCC", "drag link"),
         ((3, 1, 2.5, 2.2), 2, "GCRR", "crank-rocker"),
@@ -239,7 +239,7 @@ def test_ranges_hold_every_position_and_no_more(bar):
             assert choose_range(bars, bar) == pytest.approx(chosen, abs=4.0 * EPS)
 
 
-def exact_psi(bars: FourBar, bar: int, stretched: bool) -> mp.mpf:
+def exact_psi(bars, bar, stretched):
     """The limit's angle from the ground by the law of cosines in 50 digits."""
     d, *moving = (mp.mpf(length) for length in bars.lengths)
     own = moving.pop(bar - 2)
@@ -248,9 +248,7 @@ def exact_psi(bars: FourBar, bar: int, stretched: bool) -> mp.mpf:
 
 
 @pytest.mark.parametrize("bar", MOVING_BARS)
-def test_limits_keep_their_digits_and_close_the_loop_with_two_bars_in_line(
-    bar,
-):
+def test_limits_keep_their_digits_and_close_the_loop_with_two_bars_in_line(bar):
     checked, (first, second) = 0, OTHERS[bar]
     for bars in nearly_special(3, 100) + random_linkages(4, 80):
         d, a, b, c = bars.lengths
@@ -303,7 +301,7 @@ def test_time_ratio_is_the_time_of_both_strokes():
 
 
 @pytest.mark.parametrize(
-    ("lengths", "turns"),
+    "lengths, turns",
     [
         ((2, 1, 2, 1), (0.0, math.pi)),
         ((1, 2, 4, 3), (0.0,)),
@@ -324,4 +322,4 @@ def test_a_bar_that_does_not_move_is_refused_and_so_is_what_is_no_linkage():
     with pytest.raises(InputError, match=r"^bar = 1: must be 2, 3 or 4"):
         limit_positions(THESIS, 1)
     with pytest.raises(InputError, match=r"^linkage = .*FourBar"):
-        limit_positions("thesis.toml")  # type: ignore[arg-type]
+        limit_positions("thesis.toml")

@@ -11,9 +11,7 @@ import pytest
 
 import fourbar
 from fourbar.formulas.arithmetic import dot
-from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT, compute_state
-from fourbar.formulas.position import Position
 from tests.support.scenes import bare
 
 EPS = 2.0**-52
@@ -21,12 +19,12 @@ CLOSURE = 8 * EPS
 """Of the sum of the lengths: eight roundings of unit vectors and their sum."""
 
 
-def find_singular(position: Position) -> np.ndarray:
+def find_singular(position):
     """Mark positions whose bars 3 and 4 lie in one line."""
     return np.abs(position.sin_mu) <= NO_DIGIT_LEFT
 
 
-def assembled(state: State) -> np.ndarray:
+def assembled(state):
     return (state.position.half.outer >= 0.0) & (state.position.half.inner >= 0.0)
 
 
@@ -49,10 +47,7 @@ def test_positions_that_cannot_close_are_nan_and_say_so():
     ],
 )
 @pytest.mark.parametrize("offset", [1e-6, 1e-12, 1e-20, 1e-40])
-def test_beyond_a_limit_nothing_assembles_however_near(
-    lengths,
-    offset,
-):
+def test_beyond_a_limit_nothing_assembles_however_near(lengths, offset):
     link = bare(*lengths, 0.2)
     # the first limit ends the range in which the linkage closes, the second begins it
     for number, inside in ((1, -offset), (2, offset)):
@@ -76,7 +71,7 @@ def test_points_move_as_their_positions_do(bar, alpha):
     link, omega, z = bare(0.3, 0.1, 0.25, 0.22, 0.4), 3.0, 0.05 - 0.02j
     angles = np.linspace(0.3, 6.0, 9)
 
-    def place_at(time: float) -> np.ndarray:
+    def place_at(time):
         theta_2 = angles + omega * time + 0.5 * alpha * time**2
         return compute_state(link, theta_2, 1).point(bar, z)
 
@@ -112,9 +107,7 @@ def test_on_a_change_point_everything_is_the_limit_of_its_assembly():
 
 
 @pytest.mark.parametrize("lengths", [(3, 1, 2, 2), (0.99, 0.97, 0.98, 0.98)])
-def test_within_the_rounding_of_a_change_point_no_direction_is_left(
-    lengths,
-):
+def test_within_the_rounding_of_a_change_point_no_direction_is_left(lengths):
     """The speeds have all their digits."""
     link, after = bare(*lengths), 2.0 * EPS * np.arange(5)  # the next doubles after pi
     moving = compute_state(link, math.pi + after, 1)
@@ -127,16 +120,13 @@ def test_within_the_rounding_of_a_change_point_no_direction_is_left(
 
 
 @pytest.mark.parametrize(
-    ("lengths", "branch"),
+    "lengths, branch",
     [((0.3, 0.1, 0.3, 0.1), 1), ((0.1, 0.3, 0.3, 0.1), -1), ((0.2, 0.2, 0.2, 0.2), 1)],
 )
 @pytest.mark.parametrize("half_turn", [0, 1])
 @pytest.mark.parametrize("theta_1", [0.0, 0.4])
 def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
-    lengths,
-    branch,
-    half_turn,
-    theta_1,
+    lengths, branch, half_turn, theta_1
 ):
     """A parallelogram's coupler lies as its ground and bar 4 as bar 2.
 
@@ -162,10 +152,7 @@ def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
 
 @pytest.mark.parametrize("theta_1", [0.0, 0.4, -2.5])
 @pytest.mark.parametrize("branch", [1, -1])
-def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(
-    branch,
-    theta_1,
-):
+def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(branch, theta_1):
     """As theta_2 falls to theta_1 bars 3 and 4 come to lie together on the ground's
     line.
     """
@@ -228,11 +215,7 @@ def test_short_ground_and_input_leave_no_digit_of_mu():
 @pytest.mark.parametrize(
     "lengths", [(0.3, 0.1, 0.25, 0.22), (0.3, 0.25, 0.1, 0.22), (0.3, 0.3, 0.2, 0.2)]
 )
-def test_angles_alone_are_those_of_the_whole_position(
-    lengths,
-    branch,
-    theta_1,
-):
+def test_angles_alone_are_those_of_the_whole_position(lengths, branch, theta_1):
     """The same angles, statuses and gaps, a limit and A on O4 among them.
 
     To the roundings of an angle.

@@ -28,7 +28,7 @@ each.
 """
 
 
-def make_bodies(case: fourbar.Scene, command: fourbar.scene.Command) -> EquationTerms:
+def make_bodies(case, command):
     """Right-hand sides of the thirteen equations from the kinematics, gravity alone."""
     s = fourbar.solve(case, "acceleration", at=command)
     vectors = (e.vector for e in case.effects if isinstance(e, fourbar.Gravity))
@@ -47,7 +47,7 @@ def make_bodies(case: fourbar.Scene, command: fourbar.scene.Command) -> Equation
     return terms
 
 
-def scene(drive_bar: int) -> fourbar.Scene:
+def scene(drive_bar):
     bars = (
         fourbar.Bar(0.1, 0.2, 1e-3, (0.03, 0.4)),
         fourbar.Bar(0.25, 0.5, None, (0.1, -0.2)),
@@ -81,11 +81,7 @@ ANGLES = np.linspace(0.1, 6.0, 13)
         ((0, 0), (1, 1), (0, 0)),
     ],
 )
-def test_bars_without_mass_or_inertia(
-    bodies,
-    alpha,
-    drive_bar,
-):
+def test_bars_without_mass_or_inertia(bodies, alpha, drive_bar):
     """Mass and inertia of 0 and of 1, where a term may be left out.
 
     The thirteen equations leave none out.
@@ -99,7 +95,7 @@ def test_bars_without_mass_or_inertia(
         compare_with_thirteen(bodies_then, fourbar.solve(case))
 
 
-def compare_with_thirteen(bodies: EquationTerms, s: fourbar.Solution) -> None:
+def compare_with_thirteen(bodies, s):
     """Compare pin forces and torque with the solution of the thirteen equations."""
     unknowns = solve_thirteen(bodies, s.drive_bar)
     size = SOLVED * np.max(np.abs(unknowns[:, :12])) / np.min(np.abs(s.drive_condition))
@@ -116,8 +112,7 @@ def compare_with_thirteen(bodies: EquationTerms, s: fourbar.Solution) -> None:
 )
 @pytest.mark.parametrize("drive_bar", [2, 3, 4])
 def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
-    pins,
-    drive_bar,
+    pins, drive_bar
 ):
     """With the couples mu r |F| the thirteen equations give these forces again."""
     friction = fourbar.PinFriction.at(**{pin: (0.1, 0.02) for pin in pins})

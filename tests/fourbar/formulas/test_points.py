@@ -12,7 +12,6 @@ import pytest
 
 from fourbar.errors import InputError
 from fourbar.formulas.mobility import circuits, find_intervals, turns_fully
-from fourbar.formulas.motion import State
 from fourbar.formulas.path import compute_state
 from fourbar.formulas.points import (
     coupler_curve,
@@ -38,18 +37,18 @@ class Drawn(NamedTuple):
     theta_2: np.ndarray
     branch: int
 
-    def moving(self, omega_2: float = 1.0, alpha_2: float = 0.0) -> State:
+    def moving(self, omega_2=1.0, alpha_2=0.0):
         return compute_state(self.bars, self.theta_2, self.branch, omega_2, alpha_2)
 
     @property
-    def sine(self) -> float:
+    def sine(self):
         return float(abs(self.moving().position.sin_mu[0]))
 
 
-def random_positions(seed: int, count: int, least_sine: float = 0.05) -> list[Drawn]:
+def random_positions(seed, count, least_sine=0.05):
     """One regular position each of random linkages, on a random branch."""
     rng = np.random.default_rng(seed)
-    positions: list[Drawn] = []
+    positions = []
     while len(positions) < count:
         bars = draw_linkage(rng)
         start, stop = find_intervals(bars)[-1]
@@ -67,7 +66,7 @@ def test_point_coefficients_are_derivatives(drawn):
     with mp.workdps(50):
         exact = ExactLoop(drawn.bars)
 
-        def place(angle: mp.mpf) -> mp.mpc:
+        def place(angle):
             u = exact.close(2, angle, drawn.branch)
             return exact.lengths[1] * u[2] + u[3] * mp.mpc(0.3, -0.2)
 
@@ -121,9 +120,7 @@ CURVES = {
 
 
 @pytest.mark.parametrize("lengths", CURVES.values(), ids=CURVES)
-def test_coupler_curves_are_closed_and_lie_on_the_sextic(
-    lengths,
-):
+def test_coupler_curves_are_closed_and_lie_on_the_sextic(lengths):
     bars = bare(*lengths, 0.3)
     along, across = 0.4 * lengths[2], 0.3 * lengths[2]
     for circuit in range(len(circuits(bars))):
@@ -140,7 +137,7 @@ def test_coupler_curves_are_closed_and_lie_on_the_sextic(
         assert _off_sextic(bars, point, along, across) < 1e-9
 
 
-def _off_sextic(bars: FourBar, point: np.ndarray, along: float, across: float) -> float:
+def _off_sextic(bars, point, along, across):
     """How far the points are from the coupler curve's own equation, free of theta_2.
 
     A lies on the circle a about O2 and at the distance |(along, across)| of the point

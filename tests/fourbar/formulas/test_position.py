@@ -117,7 +117,7 @@ SHORT = (
 )
 
 
-@pytest.mark.parametrize(("lengths", "psi", "sign"), SHORT)
+@pytest.mark.parametrize("lengths, psi, sign", SHORT)
 def test_digits_are_kept_where_the_diagonal_is_short(lengths, psi, sign):
     """With E2 = 0 the assembly of this sign of the root changes at psi = 0."""
     assembly = sign if psi > 0.0 else -sign
@@ -200,7 +200,7 @@ def test_slip_is_that_of_the_two_bars(pin):
     assert s.slip(pin) == pytest.approx(slip, abs=64 * FEW_ROUNDINGS)
 
 
-@pytest.mark.parametrize(("ground", "taken"), [(0.01, True), (1.1, False)])
+@pytest.mark.parametrize("ground, taken", [(0.01, True), (1.1, False)])
 def test_a_short_ground_takes_the_moment_of_the_force_at_A_from_virtual_work(
     ground, taken
 ):

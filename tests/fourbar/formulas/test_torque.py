@@ -11,7 +11,6 @@ from fourbar.effects import Place, Table
 from fourbar.effects.effect import Actions, list_bodies
 from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.mobility import choose_range, limit_positions
-from fourbar.formulas.motion import State
 from fourbar.formulas.path import compute_state
 from fourbar.formulas.torque import half_slope, inertia
 from fourbar.linkage import MOVING_BARS
@@ -35,7 +34,7 @@ ROUNDED_SUM = 4.0 * U
 """Of the sum of four lengths: what is missing of it where each is rounded by four U."""
 
 
-def random_case(seed: int) -> tuple[fourbar.FourBar, tuple[fourbar.Load, ...], tuple]:  # type: ignore[type-arg]
+def random_case(seed):
     rng = np.random.default_rng(seed)
     bare_one = draw_linkage(rng)
     bars = [
@@ -111,7 +110,7 @@ def test_statics_of_motiongenesis():
     assert any(np.abs(angle - printed).max() <= 0.5e-8 for angle in angles)
 
 
-def with_masses(linkage: fourbar.FourBar) -> fourbar.FourBar:
+def with_masses(linkage):
     """Put masses off the bars."""
     bars = (
         replace(bar, mass=2.0 + bar.length, inertia=0.01, centre=(0.4, phase))
@@ -120,7 +119,7 @@ def with_masses(linkage: fourbar.FourBar) -> fourbar.FourBar:
     return fourbar.FourBar(linkage.ground, *bars, linkage.ground_angle)
 
 
-def inertia_of(linkage: fourbar.FourBar, state: State) -> np.ndarray:
+def inertia_of(linkage, state):
     """Return the equivalent inertia of all bars, kg m^2."""
     bodies = list_bodies(linkage)
     parts = inertia(linkage.input.length, bodies, state.position, state.k)
@@ -153,9 +152,7 @@ def test_equivalent_inertia_is_that_of_the_kinetic_energy(name):
 
 
 @pytest.mark.parametrize("drive", [2, 3, 4])
-def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(
-    drive,
-):
+def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(drive):
     """What depends on O4, on theta_2 and on rest next to motion, in one sweep."""
     linkage = with_masses(bare(0.3, 0.1, 0.25, 0.22, 0.4))
     ends = Place(1, (0.2, 0.3)), Place(4, (0.15, 0.2))

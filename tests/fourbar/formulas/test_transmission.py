@@ -1,7 +1,6 @@
 """Transmission angle against the cosine law in many digits, the rest against a scan."""
 
 import math
-from typing import Any
 
 import mpmath as mp
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 
 from fourbar.formulas.mobility import find_intervals, limit_positions
 from fourbar.formulas.transmission import transmission_extremes
-from fourbar.linkage import FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 from fourbar.show.derived import derive
@@ -27,7 +25,7 @@ HIGHER_ORDER = 1.1
 """What the terms beyond the leading one may add to the miss of a scan."""
 
 
-def derive_at(name: str, bars: FourBar, theta_2: Any, branch: int) -> np.ndarray:
+def derive_at(name, bars, theta_2, branch):
     """Derive a quantity where the input turns at 3 rad/s."""
     motion = Motion(np.array(theta_2, ndmin=1), 3.0, branch=branch)
     return derive(solve(Scene(bars, motion)), name)

@@ -4,11 +4,9 @@ import cmath
 import importlib
 import re
 import tempfile
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -20,7 +18,7 @@ from fourbar.errors import LimitError
 from fourbar.mjcf import SIMULATORS, write_mjcf_for
 from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.quantities import Array
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command
 from fourbar_validation.scenes.suites import list_model_files
 from tests.support.scenes import crank_rocker
 
@@ -32,7 +30,7 @@ Read = tuple[Array, Array, Array, float, Array]
 """Angles, speeds and accelerations of the joints, T2, and the pin force at B."""
 
 
-def errors(scene: Scene, read: Read) -> tuple[float, float]:
+def errors(scene, read):
     """Of T2 and of the pin force at B, by their greatest value in a turn.
 
     The formulas are at the simulator's own angle, speed and acceleration, and the file
@@ -48,7 +46,7 @@ def errors(scene: Scene, read: Read) -> tuple[float, float]:
     return of_torque, float(apart)
 
 
-def start_mujoco(text: str) -> tuple[Any, Any]:
+def start_mujoco(text):
     mujoco = pytest.importorskip("mujoco")
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
@@ -57,7 +55,7 @@ def start_mujoco(text: str) -> tuple[Any, Any]:
     return model, data
 
 
-def read_state(model: Any, state: Any, force: Any, world: Any = ...) -> Read:
+def read_state(model, state, force, world=...):
     """As the comment of the file says."""
     parts = state.qpos, state.qvel, state.qacc, state.actuator_force
     q, v, a, drive = (_to_numpy(part)[world].astype(float) for part in parts)
@@ -65,11 +63,11 @@ def read_state(model: Any, state: Any, force: Any, world: Any = ...) -> Read:
     return q, v, a, float(torque), _to_numpy(force)[world][:2].astype(float)
 
 
-def _to_numpy(array: Any) -> Array:
+def _to_numpy(array):
     return array.numpy() if hasattr(array, "numpy") else np.asarray(array)
 
 
-def read_mujoco(text: str, forward: int) -> Read:
+def read_mujoco(text, forward):
     import mujoco
 
     model, data = start_mujoco(text)
@@ -79,7 +77,7 @@ def read_mujoco(text: str, forward: int) -> Read:
     return read_state(model, data, data.efc_force)
 
 
-def read_warp(text: str, forward: int) -> Read:
+def read_warp(text, forward):
     """The kernels compile for minutes the first time."""
     mjw = pytest.importorskip("mujoco_warp")
     model, data = start_mujoco(text)
@@ -91,7 +89,7 @@ def read_warp(text: str, forward: int) -> Read:
     return read_state(model, state, state.efc.force, 0)
 
 
-def read_mjx(text: str, steps: int) -> Read:
+def read_mjx(text, steps):
     mjx = pytest.importorskip("mujoco.mjx")
     jax = importlib.import_module("jax")
     jax.config.update("jax_enable_x64", True)
@@ -104,15 +102,15 @@ def read_mjx(text: str, steps: int) -> Read:
     return read_state(model, state, getattr(state, "_impl", state).efc_force)
 
 
-def keyframe(text: str) -> tuple[Array, float]:
+def keyframe(text):
     """Speeds of the keyframe, and the timestep."""
     root = ET.fromstring(text)
-    speeds = root.find("keyframe/key").get("qvel").split()  # type: ignore[union-attr]
-    timestep = root.find("option").get("timestep")  # type: ignore[union-attr]
+    speeds = root.find("keyframe/key").get("qvel").split()
+    timestep = root.find("option").get("timestep")
     return np.array(speeds, dtype=float), float(str(timestep))
 
 
-def read_genesis(file: Path, steps: int) -> Read:
+def read_genesis(file, steps):
     """As the comment of the file says."""
     gs = pytest.importorskip("genesis")
     text = file.read_text()
@@ -136,7 +134,7 @@ def read_genesis(file: Path, steps: int) -> Read:
     return q, v, a, torque, solver.efc_force.to_numpy()[:2].ravel()
 
 
-def read_newton(file: Path, steps: int) -> Read:
+def read_newton(file, steps):
     """As the comment of the file says."""
     newton = pytest.importorskip("newton")
     speeds, timestep = keyframe(file.read_text())
@@ -195,7 +193,7 @@ def test_a_file_for_genesis_names_what_it_leaves_out():
 
 
 @pytest.fixture
-def _genesis() -> Iterator[None]:
+def _genesis():
     """Genesis, which starts once in a process.
 
     The next test may want other settings.
@@ -281,7 +279,7 @@ and less.
 """
 
 
-def released(**changes: Any) -> Scene:
+def released(**changes):
     """A linkage let go under its weight, with a damper."""
     motion = fourbar.Motion(1.0, 3.0, free=fourbar.Free(0.2, 2))
     effects = (fourbar.Gravity(), fourbar.Viscous.at(O2=0.05))
@@ -377,7 +375,7 @@ LOADED, AT_B = (
 
 
 @pytest.mark.parametrize(
-    ("write", "scene", "words"),
+    "write, scene, words",
     [
         (
             write_sdf,
@@ -394,11 +392,7 @@ LOADED, AT_B = (
         (write_usd, released(effects=AT_B), "no counterpart in USD"),
     ],
 )
-def test_what_a_file_cannot_hold_is_refused(
-    write,
-    scene,
-    words,
-):
+def test_what_a_file_cannot_hold_is_refused(write, scene, words):
     with pytest.raises(LimitError, match=words):
         write(scene)
 

@@ -43,7 +43,7 @@ ANY_SIZE = replace(
 )
 
 
-def random_scene(rng: np.random.Generator, kind: DrawnType) -> fourbar.Scene:
+def random_scene(rng, kind):
     """Lengths from 5 mm to 100 m, any speed, branch and direction.
 
     Bars are ten times lighter or heavier.
@@ -63,10 +63,7 @@ def random_scene(rng: np.random.Generator, kind: DrawnType) -> fourbar.Scene:
     return replace(scene, motion=motion, drive=None, drive_bar=2, loads=())
 
 
-def at_keyframe(
-    scene: fourbar.Scene,
-    text: str = "",
-) -> tuple[mujoco.MjModel, mujoco.MjData]:
+def at_keyframe(scene, text=""):
     model = mujoco.MjModel.from_xml_string(text or write_mjcf(scene))
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
@@ -74,11 +71,11 @@ def at_keyframe(
     return model, data
 
 
-def gap(data: mujoco.MjData) -> float:
+def gap(data):
     return math.dist(data.site("B3").xpos, data.site("B4").xpos)
 
 
-def run_alone(scene: fourbar.Scene) -> tuple[float, float, float]:
+def run_alone(scene):
     """Plain MuJoCo from keyframe 0 through the sweep.
 
     Worst gap, worst speed, angle still missing at the end.
@@ -126,7 +123,7 @@ LAG = 1e-3
 """Of the crank behind omega_2 t, beyond the settling of its drive, in timesteps."""
 
 
-def opened(scene: fourbar.Scene) -> tuple[mujoco.MjModel, mujoco.MjData]:
+def opened(scene):
     """As MuJoCo's viewer does it: no keyframe, no control."""
     model = mujoco.MjModel.from_xml_string(write_mjcf(scene))
     data = mujoco.MjData(model)
@@ -137,7 +134,7 @@ def opened(scene: fourbar.Scene) -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize(
-    ("lengths", "points"),
+    "lengths, points",
     [
         ((0.3, 0.1, 0.3, 0.1), (0.0, math.pi)),
         ((0.3, 0.1, 0.1, 0.3), (0.0, math.pi)),
@@ -146,11 +143,7 @@ def opened(scene: fourbar.Scene) -> tuple[mujoco.MjModel, mujoco.MjData]:
     ],
     ids=["parallelogram", "kite a = b", "kite a = d", "a + d = b + c"],
 )
-def test_the_file_opens_in_the_assembly_beyond_change_points(
-    lengths,
-    points,
-    branch,
-):
+def test_the_file_opens_in_the_assembly_beyond_change_points(lengths, points, branch):
     """Pin B lies left of the diagonal from A to O4 in the open assembly's first
     half, and changes its side at each change point that the input passes, and
     nowhere else.
@@ -167,7 +160,7 @@ def test_the_file_opens_in_the_assembly_beyond_change_points(
         assert gap(data) < OPEN
 
 
-def sprung() -> fourbar.Scene:
+def sprung():
     """Springs that count whole turns.
 
     The joints start where those put them, far from the angles' first turn.
@@ -276,11 +269,8 @@ def test_shapes_add_no_mass_and_change_no_bit():
     assert states[0] == states[1]
 
 
-@pytest.mark.parametrize(("mass", "inertia"), [(0.0, None), (1e-16, 1.0), (1.0, 1e-16)])
-def test_massless_bar_is_refused_in_one_line(
-    mass,
-    inertia,
-):
+@pytest.mark.parametrize("mass, inertia", [(0.0, None), (1e-16, 1.0), (1.0, 1e-16)])
+def test_massless_bar_is_refused_in_one_line(mass, inertia):
     linkage = fourbar.FourBar(
         0.3,
         fourbar.Bar(0.1, 1.0),
@@ -324,10 +314,7 @@ def test_without_keyframe_no_position_is_written():
 
 @pytest.mark.parametrize("pin", ("O2", "O4"))
 @pytest.mark.parametrize("theta_1", (0.0, 0.7, -2.0))
-def test_a_spring_at_a_ground_pin_rests_at_an_angle_from_the_ground(
-    pin,
-    theta_1,
-):
+def test_a_spring_at_a_ground_pin_rests_at_an_angle_from_the_ground(pin, theta_1):
     """Hinges count from the world's axis, a scene's rest from the ground bar.
 
     The preload moves it by -preload/k.

@@ -5,10 +5,8 @@ With loads, effects, and a drive on bar 4.
 
 import csv
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree as ET
 
 import mujoco
@@ -20,9 +18,8 @@ from fourbar.effects import Friction
 from fourbar.effects.place import Place
 from fourbar.linkage import BAR_NAMES
 from fourbar.mjcf import write_mjcf_for
-from fourbar.mjcf.document import SETTLING, Drive
-from fourbar.quantities import Array
-from fourbar.scene import Command, Scene
+from fourbar.mjcf.document import SETTLING
+from fourbar.scene import Command
 from tests.support.scenes import crank_rocker, thesis
 
 EXACT = 1e-6
@@ -43,7 +40,7 @@ NEXT_BAR = {
 MATRIX = Path(__file__).parents[3] / "docs" / "examples" / "benchmark.csv"
 
 
-def acted_on(**changes: Any) -> Scene:
+def acted_on(**changes):
     """Everything that has a counterpart in MJCF acts.
 
     A load of each kind on each bar, and the drive is on bar 4.
@@ -71,56 +68,54 @@ def acted_on(**changes: Any) -> Scene:
 class Opened:
     """A file in MuJoCo at its keyframe."""
 
-    def __init__(self, scene: Scene, drive: Drive) -> None:
+    def __init__(self, scene, drive):
         self.scene, self.drive = scene, drive
         self.text = write_mjcf_for(scene, drive=drive)
         self.model = mujoco.MjModel.from_xml_string(self.text)
         self.data = mujoco.MjData(self.model)
         mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
 
-    def comments(self) -> list[str]:
+    def comments(self):
         parser = ET.XMLParser(target=ET.TreeBuilder(insert_comments=True))
         nodes = ET.fromstring(self.text, parser)
         return [str(node.text).strip() for node in nodes if node.tag is ET.Comment]
 
-    def step(self, steps: int = 20) -> None:
+    def step(self, steps=20):
         mujoco.mj_step(self.model, self.data, steps)
 
-    def forward(self) -> None:
+    def forward(self):
         mujoco.mj_forward(self.model, self.data)
 
-    def move_on(self) -> "Opened":
+    def move_on(self):
         self.step()
         self.forward()
         return self
 
-    def is_moving_without_drive(self) -> bool:
+    def is_moving_without_drive(self):
         """Return True if its controls are those of loads alone."""
         names = [self.model.actuator(n).name for n in range(self.model.nu)]
         of_loads = [name.startswith("load_") for name in names]
         return all(of_loads) and self.data.qvel[0] == 10.0
 
     @property
-    def exact(self) -> float:
+    def exact(self):
         return EXACT if self.scene.motion.free is None else QUICK
 
     @property
-    def driven(self) -> Scene:
+    def driven(self):
         """The scene with the drive where the file has its own."""
         if self.drive == "flywheel":
             return replace(self.scene, drive=None, drive_bar=2)
         return self.scene
 
-    def solve_here(self, scene: Scene) -> fourbar.Solution:
+    def solve_here(self, scene):
         """By the formulas at the state that was last forwarded."""
         d = self.data
         state = (d.qpos[0], 1, d.qvel[0], d.qacc[0])
         command = Command(*(np.array([x]) for x in state))
         return fourbar.solve(scene, "force", at=command)
 
-    def errors(
-        self, answers: dict[str, Any], scene: Scene | None = None
-    ) -> dict[str, float]:
+    def errors(self, answers, scene=None):
         """Compare with the formulas; errors are over the greatest value in a turn."""
         scene = scene or self.driven
         motion = scene.motion.replace(free=None)
@@ -133,30 +128,30 @@ class Opened:
             errors[name] = float(apart / np.abs(getattr(turn, name)).max())
         return errors
 
-    def error(self, name: str, answer: Any) -> float:
+    def error(self, name, answer):
         return self.errors({name: answer})[name]
 
     @property
-    def at_B(self) -> Array:
+    def at_B(self):
         return self.data.efc_force[:2]
 
-    def torque(self) -> float:
+    def torque(self):
         armature = self.model.dof_armature[self.model.joint("O2").dofadr[0]]
         return float(
             self.data.actuator_force[self.model.actuator("drive").id]
             - armature * self.data.qacc[0]
         )
 
-    def at_pins(self, *, loads: bool) -> dict[str, Array]:
+    def at_pins(self, *, loads):
         """cfrc_int, with the loads that MuJoCo counts in, or without."""
         mujoco.mj_rnePostConstraint(self.model, self.data)
         m, d, forces = self.model, self.data, {}
         for name, bars in NEXT_BAR.items():
             forces[name] = d.cfrc_int[m.body(name).id][3:5].copy()
             for index, load in enumerate(self.scene.loads, 1):
-                if not loads and load.force is not None and BAR_NAMES[load.bar] in bars:  # type: ignore[attr-defined]
-                    size, angle = load.force  # type: ignore[attr-defined]
-                    if load.frame == "bar":  # type: ignore[attr-defined]
+                if not loads and load.force is not None and BAR_NAMES[load.bar] in bars:
+                    size, angle = load.force
+                    if load.frame == "bar":
                         x = d.site(f"load_{index}").xmat
                         angle += math.atan2(x[3], x[0])
                     forces[name] -= size * np.array([math.cos(angle), math.sin(angle)])
@@ -167,7 +162,7 @@ class Opened:
         }
 
 
-def opens_assembled(file: Opened) -> None:
+def opens_assembled(file):
     m, d = file.model, file.data
     mujoco.mj_resetData(m, d)
     file.forward()
@@ -185,7 +180,7 @@ def opens_assembled(file: Opened) -> None:
         assert math.remainder(angle - theta, math.tau) == pytest.approx(0.0, abs=1e-12)
 
 
-def is_driven(file: Opened) -> None:
+def is_driven(file):
     m, d = file.model, file.data
     mujoco.mj_resetData(m, d)
     file.step(round(8 * SETTLING))
@@ -195,7 +190,7 @@ def is_driven(file: Opened) -> None:
     assert d.qvel[0] == pytest.approx(10.0, rel=1e-3), "the flywheel alone"
 
 
-def is_accelerated(file: Opened) -> None:
+def is_accelerated(file):
     d = file.data
     assert d.qvel[0] == 10.0
     file.step(100)
@@ -205,7 +200,7 @@ def is_accelerated(file: Opened) -> None:
     )
 
 
-def starts_anew(file: Opened) -> None:
+def starts_anew(file):
     """What the viewer shows of an input that cannot turn fully.
 
     The same stretch again, from an assembled pose.
@@ -221,28 +216,28 @@ def starts_anew(file: Opened) -> None:
     raise AssertionError("the linkage went past its limit position")
 
 
-def is_driven_elsewhere(file: Opened) -> None:
+def is_driven_elsewhere(file):
     file.move_on()
     answers = {"F43": file.at_B, **file.at_pins(loads=False)}
     assert max(file.errors(answers).values()) < EXACT
     assert min(file.errors(answers, file.scene).values()) > FOUND
 
 
-def takes_control(file: Opened) -> None:
+def takes_control(file):
     assert file.data.qvel[0] == 10.0
     file.data.ctrl[file.model.actuator("drive").id] = 0.7
     file.move_on()
     assert file.error("torque", 0.7) < EXACT
 
 
-def takes_what_is_applied(file: Opened) -> None:
+def takes_what_is_applied(file):
     assert file.is_moving_without_drive()
     file.data.qfrc_applied[{2: 0, 4: 2}[file.scene.drive_bar]] = 0.7
     file.move_on()
     assert file.error("torque", 0.7) < EXACT
 
 
-def cylinder_force(file: Opened) -> float:
+def cylinder_force(file):
     """By the formulas, whose stroke is the tendon's length."""
     solution = file.solve_here(file.scene)
     length = file.data.ten_length[file.model.tendon("cylinder").id]
@@ -250,7 +245,7 @@ def cylinder_force(file: Opened) -> float:
     return float(solution.drive_force[0])
 
 
-def relieves_the_flywheel(file: Opened) -> None:
+def relieves_the_flywheel(file):
     file.move_on()
     before, control = file.torque(), file.model.actuator("cylinder").id
     file.data.ctrl[control] = cylinder_force(file)
@@ -261,28 +256,28 @@ def relieves_the_flywheel(file: Opened) -> None:
     assert file.torque() == pytest.approx(2.0 * before, rel=EXACT)
 
 
-def pushes_as_controlled(file: Opened) -> None:
+def pushes_as_controlled(file):
     assert file.data.qvel[0] == 10.0
     file.data.ctrl[file.model.actuator("cylinder").id] = 7.0
     file.move_on()
     assert cylinder_force(file) == pytest.approx(7.0, rel=FOUND)
 
 
-def pushes_as_applied(file: Opened) -> None:
+def pushes_as_applied(file):
     assert file.is_moving_without_drive()
     assert abs(cylinder_force(file.move_on())) < FOUND * 7.0
 
 
-def is_released(file: Opened) -> None:
+def is_released(file):
     assert file.data.qvel[0] == 10.0
     file.move_on()
     assert file.error("torque", 0.0) < QUICK
 
 
-def is_of_the_instant_after_forward(file: Opened) -> None:
+def is_of_the_instant_after_forward(file):
     """The files without a flywheel step more finely."""
 
-    def read() -> Array:
+    def read():
         d = file.data
         return np.array([*d.qacc, *d.actuator_force, *d.efc_force[:2]])
 
@@ -295,17 +290,17 @@ def is_of_the_instant_after_forward(file: Opened) -> None:
         assert file.error("F43", before[-2:]) > 10.0 * file.exact
 
 
-def gives_torque(file: Opened) -> None:
+def gives_torque(file):
     file.move_on()
     assert file.error("torque", file.torque()) < EXACT
 
 
-def gives_force_at_B(file: Opened) -> None:
+def gives_force_at_B(file):
     file.move_on()
     assert file.error("F43", file.at_B) < file.exact
 
 
-def gives_forces_at_pins(file: Opened) -> None:
+def gives_forces_at_pins(file):
     """Without loads as it stands."""
     bare = Opened(replace(file.scene, loads=()), file.drive)
     bare.move_on()
@@ -313,13 +308,13 @@ def gives_forces_at_pins(file: Opened) -> None:
     assert "counts loads in" not in bare.text
 
 
-def counts_loads_in(file: Opened) -> None:
+def counts_loads_in(file):
     file.move_on()
     assert max(file.errors(file.at_pins(loads=False)).values()) < file.exact
     assert min(file.errors(file.at_pins(loads=True)).values()) > FOUND
 
 
-def yields_more(file: Opened) -> None:
+def yields_more(file):
     """In this scene inertia dominates.
 
     Change points and static loads are measured with the check of files.
@@ -330,13 +325,13 @@ def yields_more(file: Opened) -> None:
     assert file.error("F43", file.at_B) < bound
 
 
-def holds_with_a_flywheel(file: Opened) -> None:
+def holds_with_a_flywheel(file):
     driven = Opened(replace(file.scene, drive=None, drive_bar=2), "flywheel")
     driven.move_on()
     assert driven.error("F43", driven.at_B) < EXACT
 
 
-def has_one_control_with_a_range(file: Opened) -> None:
+def has_one_control_with_a_range(file):
     """Gymnasium's MujocoEnv makes a row of its box of actions of each control's
     range.
     """
@@ -351,7 +346,7 @@ def has_one_control_with_a_range(file: Opened) -> None:
     assert d.actuator_force[0] == 10.0 * most
 
 
-def has_passive_motors(file: Opened) -> None:
+def has_passive_motors(file):
     m, d = file.model, file.data
     drive = "drive" if file.scene.drive is None else "cylinder"
     others = [i for i in range(m.nactuator) if m.actuator(i).name != drive]
@@ -368,11 +363,11 @@ def has_passive_motors(file: Opened) -> None:
     np.testing.assert_allclose(d.actuator_force[others], before, rtol=1e-15)
 
 
-def was_wrong_before_3_7(file: Opened) -> None:
+def was_wrong_before_3_7(file):
     """Compare two versions of the benchmark's matrix at the worst of three
     timesteps.
     """
-    errors: dict[str, dict[str, float]] = {"3.3.7": {}, "4.0.0": {}}
+    errors = {"3.3.7": {}, "4.0.0": {}}
     simulated = ("MuJoCo 3.3.7: simulated", "MuJoCo: simulated")
     in_a_turn = ("crank_rocker", "newton_128", "drake_23842")
     with MATRIX.open(encoding="utf-8", newline="") as table:
@@ -388,7 +383,7 @@ def was_wrong_before_3_7(file: Opened) -> None:
     assert max(errors["4.0.0"].values()) < 1e-6
 
 
-SAID: dict[str, Callable[[Opened], None]] = {
+SAID = {
     "Written by fourbar. Opens assembled": opens_assembled,
     "The drive brings the input to omega_2": is_driven,
     "The drive is a constant motor for alpha_2": is_accelerated,
@@ -421,7 +416,7 @@ PRELOADED = fourbar.Spring(
 """A spring that pulls even where its ends meet: a tendon's rest length cannot express
 it.
 """
-FILES: dict[str, tuple[Scene, Drive]] = {
+FILES = {
     "at omega_2": (acted_on(), "flywheel"),
     "at alpha_2": (
         acted_on(motion=fourbar.Motion(fourbar.Sweep(0.4, 5.0, 60), 10.0, 30.0)),
@@ -455,10 +450,7 @@ def test_every_sentence_holds(name):
         holds[0](Opened(*FILES[name]))
 
 
-def test_a_linkage_with_limits_says_so(
-    tmp_path,
-    monkeypatch,
-):
+def test_a_linkage_with_limits_says_so(tmp_path, monkeypatch):
     """MuJoCo writes a log of its resets into the working folder."""
     monkeypatch.chdir(tmp_path)
     file = Opened(thesis(), "flywheel")
@@ -503,4 +495,4 @@ def test_a_motor_for_one_that_takes_none_is_refused():
         {"simulator": "ode"},
     ):
         with pytest.raises(fourbar.InputError, match=r"^[^\n]+$"):
-            write_mjcf_for(crank_rocker(), **wrong)  # type: ignore[arg-type]
+            write_mjcf_for(crank_rocker(), **wrong)

@@ -20,14 +20,12 @@ AXES = [(0.3, 0.0, 1.0), (-2.0, 5.0, 1.0), (0.0, 1.0, 0.0), (0.0, 0.0, -3.0)]
 ORIGIN = (1.0, -2.0, 0.5)
 
 
-def scene() -> fourbar.Scene:
+def scene():
     return fourbar.load(ROOT / "models" / "crank_rocker.toml")
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_the_frame_turns_z_to_the_axis_by_the_shortest_way(
-    axis,
-):
+def test_the_frame_turns_z_to_the_axis_by_the_shortest_way(axis):
     plane = Plane(axis)
     turn = plane.rotation
     unit = np.array(axis) / np.linalg.norm(axis)
@@ -52,13 +50,11 @@ def test_the_frame_turns_z_to_the_axis_by_the_shortest_way(
 @pytest.mark.parametrize("axis", [(0.0, 0.0, 0.0), (1.0, 2.0), (1.0, 0.0, np.nan), "z"])
 def test_what_is_no_direction_is_refused(axis):
     with pytest.raises(InputError, match="axis"):
-        Plane(axis)  # type: ignore[arg-type]
+        Plane(axis)
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_mujoco_moves_and_loads_a_tilted_linkage_alike(
-    axis,
-):
+def test_mujoco_moves_and_loads_a_tilted_linkage_alike(axis):
     mujoco = pytest.importorskip("mujoco")
 
     plane = Plane(axis, ORIGIN)
@@ -84,9 +80,7 @@ def test_mujoco_moves_and_loads_a_tilted_linkage_alike(
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_an_sdf_has_its_model_and_gravity_turned(
-    axis,
-):
+def test_an_sdf_has_its_model_and_gravity_turned(axis):
     plane = Plane(axis, ORIGIN)
     trees = [
         ET.fromstring(write_sdf(scene(), without_loads=True, plane=place))
@@ -125,13 +119,11 @@ def test_only_a_plane_that_is_tilted_is_called_so():
 
 
 @pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), *AXES])
-def test_the_joints_of_a_usd_meet_wherever_the_plane_is(
-    axis,
-):
+def test_the_joints_of_a_usd_meet_wherever_the_plane_is(axis):
     plane = Plane(axis, ORIGIN)
     text = write_usd(scene(), without_loads=True, plane=plane)
 
-    def read(name: str, block: str) -> np.ndarray:
+    def read(name, block):
         found = re.search(rf"{name} = \(([^)]*)\)", block)
         assert found
         return np.array([float(number) for number in found[1].split(",")])

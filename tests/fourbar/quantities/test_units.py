@@ -69,7 +69,7 @@ SAME = [
 ]
 
 
-@pytest.mark.parametrize(("make", "texts", "numbers"), SAME)
+@pytest.mark.parametrize("make, texts, numbers", SAME)
 def test_a_text_with_a_unit_is_its_number(make, texts, numbers):
     assert make(*texts) == make(*numbers)
 
@@ -91,7 +91,7 @@ def test_a_motion_is_written_as_in_the_file():
 
 
 @pytest.mark.parametrize(
-    ("make", "words"),
+    "make, words",
     [
         (
             lambda: fourbar.uniform("6", 1, 1, 1),
@@ -194,7 +194,7 @@ def test_every_unit_is_its_fraction(name):
 
 
 @pytest.mark.parametrize(
-    ("text", "inches"),
+    "text, inches",
     [
         ("1'6\"", 18),
         ("1' 6 1/2\"", Fraction(37, 2)),
@@ -212,7 +212,7 @@ def test_feet_and_inches_are_one_length(text, inches):
 
 
 @pytest.mark.parametrize(
-    ("text", "half"),
+    "text, half",
     [
         ("0.10 m", 5e-3),
         ("12.5 mm", 5e-5),
@@ -253,7 +253,7 @@ def test_the_tables_name_every_unit_and_prefix():
 
 
 @pytest.mark.parametrize(
-    ("text", "unit", "value"),
+    "text, unit, value",
     [
         ("45º", "rad", math.pi / 4.0),
         ("45˚", "rad", math.pi / 4.0),
@@ -267,7 +267,7 @@ def test_units_are_read_as_people_write_them(text, unit, value):
 
 
 @pytest.mark.parametrize(
-    ("text", "plain"),
+    "text, plain",
     [
         ("84 rad/s cw", "-84 rad/s"),
         ("84 rpm CW", "-84 rpm"),

@@ -39,7 +39,7 @@ def test_effects_and_loads_take_them():
 
 
 @pytest.mark.parametrize(
-    ("quantity", "sentence"),
+    "quantity, sentence",
     [
         (3.0 * ureg.second, "does not convert to m"),
         (math.nan * ureg.meter, "no finite number"),

@@ -35,15 +35,15 @@ SINE = (
 )
 
 
-def make_swing(law: str) -> fourbar.Scene:
+def make_swing(law):
     return loads(SWING.replace("CENTRE", CENTRE).replace("LAW", law))
 
 
-def kinetic_energy(time: float) -> float:
+def kinetic_energy(time):
     """Return the energy of the bars by differences of positions, J."""
     step = 1e-4
 
-    def move(t: float) -> tuple[complex, complex, complex, float]:
+    def move(t):
         A = 0.0508 * np.exp(1j * (1.0 + math.sin(0.5 * t)))
         to_O4 = 0.1397 - A
         d = abs(to_O4)
@@ -58,7 +58,7 @@ def kinetic_energy(time: float) -> float:
     return slender + 0.268224 * abs(G) ** 2 / 2.0 + 5.19142188e-4 * turn**2 / 2.0
 
 
-def test_the_torque_of_a_sine_is_the_power_of_its_energy() -> None:
+def test_the_torque_of_a_sine_is_the_power_of_its_energy():
     scene = make_swing(SINE)
     assert loads(dump(scene)) == scene
     s = fourbar.solve(scene)
@@ -73,9 +73,7 @@ def test_the_torque_of_a_sine_is_the_power_of_its_energy() -> None:
 
 @pytest.mark.parametrize("bar", MOVING_BARS)
 @pytest.mark.parametrize("rates", [0, 1, 2])
-def test_a_polynomial_comes_back_from_its_points_and_rates(
-    rates: int, bar: int
-) -> None:
+def test_a_polynomial_comes_back_from_its_points_and_rates(rates, bar):
     """Speeds make each piece a cubic, accelerations beside them a quintic.
 
     Through four points alone goes one cubic.
@@ -107,14 +105,14 @@ LAWS = {
     "rest": Law(*POINTS, 10, "rest"),
     "periodic": Law(*POINTS, 10, "periodic"),
     "periodic, from 10 s on": Law(*LATE, 8, "periodic"),
-    "cycloidal": Rise("cycloidal", theta_2=-0.4, **CAM),  # type: ignore[arg-type]
-    "345": Rise("345", theta_4=-0.4, **CAM),  # type: ignore[arg-type]
+    "cycloidal": Rise("cycloidal", theta_2=-0.4, **CAM),
+    "345": Rise("345", theta_4=-0.4, **CAM),
     "345 that does not fall": Rise("345", (-1.0, 0.5), 2.0, dwell=0.3),
 }
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_rates_are_the_slopes_of_a_law_that_passes_its_points(name: str) -> None:
+def test_rates_are_the_slopes_of_a_law_that_passes_its_points(name):
     """Pieces join without a jump.
 
     Central differences miss the third derivative times step^2/6, and rounding over
@@ -141,10 +139,10 @@ def test_rates_are_the_slopes_of_a_law_that_passes_its_points(name: str) -> None
 
 
 @pytest.mark.parametrize(
-    ("kind", "speed", "acceleration"),
+    "kind, speed, acceleration",
     [("cycloidal", 2.0, 2.0 * math.pi), ("345", 1.875, 10.0 / math.sqrt(3.0))],
 )
-def test_a_cam_has_the_factors_of_the_books(kind, speed, acceleration) -> None:
+def test_a_cam_has_the_factors_of_the_books(kind, speed, acceleration):
     """C_v = 2 and C_a = 2 pi of the cycloidal law, 1.875 and 5.7735 of 3-4-5."""
     law = LAWS[kind]
     assert law.time == pytest.approx((0.0, 0.5, 0.7, 1.1, 1.2))
@@ -162,7 +160,7 @@ RISE = {"kind": "345", "rise": (1.0, 0.5), "theta_2": 0.0}
 
 
 @pytest.mark.parametrize(
-    ("make", "key"),
+    "make, key",
     [
         (lambda: Rise(**RISE | {"kind": "harmonic"}), "motion.law.kind"),
         (lambda: Rise(**RISE | {"rise": (1.0, 0.0)}), "motion.law.rise"),
@@ -174,7 +172,7 @@ RISE = {"kind": "345", "rise": (1.0, 0.5), "theta_2": 0.0}
         (lambda: Motion(1.0, law=Law(*POINTS)), "motion.law"),
     ],
 )
-def test_a_law_that_cannot_be_names_its_key(make, key: str) -> None:
+def test_a_law_that_cannot_be_names_its_key(make, key):
     with pytest.raises(InputError) as error:
         make()
     assert error.value.key.startswith(key)
@@ -185,7 +183,7 @@ RATES = 'omega_2 = ["0 rad/s", "1 rad/s"]'
 
 
 @pytest.mark.parametrize(
-    ("law", "words"),
+    "law, words",
     [
         (f'{TABLE}, alpha_2 = ["0 rad/s^2", "1 rad/s^2"]', ("alpha_2", "omega_2")),
         (f'{TABLE}, {RATES}, ends = "rest"', ("law.ends", "left out")),
@@ -198,16 +196,14 @@ RATES = 'omega_2 = ["0 rad/s", "1 rad/s"]'
         (SINE[2:-2].replace("sine", "cosine"), ("law.kind", '"sine"')),
     ],
 )
-def test_a_law_that_states_too_much_or_too_little_is_refused(
-    law: str, words: tuple[str, ...]
-) -> None:
+def test_a_law_that_states_too_much_or_too_little_is_refused(law, words):
     with pytest.raises(InputError) as refused:
         make_swing(f"{{ {law} }}")
     assert all(word in str(refused.value) for word in words), refused.value
 
 
-@pytest.mark.parametrize(("ends", "other"), [("free", "rest"), ("rest", "free")])
-def test_a_table_of_angles_says_what_its_ends_assume(ends: str, other: str) -> None:
+@pytest.mark.parametrize("ends, other", [("free", "rest"), ("rest", "free")])
+def test_a_table_of_angles_says_what_its_ends_assume(ends, other):
     """The change is that of the two laws on a dense grid of the end intervals."""
     times, angles = (0.0, 0.2, 0.5, 0.7, 1.0), (0.0, 0.5, 1.5, 1.9, 2.0)
     law, changed = (Law(times, angles, ends=name) for name in (ends, other))
@@ -223,13 +219,13 @@ def test_a_table_of_angles_says_what_its_ends_assume(ends: str, other: str) -> N
     assert float(said[3]) == pytest.approx(changes[2], rel=2e-3)
 
 
-def write_note(scene: fourbar.Scene) -> str:
+def write_note(scene):
     from fourbar.show.block import write_block
 
     return " ".join(" ".join(write_block(scene, fourbar.solve(scene, "error"))).split())
 
 
-def test_what_leaves_no_choice_says_nothing_of_its_ends() -> None:
+def test_what_leaves_no_choice_says_nothing_of_its_ends():
     periodic = Law(
         (0.0, 0.3, 0.7, 1.0), (0.0, 2.0, 4.0, 2.0 * math.pi), ends="periodic"
     )

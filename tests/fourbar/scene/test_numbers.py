@@ -5,12 +5,11 @@ Where they are, how they move, and the columns that they fill.
 
 import json
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
-from fourbar import InputError, Motion, Point, Scene, load, solve, vary
+from fourbar import InputError, Motion, Point, load, solve, vary
 from fourbar.files import dump, loads
 from fourbar.show.tables import list_columns
 from fourbar.solution import write_csv, write_json
@@ -31,11 +30,11 @@ Accelerations are ten times larger again, and their derivatives too.
 """
 
 
-def scene(*points: Point, **changes: Any) -> Scene:
+def scene(*points, **changes):
     return crank_rocker(points=points, **changes)
 
 
-def test_pins_and_mass_centres_are_points() -> None:
+def test_pins_and_mass_centres_are_points():
     linkage = crank_rocker().linkage
     s = solve(
         scene(
@@ -58,7 +57,7 @@ def test_pins_and_mass_centres_are_points() -> None:
             )
 
 
-def test_velocity_and_acceleration_are_derivatives() -> None:
+def test_velocity_and_acceleration_are_derivatives():
     theta_2, h, omega_2 = np.linspace(0.3, 6.0, 7), STEP, 10.0
     before, here, after = (
         solve(scene(*POINTS, motion=Motion(theta_2 + step, omega_2)))
@@ -95,7 +94,7 @@ def test_velocity_and_acceleration_are_derivatives() -> None:
     )
 
 
-def test_positions_alone_have_no_velocities_of_points() -> None:
+def test_positions_alone_have_no_velocities_of_points():
     posed = scene(*POINTS, motion=Motion(1.0))
     s = solve(posed)
     assert (
@@ -109,7 +108,7 @@ def test_positions_alone_have_no_velocities_of_points() -> None:
 
 
 @pytest.mark.slow
-def test_every_table_has_their_columns() -> None:
+def test_every_table_has_their_columns():
     s = solve(scene(*POINTS))
     document, head = (
         json.loads(write_json(s)),
@@ -128,7 +127,7 @@ def test_every_table_has_their_columns() -> None:
                 )
 
 
-def test_a_study_varies_them_and_lists_its_members() -> None:
+def test_a_study_varies_them_and_lists_its_members():
     study = vary(
         scene(*POINTS),
         {"points.P.from_pin.0": [0.0, 0.04], "lengths.coupler": [0.25, 0.26]},
@@ -148,10 +147,10 @@ def test_a_study_varies_them_and_lists_its_members() -> None:
     assert (
         np.shape(json.loads(write_json(s))["torque"]) == (2, 61)
         and "2 linkages" in s._repr_html_()
-    )  # type: ignore[attr-defined]
+    )
 
 
-def test_a_file_holds_them(tmp_path: Any) -> None:
+def test_a_file_holds_them(tmp_path):
     file = tmp_path / "scene.toml"
     file.write_text(dump(scene(*POINTS)))
     assert load(file).points == POINTS
@@ -189,7 +188,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_a_wrong_point_is_refused_in_one_line(name: str) -> None:
+def test_a_wrong_point_is_refused_in_one_line(name):
     line, words = WRONG[name]
     with pytest.raises(InputError) as caught:
         loads(dump(scene()) + f"\n[points]\n{line}\n")
@@ -200,6 +199,6 @@ def test_a_wrong_point_is_refused_in_one_line(name: str) -> None:
     )
 
 
-def test_two_points_of_one_name_are_refused() -> None:
+def test_two_points_of_one_name_are_refused():
     with pytest.raises(InputError, match="a name of its own"):
         scene(POINTS[0], Point("P", 2, (0.1, 0.0)))

@@ -5,7 +5,6 @@ Kept by it, shown by the page, and no path out of the scene's folder.
 
 import base64
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -22,18 +21,14 @@ from tests.support.texts import LENGTHS
 EMBEDDED = "data:image/png;base64," + base64.b64encode(PNG).decode()
 
 
-def scene_file(folder: Path, name: str, bar: str = "coupler") -> Path:
+def scene_file(folder, name, bar="coupler"):
     file = folder / "scene.toml"
     file.write_text(f'{LENGTHS}[bars.{bar}]\npicture = "{name}"\n', encoding="utf-8")
     return file
 
 
 @pytest.mark.parametrize("name", ("bar.png", "parts/bar.png"))
-def test_the_picture_of_a_scene_file_is_shown_and_saved(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    name: str,
-) -> None:
+def test_the_picture_of_a_scene_file_is_shown_and_saved(tmp_path, monkeypatch, name):
     (tmp_path / "parts").mkdir()
     (tmp_path / name).write_bytes(PNG)
     monkeypatch.chdir("/")  # the name is relative to the scene file
@@ -48,9 +43,7 @@ def test_the_picture_of_a_scene_file_is_shown_and_saved(
     )  # a massless bar with a picture stays massless
 
 
-def test_a_scene_saved_elsewhere_names_the_same_file_or_says_why_not(
-    tmp_path: Path,
-) -> None:
+def test_a_scene_saved_elsewhere_names_the_same_file_or_says_why_not(tmp_path):
     inner = tmp_path / "inner"
     inner.mkdir()
     (inner / "bar.png").write_bytes(PNG)
@@ -70,7 +63,7 @@ def test_a_scene_saved_elsewhere_names_the_same_file_or_says_why_not(
     assert not list(elsewhere.iterdir())
 
 
-def test_one_given_with_the_command_takes_its_place(tmp_path: Path) -> None:
+def test_one_given_with_the_command_takes_its_place(tmp_path):
     (tmp_path / "bar.png").write_bytes(PNG)
     (tmp_path / "other.png").write_bytes(PNG + b"x")
     scene = load(scene_file(tmp_path, "bar.png"))
@@ -106,10 +99,8 @@ def test_one_given_with_the_command_takes_its_place(tmp_path: Path) -> None:
     ),
 )
 def test_a_name_that_leads_elsewhere_is_refused_when_the_file_is_read(
-    tmp_path: Path,
-    name: str,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    tmp_path, name, capsys
+):
     (tmp_path / "secret.png").write_bytes(PNG)
     inner = tmp_path / "inner"
     inner.mkdir()
@@ -121,12 +112,12 @@ def test_a_name_that_leads_elsewhere_is_refused_when_the_file_is_read(
     )
 
 
-def test_a_picture_that_is_no_text_is_refused() -> None:
+def test_a_picture_that_is_no_text_is_refused():
     with pytest.raises(InputError, match=r"bars\.input\.picture.*text"):
         loads(LENGTHS + "[bars.input]\npicture = 3\n")
 
 
-def test_what_the_name_leads_to_is_looked_at_before_it_is_shown(tmp_path: Path) -> None:
+def test_what_the_name_leads_to_is_looked_at_before_it_is_shown(tmp_path):
     inner = tmp_path / "inner"
     inner.mkdir()
     (tmp_path / "secret.png").write_bytes(PNG)
@@ -153,7 +144,7 @@ def test_what_the_name_leads_to_is_looked_at_before_it_is_shown(tmp_path: Path) 
         assert not (tmp_path / "page.html").exists()
 
 
-def test_a_bar_has_one_picture_and_the_ground_none() -> None:
+def test_a_bar_has_one_picture_and_the_ground_none():
     with pytest.raises(InputError, match="one picture"):
         replace(crank_rocker(), pictures=[Picture(3, "a.png"), Picture(3, "b.png")])
     with pytest.raises(InputError, match="2, 3 or 4"):
@@ -167,8 +158,8 @@ TRACED = (
 
 
 def test_the_picture_under_the_drawing_is_read_and_written_and_need_not_be_there(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     file = tmp_path / "scene.toml"
     file.write_text(LENGTHS + TRACED)
     scene = load(file)
@@ -188,7 +179,7 @@ def test_the_picture_under_the_drawing_is_read_and_written_and_need_not_be_there
 
 
 @pytest.mark.parametrize(
-    ("stated", "words"),
+    "stated, words",
     [
         ('file = "../photo.jpg"', "picture.file .*next to the scene file"),
         ('file = "photo.jpg"\nscale = "0 mm"', "picture.scale .*> 0 with a unit"),
@@ -199,13 +190,13 @@ def test_the_picture_under_the_drawing_is_read_and_written_and_need_not_be_there
         ('scale = "1 mm"', "picture.file"),
     ],
 )
-def test_a_wrong_entry_of_the_picture_is_refused(stated: str, words: str) -> None:
+def test_a_wrong_entry_of_the_picture_is_refused(stated, words):
     with pytest.raises(InputError, match=words):
         loads(f"{LENGTHS}[picture]\n{stated}\n")
 
 
 @pytest.mark.parametrize(
-    ("content", "kind"),
+    "content, kind",
     [
         (PNG, "image/png"),
         (b"\xff\xd8\xff\xe0", "image/jpeg"),
@@ -213,11 +204,7 @@ def test_a_wrong_entry_of_the_picture_is_refused(stated: str, words: str) -> Non
         (b"<html>", None),
     ],
 )
-def test_what_is_traced_is_a_picture(
-    tmp_path: Path,
-    content: bytes,
-    kind: str | None,
-) -> None:
+def test_what_is_traced_is_a_picture(tmp_path, content, kind):
     (tmp_path / "photo").write_bytes(content)
     picture = TracedPicture("photo", folder=str(tmp_path))
     if kind is None:

@@ -6,7 +6,6 @@ The same linkage in the same motion, whichever bar is told to make it.
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -32,7 +31,6 @@ from fourbar.formulas.mobility import find_limit_angles, limit_positions
 from fourbar.linkage import MOVING_BARS
 from fourbar.mjcf import write_mjcf
 from fourbar.scene import Command, command_at, with_signs
-from fourbar.solution import Solution
 from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import compute_reference
@@ -61,27 +59,24 @@ COMPARED = "omega_2 omega_3 omega_4 alpha_2 a_B F12 F32 F43 F14 torque"
 COMPARED_NAMES = COMPARED.split()
 
 
-def sine(solution: Solution, bar: int) -> np.ndarray:
+def sine(solution, bar):
     """Between the two moving bars besides it."""
     first, second = (getattr(solution, f"theta_{number}") for number in OTHERS[bar])
     return np.asarray(np.sin(second - first))
 
 
-def of_bar(solution: Solution, bar: int) -> Command:
+def of_bar(solution, bar):
     """What a bar was found to do, as a command."""
     names = (f"{name}_{bar}" for name in ("theta", "omega", "alpha"))
     theta, omega, alpha = (np.asarray(getattr(solution, name)) for name in names)
     signs = np.where(sine(solution, bar) < 0.0, -1, 1).astype(np.int8)
-    linkage = bare(*solution.lengths, solution.ground[1])  # type: ignore[misc]
+    linkage = bare(*solution.lengths, solution.ground[1])
     return with_signs(linkage, Command(theta, signs, omega, alpha, bar=bar))
 
 
 @pytest.mark.parametrize("bar", [3, 4])
 @pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
-def test_what_comes_out_fed_back_as_a_command_returns_itself(
-    path: Path,
-    bar: int,
-) -> None:
+def test_what_comes_out_fed_back_as_a_command_returns_itself(path, bar):
     scene = fourbar.load(path)
     compared = 0
     for branch in (1, -1):
@@ -113,7 +108,7 @@ def test_what_comes_out_fed_back_as_a_command_returns_itself(
 
 
 @pytest.mark.parametrize("bar", MOVING_BARS)
-def test_limits_of_a_bar_are_where_its_own_sine_is_zero(bar: int) -> None:
+def test_limits_of_a_bar_are_where_its_own_sine_is_zero(bar):
     rocker = FourBar(0.5, Bar(0.4), Bar(0.3), Bar(0.25), 0.2)
     for number, angle in enumerate(find_limit_angles(rocker, bar), 1):
         away = [limit[bar - 2] - angle for limit in limit_positions(rocker, bar)]
@@ -133,7 +128,7 @@ def test_limits_of_a_bar_are_where_its_own_sine_is_zero(bar: int) -> None:
         solve(Scene(uniform(0.1, 0.3, 0.25, 0.28), Motion(theta_4=FromLimit(1))))
 
 
-def test_at_a_limit_of_theta_2_a_command_of_theta_4_has_motion_and_forces() -> None:
+def test_at_a_limit_of_theta_2_a_command_of_theta_4_has_motion_and_forces():
     """The drive on bar 2 alone has no lever there.
 
     Pin forces with the others are those just before and after.
@@ -171,7 +166,7 @@ def test_at_a_limit_of_theta_2_a_command_of_theta_4_has_motion_and_forces() -> N
 
 
 @pytest.mark.parametrize("bar", [3, 4])
-def test_a_sweep_a_law_and_what_is_left_out_follow_the_commanded_bar(bar: int) -> None:
+def test_a_sweep_a_law_and_what_is_left_out_follow_the_commanded_bar(bar):
     swept = solve(replace(LOADED, motion=Motion(**{f"omega_{bar}": 2.0})))
     angle = getattr(swept, f"theta_{bar}")
     assert len(swept) == 361 and np.isfinite(swept.torque).all()
@@ -199,9 +194,7 @@ def test_a_sweep_a_law_and_what_is_left_out_follow_the_commanded_bar(bar: int) -
         Law((0.0, 1.0), (0.0, 1.0), ends="rest", theta_4=(0.0, 1.0))
 
 
-def test_a_study_sensitivities_and_tolerances_take_the_keys_of_the_commanded_bar() -> (
-    None
-):
+def test_a_study_sensitivities_and_tolerances_take_the_keys_of_the_commanded_bar():
     inside = fourbar.command(replace(LOADED, motion=Motion(omega_4=1.0))).angle[
         [90, 200]
     ]
@@ -242,9 +235,7 @@ def test_a_study_sensitivities_and_tolerances_take_the_keys_of_the_commanded_bar
 
 
 @pytest.mark.parametrize("bar", [3, 4])
-def test_released_at_an_angle_of_another_bar_it_moves_as_at_its_own_theta_2(
-    bar: int,
-) -> None:
+def test_released_at_an_angle_of_another_bar_it_moves_as_at_its_own_theta_2(bar):
     free = Free(0.4, 8)
     scene = replace(LOADED, effects=(*LOADED.effects, Viscous.at(O2=0.01)), loads=())
     start = solve(replace(scene, motion=Motion(1.2, 3.0)), "velocity")
@@ -267,14 +258,14 @@ def test_released_at_an_angle_of_another_bar_it_moves_as_at_its_own_theta_2(
     )
 
 
-def replace_alpha(solution: Solution) -> Solution:
+def replace_alpha(solution):
     """Give it accelerations, which a release has none of."""
     none = np.zeros(len(solution))
     return replace(solution, alpha_2=none, alpha_3=none, alpha_4=none)
 
 
 @pytest.mark.slow
-def test_released_at_theta_4_it_passes_limits_of_theta_2_and_its_own() -> None:
+def test_released_at_theta_4_it_passes_limits_of_theta_2_and_its_own():
     rocker = FourBar(0.5, Bar(0.4, 1.0), Bar(0.3, 1.0), Bar(0.25, 1.0))
     limit = limit_positions(rocker)[0]
     sign = 1 if math.sin(limit.theta_3 - limit.theta_2) > 0.0 else -1
@@ -314,7 +305,7 @@ STROKE = Motion(
 
 
 @pytest.mark.parametrize(
-    ("motion", "changes", "same"),
+    "motion, changes, same",
     [
         (
             Motion(1.0, 2.0, 3.0, -1),
@@ -340,11 +331,7 @@ STROKE = Motion(
     ],
     ids=str,
 )
-def test_a_motion_is_replaced_by_what_it_commands(
-    motion: Motion,
-    changes: dict[str, Any],
-    same: Motion,
-) -> None:
+def test_a_motion_is_replaced_by_what_it_commands(motion, changes, same):
     assert motion.replace() == motion != same == motion.replace(**changes)
     with pytest.raises(
         TypeError,
@@ -353,7 +340,7 @@ def test_a_motion_is_replaced_by_what_it_commands(
         motion.replace(theta_2=1.0)
 
 
-def test_a_motion_reads_by_the_name_of_what_it_commands() -> None:
+def test_a_motion_reads_by_the_name_of_what_it_commands():
     rates = STROKE.stroke, STROKE.stroke_speed, STROKE.stroke_acceleration
     assert (*rates, STROKE.theta_2) == (0.3, 0.1, 0.2, None)
     output = Motion(theta_4=1.0, omega_4=2.0, alpha_4=3.0)
@@ -363,7 +350,7 @@ def test_a_motion_reads_by_the_name_of_what_it_commands() -> None:
     assert others == (None, None, 0.0, None)
 
 
-def make_motion_of_a_law(law: Law) -> Motion:
+def make_motion_of_a_law(law):
     """State the positions of a law one by one, each with its speed and growth."""
     angle, speed, acceleration = law.at(law.times())
     names = fourbar.Motion(**{f"theta_{law.bar}": 0.0}).names
@@ -371,7 +358,7 @@ def make_motion_of_a_law(law: Law) -> Motion:
 
 
 @pytest.mark.parametrize("bar", [2, 3, 4])
-def test_angles_with_rates_of_their_own_are_the_positions_of_a_law(bar: int) -> None:
+def test_angles_with_rates_of_their_own_are_the_positions_of_a_law(bar):
     points = solve(
         LOADED,
         "position",
@@ -396,7 +383,7 @@ def test_angles_with_rates_of_their_own_are_the_positions_of_a_law(bar: int) -> 
 
 
 @pytest.mark.parametrize(
-    ("motion", "said"),
+    "motion, said",
     [
         ({"theta_2": [1.0, 2.0], "omega_2": [1.0]}, "2: one for each angle"),
         ({"theta_2": [1.0, 2.0], "alpha_2": [1.0] * 3}, "2: one for each angle"),
@@ -410,13 +397,13 @@ def test_angles_with_rates_of_their_own_are_the_positions_of_a_law(bar: int) -> 
         ),
     ],
 )
-def test_rates_that_belong_to_no_angle_are_refused(motion: Any, said: str) -> None:
+def test_rates_that_belong_to_no_angle_are_refused(motion, said):
     with pytest.raises(InputError, match=said):
         Motion(**motion)
 
 
 @pytest.mark.parametrize(
-    ("lines", "said"),
+    "lines, said",
     [
         (
             'theta_2 = "1 rad"\ntheta_4 = "1 rad"',
@@ -437,7 +424,7 @@ def test_rates_that_belong_to_no_angle_are_refused(motion: Any, said: str) -> No
         ),
     ],
 )
-def test_two_commands_of_motion_are_one_line(lines: str, said: str) -> None:
+def test_two_commands_of_motion_are_one_line(lines, said):
     with pytest.raises(InputError) as refused:
         fourbar.files.loads(TWO + lines)
     assert said in str(refused.value) and "\n" not in str(refused.value)
@@ -446,8 +433,8 @@ def test_two_commands_of_motion_are_one_line(lines: str, said: str) -> None:
 @pytest.mark.parametrize(
     "angle", [1.5, Sweep(3.8, 4.2, 7), np.array([4.0, 4.1]), FromLimit(1, 1e-9), None]
 )
-def test_a_file_of_it_reads_back_bit_for_bit(angle: object) -> None:
-    motion = Motion(theta_4=angle, omega_4=2.0, alpha_4=-0.1, branch=-1)  # type: ignore[arg-type]
+def test_a_file_of_it_reads_back_bit_for_bit(angle):
+    motion = Motion(theta_4=angle, omega_4=2.0, alpha_4=-0.1, branch=-1)
     scene = replace(LOADED, motion=motion)
     text = fourbar.dump(scene)
     again = fourbar.files.loads(text)
@@ -457,7 +444,7 @@ def test_a_file_of_it_reads_back_bit_for_bit(angle: object) -> None:
     assert np.array_equal(before, after, equal_nan=True)
 
 
-def test_what_takes_theta_2_alone_refuses_in_one_line() -> None:
+def test_what_takes_theta_2_alone_refuses_in_one_line():
     scene = replace(
         LOADED,
         motion=Motion(theta_4=Sweep(3.8, 4.2, 7), omega_4=1.0),
@@ -479,7 +466,7 @@ def test_what_takes_theta_2_alone_refuses_in_one_line() -> None:
 
 
 @pytest.mark.slow
-def test_the_harness_asks_who_takes_the_command_and_writes_who_refuses() -> None:
+def test_the_harness_asks_who_takes_the_command_and_writes_who_refuses():
     scene = replace(
         LOADED,
         motion=Motion(theta_4=Sweep(3.9, 4.4, 4), omega_4=2.0, alpha_4=1.0),

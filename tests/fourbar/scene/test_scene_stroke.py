@@ -5,7 +5,6 @@ commanded alone, and an impossible stroke is refused.
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -40,14 +39,7 @@ third derivatives of 1e4.
 """
 
 
-def scene(
-    bar: int,
-    stroke: Any,
-    side: str = "left",
-    *,
-    turned: bool = False,
-    **motion: Any,
-) -> fourbar.Scene:
+def scene(bar, stroke, side="left", *, turned=False, **motion):
     ends = (ENDS[bar], GROUND) if turned else (GROUND, ENDS[bar])
     commanded = fourbar.Motion(stroke=stroke, side=side, **motion)
     return crank_rocker(
@@ -60,14 +52,9 @@ def scene(
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize(
-    ("bar", "strokes"), [(2, Sweep(0.25, 0.35, 6)), (4, Sweep(0.45, 0.52, 6))]
+    "bar, strokes", [(2, Sweep(0.25, 0.35, 6)), (4, Sweep(0.45, 0.52, 6))]
 )
-def test_its_bar_moves_as_the_triangle_in_balls_does(
-    bar: int,
-    strokes: Sweep,
-    side: str,
-    turned: bool,
-) -> None:
+def test_its_bar_moves_as_the_triangle_in_balls_does(bar, strokes, side, turned):
     by_stroke = scene(
         bar,
         strokes,
@@ -102,7 +89,7 @@ def test_its_bar_moves_as_the_triangle_in_balls_does(
         )
 
 
-def test_the_sides_are_left_and_right_of_the_line_from_pin_to_ground_end() -> None:
+def test_the_sides_are_left_and_right_of_the_line_from_pin_to_ground_end():
     for side, sign in (("left", 1.0), ("right", -1.0)):
         s = fourbar.solve(scene(2, 0.3, side))
         end = 0.12 * np.exp(1j * (s.theta_2[0] + 0.4))
@@ -111,12 +98,9 @@ def test_the_sides_are_left_and_right_of_the_line_from_pin_to_ground_end() -> No
 
 
 @pytest.mark.parametrize(
-    ("bar", "strokes"), [(2, [0.181, 0.4, 0.4199999]), (4, [0.4, 0.45, 0.5])]
+    "bar, strokes", [(2, [0.181, 0.4, 0.4199999]), (4, [0.4, 0.45, 0.5])]
 )
-def test_error_bars_hold_what_the_angle_of_a_stroke_loses(
-    bar: int,
-    strokes: list[float],
-) -> None:
+def test_error_bars_hold_what_the_angle_of_a_stroke_loses(bar, strokes):
     """The ground turned with all that is on it.
 
     The same force, every number of which rounds otherwise. Against balls, and not the
@@ -153,13 +137,13 @@ def test_error_bars_hold_what_the_angle_of_a_stroke_loses(
         assert np.quantile(off, 0.9) > 0.1  # no bar is wide enough to hide anything
 
 
-def test_where_the_line_passes_the_pin_the_stroke_is_at_its_end_and_singular() -> None:
+def test_where_the_line_passes_the_pin_the_stroke_is_at_its_end_and_singular():
     s = fourbar.solve(scene(2, np.array([0.42, 0.3]), stroke_speed=0.1))
     assert list(s.status) == ["singular", "ok"]
-    assert np.isnan(s.omega_3[0]) and s.condition[0] < 1e-7  # type: ignore[index]
+    assert np.isnan(s.omega_3[0]) and s.condition[0] < 1e-7
 
 
-def test_it_reads_back_as_it_was_written() -> None:
+def test_it_reads_back_as_it_was_written():
     by_stroke = scene(
         4,
         Sweep(0.4, 0.5, 5),
@@ -172,7 +156,7 @@ def test_it_reads_back_as_it_was_written() -> None:
 
 
 @pytest.mark.parametrize(
-    ("motion", "says"),
+    "motion, says",
     [
         ({"stroke": 0.9, "side": "left"}, "0.18 to 0.42 m"),
         ({"stroke": 0.3}, "left"),
@@ -180,10 +164,7 @@ def test_it_reads_back_as_it_was_written() -> None:
         ({"stroke": -0.3, "side": "left"}, "above 0"),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_line(
-    motion: dict[str, Any],
-    says: str,
-) -> None:
+def test_what_cannot_be_is_refused_in_one_line(motion, says):
     with pytest.raises(InputError, match=says) as caught:
         refused = crank_rocker(
             motion=fourbar.Motion(**motion),
@@ -193,7 +174,7 @@ def test_what_cannot_be_is_refused_in_one_line(
     assert "\n" not in str(caught.value)
 
 
-def test_who_does_not_take_it_says_so() -> None:
+def test_who_does_not_take_it_says_so():
     with pytest.raises(InputError, match=r"motion\.stroke.*cylinder"):
         crank_rocker(motion=fourbar.Motion(stroke=0.3, side="left"))
     by_stroke = scene(2, Sweep(0.25, 0.35, 8), stroke_speed=0.2)
@@ -202,7 +183,7 @@ def test_who_does_not_take_it_says_so() -> None:
     assert replace(by_stroke, title="b") != by_stroke
 
 
-def test_a_member_whose_cylinder_cannot_have_the_stroke_does_not_assemble() -> None:
+def test_a_member_whose_cylinder_cannot_have_the_stroke_does_not_assemble():
     solution = fourbar.solve(
         fourbar.vary(
             scene(2, 0.3, stroke_speed=0.2), {"motion.stroke": [0.1, 0.3, 0.5]}
@@ -214,8 +195,8 @@ def test_a_member_whose_cylinder_cannot_have_the_stroke_does_not_assemble() -> N
     )
 
 
-@pytest.mark.parametrize(("bar", "stroke"), [(2, 0.3), (4, 0.48)])
-def test_sensitivities_at_a_stroke_are_its_differences(bar: int, stroke: float) -> None:
+@pytest.mark.parametrize("bar, stroke", [(2, 0.3), (4, 0.48)])
+def test_sensitivities_at_a_stroke_are_its_differences(bar, stroke):
     by_stroke, h = scene(bar, stroke, stroke_speed=0.2, stroke_acceleration=0.1), 1e-6
     slopes = fourbar.sensitivity(by_stroke)
     assert {
@@ -256,7 +237,7 @@ def test_sensitivities_at_a_stroke_are_its_differences(bar: int, stroke: float) 
 
 
 @pytest.mark.parametrize(
-    ("keywords", "words"),
+    "keywords, words",
     [
         ({"theta_2": fourbar.Sweep("10 cm", "20 cm", 4)}, "motion.theta_2"),
         (
@@ -265,9 +246,7 @@ def test_sensitivities_at_a_stroke_are_its_differences(bar: int, stroke: float) 
         ),
     ],
 )
-def test_a_sweep_of_texts_is_read_by_the_unit_that_they_state(
-    keywords: dict[str, Any], words: str
-) -> None:
+def test_a_sweep_of_texts_is_read_by_the_unit_that_they_state(keywords, words):
     sweep = fourbar.Sweep("10 cm", "0.2 m", 4)
     motion = fourbar.Motion(stroke=sweep, side="left")
     assert motion.angle == fourbar.Sweep(0.1, 0.2, 4)
@@ -277,10 +256,7 @@ def test_a_sweep_of_texts_is_read_by_the_unit_that_they_state(
 
 @pytest.mark.parametrize("name", ["stroke_input", "stroke_output"])
 @pytest.mark.parametrize("turned", [0.0, 100.0, -160.0])
-def test_a_bar_that_follows_a_stroke_begins_within_half_a_turn(
-    name: str,
-    turned: float,
-) -> None:
+def test_a_bar_that_follows_a_stroke_begins_within_half_a_turn(name, turned):
     """Whatever the ground's angle: the same directions, continuous from the first."""
     scene = fourbar.load(MODELS / "capabilities" / f"{name}.toml")
     linkage = replace(scene.linkage, ground_angle=math.radians(turned))

@@ -171,7 +171,7 @@ def test_a_spring_that_changes_its_sense_is_told_where(length):
 
 
 @pytest.mark.parametrize(
-    ("load", "said"),
+    "load, said",
     [
         ('bar = 4\nmoment = "1 N m"', "load 1 enters bar 4 at O4"),
         ('bar = 3\nmoment = "1 N m"', "load 1 enters bar 3 at G"),
@@ -217,7 +217,7 @@ mass = "1 kg"
 
 
 @pytest.mark.parametrize(
-    ("start", "stop", "told"),
+    "start, stop, told",
     [
         ("drawn", "-170 deg", 'to = "190 deg" is the same direction, 20 deg from'),
         ("-170 deg", "drawn", 'from = "190 deg" is the same direction, 20 deg from'),
@@ -235,7 +235,7 @@ def test_a_sweep_from_a_drawing_that_goes_the_long_way_is_told(start, stop, told
     assert told in note and bool(told) == note.startswith("theta_2 goes by 340 deg")
 
 
-@pytest.mark.parametrize(("start", "stop"), [(2.0, 2.0 + math.tau), (8.0, 2.0)])
+@pytest.mark.parametrize("start, stop", [(2.0, 2.0 + math.tau), (8.0, 2.0)])
 def test_a_spring_pulls_between_the_positions_of_a_coarse_sweep(start, stop):
     """It is longest where the crank points away from its end, between two of three."""
     ends = fourbar.Place(1, (0.3, 0.0)), fourbar.Place(2, (0.1, 0.0))

@@ -130,7 +130,7 @@ def test_a_free_motion_is_embedded_instant_by_instant():
 
 
 @pytest.mark.parametrize(
-    ("duration", "rate"),
+    "duration, rate",
     [(0.2, 0.1), (1.4e-3, 1e-4), (30.0, 1.0), (6e3, 100.0), (6.1e3, 1e3)],
 )
 def test_what_is_too_quick_to_see_is_slowed_down_by_a_power_of_ten(duration, rate):
@@ -194,7 +194,7 @@ def test_the_policy_of_the_page_allows_its_own_script_and_nothing_else():
 
 
 @pytest.mark.parametrize(
-    ("bar", "content", "message"),
+    "bar, content, message",
     [
         ("input", b"<svg onload='alert(1)'/>", "PNG or JPEG"),
         ("input", b"", "PNG or JPEG"),

@@ -68,7 +68,7 @@ def test_a_new_parallelogram_is_one_at_every_angle(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("lengths", "motion", "head"),
+    "lengths, motion, head",
     [
         ((0.3, 0.1, 0.3, 0.1), {}, "Parallelogram, open"),
         ((0.3, 0.1, 0.3, 0.1), {"branch": -1}, "Antiparallelogram, crossed"),
@@ -177,7 +177,7 @@ O4 = ["60 mm", "65 mm"]
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    "text, said",
     [
         (
             GRIPPER,
@@ -222,7 +222,7 @@ def test_lengths_that_are_read_as_equal_are_said_with_their_difference(
 
 
 @pytest.mark.parametrize(
-    ("angles", "said"),
+    "angles, said",
     [
         ([0.0, 1.0, math.pi], "3 positions: 1 ok, 2 at a change point"),
         ([0.0, 1.0, 3.14159265359], "1 ok, 1 at a change point, 1 within 1.186e-11"),

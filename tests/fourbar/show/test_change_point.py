@@ -21,7 +21,7 @@ PARALLELOGRAM = fourbar.FourBar(
 )
 
 
-@pytest.mark.parametrize(("theta_2", "sense"), ((0.0, 1.0), (np.pi, -1.0)))
+@pytest.mark.parametrize("theta_2, sense", ((0.0, 1.0), (np.pi, -1.0)))
 def test_pin_forces_that_are_bounded_on_a_change_point_have_their_limit(theta_2, sense):
     """Weights along the line of all bars ask for no moment there.
 
@@ -126,7 +126,7 @@ def test_the_reason_is_said_where_a_law_begins():
 
 
 @pytest.mark.parametrize(
-    ("omega", "why"),
+    "omega, why",
     [
         (6.0, "the release begins or ends there, and has one side alone"),
         (0.0, "the release stands still there"),

@@ -51,7 +51,7 @@ def test_a_ratio_of_forces_has_a_unit_where_the_two_differ():
 
 
 @pytest.mark.parametrize(
-    ("name", "says"),
+    "name, says",
     [
         ("tork", 'did you mean "torque"'),
         ("F12_z", "F12_x is a component"),

@@ -64,7 +64,7 @@ def parallelogram(motion=SWEEP):
     ],
 )
 @pytest.mark.parametrize(
-    ("name", "value", "places"),
+    "name, value, places",
     [
         ("B_x", "0.855 m", [math.acos(0.11)]),
         ("B_y", "499.9 mm", [math.asin(0.9998), math.pi - math.asin(0.9998)]),
@@ -92,7 +92,7 @@ def test_an_extreme_that_touches_the_value_is_a_position():
 
 
 @pytest.mark.parametrize(
-    ("name", "side", "place"),
+    "name, side, place",
     [
         ("B_y", "max", math.pi / 2),
         ("v_B_x", "min", math.pi / 2),
@@ -154,7 +154,7 @@ def test_a_release_has_a_value_at_times():
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "kind", "words"),
+    "name, value, kind, words",
     [
         ("B_y", "0.6 m", NotAssembledError, "no position has it; B_y goes from 0 to"),
         ("omega_4", "1 rad/s", NotAssembledError, "constant; omega_4 is 1 rad/s"),

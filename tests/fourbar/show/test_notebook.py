@@ -117,7 +117,7 @@ def test_a_new_scene_is_a_scene_and_its_comments_are_entries(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("lengths", "words"),
+    "lengths, words",
     [
         (("1 m", "2 m", "3 m", "40 m"), "never close"),
         (("1 kg", "2 m", "3 m", "4 m"), "ground"),

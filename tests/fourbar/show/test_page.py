@@ -225,7 +225,7 @@ OUTPUT = fourbar.Motion(theta_4=fourbar.Sweep(1.75, 2.95, 40), omega_4=4.0)
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("motion", "name", "place", "over", "pace"),
+    "motion, name, place, over, pace",
     [
         (
             STROKES,
@@ -477,7 +477,7 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(turning, scali
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("width", "scaling"),
+    "width, scaling",
     [(360, "position"), (1100, "position"), (360, "sweep"), (1100, "sweep")],
 )
 def test_no_arrow_and_no_name_of_one_leaves_the_picture(browse, width, scaling):
@@ -786,7 +786,7 @@ def test_a_scene_without_bands_says_why_or_shows_nothing(browse):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("names", "head", "mass", "inertia"),
+    "names, head, mass, inertia",
     [
         ("imperial", "mass lb inertia lb in²", 0.45359237, 0.45359237 * 0.0254**2),
         ("mm N", "mass kg inertia kg m²", 1.0, 1.0),

@@ -91,7 +91,7 @@ def test_what_grows_without_bound_is_said_to_and_where(power):
 
 
 @pytest.mark.parametrize(
-    ("curve", "peak", "place"),
+    "curve, peak, place",
     [
         (lambda x: np.where(x < 0.7, np.nan, -x), 2.0, 2.0),
         (lambda x: np.where(x < 0.7, 1.0 + x, 0.3), 1.7, 0.7),

@@ -247,7 +247,7 @@ def test_a_gap_within_a_step_is_no_full_turn():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("start", "steps", "pins"),
+    "start, steps, pins",
     [(0.0, 36, ("O2", "A", "B", "O4")), (-math.pi, 97, ("B",)), (0.3, 36, ("B",))],
 )
 def test_a_jump_where_pin_friction_reverses_is_no_pole(start, steps, pins):

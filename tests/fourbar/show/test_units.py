@@ -204,7 +204,7 @@ def test_pounds_without_a_unit_of_force_are_one_line_that_says_what_to_write(tex
 
 
 @pytest.mark.parametrize(
-    ("stated", "shown"),
+    "stated, shown",
     [({}, "rad/s"), ({"omega_2": "60 rpm"}, "rpm"), ({"omega_2": "9 deg/s"}, "deg/s")],
 )
 @pytest.mark.parametrize("length", ("300 mm", "12 in"))
@@ -217,7 +217,7 @@ def test_a_released_motion_has_speeds_that_suit_its_accelerations(
 
 
 @pytest.mark.parametrize(
-    ("value", "text"), [(-0.0, "0"), (-1e-3, "-0.001"), (123456.7, "123500")]
+    "value, text", [(-0.0, "0"), (-1e-3, "-0.001"), (123456.7, "123500")]
 )
 def test_a_number_has_four_digits_and_zero_no_sign(value, text):
     assert write_digits(value) == text

@@ -32,7 +32,7 @@ the number.
 """
 
 
-@pytest.mark.parametrize(("effects", "drive"), [(DRIVEN, 4), (RUBBING, 2)])
+@pytest.mark.parametrize("effects, drive", [(DRIVEN, 4), (RUBBING, 2)])
 def test_every_effect_has_the_slopes_of_files_with_a_number_moved(effects, drive):
     case = scene(effects, drive)
     points = (fourbar.Point("P", 3, (0.1, 0.4)),)
@@ -108,7 +108,7 @@ KITE = (0.3, 0.1, 0.1, 0.3)
 
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize(
-    ("lengths", "command"),
+    "lengths, command",
     [(PARALLELOGRAM, "theta_2"), (PARALLELOGRAM, "theta_4"), (KITE, "theta_2")],
 )
 def test_derivatives_are_the_differences_of_a_study_at_change_points(
@@ -125,7 +125,7 @@ def test_derivatives_are_the_differences_of_a_study_at_change_points(
 
 
 @pytest.mark.parametrize(
-    ("motion", "word"),
+    "motion, word",
     [
         ({"theta_2": FromLimit(1, 0.1)}, "limit moves"),
         ({"theta_2": 1.0, "free": Free(1.0, 2)}, "free motion"),
@@ -182,7 +182,7 @@ def test_the_command_ranks_the_numbers_and_writes_them_all(capsys, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("ground_angle", "theta_2"),
+    "ground_angle, theta_2",
     [(0.0, np.pi), (-0.4, np.pi - 0.4), (0.3, np.pi), (0.0, -np.pi)],
 )
 def test_half_a_turn_from_the_ground_the_first_derivative_is_the_ratio_of_the_speeds(

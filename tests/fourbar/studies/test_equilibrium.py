@@ -363,7 +363,7 @@ B = { stiffness = "10 N m/rad", rest = "-90 deg" }
 """
 
 
-@pytest.mark.parametrize(("start", "count"), [("60 deg", 0), ("160 deg", 1)])
+@pytest.mark.parametrize("start, count", [("60 deg", 0), ("160 deg", 1)])
 def test_a_torsion_spring_is_followed_from_the_start_of_the_sweep(start, count):
     """Two circles close the loop at 5000 angles, along which the pins are followed.
 
@@ -532,7 +532,7 @@ def test_no_unit_of_length_changes_an_equilibrium(unit):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "swept", "side"),
+    "name, swept, side",
     [
         ("theta_3", (1.0, 1.25), {"branch": -1}),
         ("theta_4", (1.95, 2.4), {"branch": -1}),

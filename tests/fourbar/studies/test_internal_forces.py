@@ -49,7 +49,7 @@ def test_a_force_across_the_coupler_bends_it_as_a_beam_on_two_supports():
 
 
 @pytest.mark.parametrize(
-    ("bar", "load", "foot"),
+    "bar, load, foot",
     [
         (4, {}, 0.0),
         (3, {}, 0.125),

@@ -96,7 +96,7 @@ def find_pole(low, high):
     return 0.5 * (low + high)
 
 
-@pytest.mark.parametrize(("low", "high"), [(1.0, 1.1), (3.7, 3.8)])
+@pytest.mark.parametrize("low, high", [(1.0, 1.1), (3.7, 3.8)])
 def test_the_rounding_of_a_pole_bends_no_bar_without_drive(low, high):
     distances = np.logspace(-2, -12, 11)
     places = find_pole(low, high) + np.concatenate([-distances, distances])

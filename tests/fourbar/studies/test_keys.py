@@ -281,7 +281,7 @@ def test_a_member_with_two_pins_in_one_place_is_invalid():
 
 
 @pytest.mark.parametrize(
-    ("key", "line"),
+    "key, line",
     [
         ("pins.C.0", 'unknown key; did you mean "pins.'),
         ("pins.A.2", 'unknown key; did you mean "pins.A.'),
@@ -401,7 +401,7 @@ def test_the_tolerance_of_a_drawn_point_is_that_of_its_coordinate():
 
 
 @pytest.mark.parametrize(
-    ("key", "line"),
+    "key, line",
     [
         (
             "points.P.drawn.0",
@@ -435,7 +435,7 @@ output = "0.22 m"
 
 
 @pytest.mark.parametrize(
-    ("key", "line"),
+    "key, line",
     [
         ("pins.A.y", 'did you mean "pins.A.1"?'),
         ("points.P.drawn.y", 'did you mean "points.P.drawn.1"?'),

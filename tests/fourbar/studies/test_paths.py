@@ -55,7 +55,7 @@ def scan(path, directions):
     return widths[least], np.ptp(turned.real[:, least]), directions[least]
 
 
-@pytest.mark.parametrize(("turned", "steps"), [(0.0, 36), (20.0, 360)])
+@pytest.mark.parametrize("turned, steps", [(0.0, 36), (20.0, 360)])
 def test_straightness_is_the_distance_of_the_nearest_two_lines(turned, steps):
     """Whatever the ground's angle, and however coarse the steps are."""
     sweep = f'theta_2 = {{ from = "0 deg", to = "360 deg", steps = {steps} }}'
@@ -87,7 +87,7 @@ P = { bar = 2, from_pin = ["80 mm", "0 deg"] }
 
 
 @pytest.mark.parametrize(
-    ("motion", "ends"),
+    "motion, ends",
     [
         ('theta_2 = { from = "20 deg", to = "100 deg", steps = 3 }', (20, 100)),
         ('theta_2 = { from = "100 deg", to = "20 deg", steps = 3 }', (20, 100)),
@@ -116,7 +116,7 @@ TRAINER = ((50.0, 8.0, 33.0, 34.0), 12.0, 167.0)
 """The same of an elliptical trainer and its pedal."""
 
 
-@pytest.mark.parametrize(("lengths", "distance", "angle"), [CUTTER, TRAINER])
+@pytest.mark.parametrize("lengths, distance, angle", [CUTTER, TRAINER])
 def test_a_wide_curve_is_no_narrower_than_by_a_scan(lengths, distance, angle):
     """Of an oval the width turns slowly, and every side of it decides."""
     ground, crank, coupler, output = lengths

@@ -142,7 +142,7 @@ def test_tolerances_of_a_file_come_back_as_they_were():
 
 
 @pytest.mark.parametrize(
-    ("line", "words"),
+    "line, words",
     [
         ('"lengths.input" = "150 mm"', "less than the number itself, 0.1 m"),
         ('"lengths.input" = ["40 mm", "sigma"]', "three sigma of it must be less"),

@@ -98,7 +98,7 @@ def alone(study, values, member):
 
 
 @pytest.mark.parametrize(
-    ("effects", "drive", "stage"),
+    "effects, drive, stage",
     [
         (DRIVEN, 4, "error"),
         (RUBBING, 2, "force"),
@@ -310,7 +310,7 @@ def test_what_cannot_vary_is_refused_in_one_line(name):
 
 
 @pytest.mark.parametrize(
-    ("motion", "words"),
+    "motion, words",
     [
         (Motion(None, 1.0), "a study states it"),
         (Motion(FromLimit(1, 0.1), 1.0), "a study states it"),

@@ -167,7 +167,7 @@ def test_no_texts_of_a_position_of_three_rockers_overlap(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "dimensions"),
+    "name, dimensions",
     [("tailgate", True), ("landing_gear", True), ("double_crank_pump", False)],
 )
 def test_a_leader_crosses_neither_a_text_nor_another_leader(name, dimensions):
@@ -222,7 +222,7 @@ def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("figure", "panels"), [("overview", 5), ("kinematics", 1)])
+@pytest.mark.parametrize("figure, panels", [("overview", 5), ("kinematics", 1)])
 def test_positions_at_rest_have_no_panel_of_zeros(figure, panels):
     """With a speed there are speeds, accelerations and power besides."""
     sweep = fourbar.Sweep(1.0, 2.0, 10)
@@ -394,7 +394,7 @@ BETWEEN_NEIGHBOURS = fourbar.LinearDrive(Place(2, (0.17, -1.1)), Place(3, (0.09,
 
 
 @pytest.mark.parametrize(
-    ("drive", "effects"),
+    "drive, effects",
     [
         *((drive, EFFECTS) for drive in (2, 3, 4, CYLINDER, BETWEEN_NEIGHBOURS)),
         *((3, (one,)) for one in EFFECTS),
@@ -504,7 +504,7 @@ def test_hostile_titles_are_text(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "options"),
+    "name, options",
     [
         ("a.bmp", {}),
         ("a.png", {"figure": "pie"}),
@@ -695,7 +695,7 @@ def test_matplotlib_is_loaded_only_to_draw_and_its_absence_is_one_line(tmp_path)
 
 
 @pytest.mark.parametrize(
-    ("value", "shown"),
+    "value, shown",
     [
         (0.0, "0"),
         (-1234.6, "−1235"),
@@ -777,7 +777,7 @@ def test_curves_are_drawn_over_what_is_commanded(label):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("figure", "label"),
+    "figure, label",
     [
         *zip(
             ("freebody", "hodograph", "transmission", "kinematics", "sensitivity"),
