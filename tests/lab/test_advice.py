@@ -4,11 +4,9 @@ On linkages that it has never seen, against an exhaustive search.
 """
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-import fourbar
 from fourbar.scene import command
 from fourbar_lab import advice
 from fourbar_lab.advice import try_all_settings
@@ -20,9 +18,7 @@ from tests.validation.cost.test_cost import turning
 
 @pytest.mark.slow
 @pytest.mark.parametrize("index", [9, 10])
-def test_an_unseen_linkage_is_served_and_not_at_three_times_the_cheapest(
-    index: int,
-) -> None:
+def test_an_unseen_linkage_is_served_and_not_at_three_times_the_cheapest(index):
     """A linkage of the study `advice` is judged between the positions that the advice
     saw. These two ask for two digits, which a search finds in few steps.
     """
@@ -31,7 +27,7 @@ def test_an_unseen_linkage_is_served_and_not_at_three_times_the_cheapest(
 
 
 @pytest.mark.slow
-def test_the_search_knows_when_nothing_serves() -> None:
+def test_the_search_knows_when_nothing_serves():
     scene = turning(positions=12)
     setup = TrialSetup(scene, command(scene))
     assert try_all_settings(setup, 1e-3, {("RK4", True): 1.0}) is not None
@@ -42,18 +38,14 @@ def test_the_search_knows_when_nothing_serves() -> None:
     )
 
 
-def hopeless(scene: fourbar.Scene) -> object:
+def hopeless(scene):
     made = TrialSetup(scene, command(scene)).try_out(advise.make_settings(10.0, 3.0))
     made.broken = "lost"
     return made
 
 
 @pytest.mark.slow
-def test_a_count_that_cannot_decide_says_which_one_can(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_count_that_cannot_decide_says_which_one_can(tmp_path, monkeypatch, capsys):
     case = advice.AdviceCase(0, 1e-3, True, 5e-4, 20.0, 19.0)
     monkeypatch.setattr(
         advice, "measure_case", lambda seed, index, costs: replace(case, index=index)
@@ -73,10 +65,10 @@ def test_a_count_that_cannot_decide_says_which_one_can(
         assert stated == (status == 1)
 
 
-def test_a_measure_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_measure_is_resumed(tmp_path, monkeypatch):
     made: list[int] = []
 
-    def case(seed: int, index: int, costs: object) -> advice.AdviceCase:
+    def case(seed, index, costs):
         made.append(index)
         return advice.AdviceCase(index, 1e-3, True, 5e-4, 20.0, 19.0)
 

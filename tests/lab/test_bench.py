@@ -4,7 +4,6 @@ Each is of a row that is measured, is reported with its reason, and costs the ru
 """
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,7 +21,7 @@ ROUNDING = 1e-11
 
 
 @pytest.fixture
-def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+def quick(monkeypatch):
     """Counts at which the times mean nothing, but everything runs."""
     monkeypatch.setattr(bench, "import_cost", lambda: 0.5)
     monkeypatch.setattr(bench, "measure_starts", lambda: measure_starts(1))
@@ -32,7 +31,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("quick")
-def test_every_limit_is_of_a_row_that_is_measured(tmp_path: Path) -> None:
+def test_every_limit_is_of_a_row_that_is_measured(tmp_path):
     measured = bench.measure_speed(1000, 1, 10_000)
     assert bench.SPEED_LIMITS.keys() - measured.not_run.keys() <= measured.rows.keys()
     numbers = [
@@ -58,7 +57,7 @@ def test_every_limit_is_of_a_row_that_is_measured(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.posix
 @pytest.mark.timeout(600)
-def test_commands_start_within_their_limits() -> None:
+def test_commands_start_within_their_limits():
     """Two processes that follow one another share what else the machine does. What is
     beyond its limit after a few rounds is measured in more.
     """
@@ -74,9 +73,7 @@ def test_commands_start_within_their_limits() -> None:
 
 
 @pytest.mark.slow
-def test_every_contender_finds_the_same_unknowns(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_every_contender_finds_the_same_unknowns(monkeypatch):
     scene, command = make_example(), command_positions(500)
     solution = solve(scene, at=command)
     expected = np.concatenate(
@@ -94,9 +91,7 @@ def test_every_contender_finds_the_same_unknowns(
         ).all(), name
 
 
-def test_more_positions_than_fit_are_evaluated_in_pieces(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_more_positions_than_fit_are_evaluated_in_pieces(monkeypatch):
     monkeypatch.setattr(contenders, "POSITIONS_OF_ONE_CALL", 1000)
     monkeypatch.setattr(contenders, "LEAST_POSITIONS", 1)
     sizes: list[int] = []
@@ -106,9 +101,7 @@ def test_more_positions_than_fit_are_evaluated_in_pieces(
     assert set(times["it"]) == {1000, 10_000} and sizes == [1000] * (2 + 2 * 10)
 
 
-def test_what_is_missing_is_named_with_its_reason(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_is_missing_is_named_with_its_reason(monkeypatch):
     monkeypatch.setenv("PATH", "")
     peers = contenders.collect_loops()
     assert set(peers.here) == {"NumPy"} and set(peers.not_run) == {"C"}
@@ -127,11 +120,7 @@ def test_what_is_missing_is_named_with_its_reason(
 
 @pytest.mark.parametrize("name", bench.SPEED_LIMITS)
 @pytest.mark.parametrize("spoiled", [math.nan, "beyond", None])
-def test_what_is_beyond_its_limit_fails_with_the_reason(
-    name: str,
-    spoiled: float | str | None,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_is_beyond_its_limit_fails_with_the_reason(name, spoiled, monkeypatch):
     rows = {what: limit.bound for what, limit in bench.SPEED_LIMITS.items()} | {
         "all, 1000 positions": 100.0
     }

@@ -7,7 +7,6 @@ asked twice.
 import csv
 import json
 import re
-from pathlib import Path
 
 import pytest
 
@@ -32,7 +31,7 @@ WRONG = ('"torque": moments[0]', '"torque": 1.1 * moments[0]')
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     """A stranger's folder.
 
     The engine of the page, one that is wrong, and the entries of both.
@@ -54,7 +53,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def run(folder: Path, *problems: str) -> dict[tuple[str, str], str]:
+def run(folder, *problems):
     """The letters of a run, by engine and problem."""
     options = [
         option for name in problems or PROBLEMS_ASKED for option in ("--problem", name)
@@ -79,9 +78,7 @@ def run(folder: Path, *problems: str) -> dict[tuple[str, str], str]:
     }
 
 
-def test_a_stranger_s_engine_has_the_letters_that_its_numbers_earn(
-    folder: Path,
-) -> None:
+def test_a_stranger_s_engine_has_the_letters_that_its_numbers_earn(folder):
     letters = run(folder)
     assert (
         letters["mine", "crank_rocker"] == "AA"
@@ -113,7 +110,7 @@ def test_a_stranger_s_engine_has_the_letters_that_its_numbers_earn(
 
 
 @pytest.mark.slow
-def test_what_was_answered_is_not_asked_again(folder: Path) -> None:
+def test_what_was_answered_is_not_asked_again(folder):
     first = run(folder, "crank_rocker")
     code = (folder / "mine.py").read_text()
     (folder / "mine.py").write_text(
@@ -132,7 +129,7 @@ def test_what_was_answered_is_not_asked_again(folder: Path) -> None:
     assert run(folder, "crank_rocker")["mine", "crank_rocker"] == "-"
 
 
-def test_the_engines_of_the_lab_are_entries_that_a_run_finds_too() -> None:
+def test_the_engines_of_the_lab_are_entries_that_a_run_finds_too():
     engines, reasons = (
         read_engines_of(BENCHMARKED_ENGINES),
         read_reasons(BENCHMARKED_ENGINES),
@@ -145,7 +142,7 @@ def test_the_engines_of_the_lab_are_entries_that_a_run_finds_too() -> None:
     assert all(any(reason.startswith(row) for row in rows) for reason in reasons)
 
 
-def test_a_row_names_its_version_before_its_way() -> None:
+def test_a_row_names_its_version_before_its_way():
     assert name_row("MuJoCo: simulated", "4.0.0") == "MuJoCo 4.0.0: simulated"
     assert (
         name_row("mujoco 3.3.7", "3.3.7") == "mujoco 3.3.7"
@@ -163,11 +160,7 @@ def test_a_row_names_its_version_before_its_way() -> None:
         None,
     ],
 )
-def test_entries_that_cannot_be_read_are_named_in_one_line(
-    text: str | None,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_entries_that_cannot_be_read_are_named_in_one_line(text, tmp_path, capsys):
     if text is not None:
         (tmp_path / "engines.toml").write_text(text)
     assert (
@@ -187,7 +180,7 @@ def test_entries_that_cannot_be_read_are_named_in_one_line(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("library", ["mujoco", "pinocchio"])
-def test_an_engine_answers_the_slider_cranks(library: str, folder: Path) -> None:
+def test_an_engine_answers_the_slider_cranks(library, folder):
     pytest.importorskip(library)
     program = ["python", "-m", "fourbar_lab.simulators.slider_engines", library]
     (folder / "engines.toml").write_text(
@@ -232,9 +225,7 @@ for question in map(json.loads, sys.stdin):
 
 
 @pytest.mark.slow
-def test_of_several_timesteps_the_finest_is_judged_and_each_setting_is_a_row(
-    folder: Path,
-) -> None:
+def test_of_several_timesteps_the_finest_is_judged_and_each_setting_is_a_row(folder):
     (folder / "slow.py").write_text(SLOW.format(path=str(folder / "mine.py")))
     (folder / "engines.toml").write_text(
         '[[engine]]\nname = "slow"\n'
@@ -276,7 +267,7 @@ def test_of_several_timesteps_the_finest_is_judged_and_each_setting_is_a_row(
 
 
 @pytest.mark.slow
-def test_a_simulator_answers_single_states_at_its_own_motion(folder: Path) -> None:
+def test_a_simulator_answers_single_states_at_its_own_motion(folder):
     pytest.importorskip("mujoco")
     adapter = "fourbar_lab.simulators.mujoco_c:MujocoFile"
     (folder / "engines.toml").write_text(
@@ -291,9 +282,7 @@ def test_a_simulator_answers_single_states_at_its_own_motion(folder: Path) -> No
 
 
 @pytest.mark.slow
-def test_an_entry_of_one_kind_of_problem_answers_in_the_row_of_another(
-    folder: Path,
-) -> None:
+def test_an_entry_of_one_kind_of_problem_answers_in_the_row_of_another(folder):
     pytest.importorskip("pinocchio")
     released = "fourbar_validation.engines.pinocchio:PinocchioReleased"
     (folder / "engines.toml").write_text(
@@ -311,7 +300,7 @@ def test_an_entry_of_one_kind_of_problem_answers_in_the_row_of_another(
     )
 
 
-def test_the_picture_has_every_run_through_time_in_the_panel_of_its_family() -> None:
+def test_the_picture_has_every_run_through_time_in_the_panel_of_its_family():
     table = ROOT / "docs" / "examples" / "benchmark.csv"
     with table.open(encoding="utf-8", newline="") as file:
         lines = read_work(csv.DictReader(file))

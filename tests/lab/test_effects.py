@@ -4,9 +4,6 @@ What every effect costs is measured by `effects`.
 """
 
 import time
-from pathlib import Path
-
-import pytest
 
 from fourbar.errors import BROKEN, HOLDS
 from fourbar_lab import effects
@@ -20,7 +17,7 @@ SAVED = 0.08
 """
 
 
-def test_the_bare_scene_steps_faster_than_with_default_flags() -> None:
+def test_the_bare_scene_steps_faster_than_with_default_flags():
     works = {
         effect: effects.prepare_simulation(effect) for effect in ("none", DEFAULT_FLAGS)
     }
@@ -35,10 +32,8 @@ def test_the_bare_scene_steps_faster_than_with_default_flags() -> None:
     assert best["none"] <= (1.0 - SAVED) * best[DEFAULT_FLAGS]
 
 
-def test_a_workload_with_twice_the_work_costs_twice_as_much(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def prepare(effect: str) -> object:
+def test_a_workload_with_twice_the_work_costs_twice_as_much(monkeypatch):
+    def prepare(effect):
         return lambda amount: sum(range((1 + (effect == "twice")) * 1000 * amount))
 
     monkeypatch.setitem(effects.WORKLOADS, "formulas", prepare)
@@ -50,11 +45,7 @@ def test_a_workload_with_twice_the_work_costs_twice_as_much(
     )
 
 
-def test_the_table_has_a_row_for_each_effect_and_flag(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_table_has_a_row_for_each_effect_and_flag(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(
         effects,
         "measure_effect",
@@ -78,10 +69,7 @@ def test_the_table_has_a_row_for_each_effect_and_flag(
     )
 
 
-def test_an_engine_that_is_missing_is_named(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_an_engine_that_is_missing_is_named(monkeypatch, capsys):
     monkeypatch.setattr(registry, "find_missing", lambda _: "mujoco is not installed")
     assert status(["effects", "--engines", "formulas,mujoco-inverse"]) == BROKEN
     assert capsys.readouterr().err == "error: mujoco-inverse: mujoco is not installed\n"

@@ -43,7 +43,7 @@ CHOSEN = {"forces": IN_FORCES, "torque": IN_TORQUE, "elsewhere": ELSEWHERE}
 EXACT = {"pinocchio-inverse", "mujoco-inverse", "free-body"}
 
 
-def test_every_entry_fits_its_module_and_says_what_catches_it() -> None:
+def test_every_entry_fits_its_module_and_says_what_catches_it():
     assert len(ENTRIES) == len(read_faults()) >= 250
     for entry in read_faults():
         for name, text in inject_fault(entry).items():
@@ -64,10 +64,7 @@ def test_every_entry_fits_its_module_and_says_what_catches_it() -> None:
         "a drawn place moves along the axes of its bar",
     ],
 )
-def test_a_fault_falls_in_the_tests_that_its_entry_names(
-    fault: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_fault_falls_in_the_tests_that_its_entry_names(fault, monkeypatch):
     """How soon they fail is for `python -m fourbar_lab faults`.
 
     A slow machine is no fault.
@@ -76,9 +73,7 @@ def test_a_fault_falls_in_the_tests_that_its_entry_names(
     assert faults.try_tests(ENTRIES[fault]) is None
 
 
-def test_tests_that_do_not_fail_or_take_long_let_a_fault_survive(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_tests_that_do_not_fail_or_take_long_let_a_fault_survive(monkeypatch):
     for status, seconds, says in ((0, 1.0, "status 0"), (1, 11.0, "take 11.0 s")):
         ended = Ended(
             f'...\n{{"status": {status}, "seconds": {seconds}}}\n', "", False, ""
@@ -99,9 +94,7 @@ def test_tests_that_do_not_fail_or_take_long_let_a_fault_survive(
         ),
     ],
 )
-def test_an_injected_fault_fails_the_harness_where_its_entry_says(
-    chosen: tuple[str, ...],
-) -> None:
+def test_an_injected_fault_fails_the_harness_where_its_entry_says(chosen):
     """A fault of the formulas is noticed by every exact engine by itself."""
     outcomes = try_faults([ENTRIES[fault] for fault in chosen])
     assert not isinstance(outcomes, str), outcomes
@@ -111,7 +104,7 @@ def test_an_injected_fault_fails_the_harness_where_its_entry_says(
         assert chosen is ELSEWHERE or noticed >= EXACT, (fault, noticed)
 
 
-def test_what_does_not_fail_or_fails_elsewhere_survives() -> None:
+def test_what_does_not_fail_or_fails_elsewhere_survives():
     entry = {"caught_by": ["torque"]}
     assert "nothing fails" in (explain_survival(entry, {"crank": []}) or "")
     assert "none of torque" in (
@@ -121,12 +114,10 @@ def test_what_does_not_fail_or_fails_elsewhere_survives() -> None:
     assert explain_survival(entry, {"crank": ["free-body torque: equivalence"]}) is None
 
 
-def test_positions_outside_the_range_fail_the_run(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_positions_outside_the_range_fail_the_run(monkeypatch):
     true = fourbar_validation.run.question.solve
 
-    def pretend(*arguments: object, **keywords: object) -> Solution:
+    def pretend(*arguments, **keywords):
         solution: Solution = true(*arguments, **keywords)  # type: ignore[arg-type]
         solution.status_code[:] = 0
         return solution
@@ -141,10 +132,8 @@ def test_positions_outside_the_range_fail_the_run(
     assert {(engine, "assembled") for engine in EXACT} <= failing
 
 
-def test_a_fault_that_ends_the_process_costs_no_other_one(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def tried(numbers: list[int]) -> list[dict[str, list[str]]] | str:
+def test_a_fault_that_ends_the_process_costs_no_other_one(monkeypatch):
+    def tried(numbers):
         return (
             "it ended"
             if 2 in numbers

@@ -7,7 +7,6 @@ import os
 import signal
 from dataclasses import replace
 from importlib import import_module
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -37,16 +36,16 @@ SEED = 0
     sorted(COUNTEREXAMPLES.glob("*.toml")),
     ids=lambda path: path.stem,
 )
-def test_a_kept_counterexample_holds(path: Path) -> None:
+def test_a_kept_counterexample_holds(path):
     assert examine.list_findings(loads(path.read_text(encoding="utf-8"))) == []
 
 
 @pytest.mark.slow
-def test_a_stretch_of_scenes_holds() -> None:
+def test_a_stretch_of_scenes_holds():
     assert not [number for number in range(60) if examine.examine_scene(SEED, number)]
 
 
-def test_a_scene_depends_on_its_number_alone() -> None:
+def test_a_scene_depends_on_its_number_alone():
     assert (
         fourbar.dump(draw_fuzz_scene(3, 17))
         == fourbar.dump(draw_fuzz_scene(3, 17))
@@ -54,7 +53,7 @@ def test_a_scene_depends_on_its_number_alone() -> None:
     )
 
 
-def test_half_are_adversarial() -> None:
+def test_half_are_adversarial():
     """Odd scenes reach where even ones never go.
 
     Bars in a ratio beyond 100, or positions that barely close.
@@ -67,7 +66,7 @@ def test_half_are_adversarial() -> None:
     assert max(spread[1::2]) > 1e3
 
 
-def small_error(true: object) -> object:
+def small_error(true):
     """One part in 1e9 of the moment of bar 3."""
 
     def wrong(lengths, angles, drive_bar, w, *others):  # type: ignore[no-untyped-def]
@@ -78,10 +77,7 @@ def small_error(true: object) -> object:
     return wrong
 
 
-def test_an_error_of_a_billionth_is_found_and_shrunk(
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-) -> None:
+def test_an_error_of_a_billionth_is_found_and_shrunk(monkeypatch, tmp_path):
     solving = import_module("fourbar.evaluation.case")
     monkeypatch.setattr(solving, "pin_forces", small_error(solving.pin_forces))
     scene = replace(
@@ -98,11 +94,7 @@ def test_an_error_of_a_billionth_is_found_and_shrunk(
 
 
 @pytest.mark.parametrize(("times", "found"), [(9.0, False), (11.0, True)])
-def test_a_force_that_vanishes_is_held_to_its_prediction(
-    monkeypatch: pytest.MonkeyPatch,
-    times: float,
-    found: bool,
-) -> None:
+def test_a_force_that_vanishes_is_held_to_its_prediction(monkeypatch, times, found):
     """An error has no size relative to a force of 0, and is judged in newtons."""
     scene = loads(
         (COUNTEREXAMPLES / "bar_with_all_mass_stands_for_an_instant.toml").read_text(
@@ -122,22 +114,20 @@ def test_a_force_that_vanishes_is_held_to_its_prediction(
     assert [row.verdict == "fails" for row in rows if row.quantity == "F12"] == [found]
 
 
-def test_a_traceback_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*_: object) -> None:
+def test_a_traceback_is_a_finding(monkeypatch):
+    def broken(*_):
         raise ZeroDivisionError("oops")
 
     monkeypatch.setattr(examine, "_check_file", broken)
     assert examine.list_findings(crank_rocker()) == ["ZeroDivisionError: oops"]
 
 
-def test_a_position_that_does_not_close_is_a_finding(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_position_that_does_not_close_is_a_finding(monkeypatch):
     scene = replace(crank_rocker(), linkage=fourbar.uniform(0.3, 0.25, 0.1, 0.22))
     scene = replace(scene, motion=fourbar.Motion(np.array([3.0]), 1.0), loads=())
     true = fourbar.solve
 
-    def pretend(*arguments: object, **keywords: object) -> object:
+    def pretend(*arguments, **keywords):
         solution = true(*arguments, **keywords)  # type: ignore[arg-type]
         solution.status_code[:] = 0
         return solution
@@ -148,10 +138,7 @@ def test_a_position_that_does_not_close_is_a_finding(
 
 
 @pytest.mark.slow
-def test_an_interrupted_run_goes_on(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_interrupted_run_goes_on(tmp_path, monkeypatch):
     monkeypatch.setattr("fourbar_lab.fuzz.SCENES_OF_A_TASK", 4)
     first = examine_scenes(12, 1, tmp_path, 1)
     next(first)
@@ -164,16 +151,13 @@ def test_an_interrupted_run_goes_on(
 
 
 @pytest.mark.slow
-def test_a_scene_that_kills_its_worker_costs_itself_alone(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_scene_that_kills_its_worker_costs_itself_alone(tmp_path, monkeypatch):
     monkeypatch.setattr(examine, "examine_scene", dies_in_scene_2)
     (finding,) = examine_scenes(4, 1, tmp_path, 1)
     assert finding.keys() == {"2"} and finding["2"][0].startswith(examine.WORKER_LOST)
 
 
-def dies_in_scene_2(seed: int, index: int) -> list[str]:
+def dies_in_scene_2(seed, index):
     if index == 2:
         os.kill(os.getpid(), signal.SIGSEGV)
     return []

@@ -5,7 +5,6 @@ How they are made, what counts as a changed number, and what the harness catches
 
 import importlib.util
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,7 +20,7 @@ from tests.support.scenes import crank_rocker
 SCENE = crank_rocker()
 
 
-def test_a_number_counts_as_changed_from_a_billionth_on() -> None:
+def test_a_number_counts_as_changed_from_a_billionth_on():
     command = command_of(SCENE)
     before = compute_numbers(SCENE, command)
     assert not is_changed(before, compute_numbers(SCENE, command))
@@ -36,7 +35,7 @@ def test_a_number_counts_as_changed_from_a_billionth_on() -> None:
 
 
 @pytest.mark.slow
-def test_without_a_mutant_the_harness_holds() -> None:
+def test_without_a_mutant_the_harness_holds():
     """Near change points too it holds.
 
     The engines lose as many digits there as they are expected to.
@@ -52,9 +51,7 @@ def test_without_a_mutant_the_harness_holds() -> None:
 
 
 @pytest.mark.slow
-def test_the_harness_alone_catches_a_wrong_sign(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_harness_alone_catches_a_wrong_sign(monkeypatch):
     command = command_of(SCENE)
     answers = [
         (w, harness.ask_at(w.start(), SCENE, command))
@@ -64,7 +61,7 @@ def test_the_harness_alone_catches_a_wrong_sign(
     assert not is_caught(SCENE, command, answers)
     true = harness.solve
 
-    def wrong(*arguments: object, **keywords: object) -> object:
+    def wrong(*arguments, **keywords):
         solution = true(*arguments, **keywords)  # type: ignore[arg-type]
         return replace(solution, F14=-solution.F14)  # type: ignore[type-var,operator]
 
@@ -72,9 +69,7 @@ def test_the_harness_alone_catches_a_wrong_sign(
     assert is_caught(SCENE, command, answers)
 
 
-def test_a_mutant_acts_wherever_its_function_was_imported_and_only_while_active() -> (
-    None
-):
+def test_a_mutant_acts_wherever_its_function_was_imported_and_only_while_active():
     command = command_of(SCENE)
     before = compute_numbers(SCENE, command)
     tried = list(compile_mutants(torque))
@@ -86,8 +81,8 @@ def test_a_mutant_acts_wherever_its_function_was_imported_and_only_while_active(
 
 
 def test_every_operator_and_number_of_functions_methods_and_properties_is_changed(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     source = (
         "A = 3\ndef f(x):\n    return -x if 0 < x <= 1.5 and x is not None else x**2\n"
     )
@@ -137,11 +132,8 @@ def test_every_operator_and_number_of_functions_methods_and_properties_is_change
     ],
 )
 def test_few_mutants_may_be_missed_and_none_that_matters_is_no_success(
-    verdicts: list[bool | None],
-    status: int,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    verdicts, status, monkeypatch, capsys
+):
     some = [
         harness.Mutant(str(n), lambda: None, (lambda: None).__code__)
         for n, _ in enumerate(verdicts)
@@ -155,9 +147,7 @@ def test_few_mutants_may_be_missed_and_none_that_matters_is_no_success(
 
 
 @pytest.mark.posix
-def test_a_mutant_that_hangs_or_raises_is_caught(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_mutant_that_hangs_or_raises_is_caught(monkeypatch):
     tried = [
         harness.Baseline(
             SCENE, command := command_of(SCENE), [], compute_numbers(SCENE, command)
@@ -165,7 +155,7 @@ def test_a_mutant_that_hangs_or_raises_is_caught(
     ]
     mutant = next(compile_mutants(torque))
 
-    def raises(*_: object) -> None:
+    def raises(*_):
         raise ZeroDivisionError
 
     monkeypatch.setattr(harness, "compute_numbers", raises)

@@ -79,16 +79,13 @@ theta_2 - theta_1 had lost nothing.
 
 
 @pytest.fixture(scope="module")
-def tallies() -> dict[str, Tally]:
+def tallies():
     return {family: judge_samples(family, range(SAMPLES)) for family in FAMILY_DRAWERS}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILY_DRAWERS)
-def test_every_output_is_within_what_the_inputs_last_digits_do(
-    family: str,
-    tallies: dict[str, Tally],
-) -> None:
+def test_every_output_is_within_what_the_inputs_last_digits_do(family, tallies):
     tally = tallies[family]
     assert tally.samples == SAMPLES
     assert tally.not_assembled < SAMPLES / 10
@@ -100,9 +97,8 @@ def test_every_output_is_within_what_the_inputs_last_digits_do(
 @pytest.mark.parametrize("bar", [3, 4])
 @pytest.mark.parametrize("family", FAMILY_DRAWERS)
 def test_fed_back_as_a_command_of_another_bar_every_output_returns_within_it_too(
-    family: str,
-    bar: int,
-) -> None:
+    family, bar
+):
     tally = judge_samples(family, range(FED_BACK), bar=bar)
     assert tally.samples > FED_BACK / 2 and not tally.not_assembled and not tally.warned
     assert not {
@@ -112,13 +108,13 @@ def test_fed_back_as_a_command_of_another_bar_every_output_returns_within_it_too
     assert all(ratio <= TOO_SMALL for ratio in tally.too_small.values())
 
 
-def test_derivatives_are_within_what_the_inputs_last_digits_do_to_them() -> None:
+def test_derivatives_are_within_what_the_inputs_last_digits_do_to_them():
     tally = judge_samples("random", range(6), derivatives=True)
     assert tally.holds() and not tally.untold
     assert {"torque", "F12_x", "theta_4", "a_B_y"} <= tally.worst.keys()
 
 
-def test_the_power_of_a_bar_that_hardly_turns_has_its_digits() -> None:
+def test_the_power_of_a_bar_that_hardly_turns_has_its_digits():
     """Its torque has a pole.
 
     Of torque times speed the derivative by theta_2 was 1.05 of what is allowed.
@@ -127,15 +123,13 @@ def test_the_power_of_a_bar_that_hardly_turns_has_its_digits() -> None:
 
 
 @pytest.mark.slow
-def test_a_derivative_that_is_left_out_is_a_failure(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_derivative_that_is_left_out_is_a_failure(monkeypatch):
     """The reference says where there is none.
 
     Where the loop does not close, or dry friction holds a pin at rest.
     """
 
-    def lost(scene: fourbar.Scene) -> fourbar.Sensitivity:
+    def lost(scene):
         sensitivity = fourbar.sensitivity(scene)
         by = {
             name: np.full_like(slopes, np.nan)
@@ -143,7 +137,7 @@ def test_a_derivative_that_is_left_out_is_a_failure(
         }
         return replace(sensitivity, status=["no_torque"], by=by)
 
-    def judged(scene: fourbar.Scene) -> Tally:
+    def judged(scene):
         judge_slopes(scene, tally := Tally(), "")
         return tally
 
@@ -168,7 +162,7 @@ def test_a_derivative_that_is_left_out_is_a_failure(
     )
 
 
-def test_the_numbers_of_a_table_are_inputs() -> None:
+def test_the_numbers_of_a_table_are_inputs():
     """The load's factor is what two of them leave of each other.
 
     3.9 of what the other inputs allow.
@@ -176,7 +170,7 @@ def test_the_numbers_of_a_table_are_inputs() -> None:
     assert judge_samples("tables", range(8523, 8524)).holds()
 
 
-def test_a_pull_between_two_bars_stays_out_of_the_force_at_a_third() -> None:
+def test_a_pull_between_two_bars_stays_out_of_the_force_at_a_third():
     """F12_y is 1.8 mN, the spring between input and coupler pulls with 5.4 N.
 
     In their sums 1.45 of what is allowed.
@@ -184,9 +178,7 @@ def test_a_pull_between_two_bars_stays_out_of_the_force_at_a_third() -> None:
     assert judge_samples("springs", range(2515, 2516)).holds()
 
 
-def test_error_bars_are_neither_too_small_nor_useless(
-    tallies: dict[str, Tally],
-) -> None:
+def test_error_bars_are_neither_too_small_nor_useless(tallies):
     for bar, families in (
         ("torque_error", 10),
         ("drive_force_error", 4),
@@ -202,9 +194,9 @@ def test_error_bars_are_neither_too_small_nor_useless(
         )
 
 
-def test_a_share_is_one_that_chance_explains() -> None:
+def test_a_share_is_one_that_chance_explains():
     # P(X >= k) of a binomial by its sum
-    def least_unexplained(samples: int) -> int:
+    def least_unexplained(samples):
         beyond, k = 1.0, 0
         while beyond >= CHANCE:
             beyond -= (
@@ -225,25 +217,21 @@ def test_a_share_is_one_that_chance_explains() -> None:
     ("family", "seed", "number"),
     [(f, *sample) for f, bad in ONCE_BAD.items() for sample in bad],
 )
-def test_samples_that_once_were_bad(family: str, seed: int, number: int) -> None:
+def test_samples_that_once_were_bad(family, seed, number):
     tally = judge_samples(family, range(number, number + 1), seed)
     assert all(ratio <= 1.0 for ratio, _ in tally.worst.values())
     assert all(ratio <= TOO_SMALL for ratio in tally.too_small.values())
 
 
 @pytest.mark.parametrize("number", ONCE_TOO_WIDE)
-def test_bars_that_stay_parallel_are_charged_what_the_subtraction_lost_alone(
-    number: int,
-) -> None:
+def test_bars_that_stay_parallel_are_charged_what_the_subtraction_lost_alone(number):
     tally = judge_samples("change_point", range(number, number + 1))
     assert not any(tally.too_large.values())
     assert all(ratio <= TOO_SMALL for ratio in tally.too_small.values())
 
 
-def test_an_angle_without_a_value_is_beyond_what_is_allowed(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def lost(*arguments: object, **options: object) -> fourbar.Solution:
+def test_an_angle_without_a_value_is_beyond_what_is_allowed(monkeypatch):
+    def lost(*arguments, **options):
         solution = fourbar.solve(*arguments, **options)  # type: ignore[arg-type]
         solution.theta_3[:] = np.nan
         return solution
@@ -257,14 +245,14 @@ def test_an_angle_without_a_value_is_beyond_what_is_allowed(
     )
 
 
-def test_a_tally_adds_up() -> None:
+def test_a_tally_adds_up():
     tally, parts = judge_samples("random", range(12)), Tally()
     for part in (range(5), range(5, 12)):
         parts.add(judge_samples("random", part))
     assert parts == tally
 
 
-def test_the_command_line_says_how_few_digits_are_left() -> None:
+def test_the_command_line_says_how_few_digits_are_left():
     linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
     dead = float(
         np.arccos((0.3**2 + 0.35**2 - 0.22**2) / (2 * 0.3 * 0.35))
@@ -288,7 +276,7 @@ def test_the_command_line_says_how_few_digits_are_left() -> None:
     )
 
 
-def test_error_bars_grow_towards_a_dead_centre() -> None:
+def test_error_bars_grow_towards_a_dead_centre():
     linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
     # bars 2 and 3 in line: e^2 = c^2 with O2, B, O4; the input angle by the cosine rule
     reach = 0.35

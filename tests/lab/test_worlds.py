@@ -4,8 +4,6 @@ MJX and MuJoCo Warp need not be there. Where they are, they run on any device.
 """
 
 import math
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -40,7 +38,7 @@ TWO_TURNS = 50
 """Worlds that hold each of the 25 positions twice."""
 
 
-def check_errors(name: str, torque: float, force: float) -> None:
+def check_errors(name, torque, force):
     """Check errors against what is known of a contender."""
     low, high = 0.0, SINGLE
     if name == MUJOCO:
@@ -51,7 +49,7 @@ def check_errors(name: str, torque: float, force: float) -> None:
     assert low < force < high, name
 
 
-def test_the_last_worlds_are_judged_and_every_world_has_a_state() -> None:
+def test_the_last_worlds_are_judged_and_every_world_has_a_state():
     cost = measure_worlds(MUJOCO, TWO_TURNS)
     check_errors(MUJOCO, cost.torque, cost.force)
     assert cost.first > 0.5 * cost.seconds and cost.exchanged > 0.5 * cost.seconds
@@ -63,7 +61,7 @@ def test_the_last_worlds_are_judged_and_every_world_has_a_state() -> None:
     assert len(v) == TWO_TURNS
 
 
-def test_a_world_that_is_not_finite_fails() -> None:
+def test_a_world_that_is_not_finite_fails():
     scene, _ = ask_position()
     prepared = MujocoFile().in_worlds(scene, TWO_TURNS)
     results = prepared.exchange()
@@ -74,13 +72,13 @@ def test_a_world_that_is_not_finite_fails() -> None:
         prepared.read(results)
 
 
-def test_a_wrong_world_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wrong_world_is_seen(monkeypatch):
     plain = MujocoFile.in_worlds
 
-    def with_an_error(self: MujocoFile, scene: Any, count: int) -> Any:
+    def with_an_error(self, scene, count):
         prepared = plain(self, scene, count)
 
-        def exchange() -> Any:
+        def exchange():
             results = prepared.exchange()
             # the closing force of the last position
             results[4][-1] *= 1.1
@@ -93,7 +91,7 @@ def test_a_wrong_world_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     assert cost.force > 1e-3 and cost.torque < EXACT
 
 
-def test_times_are_divided_by_those_of_the_formulas() -> None:
+def test_times_are_divided_by_those_of_the_formulas():
     costs = [
         WorldsCost(FORMULAS_ON_ONE_CORE, 1000, 2e-4, 2e-4, 0.01),
         WorldsCost(MUJOCO, 1000, 6e-3, 8e-3, 0.1, 1e-12, 3e-12),
@@ -117,11 +115,7 @@ def test_times_are_divided_by_those_of_the_formulas() -> None:
     ]
 
 
-def test_without_a_gpu_nothing_is_claimed_of_one(
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_without_a_gpu_nothing_is_claimed_of_one(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(worlds, "load_simulator", lambda _: MujocoFile)
     out = tmp_path / "worlds.md"
     assert status(["worlds", "--worlds", str(TWO_TURNS), "-o", str(out)]) == BROKEN
@@ -135,16 +129,12 @@ def test_without_a_gpu_nothing_is_claimed_of_one(
 class Elsewhere(MujocoFile):
     """MuJoCo in the place of a simulator for GPUs."""
 
-    def in_worlds(self, scene: Any, count: int, double: bool = True) -> Any:
+    def in_worlds(self, scene, count, double=True):
         return super().in_worlds(scene, count)
 
 
 @pytest.mark.parametrize("on_gpu", [True, False])
-def test_with_a_gpu_or_on_any_device_all_are_run(
-    on_gpu: bool,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_with_a_gpu_or_on_any_device_all_are_run(on_gpu, monkeypatch, capsys):
     monkeypatch.setattr(Elsewhere, "on_gpu", on_gpu)
     monkeypatch.setattr(worlds, "load_simulator", lambda _: Elsewhere)
     words = ["worlds", "--worlds", str(TWO_TURNS)]
@@ -157,11 +147,8 @@ def test_with_a_gpu_or_on_any_device_all_are_run(
         assert f"{name}, {TWO_TURNS} worlds: " in printed
 
 
-def test_what_is_not_installed_is_named(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    def refuse(adapter: str) -> type[MujocoFile]:
+def test_what_is_not_installed_is_named(monkeypatch, capsys):
+    def refuse(adapter):
         if "warp" in adapter:
             raise ModuleNotFoundError("No module named 'warp'")
         return MujocoFile
@@ -171,11 +158,8 @@ def test_what_is_not_installed_is_named(
     assert "not run: No module named 'warp'" in capsys.readouterr().out
 
 
-def test_a_call_that_fails_costs_its_own_row(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    def fail(*_: Any) -> None:
+def test_a_call_that_fails_costs_its_own_row(monkeypatch, capsys):
+    def fail(*_):
         raise MemoryError("out of memory")
 
     monkeypatch.setattr(worlds, "measure_worlds", fail)
@@ -186,12 +170,12 @@ def test_a_call_that_fails_costs_its_own_row(
 
 
 @pytest.mark.parametrize("text", ["30", "0", "many", ""])
-def test_worlds_are_whole_turns(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_worlds_are_whole_turns(text, capsys):
     assert status(["worlds", "--worlds", text]) == BAD_INPUT
     assert "must be multiples of 25" in capsys.readouterr().err
 
 
-def test_the_page_states_errors_that_hold() -> None:
+def test_the_page_states_errors_that_hold():
     page = (ROOT / "docs" / "cost.md").read_text(encoding="utf-8")
     table = page.partition("<!-- data worlds -->")[2].partition("<!-- end -->")[0]
     rows = {}
@@ -207,7 +191,7 @@ def test_the_page_states_errors_that_hold() -> None:
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", [name for name in CONTENDERS if name != MUJOCO])
-def test_each_simulator_that_is_installed_evaluates_worlds(name: str) -> None:
+def test_each_simulator_that_is_installed_evaluates_worlds(name):
     module = CONTENDERS[name].adapter.partition(":")[0]
     pytest.importorskip(f"fourbar_lab.simulators.{module}", exc_type=ImportError)
     cost = measure_worlds(name, TWO_TURNS)

@@ -3,8 +3,6 @@
 Each says where it comes from, and its generated MJCF is not stale.
 """
 
-from pathlib import Path
-
 import pytest
 
 from fourbar.errors import InputError
@@ -16,17 +14,17 @@ FILES = list_model_files()
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
-def test_every_model_names_its_source_and_has_its_mjcf(file: Path) -> None:
+def test_every_model_names_its_source_and_has_its_mjcf(file):
     scene = load(file)
     assert scene.title and scene.source
     assert not find_stale([file]), "stale: run `make models`"
 
 
-def test_no_mjcf_without_its_scene() -> None:
+def test_no_mjcf_without_its_scene():
     assert {xml.stem for xml in MODELS.glob("*.xml")} <= {file.stem for file in FILES}
 
 
-def test_a_changed_scene_makes_its_mjcf_stale(tmp_path: Path) -> None:
+def test_a_changed_scene_makes_its_mjcf_stale(tmp_path):
     file = tmp_path / "scene.toml"
     file.write_text(FILES[0].read_text(encoding="utf-8"), encoding="utf-8")
     assert find_stale([file]) == [file]

@@ -5,7 +5,6 @@ import pytest
 
 import fourbar
 from fourbar.files import dump, loads
-from fourbar.scene import Scene
 from fourbar_validation.places import MODELS
 from tests.oracle.coordinates import is_coordinate
 from tests.oracle.variants import SceneFile, ask_free_bodies
@@ -42,12 +41,12 @@ PLACE_MOVES = {
 """Coordinate, its place before and after as the file has it, difference, m."""
 
 
-def replace_in(text: str, before: str, after: str) -> str:
+def replace_in(text, before, after):
     assert text.count(before) == 1
     return text.replace(before, after)
 
 
-def assert_alike(one: Scene, other: Scene) -> None:
+def assert_alike(one, other):
     """Hold what free bodies answer of two scenes against each other."""
     answers = [ask_free_bodies(scene).quantities for scene in (one, other)]
     for name in ("theta_3", "theta_4", "G3", "G4", "F12", "F43", "torque"):
@@ -60,7 +59,7 @@ def assert_alike(one: Scene, other: Scene) -> None:
         )
 
 
-def test_every_coordinate_is_found_where_it_is_drawn() -> None:
+def test_every_coordinate_is_found_where_it_is_drawn():
     scene = fourbar.load(DRAWN)
     keys = [key for key in fourbar.sensitivity(scene).keys if is_coordinate(key)]
     stated = SceneFile(scene).find_stated(keys)
@@ -77,7 +76,7 @@ def test_every_coordinate_is_found_where_it_is_drawn() -> None:
 
 
 @pytest.mark.parametrize("key", PIN_MOVES)
-def test_a_moved_pin_is_that_of_the_file_with_places_on_their_bars(key: str) -> None:
+def test_a_moved_pin_is_that_of_the_file_with_places_on_their_bars(key):
     before, after, change = PIN_MOVES[key]
     scene = fourbar.load(DRAWN)
     by_hand = loads(replace_in(dump(scene), before, after))
@@ -89,7 +88,7 @@ def test_a_moved_pin_is_that_of_the_file_with_places_on_their_bars(key: str) -> 
 
 
 @pytest.mark.parametrize("key", PLACE_MOVES)
-def test_a_moved_place_is_that_of_the_drawing(key: str) -> None:
+def test_a_moved_place_is_that_of_the_drawing(key):
     before, after, change = PLACE_MOVES[key]
     text = DRAWN.read_text(encoding="utf-8")
     by_hand = loads(replace_in(text, before, after))

@@ -3,9 +3,7 @@
 Each check holds, and each fails where its public call errs.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +16,7 @@ from fourbar.scene import Scene, command
 from fourbar.studies import derivatives
 from fourbar.studies.keys import read_numbers
 from fourbar_lab.fault_scenes import FAULT_SCENES
-from fourbar_validation.compare.rows import REFUSES, Row
+from fourbar_validation.compare.rows import REFUSES
 from fourbar_validation.run.question import NotAskedError
 from tests.oracle import files
 from tests.oracle.coordinates import DRAWN_SETTING
@@ -28,15 +26,12 @@ from tests.oracle.variants import SceneFile
 from tests.support.scenes import crank_rocker
 
 
-def failing(rows: list[Row]) -> set[str]:
+def failing(rows):
     return {row.quantity for row in rows if row.failed}
 
 
-def altered(
-    call: Callable[..., Any],
-    change: Callable[[Any], None],
-) -> Callable[..., Any]:
-    def wrong(*arguments: Any, **options: Any) -> Any:
+def altered(call, change):
+    def wrong(*arguments, **options):
         answer = call(*arguments, **options)
         change(answer)
         return answer
@@ -44,37 +39,37 @@ def altered(
     return wrong
 
 
-def swapped(solution: Any) -> None:
+def swapped(solution):
     solution.torque[[1, 2]] = solution.torque[[2, 1]]
 
 
-def steeper(answer: Any) -> None:
+def steeper(answer):
     answer.by["torque"] *= 1.000001
 
 
-def lost(answer: Any) -> None:
+def lost(answer):
     answer.by["torque"][:] = np.nan
 
 
-def lost_at_one_position(answer: Any) -> None:
+def lost_at_one_position(answer):
     answer.by["torque"][0, 1] = np.nan
 
 
-def left_out(answer: Any) -> None:
+def left_out(answer):
     del answer.by["torque"]
 
 
-def enlarged(answer: Any) -> None:
+def enlarged(answer):
     """Off by a millionth, in an answer whose own values would be a wide scale."""
     steeper(answer)
     answer.solution.torque[:] *= 1e6
 
 
-def stiffer(answer: Any) -> None:
+def stiffer(answer):
     answer.V[1, 2] *= 1.0 + 1e-8
 
 
-def narrower(answer: Any) -> None:
+def narrower(answer):
     answer.spreads["torque"].deviation[:] *= 0.9
 
 
@@ -90,20 +85,12 @@ def narrower(answer: Any) -> None:
         ("internal_forces", "internal_forces", stiffer, "V3"),
     ],
 )
-def test_a_public_call_that_errs_fails(
-    monkeypatch: pytest.MonkeyPatch,
-    engine: str,
-    call: str,
-    change: Callable[[Any], None],
-    quantity: str,
-) -> None:
+def test_a_public_call_that_errs_fails(monkeypatch, engine, call, change, quantity):
     monkeypatch.setattr(fourbar, call, altered(getattr(fourbar, call), change))
     assert quantity in failing(judge_by(SLENDER, engine))
 
 
-def test_a_derivative_that_is_left_out_ends_its_check(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_derivative_that_is_left_out_ends_its_check(monkeypatch):
     """Which the run counts as a failure."""
     call = altered(fourbar.sensitivity, left_out)
     monkeypatch.setattr(fourbar, "sensitivity", call)
@@ -119,7 +106,7 @@ NEAREST = ("study", "sensitivity", "tolerances")
 """Checks whose members keep the nominal assembly."""
 
 
-def passing_change_points(name: str, branch: int) -> Scene:
+def passing_change_points(name, branch):
     d, a, b, c = CHANGE_POINTS[name]
     linkage = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b, 2.0), fourbar.Bar(c))
     motion = fourbar.Motion(fourbar.Sweep(0.0, 2.0 * np.pi, 24), 6.3, branch=branch)
@@ -128,10 +115,7 @@ def passing_change_points(name: str, branch: int) -> Scene:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "branch"), [("a parallelogram", 1), ("a kite", -1)])
-def test_members_near_a_change_point_keep_the_nominal_assembly(
-    name: str,
-    branch: int,
-) -> None:
+def test_members_near_a_change_point_keep_the_nominal_assembly(name, branch):
     scene = passing_change_points(name, branch)
     for engine in NEAREST:
         rows = judge_by(scene, engine)
@@ -139,34 +123,34 @@ def test_members_near_a_change_point_keep_the_nominal_assembly(
         assert not failing(rows)
 
 
-def test_a_member_in_the_other_closure_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_member_in_the_other_closure_fails(monkeypatch):
     """Each member solved alone changes over to the other motion past 180 deg."""
     monkeypatch.setattr(Case, "beside", lambda case, _: case)
     scene = passing_change_points("a parallelogram", 1)
     assert {"theta_4", "torque"} <= failing(judge_by(scene, "study"))
 
 
-def test_derivatives_of_the_other_closure_fail(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_derivatives_of_the_other_closure_fail(monkeypatch):
     monkeypatch.setattr(derivatives, "find_root_sign", lambda *_, **__: 1.0)
     scene = passing_change_points("a parallelogram", 1)
     assert {"theta_4", "torque"} <= failing(judge_by(scene, "sensitivity"))
     assert {"theta_4", "torque"} <= failing(judge_by(scene, "tolerances"))
 
 
-def test_tolerances_far_past_a_change_point_are_not_asked() -> None:
+def test_tolerances_far_past_a_change_point_are_not_asked():
     scene = passing_change_points("a parallelogram", 1)
     wide = fourbar.Tolerance("lengths.input", 0.01)
     with pytest.raises(NotAskedError, match="far past a change point"):
         judge_by(replace(scene, tolerances=(wide,)), "tolerances")
 
 
-def changed(**numbers: Any) -> Callable[[Any], Any]:
+def changed(**numbers):
     return lambda answer: answer._replace(
         found=(answer.found[0]._replace(**numbers), *answer.found[1:])
     )
 
 
-def turned(answer: Any) -> Any:
+def turned(answer):
     place = answer.found[0].place
     return changed(place=place._replace(theta_2=place.theta_2 + 1e-7))(answer)
 
@@ -184,26 +168,20 @@ def turned(answer: Any) -> Any:
         (changed(frequency=3.0), {"frequency"}),
     ],
 )
-def test_equilibria_that_err_fail(
-    monkeypatch: pytest.MonkeyPatch,
-    change: Callable[[Any], Any],
-    quantities: set[str],
-) -> None:
+def test_equilibria_that_err_fail(monkeypatch, change, quantities):
     call = fourbar.equilibrium
     monkeypatch.setattr(fourbar, "equilibrium", lambda scene: change(call(scene)))
     assert failing(judge_by(SLENDER, "equilibria")) >= quantities
 
 
-def test_a_frequency_of_an_inertia_that_is_rounding_fails(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_frequency_of_an_inertia_that_is_rounding_fails(monkeypatch):
     output = fourbar.Bar(0.25, 1.0, 0.002, (0.1, 0.0))
     bars = fourbar.Bar(0.4), fourbar.Bar(0.2), output
     scene = Scene(fourbar.FourBar(0.3, *bars, 0.5), effects=(fourbar.Gravity(),))
     assert not failing(judge_by(scene, "equilibria"))
     call = fourbar.equilibrium
 
-    def with_frequency(asked: Scene) -> Any:
+    def with_frequency(asked):
         answer = call(asked)
         found = [
             each._replace(frequency=1e16)
@@ -218,7 +196,7 @@ def test_a_frequency_of_an_inertia_that_is_rounding_fails(
 
 
 @pytest.mark.parametrize("gravity", [-0.7, 2.1])
-def test_equilibria_near_a_limit_are_compared_too(gravity: float) -> None:
+def test_equilibria_near_a_limit_are_compared_too(gravity):
     scene = replace(
         FAULT_SCENES["limited"],
         effects=(fourbar.Gravity(9.81, gravity),),
@@ -273,13 +251,13 @@ HARD_AT_REST = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", HARD_AT_REST)
-def test_right_equilibria_hold_where_they_are_hard_to_judge(name: str) -> None:
+def test_right_equilibria_hold_where_they_are_hard_to_judge(name):
     rows = judge_by(HARD_AT_REST[name], "equilibria")
     assert {row.quantity for row in rows} >= {"missed", "torque", "slope", "inertia"}
     assert not [row for row in rows if row.failed]
 
 
-def test_a_heavy_output_that_turns_slowly_keeps_its_inertia() -> None:
+def test_a_heavy_output_that_turns_slowly_keeps_its_inertia():
     """Its turn is 6e-7 of the fastest bar's, to all digits, beside a dead centre."""
     crank, coupler, output = (
         fourbar.Bar(length, mass)
@@ -292,7 +270,7 @@ def test_a_heavy_output_that_turns_slowly_keeps_its_inertia() -> None:
 
 
 @pytest.mark.parametrize("engine", ["equilibria", "study", "sensitivity"])
-def test_where_nothing_assembles_nothing_is_asked(engine: str) -> None:
+def test_where_nothing_assembles_nothing_is_asked(engine):
     scene = FAULT_SCENES["limited"]
     scene = replace(
         scene,
@@ -318,7 +296,7 @@ bring to where nothing assembles.
 
 
 @pytest.mark.parametrize("engine", BARELY)
-def test_a_changed_linkage_that_hardly_assembles_is_no_failure(engine: str) -> None:
+def test_a_changed_linkage_that_hardly_assembles_is_no_failure(engine):
     d, *moving = BARELY[engine]
     linkage = fourbar.FourBar(d, *(fourbar.Bar(length, 1.0) for length in moving))
     scene = fourbar.Scene(
@@ -349,7 +327,7 @@ COMMANDS = {
 }
 
 
-def commanding(name: str) -> Scene:
+def commanding(name):
     ends = Place(1, (0.25, -2.8)), Place(2, (0.09, 0.17))
     return crank_rocker(
         motion=COMMANDS[name],
@@ -360,19 +338,17 @@ def commanding(name: str) -> Scene:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", COMMANDS)
-def test_other_commands_are_judged_too(name: str) -> None:
+def test_other_commands_are_judged_too(name):
     rows = judge_by(commanding(name))
     assert not failing(rows)
     oracles = {oracle.__name__ for oracle in OF_FORCES} - {"sdf", "usd"}
     assert {row.engine for row in rows if row.compared} >= oracles
 
 
-def test_a_study_of_another_command_that_errs_fails(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_study_of_another_command_that_errs_fails(monkeypatch):
     scene, call = commanding("stroke"), fourbar.solve
 
-    def wrong(subject: Any, *arguments: Any, **options: Any) -> Any:
+    def wrong(subject, *arguments, **options):
         answer = call(subject, *arguments, **options)
         if not isinstance(subject, Scene):
             answer.drive_force[[1, 2]] = answer.drive_force[[2, 1]]
@@ -385,15 +361,11 @@ def test_a_study_of_another_command_that_errs_fails(
 @pytest.mark.parametrize(
     ("engine", "number"), [("sdf", "0.2"), ("sdf", "0.25"), ("usd", "0.2")]
 )
-def test_a_file_with_another_number_fails(
-    monkeypatch: pytest.MonkeyPatch,
-    engine: str,
-    number: str,
-) -> None:
+def test_a_file_with_another_number_fails(monkeypatch, engine, number):
     """0.2 kg is the mass of the input, 0.25 m the length of the coupler."""
     text = getattr(files, f"{engine}_text")
 
-    def wrong(scene: Scene) -> str:
+    def wrong(scene):
         written: str = text(scene)
         for before, after in ((">", "<"), (">", " "), ("= ", "\n"), ("(", ",")):
             written = written.replace(
@@ -406,7 +378,7 @@ def test_a_file_with_another_number_fails(
     assert failing(judge_by(SLENDER, engine))
 
 
-def test_what_a_file_cannot_hold_is_refused() -> None:
+def test_what_a_file_cannot_hold_is_refused():
     (row,) = judge_by(FAULT_SCENES["sliding pins"], "usd")
     assert row.verdict == REFUSES and "pin_friction" in row.reason
 
@@ -414,7 +386,7 @@ def test_what_a_file_cannot_hold_is_refused() -> None:
 @pytest.mark.parametrize(
     "name", ["crank-rocker", "damped", "sprung", "flywheel", "sliding pins", "table"]
 )
-def test_every_number_that_a_scene_states_is_found_in_its_file(name: str) -> None:
+def test_every_number_that_a_scene_states_is_found_in_its_file(name):
     scene = FAULT_SCENES[name]
     keys = read_numbers(scene).keys()
     stated = SceneFile(scene).find_stated(keys)
@@ -449,7 +421,7 @@ gravity = ["9.81 m/s^2", "-90 deg"]
 
 
 @pytest.mark.parametrize("check", ["sensitivity", "tolerances", "study"])
-def test_a_drawn_scene_is_judged_by_lengths_and_by_its_coordinates(check: str) -> None:
+def test_a_drawn_scene_is_judged_by_lengths_and_by_its_coordinates(check):
     rows = judge_by(loads(LIFT), check)
     assert not failing(rows)
     judged = {(row.setting, row.quantity): row.reason for row in rows if row.compared}
@@ -464,17 +436,16 @@ def test_a_drawn_scene_is_judged_by_lengths_and_by_its_coordinates(check: str) -
         assert judged[DRAWN_SETTING, "points"].endswith("in 14 numbers")
 
 
-def test_a_scene_stated_by_lengths_has_no_coordinates_to_judge() -> None:
+def test_a_scene_stated_by_lengths_has_no_coordinates_to_judge():
     for check in ("sensitivity", "study"):
         assert {row.setting for row in judge_by(SLENDER, check)} == {"exact"}
 
 
 @pytest.mark.parametrize("key", ["pins.B.1", "drive.to.drawn.0", "points.edge.drawn.1"])
 def test_a_wrong_slope_by_a_coordinate_fails_in_the_rows_of_the_drawing(
-    monkeypatch: pytest.MonkeyPatch,
-    key: str,
-) -> None:
-    def steepen(answer: Any) -> None:
+    monkeypatch, key
+):
+    def steepen(answer):
         for slopes in answer.by.values():
             slopes[list(answer.keys).index(key)] *= 1.00001
 
@@ -486,7 +457,7 @@ def test_a_wrong_slope_by_a_coordinate_fails_in_the_rows_of_the_drawing(
 
 
 @pytest.mark.slow
-def test_tolerances_of_coordinates_are_judged() -> None:
+def test_tolerances_of_coordinates_are_judged():
     """A load acts at the point: it changes forces, and the pins the motion."""
     text = (
         LIFT
@@ -509,7 +480,7 @@ force = ["900 N", "-80 deg"]
             assert {row.reason for row in rows} == {f"spread: {keys}"}
 
 
-def test_what_a_balanced_linkage_leaves_of_a_torque_is_not_judged() -> None:
+def test_what_a_balanced_linkage_leaves_of_a_torque_is_not_judged():
     """A lamp that a spring of no free length balances: k = m g l/(r h)."""
     arms = (fourbar.Bar(0.3), fourbar.Bar(0.06, 2.0), fourbar.Bar(0.3))
     linkage = fourbar.FourBar(0.06, *arms, 0.5 * np.pi)

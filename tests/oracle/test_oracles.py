@@ -8,7 +8,6 @@ from contextlib import suppress
 
 import pytest
 
-from fourbar_validation.compare.rows import Row
 from fourbar_validation.run.question import NotAskedError
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from fourbar_validation.scenes.suites import read_default_suite
@@ -39,7 +38,7 @@ SAMPLE = {
 """Oracles that have something to compare in each scene of the quick sample."""
 
 
-def find_failing(rows: list[Row]) -> list[str]:
+def find_failing(rows):
     return [f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.failed]
 
 
@@ -47,13 +46,13 @@ def find_failing(rows: list[Row]) -> list[str]:
     ("name", "oracle"),
     [(name, oracle) for name, oracles in SAMPLE.items() for oracle in sorted(oracles)],
 )
-def test_the_sample_is_compared_and_holds(name: str, oracle: str) -> None:
+def test_the_sample_is_compared_and_holds(name, oracle):
     rows = judge_by(take_scene(name), oracle)
     assert any(row.compared for row in rows)
     assert not find_failing(rows)
 
 
-def test_every_oracle_is_in_the_sample() -> None:
+def test_every_oracle_is_in_the_sample():
     assert set().union(*SAMPLE.values()) == ORACLES.keys()
 
 
@@ -61,7 +60,7 @@ def test_every_oracle_is_in_the_sample() -> None:
 @pytest.mark.parametrize(
     "number", range(len(SHIPPED)), ids=[SHIPPED.name(i) for i in range(len(SHIPPED))]
 )
-def test_every_shipped_scene_holds(number: int) -> None:
+def test_every_shipped_scene_holds(number):
     assert not find_failing(judge_by(SHIPPED.scene(number)))
 
 
@@ -74,7 +73,7 @@ def test_every_shipped_scene_holds(number: int) -> None:
         for number in range(place % SHARE, RANDOM_SCENES, SHARE)
     ],
 )
-def test_random_scenes_hold(number: int, oracle: str) -> None:
+def test_random_scenes_hold(number, oracle):
     scene = draw_random_scene(SEED, number, tuple(DrawnType))
     with suppress(NotAskedError):
         assert not find_failing(judge_by(scene, oracle))

@@ -9,7 +9,7 @@ import pytest
 from fourbar.effects import Load, Table
 from fourbar.formulas.mobility import TURN, choose_range
 from fourbar.linkage import PIN_FORCE
-from fourbar.scene import Scene, command_at
+from fourbar.scene import command_at
 from fourbar.scene.motion import RISE_LAWS, Motion, Rise, Sine
 from fourbar.show.block import write_motor
 from fourbar_lab.fault_scenes import CRANK_ROCKER
@@ -31,7 +31,7 @@ EXCESS = 1e-4
 """Part by which a value may exceed a printed peak, which has four digits."""
 
 
-def find_excess(scene: Scene) -> dict[str, float]:
+def find_excess(scene):
     """Return by what part each printed peak is exceeded, by quantity."""
     question = make_question("", scene, ())
     facts = summarize_scene(question)
@@ -66,7 +66,7 @@ def find_excess(scene: Scene) -> dict[str, float]:
     }
 
 
-def fall(duration: float, steps: int) -> Scene:
+def fall(duration, steps):
     law = Rise("cycloidal", (1.2, 0.5), 0.3, 0.1, duration, 0.1, steps=steps)
     return replace(CRANK_ROCKER, motion=Motion(law=law))
 
@@ -92,13 +92,13 @@ SPIKE = Load(
         pytest.param(fall(0.02, 24), id="fall in 20 ms"),
     ],
 )
-def test_no_position_exceeds_a_printed_peak(scene: Scene) -> None:
+def test_no_position_exceeds_a_printed_peak(scene):
     excess = find_excess(scene)
     assert {"torque", "power", *PIN_FORCE.values()} == excess.keys()
     assert max(excess.values()) <= EXCESS, excess
 
 
-def require_no_excess(scene: Scene) -> None:
+def require_no_excess(scene):
     try:
         excess = find_excess(scene)
     except NotAskedError as reason:
@@ -108,17 +108,17 @@ def require_no_excess(scene: Scene) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(len(SHIPPED)))
-def test_no_position_of_a_shipped_scene_exceeds_a_peak(number: int) -> None:
+def test_no_position_of_a_shipped_scene_exceeds_a_peak(number):
     require_no_excess(SHIPPED.scene(number))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(0, RANDOM_SCENES, min(SHARE, SCENE_SHARE)))
-def test_no_position_of_a_random_scene_exceeds_a_peak(number: int) -> None:
+def test_no_position_of_a_random_scene_exceeds_a_peak(number):
     require_no_excess(draw_random_scene(SEED, number, tuple(DrawnType)))
 
 
-def draw_motion(seed: int, number: int) -> Scene:
+def draw_motion(seed, number):
     """Draw a random linkage whose commanded angle follows a random law.
 
     Parts of the law last from 5 ms to 1 s, and 12 to 90 steps cover all of them.
@@ -142,5 +142,5 @@ def draw_motion(seed: int, number: int) -> Scene:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(0, LAWS, min(SHARE, LAW_SHARE)))
-def test_no_position_of_a_random_law_exceeds_a_peak(number: int) -> None:
+def test_no_position_of_a_random_law_exceeds_a_peak(number):
     require_no_excess(draw_motion(SEED, number))

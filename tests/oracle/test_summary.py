@@ -19,7 +19,7 @@ from tests.oracle.summary import summary
 from tests.support.scenes import CYLINDER, crank_rocker
 
 
-def turn(turns: float = 1.0, steps: int = 36, **changes: Any) -> fourbar.Scene:
+def turn(turns=1.0, steps=36, **changes):
     sweep = fourbar.Sweep(0.1, 0.1 + math.tau * turns, steps)
     return crank_rocker(motion=fourbar.Motion(sweep, 9.0), **changes)
 
@@ -33,7 +33,7 @@ PUSHED = crank_rocker(
 )
 
 
-def judge(scene: fourbar.Scene) -> set[str]:
+def judge(scene):
     """Return the names of the rows that fail; a check that breaks down is "all"."""
     question = make_question("scene", scene, ())
     rows = question.attempt(lambda: summary(question), "summary")
@@ -43,16 +43,14 @@ def judge(scene: fourbar.Scene) -> set[str]:
 @pytest.mark.parametrize(
     ("scene", "last"), [(TURN, "frame_force"), (PUSHED, "bore")], ids=("turn", "pushed")
 )
-def test_the_summary_of_a_scene_agrees_with_free_bodies(
-    scene: fourbar.Scene, last: str
-) -> None:
+def test_the_summary_of_a_scene_agrees_with_free_bodies(scene, last):
     rows = summary(make_question("scene", scene, ()))
     assert not [row for row in rows if row.failed]
     names = {"ranges", "peaks", "integrals", "pins", "bending", last}
     assert {row.quantity for row in rows} == names
 
 
-def put(whole: Any, path: tuple[Any, ...], change: Callable[[Any], Any]) -> Any:
+def put(whole, path, change):
     """Return a copy of nested records, mappings and tuples with one part changed."""
     if not path:
         return change(whole)
@@ -68,19 +66,19 @@ def put(whole: Any, path: tuple[Any, ...], change: Callable[[Any], Any]) -> Any:
     return whole._replace(**{first: part})
 
 
-def times(factor: float) -> Callable[[float], float]:
+def times(factor):
     return lambda number: number * factor
 
 
-def plus(difference: float) -> Callable[[float], float]:
+def plus(difference):
     return lambda number: number + difference
 
 
-def become(value: Any) -> Callable[[Any], Any]:
+def become(value):
     return lambda _: value
 
 
-def only(key: Any) -> Callable[[Any], Any]:
+def only(key):
     return lambda parts: {key: parts[key]}
 
 
@@ -142,7 +140,7 @@ MOTOR: dict[str, list[tuple[str, Callable[[Any], Any]]]] = {
 
 
 @pytest.fixture(scope="module")
-def said() -> dict[str, Any]:
+def said():
     """What is said of the turn, by the function that says it."""
     question = make_question("scene", TURN, ())
     motor = module.write_motor(TURN, question.solution, {})
@@ -160,13 +158,8 @@ def said() -> dict[str, Any]:
     ],
 )
 def test_what_is_off_or_missing_fails_its_row(
-    function: str,
-    rows: str,
-    path: str,
-    change: Callable[[Any], Any],
-    said: dict[str, Any],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    function, rows, path, change, said, monkeypatch
+):
     steps = tuple(int(step) if step.isdigit() else step for step in path.split())
     spoilt = put(said[function], steps, change)
     monkeypatch.setattr(module, function, lambda *_: spoilt)
@@ -174,7 +167,7 @@ def test_what_is_off_or_missing_fails_its_row(
 
 
 @pytest.mark.parametrize("turns", [1, pytest.param(24, marks=pytest.mark.slow)])
-def test_what_grows_between_positions_is_believed(turns: int) -> None:
+def test_what_grows_between_positions_is_believed(turns):
     """The drive's bar stands still between the positions, of which none is near."""
     sweep = fourbar.Sweep(0.12, 0.12 + math.tau * turns, 40 * turns)
     scene = crank_rocker(motion=fourbar.Motion(sweep, 9.0), drive_bar=4)
@@ -184,14 +177,11 @@ def test_what_grows_between_positions_is_believed(turns: int) -> None:
 
 
 @pytest.mark.parametrize("part", [0.0, 0.479])
-def test_a_bar_that_bends_more_elsewhere_fails(
-    part: float,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_bar_that_bends_more_elsewhere_fails(part, monkeypatch):
     """The largest moment that is said may be a true one, at another place."""
     free_piece = module.free_piece
 
-    def bend_more(*of: Any) -> Any:
+    def bend_more(*of):
         piece = free_piece(*of)
         if piece.bar == 3 and piece.cut == part * TURN.linkage.coupler.length:
             piece.M += 1e3
@@ -203,9 +193,7 @@ def test_a_bar_that_bends_more_elsewhere_fails(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("turns", "factor"), [(1, 5), (3, 5), (0.75, 0.75)])
-def test_an_open_motion_is_told_from_a_turn(
-    turns: float, factor: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_open_motion_is_told_from_a_turn(turns, factor, monkeypatch):
     """The package's word for a closed motion follows from it."""
     scene = turn(turns, round(36 * turns))
     assert not judge(scene)
@@ -214,12 +202,10 @@ def test_an_open_motion_is_told_from_a_turn(
     assert judge(scene) == {"integrals"}
 
 
-def test_a_printed_bore_that_is_off_fails_its_row(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_printed_bore_that_is_off_fails_its_row(monkeypatch):
     write = module.write_block
 
-    def off(*of: Any, **options: Any) -> list[str]:
+    def off(*of, **options):
         lines = write(*of, **options)
         return [re.sub(r"at least (\d)", r"at least 1\1", line) for line in lines]
 
@@ -245,7 +231,7 @@ BESIDE_A_POLE = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BESIDE_A_POLE)
-def test_beside_a_pole_bending_agrees(name: str) -> None:
+def test_beside_a_pole_bending_agrees(name):
     rows = summary(make_question("scene", BESIDE_A_POLE[name], ()))
     assert [row.compared for row in rows if row.quantity == "bending"] == [True]
     assert not [row for row in rows if row.failed]
@@ -262,6 +248,6 @@ def test_beside_a_pole_bending_agrees(name: str) -> None:
         ({"motion": fourbar.Motion(np.array([0.1, 0.2]), 1.0)}, "no sweep"),
     ],
 )
-def test_what_has_poles_or_jumps_is_not_asked(changes: Any, why: str) -> None:
+def test_what_has_poles_or_jumps_is_not_asked(changes, why):
     with pytest.raises(NotAskedError, match=why):
         summary(make_question("scene", crank_rocker(**changes), ()))

@@ -9,7 +9,7 @@ import math
 import pydoc
 import re
 import runpy
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import fields, replace
 from decimal import Decimal
 from functools import partial
@@ -27,7 +27,7 @@ from tests.support.scenes import CYLINDER, crank_rocker
 DOCS = Path(__file__).parents[2] / "docs"
 
 
-def test_the_page_of_the_api_has_every_public_name_once_and_its_reference_too() -> None:
+def test_the_page_of_the_api_has_every_public_name_once_and_its_reference_too():
     names = sorted(dir(fourbar))
     table = (
         (DOCS / "api.md")
@@ -41,7 +41,7 @@ def test_the_page_of_the_api_has_every_public_name_once_and_its_reference_too() 
     assert all(f"\n### {name}\n" in reference for name in names)
 
 
-def test_dir_shows_what_there_is_and_nothing_else() -> None:
+def test_dir_shows_what_there_is_and_nothing_else():
     assert {
         "classify",
         "limit_positions",
@@ -57,7 +57,7 @@ def test_dir_shows_what_there_is_and_nothing_else() -> None:
 
 
 @pytest.mark.parametrize("number", [0.25, np.float64(0.25)])
-def test_a_number_where_a_bar_belongs_gets_a_sentence(number: float) -> None:
+def test_a_number_where_a_bar_belongs_gets_a_sentence(number):
     with pytest.raises(
         fourbar.InputError,
         match=r"bars.coupler = .*0\.25.*must be a Bar, like fourbar\.Bar",
@@ -87,7 +87,7 @@ OF_OTHERS = {"Solution", "Sensitivity", "Study", "Released"}
 """What functions return; nobody constructs them."""
 
 
-def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
+def calls():
     """Every public function and class, used: what is called, and good arguments."""
     link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
     scene, rows = (
@@ -106,28 +106,28 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
     drawn = ((0.0, 0.0), (0.0, 0.1), (0.175, 0.05), (0.25, 0.05))
     times, angles = (0.0, 1.0, 2.0, 3.0), (0.0, 0.1, 0.2, 0.1)
 
-    def moving(motion: fourbar.Motion) -> object:
+    def moving(motion):
         return fourbar.solve(fourbar.Scene(link, motion))
 
-    def acting(effect: Any) -> object:
+    def acting(effect):
         return fourbar.solve(
             fourbar.Scene(link, fourbar.Motion(1.0, 10.0), effects=(effect,))
         )
 
-    def by(kind: Any, *values: Any) -> object:
+    def by(kind, *values):
         return acting(kind.at(O2=values[0]))
 
-    def law(*arguments: Any) -> object:
+    def law(*arguments):
         return moving(fourbar.Motion(law=fourbar.Law(*arguments)))
 
-    def bars(*arguments: Any) -> object:
+    def bars(*arguments):
         return fourbar.solve(
             fourbar.Scene(
                 fourbar.FourBar(0.3, fourbar.Bar(*arguments), link.coupler, link.output)
             )
         )
 
-    def solved(*arguments: Any) -> object:
+    def solved(*arguments):
         return fourbar.solve(
             arguments[0],
             arguments[1],
@@ -304,7 +304,7 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
     }
 
 
-def calls_by_name() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
+def calls_by_name():
     """Arguments that are given by their names, each for itself.
 
     What is called, and a good value.
@@ -313,36 +313,36 @@ def calls_by_name() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
     ends = (fourbar.Place(2, (0.1, 0.2)), fourbar.Place(4, (0.1, 0.2)))
     pair, points = (0.1, 0.2), (fourbar.Point("P", 2, (0.1, 0.2)),)
 
-    def solve(motion: fourbar.Motion = base, **parts: Any) -> object:
+    def solve(motion=base, **parts):
         return fourbar.solve(fourbar.Scene(link, motion, points=points, **parts))
 
-    def load(**stated: Any) -> object:
+    def load(**stated):
         return solve(loads=(fourbar.Load(2, (1.0, 0.0), **stated),))
 
-    def bar(**stated: Any) -> object:
+    def bar(**stated):
         moving = fourbar.Bar(0.1, **stated), link.coupler, link.output
         return fourbar.solve(fourbar.Scene(fourbar.FourBar(0.3, *moving), base))
 
-    def pull(**stated: Any) -> object:
+    def pull(**stated):
         spring = fourbar.Spring(fourbar.Place(2, **stated), ends[1], 1.0)
         return solve(effects=(fourbar.Springs((spring,)),))
 
-    def name(**stated: Any) -> object:
+    def name(**stated):
         return fourbar.solve(
             fourbar.Scene(link, base, points=(fourbar.Point("Q", 3, **stated),))
         )
 
-    def rise(**stated: Any) -> object:
+    def rise(**stated):
         return solve(fourbar.Motion(law=fourbar.Rise("345", pair, steps=8, **stated)))
 
-    def follow(**stated: Any) -> object:
+    def follow(**stated):
         law = fourbar.Law((0.0, 1.0, 2.0, 3.0), steps=2, **stated)
         return solve(fourbar.Motion(law=law))
 
-    def turn(**stated: Any) -> object:
+    def turn(**stated):
         return solve(fourbar.Motion(**stated))
 
-    def stroke(**stated: Any) -> object:
+    def stroke(**stated):
         motion = fourbar.Motion(**({"stroke": 0.25, "side": "left"} | stated))
         return solve(motion, drive=CYLINDER)
 
@@ -384,7 +384,7 @@ def calls_by_name() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
     return table_of_calls
 
 
-def spoilt(value: Any, wrong: object) -> Iterator[Any]:
+def spoilt(value, wrong):
     """The wrong value, and tuples in which it stands for one part, at any depth."""
     yield wrong
     if isinstance(value, tuple):
@@ -396,9 +396,8 @@ def spoilt(value: Any, wrong: object) -> Iterator[Any]:
 
 @pytest.mark.slow
 def test_whatever_an_argument_is_the_answer_is_a_value_or_one_line(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     table = calls() | calls_by_name()
     public = set(dir(fourbar)) - OF_OTHERS
@@ -421,7 +420,7 @@ def test_whatever_an_argument_is_the_answer_is_a_value_or_one_line(
     assert not holes, "\n".join(holes)
 
 
-def test_a_figure_is_refused_arguments_of_another_type(tmp_path: Path) -> None:
+def test_a_figure_is_refused_arguments_of_another_type(tmp_path):
     scene = fourbar.Scene(
         fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(1.0, 10.0)
     )
@@ -442,7 +441,7 @@ def test_a_figure_is_refused_arguments_of_another_type(tmp_path: Path) -> None:
         assert "\n" not in str(caught.value)
 
 
-def test_the_public_formulas_agree_with_a_solution() -> None:
+def test_the_public_formulas_agree_with_a_solution():
     """A point's velocity is its coefficient times omega_2.
 
     The coupler curve passes through the point at each angle.
@@ -474,9 +473,7 @@ def test_the_public_formulas_agree_with_a_solution() -> None:
     assert np.allclose(np.column_stack(pin), solution.A, rtol=0.0, atol=1e-15)
 
 
-def test_classify_as_json_is_what_the_formulas_say(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_classify_as_json_is_what_the_formulas_say(capsys):
     assert status(["classify", "0.3", "0.1", "0.25", "0.22", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
@@ -497,7 +494,7 @@ def test_classify_as_json_is_what_the_formulas_say(
     assert json.loads(capsys.readouterr().out)["barker"] is None
 
 
-def test_a_scene_draws_itself(tmp_path: Path) -> None:
+def test_a_scene_draws_itself(tmp_path):
     pytest.importorskip(
         "matplotlib",
         reason="drawing needs matplotlib: pip install matplotlib",
@@ -510,7 +507,7 @@ def test_a_scene_draws_itself(tmp_path: Path) -> None:
         crank_rocker().plot("pie")  # type: ignore[attr-defined]
 
 
-def test_help_says_the_parameters() -> None:
+def test_help_says_the_parameters():
     shown = pydoc.render_doc(crank_rocker().plot, renderer=pydoc.plaintext)  # type: ignore[attr-defined]
     assert all(
         f"{name} :" in shown
@@ -523,7 +520,7 @@ def test_help_says_the_parameters() -> None:
         )
 
 
-def test_scenes_compare_by_value(tmp_path: Path) -> None:
+def test_scenes_compare_by_value(tmp_path):
     scene = crank_rocker(motion=fourbar.Motion(np.array([0.1, 0.2]), 10.0))
     same = crank_rocker(motion=fourbar.Motion(np.array([0.1, 0.2]), 10.0))
     assert scene == same and hash(scene) == hash(same) and scene != "scene"
@@ -541,10 +538,7 @@ def test_scenes_compare_by_value(tmp_path: Path) -> None:
     assert fourbar.load(file) == fourbar.load(tmp_path / "a.toml")
 
 
-def test_loads_without_a_speed_are_pointed_to_the_static_torque(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_loads_without_a_speed_are_pointed_to_the_static_torque(tmp_path, capsys):
     save(crank_rocker(motion=fourbar.Motion(1.0)), tmp_path / "still.toml")
     assert status(["analyze", str(tmp_path / "still.toml")]) == 0
     hint = 'omega_2 = "0 rad/s" gives the static torque and pin forces'
@@ -572,7 +566,7 @@ def test_loads_without_a_speed_are_pointed_to_the_static_torque(
 
 
 @pytest.mark.parametrize("wrong", [0, 2, -1.5, np.nan])
-def test_a_command_on_no_branch_is_refused(wrong: float) -> None:
+def test_a_command_on_no_branch_is_refused(wrong):
     scene = fourbar.Scene(
         fourbar.uniform(0.3, 0.1, 0.25, 0.22),
         fourbar.Motion(np.array([0.1, 0.2]), 10.0),

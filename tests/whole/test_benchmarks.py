@@ -3,15 +3,11 @@
 import math
 from itertools import product
 
-import pytest
-
 from benchmarks import engines, formulas
 from fourbar_validation.engines.registry import ENGINES
 
 
-def test_the_benchmarks_judge_a_model_and_time_what_is_installed(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_benchmarks_judge_a_model_and_time_what_is_installed(monkeypatch):
     free_body = next(engine for engine in ENGINES if engine.name == "free-body")
     monkeypatch.setattr(engines, "ENGINES", (free_body,))
     monkeypatch.setattr(

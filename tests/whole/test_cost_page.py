@@ -11,11 +11,10 @@ from pathlib import Path
 import pytest
 
 from fourbar.files import load
-from fourbar.mjcf import Settings
 from fourbar.scene import command
 from fourbar.show.plot.style import apply_style
 from fourbar_validation.advise.matters import judge_trial
-from fourbar_validation.advise.worst_errors import WorstErrors, compute_errors
+from fourbar_validation.advise.worst_errors import compute_errors
 from fourbar_validation.cost import pictures, study
 from fourbar_validation.cost.conclusion import DEFAULT
 from fourbar_validation.cost.cost import write_subtitle
@@ -34,7 +33,7 @@ PRINTED = 0.06
 DRAWS = runpy.run_path(str(DOCS / "cost.py"))
 
 
-def read_rows() -> list[list[str]]:
+def read_rows():
     """Read the table of settings."""
     table = PAGE.partition("<!-- data settings -->")[2].partition("<!-- end -->")[0]
     lines = table.strip().splitlines()[2:]
@@ -44,7 +43,7 @@ def read_rows() -> list[list[str]]:
 ROWS = read_rows()
 
 
-def read_settings(text: str, steps: float) -> Settings:
+def read_settings(text, steps):
     """Read settings as the page words them."""
     constant = float(re.findall(r"tc = (\S+) steps", text)[0])
     tolerance = float(re.findall(r"tolerance ([^,]+)", text)[0])
@@ -57,7 +56,7 @@ def read_settings(text: str, steps: float) -> Settings:
     )
 
 
-def compute_row(text: str, steps: float, folder: Path) -> WorstErrors:
+def compute_row(text, steps, folder):
     """Compute the errors of a row of the table."""
     if "defaults" not in text:
         setup = TrialSetup(SCENE, command(SCENE))
@@ -78,17 +77,14 @@ def compute_row(text: str, steps: float, folder: Path) -> WorstErrors:
 
 
 @pytest.mark.parametrize("row", ROWS, ids=[row[0] for row in ROWS])
-def test_the_errors_of_the_table_are_computed_again(
-    row: list[str],
-    tmp_path: Path,
-) -> None:
+def test_the_errors_of_the_table_are_computed_again(row, tmp_path):
     text, steps, torque, force, _ = row
     errors = compute_row(text, float(steps), tmp_path)
     assert errors.torque == pytest.approx(float(torque), rel=PRINTED)
     assert errors.force == pytest.approx(float(force), rel=PRINTED)
 
 
-def test_the_first_sentences_are_those_of_the_table() -> None:
+def test_the_first_sentences_are_those_of_the_table():
     six = next(row for row in ROWS if row[1] == "104")
     default = next(row for row in ROWS if row[0] == "Euler, MuJoCo's defaults")
     assert float(six[3]) < 1e-6
@@ -101,17 +97,14 @@ def test_the_first_sentences_are_those_of_the_table() -> None:
     assert 1e-3 < float(default[3]) < 1e-2
 
 
-def read_words(svg: str) -> set[str]:
+def read_words(svg):
     """Read what is written in a picture, but for lines with numbers."""
     texts = re.findall(r"<text[^>]*>([^<]*)</text>", svg)
     return {text for text in texts if text.strip() and not re.search(r"\d", text)}
 
 
 @pytest.mark.slow
-def test_the_pictures_are_those_that_few_points_draw(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_pictures_are_those_that_few_points_draw(tmp_path, monkeypatch):
     monkeypatch.setattr(study, "TIMINGS_OF_A_SETTING", 2)
     monkeypatch.setattr(study, "ERRORS_ADVISED", (1e-2, 1e-4))
     looks = (
@@ -147,14 +140,14 @@ def test_the_pictures_are_those_that_few_points_draw(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["hard", "effects", "small-hard", "small-effects"])
-def test_the_other_pictures_are_those_that_are_drawn(name: str) -> None:
+def test_the_other_pictures_are_those_that_are_drawn(name):
     with apply_style():
         drawn = write_alone(DRAWS[f"draw_{name.replace('-', '_')}"](), name)
     kept = (DOCS / "cost" / f"{name}.svg").read_text(encoding="utf-8")
     assert read_words(drawn) == read_words(kept)
 
 
-def test_every_point_of_the_hard_picture_stays_below_the_limit() -> None:
+def test_every_point_of_the_hard_picture_stays_below_the_limit():
     """The title of the picture says so; each engine has points on three approaches."""
     points = list(DRAWS["list_hard_points"]())
     engines = [engine for *_, engine in points]

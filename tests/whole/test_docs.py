@@ -52,15 +52,15 @@ PAGES = [*(ROOT / f"{name}.md" for name in TOP), *sorted(DOCS.rglob("*.md"))]
 FORMS = sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml"))
 
 
-def read(name: str) -> str:
+def read(name):
     return (ROOT / name).read_text(encoding="utf-8")
 
 
-def blocks(language: str, text: str) -> list[str]:
+def blocks(language, text):
     return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
 
-def test_the_examples_of_continuous_integration_use_commands_that_exist() -> None:
+def test_the_examples_of_continuous_integration_use_commands_that_exist():
     for file in sorted((DOCS / "ci").glob("*.yml")):
         text = re.sub(r"\\\n\s*|>\n\s*|(?<=\S)\n\s+(?=--)", " ", file.read_text())
         lines = re.findall(r"(validation|fourbar_lab) ([\w-]+)(.*)", text)
@@ -77,9 +77,8 @@ def test_the_examples_of_continuous_integration_use_commands_that_exist() -> Non
 
 @pytest.mark.slow
 def test_the_run_of_a_pull_request_is_held_against_what_comes_along(
-    checkout: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    checkout, monkeypatch
+):
     """The accepted state of the project is cut down to the scene and the engine of this
     run.
     """
@@ -103,13 +102,13 @@ def test_the_run_of_a_pull_request_is_held_against_what_comes_along(
     assert "<testcase" in Path("results/changes.xml").read_text(encoding="utf-8")
 
 
-def test_every_long_part_is_run_in_the_night() -> None:
+def test_every_long_part_is_run_in_the_night():
     parts = re.findall(r"^LONG [:+]= (.*)$", read("Makefile"), re.MULTILINE)
     (nightly,) = re.findall(r"part: \[(.*)\]", read(".github/workflows/nightly.yml"))
     assert nightly.split(", ") == " ".join(parts).split()
 
 
-def test_one_version_stands_everywhere() -> None:
+def test_one_version_stands_everywhere():
     for name, line in (
         ("pyproject.toml", 'version = "{}"'),
         ("CITATION.cff", "version: {}"),
@@ -119,17 +118,14 @@ def test_one_version_stands_everywhere() -> None:
 
 
 @pytest.fixture
-def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def checkout(tmp_path, monkeypatch):
     """A folder that looks like a checkout and may be written to."""
     (tmp_path / "models").symlink_to(ROOT / "models")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
-def test_the_readme_goes_on_from_its_first_scene(
-    checkout: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_readme_goes_on_from_its_first_scene(checkout, capsys):
     """The commands and the call that stand in its sentences."""
     begin, *_ = re.findall(r"^\$ fourbar (new .*)$", read("README.md"), re.MULTILINE)
     sentences = read("README.md").partition("rounding changes none")[2]
@@ -156,7 +152,7 @@ def test_the_readme_goes_on_from_its_first_scene(
         ("docs/guide-roboticist.md", 4),
     ],
 )
-def test_the_programs_print_what_is_shown(name: str, count: int) -> None:
+def test_the_programs_print_what_is_shown(name, count):
     programs, texts = blocks("python", read(name)), blocks("text", read(name))
     assert len(programs) == len(texts) == count
     for program, shown in zip(programs, texts, strict=True):
@@ -166,10 +162,7 @@ def test_the_programs_print_what_is_shown(name: str, count: int) -> None:
         assert printed.getvalue() == shown
 
 
-def test_the_table_of_the_exercise_is_right(
-    checkout: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_table_of_the_exercise_is_right(checkout, capsys):
     (table,) = blocks("csv", read("docs/tutorial.md"))
     (checkout / "theirs.csv").write_text(table, encoding="utf-8")
     assert harness(["check", "models/crank_rocker.toml", "theirs.csv"]) == HOLDS
@@ -182,11 +175,7 @@ def test_the_table_of_the_exercise_is_right(
 
 
 @pytest.mark.slow
-def test_the_engine_of_the_guide_agrees(
-    checkout: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_engine_of_the_guide_agrees(checkout, monkeypatch, capsys):
     (program,) = blocks("python", read("docs/guide-simulator.md"))
     (checkout / "closure.py").write_text(program, encoding="utf-8")
     monkeypatch.syspath_prepend(str(checkout))
@@ -212,7 +201,7 @@ def test_the_engine_of_the_guide_agrees(
     capsys.readouterr()
 
 
-def test_the_scene_file_is_one(checkout: Path) -> None:
+def test_the_scene_file_is_one(checkout):
     # a scene; a bar by its material; pins in place of the lengths; an example of each
     # effect; a picture
     text, material, pins, *_, picture = blocks("toml", read("docs/scene-file.md"))
@@ -228,7 +217,7 @@ def test_the_scene_file_is_one(checkout: Path) -> None:
 
 
 @pytest.mark.parametrize("page", [*PAGES, *FORMS], ids=lambda page: page.name)
-def test_every_other_command_line_is_one_that_its_program_takes(page: Path) -> None:
+def test_every_other_command_line_is_one_that_its_program_takes(page):
     """Parse the command lines, which run for minutes or name a SCENE, in running text
     and shell blocks.
     """
@@ -256,7 +245,7 @@ def test_every_other_command_line_is_one_that_its_program_takes(page: Path) -> N
             command.make_context(words[1], arguments)
 
 
-def options() -> list[set[str]]:
+def options():
     """Return the names of each option of each command, its short one among them."""
     names = []
     for program in {id(group): group for group in GROUPS.values()}.values():
@@ -283,35 +272,32 @@ def options() -> list[set[str]]:
         "guide-roboticist.md",
     ],
 )
-def test_every_option_that_a_page_names_is_one(name: str) -> None:
+def test_every_option_that_a_page_names_is_one(name):
     assert set(
         re.findall(r"(?<![\w-])--[a-z][a-z-]*", read(f"docs/{name}"))
     ) <= set().union(*options())
 
 
-def test_every_out_has_its_short_name() -> None:
+def test_every_out_has_its_short_name():
     writing = [names for names in options() if "--out" in names]
     assert len(writing) > 12 and all("-o" in names for names in writing)
 
 
-def test_every_effect_whose_cost_is_counted_can_be_chosen_from_a_list() -> None:
+def test_every_effect_whose_cost_is_counted_can_be_chosen_from_a_list():
     assert not any("," in name for name in EFFECTS)
 
 
 @pytest.mark.parametrize(
     ("program", "commands"), [("fourbar-validation", COMMANDS), ("fourbar_lab", LABS)]
 )
-def test_every_command_of_harness_and_lab_is_listed(
-    program: str,
-    commands: dict[str, str],
-) -> None:
+def test_every_command_of_harness_and_lab_is_listed(program, commands):
     table = read("docs/checks.md").partition(f"`{program}` |")[2].partition("\n\n")[0]
     first = "".join(line.split("|")[1] for line in table.splitlines()[2:] if line)
     listed = [re.match("[a-z-]+", words)[0] for words in re.findall("`([^`]*)`", first)]  # type: ignore[index]
     assert sorted(listed) == sorted(commands)
 
 
-def anchors(page: Path) -> set[str]:
+def anchors(page):
     """Return the anchors of the headings, as GitHub and the site name them."""
     headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     return {
@@ -321,7 +307,7 @@ def anchors(page: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_every_link_leads_somewhere(page: Path) -> None:
+def test_every_link_leads_somewhere(page):
     for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
         file, _, anchor = target.partition("#")
         to = page.parent / file if file else page
@@ -329,7 +315,7 @@ def test_every_link_leads_somewhere(page: Path) -> None:
         assert not anchor or target.startswith("http") or anchor in anchors(to), target
 
 
-def test_the_index_lists_every_page_for_readers_and_for_the_site() -> None:
+def test_the_index_lists_every_page_for_readers_and_for_the_site():
     text = read("docs/index.md")
     pages = {
         page.relative_to(DOCS).as_posix() for page in PAGES if DOCS in page.parents
@@ -346,7 +332,7 @@ def test_the_index_lists_every_page_for_readers_and_for_the_site() -> None:
     )
 
 
-def test_pages_keep_to_their_length() -> None:
+def test_pages_keep_to_their_length():
     tokens = {
         page: page.read_text(encoding="utf-8").split() for page in DOCS.rglob("*.md")
     }
@@ -363,14 +349,14 @@ def test_pages_keep_to_their_length() -> None:
     [page for page in PAGES if page.parent == DOCS],
     ids=lambda page: page.stem,
 )
-def test_a_page_begins_with_what_its_reader_can_do(page: Path) -> None:
+def test_a_page_begins_with_what_its_reader_can_do(page):
     title, first = page.read_text(encoding="utf-8").split("\n\n")[:2]
     assert title.startswith("# ") and (
         page.stem == "index" or first.startswith(("After this page", "After reading"))
     )
 
 
-def prose(page: Path) -> str:
+def prose(page):
     """Return the text of a page without programs and formulas."""
     return re.sub(
         r"^(```|\$\$).*?\1$",
@@ -387,7 +373,7 @@ how much a capital is broader.
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_no_table_is_wider_than_the_column_of_a_page(page: Path) -> None:
+def test_no_table_is_wider_than_the_column_of_a_page(page):
     """A cell breaks between words, so its longest word decides."""
     text = re.sub(r"\[([^]\n]*)\]\([^)\n]*\)", r"\1", prose(page))
     for table in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE):
@@ -399,11 +385,11 @@ def test_no_table_is_wider_than_the_column_of_a_page(page: Path) -> None:
         assert width <= COLUMN, head
 
 
-def measure_word(word: str) -> int:
+def measure_word(word):
     return LETTER * len(word) + CAPITAL * sum(map(str.isupper, word))
 
 
-def test_paragraphs_are_short_and_tables_hold_the_rest() -> None:
+def test_paragraphs_are_short_and_tables_hold_the_rest():
     for page in (page for page in PAGES if page.parent in (ROOT, DOCS)):
         for paragraph in re.split(r"\n\s*\n", prose(page)):
             if not re.match(r"[|#!\-`]|\d+\. |---", paragraph.strip()):
@@ -414,7 +400,7 @@ def test_paragraphs_are_short_and_tables_hold_the_rest() -> None:
                 )
 
 
-def test_the_page_of_the_commands_lists_each_and_its_reference_every_option() -> None:
+def test_the_page_of_the_commands_lists_each_and_its_reference_every_option():
     table = (
         read("docs/commands.md")
         .partition("| command | result |")[2]
@@ -445,7 +431,7 @@ def test_the_page_of_the_commands_lists_each_and_its_reference_every_option() ->
 
 @pytest.mark.slow
 @pytest.mark.parametrize("package", ["fourbar", "fourbar_validation"])
-def test_the_architecture_names_every_layer_and_no_other(package: str) -> None:
+def test_the_architecture_names_every_layer_and_no_other(package):
     table = (
         read("docs/architecture.md")
         .partition(f"\n## {package}\n\n")[2]
@@ -461,7 +447,7 @@ def test_the_architecture_names_every_layer_and_no_other(package: str) -> None:
     )
 
 
-def test_the_figure_of_the_theory_is_the_one_that_is_drawn() -> None:
+def test_the_figure_of_the_theory_is_the_one_that_is_drawn():
     assert read("docs/theory.svg") == runpy.run_path(str(DOCS / "theory.py"))["text"]()
 
 
@@ -474,11 +460,7 @@ def test_the_figure_of_the_theory_is_the_one_that_is_drawn() -> None:
         ("bars.svg", ("--figure", "bars")),
     ],
 )
-def test_the_pictures_are_those_that_are_drawn(
-    name: str,
-    options: tuple[str, ...],
-    tmp_path: Path,
-) -> None:
+def test_the_pictures_are_those_that_are_drawn(name, options, tmp_path):
     """Compare what is written in the pictures.
 
     Another matplotlib draws other paths.
@@ -502,13 +484,13 @@ def test_the_pictures_are_those_that_are_drawn(
     sorted(DOCS.rglob("*.svg")),
     ids=lambda path: path.name,
 )
-def test_every_figure_has_a_form_for_dark_pages(path: Path) -> None:
+def test_every_figure_has_a_form_for_dark_pages(path):
     assert "prefers-color-scheme" in path.read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_pictures_follow_the_switch_of_the_site(browse: Any, theme: str) -> None:
+def test_pictures_follow_the_switch_of_the_site(browse, theme):
     """A reader of a light system may switch the site to dark, and the other way."""
     image = pytest.importorskip("PIL.Image", reason="pixels are read by pillow")
     style = read("docs/style/pages.css")
@@ -525,7 +507,7 @@ def test_pictures_follow_the_switch_of_the_site(browse: Any, theme: str) -> None
 
 
 @pytest.mark.slow
-def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
+def test_the_gallery_is_a_suite_with_pictures_and_sources():
     suite = read_suite(GALLERY / "suite.txt")
     names = [suite.name(index) for index in range(len(suite))]
     assert (
@@ -588,9 +570,7 @@ def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
 
 
 @pytest.mark.slow
-def test_the_wiper_of_the_page_needs_less_torque_by_other_means(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_wiper_of_the_page_needs_less_torque_by_other_means(monkeypatch):
     """Check the optimum by `solve`, `swing` and `transmission_extremes`.
 
     The optimiser does not use them.
@@ -622,9 +602,7 @@ def test_the_wiper_of_the_page_needs_less_torque_by_other_means(
     )
 
 
-def test_the_python_page_goes_to_a_table_of_torque_in_five_lines(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_python_page_goes_to_a_table_of_torque_in_five_lines(capsys):
     pytest.importorskip("pandas", reason="the table needs pandas: pip install pandas")
     program = blocks("python", read("docs/api.md"))[0]
     assert len(list(filter(None, program.splitlines()))) == 5

@@ -10,7 +10,6 @@ import shutil
 import subprocess
 import sys
 import textwrap
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,7 @@ from fourbar.effects import Load
 from fourbar.errors import InputError, LimitError
 from fourbar.files import dump, loads
 from fourbar.mjcf import write_mjcf
-from fourbar.scene import Scene, command
+from fourbar.scene import command
 from fourbar.solving import solve
 from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.study import vary
@@ -57,12 +56,12 @@ omega_2 = "10 rad/s"
 """
 
 
-def block(language: str, page: str = PAGE, number: int = 0) -> str:
+def block(language, page=PAGE, number=0):
     return re.findall(rf"```{language}\n(.*?)```", page, re.S)[number]
 
 
 @pytest.fixture
-def latch(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Any]:
+def latch(monkeypatch, tmp_path):
     """The effect of the page, from its one file in the folder of effects."""
     (tmp_path / "latch.py").write_text(block("python"), encoding="utf-8")
     monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
@@ -74,7 +73,7 @@ def latch(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Any]:
     del effects.Latch
 
 
-def test_one_file_is_all_that_the_example_needs(latch: Any) -> None:
+def test_one_file_is_all_that_the_example_needs(latch):
     """The page's own test, with nothing registered anywhere."""
     names: dict[str, Any] = {}
     exec(block("python", number=1), names)
@@ -85,13 +84,11 @@ def test_one_file_is_all_that_the_example_needs(latch: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["act_on_engine", "act_on_free_bodies", "act"])
 def test_the_test_of_the_page_fails_for_a_mistake_in_one_derivation(
-    latch: Any,
-    method: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    latch, method, monkeypatch
+):
     right = getattr(latch, method)
 
-    def twice(*arguments: Any) -> None:
+    def twice(*arguments):
         right(*arguments)
         right(*arguments)
 
@@ -102,11 +99,11 @@ def test_the_test_of_the_page_fails_for_a_mistake_in_one_derivation(
         names["test_every_exact_engine_agrees"]()
 
 
-def guide_scene() -> Scene:
+def guide_scene():
     return loads(SCENE + block("toml"))
 
 
-def refusals(scene: Scene, engines: list[Any]) -> dict[str, str]:
+def refusals(scene, engines):
     """Return the reason of each engine that refuses."""
     return {
         r.engine: r.reason
@@ -115,7 +112,7 @@ def refusals(scene: Scene, engines: list[Any]) -> dict[str, str]:
     }
 
 
-def test_the_example_is_read_written_and_agreed_on(latch: Any) -> None:
+def test_the_example_is_read_written_and_agreed_on(latch):
     scene = guide_scene()
     assert scene.effects == (latch(4, 0.2, math.radians(115.0), math.radians(5.0)),)
     assert loads(dump(scene)).effects == scene.effects
@@ -129,11 +126,8 @@ def test_the_example_is_read_written_and_agreed_on(latch: Any) -> None:
     [("act_on_engine", ON_TREES), ("act_on_free_bodies", {"free-body"})],
 )
 def test_engines_without_a_model_refuse_the_example(
-    latch: Any,
-    method: str,
-    engines: set[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    latch, method, engines, monkeypatch
+):
     monkeypatch.delattr(latch, method)
     assert failing(guide_scene(), EXACT) == []
     reasons = refusals(guide_scene(), EXACT)
@@ -141,7 +135,7 @@ def test_engines_without_a_model_refuse_the_example(
     assert all("'latch'" in reason for reason in reasons.values())
 
 
-def test_mjcf_has_no_counterpart_of_the_example_and_refuses_it(latch: Any) -> None:
+def test_mjcf_has_no_counterpart_of_the_example_and_refuses_it(latch):
     assert failing(guide_scene(), SIMULATED) == []
     reasons = refusals(guide_scene(), SIMULATED)
     assert (
@@ -152,10 +146,7 @@ def test_mjcf_has_no_counterpart_of_the_example_and_refuses_it(latch: Any) -> No
         write_mjcf(guide_scene())
 
 
-def test_without_its_size_nothing_is_judged_by_another_scale(
-    latch: Any,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_without_its_size_nothing_is_judged_by_another_scale(latch, monkeypatch):
     monkeypatch.delattr(latch, "size")
     rows = judge("scene", guide_scene(), EXACT).rows
     engines = {row.engine for row in rows if row.failed and "'latch'" in row.reason}
@@ -163,9 +154,8 @@ def test_without_its_size_nothing_is_judged_by_another_scale(
 
 
 def test_without_its_file_a_scene_neither_reads_nor_writes_the_example(
-    latch: Any,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    latch, monkeypatch
+):
     scene = guide_scene()
     classes = {k: v for k, v in effects.list_classes().items() if v is not latch}
     monkeypatch.setattr(effects, "list_classes", lambda: classes)
@@ -175,7 +165,7 @@ def test_without_its_file_a_scene_neither_reads_nor_writes_the_example(
         dump(scene)
 
 
-def test_the_drive_makes_up_for_what_the_example_takes(latch: Any) -> None:
+def test_the_drive_makes_up_for_what_the_example_takes(latch):
     """The couple, at angles and speeds of the free bodies, has the power that the drive
     makes up for: at few positions, and in both senses.
     """
@@ -194,7 +184,7 @@ def test_the_drive_makes_up_for_what_the_example_takes(latch: Any) -> None:
     )
 
 
-def test_studies_and_sensitivities_know_the_numbers_of_the_example(latch: Any) -> None:
+def test_studies_and_sensitivities_know_the_numbers_of_the_example(latch):
     scene, step = guide_scene(), 1e-6
     couples = [0.2 + step, 0.2 - step]
     torque = solve(vary(scene, {"effects.latch.couple": couples})).torque
@@ -204,7 +194,7 @@ def test_studies_and_sensitivities_know_the_numbers_of_the_example(latch: Any) -
 
 
 @pytest.mark.parametrize("key", effects.list_kinds())
-def test_the_example_of_each_effect_is_read_and_written_back(key: str) -> None:
+def test_the_example_of_each_effect_is_read_and_written_back(key):
     example = effects.list_kinds()[key].example
     scene = loads(f"{SCENE}[effects]\n{example}")
     assert [effect.key for effect in scene.effects] == [key]
@@ -212,7 +202,7 @@ def test_the_example_of_each_effect_is_read_and_written_back(key: str) -> None:
     assert example.split("=")[0] in REFERENCE
 
 
-def test_every_effect_of_the_package_has_a_row_in_each_table() -> None:
+def test_every_effect_of_the_package_has_a_row_in_each_table():
     """Loads have a table of their own in a file."""
     keys = {*effects.list_kinds()}
     assert keys == {*free_body_effects.WRENCH_OF}
@@ -225,7 +215,7 @@ def test_every_effect_of_the_package_has_a_row_in_each_table() -> None:
     assert without_mjcf == {"pin_friction"}
 
 
-def test_the_scene_of_the_reference_names_everything_and_is_agreed_on() -> None:
+def test_the_scene_of_the_reference_names_everything_and_is_agreed_on():
     scene = loads(SCENE.partition("[motion]")[0] + block("toml", REFERENCE, 5))
     assert [effect.key for effect in scene.effects] == list(effects.list_kinds())
     assert scene.motion.law is not None and scene.loads[0].table is not None
@@ -239,7 +229,7 @@ def test_the_scene_of_the_reference_names_everything_and_is_agreed_on() -> None:
 
 
 @pytest.mark.parametrize("page", ["architecture", "extending"])
-def test_each_file_and_each_name_in_one_is_where_the_page_says(page: str) -> None:
+def test_each_file_and_each_name_in_one_is_where_the_page_says(page):
     text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
     stated = re.findall(r"`(\w+(?:/[\w.-]+)*/[\w-]+\.\w+)`", text)
     placed = re.findall(
@@ -254,7 +244,7 @@ def test_each_file_and_each_name_in_one_is_where_the_page_says(page: str) -> Non
         assert any(map(word.search, texts)), (name, file)
 
 
-def find_files(name: str) -> list[Path]:
+def find_files(name):
     """Find the files that a page means: paths start at the checkout or a package."""
     paths = [ROOT / folder / name for folder in FOLDERS]
     return [path for path in paths if path.is_file()]
@@ -280,9 +270,7 @@ for row in rows:
 """
 
 
-def test_the_example_of_a_quantity_is_judged_by_every_exact_engine(
-    tmp_path: Path,
-) -> None:
+def test_the_example_of_a_quantity_is_judged_by_every_exact_engine(tmp_path):
     """The lines of the page stand in a copy of both packages, and nothing else."""
     for package in (ROOT / "fourbar", ROOT / "validation" / "fourbar_validation"):
         shutil.copytree(package, tmp_path / package.name)

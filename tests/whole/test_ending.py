@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -54,7 +53,7 @@ KILLS = int(os.environ.get("KILLS", "2"))
 """Moments of a start at which it is interrupted; every night there are fifty."""
 
 
-def start(what: str, folder: Path, mark: str) -> "subprocess.Popen[bytes]":
+def start(what, folder, mark):
     """Start a command that would take minutes, with a mark in its environment."""
     harness = [sys.executable, "-m", "validation"]
     if what == READING:
@@ -78,7 +77,7 @@ def start(what: str, folder: Path, mark: str) -> "subprocess.Popen[bytes]":
     )
 
 
-def wait_for_process(word: bytes, mark: str) -> None:
+def wait_for_process(word, mark):
     """Wait until a process runs that has the word in its command line."""
     for _ in range(3000):
         for process in list_processes(mark):
@@ -91,7 +90,7 @@ def wait_for_process(word: bytes, mark: str) -> None:
 
 
 @contextmanager
-def leaving_nothing(mark: str) -> Iterator[None]:
+def leaving_nothing(mark):
     """Hold that soon after the body no process has the mark."""
     try:
         yield
@@ -109,7 +108,7 @@ def leaving_nothing(mark: str) -> Iterator[None]:
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.timeout(120 + 10 * KILLS)
 @pytest.mark.parametrize("what", [READING, GUEST])
-def test_ctrl_c_while_workers_start_is_one_line(what: str, tmp_path: Path) -> None:
+def test_ctrl_c_while_workers_start_is_one_line(what, tmp_path):
     """A terminal sends it to all processes of the command."""
     for moment in START_SECONDS * (np.arange(KILLS) + 0.5) / KILLS:
         mark = f"{tmp_path}/{what}/{moment}"
@@ -127,11 +126,7 @@ def test_ctrl_c_while_workers_start_is_one_line(what: str, tmp_path: Path) -> No
 @pytest.mark.linux
 @pytest.mark.parametrize("ended_by", [signal.SIGTERM, signal.SIGKILL])
 @pytest.mark.parametrize("what", [READING, GUEST])
-def test_nothing_outlives_a_command_that_is_ended(
-    what: str,
-    ended_by: signal.Signals,
-    tmp_path: Path,
-) -> None:
+def test_nothing_outlives_a_command_that_is_ended(what, ended_by, tmp_path):
     mark = f"{tmp_path}/{what}"
     process = start(what, tmp_path, mark)
     with leaving_nothing(mark):
@@ -147,7 +142,7 @@ def test_nothing_outlives_a_command_that_is_ended(
 
 @pytest.mark.slow
 @pytest.mark.posix
-def test_processor_time_is_bounded_by_the_process_itself() -> None:
+def test_processor_time_is_bounded_by_the_process_itself():
     spinning = (
         "from fourbar_validation.engines.processes import bound_processor_time\n"
         "bound_processor_time(0.1)\n"
@@ -157,7 +152,7 @@ def test_processor_time_is_bounded_by_the_process_itself() -> None:
     assert ended.returncode == -signal.SIGXCPU
 
 
-def test_a_worker_loads_no_library_of_windows() -> None:
+def test_a_worker_loads_no_library_of_windows():
     """The library starts a program, which outlives the worker or complains."""
     looking = (
         "from fourbar_validation.engines.processes import open_no_windows\n"

@@ -44,12 +44,7 @@ READING = [
 @pytest.mark.timeout(30)
 @pytest.mark.parametrize("what", ["pipe", "device", "directory"])
 @pytest.mark.parametrize("line", READING, ids=lambda line: " ".join(line[:2]))
-def test_what_may_never_end_is_not_waited_for(
-    line: list[str],
-    what: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_may_never_end_is_not_waited_for(line, what, tmp_path, capsys):
     endless = {
         "pipe": tmp_path / "pipe",
         "device": Path("/dev/zero"),
@@ -94,10 +89,8 @@ gravity = ["9.81 m/s^2", "-90 deg"]
 
 @pytest.mark.slow
 def test_a_free_motion_without_end_is_given_up_with_its_reason(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    tmp_path, monkeypatch, capsys
+):
     (tmp_path / "released.toml").write_text(RELEASED)
     monkeypatch.setattr(free_motion, "MOST_INTEGRATION_STEPS", 500)
     for command, ending in (("analyze", "csv"), ("plot", "svg"), ("animate", "html")):
@@ -118,7 +111,7 @@ def test_a_free_motion_without_end_is_given_up_with_its_reason(
 
 @pytest.mark.posix
 @pytest.mark.usefixtures("interruptible")
-def test_a_long_free_motion_stops_at_ctrl_c(tmp_path: Path) -> None:
+def test_a_long_free_motion_stops_at_ctrl_c(tmp_path):
     (tmp_path / "released.toml").write_text(RELEASED)
     begin = "from fourbar.cli import main; print(flush=True); main()"
     command = [sys.executable, "-c", begin, "analyze", str(tmp_path / "released.toml")]
@@ -147,9 +140,8 @@ def test_a_long_free_motion_stops_at_ctrl_c(tmp_path: Path) -> None:
 
 
 def test_a_free_motion_too_long_for_the_engines_is_refused_before_a_run(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    tmp_path, capsys
+):
     (tmp_path / "released.toml").write_text(RELEASED)
     assert (
         fourbar_validation.cli.status(

@@ -18,7 +18,7 @@ MET_FIRST = {
 """Modules that have examples: those that one meets first."""
 
 
-def find_modules() -> list[str]:
+def find_modules():
     """Return the names of the modules whose docstrings have an example."""
     names = []
     for package in PACKAGES:
@@ -34,17 +34,14 @@ MODULES = find_modules()
 
 
 @pytest.mark.parametrize("name", MODULES)
-def test_examples_print_what_they_say(
-    name: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_examples_print_what_they_say(name, monkeypatch):
     monkeypatch.chdir(ROOT)  # some load a scene of `models`
     failed, attempted = doctest.testmod(import_module(name))
     assert failed == 0
     assert attempted > 0
 
 
-def test_what_one_meets_first_has_an_example() -> None:
+def test_what_one_meets_first_has_an_example():
     first = {
         f"{package}.{name}" for package, names in MET_FIRST.items() for name in names
     }

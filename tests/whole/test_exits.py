@@ -32,8 +32,6 @@ from fourbar.errors import (
 )
 from fourbar.writing import write_text
 from fourbar_lab.bench import Measured
-from fourbar_lab.tally import Tally
-from fourbar_validation.cli import LazyGroup
 from fourbar_validation.compare.rows import AGREES, FAILS, Row, write_results
 from fourbar_validation.published.figures import PublishedFigure
 from tests.support.alone import alone
@@ -46,26 +44,26 @@ NO_FILE = "no-such-file"
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-def raising(error: BaseException) -> click.Group:
+def raising(error):
     """A group whose command `go` ends by an exception."""
 
     @click.command()
-    def go() -> None:
+    def go():
         raise error
 
     return click.Group(commands={"go": go})
 
 
-def returning(value: object) -> click.Group:
+def returning(value):
     """A group whose command `go` returns something."""
     return click.Group(commands={"go": click.command(name="go")(lambda: value)})
 
 
-def leaving() -> click.Group:
+def leaving():
     """A group whose command ends as rich ends where the reader of its pipe has gone."""
 
     @click.command()
-    def go() -> None:
+    def go():
         try:
             raise BrokenPipeError(32, "Broken pipe")
         except BrokenPipeError:
@@ -83,12 +81,7 @@ def leaving() -> click.Group:
         "run {0} --junit {0}",
     ],
 )
-def test_no_command_writes_over_what_it_reads(
-    command: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_no_command_writes_over_what_it_reads(command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     texts = {
         "scene.toml": Path(MODEL).read_text(),
@@ -132,12 +125,7 @@ def test_no_command_writes_over_what_it_reads(
         (raising(click.Abort()), INTERRUPTED),
     ],
 )
-def test_every_end_has_its_status(
-    group: click.Group,
-    status: int,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_every_end_has_its_status(group, status, monkeypatch, capsys):
     monkeypatch.delenv("FOURBAR_TRACEBACK", raising=False)
     monkeypatch.setattr(
         sys, "stdout", sys.stdout
@@ -156,10 +144,7 @@ def test_every_end_has_its_status(
 
 
 @pytest.mark.parametrize("module", ["fourbar", "validation"])
-def test_an_interruption_while_the_libraries_are_imported_is_one_line(
-    module: str,
-    tmp_path: Path,
-) -> None:
+def test_an_interruption_while_the_libraries_are_imported_is_one_line(module, tmp_path):
     (tmp_path / "numpy.py").write_text("raise KeyboardInterrupt")
     paths = os.pathsep.join((str(tmp_path), str(ROOT), str(ROOT / "validation")))
     line = [sys.executable, "-m", module, "--help"]
@@ -174,7 +159,7 @@ def test_an_interruption_while_the_libraries_are_imported_is_one_line(
 
 
 @pytest.mark.slow
-def test_a_program_without_output_streams_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_program_without_output_streams_runs(monkeypatch):
     """One started with `>&- 2>&-`, or on Windows without a console."""
     for stream in ("stdout", "stderr"):
         monkeypatch.setattr(sys, stream, None)
@@ -186,11 +171,8 @@ def test_a_program_without_output_streams_runs(monkeypatch: pytest.MonkeyPatch) 
     sys.stderr.close()
 
 
-def test_a_full_disk_names_the_file(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def full(_: int) -> None:
+def test_a_full_disk_names_the_file(tmp_path, monkeypatch):
+    def full(_):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("os.fsync", full)
@@ -208,7 +190,7 @@ TABLE = "theta_2 [deg], torque\n60, 1.0\n"
 """A torque that is not that of the crank-rocker."""
 
 
-def study(folder: Path) -> dict[str, str]:
+def study(folder):
     """Files that the commands of the table are given."""
     write_results([ROW], folder / "good.csv")
     write_results(
@@ -271,21 +253,15 @@ STATUSES: list[tuple[Callable[[list[str]], int], str, int]] = [
     ids=[line for _, line, _ in STATUSES],
 )
 def test_every_command_ends_with_its_status(
-    command: Callable[[list[str]], int],
-    line: str,
-    status: int,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    command, line, status, tmp_path, monkeypatch
+):
     files = study(tmp_path)
     monkeypatch.chdir(tmp_path)
     judge_here(monkeypatch)
     assert command([files.get(word, word) for word in line.split()]) == status
 
 
-def test_a_figure_that_no_erratum_explains_is_status_1(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_figure_that_no_erratum_explains_is_status_1(monkeypatch):
     assert VALIDATION(["published"]) == HOLDS
     wrong = PublishedFigure("2.4 positions", "1 theta3_1", "167.877224", 167.8)
     monkeypatch.setattr(
@@ -294,10 +270,7 @@ def test_a_figure_that_no_erratum_explains_is_status_1(
     assert VALIDATION(["published"]) == FAILED
 
 
-def test_no_figure_at_all_is_status_1(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_no_figure_at_all_is_status_1(monkeypatch, capsys):
     monkeypatch.setattr(
         "fourbar_validation.published.comparison.list_figures", lambda: iter([])
     )
@@ -308,12 +281,10 @@ def test_no_figure_at_all_is_status_1(
 STABILITY = ["stability", "--samples", "3", "--family", "random", "--jobs", "1"]
 
 
-def test_a_torque_off_in_its_twelfth_digit_is_status_1(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_torque_off_in_its_twelfth_digit_is_status_1(monkeypatch):
     true = fourbar.solve
 
-    def off(*arguments: object, **options: object) -> fourbar.Solution:
+    def off(*arguments, **options):
         solution = true(*arguments, **options)  # type: ignore[arg-type]
         return replace(solution, torque=solution.torque * (1.0 + 1e-12))
 
@@ -322,11 +293,8 @@ def test_a_torque_off_in_its_twelfth_digit_is_status_1(
     assert LAB(STABILITY) == FAILED
 
 
-def test_samples_that_compare_nothing_are_status_1(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    def open_loop(scene: fourbar.Scene, tally: Tally, *_: str) -> None:
+def test_samples_that_compare_nothing_are_status_1(monkeypatch, capsys):
+    def open_loop(scene, tally, *_):
         tally.samples += 1
         tally.not_assembled += 1
 
@@ -336,9 +304,7 @@ def test_samples_that_compare_nothing_are_status_1(
     assert "random: nothing was compared" in capsys.readouterr().out
 
 
-def test_a_ratio_that_is_not_reached_is_status_1(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_ratio_that_is_not_reached_is_status_1(monkeypatch):
     for name in ONE_THREAD:
         monkeypatch.setenv(name, "1")
     rows = {"growth from 1000 positions on": 1.1, "floor": 1.0}
@@ -353,11 +319,7 @@ def test_a_ratio_that_is_not_reached_is_status_1(
 @pytest.mark.parametrize(
     ("ended", "status"), [(0, HOLDS), (1, FAILED), (3, BROKEN), (-11, BROKEN)]
 )
-def test_bench_passes_on_how_its_own_process_ended(
-    ended: int,
-    status: int,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_bench_passes_on_how_its_own_process_ended(ended, status, monkeypatch):
     for name in ONE_THREAD:
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(
@@ -418,12 +380,7 @@ PROCESSES = [
     PROCESSES,
     ids=[f"{p} {w.split()[0]}" for p, w, _ in PROCESSES],
 )
-def test_each_command_in_a_process_of_its_own(
-    program: str,
-    line: str,
-    status: int,
-    tmp_path: Path,
-) -> None:
+def test_each_command_in_a_process_of_its_own(program, line, status, tmp_path):
     ended, complained = alone(program, line.split(), tmp_path)
     assert (ended, bool(complained.strip())) == (
         status,
@@ -431,7 +388,7 @@ def test_each_command_in_a_process_of_its_own(
     ), complained
 
 
-def test_every_command_is_in_the_table_of_processes() -> None:
+def test_every_command_is_in_the_table_of_processes():
     tried = {(program, line.split()[0]) for program, line, _ in PROCESSES}
     assert tried == {
         *(("fourbar", name) for name in fourbar.cli.group.commands),
@@ -445,7 +402,7 @@ def test_every_command_is_in_the_table_of_processes() -> None:
     [fourbar_validation.cli.group, fourbar_lab.cli.group],
     ids=lambda group: group.callback.__module__,
 )
-def test_the_help_says_of_each_command_what_the_command_says(group: LazyGroup) -> None:
+def test_the_help_says_of_each_command_what_the_command_says(group):
     context = click.Context(group)
     for name, listed in group.listed.items():
         command = group.get_command(context, name)
@@ -453,7 +410,7 @@ def test_the_help_says_of_each_command_what_the_command_says(group: LazyGroup) -
         assert listed.about == command.get_short_help_str(limit=200)
 
 
-def test_the_help_of_the_harness_imports_no_engine() -> None:
+def test_the_help_of_the_harness_imports_no_engine():
     code = "import sys; from fourbar_validation.cli import status; status(['--help']); "
     code += "sys.exit(bool({'scipy', 'mujoco', 'pint', 'rich'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False)
@@ -465,7 +422,7 @@ def test_the_help_of_the_harness_imports_no_engine() -> None:
     not Path("/dev/full").exists(),
     reason="only Linux has a device that is always full",
 )
-def test_what_was_printed_without_being_written_out_is_not_lost_in_silence() -> None:
+def test_what_was_printed_without_being_written_out_is_not_lost_in_silence():
     code = "import click, sys; from fourbar.errors import run; "
     code += "go = click.command(name='go')(lambda: print('printed')); "
     code += "sys.exit(run(click.Group(commands={'go': go}), 'p', ['go']))"
@@ -488,10 +445,7 @@ def test_what_was_printed_without_being_written_out_is_not_lost_in_silence() -> 
         assert (done.returncode, done.stderr) == (status, printed)
 
 
-def test_published_says_at_once_that_scipy_is_missing(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_published_says_at_once_that_scipy_is_missing(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "scipy.integrate", None)
     assert fourbar_validation.cli.status(["published"]) == BROKEN
     printed = capsys.readouterr()
@@ -499,10 +453,8 @@ def test_published_says_at_once_that_scipy_is_missing(
 
 
 def test_a_module_that_the_harness_lacks_is_in_the_extra_of_the_harness(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    tmp_path: Path,
-) -> None:
+    monkeypatch, capsys, tmp_path
+):
     monkeypatch.setitem(sys.modules, "filelock", None)
     assert (
         fourbar_validation.cli.status(
@@ -529,12 +481,7 @@ def test_a_module_that_the_harness_lacks_is_in_the_extra_of_the_harness(
     ],
     ids=["a long heading", "many headings"],
 )
-def test_no_line_is_longer_than_a_screen_can_show(
-    header: str,
-    row: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_no_line_is_longer_than_a_screen_can_show(header, row, tmp_path, capsys):
     table = tmp_path / "table.csv"
     table.write_text(f"{header}\n{row}\n")
     scene = ROOT / "models" / "crank_rocker.toml"
@@ -550,7 +497,7 @@ def test_no_line_is_longer_than_a_screen_can_show(
 
 
 @pytest.mark.posix
-def test_a_closed_standard_input_is_one_line() -> None:
+def test_a_closed_standard_input_is_one_line():
     done = subprocess.run(
         f"{sys.executable} -m fourbar analyze - <&-",
         shell=True,

@@ -8,7 +8,6 @@ import json
 import re
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -20,7 +19,6 @@ import fourbar_validation.run.plan
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
 from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.assembly import write_sdf, write_usd
-from fourbar.scene import Command, Scene
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import LONGEST_CELL, read_columns
@@ -57,7 +55,7 @@ STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 EXACT = choose_engines("free-body")
 
 
-def scene_text(title: str) -> str:
+def scene_text(title):
     return fourbar.dump(crank_rocker(title=title, source=title))
 
 
@@ -73,27 +71,23 @@ class Named:
         " ".join(HOSTILE.values()),
     )
 
-    def __len__(self) -> int:
+    def __len__(self):
         return len(self.texts)
 
-    def name(self, index: int) -> str:
+    def name(self, index):
         return self.texts[index]
 
-    def scene(self, index: int) -> Scene:
+    def scene(self, index):
         text = self.texts[index]
         motion = fourbar.Motion(fourbar.Sweep(0.1, 1.0, 3), 1.0)
         return crank_rocker(title=text, source=text, motion=motion)
 
-    def fingerprint(self) -> str:
+    def fingerprint(self):
         return repr(self.texts)
 
 
 @pytest.mark.slow
-def test_reports_hold_hostile_text_as_text(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_reports_hold_hostile_text_as_text(tmp_path, monkeypatch, capsys):
     judge_here(monkeypatch)
     out = tmp_path / "deep" / "out"
     summary = run(Plan(Named(), EXACT, RunOptions(workers=1)), out)
@@ -119,7 +113,7 @@ def test_reports_hold_hostile_text_as_text(
 
 
 @pytest.mark.parametrize("title", [*HOSTILE.values(), "\ud800", "é" * 10_000, ""])
-def test_mjcf_holds_a_hostile_title_as_an_attribute(title: str) -> None:
+def test_mjcf_holds_a_hostile_title_as_an_attribute(title):
     root = ET.fromstring(write_mjcf(crank_rocker(title=title)))
     assert root.tag == "mujoco"
     assert not STEERING.search(root.attrib["model"])
@@ -127,7 +121,7 @@ def test_mjcf_holds_a_hostile_title_as_an_attribute(title: str) -> None:
 
 
 @pytest.mark.parametrize("kind", HOSTILE)
-def test_sdf_and_usd_hold_a_hostile_title_as_a_text(kind: str) -> None:
+def test_sdf_and_usd_hold_a_hostile_title_as_a_text(kind):
     scene = crank_rocker(title=HOSTILE[kind])
     root = ET.fromstring(write_sdf(scene, without_loads=True))
     (model,) = root.findall(".//model")
@@ -140,10 +134,7 @@ def test_sdf_and_usd_hold_a_hostile_title_as_a_text(kind: str) -> None:
 
 
 @pytest.mark.slow
-def test_differences_hold_hostile_names_as_text(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_differences_hold_hostile_names_as_text(tmp_path, capsys):
     # a table written by somebody else, whose names nothing has looked at
     for folder, cells in (
         ("old", ("1e-15", "1e-14", "true", "agrees")),
@@ -184,11 +175,7 @@ def test_differences_hold_hostile_names_as_text(
         "[" * 9999,
     ],
 )
-def test_what_is_no_table_of_results_is_one_line(
-    text: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_is_no_table_of_results_is_one_line(text, tmp_path, capsys):
     good = ",".join(RESULT_COLUMNS) + "\n"
     for rows, record in (
         (text, "{}"),
@@ -215,12 +202,8 @@ def test_what_is_no_table_of_results_is_one_line(
     ids=["rows", "a cell"],
 )
 def test_a_small_parquet_of_very_much_is_one_line(
-    rows: int,
-    reason: str,
-    words: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    rows, reason, words, tmp_path, capsys
+):
     """Of one row many times, or of one long text, a file has some kilobytes."""
     index = pa.array(np.zeros(rows, np.int32))
     columns = {
@@ -244,10 +227,7 @@ def test_a_small_parquet_of_very_much_is_one_line(
 @pytest.mark.parametrize(
     "name", ["../out", "/tmp/out", "a/b", "..", ".", "", "a\x00b", "a\x1b[0m"]
 )
-def test_a_baseline_has_a_name_and_no_path(
-    name: str,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_baseline_has_a_name_and_no_path(name, capsys):
     assert status(["accept", "results", "--as", name]) == BAD_INPUT
     printed = capsys.readouterr().err
     assert "--as" in printed
@@ -258,11 +238,7 @@ FILE_NAMES = ("\x1b[31mred.toml", "a\nb.toml", "<b>.toml", "[red]x.toml")
 
 
 @pytest.mark.parametrize("name", FILE_NAMES)
-def test_a_hostile_name_of_a_bad_file_is_shown_and_not_sent(
-    name: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_hostile_name_of_a_bad_file_is_shown_and_not_sent(name, tmp_path, capsys):
     (tmp_path / name).write_text('title = "no lengths"')
     assert (
         status(["run", str(tmp_path / name), "--out", str(tmp_path / "out")])
@@ -275,10 +251,8 @@ def test_a_hostile_name_of_a_bad_file_is_shown_and_not_sent(
 
 @pytest.mark.slow
 def test_a_suite_file_of_hostile_names_runs_and_they_are_shown_and_not_sent(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    tmp_path, monkeypatch, capsys
+):
     judge_here(monkeypatch)
     names = ("\x1b[31m<b>[red]x.toml", "a\nb.toml")
     for name in names:
@@ -303,7 +277,7 @@ def test_a_suite_file_of_hostile_names_runs_and_they_are_shown_and_not_sent(
     assert not STEERING.search(capsys.readouterr().out)
 
 
-def listed(tmp_path: Path, text: str | bytes, name: str = "suite.txt") -> Path:
+def listed(tmp_path, text, name="suite.txt"):
     for file in ("a.toml", "b.toml"):
         (tmp_path / file).write_text(scene_text(file))
     path = tmp_path / name
@@ -323,12 +297,7 @@ LISTS = [
     LISTS,
     ids=[case[0] for case in LISTS],
 )
-def test_a_suite_file_lists_scenes_from_its_own_folder(
-    what: str,
-    name: str,
-    text: str,
-    tmp_path: Path,
-) -> None:
+def test_a_suite_file_lists_scenes_from_its_own_folder(what, name, text, tmp_path):
     suite = read_suite(listed(tmp_path, text, name))
     assert [suite.name(i) for i in range(len(suite))] == ["a", "b"]
 
@@ -351,12 +320,7 @@ BAD_LISTS = [
     BAD_LISTS,
     ids=[case[0] for case in BAD_LISTS],
 )
-def test_a_bad_suite_file_is_one_line(
-    what: str,
-    text: str | bytes,
-    words: str,
-    tmp_path: Path,
-) -> None:
+def test_a_bad_suite_file_is_one_line(what, text, words, tmp_path):
     with pytest.raises(InputError) as caught:
         read_suite(listed(tmp_path, text))
     assert words in str(caught.value)
@@ -373,17 +337,17 @@ def test_a_bad_suite_file_is_one_line(
         "scenes = " + "[" * 9999,
     ],
 )
-def test_a_bad_suite_in_toml_is_one_line(text: str, tmp_path: Path) -> None:
+def test_a_bad_suite_in_toml_is_one_line(text, tmp_path):
     with pytest.raises(InputError, match=r"suite\.toml"):
         read_suite(listed(tmp_path, text, "suite.toml"))
 
 
-def test_the_pattern_of_a_suite_does_not_take_the_suite_itself(tmp_path: Path) -> None:
+def test_the_pattern_of_a_suite_does_not_take_the_suite_itself(tmp_path):
     suite = read_suite(listed(tmp_path, 'scenes = ["*.toml"]', "suite.toml"))
     assert [suite.name(i) for i in range(len(suite))] == ["a", "b"]
 
 
-def test_a_worker_carries_only_its_own_scenes(tmp_path: Path) -> None:
+def test_a_worker_carries_only_its_own_scenes(tmp_path):
     suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
     (job,) = pool.make_jobs(suite, [1], (), draw=False)
     assert job.name == "b" and len(job.suite) == 1
@@ -394,21 +358,19 @@ class Greedy:
 
     name = "greedy"
 
-    def answer(self, scene: Scene, command: Command) -> Answer:
+    def answer(self, scene, command):
         if scene.title == "b.toml":
             bytearray(2 * WORKER_MEMORY)
         return Answer("greedy", "exact", refusal="declined")
 
 
 @pytest.mark.linux
-def test_a_system_that_sets_no_limit_of_memory_goes_on_without(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_system_that_sets_no_limit_of_memory_goes_on_without(monkeypatch):
     import resource
 
     asked = []
 
-    def refuse(*limit: object) -> None:
+    def refuse(*limit):
         asked.append(limit)
         raise ValueError("current limit exceeds maximum limit")
 
@@ -419,10 +381,7 @@ def test_a_system_that_sets_no_limit_of_memory_goes_on_without(
 
 @pytest.mark.slow
 @pytest.mark.linux
-def test_running_out_of_memory_costs_its_own_row(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_running_out_of_memory_costs_its_own_row(tmp_path, monkeypatch):
     suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
     for size in ("SCENES_OF_A_SLOW_TASK", "SCENES_OF_A_QUICK_TASK"):
         monkeypatch.setattr(fourbar_validation.run.plan, size, 2)

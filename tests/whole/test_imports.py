@@ -76,12 +76,12 @@ in at a glance.
 
 
 @cache
-def parse(path: Path) -> ast.Module:
+def parse(path):
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
 @cache
-def imported(path: Path, *, types: bool = False) -> set[str]:
+def imported(path, *, types=False):
     """Full names of all modules that a file imports when it runs, at any depth.
 
     With those of its types if wanted.
@@ -109,7 +109,7 @@ def imported(path: Path, *, types: bool = False) -> set[str]:
     return names
 
 
-def test_solving_loads_numpy_alone() -> None:
+def test_solving_loads_numpy_alone():
     """With the names that a first program uses.
 
     The others are imported on their first use.
@@ -133,7 +133,7 @@ def test_solving_loads_numpy_alone() -> None:
     sorted((ROOT / "fourbar").rglob("*.py")),
     ids=lambda path: path.stem,
 )
-def test_the_product_knows_neither_harness_nor_engines(path: Path) -> None:
+def test_the_product_knows_neither_harness_nor_engines(path):
     roots = {name.partition(".")[0] for name in imported(path)}
     assert not roots & {"fourbar_validation", "fourbar_lab", "tests", *ENGINES}
 
@@ -146,7 +146,7 @@ HARNESS_AND_LAB = sorted(
 
 
 @pytest.mark.parametrize("path", HARNESS_AND_LAB, ids=lambda path: path.stem)
-def test_each_engine_is_imported_under_its_own_name_alone(path: Path) -> None:
+def test_each_engine_is_imported_under_its_own_name_alone(path):
     names = imported(path)
     assert not {name for name in names if name.partition(".")[0] == "tests"}
     for engine, its_name in ENGINES.items():
@@ -155,12 +155,12 @@ def test_each_engine_is_imported_under_its_own_name_alone(path: Path) -> None:
             assert its_name in path.relative_to(ROOT).as_posix()
 
 
-def layer(name: str) -> str:
+def layer(name):
     """The layer of a module: the second part of its name."""
     return name.split(".")[1]
 
 
-def modules(package: str) -> dict[str, Path]:
+def modules(package):
     """Every module of a package, but for its dunder files at the top."""
     top = PACKAGES[package]
     names = {
@@ -176,7 +176,7 @@ def modules(package: str) -> dict[str, Path]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("package", LAYERS)
-def test_layers_stand_on_floors(package: str) -> None:
+def test_layers_stand_on_floors(package):
     floors = [floor.split() for floor in LAYERS[package]]
     entries = {
         path.name.removesuffix(".py")
@@ -209,7 +209,7 @@ def test_layers_stand_on_floors(package: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("package", PACKAGES)
-def test_no_modules_import_each_other_in_a_circle_types_included(package: str) -> None:
+def test_no_modules_import_each_other_in_a_circle_types_included(package):
     names = modules(package)
     uses = {
         name: {used for used in imported(path, types=True) if used in names} - {name}
@@ -221,7 +221,7 @@ def test_no_modules_import_each_other_in_a_circle_types_included(package: str) -
 
 
 @pytest.mark.slow
-def test_no_class_name_stands_for_two_things() -> None:
+def test_no_class_name_stands_for_two_things():
     names = Counter(
         node.name
         for package in PACKAGES
@@ -233,21 +233,21 @@ def test_no_class_name_stands_for_two_things() -> None:
 
 
 @pytest.mark.slow
-def test_the_picture_of_the_layers_is_what_the_imports_make() -> None:
+def test_the_picture_of_the_layers_is_what_the_imports_make():
     picture = (ROOT / "docs" / "architecture.svg").read_text(encoding="utf-8")
     assert (
         picture == runpy.run_path(str(ROOT / "docs" / "architecture.py"))["text"]()
     ), "python docs/architecture.py"
 
 
-def test_the_formulas_know_numpy_and_the_linkage_alone() -> None:
+def test_the_formulas_know_numpy_and_the_linkage_alone():
     for path in (ROOT / "fourbar" / "formulas").glob("*.py"):
         used = {name for name in imported(path) if name.startswith("fourbar.")}
         assert {layer(name) for name in used} <= {"formulas", "linkage", "errors"}, path
 
 
 @pytest.mark.parametrize("name", ["compare", "report"])
-def test_what_judges_knows_no_engine_library(name: str) -> None:
+def test_what_judges_knows_no_engine_library(name):
     paths = [*(PACKAGES["fourbar_validation"] / name).rglob("*.py")]
     assert paths
     for path in paths:
@@ -256,7 +256,7 @@ def test_what_judges_knows_no_engine_library(name: str) -> None:
         ), path
 
 
-def test_nothing_that_is_shipped_knows_the_lab() -> None:
+def test_nothing_that_is_shipped_knows_the_lab():
     """Not even as a text such as "module:Class", which no import shows."""
     shipped = [
         path

@@ -10,7 +10,6 @@ import subprocess
 import sys
 import time
 import tomllib
-from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
@@ -21,7 +20,6 @@ import pytest
 
 import fourbar_validation.run.plan
 from fourbar.errors import BROKEN, FourBarError, InputError
-from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import FAILS, REFUSES, Row
@@ -31,7 +29,6 @@ from fourbar_validation.engines.registry import Engine
 from fourbar_validation.engines.table import choose_engines
 from fourbar_validation.report.machine import CODE, build, hash_modules
 from fourbar_validation.report.record import Record
-from fourbar_validation.report.summary import Summary
 from fourbar_validation.run import pool
 from fourbar_validation.run.plan import COLLECTING, Plan, RunOptions
 from fourbar_validation.run.run import run
@@ -42,7 +39,6 @@ from fourbar_validation.scenes.suites import (
     MOST_POSITIONS_OF_A_SCENE,
     Files,
     Random,
-    Suite,
     read_scene_files,
 )
 from tests.support.guests import list_processes, write_program
@@ -81,12 +77,7 @@ TYPES = tuple(DrawnType)
 EXACT = choose_engines("free-body")
 
 
-def judge_all(
-    suite: Suite,
-    out: Path,
-    engines: tuple[Engine, ...] = EXACT,
-    workers: int = 2,
-) -> Summary:
+def judge_all(suite, out, engines=EXACT, workers=2):
     heard = Heard()
     options = RunOptions(workers=workers, drawn=False)
     summary = run(Plan(suite, engines, options), out, heard)
@@ -98,10 +89,7 @@ def judge_all(
 @pytest.mark.timeout(
     300
 )  # its hangs alone take half a minute, and every new worker imports the harness again
-def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path, monkeypatch):
     for size in ("SCENES_OF_A_SLOW_TASK", "SCENES_OF_A_QUICK_TASK"):
         monkeypatch.setattr(fourbar_validation.run.plan, size, 2)
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
@@ -126,11 +114,8 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(
 @pytest.mark.posix
 @pytest.mark.parametrize(("kills", "blamed"), [(1, False), (KILLS_OF_BLAME, True)])
 def test_a_worker_killed_once_is_not_held_against_the_engine(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    kills: int,
-    blamed: bool,
-) -> None:
+    tmp_path, monkeypatch, kills, blamed
+):
     """One that kills its worker each time is: in the scene, and by itself."""
     (tmp_path / "lives").mkdir()
     for life in range(kills):
@@ -147,9 +132,8 @@ def test_a_worker_killed_once_is_not_held_against_the_engine(
 
 @pytest.mark.slow
 def test_workers_that_die_with_nothing_to_do_end_the_run_which_can_be_resumed(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    tmp_path, monkeypatch
+):
     (tmp_path / "lives").mkdir()
     (tmp_path / "lives" / "0").touch()
     monkeypatch.setenv("LIVES", str(tmp_path / "lives"))
@@ -163,9 +147,7 @@ def test_workers_that_die_with_nothing_to_do_end_the_run_which_can_be_resumed(
 
 @pytest.mark.slow
 @pytest.mark.posix
-def test_a_worker_killed_with_the_lock_of_the_pipe_ends_the_run_within_seconds() -> (
-    None
-):
+def test_a_worker_killed_with_the_lock_of_the_pipe_ends_the_run_within_seconds():
     """Nobody gives the lock back.
 
     The others must not wait for it as long as Pebble does, two minutes.
@@ -184,15 +166,12 @@ def test_a_worker_killed_with_the_lock_of_the_pipe_ends_the_run_within_seconds()
 
 
 @pytest.mark.slow
-def test_a_clock_that_jumps_forward_ends_nothing(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_clock_that_jumps_forward_ends_nothing(tmp_path, monkeypatch):
     """As that of a machine does which slept while an item was worked at."""
     starts = tmp_path / "starts"
     jump = 1e6
 
-    def now() -> float:
+    def now():
         return time.time() + jump * starts.exists()
 
     clock = SimpleNamespace(time=now, sleep=time.sleep)
@@ -208,7 +187,7 @@ def test_a_clock_that_jumps_forward_ends_nothing(
     assert len(starts.read_text().splitlines()) > 1
 
 
-def test_random_scenes_depend_on_seed_and_index_alone() -> None:
+def test_random_scenes_depend_on_seed_and_index_alone():
     short, long = Random(3, SEED, TYPES), Random(30, SEED, TYPES)
     assert short.scene(2).linkage == long.scene(2).linkage
     assert short.scene(2).linkage != Random(3, SEED + 1, TYPES).scene(2).linkage
@@ -216,7 +195,7 @@ def test_random_scenes_depend_on_seed_and_index_alone() -> None:
     assert names == sorted(names)
 
 
-def test_the_hash_of_the_code_is_that_of_its_modules(tmp_path: Path) -> None:
+def test_the_hash_of_the_code_is_that_of_its_modules(tmp_path):
     hashes = []
     for name, text in (
         ("fourbar/a.py", "1"),
@@ -243,7 +222,7 @@ def test_the_hash_of_the_code_is_that_of_its_modules(tmp_path: Path) -> None:
     assert build("numpy") and build("no-such-package") == ""
 
 
-def test_a_record_is_read_from_its_part_as_it_was(tmp_path: Path) -> None:
+def test_a_record_is_read_from_its_part_as_it_was(tmp_path):
     errors = (math.nan, math.inf, REFUSES, "a limit", -0.0, 1e-300)
     record = Record("a", title="A", rows=[Row("a", "engine", "exact", "F12", *errors)])
     with Store(tmp_path, {}).held() as store:
@@ -263,13 +242,8 @@ results do not.
 
 
 def start(
-    out: Path,
-    count: int,
-    *program: str,
-    workers: int = 2 if FULL else 1,
-    stderr: int = subprocess.DEVNULL,
-    more: Sequence[str] = (),
-) -> subprocess.Popen[bytes]:
+    out, count, *program, workers=2 if FULL else 1, stderr=subprocess.DEVNULL, more=()
+):
     command = [
         sys.executable,
         *(program or PROGRAM),
@@ -296,13 +270,13 @@ def start(
     )
 
 
-def assert_unfinished(out: Path) -> None:
+def assert_unfinished(out):
     """What ended the run left it without results and with parts to go on from."""
     assert not (out / "results.csv").exists()
     assert list(out.glob("parts/0*"))
 
 
-def wait_for_parts(out: Path, process: subprocess.Popen[bytes], at_least: int) -> None:
+def wait_for_parts(out, process, at_least):
     deadline = time.monotonic() + 60.0
     while (
         len(list(out.glob("parts/0*"))) < at_least
@@ -313,7 +287,7 @@ def wait_for_parts(out: Path, process: subprocess.Popen[bytes], at_least: int) -
 
 
 @pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def undisturbed(tmp_path_factory):
     """The folder of a run that nothing disturbed, judged in this process."""
     out = tmp_path_factory.mktemp("undisturbed")
     with pytest.MonkeyPatch.context() as monkeypatch:
@@ -327,9 +301,8 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.timeout(120 + 20 * KILLS)
 def test_whatever_ended_it_a_rerun_goes_on_and_ends_with_the_same_bytes(
-    tmp_path: Path,
-    undisturbed: Path,
-) -> None:
+    tmp_path, undisturbed
+):
     """A run with one worker is interrupted, killed at random moments and met with a
     full disk, one after the other in one folder.
     """
@@ -367,7 +340,7 @@ def test_whatever_ended_it_a_rerun_goes_on_and_ends_with_the_same_bytes(
     }
 
 
-def workers_of(process: subprocess.Popen[bytes]) -> list[int]:
+def workers_of(process):
     """The processes that judge.
 
     No zombie of one that was killed, nor Python's tracker of resources.
@@ -388,10 +361,7 @@ def workers_of(process: subprocess.Popen[bytes]) -> list[int]:
 @pytest.mark.slow
 @pytest.mark.linux
 @pytest.mark.timeout(400 + 20 * KILLS)
-def test_a_worker_killed_at_random_moments_changes_no_byte(
-    tmp_path: Path,
-    undisturbed: Path,
-) -> None:
+def test_a_worker_killed_at_random_moments_changes_no_byte(tmp_path, undisturbed):
     rng = np.random.default_rng(SEED + 1)
     kills = runs = 0
     # a run is over after some ten of them, or before the first: another one takes the
@@ -418,7 +388,7 @@ def test_a_worker_killed_at_random_moments_changes_no_byte(
         ).read_bytes()
 
 
-def guests_of(mark: str, program: str) -> list[int]:
+def guests_of(mark, program):
     """The programs of guests among the processes with a mark.
 
     The run names them too.
@@ -436,9 +406,8 @@ def guests_of(mark: str, program: str) -> list[int]:
 @pytest.mark.linux
 @pytest.mark.timeout(200 + 120 * KILLS)
 def test_a_guest_its_worker_and_its_run_killed_in_turn_change_no_byte(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    tmp_path, monkeypatch
+):
     """Each is killed in the middle, with questions left to ask."""
     guest = [f"--guest={write_program(tmp_path, 'plain')}"]
     undisturbed = tmp_path / "undisturbed"
@@ -479,7 +448,7 @@ def test_a_guest_its_worker_and_its_run_killed_in_turn_change_no_byte(
     not hasattr(os, "geteuid") or os.geteuid() == 0,
     reason="a folder that root may write to",
 )
-def test_a_read_only_folder_is_reported(tmp_path: Path) -> None:
+def test_a_read_only_folder_is_reported(tmp_path):
     tmp_path.chmod(0o500)
     with pytest.raises((OSError, FourBarError)):
         judge_all(Few(), tmp_path / "run")
@@ -500,10 +469,8 @@ def test_a_read_only_folder_is_reported(tmp_path: Path) -> None:
     ],
 )
 def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(
-    motion: str,
-    key: str,
-    tmp_path: Path,
-) -> None:
+    motion, key, tmp_path
+):
     lengths = (
         '[lengths]\nground = "4 m"\ninput = "1 m"\ncoupler = "3 m"\noutput = "3 m"\n'
     )
@@ -530,7 +497,7 @@ def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(
         read_scene_files([path])
 
 
-def test_a_scene_of_many_positions_has_longer_before_it_counts_as_hanging() -> None:
+def test_a_scene_of_many_positions_has_longer_before_it_counts_as_hanging():
     """One of fifty thousand needs minutes in the simulators."""
     one = pool.find_time_limit(Random(1, 0, TYPES), ())
     assert pool.find_time_limit(Files((), 50_000), ()) > 5.0 * one
@@ -542,7 +509,7 @@ class Blunders:
     name = "blunders"
     titles: ClassVar[list[str]] = []
 
-    def answer(self, scene: Scene, command: Command) -> Answer:
+    def answer(self, scene, command):
         self.titles.append(scene.title)
         if scene.title == "b":
             raise RuntimeError("no licence")
@@ -555,9 +522,8 @@ class Blunders:
 
 @pytest.mark.slow
 def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    tmp_path, monkeypatch
+):
     """Drawn at the end, without the engine that broke down.
 
     With --no-pictures not at all.
@@ -566,7 +532,7 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     drawn: list[str] = []
     judge = pool.judge_job
 
-    def noting(job: pool.Job) -> Record:
+    def noting(job):
         drawn.extend([job.name] * job.draw)
         return judge(job)
 

@@ -8,7 +8,6 @@ outside. KILLS states how often.
 import os
 import signal
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -35,11 +34,7 @@ DRAFT = ".*.part"
 MODELS = Path(__file__).parents[2] / "models"
 
 
-def kill_while(
-    write: Callable[[], object],
-    seen: Callable[[], object],
-    after: float,
-) -> bool:
+def kill_while(write, seen, after):
     """Kill a process some seconds after `seen`; return whether it was still running."""
     child = os.fork()
     if child == 0:
@@ -55,7 +50,7 @@ def kill_while(
     return os.WIFSIGNALED(os.waitpid(child, 0)[1])
 
 
-def stamp(folder: Path) -> list[tuple[str, int]]:
+def stamp(folder):
     """List the files of a folder with the times at which they changed."""
     stamps = []
     for path in folder.glob("*"):
@@ -64,14 +59,14 @@ def stamp(folder: Path) -> list[tuple[str, int]]:
     return sorted(stamps)
 
 
-def changes(folder: Path) -> Callable[[], bool]:
+def changes(folder):
     before = stamp(folder)
     return lambda: stamp(folder) != before
 
 
 def test_a_killed_accept_leaves_one_accepted_state_and_is_completed_by_another(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     _, rows = read_run(
         MODELS.parent / "validation/fourbar_validation/regression/accepted"
     )
@@ -102,10 +97,7 @@ def test_a_killed_accept_leaves_one_accepted_state_and_is_completed_by_another(
     assert left <= {"results.csv", "timings.csv", "record.json", "history.parquet"}
 
 
-def test_a_killed_collect_is_done_again_with_the_same_bytes(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_killed_collect_is_done_again_with_the_same_bytes(tmp_path, monkeypatch):
     judge_here(monkeypatch)
     monkeypatch.setattr(plan, "SCENES_OF_A_QUICK_TASK", 2)
     options = ["--random", "8", "--engines", "free-body", "--no-pictures"]
@@ -132,7 +124,7 @@ def test_a_killed_collect_is_done_again_with_the_same_bytes(
     assert killed
 
 
-def test_a_killed_workbench_leaves_a_whole_scene_file(tmp_path: Path) -> None:
+def test_a_killed_workbench_leaves_a_whole_scene_file(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_bytes((MODELS / "crank_rocker.toml").read_bytes())
     texts = {path.read_text(encoding="utf-8")}
@@ -142,7 +134,7 @@ def test_a_killed_workbench_leaves_a_whole_scene_file(tmp_path: Path) -> None:
         session.do({"do": "set", "path": ["lengths", "input"], "value": length})
         texts.add(session.now.text)
 
-    def save() -> None:
+    def save():
         of_child = Session(path, tmp_path / "exports")
         for number in range(10_000):
             value = lengths[number % 2]

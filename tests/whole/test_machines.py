@@ -9,7 +9,6 @@ every numerical test file, and the whole `validation run`.
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -41,7 +40,7 @@ NUMERICAL = [
 @pytest.mark.slow
 @pytest.mark.timeout(3600 if ALL else 600)
 @pytest.mark.parametrize("core", CORES if ALL else ["another"])
-def test_the_numbers_hold_on_another_machine(core: str, tmp_path: Path) -> None:
+def test_the_numbers_hold_on_another_machine(core, tmp_path):
     reasons = {name: why_not(name) for name in ([core] if ALL else CORES)}
     possible = [name for name, reason in reasons.items() if reason is None]
     if not possible:

@@ -13,10 +13,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
@@ -36,24 +34,19 @@ pytestmark = [pytest.mark.slow, pytest.mark.posix, pytest.mark.timeout(600)]
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def alone(tmp_path_factory):
     """The folder of the same run on one machine."""
     out = tmp_path_factory.mktemp("alone")
     assert status(["run", *OPTIONS, "--out", str(out)]) == 0
     return out
 
 
-def assert_same_bytes(out: Path, alone: Path) -> None:
+def assert_same_bytes(out, alone):
     for name in TABLES:
         assert (out / name).read_bytes() == (alone / name).read_bytes(), name
 
 
-def run_shell(
-    script: str,
-    folder: Path,
-    options: Sequence[str] = (),
-    **variables: str,
-) -> None:
+def run_shell(script, folder, options=(), **variables):
     """Run a script as a machine does that has the programs of this environment."""
     path = f"{PROGRAM.parent}{os.pathsep}{os.environ['PATH']}"
     subprocess.run(
@@ -65,7 +58,7 @@ def run_shell(
     )
 
 
-def collect_as_shown(folder: Path) -> Path:
+def collect_as_shown(folder):
     """Run the command that the page shows for collecting."""
     page = (ROOT / "docs" / "many-machines.md").read_text(encoding="utf-8")
     line = "fourbar-validation collect parts/* --out results"
@@ -74,7 +67,7 @@ def collect_as_shown(folder: Path) -> Path:
     return folder / "results"
 
 
-def test_a_slurm_array_changes_no_byte(alone: Path, tmp_path: Path) -> None:
+def test_a_slurm_array_changes_no_byte(alone, tmp_path):
     """One task is killed in the middle, and submitted again."""
     script = (CI / "slurm.sh").read_text(encoding="utf-8")
     for task in (1, 2):
@@ -97,7 +90,7 @@ def test_a_slurm_array_changes_no_byte(alone: Path, tmp_path: Path) -> None:
     assert_same_bytes(collect_as_shown(tmp_path), alone)
 
 
-def test_a_matrix_of_a_workflow_changes_no_byte(alone: Path, tmp_path: Path) -> None:
+def test_a_matrix_of_a_workflow_changes_no_byte(alone, tmp_path):
     """Every machine has folders of its own; artefacts alone go from one to another."""
     workflow = (CI / "parts.yml").read_text(encoding="utf-8")
     (numbers,) = re.findall(r"part: \[(.*)\]", workflow)
@@ -121,7 +114,7 @@ def test_a_matrix_of_a_workflow_changes_no_byte(alone: Path, tmp_path: Path) -> 
 
 
 @contextmanager
-def started(*line: str, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
+def started(*line, folder):
     """Start a program of Dask, and end it."""
     process = subprocess.Popen(
         [sys.executable, "-m", "dask", *line],
@@ -136,7 +129,7 @@ def started(*line: str, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
         process.wait()
 
 
-def wait_for(ready: Callable[[], bool], process: subprocess.Popen[bytes]) -> None:
+def wait_for(ready, process):
     """Wait for what a process makes while it runs; it must not have ended then."""
     latest = time.monotonic() + TIME
     while process.poll() is None and not ready():
@@ -145,7 +138,7 @@ def wait_for(ready: Callable[[], bool], process: subprocess.Popen[bytes]) -> Non
     assert process.poll() is None, "it has ended"
 
 
-def has_address(scheduler: Path) -> bool:
+def has_address(scheduler):
     """Whether the file of a scheduler is there, whole."""
     return scheduler.exists() and scheduler.read_text().rstrip().endswith("}")
 
@@ -154,10 +147,7 @@ def has_address(scheduler: Path) -> bool:
     importlib.util.find_spec("distributed") is None,
     reason="not run: distributed is not installed: pip install distributed",
 )
-def test_a_dask_worker_that_dies_and_one_that_joins_change_no_byte(
-    alone: Path,
-    tmp_path: Path,
-) -> None:
+def test_a_dask_worker_that_dies_and_one_that_joins_change_no_byte(alone, tmp_path):
     scheduler = tmp_path / "scheduler.json"
     worker = ("worker", "--scheduler-file", str(scheduler), "--nthreads", "1")
     worker = (*worker, "--no-nanny", "--no-dashboard")
@@ -183,7 +173,7 @@ def test_a_dask_worker_that_dies_and_one_that_joins_change_no_byte(
     importlib.util.find_spec("distributed") is None,
     reason="not run: distributed is not installed: pip install distributed",
 )
-def test_a_worker_with_other_code_judges_nothing() -> None:
+def test_a_worker_with_other_code_judges_nothing():
     with pytest.raises(AssertionError, match="other versions or code"):
         load_dask_run().judge("1/1", {"code": "of yesterday"}, OPTIONS)
 
@@ -192,10 +182,7 @@ def test_a_worker_with_other_code_judges_nothing() -> None:
     importlib.util.find_spec("distributed") is None,
     reason="not run: distributed is not installed: pip install distributed",
 )
-def test_a_part_whose_unpacking_is_interrupted_is_not_there(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_part_whose_unpacking_is_interrupted_is_not_there(tmp_path, monkeypatch):
     program = load_dask_run()
     (tmp_path / "judged").mkdir()
     (tmp_path / "judged" / "results.csv").write_text("scene")
@@ -204,7 +191,7 @@ def test_a_part_whose_unpacking_is_interrupted_is_not_there(
     parts = tmp_path / "parts"
     parts.mkdir()
 
-    def interrupted(archive: Path, folder: Path) -> None:
+    def interrupted(archive, folder):
         folder.mkdir()
         raise KeyboardInterrupt
 
@@ -217,7 +204,7 @@ def test_a_part_whose_unpacking_is_interrupted_is_not_there(
     assert [path.name for path in parts.rglob("*")] == ["1", "results.csv"]
 
 
-def load_dask_run() -> ModuleType:
+def load_dask_run():
     """Import the program that the page on many machines shows."""
     spec = importlib.util.spec_from_file_location("dask_run", CI / "dask_run.py")
     assert spec is not None and spec.loader is not None

@@ -39,9 +39,7 @@ memory of the process that started it in it.
 
 @pytest.mark.slow
 @pytest.mark.linux
-def test_analyze_of_a_million_positions_needs_little_beyond_them(
-    tmp_path: Path,
-) -> None:
+def test_analyze_of_a_million_positions_needs_little_beyond_them(tmp_path):
     scene = tmp_path / "million.toml"
     text = (MODELS / "crank_rocker.toml").read_text(encoding="utf-8")
     longer, steps = re.subn(r"steps = \d+", "steps = 999998", text)
@@ -56,10 +54,7 @@ def test_analyze_of_a_million_positions_needs_little_beyond_them(
 
 
 @pytest.mark.parametrize("name", ["crank_rocker", "capabilities/springs"])
-def test_bending_is_the_same_in_blocks(
-    name: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_bending_is_the_same_in_blocks(name, monkeypatch):
     scene = fourbar.load(MODELS / f"{name}.toml")
     solution = solve(scene, at=command(scene))
     whole = motion_curves.compute_bending(scene, solution)

@@ -6,8 +6,6 @@ Tests/ mirrors the tree, and what has no test of its name stands below.
 module alone, `support/` holds what tests share.
 """
 
-from pathlib import Path
-
 import pytest
 
 from tests.whole.test_imports import ROOT
@@ -126,7 +124,7 @@ one of them is wrong.
 """
 
 
-def listed() -> dict[str, str]:
+def listed():
     """The test of each module of the table."""
     tests_of = {}
     for test, groups in JUDGED_BY.items():
@@ -144,7 +142,7 @@ def listed() -> dict[str, str]:
     return tests_of
 
 
-def own_test(path: Path, top: str) -> bool:
+def own_test(path, top):
     """Whether a module has a test of its name."""
     folder = ROOT / "tests" / top / path.parent.relative_to(SOURCES[top])
     return any(
@@ -153,7 +151,7 @@ def own_test(path: Path, top: str) -> bool:
 
 
 @pytest.mark.parametrize("top", SOURCES)
-def test_every_module_has_a_test_or_is_listed(top: str) -> None:
+def test_every_module_has_a_test_or_is_listed(top):
     paths = [
         path for path in SOURCES[top].rglob("*.py") if not path.name.startswith("__")
     ]
@@ -167,12 +165,12 @@ def test_every_module_has_a_test_or_is_listed(top: str) -> None:
     assert without == of_top
 
 
-def test_the_tests_of_the_table_are_there() -> None:
+def test_the_tests_of_the_table_are_there():
     assert all((ROOT / "tests" / test).is_file() for test in JUDGED_BY)
 
 
 @pytest.mark.parametrize("top", SOURCES)
-def test_every_test_has_the_name_of_a_module_or_folder(top: str) -> None:
+def test_every_test_has_the_name_of_a_module_or_folder(top):
     for test in (ROOT / "tests" / top).rglob("test_*.py"):
         folder = SOURCES[top] / test.parent.relative_to(ROOT / "tests" / top)
         names = {folder.name, *(entry.stem for entry in folder.iterdir())}

@@ -52,12 +52,7 @@ omega_2 = "1 rad/s"
 """
 
 
-def without(
-    library: str,
-    folder: Path,
-    *arguments: str,
-    **settings: str,
-) -> subprocess.CompletedProcess[str]:
+def without(library, folder, *arguments, **settings):
     """`python -m validation run` where a library cannot be imported."""
     (folder / "sitecustomize.py").write_text(BLOCKER)
     (folder / "scene.toml").write_text(SCENE)
@@ -92,10 +87,7 @@ def without(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("library", ENGINES)
-def test_the_others_run_and_the_missing_named_with_the_reason(
-    library: str,
-    tmp_path: Path,
-) -> None:
+def test_the_others_run_and_the_missing_named_with_the_reason(library, tmp_path):
     done = without(library, tmp_path)
     reason = f'{library} is not installed: pip install ".[validation]" in the checkout'
     with (tmp_path / "out" / "results.csv").open() as table:
@@ -114,7 +106,7 @@ def test_the_others_run_and_the_missing_named_with_the_reason(
 
 
 @pytest.mark.slow
-def test_requested_by_name_nothing_is_run(tmp_path: Path) -> None:
+def test_requested_by_name_nothing_is_run(tmp_path):
     done = without("mujoco", tmp_path, "--engines", "free-body,mujoco-inverse")
     reason = 'mujoco is not installed: pip install ".[validation]" in the checkout'
     assert done.stderr.strip() == f"error: mujoco-inverse: {reason}"
@@ -122,7 +114,7 @@ def test_requested_by_name_nothing_is_run(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_an_engine_that_is_there_and_does_not_load_is_one_line(tmp_path: Path) -> None:
+def test_an_engine_that_is_there_and_does_not_load_is_one_line(tmp_path):
     done = without("pinocchio", tmp_path, "--engines", "pinocchio-inverse", BROKEN="1")
     what = "ImportError: libboost.so: cannot open shared object file"
     assert (

@@ -46,12 +46,7 @@ NO_TABLE = {
 }
 
 
-def show(
-    line: str,
-    width: int,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> list[str]:
+def show(line, width, monkeypatch, capsys):
     """Lines that a command prints on a terminal of a width."""
     program, *words = line.split()
     monkeypatch.setenv("COLUMNS", str(width))
@@ -65,12 +60,7 @@ def show(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("line", [*SAME, *OTHER], ids=lambda line: Path(line).name)
-def test_tables_fit_a_narrow_terminal(
-    line: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_tables_fit_a_narrow_terminal(line, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     judge_here(monkeypatch)
     (tmp_path / "theirs.csv").write_text("theta_2 [deg], torque\n60, 1.0\n")
@@ -82,7 +72,7 @@ def test_tables_fit_a_narrow_terminal(
         assert words <= set(" ".join(lines).split())
 
 
-def test_every_command_is_tried_or_has_no_table() -> None:
+def test_every_command_is_tried_or_has_no_table():
     tried = {" ".join(line.split()[:2]) for line in (*SAME, *OTHER)}
     assert tried | NO_TABLE == {
         *(f"fourbar {name}" for name in fourbar.cli.group.commands),

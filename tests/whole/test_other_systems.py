@@ -9,7 +9,6 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -34,7 +33,7 @@ BEGIN = (
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     """A folder whose name takes more than ASCII, with a scene whose title does."""
     scene_folder = tmp_path / "Análisis de θ"
     scene_folder.mkdir()
@@ -62,11 +61,7 @@ def folder(tmp_path: Path) -> Path:
         ("fourbar_validation.cli", "check-mjcf scène.toml {models}/crank_rocker.xml"),
     ],
 )
-def test_commands_need_neither_fork_nor_utf_8(
-    module: str,
-    line: str,
-    folder: Path,
-) -> None:
+def test_commands_need_neither_fork_nor_utf_8(module, line, folder):
     if "mjcf" in line:
         pytest.importorskip("mujoco")
     path = {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "validation")])}
@@ -96,10 +91,7 @@ def test_commands_need_neither_fork_nor_utf_8(
     ]
 
 
-def test_line_ends_of_windows_are_read(
-    folder: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_line_ends_of_windows_are_read(folder, capsys):
     scene, table = folder / "scène.toml", folder / "table.csv"
     assert status(["analyze", str(scene), "--csv", "-o", str(table)]) == HOLDS
     before = fourbar.load(scene)

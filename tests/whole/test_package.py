@@ -46,7 +46,7 @@ MODULE_OF = {
 """Libraries that are imported under another name than they are installed by."""
 
 
-def libraries(requirements: list[str]) -> set[str]:
+def libraries(requirements):
     names = {re.split(r"[<>=\[]", requirement)[0] for requirement in requirements}
     return {MODULE_OF.get(name, name) for name in names}
 
@@ -59,7 +59,7 @@ def libraries(requirements: list[str]) -> set[str]:
         (MODELS, "models"),
     ],
 )
-def test_every_file_of_the_package_is_shipped(package: str, folder: str) -> None:
+def test_every_file_of_the_package_is_shipped(package, folder):
     patterns = PROJECT["tool"]["setuptools"]["package-data"][package]
     for path in (ROOT / folder).rglob("*"):
         if (
@@ -74,7 +74,7 @@ def test_every_file_of_the_package_is_shipped(package: str, folder: str) -> None
             assert (path.parent / "__init__.py").is_file(), path
 
 
-def test_the_source_archive_has_the_package_that_lies_elsewhere() -> None:
+def test_the_source_archive_has_the_package_that_lies_elsewhere():
     """The wheel is built from the archive.
 
     The archive has no module of a package that is mapped to another folder.
@@ -87,22 +87,15 @@ def test_the_source_archive_has_the_package_that_lies_elsewhere() -> None:
 
 
 @pytest.mark.parametrize("line", ["write", "problems"])
-def test_what_needs_a_checkout_says_so_in_one_line(
-    line: str,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_needs_a_checkout_says_so_in_one_line(line, monkeypatch, capsys):
     monkeypatch.setattr("fourbar_validation.places.CHECKOUT", None)
     assert lab([line]) == BAD_INPUT
     complained = capsys.readouterr().err
     assert complained.count("\n") == 1 and "needs a checkout" in complained
 
 
-def test_the_harness_lists_a_command_whose_library_is_missing(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    def without_flint(_: str) -> None:
+def test_the_harness_lists_a_command_whose_library_is_missing(monkeypatch, capsys):
+    def without_flint(_):
         raise ModuleNotFoundError("No module named 'flint'", name="flint")
 
     with monkeypatch.context() as context:
@@ -118,7 +111,7 @@ def test_the_harness_lists_a_command_whose_library_is_missing(
     )
 
 
-def test_extras_of_extras_are_named_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_extras_of_extras_are_named_one_by_one(monkeypatch):
     """No index of packages has `fourbar[plot]`."""
     monkeypatch.setattr("fourbar.errors.__file__", "/nowhere/fourbar/errors.py")
     for extra in ("validation", "all"):
@@ -129,8 +122,8 @@ def test_extras_of_extras_are_named_one_by_one(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_another_interpreter_finds_the_code_of_a_wheel_and_no_library_of_it(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     monkeypatch.setattr("fourbar_validation.places.CHECKOUT", None)
     monkeypatch.delenv("PYTHONPATH", raising=False)
     with import_path() as path:
@@ -141,9 +134,7 @@ def test_another_interpreter_finds_the_code_of_a_wheel_and_no_library_of_it(
     assert not Path(path).exists()
 
 
-def test_a_wheel_in_a_folder_of_another_project_takes_that_for_no_checkout(
-    tmp_path: Path,
-) -> None:
+def test_a_wheel_in_a_folder_of_another_project_takes_that_for_no_checkout(tmp_path):
     """`pip install --target vendor` at the top of a project."""
     package = tmp_path / "vendor" / "fourbar_validation"
     shutil.copytree(ROOT / "models", package / "models")
@@ -153,7 +144,7 @@ def test_a_wheel_in_a_folder_of_another_project_takes_that_for_no_checkout(
     assert places["CHECKOUT"] is None and (places["MODELS"] / "thesis.toml").is_file()
 
 
-def test_every_library_that_fourbar_imports_is_declared() -> None:
+def test_every_library_that_fourbar_imports_is_declared():
     project = PROJECT["project"]
     declared = libraries(project["dependencies"]) | libraries(
         [
@@ -188,13 +179,8 @@ def test_every_library_that_fourbar_imports_is_declared() -> None:
     ],
 )
 def test_an_extra_that_is_missing_is_one_line(
-    library: str,
-    extra: str,
-    command: list[str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    library, extra, command, tmp_path, monkeypatch, capsys
+):
     import fourbar
 
     monkeypatch.chdir(tmp_path)
@@ -213,7 +199,7 @@ def test_an_extra_that_is_missing_is_one_line(
     assert sorted(tmp_path.iterdir()) == before
 
 
-def built(folder: Path) -> tuple[Path, Path]:
+def built(folder):
     """Wheel and source archive of the tree, made from a copy."""
     tree = folder / "tree"
     keep = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "results")
@@ -233,19 +219,14 @@ def built(folder: Path) -> tuple[Path, Path]:
     return wheel, archive
 
 
-def lowest(requirements: list[str]) -> list[str]:
+def lowest(requirements):
     """The lowest versions that are declared: the constraints of an installation."""
     return [
         re.sub(r">=([0-9.]+).*", r"==\1.*", requirement) for requirement in requirements
     ]
 
 
-def installed_works(
-    python: str,
-    package: Path,
-    folder: Path,
-    constraints: list[str],
-) -> None:
+def installed_works(python, package, folder, constraints):
     """Install afresh, outside the tree.
 
     Then version, numbers, a page, and the one line of a missing extra.
@@ -270,9 +251,7 @@ def installed_works(
         name: value for name, value in os.environ.items() if name != "PYTHONPATH"
     }
 
-    def run(
-        *arguments: str, program: str = "fourbar"
-    ) -> subprocess.CompletedProcess[str]:
+    def run(*arguments, program="fourbar"):
         command = [str(folder / "bin" / program), *arguments]
         return subprocess.run(
             command,
@@ -314,7 +293,7 @@ def installed_works(
     reason="PACKAGE=all builds and installs wheel and archive",
 )
 @pytest.mark.timeout(1800)
-def test_wheel_and_archive_install_on_every_python(tmp_path: Path) -> None:
+def test_wheel_and_archive_install_on_every_python(tmp_path):
     wheel, archive = built(tmp_path)
     names = set(zipfile.ZipFile(wheel).namelist())
     assert {name.partition("/")[0] for name in names} == {

@@ -6,7 +6,6 @@ No text that somebody hands in may hang the program.
 import ast
 import re
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -41,7 +40,7 @@ exponential one cannot.
 """
 
 
-def list_patterns() -> Iterator[tuple[str, re.Pattern[str]]]:
+def list_patterns():
     """List the literal patterns of the three packages, each with its place."""
     for folder in FOLDERS:
         for path in sorted((ROOT / folder).rglob("*.py")):
@@ -61,7 +60,7 @@ def list_patterns() -> Iterator[tuple[str, re.Pattern[str]]]:
                     yield place, re.compile(str(pattern.value))
 
 
-def measure_slowest(pattern: re.Pattern[str]) -> float:
+def measure_slowest(pattern):
     """Return the longest processor time of a search in hostile texts, s, up to the
     first that is too long.
     """
@@ -81,7 +80,7 @@ def measure_slowest(pattern: re.Pattern[str]) -> float:
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-def test_a_hostile_repeat_is_refused_at_once() -> None:
+def test_a_hostile_repeat_is_refused_at_once():
     patterns = dict(list_patterns())
     assert len(patterns) > 30
     assert any(place.startswith("fourbar/quantities/units.py") for place in patterns)
@@ -93,5 +92,5 @@ def test_a_hostile_repeat_is_refused_at_once() -> None:
     assert not slow
 
 
-def test_a_pattern_with_two_readings_is_caught() -> None:
+def test_a_pattern_with_two_readings_is_caught():
     assert measure_slowest(re.compile("(?:[a-z]+)+")) > SECONDS

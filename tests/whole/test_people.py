@@ -7,7 +7,6 @@ printed in the source of the task.
 
 import re
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,18 +23,14 @@ Steps = Callable[..., str]
 
 
 @pytest.fixture
-def ask(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> Steps:
+def ask(tmp_path, capsys, monkeypatch):
     """Run one command line of `fourbar` in an empty folder.
 
     Return what it prints.
     """
     monkeypatch.chdir(tmp_path)
 
-    def run(*words: str) -> str:
+    def run(*words):
         code = status(list(words))
         printed = capsys.readouterr()
         assert (code, printed.err) == (HOLDS, ""), printed.err
@@ -45,7 +40,7 @@ def ask(
     return run
 
 
-def row_of(text: str, label: str, after: str = "") -> list[float]:
+def row_of(text, label, after=""):
     """Return the numbers of the first row with a label.
 
     The row is below one that begins with `after`.
@@ -87,11 +82,8 @@ CROSSED = {
 
 @pytest.mark.parametrize(("branch", "right"), [("open", OPEN), ("crossed", CROSSED)])
 def test_everything_about_one_position_of_a_homework_linkage(
-    branch: str,
-    right: dict[str, tuple[float, ...]],
-    ask: Steps,
-    tmp_path: Path,
-) -> None:
+    branch, right, ask, tmp_path
+):
     """A file, an edit of its branch, a command."""
     stated = HOMEWORK.replace("[points]", f'branch = "{branch}"\n[points]')
     (tmp_path / "homework.toml").write_text(stated)
@@ -103,10 +95,7 @@ def test_everything_about_one_position_of_a_homework_linkage(
     assert len(text.splitlines()) < 40
 
 
-def test_another_position_is_asked_for_on_the_command_line(
-    ask: Steps,
-    tmp_path: Path,
-) -> None:
+def test_another_position_is_asked_for_on_the_command_line(ask, tmp_path):
     (tmp_path / "homework.toml").write_text(HOMEWORK.replace('"45 deg"', '"10 deg"'))
     text = ask("analyze", "homework.toml", "--at", "45 deg")
     assert row_of(text, "bar 3") == pytest.approx(OPEN["bar 3"], rel=PRINTED)
@@ -126,7 +115,7 @@ P = { bar = 3, from_pin = ["6 in", "45 deg"] }
 """
 
 
-def test_the_output_angle_is_known(ask: Steps, tmp_path: Path) -> None:
+def test_the_output_angle_is_known(ask, tmp_path):
     """A file, a command; an edit of the branch gives the other assembly."""
     answers = {
         "open": (-0.015833, (6.659926, 5.879577)),
@@ -140,10 +129,7 @@ def test_the_output_angle_is_known(ask: Steps, tmp_path: Path) -> None:
         assert row_of(text, "P") == pytest.approx(place, rel=PRINTED)
 
 
-def test_pliers_have_their_advantage_without_a_speed(
-    ask: Steps,
-    tmp_path: Path,
-) -> None:
+def test_pliers_have_their_advantage_without_a_speed(ask, tmp_path):
     (tmp_path / "pliers.toml").write_text(PLIERS)
     text = ask("analyze", "pliers.toml")
     assert row_of(text, "omega_4/omega_2")[0] == pytest.approx(0.1332544, rel=PRINTED)
@@ -154,7 +140,7 @@ def test_pliers_have_their_advantage_without_a_speed(
     assert row_of(text, "F_jaw/F_handle")[0] == pytest.approx(31.969, rel=PRINTED)
 
 
-def test_pliers_have_their_force_ratio_over_a_sweep(ask: Steps, tmp_path: Path) -> None:
+def test_pliers_have_their_force_ratio_over_a_sweep(ask, tmp_path):
     """At 49 deg it is the one of the position; by the speeds of both points."""
     sweep = 'theta_2 = { from = "49 deg", to = "55 deg", steps = 3 }'
     assert 'theta_2 = "49 deg"' in PLIERS
@@ -165,10 +151,7 @@ def test_pliers_have_their_force_ratio_over_a_sweep(ask: Steps, tmp_path: Path) 
     assert all(forces == speeds for _, forces, speeds in rows)
 
 
-def test_four_pins_and_the_speed_of_the_output_as_they_are_drawn(
-    ask: Steps,
-    tmp_path: Path,
-) -> None:
+def test_four_pins_and_the_speed_of_the_output_as_they_are_drawn(ask, tmp_path):
     """A command, an edit of two lines, a command."""
     ask("new", "pins.toml", "--pins", "0,0 0,100 175,50 250,50", "--unit", "mm")
     text = (tmp_path / "pins.toml").read_text()
@@ -186,7 +169,7 @@ def test_four_pins_and_the_speed_of_the_output_as_they_are_drawn(
     )
 
 
-def test_a_linkage_by_the_coordinates_of_its_joints(ask: Steps, tmp_path: Path) -> None:
+def test_a_linkage_by_the_coordinates_of_its_joints(ask, tmp_path):
     """E stands where it is drawn, in the coordinates of the drawing, and its path goes
     through it.
     """
@@ -204,14 +187,14 @@ def test_a_linkage_by_the_coordinates_of_its_joints(ask: Steps, tmp_path: Path) 
     assert np.hypot(x + 0.02591, y - 0.01657).min() < 1e-4
 
 
-def list_columns(text: str) -> list[list[float]]:
+def list_columns(text):
     """Return the rows of numbers of a printed table."""
     below = text[text.index("──") :].splitlines()[1:]
     rows = [line.split() for line in below if not line.startswith(("shown", "not"))]
     return [[float(cell) for cell in row] for row in rows if row]
 
 
-def test_a_new_parallelogram_is_one_over_the_whole_turn(ask: Steps) -> None:
+def test_a_new_parallelogram_is_one_over_the_whole_turn(ask):
     """Two commands; 0.3924 cos(theta_2), at 0 and 180 deg as the limit."""
     ask("new", "tp.toml", "--lengths", "300mm", "100mm", "300mm", "100mm")
     text = ask("analyze", "tp.toml")
@@ -226,7 +209,7 @@ def test_a_new_parallelogram_is_one_over_the_whole_turn(ask: Steps) -> None:
         assert torque == pytest.approx(right, abs=2e-6), theta_2
 
 
-def test_the_static_torque_of_a_long_parallelogram(ask: Steps, tmp_path: Path) -> None:
+def test_the_static_torque_of_a_long_parallelogram(ask, tmp_path):
     """A command, an edit, a command: 1 kg on the coupler, g = 10 m/s^2, arms of 1 m."""
     ask("new", "lift.toml", "--lengths", "3", "1", "3", "1", "--unit", "m")
     text = (tmp_path / "lift.toml").read_text()
@@ -256,10 +239,7 @@ gravity = ["9.81 m/s^2", "-90 deg"]
 """
 
 
-def test_a_platform_that_hangs_on_two_arms_as_it_is_drawn(
-    ask: Steps,
-    tmp_path: Path,
-) -> None:
+def test_a_platform_that_hangs_on_two_arms_as_it_is_drawn(ask, tmp_path):
     """Arms of 200 mm, whose drawn ends are rounded to a thousandth of a millimetre."""
     (tmp_path / "platform.toml").write_text(HANGING)
     text = ask("analyze", "platform.toml")
@@ -291,10 +271,7 @@ gravity = ["9.81 m/s^2", "-90 deg"]
 
 
 @pytest.mark.slow
-def test_a_given_couple_moves_two_parallel_links_from_rest(
-    ask: Steps,
-    tmp_path: Path,
-) -> None:
+def test_a_given_couple_moves_two_parallel_links_from_rest(ask, tmp_path):
     """alpha = 14.8148 - 6.54 cos 30 deg; the upper link carries 2.139 kN."""
     (tmp_path / "links.toml").write_text(COUPLE)
     text = ask("analyze", "links.toml", "--at", "30 deg")
@@ -306,14 +283,14 @@ def test_a_given_couple_moves_two_parallel_links_from_rest(
     assert row_of(text, "F14 at O4")[2] == pytest.approx(2.139, rel=1e-3)
 
 
-def test_a_weight_hung_at_the_tip_of_the_rocker(ask: Steps, tmp_path: Path) -> None:
+def test_a_weight_hung_at_the_tip_of_the_rocker(ask, tmp_path):
     (tmp_path / "hung.toml").write_text(HUNG)
     rows = list_columns(ask("analyze", "hung.toml", "--columns", "theta_2,torque"))
     right = [0.441477, -0.417152, -0.621733, 0.532516]
     assert [torque for _, torque in rows] == pytest.approx(right, rel=PRINTED)
 
 
-def test_a_force_along_x_at_the_end_of_the_rocker(ask: Steps, tmp_path: Path) -> None:
+def test_a_force_along_x_at_the_end_of_the_rocker(ask, tmp_path):
     (tmp_path / "pull.toml").write_text(PULL)
     text = ask("analyze", "pull.toml")
     assert row_of(text, "torque") == pytest.approx([1.656231], rel=PRINTED)
@@ -337,7 +314,7 @@ omega_2 = "20 rpm"
 """
 
 
-def test_steel_rods_by_their_density(ask: Steps, tmp_path: Path) -> None:
+def test_steel_rods_by_their_density(ask, tmp_path):
     """A file, two commands: torque, pins and stress.
 
     The shaking force position by position.
@@ -375,7 +352,7 @@ alpha_2 = "-26 rad/s^2"
 """
 
 
-def test_an_exercise_that_states_masses_per_length(ask: Steps, tmp_path: Path) -> None:
+def test_an_exercise_that_states_masses_per_length(ask, tmp_path):
     """Nine equations of the free bodies, solved apart from fourbar, are the oracle."""
     (tmp_path / "exercise.toml").write_text(PER_LENGTH)
     text = ask("analyze", "exercise.toml")
@@ -407,7 +384,7 @@ length = "1e6 ft"
 """
 
 
-def test_a_frame_with_a_spring_on_a_roller(ask: Steps, tmp_path: Path) -> None:
+def test_a_frame_with_a_spring_on_a_roller(ask, tmp_path):
     """V = 160 sin(theta) + 100 cos^2(theta) lbf ft: sin(theta) = 0.8, or upright."""
     (tmp_path / "frame.toml").write_text(GUIDED)
     text = ask("equilibrium", "frame.toml")
@@ -434,7 +411,7 @@ gravity = ["9.81 m/s^2", "-90 deg"]
 """
 
 
-def test_a_bar_without_mass_is_not_bent(ask: Steps, tmp_path: Path) -> None:
+def test_a_bar_without_mass_is_not_bent(ask, tmp_path):
     (tmp_path / "rocker.toml").write_text(MASSLESS)
     text = ask("analyze", "rocker.toml")
     assert row_of(text, "moment", after="bending")[2] == 0.0
@@ -498,7 +475,7 @@ gravity = ["1 g_0", "-90 deg"]
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_a_task_of_a_textbook_or_a_forum(task: str, ask: Steps, tmp_path: Path) -> None:
+def test_a_task_of_a_textbook_or_a_forum(task, ask, tmp_path):
     text, rows = TASKS[task]
     (tmp_path / "task.toml").write_text(text)
     at = ("--at", "time=0 s") if "free" in text else ()

@@ -104,18 +104,14 @@ MIMIC = """\
 
 
 @pytest.fixture
-def ask(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> Steps:
+def ask(tmp_path, capsys, monkeypatch):
     """Run one command line in an empty folder.
 
     Return what it prints in one line, which fits in a terminal of 80 columns.
     """
     monkeypatch.chdir(tmp_path)
 
-    def run(line: str, code: int = 0) -> str:
+    def run(line, code=0):
         command, *words = line.split()
         assert COMMANDS[command](words) == code, capsys.readouterr()
         printed = capsys.readouterr().out
@@ -125,11 +121,11 @@ def ask(
     return run
 
 
-def write(name: str, text: str) -> None:
+def write(name, text):
     Path(name).write_text(text)
 
 
-def spoil(name: str, old: str, new: str) -> None:
+def spoil(name, old, new):
     """Change a written file in one place."""
     text = Path(name).read_text()
     changed, times = re.subn(old, new, text, count=1)
@@ -138,7 +134,7 @@ def spoil(name: str, old: str, new: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_file_with_dry_friction_is_right(ask: Steps) -> None:
+def test_a_file_with_dry_friction_is_right(ask):
     """MuJoCo's default friction.
 
     1.2243167 N m at 30 deg by bisection where 1.2243155 is exact.
@@ -155,7 +151,7 @@ def test_a_file_with_dry_friction_is_right(ask: Steps) -> None:
 
 
 @pytest.mark.slow
-def test_a_file_whose_friction_is_wrong_is_not(ask: Steps) -> None:
+def test_a_file_whose_friction_is_wrong_is_not(ask):
     write("friction.toml", FRICTION)
     ask("fourbar mjcf friction.toml --drive none -o friction.xml")
     spoil("friction.xml", 'frictionloss="0.5"', 'frictionloss="0.505"')
@@ -164,7 +160,7 @@ def test_a_file_whose_friction_is_wrong_is_not(ask: Steps) -> None:
 
 
 @pytest.mark.slow
-def test_a_rotor_may_stand_as_armature(ask: Steps) -> None:
+def test_a_rotor_may_stand_as_armature(ask):
     write("bare.toml", ROTOR.replace("flywheel", "# flywheel"))
     write("armature.toml", ROTOR)
     ask("fourbar mjcf bare.toml --drive none -o arm.xml")
@@ -176,7 +172,7 @@ def test_a_rotor_may_stand_as_armature(ask: Steps) -> None:
 
 
 @pytest.mark.parametrize("columns", [2, 3])
-def test_torques_of_the_open_tree_are_named(ask: Steps, columns: int) -> None:
+def test_torques_of_the_open_tree_are_named(ask, columns):
     """As `mj_inverse` and `rnea` give them for a loop: the loop force is missing."""
     write("statics.toml", STATICS)
     rows = [row.split(",")[:columns] for row in INVERSE_DYNAMICS.splitlines()]
@@ -192,7 +188,7 @@ def test_torques_of_the_open_tree_are_named(ask: Steps, columns: int) -> None:
 
 
 @pytest.mark.slow
-def test_what_a_polynomial_in_place_of_the_loop_loses(ask: Steps) -> None:
+def test_what_a_polynomial_in_place_of_the_loop_loses(ask):
     write("mimic.toml", KNEE)
     write("mimic.xml", MIMIC)
     told = ask("fourbar-validation check-mjcf mimic.toml mimic.xml --mimic s")

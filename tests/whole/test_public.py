@@ -5,7 +5,6 @@
 
 import inspect
 import runpy
-from collections.abc import Iterator
 from pathlib import Path
 
 import click
@@ -26,7 +25,7 @@ GROUPS = {
 }
 
 
-def of_commands() -> Iterator[str]:
+def of_commands():
     for program, group in GROUPS.items():
         context = click.Context(group)
         for name in group.list_commands(context):
@@ -42,7 +41,7 @@ def of_commands() -> Iterator[str]:
                 yield f"{program} {name}: {names}{chosen}"
 
 
-def of_python() -> Iterator[str]:
+def of_python():
     page = runpy.run_path(str(API))
     public = {
         name: getattr(fourbar, name)
@@ -66,7 +65,7 @@ def of_python() -> Iterator[str]:
             yield f"{name}.{method}{page['signature'](getattr(thing, method))}"
 
 
-def public() -> str:
+def public():
     """One line a name.
 
     Of Python, of commands and their options, exit statuses, quantities, columns of
@@ -86,7 +85,7 @@ def public() -> str:
     )
 
 
-def test_nothing_public_changes_unnoticed() -> None:
+def test_nothing_public_changes_unnoticed():
     kept, current = KEPT.read_text(encoding="utf-8").splitlines(), public().splitlines()
     gone, new = (
         "\n".join(line for line in one if line not in other)
@@ -97,7 +96,7 @@ def test_nothing_public_changes_unnoticed() -> None:
     )
 
 
-def test_all_is_what_dir_shows() -> None:
+def test_all_is_what_dir_shows():
     assert dir(fourbar) == fourbar.__all__
     names: dict[str, object] = {}
     exec("from fourbar import *", names)

@@ -67,7 +67,7 @@ TYPES = {"string": str, "double": float, "boolean": bool}
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     with pytest.MonkeyPatch.context() as monkeypatch:
         judge_here(monkeypatch)
@@ -77,7 +77,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_every_column_is_described_with_its_type() -> None:
+def test_every_column_is_described_with_its_type():
     described = dict(
         re.findall(r"^\| `(\w+)` \| (string|double|boolean) \|", PAGE, re.MULTILINE)
     )
@@ -87,7 +87,7 @@ def test_every_column_is_described_with_its_type() -> None:
     }
 
 
-def test_every_quantity_stands_in_the_row_of_its_stage_with_its_unit() -> None:
+def test_every_quantity_stands_in_the_row_of_its_stage_with_its_unit():
     table = PAGE.partition("| stage | quantities and units |")[2].partition("\n\n")[0]
     described = {
         (stage, name, unit)
@@ -104,7 +104,7 @@ def test_every_quantity_stands_in_the_row_of_its_stage_with_its_unit() -> None:
     }
 
 
-def test_every_engine_is_described() -> None:
+def test_every_engine_is_described():
     table = PAGE.partition("## The engines")[2].partition("## The quantities")[0]
     described = re.findall(r"^\| `([\w-]+)` \| .+ \|$", table, re.MULTILINE)
     assert sorted(described) == sorted(["engine", *WORK, *FORWARD])
@@ -112,7 +112,7 @@ def test_every_engine_is_described() -> None:
     assert names | {FORMULAS} == set(WORK)
 
 
-def test_every_quantity_of_a_scene_is_described(results: Path) -> None:
+def test_every_quantity_of_a_scene_is_described(results):
     table = PAGE.partition("## Quantities of a scene")[2].partition("## Queries")[0]
     described = re.findall(r"^\| `([\w ]+)` \| [^|]+ \| .+ \|$", table, re.MULTILINE)
     of_positions = {q.name for q in QUANTITIES}
@@ -132,7 +132,7 @@ def test_every_quantity_of_a_scene_is_described(results: Path) -> None:
     assert {row.quantity for row in rows} <= {*described, *of_positions}
 
 
-def test_the_fields_of_a_solution_are_the_rows_of_the_table() -> None:
+def test_the_fields_of_a_solution_are_the_rows_of_the_table():
     fields = [field.name for field in dataclasses.fields(Solution)]
     assert [name for name in fields if name not in NOT_QUANTITIES] == [
         q.name for q in QUANTITIES
@@ -149,7 +149,7 @@ def test_the_fields_of_a_solution_are_the_rows_of_the_table() -> None:
     assert STAGES == ("position", "velocity", "acceleration", "force", "error")
 
 
-def test_a_solution_has_the_shapes_of_the_table_and_no_other_quantity() -> None:
+def test_a_solution_has_the_shapes_of_the_table_and_no_other_quantity():
     solution = solve(crank_rocker(effects=(PinFriction.at(A=(0.1, 0.01)),)), "error")
     for q in QUANTITIES:
         values = getattr(solution, q.name)
@@ -159,7 +159,7 @@ def test_a_solution_has_the_shapes_of_the_table_and_no_other_quantity() -> None:
         )
 
 
-def test_the_formulas_name_the_pin_forces_as_the_table_does() -> None:
+def test_the_formulas_name_the_pin_forces_as_the_table_does():
     assert PinForces._fields == PIN_FORCES == ("F12", "F32", "F43", "F14")
     assert (
         tuple(name for name in UNKNOWNS if name not in FORCE_NAMES) + FORCE_NAMES[:5]
@@ -168,7 +168,7 @@ def test_the_formulas_name_the_pin_forces_as_the_table_does() -> None:
     assert FORCE_NAMES[5:] == ("drive_force", "power")
 
 
-def test_the_parquet_file_holds_the_rows_of_the_table(results: Path) -> None:
+def test_the_parquet_file_holds_the_rows_of_the_table(results):
     import pyarrow.parquet as pq
 
     file = pq.ParquetFile(results / "results" / "results.parquet")
@@ -185,11 +185,7 @@ def test_the_parquet_file_holds_the_rows_of_the_table(results: Path) -> None:
             assert ours == theirs or (math.isnan(ours) and math.isnan(theirs))
 
 
-def test_the_pandas_snippet_runs(
-    results: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_pandas_snippet_runs(results, monkeypatch, capsys):
     pytest.importorskip("pandas", reason="pandas is optional")
     monkeypatch.chdir(results)
     assert status(["accept", "results"]) == 0
@@ -206,7 +202,7 @@ def test_the_pandas_snippet_runs(
     )  # type: ignore[arg-type]
 
 
-def test_the_sql_runs(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_sql_runs(results, monkeypatch):
     duckdb = pytest.importorskip("duckdb", reason="DuckDB is optional")
     monkeypatch.chdir(results)
     assert status(["accept", "results"]) == 0

@@ -5,9 +5,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -34,7 +32,7 @@ int clock_gettime(clockid_t id, struct timespec *t) {
 """
 
 
-def harness(*line: object, **settings: Any) -> subprocess.CompletedProcess[str]:
+def harness(*line, **settings):
     words = [sys.executable, "-m", "fourbar_validation", *map(str, line)]
     return subprocess.run(
         words, capture_output=True, text=True, check=False, **settings
@@ -44,7 +42,7 @@ def harness(*line: object, **settings: Any) -> subprocess.CompletedProcess[str]:
 @pytest.mark.slow
 @pytest.mark.linux
 @pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
-def test_a_clock_that_goes_back_changes_no_byte(tmp_path: Path) -> None:
+def test_a_clock_that_goes_back_changes_no_byte(tmp_path):
     (tmp_path / "clock.c").write_text(CLOCK_THAT_GOES_BACK, encoding="utf-8")
     library = tmp_path / "clock.so"
     compile_it = ["cc", "-shared", "-fPIC", "-o", str(library)]
@@ -62,7 +60,7 @@ def test_a_clock_that_goes_back_changes_no_byte(tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def locked() -> Iterator[Path]:
+def locked():
     """A folder that its user may read and not write, with a scene."""
     folder = Path(tempfile.mkdtemp())
     shutil.copy(MODELS / "crank_rocker.toml", folder / "scene.toml")
@@ -86,11 +84,8 @@ def locked() -> Iterator[Path]:
     ids=lambda value: " ".join(value[:1]) if isinstance(value, list) else "",
 )
 def test_a_user_who_may_write_nowhere_gets_numbers_or_one_line(
-    locked: Path,
-    program: str,
-    line: list[str],
-    status: int,
-) -> None:
+    locked, program, line, status
+):
     """Nor at home, where libraries keep their caches."""
     environment = os.environ | {"HOME": str(locked), "PYTHONDONTWRITEBYTECODE": "1"}
     rights: list[str] = []
@@ -117,7 +112,7 @@ def test_a_user_who_may_write_nowhere_gets_numbers_or_one_line(
     assert [path.name for path in locked.iterdir()] == ["scene.toml"]
 
 
-def damage(table: bytes, rng: np.random.Generator) -> bytes:
+def damage(table, rng):
     """Turn bits, cut, or write over the footer of a parquet file."""
     kind = rng.integers(4)
     changed = bytearray(table)
@@ -137,7 +132,7 @@ def damage(table: bytes, rng: np.random.Generator) -> bytes:
 
 @pytest.mark.slow
 @pytest.mark.linux
-def test_a_damaged_table_is_refused_or_read(tmp_path: Path) -> None:
+def test_a_damaged_table_is_refused_or_read(tmp_path):
     """Each in a process of its own, which a fault of the reader would end."""
     table = (find_baseline(ACCEPTED) / "results.parquet").read_bytes()
     rng = np.random.default_rng(3)

@@ -35,12 +35,8 @@ PROGRAMS = ("docs/tutorial", "docs/thesis", "docs/recipes")
     ],
 )
 def test_a_page_does_and_prints_what_it_says(
-    page: str,
-    sessions: int,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    page, sessions, tmp_path, monkeypatch, capsys
+):
     if page in ("docs/tutorial", "docs/recipes"):
         pytest.importorskip("pandas", reason="a table is made: pip install pandas")
     if page == "docs/recipes":

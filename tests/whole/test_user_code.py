@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = "tests/support/user_code.py"
 
 
-def run_checker(*line: str) -> str:
+def run_checker(*line):
     done = subprocess.run(
         [sys.executable, "-m", *line, PAGE],
         cwd=ROOT,
@@ -24,7 +24,7 @@ def run_checker(*line: str) -> str:
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)  # without a cache mypy reads numpy's types first
-def test_mypy_passes_the_page() -> None:
+def test_mypy_passes_the_page():
     assert not run_checker("mypy", "--strict")
 
 
@@ -33,11 +33,11 @@ def test_mypy_passes_the_page() -> None:
     importlib.util.find_spec("pyright") is None,
     reason="not run: pyright is not installed: pip install 'pyright[nodejs]'",
 )
-def test_pyright_passes_the_page() -> None:
+def test_pyright_passes_the_page():
     assert not run_checker("pyright")
 
 
 @pytest.mark.slow
-def test_the_page_runs() -> None:
+def test_the_page_runs():
     done = subprocess.run([sys.executable, PAGE], cwd=ROOT, check=False)
     assert done.returncode == 0

@@ -30,10 +30,7 @@ SECONDS = 100.0
 @pytest.mark.slow
 @pytest.mark.nightly
 @pytest.mark.parametrize("finding", ALL, ids=lambda finding: finding.script.stem)
-def test_each_finding_holds_or_says_since_when_not(
-    finding: module.Reproduction,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_each_finding_holds_or_says_since_when_not(finding, monkeypatch):
     monkeypatch.setattr(
         module, "read_engines", lambda folders: {}
     )  # no test makes an environment
@@ -45,7 +42,7 @@ def test_each_finding_holds_or_says_since_when_not(
     ), state
 
 
-def test_each_finding_is_a_report_and_stands_in_the_list() -> None:
+def test_each_finding_is_a_report_and_stands_in_the_list():
     assert FINDINGS is not None and len(ALL) >= 8
     listed = (FINDINGS.parent / "findings.md").read_text(encoding="utf-8")
     for finding in ALL:
@@ -68,11 +65,7 @@ def test_each_finding_is_a_report_and_stands_in_the_list() -> None:
         ("while True: pass", "not run: no answer within 1 s"),
     ],
 )
-def test_a_script_that_breaks_down_is_not_fixed(
-    code: str,
-    state: str,
-    tmp_path: Path,
-) -> None:
+def test_a_script_that_breaks_down_is_not_fixed(code, state, tmp_path):
     (tmp_path / "one.py").write_text(
         f'"""It is\nso.\n\nEngine: pip (pip)\nSince: 1.0 and\n  more\n"""\n{code}\n'
     )
@@ -82,10 +75,7 @@ def test_a_script_that_breaks_down_is_not_fixed(
     assert finding.run(Path(sys.executable), seconds) == state
 
 
-def test_the_command_says_what_could_not_run(
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-) -> None:
+def test_the_command_says_what_could_not_run(monkeypatch, tmp_path):
     script = tmp_path / "one.py"
     script.write_text(
         '"""It is so.\n\nEngine: nothing-such (nothing_such)\nWith: also=={version},'
@@ -107,16 +97,14 @@ def test_the_command_says_what_could_not_run(
     )
 
 
-def test_a_simulator_is_sought_in_the_environments_of_engines(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_simulator_is_sought_in_the_environments_of_engines(monkeypatch):
     packages = ("nothing", "nothing-such", "nothing-such")
     entries = {
         f"{n}": Entry(f"{n}", "a:B", requires=(f"{name}[sim]>=1",))
         for n, name in enumerate(packages)
     }
 
-    def make(entry: Entry) -> str:
+    def make(entry):
         if entry.name == "1":
             raise DependencyError("no network")
         return f"python of {entry.name}"
@@ -130,9 +118,6 @@ def test_a_simulator_is_sought_in_the_environments_of_engines(
 
 
 @pytest.mark.parametrize("arguments", [[__file__], ["no_such.py"]])
-def test_bad_input_is_one_line(
-    arguments: list[str],
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_bad_input_is_one_line(arguments, capsys):
     assert status(["findings", *arguments]) == 2
     assert capsys.readouterr().err.count("\n") == 1

@@ -46,19 +46,19 @@ IN_MANY_DIGITS = [
 
 
 @cache
-def read_stored(name: str) -> Any:
+def read_stored(name):
     """Read a problem as it stands in the tree."""
     return read_problem(PROBLEMS / f"{name}.json")
 
 
-def find_distance(first: Any, second: Any) -> Any:
+def find_distance(first, second):
     """Return the distance between two answers at each position."""
     return magnitude(
         np.atleast_1d(np.asarray(first, dtype=float) - np.asarray(second, dtype=float))
     )
 
 
-def assert_agreement(name: str, answers: Any, share: float = 0.0) -> None:
+def assert_agreement(name, answers, share=0.0):
     """Assert that each answer lies within its error bar.
 
     The bar is widened by a share of the largest value for its derivation.
@@ -82,7 +82,7 @@ def assert_agreement(name: str, answers: Any, share: float = 0.0) -> None:
     assert compared >= 4
 
 
-def test_there_are_fifteen_and_their_files_agree() -> None:
+def test_there_are_fifteen_and_their_files_agree():
     assert len(NAMES) == 15 and {file.stem for file in PROBLEMS.glob("*.json")} == set(
         NAMES
     )
@@ -90,7 +90,7 @@ def test_there_are_fifteen_and_their_files_agree() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in LONG])
-def test_the_files_are_those_of_today(name: str) -> None:
+def test_the_files_are_those_of_today(name):
     old, new = read_stored(name), json.loads(json.dumps(collect_problem(name)))
     assert (
         old["schema"] == PROBLEM_SCHEMA
@@ -117,7 +117,7 @@ def test_the_files_are_those_of_today(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_problem_is_what_the_schema_says(name: str) -> None:
+def test_a_problem_is_what_the_schema_says(name):
     jsonschema = pytest.importorskip("jsonschema")
     schema = json.loads(
         (ROOT / "docs" / "protocol.schema.json").read_text(encoding="utf-8")
@@ -132,7 +132,7 @@ def test_a_problem_is_what_the_schema_says(name: str) -> None:
     )
 
 
-def read_question(name: str) -> Any:
+def read_question(name):
     """Read scene and command as an engine does."""
     problem = read_stored(name)
     return protocol.command_from_json(
@@ -141,7 +141,7 @@ def read_question(name: str) -> Any:
 
 
 @pytest.mark.parametrize("name", PRESCRIBED)
-def test_the_free_bodies_answer_the_same(name: str) -> None:
+def test_the_free_bodies_answer_the_same(name):
     scene, command = read_question(name)
     answers = FreeBody().answer(scene, command).quantities
     assert_agreement(
@@ -150,7 +150,7 @@ def test_the_free_bodies_answer_the_same(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", IN_MANY_DIGITS)
-def test_ninety_digits_answer_the_same(name: str) -> None:
+def test_ninety_digits_answer_the_same(name):
     exact = pytest.importorskip("fourbar_validation.engines.exact")
     pytest.importorskip("flint")
     assert_agreement(
@@ -158,7 +158,7 @@ def test_ninety_digits_answer_the_same(name: str) -> None:
     )
 
 
-def slide(mp: Any, scene: Any, place: Any, omega: Any, alpha: Any) -> dict[str, Any]:
+def slide(mp, scene, place, omega, alpha):
     """Answer a slider-crank by virtual work.
 
     The motion as functions of time, which are differentiated in many digits. Each
@@ -169,13 +169,13 @@ def slide(mp: Any, scene: Any, place: Any, omega: Any, alpha: Any) -> dict[str, 
     a, b, e = (mp.mpf(scene["lengths"][name]) for name in ("crank", "rod", "offset"))
     weight = mp.mpc(0, -mp.mpf(scene["effects"]["gravity"][0]))
 
-    def theta(t: Any) -> Any:
+    def theta(t):
         return place + omega * t + alpha * t * t / 2
 
-    def psi(angle: Any) -> Any:
+    def psi(angle):
         return mp.asin((e - a * mp.sin(angle)) / b)
 
-    def slope(point: Any, angle: Any, order: int = 1) -> Any:
+    def slope(point, angle, order=1):
         return mp.mpc(
             *(
                 mp.diff(lambda x, part=part: part(point(x)), angle, order)
@@ -183,7 +183,7 @@ def slide(mp: Any, scene: Any, place: Any, omega: Any, alpha: Any) -> dict[str, 
             )
         )
 
-    def work(force: Any, displaced: Any) -> Any:
+    def work(force, displaced):
         return mp.re(force * mp.conj(displaced))
 
     bodies = []
@@ -237,7 +237,7 @@ def slide(mp: Any, scene: Any, place: Any, omega: Any, alpha: Any) -> dict[str, 
 
 
 @pytest.mark.parametrize("name", SLIDING)
-def test_virtual_work_answers_the_slider_cranks_the_same(name: str) -> None:
+def test_virtual_work_answers_the_slider_cranks_the_same(name):
     mp = pytest.importorskip("mpmath").mp
     command = read_stored(name)["command"]
     with mp.workdps(60):
@@ -252,7 +252,7 @@ def test_virtual_work_answers_the_slider_cranks_the_same(name: str) -> None:
     )
 
 
-def pendulum(problem: Any) -> tuple[float, float]:
+def pendulum(problem):
     """Return k in theta'' = -k cos theta, and the energy.
 
     The energy of a released parallelogram is theta'^2/2 + k sin theta.
@@ -275,7 +275,7 @@ def pendulum(problem: Any) -> tuple[float, float]:
     return k, start["omega_2"] ** 2 / 2.0 + k * math.sin(start["theta_2"])
 
 
-def test_gazebos_four_bar_swings_as_a_pendulum() -> None:
+def test_gazebos_four_bar_swings_as_a_pendulum():
     special = pytest.importorskip("scipy.special")
     problem = read_stored("gz_physics_987")
     answers, errors = problem["answers"], problem["errors"]
@@ -301,7 +301,7 @@ def test_gazebos_four_bar_swings_as_a_pendulum() -> None:
     )
 
 
-def test_a02_passes_every_angle_when_energy_says() -> None:
+def test_a02_passes_every_angle_when_energy_says():
     integrate = pytest.importorskip("scipy.integrate")
     problem = read_stored("iftomm_a02")
     answers, errors = problem["answers"], problem["errors"]
@@ -325,11 +325,7 @@ def test_a02_passes_every_angle_when_energy_says() -> None:
     assert passed == 20 and time[-1] == 20.0
 
 
-def solve_pin_forces(
-    problem: Any,
-    theta: Any,
-    omega: Any,
-) -> dict[str, list[list[float]]]:
+def solve_pin_forces(problem, theta, omega):
     """Return the pin forces of a released parallelogram, N, from the balances of its
     coupler, which does not turn.
 
@@ -345,10 +341,10 @@ def solve_pin_forces(
     )
     forces: dict[str, list[list[float]]] = {"F12": [], "F32": [], "F43": [], "F14": []}
 
-    def cross(arm: Any, force: Any) -> Any:
+    def cross(arm, force):
         return (mp.conj(arm) * force).imag
 
-    def centre(name: str, length: float) -> Any:
+    def centre(name, length):
         r, angle = scene["bars"][name].get("centre", (length / 2, 0.0))
         return r * mp.expj(angle)
 
@@ -382,7 +378,7 @@ def solve_pin_forces(
     return forces
 
 
-def test_the_page_s_example_reads_an_answer_without_this_project() -> None:
+def test_the_page_s_example_reads_an_answer_without_this_project():
     page = (ROOT / "docs/benchmark.md").read_text()
     code = page[page.index("```python") + 9 :].partition("```")[0]
     names: dict[str, Any] = {}
@@ -397,7 +393,7 @@ def test_the_page_s_example_reads_an_answer_without_this_project() -> None:
     assert 1e-4 < names["find_error"](file, "F43", wrong) < 1e-2
 
 
-def test_the_page_has_the_data_the_letters_and_a_figure_of_every_problem() -> None:
+def test_the_page_has_the_data_the_letters_and_a_figure_of_every_problem():
     written = runpy.run_path(str(ROOT / "docs/benchmark.py"))
     for name, words in {"benchmark.md": 2800, "findings.md": 1750}.items():
         page = (ROOT / "docs" / name).read_text(encoding="utf-8")
@@ -408,7 +404,7 @@ def test_the_page_has_the_data_the_letters_and_a_figure_of_every_problem() -> No
     assert {file.stem for file in (ROOT / "docs/benchmark").glob("*.svg")} == set(NAMES)
 
 
-def test_the_proposed_problem_rests_and_swings_as_its_page_says() -> None:
+def test_the_proposed_problem_rests_and_swings_as_its_page_says():
     mp = pytest.importorskip("mpmath").mp
     page = (
         (ROOT / "docs/benchmark.md")
@@ -451,7 +447,7 @@ def test_the_proposed_problem_rests_and_swings_as_its_page_says() -> None:
         assert text in page
 
 
-def make_result(name: str, **answers: Any) -> dict[str, Any]:
+def make_result(name, **answers):
     return {
         "schema": RESULT,
         "problem": name,
@@ -464,7 +460,7 @@ def make_result(name: str, **answers: Any) -> dict[str, Any]:
     ("error", "level"),
     [(0.0, "A"), (5e-10, "A"), (5e-7, "B"), (5e-4, "C"), (5e-3, "D")],
 )
-def test_a_level_is_that_of_the_worst_position(error: float, level: str) -> None:
+def test_a_level_is_that_of_the_worst_position(error, level):
     torque = list(read_stored("newton_128")["answers"]["torque"])
     torque[7] += error * max(map(abs, torque))
     levels = find_levels(
@@ -478,7 +474,7 @@ def test_a_level_is_that_of_the_worst_position(error: float, level: str) -> None
 @pytest.mark.parametrize(
     "torque", [None, [], [1.0], "x", [[1.0, 2.0]] * 37, [math.nan] * 37]
 )
-def test_an_answer_that_is_none_has_no_level(torque: Any) -> None:
+def test_an_answer_that_is_none_has_no_level(torque):
     assert (
         find_levels(
             judge_answers(
@@ -489,7 +485,7 @@ def test_an_answer_that_is_none_has_no_level(torque: Any) -> None:
     )
 
 
-def test_error_bars_are_allowed_where_they_are_larger() -> None:
+def test_error_bars_are_allowed_where_they_are_larger():
     problem = read_stored("near_limit")
     torque, bars = (
         np.array(problem["answers"]["torque"]),
@@ -507,7 +503,7 @@ def test_error_bars_are_allowed_where_they_are_larger() -> None:
     )
 
 
-def test_an_answer_at_its_own_motion_is_judged_there() -> None:
+def test_an_answer_at_its_own_motion_is_judged_there():
     problem = read_stored("crank_rocker")
     scene, command = read_question("crank_rocker")
     moved = command._replace(
@@ -525,10 +521,7 @@ def test_an_answer_at_its_own_motion_is_judged_there() -> None:
     assert set(find_levels(judge_answers(problem, answer_file)).values()) != {"A"}
 
 
-def test_the_command_judges_a_result_file(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_command_judges_a_result_file(tmp_path, capsys):
     file, problem = tmp_path / "mine.json", str(PROBLEMS / "newton_128.json")
     file.write_text(json.dumps(make_result("newton_128")))
     assert status(["check", problem, str(file)]) == 0
@@ -543,9 +536,7 @@ def test_the_command_judges_a_result_file(
         assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_the_archive_holds_the_set_and_is_the_same_bytes_each_time(
-    tmp_path: Path,
-) -> None:
+def test_the_archive_holds_the_set_and_is_the_same_bytes_each_time(tmp_path):
     for name in ("one.zip", "two.zip"):
         assert lab_status(["problems", "--archive", str(tmp_path / name)]) == 0
     assert (tmp_path / "one.zip").read_bytes() == (tmp_path / "two.zip").read_bytes()

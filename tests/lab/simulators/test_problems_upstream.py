@@ -4,7 +4,6 @@ module of this project.
 
 import ast
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ DIGITS = 1e-8
 """Of the ten digits that the files state."""
 
 
-def literals(path: Path) -> dict[str, Any]:
+def literals(path):
     """What the file states as plain values."""
     outcomes = {}
     for node in ast.parse(path.read_text()).body:
@@ -33,7 +32,7 @@ def literals(path: Path) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("quantity", ["torque", "F14"])
-def test_newton_s_free_bodies_find_our_answers(quantity: str) -> None:
+def test_newton_s_free_bodies_find_our_answers(quantity):
     numbers = [
         node
         for node in ast.parse(NEWTON.read_text()).body
@@ -62,7 +61,7 @@ def test_newton_s_free_bodies_find_our_answers(quantity: str) -> None:
     [path for path in UPSTREAM.glob("*/*.py") if path.name != "conftest.py"],
     ids=str,
 )
-def test_every_test_for_another_project_says_what_it_compares(path: Path) -> None:
+def test_every_test_for_another_project_says_what_it_compares(path):
     tree = ast.parse(path.read_text())
     tests = [
         node
@@ -79,7 +78,7 @@ def test_every_test_for_another_project_says_what_it_compares(path: Path) -> Non
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.parent.name)
-def test_a_file_for_another_project_states_our_answers(path: Path) -> None:
+def test_a_file_for_another_project_states_our_answers(path):
     text, stated = path.read_text(), literals(path)
     problems = [file.stem for file in PROBLEMS.glob("*.json") if file.stem in text]
     tables = (
@@ -104,7 +103,7 @@ def test_a_file_for_another_project_states_our_answers(path: Path) -> None:
     assert compared >= 16
 
 
-def test_each_project_has_its_file() -> None:
+def test_each_project_has_its_file():
     projects = {path.parent.name for path in UPSTREAM.glob("*/*.py")}
     assert projects == {"drake", "genesis", "mujoco_warp", "newton", "pinocchio"}
     page = (ROOT / "docs/findings.md").read_text()

@@ -19,10 +19,10 @@ from fourbar.errors import LimitError, NotAssembledError
 from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.assembly import write_sdf
 from fourbar.quantities import PIN_FORCES
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command
 from fourbar_lab import benchmark
 from fourbar_lab.simulators import gradients, motion, mujoco_c
-from fourbar_lab.simulators.motion import Course, Instant, Readings, Simulator
+from fourbar_lab.simulators.motion import Instant, Simulator
 from fourbar_lab.simulators.problems import PROBLEMS
 from fourbar_validation.check.problem import judge_answers, read_problem
 from fourbar_validation.engine import open_engine, serve
@@ -58,13 +58,13 @@ ENTRIES = {
 }
 
 
-def ask_position() -> tuple[Scene, Command]:
+def ask_position():
     return protocol.command_from_json(
         protocol.scene_from_json(PROBLEM["scene"]), PROBLEM["command"]
     )
 
 
-def find_errors(simulator: Any, **setting: Any) -> dict[str, float]:
+def find_errors(simulator, **setting):
     """Errors of a simulator's answer, each read back from the protocol's JSON."""
     scene, command = ask_position()
     answer = simulator().at_setting(**setting).answer(scene, command)
@@ -74,20 +74,20 @@ def find_errors(simulator: Any, **setting: Any) -> dict[str, float]:
 
 
 @pytest.fixture
-def sealed(monkeypatch: pytest.MonkeyPatch) -> None:
+def sealed(monkeypatch):
     """The writers of model files have no formulas.
 
     What a simulator receives is the simulator's own assembly.
     """
 
-    def refused(*_: Any, **__: Any) -> None:
+    def refused(*_, **__):
         raise AssertionError("a simulator would receive what the formulas computed")
 
     monkeypatch.setattr("fourbar.mjcf.document.solve", refused)
 
 
 @pytest.mark.usefixtures("sealed")
-def test_a_simulator_starts_from_its_own_assembly_without_the_formulas() -> None:
+def test_a_simulator_starts_from_its_own_assembly_without_the_formulas():
     paths = [
         path
         for path in (ROOT / "lab/fourbar_lab/simulators").glob("*.py")
@@ -122,9 +122,7 @@ def test_a_simulator_starts_from_its_own_assembly_without_the_formulas() -> None
         )
 
 
-def test_beyond_a_change_point_a_simulator_starts_in_the_assembly_that_is_stated() -> (
-    None
-):
+def test_beyond_a_change_point_a_simulator_starts_in_the_assembly_that_is_stated():
     """Of a parallelogram bars 2 and 4 stay parallel there, and the coupler level."""
     scene = low_parallelogram()
     for qpos in (
@@ -155,15 +153,15 @@ class Rigid(Simulator):
     left_out = ""
     diverges_at = math.inf
 
-    def through(self, scene: Scene, course: Course) -> Readings:
+    def through(self, scene, course):
         begin, speed, done = motion.start(scene), scene.motion.omega_2 or 0.0, 0
 
-        def advance(steps: int) -> float:
+        def advance(steps):
             nonlocal done
             done += steps
             return begin.qpos[0] + speed * done * course.timestep
 
-        def read(theta: float) -> Instant:
+        def read(theta):
             one = np.array([theta])
             branch = np.array([scene.motion.branch], dtype=np.int8)
             exact = (
@@ -181,7 +179,7 @@ class Rigid(Simulator):
         return motion.run_through(scene, course, advance, read)
 
 
-def test_a_run_is_judged_at_the_motion_that_it_made() -> None:
+def test_a_run_is_judged_at_the_motion_that_it_made():
     errors = find_errors(Rigid, steps_per_turn=50)
     assert max(errors.values()) < EXACT and set(errors) == {
         "theta_3",
@@ -192,7 +190,7 @@ def test_a_run_is_judged_at_the_motion_that_it_made() -> None:
     assert find_errors(Rigid, name="wrong")["torque"] == pytest.approx(0.1, abs=1e-9)
 
 
-def test_a_run_begins_before_its_first_position_where_the_linkage_closes() -> None:
+def test_a_run_begins_before_its_first_position_where_the_linkage_closes():
     scene, command = ask_position()
     led, course = motion.lay_out(scene, command, 100)
     assert (
@@ -229,7 +227,7 @@ def test_a_run_begins_before_its_first_position_where_the_linkage_closes() -> No
         {"theta_2": [1.0, 1.0001] * 12},
     ],
 )
-def test_a_motion_that_no_simulator_makes_is_a_refusal(changes: dict[str, Any]) -> None:
+def test_a_motion_that_no_simulator_makes_is_a_refusal(changes):
     scene, command = protocol.command_from_json(
         protocol.scene_from_json(PROBLEM["scene"]), {**PROBLEM["command"], **changes}
     )
@@ -237,9 +235,7 @@ def test_a_motion_that_no_simulator_makes_is_a_refusal(changes: dict[str, Any]) 
     assert answer.refusal is not None and answer.setting == "plain, 628/rev"
 
 
-def test_a_run_that_diverges_or_stops_is_no_answer(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_run_that_diverges_or_stops_is_no_answer(monkeypatch):
     monkeypatch.setattr(Rigid, "diverges_at", 100)
     with pytest.raises(ArithmeticError, match="diverged"):
         Rigid().answer(*ask_position())
@@ -248,19 +244,15 @@ def test_a_run_that_diverges_or_stops_is_no_answer(
         Rigid().answer(*ask_position())
 
 
-def test_a_force_that_is_not_read_is_missing_and_the_others_count(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_force_that_is_not_read_is_missing_and_the_others_count(monkeypatch):
     monkeypatch.setattr(Rigid, "left_out", "F43")
     errors = find_errors(Rigid)
     assert np.isnan(errors.pop("F43")) and max(errors.values()) < EXACT
 
 
 @pytest.mark.slow
-def test_the_host_serves_a_simulator_its_settings_and_derivatives(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def tell(question: dict[str, Any]) -> dict[str, Any]:
+def test_the_host_serves_a_simulator_its_settings_and_derivatives(monkeypatch):
+    def tell(question):
         replies = BytesIO()
         serve(
             f"{__name__}:Rigid",
@@ -303,7 +295,7 @@ def test_the_host_serves_a_simulator_its_settings_and_derivatives(
 
 
 @pytest.mark.usefixtures("sealed")
-def test_mujoco_answers_at_states_and_through_a_turn() -> None:
+def test_mujoco_answers_at_states_and_through_a_turn():
     module = pytest.importorskip(
         "fourbar_lab.simulators.mujoco_c",
         exc_type=ImportError,
@@ -320,7 +312,7 @@ def test_mujoco_answers_at_states_and_through_a_turn() -> None:
 
 
 @pytest.mark.usefixtures("sealed")
-def test_each_solver_of_pinocchio_carries_the_loop() -> None:
+def test_each_solver_of_pinocchio_carries_the_loop():
     module = pytest.importorskip(
         "fourbar_lab.simulators.pinocchio_simulated",
         exc_type=ImportError,
@@ -343,7 +335,7 @@ def test_each_solver_of_pinocchio_carries_the_loop() -> None:
             assert answer.refusal == "an impulse solver has no single states"
 
 
-def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state() -> None:
+def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state():
     """By differences of what MuJoCo itself answers along the changes.
 
     A differentiable simulator is given these changes.
@@ -355,7 +347,7 @@ def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state() ->
     scene = fourbar.load(PROBLEMS / "crank_rocker.toml")
     _, theta_2 = gradients.choose_quarter(scene)
 
-    def answered(state: gradients.ClosedState) -> Instant:
+    def answered(state):
         state.data.qpos[:], state.data.qvel[:] = state.qpos, state.qvel
         instant: Instant = mujoco_c._evaluate_mujoco(state.model, state.data)
         return instant
@@ -389,7 +381,7 @@ def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state() ->
 
 
 @pytest.mark.nightly
-def test_exudyn_refuses_what_it_has_no_element_for() -> None:
+def test_exudyn_refuses_what_it_has_no_element_for():
     module = pytest.importorskip(
         "fourbar_lab.simulators.exudyn_simulated",
         exc_type=ImportError,
@@ -427,7 +419,7 @@ def test_exudyn_refuses_what_it_has_no_element_for() -> None:
 @pytest.mark.parametrize(
     "name", [name for name, entry in ENTRIES.items() if entry.steps]
 )
-def test_each_simulator_that_is_installed_carries_the_loop(name: str) -> None:
+def test_each_simulator_that_is_installed_carries_the_loop(name):
     entry = ENTRIES[name]
     module, _, cls = entry.adapter.partition(":")
     assert find_spec(module) is not None

@@ -27,7 +27,7 @@ NEAR = 0.45
 
 
 @pytest.mark.slow
-def test_the_bars_are_seen_where_the_formulas_put_them() -> None:
+def test_the_bars_are_seen_where_the_formulas_put_them():
     scene = thesis(np.radians([100.0, 250.0]))
     drawn, why_not = render_pictures({"thesis": write_mjcf(scene)})
     if why_not:
@@ -60,7 +60,7 @@ def test_the_bars_are_seen_where_the_formulas_put_them() -> None:
     [thesis(), crank_rocker()],
     ids=["thesis", "crank-rocker"],
 )
-def test_no_position_leaves_the_frame(scene: fourbar.Scene) -> None:
+def test_no_position_leaves_the_frame(scene):
     seen = compute_frame(scene.linkage)
     linkage = scene.linkage
     for branch in (1, -1):
@@ -75,13 +75,13 @@ def test_no_position_leaves_the_frame(scene: fourbar.Scene) -> None:
 
 
 @pytest.mark.slow
-def test_without_opengl_there_is_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_opengl_there_is_a_reason(monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "disabled")
     drawn, why_not = render_pictures({"thesis": write_mjcf(thesis())})
     assert drawn == {} and "off screen" in why_not
 
 
-def test_many_scenes_are_left_out_with_a_reason() -> None:
+def test_many_scenes_are_left_out_with_a_reason():
     drawn, why_not = render_pictures(
         dict.fromkeys(map(str, range(MOST_SCENES_DRAWN + 1)), "")
     )

@@ -10,7 +10,7 @@ from fourbar_validation.scenes.suites import MODELS
 from tests.support.scenes import crank_rocker, low_parallelogram, thesis
 
 
-def test_it_answers_to_round_off() -> None:
+def test_it_answers_to_round_off():
     """Where bar 2 or 3 is driven, close to limits, beyond a change point.
 
     Loads are placed from any origin.

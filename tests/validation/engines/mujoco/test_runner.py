@@ -4,9 +4,7 @@ Motion laws and loads over theta_2.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -14,9 +12,7 @@ import pytest
 
 import fourbar
 from fourbar.effects import Friction, Gravity, Load, Table
-from fourbar.scene import Scene
 from fourbar.scene.motion import Law, Rise
-from fourbar_validation.compare.rows import Row
 from fourbar_validation.engines.mujoco import runner, simulate
 from fourbar_validation.engines.mujoco.runner import OVERRUN, clip_angles
 from fourbar_validation.engines.registry import ENGINES
@@ -59,20 +55,20 @@ WHOLE_TURN = Load(
 )
 
 
-def simulated(posed: Scene) -> list[Row]:
+def simulated(posed):
     record = judge("scene", posed, SIMULATED)
     assert not [line for line in record.left_out if line.startswith("mujoco")]
     return [row for row in record.rows if row.engine == "mujoco-simulated"]
 
 
-def failing(posed: Scene) -> set[str]:
+def failing(posed):
     return {row.quantity for row in simulated(posed) if not row.passed}
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize(("name", "drive"), [*zip(LAWS, (2, 4, 2, 4, 2), strict=True)])
-def test_a_motion_law_is_run_through(name: str, drive: int) -> None:
+def test_a_motion_law_is_run_through(name, drive):
     """A load over theta_2, gravity and dry friction act at once.
 
     Friction changes its sense with the law's.
@@ -89,7 +85,7 @@ def test_a_motion_law_is_run_through(name: str, drive: int) -> None:
     assert {"theta_4", "alpha_4", "F32", "torque"} <= {row.quantity for row in rows}
 
 
-def test_the_law_is_followed_at_its_own_times() -> None:
+def test_the_law_is_followed_at_its_own_times():
     posed = crank_rocker(
         motion=fourbar.Motion(law=LAWS["periodic"]),
         loads=(),
@@ -110,7 +106,7 @@ def test_the_law_is_followed_at_its_own_times() -> None:
 
 
 @pytest.mark.parametrize("omega", [10.0, -10.0])
-def test_a_table_that_ends_where_the_sweep_does(omega: float) -> None:
+def test_a_table_that_ends_where_the_sweep_does(omega):
     motion = fourbar.Motion(fourbar.Sweep(0.1, 2.0, 12), omega)
     assert (
         failing(
@@ -124,7 +120,7 @@ def test_a_table_that_ends_where_the_sweep_does(omega: float) -> None:
     )
 
 
-def test_an_overrun_is_put_back_only_if_it_is_a_rounding() -> None:
+def test_an_overrun_is_put_back_only_if_it_is_a_rounding():
     posed = crank_rocker(loads=(PART_OF_A_TURN,))
     angles = np.array([0.1, 2.0, 2.0 * math.pi + 0.5])
     put_back = clip_angles(posed, angles + np.array([-OVERRUN, OVERRUN, 0.0]) / 2.0)
@@ -133,7 +129,7 @@ def test_an_overrun_is_put_back_only_if_it_is_a_rounding() -> None:
         clip_angles(posed, angles + 2.0 * OVERRUN)
 
 
-def changed(right: Callable[..., Any], factor: float) -> Callable[..., Any]:
+def changed(right, factor):
     return lambda *arguments: factor * right(*arguments)
 
 
@@ -143,10 +139,7 @@ def changed(right: Callable[..., Any], factor: float) -> Callable[..., Any]:
     [-1.0, 2.0, 0.0],
     ids=["wrong sign", "applied twice", "missing"],
 )
-def test_a_fault_in_a_table_fails_the_run(
-    factor: float,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_fault_in_a_table_fails_the_run(factor, monkeypatch):
     right = simulate.evaluate_loads
     monkeypatch.setattr(
         simulate,
@@ -166,10 +159,7 @@ def test_a_fault_in_a_table_fails_the_run(
     [-1.0, 1.001, 0.0],
     ids=["wrong sign", "a thousandth more", "missing"],
 )
-def test_a_drive_that_does_not_follow_the_law_fails_the_run(
-    factor: float,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_drive_that_does_not_follow_the_law_fails_the_run(factor, monkeypatch):
     """The engine is judged at the motion it made; its own speed says that it is not the
     law's.
     """
@@ -185,7 +175,7 @@ def test_a_drive_that_does_not_follow_the_law_fails_the_run(
     assert any("does not turn as commanded" in row.reason for row in failed)
 
 
-def test_the_callback_ends_with_the_run() -> None:
+def test_the_callback_ends_with_the_run():
     simulated(
         crank_rocker(
             motion=fourbar.Motion(law=LAWS["at constant speed"]),
@@ -197,7 +187,7 @@ def test_the_callback_ends_with_the_run() -> None:
 
 @pytest.mark.parametrize("torque", [0.05, 5.0])
 @pytest.mark.parametrize("omega", [10.0, 0.01])
-def test_dry_friction_is_simulated_at_any_speed(omega: float, torque: float) -> None:
+def test_dry_friction_is_simulated_at_any_speed(omega, torque):
     """Slow slip and large torques.
 
     The friction reaches its full size within the last digits of the slip.

@@ -20,7 +20,6 @@ from fourbar_validation.compare.rows import (
     FAILS,
     REFUSES,
     UNDECIDED,
-    Row,
 )
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
@@ -38,12 +37,7 @@ from tests.validation.engines.test_engines import commanded
 TURN = fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 90)
 
 
-def scene(
-    lengths: tuple[float, float, float, float],
-    sweep: fourbar.Sweep,
-    omega: float,
-    **parts: object,
-) -> fourbar.Scene:
+def scene(lengths, sweep, omega, **parts):
     """Offset mass centres, gravity, loads in both frames."""
     d, a, b, c = lengths
     bars = [
@@ -91,7 +85,7 @@ SCENES = {
 }
 
 
-def compared(posed: fourbar.Scene, answer: Answer) -> list[Row]:
+def compared(posed, answer):
     """Rows of the simulation against the formulas at the motion that it made."""
     return Comparison(
         "",
@@ -103,7 +97,7 @@ def compared(posed: fourbar.Scene, answer: Answer) -> list[Row]:
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_within_1e_5_of_the_scale(name: str) -> None:
+def test_within_1e_5_of_the_scale(name):
     posed = SCENES[name]
     answer = MujocoSimulated().answer(posed, fourbar.command(posed))
     assert answer.refusal is None and answer.at is not None
@@ -115,7 +109,7 @@ def test_within_1e_5_of_the_scale(name: str) -> None:
 
 @pytest.mark.parametrize("index", [1, 6, 10, 21])
 @pytest.mark.parametrize("loaded", [False, True], ids=["bare", "loaded"])
-def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
+def test_slow_linkages_hold_as_well(loaded, index):
     """One pass of Newton's method is all they get.
 
     Under loads the closure must be the stiffer for it. Pin forces of which 1e7 times
@@ -137,14 +131,12 @@ def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
     assert not any(row.failed for row in rows), [row for row in rows if row.failed]
 
 
-def test_an_input_that_speeds_up_covers_the_end_of_its_window_in_as_many_steps() -> (
-    None
-):
+def test_an_input_that_speeds_up_covers_the_end_of_its_window_in_as_many_steps():
     run = WindowMotion(0.0, 3.0, 0.01, 5.0)
     assert run.fastest * run.timestep(RECIPE) <= 3.0 / RECIPE.steps_per_window
 
 
-def test_it_is_run_near_the_requested_positions() -> None:
+def test_it_is_run_near_the_requested_positions():
     posed = SCENES["crank-rocker"]
     command = fourbar.command(posed)
     moved = MujocoSimulated().answer(posed, command).at
@@ -154,7 +146,7 @@ def test_it_is_run_near_the_requested_positions() -> None:
     )  # half a step of some 628 a turn
 
 
-def test_a_wrong_load_is_seen() -> None:
+def test_a_wrong_load_is_seen():
     posed = SCENES["crank-rocker"]
     answer = MujocoSimulated().answer(posed, fourbar.command(posed))
     on_coupler = replace(
@@ -170,7 +162,7 @@ def test_a_wrong_load_is_seen() -> None:
     }
 
 
-def test_positions_outside_the_range_are_not_assembled() -> None:
+def test_positions_outside_the_range_are_not_assembled():
     posed = scene(TRIPLE, fourbar.Sweep(0.2 - math.pi, 0.2 + math.pi, 72), 10.0)
     command = fourbar.command(posed)
     answer = MujocoSimulated().answer(posed, command)
@@ -190,13 +182,13 @@ def test_positions_outside_the_range_are_not_assembled() -> None:
         (fourbar.Motion(TURN, 1.0, -5.0), "to rest"),
     ],
 )
-def test_refusals_state_their_reason(motion: fourbar.Motion, reason: str) -> None:
+def test_refusals_state_their_reason(motion, reason):
     posed = crank_rocker(motion=motion)
     refusal = MujocoSimulated().answer(posed, fourbar.command(posed)).refusal
     assert refusal is not None and reason in refusal and "\n" not in refusal
 
 
-def test_a_change_point_is_a_declared_limit() -> None:
+def test_a_change_point_is_a_declared_limit():
     motion = fourbar.Motion(TURN, 10.0)
     for lengths, refused in (
         ((0.3, 0.1, 0.3, 0.1), True),
@@ -208,14 +200,14 @@ def test_a_change_point_is_a_declared_limit() -> None:
         assert (refusal is not None and "change point" in refusal) == refused
 
 
-def test_error_falls_with_the_fourth_power_of_the_timestep() -> None:
+def test_error_falls_with_the_fourth_power_of_the_timestep():
     """RK4, the closure's time constant held in seconds.
 
     The softness stays what it is.
     """
     posed = crank_rocker(motion=fourbar.Motion(TURN, 10.0))
 
-    def error(answer: Answer) -> float:
+    def error(answer):
         return float(
             np.abs(
                 answer.quantities["F43"] - fourbar.solve(posed, at=answer.at).F43
@@ -226,11 +218,11 @@ def test_error_falls_with_the_fourth_power_of_the_timestep() -> None:
     assert fine < coarse and 3.0 < order < 6.0, (coarse, fine, order)
 
 
-def test_the_order_is_of_the_assembly_that_is_stated_beyond_a_change_point() -> None:
+def test_the_order_is_of_the_assembly_that_is_stated_beyond_a_change_point():
     posed = low_parallelogram(steps=4)
     seen = []
 
-    def error(answer: Answer) -> float:
+    def error(answer):
         s = fourbar.solve(posed, at=answer.at)
         seen.append(np.abs(answer.quantities["torque"] - s.torque).max())
         return float(seen[-1] / np.abs(s.torque).max())
@@ -239,9 +231,7 @@ def test_the_order_is_of_the_assembly_that_is_stated_beyond_a_change_point() -> 
     assert len(seen) == 2 and max(seen) < 1e-3
 
 
-def test_a_residual_that_is_no_number_raises_its_alarm(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_residual_that_is_no_number_raises_its_alarm(monkeypatch):
     monkeypatch.setattr(
         ResidualMonitor, "evidence", lambda self: {"force_gap": math.nan}
     )
@@ -260,14 +250,14 @@ def test_a_residual_that_is_no_number_raises_its_alarm(
     }
 
 
-def test_without_an_error_there_is_no_order(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_an_error_there_is_no_order(monkeypatch):
     monkeypatch.setattr(MujocoSimulated, "answer", lambda *_: Answer("", ""))
     assert math.isnan(
         observe_order(crank_rocker(), fourbar.command(crank_rocker()), lambda _: 0.0)[2]
     )
 
 
-def hood(links: float, output: float | None = None) -> fourbar.Scene:
+def hood(links, output=None):
     """14.5 kg that reach far out on light links, slowly."""
     coupler = fourbar.Bar(0.08, 14.5, 5.0, (1.0, 0.2))
     bars = (
@@ -293,8 +283,8 @@ SIMULATION = [
 
 @pytest.mark.parametrize(("links", "excused"), [(1e-2, set()), (1e-8, {"F12", "F32"})])
 def test_the_closure_is_as_stiff_as_the_lightest_bar_that_it_joins_needs(
-    links: float, excused: set[str]
-) -> None:
+    links, excused
+):
     """With pads for bars of one size the inertial torque was off by 3e-5 at 10 g, by
     3e-3 at 1 g.
 
@@ -310,9 +300,7 @@ def test_the_closure_is_as_stiff_as_the_lightest_bar_that_it_joins_needs(
     assert inertia.error < 1e-6
 
 
-def test_a_simulation_that_fails_names_the_ratio_of_masses(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_simulation_that_fails_names_the_ratio_of_masses(monkeypatch):
     monkeypatch.setattr(
         "fourbar.mjcf.document.compute_mass_ratio", lambda linkage: 1.0
     )  # pads for bars of one size
@@ -330,10 +318,7 @@ def test_a_simulation_that_fails_names_the_ratio_of_masses(
 
 
 @pytest.mark.parametrize(("links", "output"), [(0.0, None), (0.01, 0.0)])
-def test_the_mass_that_a_massless_bar_is_advised_to_have_leads_to_a_pass(
-    links: float,
-    output: float | None,
-) -> None:
+def test_the_mass_that_a_massless_bar_is_advised_to_have_leads_to_a_pass(links, output):
     (refused,) = (
         row
         for row in judge("hood", hood(links, output), SIMULATION).rows
@@ -346,7 +331,7 @@ def test_the_mass_that_a_massless_bar_is_advised_to_have_leads_to_a_pass(
     assert {row.verdict for row in judge("hood", scene, SIMULATION).rows} == {AGREES}
 
 
-def by_quantity(scene: fourbar.Scene) -> dict[str, Row]:
+def by_quantity(scene):
     return {
         row.quantity: row
         for row in judge("", scene, SIMULATION).rows
@@ -357,10 +342,8 @@ def by_quantity(scene: fourbar.Scene) -> dict[str, Row]:
 @pytest.mark.slow
 @pytest.mark.parametrize(("one", "other"), list(combinations((1, 2, 3, 4), 2)))
 def test_its_own_actuator_between_two_sites_gives_the_force_of_a_cylinder(
-    one: int,
-    other: int,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    one, other, monkeypatch
+):
     drive = fourbar.LinearDrive(Place(one, (0.17, -1.1)), Place(other, (0.09, 0.7)))
     scene = crank_rocker(
         motion=fourbar.Motion(TURN, 10.0, 5.0),
@@ -403,10 +386,8 @@ def test_its_own_actuator_between_two_sites_gives_the_force_of_a_cylinder(
     ],
 )
 def test_the_input_is_led_so_that_what_is_commanded_moves_as_told(
-    what: str,
-    branch: int,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    what, branch, monkeypatch
+):
     (simulated,) = SIMULATION
     scene = commanded(what, branch)
     question = Question("", scene, fourbar.command(scene))
@@ -433,7 +414,7 @@ def test_the_input_is_led_so_that_what_is_commanded_moves_as_told(
     assert any("speed_error" in row.reason for row in failed)
 
 
-def test_an_input_that_must_hurry_is_not_led() -> None:
+def test_an_input_that_must_hurry_is_not_led():
     near = float(
         fourbar.formulas.mobility.find_limit_angles(crank_rocker().linkage, 4)[0]
     )
@@ -446,7 +427,7 @@ def test_an_input_that_must_hurry_is_not_led() -> None:
     ]
 
 
-def test_near_a_pole_of_the_drive_on_the_coupler_no_simulation_is_accused() -> None:
+def test_near_a_pole_of_the_drive_on_the_coupler_no_simulation_is_accused():
     """One of ten thousand random linkages stands close to a pole.
 
     At 1.5e-3 rad from where omega_3 vanishes T3 and every force diverge.

@@ -52,12 +52,12 @@ class Case:
     """Factor on dof_invweight0 where a joint equality holds the crank to a wheel."""
 
 
-def soften(text: str, _: float) -> drives.ClosedLoop:
+def soften(text, _):
     """Build the loop with body_invweight0 a hundredth of its own."""
     return drives.Softened(text, 1e-2)
 
 
-def defaults(integrator: str, steps: int = 160) -> Case:
+def defaults(integrator, steps=160):
     """MuJoCo's own solref, solimp and solver."""
     settings = replace(BEST, pad=None, integrator=integrator)
     return Case(
@@ -120,7 +120,7 @@ WHEEL = 1e8
 QUICK = ("defaults, Euler", "no pads", "pads")
 
 
-def make_scene(drive: str) -> fourbar.Scene:
+def make_scene(drive):
     """Return a turn of a crank, or a window.
 
     The drive stays far from its poles in it.
@@ -136,11 +136,7 @@ def make_scene(drive: str) -> fourbar.Scene:
     return replace(fourbar.load(MODELS / f"{name}.toml"), drive_bar=int(bar))
 
 
-def make_carrier(
-    case: Case,
-    inertia: float,
-    omega: float,
-) -> Servo | TurningWheel | None:
+def make_carrier(case, inertia, omega):
     """Return what keeps the crank's speed in place of a flywheel."""
     if case.gains is not None:
         position, velocity = case.gains
@@ -150,7 +146,7 @@ def make_carrier(
     return None
 
 
-def compare(drive: str, case: Case) -> None:
+def compare(drive, case):
     """Compare the errors of both loops, quantity by quantity."""
     scene = make_scene(drive)
     setup = TrialSetup(scene, command(scene))
@@ -178,28 +174,28 @@ DRIVES = ("crank_rocker 2", "drag_link 3", "drag_link 4", "cylinder")
 
 @pytest.mark.parametrize("case", QUICK)
 @pytest.mark.parametrize("drive", DRIVES)
-def test_the_plotted_error_is_that_of_a_second_loop(drive: str, case: str) -> None:
+def test_the_plotted_error_is_that_of_a_second_loop(drive, case):
     compare(drive, CASES[case])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", [name for name in CASES if name not in QUICK])
 @pytest.mark.parametrize("drive", DRIVES)
-def test_so_is_that_of_every_integrator_and_softness(drive: str, case: str) -> None:
+def test_so_is_that_of_every_integrator_and_softness(drive, case):
     compare(drive, CASES[case])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CARRIED)
 @pytest.mark.parametrize("drive", DRIVES)
-def test_so_is_that_of_every_other_drive_of_the_crank(drive: str, case: str) -> None:
+def test_so_is_that_of_every_other_drive_of_the_crank(drive, case):
     compare(drive, CARRIED[case])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["defaults, Euler", "no pads", "pads"])
 @pytest.mark.parametrize("drive", DRIVES)
-def test_a_step_takes_as_long_as_in_a_second_loop(drive: str, case: str) -> None:
+def test_a_step_takes_as_long_as_in_a_second_loop(drive, case):
     """In turns, so that both meet the same machine; the middle ratio counts."""
     scene, settings = make_scene(drive), CASES[case].settings
     setup = TrialSetup(scene, command(scene))
@@ -211,7 +207,7 @@ def test_a_step_takes_as_long_as_in_a_second_loop(drive: str, case: str) -> None
     assert 1.0 / NOISE < statistics.median(ratios) < NOISE
 
 
-def test_finer_steps_do_not_make_the_defaults_worse_where_bar_4_is_driven() -> None:
+def test_finer_steps_do_not_make_the_defaults_worse_where_bar_4_is_driven():
     """Their softness alone is left.
 
     Read through another one the error grew as the steps fell.

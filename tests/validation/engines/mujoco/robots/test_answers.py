@@ -23,7 +23,7 @@ OWN = RobotSettings(
 AT_REST = BarMotion(*[0.0] * 6)
 
 
-def make_row(torque: float, off: float, condition: float = 0.5) -> InsideRow:
+def make_row(torque, off, condition=0.5):
     rigid = PinsAndTorque(torque, {name: np.array([3.0, 4.0]) for name in PINS})
     soft = PinsAndTorque(
         torque + off, {name: np.array([3.0, 4.0 + off]) for name in PINS}
@@ -31,7 +31,7 @@ def make_row(torque: float, off: float, condition: float = 0.5) -> InsideRow:
     return InsideRow(0.1, 1.0, 0.0, 0.2, soft, rigid, 1e-4, AT_REST, condition)
 
 
-def test_errors_are_sizes_of_differences_and_scales_those_of_rigid_pins() -> None:
+def test_errors_are_sizes_of_differences_and_scales_those_of_rigid_pins():
     answer = InsideAnswer([make_row(2.0, 0.5), make_row(-4.0, -0.25)])
     assert answer.errors()["torque"] == pytest.approx([0.5, 0.25])
     assert answer.errors()["F43"] == pytest.approx([0.5, 0.25])
@@ -51,7 +51,7 @@ CONDITIONS = np.array([0.9, 0.01])
 
 
 @pytest.mark.parametrize("torque", [[0.0, 0.0], [1e-6 * 15.0, 1.0]])
-def test_what_vanishes_is_judged_by_the_largest_pin_force(torque: list[float]) -> None:
+def test_what_vanishes_is_judged_by_the_largest_pin_force(torque):
     """A torque is a sum of couples of pin forces, which may cancel.
 
     Rounded lengths leave little of it, and more beside a change point.
@@ -65,32 +65,30 @@ def test_what_vanishes_is_judged_by_the_largest_pin_force(torque: list[float]) -
 
 
 @pytest.mark.parametrize("torque", [[1.0, 1.0], [1e-3, 0.0]])
-def test_a_torque_is_none_because_pin_forces_grow_beside_a_change_point(
-    torque: list[float],
-) -> None:
+def test_a_torque_is_none_because_pin_forces_grow_beside_a_change_point(torque):
     sizes = {"torque": np.array(torque), **FORCES}
     scales = find_scales(sizes, CONDITIONS, 0.5)
     assert scales["torque"] == pytest.approx(max(torque))
 
 
-def test_where_nothing_acts_there_is_no_scale() -> None:
+def test_where_nothing_acts_there_is_no_scale():
     sizes = dict.fromkeys(("torque", *FORCES), np.zeros(2))
     assert not any(find_scales(sizes, CONDITIONS, 0.5).values())
 
 
-def test_an_error_is_over_its_scale() -> None:
+def test_an_error_is_over_its_scale():
     assert divide(1.0, 4.0) == 0.25
     assert divide(0.0, 0.0) == 0.0
     assert divide(1.0, 0.0) == divide(np.inf, 4.0) == np.inf
 
 
-def test_fewer_positions_keep_both_ends() -> None:
+def test_fewer_positions_keep_both_ends():
     motion = LoopMotion(tuple(np.linspace(0.0, 1.0, 101).tolist()), 1.0, 0.0)
     assert motion.thin_out(3).angle == (0.0, 0.5, 1.0)
     assert motion.thin_out(500) == motion
 
 
-def test_changes_are_written_as_attributes() -> None:
+def test_changes_are_written_as_attributes():
     changed = replace(OWN, solref=(0.002, 1.0), integrator="RK4")
     assert changed.list_changes(OWN) == {"solref": "0.002 1", "integrator": "RK4"}
     assert OWN.list_changes(OWN) == {}

@@ -19,10 +19,7 @@ from fourbar_validation.engines.mujoco.robots.closures import (
 )
 from fourbar_validation.engines.mujoco.robots.loop import (
     PoseOptions,
-    RobotClosure,
     RobotFile,
-    RobotLoop,
-    RobotReport,
 )
 from tests.support.robots import ADAPTIVE, EXCAVATOR, TILT, Planar, rotation
 from tests.whole.test_imports import ROOT
@@ -30,15 +27,15 @@ from tests.whole.test_imports import ROOT
 MODELS = ROOT / "models" / "robots"
 
 
-def report_of(text: str, **options: object) -> RobotReport:
+def report_of(text, **options):
     return list_closures(RobotFile(Path("robot.xml"), text), PoseOptions(**options))
 
 
-def closure_of(text: str, **options: object) -> RobotClosure:
+def closure_of(text, **options):
     return report_of(text, **options).closures[0]
 
 
-def loop_of(text: str, **options: object) -> RobotLoop:
+def loop_of(text, **options):
     closure = closure_of(text, **options)
     assert closure.loop is not None, closure.reason
     return closure.loop
@@ -48,10 +45,7 @@ CUTS = [*product(("A", "B", "O4"), ("anchor", "site")), ("B", "weld")]
 
 
 @pytest.mark.parametrize(("cut", "by"), CUTS)
-def test_a_loop_has_the_lengths_of_its_pins_wherever_it_is_cut(
-    cut: str,
-    by: str,
-) -> None:
+def test_a_loop_has_the_lengths_of_its_pins_wherever_it_is_cut(cut, by):
     planar = Planar(cut=cut, by=by)
     loop = loop_of(planar.text())
     assert np.allclose(loop.lengths, planar.lengths(), rtol=1e-12)
@@ -66,7 +60,7 @@ def test_a_loop_has_the_lengths_of_its_pins_wherever_it_is_cut(
 
 
 @pytest.mark.parametrize(("cut", "by"), CUTS)
-def test_bars_and_pins_are_where_the_file_puts_them(cut: str, by: str) -> None:
+def test_bars_and_pins_are_where_the_file_puts_them(cut, by):
     planar = Planar(cut=cut, by=by)
     loop = loop_of(planar.text())
     model = mujoco.MjModel.from_xml_string(planar.text())
@@ -87,7 +81,7 @@ def test_bars_and_pins_are_where_the_file_puts_them(cut: str, by: str) -> None:
 
 
 @pytest.mark.parametrize("sign", ["1", "-1"])
-def test_angles_count_from_the_horizontal_and_with_the_driven_joint(sign: str) -> None:
+def test_angles_count_from_the_horizontal_and_with_the_driven_joint(sign):
     planar = Planar(axes={"O2": f"0 0 {sign}", "A": "0 0 -2"})
     text = planar.text()
     loop = loop_of(text)
@@ -117,7 +111,7 @@ def test_angles_count_from_the_horizontal_and_with_the_driven_joint(sign: str) -
     assert loop.senses["A"] == -float(sign)
 
 
-def test_bodies_without_joints_are_one_bar_and_what_hangs_on_it_is_held() -> None:
+def test_bodies_without_joints_are_one_bar_and_what_hangs_on_it_is_held():
     plate = (
         '<body name="plate" pos="0.1 0 0"><geom size="0.01"/><body name="flap"><joint'
         ' name="flap" axis="0 1 0"/><geom size="0.01"/></body></body>'
@@ -143,7 +137,7 @@ FIVE_BAR = """
 """
 
 
-def test_five_hinges_are_a_four_bar_once_one_is_held() -> None:
+def test_five_hinges_are_a_four_bar_once_one_is_held():
     text = FIVE_BAR.format(more="")
     reason = closure_of(text).reason
     assert "five hinges and two freedoms" in reason
@@ -158,7 +152,7 @@ def test_five_hinges_are_a_four_bar_once_one_is_held() -> None:
     assert model.joint("d").id in loop.held
 
 
-def test_the_joint_that_a_spring_holds_is_the_first_to_hold() -> None:
+def test_the_joint_that_a_spring_holds_is_the_first_to_hold():
     """The finger of an adaptive gripper."""
     assert "--hold spring_link (or " in closure_of(ADAPTIVE).reason
     stiff = FIVE_BAR.format(more="").replace(
@@ -167,7 +161,7 @@ def test_the_joint_that_a_spring_holds_is_the_first_to_hold() -> None:
     assert "--hold c (or b, d)" in closure_of(stiff).reason
 
 
-def test_two_motors_are_named() -> None:
+def test_two_motors_are_named():
     text = FIVE_BAR.format(more='<motor name="two" joint="c"/>')
     assert "driven by 2 motors (one, two)" in closure_of(text).reason
     assert "--hold a (or c) makes it a four-bar" in closure_of(text).reason
@@ -195,16 +189,13 @@ def test_two_motors_are_named() -> None:
         ),
     ],
 )
-def test_the_reason_is_given_where_it_is_no_four_bar(
-    planar: Planar,
-    words: str,
-) -> None:
+def test_the_reason_is_given_where_it_is_no_four_bar(planar, words):
     closure = closure_of(planar.text())
     assert closure.loop is None
     assert words in closure.reason
 
 
-def test_a_weld_of_three_hinges_leaves_no_freedom() -> None:
+def test_a_weld_of_three_hinges_leaves_no_freedom():
     text = Planar().text().replace("<connect", "<weld")
     assert "a weld that leaves no freedom: three hinges" in closure_of(text).reason
     pin = text.replace("<weld", '<weld torquescale="0"')
@@ -217,7 +208,7 @@ def test_a_weld_of_three_hinges_leaves_no_freedom() -> None:
     )
 
 
-def test_axes_that_a_file_rounds_are_parallel_and_measured() -> None:
+def test_axes_that_a_file_rounds_are_parallel_and_measured():
     angle = math.radians(0.05)
     planar = Planar(axes={"A": f"0 {math.tan(angle)!r} 1"})
     closure = closure_of(planar.text())
@@ -227,9 +218,7 @@ def test_axes_that_a_file_rounds_are_parallel_and_measured() -> None:
 
 
 @pytest.mark.parametrize("limited", ["", 'limited="true" range="0 3"'])
-def test_a_hinge_in_place_of_a_ball_among_parallel_axes_is_what_to_type(
-    limited: str,
-) -> None:
+def test_a_hinge_in_place_of_a_ball_among_parallel_axes_is_what_to_type(limited):
     """The frame of the ball's body is tilted: its axis is not that of the others.
 
     What is advised makes the linkage of the pins.
@@ -255,7 +244,7 @@ def test_a_hinge_in_place_of_a_ball_among_parallel_axes_is_what_to_type(
     assert loop.misaligned < 1e-6
 
 
-def test_a_ball_joint_and_a_floating_body_are_named() -> None:
+def test_a_ball_joint_and_a_floating_body_are_named():
     ball = Planar().text().replace('name="A" axis="0 0 1"', 'name="A" type="ball"')
     assert "A is a ball joint, but the axes" in closure_of(ball).reason
     spatial = ball.replace('name="O4" axis="0 0 1"', 'name="O4" axis="1 0 0"')
@@ -272,7 +261,7 @@ def test_a_ball_joint_and_a_floating_body_are_named() -> None:
     assert "float floats freely" in closure_of(loose).reason
 
 
-def test_two_connects_along_one_axis_are_one_pin() -> None:
+def test_two_connects_along_one_axis_are_one_pin():
     second = '<connect body1="coupler" body2="output" anchor="0.22 0.09 0.02"/>'
     text = Planar().text().replace("</equality>", f"{second}</equality>")
     report = report_of(text)
@@ -283,7 +272,7 @@ def test_two_connects_along_one_axis_are_one_pin() -> None:
     assert other.loop is not None
 
 
-def test_a_joint_equality_is_a_mimic() -> None:
+def test_a_joint_equality_is_a_mimic():
     mimic = '<joint joint1="O4" joint2="O2" polycoef="0.1 0.5 0 0 0"/>'
     text = Planar().text().replace("</equality>", f"{mimic}</equality>")
     one, other = report_of(text).closures
@@ -294,7 +283,7 @@ def test_a_joint_equality_is_a_mimic() -> None:
     assert one.loop.other_equalities == (1,)
 
 
-def test_a_fixed_tendon_over_two_joints_is_a_mimic() -> None:
+def test_a_fixed_tendon_over_two_joints_is_a_mimic():
     tendon = (
         '<tendon><fixed name="T"><joint joint="O4" coef="2"/>'
         '<joint joint="O2" coef="-1"/></fixed></tendon><equality>'
@@ -306,7 +295,7 @@ def test_a_fixed_tendon_over_two_joints_is_a_mimic() -> None:
     assert one.loop is not None
 
 
-def test_another_hinge_of_the_ground_can_be_the_driven_one() -> None:
+def test_another_hinge_of_the_ground_can_be_the_driven_one():
     planar = Planar()
     loop = loop_of(planar.text(), drive="O4")
     d, a, b, c = planar.lengths()
@@ -328,7 +317,7 @@ def test_another_hinge_of_the_ground_can_be_the_driven_one() -> None:
         loop_of(planar.text(), drive="wheel")
 
 
-def test_where_no_motor_acts_the_first_hinge_of_the_file_is_driven() -> None:
+def test_where_no_motor_acts_the_first_hinge_of_the_file_is_driven():
     for cut in ("A", "B"):
         planar = Planar(cut=cut, drive="")
         loop = loop_of(planar.text())
@@ -337,7 +326,7 @@ def test_where_no_motor_acts_the_first_hinge_of_the_file_is_driven() -> None:
         assert "no motor acts on it" in loop.remarks[0]
 
 
-def test_a_hinge_that_another_loop_moves_is_the_driven_one() -> None:
+def test_a_hinge_that_another_loop_moves_is_the_driven_one():
     model = mujoco.MjModel.from_xml_string(EXCAVATOR)
     loop = loop_of(EXCAVATOR)
     assert model.joint(loop.joint).name == "rocker"
@@ -346,7 +335,7 @@ def test_a_hinge_that_another_loop_moves_is_the_driven_one() -> None:
     assert loop_of(EXCAVATOR, drive="bucket").joint == model.joint("bucket").id
 
 
-def test_a_joint_without_a_name_is_held_by_the_name_that_is_printed() -> None:
+def test_a_joint_without_a_name_is_held_by_the_name_that_is_printed():
     text = FIVE_BAR.format(more="").replace('<joint name="d"', "<joint")
     assert "--hold b (or c, joint 3)" in closure_of(text).reason
     assert loop_of(text, held=("joint 3",)).lengths == pytest.approx(
@@ -354,7 +343,7 @@ def test_a_joint_without_a_name_is_held_by_the_name_that_is_printed() -> None:
     )
 
 
-def test_a_loop_seen_from_behind_turns_the_other_way() -> None:
+def test_a_loop_seen_from_behind_turns_the_other_way():
     loop = loop_of(Planar().text())
     behind = loop.seen_from_behind()
     assert np.allclose(behind.angles, np.negative(loop.angles))
@@ -363,7 +352,7 @@ def test_a_loop_seen_from_behind_turns_the_other_way() -> None:
     assert behind.lengths == loop.lengths
 
 
-def test_a_loop_is_chosen_by_its_name() -> None:
+def test_a_loop_is_chosen_by_its_name():
     closures = report_of(Planar().text()).closures
     assert choose_loop(closures, "coupler-output") is closures[0].loop
     with pytest.raises(InputError, match="the file has: coupler-output"):
@@ -373,7 +362,7 @@ def test_a_loop_is_chosen_by_its_name() -> None:
         choose_loop(spatial, "coupler-output")
 
 
-def test_our_robots_have_the_loops_that_they_were_made_with() -> None:
+def test_our_robots_have_the_loops_that_they_were_made_with():
     gripper = report_of((MODELS / "gripper.xml").read_text())
     for closure in gripper.closures:
         assert closure.loop is not None
@@ -417,11 +406,7 @@ TWO_LOOPS = """
         (("m2",), "5 hinges, 2 loops and one freedom: a six-bar (", "world"),
     ],
 )
-def test_loops_that_share_bars_are_counted_together(
-    held: tuple[str, ...],
-    counts: str,
-    ground: str,
-) -> None:
+def test_loops_that_share_bars_are_counted_together(held, counts, ground):
     *_, second = report_of(TWO_LOOPS, held=held).closures
     assert second.loop is None
     assert f"with loop1, which moves its bars too, {counts}" in second.reason
@@ -430,12 +415,12 @@ def test_loops_that_share_bars_are_counted_together(
     assert "--hold" not in second.reason and "motors" not in second.reason
 
 
-def test_no_hold_is_offered_for_bars_of_another_loop() -> None:
+def test_no_hold_is_offered_for_bars_of_another_loop():
     first, _ = report_of(TWO_LOOPS).closures
     assert "--hold" not in first.reason and "on g" not in first.reason
 
 
-def test_two_fingers_on_one_base_stay_apart() -> None:
+def test_two_fingers_on_one_base_stay_apart():
     finger = (
         '<body name="{0}a" pos="{1} 0 0"><joint name="{0}a" axis="0 1 0"/>'
         '<geom size=".01"/><body name="{0}b" pos="0 0 .1"><joint name="{0}b"'
@@ -456,7 +441,7 @@ def test_two_fingers_on_one_base_stay_apart() -> None:
         assert closure.reason.startswith("five hinges and two freedoms; --hold ")
 
 
-def test_a_slide_is_no_hinge() -> None:
+def test_a_slide_is_no_hinge():
     *_, piston = report_of(EXCAVATOR).closures
     assert "stroke" not in piston.hinges
     assert piston.other_joints == ("stroke (slide)",)

@@ -18,7 +18,6 @@ from fourbar_validation.engines.mujoco.robots.inside import (
     LoopInside,
 )
 from fourbar_validation.engines.mujoco.robots.loop import (
-    LoopScene,
     PoseOptions,
     RobotFile,
 )
@@ -70,11 +69,11 @@ CHANGE_POINT = """
 """
 
 
-def read(text: str) -> LoopScene:
+def read(text):
     return read_loop_scene(RobotFile(Path("foot.xml"), text), PoseOptions(), None, 1.0)
 
 
-def list_equal(made: LoopScene) -> list[str]:
+def list_equal(made):
     return [remark for remark in made.remarks if "read as equal" in remark]
 
 
@@ -90,9 +89,8 @@ def list_equal(made: LoopScene) -> list[str]:
     ],
 )
 def test_the_rounding_of_numbers_is_half_of_the_last_digit_that_one_shows(
-    vector: tuple[float, ...],
-    rounding: float,
-) -> None:
+    vector, rounding
+):
     assert find_rounding(vector) == pytest.approx(rounding, rel=1e-12)
 
 
@@ -101,10 +99,7 @@ def test_the_rounding_of_numbers_is_half_of_the_last_digit_that_one_shows(
     [(FREE, 1.0), (FIVE_DIGITS, 1.0), (TURNED, 1.0), (LARGE, 10.0)],
     ids=["six digits", "five digits", "quaternions", "large"],
 )
-def test_a_parallelogram_of_rounded_numbers_is_the_one_that_was_built(
-    text: str,
-    size: float,
-) -> None:
+def test_a_parallelogram_of_rounded_numbers_is_the_one_that_was_built(text, size):
     made = read(text)
     lengths = np.multiply(size, (0.14, 0.06, 0.14, 0.06))
     assert made.scene.linkage.lengths == pytest.approx(lengths, rel=1e-12)
@@ -115,7 +110,7 @@ def test_a_parallelogram_of_rounded_numbers_is_the_one_that_was_built(
     assert sweep.stop - sweep.start == pytest.approx(math.tau)
 
 
-def test_what_is_read_as_equal_is_said_with_its_difference() -> None:
+def test_what_is_read_as_equal_is_said_with_its_difference():
     """The pins of the file: A on the turned crank, B on the foot."""
     quaternion = [float(number) for number in QUATERNION.split()]
     pin_a = np.array([0.0, 0.0, 0.29]) + rotation(quaternion) @ (-0.06, 0.0, 0.0)
@@ -129,7 +124,7 @@ def test_what_is_read_as_equal_is_said_with_its_difference() -> None:
     )
 
 
-def test_the_range_of_the_motor_is_that_of_the_file() -> None:
+def test_the_range_of_the_motor_is_that_of_the_file():
     """It passes the change point at which the rounded lengths would stop it."""
     made = read(FOOT_PARALLELOGRAM)
     sweep = made.scene.motion.angle
@@ -145,7 +140,7 @@ def test_the_range_of_the_motor_is_that_of_the_file() -> None:
     ],
     ids=["another length", "more digits"],
 )
-def test_what_the_digits_tell_apart_stays(text: str) -> None:
+def test_what_the_digits_tell_apart_stays(text):
     made = read(text)
     assert not list_equal(made)
     assert made.loop.rounding == 0.0
@@ -153,9 +148,7 @@ def test_what_the_digits_tell_apart_stays(text: str) -> None:
     assert classify(made.scene.linkage).name != "parallelogram"
 
 
-def test_a_file_that_mujoco_saved_is_read_as_the_one_that_was_written(
-    tmp_path: Path,
-) -> None:
+def test_a_file_that_mujoco_saved_is_read_as_the_one_that_was_written(tmp_path):
     """Exact lengths and a turn of all digits, of which MuJoCo writes six."""
     half = 0.5 * math.radians(21.51)
     exact = FREE.replace(QUATERNION, f"{math.cos(half)!r} 0 {math.sin(half)!r} 0")
@@ -172,9 +165,7 @@ def test_a_file_that_mujoco_saved_is_read_as_the_one_that_was_written(
 
 
 @pytest.mark.parametrize("text", [FREE, FIVE_DIGITS, LARGE])
-def test_a_turn_is_measured_but_where_the_digits_do_not_tell_the_pose(
-    text: str,
-) -> None:
+def test_a_turn_is_measured_but_where_the_digits_do_not_tell_the_pose(text):
     """The rigid robot is that of the formulas within the digits of its lengths."""
     file = RobotFile(Path("foot.xml"), text)
     (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), None).loops
@@ -191,7 +182,7 @@ def test_a_turn_is_measured_but_where_the_digits_do_not_tell_the_pose(
             assert error.median < ROUNDINGS * relative
 
 
-def test_a_loop_is_closed_on_a_change_point_that_its_lengths_miss() -> None:
+def test_a_loop_is_closed_on_a_change_point_that_its_lengths_miss():
     """The bars are in line there, and leave a gap of what a + d = b + c misses by."""
     file = RobotFile(Path("foot.xml"), LARGE)
     made = read(LARGE)
@@ -205,7 +196,7 @@ def test_a_loop_is_closed_on_a_change_point_that_its_lengths_miss() -> None:
     assert LoopInside(model, exact).close(in_line) is None
 
 
-def test_one_equality_alone_is_met_by_chance() -> None:
+def test_one_equality_alone_is_met_by_chance():
     """The sum d + a is b + c but for 1e-5: less than three roundings of 5e-6."""
     made = read(CHANGE_POINT)
     assert not list_equal(made)

@@ -15,7 +15,6 @@ from fourbar.scene.motion import BRANCH_NAMES, Motion
 from fourbar.solving import solve
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.mujoco.robots.answers import (
-    LoopMeasurement,
     MeasureOptions,
 )
 from fourbar_validation.engines.mujoco.robots.examine import examine_file
@@ -87,7 +86,7 @@ one speed through time; empty where they have one.
 """
 
 
-def measured(drive: str) -> LoopMeasurement:
+def measured(drive):
     scene: Scene = loads(f"{SCENE}[drive]\n{DRIVES[drive]}\n")
     bare: Scene = loads(SCENE)
     file = RobotFile(Path("bare.xml"), write_mjcf(bare, drive="none"))
@@ -98,7 +97,7 @@ def measured(drive: str) -> LoopMeasurement:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("drive", DRIVES)
-def test_every_drive_is_that_of_the_formulas_in_a_file_without_it(drive: str) -> None:
+def test_every_drive_is_that_of_the_formulas_in_a_file_without_it(drive):
     loop = measured(drive)
     assert find_left_out(loop) < 1e-8
     errors = list_errors_by_method(loop)
@@ -113,19 +112,19 @@ SOLVER = '<option timestep="0.0002" integrator="RK4" tolerance="0"/>'
 ANGLES = ("theta_2", "theta_3", "theta_4")
 
 
-def command(scene: Scene, bar: int, angles: np.ndarray, branch: int) -> Scene:
+def command(scene, bar, angles, branch):
     """Return a scene that commands a bar, on which its drive acts too."""
     stated = {f"theta_{bar}": angles, f"omega_{bar}": 2.0}
     return replace(scene, motion=Motion(**stated, branch=branch), drive_bar=bar)
 
 
-def find_circuit_of(scene: Scene) -> int:
+def find_circuit_of(scene):
     solution = solve(scene, "position")
     numbers = find_circuit(scene.linkage, solution.theta_2, solution.branch)
     return int(numbers[0])
 
 
-def list_ways(scene: Scene) -> np.ndarray:
+def list_ways(scene):
     """Return cosine and sine of the angles of the moving bars, (n, 3, 2)."""
     solution = solve(scene, "position")
     angles = np.stack([getattr(solution, name) for name in ANGLES], axis=-1)
@@ -135,9 +134,7 @@ def list_ways(scene: Scene) -> np.ndarray:
 @pytest.mark.parametrize("away", [False, True])
 @pytest.mark.parametrize("bar", [2, 3, 4])
 @pytest.mark.parametrize("cut", ["O2", "A", "B", "O4"])
-def test_a_loop_closed_at_any_pin_is_moved_by_any_bar(
-    cut: str, bar: int, away: bool
-) -> None:
+def test_a_loop_closed_at_any_pin_is_moved_by_any_bar(cut, bar, away):
     """Half a turn of the crank away from its pose the loop is in the other assembly of
     a command of each other bar: it moves there, through a limit of that bar.
     """
@@ -170,7 +167,7 @@ def test_a_loop_closed_at_any_pin_is_moved_by_any_bar(
 
 
 @pytest.mark.parametrize(("name", "refusal"), COMMANDS.items())
-def test_every_command_is_judged_at_single_states(name: str, refusal: str) -> None:
+def test_every_command_is_judged_at_single_states(name, refusal):
     loop = examine_file(load(MODELS / f"{name}.toml"), None).measured
     assert find_left_out(loop) < 1e-8
     for error in list_errors_by_method(loop):

@@ -14,7 +14,6 @@ import pytest
 
 from fourbar.files import load
 from fourbar.mjcf import write_mjcf
-from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco.robots.ancestry import list_lifted_masses
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.forces import (
@@ -37,7 +36,7 @@ flags: without passive forces gravity is not compensated.
 
 
 @pytest.mark.parametrize("off", [c for n in range(4) for c in combinations(FLAGS, n)])
-def test_gravity_is_compensated_where_mujoco_does(off: tuple[str, ...]) -> None:
+def test_gravity_is_compensated_where_mujoco_does(off):
     flags = " ".join(f'{flag}="disable"' for flag in off)
     model = mujoco.MjModel.from_xml_string(
         f"<mujoco><option><flag {flags}/></option><worldbody>"
@@ -52,12 +51,12 @@ def test_gravity_is_compensated_where_mujoco_does(off: tuple[str, ...]) -> None:
 
 
 @pytest.fixture
-def scene() -> Scene:
+def scene():
     return load(CRANK_ROCKER)
 
 
 @pytest.mark.parametrize("flags", F14_AT_90_DEG)
-def test_pin_forces_are_those_of_the_free_body(scene: Scene, flags: str) -> None:
+def test_pin_forces_are_those_of_the_free_body(scene, flags):
     text = write_mjcf(scene)
     text, bodies = re.subn(
         '<body name="(coupler|output)" ', r'\g<0>gravcomp="1" ', text
@@ -81,9 +80,7 @@ SOLVED = 1e-6
 """Parts of the weight: MuJoCo's solver stops at a tolerance of 1e-8."""
 
 
-def test_the_listing_of_the_guide_reads_what_the_harness_reads(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_listing_of_the_guide_reads_what_the_harness_reads(monkeypatch):
     monkeypatch.chdir(ROOT)
     names: dict[str, Any] = {}
     with contextlib.redirect_stdout(io.StringIO()):
@@ -103,7 +100,7 @@ def test_the_listing_of_the_guide_reads_what_the_harness_reads(
 
 
 @pytest.mark.parametrize("scale", [1.0, 0.3])
-def test_a_weld_exerts_force_and_moment_as_the_guide_has_them(scale: float) -> None:
+def test_a_weld_exerts_force_and_moment_as_the_guide_has_them(scale):
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option gravity="0 0 0" tolerance="0"/><worldbody>
         <body name="one" pos=".1 0 0"><freejoint/><geom size=".1"/></body>

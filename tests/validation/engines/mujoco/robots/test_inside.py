@@ -27,7 +27,6 @@ from fourbar_validation.engines.mujoco.robots.closures import find_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.inside import HEAVY, LoopInside
 from fourbar_validation.engines.mujoco.robots.loop import (
-    LoopScene,
     PoseOptions,
     RobotFile,
 )
@@ -60,7 +59,7 @@ RIGID = 1e-8
 
 
 @cache
-def open_loop(name: str) -> tuple[LoopInside, LoopScene]:
+def open_loop(name):
     closing, options = LOOPS.get(name, (None, PoseOptions()))
     path = ROBOTS / f"{name}.xml"
     text = TEXTS.get(name)
@@ -75,7 +74,7 @@ def open_loop(name: str) -> tuple[LoopInside, LoopScene]:
     return LoopInside(posed.model, loop), make_loop_scene(compiled, posed, loop, 2.0)
 
 
-def spread_over_range(inside: LoopInside, made: LoopScene, count: int) -> np.ndarray:
+def spread_over_range(inside, made, count):
     """Return angles of bar 2 in the loop's plane within its hinges' range, rad."""
     sweep = made.scene.motion.angle
     assert isinstance(sweep, Sweep)
@@ -85,7 +84,7 @@ def spread_over_range(inside: LoopInside, made: LoopScene, count: int) -> np.nda
     return np.asarray(angles + math.tau * round(away / math.tau))
 
 
-def ask_again(inside: LoopInside, theta_2: float, alpha_2: float) -> float:
+def ask_again(inside, theta_2, alpha_2):
     """Find all joint forces at once by `mj_forward` alone.
 
     The hinges that are not driven are left to themselves. Newton's method on the
@@ -100,7 +99,7 @@ def ask_again(inside: LoopInside, theta_2: float, alpha_2: float) -> float:
     wanted[0] = sense * alpha_2
     forces = np.zeros(len(moved))
 
-    def accelerate(at: np.ndarray) -> np.ndarray:
+    def accelerate(at):
         mujoco.mj_resetData(model, data)
         data.qpos[:], data.qvel[:] = state.qpos, state.qvel
         data.qfrc_applied[moved] = at
@@ -127,9 +126,7 @@ def ask_again(inside: LoopInside, theta_2: float, alpha_2: float) -> float:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*FILES, *TEXTS])
-def test_the_torque_is_the_one_that_mujoco_gives_when_asked_by_itself(
-    name: str,
-) -> None:
+def test_the_torque_is_the_one_that_mujoco_gives_when_asked_by_itself(name):
     inside, made = open_loop(name)
     theta_2 = float(spread_over_range(inside, made, 3)[-1])
     (row,) = inside.answer_states(LoopMotion((theta_2,), 2.0, 3.0)).rows
@@ -141,8 +138,8 @@ def test_the_torque_is_the_one_that_mujoco_gives_when_asked_by_itself(
 
 @pytest.mark.parametrize("impedance", ["0.9999 0.9999", "0.95 0.95"])
 def test_beside_a_huge_flywheel_a_soft_closure_has_the_force_of_its_equations(
-    impedance: str,
-) -> None:
+    impedance,
+):
     """M a + c - J^T f = tau and J a + R f = r, solved at once, a of the input given."""
     scene = load(ROBOTS.parent / "crank_rocker.toml")
     text = write_mjcf(scene).replace("0.9999 0.9999", impedance)
@@ -181,7 +178,7 @@ ROUNDED = 1e-12
 
 
 @pytest.mark.parametrize("name", [*FILES, *TEXTS])
-def test_rigid_pins_in_the_robot_are_the_formulas_of_its_scene(name: str) -> None:
+def test_rigid_pins_in_the_robot_are_the_formulas_of_its_scene(name):
     """Multipliers on MuJoCo's mass matrix of the whole robot are the forces of a scene
     of three bars, and of its free bodies.
     """
@@ -200,11 +197,11 @@ def test_rigid_pins_in_the_robot_are_the_formulas_of_its_scene(name: str) -> Non
             assert measure_sizes(rigid - right).max() <= RIGID * size
 
 
-def _turn_back(inside: LoopInside, made: LoopScene) -> float:
+def _turn_back(inside, made):
     return inside.loop.angles[0] - made.scene.linkage.ground_angle
 
 
-def test_the_start_of_a_simulation_is_not_judged() -> None:
+def test_the_start_of_a_simulation_is_not_judged():
     """It begins exactly closed, where the loop has not yielded yet.
 
     The forces are those of a single state.
@@ -224,7 +221,7 @@ def test_the_start_of_a_simulation_is_not_judged() -> None:
         assert single.errors()[quantity].max() / scale > 10.0 * settled
 
 
-def test_what_ties_the_loop_to_held_joints_is_off_and_the_rest_is_not() -> None:
+def test_what_ties_the_loop_to_held_joints_is_off_and_the_rest_is_not():
     inside, _ = open_loop("finger")
     names = [inside.model.equality(i).name for i in range(inside.model.neq)]
     active = inside.model.eq_active0.tolist()
@@ -237,7 +234,7 @@ def test_what_ties_the_loop_to_held_joints_is_off_and_the_rest_is_not() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FILES)
-def test_what_holds_the_other_joints_hardly_matters(name: str) -> None:
+def test_what_holds_the_other_joints_hardly_matters(name):
     """And what held them too firmly would: the solver then loses the light bars."""
     inside, _ = open_loop(name)
     angles = (inside.loop.angles[1] + np.linspace(-0.3, 0.3, 5)).tolist()
@@ -254,7 +251,7 @@ def test_what_holds_the_other_joints_hardly_matters(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_motor_opens_the_loop_the_more_the_harder_it_pushes() -> None:
+def test_a_motor_opens_the_loop_the_more_the_harder_it_pushes():
     inside, _ = open_loop("biped_foot")
     start = [inside.loop.angles[1]]
     (weak,) = inside.answer_under_torque(start, 2.0, 0.02)

@@ -9,7 +9,6 @@ import pytest
 from fourbar.scene import find_signs
 from fourbar_validation.engines.free_body_closure import close
 from fourbar_validation.engines.mujoco.robots.answers import (
-    LoopMeasurement,
     MeasureOptions,
     RobotMeasurement,
 )
@@ -53,7 +52,7 @@ RHOMBUS = """
 """
 
 
-def measured(text: str, speed: float = 1.0, **pose: str) -> LoopMeasurement:
+def measured(text, speed=1.0, **pose):
     file = RobotFile(Path("robot.xml"), text)
     options = MeasureOptions(PoseOptions(joints=pose), speed=speed)
     (loop,) = measure_loops(file, options, None).loops
@@ -62,11 +61,11 @@ def measured(text: str, speed: float = 1.0, **pose: str) -> LoopMeasurement:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("start", ["0deg", "10deg", "-160deg", "200deg"])
-def test_states_are_compared_in_the_assembly_of_the_robot(start: str) -> None:
+def test_states_are_compared_in_the_assembly_of_the_robot(start):
     assert find_left_out(measured(SINGLE, j2=start)) < 1e-8
 
 
-def test_a_state_after_a_turn_is_that_of_the_same_motion() -> None:
+def test_a_state_after_a_turn_is_that_of_the_same_motion():
     """Beyond its change point the other assembly has the branch of the scene."""
     loop = measured(SINGLE, j2="10deg")
     theta_2 = np.array([row.angle for row in loop.states.rows]) - loop.turned
@@ -77,7 +76,7 @@ def test_a_state_after_a_turn_is_that_of_the_same_motion() -> None:
     assert abs(theta_4[-1] - theta_4[0]) > 0.1
 
 
-def test_going_over_to_the_other_assembly_is_said_and_is_in_no_percentage() -> None:
+def test_going_over_to_the_other_assembly_is_said_and_is_in_no_percentage():
     loop = measured(SINGLE, -1.0, j2="10deg")
     through = loop.through_time
     assert through is not None and through.other_assembly is not None
@@ -91,7 +90,7 @@ def test_going_over_to_the_other_assembly_is_said_and_is_in_no_percentage() -> N
     assert [torque.part < 0.5 for torque in torques] == [True]
 
 
-def test_one_scale_for_a_column_where_the_torque_is_rounding() -> None:
+def test_one_scale_for_a_column_where_the_torque_is_rounding():
     """The torque is a sum that cancels: 12.6 % of 8042 N m, not 1e6 %."""
     loop = measured(RHOMBUS)
     torques = {
@@ -113,7 +112,7 @@ def test_one_scale_for_a_column_where_the_torque_is_rounding() -> None:
     assert loop.influence is not None and loop.influence.worst < 0.01
 
 
-def test_what_is_said_of_a_change_of_assembly() -> None:
+def test_what_is_said_of_a_change_of_assembly():
     loop = measured(SINGLE, -1.0, j2="10deg")
     said = [
         block

@@ -39,7 +39,7 @@ ROBOTS = Path(__file__).parents[5] / "models" / "robots"
 
 
 @pytest.mark.slow
-def test_both_fingers_of_a_gripper_are_measured_and_are_alike() -> None:
+def test_both_fingers_of_a_gripper_are_measured_and_are_alike():
     file = read_robot(ROBOTS / "gripper.xml")
     right, left = measure_loops(file, MeasureOptions(PoseOptions()), None).loops
     assert find_worst_of_loop(right) == pytest.approx(
@@ -49,7 +49,7 @@ def test_both_fingers_of_a_gripper_are_measured_and_are_alike() -> None:
 
 
 @pytest.mark.slow
-def test_a_scene_with_axes_of_its_own_gives_the_same_errors() -> None:
+def test_a_scene_with_axes_of_its_own_gives_the_same_errors():
     """The axes of the scene are turned by 0.3 rad against those of the loop's plane.
 
     No weight acts across it.
@@ -79,7 +79,7 @@ TILTED = Plane((-2.0, 5.0, 1.0), (1.0, -2.0, 0.5))
 
 @pytest.mark.slow
 @pytest.mark.parametrize("plane", [Plane(), TILTED], ids=["level", "tilted"])
-def test_loads_of_the_file_act_and_its_motor_does_not(plane: Plane) -> None:
+def test_loads_of_the_file_act_and_its_motor_does_not(plane):
     """With rigid pins the robot's torque and forces are those of the scene.
 
     Loads are included.
@@ -95,7 +95,7 @@ def test_loads_of_the_file_act_and_its_motor_does_not(plane: Plane) -> None:
 
 
 @pytest.mark.slow
-def test_a_scene_may_see_the_loop_from_behind() -> None:
+def test_a_scene_may_see_the_loop_from_behind():
     bare = replace(ROCKER, loads=(), effects=())
     file = RobotFile(Path("arm.xml"), write_mjcf(bare, drive="motor"))
     options = MeasureOptions(PoseOptions())
@@ -110,7 +110,7 @@ def test_a_scene_may_see_the_loop_from_behind() -> None:
 
 
 @pytest.mark.slow
-def test_the_input_of_the_scene_is_driven_whatever_the_file_drives() -> None:
+def test_the_input_of_the_scene_is_driven_whatever_the_file_drives():
     """Here the motor of the file acts on the output of the scene."""
     scene = replace(ROCKER, loads=(), effects=())
     text = write_mjcf(scene, drive="motor")
@@ -125,7 +125,7 @@ def test_the_input_of_the_scene_is_driven_whatever_the_file_drives() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["dip_loop", "pip_link-middle"])
-def test_the_loop_of_a_scene_is_found_by_its_lengths(name: str) -> None:
+def test_the_loop_of_a_scene_is_found_by_its_lengths(name):
     file = RobotFile(Path("finger.xml"), FINGER)
     scene = read_loop_scene(file, PoseOptions(), name, None).scene
     (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), scene).loops
@@ -133,11 +133,11 @@ def test_the_loop_of_a_scene_is_found_by_its_lengths(name: str) -> None:
     assert find_left_out(loop) < 1e-7
 
 
-def made_angles(made: object) -> list[float]:
+def made_angles(made):
     return [row.angle - made.turned for row in made.states.rows]  # type: ignore[attr-defined]
 
 
-def test_a_loop_that_is_not_there_is_refused() -> None:
+def test_a_loop_that_is_not_there_is_refused():
     file = read_robot(ROBOTS / "gripper.xml")
     with pytest.raises(InputError, match="no such closure"):
         measure_loops(file, MeasureOptions(PoseOptions(), "tail"), None)
@@ -149,9 +149,8 @@ def test_a_loop_that_is_not_there_is_refused() -> None:
     ids=["no torque", "rhombus", "rectangle"],
 )
 def test_a_full_turn_of_a_parallelogram_is_measured_but_for_its_change_points(
-    ground: float,
-    gravity: str,
-) -> None:
+    ground, gravity
+):
     """The loop stays a parallelogram past the positions in line."""
     file = make_parallelogram(ground, 0.4, gravity)
     (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), None).loops
@@ -165,7 +164,7 @@ def test_a_full_turn_of_a_parallelogram_is_measured_but_for_its_change_points(
     assert all(math.isfinite(error.part) for error in errors)
 
 
-def test_a_torque_that_vanishes_is_judged_on_the_pin_forces_times_a_bar() -> None:
+def test_a_torque_that_vanishes_is_judged_on_the_pin_forces_times_a_bar():
     """A parallelogram of equal cranks that turns uniformly needs no torque."""
     file = make_parallelogram(0.5, 0.4, "0 0 0")
     (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), None).loops
@@ -186,7 +185,7 @@ def test_a_torque_that_vanishes_is_judged_on_the_pin_forces_times_a_bar() -> Non
     assert loop.influence is not None and loop.influence.worst < 1.0
 
 
-def test_a_torque_beside_a_change_point_is_judged_by_itself() -> None:
+def test_a_torque_beside_a_change_point_is_judged_by_itself():
     """Viscous couples of 0.5 N m at O2 and O4, and the weights on level cranks."""
     file = RobotFile(Path("foot.xml"), FOOT_PARALLELOGRAM)
     (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), None).loops
@@ -201,7 +200,7 @@ def test_a_torque_beside_a_change_point_is_judged_by_itself() -> None:
 
 
 @pytest.mark.slow
-def test_what_the_scene_leaves_out_is_no_error_of_mujoco() -> None:
+def test_what_the_scene_leaves_out_is_no_error_of_mujoco():
     """An armature I between bars 2 and 3 takes I (a3 - a2)(w3 - w2)/w2 of the motor."""
     bare = replace(ROCKER, loads=(), effects=())
     armature = 0.01
@@ -232,7 +231,7 @@ def test_what_the_scene_leaves_out_is_no_error_of_mujoco() -> None:
     assert errors[MEASURED_THROUGH_TIME].part < 0.1 * errors[RIGID].part
 
 
-def test_a_couple_is_found_where_nothing_accelerates() -> None:
+def test_a_couple_is_found_where_nothing_accelerates():
     """At rest without weights no acceleration tells how large a trial is to be."""
     file = make_parallelogram(0.5, 0.4, "0 0 0")
     options = MeasureOptions(PoseOptions(), speed=0.0)
@@ -241,13 +240,13 @@ def test_a_couple_is_found_where_nothing_accelerates() -> None:
     assert all(abs(row.soft.torque) < 1e-9 for row in loop.states.rows)
 
 
-def test_an_actuator_without_a_name_is_told_by_its_joint() -> None:
+def test_an_actuator_without_a_name_is_told_by_its_joint():
     file = make_parallelogram(0.5, 0.4, "0 0 0")
     made = read_loop_scene(file, PoseOptions(), None, None)
     assert "not in the scene: an actuator without a name, on hinge_2" in made.remarks
 
 
-def test_what_a_second_solver_of_dry_friction_changes_is_said() -> None:
+def test_what_a_second_solver_of_dry_friction_changes_is_said():
     """The same file without it is measured by itself.
 
     Below the speed at which dry friction acts in full the solver changes it, and never

@@ -1,7 +1,5 @@
 """A joint equality as it is read from a robot's file."""
 
-from pathlib import Path
-
 import mujoco
 import numpy as np
 import pytest
@@ -26,7 +24,7 @@ LOOP = Scene(
 )
 
 
-def test_coefficients_zero_and_sense_are_those_of_the_file(tmp_path: Path) -> None:
+def test_coefficients_zero_and_sense_are_those_of_the_file(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(FILE)
     equality = read_joint_equality(read_robot(path), "follow", LOOP)
@@ -71,8 +69,8 @@ EXACT = 1e-13
     ],
 )
 def test_a_follower_at_its_polynomial_leaves_the_equality_no_residual(
-    equality: str, followers: list[str]
-) -> None:
+    equality, followers
+):
     model = mujoco.MjModel.from_xml_string(TENDONS.format(equality))
     data = mujoco.MjData(model)
     ties = list_followers(model, 0)

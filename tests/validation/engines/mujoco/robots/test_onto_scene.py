@@ -48,7 +48,7 @@ NEAR_G = fourbar.Gravity(9.80665)
 """The gravity of a scene differs from the robot's 9.81 in its size alone."""
 
 
-def make_scene(branch: str, gravity: fourbar.Gravity | None = None) -> fourbar.Scene:
+def make_scene(branch, gravity=None):
     linkage = fourbar.FourBar(
         0.5,
         fourbar.Bar(0.15, 0.3, 0.3 * 0.15**2 / 12.0, (0.075, 0.0)),
@@ -62,7 +62,7 @@ def make_scene(branch: str, gravity: fourbar.Gravity | None = None) -> fourbar.S
 
 
 @pytest.mark.parametrize("branch", ["open", "crossed"])
-def test_a_flat_rest_pose_is_closed_onto_the_assembly_of_the_scene(branch: str) -> None:
+def test_a_flat_rest_pose_is_closed_onto_the_assembly_of_the_scene(branch):
     scene = make_scene(branch)
     measured = measure_loops(FILE, MeasureOptions(PoseOptions()), scene)
     (loop,) = measured.loops
@@ -75,7 +75,7 @@ def test_a_flat_rest_pose_is_closed_onto_the_assembly_of_the_scene(branch: str) 
 @pytest.mark.slow
 @pytest.mark.parametrize("branch", ["open", "crossed"])
 @pytest.mark.parametrize("axis", ["0 -1 0", "0 1 0"])
-def test_gravity_tells_the_side_by_its_direction_alone(branch: str, axis: str) -> None:
+def test_gravity_tells_the_side_by_its_direction_alone(branch, axis):
     """The hinges turn the other way: the plane is seen from the other side."""
     file = RobotFile(Path("loop.xml"), TEXT.replace("0 -1 0", axis))
     scene = make_scene(branch, NEAR_G)
@@ -84,13 +84,13 @@ def test_gravity_tells_the_side_by_its_direction_alone(branch: str, axis: str) -
     assert find_left_out(loop) < 2.0 * difference
 
 
-def test_a_pose_of_the_other_assembly_is_refused_for_another_size_of_gravity() -> None:
+def test_a_pose_of_the_other_assembly_is_refused_for_another_size_of_gravity():
     options = MeasureOptions(PoseOptions(OPEN_POSE))
     with pytest.raises(InputError, match="to the open assembly"):
         measure_loops(FILE, options, make_scene("crossed", NEAR_G))
 
 
-def test_a_pose_of_the_other_assembly_is_refused_with_one_that_closes() -> None:
+def test_a_pose_of_the_other_assembly_is_refused_with_one_that_closes():
     scene = make_scene("crossed")
     options = MeasureOptions(PoseOptions(OPEN_POSE))
     with pytest.raises(InputError, match="to the open assembly") as refused:
@@ -103,7 +103,7 @@ def test_a_pose_of_the_other_assembly_is_refused_with_one_that_closes() -> None:
     assert not [note for note in measured.notes if "what is left" in note]
 
 
-def test_without_a_scene_it_is_said_what_a_flat_pose_closed_to() -> None:
+def test_without_a_scene_it_is_said_what_a_flat_pose_closed_to():
     made = read_loop_scene(FILE, PoseOptions(), None, 4.0)
     (remark,) = [text for text in made.remarks if "in line" in text]
     assert "closed to the crossed one" in remark
@@ -115,14 +115,14 @@ def test_without_a_scene_it_is_said_what_a_flat_pose_closed_to() -> None:
     assert not [text for text in other.remarks if "in line" in text]
 
 
-def test_joints_that_are_held_are_the_reason_why_a_pose_stays_open() -> None:
+def test_joints_that_are_held_are_the_reason_why_a_pose_stays_open():
     made = read_loop_scene(FILE, PoseOptions(OPEN_POSE), None, 4.0)
     (note,) = [note for note in made.notes if "what is left is 6.24 mm" in note]
     assert "j_crank, j_rod, j_rocker stay where --pose states them" in note
     assert "ranges" not in note
 
 
-def test_what_is_not_judged_is_said_of_a_file_with_its_own_flywheel_too() -> None:
+def test_what_is_not_judged_is_said_of_a_file_with_its_own_flywheel_too():
     scene = make_scene("open")
     examined = examine_text(scene, write_mjcf(scene), {})
     judged = len(answer_of(examined, FILE_THROUGH_TIME).quantities["torque"])

@@ -8,7 +8,6 @@ import pytest
 
 from fourbar.solving import solve
 from fourbar_validation.engines.mujoco.robots.answers import (
-    LoopMeasurement,
     MeasureOptions,
 )
 from fourbar_validation.engines.mujoco.robots.closures import list_closures
@@ -40,11 +39,11 @@ SAME = 1e-9
 """Relative; the differences of the derivation have some ten digits."""
 
 
-def file_of(offset: float) -> RobotFile:
+def file_of(offset):
     return RobotFile(Path("offset.xml"), OFFSET.format(offset=offset))
 
 
-def measured(offset: float) -> LoopMeasurement:
+def measured(offset):
     options = MeasureOptions(PoseOptions(), speed=1.0)
     (loop,) = measure_loops(file_of(offset), options, None).loops
     return loop
@@ -52,7 +51,7 @@ def measured(offset: float) -> LoopMeasurement:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("offset", [1e-5, 1e-3])
-def test_an_offset_along_the_axes_changes_nothing_in_the_plane(offset: float) -> None:
+def test_an_offset_along_the_axes_changes_nothing_in_the_plane(offset):
     loop = measured(offset)
     torques = {round(np.degrees(row.joint), 6): row.rigid for row in loop.states.rows}
     for joint, torque in TORQUES.items():
@@ -63,7 +62,7 @@ def test_an_offset_along_the_axes_changes_nothing_in_the_plane(offset: float) ->
 
 
 @pytest.mark.parametrize("offset", [1e-5, 1e-3])
-def test_an_offset_is_named_with_the_force_that_mujoco_has_there(offset: float) -> None:
+def test_an_offset_is_named_with_the_force_that_mujoco_has_there(offset):
     report = list_closures(file_of(offset), PoseOptions())
     (closure,) = report.closures
     assert closure.loop is not None and not report.notes
@@ -78,7 +77,7 @@ def test_an_offset_is_named_with_the_force_that_mujoco_has_there(offset: float) 
     assert f"{np.hypot(x, y):.4g} N in it" in remark
 
 
-def test_ends_in_one_plane_are_not_remarked() -> None:
+def test_ends_in_one_plane_are_not_remarked():
     (closure,) = list_closures(file_of(0.0), PoseOptions()).closures
     assert closure.loop is not None and not closure.loop.remarks
 
@@ -91,7 +90,7 @@ HALF = """
 """Half of the coupler on the rocker's end, whose welded part has axes of its own."""
 
 
-def test_a_weld_holds_the_turn_whatever_the_axes_of_its_bodies() -> None:
+def test_a_weld_holds_the_turn_whatever_the_axes_of_its_bodies():
     """Both halves of the coupler turn alike: no motion of the loop parts them."""
     x, y = -0.03665501207128674, 0.21692489504446885
     text = OFFSET.format(offset=0.0)

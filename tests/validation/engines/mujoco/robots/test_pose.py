@@ -19,11 +19,11 @@ from tests.whole.test_imports import ROOT
 FOOT = ROOT / "models" / "robots" / "biped_foot.xml"
 
 
-def compiled(text: str) -> mujoco.MjModel:
+def compiled(text):
     return mujoco.MjModel.from_xml_string(text)
 
 
-def gap(model: mujoco.MjModel, qpos: np.ndarray) -> float:
+def gap(model, qpos):
     """Distance of the two sites of the first equality, m."""
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
@@ -32,14 +32,14 @@ def gap(model: mujoco.MjModel, qpos: np.ndarray) -> float:
     return float(np.linalg.norm(one - two))
 
 
-def test_the_rest_pose_of_a_closed_file_stays() -> None:
+def test_the_rest_pose_of_a_closed_file_stays():
     model = compiled(Planar(by="site").text())
     posed = pose_robot(model, PoseOptions())
     assert np.array_equal(posed.data.qpos, model.qpos0)
     assert not posed.notes
 
 
-def test_a_stated_joint_stays_and_the_loop_closes_around_it() -> None:
+def test_a_stated_joint_stays_and_the_loop_closes_around_it():
     model = compiled(FOOT.read_text())
     joints = {"crank": "20deg", "knee": "60 deg"}
     posed = pose_robot(model, PoseOptions(joints=joints))
@@ -67,7 +67,7 @@ def test_a_stated_joint_stays_and_the_loop_closes_around_it() -> None:
     assert any(re.search(r"rod by \S+ deg, ankle by", note) for note in posed.notes)
 
 
-def test_a_rest_pose_outside_the_ranges_is_closed_inside_them() -> None:
+def test_a_rest_pose_outside_the_ranges_is_closed_inside_them():
     text = FOOT.read_text().replace('range="-70 60"', 'range="15 60"')
     model = compiled(text)
     posed = pose_robot(model, PoseOptions())
@@ -77,7 +77,7 @@ def test_a_rest_pose_outside_the_ranges_is_closed_inside_them() -> None:
     assert posed.notes[0] == "outside their ranges in the rest pose of the file: crank"
 
 
-def test_a_file_without_joints_or_equalities_has_a_pose() -> None:
+def test_a_file_without_joints_or_equalities_has_a_pose():
     for inside in (
         "<body><geom size='1'/></body>",
         "<body><joint/><geom size='1'/></body>",
@@ -88,7 +88,7 @@ def test_a_file_without_joints_or_equalities_has_a_pose() -> None:
         assert not posed.notes
 
 
-def test_closing_does_not_leave_the_range_of_a_joint() -> None:
+def test_closing_does_not_leave_the_range_of_a_joint():
     joints = {"crank": "20deg"}
     free = pose_robot(compiled(FOOT.read_text()), PoseOptions(joints=joints))
     model = free.model
@@ -102,7 +102,7 @@ def test_closing_does_not_leave_the_range_of_a_joint() -> None:
     assert any("no pose near this one" in note for note in posed.notes)
 
 
-def test_a_keyframe_is_a_pose() -> None:
+def test_a_keyframe_is_a_pose():
     model = compiled(FOOT.read_text())
     posed = pose_robot(model, PoseOptions(key="crouch"))
     assert posed.data.qpos[2] == 0.82
@@ -113,7 +113,7 @@ def test_a_keyframe_is_a_pose() -> None:
         pose_robot(model, PoseOptions(key="jump"))
 
 
-def test_a_pose_that_cannot_close_says_what_is_left() -> None:
+def test_a_pose_that_cannot_close_says_what_is_left():
     model = compiled(FOOT.read_text().replace('pos="0.001 -0.316 0"', 'pos="0 -0.6 0"'))
     posed = pose_robot(model, PoseOptions())
     assert any("no pose near this one closes all loops" in note for note in posed.notes)
@@ -127,13 +127,13 @@ def test_a_pose_that_cannot_close_says_what_is_left() -> None:
         ({"wheel": "20deg"}, "no such joint"),
     ],
 )
-def test_what_is_no_position_is_refused(joints: dict[str, str], words: str) -> None:
+def test_what_is_no_position_is_refused(joints, words):
     model = compiled(FOOT.read_text())
     with pytest.raises(InputError, match=words):
         pose_robot(model, PoseOptions(joints=joints))
 
 
-def test_held_joints_do_not_close_the_loop() -> None:
+def test_held_joints_do_not_close_the_loop():
     model = compiled(FOOT.read_text())
     options = PoseOptions(joints={"crank": "10deg"}, held=("ankle", "rod"))
     posed = pose_robot(model, options)
@@ -157,7 +157,7 @@ BOOM = """
 """The rod's end is at (0.4, 0.35) m from the tube's hinge, the eye at (0.4, 0.4)."""
 
 
-def test_what_a_motor_holds_stays_where_the_passive_joints_close_the_loop() -> None:
+def test_what_a_motor_holds_stays_where_the_passive_joints_close_the_loop():
     held = '<actuator><motor joint="boom"/></actuator>'
     posed = pose_robot(compiled(BOOM.format(actuator=held)), PoseOptions())
     boom, tilt, stroke = posed.data.qpos
@@ -175,13 +175,13 @@ def test_what_a_motor_holds_stays_where_the_passive_joints_close_the_loop() -> N
     assert "boom by" in free.notes[0]
 
 
-def test_zero_needs_no_unit() -> None:
+def test_zero_needs_no_unit():
     model = compiled(FOOT.read_text())
     posed = pose_robot(model, PoseOptions(joints={"crank": "0"}))
     assert posed.data.qpos[model.joint("crank").qposadr[0]] == 0.0
 
 
-def test_a_floating_body_that_is_tied_to_the_ground_moves_there() -> None:
+def test_a_floating_body_that_is_tied_to_the_ground_moves_there():
     """A metre along x and a turn of 30 deg about z, by half angles."""
     model = compiled(
         """<mujoco><worldbody><body name="part"><freejoint name="free"/>

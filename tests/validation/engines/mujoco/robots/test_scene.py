@@ -20,7 +20,6 @@ import fourbar
 from fourbar.errors import InputError
 from fourbar.files import loads
 from fourbar_validation.engines.mujoco.robots.loop import (
-    LoopScene,
     PoseOptions,
     RobotFile,
 )
@@ -49,7 +48,7 @@ class Whole(NamedTuple):
 class WholeRobot:
     """A robot's model that answers for one loop while everything else stands still."""
 
-    def __init__(self, text: str, made: LoopScene) -> None:
+    def __init__(self, text, made):
         self.model = model = mujoco.MjModel.from_xml_string(text)
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
         for name in ("CONTACT", "LIMIT", "FRICTIONLOSS"):
@@ -66,7 +65,7 @@ class WholeRobot:
         }
         self.others = [dof for pin, dof in self.dofs.items() if pin != "O2"]
 
-    def closure(self, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def closure(self, qpos):
         """Residual of the equality and its derivative."""
         self.data.qpos[:] = qpos
         mujoco.mj_fwdPosition(self.model, self.data)
@@ -74,7 +73,7 @@ class WholeRobot:
         jacobian = self.data.efc_J.reshape(-1, self.model.nv)[:rows]
         return self.data.efc_pos[:rows].copy(), jacobian.copy()
 
-    def place(self, qpos: np.ndarray, angle: float) -> np.ndarray:
+    def place(self, qpos, angle):
         """Turn the driven joint to an angle and close the loop from a near pose."""
         qpos = qpos.copy()
         qpos[self.addresses["O2"]] = angle
@@ -88,12 +87,7 @@ class WholeRobot:
                 break
         return qpos
 
-    def rates(
-        self,
-        jacobian: np.ndarray,
-        driven: float,
-        rest: np.ndarray,
-    ) -> np.ndarray:
+    def rates(self, jacobian, driven, rest):
         """Solve J rates + rest = 0 with the driven rate given.
 
         All other joints are still.
@@ -105,7 +99,7 @@ class WholeRobot:
         rates[self.others] = solved
         return rates
 
-    def ask(self, qpos: np.ndarray, omega: float) -> Whole:
+    def ask(self, qpos, omega):
         """Torque and pin forces at a closed pose.
 
         The driven joint has constant speed.
@@ -135,7 +129,7 @@ class WholeRobot:
         data.xfrc_applied[:] = 0.0
         return Whole(float(solved[-1]), forces)
 
-    def pin_forces(self, multipliers: np.ndarray) -> dict[str, float]:
+    def pin_forces(self, multipliers):
         """Sizes in the plane, from the recursion of MuJoCo.
 
         The closing force and gravcomp are applied.
@@ -170,18 +164,12 @@ class WholeRobot:
         }
 
 
-def read(
-    text: str,
-    *,
-    loop: str | None = None,
-    speed: float = 3.0,
-    **pose: object,
-) -> LoopScene:
+def read(text, *, loop=None, speed=3.0, **pose):
     options = PoseOptions(**pose)  # type: ignore[arg-type]
     return read_loop_scene(RobotFile(Path("robot.xml"), text), options, loop, speed)
 
 
-def compare(text: str, made: LoopScene, speed: float = 3.0) -> None:
+def compare(text, made, speed=3.0):
     """Hold torque and pin forces of the scene's sweep against the whole robot."""
     robot = WholeRobot(text, made)
     solution = fourbar.solve(made.scene)
@@ -213,12 +201,12 @@ def compare(text: str, made: LoopScene, speed: float = 3.0) -> None:
 @pytest.mark.parametrize(
     "loop", ["right_finger-right_follower", "left_finger-left_follower"]
 )
-def test_the_gripper_has_the_torques_and_forces_of_the_whole_robot(loop: str) -> None:
+def test_the_gripper_has_the_torques_and_forces_of_the_whole_robot(loop):
     made = read(GRIPPER, loop=loop)
     compare(GRIPPER, made)
 
 
-def test_a_finger_in_another_attitude_has_them_too() -> None:
+def test_a_finger_in_another_attitude_has_them_too():
     text = GRIPPER.replace(
         '<body name="palm" pos="0 0 0.5">', '<body name="palm" euler="20 40 60">'
     )
@@ -227,14 +215,12 @@ def test_a_finger_in_another_attitude_has_them_too() -> None:
 
 
 @pytest.mark.parametrize("key", [None, "crouch"])
-def test_the_foot_has_the_torques_and_forces_of_the_whole_robot(
-    key: str | None,
-) -> None:
+def test_the_foot_has_the_torques_and_forces_of_the_whole_robot(key):
     made = read(FOOT, key=key)
     compare(FOOT, made)
 
 
-def test_what_hangs_on_a_bar_counts_as_it_stands() -> None:
+def test_what_hangs_on_a_bar_counts_as_it_stands():
     straight, bent = (read(FOOT, joints={"toe": angle}) for angle in ("0deg", "30deg"))
     assert straight.scene.linkage.output.mass == pytest.approx(0.53)
     inertias = [s.scene.linkage.output.inertia for s in (straight, bent)]
@@ -257,7 +243,7 @@ EVERYTHING = {
 
 
 @pytest.mark.parametrize("name", EVERYTHING)
-def test_every_effect_is_that_of_the_whole_robot(name: str) -> None:
+def test_every_effect_is_that_of_the_whole_robot(name):
     planar = replace(EVERYTHING[name], base='<joint name="base" axis="0 1 0"/>')
     text = planar.text()
     if name == "gravcomp":
@@ -272,7 +258,7 @@ def test_every_effect_is_that_of_the_whole_robot(name: str) -> None:
     compare(text, made)
 
 
-def test_a_motor_counts_behind_its_gear() -> None:
+def test_a_motor_counts_behind_its_gear():
     motor = '<motor name="motor" joint="O2" gear="10" armature="1e-4" damping="2e-3"/>'
     plain = '<motor name="motor" joint="O2"/>'
     text = Planar().text().replace(plain, motor)
@@ -283,13 +269,13 @@ def test_a_motor_counts_behind_its_gear() -> None:
     assert effects["viscous"].coefficients == (("O2", pytest.approx(0.2)),)
 
 
-def test_armature_between_moving_bars_is_named_with_its_size() -> None:
+def test_armature_between_moving_bars_is_named_with_its_size():
     text = Planar().text().replace('name="A" axis', 'name="A" armature="0.125" axis')
     remarks = read(text).remarks
     assert any("armature 0.125 kg m^2 of A" in remark for remark in remarks)
 
 
-def test_forces_across_the_plane_are_named_with_their_sizes() -> None:
+def test_forces_across_the_plane_are_named_with_their_sizes():
     made = read(FOOT)
     (remark,) = [r for r in made.remarks if "across the plane" in r]
     model = mujoco.MjModel.from_xml_string(FOOT)
@@ -300,7 +286,7 @@ def test_forces_across_the_plane_are_named_with_their_sizes() -> None:
     assert f"output {0.53 * pull:.4g} N" in remark
 
 
-def test_the_sweep_is_the_range_of_the_driven_hinge() -> None:
+def test_the_sweep_is_the_range_of_the_driven_hinge():
     made = read(GRIPPER, loop="right_finger-right_follower")
     motion = made.scene.motion.angle
     assert motion.stop - motion.start == pytest.approx(math.radians(80.0))
@@ -308,7 +294,7 @@ def test_the_sweep_is_the_range_of_the_driven_hinge() -> None:
     assert 0.5 * (motion.start + motion.stop) == pytest.approx(0.5 * math.pi)
 
 
-def test_the_range_of_another_hinge_ends_the_sweep_and_is_named() -> None:
+def test_the_range_of_another_hinge_ends_the_sweep_and_is_named():
     text = GRIPPER.replace(
         '<joint name="right_follower" class="passive" />',
         '<joint name="right_follower" class="passive" range="-10 20" />',
@@ -320,7 +306,7 @@ def test_the_range_of_another_hinge_ends_the_sweep_and_is_named() -> None:
     assert any("range of right_follower ends the motion" in r for r in made.remarks)
 
 
-def test_without_a_range_it_goes_as_far_as_the_loop_assembles() -> None:
+def test_without_a_range_it_goes_as_far_as_the_loop_assembles():
     planar = Planar()
     made = read(planar.text())
     d, a, b, c = planar.lengths()
@@ -339,7 +325,7 @@ def test_without_a_range_it_goes_as_far_as_the_loop_assembles() -> None:
     assert width == pytest.approx(2.0 * most - 2.0 * math.radians(1.0))
 
 
-def test_a_right_angle_of_the_pose_meets_both_change_points() -> None:
+def test_a_right_angle_of_the_pose_meets_both_change_points():
     """An upright parallelogram is swept by steps of 3 deg."""
     square = {"O2": (0.0, 0.0), "A": (0.0, 0.2), "B": (0.3, 0.2), "O4": (0.3, 0.0)}
     made = read(Planar(pins=square).text())
@@ -347,14 +333,14 @@ def test_a_right_angle_of_the_pose_meets_both_change_points() -> None:
     assert solution.status.count("change_point") == 2
 
 
-def test_a_scene_reads_back_and_says_what_it_is() -> None:
+def test_a_scene_reads_back_and_says_what_it_is():
     made = read(FOOT)
     assert loads(fourbar.dump(made.scene)) == made.scene
     assert made.parts[0] == "Pins: O2 crank, A rod, B rod, O4 ankle."
     assert "Held as they stand" in made.parts[2]
 
 
-def test_gravcomp_away_from_the_mass_centre_is_a_load_where_it_acts() -> None:
+def test_gravcomp_away_from_the_mass_centre_is_a_load_where_it_acts():
     text = FOOT.replace('<body name="toe"', '<body name="toe" gravcomp="1"')
     made = read(text)
     (load,) = made.scene.loads
@@ -367,14 +353,14 @@ def test_gravcomp_away_from_the_mass_centre_is_a_load_where_it_acts() -> None:
     compare(text, made)
 
 
-def test_a_loop_is_asked_for_where_there_are_several() -> None:
+def test_a_loop_is_asked_for_where_there_are_several():
     with pytest.raises(InputError, match="right_finger-right_follower, left_finger"):
         read(GRIPPER)
     with pytest.raises(InputError, match="no such closure"):
         read(GRIPPER, loop="thumb")
 
 
-def test_a_pose_in_a_change_point_is_said() -> None:
+def test_a_pose_in_a_change_point_is_said():
     text = GRIPPER.replace('range="-40 40"', 'range="-100 100"')
     made = read(
         text,

@@ -10,7 +10,6 @@ from fourbar.errors import InputError
 from fourbar_validation.engines.mujoco.robots.answers import (
     LoopMotion,
     MeasureOptions,
-    SettingsAdvice,
 )
 from fourbar_validation.engines.mujoco.robots.closures import find_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
@@ -33,7 +32,7 @@ LIGHT_LOAD = 0.3
 """rad to either side of the pose."""
 
 
-def search(file: RobotFile) -> SettingsSearch:
+def search(file):
     posed = pose_robot(compile_robot(file).model, PoseOptions())
     (loop,) = (one.loop for one in find_closures(posed, PoseOptions()))
     assert loop is not None
@@ -42,7 +41,7 @@ def search(file: RobotFile) -> SettingsSearch:
     return SettingsSearch(LoopInside(posed.model, loop), LoopMotion(angles, 2.0, 0.0))
 
 
-def paste(text: str, advice: SettingsAdvice) -> str:
+def paste(text, advice):
     """Put the elements that were printed in the place of those of the file."""
     for element in advice.typed:
         if element.startswith("<option"):
@@ -56,7 +55,7 @@ def paste(text: str, advice: SettingsAdvice) -> str:
 
 
 @pytest.mark.slow
-def test_what_is_typed_reaches_the_error_that_was_wanted() -> None:
+def test_what_is_typed_reaches_the_error_that_was_wanted():
     file = read_robot(FOOT)
     advice = search(file).advise(2e-3, file)
     assert advice.reached and advice.best.error <= 2e-3 < advice.before.error
@@ -68,7 +67,7 @@ def test_what_is_typed_reaches_the_error_that_was_wanted() -> None:
 
 
 @pytest.mark.slow
-def test_stiffness_alone_helps_and_what_costs_nothing_is_tried_first() -> None:
+def test_stiffness_alone_helps_and_what_costs_nothing_is_tried_first():
     file = read_robot(FOOT)
     advice = search(file).advise(2e-3, file)
     stiff = next(one for one in advice.alone if list(one.changes) == ["solimp"])
@@ -78,9 +77,7 @@ def test_stiffness_alone_helps_and_what_costs_nothing_is_tried_first() -> None:
 
 
 @pytest.mark.slow
-def test_an_error_that_nothing_reaches_is_not_reached(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_error_that_nothing_reaches_is_not_reached(monkeypatch):
     monkeypatch.setattr(
         "fourbar_validation.engines.mujoco.robots.settings.SEARCH_SECONDS", 3.0
     )
@@ -99,7 +96,7 @@ ONE_STEP = 2e-3
 """rad; a simulation is read at its own steps, of 1 ms at 1 rad/s."""
 
 
-def bend(angle: float) -> tuple[complex, complex]:
+def bend(angle):
     """Return pins A and B of the leg at an angle of its crank, m."""
     pin = 0.2 * complex(math.cos(angle), math.sin(angle))
     line = 0.3 - pin
@@ -108,14 +105,14 @@ def bend(angle: float) -> tuple[complex, complex]:
     return pin, pin + line * turn
 
 
-def write_leg(sense: int) -> RobotFile:
+def write_leg(sense):
     """Write a leg that is drawn at 10 deg and whose knee stops beside its limit."""
     start = math.radians(10.0)
     pin, knee = bend(start)
     stop = LIMIT - NEAR - start
     ends = (0.0, stop) if sense > 0 else (-stop, 0.0)
 
-    def place(point: complex) -> str:
+    def place(point):
         return f"{point.real!r} 0 {point.imag!r}"
 
     return RobotFile(
@@ -134,7 +131,7 @@ def write_leg(sense: int) -> RobotFile:
     )
 
 
-def test_states_beside_a_limit_decide_and_the_range_without_them_is_named() -> None:
+def test_states_beside_a_limit_decide_and_the_range_without_them_is_named():
     """The range is measured again, and the whole motion is not within the error."""
     wanted = 1e-4
     posed = pose_robot(compile_robot(write_leg(1)).model, PoseOptions())
@@ -143,7 +140,7 @@ def test_states_beside_a_limit_decide_and_the_range_without_them_is_named() -> N
     first, last = loop.angles[1], loop.angles[1] + LIMIT - NEAR - math.radians(10.0)
     angles = [first + (last - first) * step / 8 for step in range(9)]
 
-    def search(low: int, high: int) -> SettingsSearch:
+    def search(low, high):
         motion = LoopMotion(tuple(angles[low : high + 1]), 2.0, 0.0)
         return SettingsSearch(LoopInside(posed.model, loop), motion)
 
@@ -164,7 +161,7 @@ def test_states_beside_a_limit_decide_and_the_range_without_them_is_named() -> N
 
 
 @pytest.mark.parametrize("sense", [1, -1])
-def test_a_range_is_that_of_the_driven_joint(sense: int) -> None:
+def test_a_range_is_that_of_the_driven_joint(sense):
     span = (0.2, 0.6) if sense > 0 else (-0.6, -0.2)
     options = MeasureOptions(PoseOptions(), span=span)
     measurement = measure_loops(write_leg(sense), options, None)
@@ -181,7 +178,7 @@ def test_a_range_is_that_of_the_driven_joint(sense: int) -> None:
     ("text", "message"),
     [("-40deg", "two angles"), ("30deg,-40deg", "begin below"), ("1deg,2m", "--range")],
 )
-def test_a_range_is_two_angles(text: str, message: str) -> None:
+def test_a_range_is_two_angles(text, message):
     robot = {"pose": (), "key": None, "hold": (), "drive": None, "speed": None}
     read = read_measure_options(None, None, {**robot, "span": "-40deg, 0.5 rad"})
     assert read.span == pytest.approx((math.radians(-40.0), 0.5))
