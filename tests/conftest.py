@@ -12,6 +12,10 @@ from pathlib import Path
 
 import pytest
 
+# NumPy and SciPy are loaded after this. Each worker of the tests has a core of its own:
+# threads that wait for one another would take time from the other worker.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 CHROMIUM = (
     shutil.which("chromium")
     or shutil.which("chromium-browser")
