@@ -310,16 +310,23 @@ def test_a_plugin_is_left_out_and_said(tmp_path: Path, inertial: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "text",
+    ("before", "text"),
     [
-        '<geom type="sphere"size=".1"/>',
-        "<geom type='sphere'size='.1'/>",
-        '<geom type="sphere" size=".1" name="a & b"/>',
-        '<!-- a -- b --><geom type="sphere" size=".1"/>',
+        ("", '<geom type="sphere"size=".1"/>'),
+        ("", "<geom type='sphere'size='.1'/>"),
+        ("", '<geom type="sphere" size=".1" name="a & b"/>'),
+        ("", '<geom type="sphere" size=".1" name="a&foo;b"/>'),
+        ("", '<geom type="sphere" size=".1" name="a<b"/>'),
+        ("", '<geom type="sphere" size=".1"/>\x01'),
+        ("", '<!-- a -- b --><geom type="sphere" size=".1"/>'),
+        ("  <?xml version='1.0'?>\n", '<geom size=".1"/>'),
+        ("<?xml version=1.0?><?xml version='1.0'?>", '<geom size=".1"/>'),
+        ("a robot ", '<geom size=".1"/>'),
     ],
 )
-def test_what_mujoco_reads_is_read(tmp_path: Path, text: str) -> None:
-    written = f"<mujoco><worldbody><body><joint/>{text}</body></worldbody></mujoco>"
+def test_what_mujoco_reads_is_read(tmp_path: Path, before: str, text: str) -> None:
+    inside = f"<worldbody><body><joint/>{text}</body></worldbody>"
+    written = f"{before}<mujoco>{inside}</mujoco>"
     of_mujoco = mujoco.MjModel.from_xml_string(written)
     path = tmp_path / "robot.xml"
     path.write_text(written)
@@ -328,3 +335,12 @@ def test_what_mujoco_reads_is_read(tmp_path: Path, text: str) -> None:
     assert robot.model.geom(0).name == of_mujoco.geom(0).name
     (note,) = robot.notes
     assert note.startswith("robot.xml is no XML")
+
+
+def test_no_document_type_hides_in_what_is_dropped(tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    path.write_text(
+        '<!DOC<!-- -->TYPE m [<!ENT<!-- -->ITY a "b">]><mujoco name="&a;"/>'
+    )
+    with pytest.raises(InputError, match="needs no document type"):
+        read_robot(path)

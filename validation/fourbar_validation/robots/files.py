@@ -16,6 +16,11 @@ from fourbar.errors import InputError
 from fourbar.writing import read_text
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile
 
+_DROPPED = r"<!--.*?-->|<\?.*?\?>|[\x01-\x08\x0b\x0c\x0e-\x1f]"
+"""Comments, declarations and control characters, which MuJoCo's reader lets stand
+anywhere.
+"""
+_NO_ENTITY = r"&(?!(?:#\d+|#x[\da-fA-F]+|amp|lt|gt|quot|apos);)"
 _USD = (".usd", ".usda", ".usdc", ".usdz")
 _KINDS = {"mujoco": "MJCF", "sdf": "SDF", "robot": "URDF"}
 """Format of a file, by its outermost element."""
@@ -79,13 +84,19 @@ def read_robot(path: Path, assets: Path | None = None) -> RobotFile:
 def mend_text(text: str) -> str:
     """Return a text as XML where MuJoCo's reader asks for less.
 
-    Comments are dropped, since two hyphens may stand in them; attributes get a blank
-    between them; an ampersand that begins no entity is one; a prefix that nothing
-    binds, like that of Drake's elements, stands for itself.
+    Comments are dropped, since two hyphens may stand in them, and so are declarations,
+    control characters and what stands before the first element; attributes get a blank
+    between them and may hold "<"; an ampersand that begins no entity is one; a prefix
+    that nothing binds, like that of Drake's elements, stands for itself.
     """
-    text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
-    text = re.sub(r"""(=\s*(?:"[^"]*"|'[^']*'))(?=[A-Za-z_])""", r"\1 ", text)
-    text = re.sub(r"&(?!#?\w+;)", "&amp;", text)
+    text = re.sub(_DROPPED, "", text, flags=re.DOTALL)
+    text = text[text.find("<") :]
+    text = re.sub(
+        r"""=\s*(?:"[^"]*"|'[^']*')""",
+        lambda attribute: attribute[0].replace("<", "&lt;") + " ",
+        text,
+    )
+    text = re.sub(_NO_ENTITY, "&amp;", text)
     used, bound = (set(re.findall(one, text)) for one in (r"<(\w+):", r"xmlns:(\w+)"))
     spaces = "".join(f' xmlns:{prefix}="{prefix}"' for prefix in sorted(used - bound))
     return re.sub(r"<\w+", rf"\g<0>{spaces}", text, count=1)
@@ -207,11 +218,6 @@ class _RobotReading:
         self.size += len(text)
         if self.size > LARGEST_TEXT:
             raise self._refuse(path.name, f"and its includes exceed {LARGEST_TEXT} B")
-        for word in ("<!DOCTYPE", "<!ENTITY"):
-            if word in text.upper():
-                raise self._refuse(
-                    word, "is not allowed: the file needs no document type"
-                )
         try:
             return self._parse_text(text, path)
         except (ET.ParseError, ValueError) as caught:
@@ -226,6 +232,11 @@ class _RobotReading:
         return root
 
     def _parse_text(self, text: str, path: Path) -> ET.Element:
+        for word in ("<!DOCTYPE", "<!ENTITY"):
+            if word in text.upper():
+                raise self._refuse(
+                    word, "is not allowed: the file needs no document type"
+                )
         parsed = ET.iterparse(io.StringIO(text), ("start", "end"))
         depth = 0
         for event, _ in parsed:

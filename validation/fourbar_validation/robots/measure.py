@@ -41,7 +41,7 @@ STATES = "single states"
 MEASURED_THROUGH_TIME = "through time"
 _DECIMALS_OF_A_POSE = 9
 """Decimals of a position in degrees; those beyond are rounding."""
-_LEAST_PERCENT = 1e-6
+_LEAST_PERCENT = 1e-5
 """Percentage below which errors are rounding, and none is written."""
 _SLIP = 1e-9
 """Part of the speeds below which a pin with dry friction is at rest. It may then rub
@@ -92,7 +92,7 @@ def write_percent(part: float) -> str:
     """Write a part of a whole in percent, with three digits and never an exponent."""
     percent = float(f"{100.0 * part:.3g}")
     if 0.0 < percent < _LEAST_PERCENT:
-        return f"< {_LEAST_PERCENT:.6f} %"
+        return f"< {_LEAST_PERCENT:.5f} %"
     if not (percent and math.isfinite(percent)):
         return f"{percent:g} %"
     decimals = max(2 - math.floor(math.log10(percent)), 0)

@@ -12,10 +12,13 @@ import mujoco
 import numpy as np
 import pytest
 
+import fourbar
 from fourbar.errors import InputError
+from fourbar.mjcf import write_mjcf
 from fourbar_validation.engines.mujoco.robots.closures import (
     choose_loop,
     list_closures,
+    require_loops,
 )
 from fourbar_validation.engines.mujoco.robots.loop import (
     PoseOptions,
@@ -326,6 +329,13 @@ def test_where_no_motor_acts_the_first_hinge_of_the_file_is_driven():
         assert "no motor acts on it" in loop.remarks[0]
 
 
+def test_what_keeps_a_speed_without_a_control_drives():
+    scene = fourbar.load(ROOT / "models" / "crank_rocker.toml")
+    loop = loop_of(write_mjcf(scene, drive="flywheel"))
+    assert not loop.motors
+    assert not loop.remarks
+
+
 def test_a_hinge_that_another_loop_moves_is_the_driven_one():
     model = mujoco.MjModel.from_xml_string(EXCAVATOR)
     loop = loop_of(EXCAVATOR)
@@ -360,6 +370,10 @@ def test_a_loop_is_chosen_by_its_name():
     spatial = report_of(replace(Planar(), axes={"A": "0 1 1"}).text()).closures
     with pytest.raises(InputError, match="is no four-bar: the axes"):
         choose_loop(spatial, "coupler-output")
+    with pytest.raises(InputError, match="coupler-output: the axes"):
+        require_loops(spatial)
+    with pytest.raises(InputError, match="loops says why of its 2 equalities"):
+        require_loops(spatial * 2)
 
 
 def test_our_robots_have_the_loops_that_they_were_made_with():

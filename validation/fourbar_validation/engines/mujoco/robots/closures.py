@@ -24,6 +24,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     find_parent,
     find_roots,
     find_tied_bodies,
+    list_actuators,
     list_followers,
     list_joints,
     list_motors,
@@ -137,8 +138,11 @@ def require_loops(closures: Sequence[RobotClosure]) -> list[RobotLoop]:
     """Return the four-bars among closures; an InputError says why there are none."""
     loops = [one.loop for one in closures if one.loop is not None]
     if not loops:
-        reasons = "; ".join(f"{one.name}: {one.reason}" for one in closures)
-        why = reasons or "the file has no equality that closes a loop"
+        why = "the file has no equality that closes a loop"
+        if len(closures) == 1:
+            why = f"{closures[0].name}: {closures[0].reason}"
+        elif closures:
+            why = f"fourbar-validation loops says why of its {len(closures)} equalities"
         raise InputError("MJCF", None, f"has no planar four-bar: {why}")
     return loops
 
@@ -718,6 +722,8 @@ class _Finder:
             if stated in at_ground:
                 return stated, []
         driven = [joint for joint, _ in motors]
+        if not driven:  # one that takes no control drives by a speed that it keeps
+            driven = [joint for joint in at_ground if list_actuators(model, joint)]
         names = ", ".join(dict.fromkeys(name_joint(model, joint) for joint in driven))
         for joint in driven:
             if joint in at_ground:
