@@ -130,6 +130,7 @@ def test_a_member_in_the_other_closure_fails(monkeypatch):
     assert {"theta_4", "torque"} <= failing(judge_by(scene, "study"))
 
 
+@pytest.mark.slow
 def test_derivatives_of_the_other_closure_fail(monkeypatch):
     monkeypatch.setattr(derivatives, "find_root_sign", lambda *_, **__: 1.0)
     scene = passing_change_points("a parallelogram", 1)
@@ -174,6 +175,7 @@ def test_equilibria_that_err_fail(monkeypatch, change, quantities):
     assert failing(judge_by(SLENDER, "equilibria")) >= quantities
 
 
+@pytest.mark.slow
 def test_a_frequency_of_an_inertia_that_is_rounding_fails(monkeypatch):
     output = fourbar.Bar(0.25, 1.0, 0.002, (0.1, 0.0))
     bars = fourbar.Bar(0.4), fourbar.Bar(0.2), output
@@ -420,7 +422,10 @@ gravity = ["9.81 m/s^2", "-90 deg"]
 """
 
 
-@pytest.mark.parametrize("check", ["sensitivity", "tolerances", "study"])
+@pytest.mark.parametrize(
+    "check",
+    ["sensitivity", pytest.param("tolerances", marks=pytest.mark.slow), "study"],
+)
 def test_a_drawn_scene_is_judged_by_lengths_and_by_its_coordinates(check):
     rows = judge_by(loads(LIFT), check)
     assert not failing(rows)
@@ -480,6 +485,7 @@ force = ["900 N", "-80 deg"]
             assert {row.reason for row in rows} == {f"spread: {keys}"}
 
 
+@pytest.mark.slow
 def test_what_a_balanced_linkage_leaves_of_a_torque_is_not_judged():
     """A lamp that a spring of no free length balances: k = m g l/(r h)."""
     arms = (fourbar.Bar(0.3), fourbar.Bar(0.06, 2.0), fourbar.Bar(0.3))

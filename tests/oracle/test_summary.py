@@ -166,7 +166,8 @@ def test_what_is_off_or_missing_fails_its_row(
     assert judge(TURN) == {*rows.split()}
 
 
-@pytest.mark.parametrize("turns", [1, pytest.param(24, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("turns", [1, 24])
 def test_what_grows_between_positions_is_believed(turns):
     """The drive's bar stands still between the positions, of which none is near."""
     sweep = fourbar.Sweep(0.12, 0.12 + math.tau * turns, 40 * turns)

@@ -420,6 +420,7 @@ def test_whatever_an_argument_is_the_answer_is_a_value_or_one_line(
     assert not holes, "\n".join(holes)
 
 
+@pytest.mark.slow
 def test_a_figure_is_refused_arguments_of_another_type(tmp_path):
     scene = fourbar.Scene(
         fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(1.0, 10.0)
@@ -494,6 +495,7 @@ def test_classify_as_json_is_what_the_formulas_say(capsys):
     assert json.loads(capsys.readouterr().out)["barker"] is None
 
 
+@pytest.mark.slow
 def test_a_scene_draws_itself(tmp_path):
     pytest.importorskip(
         "matplotlib",

@@ -149,7 +149,7 @@ def test_the_readme_goes_on_from_its_first_scene(checkout, capsys):
     [
         ("docs/theory.md", 2),
         ("docs/guide-designer.md", 3),
-        ("docs/guide-roboticist.md", 4),
+        pytest.param("docs/guide-roboticist.md", 4, marks=pytest.mark.slow),
     ],
 )
 def test_the_programs_print_what_is_shown(name, count):

@@ -109,6 +109,7 @@ def test_a_free_motion_without_end_is_given_up_with_its_reason(
         assert "followed for 500 steps" in printed and not out.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.posix
 @pytest.mark.usefixtures("interruptible")
 def test_a_long_free_motion_stops_at_ctrl_c(tmp_path):

@@ -476,10 +476,14 @@ def test_a_module_that_the_harness_lacks_is_in_the_extra_of_the_harness(
 @pytest.mark.parametrize(
     ("header", "row"),
     [
-        ("theta_2,torque," + "x" * 20_000, "1,2,3"),
-        ("theta_2,torque" + ",unknown" * 20_000, "1,2" + ",3" * 20_000),
+        pytest.param("theta_2,torque," + "x" * 20_000, "1,2,3", id="a long heading"),
+        pytest.param(
+            "theta_2,torque" + ",unknown" * 20_000,
+            "1,2" + ",3" * 20_000,
+            id="many headings",
+            marks=pytest.mark.slow,
+        ),
     ],
-    ids=["a long heading", "many headings"],
 )
 def test_no_line_is_longer_than_a_screen_can_show(header, row, tmp_path, capsys):
     table = tmp_path / "table.csv"

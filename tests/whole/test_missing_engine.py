@@ -114,6 +114,7 @@ def test_requested_by_name_nothing_is_run(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_an_engine_that_is_there_and_does_not_load_is_one_line(tmp_path):
     done = without("pinocchio", tmp_path, "--engines", "pinocchio-inverse", BROKEN="1")
     what = "ImportError: libboost.so: cannot open shared object file"

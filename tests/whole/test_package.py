@@ -7,7 +7,6 @@ them afresh on each Python that the machine has, and once more with the lowest v
 that pyproject.toml allows.
 """
 
-import ast
 import fnmatch
 import os
 import re
@@ -29,6 +28,7 @@ from fourbar_lab.cli import status as lab
 from fourbar_validation.cli import status as harness
 from fourbar_validation.places import import_path
 from tests.support.scenes import crank_rocker
+from tests.whole.test_imports import imported
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -154,19 +154,8 @@ def test_every_library_that_fourbar_imports_is_declared():
         ]
     )
     for path in (ROOT / "fourbar").rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            names = (
-                [alias.name for alias in node.names]
-                if isinstance(node, ast.Import)
-                else []
-            )
-            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
-            for name in (name.partition(".")[0] for name in names):
-                assert (
-                    name == "fourbar"
-                    or name in sys.stdlib_module_names
-                    or name in declared
-                ), f"{path}: {name}"
+        roots = {name.partition(".")[0] for name in imported(path, types=True)}
+        assert roots <= {"fourbar", *sys.stdlib_module_names, *declared}, path
 
 
 @pytest.mark.parametrize(

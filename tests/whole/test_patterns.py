@@ -92,5 +92,6 @@ def test_a_hostile_repeat_is_refused_at_once():
     assert not slow
 
 
+@pytest.mark.slow
 def test_a_pattern_with_two_readings_is_caught():
     assert measure_slowest(re.compile("(?:[a-z]+)+")) > SECONDS

@@ -194,6 +194,7 @@ def list_columns(text):
     return [[float(cell) for cell in row] for row in rows if row]
 
 
+@pytest.mark.slow
 def test_a_new_parallelogram_is_one_over_the_whole_turn(ask):
     """Two commands; 0.3924 cos(theta_2), at 0 and 180 deg as the limit."""
     ask("new", "tp.toml", "--lengths", "300mm", "100mm", "300mm", "100mm")

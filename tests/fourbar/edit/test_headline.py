@@ -76,6 +76,7 @@ def test_what_grows_without_bound_is_no_number(name):
     assert unbounded & {"torque", "drive_force"}
 
 
+@pytest.mark.slow
 def test_a_balanced_drive_has_no_peak_of_rounding():
     """Nothing acts on this linkage at a constant speed but inertia, which is zero."""
     scene = fourbar.load(MODELS / "capabilities" / "parallelogram.toml")

@@ -206,6 +206,7 @@ def test_only_a_page_with_the_token_from_this_address_is_answered(bench):
     bench(ask)
 
 
+@pytest.mark.slow
 def test_a_request_of_a_hundred_megabytes_is_not_read(bench):
     async def ask(made: Workbench, address: str) -> None:
         host, port = address.split("/")[2].split(":")
@@ -267,6 +268,7 @@ def test_a_hundred_requests_at_once_are_answered_and_of_a_drag_only_the_latest(b
     bench(ask)
 
 
+@pytest.mark.slow
 def test_error_bars_follow_and_every_page_sees_the_change(bench):
     async def ask(made: Workbench, address: str) -> None:
         first_page, second_page = await page(address), await page(address)
@@ -316,6 +318,7 @@ def test_samples_of_a_scene_that_has_changed_are_given_up(bench, monkeypatch):
     bench(ask)
 
 
+@pytest.mark.slow
 def test_it_ends_when_the_last_page_has_gone_and_not_before(bench):
     async def ask(made: Workbench, address: str) -> None:
         one = await page(address)
@@ -331,6 +334,7 @@ def test_it_ends_when_the_last_page_has_gone_and_not_before(bench):
     assert not bench(ask).state_file.exists()  # nothing was changed
 
 
+@pytest.mark.slow
 def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
     bench, monkeypatch
 ):
@@ -459,6 +463,7 @@ def test_a_page_that_closes_while_answers_wait_leaves_no_trace(bench, caplog):
     assert not caplog.records
 
 
+@pytest.mark.slow
 def test_the_line_of_a_page_that_does_not_read_is_dropped(bench, caplog, monkeypatch):
     """One page changes the scene, another one that reads nothing is told each time."""
     monkeypatch.setattr(server, "MOST_UNREAD", 100_000)
@@ -579,6 +584,7 @@ server.edit(Path(sys.argv[1]), Path(sys.argv[1] + "_exports"), browse=False)
     assert error == "" and '"105 mm"' in path.read_text()
 
 
+@pytest.mark.slow
 def test_the_oldest_connection_gives_way_and_a_page_stays(bench):
     async def ask(made: Workbench, address: str) -> None:
         line = await page(address)

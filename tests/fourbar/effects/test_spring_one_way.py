@@ -123,6 +123,7 @@ def test_no_equilibrium_is_found_where_the_spring_would_have_to_pull():
     assert fourbar.equilibrium(make_door(sweep)).found == ()
 
 
+@pytest.mark.slow
 def test_a_released_door_arrives_as_its_energy_says():
     """t = integral of d theta/omega, omega^2 = 2 (U(start) - U)/J."""
     motion = 'theta_2 = "150 deg"\nfree = { duration = "0.04 s", steps = 4000 }'

@@ -48,6 +48,7 @@ def test_one_window_of_iftomm_a02():
     assert m.energy_drift < 1e-12  # hundreds of steps of 3e-14
 
 
+@pytest.mark.slow
 def test_needs_no_driving_torque():
     """Told to move so, not released: of a release the torque is zero whatever it is."""
     terms = (DOWN, fourbar.Viscous.at(O2=0.002, B=0.001))

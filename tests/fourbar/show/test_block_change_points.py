@@ -110,6 +110,7 @@ def test_a_single_change_point_takes_two_turns():
     assert np.abs(np.sin(0.5 * apart)).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_a_scene_without_a_range_covers_both_turns_of_a_single_change_point():
     """The drive then gives as much energy as it takes back: only weights act."""
     linkage = fourbar.uniform(0.4, 0.2, 0.3, 0.3)
@@ -289,6 +290,7 @@ def test_a_lamp_that_a_spring_balances_shows_zeros_and_not_their_rounding():
             assert word not in text
 
 
+@pytest.mark.slow
 def test_rounding_is_written_as_zero():
     """A massless rocker is a two-force bar, and bars without mass need no torque."""
     linkage = fourbar.FourBar(

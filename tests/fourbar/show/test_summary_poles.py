@@ -232,6 +232,7 @@ def test_ranges_over_change_points_and_gaps_are_those_of_the_angles(lengths):
         assert widths[0] <= fourbar.swing(fourbar.uniform(*lengths)) + LOCATED
 
 
+@pytest.mark.slow
 def test_a_gap_within_a_step_is_no_full_turn():
     """The longest bar exceeds what lets bar 2 turn by 1 um.
 

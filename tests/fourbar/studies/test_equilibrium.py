@@ -193,6 +193,7 @@ def test_a_slope_that_is_no_number_is_neither_stable_nor_unstable(monkeypatch):
     ] * 2
 
 
+@pytest.mark.slow
 def test_friction_holds_a_pendulum_within_the_angle_that_it_can():
     f = 0.2
     away = math.asin(f / (M * 9.81 * R))
@@ -363,7 +364,10 @@ B = { stiffness = "10 N m/rad", rest = "-90 deg" }
 """
 
 
-@pytest.mark.parametrize("start, count", [("60 deg", 0), ("160 deg", 1)])
+@pytest.mark.parametrize(
+    "start, count",
+    [pytest.param("60 deg", 0, marks=pytest.mark.slow), ("160 deg", 1)],
+)
 def test_a_torsion_spring_is_followed_from_the_start_of_the_sweep(start, count):
     """Two circles close the loop at 5000 angles, along which the pins are followed.
 
@@ -493,6 +497,7 @@ def test_at_a_change_point_a_released_parallelogram_has_two_ways_to_move():
     assert [words[angle] for angle in ("0", "180", "360")] == ["change_point"] * 3
 
 
+@pytest.mark.slow
 def test_the_command_prints_what_python_finds(run):
     file = MODELS / "problems" / "gz_physics_987.toml"
     printed = run(str(file))

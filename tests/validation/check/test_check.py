@@ -549,6 +549,7 @@ def test_a_ratio_fitted_to_rounded_numbers_and_one_to_SI_are_named(
     assert first.startswith("units: numbers in rad where deg was announced")
 
 
+@pytest.mark.slow
 def test_a_position_that_agrees_by_chance_does_not_hide_a_mistake(judged):
     numbers = right(OURS)
     slip = numbers["torque"] * np.where(np.arange(12) == 5, -1.0, 1.0)
@@ -773,7 +774,14 @@ FAR_OFF = 1e-6
 """Part of its largest number by which a column is off: beyond every allowed error."""
 
 
-@pytest.mark.parametrize("name", ["drawn", "springs", "push_output"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("drawn", marks=pytest.mark.slow),
+        pytest.param("springs", marks=pytest.mark.slow),
+        "push_output",
+    ],
+)
 def test_every_column_of_the_file_of_analyze_is_known(name, tmp_path):
     """Those that are made of a solution's quantities are judged too."""
     file = MODELS / "capabilities" / f"{name}.toml"
@@ -1162,7 +1170,9 @@ def rounded(values, digits):
     return np.array([float(f"{x:.{digits - 1}e}") for x in values.tolist()])
 
 
-@pytest.mark.parametrize(("digits", "power"), [(8, -7), (5, -4)])
+@pytest.mark.parametrize(
+    ("digits", "power"), [pytest.param(8, -7, marks=pytest.mark.slow), (5, -4)]
+)
 def test_a_right_table_of_fewer_digits_than_it_prints_is_told_the_tolerance(
     digits, power, check
 ):
@@ -1185,7 +1195,7 @@ def test_a_right_table_of_fewer_digits_than_it_prints_is_told_the_tolerance(
     assert code == FAILED and "all agree within" not in printed
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("sign", [1.0, pytest.param(-1.0, marks=pytest.mark.slow)])
 def test_a_table_with_mistakes_and_few_right_digits_is_told_both(sign, check):
     """Angles half a turn off, perhaps forces of the other sign, and 8 right digits.
 

@@ -351,6 +351,7 @@ def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before():
     assert nothing.get("failures") == "1" and nothing.get("skipped") == "1"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new", "sentence", "code"),
     [

@@ -111,7 +111,9 @@ def others_agree(by_engine):
     return all(verdicts(rows) == {AGREES} for rows in others)
 
 
-@pytest.mark.parametrize("language", ["python", "node"])
+@pytest.mark.parametrize(
+    "language", ["python", pytest.param("node", marks=pytest.mark.slow)]
+)
 def test_a_program_in_any_language_agrees(language, tmp_path):
     if language == "node" and shutil.which("node") is None:
         pytest.skip("no node")
@@ -526,6 +528,7 @@ def test_a_guest_that_kills_its_worker_turns_no_other_engine_red(tmp_path, suite
     assert summary.counts.status == 1
 
 
+@pytest.mark.slow
 def test_a_report_shows_the_versions_that_guests_state(tmp_path, suite, monkeypatch):
     judge_here(monkeypatch)
     stated = {"numpy-like": "", "own": "2.1", "own 3.0": "3.0"}
@@ -596,7 +599,13 @@ def test_parts_judged_by_another_code_are_made_again(tmp_path, monkeypatch, suit
 
 @pytest.mark.usefixtures("hosted")
 @pytest.mark.parametrize(
-    "engine", [*ENGINES, *load_further()], ids=lambda engine: engine.name
+    "engine",
+    [
+        pytest.param(
+            engine, id=engine.name, marks=[pytest.mark.slow] * engine.through_time
+        )
+        for engine in (*ENGINES, *load_further())
+    ],
 )
 def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine):
     if missing := engine.missing():

@@ -326,6 +326,7 @@ def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(tmp_path):
         read_run(tmp_path)
 
 
+@pytest.mark.slow
 def test_of_two_long_runs_every_row_is_counted_and_the_worst_are_listed(
     tmp_path, monkeypatch, call
 ):
@@ -364,6 +365,7 @@ def test_of_two_long_runs_every_row_is_counted_and_the_worst_are_listed(
     assert call("compare", kept, new)[0] == 0
 
 
+@pytest.mark.slow
 def test_a_part_of_a_long_run_compares_with_its_part(saved, call):
     rows = [changed(scene=f"scene {k:03d}") for k in range(80)]
     whole, some = saved("whole", *rows), saved("some", rows[7], rows[70])
@@ -488,6 +490,7 @@ def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared():
     assert compare_rows(alone, made([wrong], {"scene": heavier})).nothing
 
 
+@pytest.mark.slow
 def test_a_renamed_scene_is_found_by_what_it_states(saved, call):
     heavier = weighted(0.05)
     both = []
@@ -562,6 +565,7 @@ def test_more_positions_and_other_settings_are_named_so():
     assert not more.regressed and not other.regressed
 
 
+@pytest.mark.slow
 def test_of_an_older_record_only_the_hash_can_say_that_scenes_changed():
     settings = {**HERE.settings, "suite": "0123456789abcdef"}
     old = About(HERE.versions, HERE.machine, settings)
@@ -591,6 +595,7 @@ LOOSE = changed(
 )
 
 
+@pytest.mark.slow
 def test_a_wider_tolerance_is_a_regression_over_two_nights(tmp_path, saved, call):
     """The first night widens it and is not accepted.
 
@@ -740,6 +745,7 @@ def test_the_run_itself_is_written_as_junit(tmp_path, monkeypatch, call):
     assert told == [("failure", "not held")] * 2 + [("skipped", "")]
 
 
+@pytest.mark.slow
 def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(tmp_path, saved, call):
     kept = tmp_path / "kept"
     dates = [f"2026-01-0{night}T02:00:00+00:00" for night in (1, 2, 3)]
@@ -840,6 +846,7 @@ def test_a_failure_is_looked_up_in_the_accepted_runs(
         assert since == words.format(before=run.describe())
 
 
+@pytest.mark.slow
 def test_the_page_of_differences_begins_with_a_picture_of_what_fails_first(
     tmp_path, saved, call, nights
 ):

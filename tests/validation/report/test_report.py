@@ -187,6 +187,7 @@ def test_the_errors_drawn_are_the_largest_of_their_stretches():
     assert len(find_worst_of_segments(np.array([LEAST_DRAWN_ERROR]), 0.5)) == 1
 
 
+@pytest.mark.slow
 def test_the_times_of_engines_are_those_of_the_run():
     """The median over scenes.
 

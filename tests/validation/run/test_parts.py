@@ -171,6 +171,7 @@ def test_scene_files_need_not_be_where_parts_are_collected(tmp_path):
     assert (out / "results.csv").read_text().count("\nmine,") > 20
 
 
+@pytest.mark.slow
 def test_an_engine_that_is_missing_has_the_status_of_a_whole_run(
     tmp_path, monkeypatch, capsys
 ):

@@ -282,6 +282,7 @@ def test_near_a_toggle_a_wrong_force_fails_that_the_law_excuses():
     assert verdict == DEGRADED and allowed < Wrong.part
 
 
+@pytest.mark.slow
 def test_predictions_know_what_no_law_in_sines_knows():
     """A parallelogram that stays parallel is regular in the formulas and 1/d^3 in the
     data; a scale changes nothing.

@@ -27,6 +27,7 @@ def list_lines(figure):
     }
 
 
+@pytest.mark.slow
 def test_the_shaking_force_is_drawn_with_its_components():
     lines = list_lines("shaking")
     force = derive(fourbar.solve(SCENE), "shaking_force")
@@ -51,6 +52,7 @@ def test_ratios_are_those_of_the_speeds_and_no_line_crosses_a_dead_centre():
     assert jumps == np.sum(np.diff(np.sign(s.omega_4)) != 0.0)
 
 
+@pytest.mark.slow
 def test_instant_centres_lie_on_the_lines_of_the_bars():
     lines = list_lines("centres")
     here = make_view(SCENE).here

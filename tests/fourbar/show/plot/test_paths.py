@@ -66,6 +66,7 @@ def test_a_stated_sweep_keeps_its_ends():
     assert measure_chords(path)[0] < LONGEST
 
 
+@pytest.mark.slow
 def test_the_coupler_figure_draws_that_path():
     scene = loads(COORDINATES)
     figure = draw_figure(scene, "coupler").figure

@@ -186,6 +186,7 @@ def test_a_leader_crosses_neither_a_text_nor_another_leader(name, dimensions):
     assert not any(one.intersects_path(two) for one, two in combinations(leaders, 2))
 
 
+@pytest.mark.slow
 def test_no_text_stands_on_a_bar():
     scene = fourbar.load(
         Path(__file__).parents[4] / "models" / "gallery" / "hoecken.toml"
@@ -271,6 +272,7 @@ def test_bars_are_drawn_to_scale_at_the_requested_position():
     assert x_scale[0] == pytest.approx(y_scale[1])
 
 
+@pytest.mark.slow
 def test_the_coupler_figure_shows_the_points_of_the_scene():
     scene = crank_rocker(
         points=(fourbar.Point("P", 3, (0.15, 0.7)), fourbar.Point("Q", 4, (0.1, 0.0)))
@@ -341,6 +343,7 @@ def test_an_ordinary_curve_is_not_clipped():
     assert choose_limit([np.full(3, np.nan)]) is None
 
 
+@pytest.mark.slow
 def test_transmission_angle_marks_limits_and_dead_centres():
     panel = composed(thesis(FULL_TURN), "transmission").axes[0]
     marks = {
@@ -611,6 +614,7 @@ def test_both_branches_of_a_release_share_their_scales():
             )
 
 
+@pytest.mark.slow
 def test_the_position_of_a_motion_through_time_is_one_that_it_passes(tmp_path):
     shown = make_view(released(), position=0.3)
     k = int(np.argmin(np.abs(shown.sweep.theta_2 - 0.3)))
@@ -627,6 +631,7 @@ instants 2 ms apart.
 """
 
 
+@pytest.mark.slow
 def test_the_work_of_what_acts_is_the_kinetic_energy():
     scene = released(
         effects=(
@@ -871,6 +876,7 @@ def test_a_cylinder_keeps_its_barrel_and_its_rod_comes_out():
     )
 
 
+@pytest.mark.slow
 def test_the_stroke_is_a_figure_where_it_is_not_the_axis():
     scene = commanding(COMMANDS[r"$\theta_4$ (°)"])
     (axes,) = composed(scene, "stroke").axes

@@ -175,6 +175,7 @@ def test_a_drive_that_does_not_follow_the_law_fails_the_run(factor, monkeypatch)
     assert any("does not turn as commanded" in row.reason for row in failed)
 
 
+@pytest.mark.slow
 def test_the_callback_ends_with_the_run():
     simulated(
         crank_rocker(

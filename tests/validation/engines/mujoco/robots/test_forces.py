@@ -55,7 +55,13 @@ def scene():
     return load(CRANK_ROCKER)
 
 
-@pytest.mark.parametrize("flags", F14_AT_90_DEG)
+@pytest.mark.parametrize(
+    "flags",
+    [
+        pytest.param(flags, marks=[pytest.mark.slow] * bool(flags))
+        for flags in F14_AT_90_DEG
+    ],
+)
 def test_pin_forces_are_those_of_the_free_body(scene, flags):
     text = write_mjcf(scene)
     text, bodies = re.subn(

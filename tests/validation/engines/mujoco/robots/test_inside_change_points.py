@@ -1,6 +1,7 @@
 """Loops that pass change points: the assembly, and the scale of what vanishes."""
 
 import math
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +53,7 @@ RHOMBUS = """
 """
 
 
+@cache
 def measured(text, speed=1.0, **pose):
     file = RobotFile(Path("robot.xml"), text)
     options = MeasureOptions(PoseOptions(joints=pose), speed=speed)
@@ -90,6 +92,7 @@ def test_going_over_to_the_other_assembly_is_said_and_is_in_no_percentage():
     assert [torque.part < 0.5 for torque in torques] == [True]
 
 
+@pytest.mark.slow
 def test_one_scale_for_a_column_where_the_torque_is_rounding():
     """The torque is a sum that cancels: 12.6 % of 8042 N m, not 1e6 %."""
     loop = measured(RHOMBUS)
@@ -112,6 +115,7 @@ def test_one_scale_for_a_column_where_the_torque_is_rounding():
     assert loop.influence is not None and loop.influence.worst < 0.01
 
 
+@pytest.mark.slow
 def test_what_is_said_of_a_change_of_assembly():
     loop = measured(SINGLE, -1.0, j2="10deg")
     said = [

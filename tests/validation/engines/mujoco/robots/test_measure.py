@@ -145,8 +145,11 @@ def test_a_loop_that_is_not_there_is_refused():
 
 @pytest.mark.parametrize(
     ("ground", "gravity"),
-    [(0.4, "0 0 0"), (0.4, "0 0 -9.81"), (0.5, "0 0 -9.81")],
-    ids=["no torque", "rhombus", "rectangle"],
+    [
+        pytest.param(0.4, "0 0 0", id="no torque", marks=pytest.mark.slow),
+        pytest.param(0.4, "0 0 -9.81", id="rhombus", marks=pytest.mark.slow),
+        pytest.param(0.5, "0 0 -9.81", id="rectangle"),
+    ],
 )
 def test_a_full_turn_of_a_parallelogram_is_measured_but_for_its_change_points(
     ground, gravity

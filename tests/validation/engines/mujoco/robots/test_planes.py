@@ -90,6 +90,7 @@ HALF = """
 """Half of the coupler on the rocker's end, whose welded part has axes of its own."""
 
 
+@pytest.mark.slow
 def test_a_weld_holds_the_turn_whatever_the_axes_of_its_bodies():
     """Both halves of the coupler turn alike: no motion of the loop parts them."""
     x, y = -0.03665501207128674, 0.21692489504446885

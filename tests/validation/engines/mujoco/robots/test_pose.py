@@ -113,6 +113,7 @@ def test_a_keyframe_is_a_pose():
         pose_robot(model, PoseOptions(key="jump"))
 
 
+@pytest.mark.slow
 def test_a_pose_that_cannot_close_says_what_is_left():
     model = compiled(FOOT.read_text().replace('pos="0.001 -0.316 0"', 'pos="0 -0.6 0"'))
     posed = pose_robot(model, PoseOptions())
