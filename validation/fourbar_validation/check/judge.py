@@ -6,6 +6,7 @@ A number gets its error, the allowed error, and what may explain the difference.
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from fourbar_validation.check.rows import (
     list_stated_rates,
 )
 from fourbar_validation.check.theirs import TheirTable, name_quantity
-from fourbar_validation.compare.scales import Scale, scale_of
+from fourbar_validation.compare.scales import Scale, TermSizes
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
     MOST_ALLOWED,
@@ -85,6 +86,19 @@ class Discrepancy:
         return self.exact or (self.judged and self.difference <= self.permitted)
 
 
+class _Allowed(NamedTuple):
+    """What a key is divided by and allowed, (n,) each, in parts of its size."""
+
+    size: Array
+    exact: Array
+    """Round-off, and what half a unit of a rounded angle moves; infinite where no digit
+    is left.
+    """
+    rounding: Array
+    complete: bool
+    """True if the table has a number in every row and component."""
+
+
 class Judge:
     """Numbers of a table against the formulas at its positions.
 
@@ -119,6 +133,7 @@ class Judge:
         self.ok = self.right.status_code == OK
         self._scales: dict[str, Scale] = {}
         self._exact: dict[str, Array] = {}
+        self._allowed: dict[str, _Allowed] = {}
         self._where: dict[str, Mask] = {}
         self._judged: dict[str, tuple[Array, Array, Array]] = {}
         self._right_columns: dict[str, Array] = {}
@@ -160,13 +175,14 @@ class Judge:
         """Compute size of a key and how far its terms cancel, (n,)."""
         if key not in self._scales:
             name = name_quantity(key)
-            self._scales[key] = scale_of(
-                find_made_of(name, self.scene),
-                self.scene,
-                self.right,
-                self._right_columns[name],
-            )
+            made_of = find_made_of(name, self.scene)
+            values = self._right_columns[name]
+            self._scales[key] = self._terms.scales([made_of], [values]).select(0)
         return self._scales[key]
+
+    @cached_property
+    def _terms(self) -> TermSizes:
+        return TermSizes(self.scene, self.right)
 
     def find_exact(self, key: str) -> Array:
         """Compute the error that round-off allows a key at each position, (n,)."""
@@ -202,34 +218,40 @@ class Judge:
         `ours` is taken for the right numbers.
         """
         quantity = name_quantity(key)
-        scale = replace_zero_size(self.size(key))  # quantities whose terms are all 0
+        limits = self._allow(key)
         theirs = self.table.values[key]
-        theirs = np.where(
-            np.isnan(theirs),
-            ours,
-            theirs,
-        )  # a component that their table does not have
+        if not limits.complete:
+            theirs = np.where(np.isnan(theirs), ours, theirs)
         apart = compute_difference(quantity, ours, theirs)
         # the number a mistake would have printed is rounded at its own size, however
         # much larger
-        unchanged = self.ours(key)
         larger: Array | float = 1.0
-        if ours is not unchanged:
-            usual = TURN if quantity.startswith("theta") else scale
+        if ours is not self.ours(key):
+            usual = TURN if quantity.startswith("theta") else limits.size
             largest = np.nanmax(magnitude(ours)[self.ok], initial=0.0)
             larger = np.maximum(largest / usual, 1.0)
-        moves = [
-            compute_difference(quantity, unchanged, self.ours(key, other))
-            for other in self.near
-        ]
-        spread = divide(np.fmax.reduce(moves), scale) if moves else 0.0
-        exact = self.find_exact(key)
-        allowed = (exact + spread) * larger + divide(self.table.rounding[key], scale)
-        return (
-            divide(apart, scale),
-            np.where(exact <= MOST_ALLOWED, allowed, np.inf),
-            apart,
-        )
+        allowed = limits.exact * larger + limits.rounding
+        return divide(apart, limits.size), allowed, apart
+
+    def _allow(self, key: str) -> _Allowed:
+        if key not in self._allowed:
+            # quantities whose terms are all 0 have the size 1
+            size = replace_zero_size(self.size(key))
+            quantity = name_quantity(key)
+            ours = self.ours(key)
+            moves = [
+                compute_difference(quantity, ours, self.ours(key, other))
+                for other in self.near
+            ]
+            spread = divide(np.fmax.reduce(moves), size) if moves else 0.0
+            exact = self.find_exact(key)
+            self._allowed[key] = _Allowed(
+                size,
+                np.where(exact <= MOST_ALLOWED, exact + spread, np.inf),
+                divide(self.table.rounding[key], size),
+                not np.isnan(self.table.values[key]).any(),
+            )
+        return self._allowed[key]
 
     def permitted(self, key: str, ours: Array) -> Array | None:
         """Return the difference that the given tolerance allows, (n,), in our unit."""

@@ -335,7 +335,12 @@ def compute_differences(
 
 def compute_difference(quantity: str, ours: Array, theirs: Array) -> Array:
     """Compute the differences of one quantity, (n,)."""
-    return np.asarray(compute_differences([quantity], [ours], [theirs])[0])
+    if ours.shape != theirs.shape:
+        return np.full(len(ours), np.nan)
+    difference = ours - theirs
+    if quantity.startswith("theta"):
+        difference = wrap_difference(difference)
+    return magnitude(difference)
 
 
 def divide(apart: Array | float, size: Array | float) -> Array:
