@@ -15,11 +15,12 @@ import pytest
 
 import fourbar
 from fourbar_lab.fault_scenes import FAULT_SCENES
-from fourbar_validation.check.calculated import find_wrenches
+from fourbar_validation.check.calculated import Calculation
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.rows import AGREES, FAILS, FORMULAS, Row
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines import protocol
+from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.overview import Overview
@@ -243,7 +244,7 @@ def test_the_joint_of_a_driven_bar_carries_the_bars_behind_it(pin, bar):
     for one in behind:
         weight = scene.linkage.bar(one).mass * 9.81
         torque += weight * (right[f"G{one}"] - joint)[:, 0]
-    cut = find_wrenches(scene, right).cut(pin)
+    cut = Calculation(scene, right).cut(pin)
     np.testing.assert_allclose(cut["torque"], torque, atol=1e-12)
 
 
@@ -262,13 +263,36 @@ def test_a_mistake_is_named_first(text):
     assert find_causes(make_guest(**BUGS[text]))[0] == text
 
 
-def test_free_bodies_give_back_the_forces_that_they_are_made_of():
-    """Whatever acts: loads, gravity, and an acceleration of the crank."""
-    scene = crank_rocker()
+@pytest.mark.parametrize("name", ["loads", "springs", "sliding_pins", "push_output"])
+def test_what_is_left_out_of_the_free_bodies_is_left_out_of_the_scene(name):
+    """The formulas solve the scene without it, pins whose friction it loads too."""
+    scene = fourbar.load(CAPABILITIES / f"{name}.toml")
     right = fourbar.solve(scene, "force")
-    values = find_wrenches(scene, right).solve()
-    for name in FORCES:
-        np.testing.assert_allclose(values[name], getattr(right, name), atol=1e-12)
+    mistakes = Calculation(scene, right).mistakes()
+    predictions = {mistake.text: mistake.predict for mistake in mistakes}
+    without = {
+        "the loads are missing": replace(scene, loads=()),
+        **{
+            f"{words} missing": replace(
+                scene, effects=[one for one in scene.effects if one.key != key]
+            )
+            for key, words in {
+                "gravity": "gravity is",
+                "springs": "the springs are",
+                "pin_friction": "the friction of the pin load is",
+            }.items()
+        },
+    }
+    compared = set(without) & set(predictions)
+    assert compared
+    for text in compared:
+        left = fourbar.solve(without[text], "force", at=right.at)
+        for quantity in (*PIN_FORCES, name_driving(scene), "power"):
+            values = predictions[text](quantity, right)
+            expected = getattr(left, quantity)
+            if expected is not None:
+                size = np.nanmax(np.abs(expected), initial=0.0)
+                np.testing.assert_allclose(values, expected, atol=1e-9 * (size + 1e-3))
 
 
 def test_a_right_guest_has_no_cause():

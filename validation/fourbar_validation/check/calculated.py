@@ -1,19 +1,15 @@
 """Mistakes in a calculation of forces, as hypotheses: what its free bodies would give.
 
-Of each bar, p is the mass times the acceleration of G less what acts from outside, and
-q the same for moments about G. The pins and the drive must give both:
-
-    bar 2:  p2 = F12 + F32      bar 3:  p3 = F43 - F32      bar 4:  p4 = F14 - F43
-
-The right p and q follow from the right forces, whatever acts; a mistake changes some of
-them, or a force in place of a balance.
+A mistake lets act on bars 2, 3 and 4 what does not, or leaves out what does. Pins and
+drive follow from this change by the equations of the free bodies, which are solved for
+all changes at once.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,17 +17,40 @@ from numpy.typing import NDArray
 from fourbar.effects import Gravity
 from fourbar.errors import FourBarError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
-from fourbar.quantities import FORCE_NAMES, PIN_FORCES, VECTORS, Array
+from fourbar.quantities import FORCE_NAMES, PIN_FORCES, VECTORS, Array, ComplexArray
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.check.judge import Judge
 from fourbar_validation.check.theirs import name_quantity
-from fourbar_validation.check.variants import Mistake
-from fourbar_validation.compare.line import place_line
-from fourbar_validation.compare.tolerance import EPS
-from fourbar_validation.engines.description import FORCE_BETWEEN, name_driving
-from fourbar_validation.engines.free_body import solve_system
+from fourbar_validation.check.variants import Mistake, Wanted, always
+from fourbar_validation.compare.pins import find_inertia, find_mass, state_from_pins
+from fourbar_validation.compare.tolerance import EPS, magnitude
+from fourbar_validation.engines.description import (
+    FORCE_AT,
+    FORCE_BETWEEN,
+    name_driving,
+)
+from fourbar_validation.engines.free_body import (
+    DRIVE_COLUMN,
+    FORCE_COLUMNS,
+    STEPS_FROM_NEARBY,
+    balance,
+    solve_couples,
+    solve_unit_couples,
+    solve_wrenches,
+    stack_components,
+)
+from fourbar_validation.engines.free_body_closure import cross_products
+from fourbar_validation.engines.free_body_effects import (
+    BodyMotion,
+    BodyWrenches,
+    apply_effect,
+    apply_load,
+    find_arm,
+    has_wrench,
+    list_sliding_pins,
+)
 
 MistakenNumbers = dict[str, Array]
 """Numbers that a mistake leads to, by quantity; others stay right."""
@@ -62,76 +81,172 @@ _LATE = {
     "one step early: numbers of the position after": -1,
 }
 """Mistakes in time, and by how many positions the numbers are late."""
+_CENTIMETRES = "m a and I alpha in kg cm/s^2 and kg cm^2/s^2, added to N and N cm"
+_MILLIMETRES = "m a and I alpha in kg mm/s^2 and kg mm^2/s^2, added to N and N mm"
+_D_ALEMBERT = "(d'Alembert's forces put on the side of m a)"
+_INERTIAL = {
+    f"{_CENTIMETRES}: 100 times": (1e2, 1e2),
+    "m a in kg cm/s^2 added to N: 100 times too large": (1e2, 1.0),
+    "I alpha in kg cm^2/s^2 added to N cm: 100 times too large": (1.0, 1e2),
+    f"{_MILLIMETRES}: 1000 times": (1e3, 1e3),
+    "m a in kg mm/s^2 added to N: 1000 times too large": (1e3, 1.0),
+    f"inertial forces with the wrong sign {_D_ALEMBERT}": (-1.0, -1.0),
+    "I alpha with the wrong sign": (1.0, -1.0),
+}
+"""Factors on m a and I alpha of every bar, by the mistake behind them."""
+_EFFECT_NAMES = {
+    "gravity": "gravity",
+    "springs": "the springs",
+    "torsion": "the torsion springs",
+    "viscous": "the viscous damping",
+    "friction": "the dry friction",
+    "pin_friction": "the friction of the pin load",
+    "flywheel": "the flywheel",
+}
+"""Names of the effects of the package, by their keys."""
+_PART_FIELDS = {
+    "springs": "springs",
+    "torsion": "springs",
+    "viscous": "coefficients",
+    "friction": "torques",
+    "pin_friction": "pins",
+}
+"""Field with the parts of an effect, by its key."""
+_SCALED = {0.0: "missing", 2.0: "doubled", -1.0: "reversed"}
+"""Factors on what acts besides inertia, and what was done to it."""
+_WHERE = {
+    "": FORCE_NAMES,
+    " in the pin forces alone": PIN_FORCES,
+    " in what drives alone": tuple(set(FORCE_NAMES) - set(PIN_FORCES)),
+}
+"""Quantities in which that was done."""
+_GRAVITY_TURNED = {
+    "turned by 90 deg": np.pi / 2.0,
+    "turned by -90 deg": -np.pi / 2.0,
+}
+"""Directions that gravity may be given, by their angle from the right one."""
 
 
-class _BarWrenches(NamedTuple):
-    """Bars at n positions, and what their pins and the drive must give them."""
+class _Change(NamedTuple):
+    """What a mistake changes of what acts on the bars."""
 
-    arms: dict[int, Array]
-    """Vector from the bar's first pin (O2, A, O4) to G, (n, 2)."""
-    bars: dict[int, Array]
-    """Vector from the bar's first pin to its second one, (n, 2)."""
-    p: dict[int, Array]
-    q: dict[int, Array]
-    drive_bar: int
-    """Bar on which the ground's couple acts."""
-    driving: str
-    """Name of what is solved for: the torque, or the force of the drive."""
-    push: dict[int, Array]
-    """Force of 1 N of a drive that exerts a force, (n, 2); zero for a couple."""
-    twist: dict[int, Array]
-    """Its moment about the bar's first pin, or 1 for a couple, (n,)."""
+    text: str
+    wrenches: BodyWrenches
+    """Forces and moments that act besides the right ones."""
+    moved: Mapping[str, Array] = {}
+    """Wrong motion from which they follow."""
+    where: Mapping[str, Collection[str]] = {"": FORCE_NAMES}
+    """Quantities in which it shows, by what is added to the text."""
+    friction: Mapping[str, float] = {}
+    """Factors on the friction of pins that is no right one."""
 
-    def changed(
+
+class Calculation:
+    """The right numbers of a scene, and the free bodies that they balance."""
+
+    def __init__(
         self,
-        bar: int,
-        p: Array | float = 0.0,
-        q: Array | float = 0.0,
-    ) -> "_BarWrenches":
-        """Return the wrenches with more force and moment needed by one bar."""
-        return self._replace(
-            p={**self.p, bar: self.p[bar] + p},
-            q={**self.q, bar: self.q[bar] + q},
+        scene: Scene,
+        right: Solution,
+        wanted: Wanted = always,
+    ) -> None:
+        self.stated = scene
+        self.wanted = wanted
+        self.scene = state_from_pins(scene)
+        self.right = right
+        linkage = scene.linkage
+        zero = np.zeros(len(right))
+        ground = np.exp(1j * linkage.ground_angle)
+        theta = {bar: getattr(right, f"theta_{bar}") for bar in MOVING_BARS}
+        unit = {bar: np.exp(1j * angle) for bar, angle in theta.items()}
+        O4 = zero + linkage.ground * ground
+        first_pin = {1: 0j * zero, 2: 0j * zero, 3: join(right.A), 4: O4}
+        omega, alpha = (
+            {1: zero} | {bar: zero + getattr(right, f"{rate}_{bar}") for bar in theta}
+            for rate in ("omega", "alpha")
+        )
+        self.motion = BodyMotion(
+            linkage, theta[2], {1: zero + ground, **unit}, first_pin, omega, alpha
+        )
+        self.driving = name_driving(scene)
+
+    def none(self) -> BodyWrenches:
+        """Return wrenches of nothing."""
+        return BodyWrenches(len(self.right))
+
+    def apply(self, *terms: Any) -> BodyWrenches:
+        """Sum what loads and effects do; one that the free bodies do not know, no."""
+        wrenches = self.none()
+        for term in terms:
+            if term.key == "load":
+                apply_load(term, self.motion, wrenches)
+            elif has_wrench(term):
+                apply_effect(term, self.motion, wrenches)
+        return wrenches
+
+    def solve(self, changes: list[_Change]) -> Iterator[Mistake]:
+        """Solve the free bodies under each change, all at once."""
+        changes = [change for change in changes if self._is_wanted(change)]
+        if not changes:
+            return
+        more = [change.wrenches for change in changes]
+        unknowns, _ = solve_wrenches(self.scene, self.motion, more)
+        if list_sliding_pins(self.scene):
+            unknowns = self._follow_friction(unknowns, changes)
+        for i, change in enumerate(changes):
+            numbers = self._read(unknowns[..., i])
+            if change.moved:
+                yield _state(change.text, {**change.moved, **numbers})
+            for words, names in change.where.items():
+                shown = {name: numbers[name] for name in names if name in numbers}
+                yield _state(f"{change.text}{words}", shown)
+
+    def _is_wanted(self, change: _Change) -> bool:
+        return any(
+            map(self.wanted, [f"{change.text}{words}" for words in ("", *change.where)])
         )
 
-    def about_pin(self, bar: int) -> Array:
-        """Compute the moment that a bar needs about its first pin, N m."""
-        return self.q[bar] + cross_vectors(self.arms[bar], self.p[bar])
-
-    def solve(self) -> MistakenNumbers:
-        """Solve the three free bodies.
-
-        Moments about the first pins of bars 2, 3 and 4, where a drive of size s exerts
-        s f_k and the moment s m_k on bar k:
-
-            a x F43 + s (m2 + a x f3) = moment of bar 2 + a x p3
-            b x F43 + s m3            = moment of bar 3
-           -c x F43 + s m4            = moment of bar 4
-        """
-        a, b, c = (self.bars[bar] for bar in MOVING_BARS)
-        twist = {**self.twist, 2: self.twist[2] + cross_vectors(a, self.push[3])}
-        moment = {bar: self.about_pin(bar) for bar in MOVING_BARS}
-        moment[2] = moment[2] + cross_vectors(a, self.p[3])
-        matrix = np.stack(
-            [
-                np.stack((-lever[:, 1], lever[:, 0], twist[bar]), axis=1)
-                for bar, lever in {2: a, 3: b, 4: -c}.items()
-            ],
-            axis=1,
-        )
-        right = np.stack([moment[bar] for bar in MOVING_BARS], axis=1)
-        x = solve_system(matrix, right[:, :, None])[0][:, :, 0]
-        F43 = x[:, :2]
-        size = x[:, 2]
-        f2, f3, f4 = (size[:, None] * self.push[bar] for bar in MOVING_BARS)
-        F32 = F43 - self.p[3] + f3
-        return {
-            "F43": F43,
-            "F32": F32,
-            "F12": self.p[2] - F32 - f2,
-            "F14": self.p[4] + F43 - f4,
-            self.driving: size,
+    def _read(self, more: Array) -> MistakenNumbers:
+        """Return forces, drive and power under unknowns that are added, (n, 13)."""
+        right = self.right
+        forces = {
+            name: getattr(right, name) + more[:, column : column + 2]
+            for name in PIN_FORCES
+            for column in (FORCE_COLUMNS[name],)
         }
+        effort = getattr(right, self.driving) + more[:, DRIVE_COLUMN]
+        if self.scene.drive is None:
+            speed = self.motion.omega[self.scene.drive_bar]
+        else:
+            speed = right.stroke_speed
+        return {**forces, self.driving: effort, "power": effort * speed}
+
+    def _follow_friction(self, unknowns: Array, changes: list[_Change]) -> Array:
+        """Add what the pins' friction changes with their load, (n, 13, k)."""
+        pins = list_sliding_pins(self.scene)
+        usual, loads, arms, _ = solve_unit_couples(self.scene, self.motion)
+        n, _, k = unknowns.shape
+        right = self._find_couples()
+        factors = np.array(
+            [[change.friction.get(pin, 1.0) for pin in pins] for change in changes]
+        )
+        first = [FORCE_COLUMNS[FORCE_AT[pin]] for pin in pins]
+        more = unknowns[:, first] + 1j * unknowns[:, [column + 1 for column in first]]
+        F = np.moveaxis(loads[..., :1] + more, 2, 0).reshape(k * n, -1)
+        C = np.tile(loads[..., 1:], (k, 1, 1))
+        k_of_rows = np.repeat(arms * factors, n, axis=0)
+        start = np.tile(right, (k, 1))
+        couples, _, _ = solve_couples(F, C, k_of_rows, start, STEPS_FROM_NEARBY)
+        added = couples.reshape(k, n, -1) - right
+        return np.asarray(unknowns + np.einsum("nup,knp->nuk", usual[..., 1:], added))
+
+    def _find_couples(self) -> Array:
+        """Return the friction couples that follow the pins' loads, (n, p), N m."""
+        pins = list_sliding_pins(self.scene)
+        couples = np.zeros((len(self.right), len(pins)))
+        for i, (pin, arm) in enumerate(pins.items()):
+            couples[:, i] = arm * magnitude(getattr(self.right, FORCE_AT[pin]))
+        return couples
 
     def cut(self, pin: str) -> MistakenNumbers:
         """Return forces and torque of the tree that a cut at a pin leaves.
@@ -140,166 +255,67 @@ class _BarWrenches(NamedTuple):
         driven bar hangs on the ground or on the bar before it in its chain; the joint
         carries the bar and all behind it.
         """
-        none = np.zeros_like(self.p[2])
+        F12, F32, F43, F14 = (join(getattr(self.right, name)) for name in PIN_FORCES)
+        motion = self.motion
+        needed = {2: F12 + F32, 3: F43 - F32, 4: F14 - F43}
+        at_second = {2: F32, 3: F43, 4: -F43}
+        moment = {
+            bar: cross_products(
+                motion.linkage.bar(bar).length * motion.unit[bar], at_second[bar]
+            )
+            for bar in MOVING_BARS
+        }
+        drive_bar = self.scene.drive_bar
+        moment[drive_bar] = moment[drive_bar] + self.right.torque
+        none = 0.0 * F12
         if pin == "A":
-            F32 = none
-            F43 = self.p[3]
+            F32, F43 = none, needed[3]
         elif pin == "B":
-            F32 = -self.p[3]
-            F43 = none
+            F32, F43 = -needed[3], none
         else:
-            F32 = -self.p[3] - self.p[4]
-            F43 = -self.p[4]
-        return {
-            "F12": self.p[2] - F32,
-            "F32": F32,
-            "F43": F43,
-            "F14": self.p[4] + F43,
-            "torque": self._torque_of_tree(pin),
-        }
-
-    def _torque_of_tree(self, pin: str) -> Array:
-        """Compute the moment of the driven bar's joint in the tree cut at a pin."""
-        A = self.bars[2]
-        B = A + self.bars[3]
-        first_pins = {
-            2: np.zeros_like(A),
-            3: A,
-            4: B - self.bars[4],
-        }
-        chain = next(chain for chain in _CHAINS[pin] if self.drive_bar in chain)
-        place = chain.index(self.drive_bar)
-        joint = first_pins[self.drive_bar]
-        if (pin, self.drive_bar) in (("A", 3), ("O4", 4)):
-            joint = B
-        torque = np.zeros(len(A))
-        for bar in chain[place:]:
-            arm = first_pins[bar] - joint
-            torque = torque + self.about_pin(bar) + cross_vectors(arm, self.p[bar])
-        return torque
-
-
-def cross_vectors(u: Array, v: Array) -> Array:
-    """Compute the z component of the cross product of vectors, (n, 2)."""
-    return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-
-
-def _turn_by_quarter(v: Array) -> Array:
-    """Turn vectors, (n, 2), by 90 deg."""
-    return np.stack((-v[:, 1], v[:, 0]), axis=1)
-
-
-def turn(v: Array, angle: Array) -> Array:
-    """Turn vectors, (n, 2), by an angle, rad."""
-    x = v[:, 0]
-    y = v[:, 1]
-    cosine = np.cos(angle)
-    sine = np.sin(angle)
-    return np.stack((cosine * x - sine * y, sine * x + cosine * y), axis=1)
-
-
-def find_wrenches(scene: Scene, right: Solution) -> _BarWrenches:
-    """Compute what each bar needs of its pins, from the right forces."""
-    theta_1 = scene.linkage.ground_angle
-    O4 = scene.linkage.ground * np.array([[np.cos(theta_1), np.sin(theta_1)]])
-    A = right.A
-    B = right.B
-    first = {
-        2: np.zeros_like(A),
-        3: A,
-        4: O4 + np.zeros_like(A),
-    }
-    second = {2: A, 3: B, 4: B}
-    F12, F32, F43, F14 = (getattr(right, name) for name in PIN_FORCES)
-    acting = {
-        2: (F12, F32),
-        3: (-F32, F43),
-        4: (F14, -F43),
-    }
-    arms = {}
-    bars = {}
-    p = {}
-    q = {}
-    for bar in MOVING_BARS:
-        G = getattr(right, f"G{bar}")
-        arms[bar] = G - first[bar]
-        bars[bar] = second[bar] - first[bar]
-        at_first, at_second = acting[bar]
-        p[bar] = at_first + at_second
-        about_first = cross_vectors(first[bar] - G, at_first)
-        about_second = cross_vectors(second[bar] - G, at_second)
-        q[bar] = about_first + about_second
-    driving = name_driving(scene)
-    push, twist = _place_drive(scene, right)
-    size = np.asarray(getattr(right, driving))
-    for bar in MOVING_BARS:
-        about_G = twist[bar] - cross_vectors(arms[bar], push[bar])
-        p[bar] = p[bar] + size[:, None] * push[bar]
-        q[bar] = q[bar] + size * about_G
-    return _BarWrenches(arms, bars, p, q, scene.drive_bar, driving, push, twist)
-
-
-def _place_drive(
-    scene: Scene,
-    right: Solution,
-) -> tuple[dict[int, Array], dict[int, Array]]:
-    """Return force and moment about its first pin of each bar by a drive of size 1."""
-    push = {bar: np.zeros((len(right), 2)) for bar in MOVING_BARS}
-    twist = {bar: np.zeros(len(right)) for bar in MOVING_BARS}
-    if scene.drive is None:
-        twist[scene.drive_bar] += 1.0
-        return push, twist
-    theta = {bar: getattr(right, f"theta_{bar}") for bar in MOVING_BARS}
-    line = place_line(scene.linkage, scene.drive, theta)
-    for (sense, point), arm in zip(scene.drive.ends, line.arms, strict=True):
-        if point.bar in MOVING_BARS:
-            force = sense * line.unit
-            push[point.bar] += np.stack((force.real, force.imag), axis=1)
-            twist[point.bar] += (np.conj(arm) * force).imag
-    return push, twist
-
-
-@dataclass(frozen=True)
-class _Calculation:
-    """A judge's right numbers, as wrenches of free bodies."""
-
-    judge: Judge
-    wrenches: _BarWrenches
-
-    @property
-    def right(self) -> Solution:
-        """Return the right numbers."""
-        return self.judge.right
+            F32, F43 = -needed[3] - needed[4], -needed[4]
+        chain = next(chain for chain in _CHAINS[pin] if drive_bar in chain)
+        joint = motion.first_pin[drive_bar]
+        if (pin, drive_bar) in (("A", 3), ("O4", 4)):
+            joint = join(self.right.B)
+        torque = np.zeros(len(joint))
+        for bar in chain[chain.index(drive_bar) :]:
+            arm = motion.first_pin[bar] - joint
+            torque = torque + moment[bar] + cross_products(arm, needed[bar])
+        F12 = needed[2] - F32
+        F14 = needed[4] + F43
+        forces = zip(PIN_FORCES, (F12, F32, F43, F14), strict=True)
+        vectors = {name: stack_components(force) for name, force in forces}
+        return {**vectors, "torque": torque}
 
     def mistakes(self) -> Iterator[Mistake]:
         """List the mistakes that this calculation can have, the simplest first."""
-        scene = self.judge.scene
-        if scene.drive is None:
+        if self.scene.drive is None:
             yield from self._open_tree()
         yield from self._frames()
         yield from self._equal_forces()
-        if any(effect.loaded_pins for effect in scene.effects):
-            return  # what acts follows the pin forces
-        yield from self._velocity_terms()
-        yield from self._accelerations_of_centres()
-        yield from self._inertias()
-        yield from self._weights()
-        yield from self._arms_of_loads()
+        changes = [
+            *self._scale_inertial(),
+            *self._scale_actions(),
+            *self._velocity_terms(),
+            *self._accelerations_of_centres(),
+            *self._change_bars(),
+            *self._change_loads(),
+        ]
+        yield from self.solve(changes)
+        if self.scene.drive is None and all(map(has_wrench, self.scene.effects)):
+            yield from self._drive_other_bars()
 
     def _open_tree(self) -> Iterator[Mistake]:
-        trees = {pin: self.wrenches.cut(pin) for pin in _CHAINS}
+        trees = {pin: self.cut(pin) for pin in _CHAINS}
         how = "the loop force is 0, as from mj_inverse or rnea of a loop"
         for pin, values in trees.items():
             text = f"forces and torque of the open tree, cut at {pin}: {how}"
             yield _state(text, values, left=SOFT_TORQUE)
         for pin, values in trees.items():
             text = f"torque of the open tree, cut at {pin}: {how}"
-            yield _state(
-                text,
-                {"torque": values["torque"]},
-                whole=False,
-                left=SOFT_TORQUE,
-            )
+            torque = {"torque": values["torque"]}
+            yield _state(text, torque, whole=False, left=SOFT_TORQUE)
 
     def _frames(self) -> Iterator[Mistake]:
         ways = {
@@ -308,23 +324,20 @@ class _Calculation:
         }
         for text, side in ways.items():
             frames = {name: bars[side] for name, bars in FORCE_BETWEEN.items()}
-            yield _state(f"{text}, not in world axes", self._turned(frames))
+            yield _state(f"{text}, not in world axes", self._turn(frames))
         for bar in (1, *MOVING_BARS):
             text = f"forces are in the frame of bar {bar}, not in world axes"
-            yield _state(text, self._turned(dict.fromkeys(FORCE_BETWEEN, bar)))
+            yield _state(text, self._turn(dict.fromkeys(FORCE_BETWEEN, bar)))
         for name in FORCE_BETWEEN:
             for bar in (1, *MOVING_BARS):
                 text = f"{name} is in the frame of bar {bar}, not in world axes"
-                yield _state(text, self._turned({name: bar}), whole=False)
+                yield _state(text, self._turn({name: bar}), whole=False)
 
-    def _turned(self, frames: dict[str, int]) -> MistakenNumbers:
-        theta: dict[int, Array] = {
-            bar: getattr(self.right, f"theta_{bar}") for bar in MOVING_BARS
-        }
-        theta_1 = self.judge.scene.linkage.ground_angle
-        theta[1] = np.full_like(theta[2], theta_1)
+    def _turn(self, frames: dict[str, int]) -> MistakenNumbers:
         return {
-            name: turn(getattr(self.right, name), -theta[bar])
+            name: stack_components(
+                join(getattr(self.right, name)) * np.conj(self.motion.unit[bar])
+            )
             for name, bar in frames.items()
         }
 
@@ -337,169 +350,250 @@ class _Calculation:
                 yield _state(f"{name} = {other}", {name: values}, whole=False)
                 yield _state(f"{name} = -{other}", {name: -values}, whole=False)
 
-    def _velocity_terms(self) -> Iterator[Mistake]:
+    def _scale_inertial(self) -> Iterator[_Change]:
+        """Scale the inertial forces against the loads."""
+        every = self.none()
+        turning = self.none()
+        for bar in MOVING_BARS:
+            self._accelerate(every, bar, join(getattr(self.right, f"a_G{bar}")))
+            alpha = self.motion.alpha[bar]
+            turning.couple(bar, -find_inertia(self.motion.linkage.bar(bar)) * alpha)
+        for text, (by_mass, by_inertia) in _INERTIAL.items():
+            more = (
+                self.none().plus(every, by_mass - 1.0).plus(turning, by_inertia - 1.0)
+            )
+            yield _Change(text, more)
+
+    def _accelerate(
+        self,
+        wrenches: BodyWrenches,
+        bar: int,
+        a: ComplexArray,
+        alpha: Array | float = 0.0,
+    ) -> MistakenNumbers:
+        """Add d'Alembert's forces of an added acceleration of a bar; return its a_G."""
+        body = self.motion.linkage.bar(bar)
+        wrenches.push(bar, -find_mass(body) * a, self.motion.to_centre(bar))
+        wrenches.couple(bar, -find_inertia(body) * alpha)
+        a_G = getattr(self.right, f"a_G{bar}")
+        return {f"a_G{bar}": a_G + stack_components(a)}
+
+    def _scale_actions(self) -> Iterator[_Change]:
+        """Leave out, double or reverse each load and effect, and each part of one."""
+        for name, acting, pins in self._list_acting():
+            verb = "are" if name.endswith("s") else "is"
+            for factor, done in _SCALED.items():
+                yield _Change(
+                    f"{name} {verb} {done}",
+                    self.none().plus(acting, factor - 1.0),
+                    where=_WHERE,
+                    friction=dict.fromkeys(pins, factor),
+                )
+        for effect in self.scene.effects:
+            if isinstance(effect, Gravity):
+                for text, angle in _GRAVITY_TURNED.items():
+                    turned = self.apply(replace(effect, angle=effect.angle + angle))
+                    more = turned.plus(self.apply(effect), -1.0)
+                    yield _Change(f"gravity is {text}", more)
+                return
+        text = "gravity along -y is included though the scene has none"
+        yield _Change(text, self.apply(Gravity()))
+
+    def _list_acting(self) -> Iterator[tuple[str, BodyWrenches, list[str]]]:
+        """List what acts besides inertia, with pins whose friction depends on loads."""
+        scene = self.scene
+        if scene.loads:
+            yield "the loads", self.apply(*scene.loads), []
+        for number, load in enumerate(scene.loads, 1):
+            yield f"load {number} (bar {load.bar})", self.apply(load), []
+        for effect in scene.effects:
+            name = _EFFECT_NAMES.get(effect.key, f"effect {effect.key}")
+            yield name, self.apply(effect), list(effect.loaded_pins)
+            yield from self._list_parts(effect, name)
+
+    def _list_parts(
+        self,
+        effect: Any,
+        name: str,
+    ) -> Iterator[tuple[str, BodyWrenches, list[str]]]:
+        """List the parts of an effect, and what shifts the force of a spring."""
+        field = _PART_FIELDS.get(effect.key, "")
+        parts = getattr(effect, field, ())
+        for i, part in enumerate(parts, 1):
+            alone = replace(effect, **{field: (part,)})
+            acting = self.apply(alone)
+            if len(parts) > 1:
+                yield f"part {i} of {name}", acting, list(alone.loaded_pins)
+            for text, relaxed in _relax(effect.key, part):
+                without = self.apply(replace(effect, **{field: (relaxed,)}))
+                yield f"the {text} spring {i}", acting.plus(without, -1.0), []
+
+    def _velocity_terms(self) -> Iterator[_Change]:
         """Leave out (dJ/dt) v.
 
         The accelerations of the other bars then follow that of the commanded one alone.
         """
-        right = self.right
+        motion = self.motion
+        commanded = self.right.at.bar
         with np.errstate(divide="ignore", invalid="ignore"):
-            at = right.at
-            gain = np.asarray(at.acceleration) / np.asarray(at.speed)
-        wrenches = self.wrenches
+            gain = motion.alpha[commanded] / motion.omega[commanded]
+        wrenches = self.none()
         moved = MistakenNumbers()
         for bar in MOVING_BARS:
-            if bar == at.bar:
-                continue
-            alpha = gain * getattr(right, f"omega_{bar}")
-            more = alpha - getattr(right, f"alpha_{bar}")
-            a = more[:, None] * _turn_by_quarter(wrenches.arms[bar])
-            wrenches, a_G = self._accelerate(wrenches, bar, a, more)
-            moved |= {f"alpha_{bar}": alpha, **a_G}
+            if bar != commanded:
+                alpha = gain * motion.omega[bar]
+                more = alpha - motion.alpha[bar]
+                a = 1j * more * motion.to_centre(bar)
+                moved[f"alpha_{bar}"] = alpha
+                moved |= self._accelerate(wrenches, bar, a, more)
         text = "(dJ/dt) v is missing in the accelerations of the loop"
-        yield from _state_with_forces(text, moved, wrenches)
+        yield _Change(text, wrenches, moved, _FOLLOWING)
 
-    def _accelerations_of_centres(self) -> Iterator[Mistake]:
+    def _accelerations_of_centres(self) -> Iterator[_Change]:
         """Leave out a part of the acceleration of each G about its bar's first pin."""
-        right = self.right
-        centripetal = {}
-        tangential = {}
+        motion = self.motion
+        arms = {bar: motion.to_centre(bar) for bar in MOVING_BARS}
+        centripetal = {bar: -(motion.omega[bar] ** 2) * arms[bar] for bar in arms}
+        tangential = {bar: 1j * motion.alpha[bar] * arms[bar] for bar in arms}
+        whose = "of every bar, r from its first pin to G"
+        for part, of_bars in (("-omega^2 r", centripetal), ("alpha x r", tangential)):
+            for factor, done in _PART_OF_ACCELERATION.items():
+                wrenches = self.none()
+                moved = MistakenNumbers()
+                for bar, a in of_bars.items():
+                    moved |= self._accelerate(wrenches, bar, factor * a)
+                text = f"{part} {done} in a_G {whose}"
+                yield _Change(text, wrenches, moved, _FOLLOWING)
         for bar in MOVING_BARS:
-            omega = np.broadcast_to(getattr(right, f"omega_{bar}"), len(right))
-            alpha = np.broadcast_to(getattr(right, f"alpha_{bar}"), len(right))
-            arm = self.wrenches.arms[bar]
-            centripetal[bar] = -(omega**2)[:, None] * arm
-            tangential[bar] = alpha[:, None] * _turn_by_quarter(arm)
-        parts = {
-            "-omega^2 r is missing in a_G": (centripetal, -1.0),
-            "-omega^2 r has the wrong sign in a_G": (centripetal, -2.0),
-            "-omega^2 r is doubled in a_G": (centripetal, 1.0),
-            "alpha x r is missing in a_G": (tangential, -1.0),
-            "alpha x r has the wrong sign in a_G": (tangential, -2.0),
-            "alpha x r is doubled in a_G": (tangential, 1.0),
-        }
-        for text, (part, times) in parts.items():
-            wrenches = self.wrenches
-            moved = MistakenNumbers()
-            for bar in MOVING_BARS:
-                wrenches, a_G = self._accelerate(wrenches, bar, times * part[bar])
-                moved |= a_G
-            whose = "of every bar, r from its first pin to G"
-            yield from _state_with_forces(f"{text} {whose}", moved, wrenches)
-        for bar in MOVING_BARS:
+            wrenches = self.none()
             a = -centripetal[bar] - tangential[bar]
-            wrenches, moved = self._accelerate(self.wrenches, bar, a)
+            moved = self._accelerate(wrenches, bar, a)
             text = f"the acceleration of bar {bar}'s first pin is used as its a_G"
-            yield from _state_with_forces(text, moved, wrenches)
+            yield _Change(text, wrenches, moved, _FOLLOWING)
 
-    def _accelerate(
-        self,
-        wrenches: _BarWrenches,
-        bar: int,
-        a: Array,
-        alpha: Array | float = 0.0,
-    ) -> tuple[_BarWrenches, MistakenNumbers]:
-        """Return the wrenches and a_G of a bar under an added acceleration.
-
-        `a` and `alpha` are added to its acceleration.
-        """
-        body = self.judge.scene.linkage.bar(bar)
-        needed = wrenches.changed(bar, body.mass * a, body.moment_of_inertia * alpha)
-        return needed, {f"a_G{bar}": getattr(self.right, f"a_G{bar}") + a}
-
-    def _inertias(self) -> Iterator[Mistake]:
-        """Take a moment of inertia about G for that about the bar's first pin."""
-        every = self.wrenches
-        text = "inertia about G used as the inertia about the pin"
+    def _change_bars(self) -> Iterator[_Change]:
+        """Give each bar, and every bar, another mass or moment of inertia."""
+        fields = [one for one in self.scene.effects if isinstance(one, Gravity)]
+        weights = self.apply(*fields).force
+        every: dict[str, BodyWrenches] = {}
         for bar in MOVING_BARS:
-            body = self.judge.scene.linkage.bar(bar)
-            alpha = np.asarray(getattr(self.right, f"alpha_{bar}"))
-            less = -body.mass * body.mass_centre[0] ** 2 * alpha
-            every = every.changed(bar, q=less)
-            alone = self.wrenches.changed(bar, q=less)
-            yield _state(f"{BAR_NAMES[bar]}: {text}", alone.solve())
-        yield _state(f"every bar: {text}", every.solve())
+            if fields:
+                less = self.none()
+                less.push(bar, -weights[bar], self.motion.to_centre(bar))
+                yield _Change(f"the weight of bar {bar} is missing", less)
+            for text, wrenches in self._list_bar_mistakes(bar, weights[bar]):
+                yield _Change(f"{BAR_NAMES[bar]}: {text}", wrenches)
+                every[text] = every.get(text, self.none()).plus(wrenches)
+        for text, wrenches in every.items():
+            yield _Change(f"every bar: {text}", wrenches)
 
-    def _weights(self) -> Iterator[Mistake]:
-        """Leave out the weight of one bar."""
-        for effect in self.judge.scene.effects:
-            if not isinstance(effect, Gravity):
-                continue
-            direction = np.array([np.cos(effect.angle), np.sin(effect.angle)])
-            for bar in MOVING_BARS:
-                mass = self.judge.scene.linkage.bar(bar).mass
-                weight = mass * effect.magnitude * direction
-                without = self.wrenches.changed(bar, weight)
-                yield _state(f"the weight of bar {bar} is missing", without.solve())
-
-    def _arms_of_loads(self) -> Iterator[Mistake]:
-        """Measure where a force acts from the wrong point, or turn it with its bar."""
-        scene = self.judge.scene
-        for number, load in enumerate(scene.loads):
-            if not load.force:
-                continue
-            others = scene.loads[:number] + scene.loads[number + 1 :]
-            without = solve(replace(scene, loads=others), "force", at=self.judge.at)
-            bar = load.bar
-            needed = find_wrenches(scene, without)
-            force = needed.p[bar] - self.wrenches.p[bar]
-            moment = cross_vectors(self.wrenches.arms[bar], force)
-            if load.table is None:
-                yield from self._move_load(number, needed, load.moment, moment)
-            name = f"load {number + 1} (bar {bar})"
-            what = "its place"
-            if load.arm is not None:
-                what = "its arm"
-            if load.from_pin is None:
-                yield _state(
-                    f"{name}: {what} is measured from the bar's first pin, not from G",
-                    self.wrenches.changed(bar, q=moment).solve(),
-                )
-            if load.arm is not None:
-                theta = getattr(self.right, f"theta_{bar}")
-                more = turn(force, theta) - force
-                r, phi = load.arm
-                arm = np.array([[r * np.cos(phi), r * np.sin(phi)]])
-                turned = self.wrenches.changed(bar, -more, -cross_vectors(arm, more))
-                yield _state(
-                    f"{name}: its direction turns with the bar", turned.solve()
-                )
-            else:  # an engine is told every place from the first pin
-                yield _state(
-                    f"{name}: {what} is measured from G, not from the bar's first pin",
-                    self.wrenches.changed(bar, q=-moment).solve(),
-                )
-
-    def _move_load(
+    def _list_bar_mistakes(
         self,
-        number: int,
-        without: _BarWrenches,
-        couple: float,
-        moment: Array,
-    ) -> Iterator[Mistake]:
-        """Let the force of a load act at G, or at the bar's first pin.
+        bar: int,
+        weight: ComplexArray,
+    ) -> Iterator[tuple[str, BodyWrenches]]:
+        """List mistakes in mass and inertia of a bar, with what they let act."""
+        body = self.motion.linkage.bar(bar)
+        mass, inertia = find_mass(body), find_inertia(body)
+        alpha = self.motion.alpha[bar]
+        to_centre = self.motion.to_centre(bar)
+        about_pin, massless, pointlike = (self.none() for _ in range(3))
+        about_pin.couple(bar, -mass * np.abs(to_centre) ** 2 * alpha)
+        massless.push(bar, mass * join(getattr(self.right, f"a_G{bar}")), to_centre)
+        massless.push(bar, -weight, to_centre)
+        pointlike.couple(bar, inertia * alpha)
+        if mass:
+            yield "inertia about the pin used as the inertia about G", about_pin
+            text = "inertia about G used as the inertia about the pin"
+            yield text, self.none().plus(about_pin, -1.0)
+            yield "mass left out", massless
+        if inertia:
+            yield "moment of inertia left out", pointlike
+            if mass:
+                both = massless.plus(pointlike)
+                yield "mass and moment of inertia left out", both
 
-        `without`: what the bars need without it; `moment`: of the force at G about that
-        pin.
-        """
-        bar = self.judge.scene.loads[number].bar
-        name = f"load {number + 1} (bar {bar})"
-        at_centre = without.q[bar] - self.wrenches.q[bar] - couple
-        for place, more in (("G", at_centre), ("the first pin", at_centre + moment)):
-            text = f"{name}: its force acts at {place} of the bar"
-            yield _state(text, self.wrenches.changed(bar, q=more).solve())
+    def _change_loads(self) -> Iterator[_Change]:
+        """Measure where a force acts from the wrong point, or turn it with its bar."""
+        loads = zip(self.stated.loads, self.scene.loads, strict=True)
+        for number, (stated, load) in enumerate(loads, 1):
+            if load.force is None:
+                continue
+            bar = load.bar
+            name = f"load {number} (bar {bar})"
+            what = "its place" if load.arm is None else "its arm"
+            force = self.apply(load).force[bar]
+            arm = find_arm(load, self.motion)
+            to_centre = self.motion.to_centre(bar)
+            moved = {
+                "its force acts at G of the bar": to_centre - arm,
+                "its force acts at the first pin of the bar": -arm,
+            }
+            if stated.from_pin is None:
+                from_pin = f"{what} is measured from the bar's first pin, not from G"
+                moved[from_pin] = -to_centre
+            if load.arm is None:  # an engine is told every place from the first pin
+                from_G = f"{what} is measured from G, not from the bar's first pin"
+                moved[from_G] = to_centre
+            for text, shift in moved.items():
+                couple = self.none()
+                couple.couple(bar, cross_products(shift, force))
+                yield _Change(f"{name}: {text}", couple)
+            turn = self.motion.unit[bar]
+            how = "turns with the bar"
+            if load.frame == "bar":
+                turn = np.conj(turn)
+                how = "is kept"
+            turned = self.none()
+            turned.push(bar, force * turn - force, arm)
+            yield _Change(f"{name}: its direction {how}", turned)
+
+    def _drive_other_bars(self) -> Iterator[Mistake]:
+        for bar in MOVING_BARS:
+            where = f"on bar {bar} instead of bar {self.scene.drive_bar}"
+            text = f"the torque acts {where}"
+            if bar != self.scene.drive_bar and self.wanted(text):
+                scene = replace(self.scene, drive_bar=bar)
+                unknowns = balance(scene, self.motion, self._find_couples())[0]
+                numbers = {"torque": unknowns[:, DRIVE_COLUMN]}
+                for name in PIN_FORCES:
+                    column = FORCE_COLUMNS[name]
+                    numbers[name] = unknowns[:, column : column + 2]
+                yield _state(text, numbers)
 
 
-def find_miscalculated(judge: Judge) -> Iterator[Mistake]:
+_FOLLOWING = {", from which the forces follow": FORCE_NAMES}
+_PART_OF_ACCELERATION = {
+    -1.0: "is missing",
+    -2.0: "has the wrong sign",
+    1.0: "is doubled",
+}
+"""What is added of a part of an acceleration, and what was done to it."""
+
+
+def join(vectors: Array) -> ComplexArray:
+    """Return vectors (n, 2) as complex numbers x + i y, (n,)."""
+    return np.asarray(vectors[:, 0] + 1j * vectors[:, 1])
+
+
+def _relax(key: str, spring: Any) -> Iterator[tuple[str, Any]]:
+    """List the numbers that shift a spring's force, each with it left out."""
+    if key == "springs":
+        for text, name in {"preload": "preload", "free length": "length"}.items():
+            if getattr(spring, name):
+                with suppress(FourBarError):  # one that acts one way needs its length
+                    yield f"{text} of", replace(spring, **{name: 0.0})
+    elif key == "torsion":
+        for text, place in {"rest angle": 2, "preload": 3}.items():
+            if spring[place]:
+                relaxed = (*spring[:place], 0.0, *spring[place + 1 :])
+                yield f"{text} of torsion", relaxed
+
+
+def find_miscalculated(judge: Judge, wanted: Wanted = always) -> Iterator[Mistake]:
     """List the mistakes of a calculation, or of a simulation, that a table can show."""
     if judge.stage == "force":
-        mistakes: list[Mistake] = []
-        with np.errstate(all="ignore"), suppress(FourBarError):
-            # a scene without one of its loads may be none
-            wrenches = find_wrenches(judge.scene, judge.right)
-            mistakes.extend(_Calculation(judge, wrenches).mistakes())
-        yield from mistakes
-    if judge.stage == "force":
+        yield from Calculation(judge.scene, judge.right, wanted).mistakes()
         yield from _find_impulses(judge)
     yield from _find_late(judge)
     yield from _find_other_branch(judge)
@@ -538,17 +632,6 @@ def _state(
         return values.get(quantity)
 
     return Mistake(text, predict, whole=whole, left=left)
-
-
-def _state_with_forces(
-    text: str,
-    moved: MistakenNumbers,
-    wrenches: _BarWrenches,
-) -> Iterator[Mistake]:
-    """Yield a mistake in accelerations: with its wrong forces, and these alone."""
-    forces = wrenches.solve()
-    yield _state(text, {**moved, **forces})
-    yield _state(f"{text}, from which the forces follow", forces)
 
 
 def _find_impulses(judge: Judge) -> Iterator[Mistake]:
@@ -635,6 +718,9 @@ def _find_other_branch(judge: Judge) -> Iterator[Mistake]:
     )
     if key is None:
         return
+    error, allowed, _ = judge.judged_right(key)
+    if not (error > allowed).any():
+        return
     try:
         other = solve(
             judge.scene,
@@ -643,7 +729,6 @@ def _find_other_branch(judge: Judge) -> Iterator[Mistake]:
         )
     except FourBarError:
         return
-    error = judge.judged_right(key)[0]
     of_other = judge.judged(key, judge.ours(key, other))[0]
     left = of_other < error
     places = np.flatnonzero(left)

@@ -3,23 +3,18 @@
 The numbers that each would make are held against the table.
 """
 
-from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
-from itertools import chain
 from typing import Any
 
 import numpy as np
 
-from fourbar.effects import Effect, Gravity
-from fourbar.errors import FourBarError
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import Bar
-from fourbar.quantities import FORCE_NAMES, LINE, PIN_FORCES, VECTORS, Array
+from fourbar.quantities import FORCE_NAMES, VECTORS, Array
 from fourbar.scene import Command, Scene, StrokeOrigin
 from fourbar.solution import Solution
-from fourbar.solving import solve
 from fourbar_validation.check.calculated import (
     ENOUGH_POSITIONS,
     find_miscalculated,
@@ -31,6 +26,8 @@ from fourbar_validation.check.variants import (
     Mistake,
     Predict,
     Variant,
+    Wanted,
+    always,
     predict_variants,
     state_all,
 )
@@ -38,11 +35,6 @@ from fourbar_validation.scenes.bars import list_moving
 
 RPM = np.pi / 30.0
 """rad/s of one rev/min."""
-_GRAVITY_TURNED = {
-    "turned by 90 deg": np.pi / 2.0,
-    "turned by -90 deg": -np.pi / 2.0,
-}
-"""Directions that gravity may be given, by their angle from the right one."""
 MOST_EXPLANATIONS = 5
 """Explanations that are printed."""
 _BETWEEN = {
@@ -64,21 +56,22 @@ def list_column_mistakes() -> Iterator[Mistake]:
         )
 
 
-def list_hypotheses(scene: Scene, command: Command) -> Iterator[Mistake]:
-    """List every mistake that can be made on this scene, the simplest first."""
-    if command.speed is not None:
-        yield from _scale_inertial(scene, command)
-        yield from _scale_actions(scene, command)
-        yield from _take_differences(scene, command)
-    variants = list(_list_variants(scene, command))
-    predictions = predict_variants(state_all(scene), command, variants)
-    for variant, predict in zip(variants, predictions, strict=True):
+def list_hypotheses(
+    scene: Scene,
+    command: Command,
+    wanted: Wanted = always,
+) -> Iterator[Mistake]:
+    """List every other problem that may have been solved, the simplest first."""
+    variants = [one for one in _list_variants(scene, command) if wanted(one.text)]
+    shifted = list(_shift_by_steps(command))
+    every = [*variants, *shifted]
+    if not every:
+        return
+    predictions = predict_variants(state_all(scene), command, every)
+    if shifted:
+        yield from _take_differences(command, predictions[len(variants) :])
+    for variant, predict in zip(variants, predictions, strict=False):
         yield Mistake(variant.text, predict, times=variant.times)
-    if command.speed is not None:
-        for text, changed in _list_other_scenes(scene):
-            with suppress(FourBarError):  # the mistake leaves no valid scene
-                wrong = solve(changed, "force", at=command)
-                yield Mistake(text, partial(_take_from, wrong))
 
 
 def _change_column(
@@ -109,193 +102,38 @@ def _subtract_angle_of(
     return np.asarray(values - base)
 
 
-def _take_from(
-    wrong: Solution,
-    quantity: str,
-    right: Solution,
-) -> Array | None:
-    return getattr(wrong, quantity, None)
-
-
-def _scale_inertial(scene: Scene, command: Command) -> Iterator[Mistake]:
-    """Scale the inertial forces against the loads.
-
-    Forces and torque are linear in each.
-    """
-    bare = state_all(replace(scene, loads=(), effects=()))
-    names = [f"bars.{name}" for name, _ in list_moving(scene)]
-    pointlike = Variant("I = 0", {f"{name}.inertia": 0.0 for name in names})
-    massless = Variant("m = 0", {f"{name}.mass": 0.0 for name in names})
-    of_mass, of_inertia = predict_variants(bare, command, (pointlike, massless))
-
-    def scaled(
-        by_mass: float,
-        by_inertia: float,
-    ) -> Callable[[str, Solution], Array | None]:
-        def predict(quantity: str, right: Solution) -> Array | None:
-            if quantity not in FORCE_NAMES:
-                return None
-            m_a = of_mass(quantity, right)
-            i_alpha = of_inertia(quantity, right)
-            if m_a is None or i_alpha is None:
-                return None
-            extra = (by_mass - 1.0) * m_a + (by_inertia - 1.0) * i_alpha
-            return np.asarray(getattr(right, quantity) + extra)
-
-        return predict
-
-    yield Mistake(
-        "m a and I alpha in kg cm/s^2 and kg cm^2/s^2, added to N and N cm: 100 times",
-        scaled(1e2, 1e2),
-    )
-    yield Mistake("m a in kg cm/s^2 added to N: 100 times too large", scaled(1e2, 1.0))
-    yield Mistake(
-        "I alpha in kg cm^2/s^2 added to N cm: 100 times too large", scaled(1.0, 1e2)
-    )
-    yield Mistake(
-        "m a and I alpha in kg mm/s^2 and kg mm^2/s^2, added to N and N mm: 1000 times",
-        scaled(1e3, 1e3),
-    )
-    yield Mistake("m a in kg mm/s^2 added to N: 1000 times too large", scaled(1e3, 1.0))
-    yield Mistake(
-        "inertial forces with the wrong sign (d'Alembert's forces put on the side of"
-        " m a)",
-        scaled(-1.0, -1.0),
-    )
-    yield Mistake("I alpha with the wrong sign", scaled(1.0, -1.0))
-
-
-_EFFECT_NAMES = {
-    "gravity": "gravity",
-    "springs": "the springs",
-    "torsion": "the torsion springs",
-    "viscous": "the viscous damping",
-    "friction": "the dry friction",
-    "pin_friction": "the friction of the pin load",
-    "flywheel": "the flywheel",
-}
-"""Names of the effects of the package, by their keys."""
-_PART_FIELDS = {
-    "springs": "springs",
-    "torsion": "springs",
-    "viscous": "coefficients",
-    "friction": "torques",
-    "pin_friction": "pins",
-}
-"""Field with the parts of an effect, by its key."""
-_SCALED = {0.0: "missing", 2.0: "doubled", -1.0: "reversed"}
-"""Factors on what acts besides inertia, and what was done to it."""
-_WHERE = {
-    "": FORCE_NAMES,
-    " in the pin forces alone": PIN_FORCES,
-    " in what drives alone": ("torque", LINE.value),
-}
-"""Quantities in which that was done."""
-
-
-def _scale_actions(scene: Scene, command: Command) -> Iterator[Mistake]:
-    """Leave out, double or reverse each load and effect, and each part of one.
-
-    Forces and torque are linear in each but the friction of the pin load.
-    """
-    for name, without in _list_without(scene):
-        try:
-            left = solve(without, "force", at=command)
-        except FourBarError:  # nothing can drive or hold the scene without it
-            continue
-        verb = "are" if name.endswith("s") else "is"
-        for factor, done in _SCALED.items():
-            for where, names in _WHERE.items():
-                predict = partial(_scale_from, left, factor, names)
-                yield Mistake(f"{name} {verb} {done}{where}", predict)
-
-
-def _scale_from(
-    without: Solution,
-    factor: float,
-    names: Collection[str],
-    quantity: str,
-    right: Solution,
-) -> Array | None:
-    values = getattr(right, quantity, None)
-    if quantity not in names or values is None:
-        return None
-    left = getattr(without, quantity)
-    return np.asarray(left + factor * (values - left))
-
-
-def _list_without(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """List what acts besides inertia, each with the scene without it."""
-    if scene.loads:
-        yield "the loads", replace(scene, loads=())
-    for number, load in enumerate(scene.loads, 1):
-        loads = tuple(one for one in scene.loads if one is not load)
-        yield f"load {number} (bar {load.bar})", replace(scene, loads=loads)
-    for effect in scene.effects:
-        name = _EFFECT_NAMES.get(effect.key, f"effect {effect.key}")
-        others = tuple(one for one in scene.effects if one is not effect)
-        yield name, replace(scene, effects=others)
-        for text, changed in _list_without_part(effect, name):
-            yield text, replace(scene, effects=(*others, changed))
-
-
-def _list_without_part(effect: Any, name: str) -> Iterator[tuple[str, Effect]]:
-    """List the parts of an effect, each with the effect without it."""
-    field = _PART_FIELDS.get(effect.key, "")
-    parts = getattr(effect, field, ())
-    for i, part in enumerate(parts):
-        if len(parts) > 1:
-            kept = {field: (*parts[:i], *parts[i + 1 :])}
-            yield f"part {i + 1} of {name}", replace(effect, **kept)
-        for text, relaxed in _relax(effect.key, part):
-            kept = {field: (*parts[:i], relaxed, *parts[i + 1 :])}
-            yield f"the {text} spring {i + 1}", replace(effect, **kept)
-
-
-def _relax(key: str, spring: Any) -> Iterator[tuple[str, Any]]:
-    """List the numbers that shift a spring's force, each with it left out."""
-    if key == "springs":
-        for text, name in {"preload": "preload", "free length": "length"}.items():
-            if getattr(spring, name):
-                with suppress(FourBarError):  # one that acts one way needs its length
-                    yield f"{text} of", replace(spring, **{name: 0.0})
-    elif key == "torsion":
-        for text, place in {"rest angle": 2, "preload": 3}.items():
-            if spring[place]:
-                relaxed = (*spring[:place], 0.0, *spring[place + 1 :])
-                yield f"{text} of torsion", relaxed
-
-
 _DIFFERENCES = {
     "forward": ((0, 1), (0, 1, 2)),
     "backward": ((-1, 0), (-2, -1, 0)),
     "central": ((-1, 1), (-1, 0, 1)),
 }
 """Steps of the table at which an angle is taken for its speed and acceleration."""
+_NEAR = range(-2, 3)
+"""Steps by which the angles are shifted from which the differences are taken."""
 _SAME_STEP = 1e-6
 """Part of a step by which the steps of a table may differ: the rounding of a file."""
 
 
-def _take_differences(scene: Scene, command: Command) -> Iterator[Mistake]:
-    """Take speeds and accelerations from the angles at neighbouring rows of a table.
+def _shift_by_steps(command: Command) -> Iterator[Variant]:
+    """List the positions two steps before to two after those of a table.
 
-    The rows are those of a motion at one speed, at equal steps.
+    The rows are those of a motion at one speed, at equal steps; else there are none.
     """
     steps = np.diff(command.angle)
+    if command.speed is None or steps.size < ENOUGH_NUMBERS or not steps[0]:
+        return
     speed = np.asarray(command.speed, dtype=float)
     changes = np.any(command.acceleration) or np.ptp(speed) != 0.0 or not speed.any()
-    if changes or steps.size < ENOUGH_NUMBERS or not steps[0]:
+    if changes or np.ptp(steps) > _SAME_STEP * abs(steps[0]):
         return
-    if np.ptp(steps) > _SAME_STEP * abs(steps[0]):
-        return
-    numbers = range(-2, 3)
-    shifted = [
-        Variant("", at=command._replace(angle=command.angle + number * steps[0]))
-        for number in numbers
-    ]
-    predictions = predict_variants(state_all(scene), command, shifted)
-    moved = dict(zip(numbers, predictions, strict=True))
-    second = steps[0] / float(speed.max())
+    for number in _NEAR:
+        yield Variant("", at=command._replace(angle=command.angle + number * steps[0]))
+
+
+def _take_differences(command: Command, near: list[Predict]) -> Iterator[Mistake]:
+    """Take speeds and accelerations from the angles at neighbouring rows of a table."""
+    moved = dict(zip(_NEAR, near, strict=True))
+    second = (command.angle[1] - command.angle[0]) / float(np.max(command.speed))
     for name, (of_speed, of_acceleration) in _DIFFERENCES.items():
         predict = partial(_difference, moved, second, of_speed, of_acceleration)
         yield Mistake(f"speeds and accelerations are {name} differences", predict)
@@ -322,30 +160,10 @@ def _difference(
     return np.asarray((turns[1] - turns[0]) / second**2)
 
 
-def _list_other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """List scenes that differ by a word: the bar of the torque, or a load's frame."""
-    for drive in {2, 3, 4} - {scene.drive_bar} if scene.drive is None else ():
-        text = f"the torque acts on bar {drive} instead of bar {scene.drive_bar}"
-        yield text, replace(scene, drive_bar=drive)
-    for i, load in enumerate(scene.loads):
-        if load.force is None or load.arm is not None:
-            continue
-        name = f"load {i + 1} (bar {load.bar})"
-        other = "bar"
-        how = "turns with the bar"
-        if load.frame == "bar":
-            other = "world"
-            how = "is kept"
-        loads = list(scene.loads)
-        loads[i] = replace(load, frame=other)
-        yield f"{name}: its direction {how}", replace(scene, loads=tuple(loads))
-
-
 def _list_variants(scene: Scene, command: Command) -> Iterator[Variant]:
     """List the problems that differ by numbers of the scene, or by the command."""
     yield from _list_other_commands(command)
-    yield from _change_gravity(scene)
-    yield from _change_bars(scene)
+    yield from _move_centres(scene)
 
 
 def _list_other_commands(command: Command) -> Iterator[Variant]:
@@ -396,56 +214,33 @@ def _shift_by_half(values: Any, step: int) -> Any:
     return np.asarray(0.5 * (values + extended[1 - step : len(extended) - 1 - step]))
 
 
-def _change_gravity(scene: Scene) -> Iterator[Variant]:
-    magnitude = "effects.gravity.0"
-    for effect in scene.effects:
-        if isinstance(effect, Gravity):
-            for text, angle in _GRAVITY_TURNED.items():
-                turned = {"effects.gravity.1": effect.angle + angle}
-                yield Variant(f"gravity is {text}", turned)
-            return
-    text = "gravity along -y is included though the scene has none"
-    yield Variant(text, {magnitude: Gravity().magnitude})
-
-
-def _change_bars(scene: Scene) -> Iterator[Variant]:
+def _move_centres(scene: Scene) -> Iterator[Variant]:
     every: dict[str, dict[str, float]] = {}
     for name, bar in list_moving(scene):
-        for text, numbers in _list_bar_mistakes(bar):
-            keyed = {f"bars.{name}.{key}": x for key, x in numbers.items()}
-            yield Variant(f"{name}: {text}", keyed)
+        if not bar.mass:
+            continue
+        for text, (r, phi) in _list_wrong_centres(bar):
+            keyed = {f"bars.{name}.centre.0": r, f"bars.{name}.centre.1": phi}
+            yield Variant(f"{name}: mass centre {text}", keyed)
             every.setdefault(text, {}).update(keyed)
     for text, numbers in every.items():
-        yield Variant(f"every bar: {text}", numbers)
+        yield Variant(f"every bar: mass centre {text}", numbers)
 
 
-def _list_bar_mistakes(bar: Bar) -> Iterator[tuple[str, dict[str, float]]]:
-    """List the numbers of a bar that mistakes give it, by their keys."""
+def _list_wrong_centres(bar: Bar) -> Iterator[tuple[str, tuple[float, float]]]:
+    """List where mistakes put the mass centre of a bar: distance, angle."""
     r, phi = bar.mass_centre
-    inertia = bar.moment_of_inertia
-
-    def centre(r: float, phi: float) -> dict[str, float]:
-        return {"centre.0": r, "centre.1": phi}
-
-    if bar.mass:
-        x = bar.length - r * np.cos(phi)
-        y = r * np.sin(phi)
-        from_second_pin = centre(float(np.hypot(x, y)), float(np.arctan2(y, x)))
-        yield "mass centre measured from the wrong pin", from_second_pin
-        yield "mass centre taken at mid-bar", centre(bar.length / 2.0, 0.0)
-        if r:
-            text = "mass centre turned by 180 deg about the bar's first pin"
-            yield text, centre(r, phi + np.pi)
-        if r * np.sin(phi):
-            yield "mass centre on the other side of the bar's line", centre(r, -phi)
-        text = "inertia about the pin used as the inertia about G"
-        yield text, {"inertia": inertia + bar.mass * r**2}
-        yield "mass left out", {"mass": 0.0}
-    if inertia:
-        yield "moment of inertia left out", {"inertia": 0.0}
-        if bar.mass:
-            text = "mass and moment of inertia left out"
-            yield text, {"mass": 0.0, "inertia": 0.0}
+    x = bar.length - r * np.cos(phi)
+    y = r * np.sin(phi)
+    yield (
+        "measured from the wrong pin",
+        (float(np.hypot(x, y)), float(np.arctan2(y, x))),
+    )
+    yield "taken at mid-bar", (bar.length / 2.0, 0.0)
+    if r:
+        yield "turned by 180 deg about the bar's first pin", (r, phi + np.pi)
+    if y:
+        yield "on the other side of the bar's line", (r, -phi)
 
 
 def _is_angular(quantity: str) -> bool:
@@ -508,17 +303,22 @@ class Explanation:
 
 
 @np.errstate(all="ignore")
-def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
+def explain(
+    judge: Judge,
+    differing: list[str],
+    wanted: Wanted = always,
+) -> list[Explanation]:
     """Find the mistakes under which nine tenths of what differs agrees.
 
     The most complete come first. A mistake of the calculation breaks no quantity that
-    agreed as it was; those of columns count together.
+    agreed as it was; those of columns count together. Of a calculation only those are
+    tried that are wanted.
     """
     least = ENOUGH_EXPLAINED * len(differing)
     whole: list[Explanation] = []
     of_columns: list[Explanation] = []
     for find in _SOURCES:
-        for mistake in find(judge, differing):
+        for mistake in find(judge, differing, wanted):
             explained = _list_explained(judge, mistake, differing, least)
             if explained:
                 explanation = Explanation(
@@ -578,13 +378,12 @@ def _list_explained(
     return [key for key in judge.table.values if key in explained]
 
 
-_SOURCES: tuple[Callable[[Judge, list[str]], Iterator[Mistake]], ...] = (
-    lambda judge, differing: list_column_mistakes(),
-    lambda judge, differing: chain(
-        find_miscalculated(judge), list_hypotheses(judge.scene, judge.at)
-    ),
-    find_fitted,
-    lambda judge, differing: find_single_precision(judge),
+_SOURCES: tuple[Callable[[Judge, list[str], Wanted], Iterator[Mistake]], ...] = (
+    lambda judge, differing, wanted: list_column_mistakes(),
+    lambda judge, differing, wanted: find_miscalculated(judge, wanted),
+    lambda judge, differing, wanted: list_hypotheses(judge.scene, judge.at, wanted),
+    lambda judge, differing, wanted: find_fitted(judge, differing),
+    lambda judge, differing, wanted: find_single_precision(judge),
 )
 """Sources of mistakes, the cheapest first: one is asked if none before it explains all.
 """

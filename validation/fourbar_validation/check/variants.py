@@ -26,6 +26,15 @@ None: the quantity has none.
 """
 
 
+Wanted = Callable[[str], bool]
+"""Function of the text of a mistake that returns True if it is tried."""
+
+
+def always(text: str) -> bool:
+    """Want every mistake."""
+    return True
+
+
 @dataclass(frozen=True, slots=True)
 class Mistake:
     """A mistake as a hypothesis: what was done, and what the numbers become."""

@@ -8,6 +8,7 @@ the drive (R. L. Norton, Design of Machinery, ch. 11, has them about the mass ce
 Vectors of the plane are complex numbers, x + i y.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -59,6 +60,8 @@ next.
 """
 _FRICTION_STEPS = 60
 """Newton's steps in a stage; where it converges it needs a tenth of them."""
+STEPS_FROM_NEARBY = 8
+"""The same from couples of other forces, near those that are sought."""
 _FRICTION_SETTLED = 8.0 * 2.0**-52
 """Residual of a friction couple's equation, over the sum of its terms, that counts as
 rounding.
@@ -157,11 +160,11 @@ def _compute_places(
         "sin_mu": np.sin(theta_4 - theta_3),
     }
     quantities |= {
-        "A": _stack_components(first_pin[3]),
-        "B": _stack_components(O4 + linkage.output.length * unit[4]),
+        "A": stack_components(first_pin[3]),
+        "B": stack_components(O4 + linkage.output.length * unit[4]),
     }
     for bar in MOVING_BARS:
-        quantities[f"G{bar}"] = _stack_components(
+        quantities[f"G{bar}"] = stack_components(
             first_pin[bar] + make_vector(find_centre(linkage.bar(bar))) * unit[bar]
         )
     return quantities
@@ -210,13 +213,13 @@ def _answer_positions(
         condition = line.condition
     forces["drive_condition"] = condition * from_jamming
     forces |= {
-        "a_A": _stack_components(a_A),
-        "a_B": _stack_components(
+        "a_A": stack_components(a_A),
+        "a_B": stack_components(
             motion.swing(4, scene.linkage.output.length * motion.unit[4])
         ),
     }
     for bar in MOVING_BARS:
-        forces[f"a_G{bar}"] = _stack_components(
+        forces[f"a_G{bar}"] = stack_components(
             motion.swing(bar, motion.to_centre(bar)) + (a_A if bar == 3 else 0.0)
         )
     if any(effect.dry for effect in scene.effects):
@@ -274,14 +277,12 @@ def speeds_and_accelerations(
     round_ = {2: u_2, 3: u_3, 4: -u_4}  # bar 4 is gone along from B to O4
     others = [number for number in MOVING_BARS if number != bar]
     jacobian = np.stack(
-        [_stack_components(round_[number]) for number in others],
+        [stack_components(round_[number]) for number in others],
         axis=-1,
     )
 
     def rates(stated: Array, centripetal: ComplexArray) -> dict[int, Array]:
-        right = _stack_components(
-            -length[bar] * stated * round_[bar] - 1j * centripetal
-        )
+        right = stack_components(-length[bar] * stated * round_[bar] - 1j * centripetal)
         solved = solve_system(jacobian, right[..., None])[0][..., 0].T
         return {bar: stated} | {
             number: v / length[number] for number, v in zip(others, solved, strict=True)
@@ -308,16 +309,28 @@ def speeds_and_accelerations(
     )
 
 
-def balance(scene: Scene, motion: BodyMotion) -> tuple[Array, float, Array | float]:
+def balance(
+    scene: Scene,
+    motion: BodyMotion,
+    start: Array | None = None,
+) -> tuple[Array, float, Array | float]:
     """Return the thirteen unknowns (n, 13) in N and N m, their residual and jamming.
 
     The last is the distance of friction from jamming.
+
+    `start`: friction couples near those that are sought, (n, p), N m; without them they
+    are followed from none.
     """
-    unknowns, loads, arms, residual = _solve_unit_couples(scene, motion)
+    unknowns, loads, arms, residual = solve_unit_couples(scene, motion)
     total: Array = unknowns[..., 0]
     from_jamming: Array | float = 1.0
     if len(arms):
-        couples = continue_couples(loads[..., 0], loads[..., 1:], arms)
+        if start is None:
+            couples = continue_couples(loads[..., 0], loads[..., 1:], arms)
+        else:
+            couples, _, _ = solve_couples(
+                loads[..., 0], loads[..., 1:], arms, start, STEPS_FROM_NEARBY
+            )
         from_jamming = _compute_distance_from_jamming(
             loads[..., 0], loads[..., 1:], arms, couples
         )
@@ -325,7 +338,7 @@ def balance(scene: Scene, motion: BodyMotion) -> tuple[Array, float, Array | flo
     return total, residual, from_jamming
 
 
-def _solve_unit_couples(
+def solve_unit_couples(
     scene: Scene,
     motion: BodyMotion,
 ) -> tuple[Array, ComplexArray, Array, float]:
@@ -337,19 +350,32 @@ def _solve_unit_couples(
     pins = list_sliding_pins(scene)
     wrenches = sum_acting(scene, motion)
     _add_inertia(motion, wrenches)
-    columns = [_make_right_sides(motion.linkage, wrenches)]
+    every = [wrenches]
     for pin in pins:
         unit = BodyWrenches(len(motion.theta_2))
         unit.twist_at(pin, -motion.sense(pin))
-        columns.append(_make_right_sides(motion.linkage, unit))
-    unknowns, residual = solve_system(
-        _make_matrix(scene, motion), np.stack(columns, axis=-1)
-    )
-    if scene.drive is None:
-        unknowns[:, DRIVE_COLUMN] *= motion.linkage.bar(scene.drive_bar).length
+        every.append(unit)
+    unknowns, residual = solve_wrenches(scene, motion, every)
     first = [FORCE_COLUMNS[FORCE_AT[pin]] for pin in pins]
     loads = unknowns[:, first] + 1j * unknowns[:, [column + 1 for column in first]]
     return unknowns, loads, np.array(list(pins.values())), residual
+
+
+def solve_wrenches(
+    scene: Scene,
+    motion: BodyMotion,
+    wrenches: Sequence[BodyWrenches],
+) -> tuple[Array, float]:
+    """Solve the thirteen equations for each of k sums of wrenches, (n, 13, k).
+
+    Their residual is returned too.
+    """
+    columns = [_make_right_sides(motion.linkage, one) for one in wrenches]
+    matrix = _make_matrix(scene, motion)
+    unknowns, residual = solve_system(matrix, np.stack(columns, axis=-1))
+    if scene.drive is None:
+        unknowns[:, DRIVE_COLUMN] *= motion.linkage.bar(scene.drive_bar).length
+    return unknowns, residual
 
 
 def count_solutions(scene: Scene, command: Command) -> Array:
@@ -364,7 +390,7 @@ def count_solutions(scene: Scene, command: Command) -> Array:
     motion = speeds_and_accelerations(
         scene.linkage, theta[0], *list_speeds(command), theta[1], theta[2], command.bar
     )
-    _, loads, arms, _ = _solve_unit_couples(scene, motion)
+    _, loads, arms, _ = solve_unit_couples(scene, motion)
     return np.array(
         [
             _count_at_position(F, C, arms)
@@ -392,7 +418,7 @@ def _count_at_position(F: ComplexArray, C: ComplexArray, k: Array) -> int:
         * rng.uniform(0.0, 1.0, (n, len(k)))
     )
     many = (np.broadcast_to(F, (n, *F.shape)), np.broadcast_to(C, (n, *C.shape)))
-    x, settled, _ = _solve_couples(*many, k, x)
+    x, settled, _ = solve_couples(*many, k, x)
     solutions: list[Array] = []
     for loads in x[settled & (x >= 0.0).all(axis=1)]:
         if all(
@@ -461,7 +487,7 @@ def _make_matrix(scene: Scene, motion: BodyMotion) -> Array:
 def _make_right_sides(linkage: FourBar, wrenches: BodyWrenches) -> Array:
     right = np.zeros((len(wrenches.moment[2]), 13))
     for bar, (row, _, _) in EQUATION_ROWS.items():
-        right[:, row : row + 2] = -_stack_components(wrenches.force[bar])
+        right[:, row : row + 2] = -stack_components(wrenches.force[bar])
         right[:, row + 2] = -wrenches.moment[bar] / linkage.bar(bar).length
     return right
 
@@ -500,7 +526,7 @@ def continue_couples(F: ComplexArray, C: ComplexArray, k: Array) -> Array:
     )
     x[remaining] = 0.0
     for stage in range(1, _FRICTION_STAGES + 1):
-        x[remaining], settled, det = _solve_couples(
+        x[remaining], settled, det = solve_couples(
             F[remaining], C[remaining], k * (stage / _FRICTION_STAGES), x[remaining]
         )
         # without friction the determinant is 1; a change of its sign means that the
@@ -544,32 +570,45 @@ def _compute_friction_jacobian(
     force = F + (C * x[:, None, :]).sum(axis=-1)
     size = np.abs(force)
     direction = force / np.where(size == 0.0, 1.0, size)
-    return size, np.eye(len(k)) - k[:, None] * (np.conj(direction)[..., None] * C).real
+    slopes = k[..., None] * (np.conj(direction)[..., None] * C).real
+    return size, np.eye(k.shape[-1]) - slopes
 
 
-def _solve_couples(
+def solve_couples(
     F: ComplexArray,
     C: ComplexArray,
     k: Array,
     x: Array,
+    steps: int = _FRICTION_STEPS,
 ) -> tuple[Array, NDArray[np.bool_], Array]:
     """Solve by Newton's method from couples `x`.
 
     Return also where it converged, and the Jacobian's determinant.
     """
-    for _ in range(_FRICTION_STEPS):
-        size, matrix = _compute_friction_jacobian(F, C, k, x)
-        gap = k * size - x
-        terms = k * (np.abs(F) + (np.abs(C) * x[:, None, :]).sum(axis=-1))
-        settled = (np.abs(gap) <= _FRICTION_SETTLED * terms).all(axis=1)
-        step = solve_system(matrix, gap[..., None])[0][..., 0]
-        moving = ~settled & np.isfinite(step).all(axis=1)
-        if not moving.any():
+    n, pins = x.shape
+    x = x.copy()
+    k = np.broadcast_to(k, x.shape)
+    settled = np.zeros(n, dtype=bool)
+    matrix = np.zeros((n, pins, pins))
+    left = np.arange(n)
+    for _ in range(steps):
+        couples = x[left]
+        size, matrix[left] = _compute_friction_jacobian(
+            F[left], C[left], k[left], couples
+        )
+        gap = k[left] * size - couples
+        reach = (np.abs(C[left]) * couples[:, None, :]).sum(axis=-1)
+        terms = k[left] * (np.abs(F[left]) + reach)
+        settled[left] = (np.abs(gap) <= _FRICTION_SETTLED * terms).all(axis=1)
+        step = solve_system(matrix[left], gap[..., None])[0][..., 0]
+        moving = ~settled[left] & np.isfinite(step).all(axis=1)
+        left = left[moving]
+        if not len(left):
             break
-        x = np.where(moving[:, None], x + step, x)
+        x[left] += step[moving]
     return x, settled, np.linalg.det(matrix)
 
 
-def _stack_components(vectors: ComplexArray) -> Array:
+def stack_components(vectors: ComplexArray) -> Array:
     """Return x and y of vectors (n,) as (n, 2), as they lie in memory."""
     return vectors.view(float).reshape(-1, 2)

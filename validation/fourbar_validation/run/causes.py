@@ -8,6 +8,7 @@ from fourbar_validation.check.judge import Judge
 from fourbar_validation.check.mistakes import explain
 from fourbar_validation.check.rows import RowCommands
 from fourbar_validation.check.theirs import NOT_JUDGED, TheirTable, Unit
+from fourbar_validation.check.variants import Wanted, always
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.tolerance import ErrorBound, Mask, magnitude
@@ -18,6 +19,12 @@ MOST_POSITIONS_SEARCHED = 400
 FIRST_ROWS = 30
 """Rows, about the first that differs, by which mistakes are tried first. One that these
 do not contradict is held to all rows.
+"""
+FIRST_ROWS_OF_FRICTION = 8
+"""The same where each trial looks for friction that balances the forces it follows."""
+_NO_CAUSE = {*NOT_JUDGED, "drive_condition"}
+"""Quantities by which no mistake is looked for; under friction the condition follows the
+forces.
 """
 SAME_NUMBERS = 1e-9
 """Part of a quantity's largest value within which a mistake must give an exact engine's
@@ -46,32 +53,33 @@ def find_causes(
         differing = [key for key, rows in wrong.items() if rows.any()]
         if not differing:
             return []
-        rows = choose_rows(np.logical_or.reduce(list(wrong.values())))
-        if len(table.places) > FIRST_ROWS:
+        wanted: Wanted = always
+        most = FIRST_ROWS
+        if any(effect.loaded_pins for effect in scene.effects):
+            most = FIRST_ROWS_OF_FRICTION
+        if len(table.places) > most:
+            rows = choose_rows(np.logical_or.reduce(list(wrong.values())), most)
             few = Judge(scene, table.part(rows), rows=RowCommands(judge.at.part(rows)))
             differing_there = [key for key in differing if wrong[key][rows].any()]
-            if not list_explanations(few, differing_there):
+            tried = explain(few, differing_there)
+            if not tried:
                 return []
-        return list_explanations(judge, differing)
+            wanted = {explanation.text for explanation in tried}.__contains__
+        return [
+            explanation.text
+            if explanation.whole
+            else f"{explanation.text}: {', '.join(explanation.quantities)}"
+            for explanation in explain(judge, differing, wanted)
+        ]
     except FourBarError:
         return None
 
 
-def choose_rows(wrong: Mask) -> slice:
+def choose_rows(wrong: Mask, most: int) -> slice:
     """Choose the rows by which mistakes are tried first, about the first wrong one."""
-    latest = max(0, len(wrong) - FIRST_ROWS)
-    start = min(max(0, int(np.argmax(wrong)) - FIRST_ROWS // 2), latest)
-    return slice(start, start + FIRST_ROWS)
-
-
-def list_explanations(judge: Judge, differing: list[str]) -> list[str]:
-    """List the mistakes that explain what differs in a table."""
-    return [
-        explanation.text
-        if explanation.whole
-        else f"{explanation.text}: {', '.join(explanation.quantities)}"
-        for explanation in explain(judge, differing)
-    ]
+    latest = max(0, len(wrong) - most)
+    start = min(max(0, int(np.argmax(wrong)) - most // 2), latest)
+    return slice(start, start + most)
 
 
 def make_answer_table(
@@ -97,7 +105,7 @@ def make_answer_table(
     values: dict[str, Array] = {}
     rounding: dict[str, Array] = {}
     for name, numbers in answer.quantities.items():
-        if name not in UNITS or name in NOT_JUDGED or name == answer.at.commanded:
+        if name not in UNITS or name in {*_NO_CAUSE, answer.at.commanded}:
             continue
         kept = np.array(numbers[rows], dtype=float)
         kept[blank] = np.nan
