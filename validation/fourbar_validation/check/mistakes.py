@@ -63,7 +63,8 @@ def list_hypotheses(
 ) -> Iterator[Mistake]:
     """List every other problem that may have been solved, the simplest first."""
     variants = [one for one in _list_variants(scene, command) if wanted(one.text)]
-    shifted = list(_shift_by_steps(command))
+    differences = filter(wanted, map(_name_differences, _DIFFERENCES))
+    shifted = list(_shift_by_steps(command)) if any(differences) else []
     every = [*variants, *shifted]
     if not every:
         return
@@ -136,7 +137,11 @@ def _take_differences(command: Command, near: list[Predict]) -> Iterator[Mistake
     second = (command.angle[1] - command.angle[0]) / float(np.max(command.speed))
     for name, (of_speed, of_acceleration) in _DIFFERENCES.items():
         predict = partial(_difference, moved, second, of_speed, of_acceleration)
-        yield Mistake(f"speeds and accelerations are {name} differences", predict)
+        yield Mistake(_name_differences(name), predict)
+
+
+def _name_differences(name: str) -> str:
+    return f"speeds and accelerations are {name} differences"
 
 
 def _difference(

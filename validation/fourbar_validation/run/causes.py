@@ -23,8 +23,8 @@ do not contradict is held to all rows.
 FIRST_ROWS_OF_FRICTION = 8
 """The same where each trial looks for friction that balances the forces it follows."""
 _NO_CAUSE = {*NOT_JUDGED, "drive_condition"}
-"""Quantities by which no mistake is looked for; under friction the condition follows the
-forces.
+"""Quantities by which no mistake is looked for: under friction the condition follows
+the forces.
 """
 SAME_NUMBERS = 1e-9
 """Part of a quantity's largest value within which a mistake must give an exact engine's
