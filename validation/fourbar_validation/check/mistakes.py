@@ -134,7 +134,8 @@ def _shift_by_steps(command: Command) -> Iterator[Variant]:
 def _take_differences(command: Command, near: list[Predict]) -> Iterator[Mistake]:
     """Take speeds and accelerations from the angles at neighbouring rows of a table."""
     moved = dict(zip(_NEAR, near, strict=True))
-    second = (command.angle[1] - command.angle[0]) / float(np.max(command.speed))
+    speed = np.max(np.asarray(command.speed, dtype=float))
+    second = (command.angle[1] - command.angle[0]) / float(speed)
     for name, (of_speed, of_acceleration) in _DIFFERENCES.items():
         predict = partial(_difference, moved, second, of_speed, of_acceleration)
         yield Mistake(_name_differences(name), predict)
