@@ -1,6 +1,6 @@
-"""What is derived from `solve` is judged.
+"""What is derived from `solve` is judged by the oracles where that is hard.
 
-Each check holds, and each fails where its public call errs.
+That an oracle fails what errs is tried by the planted faults of the lab.
 """
 
 from dataclasses import replace
@@ -18,7 +18,6 @@ from fourbar.studies.keys import read_numbers
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.compare.rows import REFUSES
 from fourbar_validation.run.question import NotAskedError
-from tests.oracle import files
 from tests.oracle.coordinates import DRAWN_SETTING
 from tests.oracle.oracles import OF_FORCES, judge_by
 from tests.oracle.scenes import SLENDER
@@ -28,74 +27,6 @@ from tests.support.scenes import crank_rocker
 
 def failing(rows):
     return {row.quantity for row in rows if row.failed}
-
-
-def altered(call, change):
-    def wrong(*arguments, **options):
-        answer = call(*arguments, **options)
-        change(answer)
-        return answer
-
-    return wrong
-
-
-def swapped(solution):
-    solution.torque[[1, 2]] = solution.torque[[2, 1]]
-
-
-def steeper(answer):
-    answer.by["torque"] *= 1.000001
-
-
-def lost(answer):
-    answer.by["torque"][:] = np.nan
-
-
-def lost_at_one_position(answer):
-    answer.by["torque"][0, 1] = np.nan
-
-
-def left_out(answer):
-    del answer.by["torque"]
-
-
-def enlarged(answer):
-    """Off by a millionth, in an answer whose own values would be a wide scale."""
-    steeper(answer)
-    answer.solution.torque[:] *= 1e6
-
-
-def stiffer(answer):
-    answer.V[1, 2] *= 1.0 + 1e-8
-
-
-def narrower(answer):
-    answer.spreads["torque"].deviation[:] *= 0.9
-
-
-@pytest.mark.parametrize(
-    ("engine", "call", "change", "quantity"),
-    [
-        ("study", "solve", swapped, "torque"),
-        ("sensitivity", "sensitivity", steeper, "torque"),
-        ("sensitivity", "sensitivity", lost, "torque"),
-        ("sensitivity", "sensitivity", lost_at_one_position, "torque"),
-        ("sensitivity", "sensitivity", enlarged, "torque"),
-        ("tolerances", "tolerances", narrower, "torque"),
-        ("internal_forces", "internal_forces", stiffer, "V3"),
-    ],
-)
-def test_a_public_call_that_errs_fails(monkeypatch, engine, call, change, quantity):
-    monkeypatch.setattr(fourbar, call, altered(getattr(fourbar, call), change))
-    assert quantity in failing(judge_by(SLENDER, engine))
-
-
-def test_a_derivative_that_is_left_out_ends_its_check(monkeypatch):
-    """Which the run counts as a failure."""
-    call = altered(fourbar.sensitivity, left_out)
-    monkeypatch.setattr(fourbar, "sensitivity", call)
-    with pytest.raises(fourbar.InputError, match="'torque': is not known"):
-        judge_by(SLENDER, "sensitivity")
 
 
 CHANGE_POINTS = {
@@ -145,34 +76,27 @@ def test_tolerances_far_past_a_change_point_are_not_asked():
         judge_by(replace(scene, tolerances=(wide,)), "tolerances")
 
 
-def changed(**numbers):
-    return lambda answer: answer._replace(
-        found=(answer.found[0]._replace(**numbers), *answer.found[1:])
-    )
+def turned(place):
+    return place._replace(theta_2=place.theta_2 + 1e-7)
 
 
-def turned(answer):
-    place = answer.found[0].place
-    return changed(place=place._replace(theta_2=place.theta_2 + 1e-7))(answer)
+SPOILT = {
+    "missed": lambda rest: [],
+    "torque": lambda rest: [rest._replace(place=turned(rest.place))],
+    "slope": lambda rest: [rest._replace(slope=-rest.slope)],
+    "inertia": lambda rest: [rest._replace(inertia=1.000001 * rest.inertia)],
+    "frequency": lambda rest: [rest._replace(frequency=3.0)],
+}
+"""What is put in the place of an equilibrium, by the quantity that fails."""
 
 
-@pytest.mark.parametrize(
-    ("change", "quantities"),
-    [
-        (lambda answer: answer._replace(found=answer.found[1:]), {"missed"}),
-        (turned, {"torque"}),
-        (lambda answer: changed(slope=-answer.found[0].slope)(answer), {"slope"}),
-        (
-            lambda answer: changed(inertia=1.000001 * answer.found[0].inertia)(answer),
-            {"inertia"},
-        ),
-        (changed(frequency=3.0), {"frequency"}),
-    ],
-)
-def test_equilibria_that_err_fail(monkeypatch, change, quantities):
-    call = fourbar.equilibrium
-    monkeypatch.setattr(fourbar, "equilibrium", lambda scene: change(call(scene)))
-    assert failing(judge_by(SLENDER, "equilibria")) >= quantities
+@pytest.mark.parametrize("quantity", SPOILT)
+def test_equilibria_that_err_fail(monkeypatch, quantity):
+    answer = fourbar.equilibrium(SLENDER)
+    first, *others = answer.found
+    spoilt = answer._replace(found=(*SPOILT[quantity](first), *others))
+    monkeypatch.setattr(fourbar, "equilibrium", lambda _: spoilt)
+    assert quantity in failing(judge_by(SLENDER, "equilibria"))
 
 
 @pytest.mark.slow
@@ -181,19 +105,15 @@ def test_a_frequency_of_an_inertia_that_is_rounding_fails(monkeypatch):
     bars = fourbar.Bar(0.4), fourbar.Bar(0.2), output
     scene = Scene(fourbar.FourBar(0.3, *bars, 0.5), effects=(fourbar.Gravity(),))
     assert not failing(judge_by(scene, "equilibria"))
-    call = fourbar.equilibrium
-
-    def with_frequency(asked):
-        answer = call(asked)
-        found = [
-            each._replace(frequency=1e16)
-            if each.stability == "stable" and each.frequency is None
-            else each
-            for each in answer.found
-        ]
-        return answer._replace(found=tuple(found))
-
-    monkeypatch.setattr(fourbar, "equilibrium", with_frequency)
+    answer = fourbar.equilibrium(scene)
+    found = [
+        rest._replace(frequency=1e16)
+        if rest.stability == "stable" and rest.frequency is None
+        else rest
+        for rest in answer.found
+    ]
+    spoilt = answer._replace(found=tuple(found))
+    monkeypatch.setattr(fourbar, "equilibrium", lambda _: spoilt)
     assert "frequency" in failing(judge_by(scene, "equilibria"))
 
 
@@ -204,9 +124,8 @@ def test_equilibria_near_a_limit_are_compared_too(gravity):
         effects=(fourbar.Gravity(9.81, gravity),),
     )
     rows = judge_by(scene, "equilibria")
-    assert {row.reason for row in rows if row.quantity in ("torque", "slope")} == {
-        "rest: 2 of 2 equilibria"
-    }
+    reasons = {row.reason for row in rows if row.quantity in ("torque", "slope")}
+    assert reasons == {"rest: 2 of 2 equilibria"}
     assert not failing(rows)
 
 
@@ -216,29 +135,20 @@ NEARLY_MEET = fourbar.Spring(
 """Its ends come within 0.05 mm of each other: there its line turns by half a turn
 within 1 mrad of the input.
 """
-MASSLESS = {
-    bar: fourbar.Bar(length)
-    for bar, length in (("input", 0.3), ("coupler", 0.25), ("output", 0.15))
-}
+MASSIVE = (fourbar.Bar(2.66, 2.0), fourbar.Bar(2.1, 1.0), fourbar.Bar(2.7, 1.0))
 HARD_AT_REST = {
     "a stiff spring whose line turns within a milliradian": crank_rocker(
         motion=fourbar.Motion(1.0, 2.0, 0.5),
         effects=(fourbar.Gravity(), fourbar.Springs((NEARLY_MEET,))),
     ),
     "a flywheel alone, at a limit of the input": fourbar.Scene(
-        fourbar.FourBar(0.4, **MASSLESS),
+        fourbar.FourBar(0.4, fourbar.Bar(0.3), fourbar.Bar(0.25), fourbar.Bar(0.15)),
         fourbar.Motion(0.1, 2.0, 0.5),
         loads=(fourbar.Load(2, moment=1.5),),
         effects=(fourbar.Flywheel(0.3, 2),),
     ),
     "a sweep that begins on one circuit and goes on on another": fourbar.Scene(
-        fourbar.FourBar(
-            3.15,
-            fourbar.Bar(2.66, 2.0),
-            fourbar.Bar(2.1, 1.0),
-            fourbar.Bar(2.7, 1.0),
-            ground_angle=-0.19,
-        ),
+        fourbar.FourBar(3.15, *MASSIVE, ground_angle=-0.19),
         fourbar.Motion(fourbar.Sweep(-0.3667, 2.037, 36), 7.4, 1.8),
         effects=(fourbar.Gravity(9.81, -2.0),),
     ),
@@ -261,11 +171,8 @@ def test_right_equilibria_hold_where_they_are_hard_to_judge(name):
 
 def test_a_heavy_output_that_turns_slowly_keeps_its_inertia():
     """Its turn is 6e-7 of the fastest bar's, to all digits, beside a dead centre."""
-    crank, coupler, output = (
-        fourbar.Bar(length, mass)
-        for length, mass in ((0.1, 0.2), (0.25, 0.5), (0.22, 4e5))
-    )
-    linkage = fourbar.FourBar(0.3, crank, coupler, output)
+    bars = fourbar.Bar(0.1, 0.2), fourbar.Bar(0.25, 0.5), fourbar.Bar(0.22, 4e5)
+    linkage = fourbar.FourBar(0.3, *bars)
     rows = judge_by(Scene(linkage, effects=(fourbar.Gravity(),)), "equilibria")
     assert {"inertia", "frequency"} <= {row.quantity for row in rows if row.compared}
     assert not failing(rows)
@@ -274,10 +181,8 @@ def test_a_heavy_output_that_turns_slowly_keeps_its_inertia():
 @pytest.mark.parametrize("engine", ["equilibria", "study", "sensitivity"])
 def test_where_nothing_assembles_nothing_is_asked(engine):
     scene = FAULT_SCENES["limited"]
-    scene = replace(
-        scene,
-        motion=scene.motion.replace(angle=fourbar.Sweep(3.0, 3.1, 4)),
-    )
+    nowhere = scene.motion.replace(angle=fourbar.Sweep(3.0, 3.1, 4))
+    scene = replace(scene, motion=nowhere)
     with pytest.raises(NotAskedError):
         judge_by(scene, engine)
 
@@ -301,11 +206,8 @@ bring to where nothing assembles.
 def test_a_changed_linkage_that_hardly_assembles_is_no_failure(engine):
     d, *moving = BARELY[engine]
     linkage = fourbar.FourBar(d, *(fourbar.Bar(length, 1.0) for length in moving))
-    scene = fourbar.Scene(
-        linkage,
-        fourbar.Motion(None, 2.0, 0.5),
-        effects=(fourbar.Gravity(),),
-    )
+    motion = fourbar.Motion(None, 2.0, 0.5)
+    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
     assert not failing(judge_by(scene, engine))
 
 
@@ -347,39 +249,6 @@ def test_other_commands_are_judged_too(name):
     assert {row.engine for row in rows if row.compared} >= oracles
 
 
-def test_a_study_of_another_command_that_errs_fails(monkeypatch):
-    scene, call = commanding("stroke"), fourbar.solve
-
-    def wrong(subject, *arguments, **options):
-        answer = call(subject, *arguments, **options)
-        if not isinstance(subject, Scene):
-            answer.drive_force[[1, 2]] = answer.drive_force[[2, 1]]
-        return answer
-
-    monkeypatch.setattr(fourbar, "solve", wrong)
-    assert "drive_force" in failing(judge_by(scene, "study"))
-
-
-@pytest.mark.parametrize(
-    ("engine", "number"), [("sdf", "0.2"), ("sdf", "0.25"), ("usd", "0.2")]
-)
-def test_a_file_with_another_number_fails(monkeypatch, engine, number):
-    """0.2 kg is the mass of the input, 0.25 m the length of the coupler."""
-    text = getattr(files, f"{engine}_text")
-
-    def wrong(scene):
-        written: str = text(scene)
-        for before, after in ((">", "<"), (">", " "), ("= ", "\n"), ("(", ",")):
-            written = written.replace(
-                f"{before}{number}{after}",
-                f"{before}{float(number) * 1.000001!r}{after}",
-            )
-        return written
-
-    monkeypatch.setattr(files, f"{engine}_text", wrong)
-    assert failing(judge_by(SLENDER, engine))
-
-
 def test_what_a_file_cannot_hold_is_refused():
     (row,) = judge_by(FAULT_SCENES["sliding pins"], "usd")
     assert row.verdict == REFUSES and "pin_friction" in row.reason
@@ -392,9 +261,8 @@ def test_every_number_that_a_scene_states_is_found_in_its_file(name):
     scene = FAULT_SCENES[name]
     keys = read_numbers(scene).keys()
     stated = SceneFile(scene).find_stated(keys)
-    assert stated.keys() >= keys - {
-        key for key in keys if ".centre." in key or ".inertia" in key
-    }
+    left_out = {key for key in keys if ".centre." in key or ".inertia" in key}
+    assert stated.keys() >= keys - left_out
     changed = SceneFile(scene).move({"lengths.coupler": 0.01})
     assert changed.linkage.coupler.length == scene.linkage.coupler.length + 0.01
     assert np.array_equal(command(changed).theta_2, command(scene).theta_2)
@@ -432,9 +300,8 @@ def test_a_drawn_scene_is_judged_by_lengths_and_by_its_coordinates(check):
     judged = {(row.setting, row.quantity): row.reason for row in rows if row.compared}
     settings = ["exact"] if check == "tolerances" else ["exact", DRAWN_SETTING]
     for setting in settings:
-        assert {(setting, name) for name in ("theta_4", "drive_force", "F12")} <= (
-            judged.keys()
-        )
+        for name in ("theta_4", "drive_force", "F12"):
+            assert (setting, name) in judged
     if check == "sensitivity":
         assert judged["exact", "points"].endswith("in 17 numbers")
         # x and y of four pins, of the point and of both ends of the cylinder
@@ -444,21 +311,6 @@ def test_a_drawn_scene_is_judged_by_lengths_and_by_its_coordinates(check):
 def test_a_scene_stated_by_lengths_has_no_coordinates_to_judge():
     for check in ("sensitivity", "study"):
         assert {row.setting for row in judge_by(SLENDER, check)} == {"exact"}
-
-
-@pytest.mark.parametrize("key", ["pins.B.1", "drive.to.drawn.0", "points.edge.drawn.1"])
-def test_a_wrong_slope_by_a_coordinate_fails_in_the_rows_of_the_drawing(
-    monkeypatch, key
-):
-    def steepen(answer):
-        for slopes in answer.by.values():
-            slopes[list(answer.keys).index(key)] *= 1.00001
-
-    call = altered(fourbar.sensitivity, steepen)
-    monkeypatch.setattr(fourbar, "sensitivity", call)
-    failed = [row for row in judge_by(loads(LIFT), "sensitivity") if row.failed]
-    assert {row.setting for row in failed} == {DRAWN_SETTING}
-    assert "points" in {row.quantity for row in failed}
 
 
 @pytest.mark.slow

@@ -1,10 +1,8 @@
 """Simulate a four-bar a second time, from MuJoCo's documentation alone.
 
-Newton's law judges what is simulated.
-
 Nothing of `fourbar_validation` is used: not its MJCF, its assembly, its stepping, its
-reading of forces, or its comparison. Of `fourbar` only the description of a scene is
-read, none of its formulas.
+reading of forces, or its comparison. The formulas judge what is simulated, and the
+simulation is told none of their numbers.
 """
 
 import math
@@ -16,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fourbar
+from fourbar.quantities import PIN_FORCES
 
 Array = NDArray[np.float64]
 TURNS_AT_LEAST = 0.1
@@ -112,28 +111,14 @@ class Loop:
                 return theta_3, theta_4
         raise AssertionError("the circles do not meet")
 
-    def rates(
-        self,
-        angles: Array,
-        omega_2: float,
-        alpha_2: float,
-    ) -> tuple[Array, Array]:
-        """Differentiate a e^(i t2) + b e^(i t3) - c e^(i t4) = const. twice."""
-        arms = np.array([self.a, self.b, -self.c]) * np.exp(1j * angles)
-        matrix = np.array(
-            [(1j * arms[1:]).real, (1j * arms[1:]).imag],
-            dtype=np.float64,
+    def speeds(self, angles: Array, omega_2: float) -> Array:
+        """Differentiate a e^(i t2) + b e^(i t3) - c e^(i t4) = const."""
+        first, second, third = (
+            1j * np.array([self.a, self.b, -self.c]) * np.exp(1j * angles)
         )
-
-        def others(right: complex) -> Array:
-            return np.linalg.solve(matrix, [right.real, right.imag])
-
-        speeds = np.array([omega_2, *others(-1j * arms[0] * omega_2)])
-        centripetal = complex(np.sum(arms * speeds**2))
-        accelerations = np.array(
-            [alpha_2, *others(centripetal - 1j * arms[0] * alpha_2)]
-        )
-        return speeds, accelerations
+        matrix = [[second.real, third.real], [second.imag, third.imag]]
+        right = [-first.real * omega_2, -first.imag * omega_2]
+        return np.array([omega_2, *np.linalg.solve(matrix, right)])
 
     def outside_forces(self, angles: Array) -> list[tuple[complex, float]]:
         """Return force and couple of gravity and loads on bars 2, 3 and 4.
@@ -199,13 +184,6 @@ class Loop:
                 couples[bar - 2] += _cross(arm, push)
         return forces, couples
 
-    def drive_speed(self, angles: Array, rates: Array) -> float:
-        """Return the speed at which the drive of size one does work."""
-        pushes, couples = self.drive_direction(angles)
-        carried = 1j * rates[0] * self.a * np.exp(1j * angles[0])
-        power = float(np.dot(couples, rates))
-        return power + float((pushes[1].conjugate() * carried).real)
-
     def first_pins(self, angles: Array) -> list[complex]:
         """Return O2, A and O4."""
         return [
@@ -213,58 +191,6 @@ class Loop:
             self.a * np.exp(1j * angles[0]),
             self.d * np.exp(1j * self.theta_1),
         ]
-
-    def right_forces(
-        self,
-        theta_2: float,
-        omega_2: float,
-        alpha_2: float,
-    ) -> dict[str, Array]:
-        """Solve Newton's and Euler's laws of the three bars.
-
-        The unknowns are F12, F32, F43, F14 and the drive.
-        """
-        angles = np.array([theta_2, *self.assemble(theta_2)])
-        speeds, accelerations = self.rates(angles, omega_2, alpha_2)
-        outside = self.outside_forces(angles)
-        pushes, couples = self.drive_direction(angles)
-        arms = np.array([self.a, self.b, self.c]) * np.exp(1j * angles)
-        pin_A_acceleration = arms[0] * (1j * accelerations[0] - speeds[0] ** 2)
-        matrix, right = np.zeros((9, 9)), np.zeros(9)
-        # unknowns: F12 0:2, F32 2:4, F43 4:6, F14 6:8, drive 8; F23 = -F32, F34 = -F43
-        signs = (
-            {0: (1.0, 0j), 2: (1.0, arms[0])},
-            {2: (-1.0, 0j), 4: (1.0, arms[1])},
-            {6: (1.0, 0j), 4: (-1.0, arms[2])},
-        )
-        for number in range(3):
-            centre = self.centres[number] * np.exp(1j * angles[number])
-            base = pin_A_acceleration if number == 1 else 0j
-            of_centre = base + centre * (
-                1j * accelerations[number] - speeds[number] ** 2
-            )
-            row = 3 * number
-            for column, (sign, arm) in signs[number].items():
-                matrix[row, column] = matrix[row + 1, column + 1] = sign
-                matrix[row + 2, column] = -sign * arm.imag
-                matrix[row + 2, column + 1] = sign * arm.real
-            matrix[row, 8] = pushes[number].real
-            matrix[row + 1, 8] = pushes[number].imag
-            matrix[row + 2, 8] = couples[number]
-            inertial = self.masses[number] * of_centre
-            spin = self.inertias[number] * accelerations[number]
-            force, couple = outside[number]
-            right[row] = (inertial - force).real
-            right[row + 1] = (inertial - force).imag
-            right[row + 2] = spin + _cross(centre, inertial) - couple
-        found = np.linalg.solve(matrix, right)
-        return {
-            "F12": found[0:2],
-            "F32": found[2:4],
-            "F43": found[4:6],
-            "F14": found[6:8],
-            "torque": found[8:9],
-        }
 
     def write(
         self,
@@ -373,6 +299,7 @@ class Sample:
     omega_2: float
     alpha_2: float
     forces: dict[str, Array]
+    """Pin forces, and the drive under "torque"."""
 
 
 class Simulation:
@@ -412,7 +339,7 @@ class Simulation:
     def start(self, theta_2: float) -> None:
         """Close the loop at an angle of the crank; what keeps its speed is in step."""
         angles = np.array([theta_2, *self.loop.assemble(theta_2)])
-        speeds, _ = self.loop.rates(angles, self.omega, 0.0)
+        speeds = self.loop.speeds(angles, self.omega)
         self.data.qpos[:3] = angles[0], angles[1] - angles[0], angles[2]
         self.data.qvel[:3] = speeds[0], speeds[1] - speeds[0], speeds[2]
         carrier = self.settings.carrier
@@ -429,23 +356,15 @@ class Simulation:
         mujoco.mj_step(self.model, self.data, count)
         return time.process_time() - began
 
-    def run(self, settle: bool = False) -> list[Sample]:
-        """Step through the sweep and read states on the way.
-
-        To settle, it begins one turn ahead of the sweep.
-        """
-        first = self.sweep[0] if self.omega > 0.0 else self.sweep[-1]
-        span = float(np.ptp(self.sweep))
-        sign = math.copysign(1.0, self.omega)
-        start = float(first) - (2.0 * math.pi * sign if settle else 0.0)
-        self.start(start)
+    def run(self) -> list[Sample]:
+        """Step through the sweep and read states on the way."""
+        self.start(float(self.sweep[0] if self.omega > 0.0 else self.sweep[-1]))
         n = self.settings.steps_per_revolution
-        steps = math.floor((span / (2.0 * math.pi) + (1.0 if settle else 0.0)) * n)
+        steps = math.floor(float(np.ptp(self.sweep)) / (2.0 * math.pi) * n)
         stride = max(1, round(n / SAMPLES))
         samples = []
         for step in range(steps + 1):
-            passed = step >= n if settle else True
-            if passed and step % stride == 0:
+            if step % stride == 0:
                 samples.append(self.read())
             mujoco.mj_step(self.model, self.data)
         return samples
@@ -458,35 +377,16 @@ class Simulation:
         """
         mujoco.mj_forward(self.model, self.data)
         alpha_2 = float(self.data.qacc[0])
-        angles = np.array(
-            [
-                self.data.qpos[0],
-                self.data.qpos[0] + self.data.qpos[1],
-                self.data.qpos[2],
-            ]
-        )
-        speeds = np.array(
-            [
-                self.data.qvel[0],
-                self.data.qvel[0] + self.data.qvel[1],
-                self.data.qvel[2],
-            ]
-        )
+        angles, speeds = _add_crank(self.data.qpos), _add_crank(self.data.qvel)
         if self.settings.carrier is not None and self.loop.drive == 2:
             # the drive is what carries the crank
             acceleration, closing = self.data.qacc[:3], self.data.efc_force[:2]
             drive = self.exerted()
         else:
             acceleration, closing, drive = self.probe_drive(angles, alpha_2)
-        turned = np.array(
-            [acceleration[0], acceleration[0] + acceleration[1], acceleration[2]]
-        )
-        return Sample(
-            float(self.data.qpos[0]),
-            float(self.data.qvel[0]),
-            alpha_2,
-            self.balance(angles, speeds, turned, closing, drive),
-        )
+        turned = _add_crank(acceleration)
+        forces = self.balance(angles, speeds, turned, closing, drive)
+        return Sample(float(angles[0]), float(speeds[0]), alpha_2, forces)
 
     def exerted(self) -> float:
         """Return the torque on the crank, N m: that of the servo, or the multiplier of
@@ -541,72 +441,59 @@ class Simulation:
         loop = self.loop
         outside = loop.outside_forces(angles)
         pushes, _ = loop.drive_direction(angles)
-        inertial = []
+        needed = []
         for number in range(3):
             centre = loop.centres[number] * np.exp(1j * angles[number])
             of_centre = centre * (1j * accelerations[number] - speeds[number] ** 2)
             if number == 1:
                 crank = loop.a * np.exp(1j * angles[0])
                 of_centre += crank * (1j * accelerations[0] - speeds[0] ** 2)
-            inertial.append(loop.masses[number] * of_centre)
-        needed = [
-            inertial[number] - outside[number][0] - drive * pushes[number]
-            for number in range(3)
-        ]
+            inertial = loop.masses[number] * of_centre
+            needed.append(inertial - outside[number][0] - drive * pushes[number])
         force_34 = complex(closing[0], closing[1])
         force_14 = needed[2] - force_34
         force_23 = needed[1] + force_34
         force_12 = needed[0] + force_23
-        forces = {
-            "F12": force_12,
-            "F32": -force_23,
-            "F43": -force_34,
-            "F14": force_14,
+        forces = (force_12, -force_23, -force_34, force_14)
+        pairs = [np.array([force.real, force.imag]) for force in forces]
+        return {
+            **dict(zip(PIN_FORCES, pairs, strict=True)),
+            "torque": np.array([drive]),
         }
-        arrays = {
-            name: np.array([force.real, force.imag]) for name, force in forces.items()
-        }
-        return {**arrays, "torque": np.array([drive])}
 
 
-def measure(
-    scene: fourbar.Scene,
-    settings: LoopSettings,
-    settle: bool = False,
-) -> dict[str, float]:
+def measure(scene: fourbar.Scene, settings: LoopSettings) -> dict[str, float]:
     """Return the worst error of the drive and of each pin's force, relative to the
     largest value in the sweep.
     """
-    simulation = Simulation(scene, settings)
-    samples = simulation.run(settle)
-    loop = simulation.loop
-    right = [loop.right_forces(s.theta_2, s.omega_2, s.alpha_2) for s in samples]
-    turning = list(_mark_turning(loop, samples))
+    samples = Simulation(scene, settings).run()
+    columns = np.array([(s.theta_2, s.omega_2, s.alpha_2) for s in samples]).T
+    at = fourbar.command(scene)
+    branch = np.full(len(samples), at.branch[0])
+    names = ("angle", "speed", "acceleration")
+    at = at._replace(**dict(zip(names, columns, strict=True)), branch=branch)
+    right = fourbar.solve(scene, at=at)
+    drive, speed = "torque", right[f"omega_{scene.drive_bar or 2}"]
+    if scene.drive is not None:
+        drive, speed = "drive_force", right.stroke_speed
+    judged = np.ones(len(samples), dtype=bool)
+    if scene.drive is not None or scene.drive_bar != 2:  # with poles where it rests
+        judged = np.abs(speed) > TURNS_AT_LEAST * np.abs(speed).max()
     errors = {}
-    for name in ("torque", "F12", "F32", "F43", "F14"):
-        judged = [
-            (sample.forces[name], row[name])
-            for sample, row, moves in zip(samples, right, turning, strict=True)
-            if moves
-        ]
-        worst = max(float(np.linalg.norm(ours - exact)) for ours, exact in judged)
-        errors[name] = worst / max(float(np.linalg.norm(exact)) for _, exact in judged)
+    for name in ("torque", *PIN_FORCES):
+        ours = np.array([sample.forces[name] for sample in samples])[judged]
+        exact = right[drive if name == "torque" else name][judged]
+        exact = exact.reshape(ours.shape)
+        apart, size = (np.linalg.norm(one, axis=1) for one in (ours - exact, exact))
+        errors[name] = float(apart.max() / size.max())
     return errors
 
 
-def _mark_turning(loop: Loop, samples: list[Sample]) -> list[bool]:
-    """Mark the samples at which the driven bar, or the cylinder, moves.
-
-    Elsewhere the drive is near a pole.
+def _add_crank(joints: Array) -> Array:
+    """Return angles, speeds or accelerations of the bars: the coupler's joint turns
+    on the crank.
     """
-    if loop.drive == 2:
-        return [True] * len(samples)
-    speeds = []
-    for sample in samples:
-        angles = np.array([sample.theta_2, *loop.assemble(sample.theta_2)])
-        rates, _ = loop.rates(angles, sample.omega_2, sample.alpha_2)
-        speeds.append(abs(loop.drive_speed(angles, rates)))
-    return [speed > TURNS_AT_LEAST * max(speeds) for speed in speeds]
+    return np.array([joints[0], joints[0] + joints[1], joints[2]])
 
 
 def _polar(pair: tuple[float, float]) -> complex:

@@ -8,14 +8,16 @@ import os
 import re
 import runpy
 import zipfile
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import fourbar
+from fourbar.quantities import PIN_FORCES
+from fourbar.scene import Command
 from fourbar_lab.cli import status as lab_status
 from fourbar_lab.simulators.problems import PROBLEMS, collect_problem, list_problems
 from fourbar_validation.check.problem import (
@@ -53,9 +55,8 @@ def read_stored(name):
 
 def find_distance(first, second):
     """Return the distance between two answers at each position."""
-    return magnitude(
-        np.atleast_1d(np.asarray(first, dtype=float) - np.asarray(second, dtype=float))
-    )
+    apart = np.asarray(first, dtype=float) - np.asarray(second, dtype=float)
+    return magnitude(np.atleast_1d(apart))
 
 
 def assert_agreement(name, answers, share=0.0):
@@ -63,99 +64,80 @@ def assert_agreement(name, answers, share=0.0):
 
     The bar is widened by a share of the largest value for its derivation.
     """
-    problem, compared = read_stored(name), 0
-    for quantity, values in problem["answers"].items():
-        if quantity not in answers:
-            continue
+    problem = read_stored(name)
+    compared = problem["answers"].keys() & answers.keys()
+    assert len(compared) >= 4
+    for quantity in sorted(compared):
+        values = problem["answers"][quantity]
         apart = find_distance(values, answers[quantity])
+        size = magnitude(np.atleast_1d(np.asarray(values))).max()
         if quantity.startswith("theta"):
             apart = np.minimum(apart, np.abs(apart - 2.0 * np.pi))
-        size = (
-            1.0
-            if quantity.startswith("theta")
-            else magnitude(np.atleast_1d(np.asarray(values))).max()
-        )
-        assert (
-            apart <= np.asarray(problem["errors"][quantity]) + share * size
-        ).all(), quantity
-        compared += 1
-    assert compared >= 4
+            size = 1.0
+        allowed = np.asarray(problem["errors"][quantity]) + share * size
+        assert (apart <= allowed).all(), quantity
 
 
 def test_there_are_fifteen_and_their_files_agree():
-    assert len(NAMES) == 15 and {file.stem for file in PROBLEMS.glob("*.json")} == set(
-        NAMES
-    )
+    assert len(NAMES) == 15
+    assert {file.stem for file in PROBLEMS.glob("*.json")} == {*NAMES}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in LONG])
 def test_the_files_are_those_of_today(name):
     old, new = read_stored(name), json.loads(json.dumps(collect_problem(name)))
-    assert (
-        old["schema"] == PROBLEM_SCHEMA
-        and old["answers"].keys() == new["answers"].keys() == old["errors"].keys()
-    )
+    assert old["schema"] == PROBLEM_SCHEMA
+    assert old["answers"].keys() == new["answers"].keys() == old["errors"].keys()
     for key in ("title", "source", "conventions", "mechanism", "ask", "units"):
         assert old[key] == new[key]
-    numbers = [
-        re.findall(
-            r"-?\d[\d.e+-]*", json.dumps([problem[key] for key in ("scene", "command")])
-        )
-        for problem in (old, new)
-    ]
-    assert np.allclose(
-        *(np.array(texts, dtype=float) for texts in numbers),
-        rtol=K * EPS,
-        atol=1e-9,
-    )
+
+    def find_numbers(problem):
+        text = json.dumps([problem["scene"], problem["command"]])
+        return np.array(re.findall(r"-?\d[\d.e+-]*", text), dtype=float)
+
+    numbers = map(find_numbers, (old, new))
+    np.testing.assert_allclose(*numbers, rtol=K * EPS, atol=1e-9)
     for quantity, values in old["answers"].items():
         bar = np.asarray(old["errors"][quantity])
-        assert (bar > 0.0).all() and (
-            find_distance(values, new["answers"][quantity]) <= APART * bar
-        ).all(), quantity
+        apart = find_distance(values, new["answers"][quantity])
+        assert (bar > 0.0).all() and (apart <= APART * bar).all(), quantity
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_problem_is_what_the_schema_says(name):
     jsonschema = pytest.importorskip("jsonschema")
-    schema = json.loads(
-        (ROOT / "docs" / "protocol.schema.json").read_text(encoding="utf-8")
-    )
-    check = jsonschema.Draft202012Validator(
-        {"$ref": "#/$defs/problem", "$defs": schema["$defs"]}
-    )
+    text = (ROOT / "docs" / "protocol.schema.json").read_text(encoding="utf-8")
+    definitions = json.loads(text)["$defs"]
+    schema = {"$ref": "#/$defs/problem", "$defs": definitions}
+    check = jsonschema.Draft202012Validator(schema)
     problem = json.loads((PROBLEMS / f"{name}.json").read_text(encoding="utf-8"))
     check.validate(problem)
-    assert not check.is_valid({**problem, "given": {}}) and not check.is_valid(
-        {**problem, "scene": {}}
-    )
+    for wrong in ("given", "scene"):
+        assert not check.is_valid({**problem, wrong: {}})
 
 
 def read_question(name):
     """Read scene and command as an engine does."""
     problem = read_stored(name)
-    return protocol.command_from_json(
-        protocol.scene_from_json(problem["scene"]), problem["command"]
-    )
+    scene = protocol.scene_from_json(problem["scene"])
+    return protocol.command_from_json(scene, problem["command"])
 
 
 @pytest.mark.parametrize("name", PRESCRIBED)
 def test_the_free_bodies_answer_the_same(name):
     scene, command = read_question(name)
     answers = FreeBody().answer(scene, command).quantities
-    assert_agreement(
-        name, answers, K * EPS / float(np.abs(answers["sin_mu"]).min()) ** 2
-    )
+    least = float(np.abs(answers["sin_mu"]).min())
+    assert_agreement(name, answers, K * EPS / least**2)
 
 
 @pytest.mark.parametrize("name", IN_MANY_DIGITS)
 def test_ninety_digits_answer_the_same(name):
     exact = pytest.importorskip("fourbar_validation.engines.exact")
     pytest.importorskip("flint")
-    assert_agreement(
-        name, exact.BallArithmetic().answer(*read_question(name)).quantities
-    )
+    answer = exact.BallArithmetic().answer(*read_question(name))
+    assert_agreement(name, answer.quantities)
 
 
 def slide(mp, scene, place, omega, alpha):
@@ -176,52 +158,41 @@ def slide(mp, scene, place, omega, alpha):
         return mp.asin((e - a * mp.sin(angle)) / b)
 
     def slope(point, angle, order=1):
-        return mp.mpc(
-            *(
-                mp.diff(lambda x, part=part: part(point(x)), angle, order)
-                for part in (mp.re, mp.im)
-            )
+        x, y = (
+            mp.diff(lambda at, part=part: part(point(at)), angle, order)
+            for part in (mp.re, mp.im)
         )
+        return mp.mpc(x, y)
 
     def work(force, displaced):
         return mp.re(force * mp.conj(displaced))
 
-    bodies = []
+    inertias, arms = [], []
     for name, length in (("crank", a), ("rod", b)):
         stated = scene["bars"][name]
+        slender = mp.mpf(stated["mass"]) * length**2 / 12
         r, phi = stated.get("centre", (length / 2, 0.0))
-        bodies.append(
-            (
-                stated.get("inertia", mp.mpf(stated["mass"]) * length**2 / 12),
-                mp.mpf(r) * mp.expj(phi),
-            )
-        )
-    (i2, c2), (i3, c3) = bodies
+        inertias.append(stated.get("inertia", slender))
+        arms.append(mp.mpf(r) * mp.expj(phi))
+    c2, c3 = arms
     centres = (
         lambda angle: c2 * mp.expj(angle),
         lambda angle: a * mp.expj(angle) + c3 * mp.expj(psi(angle)),
         lambda angle: a * mp.cos(angle) + b * mp.cos(psi(angle)) + mp.mpc(0, e),
     )
-    masses = (
-        mp.mpf(scene["bars"][name]["mass"]) for name in ("crank", "rod", "slider")
-    )
-    p = [
-        m * (slope(lambda t: centre(theta(t)), 0, 2) - weight)  # noqa: B023
-        for m, centre in zip(masses, centres, strict=True)
-    ]
+    p = []
+    for name, centre in zip(("crank", "rod", "slider"), centres, strict=True):
+        acceleration = slope(lambda t, centre=centre: centre(theta(t)), 0, 2)
+        p.append(mp.mpf(scene["bars"][name]["mass"]) * (acceleration - weight))
     for load in scene.get("loads", ()):
         p[2] -= mp.mpf(load["force"][0]) * mp.expj(load["force"][1])
-    t2, t3 = i2 * alpha, i3 * slope(lambda t: psi(theta(t)), 0, 2).real
-    torque = sum(
-        work(force, slope(centre, place))
-        for force, centre in zip(p, centres, strict=True)
-    )
-    torque += t2 + t3 * slope(psi, place).real
+    t3 = inertias[1] * slope(lambda t: psi(theta(t)), 0, 2).real
+    torque = inertias[0] * alpha + t3 * slope(psi, place).real
+    for force, centre in zip(p, centres, strict=True):
+        torque += work(force, slope(centre, place))
     arm = mp.expj(psi(place))
-    F43 = mp.mpc(
-        -p[2].real,
-        (work(p[1], 1j * c3 * arm) + t3 - p[2].real * b * arm.imag) / (b * arm.real),
-    )
+    turned = work(p[1], 1j * c3 * arm) + t3
+    F43 = mp.mpc(-p[2].real, (turned - p[2].real * b * arm.imag) / (b * arm.real))
     F32 = F43 - p[1]
     F12 = p[0] - F32
     numbers = {
@@ -239,17 +210,17 @@ def slide(mp, scene, place, omega, alpha):
 @pytest.mark.parametrize("name", SLIDING)
 def test_virtual_work_answers_the_slider_cranks_the_same(name):
     mp = pytest.importorskip("mpmath").mp
-    command = read_stored(name)["command"]
+    problem = read_stored(name)
+    command = problem["command"]
     with mp.workdps(60):
         rates = mp.mpf(command["omega_2"]), mp.mpf(command["alpha_2"])
         rows = [
-            slide(mp, read_stored(name)["scene"], mp.mpf(place), *rates)
+            slide(mp, problem["scene"], mp.mpf(place), *rates)
             for place in command["theta_2"]
         ]
-    assert rows[0].keys() == read_stored(name)["answers"].keys()
-    assert_agreement(
-        name, {quantity: [row[quantity] for row in rows] for quantity in rows[0]}
-    )
+    assert rows[0].keys() == problem["answers"].keys()
+    columns = {quantity: [row[quantity] for row in rows] for quantity in rows[0]}
+    assert_agreement(name, columns)
 
 
 def pendulum(problem):
@@ -259,18 +230,12 @@ def pendulum(problem):
     """
     scene, start = problem["scene"], problem["command"]
     bars, length = scene["bars"], scene["lengths"]["input"]
-    swinging, coupler = [bars["input"], bars["output"]], bars["coupler"]["mass"]
-    arms = [bar.get("centre", [0.5 * length, 0.0])[0] for bar in swinging]
-    inertias = [bar.get("inertia", bar["mass"] * length**2 / 12.0) for bar in swinging]
-    inertia = sum(
-        i + bar["mass"] * arm**2
-        for i, bar, arm in zip(inertias, swinging, arms, strict=True)
-    )
-    inertia += coupler * length**2
-    moment = (
-        sum(bar["mass"] * arm for bar, arm in zip(swinging, arms, strict=True))
-        + coupler * length
-    )
+    inertia = bars["coupler"]["mass"] * length**2
+    moment = bars["coupler"]["mass"] * length
+    for bar in (bars["input"], bars["output"]):
+        mass, (arm, _) = bar["mass"], bar.get("centre", [0.5 * length, 0.0])
+        inertia += bar.get("inertia", mass * length**2 / 12.0) + mass * arm**2
+        moment += mass * arm
     k = scene["effects"]["gravity"][0] * moment / inertia
     return k, start["omega_2"] ** 2 / 2.0 + k * math.sin(start["theta_2"])
 
@@ -279,26 +244,19 @@ def test_gazebos_four_bar_swings_as_a_pendulum():
     special = pytest.importorskip("scipy.special")
     problem = read_stored("gz_physics_987")
     answers, errors = problem["answers"], problem["errors"]
-    k, modulus = (
-        pendulum(problem)[0],
-        math.sin(0.5 * (problem["command"]["theta_2"] + 0.5 * math.pi)),
-    )
+    rate = math.sqrt(pendulum(problem)[0])
+    modulus = math.sin(0.5 * (problem["command"]["theta_2"] + 0.5 * math.pi))
     quarter = special.ellipk(modulus**2)
-    assert (
-        abs(answers["frequency"] - math.sqrt(k) / (4.0 * quarter))
-        <= errors["frequency"]
-        < 1e-9
-    )
+    apart = abs(answers["frequency"] - rate / (4.0 * quarter))
+    assert apart <= errors["frequency"] < 1e-9
     assert f"{answers['frequency']:.10f}" == "0.7504113317"
-    sn, cn, _, _ = special.ellipj(
-        quarter - math.sqrt(k) * np.asarray(problem["times"]), modulus**2
-    )
+    phase = quarter - rate * np.asarray(problem["times"])
+    sn, cn, _, _ = special.ellipj(phase, modulus**2)
     theta = 2.0 * np.arcsin(modulus * sn) - 0.5 * math.pi
-    omega = -2.0 * modulus * math.sqrt(k) * cn
-    assert_agreement(
-        "gz_physics_987",
-        {"theta_2": theta, "omega_2": omega, **solve_pin_forces(problem, theta, omega)},
-    )
+    omega = -2.0 * modulus * rate * cn
+    forces = solve_pin_forces(problem, theta, omega)
+    swing = {"theta_2": theta, "omega_2": omega}
+    assert_agreement("gz_physics_987", swing | forces)
 
 
 def test_a02_passes_every_angle_when_energy_says():
@@ -308,86 +266,49 @@ def test_a02_passes_every_angle_when_energy_says():
     k, energy = pendulum(problem)
     theta, time = np.asarray(answers["theta_2"]), problem["times"]
     speed = -np.sqrt(2.0 * (energy - k * np.sin(theta)))
-    assert_agreement(
-        "iftomm_a02", {"omega_2": speed, **solve_pin_forces(problem, theta, speed)}
-    )
-    reached, passed = 0.0, 0
+    forces = solve_pin_forces(problem, theta, speed)
+    assert_agreement("iftomm_a02", {"omega_2": speed} | forces)
+    assert len(time) == 401 and time[-1] == 20.0
+
+    def seconds_per_radian(x):
+        return -1.0 / math.sqrt(2.0 * (energy - k * math.sin(x)))
+
+    accuracy = {"epsabs": 1e-12, "epsrel": 1e-12, "limit": 200}
+    reached = 0.0
     for i in range(20, len(time), 20):
-        reached += integrate.quad(
-            lambda x: -1.0 / math.sqrt(2.0 * (energy - k * math.sin(x))),
-            *theta[[i - 20, i]],
-            epsabs=1e-12,
-            epsrel=1e-12,
-            limit=200,
-        )[0]
-        passed += 1
+        part = theta[i - 20], theta[i]
+        reached += integrate.quad(seconds_per_radian, *part, **accuracy)[0]
         assert abs(reached - time[i]) * abs(speed[i]) <= errors["theta_2"][i]
-    assert passed == 20 and time[-1] == 20.0
 
 
 def solve_pin_forces(problem, theta, omega):
-    """Return the pin forces of a released parallelogram, N, from the balances of its
-    coupler, which does not turn.
+    """Solve the pin forces of a released parallelogram in many digits, N.
 
-    Moments of the coupler about B give the part of F32 across it, moments of the input
-    about O2 the part along it.
+    Its bars 2 and 4 are parallel, and it needs no torque at its own acceleration.
     """
-    mp = pytest.importorskip("mpmath").mp
-    scene, k = problem["scene"], pendulum(problem)[0]
-    a, b, weight = (
-        scene["lengths"]["input"],
-        scene["lengths"]["coupler"],
-        mp.mpc(0, -scene["effects"]["gravity"][0]),
-    )
-    forces: dict[str, list[list[float]]] = {"F12": [], "F32": [], "F43": [], "F14": []}
-
-    def cross(arm, force):
-        return (mp.conj(arm) * force).imag
-
-    def centre(name, length):
-        r, angle = scene["bars"][name].get("centre", (length / 2, 0.0))
-        return r * mp.expj(angle)
-
-    with mp.workdps(40):
-        for angle, speed in zip(theta, omega, strict=True):
-            crank = a * mp.expj(angle)
-            growth = -k * mp.cos(angle)
-            turning = (
-                1j * growth - mp.mpf(speed) ** 2
-            )  # acceleration of a point by its arm about O2 or O4
-            swinging = {}
-            for name in ("input", "output"):
-                bar, arm = scene["bars"][name], centre(name, a) * crank / a
-                swinging[name] = bar["mass"] * (turning * arm - weight)
-            bar = scene["bars"]["input"]
-            arm = centre("input", a) * crank / a
-            turned = bar.get("inertia", bar["mass"] * a**2 / 12) * growth + cross(
-                arm, swinging["input"]
-            )
-            carried = scene["bars"]["coupler"]["mass"] * (turning * crank - weight)
-            across = -cross(b - centre("coupler", b), carried) / b
-            F32 = mp.mpc((crank.real * across - turned) / crank.imag, across)
-            pins = (
-                swinging["input"] - F32,
-                F32,
-                F32 + carried,
-                swinging["output"] + F32 + carried,
-            )
-            for rows, force in zip(forces.values(), pins, strict=True):
-                rows.append([float(force.real), float(force.imag)])
+    exact = pytest.importorskip("fourbar_validation.engines.exact")
+    pytest.importorskip("flint")
+    scene = protocol.scene_from_json(problem["scene"])
+    branch = np.sign(np.sin(theta)).astype(np.int8)
+    growth = -pendulum(problem)[0] * np.cos(theta)
+    motion = Command(np.asarray(theta), branch, np.asarray(omega), growth)
+    released = replace(scene, motion=fourbar.Motion(0.0, 0.0))
+    answers = exact.BallArithmetic().answer(released, motion).quantities
+    forces = {name: answers[name] for name in PIN_FORCES}
+    largest = max(np.abs(force).max() for force in forces.values())
+    length = problem["scene"]["lengths"]["input"]
+    assert np.abs(answers["torque"]).max() < K * EPS * largest * length
     return forces
 
 
 def test_the_page_s_example_reads_an_answer_without_this_project():
     page = (ROOT / "docs/benchmark.md").read_text()
     code = page[page.index("```python") + 9 :].partition("```")[0]
-    names: dict[str, Any] = {}
+    names = {}
     exec(code, names)
     assert "fourbar" not in code.replace("fourbar-problem/4", "")
-    file, right = (
-        PROBLEMS / "newton_128.json",
-        read_stored("newton_128")["answers"]["F43"],
-    )
+    file = PROBLEMS / "newton_128.json"
+    right = read_stored("newton_128")["answers"]["F43"]
     assert names["find_error"](file, "F43", right) <= 0.0
     wrong = [right[0], [1.01 * x for x in right[1]], *right[2:]]
     assert 1e-4 < names["find_error"](file, "F43", wrong) < 1e-2
@@ -406,37 +327,27 @@ def test_the_page_has_the_data_the_letters_and_a_figure_of_every_problem():
 
 def test_the_proposed_problem_rests_and_swings_as_its_page_says():
     mp = pytest.importorskip("mpmath").mp
-    page = (
-        (ROOT / "docs/benchmark.md")
-        .read_text(encoding="utf-8")
-        .partition("## Proposed")[2]
-    )
+    text = (ROOT / "docs/benchmark.md").read_text(encoding="utf-8")
+    page = text.partition("## Proposed")[2]
     scene = fourbar.load(PROBLEMS.parent / "proposed" / "diagonal_spring.toml")
     (rest,) = [
         row
         for row in fourbar.equilibrium(scene).found
         if row.stability == "stable" and row.place.theta_2 < 3.0
     ]
+
+    def energy(x):
+        stretch = 2 * mp.cos(x / 2) - mp.sqrt(2)
+        return 2 * mp.mpf("9.81") * mp.sin(x) + 25 * stretch**2 / 2
+
     with mp.workdps(30):
-        energy = lambda x: (  # noqa: E731
-            2 * mp.mpf("9.81") * mp.sin(x)
-            + 25 * (2 * mp.cos(x / 2) - mp.sqrt(2)) ** 2 / 2
-        )
         angle = mp.findroot(lambda x: mp.diff(energy, x), mp.mpf("2.2"))
-        stiffness, inertia, damping = (
-            mp.diff(energy, angle, 2),
-            mp.mpf(5) / 3,
-            mp.sin(angle / 2) ** 2,
-        )
-        root = (-damping + mp.sqrt(damping**2 - 4 * inertia * stiffness)) / (
-            2 * inertia
-        )
+        stiffness, inertia = mp.diff(energy, angle, 2), mp.mpf(5) / 3
+        decay = mp.sin(angle / 2) ** 2 / (2 * inertia)
+        root = -decay + mp.sqrt(decay**2 - stiffness / inertia)
         frequency = mp.sqrt(stiffness / inertia) / (2 * mp.pi)
-    assert abs(rest.place.theta_2 - float(angle)) < 1e-12 and math.isclose(
-        rest.frequency,
-        frequency,
-        rel_tol=1e-9,
-    )
+    assert abs(rest.place.theta_2 - float(angle)) < 1e-12
+    assert math.isclose(rest.frequency, frequency, rel_tol=1e-9)
     assert abs(float(angle) - 2.23433101898) < 5e-11
     for text in (
         f"{float(angle):.12f}",
@@ -448,12 +359,15 @@ def test_the_proposed_problem_rests_and_swings_as_its_page_says():
 
 
 def make_result(name, **answers):
-    return {
-        "schema": RESULT,
-        "problem": name,
-        "engine": "mine",
-        "answers": {**read_stored(name)["answers"], **answers},
-    }
+    answers = {**read_stored(name)["answers"], **answers}
+    stated = {"schema": RESULT, "problem": name, "engine": "mine"}
+    return {**stated, "answers": answers}
+
+
+def levels_of(name, **answers):
+    """Return the levels of the right answers, some of which are others."""
+    judged = judge_answers(read_stored(name), make_result(name, **answers))
+    return find_levels(judged)
 
 
 @pytest.mark.parametrize(
@@ -463,59 +377,34 @@ def make_result(name, **answers):
 def test_a_level_is_that_of_the_worst_position(error, level):
     torque = list(read_stored("newton_128")["answers"]["torque"])
     torque[7] += error * max(map(abs, torque))
-    levels = find_levels(
-        judge_answers(
-            read_stored("newton_128"), make_result("newton_128", torque=torque)
-        )
-    )
-    assert levels == {"motion": "A", "reactions": "A", "torque": level}
+    levels = {"motion": "A", "reactions": "A", "torque": level}
+    assert levels_of("newton_128", torque=torque) == levels
 
 
 @pytest.mark.parametrize(
     "torque", [None, [], [1.0], "x", [[1.0, 2.0]] * 37, [math.nan] * 37]
 )
 def test_an_answer_that_is_none_has_no_level(torque):
-    assert (
-        find_levels(
-            judge_answers(
-                read_stored("newton_128"), make_result("newton_128", torque=torque)
-            )
-        )["torque"]
-        == "-"
-    )
+    assert levels_of("newton_128", torque=torque)["torque"] == "-"
 
 
 def test_error_bars_are_allowed_where_they_are_larger():
     problem = read_stored("near_limit")
-    torque, bars = (
-        np.array(problem["answers"]["torque"]),
-        np.array(problem["errors"]["torque"]),
-    )
+    torque, bars = (np.array(problem[key]["torque"]) for key in ("answers", "errors"))
     assert (bars > LEVELS["A"] * np.abs(torque).max()).any()
-    assert (
-        find_levels(
-            judge_answers(
-                problem,
-                make_result("near_limit", torque=(torque + 0.9 * bars).tolist()),
-            )
-        )["torque"]
-        == "A"
-    )
+    beside = (torque + 0.9 * bars).tolist()
+    assert levels_of("near_limit", torque=beside)["torque"] == "A"
 
 
 def test_an_answer_at_its_own_motion_is_judged_there():
     problem = read_stored("crank_rocker")
     scene, command = read_question("crank_rocker")
-    moved = command._replace(
-        angle=command.angle + 1e-3,
-        speed=np.full(len(command.angle), 10.01),
-    )
+    speed = np.full(len(command.angle), 10.01)
+    moved = command._replace(angle=command.angle + 1e-3, speed=speed)
     theirs = fourbar.solve(scene, at=moved)
     answers = {name: getattr(theirs, name).tolist() for name in problem["answers"]}
-    answer_file = {
-        **make_result("crank_rocker", **answers),
-        "at": protocol.command_to_json(scene, moved),
-    }
+    answer_file = make_result("crank_rocker", **answers)
+    answer_file["at"] = protocol.command_to_json(scene, moved)
     assert set(find_levels(judge_answers(problem, answer_file)).values()) == {"A"}
     del answer_file["at"]
     assert set(find_levels(judge_answers(problem, answer_file)).values()) != {"A"}
@@ -540,10 +429,7 @@ def test_the_archive_holds_the_set_and_is_the_same_bytes_each_time(tmp_path):
     for name in ("one.zip", "two.zip"):
         assert lab_status(["problems", "--archive", str(tmp_path / name)]) == 0
     assert (tmp_path / "one.zip").read_bytes() == (tmp_path / "two.zip").read_bytes()
-    names = {
-        Path(name).name for name in zipfile.ZipFile(tmp_path / "one.zip").namelist()
-    }
-    assert {f"{name}.json" for name in NAMES} | {
-        f"{name}.svg" for name in NAMES
-    } <= names
+    archived = zipfile.ZipFile(tmp_path / "one.zip").namelist()
+    names = {Path(name).name for name in archived}
+    assert {f"{name}.{end}" for name in NAMES for end in ("json", "svg")} <= names
     assert {"LICENSE", "CITATION.cff", "benchmark.md"} <= names
