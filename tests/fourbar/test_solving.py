@@ -191,10 +191,8 @@ def test_where_the_status_is_ok_every_requested_quantity_is_a_number(scene, stag
     assert infinite == [], "no value is NaN, never infinite"
 
 
-PARALLELOGRAM, KITE = (
-    fourbar.uniform(1.0, 0.5, 1.0, 0.5),
-    fourbar.uniform(1.0, 0.5, 0.5, 1.0),
-)
+PARALLELOGRAM = fourbar.uniform(1.0, 0.5, 1.0, 0.5)
+KITE = fourbar.uniform(1.0, 0.5, 0.5, 1.0)
 CRANK_ROCKER = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
 
 

@@ -155,10 +155,8 @@ def test_only_a_page_with_the_token_from_this_address_is_answered(bench):
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[A-Za-z0-9_-]{32,}/", address)
         fetched = await AsyncHTTPClient(force_instance=True).fetch(address)
         assert fetched.code == 200 and b"Crank-rocker" in fetched.body
-        assert (
-            fetched.headers["Referrer-Policy"] == "no-referrer"
-            and fetched.headers["Cache-Control"] == "no-store"
-        )
+        assert fetched.headers["Referrer-Policy"] == "no-referrer"
+        assert fetched.headers["Cache-Control"] == "no-store"
         inside = address.split("/")[3] + "/scene.toml"
         for place in (
             "",
@@ -279,11 +277,9 @@ def test_error_bars_follow_and_every_page_sees_the_change(bench):
         assert not about["settled"] and "torque_error" not in str(about["columns"])
         for line in (first_page, second_page):
             about = await settled(line)
-            assert (
-                '"4 in"' in about["text"]
-                and "torque_error" in str(about["columns"])
-                and about["saved"] is False
-            )
+            assert '"4 in"' in about["text"]
+            assert "torque_error" in str(about["columns"])
+            assert about["saved"] is False
             assert "  torque   peak" in "".join(about["data"]["summary"])
         assert "refused" in await told(
             second_page, {"do": "set", "path": ["lengths", "input"], "value": "9 ft"}
@@ -365,16 +361,12 @@ def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
                     lambda about: "check" in about and not about["check"]["running"],
                 )
             )["check"]
-            assert (
-                check["lines"] == ["agrees"]
-                and check["report"]
-                and check["stopped"] is stopped
-            )
+            assert check["lines"] == ["agrees"]
+            assert check["report"]
+            assert check["stopped"] is stopped
         answer = await AsyncHTTPClient(force_instance=True).fetch(address + "report")
-        assert (
-            answer.body == b"<p>report"
-            and "sandbox" in answer.headers["Content-Security-Policy"]
-        )
+        assert answer.body == b"<p>report"
+        assert "sandbox" in answer.headers["Content-Security-Policy"]
         assert (folder / "check" / "scene.toml").read_text() == CRANK_ROCKER.read_text()
 
     bench(ask)
@@ -382,12 +374,10 @@ def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
 
 @pytest.mark.slow
 def test_a_change_overtakes_a_summary_that_is_being_computed(bench, monkeypatch):
-    evaluate, asked_for, released, summaries = (
-        session.evaluate_scene,
-        threading.Event(),
-        threading.Event(),
-        [],
-    )
+    evaluate = session.evaluate_scene
+    asked_for = threading.Event()
+    released = threading.Event()
+    summaries = []
 
     def slow(scene, units, *, settled=False, **options):
         if settled:  # the summary; a change is answered without it
@@ -620,13 +610,10 @@ def test_the_browser_gets_a_private_page_and_the_token_stands_in_no_list_of_proc
         wait_until(seen.exists)
         (opened_url,) = seen.read_text().split()
         redirect = Path(opened_url.removeprefix("file://"))
-        assert (
-            opened_url.startswith("file://") and address.split("/")[3] not in opened_url
-        )
-        assert (
-            redirect.stat().st_mode & 0o777 == 0o600
-            and f'url={address}"' in redirect.read_text().replace("0; ", "")
-        )
+        assert opened_url.startswith("file://")
+        assert address.split("/")[3] not in opened_url
+        assert redirect.stat().st_mode & 0o777 == 0o600
+        assert f'url={address}"' in redirect.read_text().replace("0; ", "")
         process.send_signal(2)
         process.communicate(timeout=20)
     assert not redirect.exists()

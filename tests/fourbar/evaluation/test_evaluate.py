@@ -115,10 +115,8 @@ def test_error_bars_are_of_the_size_of_the_error(name, kind, monkeypatch):
     if kind == "pairs of doubles":
         monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
     commanded = command(scene)
-    ours, exact = (
-        fourbar.solve(scene, "error"),
-        BallArithmetic().answer(scene, commanded),
-    )
+    ours = fourbar.solve(scene, "error")
+    exact = BallArithmetic().answer(scene, commanded)
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
         width, values = getattr(ours, bar), [getattr(ours, q) for q in quantities]
         error = np.max(
@@ -235,10 +233,8 @@ def test_what_gravity_drops_of_its_direction_shows_in_the_error_bar():
         Motion(1.5 * np.pi + np.linspace(-1e-3, 1e-3, 101), 1.0),
         effects=(Gravity(),),
     )
-    solution, exact = (
-        fourbar.solve(scene, "error"),
-        BallArithmetic().answer(scene, command(scene)),
-    )
+    solution = fourbar.solve(scene, "error")
+    exact = BallArithmetic().answer(scene, command(scene))
     error = np.abs(solution.torque - exact.quantities["torque"])
     assert (error <= printed.ERROR_BARS * solution.torque_error).all()
 

@@ -118,10 +118,8 @@ def motion(kind, number):
     lengths = KINDS[kind](rng)
     bars = []
     for length in lengths[1:]:
-        mass, centre = (
-            float(rng.uniform(0.2, 2.0)),
-            (length * float(rng.uniform(0.2, 0.8)), float(rng.uniform(-1, 1))),
-        )
+        mass = float(rng.uniform(0.2, 2.0))
+        centre = (length * float(rng.uniform(0.2, 0.8)), float(rng.uniform(-1, 1)))
         bars.append(
             fourbar.Bar(
                 length, mass, mass * length**2 * float(rng.uniform(0.05, 0.3)), centre
@@ -280,10 +278,8 @@ def test_the_reference_against_a_printed_answer():
         np.array([0.0, 10.0]),
     )
     end = theirs.theta_2[-1]
-    assert (
-        abs(np.cos(end) - 0.478385058) <= 0.5e-9
-        and abs(np.sin(end) - 0.878150179) <= 0.5e-9
-    )
+    assert abs(np.cos(end) - 0.478385058) <= 0.5e-9
+    assert abs(np.sin(end) - 0.878150179) <= 0.5e-9
     assert (
         theirs.change_points == 10
     )  # multiples of 180 deg between 90 deg and -1739 deg

@@ -462,11 +462,9 @@ def refused(arguments, words, folder, capsys):
     assert time.process_time() - started < PATIENCE
     printed = capsys.readouterr()
     assert printed.out == ""
-    assert (
-        printed.err.startswith("error: ")
-        and printed.err.endswith("\n")
-        and printed.err.count("\n") == 1
-    )
+    assert printed.err.startswith("error: ")
+    assert printed.err.endswith("\n")
+    assert printed.err.count("\n") == 1
     assert "Traceback" not in printed.err and len(printed.err) <= LONGEST_LINE
     assert printed.err[:-1].isprintable()
     for word in words:

@@ -139,9 +139,8 @@ def test_a_force_between_two_bars_in_line_does_not_exist():
         force = solve_between(2.0, 3.0, u, v, cross(u, v))
     assert not np.isfinite(force[0])
     u, v, force = u[1:], v[1:], force[1:]
-    assert cross(u, force) == pytest.approx([2.0, 2.0]) and cross(
-        v, force
-    ) == pytest.approx([3.0, 3.0])
+    assert cross(u, force) == pytest.approx([2.0, 2.0])
+    assert cross(v, force) == pytest.approx([3.0, 3.0])
 
 
 def test_bars_without_mass_hold_a_load_where_the_input_turns_back():

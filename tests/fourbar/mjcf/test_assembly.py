@@ -344,7 +344,8 @@ def test_drake_loads_the_sdf_and_moves_as_released():
     assert pulls[0] < FORCE * abs(complex(*ours.F32[-1])), (
         "the force at A as the comment says"
     )
-    assert abs(missed[1]) < 1e-2 and missed[1] / missed[0] == pytest.approx(
+    assert abs(missed[1]) < 1e-2
+    assert missed[1] / missed[0] == pytest.approx(
         0.5,
         rel=FIRST_ORDER,
     )
@@ -368,10 +369,8 @@ def test_the_pin_at_B_alone_closes_the_loop_from_outside():
     ]
 
 
-LOADED, AT_B = (
-    crank_rocker(loads=(fourbar.Load(4, moment=1.0),)),
-    (fourbar.Viscous.at(B=1.0),),
-)
+LOADED = crank_rocker(loads=(fourbar.Load(4, moment=1.0),))
+AT_B = (fourbar.Viscous.at(B=1.0),)
 
 
 @pytest.mark.parametrize(
@@ -411,11 +410,9 @@ def test_without_loads_every_model_is_written_and_says_how_to_start(write):
             np.array([theta_2]), np.array([scene.motion.branch]), omega_2, 0.0
         )
         s = fourbar.solve(scene, "velocity", at=command)
-        assert (
-            s.omega_3 is not None
-            and s.omega_4 is not None
-            and omega_2 == scene.motion.omega_2
-        )
+        assert s.omega_3 is not None
+        assert s.omega_4 is not None
+        assert omega_2 == scene.motion.omega_2
         expected = [s.theta_3[0], s.theta_4[0], s.omega_3[0] - omega_2, s.omega_4[0]]
         written = [*stated[1:3], *stated[4:]]
         assert (

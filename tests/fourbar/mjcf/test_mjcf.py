@@ -80,16 +80,12 @@ def run_alone(scene):
 
     Worst gap, worst speed, angle still missing at the end.
     """
-    assert (
-        isinstance(scene.motion.theta_2, fourbar.Sweep)
-        and scene.motion.omega_2 is not None
-    )
+    assert isinstance(scene.motion.theta_2, fourbar.Sweep)
+    assert scene.motion.omega_2 is not None
     model, data = at_keyframe(scene)
-    start, stop, omega = (
-        scene.motion.theta_2.start,
-        scene.motion.theta_2.stop,
-        scene.motion.omega_2,
-    )
+    start = scene.motion.theta_2.start
+    stop = scene.motion.theta_2.stop
+    omega = scene.motion.omega_2
     open_by = speed = 0.0
     for _ in range(round((stop - start) / abs(omega) / model.opt.timestep)):
         mujoco.mj_step(model, data)
@@ -179,10 +175,8 @@ def test_the_joints_count_the_turns_of_every_spring():
     _, data = opened(crank_rocker(motion=fourbar.Motion(1.0, 10.0), effects=(springs,)))
     at_O2, at_A, at_O4 = data.qpos
     assert gap(data) < OPEN
-    assert (
-        abs(at_O4 - rests["O4"]) < math.pi
-        and abs(at_O4 - at_O2 - at_A - rests["B"]) < math.pi
-    )
+    assert abs(at_O4 - rests["O4"]) < math.pi
+    assert abs(at_O4 - at_O2 - at_A - rests["B"]) < math.pi
 
 
 @pytest.mark.slow

@@ -126,11 +126,9 @@ def test_a_mistake_is_one_line(make, words):
 
 PI = Fraction(314159265358979323846264338327950288419716939937510582097494459, 10**62)
 """To 63 digits (A000796 of the On-Line Encyclopedia of Integer Sequences)."""
-FOOT, POUND, GRAVITY = (
-    Fraction(3048, 10_000),
-    Fraction(45_359_237, 100_000_000),
-    Fraction(980_665, 100_000),
-)
+FOOT = Fraction(3048, 10_000)
+POUND = Fraction(45_359_237, 100_000_000)
+GRAVITY = Fraction(980_665, 100_000)
 """m; kg; m/s^2: exact by definition."""
 UNITS = {
     **dict.fromkeys(("meter", "m", "metre"), ("m", 1)),

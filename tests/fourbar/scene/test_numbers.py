@@ -97,10 +97,8 @@ def test_velocity_and_acceleration_are_derivatives():
 def test_positions_alone_have_no_velocities_of_points():
     posed = scene(*POINTS, motion=Motion(1.0))
     s = solve(posed)
-    assert (
-        list(s.points) == [point.name for point in POINTS]
-        and s.velocity == {} == s.acceleration
-    )
+    assert list(s.points) == [point.name for point in POINTS]
+    assert s.velocity == {} == s.acceleration
     assert json.loads(write_json(s))["v_P"] is None
     out = {"a_P": np.zeros((1, 2))}
     s = solve(scene(*POINTS, motion=Motion(1.0, 2.0)), out=out)
@@ -110,10 +108,8 @@ def test_positions_alone_have_no_velocities_of_points():
 @pytest.mark.slow
 def test_every_table_has_their_columns():
     s = solve(scene(*POINTS))
-    document, head = (
-        json.loads(write_json(s)),
-        write_csv(s).split("\n", 1)[0].split(","),
-    )
+    document = json.loads(write_json(s))
+    head = write_csv(s).split("\n", 1)[0].split(",")
     frame, shown = s.to_pandas(), list_columns(s)
     for start, arrays in (("", s.points), ("v_", s.velocity), ("a_", s.acceleration)):
         for point in POINTS:
@@ -140,14 +136,11 @@ def test_a_study_varies_them_and_lists_its_members():
     )
     np.testing.assert_array_equal(s.acceleration["P"][1], alone.acceleration["P"])
     frame = s.to_pandas()
-    assert (
-        len(frame) == s.theta_2.size and frame["member"].tolist() == [0] * 61 + [1] * 61
-    )
+    assert len(frame) == s.theta_2.size
+    assert frame["member"].tolist() == [0] * 61 + [1] * 61
     assert np.array_equal(frame["a_P_x"].to_numpy()[61:], alone.acceleration["P"][:, 0])
-    assert (
-        np.shape(json.loads(write_json(s))["torque"]) == (2, 61)
-        and "2 linkages" in s._repr_html_()
-    )
+    assert np.shape(json.loads(write_json(s))["torque"]) == (2, 61)
+    assert "2 linkages" in s._repr_html_()
 
 
 def test_a_file_holds_them(tmp_path):
@@ -192,11 +185,9 @@ def test_a_wrong_point_is_refused_in_one_line(name):
     line, words = WRONG[name]
     with pytest.raises(InputError) as caught:
         loads(dump(scene()) + f"\n[points]\n{line}\n")
-    assert (
-        words in str(caught.value)
-        and "points" in str(caught.value)
-        and "\n" not in str(caught.value)
-    )
+    assert words in str(caught.value)
+    assert "points" in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_two_points_of_one_name_are_refused():

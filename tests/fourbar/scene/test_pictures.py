@@ -107,9 +107,9 @@ def test_a_name_that_leads_elsewhere_is_refused_when_the_file_is_read(
     file = scene_file(inner, name)
     assert status(["analyze", str(file)]) == 2
     (line,) = capsys.readouterr().err.strip().split("\n")
-    assert (
-        str(file) in line and "bars.coupler.picture" in line and "PNG or JPEG" in line
-    )
+    assert str(file) in line
+    assert "bars.coupler.picture" in line
+    assert "PNG or JPEG" in line
 
 
 def test_a_picture_that_is_no_text_is_refused():

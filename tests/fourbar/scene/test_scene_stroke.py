@@ -115,11 +115,9 @@ def test_error_bars_hold_what_the_angle_of_a_stroke_loses(bar, strokes):
     s = fourbar.solve(
         fourbar.vary(by_stroke, {"lengths.ground_angle": angles}), "error"
     )
-    assert (
-        (s.status_code == 0).all()
-        and s.drive_force is not None
-        and s.drive_force_error is not None
-    )
+    assert (s.status_code == 0).all()
+    assert s.drive_force is not None
+    assert s.drive_force_error is not None
     for place, stroke in enumerate(strokes):
         reference = compute_reference(
             replace(by_stroke, motion=by_stroke.motion.replace(angle=stroke)), 1, stroke
@@ -189,10 +187,8 @@ def test_a_member_whose_cylinder_cannot_have_the_stroke_does_not_assemble():
             scene(2, 0.3, stroke_speed=0.2), {"motion.stroke": [0.1, 0.3, 0.5]}
         )
     )
-    assert (
-        solution.status == [["not_assembled", "ok", "not_assembled"]]
-        and np.isnan(solution.theta_2[0, ::2]).all()
-    )
+    assert solution.status == [["not_assembled", "ok", "not_assembled"]]
+    assert np.isnan(solution.theta_2[0, ::2]).all()
 
 
 @pytest.mark.parametrize("bar, stroke", [(2, 0.3), (4, 0.48)])

@@ -99,9 +99,8 @@ def test_the_json_holds_the_duty():
     s = fourbar.solve(scene)
     duty, entry = motor_duty(s), write_motor(scene, s, units("imperial"))
     inch_pound = 0.0254 * 0.45359237 * 9.80665
-    assert (
-        entry["units"]["rms_power"] == "hp" and entry["units"]["energy_out"] == "lbf in"
-    )
+    assert entry["units"]["rms_power"] == "hp"
+    assert entry["units"]["energy_out"] == "lbf in"
     assert (
         abs(entry["rms_power"] * 6600.0 * inch_pound - duty.rms_power)
         < ROUND_OFF * duty.rms_power
@@ -129,12 +128,10 @@ def test_a_study_has_what_each_of_its_members_has():
     turn = np.linspace(0.1, 0.1 + 2.0 * np.pi, 61)
     theta_2 = np.array([turn, turn, np.linspace(0.1, 3.0, 61), turn])
     s = fourbar.solve(fourbar.vary(scene, {**values, "motion.theta_2": theta_2}))
-    force, moment, duty, load = (
-        shaking_force(s),
-        shaking_moment(s),
-        motor_duty(s),
-        bearing_load(s, "A"),
-    )
+    force = shaking_force(s)
+    moment = shaking_moment(s)
+    duty = motor_duty(s)
+    load = bearing_load(s, "A")
     assert force.shape == (4, 61, 2) and moment.shape == (4, 61) and duty is not None
     for member in range(3):
         d, angle = (float(array[member]) for array in values.values())
@@ -161,11 +158,9 @@ def test_a_study_has_what_each_of_its_members_has():
                     assert array is None or np.isnan(array[member])
                 else:
                     assert number == pytest.approx(array[member], rel=1e-12)
-    assert (
-        np.isnan(load.largest[3])
-        and np.isnan(duty.rms_power[3])
-        and np.isnan(moment[3]).all()
-    )
+    assert np.isnan(load.largest[3])
+    assert np.isnan(duty.rms_power[3])
+    assert np.isnan(moment[3]).all()
     assert np.isnan([duty.energy_in[3], duty.energy_out[3]]).all()
     assert duty.closed.tolist()[:3] == [True, True, False]
     speeds = {"motion.omega_2": np.array([0.0, 3.0]), "motion.theta_2": turn}

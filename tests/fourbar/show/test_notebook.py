@@ -145,11 +145,9 @@ def test_a_new_scene_never_replaces_a_file(tmp_path, capsys):
 
 def test_results_say_in_ten_lines_what_they_hold():
     scene = crank_rocker(tolerances=(fourbar.Tolerance("lengths.input", 1e-4),))
-    solution, slopes, spread = (
-        fourbar.solve(scene),
-        fourbar.sensitivity(scene),
-        fourbar.tolerances(scene, 64),
-    )
+    solution = fourbar.solve(scene)
+    slopes = fourbar.sensitivity(scene)
+    spread = fourbar.tolerances(scene, 64)
     study = fourbar.vary(scene, {"lengths.input": np.array([0.1, 0.11, 3.0])})
     for shown in (
         solution,
@@ -175,10 +173,8 @@ def test_results_say_in_ten_lines_what_they_hold():
             fourbar.Scene(scene.linkage, fourbar.Motion(1.0)), {"lengths.input": 0.1}
         )
     )
-    assert (
-        "1 linkage, 1 position each" in repr(one)
-        and "1 linkage, 1 position each" in one._repr_html_()
-    )
+    assert "1 linkage, 1 position each" in repr(one)
+    assert "1 linkage, 1 position each" in one._repr_html_()
     lengths = {
         key: number
         for key, number in zip(slopes.keys, slopes.numbers, strict=True)
@@ -197,9 +193,9 @@ def test_results_say_in_ten_lines_what_they_hold():
     assert f"sigma up to {spread.spreads['torque'].deviation.max():.3g}" in repr(spread)
     for outcome in (slopes, spread):
         shown = outcome._repr_html_()
+        assert shown.count("<tr>") == 8
         assert (
-            shown.count("<tr>") == 8
-            and HOSTILE
+            HOSTILE
             not in replace(outcome, scene=replace(scene, title=HOSTILE))._repr_html_()
         )
 
@@ -213,9 +209,8 @@ def test_sensitivities_and_tolerances_as_pandas_and_by_one_set_of_names():
     rows = table[table["key"] == "lengths.input"]
     for name in ("torque", "F12_x", "|F12|", "|F14|", "A_y"):
         assert np.array_equal(rows[name].to_numpy(), slopes.of(name, "lengths.input"))
-    assert set(spread.spreads) <= set(table.columns) and all(
-        np.isfinite(slopes.value(name)).all() for name in spread.spreads
-    )
+    assert set(spread.spreads) <= set(table.columns)
+    assert all(np.isfinite(slopes.value(name)).all() for name in spread.spreads)
     step = 1e-6
     sides = [
         fourbar.solve(fourbar.vary(scene, {"lengths.input": [0.1 + sign * step]})).F12[

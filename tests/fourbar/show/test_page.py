@@ -250,10 +250,8 @@ def test_another_command_is_the_axis_and_the_linkage_follows(
     driver, s = browse(animate.write_page(scene)), fourbar.solve(scene)
     driver.execute_script("go(20)")
     assert driver.find_element("id", "theta-text").text == place
-    assert (
-        driver.find_element("id", "over").text == over
-        and pace in driver.find_element("id", "pace").text
-    )
+    assert driver.find_element("id", "over").text == over
+    assert pace in driver.find_element("id", "pace").text
     assert not driver.find_element("id", "branch").is_displayed()
     names = ("theta_2", "theta_3", "theta_4")
     assert shown(driver, *names) == pytest.approx(
@@ -274,9 +272,8 @@ def test_another_command_is_the_axis_and_the_linkage_follows(
     assert abs(state_of(driver, "row") - 20) <= 2
     closed = [i for i in range(41) if s.assembled[i]]
     rows = clockwork(driver, 400)
-    assert (min(rows), max(rows)) == (closed[0], closed[-1]) and np.abs(
-        np.diff(rows)
-    ).max() <= 1
+    assert (min(rows), max(rows)) == (closed[0], closed[-1])
+    assert np.abs(np.diff(rows)).max() <= 1
     driver.execute_script("play(false); go(0)")
     assert driver.find_element("id", "status").is_displayed() == (not s.assembled[0])
 
@@ -367,15 +364,11 @@ def test_what_is_downloaded_is_the_scene_on_the_branch_shown(browse, tmp_path):
     ):  # made empty at first
         time.sleep(0.02)
     saved = loads(saved_file.read_text())
-    assert (
-        saved.linkage == scene.linkage
-        and saved.loads == scene.loads
-        and saved.title == "a\\nb"
-    )
-    assert (
-        saved.motion.branch == -1
-        and saved.motion.angle.tolist() == scene.motion.angle.tolist()
-    )
+    assert saved.linkage == scene.linkage
+    assert saved.loads == scene.loads
+    assert saved.title == "a\\nb"
+    assert saved.motion.branch == -1
+    assert saved.motion.angle.tolist() == scene.motion.angle.tolist()
 
 
 def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse):

@@ -55,9 +55,8 @@ def test_every_number_is_in_the_unit_that_is_named(capsys):
         out = capsys.readouterr().out
         if form == "--json":
             document = json.loads(out)
-            assert document["angle_unit"] == "deg" and set(document["units"]) <= set(
-                document
-            )
+            assert document["angle_unit"] == "deg"
+            assert set(document["units"]) <= set(document)
             printed = {
                 name: (np.array(document[name], dtype=float), unit)
                 for name, unit in document["units"].items()
@@ -67,11 +66,9 @@ def test_every_number_is_in_the_unit_that_is_named(capsys):
             column = next(
                 index for index, name in enumerate(header) if name.startswith("F12_y")
             )
-            assert (
-                header[column] == "F12_y [lbf]"
-                and "torque [lbf in]" in header
-                and "condition" in header
-            )
+            assert header[column] == "F12_y [lbf]"
+            assert "torque [lbf in]" in header
+            assert "condition" in header
             assert float(rows[90][column]) * POUND == pytest.approx(
                 solution.F12[90, 1], rel=1e-14
             )
@@ -100,9 +97,8 @@ def test_a_spreadsheet_of_decimal_commas_has_magnitudes_power_and_time(capsys):
     scene = fourbar.load(MODEL)
     assert status(["analyze", str(MODEL), "--csv-comma", "--units", "mm kW"]) == HOLDS
     header, *rows = csv.reader(io.StringIO(capsys.readouterr().out), delimiter=";")
-    assert {len(row) for row in rows} == {len(header)} and not any(
-        "." in cell for row in rows for cell in row
-    )
+    assert {len(row) for row in rows} == {len(header)}
+    assert not any("." in cell for row in rows for cell in row)
     solution = fourbar.solve(scene)
     wanted = {
         "|F14| [N]": np.hypot(*solution.F14.T),
@@ -165,11 +161,9 @@ def test_what_is_no_list_of_units_is_refused(text, capsys):
 
 
 def test_units_are_read_as_people_write_them():
-    assert (
-        units("mm, N,lbf-in") == units("mm N lbf-in")
-        and units("Imperial") == units("imperial")
-        and not units("si")
-    )
+    assert units("mm, N,lbf-in") == units("mm N lbf-in")
+    assert units("Imperial") == units("imperial")
+    assert not units("si")
     with pytest.raises(InputError, match=r'lb-in.*did you mean "lbf-in"'):
         units("mm lb-in")
 

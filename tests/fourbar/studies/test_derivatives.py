@@ -62,9 +62,8 @@ def test_where_there_is_no_derivative_a_status_says_why():
     assert rest.status == ["at_rest"] * len(ANGLES)
     assert np.isnan(rest.by["torque"]).all() and np.isfinite(rest.by["a_G3"]).all()
     jammed = sensitivity(scene((PinFriction.at(A=(9.0, 2.0)),), 2))
-    assert (
-        set(jammed.status) <= {"jammed", "several"} and np.isnan(jammed.by["F12"]).all()
-    )
+    assert set(jammed.status) <= {"jammed", "several"}
+    assert np.isnan(jammed.by["F12"]).all()
     apart = fourbar.Scene(
         fourbar.uniform(0.2, 0.48, 0.55, 0.2),
         fourbar.Motion(np.array([0.0, 1.2, np.pi]), 1.0),
@@ -167,10 +166,8 @@ def test_the_command_ranks_the_numbers_and_writes_them_all(capsys, tmp_path):
         == 0
     )
     document = json.loads(out.read_text())
-    assert (
-        document["schema"] == "fourbar-sensitivity/1"
-        and document["keys"]["lengths.input"]["unit"] == "m"
-    )
+    assert document["schema"] == "fourbar-sensitivity/1"
+    assert document["keys"]["lengths.input"]["unit"] == "m"
     slopes = sensitivity(fourbar.load(models / "crank_rocker.toml"))
     np.testing.assert_array_equal(
         document["by"]["F12"]["lengths.input"], slopes.of("F12", "lengths.input")

@@ -81,11 +81,9 @@ def test_samples_agree_with_first_order_where_it_is_straight_and_so_do_the_share
             np.testing.assert_allclose(
                 np.sqrt(share), one.spreads[name].deviation, rtol=QUASI
             )
-        assert (
-            (of_both.least <= of_both.low).all()
-            and (of_both.low < of_both.nominal).all()
-            and (of_both.high <= of_both.greatest).all()
-        )
+        assert (of_both.least <= of_both.low).all()
+        assert (of_both.low < of_both.nominal).all()
+        assert (of_both.high <= of_both.greatest).all()
 
 
 def test_the_same_seed_gives_the_same_samples_in_blocks_of_any_size(monkeypatch):
@@ -203,19 +201,15 @@ def test_the_command_prints_draws_and_writes(tmp_path, capsys):
     )
     rows = capsys.readouterr().out
     in_N_mm = re.search(r"^torque N mm +\S+ +(\S+)", rows, re.M)
-    assert (
-        nominal
-        and in_N_mm
-        and float(in_N_mm[1]) == pytest.approx(1000.0 * float(nominal[1]), rel=1e-5)
-    )
+    assert nominal
+    assert in_N_mm
+    assert float(in_N_mm[1]) == pytest.approx(1000.0 * float(nominal[1]), rel=1e-5)
     assert re.search(r"unit +rad +nominal", rows)
     assert status(["tolerance", str(scene), "--samples", "64", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     torque = document["quantities"]["torque"]
-    assert (
-        len(torque["deviation"]) == 13
-        and document["tolerances"]["lengths.coupler"]["distribution"] == "normal"
-    )
+    assert len(torque["deviation"]) == 13
+    assert document["tolerances"]["lengths.coupler"]["distribution"] == "normal"
     scene.write_text(
         text + TABLE + '\n[points]\nv = { bar = 3, from_pin = ["5 cm", "20 deg"] }\n'
     )
@@ -234,12 +228,10 @@ def test_the_share_that_is_done_is_told_from_the_start_and_reaches_all_of_it():
     told = []
     scene = crank_rocker(tolerances=(Tolerance("lengths.input", 5e-5),))
     tolerances(scene, 16384, progress=told.append)
-    assert (
-        told[0] == 0.0
-        and told[-1] == 1.0
-        and len(told) > 3
-        and np.all(np.diff(told) > 0.0)
-    )
+    assert told[0] == 0.0
+    assert told[-1] == 1.0
+    assert len(told) > 3
+    assert np.all(np.diff(told) > 0.0)
 
 
 DRAWN = """\

@@ -253,10 +253,8 @@ def test_a_key_has_the_unit_that_a_scene_file_has():
     linkage = FourBar(
         0.3, *(Bar(size, 0.2, 0.001, (0.04, 0.2)) for size in (0.1, 0.25, 0.22)), 0.4
     )
-    acting, points = (
-        (*DRIVEN, PinFriction.at(A=(0.1, 0.01))),
-        (Point("P", 3, (0.1, 0.2)),),
-    )
+    acting = (*DRIVEN, PinFriction.at(A=(0.1, 0.01)))
+    points = (Point("P", 3, (0.1, 0.2)),)
     scene = Scene(
         linkage,
         Motion(ANGLES, 2.0, alpha_2=0.5),

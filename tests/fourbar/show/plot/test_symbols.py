@@ -74,10 +74,8 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything):
         theta_3, theta_4 = solution.theta_3[index], solution.theta_4[index]
         tail, tip = (complex(*point) for point in drawn["load 1"].lines[0])
         expected = complex(*solution.G3[index]) + cmath.rect(0.03, 1.0 + theta_3)
-        assert (
-            abs(tail - expected) < 1e-15
-            and abs(cmath.phase((tip - tail) / cmath.rect(1.0, 0.5 + theta_3))) < 1e-12
-        )
+        assert abs(tail - expected) < 1e-15
+        assert abs(cmath.phase((tip - tail) / cmath.rect(1.0, 0.5 + theta_3))) < 1e-12
         tail, tip = (complex(*point) for point in drawn["load 2"].lines[0])
         factor = float(TABLED.table.at(solution.theta_2[index]))
         assert abs(tail - complex(*solution.G4[index])) < 1e-15
@@ -120,7 +118,8 @@ def test_nothing_at_a_pin_hides_a_bar_and_what_lies_off_a_bar_is_joined_to_it(
     draw_mechanism(axes, shown, shown.here, 0, Labels())
     bars = [line for line in axes.lines if line.get_linewidth() == 4.5]
     rings = [line for line in axes.lines if len(line.get_xdata()) > 30]
-    assert len(rings) >= 5 and all(
+    assert len(rings) >= 5
+    assert all(
         line.get_zorder() < min(bar.get_zorder() for bar in bars) for line in rings
     )
     pins = [np.zeros(2), factor * shown.here.A[0]]
@@ -195,10 +194,8 @@ def test_the_points_of_a_scene_are_drawn_where_they_are():
         line = next(line for line in panel.lines if line.get_label() == "P")
         assert np.allclose(line.get_ydata(), np.hypot(*of_points["P"].T), rtol=1e-15)
     data = collect_page_data(scene, {})
-    assert (
-        data["points"][0]["name"] == "P"
-        and abs(complex(*data["points"][0]["at"]) - cmath.rect(0.15, 0.7)) < 1e-15
-    )
+    assert data["points"][0]["name"] == "P"
+    assert abs(complex(*data["points"][0]["at"]) - cmath.rect(0.15, 0.7)) < 1e-15
 
 
 @pytest.mark.slow
