@@ -135,10 +135,7 @@ class InputError(FourBarError):
             value = value.item()
         shown = " ".join(repr(value).split())  # arrays take several lines
         if unit is not None:
-            if isinstance(value, tuple):
-                numbers = value
-            else:
-                numbers = (value,)
+            numbers = value if isinstance(value, tuple) else (value,)
             shown = write_in_units(unit, *map(float, numbers))
         shown = abbreviate(shown, LONGEST_VALUE)  # of a long path the end says which
         prefix = f"{file}: " if file else ""

@@ -525,10 +525,7 @@ def _list_quantities(solution: "Solution") -> list[str]:
     """
     left_out: tuple[str, ...] = LINE_QUANTITIES
     if solution.drive is not None:
-        if solution.drive.has_stroke:
-            left_out = ()
-        else:
-            left_out = (STROKE,)
+        left_out = () if solution.drive.has_stroke else (STROKE,)
     names = [
         name
         for name in UNITS

@@ -270,10 +270,7 @@ def name_entry(path: Iterable[str | int]) -> str:
 
 def _find_table(table: Any, path: KeyPath) -> Any:
     for step in path:
-        if isinstance(table, dict):
-            table = table.get(step)
-        else:
-            table = None
+        table = table.get(step) if isinstance(table, dict) else None
     return table
 
 

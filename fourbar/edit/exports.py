@@ -67,10 +67,7 @@ def evaluate_scene(
 
     Raises NotAssembledError where no position assembles, InputError as `solve` does.
     """
-    if settled:
-        stage = find_last_stage(scene)
-    else:
-        stage = None
+    stage = find_last_stage(scene) if settled else None
     solution = solve(scene, stage)
     if not solution.assembled.any():
         raise NotAssembledError(say_nowhere(scene))

@@ -10,11 +10,11 @@ largest value and no integral.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Legendre
-from numpy.polynomial.legendre import leggauss, legvander
+from numpy.polynomial.legendre import leggauss, legval, legvander
 from numpy.typing import NDArray
 
 from fourbar.quantities import Array
@@ -306,8 +306,8 @@ class Panels:
         x = (_X if self.located else np.zeros(1))[node]
         values = sizes[rows, node]
         may_exceed = smooth & (best + 2.0 * terms >= best.max())
-        for panel in np.flatnonzero(may_exceed).tolist():
-            x[panel], values[panel] = _search_extreme(curve.series[panel], rank)
+        places, extremes = _search_extremes(curve.series[may_exceed], rank)
+        x[may_exceed], values[may_exceed] = places, extremes
         ranks = np.where(np.isfinite(values), rank(values), -np.inf)
         first = int(np.argmax(ranks >= ranks.max() - TIED * scale))
         for after in range(first + 1, len(ranks)):
@@ -329,26 +329,24 @@ def _measure(values: Array) -> Array:
     return np.asarray(np.hypot.reduce(values, axis=-1))
 
 
-def _evaluate_panel(series: Array, x: Array) -> Array:
-    """Return the polynomial of a panel, or the size of a vector of them, at places."""
-    return _measure(legvander(x, NODES - 1) @ series)
-
-
-def _search_extreme(
+def _search_extremes(
     series: Array, rank: Callable[[Array], Array]
-) -> tuple[float, float]:
-    """Find the first place at which a polynomial ranks highest, and its value."""
-    low = -1.0 + _INSIDE
-    high = 1.0 - _INSIDE
+) -> tuple[Array, Array]:
+    """Find the first place at which each polynomial ranks highest, and its value."""
+    rows = np.arange(len(series))
+    terms = np.moveaxis(series, 1, 0)[:, :, None]
+    low = np.full(len(series), -1.0 + _INSIDE)
+    high = np.full(len(series), 1.0 - _INSIDE)
     for _ in range(_SEARCH_ROUNDS):
-        x = np.linspace(low, high, _SEARCH_PARTS + 1)
-        values = _evaluate_panel(series, x)
+        x = np.linspace(low, high, _SEARCH_PARTS + 1, axis=1)
+        evaluated: Any = legval(x[..., None], terms, tensor=False)
+        values = _measure(evaluated)
         ranks = rank(values)
-        slack = _FLAT * np.abs(values).max()
-        best = int(np.argmax(ranks >= ranks.max() - slack))
-        low = x[max(best - 1, 0)]
-        high = x[min(best + 1, _SEARCH_PARTS)]
-    return float(x[best]), float(values[best])
+        slack = _FLAT * np.abs(values).max(axis=1)
+        best = np.argmax(ranks >= (ranks.max(axis=1) - slack)[:, None], axis=1)
+        low = x[rows, np.maximum(best - 1, 0)]
+        high = x[rows, np.minimum(best + 1, _SEARCH_PARTS)]
+    return x[rows, best], values[rows, best]
 
 
 def _find_panel_zeros(series: Array) -> Array:

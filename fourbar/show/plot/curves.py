@@ -82,14 +82,8 @@ def draw_axes(axes: "Axes", view: View) -> Array:
     is_gap = np.concatenate([[False], ~view.sweep.assembled, [False]])
     edges = np.flatnonzero(is_gap[1:] != is_gap[:-1])
     for first, after in edges.reshape(-1, 2):
-        if first == 0:
-            start = low
-        else:
-            start = 0.5 * (over[first - 1] + over[first])
-        if after == len(over):
-            stop = high
-        else:
-            stop = 0.5 * (over[after - 1] + over[after])
+        start = low if first == 0 else 0.5 * (over[first - 1] + over[first])
+        stop = high if after == len(over) else 0.5 * (over[after - 1] + over[after])
         axes.axvspan(
             start,
             stop,
@@ -391,10 +385,7 @@ def _draw_drive(
         unit,
         view.units,
     )
-    if bar:
-        symbol = f"${letter}_{bar}$"
-    else:
-        symbol = f"${letter}$"
+    symbol = f"${letter}_{bar}$" if bar else f"${letter}$"
     plot_between_poles(axes, over, factor * values, poles, color=INK, label=symbol)
     for index in poles:
         axes.axvline(
@@ -707,10 +698,7 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
     finite = np.isfinite(direction)
     free = _find_free_direction(direction[finite])
     direction[finite] = np.unwrap(direction[finite])
-    if limit:
-        size = np.where(size_here <= top, size_here, np.nan)
-    else:
-        size = size_here
+    size = np.where(size_here <= top, size_here, np.nan) if limit else size_here
     plot_between_poles(axes, direction, factor * size, poles, **look)
     axes.plot(
         direction[dots],

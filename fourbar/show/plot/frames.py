@@ -102,10 +102,7 @@ class _LabelPicture(Artist):
     def put(self, point: Array, away: complex) -> None:
         """Put the picture beside a point (px), towards a direction of length 1."""
         height, width = self._pixels.shape[:2]
-        if abs(away.real) < 0.5:
-            share_left = 0.5
-        else:
-            share_left = float(away.real < 0.0)
+        share_left = 0.5 if abs(away.real) < 0.5 else float(away.real < 0.0)
         per_point = FILM_DPI / 72.0
         left = point[0] + 8.0 * per_point * away.real - share_left * width
         bottom = point[1] + 11.0 * per_point * away.imag - 0.5 * height

@@ -230,10 +230,7 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
         default=0.0,
     )
     longest = max(view.scene.linkage.bar(bar).length for bar in MOVING_BARS)
-    if biggest > 0.0:
-        scale = 0.75 * longest / biggest
-    else:
-        scale = 0.0
+    scale = 0.75 * longest / biggest if biggest > 0.0 else 0.0
     # one window size: the bars, too, are to one scale
     span = LABEL_SPACE * max(
         float(np.ptp(_reach(v, bar, arrows, scale), axis=0).max())

@@ -105,10 +105,7 @@ class Labels:
             half = (0.5 * extent.width + per_point, 0.5 * extent.height + per_point)
             x, y = axes.transData.transform(label.at)
             sx, sy = axes.transData.transform(label.shun)
-            if (x, y) != (sx, sy):
-                away = math.atan2(y - sy, x - sx)
-            else:
-                away = math.pi / 2
+            away = math.atan2(y - sy, x - sx) if (x, y) != (sx, sy) else math.pi / 2
             room = rooms[axes]
             beside = label.at[0] + label.ring, label.at[1]
             ring = float(axes.transData.transform(beside)[0] - x)

@@ -143,10 +143,7 @@ def list_acting(scene: Scene) -> list[Symbol]:
     for number, load in enumerate(scene.loads, 1):
         G = scene.linkage.bar(load.bar).to_centre
         if load.force is not None and load.force[0] != 0.0:
-            if load.arm is None:
-                arm = 0.0j
-            else:
-                arm = cmath.rect(*load.arm)
+            arm = 0j if load.arm is None else cmath.rect(*load.arm)
             symbols.append(
                 Symbol(
                     "force",
@@ -495,10 +492,7 @@ def _draw_turning_arrow(
 def _draw_zigzag(start: complex, end: complex, width: float) -> Any:
     """Draw a coil spring seen from the side: straight ends, teeth between."""
     along = end - start
-    if along:
-        across = 1j * along / abs(along) * width
-    else:
-        across = 0.0
+    across = 1j * along / abs(along) * width if along else 0.0
     points = [start, start + 0.15 * along]
     for tooth in range(COILS):
         share = 0.15 + 0.7 * (tooth + 0.5) / COILS

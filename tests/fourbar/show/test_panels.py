@@ -4,7 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from numpy.polynomial.legendre import legval
 
+from fourbar.show import panels as of_panels
 from fourbar.show.panels import Wanted, fit_panels
 
 EDGES = np.linspace(0.0, 2.0, 6)
@@ -158,3 +160,18 @@ def test_zeros_are_changes_of_sign_on_and_off_the_ends_of_panels():
 def test_rounding_need_not_settle():
     panels = fit(lambda x: 1e-13 * draw_noise(x), rounding=1e-12)
     assert panels.find_rms("curve") < 1e-12
+
+
+def test_the_panels_of_many_waves_are_searched_at_once(monkeypatch):
+    """200 waves are some hundred panels, each of which may have the first peak."""
+    fitted = fit(lambda x: np.sin(200.0 * np.pi * x), np.linspace(0.0, 2.0, 97))
+    searched = []
+
+    def evaluate(x, *series, **options):
+        searched.append(len(x))
+        return legval(x, *series, **options)
+
+    monkeypatch.setattr(of_panels, "legval", evaluate)
+    peak = fitted.find_peak("curve", 1)
+    assert peak == pytest.approx((1.0, 0.0025), rel=1e-6)
+    assert len(searched) < 10 < min(searched)
