@@ -5,6 +5,8 @@ What every effect costs is measured by `effects`.
 
 import time
 
+import pytest
+
 from fourbar.errors import BROKEN, HOLDS
 from fourbar_lab import effects
 from fourbar_lab.cli import status
@@ -17,6 +19,7 @@ SAVED = 0.08
 """
 
 
+@pytest.mark.slow
 def test_the_bare_scene_steps_faster_than_with_default_flags():
     works = {
         effect: effects.prepare_simulation(effect) for effect in ("none", DEFAULT_FLAGS)

@@ -133,7 +133,7 @@ class Elsewhere(MujocoFile):
         return super().in_worlds(scene, count)
 
 
-@pytest.mark.parametrize("on_gpu", [True, False])
+@pytest.mark.parametrize("on_gpu", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_with_a_gpu_or_on_any_device_all_are_run(on_gpu, monkeypatch, capsys):
     monkeypatch.setattr(Elsewhere, "on_gpu", on_gpu)
     monkeypatch.setattr(worlds, "load_simulator", lambda _: Elsewhere)

@@ -75,7 +75,9 @@ def read_csv(ended):
     return list(csv.DictReader(io.StringIO(out)))
 
 
-@pytest.mark.parametrize("name", ["thesis", "drag_link"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("thesis", marks=pytest.mark.slow), "drag_link"]
+)
 def test_json_and_csv_have_every_key_and_every_digit(name, run):
     file = MODELS / f"{name}.toml"
     document = strict(run("analyze", file, "--json"))
@@ -121,6 +123,7 @@ def test_one_position_is_an_array_and_has_no_forces_without_a_speed(run):
     assert row["torque [N m]"] == "" and row["theta_2 [rad]"] == "1.0"
 
 
+@pytest.mark.slow
 def test_a_free_motion_has_time_and_no_drive(run):
     released = fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5, 4))
     save(crank_rocker(motion=released), "scene.toml")
@@ -131,7 +134,10 @@ def test_a_free_motion_has_time_and_no_drive(run):
     assert "torque" not in out
 
 
-@pytest.mark.parametrize("ending", ["csv", "json", "txt"])
+@pytest.mark.parametrize(
+    "ending",
+    ["csv", "json", pytest.param("txt", marks=pytest.mark.slow)],
+)
 def test_a_file_holds_what_would_be_printed_and_its_name_asks_for_the_form(ending, run):
     named, asked = Path(f"named.{ending}"), Path("asked")
     form = () if ending == "txt" else (f"--{ending}",)
@@ -210,6 +216,7 @@ def test_a_heading_of_csv_is_a_word_and_no_formula(name, run):
     assert (code, out) == (BAD_INPUT, "") and "must be a word of letters" in err
 
 
+@pytest.mark.slow
 def test_degrees_are_of_angles_alone_and_named(run):
     plain = strict(run("analyze", CRANK_ROCKER, "--json"))
     turned = strict(run("analyze", CRANK_ROCKER, "--json", "--degrees"))
@@ -445,6 +452,7 @@ def test_what_goes_wrong_is_one_line_and_a_status(error, code, run, monkeypatch)
             run("analyze", THESIS)
 
 
+@pytest.mark.slow
 def test_a_full_disk_leaves_the_old_file(run, monkeypatch, tmp_path):
     def full(_):
         raise OSError(28, "No space left on device")

@@ -37,7 +37,10 @@ def load_coarse(name):
     return replace(scene, motion=scene.motion.replace(angle=coarse))
 
 
-@pytest.mark.parametrize("name", BOUNDED)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(BOUNDED[0], marks=pytest.mark.slow), *BOUNDED[1:]],
+)
 def test_at_rest_the_headline_has_the_numbers_of_analyze(name):
     scene = load_coarse(name)
     block = " ".join(write_block(scene, fourbar.solve(scene), COMMON))
@@ -65,7 +68,13 @@ def test_while_one_drags_the_numbers_of_the_positions_are_reached_at_least(name)
         assert located[force] >= sampled * (1.0 - LAST_DIGIT)
 
 
-@pytest.mark.parametrize("name", UNBOUNDED)
+@pytest.mark.parametrize(
+    "name",
+    [
+        UNBOUNDED[0],
+        *(pytest.param(name, marks=pytest.mark.slow) for name in UNBOUNDED[1:]),
+    ],
+)
 def test_what_grows_without_bound_is_no_number(name):
     scene = fourbar.load(MODELS / f"{name}.toml")
     data = evaluate_scene(scene, COMMON, settled=True)

@@ -434,6 +434,7 @@ def draw(session, pins=PINS_DRAWN, unit="in", grain=1e-6):
     return ask(session, "draw", pins=pins, unit=unit, grain=grain)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(new, side):
     assert ask(new, "hello")["fresh"]
@@ -726,6 +727,7 @@ def test_another_command_goes_over_the_position_that_is_shown(session, shown):
     assert np.abs(np.exp(1j * covered) - np.exp(1j * shown)).min() < 0.03
 
 
+@pytest.mark.slow
 def test_new_entries_and_limits_have_the_units_of_the_scene(tmp_path):
     path = tmp_path / "inches.toml"
     path.write_text(write_new_scene(["12 in", "4 in", "10.123456789 in", "9 in"]))

@@ -114,6 +114,7 @@ def test_a_door_without_other_forces_is_free_beyond_the_springs_length():
     assert torque[0] == 0.0 and torque[1] == pytest.approx(0.0506291, abs=6e-8)
 
 
+@pytest.mark.slow
 def test_no_equilibrium_is_found_where_the_spring_would_have_to_pull():
     sweep = 'theta_2 = { from = "40 deg", to = "150 deg", steps = 11 }'
     found = fourbar.equilibrium(make_door(sweep, "")).found

@@ -105,6 +105,7 @@ def test_a_motion_that_has_stopped_is_handed_to_another_process():
     assert there.speed[-1] == 0.0 and there.angle.tolist() == here.angle.tolist()
 
 
+@pytest.mark.slow
 def test_a_scene_reports_its_times():
     s = solve(let_go(0.3, 2.0, 1.0, 10, DOWN))
     assert np.array_equal(s.time, np.linspace(0.0, 1.0, 11))
@@ -327,6 +328,7 @@ def test_change_points_of_several_turns_are_noted_when_they_are_passed():
         assert np.abs(released.omega_2 - speed).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_a_released_spring_is_followed_up_to_half_a_turn_and_no_further():
     spring = fourbar.Torsion.at(O2=(0.01, 0.5, 0.0))
     still = let_go(0.5, 1.0, 0.2, 4, DOWN, spring)

@@ -224,6 +224,7 @@ def test_a_drag_changes_the_numbers_of_an_entry(scene):
     assert cmath.rect(*second.end.from_centre) == pytest.approx(wanted, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_figure_draws_it(scene):
     scene.plot("linkage")
     data = embedded(animate.write_page(scene))

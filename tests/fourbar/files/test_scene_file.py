@@ -551,6 +551,7 @@ def test_no_position_assembles(tmp_path, capsys):
     )
 
 
+@pytest.mark.slow
 def test_some_positions_do_not_assemble(tmp_path, capsys):
     (tmp_path / "scene.toml").write_text(
         rocker('{ from = "0 deg", to = "90 deg", steps = 9 }')

@@ -279,6 +279,7 @@ def test_the_half_angle_in_many_digits_is_rounded_once(offset):
                 assert abs(ours - exact) <= U * abs(exact)
 
 
+@pytest.mark.slow
 def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle():
     """From the ground's direction to the opposite, and after many turns.
 

@@ -104,7 +104,13 @@ def test_the_files_are_those_of_today(name):
         assert (bar > 0.0).all() and (apart <= APART * bar).all(), quantity
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] * (name == "iftomm_a02"))
+        for name in NAMES
+    ],
+)
 def test_a_problem_is_what_the_schema_says(name):
     jsonschema = pytest.importorskip("jsonschema")
     text = (ROOT / "docs" / "protocol.schema.json").read_text(encoding="utf-8")
