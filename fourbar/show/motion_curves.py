@@ -377,9 +377,10 @@ def _list_curves(scene: Scene, solution: Solution) -> dict[str, Array]:
 
 
 def acts(scene: Scene) -> bool:
-    """Return True if anything acts, or a bar has mass: forces are then of interest."""
-    has_mass = any(bar.mass > 0.0 for bar in scene.linkage.moving)
-    return bool(scene.loads or scene.effects or has_mass)
+    """Return True if anything acts or a bar has inertia: forces are of interest."""
+    bars = scene.linkage.moving
+    has_inertia = any(bar.mass > 0.0 or bar.moment_of_inertia > 0.0 for bar in bars)
+    return bool(scene.loads or scene.effects or has_inertia)
 
 
 def compute_pin_loads(solution: Solution) -> dict[str, Array]:

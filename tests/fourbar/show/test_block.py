@@ -409,7 +409,8 @@ def test_a_spring_that_the_cylinder_holds_end_to_end_loads_no_pin():
 def test_rates_stand_in_place_of_zeros_where_nothing_acts():
     lengths = (0.1, 0.25, 0.22)
     bare = fourbar.FourBar(0.3, *map(fourbar.Bar, lengths))
-    for linkage in (bare, fourbar.uniform(0.3, *lengths)):
+    wheel = replace(bare, output=fourbar.Bar(0.22, inertia=0.01))
+    for linkage in (bare, wheel, fourbar.uniform(0.3, *lengths)):
         scene = fourbar.Scene(linkage, TURN.motion)
         facts = summarize(scene, fourbar.solve(scene))
         lines = write_facts(facts)

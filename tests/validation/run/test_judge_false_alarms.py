@@ -54,6 +54,7 @@ SCENES = {
         bars(20e-6, 8e-6, 18e-6, 15e-6), Motion(POSITIONS, 10.0)
     ),
     "positions alone": Scene(bars(20e-6, 8e-6, 18e-6, 15e-6), Motion(POSITIONS)),
+    "two turns of a kite": Scene(bars(0.1, 0.1, 0.2, 0.2), Motion()),
 }
 
 

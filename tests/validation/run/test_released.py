@@ -13,6 +13,7 @@ import fourbar
 from fourbar.scene import Scene
 from fourbar.solving import solve
 from fourbar_validation.compare.rows import DEGRADED, FAILS, UNDECIDED
+from fourbar_validation.engines.pinocchio import PinocchioReleased
 from fourbar_validation.report.record import Record
 from fourbar_validation.run import released as free
 from fourbar_validation.run.judge import judge, judge_for_report
@@ -132,10 +133,17 @@ def test_a_linkage_that_friction_holds_beyond_a_change_point_is_judged_as_it_sta
     assert [row for row in rows if row.verdict == FAILS] == []
 
 
+@pytest.mark.parametrize("bar", ["coupler", "output"])
+def test_a_tree_without_a_mass_matrix_is_refused_by_its_reason(bar):
+    scene = falling()
+    massless = fourbar.Bar(getattr(scene.linkage, bar).length)
+    scene = replace(scene, linkage=replace(scene.linkage, **{bar: massless}))
+    answer = PinocchioReleased().release(scene, np.zeros(1))
+    assert answer.refusal.endswith("no inertia: the open tree has no mass matrix")
+
+
 def answering(monkeypatch, change):
     """The rows of Pinocchio where its answer is changed."""
-    from fourbar_validation.engines.pinocchio import PinocchioReleased
-
     true = PinocchioReleased.release
     monkeypatch.setattr(
         PinocchioReleased, "release", lambda *arguments: change(true(*arguments))

@@ -290,6 +290,14 @@ class PinocchioReleased:
                 setting,
                 "in forward dynamics only gravity has a model here",
             )
+        for bar in (3, 4):  # the ends of the open tree
+            inertia = scene.linkage.bar(bar)
+            if inertia.mass == 0.0 and inertia.moment_of_inertia == 0.0:
+                return ReleasedAnswer.refused(
+                    RELEASED_NAME,
+                    setting,
+                    f"bar {bar} has no inertia: the open tree has no mass matrix",
+                )
         tree = PinocchioTree(scene)
         none = np.zeros(3)
         start = with_signs(scene.linkage, command(scene))

@@ -74,6 +74,10 @@ POSITIONS_OF_FRICTION = 5
 """Positions of a scene that are tried for solutions of friction. Some have several,
 some one; each may take a search.
 """
+_WHOLE_TURNS = (2.0 * np.pi, 4.0 * np.pi)
+"""Ends of a sweep of an input that turns fully, rad: with a single change point its
+assembly repeats after two turns.
+"""
 TOO_NEAR_A_TOGGLE = 1e-6
 """|sin(theta_4 - theta_3)| below which doubles have no word in it."""
 
@@ -99,15 +103,15 @@ def check_identities(question: Question) -> Iterator[Row]:
 def _check_sweep(question: Question) -> Row:
     """Check a sweep that the scene leaves open.
 
-    Such a sweep is a whole turn, or ends one degree short of where the loop just
-    closes. At the end of an interval narrower than four degrees it leaves out a quarter
-    of that, which is half of the sweep.
+    Such a sweep is a whole turn, two with a single change point, or ends one degree
+    short of where the loop just closes. At the end of an interval narrower than four
+    degrees it leaves out a quarter of that, which is half of the sweep.
     """
     command = question.at
     linkage = question.scene.linkage
     start = float(command.theta_2[0])
     stop = float(command.theta_2[-1])
-    if (start, stop) == (0.0, 2.0 * np.pi):
+    if start == 0.0 and stop in _WHOLE_TURNS:
         missed = np.maximum(-compute_closing_margin(linkage, command.theta_2), 0.0)
     else:
         left_out = min(np.radians(1.0), 0.5 * (stop - start))
@@ -117,7 +121,7 @@ def _check_sweep(question: Question) -> Row:
             )
         )
     allowed = IDENTITY.factor * count_half_turns(linkage.ground_angle, command.theta_2)
-    reason = "one degree short of where the loop just closes, or a whole turn"
+    reason = "one degree short of where the loop just closes, or whole turns"
     return question.row("sweep", np.array([missed.max()]), allowed, reason)
 
 

@@ -32,7 +32,12 @@ from fourbar_validation.robots.measure import (
     find_worst_of_loop,
     list_errors_by_method,
 )
-from tests.support.robots import FINGER, FOOT_PARALLELOGRAM, make_parallelogram
+from tests.support.robots import (
+    FINGER,
+    FOOT_PARALLELOGRAM,
+    Planar,
+    make_parallelogram,
+)
 from tests.support.scenes import mirrored
 
 ROBOTS = Path(__file__).parents[5] / "models" / "robots"
@@ -143,19 +148,32 @@ def test_a_loop_that_is_not_there_is_refused():
         measure_loops(file, MeasureOptions(PoseOptions(), "tail"), None)
 
 
+HALVES = Planar(
+    pins={"O2": (0.0, 0.0), "A": (0.3, 0.0), "B": (0.3, 0.5), "O4": (0.0, 0.5)},
+    by="weld",
+)
+"""A parallelogram whose coupler is two halves."""
+
+
 @pytest.mark.parametrize(
-    ("ground", "gravity"),
+    "file",
     [
-        pytest.param(0.4, "0 0 0", id="no torque", marks=pytest.mark.slow),
-        pytest.param(0.4, "0 0 -9.81", id="rhombus", marks=pytest.mark.slow),
-        pytest.param(0.5, "0 0 -9.81", id="rectangle"),
+        pytest.param(
+            make_parallelogram(0.4, 0.4, "0 0 0"),
+            id="no torque",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            make_parallelogram(0.4, 0.4, "0 0 -9.81"),
+            id="rhombus",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(make_parallelogram(0.5, 0.4, "0 0 -9.81"), id="rectangle"),
+        pytest.param(RobotFile(Path("halves.xml"), HALVES.text()), id="welded"),
     ],
 )
-def test_a_full_turn_of_a_parallelogram_is_measured_but_for_its_change_points(
-    ground, gravity
-):
+def test_a_full_turn_of_a_parallelogram_is_measured_but_for_its_change_points(file):
     """The loop stays a parallelogram past the positions in line."""
-    file = make_parallelogram(ground, 0.4, gravity)
     (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), None).loops
     assert len(loop.states.in_line) == 2
     across = [math.cos(joint) for joint in loop.states.in_line]

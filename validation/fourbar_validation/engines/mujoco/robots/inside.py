@@ -426,7 +426,7 @@ class LoopInside:
         """
         _, jacobian = self._evaluate_closure(qpos)
         sizes = np.linalg.svd(jacobian @ self.basis, compute_uv=False)
-        return float(sizes[1])
+        return float(sizes[-1])
 
     def _measure_sine(self, qpos: Array) -> float:
         """Return the sine of the angle between the bars that follow in a pose."""
