@@ -130,39 +130,39 @@ FOOT = Fraction(3048, 10_000)
 POUND = Fraction(45_359_237, 100_000_000)
 GRAVITY = Fraction(980_665, 100_000)
 """m; kg; m/s^2: exact by definition."""
-UNITS = {
-    **dict.fromkeys(("meter", "m", "metre"), ("m", 1)),
-    **dict.fromkeys(("inch", "in", "inches"), ("m", FOOT / 12)),
-    **dict.fromkeys(("foot", "ft", "feet"), ("m", FOOT)),
-    **dict.fromkeys(("yard", "yd"), ("m", 3 * FOOT)),
-    **dict.fromkeys(("second", "s", "sec"), ("s", 1)),
-    **dict.fromkeys(("minute", "min"), ("s", 60)),
-    **dict.fromkeys(("hour", "h"), ("s", 3600)),
-    **dict.fromkeys(("gram", "g"), ("kg", Fraction(1, 1000))),
-    **dict.fromkeys(("tonne", "t"), ("kg", 1000)),
-    **dict.fromkeys(("pound", "lb", "lbm"), ("kg", POUND)),
-    **dict.fromkeys(("ounce", "oz"), ("kg", POUND / 16)),
-    **dict.fromkeys(("radian", "rad"), ("rad", 1)),
-    **dict.fromkeys(("degree", "deg", "°"), ("rad", PI / 180)),
-    **dict.fromkeys(("gradian", "grad", "gon"), ("rad", PI / 200)),
-    **dict.fromkeys(("revolution", "rev", "turn", "r"), ("rad", 2 * PI)),
+OF_NAMES = {
+    "meter m metre": ("m", 1),
+    "inch in inches": ("m", FOOT / 12),
+    "foot ft feet": ("m", FOOT),
+    "yard yd": ("m", 3 * FOOT),
+    "second s sec": ("s", 1),
+    "minute min": ("s", 60),
+    "hour h": ("s", 3600),
+    "gram g": ("kg", Fraction(1, 1000)),
+    "tonne t": ("kg", 1000),
+    "pound lb lbm": ("kg", POUND),
+    "ounce oz": ("kg", POUND / 16),
+    "radian rad": ("rad", 1),
+    "degree deg °": ("rad", PI / 180),
+    "gradian grad gon": ("rad", PI / 200),
+    "revolution rev turn r": ("rad", 2 * PI),
     "rpm": ("rad/s", 2 * PI / 60),
     "rps": ("rad/s", 2 * PI),
-    **dict.fromkeys(("newton", "N"), ("kg m/s^2", 1)),
-    **dict.fromkeys(("standard_gravity", "g_0", "g0"), ("m/s^2", GRAVITY)),
-    **dict.fromkeys(("kilogram_force", "kgf", "kp"), ("N", GRAVITY)),
-    **dict.fromkeys(("pound_force", "lbf"), ("N", POUND * GRAVITY)),
-    **dict.fromkeys(("ounce_force", "ozf"), ("N", POUND * GRAVITY / 16)),
+    "newton N": ("kg m/s^2", 1),
+    "standard_gravity g_0 g0": ("m/s^2", GRAVITY),
+    "kilogram_force kgf kp": ("N", GRAVITY),
+    "pound_force lbf": ("N", POUND * GRAVITY),
+    "ounce_force ozf": ("N", POUND * GRAVITY / 16),
     "slug": ("kg", POUND * GRAVITY / FOOT),
     "blob": ("kg", 12 * POUND * GRAVITY / FOOT),
-    **dict.fromkeys(("newton_meter", "Nm"), ("N m", 1)),
-    **dict.fromkeys(("newton_centimeter", "Ncm"), ("N m", Fraction(1, 100))),
-    **dict.fromkeys(("newton_millimeter", "Nmm"), ("N m", Fraction(1, 1000))),
-    **dict.fromkeys(("joule", "J"), ("kg m^2/s^2", 1)),
-    **dict.fromkeys(("watt", "W"), ("kg m^2/s^3", 1)),
-    **dict.fromkeys(("horsepower", "hp"), ("W", 550 * FOOT * POUND * GRAVITY)),
-    **dict.fromkeys(("metric_horsepower", "PS"), ("W", 75 * GRAVITY)),
-    **dict.fromkeys(("pascal", "Pa"), ("N/m^2", 1)),
+    "newton_meter Nm": ("N m", 1),
+    "newton_centimeter Ncm": ("N m", Fraction(1, 100)),
+    "newton_millimeter Nmm": ("N m", Fraction(1, 1000)),
+    "joule J": ("kg m^2/s^2", 1),
+    "watt W": ("kg m^2/s^3", 1),
+    "horsepower hp": ("W", 550 * FOOT * POUND * GRAVITY),
+    "metric_horsepower PS": ("W", 75 * GRAVITY),
+    "pascal Pa": ("N/m^2", 1),
     "bar": ("N/m^2", 100_000),
     "psi": ("N/m^2", POUND * GRAVITY * 144 / FOOT**2),
 }
@@ -170,18 +170,20 @@ UNITS = {
 SP 811 (2008), tables 1 to 8 and
 appendix B.8; slug, hp and PS by their definitions there.
 """
-PREFIXES = {
-    **dict.fromkeys(("nano", "n"), -9),
-    **dict.fromkeys(("micro", "\u00b5", "\u03bc", "u"), -6),
-    **dict.fromkeys(("milli", "m"), -3),
-    **dict.fromkeys(("centi", "c"), -2),
-    **dict.fromkeys(("deci", "d"), -1),
-    **dict.fromkeys(("deca", "da"), 1),
-    **dict.fromkeys(("kilo", "k"), 3),
-    **dict.fromkeys(("mega", "M"), 6),
-    **dict.fromkeys(("giga", "G"), 9),
+UNITS = {name: exact for names, exact in OF_NAMES.items() for name in names.split()}
+POWERS = {
+    "nano n": -9,
+    "micro \u00b5 \u03bc u": -6,
+    "milli m": -3,
+    "centi c": -2,
+    "deci d": -1,
+    "deca da": 1,
+    "kilo k": 3,
+    "mega M": 6,
+    "giga G": 9,
 }
 """Powers of ten: NIST SP 811, table 5."""
+PREFIXES = {name: power for names, power in POWERS.items() for name in names.split()}
 
 
 @pytest.mark.parametrize("name", UNITS)
